@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+
+include(CTest)
+option(SLSD_BENCHMARKS "Build the benchmarks" ON)
+option(SLSD_FUZZERS "Build the libFuzzer targets (needs clang)" OFF)
+set(SLSD_SANITIZE "" CACHE STRING "Sanitizers to build with, as for -fsanitize=")
+
+add_library(slsd_settings INTERFACE)
+target_include_directories(slsd_settings INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_options(slsd_settings INTERFACE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor)
+target_compile_definitions(slsd_settings INTERFACE SLSD_VERSION="${PROJECT_VERSION}")
+if(SLSD_SANITIZE)
+  add_compile_options(-fsanitize=${SLSD_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${SLSD_SANITIZE})
+endif()

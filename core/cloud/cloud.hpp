@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace slsd {
+
+/// One measured symbol. Coordinates in the rig frame (that of the first camera), millimetres.
+struct CloudPoint {
+  float x = 0, y = 0, z = 0;
+  float camera_u = 0, camera_v = 0;        ///< px, distorted, as seen
+  float projector_u = 0, projector_v = 0;  ///< px, distorted, as seen
+  float sigma_mm = 0;                      ///< one standard deviation along the camera's ray
+  std::uint16_t column = 0, row = 0;       ///< cell of the pattern
+  std::uint8_t intensity = 0;
+  std::uint8_t camera = 0;  ///< index in the calibration
+  std::uint8_t symbol = 0;  ///< 1 to 25
+  friend bool operator==(const CloudPoint&, const CloudPoint&) = default;
+};
+
+struct Cloud {
+  std::vector<CloudPoint> points;
+  int lattice_columns = 0;  ///< cells of the pattern whose symbols are shown whole
+  int lattice_rows = 0;
+  int cameras = 1;
+  std::string scan_id;
+  std::string time;         ///< ISO 8601, UTC; when the exposure began
+  std::uint64_t frame = 0;  ///< sequence number of the first camera's frame
+  friend bool operator==(const Cloud&, const Cloud&) = default;
+};
+
+}  // namespace slsd

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+inline constexpr int kWindowSide = 3;
+inline constexpr int kWindowCells = kWindowSide * kWindowSide;
+
+/// The robust pseudo-random array: rows x columns letters, letter values 0 to letters - 1, row by row.
+struct CodeArray {
+  int rows = 0;
+  int columns = 0;
+  int letters = 0;
+  std::vector<std::uint8_t> cells;
+
+  [[nodiscard]] int at(int row, int column) const { return cells[static_cast<std::size_t>(row) * columns + column]; }
+  friend bool operator==(const CodeArray&, const CodeArray&) = default;
+};
+
+enum class ArrayMethod {
+  kPaper,         ///< aligned windows pairwise different, by rejection (Elahi et al. 2020, figure 2)
+  kConstructive,  ///< every overlapping window unique, with a minimum Hamming distance
+};
+
+struct ArrayOptions {
+  int rows = 45;
+  int columns = 72;
+  int letters = 3;
+  std::uint32_t seed = 1;
+  ArrayMethod method = ArrayMethod::kConstructive;
+  std::optional<int>
+      minimum_distance;           ///< Hamming, over all overlapping windows; without it the largest that is reached
+  bool half_turn_unique = false;  ///< windows also differ from every window turned by 180 degrees
+
+  [[nodiscard]] Result<> validate() const;
+};
+
+/// Makes the array; the same options give the same array on every machine.
+/// @errors kInvalidArgument; kImpossible with the bound that forbids it
+/// @thread reentrant
+[[nodiscard]] Result<CodeArray> make_code_array(const ArrayOptions& options);
+
+/// Rows or columns of the array for a projector's extent: rounded up to an integer, then to a multiple of three.
+/// Elahi et al. 2020, equations (1) and (2).
+[[nodiscard]] int array_extent(int projector_px, int symbol_size_px, int spacing_px);
+
+/// The smallest Hamming distance between any two overlapping 3x3 windows, by plain comparison of all pairs
+/// (and of all windows with all turned ones where half_turn is set).
+[[nodiscard]] int minimum_window_distance(const CodeArray& array, bool half_turn = false);
+
+}  // namespace slsd

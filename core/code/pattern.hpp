@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/code/code_array.hpp"
+#include "core/code/symbol.hpp"
+#include "core/image.hpp"
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// What determines a pattern. The keys of the configuration's [pattern] table, and the projector's size.
+struct PatternOptions {
+  int projector_width_px = 1280;  ///< 640 to 3840
+  int projector_height_px = 800;  ///< 360 to 2160
+  int symbol_size_px = 16;        ///< one of kSymbolSizesPx
+  int spacing_px = 2;             ///< 1 to 16; dark, between two symbols
+  std::vector<int> symbols;       ///< 2 to 8 different symbol numbers; letter i of the array is shown as symbols[i]
+  std::uint32_t seed = 1;
+  ArrayMethod method = ArrayMethod::kConstructive;
+  std::optional<int> minimum_distance;
+  bool half_turn_unique = false;
+
+  [[nodiscard]] Result<> validate() const;
+};
+
+/// The symbols that serve best at a size: what is used where the user names none.
+[[nodiscard]] std::vector<int> default_symbols(int symbol_size_px);
+
+/// A pattern: the array and how it is laid on the projector. Cells are pitch_px() wide, cell (0, 0) at the top left;
+/// what reaches beyond the projector on the right and at the bottom is cut (Elahi et al. 2020, equations (5), (6)).
+///
+///     cell (row, column):   |<- pitch = size + spacing ->|
+///                           |s/2|<- symbol_size_px ->|s/2|      (the odd pixel of the spacing on the right)
+struct Pattern {
+  PatternOptions options;
+  CodeArray array;
+
+  [[nodiscard]] int pitch_px() const { return options.symbol_size_px + options.spacing_px; }
+  [[nodiscard]] int letters() const { return array.letters; }
+  /// Columns and rows of cells whose symbols are shown whole.
+  [[nodiscard]] int whole_columns() const;
+  [[nodiscard]] int whole_rows() const;
+  /// Projector pixel of the symbol's top left pixel.
+  [[nodiscard]] int symbol_left_px(int column) const { return column * pitch_px() + options.spacing_px / 2; }
+  [[nodiscard]] int symbol_top_px(int row) const { return row * pitch_px() + options.spacing_px / 2; }
+  /// Centre of the symbol's square, in projector pixels (its centroid lies elsewhere: see the decoder's prototypes).
+  [[nodiscard]] double symbol_centre_u_px(int column) const {
+    return symbol_left_px(column) + 0.5 * (options.symbol_size_px - 1);
+  }
+  [[nodiscard]] double symbol_centre_v_px(int row) const {
+    return symbol_top_px(row) + 0.5 * (options.symbol_size_px - 1);
+  }
+};
+
+/// Makes the array for the projector and lays the symbols on it. An empty `symbols` stands for default_symbols().
+/// @errors kInvalidArgument; kImpossible with the bound that forbids it
+[[nodiscard]] Result<Pattern> make_pattern(PatternOptions options);
+
+/// The exact image that the projector shows: 255 where it is lit, 0 where it is dark.
+[[nodiscard]] Grey8 draw_pattern(const Pattern& pattern);
+
+/// A pattern file: TOML with the options and the array itself, so that it can be kept and shared.
+[[nodiscard]] std::string write_pattern(const Pattern& pattern);
+
+/// Reads a pattern file's text and checks it: sizes, letters, that the windows have the promised distance.
+/// @errors kMalformed with line and key; kInvalidArgument; kMismatch
+[[nodiscard]] Result<Pattern> read_pattern(std::string_view text, std::string_view name);
+
+}  // namespace slsd

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <memory>
+
+#include "core/code/pattern.hpp"
+#include "core/decode/decoding.hpp"
+#include "core/decode/options.hpp"
+#include "core/geometry/calibration.hpp"
+#include "core/image.hpp"
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// Reads frames of one camera that see one pattern. Keeps its buffers from frame to frame: nothing is allocated once
+/// they have grown to a frame's size.
+/// @thread thread-bound: one decoder to a thread
+class Decoder {
+ public:
+  /// Prepares the codebook, the prototypes and the rays of the pattern's cells.
+  /// @errors kMismatch: the calibration's projector is not of the pattern's size; kInvalidArgument
+  [[nodiscard]] static Result<Decoder> create(const Pattern& pattern, const Calibration& calibration,
+                                              std::size_t camera_index, const DecodeOptions& options);
+  Decoder(Decoder&&) noexcept;
+  Decoder& operator=(Decoder&&) noexcept;
+  ~Decoder();
+
+  /// Image to points. The result stands until the next call. Nothing found is an empty result with its counters.
+  /// @errors kMismatch: the frame is not of the calibration's size
+  [[nodiscard]] Result<const Decoding*> decode(const GreyView& frame, StageObserver* observer = nullptr);
+
+ private:
+  class Pipeline;
+  explicit Decoder(std::unique_ptr<Pipeline> pipeline);
+  std::unique_ptr<Pipeline> pipeline_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/cloud/cloud.hpp"
+
+namespace slsd {
+
+/// What became of a region. Everything but kDecoded is a reason for rejection.
+enum class RegionStatus : std::uint8_t {
+  kDecoded,
+  kTooSmall,
+  kTooLarge,
+  kTouchesBorder,
+  kLowContrast,
+  kUnknownShape,        ///< like none of the pattern's symbols
+  kNoNeighbour,         ///< too few links to read a codeword
+  kNoCodeword,          ///< no window around it is in the pattern, within the distance that can be corrected
+  kAmbiguousCodeword,   ///< the windows around it disagree
+  kClassDisagrees,      ///< its shape is not that of the cell which its windows name
+  kNeighboursDisagree,  ///< its neighbours' shapes are not those of the cells around that cell
+  kOffEpipolarLine,
+  kOutOfDepthRange,
+  kDuplicateCell,  ///< another region claims the cell with better evidence
+};
+inline constexpr int kRegionStatusCount = 14;
+
+/// "too_small", as in the counters of `status`.
+[[nodiscard]] std::string_view to_string(RegionStatus status);
+
+enum class Stage : std::uint8_t {
+  kBinarize,
+  kFindRegions,
+  kDescribe,
+  kClassify,
+  kLinkGrid,
+  kDecodeWindows,
+  kCorrespond,
+  kTriangulate
+};
+inline constexpr int kStageCount = 8;
+[[nodiscard]] std::string_view to_string(Stage stage);
+
+/// Directions of the grid's links, along the pattern's axes: u to the right, v down.
+enum Direction : std::uint8_t { kRight, kDown, kLeft, kUp };
+
+/// One region of the frame, whatever became of it. The trace from which pictures are drawn.
+struct RegionSeen {
+  Eigen::Vector2f centre_px;  ///< in the camera
+  RegionStatus status;
+  std::int8_t letter;                 ///< index in the pattern's symbols, or -1
+  std::array<std::int32_t, 4> links;  ///< by Direction: index of the neighbour's region, or -1
+  std::array<bool, 4> broken;         ///< a link that was there and disagreed with its neighbours
+  std::int16_t column, row;           ///< cell of the pattern, where decoded; else -1
+};
+
+/// What one frame gave: its points, and for every region seen what became of it.
+struct Decoding {
+  std::vector<CloudPoint> points;
+  std::vector<RegionSeen> regions;
+  std::array<std::uint32_t, kRegionStatusCount> counts{};  ///< regions by status
+
+  [[nodiscard]] std::uint32_t count(RegionStatus status) const { return counts[static_cast<std::size_t>(status)]; }
+};
+
+/// Is told of each stage as it ends; the daemon times stages with it, as core has no clocks.
+class StageObserver {
+ public:
+  virtual ~StageObserver() = default;
+  virtual void stage_done(Stage stage) = 0;
+};
+
+}  // namespace slsd

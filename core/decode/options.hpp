@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+enum class Method { kDefault, kPaper };
+
+/// The [decode] table of the configuration. Every stage can be run the paper's way, so that both can be measured side
+/// by side.
+struct DecodeOptions {
+  double depth_min_mm = 400.0;  ///< working range along the camera's z axis; cuts the candidates of a codeword
+  double depth_max_mm = 2500.0;
+  Method binarize = Method::kDefault;
+  Method classify = Method::kDefault;
+  Method centre = Method::kDefault;
+  Method link_grid = Method::kDefault;
+  Method decode_windows = Method::kDefault;
+  Method correspond = Method::kDefault;
+
+  [[nodiscard]] Result<> validate() const;
+};
+
+}  // namespace slsd

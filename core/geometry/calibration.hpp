@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/geometry/lens.hpp"
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// A rigid motion, b_from_a: point_in_b = rotation * point_in_a + translation. Millimetres.
+struct RigidTransform {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& point) const { return rotation * point + translation; }
+  [[nodiscard]] RigidTransform inverse() const { return {rotation.transpose(), -(rotation.transpose() * translation)}; }
+};
+
+struct CalibratedCamera {
+  std::string name;
+  Lens lens;
+  RigidTransform projector_from_camera;
+  RigidTransform rig_from_camera;  ///< the identity for the first camera
+};
+
+/// What calibrating found out about itself; all of it optional in the file.
+struct CalibrationReport {
+  std::optional<double> reprojection_error_camera_px;
+  std::optional<double> reprojection_error_projector_px;
+  std::optional<std::string> board;
+  std::optional<std::string> date;
+  std::optional<std::string> projector_serial;
+  std::vector<std::string> camera_serials;  ///< one to a camera, or empty
+};
+
+struct Calibration {
+  Lens projector;
+  std::vector<CalibratedCamera> cameras;
+  CalibrationReport report;
+
+  /// The camera with this name; with a single camera in the file, that one for any name.
+  [[nodiscard]] const CalibratedCamera* camera(std::string_view name) const;
+};
+
+/// Reads a calibration file's text (OpenCV FileStorage YAML, keys in docs/formats.md).
+/// @errors kMalformed, kInvalidArgument: the message names the key
+[[nodiscard]] Result<Calibration> read_calibration(std::string_view text, std::string_view name);
+[[nodiscard]] std::string write_calibration(const Calibration& calibration);
+
+}  // namespace slsd

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+
+#include <Eigen/Core>
+
+namespace slsd {
+
+/// A pinhole with OpenCV's distortion k1 k2 p1 p2 k3 (Elahi et al. 2020, equations (24) to (28)). A projector is one
+/// too: an inverse camera.
+/// @thread reentrant
+struct Lens {
+  int width_px = 0;
+  int height_px = 0;
+  double fx = 0, fy = 0;  ///< px
+  double cx = 0, cy = 0;  ///< px, the first pixel's centre at (0, 0)
+  std::array<double, 5> distortion{};
+
+  /// Pixel of a point in this device's frame; the point has z > 0.
+  [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& point) const;
+  /// Pixel of a normalised, undistorted direction (x/z, y/z).
+  [[nodiscard]] Eigen::Vector2d distort(const Eigen::Vector2d& normalised) const;
+  /// Normalised, undistorted direction of a pixel: Newton's method to 1e-12.
+  [[nodiscard]] Eigen::Vector2d undistort(const Eigen::Vector2d& pixel) const;
+  /// Whether the distortion can be inverted everywhere in the image.
+  [[nodiscard]] bool invertible() const;
+};
+
+}  // namespace slsd
