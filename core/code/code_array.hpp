@@ -12,6 +12,9 @@ namespace slsd {
 
 inline constexpr int kWindowSide = 3;
 inline constexpr int kWindowCells = kWindowSide * kWindowSide;
+inline constexpr int kMinLetters = 2;
+inline constexpr int kMaxLetters = 8;
+inline constexpr int kMaxArrayExtent = 512;  ///< rows or columns; 3840 px at the smallest pitch are 427
 
 /// The robust pseudo-random array: rows x columns letters, letter values 0 to letters - 1, row by row.
 struct CodeArray {

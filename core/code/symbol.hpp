@@ -12,8 +12,6 @@ namespace slsd {
 
 inline constexpr int kSymbolCount = 25;
 inline constexpr int kSymbolSizesPx[] = {8, 10, 12, 14, 16};
-inline constexpr int kMinLetters = 2;
-inline constexpr int kMaxLetters = 8;
 
 /// One of the 25 primitives of the alphabet (Elahi et al. 2020, figure 1), at every size drawn by the same rule.
 struct Symbol {

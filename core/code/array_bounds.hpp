@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/code/code_array.hpp"
+
+namespace slsd {
+
+/// Words of nine letters.
+[[nodiscard]] std::int64_t word_count(int letters);
+
+/// Words that differ from one word in at most `radius` places.
+[[nodiscard]] std::int64_t ball_size(int letters, int radius);
+
+/// Overlapping windows of an array.
+[[nodiscard]] std::int64_t window_count(int rows, int columns);
+
+/// The bound that forbids so many windows at this distance, in words; empty where none does.
+/// Pigeonhole (doubled under half turn, words that equal their own turn excluded), Singleton, Hamming.
+[[nodiscard]] std::optional<std::string> forbidding_bound(const ArrayOptions& options, int minimum_distance);
+
+}  // namespace slsd

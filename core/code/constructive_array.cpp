@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/code/constructive_array.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "core/code/letter_source.hpp"
+#include "core/code/window_index.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr int kStepsPerCell = 60;     // within one row, before rows are rolled back
+constexpr int kRollbacksPerRow = 12;  // over the whole array, before a restart
+constexpr int kLongestRollbackRows = 8;
+
+/// The search of one array: a stack of cells, each with the letters that are still to be tried there.
+class Construction {
+ public:
+  Construction(const ArrayOptions& options, int minimum_distance, std::int64_t step_budget)
+      : options_(options),
+        minimum_distance_(minimum_distance),
+        steps_left_(step_budget),
+        source_(options.seed),
+        index_(options.letters, minimum_distance),
+        array_{options.rows, options.columns, options.letters,
+               std::vector<std::uint8_t>(static_cast<std::size_t>(options.rows) * options.columns)},
+        choices_(array_.cells.size()) {}
+
+  std::optional<CodeArray> run() {
+    const int restart_after = kRollbacksPerRow * options_.rows;
+    for (int rollbacks = 0; next_ < cell_count(); ++rollbacks) {
+      if (fill_row()) {
+        --rollbacks;
+        continue;
+      }
+      if (steps_left_ <= 0) return std::nullopt;
+      const int row = next_ / options_.columns;
+      const int target = rollbacks < restart_after ? std::max(0, row - 1 - source_.below(kLongestRollbackRows)) : 0;
+      take_back_to(target * options_.columns);
+      if (rollbacks >= restart_after) rollbacks = 0;
+    }
+    return array_;
+  }
+
+ private:
+  struct Choices {
+    std::array<std::uint8_t, 8> order;
+    int tried = 0;
+  };
+
+  [[nodiscard]] int cell_count() const { return static_cast<int>(array_.cells.size()); }
+
+  // From the row's first free cell to its end, depth first; false where the row's steps are used up or nothing fits.
+  bool fill_row() {
+    const int first = next_ / options_.columns * options_.columns;
+    const int end = first + options_.columns;
+    std::int64_t steps = std::int64_t{kStepsPerCell} * options_.columns;
+    next_ = first;
+    open_cell();
+    while (next_ < end) {
+      if (steps-- <= 0 || steps_left_-- <= 0) return take_back_to(first), false;
+      if (try_letter()) {
+        ++next_;
+        if (next_ < end) open_cell();
+      } else if (choices_[next_].tried == options_.letters) {
+        if (next_ == first) return false;
+        take_back_to(next_ - 1);
+      }
+    }
+    return true;
+  }
+
+  void open_cell() {
+    Choices& choices = choices_[next_];
+    choices.tried = 0;
+    for (int i = 0; i < options_.letters; ++i) {
+      const int j = source_.below(i + 1);
+      choices.order[i] = choices.order[j];
+      choices.order[j] = static_cast<std::uint8_t>(i);
+    }
+  }
+
+  bool try_letter() {
+    Choices& choices = choices_[next_];
+    if (choices.tried == options_.letters) return false;
+    array_.cells[next_] = choices.order[choices.tried++];
+    if (!ends_window(next_)) return true;
+    const PackedWindow window = window_ending_at(next_);
+    if (!fits(window)) return false;
+    index_.add(window);
+    if (options_.half_turn_unique) index_.add(half_turned(window));
+    return true;
+  }
+
+  [[nodiscard]] bool fits(PackedWindow window) const {
+    if (options_.half_turn_unique && cells_that_differ(window, half_turned(window)) < minimum_distance_) return false;
+    return !index_.has_closer(window);
+  }
+
+  bool take_back_to(int cell) {
+    while (next_ > cell) {
+      --next_;
+      if (!ends_window(next_)) continue;
+      const PackedWindow window = window_ending_at(next_);
+      if (options_.half_turn_unique) index_.remove_last(half_turned(window));
+      index_.remove_last(window);
+    }
+    return true;
+  }
+
+  [[nodiscard]] bool ends_window(int cell) const {
+    return cell / options_.columns >= kWindowSide - 1 && cell % options_.columns >= kWindowSide - 1;
+  }
+
+  [[nodiscard]] PackedWindow window_ending_at(int cell) const {
+    PackedWindow window = 0;
+    for (int row = 0; row < kWindowSide; ++row)
+      for (int column = 0; column < kWindowSide; ++column)
+        window = window << 4 | array_.cells[cell - row * options_.columns - column];
+    return window;
+  }
+
+  const ArrayOptions& options_;
+  int minimum_distance_;
+  std::int64_t steps_left_;
+  LetterSource source_;
+  WindowIndex index_;
+  CodeArray array_;
+  std::vector<Choices> choices_;
+  int next_ = 0;  // the first cell that is not filled
+};
+
+}  // namespace
+
+std::optional<CodeArray> construct_array(const ArrayOptions& options, int minimum_distance, std::int64_t step_budget) {
+  return Construction(options, minimum_distance, step_budget).run();
+}
+
+}  // namespace slsd

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+
+#include "core/code/code_array.hpp"
+
+namespace slsd {
+
+/// Draws whole arrays until all aligned 3x3 windows of one differ pairwise.
+/// Elahi et al. 2020, section II.B.2 and figure 2.
+/// @param rows, columns  at least 3
+/// @param draws          how many arrays are drawn before it gives up
+/// @return               the first array that passes; empty where none did
+/// @thread reentrant
+[[nodiscard]] std::optional<CodeArray> draw_paper_array(int rows, int columns, int letters, std::uint32_t seed,
+                                                        int draws);
+
+}  // namespace slsd

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/code/symbol.hpp"
+
+namespace slsd {
+
+/// Units to a cell's side in the rules below: every edge is a whole number of 24ths of the cell.
+inline constexpr int kRuleUnits = 24;
+
+enum class Shape : std::uint8_t {
+  kRectangle,  ///< a, b: left and top; c, d: right and bottom
+  kDisc,       ///< a, b: centre; c: radius
+  kTriangle,   ///< a, b; c, d; e, f: corners, clockwise on the screen
+};
+
+/// One step of a symbol's rule: what it covers is lit, or made dark again.
+struct Primitive {
+  Shape shape;
+  bool lit;
+  std::array<std::int8_t, 6> units;
+};
+
+inline constexpr int kMaxPrimitives = 5;
+
+/// A symbol and how it is drawn: its primitives one after the other. A pixel belongs to a primitive where the
+/// pixel's centre lies in it or on its edge; in exact integer arithmetic, so that symmetric rules give symmetric
+/// pixels.
+struct SymbolRule {
+  Symbol symbol;
+  int count;
+  std::array<Primitive, kMaxPrimitives> primitives;
+};
+
+/// The alphabet, by number minus one.
+[[nodiscard]] const std::array<SymbolRule, kSymbolCount>& symbol_rules();
+
+}  // namespace slsd

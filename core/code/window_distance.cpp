@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <algorithm>
+#include <bit>
+
+#include "core/code/code_array.hpp"
+
+namespace slsd {
+namespace {
+
+// Three bits a letter and nine letters: 27 bits. Shares nothing with the construction, which it has to check.
+constexpr std::uint32_t kFirstBitOfEachLetter = 0b001'001'001'001'001'001'001'001'001;
+
+int letters_that_differ(std::uint32_t a, std::uint32_t b) {
+  const std::uint32_t bits = a ^ b;
+  return std::popcount((bits | (bits >> 1) | (bits >> 2)) & kFirstBitOfEachLetter);
+}
+
+std::vector<std::uint32_t> all_windows(const CodeArray& array, bool turned) {
+  std::vector<std::uint32_t> windows;
+  for (int top = 0; top + 2 < array.rows; ++top) {
+    for (int left = 0; left + 2 < array.columns; ++left) {
+      std::uint32_t window = 0;
+      for (int i = 0; i < 9; ++i) {
+        const int place = turned ? 8 - i : i;
+        window |= static_cast<std::uint32_t>(array.at(top + place / 3, left + place % 3)) << (3 * i);
+      }
+      windows.push_back(window);
+    }
+  }
+  return windows;
+}
+
+int smallest_from(std::uint32_t window, const std::uint32_t* first, const std::uint32_t* last) {
+  int smallest = 9;
+  for (; first != last; ++first) smallest = std::min(smallest, letters_that_differ(window, *first));
+  return smallest;
+}
+
+}  // namespace
+
+int minimum_window_distance(const CodeArray& array, bool half_turn) {
+  const std::vector<std::uint32_t> windows = all_windows(array, false);
+  const std::uint32_t* const end = windows.data() + windows.size();
+  int smallest = 9;
+  for (std::size_t i = 0; i < windows.size(); ++i)
+    smallest = std::min(smallest, smallest_from(windows[i], windows.data() + i + 1, end));
+  if (!half_turn) return smallest;
+  // Distance to a turned window is the same both ways, so the pairs from i upwards suffice; i itself is among them.
+  const std::vector<std::uint32_t> turned = all_windows(array, true);
+  for (std::size_t i = 0; i < windows.size(); ++i)
+    smallest = std::min(smallest, smallest_from(turned[i], windows.data() + i, end));
+  return smallest;
+}
+
+}  // namespace slsd

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/code/window_index.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+
+namespace slsd {
+namespace {
+
+constexpr PackedWindow kLowestBits = 0x1'1111'1111;
+
+int letter_at(PackedWindow window, int cell) {
+  return static_cast<int>(window >> (4 * cell) & 0xF);
+}
+
+std::size_t files_of(int letters, int cells) {
+  std::size_t files = 1;
+  for (int i = 0; i < cells; ++i) files *= static_cast<std::size_t>(letters);
+  return files;
+}
+
+}  // namespace
+
+PackedWindow half_turned(PackedWindow window) {
+  PackedWindow turned = 0;
+  for (int cell = 0; cell < kWindowCells; ++cell) turned = turned << 4 | (window >> (4 * cell) & 0xF);
+  return turned;
+}
+
+int cells_that_differ(PackedWindow a, PackedWindow b) {
+  const PackedWindow bits = a ^ b;
+  return std::popcount((bits | bits >> 1 | bits >> 2 | bits >> 3) & kLowestBits);
+}
+
+WindowIndex::WindowIndex(int letters, int minimum_distance) : letters_(letters), minimum_distance_(minimum_distance) {
+  assert(letters >= kMinLetters && letters <= kMaxLetters);
+  assert(minimum_distance >= 1 && minimum_distance <= kWindowCells);
+  for (int i = 0; i < minimum_distance; ++i) {
+    const int first = kWindowCells * i / minimum_distance;
+    const int cells = kWindowCells * (i + 1) / minimum_distance - first;
+    groups_.push_back({first, cells, {}});
+    groups_.back().files.resize(files_of(letters, cells));
+  }
+}
+
+std::size_t WindowIndex::file_of(const Group& group, PackedWindow window) const {
+  std::size_t file = 0;
+  for (int cell = group.first_cell; cell < group.first_cell + group.cells; ++cell)
+    file = file * static_cast<std::size_t>(letters_) + static_cast<std::size_t>(letter_at(window, cell));
+  return file;
+}
+
+bool WindowIndex::has_closer(PackedWindow window) const {
+  return std::ranges::any_of(groups_, [&](const Group& group) {
+    return std::ranges::any_of(group.files[file_of(group, window)], [&](PackedWindow other) {
+      return cells_that_differ(window, other) < minimum_distance_;
+    });
+  });
+}
+
+void WindowIndex::add(PackedWindow window) {
+  for (Group& group : groups_) group.files[file_of(group, window)].push_back(window);
+}
+
+void WindowIndex::remove_last(PackedWindow window) {
+  for (Group& group : groups_) {
+    auto& file = group.files[file_of(group, window)];
+    assert(!file.empty() && file.back() == window);
+    file.pop_back();
+  }
+}
+
+}  // namespace slsd
