@@ -17,7 +17,9 @@ std::vector<std::uint8_t> read(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-void feed(const std::vector<std::uint8_t>& bytes) { LLVMFuzzerTestOneInput(bytes.data(), bytes.size()); }
+void feed(const std::vector<std::uint8_t>& bytes) {
+  LLVMFuzzerTestOneInput(bytes.data(), bytes.size());
+}
 
 // Every seed as it is, cut short in 16 places, and with a byte changed in 64: what a compiler without libFuzzer can do.
 void replay(std::vector<std::uint8_t> seed) {
