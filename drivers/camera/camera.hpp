@@ -19,23 +19,32 @@ struct CameraDescription {
 };
 
 /// A camera that takes one frame to a trigger. Backends: file. Every backend passes the suite in tests/drivers.
+/// Frames may outlive the camera.
+///
+///     made --open()--> ready --capture(): kDisconnected--> gone --open()--> ready
+///                      ready --capture(): any other-----> ready
+///
 /// @thread thread-bound, but for cancel()
 class Camera {
  public:
   virtual ~Camera() = default;
 
+  /// Width and height are known after open(), and zero before.
   [[nodiscard]] virtual const CameraDescription& description() const = 0;
 
-  /// Opens the device, again after a fault; configures everything anew.
+  /// Opens the device, again after a fault; configures everything anew and starts the sequence numbers at 0.
   /// @errors kNotFound, kPermissionDenied, kMalformed, kUnsupported, kDisconnected: the device's supervisor retries
   [[nodiscard]] virtual Result<> open() = 0;
 
-  /// Exposes one frame that begins after the call, and waits for it.
+  /// Exposes one frame that begins after the call, and waits for it until the deadline at most.
   /// @errors kFrameDropped, kFrameTorn, kFrameStale, kFrameLate: this frame is lost, the camera goes on;
-  ///         kDisconnected: it needs open(); kCancelled
+  ///         kBusy: too many frames are held, give one back; kDisconnected: it needs open(); kCancelled; any other: as
+  ///         the backend documents, this frame is lost
   [[nodiscard]] virtual Result<Frame> capture(MonotonicTime deadline) = 0;
 
-  /// Ends a capture() that is waiting on another thread, soon, with kCancelled. @thread thread-safe
+  /// Ends the capture() that waits on another thread, soon, with kCancelled; where none waits, ends the next one, so
+  /// that a cancel() that comes just before it is not lost. open() forgets it.
+  /// @thread thread-safe
   virtual void cancel() = 0;
 };
 

@@ -18,6 +18,10 @@ using MonotonicTime = std::chrono::time_point<std::chrono::steady_clock, std::ch
 /// @thread thread-bound; may be moved between threads
 class Frame {
  public:
+  /// @param sequence        counts the device's frames from open() on; a gap tells of a lost frame
+  /// @param exposure_start  when its exposure began, as the device says; an old one tells of a stale frame
+  /// @param received        when its last byte was there
+  /// @param give_back       called once, on whichever thread ends the lease, even after the camera's end
   Frame(GreyView image, std::uint64_t sequence, MonotonicTime exposure_start, MonotonicTime received,
         std::function<void()> give_back)
       : image_(image),
@@ -39,7 +43,7 @@ class Frame {
   [[nodiscard]] const GreyView& image() const { return image_; }
   [[nodiscard]] std::uint64_t sequence() const { return sequence_; }
   [[nodiscard]] MonotonicTime exposure_start() const { return exposure_start_; }
-  [[nodiscard]] MonotonicTime received() const { return received_; }  ///< when its last byte was there
+  [[nodiscard]] MonotonicTime received() const { return received_; }
 
  private:
   GreyView image_;

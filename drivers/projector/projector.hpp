@@ -19,16 +19,18 @@ struct ProjectorDescription {
 
 /// A projector that shows one image, pixel for pixel. Backends: headless. Every backend passes the suite in
 /// tests/drivers.
+/// After kDisconnected it needs open(), and then shows black until show().
 /// @thread thread-bound
 class Projector {
  public:
   virtual ~Projector() = default;
   [[nodiscard]] virtual const ProjectorDescription& description() const = 0;
 
+  /// Opens the projector, again after a fault, and shows black.
   /// @errors kNotFound, kPermissionDenied, kMismatch, kUnsupported, kDisconnected
   [[nodiscard]] virtual Result<> open() = 0;
 
-  /// Shows the image from now on; returns when its first complete refresh began.
+  /// Shows the image from now on; waits for its first complete refresh to begin and returns when that was.
   /// @errors kMismatch: not of the projector's size; kDisconnected
   [[nodiscard]] virtual Result<MonotonicTime> show(const Grey8& image) = 0;
 
