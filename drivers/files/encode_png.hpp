@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+
+#include "core/image.hpp"
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// The bytes of a PNG file: 8 or 16 bits of grey, or 8 bits each of red, green and blue. Lossless.
+/// @errors kInvalidArgument (an empty image), kIo (the encoder failed)
+/// @thread reentrant
+[[nodiscard]] Result<std::string> encode_png(const Grey8& image);
+[[nodiscard]] Result<std::string> encode_png(const Grey16& image);
+[[nodiscard]] Result<std::string> encode_png(const ColourImage& image);
+[[nodiscard]] Result<std::string> encode_png(const GreyView& image);
+
+}  // namespace slsd

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/files/file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <utility>
+
+#include "drivers/files/system_error.hpp"
+
+namespace slsd {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+  Descriptor& operator=(Descriptor&&) = delete;
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  [[nodiscard]] bool valid() const { return number_ >= 0; }
+  [[nodiscard]] int number() const { return number_; }
+  /// Zero or errno: a network file system may report a full disk only here.
+  [[nodiscard]] int close() { return ::close(std::exchange(number_, -1)) == 0 ? 0 : errno; }
+
+ private:
+  int number_;
+};
+
+tl::unexpected<Error> fail_call(std::string_view doing, const fs::path& path) {
+  return tl::unexpected<Error>(system_error(errno, doing, path));
+}
+
+Result<> check_readable(const Descriptor& file, const fs::path& path, std::size_t limit_bytes) {
+  struct stat status {};
+  if (::fstat(file.number(), &status) != 0) return fail_call("cannot read", path);
+  if (S_ISDIR(status.st_mode))
+    return fail(ErrorCode::kInvalidArgument, "is a folder; name a file in it", path.string());
+  if (!S_ISREG(status.st_mode)) return fail(ErrorCode::kInvalidArgument, "is not a regular file", path.string());
+  if (static_cast<std::size_t>(status.st_size) > limit_bytes)
+    return fail(
+        ErrorCode::kInvalidArgument,
+        "is " + std::to_string(status.st_size) + " bytes long; at most " + std::to_string(limit_bytes) + " are read",
+        path.string());
+  return {};
+}
+
+Result<std::string> read_to_end(const Descriptor& file, const fs::path& path, std::size_t limit_bytes) {
+  struct stat status {};
+  if (::fstat(file.number(), &status) != 0) return fail_call("cannot read", path);
+  std::string bytes(static_cast<std::size_t>(status.st_size) + 1, '\0');
+  std::size_t size = 0;
+  while (true) {
+    const ssize_t count = ::read(file.number(), bytes.data() + size, bytes.size() - size);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return fail_call("cannot read", path);
+    if (count == 0) break;
+    size += static_cast<std::size_t>(count);
+    if (size > limit_bytes) return fail(ErrorCode::kInvalidArgument, "grows beyond what is read", path.string());
+    if (size == bytes.size()) bytes.resize(2 * size);
+  }
+  bytes.resize(size);
+  return bytes;
+}
+
+Result<> write_all(const Descriptor& file, std::string_view bytes, const fs::path& path) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(file.number(), bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return fail_call("cannot write", path);
+    bytes.remove_prefix(static_cast<std::size_t>(count));
+  }
+  return {};
+}
+
+/// What stands at the path now: its type and its permissions; nothing is a regular file with the usual ones.
+mode_t mode_of(const fs::path& path) {
+  struct stat status {};
+  return ::stat(path.c_str(), &status) == 0 ? status.st_mode : S_IFREG;
+}
+
+/// Its name does not grow with the file's, which may be as long as names can be.
+fs::path temporary_beside(const fs::path& path) {
+  static std::atomic<unsigned> count{0};
+  return path.parent_path() / (".slsd-" + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".part");
+}
+
+Result<> write_temporary(const fs::path& temporary, const fs::path& path, mode_t mode, std::string_view bytes) {
+  Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (!file.valid()) return fail_call("cannot write", path);
+  const mode_t permissions = mode & 07777;
+  if (permissions != 0 && ::fchmod(file.number(), permissions) != 0) return fail_call("cannot write", path);
+  if (auto written = write_all(file, bytes, path); !written) return written;
+  if (::fsync(file.number()) != 0) return fail_call("cannot write", path);
+  if (const int error = file.close(); error != 0)
+    return tl::unexpected<Error>(system_error(error, "cannot write", path));
+  return {};
+}
+
+/// Makes the new name last through a power cut; not every file system can, so that its failure is none.
+void synchronise_folder_of(const fs::path& path) {
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  const Descriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (file.valid()) static_cast<void>(::fsync(file.number()));
+}
+
+Result<> replace_file(const fs::path& path, mode_t mode, std::string_view bytes) {
+  const fs::path temporary = temporary_beside(path);
+  Result<> done = write_temporary(temporary, path, mode, bytes);
+  if (done && ::rename(temporary.c_str(), path.c_str()) != 0) done = fail_call("cannot write", path);
+  if (!done) {
+    ::unlink(temporary.c_str());
+    return done;
+  }
+  synchronise_folder_of(path);
+  return {};
+}
+
+Result<> write_in_place(const fs::path& path, std::string_view bytes) {
+  const Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  if (!file.valid()) return fail_call("cannot write", path);
+  return write_all(file, bytes, path);
+}
+
+}  // namespace
+
+Result<std::string> read_file(const fs::path& path, std::size_t limit_bytes) {
+  // Without O_NONBLOCK a pipe that nobody writes would hold us here.
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!file.valid()) return fail_call("cannot read", path);
+  if (auto readable = check_readable(file, path, limit_bytes); !readable) return tl::unexpected(readable.error());
+  return read_to_end(file, path, limit_bytes);
+}
+
+Result<> write_file_atomically(const fs::path& path, std::string_view bytes) {
+  if (path.empty()) return fail(ErrorCode::kInvalidArgument, "the path of the file to write is empty");
+  const mode_t mode = mode_of(path);
+  if (S_ISDIR(mode)) return fail(ErrorCode::kInvalidArgument, "is a folder; name a file in it", path.string());
+  if (!S_ISREG(mode)) return write_in_place(path, bytes);
+  // Renaming would get round a file's own write protection.
+  if (::access(path.c_str(), F_OK) == 0 && ::access(path.c_str(), W_OK) != 0) return fail_call("cannot write", path);
+  std::error_code error;
+  const fs::path target = fs::is_symlink(path, error) ? fs::weakly_canonical(path, error) : path;
+  if (error) return tl::unexpected<Error>(system_error(error.value(), "cannot write", path));
+  return replace_file(target, mode, bytes);
+}
+
+}  // namespace slsd

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// Reads a whole regular file.
+/// @param limit_bytes  a longer file is refused before it is read
+/// @errors kNotFound, kPermissionDenied, kInvalidArgument (a folder, a device, too long), kIo
+/// @thread reentrant
+[[nodiscard]] Result<std::string> read_file(const std::filesystem::path& path, std::size_t limit_bytes);
+
+/// Writes a file so that a reader sees the old one or the new one, whole, whatever happens in between: a temporary file
+/// beside it, synchronised, then renamed. Where the write fails nothing new is left behind. A symbolic link is
+/// followed.
+/// @errors kNotFound (its folder), kPermissionDenied, kNoSpace, kInvalidArgument (a folder, not a regular file), kIo
+/// @thread reentrant
+[[nodiscard]] Result<> write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
+
+}  // namespace slsd

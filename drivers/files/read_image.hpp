@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string_view>
+#include <variant>
+
+#include "core/image.hpp"
+#include "core/result.hpp"
+#include "drivers/files/bayer.hpp"
+
+namespace slsd {
+
+/// An owned grey image of 8 or 16 bits a pixel.
+using GreyImage = std::variant<Grey8, Grey16>;
+
+[[nodiscard]] GreyView view(const GreyImage& image);
+
+/// How an image file is read, and what it may cost.
+struct ReadImageOptions {
+  BayerPattern bayer = BayerPattern::kNone;    ///< what a grey image's pixels stand for; colour images ignore it
+  std::size_t limit_file_bytes = 1u << 28;     ///< 256 MiB
+  std::size_t limit_decoded_bytes = 1u << 28;  ///< 256 MiB of pixels, as the file's header declares them
+};
+
+/// Turns the bytes of a PNG, TIFF, PGM, PPM or BMP file into grey. Colour becomes 0.299 R + 0.587 G + 0.114 B (ITU-R
+/// BT.601), transparency is ignored, the values are not scaled: 10 bits in a 16-bit file stay below 1024. A file that
+/// ends early is an error and never a half-grey image.
+/// @param name  what the error calls the bytes
+/// @errors kMalformed (empty, cut short, damaged), kUnsupported (another format, or a rare variant of one of these),
+///         kInvalidArgument (larger than the limits)
+/// @thread reentrant
+[[nodiscard]] Result<GreyImage> decode_image(std::string_view bytes, std::string_view name,
+                                             const ReadImageOptions& options = {});
+
+/// Reads an image file. @errors as read_file() and decode_image() @thread reentrant
+[[nodiscard]] Result<GreyImage> read_image(const std::filesystem::path& path, const ReadImageOptions& options = {});
+
+}  // namespace slsd
