@@ -22,10 +22,16 @@ struct Lens {
   [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& point) const;
   /// Pixel of a normalised, undistorted direction (x/z, y/z).
   [[nodiscard]] Eigen::Vector2d distort(const Eigen::Vector2d& normalised) const;
+  /// Derivative of distort(): pixels per unit of the normalised direction.
+  [[nodiscard]] Eigen::Matrix2d distort_jacobian(const Eigen::Vector2d& normalised) const;
   /// Normalised, undistorted direction of a pixel: Newton's method to 1e-12.
   [[nodiscard]] Eigen::Vector2d undistort(const Eigen::Vector2d& pixel) const;
+  /// One step of Newton's method from an estimate of undistort(pixel).
+  [[nodiscard]] Eigen::Vector2d refine(const Eigen::Vector2d& estimate, const Eigen::Vector2d& pixel) const;
   /// Whether the distortion can be inverted everywhere in the image.
   [[nodiscard]] bool invertible() const;
+
+  friend bool operator==(const Lens&, const Lens&) = default;
 };
 
 }  // namespace slsd

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/geometry/lens.hpp"
+
+#include <cmath>
+
+#include <Eigen/LU>
+
+namespace slsd {
+namespace {
+
+constexpr int kMaxSteps = 50;
+constexpr int kMaxHalvings = 20;
+
+// The image is sampled so densely that a distortion of five coefficients cannot fold between two samples unseen.
+constexpr int kSamplesAcross = 32;
+constexpr int kSamplesAlongRay = 16;
+
+// Whether nothing folds on the way from the optical axis to this direction.
+bool unfolded(const Lens& lens, const Eigen::Vector2d& normalised) {
+  for (int i = 0; i <= kSamplesAlongRay; ++i) {
+    const double share = static_cast<double>(i) / kSamplesAlongRay;
+    if (!(lens.distort_jacobian(share * normalised).determinant() > 0.0)) return false;
+  }
+  return true;
+}
+
+bool invertible_at(const Lens& lens, const Eigen::Vector2d& pixel) {
+  const Eigen::Vector2d normalised = lens.undistort(pixel);
+  return (lens.distort(normalised) - pixel).norm() < 1e-6 && unfolded(lens, normalised);
+}
+
+}  // namespace
+
+Eigen::Vector2d Lens::project(const Eigen::Vector3d& point) const {
+  return distort(Eigen::Vector2d(point.x() / point.z(), point.y() / point.z()));
+}
+
+Eigen::Vector2d Lens::distort(const Eigen::Vector2d& normalised) const {
+  const auto& [k1, k2, p1, p2, k3] = distortion;
+  const double x = normalised.x(), y = normalised.y();
+  const double r2 = x * x + y * y;
+  const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  return {fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx,
+          fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy};
+}
+
+Eigen::Matrix2d Lens::distort_jacobian(const Eigen::Vector2d& normalised) const {
+  const auto& [k1, k2, p1, p2, k3] = distortion;
+  const double x = normalised.x(), y = normalised.y();
+  const double r2 = x * x + y * y;
+  const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  const double slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3));
+  const double cross = x * y * slope + 2 * p1 * x + 2 * p2 * y;
+  Eigen::Matrix2d jacobian;
+  jacobian << fx * (radial + x * x * slope + 2 * p1 * y + 6 * p2 * x), fx * cross,  //
+      fy * cross, fy * (radial + y * y * slope + 6 * p1 * y + 2 * p2 * x);
+  return jacobian;
+}
+
+Eigen::Vector2d Lens::refine(const Eigen::Vector2d& estimate, const Eigen::Vector2d& pixel) const {
+  return estimate - distort_jacobian(estimate).inverse() * (distort(estimate) - pixel);
+}
+
+Eigen::Vector2d Lens::undistort(const Eigen::Vector2d& pixel) const {
+  Eigen::Vector2d estimate((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
+  double error = (distort(estimate) - pixel).norm();
+  for (int step = 0; step < kMaxSteps; ++step) {
+    Eigen::Vector2d next = refine(estimate, pixel);
+    double next_error = (distort(next) - pixel).norm();
+    for (int i = 0; i < kMaxHalvings && !(next_error <= error); ++i) {
+      next = 0.5 * (next + estimate);
+      next_error = (distort(next) - pixel).norm();
+    }
+    if (!(next_error < error)) break;
+    const double moved = (next - estimate).norm();
+    estimate = next;
+    error = next_error;
+    if (moved < 1e-13) break;
+  }
+  return estimate;
+}
+
+bool Lens::invertible() const {
+  for (int row = 0; row <= kSamplesAcross; ++row) {
+    for (int column = 0; column <= kSamplesAcross; ++column) {
+      const Eigen::Vector2d pixel(column * width_px / static_cast<double>(kSamplesAcross) - 0.5,
+                                  row * height_px / static_cast<double>(kSamplesAcross) - 0.5);
+      if (!invertible_at(*this, pixel)) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace slsd
