@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/geometry/epipolar_gate.hpp"
+
+#include <algorithm>
+
+#include <Eigen/Geometry>
+
+namespace slsd {
+namespace {
+
+// A point nearer than this to the projector's plane is taken for behind it.
+constexpr double kMinProjectorDepth_mm = 1.0;
+
+}  // namespace
+
+EpipolarGate::EpipolarGate(const CalibratedCamera& camera, const Lens& projector, double depth_min_mm,
+                           double depth_max_mm)
+    : projector_from_camera_(camera.projector_from_camera),
+      focal_px_(projector.fx, projector.fy),
+      depth_min_mm_(depth_min_mm),
+      depth_max_mm_(depth_max_mm) {}
+
+EpipolarSegment EpipolarGate::prepare(const Eigen::Vector2d& camera_direction) const {
+  // The ray in the projector's frame: start + depth * slope.
+  const Eigen::Vector3d slope = projector_from_camera_.rotation * camera_direction.homogeneous();
+  const Eigen::Vector3d& start = projector_from_camera_.translation;
+  const Eigen::Vector3d line = start.cross(slope);
+  const Eigen::Vector2d normal = (line.head<2>().array() / focal_px_).matrix();
+  const double length = normal.norm();
+  EpipolarSegment segment;
+  if (!(length > 0)) return segment;
+
+  segment.line_ = line.head<2>() / length;
+  segment.line_offset_px_ = line.z() / length;
+  segment.axis_ = (Eigen::Array2d(-normal.y(), normal.x()) / length * focal_px_).matrix();
+  segment.along_start_ = segment.axis_.dot(start.head<2>());
+  segment.along_slope_ = segment.axis_.dot(slope.head<2>());
+  segment.depth_start_ = start.z();
+  segment.depth_slope_ = slope.z();
+
+  const double crossing = (kMinProjectorDepth_mm - start.z()) / slope.z();
+  const double nearest = slope.z() > 0 ? std::max(depth_min_mm_, crossing) : depth_min_mm_;
+  const double farthest = slope.z() < 0 ? std::min(depth_max_mm_, crossing) : depth_max_mm_;
+  if (!(nearest <= farthest) || !(start.z() + nearest * slope.z() > 0)) return segment;
+  segment.near_end_ = (start + nearest * slope).hnormalized();
+  segment.far_end_ = (start + farthest * slope).hnormalized();
+  const double near_px = segment.along_px(segment.near_end_), far_px = segment.along_px(segment.far_end_);
+  segment.along_min_px_ = std::min(near_px, far_px);
+  segment.along_max_px_ = std::max(near_px, far_px);
+  return segment;
+}
+
+}  // namespace slsd

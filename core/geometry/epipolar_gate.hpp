@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <limits>
+
+#include <Eigen/Core>
+
+#include "core/geometry/calibration.hpp"
+
+namespace slsd {
+
+/// Where a camera pixel's point may be seen by the projector: the part of the epipolar line within the working depth.
+/// In undistorted, normalised projector coordinates it is exactly straight; distances are in projector px, scaled by
+/// the focal lengths (not by the distortion's local magnification, a few percent at the border).
+///
+///     depth_max ───┬──────────●───────┬─── depth_min     residual_px: signed distance of ● from the line
+///                  far end          near end              along_px: place on the line
+class EpipolarSegment {
+ public:
+  /// Signed distance from the line, projector px.
+  [[nodiscard]] double residual_px(const Eigen::Vector2d& projector_direction) const {
+    return line_.dot(projector_direction) + line_offset_px_;
+  }
+  /// Place along the line, projector px.
+  [[nodiscard]] double along_px(const Eigen::Vector2d& projector_direction) const {
+    return axis_.dot(projector_direction);
+  }
+  /// Depth along the camera's z axis of the point on this camera ray whose image lies at along_px, mm.
+  [[nodiscard]] double depth_mm(const Eigen::Vector2d& projector_direction) const {
+    const double along = along_px(projector_direction);
+    return (along_start_ - along * depth_start_) / (along * depth_slope_ - along_slope_);
+  }
+  /// Whether a projector direction lies within tolerance_px of the segment's line, and between its ends.
+  [[nodiscard]] bool passes(const Eigen::Vector2d& projector_direction, double tolerance_px) const {
+    const double residual = residual_px(projector_direction);
+    const double along = along_px(projector_direction);
+    return (residual <= tolerance_px) & (residual >= -tolerance_px) & (along >= along_min_px_) &
+           (along <= along_max_px_);
+  }
+  [[nodiscard]] double along_min_px() const { return along_min_px_; }
+  [[nodiscard]] double along_max_px() const { return along_max_px_; }
+  /// No depth of the working range lies in front of the projector.
+  [[nodiscard]] bool empty() const { return !(along_min_px_ <= along_max_px_); }
+
+  /// Undistorted, normalised projector directions of the two ends; meaningless where empty().
+  [[nodiscard]] const Eigen::Vector2d& near_end() const { return near_end_; }
+  [[nodiscard]] const Eigen::Vector2d& far_end() const { return far_end_; }
+
+ private:
+  friend class EpipolarGate;
+  Eigen::Vector2d line_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d axis_ = Eigen::Vector2d::Zero();
+  double line_offset_px_ = std::numeric_limits<double>::infinity();
+  double along_min_px_ = 1, along_max_px_ = -1;
+  double along_start_ = 0, along_slope_ = 0;  // along = (start + slope z) / (depth_start + depth_slope z)
+  double depth_start_ = 0, depth_slope_ = 0;
+  Eigen::Vector2d near_end_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d far_end_ = Eigen::Vector2d::Zero();
+};
+
+/// Makes the segment of any camera ray.
+/// @thread reentrant
+class EpipolarGate {
+ public:
+  /// @param depth_min_mm  working range along the camera's z axis, 0 < min < max
+  EpipolarGate(const CalibratedCamera& camera, const Lens& projector, double depth_min_mm, double depth_max_mm);
+
+  /// @param camera_direction  undistorted, normalised
+  [[nodiscard]] EpipolarSegment prepare(const Eigen::Vector2d& camera_direction) const;
+
+ private:
+  RigidTransform projector_from_camera_;
+  Eigen::Array2d focal_px_;
+  double depth_min_mm_;
+  double depth_max_mm_;
+};
+
+}  // namespace slsd
