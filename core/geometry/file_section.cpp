@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/geometry/file_section.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kMaxElements = 9;
+
+bool is_number(const cv::FileNode& node) {
+  return node.isInt() || node.isReal();
+}
+
+bool is_control(char letter) {
+  return static_cast<unsigned char>(letter) < 0x20 || letter == 0x7f;
+}
+
+}  // namespace
+
+void FileSection::refuse(const std::string& key, const std::string& problem) {
+  if (!error_) error_ = Error{ErrorCode::kMalformed, path_ + key + " " + problem, where_};
+}
+
+bool FileSection::has(const char* key) const {
+  return node_.isMap() && !node_[key].empty();
+}
+
+std::optional<cv::FileNode> FileSection::find(const char* key) {
+  if (!has(key)) {
+    refuse(key, "is missing");
+    return std::nullopt;
+  }
+  return node_[key];
+}
+
+double FileSection::number(const char* key) {
+  const auto node = find(key);
+  if (!node) return 0.0;
+  if (!is_number(*node) || !std::isfinite(node->real())) {
+    refuse(key, "must be a number");
+    return 0.0;
+  }
+  return node->real();
+}
+
+int FileSection::whole(const char* key, int low, int high) {
+  const double value = number(key);
+  if (!(value >= low && value <= high) || value != std::floor(value)) {
+    refuse(key, "must be a whole number from " + std::to_string(low) + " to " + std::to_string(high));
+    return 0;
+  }
+  return static_cast<int>(value);
+}
+
+std::string FileSection::text(const char* key) {
+  const auto node = find(key);
+  if (!node) return {};
+  const std::string value = node->isString() ? node->string() : std::string();
+  if (value.empty() || value.size() > kMaxTextLength || std::any_of(value.begin(), value.end(), is_control)) {
+    refuse(key, "must be a text in quotes, of 1 to " + std::to_string(kMaxTextLength) + " bytes");
+    return {};
+  }
+  return value;
+}
+
+// Element by element: reading into a cv::Mat would first allocate whatever size the file claims.
+std::vector<double> FileSection::elements(const char* key, int& rows, int& columns) {
+  const auto node = find(key);
+  if (!node) return {};
+  if (!node->isMap() || (*node)["data"].empty() || (*node)["rows"].empty() || (*node)["cols"].empty()) {
+    refuse(key, "must be a matrix (!!opencv-matrix with rows, cols, dt and data)");
+    return {};
+  }
+  FileSection matrix(*node, path_ + key + ".", where_);
+  rows = matrix.whole("rows", 1, kMaxElements);
+  columns = matrix.whole("cols", 1, kMaxElements);
+  const cv::FileNode data = (*node)["data"];
+  if (matrix.error() || !data.isSeq() || data.size() != static_cast<std::size_t>(rows) * columns ||
+      data.size() > kMaxElements) {
+    refuse(key, "must have rows x cols numbers, at most 9");
+    return {};
+  }
+  std::vector<double> values;
+  for (const cv::FileNode& element : data) {
+    values.push_back(is_number(element) ? element.real() : std::nan(""));
+  }
+  if (!std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); })) {
+    refuse(key, "holds something that is not a finite number");
+  }
+  return values;
+}
+
+Eigen::Matrix3d FileSection::matrix3(const char* key) {
+  int rows = 0, columns = 0;
+  const std::vector<double> values = elements(key, rows, columns);
+  if (rows != 3 || columns != 3) refuse(key, "must be 3x3");
+  if (error_) return Eigen::Matrix3d::Zero();
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(values.data());
+}
+
+Eigen::VectorXd FileSection::vector(const char* key, int count) {
+  int rows = 0, columns = 0;
+  const std::vector<double> values = elements(key, rows, columns);
+  if (std::min(rows, columns) != 1 || std::max(rows, columns) != count) {
+    refuse(key, "must be 1x" + std::to_string(count) + " or " + std::to_string(count) + "x1");
+  }
+  if (error_) return Eigen::VectorXd::Zero(count);
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), count);
+}
+
+}  // namespace slsd

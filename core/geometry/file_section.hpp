@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core/persistence.hpp>
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// A map of an OpenCV FileStorage, read key by key. The first key that is missing or wrong is kept as the error; from
+/// then on every read gives zeros.
+/// @thread thread-bound
+class FileSection {
+ public:
+  /// @param path   what stands before the keys in messages: "cameras[0] (left): ", or empty
+  /// @param where  the file's name
+  FileSection(const cv::FileNode& node, std::string path, std::string where)
+      : node_(node), path_(std::move(path)), where_(std::move(where)) {}
+
+  [[nodiscard]] bool has(const char* key) const;
+  [[nodiscard]] double number(const char* key);
+  /// A whole number within [low, high].
+  [[nodiscard]] int whole(const char* key, int low, int high);
+  /// 1 to kMaxTextLength bytes without control characters.
+  [[nodiscard]] std::string text(const char* key);
+  [[nodiscard]] Eigen::Matrix3d matrix3(const char* key);
+  /// `count` numbers in a row or in a column; count at most 9.
+  [[nodiscard]] Eigen::VectorXd vector(const char* key, int count);
+
+  /// Notes that this key is wrong, unless an earlier one was.
+  void refuse(const std::string& key, const std::string& problem);
+  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+  void set_path(std::string path) { path_ = std::move(path); }
+
+  static constexpr std::size_t kMaxTextLength = 256;
+
+ private:
+  [[nodiscard]] std::optional<cv::FileNode> find(const char* key);
+  [[nodiscard]] std::vector<double> elements(const char* key, int& rows, int& columns);
+
+  cv::FileNode node_;
+  std::string path_;
+  std::string where_;
+  std::optional<Error> error_;
+};
+
+}  // namespace slsd

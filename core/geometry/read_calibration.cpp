@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <algorithm>
+#include <set>
+
+#include <Eigen/Geometry>
+#include <opencv2/core/persistence.hpp>
+
+#include "core/geometry/calibration.hpp"
+#include "core/geometry/file_section.hpp"
+#include "core/geometry/file_syntax.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kMaxFileSize = 1 << 20;
+constexpr std::size_t kMaxCameras = 64;
+constexpr int kMaxImageSide_px = 65535;
+constexpr double kMaxLength = 1e7;  // of a focal length in px, of a translation in mm
+constexpr double kMinBaseline_mm = 1e-3;
+constexpr double kRotationTolerance = 1e-4;
+
+void read_pinhole(FileSection& section, const char* key, Lens& lens) {
+  const Eigen::Matrix3d matrix = section.matrix3(key);
+  if (!(matrix(0, 0) > 0 && matrix(1, 1) > 0 && matrix(0, 0) < kMaxLength && matrix(1, 1) < kMaxLength)) {
+    section.refuse(key, "must have positive focal lengths, in pixels");
+  }
+  if (matrix(0, 1) != 0 || matrix(1, 0) != 0) section.refuse(key, "must have no skew");
+  if (matrix.row(2) != Eigen::RowVector3d(0, 0, 1)) section.refuse(key, "must have 0 0 1 as its last row");
+  if (matrix.col(2).cwiseAbs().maxCoeff() > kMaxLength) section.refuse(key, "has its principal point far outside");
+  lens.fx = matrix(0, 0);
+  lens.fy = matrix(1, 1);
+  lens.cx = matrix(0, 2);
+  lens.cy = matrix(1, 2);
+}
+
+struct LensKeys {
+  const char* width;
+  const char* height;
+  const char* matrix;
+  const char* distortion;
+};
+constexpr LensKeys kProjectorKeys{"projector_width", "projector_height", "projector_matrix", "projector_distortion"};
+constexpr LensKeys kCameraKeys{"width", "height", "camera_matrix", "camera_distortion"};
+
+Lens read_lens(FileSection& section, const LensKeys& keys) {
+  Lens lens;
+  lens.width_px = section.whole(keys.width, 1, kMaxImageSide_px);
+  lens.height_px = section.whole(keys.height, 1, kMaxImageSide_px);
+  read_pinhole(section, keys.matrix, lens);
+  Eigen::Map<Eigen::Matrix<double, 5, 1>>(lens.distortion.data()) = section.vector(keys.distortion, 5);
+  if (!section.error() && !lens.invertible()) {
+    section.refuse(keys.distortion,
+                   "cannot be inverted over the whole image; calibrate again, with views in the corners");
+  }
+  return lens;
+}
+
+RigidTransform read_motion(FileSection& section, const char* rotation_key, const char* translation_key) {
+  RigidTransform motion{section.matrix3(rotation_key), section.vector(translation_key, 3)};
+  const Eigen::Matrix3d defect = motion.rotation * motion.rotation.transpose() - Eigen::Matrix3d::Identity();
+  if (!(defect.cwiseAbs().maxCoeff() < kRotationTolerance && motion.rotation.determinant() > 0)) {
+    section.refuse(rotation_key, "is not a rotation");
+  }
+  if (!(motion.translation.cwiseAbs().maxCoeff() < kMaxLength)) section.refuse(translation_key, "is out of range");
+  return motion;
+}
+
+RigidTransform read_rig_motion(FileSection& section, bool first) {
+  const char* const rotation_key = "rig_from_camera_R";
+  const char* const translation_key = "rig_from_camera_T";
+  if (first && !section.has(rotation_key) && !section.has(translation_key)) return {};
+  const RigidTransform motion = read_motion(section, rotation_key, translation_key);
+  if (first && (!motion.rotation.isIdentity(kRotationTolerance) || motion.translation.norm() > kMinBaseline_mm)) {
+    section.refuse(rotation_key, "must be the identity for the first camera: its frame is the rig's");
+  }
+  return motion;
+}
+
+CalibratedCamera read_camera(FileSection& section, std::size_t index) {
+  const std::string place = "cameras[" + std::to_string(index) + "]";
+  section.set_path(place + ".");
+  CalibratedCamera camera;
+  camera.name = section.text("name");
+  section.set_path(place + " (" + camera.name + "): ");
+  camera.lens = read_lens(section, kCameraKeys);
+  camera.projector_from_camera = read_motion(section, "R", "T");
+  if (camera.projector_from_camera.translation.norm() < kMinBaseline_mm) {
+    section.refuse("T", "is zero: without a distance between camera and projector there is no depth");
+  }
+  camera.rig_from_camera = read_rig_motion(section, index == 0);
+  return camera;
+}
+
+CalibrationReport read_report(FileSection& section) {
+  CalibrationReport report;
+  if (section.has("reprojection_error_camera_px")) {
+    report.reprojection_error_camera_px = section.number("reprojection_error_camera_px");
+  }
+  if (section.has("reprojection_error_projector_px")) {
+    report.reprojection_error_projector_px = section.number("reprojection_error_projector_px");
+  }
+  if (section.has("board")) report.board = section.text("board");
+  if (section.has("date")) report.date = section.text("date");
+  if (section.has("projector_serial")) report.projector_serial = section.text("projector_serial");
+  return report;
+}
+
+std::optional<Error> read_cameras(const cv::FileNode& sequence, std::string_view name, Calibration& calibration) {
+  std::set<std::string> names;
+  std::vector<std::string> serials;
+  for (const cv::FileNode& node : sequence) {
+    FileSection section(node, {}, std::string(name));
+    CalibratedCamera camera = read_camera(section, calibration.cameras.size());
+    if (!names.insert(camera.name).second) section.refuse("name", "is another camera's name already");
+    serials.push_back(section.has("serial") ? section.text("serial") : std::string());
+    if (section.error()) return section.error();
+    calibration.cameras.push_back(std::move(camera));
+  }
+  const bool any = std::any_of(serials.begin(), serials.end(), [](const auto& serial) { return !serial.empty(); });
+  if (any) calibration.report.camera_serials = std::move(serials);
+  return std::nullopt;
+}
+
+Result<Calibration> read_root(const cv::FileNode& root, std::string_view name) {
+  FileSection section(root, {}, std::string(name));
+  Calibration calibration;
+  calibration.projector = read_lens(section, kProjectorKeys);
+  calibration.report = read_report(section);
+  const bool listed = section.has("cameras") && root["cameras"].isSeq();
+  if (!listed || root["cameras"].size() == 0 || root["cameras"].size() > kMaxCameras) {
+    section.refuse("cameras", "must be a sequence of 1 to " + std::to_string(kMaxCameras) + " maps");
+  }
+  if (section.error()) return tl::unexpected(*section.error());
+  if (auto error = read_cameras(root["cameras"], name, calibration)) return tl::unexpected(*error);
+  return calibration;
+}
+
+}  // namespace
+
+Result<Calibration> read_calibration(std::string_view text, std::string_view name) {
+  const std::string where(name);
+  if (text.size() > kMaxFileSize) return fail(ErrorCode::kMalformed, "is no calibration file: above 1 MiB", where);
+  if (const auto problem = syntax_problem(text)) {
+    return fail(ErrorCode::kMalformed, problem->message, where + ":" + std::to_string(problem->line));
+  }
+  try {
+    const cv::FileStorage storage(std::string(text),
+                                  cv::FileStorage::READ | cv::FileStorage::MEMORY | cv::FileStorage::FORMAT_YAML);
+    return read_root(storage.root(), name);
+  } catch (const std::exception& exception) {
+    return fail(ErrorCode::kMalformed, std::string("is not YAML as OpenCV writes it: ") + exception.what(), where);
+  }
+}
+
+}  // namespace slsd

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/geometry/calibration.hpp"
+
+#include <fstream>
+#include <iterator>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include "tests/core/geometry/paper_rig.hpp"
+
+namespace slsd {
+namespace {
+
+using ::testing::HasSubstr;
+
+Calibration two_cameras() {
+  Calibration rig = paper_rig();
+  CalibratedCamera right = rig.cameras[0];
+  right.name = "right";
+  right.projector_from_camera.translation.x() = 190;
+  right.rig_from_camera.translation.x() = 368;
+  rig.cameras.push_back(right);
+  rig.report = {0.11, 0.09, "charuco 12x9", "2026-03-01", "P-77", {"C-1", "C-2"}};
+  return rig;
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to, std::size_t after = 0) {
+  const std::size_t place = text.find(from, after);
+  EXPECT_NE(place, text.npos) << from;
+  return text.replace(place, from.size(), to);
+}
+
+// The text with one key taken out: its line, and the lines of its matrix.
+std::string without(std::string text, const std::string& key) {
+  const std::size_t begin = text.rfind('\n', text.find(key + ":")) + 1;
+  std::size_t end = text.find('\n', begin) + 1;
+  while (text.compare(end, 3, "   ") == 0 && text.find("rows:", end) < text.find('\n', end)) {
+    end = text.find(']', end) + 2;
+  }
+  return text.erase(begin, end - begin);
+}
+
+std::string message_of(const std::string& text) {
+  const auto read = read_calibration(text, "calibration.yml");
+  return read ? "accepted" : to_string(read.error());
+}
+
+void expect_same(const RigidTransform& a, const RigidTransform& b) {
+  EXPECT_EQ(a.rotation, b.rotation);
+  EXPECT_EQ(a.translation, b.translation);
+}
+
+TEST(ReadCalibration, ReturnsWhatWasWritten) {
+  const Calibration written = two_cameras();
+  const auto read = read_calibration(write_calibration(written), "calibration.yml");
+  ASSERT_TRUE(read) << to_string(read.error());
+  EXPECT_EQ(read->projector, written.projector);
+  ASSERT_EQ(read->cameras.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(read->cameras[i].name, written.cameras[i].name);
+    EXPECT_EQ(read->cameras[i].lens, written.cameras[i].lens);
+    expect_same(read->cameras[i].projector_from_camera, written.cameras[i].projector_from_camera);
+    expect_same(read->cameras[i].rig_from_camera, written.cameras[i].rig_from_camera);
+  }
+  EXPECT_EQ(read->report.reprojection_error_camera_px, 0.11);
+  EXPECT_EQ(read->report.reprojection_error_projector_px, 0.09);
+  EXPECT_EQ(read->report.board, "charuco 12x9");
+  EXPECT_EQ(read->report.date, "2026-03-01");
+  EXPECT_EQ(read->report.projector_serial, "P-77");
+  EXPECT_EQ(read->report.camera_serials, written.report.camera_serials);
+}
+
+TEST(ReadCalibration, LoadsWithoutTheReport) {
+  const auto read = read_calibration(write_calibration(paper_rig()), "calibration.yml");
+  ASSERT_TRUE(read) << to_string(read.error());
+  EXPECT_FALSE(read->report.date);
+  EXPECT_TRUE(read->report.camera_serials.empty());
+}
+
+TEST(ReadCalibration, LoadsAFileWrittenByOthers) {
+  std::ifstream file(SLSD_SOURCE_DIR "/tests/fuzz/seeds/calibration/plain.yml");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const auto read = read_calibration(text, "plain.yml");
+  ASSERT_TRUE(read) << to_string(read.error());
+  EXPECT_EQ(read->projector.width_px, 1280);
+  EXPECT_EQ(read->cameras[0].lens.distortion[1], 0.25);
+  EXPECT_EQ(read->cameras[0].projector_from_camera.translation, Eigen::Vector3d(-180, 0, 5));
+}
+
+class RequiredKey : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(RequiredKey, IsNamedWhereItIsMissing) {
+  EXPECT_THAT(message_of(without(write_calibration(two_cameras()), GetParam())), HasSubstr(GetParam()));
+}
+
+TEST_P(RequiredKey, IsNamedWhereItIsOfAnotherType) {
+  const std::string text = write_calibration(two_cameras());
+  const std::string key = GetParam();
+  const std::size_t begin = text.rfind('\n', text.find(key + ":")) + 1;
+  const std::string indent = text.substr(begin, text.find(key, begin) - begin);
+  const std::string bare = without(text, key);
+  EXPECT_THAT(message_of(bare.substr(0, begin) + indent + key + ": [ 1, 2 ]\n" + bare.substr(begin)), HasSubstr(key));
+}
+
+INSTANTIATE_TEST_SUITE_P(ReadCalibration, RequiredKey,
+                         ::testing::Values("projector_width", "projector_height", "projector_matrix",
+                                           "projector_distortion", "name", "width", "height", "camera_matrix",
+                                           "camera_distortion", "R", "T", "rig_from_camera_R", "rig_from_camera_T"),
+                         [](const auto& one) { return std::string(one.param); });
+
+TEST(ReadCalibration, NamesTheCamera) {
+  Calibration rig = two_cameras();
+  rig.cameras[1].lens.fx = -1;
+  EXPECT_EQ(message_of(write_calibration(rig)),
+            "calibration.yml: cameras[1] (right): camera_matrix must have positive focal lengths, in pixels");
+}
+
+// What a calibration is changed to, and the key that the refusal names.
+struct Breakage {
+  const char* name;
+  const char* key;
+  void (*breaks)(Calibration&);
+};
+
+class Broken : public ::testing::TestWithParam<Breakage> {};
+
+TEST_P(Broken, IsRefusedByName) {
+  Calibration rig = two_cameras();
+  GetParam().breaks(rig);
+  EXPECT_THAT(message_of(write_calibration(rig)), HasSubstr(GetParam().key));
+}
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr Breakage kBreakages[] = {
+    {"ZeroWidth", "projector_width", [](Calibration& rig) { rig.projector.width_px = 0; }},
+    {"NegativeHeight", "cameras[1] (right): height", [](Calibration& rig) { rig.cameras[1].lens.height_px = -5; }},
+    {"HugeWidth", "width", [](Calibration& rig) { rig.cameras[0].lens.width_px = 2000000000; }},
+    {"ZeroFocalLength", "projector_matrix", [](Calibration& rig) { rig.projector.fy = 0; }},
+    {"NanFocalLength", "projector_matrix", [](Calibration& rig) { rig.projector.fx = kNan; }},
+    {"InfinitePrincipalPoint", "camera_matrix", [](Calibration& rig) { rig.cameras[0].lens.cx = 1.0 / 0.0; }},
+    {"NanDistortion", "camera_distortion", [](Calibration& rig) { rig.cameras[0].lens.distortion[4] = kNan; }},
+    {"Folded", "projector_distortion cannot be inverted", [](Calibration& rig) { rig.projector.distortion[0] = -9; }},
+    {"Scaled", "(left): R is not a rotation",
+     [](Calibration& rig) { rig.cameras[0].projector_from_camera.rotation *= 1.001; }},
+    {"Mirrored", "(left): R is not a rotation",
+     [](Calibration& rig) { rig.cameras[0].projector_from_camera.rotation.row(0) *= -1; }},
+    {"ZeroBaseline", "(left): T is zero",
+     [](Calibration& rig) { rig.cameras[0].projector_from_camera.translation.setZero(); }},
+    {"NanTranslation", "rig_from_camera_T",
+     [](Calibration& rig) { rig.cameras[1].rig_from_camera.translation.x() = kNan; }},
+    {"SameName", "cameras[1] (left): name", [](Calibration& rig) { rig.cameras[1].name = "left"; }},
+    {"EmptyName", "cameras[1].name", [](Calibration& rig) { rig.cameras[1].name = ""; }},
+    {"NoCamera", "cameras", [](Calibration& rig) { rig.cameras.clear(); }},
+    {"NanReport", "reprojection_error_camera_px",
+     [](Calibration& rig) { rig.report.reprojection_error_camera_px = kNan; }},
+    {"LongDate", "date", [](Calibration& rig) { rig.report.date = std::string(300, 'x'); }},
+};
+
+INSTANTIATE_TEST_SUITE_P(ReadCalibration, Broken, ::testing::ValuesIn(kBreakages),
+                         [](const auto& one) { return one.param.name; });
+
+TEST(ReadCalibration, RefusesSkewAndAWrongLastRow) {
+  const std::string text = write_calibration(paper_rig());
+  EXPECT_THAT(message_of(replaced(text, "1920., 0., ", "1920., 2., ")),
+              HasSubstr("projector_matrix must have no skew"));
+  EXPECT_THAT(message_of(replaced(text, "0., 0., 1. ]", "0., 0., 2. ]")),
+              HasSubstr("projector_matrix must have 0 0 1"));
+}
+
+TEST(ReadCalibration, RefusesAMatrixOfAnotherShape) {
+  const std::string text = write_calibration(paper_rig());
+  EXPECT_THAT(message_of(replaced(text, "cols: 5", "cols: 4")), HasSubstr("projector_distortion must"));
+  EXPECT_THAT(message_of(replaced(text, "rows: 3", "rows: 1000000000")), HasSubstr("projector_matrix must"));
+}
+
+TEST(ReadCalibration, RefusesAFirstCameraThatIsNotTheRig) {
+  const std::string text = write_calibration(two_cameras());
+  const std::size_t begin = text.find("rig_from_camera_R"), end = text.rfind(']') + 2;
+  const std::string motion_of_second = text.substr(begin, end - begin) + "      ";
+  EXPECT_THAT(message_of(replaced(text, "name:", motion_of_second + "name:")), HasSubstr("first camera"));
+}
+
+TEST(ReadCalibration, RefusesRubbishWithItsPlace) {
+  EXPECT_THAT(message_of(""), HasSubstr("calibration.yml:1: is no calibration file"));
+  EXPECT_THAT(message_of("{ \"a\": 1 }"), HasSubstr("%YAML"));
+  EXPECT_THAT(message_of(std::string("%YAML:1.0\n---\na: \0\n", 19)), HasSubstr("calibration.yml:3: "));
+  EXPECT_THAT(message_of("%YAML:1.0\n---\na: [[[[[[[[[[\n"), HasSubstr("calibration.yml:3: has brackets"));
+  EXPECT_THAT(message_of("%YAML:1.0\n---\na:\n   - - - 1\n"), HasSubstr("calibration.yml:4: "));
+  EXPECT_THAT(message_of("%YAML:1.0\n---\na: \"open\n"), HasSubstr("calibration.yml"));
+  EXPECT_THAT(message_of("%YAML:1.0\n---\n"), HasSubstr("projector_width"));
+  EXPECT_THAT(message_of("%YAML:1.0\n" + std::string(2 << 20, '\n')), HasSubstr("above 1 MiB"));
+}
+
+TEST(Camera, IsFoundByName) {
+  Calibration rig = two_cameras();
+  EXPECT_EQ(rig.camera("right"), &rig.cameras[1]);
+  EXPECT_EQ(rig.camera("middle"), nullptr);
+  rig.cameras.pop_back();
+  EXPECT_EQ(rig.camera("middle"), &rig.cameras[0]);
+}
+
+}  // namespace
+}  // namespace slsd

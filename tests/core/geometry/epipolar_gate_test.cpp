@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/geometry/epipolar_gate.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include "core/geometry/triangulate.hpp"
+#include "tests/core/geometry/paper_rig.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr double kMin_mm = 400.0, kMax_mm = 2500.0;
+
+Eigen::Vector2d projector_direction(const Calibration& rig, const Eigen::Vector3d& point) {
+  return (rig.cameras[0].projector_from_camera * point).hnormalized();
+}
+
+RC_GTEST_PROP(EpipolarGate, PassesEveryPointWithinTheWorkingDepth, ()) {
+  const Calibration rig = paper_rig();
+  const EpipolarGate gate(rig.cameras[0], rig.projector, kMin_mm, kMax_mm);
+  const Eigen::Vector3d point = any_point(rig.cameras[0].lens, kMin_mm + 0.1, kMax_mm - 0.1);
+  const EpipolarSegment segment = gate.prepare(point.hnormalized());
+  const Eigen::Vector2d direction = projector_direction(rig, point);
+  RC_ASSERT(std::abs(segment.residual_px(direction)) < 1e-9);
+  RC_ASSERT(std::abs(segment.depth_mm(direction) - point.z()) < 1e-6);
+  RC_ASSERT(segment.passes(direction, 1e-6));
+}
+
+RC_GTEST_PROP(EpipolarGate, StopsEveryPointBeyondTheWorkingDepth, ()) {
+  const Calibration rig = paper_rig();
+  const EpipolarGate gate(rig.cameras[0], rig.projector, kMin_mm, kMax_mm);
+  const Eigen::Vector2d camera = rig.cameras[0].lens.undistort(any_pixel(rig.cameras[0].lens));
+  const EpipolarSegment segment = gate.prepare(camera);
+  const auto passes = [&](double depth) {
+    return segment.passes(projector_direction(rig, depth * camera.homogeneous()), 1.0);
+  };
+  RC_ASSERT(!passes(kMin_mm - uniform(0.01, 300)));
+  RC_ASSERT(!passes(kMax_mm + uniform(0.01, 100000)));
+  RC_ASSERT(passes(kMin_mm + 0.01));
+  RC_ASSERT(passes(kMax_mm - 0.01));
+}
+
+RC_GTEST_PROP(EpipolarGate, ResidualIsThatOfTriangulateToAFewPercent, ()) {
+  const Calibration rig = paper_rig();
+  const CalibratedCamera& camera = rig.cameras[0];
+  const EpipolarGate gate(camera, rig.projector, kMin_mm, kMax_mm);
+  const Match match{any_pixel(camera.lens), any_pixel(rig.projector)};
+  const double exact = triangulate(match, camera, rig.projector, 0.1).epipolar_residual_px;
+  const double quick = std::abs(
+      gate.prepare(camera.lens.undistort(match.camera_px)).residual_px(rig.projector.undistort(match.projector_px)));
+  RC_ASSERT(std::abs(quick - exact) < 0.05 * exact + 1e-9);
+}
+
+RC_GTEST_PROP(EpipolarGate, EndsAreTheImagesOfTheDepthLimits, ()) {
+  const Calibration rig = paper_rig();
+  const EpipolarGate gate(rig.cameras[0], rig.projector, kMin_mm, kMax_mm);
+  const Eigen::Vector2d camera = rig.cameras[0].lens.undistort(any_pixel(rig.cameras[0].lens));
+  const EpipolarSegment segment = gate.prepare(camera);
+  RC_ASSERT((segment.near_end() - projector_direction(rig, kMin_mm * camera.homogeneous())).norm() < 1e-12);
+  RC_ASSERT((segment.far_end() - projector_direction(rig, kMax_mm * camera.homogeneous())).norm() < 1e-12);
+}
+
+TEST(EpipolarGate, CutsWhatLiesBehindTheProjector) {
+  Calibration rig = paper_rig();
+  rig.cameras[0].projector_from_camera = {Eigen::Matrix3d::Identity(), {-180, 0, -1000}};
+  const EpipolarGate gate(rig.cameras[0], rig.projector, kMin_mm, kMax_mm);
+  const EpipolarSegment segment = gate.prepare({0.1, 0.05});
+  EXPECT_FALSE(segment.empty());
+  EXPECT_TRUE(segment.passes(projector_direction(rig, 2000 * Eigen::Vector3d(0.1, 0.05, 1)), 0.1));
+  EXPECT_FALSE(segment.passes(projector_direction(rig, 500 * Eigen::Vector3d(0.1, 0.05, 1)), 0.1));
+  EXPECT_TRUE(EpipolarGate(rig.cameras[0], rig.projector, 400, 900).prepare({0.1, 0.05}).empty());
+}
+
+TEST(EpipolarGate, PassesNothingOnTheRayThroughTheProjector) {
+  Calibration rig = paper_rig();
+  rig.cameras[0].projector_from_camera = {Eigen::Matrix3d::Identity(), {0, 0, -100}};
+  const EpipolarSegment segment = EpipolarGate(rig.cameras[0], rig.projector, 400, 900).prepare({0, 0});
+  EXPECT_TRUE(segment.empty());
+  EXPECT_FALSE(segment.passes({0, 0}, 1e9));
+}
+
+}  // namespace
+}  // namespace slsd
