@@ -38,8 +38,8 @@ struct ArrayOptions {
   int letters = 3;
   std::uint32_t seed = 1;
   ArrayMethod method = ArrayMethod::kConstructive;
-  std::optional<int>
-      minimum_distance;           ///< Hamming, over all overlapping windows; without it the largest that is reached
+  /// Hamming, over all overlapping windows; without it the largest that is reached.
+  std::optional<int> minimum_distance{};
   bool half_turn_unique = false;  ///< windows also differ from every window turned by 180 degrees
 
   [[nodiscard]] Result<> validate() const;

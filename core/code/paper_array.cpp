@@ -18,6 +18,8 @@ std::uint32_t aligned_codeword(const CodeArray& array, int top, int left) {
   return codeword;
 }
 
+}  // namespace
+
 bool aligned_windows_differ(const CodeArray& array) {
   std::unordered_set<std::uint32_t> seen;
   for (int top = 0; top + kWindowSide <= array.rows; top += kWindowSide)
@@ -25,8 +27,6 @@ bool aligned_windows_differ(const CodeArray& array) {
       if (!seen.insert(aligned_codeword(array, top, left)).second) return false;
   return true;
 }
-
-}  // namespace
 
 std::optional<CodeArray> draw_paper_array(int rows, int columns, int letters, std::uint32_t seed, int draws) {
   LetterSource source(seed);

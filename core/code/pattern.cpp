@@ -8,8 +8,6 @@
 namespace slsd {
 namespace {
 
-constexpr int kMaxSpacingPx = 16;
-
 Result<> in_range(const char* key, int value, int low, int high) {
   if (value >= low && value <= high) return {};
   return fail(ErrorCode::kInvalidArgument, std::string(key) + " must be " + std::to_string(low) + " to " +
@@ -58,8 +56,12 @@ void blit(const Grey8& symbol_image, int left_px, int top_px, Grey8& image) {
 }  // namespace
 
 Result<> PatternOptions::validate() const {
-  if (auto valid = in_range("projector width_px", projector_width_px, 640, 3840); !valid) return valid;
-  if (auto valid = in_range("projector height_px", projector_height_px, 360, 2160); !valid) return valid;
+  if (auto valid = in_range("projector width_px", projector_width_px, kMinProjectorWidthPx, kMaxProjectorWidthPx);
+      !valid)
+    return valid;
+  if (auto valid = in_range("projector height_px", projector_height_px, kMinProjectorHeightPx, kMaxProjectorHeightPx);
+      !valid)
+    return valid;
   if (auto valid = check_symbol_size(symbol_size_px); !valid) return valid;
   if (auto valid = in_range("spacing_px", spacing_px, 1, kMaxSpacingPx); !valid) return valid;
   if (!symbols.empty())

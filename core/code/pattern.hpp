@@ -14,19 +14,26 @@
 
 namespace slsd {
 
+inline constexpr int kMinProjectorWidthPx = 640;
+inline constexpr int kMaxProjectorWidthPx = 3840;
+inline constexpr int kMinProjectorHeightPx = 360;
+inline constexpr int kMaxProjectorHeightPx = 2160;
+inline constexpr int kMaxSpacingPx = 16;
+
 /// What determines a pattern. The keys of the configuration's [pattern] table, and the projector's size.
 struct PatternOptions {
   int projector_width_px = 1280;  ///< 640 to 3840
   int projector_height_px = 800;  ///< 360 to 2160
   int symbol_size_px = 16;        ///< one of kSymbolSizesPx
   int spacing_px = 2;             ///< 1 to 16; dark, between two symbols
-  std::vector<int> symbols;       ///< 2 to 8 different symbol numbers; letter i of the array is shown as symbols[i]
+  std::vector<int> symbols{};     ///< 2 to 8 different symbol numbers; letter i of the array is shown as symbols[i]
   std::uint32_t seed = 1;
   ArrayMethod method = ArrayMethod::kConstructive;
-  std::optional<int> minimum_distance;
+  std::optional<int> minimum_distance{};
   bool half_turn_unique = false;
 
   [[nodiscard]] Result<> validate() const;
+  friend bool operator==(const PatternOptions&, const PatternOptions&) = default;
 };
 
 /// The symbols that serve best at a size: what is used where the user names none.

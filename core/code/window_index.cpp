@@ -15,10 +15,18 @@ int letter_at(PackedWindow window, int cell) {
   return static_cast<int>(window >> (4 * cell) & 0xF);
 }
 
+constexpr std::size_t kMaxFiles = 1 << 15;
+
 std::size_t files_of(int letters, int cells) {
   std::size_t files = 1;
   for (int i = 0; i < cells; ++i) files *= static_cast<std::size_t>(letters);
   return files;
+}
+
+// What agrees on a whole group agrees on its first cells: fewer files, longer ones, the same answers.
+int cells_filed(int letters, int cells) {
+  while (files_of(letters, cells) > kMaxFiles) --cells;
+  return cells;
 }
 
 }  // namespace
@@ -39,7 +47,7 @@ WindowIndex::WindowIndex(int letters, int minimum_distance) : letters_(letters),
   assert(minimum_distance >= 1 && minimum_distance <= kWindowCells);
   for (int i = 0; i < minimum_distance; ++i) {
     const int first = kWindowCells * i / minimum_distance;
-    const int cells = kWindowCells * (i + 1) / minimum_distance - first;
+    const int cells = cells_filed(letters, kWindowCells * (i + 1) / minimum_distance - first);
     groups_.push_back({first, cells, {}});
     groups_.back().files.resize(files_of(letters, cells));
   }
