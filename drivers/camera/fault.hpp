@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// What real cameras do to those who use them.
+enum class FaultKind {
+  kDrop,        ///< the frame is lost: kFrameDropped, and a gap in the sequence numbers
+  kTear,        ///< a part of the frame is missing: kFrameTorn
+  kLate,        ///< the frame arrives `duration` late (without one: never): kFrameLate where that is past its deadline
+  kStale,       ///< the frame was exposed `duration` before the trigger (100 ms), and says so in exposure_start()
+  kStall,       ///< for `duration` (without one: until open()) no frame arrives: kFrameLate for those that wait less
+  kDisconnect,  ///< the device goes: kDisconnected, also from open() for `duration` (0 s)
+};
+
+/// One fault, at one capture.
+struct Fault {
+  FaultKind kind = FaultKind::kDrop;
+  std::uint64_t capture = 1;  ///< at which capture() of the camera's life, counted from 1
+  std::optional<std::chrono::nanoseconds> duration;
+
+  friend bool operator==(const Fault&, const Fault&) = default;
+};
+
+/// Reads a fault as the configuration writes it: KIND@CAPTURE or KIND@CAPTURE:DURATION, KIND being drop, tear, late,
+/// stale, stall or disconnect, DURATION a number and us, ms or s: "drop@3", "late@5:200ms", "disconnect@7:1.5s".
+/// @errors kInvalidArgument
+/// @thread reentrant
+[[nodiscard]] Result<Fault> parse_fault(std::string_view text);
+
+/// Reads a list of faults; the error names the entry. @errors kInvalidArgument @thread reentrant
+[[nodiscard]] Result<std::vector<Fault>> parse_faults(const std::vector<std::string>& texts);
+
+}  // namespace slsd

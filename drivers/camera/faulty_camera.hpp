@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/camera/camera.hpp"
+#include "drivers/camera/cancel_latch.hpp"
+#include "drivers/camera/fault.hpp"
+
+namespace slsd {
+
+/// A camera with faults: passes everything on to the camera that it holds, but at the captures that the faults name
+/// does as they say. For the tests of everything above a camera.
+/// @thread thread-bound, but for cancel()
+class FaultyCamera final : public Camera {
+ public:
+  /// @param camera  not null
+  /// @param faults  in any order; of several at the same capture the first is used
+  FaultyCamera(std::unique_ptr<Camera> camera, std::vector<Fault> faults);
+
+  [[nodiscard]] const CameraDescription& description() const override { return camera_->description(); }
+  [[nodiscard]] Result<> open() override;
+  [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
+  void cancel() override;
+
+ private:
+  [[nodiscard]] const Fault* fault_now() const;
+  [[nodiscard]] Result<Frame> capture_with(const Fault& fault, MonotonicTime deadline);
+  [[nodiscard]] Result<Frame> capture_sound(MonotonicTime deadline);
+  [[nodiscard]] Result<Frame> lose_frame(ErrorCode code, std::string message, MonotonicTime deadline);
+  [[nodiscard]] Result<Frame> delay_frame(const Fault& fault, MonotonicTime deadline);
+  [[nodiscard]] Result<Frame> age_frame(const Fault& fault, MonotonicTime deadline);
+  [[nodiscard]] Result<Frame> disconnect(const Fault& fault);
+  [[nodiscard]] Result<> wait_until(MonotonicTime time, MonotonicTime deadline);
+  [[nodiscard]] tl::unexpected<Error> fail_here(ErrorCode code, std::string message) const;
+
+  std::unique_ptr<Camera> camera_;
+  std::vector<Fault> faults_;
+  CancelLatch cancel_;
+  std::uint64_t captures_ = 0;
+  bool connected_ = true;
+  std::optional<MonotonicTime> back_at_;  ///< open() fails until then
+  std::optional<MonotonicTime> stalled_until_;
+};
+
+}  // namespace slsd

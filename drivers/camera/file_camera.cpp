@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/file_camera.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <variant>
+
+namespace slsd {
+namespace {
+
+constexpr double kRateMaxHz = 1000.0;
+
+std::string size_text(int width_px, int height_px) {
+  return std::to_string(width_px) + "x" + std::to_string(height_px);
+}
+
+std::string format_text(const FrameFormat& format) {
+  return size_text(format.width_px, format.height_px) + " with " + std::to_string(8 * format.bytes_per_pixel) + " bits";
+}
+
+/// The first tick of the period, counted from the start, that is not before the time.
+MonotonicTime next_tick(MonotonicTime start, std::chrono::nanoseconds period, MonotonicTime time) {
+  const auto ticks = (time - start + period - std::chrono::nanoseconds(1)) / period;
+  return start + ticks * period;
+}
+
+}  // namespace
+
+Result<> FileCameraOptions::validate() const {
+  if (name.empty()) return fail(ErrorCode::kInvalidArgument, "a camera needs a name", "name");
+  if (path.empty()) return fail(ErrorCode::kInvalidArgument, "a file camera needs a folder or an image", "path");
+  if (!(rate_hz >= 0.0 && rate_hz <= kRateMaxHz) || (rate_hz > 0.0 && rate_hz < 1e-3))
+    return fail(ErrorCode::kInvalidArgument, "must be 0, or between 0.001 and 1000", "rate_hz");
+  if (size_px && (size_px->first < 1 || size_px->second < 1))
+    return fail(ErrorCode::kInvalidArgument, "width and height must be at least 1", "size_px");
+  if (frames_held_max < 2 || frames_held_max > 64)
+    return fail(ErrorCode::kInvalidArgument, "must be between 2 and 64", "frames_held_max");
+  return {};
+}
+
+FileCamera::FileCamera(FileCameraOptions options)
+    : options_(std::move(options)), description_{options_.name, "file", options_.path.string(), 0, 0} {}
+
+Result<> FileCamera::open() {
+  pool_.reset();
+  cancel_.reset();
+  if (auto valid = options_.validate(); !valid) return valid;
+  ReadImageOptions reading;
+  reading.bayer = options_.bayer;
+  if (auto listed = folder_.open(options_.path, reading, options_.cache_bytes); !listed) return listed;
+  const auto first = folder_.image(0);
+  if (!first) return tl::unexpected(first.error());
+  return configure(format_of(view(**first)));
+}
+
+Result<> FileCamera::configure(const FrameFormat& format) {
+  if (options_.size_px && *options_.size_px != std::pair(format.width_px, format.height_px))
+    return fail(ErrorCode::kMismatch,
+                "the first image is " + size_text(format.width_px, format.height_px) +
+                    " pixels, the configuration says " + size_text(options_.size_px->first, options_.size_px->second) +
+                    "; change one of them",
+                options_.path.string());
+  description_.width_px = format.width_px;
+  description_.height_px = format.height_px;
+  pool_.emplace(format, options_.frames_held_max);
+  opened_ = std::chrono::steady_clock::now();
+  next_sequence_ = 0;
+  return {};
+}
+
+Result<Frame> FileCamera::capture(MonotonicTime deadline) {
+  if (!pool_) return fail(ErrorCode::kDisconnected, "the camera is not open; open it", options_.name);
+  const auto exposure_start = wait_for_exposure(deadline);
+  if (!exposure_start) return tl::unexpected(exposure_start.error());
+  auto frame = deliver(*exposure_start);
+  if (!frame && frame.error().code == ErrorCode::kDisconnected) pool_.reset();
+  if (frame && frame->received() > deadline) return fail_late();
+  return frame;
+}
+
+Result<MonotonicTime> FileCamera::wait_for_exposure(MonotonicTime deadline) {
+  const MonotonicTime now = std::chrono::steady_clock::now();
+  MonotonicTime exposure_start = now;
+  if (options_.rate_hz > 0.0) {
+    const auto period = std::chrono::nanoseconds(std::llround(1e9 / options_.rate_hz));
+    exposure_start = next_tick(opened_, period, now);
+  }
+  const bool cancelled = cancel_.wait_until(std::min(exposure_start, deadline));
+  if (cancelled) return fail(ErrorCode::kCancelled, "the capture was cancelled", options_.name);
+  if (exposure_start > deadline) return fail_late();
+  return exposure_start;
+}
+
+Result<Frame> FileCamera::deliver(MonotonicTime exposure_start) {
+  const std::uint64_t sequence = next_sequence_;
+  if (sequence >= folder_.size() && !options_.loop)
+    return fail(ErrorCode::kNotFound,
+                "all " + std::to_string(folder_.size()) + " images were shown; set loop = true to begin again",
+                options_.path.string());
+  ++next_sequence_;
+  const auto image = folder_.image(sequence % folder_.size());
+  if (!image) return tl::unexpected(image.error());
+  const GreyView pixels = view(**image);
+  if (format_of(pixels) != pool_->format()) return fail_format(sequence, format_of(pixels));
+  auto frame = pool_->lend(pixels, sequence, exposure_start);
+  if (frame) return std::move(*frame);
+  return fail(ErrorCode::kBusy,
+              "all " + std::to_string(options_.frames_held_max) + " frames are held; give some back first",
+              options_.name);
+}
+
+tl::unexpected<Error> FileCamera::fail_late() const {
+  return fail(ErrorCode::kFrameLate, "no frame came before the deadline; allow more time or raise rate_hz",
+              options_.name);
+}
+
+tl::unexpected<Error> FileCamera::fail_format(std::uint64_t sequence, const FrameFormat& format) const {
+  return fail(ErrorCode::kMismatch,
+              "image " + std::to_string(sequence % folder_.size() + 1) + " of " + std::to_string(folder_.size()) +
+                  " is " + format_text(format) + ", the first is " + format_text(pool_->format()) +
+                  "; keep images of one kind to a folder",
+              options_.path.string());
+}
+
+}  // namespace slsd

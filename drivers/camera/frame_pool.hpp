@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "core/image.hpp"
+#include "drivers/camera/frame.hpp"
+
+namespace slsd {
+
+/// The size and depth of a camera's frames.
+struct FrameFormat {
+  int width_px = 0;
+  int height_px = 0;
+  int bytes_per_pixel = 1;  ///< 1 or 2
+
+  friend bool operator==(const FrameFormat&, const FrameFormat&) = default;
+};
+
+[[nodiscard]] FrameFormat format_of(const GreyView& image);
+
+/// A fixed number of buffers, all allocated at the beginning, lent to frames. Frames may outlive the pool: the buffers
+/// go with the last of both.
+/// @thread thread-bound; the frames that it lends may end on any thread
+class FramePool {
+ public:
+  FramePool(FrameFormat format, int buffers);
+  ~FramePool();
+  FramePool(FramePool&& other) noexcept;
+  FramePool& operator=(FramePool&& other) noexcept;
+
+  [[nodiscard]] const FrameFormat& format() const;
+
+  /// A copy of the pixels in a free buffer, or nothing if all are lent.
+  /// @param image  of the pool's format
+  [[nodiscard]] std::optional<Frame> lend(const GreyView& image, std::uint64_t sequence, MonotonicTime exposure_start);
+
+ private:
+  struct Buffers;
+  Buffers* buffers_;  ///< counted by itself, so that a lease fits into std::function without an allocation
+};
+
+}  // namespace slsd

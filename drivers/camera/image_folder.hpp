@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "core/result.hpp"
+#include "drivers/files/read_image.hpp"
+
+namespace slsd {
+
+/// The images of a folder, or one image, one after the other in the order of their names' bytes. Decoded images are
+/// kept as far as the cache reaches: the first ones, since what comes round again is used the latest.
+/// @thread thread-bound
+class ImageFolder {
+ public:
+  /// Lists the images and begins anew.
+  /// @errors kNotFound (path, or no image in it), kPermissionDenied, kIo
+  [[nodiscard]] Result<> open(const std::filesystem::path& path, const ReadImageOptions& options,
+                              std::size_t cache_bytes);
+
+  [[nodiscard]] std::size_t size() const { return images_.size(); }
+
+  /// The i-th image as it is on disk now; valid until the next call.
+  /// @errors as read_image(); kDisconnected where the folder itself, or the only image, is gone
+  [[nodiscard]] Result<const GreyImage*> image(std::size_t i);
+
+ private:
+  /// Tells a file from what stood in its place before.
+  struct Version {
+    std::uint64_t node = 0;
+    std::int64_t bytes = 0;
+    std::int64_t modified_ns = 0;
+    friend bool operator==(const Version&, const Version&) = default;
+  };
+  struct Entry {
+    std::filesystem::path path;
+    Version version;
+    std::optional<GreyImage> decoded;
+  };
+
+  [[nodiscard]] static std::optional<Version> version_of(const std::filesystem::path& path);
+  [[nodiscard]] Result<> list_folder();
+  [[nodiscard]] Result<const GreyImage*> decode(Entry& entry, const Version& version);
+
+  std::filesystem::path path_;
+  ReadImageOptions options_;
+  std::size_t cache_left_bytes_ = 0;
+  std::vector<Entry> images_;
+  GreyImage uncached_;
+};
+
+}  // namespace slsd
