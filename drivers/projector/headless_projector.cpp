@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/projector/headless_projector.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <string>
+#include <thread>
+#include <utility>
+
+namespace slsd {
+namespace {
+
+constexpr int kSideMaxPx = 16384;
+
+std::string size_text(int width_px, int height_px) {
+  return std::to_string(width_px) + "x" + std::to_string(height_px);
+}
+
+}  // namespace
+
+Result<> HeadlessProjectorOptions::validate() const {
+  if (width_px < 1 || width_px > kSideMaxPx)
+    return fail(ErrorCode::kInvalidArgument, "must be between 1 and 16384", "width_px");
+  if (height_px < 1 || height_px > kSideMaxPx)
+    return fail(ErrorCode::kInvalidArgument, "must be between 1 and 16384", "height_px");
+  if (!(refresh_hz >= 1.0 && refresh_hz <= 1000.0))
+    return fail(ErrorCode::kInvalidArgument, "must be between 1 and 1000", "refresh_hz");
+  return {};
+}
+
+HeadlessProjector::HeadlessProjector(HeadlessProjectorOptions options)
+    : options_(std::move(options)), description_{"headless", "headless", options_.width_px, options_.height_px} {}
+
+Result<> HeadlessProjector::open() {
+  if (auto valid = options_.validate(); !valid) return valid;
+  shown_.emplace(options_.width_px, options_.height_px);
+  first_refresh_ = std::chrono::steady_clock::now();
+  return {};
+}
+
+Result<MonotonicTime> HeadlessProjector::show(const Grey8& image) {
+  ++shows_;
+  if (std::find(options_.disconnect_at.begin(), options_.disconnect_at.end(), shows_) != options_.disconnect_at.end())
+    disconnect();
+  if (auto connected = check_connected(); !connected) return tl::unexpected(connected.error());
+  if (image.width() != options_.width_px || image.height() != options_.height_px)
+    return fail(ErrorCode::kMismatch,
+                "the image is " + size_text(image.width(), image.height()) + " pixels, the projector " +
+                    size_text(options_.width_px, options_.height_px) + "; make the pattern for this projector",
+                description_.monitor);
+  *shown_ = image;
+  const MonotonicTime refresh = next_refresh(std::chrono::steady_clock::now());
+  std::this_thread::sleep_until(refresh);
+  return refresh;
+}
+
+Result<Grey8> HeadlessProjector::read_back() {
+  if (auto connected = check_connected(); !connected) return tl::unexpected(connected.error());
+  return *shown_;
+}
+
+Result<> HeadlessProjector::check_connected() const {
+  if (shown_) return {};
+  return fail(ErrorCode::kDisconnected, "the projector is not there; check its cable and open it again",
+              description_.monitor);
+}
+
+MonotonicTime HeadlessProjector::next_refresh(MonotonicTime after) const {
+  const auto period = std::chrono::nanoseconds(std::llround(1e9 / options_.refresh_hz));
+  return first_refresh_ + ((after - first_refresh_) / period + 1) * period;
+}
+
+}  // namespace slsd
