@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include "core/image.hpp"
+
+namespace slsd {
+
+struct BinarizeOptions {
+  /// Side of a tile in camera pixels. A threshold is taken from 3x3 tiles, which have to hold a symbol and a gap: half the
+  /// pitch of the grid as the camera sees it.
+  int tile_px = 12;
+  /// Where the threshold lies between dark and light. Below the middle keeps a symbol whose parts touch at a corner in one
+  /// piece; at the middle keeps neighbours apart that are less than two pixels from each other.
+  float level = 0.5F;
+  /// Smallest difference between light and dark, in grey levels of 255, that is taken for the pattern.
+  int contrast_min = 8;
+};
+
+/// Separates lit from dark by a threshold midway between the least and the greatest grey value around each pixel,
+/// interpolated between tiles: it follows light that falls off over the frame, where one threshold for all cannot.
+/// @thread thread-bound: keeps its buffers
+class Binarizer {
+ public:
+  explicit Binarizer(BinarizeOptions options) : options_(options) {}
+
+  /// @param mask  becomes of the frame's size: 255 where lit, 0 elsewhere
+  void binarize(const GreyView& frame, Grey8& mask);
+
+ private:
+  template <class T>
+  void binarize_as(const ImageView<T>& frame, Grey8& mask);
+  template <class T>
+  void find_extremes(const ImageView<T>& frame);
+  void set_thresholds(int contrast_min, int nothing_lit);
+
+  BinarizeOptions options_;
+  int columns_ = 0, rows_ = 0;  // tiles
+  std::vector<int> least_, greatest_;
+  std::vector<float> midway_, threshold_;
+  std::vector<float> row_threshold_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// Lit pixels left to right - 1 of a row.
+struct Run {
+  std::int16_t row, left, right;
+};
+
+/// A set of lit pixels that touch along an edge or at a corner (8-connected).
+struct Region {
+  int left, top, right, bottom;  ///< its box, the last column and row inside
+  int area_px;
+  int first_run, run_count;  ///< in Regions::runs, in raster order
+
+  [[nodiscard]] int width_px() const { return right - left + 1; }
+  [[nodiscard]] int height_px() const { return bottom - top + 1; }
+};
+
+/// The regions of a mask in the raster order of their first pixels.
+struct Regions {
+  std::vector<Region> regions;
+  std::vector<Run> runs;
+
+  [[nodiscard]] std::span<const Run> runs_of(const Region& region) const {
+    return {runs.data() + region.first_run, static_cast<std::size_t>(region.run_count)};
+  }
+};
+
+/// Labels 8-connected regions by runs and union-find (Haralick and Shapiro's local table method, on runs).
+/// @thread thread-bound: keeps its buffers
+class RegionFinder {
+ public:
+  /// @param mask  non-zero where lit; at most 32767 pixels wide and high
+  void find(const ImageView<std::uint8_t>& mask, Regions& found);
+
+ private:
+  void find_runs(const ImageView<std::uint8_t>& mask);
+  void join_touching_runs(int height);
+  void gather(Regions& found);
+  int root(int run);
+
+  std::vector<Run> runs_;
+  std::vector<int> first_run_of_row_;
+  std::vector<int> parent_;
+  std::vector<int> region_of_run_;
+};
+
+}  // namespace slsd

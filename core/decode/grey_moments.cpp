@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/grey_moments.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/decode/clones.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr float kOutside = -1.F;
+constexpr float kRampStart = 0.2F;
+constexpr float kRampEnd = 0.8F;
+
+struct Levels {
+  float background, peak;
+};
+
+/// Background and peak as the means of the lowest and the highest quarter of the range: single noisy pixels do not move them.
+SLSD_CLONES Levels find_levels(const float* patch, int count) {
+  float low = std::numeric_limits<float>::max(), high = 0;
+  for (int i = 0; i < count; ++i) {
+    const float value = patch[i];
+    high = value > high ? value : high;
+    low = value >= 0 && value < low ? value : low;
+  }
+  const float low_limit = low + 0.25F * (high - low), high_limit = high - 0.25F * (high - low);
+  float low_sum = 0, high_sum = 0, low_count = 0, high_count = 0;
+#pragma GCC ivdep
+  for (int i = 0; i < count; ++i) {
+    const float value = patch[i];
+    const float is_low = value >= 0 && value <= low_limit ? 1.F : 0.F;
+    const float is_high = value >= high_limit ? 1.F : 0.F;
+    low_sum += is_low * value;
+    low_count += is_low;
+    high_sum += is_high * value;
+    high_count += is_high;
+  }
+  return {low_count > 0 ? low_sum / low_count : low, high_count > 0 ? high_sum / high_count : high};
+}
+
+/// Sums of w x^k along one row, k = 0 to 3, x from the patch's middle.
+struct RowSums {
+  float s0, s1, s2, s3;
+};
+
+SLSD_CLONES RowSums sum_row(const float* row, int width, float middle, float offset, float scale) {
+  float s0 = 0, s1 = 0, s2 = 0, s3 = 0;
+  for (int i = 0; i < width; ++i) {
+    const float x = static_cast<float>(i) - middle;
+    const float w = std::clamp((row[i] - offset) * scale, 0.F, 1.F);
+    const float wx = w * x, wxx = wx * x;
+    s0 += w;
+    s1 += wx;
+    s2 += wxx;
+    s3 += wxx * x;
+  }
+  return {s0, s1, s2, s3};
+}
+
+/// Raw moments about the patch's middle, to central ones over the weight.
+GreyMoments central(const double (&m)[4][4], double middle_x, double middle_y) {
+  GreyMoments g;
+  if (m[0][0] <= 0) return g;
+  const double n = 1 / m[0][0];
+  const double x = m[1][0] * n, y = m[0][1] * n;
+  const double xx = m[2][0] * n, xy = m[1][1] * n, yy = m[0][2] * n;
+  g.weight = static_cast<float>(m[0][0]);
+  g.x = static_cast<float>(middle_x + x);
+  g.y = static_cast<float>(middle_y + y);
+  g.m20 = static_cast<float>(xx - x * x);
+  g.m11 = static_cast<float>(xy - x * y);
+  g.m02 = static_cast<float>(yy - y * y);
+  g.m30 = static_cast<float>(m[3][0] * n - 3 * x * xx + 2 * x * x * x);
+  g.m21 = static_cast<float>(m[2][1] * n - 2 * x * xy - y * xx + 2 * x * x * y);
+  g.m12 = static_cast<float>(m[1][2] * n - 2 * y * xy - x * yy + 2 * y * y * x);
+  g.m03 = static_cast<float>(m[0][3] * n - 3 * y * yy + 2 * y * y * y);
+  return g;
+}
+
+}  // namespace
+
+template <class T>
+void GreyMomentMeter::copy_patch(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
+  const int left = region.left - margin_px_, top = region.top - margin_px_;
+  width_ = region.width_px() + 2 * margin_px_;
+  height_ = region.height_px() + 2 * margin_px_;
+  first_.assign(static_cast<std::size_t>(height_), width_);
+  last_.assign(static_cast<std::size_t>(height_), -1);
+  for (const Run& run : runs) {
+    for (int y = run.row - top - margin_px_; y <= run.row - top + margin_px_; ++y) {
+      first_[y] = std::min(first_[y], run.left - left - margin_px_);
+      last_[y] = std::max(last_[y], run.right - 1 - left + margin_px_);
+    }
+  }
+  patch_.assign(static_cast<std::size_t>(width_) * height_, kOutside);
+  for (int y = 0; y < height_; ++y) {
+    if (top + y < 0 || top + y >= frame.height) continue;
+    const T* pixels = frame.row(top + y);
+    float* row = patch_.data() + y * width_;
+    const int end = std::min(last_[y], frame.width - 1 - left);
+    for (int x = std::max(first_[y], -left); x <= end; ++x) row[x] = static_cast<float>(pixels[left + x]);
+  }
+}
+
+template <class T>
+GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
+  copy_patch(frame, region, runs);
+  const Levels levels = find_levels(patch_.data(), width_ * height_);
+  const float range = levels.peak - levels.background;
+  if (range <= 0) return {};
+
+  const float offset = levels.background + kRampStart * range;
+  const float scale = 1.F / ((kRampEnd - kRampStart) * range);
+  const double middle_x = 0.5 * (width_ - 1), middle_y = 0.5 * (height_ - 1);
+  double m[4][4] = {};
+  for (int row = 0; row < height_; ++row) {
+    const RowSums s = sum_row(patch_.data() + row * width_, width_, static_cast<float>(middle_x), offset, scale);
+    const double y = row - middle_y;
+    m[0][0] += s.s0;
+    m[1][0] += s.s1;
+    m[2][0] += s.s2;
+    m[3][0] += s.s3;
+    m[0][1] += y * s.s0;
+    m[1][1] += y * s.s1;
+    m[2][1] += y * s.s2;
+    m[0][2] += y * y * s.s0;
+    m[1][2] += y * y * s.s1;
+    m[0][3] += y * y * y * s.s0;
+  }
+  GreyMoments moments = central(m, region.left - margin_px_ + middle_x, region.top - margin_px_ + middle_y);
+  moments.background = levels.background;
+  moments.peak = levels.peak;
+  return moments;
+}
+
+template GreyMoments GreyMomentMeter::measure(const ImageView<std::uint8_t>&, const Region&, std::span<const Run>);
+template GreyMoments GreyMomentMeter::measure(const ImageView<std::uint16_t>&, const Region&, std::span<const Run>);
+
+}  // namespace slsd
