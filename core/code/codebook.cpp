@@ -14,7 +14,8 @@ Codeword codeword_at(const CodeArray& array, int row, int column) {
   return codeword;
 }
 
-Codebook::Codebook(const CodeArray& array, int rows, int columns, int radius) : letters_(static_cast<std::uint32_t>(array.letters)) {
+Codebook::Codebook(const CodeArray& array, int rows, int columns, int radius)
+    : letters_(static_cast<std::uint32_t>(array.letters)) {
   const std::size_t per_window = radius > 0 ? 1 + kWindowCells * (letters_ - 1) : 1;
   const std::size_t entries = static_cast<std::size_t>(rows) * columns * per_window;
   mask_ = std::bit_ceil(2 * entries + 1) - 1;
@@ -45,7 +46,8 @@ void Codebook::insert(const Codeword& codeword, int row, int column, int errors)
   const std::uint32_t key = key_of(codeword);
   std::size_t slot = slot_of(key);
   while (table_[slot].errors >= 0) slot = (slot + 1) & mask_;
-  table_[slot] = {key, static_cast<std::int16_t>(row), static_cast<std::int16_t>(column), static_cast<std::int8_t>(errors)};
+  table_[slot] = {key, static_cast<std::int16_t>(row), static_cast<std::int16_t>(column),
+                  static_cast<std::int8_t>(errors)};
 }
 
 }  // namespace slsd

@@ -13,7 +13,8 @@ namespace slsd {
 /// The nine letters of a 3x3 window, row by row.
 using Codeword = std::array<std::uint8_t, kWindowCells>;
 
-/// Finds windows of the array by their codewords, with up to the number of errors that its minimum distance can correct.
+/// Finds windows of the array by their codewords, with up to the number of errors that its minimum distance can
+/// correct.
 /// @thread reentrant
 class Codebook {
  public:
@@ -24,7 +25,8 @@ class Codebook {
   };
 
   /// @param rows, columns  the part of the array that is shown
-  /// @param radius         errors to correct, 0 or 1; at most (minimum distance - 1) / 2 where the answers are to be unique
+  /// @param radius         errors to correct, 0 or 1; at most (minimum distance - 1) / 2 where the answers are to be
+  /// unique
   Codebook(const CodeArray& array, int rows, int columns, int radius);
 
   /// Calls found(const Entry&) for every window within the radius of the codeword.

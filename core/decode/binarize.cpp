@@ -35,7 +35,8 @@ float mean_around(const std::vector<float>& tiles, int columns, int rows, int co
   float sum = 0;
   int count = 0;
   for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows - 1); ++r) {
-    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns - 1); ++c, ++count) sum += tiles[r * columns + c];
+    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns - 1); ++c, ++count)
+      sum += tiles[r * columns + c];
   }
   return sum / static_cast<float>(count);
 }
@@ -72,7 +73,9 @@ void Binarizer::set_thresholds(int contrast_min, int nothing_lit) {
           high = std::max(high, greatest_[r * columns_ + c]);
         }
       }
-      midway_[row * columns_ + column] = high - low < contrast_min ? static_cast<float>(high + nothing_lit) : static_cast<float>(low) + options_.level * static_cast<float>(high - low);
+      midway_[row * columns_ + column] =
+          high - low < contrast_min ? static_cast<float>(high + nothing_lit)
+                                    : static_cast<float>(low) + options_.level * static_cast<float>(high - low);
     }
   }
   for (int row = 0; row < rows_; ++row) {

@@ -9,11 +9,11 @@
 namespace slsd {
 
 struct BinarizeOptions {
-  /// Side of a tile in camera pixels. A threshold is taken from 3x3 tiles, which have to hold a symbol and a gap: half the
-  /// pitch of the grid as the camera sees it.
+  /// Side of a tile in camera pixels. A threshold is taken from 3x3 tiles, which have to hold a symbol and a gap: half
+  /// the pitch of the grid as the camera sees it.
   int tile_px = 12;
-  /// Where the threshold lies between dark and light. Below the middle keeps a symbol whose parts touch at a corner in one
-  /// piece; at the middle keeps neighbours apart that are less than two pixels from each other.
+  /// Where the threshold lies between dark and light. Below the middle keeps a symbol whose parts touch at a corner in
+  /// one piece; at the middle keeps neighbours apart that are less than two pixels from each other.
   float level = 0.5F;
   /// Smallest difference between light and dark, in grey levels of 255, that is taken for the pattern.
   int contrast_min = 8;

@@ -22,7 +22,9 @@ class CellRays {
   [[nodiscard]] const PixelRay& ray(int row, int column) const { return rays_[index(row, column)]; }
 
  private:
-  [[nodiscard]] std::size_t index(int row, int column) const { return static_cast<std::size_t>(row) * columns_ + column; }
+  [[nodiscard]] std::size_t index(int row, int column) const {
+    return static_cast<std::size_t>(row) * columns_ + column;
+  }
 
   int rows_, columns_;
   std::vector<Eigen::Vector2d> pixels_;

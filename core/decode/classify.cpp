@@ -20,7 +20,8 @@ Classification classify(const ShapeFeatures& features, const std::vector<Prototy
   for (std::size_t i = 0; i < prototypes.size(); ++i) {
     const Prototype& prototype = prototypes[i];
     const float squared = (prototype.whitening * (features - prototype.mean)).squaredNorm();
-    result.log_probability[i] = -0.5F * (kDegreesOfFreedom + kFeatureCount) * std::log1p(squared / kDegreesOfFreedom) - prototype.log_volume;
+    result.log_probability[i] =
+        -0.5F * (kDegreesOfFreedom + kFeatureCount) * std::log1p(squared / kDegreesOfFreedom) - prototype.log_volume;
     squared_least = std::min(squared_least, squared);
     if (result.log_probability[i] > best) best = result.log_probability[i], letter = static_cast<int>(i);
   }

@@ -23,7 +23,8 @@ void Correspondence::settle_duplicates(int columns, std::vector<CellClaim>& clai
   }
 }
 
-void Correspondence::correspond(const CellRays& cells, const std::vector<EpipolarSegment>& segments, std::vector<CellClaim>& claims) {
+void Correspondence::correspond(const CellRays& cells, const std::vector<EpipolarSegment>& segments,
+                                std::vector<CellClaim>& claims) {
   for (std::size_t node = 0; node < claims.size(); ++node) {
     CellClaim& claim = claims[node];
     if (claim.status != RegionStatus::kDecoded) continue;

@@ -13,8 +13,8 @@ struct CorrespondOptions {
   float evidence_margin = 2;     ///< by how much the better of two claims on one cell has to be better to stand
 };
 
-/// Makes correspondences of claims: each cell belongs to one node at most, on its epipolar line and within the working depth.
-/// Of two claims on one cell the better stands, if it is clearly better; otherwise neither.
+/// Makes correspondences of claims: each cell belongs to one node at most, on its epipolar line and within the working
+/// depth. Of two claims on one cell the better stands, if it is clearly better; otherwise neither.
 /// @param segments  one to a node
 /// @param claims    in and out: rejected ones change their status
 /// @thread thread-bound: keeps its buffers

@@ -34,7 +34,8 @@ void WindowDecoder::vote(std::int32_t node, int row, int column, int weight, con
     return;
   }
   if (ballot.count == kVotes) return;
-  ballot.votes[ballot.count++] = {static_cast<std::int16_t>(row), static_cast<std::int16_t>(column), static_cast<std::int16_t>(weight)};
+  ballot.votes[ballot.count++] = {static_cast<std::int16_t>(row), static_cast<std::int16_t>(column),
+                                  static_cast<std::int16_t>(weight)};
 }
 
 void WindowDecoder::look_up_windows(const std::vector<Classification>& shapes, const CellGate& gate) {
@@ -54,7 +55,8 @@ void WindowDecoder::look_up_windows(const std::vector<Classification>& shapes, c
     });
     if (hits != 1) continue;
     for (int i = 0; i < kWindowCells; ++i) {
-      vote(around[i], hit.row - 1 + i / kWindowSide, hit.column - 1 + i % kWindowSide, hit.errors == 0 ? kExactWeight : kCorrectedWeight, gate);
+      vote(around[i], hit.row - 1 + i / kWindowSide, hit.column - 1 + i % kWindowSide,
+           hit.errors == 0 ? kExactWeight : kCorrectedWeight, gate);
     }
   }
 }
@@ -94,7 +96,8 @@ void WindowDecoder::spread(const std::vector<GridNode>& nodes, const CellGate& g
         const std::int32_t other = neighbour(nodes, static_cast<std::int32_t>(node), d);
         if (other < 0 || !claims[other].named()) continue;
         const Eigen::Vector2f back = step(opposite(d));
-        const int row = claims[other].row + static_cast<int>(back.y()), column = claims[other].column + static_cast<int>(back.x());
+        const int row = claims[other].row + static_cast<int>(back.y()),
+                  column = claims[other].column + static_cast<int>(back.x());
         if (!shown(row, column) || !gate.admits(static_cast<std::int32_t>(node), row, column)) continue;
         if (named.named() && !named.same_cell(row, column)) {
           named = {-1, -1, 0, RegionStatus::kAmbiguousCodeword};
@@ -134,8 +137,8 @@ void WindowDecoder::verify(const std::vector<Classification>& shapes, std::vecto
   }
 }
 
-void WindowDecoder::decode(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes, const CellGate& gate,
-                           std::vector<CellClaim>& claims) {
+void WindowDecoder::decode(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes,
+                           const CellGate& gate, std::vector<CellClaim>& claims) {
   around_.resize(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i) around_[i] = neighbourhood(nodes, static_cast<std::int32_t>(i));
   ballots_.assign(nodes.size(), {});

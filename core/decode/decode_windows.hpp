@@ -21,23 +21,28 @@ struct CellClaim {
   RegionStatus status = RegionStatus::kNoNeighbour;  ///< kDecoded, or why not
 
   [[nodiscard]] bool named() const { return row >= 0; }
-  [[nodiscard]] bool same_cell(int other_row, int other_column) const { return row == other_row && column == other_column; }
+  [[nodiscard]] bool same_cell(int other_row, int other_column) const {
+    return row == other_row && column == other_column;
+  }
 };
 
 struct DecodeWindowsOptions {
-  int rows = 0, columns = 0;   ///< of the part of the array that is shown
-  float evidence_min = 5;      ///< e^5: odds of 150 to 1 against chance
-  float own_class_min = -2.5F; ///< log-probability of the node's own letter at its cell
-  float mismatch = -3;         ///< what one neighbour may count against a cell at the most
+  int rows = 0, columns = 0;    ///< of the part of the array that is shown
+  float evidence_min = 5;       ///< e^5: odds of 150 to 1 against chance
+  float own_class_min = -2.5F;  ///< log-probability of the node's own letter at its cell
+  float mismatch = -3;          ///< what one neighbour may count against a cell at the most
 };
 
 /// Names the cell of each node.
 ///
-/// 1. Every full 3x3 window is looked up, correcting as many errors as the array's distance allows; what the epipolar gate
+/// 1. Every full 3x3 window is looked up, correcting as many errors as the array's distance allows; what the epipolar
+/// gate
 ///    excludes does not count.
-/// 2. Each window found votes for the cells of all its nine nodes, so a node at an edge, or misread, is named by its neighbours.
+/// 2. Each window found votes for the cells of all its nine nodes, so a node at an edge, or misread, is named by its
+/// neighbours.
 /// 3. What no window reaches is named by neighbours that are named already.
-/// 4. Every name is verified: the node's own shape, and the shapes around it, have to be those of the cells around that cell.
+/// 4. Every name is verified: the node's own shape, and the shapes around it, have to be those of the cells around that
+/// cell.
 /// @thread thread-bound: keeps its buffers
 class WindowDecoder {
  public:

@@ -7,7 +7,9 @@
 namespace slsd {
 namespace {
 
-std::string size_text(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
+std::string size_text(int width, int height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
 
 }  // namespace
 
@@ -16,15 +18,18 @@ Decoder::Decoder(Decoder&&) noexcept = default;
 Decoder& Decoder::operator=(Decoder&&) noexcept = default;
 Decoder::~Decoder() = default;
 
-Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index, const DecodeOptions& options) {
+Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
+                                const DecodeOptions& options) {
   if (auto valid = options.validate(); !valid) return tl::unexpected(valid.error());
   if (camera_index >= calibration.cameras.size()) {
     return fail(ErrorCode::kInvalidArgument, "the calibration has no camera " + std::to_string(camera_index));
   }
   const Lens& projector = calibration.projector;
-  if (projector.width_px != pattern.options.projector_width_px || projector.height_px != pattern.options.projector_height_px) {
+  if (projector.width_px != pattern.options.projector_width_px ||
+      projector.height_px != pattern.options.projector_height_px) {
     return fail(ErrorCode::kMismatch,
-                "the calibration is of a projector of " + size_text(projector.width_px, projector.height_px) + " pixels, the pattern is for " +
+                "the calibration is of a projector of " + size_text(projector.width_px, projector.height_px) +
+                    " pixels, the pattern is for " +
                     size_text(pattern.options.projector_width_px, pattern.options.projector_height_px) +
                     "; calibrate with this projector, or set the projector's size to the calibrated one");
   }
@@ -35,8 +40,10 @@ Result<const Decoding*> Decoder::decode(const GreyView& frame, StageObserver* ob
   const auto [width, height] = std::visit([](const auto& view) { return std::pair(view.width, view.height); }, frame);
   const Lens& lens = pipeline_->camera_lens();
   if (width != lens.width_px || height != lens.height_px) {
-    return fail(ErrorCode::kMismatch, "the frame has " + size_text(width, height) + " pixels, the camera was calibrated with " +
-                                          size_text(lens.width_px, lens.height_px) + "; set the camera to the calibrated size, or calibrate again");
+    return fail(ErrorCode::kMismatch, "the frame has " + size_text(width, height) +
+                                          " pixels, the camera was calibrated with " +
+                                          size_text(lens.width_px, lens.height_px) +
+                                          "; set the camera to the calibrated size, or calibrate again");
   }
   return &pipeline_->decode(frame, observer);
 }

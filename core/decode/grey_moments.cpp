@@ -18,17 +18,20 @@ struct Levels {
   float background, peak;
 };
 
-/// Background and peak as the means of the lowest and the highest quarter of the range: single noisy pixels do not move them.
+/// Background and peak as the means of the lowest and the highest quarter of the range: single noisy pixels do not move
+/// them.
 SLSD_CLONES Levels find_levels(const float* patch, int count) {
   float low = std::numeric_limits<float>::max(), high = 0;
+#pragma omp simd reduction(max : high) reduction(min : low)
   for (int i = 0; i < count; ++i) {
     const float value = patch[i];
     high = value > high ? value : high;
-    low = value >= 0 && value < low ? value : low;
+    const float inside = value >= 0 ? value : std::numeric_limits<float>::max();
+    low = inside < low ? inside : low;
   }
   const float low_limit = low + 0.25F * (high - low), high_limit = high - 0.25F * (high - low);
   float low_sum = 0, high_sum = 0, low_count = 0, high_count = 0;
-#pragma GCC ivdep
+#pragma omp simd reduction(+ : low_sum, high_sum, low_count, high_count)
   for (int i = 0; i < count; ++i) {
     const float value = patch[i];
     const float is_low = value >= 0 && value <= low_limit ? 1.F : 0.F;
@@ -48,6 +51,7 @@ struct RowSums {
 
 SLSD_CLONES RowSums sum_row(const float* row, int width, float middle, float offset, float scale) {
   float s0 = 0, s1 = 0, s2 = 0, s3 = 0;
+#pragma omp simd reduction(+ : s0, s1, s2, s3)
   for (int i = 0; i < width; ++i) {
     const float x = static_cast<float>(i) - middle;
     const float w = std::clamp((row[i] - offset) * scale, 0.F, 1.F);

@@ -13,25 +13,34 @@ namespace {
 constexpr int kSpacingPx = 64;
 
 /// Projector pixel that lights what the camera sees at a pixel, on a plane z = depth of the camera.
-Eigen::Vector2d projector_pixel(const CalibratedCamera& camera, const Lens& projector, double x, double y, double depth_mm) {
+Eigen::Vector2d projector_pixel(const CalibratedCamera& camera, const Lens& projector, double x, double y,
+                                double depth_mm) {
   const Eigen::Vector2d direction = camera.lens.undistort({x, y});
-  return projector.project(camera.projector_from_camera * Eigen::Vector3d(direction.x() * depth_mm, direction.y() * depth_mm, depth_mm));
+  return projector.project(camera.projector_from_camera *
+                           Eigen::Vector3d(direction.x() * depth_mm, direction.y() * depth_mm, depth_mm));
 }
 
 LatticeFrame frame_at(const CalibratedCamera& camera, const Lens& projector, double x, double y, double depth_mm) {
   constexpr double kStep = 2;
   Eigen::Matrix2d projector_from_camera;
-  projector_from_camera.col(0) = (projector_pixel(camera, projector, x + kStep, y, depth_mm) - projector_pixel(camera, projector, x - kStep, y, depth_mm)) / (2 * kStep);
-  projector_from_camera.col(1) = (projector_pixel(camera, projector, x, y + kStep, depth_mm) - projector_pixel(camera, projector, x, y - kStep, depth_mm)) / (2 * kStep);
+  projector_from_camera.col(0) = (projector_pixel(camera, projector, x + kStep, y, depth_mm) -
+                                  projector_pixel(camera, projector, x - kStep, y, depth_mm)) /
+                                 (2 * kStep);
+  projector_from_camera.col(1) = (projector_pixel(camera, projector, x, y + kStep, depth_mm) -
+                                  projector_pixel(camera, projector, x, y - kStep, depth_mm)) /
+                                 (2 * kStep);
   return projector_from_camera.inverse().cast<float>();
 }
 
-float scale_of(const LatticeFrame& frame) { return std::sqrt(std::abs(frame.determinant())); }
+float scale_of(const LatticeFrame& frame) {
+  return std::sqrt(std::abs(frame.determinant()));
+}
 
 }  // namespace
 
 ExpectedFrames::ExpectedFrames(const CalibratedCamera& camera, const Lens& projector, double depth_mm)
-    : columns_((camera.lens.width_px + kSpacingPx - 1) / kSpacingPx), rows_((camera.lens.height_px + kSpacingPx - 1) / kSpacingPx) {
+    : columns_((camera.lens.width_px + kSpacingPx - 1) / kSpacingPx),
+      rows_((camera.lens.height_px + kSpacingPx - 1) / kSpacingPx) {
   for (int row = 0; row < rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
       frames_.push_back(frame_at(camera, projector, (column + 0.5) * kSpacingPx, (row + 0.5) * kSpacingPx, depth_mm));

@@ -14,8 +14,8 @@ namespace slsd {
 /// (first column) and one down (second column).
 using LatticeFrame = Eigen::Matrix2f;
 
-/// The frames that the calibration lets one expect: those of a surface that faces the camera in the middle of the working range.
-/// They hardly depend on the depth; what turns them is the tilt of the surface.
+/// The frames that the calibration lets one expect: those of a surface that faces the camera in the middle of the
+/// working range. They hardly depend on the depth; what turns them is the tilt of the surface.
 /// @thread reentrant
 class ExpectedFrames {
  public:

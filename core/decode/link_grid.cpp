@@ -23,10 +23,14 @@ Eigen::Vector2f link_vector(const std::vector<GridNode>& nodes, std::size_t from
 
 Eigen::Vector2f step(Direction direction) {
   switch (direction) {
-    case kRight: return {1, 0};
-    case kDown: return {0, 1};
-    case kLeft: return {-1, 0};
-    case kUp: break;
+    case kRight:
+      return {1, 0};
+    case kDown:
+      return {0, 1};
+    case kLeft:
+      return {-1, 0};
+    case kUp:
+      break;
   }
   return {0, -1};
 }
@@ -52,13 +56,15 @@ void GridLinker::sort_into_buckets(const std::vector<GridNode>& nodes) {
   for (const GridNode& node : nodes) ++first_of_bucket_[bucket(node) + 1];
   for (std::size_t i = 1; i < first_of_bucket_.size(); ++i) first_of_bucket_[i] += first_of_bucket_[i - 1];
   in_buckets_.resize(nodes.size());
-  for (std::size_t i = nodes.size(); i-- > 0;) in_buckets_[--first_of_bucket_[bucket(nodes[i]) + 1]] = static_cast<std::int32_t>(i);
+  for (std::size_t i = nodes.size(); i-- > 0;)
+    in_buckets_[--first_of_bucket_[bucket(nodes[i]) + 1]] = static_cast<std::int32_t>(i);
   // The counting sort has moved each bucket's end to its beginning.
   first_of_bucket_.erase(first_of_bucket_.begin());
   first_of_bucket_.push_back(static_cast<std::int32_t>(nodes.size()));
 }
 
-std::int32_t GridLinker::nearest(const std::vector<GridNode>& nodes, std::size_t from, Direction direction, float radius) const {
+std::int32_t GridLinker::nearest(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
+                                 float radius) const {
   const GridNode& node = nodes[from];
   const Eigen::Vector2f target = node.centre_px + node.frame * (options_.pitch_px * step(direction));
   const Eigen::Matrix2f cells_from_camera = node.frame.inverse() / options_.pitch_px;
@@ -120,7 +126,8 @@ void GridLinker::break_inconsistent(std::vector<GridNode>& nodes) {
       std::array<Eigen::Vector2f, 4> parallel;
       int count = 0;
       const auto add = [&](std::int32_t from) {
-        if (from >= 0 && nodes[from].links[d] >= 0) parallel[count++] = link_vector(nodes, static_cast<std::size_t>(from), d);
+        if (from >= 0 && nodes[from].links[d] >= 0)
+          parallel[count++] = link_vector(nodes, static_cast<std::size_t>(from), d);
       };
       add(nodes[i].links[opposite(d)]);
       add(other);
@@ -131,7 +138,8 @@ void GridLinker::break_inconsistent(std::vector<GridNode>& nodes) {
       const Eigen::Matrix2f cells_from_camera = nodes[i].frame.inverse() / options_.pitch_px;
       int against = 0;
       for (int k = 0; k < count; ++k) {
-        against += (cells_from_camera * (own - parallel[k])).squaredNorm() > options_.deviation_max * options_.deviation_max;
+        against +=
+            (cells_from_camera * (own - parallel[k])).squaredNorm() > options_.deviation_max * options_.deviation_max;
       }
       if (2 * against > count) inconsistent_[i][d] = inconsistent_[other][opposite(d)] = true;
     }

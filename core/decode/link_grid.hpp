@@ -30,14 +30,17 @@ struct LinkGridOptions {
 };
 
 /// The opposite way along a link.
-[[nodiscard]] constexpr Direction opposite(Direction d) { return static_cast<Direction>((d + 2) % 4); }
+[[nodiscard]] constexpr Direction opposite(Direction d) {
+  return static_cast<Direction>((d + 2) % 4);
+}
 
 /// One step of the pattern in a direction, in cells.
 [[nodiscard]] Eigen::Vector2f step(Direction direction);
 
-/// Links each symbol with its four neighbours on the grid. A neighbour is the nearest one to where the local frame puts it, and
-/// the choice has to be mutual. Frames are then measured from the links and the search repeated more narrowly; last, links whose
-/// step disagrees with those beside and behind them are broken: they were carried across an edge in depth.
+/// Links each symbol with its four neighbours on the grid. A neighbour is the nearest one to where the local frame puts
+/// it, and the choice has to be mutual. Frames are then measured from the links and the search repeated more narrowly;
+/// last, links whose step disagrees with those beside and behind them are broken: they were carried across an edge in
+/// depth.
 ///
 ///        up
 ///         |          frame.col(0) = camera px for one projector px to the right
@@ -53,7 +56,8 @@ class GridLinker {
 
  private:
   void sort_into_buckets(const std::vector<GridNode>& nodes);
-  [[nodiscard]] std::int32_t nearest(const std::vector<GridNode>& nodes, std::size_t from, Direction direction, float radius) const;
+  [[nodiscard]] std::int32_t nearest(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
+                                     float radius) const;
   void find_mutual(std::vector<GridNode>& nodes, float radius);
   void measure_frames(std::vector<GridNode>& nodes) const;
   void break_inconsistent(std::vector<GridNode>& nodes);

@@ -15,12 +15,14 @@ namespace slsd {
 using Neighbourhood = std::array<std::int32_t, kWindowCells>;
 
 /// The neighbour along a link that is not broken, or -1.
-[[nodiscard]] inline std::int32_t neighbour(const std::vector<GridNode>& nodes, std::int32_t node, Direction direction) {
+[[nodiscard]] inline std::int32_t neighbour(const std::vector<GridNode>& nodes, std::int32_t node,
+                                            Direction direction) {
   if (node < 0 || nodes[node].broken[direction]) return -1;
   return nodes[node].links[direction];
 }
 
-/// Follows the links around a node. A corner can be reached by two ways; where they lead to different nodes it is left out.
+/// Follows the links around a node. A corner can be reached by two ways; where they lead to different nodes it is left
+/// out.
 [[nodiscard]] Neighbourhood neighbourhood(const std::vector<GridNode>& nodes, std::int32_t node);
 
 }  // namespace slsd

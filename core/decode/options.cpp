@@ -5,7 +5,8 @@
 namespace slsd {
 
 Result<> DecodeOptions::validate() const {
-  if (!(depth_min_mm > 0)) return fail(ErrorCode::kInvalidArgument, "depth_min_mm has to be greater than 0", "decode.depth_min_mm");
+  if (!(depth_min_mm > 0))
+    return fail(ErrorCode::kInvalidArgument, "depth_min_mm has to be greater than 0", "decode.depth_min_mm");
   if (!(depth_max_mm > depth_min_mm)) {
     return fail(ErrorCode::kInvalidArgument, "depth_max_mm has to be greater than depth_min_mm", "decode.depth_max_mm");
   }

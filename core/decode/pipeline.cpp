@@ -10,7 +10,8 @@
 namespace slsd {
 namespace {
 
-/// How far frames are off: the calibration's expectation by the tilt of the surface, a measured one by noise and curvature.
+/// How far frames are off: the calibration's expectation by the tilt of the surface, a measured one by noise and
+/// curvature.
 constexpr float kExpectedFrameError = 0.15F;
 constexpr float kMeasuredFrameError = 0.05F;
 /// Standard deviations from the nearest prototype beyond which a shape is none of the pattern's.
@@ -29,24 +30,32 @@ PrototypeOptions prototype_options(const Pattern& pattern, float scale, float fr
 
 BinarizeOptions binarize_options(const Pattern& pattern, float scale) {
   const float pitch = static_cast<float>(pattern.pitch_px()) * scale;
-  return {.tile_px = std::clamp(static_cast<int>(std::lround(0.5F * pitch)), 4, 64), .level = threshold_level(pattern.options.spacing_px, scale)};
+  return {.tile_px = std::clamp(static_cast<int>(std::lround(0.5F * pitch)), 4, 64),
+          .level = threshold_level(pattern.options.spacing_px, scale)};
 }
 
 /// Errors that the array's distance corrects; more than one costs more memory than it gains.
-int radius_of(const CodeArray& array) { return minimum_window_distance(array) >= 3 ? 1 : 0; }
+int radius_of(const CodeArray& array) {
+  return minimum_window_distance(array) >= 3 ? 1 : 0;
+}
 
-float grey_levels(const GreyView& frame) { return std::holds_alternative<ImageView<std::uint8_t>>(frame) ? 1.F : 257.F; }
+float grey_levels(const GreyView& frame) {
+  return std::holds_alternative<ImageView<std::uint8_t>>(frame) ? 1.F : 257.F;
+}
 
 }  // namespace
 
-Decoder::Pipeline::Pipeline(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index, const DecodeOptions& options)
+Decoder::Pipeline::Pipeline(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
+                            const DecodeOptions& options)
     : pattern_(pattern),
       camera_(calibration.cameras[camera_index]),
       camera_index_(static_cast<std::uint8_t>(camera_index)),
       options_(options),
       expected_(camera_, calibration.projector, std::sqrt(options.depth_min_mm * options.depth_max_mm)),
-      prototypes_as_expected_(make_prototypes(prototype_options(pattern, expected_.middle_scale(), kExpectedFrameError))),
-      prototypes_as_measured_(make_prototypes(prototype_options(pattern, expected_.middle_scale(), kMeasuredFrameError))),
+      prototypes_as_expected_(
+          make_prototypes(prototype_options(pattern, expected_.middle_scale(), kExpectedFrameError))),
+      prototypes_as_measured_(
+          make_prototypes(prototype_options(pattern, expected_.middle_scale(), kMeasuredFrameError))),
       cells_(pattern, prototypes_as_measured_, calibration.projector),
       camera_rays_(camera_.lens),
       epipolar_gate_(camera_, calibration.projector, options.depth_min_mm, options.depth_max_mm),
@@ -54,7 +63,8 @@ Decoder::Pipeline::Pipeline(const Pattern& pattern, const Calibration& calibrati
       binarizer_(binarize_options(pattern, expected_.middle_scale())),
       meter_(margin_px(pattern.options.spacing_px, expected_.middle_scale())),
       linker_({.pitch_px = static_cast<float>(pattern.pitch_px())}),
-      window_decoder_(pattern, {.rows = pattern.whole_rows(), .columns = pattern.whole_columns()}, radius_of(pattern.array)),
+      window_decoder_(pattern, {.rows = pattern.whole_rows(), .columns = pattern.whole_columns()},
+                      radius_of(pattern.array)),
       correspondence_({}) {}
 
 const Decoding& Decoder::Pipeline::decode(const GreyView& frame, StageObserver* observer) {
@@ -74,21 +84,28 @@ const Decoding& Decoder::Pipeline::decode(const GreyView& frame, StageObserver* 
   return decoding_;
 }
 
-void Decoder::Pipeline::binarize(const GreyView& frame) { binarizer_.binarize(frame, mask_); }
+void Decoder::Pipeline::binarize(const GreyView& frame) {
+  binarizer_.binarize(frame, mask_);
+}
 
-void Decoder::Pipeline::find_regions() { region_finder_.find(mask_.view(), regions_); }
+void Decoder::Pipeline::find_regions() {
+  region_finder_.find(mask_.view(), regions_);
+}
 
 RegionStatus Decoder::Pipeline::judge_size(const Region& region) const {
   if (region.left == 0 || region.top == 0 || region.right == mask_.width() - 1 || region.bottom == mask_.height() - 1) {
     return RegionStatus::kTouchesBorder;
   }
-  const LatticeFrame& frame = expected_.at(0.5F * static_cast<float>(region.left + region.right), 0.5F * static_cast<float>(region.top + region.bottom));
+  const LatticeFrame& frame = expected_.at(0.5F * static_cast<float>(region.left + region.right),
+                                           0.5F * static_cast<float>(region.top + region.bottom));
   const float scale_squared = std::abs(frame.determinant());
-  const float size = static_cast<float>(pattern_.options.symbol_size_px), pitch = static_cast<float>(pattern_.pitch_px());
+  const float size = static_cast<float>(pattern_.options.symbol_size_px),
+              pitch = static_cast<float>(pattern_.pitch_px());
   const float area = static_cast<float>(region.area_px);
   if (region.area_px < kAreaMinPx || area < kAreaMin * size * size * scale_squared) return RegionStatus::kTooSmall;
   const float extent = static_cast<float>(std::max(region.width_px(), region.height_px()));
-  if (area > kAreaMax * pitch * pitch * scale_squared || extent > 2 * pitch * std::sqrt(scale_squared)) return RegionStatus::kTooLarge;
+  if (area > kAreaMax * pitch * pitch * scale_squared || extent > 2 * pitch * std::sqrt(scale_squared))
+    return RegionStatus::kTooLarge;
   return RegionStatus::kNoNeighbour;
 }
 
@@ -101,7 +118,8 @@ void Decoder::Pipeline::describe(const GreyView& frame) {
     const Region& region = regions_.regions[i];
     region_status_[i] = judge_size(region);
     if (region_status_[i] != RegionStatus::kNoNeighbour) continue;
-    const GreyMoments moments = std::visit([&](const auto& view) { return meter_.measure(view, region, regions_.runs_of(region)); }, frame);
+    const GreyMoments moments =
+        std::visit([&](const auto& view) { return meter_.measure(view, region, regions_.runs_of(region)); }, frame);
     if (moments.peak - moments.background < contrast_min || moments.weight <= 0) {
       region_status_[i] = RegionStatus::kLowContrast;
       continue;
@@ -117,21 +135,25 @@ void Decoder::Pipeline::classify_as_expected() {
   nodes_.assign(moments_.size(), {});
   for (std::size_t i = 0; i < moments_.size(); ++i) {
     const LatticeFrame& frame = expected_.at(moments_[i].x, moments_[i].y);
-    shapes_[i] = classify(shape_features(moments_[i], frame.inverse(), size), prototypes_as_expected_, kExpectedDistanceMax);
+    shapes_[i] =
+        classify(shape_features(moments_[i], frame.inverse(), size), prototypes_as_expected_, kExpectedDistanceMax);
     nodes_[i].frame = frame;
     nodes_[i].centre_px = {moments_[i].x, moments_[i].y};
     if (shapes_[i].letter >= 0) nodes_[i].centre_px -= frame * prototypes_as_expected_[shapes_[i].letter].centroid_px;
   }
 }
 
-void Decoder::Pipeline::link_grid() { linker_.link(nodes_); }
+void Decoder::Pipeline::link_grid() {
+  linker_.link(nodes_);
+}
 
 void Decoder::Pipeline::classify_as_measured() {
   const float size = static_cast<float>(pattern_.options.symbol_size_px);
   for (std::size_t i = 0; i < moments_.size(); ++i) {
     const bool measured = nodes_[i].measured_u && nodes_[i].measured_v;
     if (!measured) continue;
-    shapes_[i] = classify(shape_features(moments_[i], nodes_[i].frame.inverse(), size), prototypes_as_measured_, kMeasuredDistanceMax);
+    shapes_[i] = classify(shape_features(moments_[i], nodes_[i].frame.inverse(), size), prototypes_as_measured_,
+                          kMeasuredDistanceMax);
   }
 }
 
@@ -145,7 +167,9 @@ void Decoder::Pipeline::decode_windows() {
   window_decoder_.decode(nodes_, shapes_, CellGate(cells_, segments_, CorrespondOptions{}.epipolar_max_px), claims_);
 }
 
-void Decoder::Pipeline::correspond() { correspondence_.correspond(cells_, segments_, claims_); }
+void Decoder::Pipeline::correspond() {
+  correspondence_.correspond(cells_, segments_, claims_);
+}
 
 void Decoder::Pipeline::triangulate() {
   decoding_.points.clear();
@@ -178,7 +202,8 @@ void Decoder::Pipeline::report() {
     const Region& region = regions_.regions[i];
     RegionSeen& seen = decoding_.regions[i];
     seen = {};
-    seen.centre_px = {0.5F * static_cast<float>(region.left + region.right), 0.5F * static_cast<float>(region.top + region.bottom)};
+    seen.centre_px = {0.5F * static_cast<float>(region.left + region.right),
+                      0.5F * static_cast<float>(region.top + region.bottom)};
     seen.status = region_status_[i];
     seen.letter = -1;
     seen.links.fill(-1);

@@ -24,7 +24,8 @@ namespace slsd {
 /// @thread thread-bound
 class Decoder::Pipeline {
  public:
-  Pipeline(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index, const DecodeOptions& options);
+  Pipeline(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
+           const DecodeOptions& options);
 
   const Decoding& decode(const GreyView& frame, StageObserver* observer);
   [[nodiscard]] const Lens& camera_lens() const { return camera_.lens; }

@@ -20,8 +20,8 @@ namespace {
 
 using Covariance = Eigen::Matrix<double, kFeatureCount, kFeatureCount>;
 
-/// What the model leaves out (uneven light, curvature, texture) as a standard deviation of each feature, so that no direction is
-/// held for more certain than it is.
+/// What the model leaves out (uneven light, curvature, texture) as a standard deviation of each feature, so that no
+/// direction is held for more certain than it is.
 constexpr double kFeatureFloor[kFeatureCount] = {0.02, 0.003, 0.003, 0.003, 0.0008, 0.0006, 0.0006, 0.0008};
 
 struct Look {
@@ -30,7 +30,8 @@ struct Look {
 };
 
 /// The region nearest to the middle of the view, measured as the decoder measures it.
-std::optional<Look> look_at(const SymbolView& view, const PrototypeOptions& options, const LatticeFrame& assumed, Regions& regions) {
+std::optional<Look> look_at(const SymbolView& view, const PrototypeOptions& options, const LatticeFrame& assumed,
+                            Regions& regions) {
   RegionFinder().find(view.mask.view(), regions);
   const float middle = 0.5F * static_cast<float>(view.image.width() - 1);
   const Region* nearest = nullptr;
@@ -41,14 +42,18 @@ std::optional<Look> look_at(const SymbolView& view, const PrototypeOptions& opti
     if (distance < nearest_px) nearest = &region, nearest_px = distance;
   }
   if (nearest == nullptr) return std::nullopt;
-  const float reach = 0.6F * view.frame.colwise().norm().maxCoeff() * static_cast<float>(options.symbol_size_px + options.spacing_px) + 1;
-  const bool merged = static_cast<float>(nearest->left) < middle - reach || static_cast<float>(nearest->right) > middle + reach ||
-                      static_cast<float>(nearest->top) < middle - reach || static_cast<float>(nearest->bottom) > middle + reach;
+  const float reach =
+      0.6F * view.frame.colwise().norm().maxCoeff() * static_cast<float>(options.symbol_size_px + options.spacing_px) +
+      1;
+  const bool merged =
+      static_cast<float>(nearest->left) < middle - reach || static_cast<float>(nearest->right) > middle + reach ||
+      static_cast<float>(nearest->top) < middle - reach || static_cast<float>(nearest->bottom) > middle + reach;
   if (merged) return std::nullopt;
   GreyMomentMeter meter(margin_px(options.spacing_px, options.camera_px_per_projector_px));
   const GreyMoments moments = meter.measure(view.image.view(), *nearest, regions.runs_of(*nearest));
   const Eigen::Vector2f from_middle = Eigen::Vector2f(moments.x, moments.y) - view.middle_px;
-  return Look{shape_features(moments, assumed.inverse(), static_cast<float>(options.symbol_size_px)), view.frame.inverse() * from_middle};
+  return Look{shape_features(moments, assumed.inverse(), static_cast<float>(options.symbol_size_px)),
+              view.frame.inverse() * from_middle};
 }
 
 Prototype summarise(const std::vector<Look>& looks) {

@@ -13,8 +13,9 @@ namespace slsd {
 /// How a symbol looks: the distribution of its features over blur, tilt, noise and where it falls on the pixels.
 struct Prototype {
   ShapeFeatures mean;
-  Eigen::Matrix<float, kFeatureCount, kFeatureCount> whitening;  ///< features minus mean, times this, have unit covariance
-  float log_volume;                                             ///< half the logarithm of the covariance's determinant
+  Eigen::Matrix<float, kFeatureCount, kFeatureCount>
+      whitening;                ///< features minus mean, times this, have unit covariance
+  float log_volume;             ///< half the logarithm of the covariance's determinant
   Eigen::Vector2f centroid_px;  ///< of its grey moments, from the middle of its square, projector px
 };
 
@@ -24,14 +25,14 @@ struct PrototypeOptions {
   int symbol_size_px = 16;
   int spacing_px = 2;
   float camera_px_per_projector_px = 1.4F;
-  /// How far the frame that the features are taken in may be off, as a share of a step: the calibration's expectation is off by
-  /// the tilt of the surface, a frame measured from neighbours by a few hundredths.
+  /// How far the frame that the features are taken in may be off, as a share of a step: the calibration's expectation
+  /// is off by the tilt of the surface, a frame measured from neighbours by a few hundredths.
   float frame_error = 0.05F;
   int samples = 120;  ///< looks at each symbol
 };
 
-/// Draws each symbol among random neighbours as a camera would see it, many times, reads it with the decoder's own stages, and
-/// keeps mean, covariance and centre. The same options give the same prototypes.
+/// Draws each symbol among random neighbours as a camera would see it, many times, reads it with the decoder's own
+/// stages, and keeps mean, covariance and centre. The same options give the same prototypes.
 /// @return one to a letter, in the order of `symbols`
 /// @thread reentrant
 [[nodiscard]] std::vector<Prototype> make_prototypes(const PrototypeOptions& options);
@@ -39,8 +40,8 @@ struct PrototypeOptions {
 /// Largest margin that a region's edge can be followed by without reaching its neighbour.
 [[nodiscard]] int margin_px(int spacing_px, float camera_px_per_projector_px);
 
-/// Where between dark and light the threshold lies: below the middle where the gaps are wide enough for it, so that a symbol whose
-/// parts touch at a corner stays in one piece.
+/// Where between dark and light the threshold lies: below the middle where the gaps are wide enough for it, so that a
+/// symbol whose parts touch at a corner stays in one piece.
 [[nodiscard]] float threshold_level(int spacing_px, float camera_px_per_projector_px);
 
 }  // namespace slsd

@@ -16,10 +16,10 @@ ShapeFeatures shape_features(const GreyMoments& g, const Eigen::Matrix2f& patter
            (p0 * q1 * q2 + q0 * p1 * q2 + q0 * q1 * p2) * third[2] + q0 * q1 * q2 * third[3];
   };
   ShapeFeatures features;
-  features << g.weight * std::abs(a * d - b * c),                   //
-      a * a * g.m20 + 2 * a * b * g.m11 + b * b * g.m02,            //
-      a * c * g.m20 + (a * d + b * c) * g.m11 + b * d * g.m02,      //
-      c * c * g.m20 + 2 * c * d * g.m11 + d * d * g.m02,            //
+  features << g.weight * std::abs(a * d - b * c),               //
+      a * a * g.m20 + 2 * a * b * g.m11 + b * b * g.m02,        //
+      a * c * g.m20 + (a * d + b * c) * g.m11 + b * d * g.m02,  //
+      c * c * g.m20 + 2 * c * d * g.m11 + d * d * g.m02,        //
       cubic(a, b, a, b, a, b), cubic(a, b, a, b, c, d), cubic(a, b, c, d, c, d), cubic(c, d, c, d, c, d);
   return features;
 }

@@ -29,7 +29,8 @@ float SymbolViewer::uniform(float low, float high) {
 Eigen::Matrix2f SymbolViewer::frame_error(float size) {
   Eigen::Matrix2f error;
   // A tilted surface stretches and shears along the base line, which is mostly the pattern's u; the rest is smaller.
-  error << 1 + uniform(-size, size), uniform(-size, size), uniform(-0.5F * size, 0.5F * size), 1 + uniform(-0.5F * size, 0.5F * size);
+  error << 1 + uniform(-size, size), uniform(-size, size), uniform(-0.5F * size, 0.5F * size),
+      1 + uniform(-0.5F * size, 0.5F * size);
   return error;
 }
 
@@ -41,7 +42,8 @@ void SymbolViewer::draw_cells(int letter) {
       const bool middle = row == 1 && column == 1;
       const Grey8& drawing = drawings_[middle ? static_cast<std::size_t>(letter) : random_() % drawings_.size()];
       for (int y = 0; y < drawing.height(); ++y) {
-        std::copy_n(drawing.row(y), drawing.width(), cells_.row(row * pitch + y + options_.spacing_px / 2) + column * pitch + options_.spacing_px / 2);
+        std::copy_n(drawing.row(y), drawing.width(),
+                    cells_.row(row * pitch + y + options_.spacing_px / 2) + column * pitch + options_.spacing_px / 2);
       }
     }
   }
@@ -49,13 +51,16 @@ void SymbolViewer::draw_cells(int letter) {
 
 void SymbolViewer::expose(int side_px) {
   const Eigen::Matrix2f inverse = view_.frame.inverse();
-  const float middle_of_square = static_cast<float>(options_.symbol_size_px + options_.spacing_px + options_.spacing_px / 2) + 0.5F * static_cast<float>(options_.symbol_size_px);
+  const float middle_of_square =
+      static_cast<float>(options_.symbol_size_px + options_.spacing_px + options_.spacing_px / 2) +
+      0.5F * static_cast<float>(options_.symbol_size_px);
   light_.assign(static_cast<std::size_t>(side_px) * side_px, 0.F);
   for (int y = 0; y < side_px; ++y) {
     for (int x = 0; x < side_px; ++x) {
       int lit = 0;
       for (int sub = 0; sub < kSubpixels * kSubpixels; ++sub) {
-        const Eigen::Vector2f at(static_cast<float>(x) + (static_cast<float>(sub % kSubpixels) - 1) / kSubpixels, static_cast<float>(y) + (static_cast<float>(sub / kSubpixels) - 1) / kSubpixels);
+        const Eigen::Vector2f at(static_cast<float>(x) + (static_cast<float>(sub % kSubpixels) - 1) / kSubpixels,
+                                 static_cast<float>(y) + (static_cast<float>(sub / kSubpixels) - 1) / kSubpixels);
         const Eigen::Vector2f cell = inverse * (at - view_.middle_px) + Eigen::Vector2f::Constant(middle_of_square);
         const int u = static_cast<int>(std::floor(cell.x())), v = static_cast<int>(std::floor(cell.y()));
         if (cells_.view().contains(u, v)) lit += cells_.at(u, v);
@@ -69,7 +74,8 @@ void SymbolViewer::blur(float sigma_px) {
   const int side = view_.image.width(), reach = static_cast<int>(std::ceil(3 * sigma_px));
   std::vector<float> kernel;
   float sum = 0;
-  for (int i = -reach; i <= reach; ++i) sum += kernel.emplace_back(std::exp(-0.5F * static_cast<float>(i * i) / (sigma_px * sigma_px)));
+  for (int i = -reach; i <= reach; ++i)
+    sum += kernel.emplace_back(std::exp(-0.5F * static_cast<float>(i * i) / (sigma_px * sigma_px)));
   const auto pass = [&](const std::vector<float>& from, std::vector<float>& to, int step_x, int step_y) {
     to.assign(from.size(), 0.F);
     for (int y = 0; y < side; ++y) {
