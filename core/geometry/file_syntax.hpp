@@ -13,8 +13,15 @@ struct SyntaxProblem {
   std::string message;
 };
 
-/// What in a text OpenCV's YAML reader must not be given: it recurses without bound and reads past a line's end on
-/// some of what is not YAML. Nothing where the text may be handed on.
+/// Whether every line has a form that a calibration file can have; OpenCV's YAML reader may be given nothing else, as
+/// it recurses without bound, loops or reads past a line's end on some of what is not YAML (4.6).
+///
+///     %YAML:1.0                       first, then one ---
+///     key: value                      value: number, word, "text", !!opencv-matrix, or nothing
+///        -                            begins a map of a sequence; a key may follow on the line
+///        key: [ 1., 2.5e-3,           a list of numbers, over as many lines as it takes
+///            .Nan ]
+///     # comment
 /// @thread reentrant
 [[nodiscard]] std::optional<SyntaxProblem> syntax_problem(std::string_view text);
 

@@ -186,12 +186,43 @@ TEST(ReadCalibration, RefusesAFirstCameraThatIsNotTheRig) {
 TEST(ReadCalibration, RefusesRubbishWithItsPlace) {
   EXPECT_THAT(message_of(""), HasSubstr("calibration.yml:1: is no calibration file"));
   EXPECT_THAT(message_of("{ \"a\": 1 }"), HasSubstr("%YAML"));
-  EXPECT_THAT(message_of(std::string("%YAML:1.0\n---\na: \0\n", 19)), HasSubstr("calibration.yml:3: "));
-  EXPECT_THAT(message_of("%YAML:1.0\n---\na: [[[[[[[[[[\n"), HasSubstr("calibration.yml:3: has brackets"));
-  EXPECT_THAT(message_of("%YAML:1.0\n---\na:\n   - - - 1\n"), HasSubstr("calibration.yml:4: "));
-  EXPECT_THAT(message_of("%YAML:1.0\n---\na: \"open\n"), HasSubstr("calibration.yml"));
+  EXPECT_THAT(message_of("%YAML:1.0\n---\na: [ 1,\n"), HasSubstr("calibration.yml:3: ends too early"));
   EXPECT_THAT(message_of("%YAML:1.0\n---\n"), HasSubstr("projector_width"));
   EXPECT_THAT(message_of("%YAML:1.0\n" + std::string(2 << 20, '\n')), HasSubstr("above 1 MiB"));
+}
+
+TEST(ReadCalibration, KeepsFromOpenCvWhatItCannotStand) {
+  const std::string begin = "%YAML:1.0\n---\n";
+  const std::string nul("a: \0", 4);
+  for (const std::string& line :
+       {nul, std::string("a: [[[[[["), std::string("   - - - 1"), std::string("a: \"open"), std::string("a: \"\\x\""),
+        std::string("-----Y:"), std::string("a: &b"), std::string("a: - - b"), std::string("a: \"$\" b"),
+        std::string(70, ' ') + "a: 1", std::string("..."), std::string("---"), std::string("a: { b: 1 }"),
+        std::string(2000, 'a')}) {
+    EXPECT_THAT(message_of(begin + line + "\n"), HasSubstr("calibration.yml:3: is not a line")) << line;
+  }
+}
+
+TEST(ReadCalibration, TakesCommentsAndOtherLineEnds) {
+  std::string text = write_calibration(paper_rig());
+  text = replaced(text, "projector_width: 1280", "# the beamer\nprojector_width: 1280   # px");
+  for (std::size_t at = 0; (at = text.find('\n', at)) != text.npos; at += 2) text.replace(at, 1, "\r\n");
+  EXPECT_EQ(message_of(text), "accepted");
+}
+
+TEST(ReadCalibration, TakesNamesWithQuotesAndUmlauts) {
+  Calibration rig = paper_rig();
+  rig.cameras[0].name = "the \"left\" \\ \xc3\xa4ussere # one";
+  const auto read = read_calibration(write_calibration(rig), "calibration.yml");
+  ASSERT_TRUE(read) << to_string(read.error());
+  EXPECT_EQ(read->cameras[0].name, rig.cameras[0].name);
+}
+
+RC_GTEST_PROP(ReadCalibration, RefusesEveryTruncation, ()) {
+  const std::string text = write_calibration(paper_rig());
+  const std::size_t end = text.rfind(']');
+  const std::size_t size = *rc::gen::resize(rc::kNominalSize, rc::gen::inRange<std::size_t>(0, end));
+  RC_ASSERT(message_of(text.substr(0, size)) != "accepted");
 }
 
 TEST(Camera, IsFoundByName) {
