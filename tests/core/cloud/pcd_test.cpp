@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/cloud/pcd.hpp"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/cloud/point_record.hpp"
+#include "tests/core/cloud/any_cloud.hpp"
+
+namespace slsd {
+namespace {
+
+using ::testing::HasSubstr;
+
+CloudPoint cell(const std::string& pcd, std::size_t index) {
+  return read_point(pcd.data() + pcd.find("DATA binary\n") + 12 + index * kPointBytes);
+}
+
+TEST(WritePcd, PutsEachPointInItsCellAndNanElsewhere) {
+  const Cloud cloud = any_cloud(5, 7, 4);
+  const std::string pcd = write_pcd(cloud);
+  EXPECT_THAT(pcd, HasSubstr("\nWIDTH 7\nHEIGHT 8\n"));
+  EXPECT_THAT(pcd, HasSubstr("\nPOINTS 56\n"));
+  EXPECT_EQ(pcd.size(), pcd.find("DATA binary\n") + 12 + 56 * kPointBytes);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < 56; ++i) {
+    const CloudPoint found = cell(pcd, i);
+    EXPECT_EQ((found.camera * 4U + found.row) * 7U + found.column, i);
+    if (std::isnan(found.x)) {
+      EXPECT_TRUE(std::isnan(found.z) && std::isnan(found.camera_u) && std::isnan(found.sigma_mm));
+      EXPECT_EQ(found.symbol, 0);
+    } else {
+      EXPECT_EQ(found, cloud.points[next++]);
+    }
+  }
+  EXPECT_EQ(next, cloud.points.size());
+}
+
+TEST(WritePcd, LeavesOutWhatIsOutsideTheLattice) {
+  Cloud cloud;
+  cloud.lattice_columns = cloud.lattice_rows = 2;
+  cloud.points.resize(2);
+  cloud.points[0].column = 2;
+  cloud.points[1].camera = 1;
+  const std::string pcd = write_pcd(cloud);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_TRUE(std::isnan(cell(pcd, i).x));
+}
+
+TEST(WritePcd, IsEmptyWithoutALattice) {
+  EXPECT_THAT(write_pcd({}), HasSubstr("WIDTH 0\nHEIGHT 0\n"));
+}
+
+}  // namespace
+}  // namespace slsd
