@@ -41,7 +41,7 @@ void extend(std::vector<Point>& chain, std::size_t fixed, const Point& point) {
   chain.push_back(point);
 }
 
-RectangleSides rectangle_along(const Point& side, const std::vector<Point>& hull) {
+double rectangle_area_along(const Point& side, const std::vector<Point>& hull) {
   const Point across(-side.y(), side.x());
   Point low = Point::Constant(std::numeric_limits<double>::max());
   Point high = -low;
@@ -50,8 +50,7 @@ RectangleSides rectangle_along(const Point& side, const std::vector<Point>& hull
     low = low.cwiseMin(turned);
     high = high.cwiseMax(turned);
   }
-  const Point extent = high - low;
-  return {extent.maxCoeff(), extent.minCoeff()};
+  return (high - low).prod();
 }
 
 }  // namespace
@@ -75,19 +74,11 @@ double polygon_area(const std::vector<Point>& polygon) {
   return std::abs(twice) / 2;
 }
 
-RectangleSides least_rectangle(const std::vector<Point>& hull) {
-  // Of two with the same area, but for rounding, the squarer: which comes first depends on how the shape lies.
-  constexpr double kSame = 1e-9;
-  RectangleSides least;
-  double least_area = std::numeric_limits<double>::max();
+double least_rectangle_area(const std::vector<Point>& hull) {
+  double least = std::numeric_limits<double>::max();
   for (std::size_t i = 0; i < hull.size(); ++i) {
-    const Point side = (hull[(i + 1) % hull.size()] - hull[i]).normalized();
-    const RectangleSides sides = rectangle_along(side, hull);
-    const double area = sides.longer_px * sides.shorter_px;
-    const bool same = std::abs(area - least_area) <= kSame * area;
-    if (same ? sides.longer_px >= least.longer_px : area > least_area) continue;
-    least_area = area;
-    least = sides;
+    const Point side = hull[(i + 1) % hull.size()] - hull[i];
+    least = std::min(least, rectangle_area_along(side.normalized(), hull));
   }
   return least;
 }

@@ -20,13 +20,8 @@ namespace slsd {
 /// The area of a polygon, px^2 (the shoelace formula).
 [[nodiscard]] double polygon_area(const std::vector<Eigen::Vector2d>& polygon);
 
-struct RectangleSides {
-  double longer_px = 0;
-  double shorter_px = 0;
-};
-
-/// The sides of the rectangle of least area, at any angle, around a convex polygon: one of its sides lies on one of
-/// the polygon's.
-[[nodiscard]] RectangleSides least_rectangle(const std::vector<Eigen::Vector2d>& hull);
+/// The area of the rectangle of least area, at any angle, around a convex polygon, px^2: one of its sides lies on one
+/// of the polygon's.
+[[nodiscard]] double least_rectangle_area(const std::vector<Eigen::Vector2d>& hull);
 
 }  // namespace slsd

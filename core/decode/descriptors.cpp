@@ -44,10 +44,11 @@ Moments measure_moments(const Mask& mask) {
   return {m00, c, m20 / m00 - c.x() * c.x() + 1. / 12, m11 / m00 - c.x() * c.y(), m02 / m00 - c.y() * c.y() + 1. / 12};
 }
 
-double eccentricity(const Moments& m) {
+// l2 / l1 of the eigenvalues of the second moments.
+double eigenvalue_ratio(const Moments& m) {
   const double mean = (m.mu20 + m.mu02) / 2;
   const double half_difference = std::hypot((m.mu20 - m.mu02) / 2, m.mu11);
-  return std::sqrt(2 * half_difference / (mean + half_difference));
+  return std::max(0., mean - half_difference) / (mean + half_difference);
 }
 
 double orientation_rad(const Moments& m) {
@@ -107,11 +108,11 @@ Descriptors describe_shape(const ImageView<std::uint8_t>& mask) {
   const double area = moments.m00;
   if (area == 0) return {};
   const auto hull = convex_hull(mask);
-  const RectangleSides rectangle = least_rectangle(hull);
+  const double ratio = eigenvalue_ratio(moments);
   const BitQuads quads = count_quads(mask);
-  return {.rectangularity = area / (rectangle.longer_px * rectangle.shorter_px),
-          .eccentricity = eccentricity(moments),
-          .aspect_ratio = rectangle.shorter_px / rectangle.longer_px,
+  return {.rectangularity = area / least_rectangle_area(hull),
+          .eccentricity = std::sqrt(1 - ratio),
+          .aspect_ratio = std::sqrt(ratio),
           .convex_to_area = polygon_area(hull) / area,
           .perimeter_to_area = quads.perimeter() / area,
           .area_px = area,

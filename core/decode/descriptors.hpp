@@ -15,7 +15,9 @@ namespace slsd {
 struct Descriptors {
   double rectangularity = 0;  ///< area / area of the least rectangle around it, at any angle; 0 to 1
   double eccentricity = 0;    ///< sqrt(1 - l2 / l1), l1 >= l2 the eigenvalues of (mu20 mu11; mu11 mu02); 0 to 1
-  double aspect_ratio = 0;    ///< shorter / longer side of the least rectangle; 0 to 1
+  /// sqrt(l2 / l1): shorter / longer axis of the ellipse with the same second moments; 0 to 1. Not of the least
+  /// rectangle, which for two squares on the diagonal is as small along the cell as along the diagonal.
+  double aspect_ratio = 0;
   double convex_to_area = 0;  ///< area of the convex hull of the pixels' corners / area; 1 and more
   /// Perimeter / area, 1/px. The perimeter, holes included, counts the 2x2 neighbourhoods with one, two adjacent, three
   /// and two diagonal lit pixels: n2 + (n1 + n3 + 2 nd) / sqrt(2) (Gray's bit quads).
