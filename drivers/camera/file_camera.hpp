@@ -21,13 +21,13 @@ namespace slsd {
 /// The keys of a [[camera]] table whose driver is "file".
 struct FileCameraOptions {
   std::string name = "camera";
-  std::filesystem::path path;  ///< a folder of PNG, TIFF, PGM, PPM or BMP images, or one image
-  bool loop = true;            ///< after the last image from the first on again; else kNotFound
-  double rate_hz = 0.0;        ///< 0: exposes at the trigger; else runs freely and delivers the next frame, up to 1000
-  std::optional<std::pair<int, int>> size_px;  ///< width and height expected; without it those of the first image
-  BayerPattern bayer = BayerPattern::kNone;    ///< grey images are mosaics of this pattern
-  int frames_held_max = 8;                     ///< buffers, 2 to 64: how many frames may be held at once
-  std::size_t cache_bytes = 64u << 20;         ///< decoded images that are kept; what does not fit is decoded each time
+  std::filesystem::path path = {};  ///< a folder of PNG, TIFF, PGM, PPM or BMP images, or one image
+  bool loop = true;                 ///< after the last image from the first on again; else kNotFound
+  double rate_hz = 0.0;  ///< 0: exposes at the trigger; else runs freely and delivers the next frame, up to 1000
+  std::optional<std::pair<int, int>> size_px = {};  ///< width and height expected; without it those of the first image
+  BayerPattern bayer = BayerPattern::kNone;         ///< grey images are mosaics of this pattern
+  int frames_held_max = 8;                          ///< buffers, 2 to 64: how many frames may be held at once
+  std::size_t cache_bytes = 64u << 20;  ///< decoded images that are kept; what does not fit is decoded each time
 
   [[nodiscard]] Result<> validate() const;
 };

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <system_error>
 #include <utility>
 
 #include "drivers/files/system_error.hpp"
@@ -124,6 +125,18 @@ Result<> replace_file(const fs::path& path, mode_t mode, std::string_view bytes)
   return {};
 }
 
+/// Where the links end, be it there or not; in a ring of links at one of them.
+fs::path follow_links(fs::path path) {
+  constexpr int kLinksMax = 40;
+  for (int i = 0; i < kLinksMax; ++i) {
+    std::error_code no_link;
+    const fs::path target = fs::read_symlink(path, no_link);
+    if (no_link) break;
+    path = path.parent_path() / target;
+  }
+  return path;
+}
+
 Result<> write_in_place(const fs::path& path, std::string_view bytes) {
   const Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
   if (!file.valid()) return fail_call("cannot write", path);
@@ -147,10 +160,7 @@ Result<> write_file_atomically(const fs::path& path, std::string_view bytes) {
   if (!S_ISREG(mode)) return write_in_place(path, bytes);
   // Renaming would get round a file's own write protection.
   if (::access(path.c_str(), F_OK) == 0 && ::access(path.c_str(), W_OK) != 0) return fail_call("cannot write", path);
-  std::error_code error;
-  const fs::path target = fs::is_symlink(path, error) ? fs::weakly_canonical(path, error) : path;
-  if (error) return tl::unexpected<Error>(system_error(error.value(), "cannot write", path));
-  return replace_file(target, mode, bytes);
+  return replace_file(follow_links(path), mode, bytes);
 }
 
 }  // namespace slsd

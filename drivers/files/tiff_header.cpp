@@ -20,6 +20,7 @@ enum Tag : std::uint32_t {
   kCompression = 259,
   kPhotometric = 262,
   kStripOffsets = 273,
+  kOrientation = 274,
   kSamplesPerPixel = 277,
   kRowsPerStrip = 278,
   kStripByteCounts = 279,
@@ -27,6 +28,7 @@ enum Tag : std::uint32_t {
   kTileWidth = 322,
   kSampleFormat = 339,
 };
+constexpr std::uint32_t kUncompressed = 1;
 constexpr std::uint32_t kShort = 3;
 constexpr std::uint32_t kLong = 4;
 constexpr std::uint64_t kEntryBytes = 12;
@@ -83,16 +85,21 @@ bool one_of(std::uint32_t value, std::initializer_list<std::uint32_t> choices) {
 /// What of the format OpenCV 4.6 does not decode faithfully, or in ways that are seldom trodden.
 std::optional<std::string> find_rare(const Directory& directory, std::uint32_t samples, std::uint32_t bits) {
   if (directory.find(kTileWidth)) return "tiles";
-  if (!one_of(directory.value(kCompression, 1), {1, 5, 8, 32773, 32946})) return "this compression";
-  if (!one_of(directory.value(kPhotometric, 1), {1, 2})) return "inverted grey, a palette or unusual colours";
-  if (!one_of(samples, {1, 3, 4}) || !one_of(bits, {8, 16})) return "other than 1, 3 or 4 channels of 8 or 16 bits";
+  if (!one_of(directory.value(kCompression, kUncompressed), {kUncompressed, 5, 8, 32773, 32946}))
+    return "this compression";
+  if (!one_of(directory.value(kPhotometric, 0), {1, 2})) return "inverted grey, a palette or unusual colours";
+  if (!one_of(samples, {1, 3}) || !one_of(bits, {8, 16})) return "other than 1 or 3 channels of 8 or 16 bits";
   if (samples > 1 && directory.value(kPlanarConfiguration, 1) != 1) return "separate planes";
+  if (directory.value(kOrientation, 1) != 1) return "turned or mirrored rows";
   if (directory.value(kSampleFormat, 1) != 1) return "signed or floating-point pixels";
   return std::nullopt;
 }
 
-/// True if every strip that the image needs lies within the file.
-bool has_strips(const Directory& directory, std::uint32_t height_px, std::uint64_t file_bytes) {
+/// True if every strip that the image needs lies within the file, and is as long as its rows where it is not
+/// compressed.
+bool has_strips(const Directory& directory, std::uint32_t height_px, std::uint64_t row_bytes,
+                std::uint64_t file_bytes) {
+  const bool compressed = directory.value(kCompression, kUncompressed) != kUncompressed;
   const std::uint32_t rows = std::clamp<std::uint32_t>(directory.value(kRowsPerStrip, height_px), 1, height_px);
   const std::uint32_t strips = (height_px - 1) / rows + 1;
   const auto offsets = directory.find(kStripOffsets);
@@ -101,6 +108,7 @@ bool has_strips(const Directory& directory, std::uint32_t height_px, std::uint64
   for (std::uint32_t i = 0; i < strips; ++i) {
     const auto offset = offsets->at(i), length = lengths->at(i);
     if (!offset || !length || *length == 0 || std::uint64_t{*offset} + *length > file_bytes) return false;
+    if (!compressed && *length < std::min(rows, height_px - i * rows) * row_bytes) return false;
   }
   return true;
 }
@@ -114,7 +122,8 @@ Result<ImageHeader> read_tiff_header(std::string_view bytes) {
   if (width == 0 || height == 0) return fail_truncated("TIFF");
   const std::uint32_t samples = directory.value(kSamplesPerPixel, 1), bits = directory.value(kBitsPerSample, 1);
   if (const auto rare = find_rare(directory, samples, bits)) return fail_variant("TIFF", *rare);
-  if (!has_strips(directory, height, file.size())) return fail_truncated("TIFF");
+  if (!has_strips(directory, height, std::uint64_t{width} * samples * bits / 8, file.size()))
+    return fail_truncated("TIFF");
   return ImageHeader{width, height, static_cast<int>(samples), bits == 16 ? 2 : 1};
 }
 

@@ -12,10 +12,10 @@ namespace slsd {
 
 /// The keys of the [projector] table that a headless projector reads.
 struct HeadlessProjectorOptions {
-  int width_px = 1280;                       ///< 1 to 16384
-  int height_px = 800;                       ///< 1 to 16384
-  double refresh_hz = 60.0;                  ///< 1 to 1000
-  std::vector<std::uint64_t> disconnect_at;  ///< at which calls of show(), counted from 1, it is found unplugged
+  int width_px = 1280;                            ///< 1 to 16384
+  int height_px = 800;                            ///< 1 to 16384
+  double refresh_hz = 60.0;                       ///< 1 to 1000
+  std::vector<std::uint64_t> disconnect_at = {};  ///< at which calls of show(), counted from 1, it is found unplugged
 
   [[nodiscard]] Result<> validate() const;
 };
