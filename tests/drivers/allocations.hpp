@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+
+namespace slsd::test {
+
+/// How often operator new was called in this program so far, on all threads.
+[[nodiscard]] std::uint64_t allocations();
+
+}  // namespace slsd::test

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/files/file.hpp"
+
+#include <csignal>
+#include <filesystem>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "tests/drivers/temporary_folder.hpp"
+
+namespace slsd {
+namespace {
+
+namespace fs = std::filesystem;
+using test::bytes_of;
+using test::TemporaryFolder;
+using ::testing::HasSubstr;
+
+std::size_t entries(const fs::path& folder) {
+  return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+/// While it lives no file may grow beyond the limit: a full disk that needs no disk.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
+
+TEST(ReadFile, GivesAllBytes) {
+  const TemporaryFolder folder;
+  const std::string bytes("a\0b\n\xff", 5);
+  EXPECT_EQ(read_file(folder.write("file", bytes), 100), bytes);
+  EXPECT_EQ(read_file(folder.write("empty", ""), 100), std::string());
+}
+
+TEST(ReadFile, RefusesWhatIsLongerThanTheLimit) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.write("file", "12345");
+  EXPECT_TRUE(read_file(path, 5));
+  const auto refused = read_file(path, 4);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(refused.error().where, path.string());
+  EXPECT_THAT(refused.error().message, HasSubstr("at most 4"));
+}
+
+TEST(ReadFile, NamesWhatIsWrongWithThePath) {
+  const TemporaryFolder folder;
+  folder.write("file", "");
+  EXPECT_EQ(read_file(folder.path() / "none", 1).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(read_file(folder.path() / "file" / "below", 1).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(read_file(folder.path(), 1).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(read_file("/dev/null", 1).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(read_file("", 1).error().code, ErrorCode::kNotFound);
+}
+
+TEST(ReadFile, DoesNotWaitForAPipe) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "pipe";
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  EXPECT_EQ(read_file(path, 1).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(ReadFile, SaysThatAFileMayNotBeRead) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root may read everything";
+  const TemporaryFolder folder;
+  const fs::path path = folder.write("file", "x");
+  fs::permissions(path, fs::perms::none);
+  EXPECT_EQ(read_file(path, 1).error().code, ErrorCode::kPermissionDenied);
+}
+
+TEST(WriteFileAtomically, WritesANewFileAndNothingElse) {
+  const TemporaryFolder folder;
+  const std::string bytes("a\0b", 3);
+  ASSERT_TRUE(write_file_atomically(folder.path() / "new", bytes));
+  EXPECT_EQ(bytes_of(folder.path() / "new"), bytes);
+  EXPECT_EQ(entries(folder.path()), 1u);
+}
+
+TEST(WriteFileAtomically, LeavesAReaderOfTheOldFileWithTheOldFile) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.write("file", "old");
+  std::ifstream reader(path);
+  ASSERT_TRUE(write_file_atomically(path, "new"));
+  std::string seen;
+  reader >> seen;
+  EXPECT_EQ(seen, "old");
+  EXPECT_EQ(bytes_of(path), "new");
+}
+
+TEST(WriteFileAtomically, KeepsPermissionsAndFollowsLinks) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.write("file", "old");
+  fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write | fs::perms::group_read);
+  fs::create_symlink("file", folder.path() / "link");
+  ASSERT_TRUE(write_file_atomically(folder.path() / "link", "new"));
+  EXPECT_TRUE(fs::is_symlink(folder.path() / "link"));
+  EXPECT_EQ(bytes_of(path), "new");
+  EXPECT_EQ(fs::status(path).permissions(), fs::perms::owner_read | fs::perms::owner_write | fs::perms::group_read);
+}
+
+TEST(WriteFileAtomically, FollowsALinkToAFileThatIsNotThereYet) {
+  const TemporaryFolder folder;
+  fs::create_symlink("target", folder.path() / "link");
+  ASSERT_TRUE(write_file_atomically(folder.path() / "link", "new"));
+  EXPECT_EQ(bytes_of(folder.path() / "target"), "new");
+}
+
+TEST(WriteFileAtomically, LeavesTheOldFileAndNoRestOnAFullDisk) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.write("file", "old");
+  Result<> written;
+  {
+    const FileSizeLimit full(10000);
+    written = write_file_atomically(path, std::string(100000, 'x'));
+  }
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, ErrorCode::kNoSpace);
+  EXPECT_EQ(written.error().where, path.string());
+  EXPECT_EQ(bytes_of(path), "old");
+  EXPECT_EQ(entries(folder.path()), 1u);
+}
+
+TEST(WriteFileAtomically, WritesDevicesInPlace) {
+  EXPECT_TRUE(write_file_atomically("/dev/null", "x"));
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+  EXPECT_EQ(write_file_atomically("/dev/full", "x").error().code, ErrorCode::kNoSpace);
+}
+
+TEST(WriteFileAtomically, NamesWhatIsWrongWithThePath) {
+  const TemporaryFolder folder;
+  folder.write("file", "");
+  EXPECT_EQ(write_file_atomically(folder.path(), "x").error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(write_file_atomically("", "x").error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(write_file_atomically(folder.path() / "no" / "file", "x").error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(write_file_atomically(folder.path() / "file" / "x", "x").error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(write_file_atomically(folder.path() / std::string(300, 'n'), "x").error().code,
+            ErrorCode::kInvalidArgument);
+  EXPECT_EQ(entries(folder.path()), 1u);
+}
+
+TEST(WriteFileAtomically, RespectsAWriteProtectedFile) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root may write everything";
+  const TemporaryFolder folder;
+  const fs::path path = folder.write("file", "old");
+  fs::permissions(path, fs::perms::owner_read);
+  EXPECT_EQ(write_file_atomically(path, "new").error().code, ErrorCode::kPermissionDenied);
+  EXPECT_EQ(bytes_of(path), "old");
+}
+
+}  // namespace
+}  // namespace slsd
