@@ -3,7 +3,9 @@
 #include "core/decode/binarize.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 
 #include "core/decode/clones.hpp"
@@ -28,6 +30,26 @@ SLSD_CLONES void compare_row(const std::uint8_t* pixels, const float* threshold,
 }
 SLSD_CLONES void compare_row(const std::uint16_t* pixels, const float* threshold, int width, std::uint8_t* mask) {
   for (int x = 0; x < width; ++x) mask[x] = static_cast<float>(pixels[x]) > threshold[x] ? 255 : 0;
+}
+
+/// Standard deviation of the noise, from the median second difference along the rows of a sample of pixels: edges are
+/// too few to move the median.
+template <class T>
+float noise_sigma(const ImageView<T>& frame) {
+  constexpr int kStep = 7, kBins = 1024;
+  std::array<int, kBins> histogram{};
+  int count = 0;
+  for (int y = kStep; y < frame.height; y += kStep) {
+    const T* row = frame.row(y);
+    for (int x = 1; x + 1 < frame.width; x += kStep, ++count) {
+      ++histogram[std::min(std::abs(row[x - 1] - 2 * row[x] + row[x + 1]) / (sizeof(T) == 1 ? 1 : 64), kBins - 1)];
+    }
+  }
+  int bin = 0;
+  for (int below = histogram[0]; 2 * below < count; below += histogram[++bin]) {
+  }
+  constexpr float kMedianOfDifference = 0.6745F * 2.4495F;  // of |a - 2b + c|, sigma 1
+  return static_cast<float>(bin) * (sizeof(T) == 1 ? 1.F : 64.F) / kMedianOfDifference;
 }
 
 /// Mean of the 3x3 neighbours of a tile, fewer at the border.
@@ -88,7 +110,8 @@ void Binarizer::set_thresholds(int contrast_min, int nothing_lit) {
 template <class T>
 void Binarizer::binarize_as(const ImageView<T>& frame, Grey8& mask) {
   if (mask.width() != frame.width || mask.height() != frame.height) mask = Grey8(frame.width, frame.height);
-  const int contrast_min = sizeof(T) == 1 ? options_.contrast_min : options_.contrast_min * 257;
+  const int floor = sizeof(T) == 1 ? options_.contrast_min : options_.contrast_min * 257;
+  const int contrast_min = std::max(floor, static_cast<int>(options_.contrast_min_sigma * noise_sigma(frame)));
   find_extremes(frame);
   set_thresholds(contrast_min, contrast_min);
   row_threshold_.resize(static_cast<std::size_t>(frame.width));

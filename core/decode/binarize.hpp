@@ -17,6 +17,8 @@ struct BinarizeOptions {
   float level = 0.5F;
   /// Smallest difference between light and dark, in grey levels of 255, that is taken for the pattern.
   int contrast_min = 8;
+  /// The same in standard deviations of the frame's noise: the range that plain noise spans in a window, and some more.
+  float contrast_min_sigma = 9;
 };
 
 /// Separates lit from dark by a threshold midway between the least and the greatest grey value around each pixel,

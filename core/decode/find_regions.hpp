@@ -30,6 +30,13 @@ struct Regions {
   std::vector<Region> regions;
   std::vector<Run> runs;
 
+  /// Adds a region of another set.
+  void append(const Region& region, std::span<const Run> region_runs) {
+    regions.push_back(region);
+    regions.back().first_run = static_cast<int>(runs.size());
+    runs.insert(runs.end(), region_runs.begin(), region_runs.end());
+  }
+
   [[nodiscard]] std::span<const Run> runs_of(const Region& region) const {
     return {runs.data() + region.first_run, static_cast<std::size_t>(region.run_count)};
   }

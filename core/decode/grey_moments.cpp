@@ -13,6 +13,8 @@ namespace {
 constexpr float kOutside = -1.F;
 constexpr float kRampStart = 0.2F;
 constexpr float kRampEnd = 0.8F;
+/// What is left of the light at the dark end of a symbol, at the least.
+constexpr float kLeastLight = 0.3F;
 
 struct Levels {
   float background, peak;
@@ -109,9 +111,25 @@ void GreyMomentMeter::copy_patch(const ImageView<T>& frame, const Region& region
   }
 }
 
+void GreyMomentMeter::level_light(const Eigen::Vector2f& shading) {
+  const float background = find_levels(patch_.data(), width_ * height_).background;
+  const float middle_x = 0.5F * static_cast<float>(width_ - 1), middle_y = 0.5F * static_cast<float>(height_ - 1);
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      float& value = patch_[y * width_ + x];
+      if (value < 0) continue;
+      const float light =
+          1 + shading.x() * (static_cast<float>(x) - middle_x) + shading.y() * (static_cast<float>(y) - middle_y);
+      value = std::max(0.F, background + (value - background) / std::max(light, kLeastLight));
+    }
+  }
+}
+
 template <class T>
-GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
+GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
+                                     const Eigen::Vector2f& shading) {
   copy_patch(frame, region, runs);
+  if (!shading.isZero()) level_light(shading);
   const Levels levels = find_levels(patch_.data(), width_ * height_);
   const float range = levels.peak - levels.background;
   if (range <= 0) return {};
@@ -140,7 +158,9 @@ GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& re
   return moments;
 }
 
-template GreyMoments GreyMomentMeter::measure(const ImageView<std::uint8_t>&, const Region&, std::span<const Run>);
-template GreyMoments GreyMomentMeter::measure(const ImageView<std::uint16_t>&, const Region&, std::span<const Run>);
+template GreyMoments GreyMomentMeter::measure(const ImageView<std::uint8_t>&, const Region&, std::span<const Run>,
+                                              const Eigen::Vector2f&);
+template GreyMoments GreyMomentMeter::measure(const ImageView<std::uint16_t>&, const Region&, std::span<const Run>,
+                                              const Eigen::Vector2f&);
 
 }  // namespace slsd

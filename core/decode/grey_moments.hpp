@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "core/decode/find_regions.hpp"
 #include "core/image.hpp"
 
@@ -27,12 +29,16 @@ class GreyMomentMeter {
   /// @param margin_px  how far beyond the mask a region's blurred edge is followed; less than the gap to its neighbours
   explicit GreyMomentMeter(int margin_px) : margin_px_(margin_px) {}
 
+  /// @param shading  how the light falls off over the region: relative change for one camera px, about its box's middle
   template <class T>
-  [[nodiscard]] GreyMoments measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs);
+  [[nodiscard]] GreyMoments measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
+                                    const Eigen::Vector2f& shading = Eigen::Vector2f::Zero());
 
  private:
   template <class T>
   void copy_patch(const ImageView<T>& frame, const Region& region, std::span<const Run> runs);
+
+  void level_light(const Eigen::Vector2f& shading);
 
   int margin_px_;
   int width_ = 0, height_ = 0;

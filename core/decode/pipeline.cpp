@@ -19,8 +19,16 @@ constexpr float kExpectedDistanceMax = 12;
 constexpr float kMeasuredDistanceMax = 8;
 /// Least and greatest area of a region, as a share of a symbol's square and of a cell.
 constexpr float kAreaMin = 0.08F;
-constexpr float kAreaMax = 1.3F;
+constexpr float kAreaMax = 1.1F;
 constexpr int kAreaMinPx = 6;
+/// Change of the light from cell to cell from which on a symbol is measured again with the light levelled, and how far
+/// its centre may move by that, as a share of its size: more would be a border of the surface's colour, not shading.
+constexpr float kShadingMin = 0.08F;
+constexpr float kShadingMoveMax = 0.1F;
+/// Levels between a merged region's dark and light at which it is taken apart.
+constexpr float kSplitLevels[] = {0.35F, 0.6F};
+/// What is larger than this is not a few symbols that ran together.
+constexpr int kSplitAreaMaxPx = 20000;
 /// Grey levels of 255 between a region's peak and its background.
 constexpr float kContrastMin = 8;
 
@@ -37,6 +45,17 @@ BinarizeOptions binarize_options(const Pattern& pattern, float scale) {
 /// Errors that the array's distance corrects; more than one costs more memory than it gains.
 int radius_of(const CodeArray& array) {
   return minimum_window_distance(array) >= 3 ? 1 : 0;
+}
+
+/// Relative change of the light from one cell to the next along a direction, from the peaks of the neighbours.
+float light_change(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments, std::size_t node,
+                   Direction direction) {
+  const auto light = [&](std::int32_t at) { return moments[at].peak - moments[at].background; };
+  const auto self = static_cast<std::int32_t>(node);
+  const std::int32_t next = neighbour(nodes, self, direction), last = neighbour(nodes, self, opposite(direction));
+  const std::int32_t from = last >= 0 ? last : self, to = next >= 0 ? next : self;
+  const float steps = static_cast<float>((last >= 0) + (next >= 0));
+  return steps == 0 ? 0.F : (light(to) - light(from)) / (steps * light(self));
 }
 
 float grey_levels(const GreyView& frame) {
@@ -65,20 +84,24 @@ Decoder::Pipeline::Pipeline(const Pattern& pattern, const Calibration& calibrati
       linker_({.pitch_px = static_cast<float>(pattern.pitch_px())}),
       window_decoder_(pattern, {.rows = pattern.whole_rows(), .columns = pattern.whole_columns()},
                       radius_of(pattern.array)),
-      correspondence_({}) {}
+      correspondence_({}),
+      centre_correction_(prototypes_as_measured_, static_cast<float>(pattern.pitch_px()),
+                         static_cast<float>(pattern.options.symbol_size_px)) {}
 
 const Decoding& Decoder::Pipeline::decode(const GreyView& frame, StageObserver* observer) {
   const auto done = [&](Stage stage) {
     if (observer != nullptr) observer->stage_done(stage);
   };
   binarize(frame), done(Stage::kBinarize);
-  find_regions(), done(Stage::kFindRegions);
+  find_regions(frame), done(Stage::kFindRegions);
   describe(frame), done(Stage::kDescribe);
   classify_as_expected(), done(Stage::kClassify);
   link_grid(), done(Stage::kLinkGrid);
   classify_as_measured();
   decode_windows(), done(Stage::kDecodeWindows);
   correspond(), done(Stage::kCorrespond);
+  level_shaded(frame);
+  correct_centres();
   triangulate();
   report(), done(Stage::kTriangulate);
   return decoding_;
@@ -88,8 +111,28 @@ void Decoder::Pipeline::binarize(const GreyView& frame) {
   binarizer_.binarize(frame, mask_);
 }
 
-void Decoder::Pipeline::find_regions() {
+void Decoder::Pipeline::find_regions(const GreyView& frame) {
   region_finder_.find(mask_.view(), regions_);
+  split_merged(frame);
+}
+
+void Decoder::Pipeline::split_merged(const GreyView& frame) {
+  for (const float level : kSplitLevels) {
+    const std::size_t count = regions_.regions.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      const Region region = regions_.regions[i];
+      if (judge_size(region) != RegionStatus::kTooLarge || region.area_px > kSplitAreaMaxPx) continue;
+      std::visit(
+          [&](const auto& view) {
+            const Regions& parts = splitter_.split(view, region, regions_.runs_of(region), level);
+            if (parts.regions.size() < 2) return;
+            for (const Region& part : parts.regions) regions_.append(part, parts.runs_of(part));
+            regions_.regions[i].area_px = 0;
+          },
+          frame);
+    }
+    std::erase_if(regions_.regions, [](const Region& region) { return region.area_px == 0; });
+  }
 }
 
 RegionStatus Decoder::Pipeline::judge_size(const Region& region) const {
@@ -104,7 +147,7 @@ RegionStatus Decoder::Pipeline::judge_size(const Region& region) const {
   const float area = static_cast<float>(region.area_px);
   if (region.area_px < kAreaMinPx || area < kAreaMin * size * size * scale_squared) return RegionStatus::kTooSmall;
   const float extent = static_cast<float>(std::max(region.width_px(), region.height_px()));
-  if (area > kAreaMax * pitch * pitch * scale_squared || extent > 2 * pitch * std::sqrt(scale_squared))
+  if (area > kAreaMax * pitch * pitch * scale_squared || extent > 1.5F * pitch * std::sqrt(scale_squared))
     return RegionStatus::kTooLarge;
   return RegionStatus::kNoNeighbour;
 }
@@ -171,12 +214,40 @@ void Decoder::Pipeline::correspond() {
   correspondence_.correspond(cells_, segments_, claims_);
 }
 
+void Decoder::Pipeline::level_shaded(const GreyView& frame) {
+  const float size = static_cast<float>(pattern_.options.symbol_size_px);
+  for (std::size_t i = 0; i < claims_.size(); ++i) {
+    if (claims_[i].status != RegionStatus::kDecoded) continue;
+    const Eigen::Vector2f per_cell(light_change(nodes_, moments_, i, kRight), light_change(nodes_, moments_, i, kDown));
+    if (per_cell.cwiseAbs().maxCoeff() < kShadingMin) continue;
+    const Eigen::Vector2f shading =
+        nodes_[i].frame.inverse().transpose() * per_cell / static_cast<float>(pattern_.pitch_px());
+    const Region& region = regions_.regions[region_of_node_[i]];
+    const GreyMoments levelled = std::visit(
+        [&](const auto& view) { return meter_.measure(view, region, regions_.runs_of(region), shading); }, frame);
+    const Eigen::Vector2f moved(levelled.x - moments_[i].x, levelled.y - moments_[i].y);
+    if (levelled.weight > 0 && (nodes_[i].frame.inverse() * moved).norm() < kShadingMoveMax * size) {
+      moments_[i].x = levelled.x, moments_[i].y = levelled.y;
+    }
+  }
+}
+
+void Decoder::Pipeline::correct_centres() {
+  letters_.resize(claims_.size());
+  for (std::size_t i = 0; i < claims_.size(); ++i) {
+    letters_[i] = claims_[i].named() ? static_cast<std::int8_t>(pattern_.array.at(claims_[i].row, claims_[i].column))
+                                     : std::int8_t{-1};
+  }
+  centre_correction_.correct(nodes_, moments_, claims_, letters_, centres_);
+}
+
 void Decoder::Pipeline::triangulate() {
   decoding_.points.clear();
   for (std::size_t i = 0; i < claims_.size(); ++i) {
     const CellClaim& claim = claims_[i];
     if (claim.status != RegionStatus::kDecoded) continue;
-    const TriangulatedPoint solved = triangulator_.triangulate(rays_[i], cells_.ray(claim.row, claim.column), 0.03);
+    const TriangulatedPoint solved = triangulator_.triangulate(camera_rays_.ray(centres_[i].cast<double>()),
+                                                               cells_.ray(claim.row, claim.column), 0.03);
     if (!(solved.point_in_camera.z() >= options_.depth_min_mm && solved.point_in_camera.z() <= options_.depth_max_mm)) {
       claims_[i].status = RegionStatus::kOutOfDepthRange;
       continue;
@@ -185,7 +256,7 @@ void Decoder::Pipeline::triangulate() {
     const Eigen::Vector2f projector = cells_.pixel(claim.row, claim.column).cast<float>();
     CloudPoint& out = decoding_.points.emplace_back();
     out.x = point.x(), out.y = point.y(), out.z = point.z();
-    out.camera_u = moments_[i].x, out.camera_v = moments_[i].y;
+    out.camera_u = centres_[i].x(), out.camera_v = centres_[i].y();
     out.projector_u = projector.x(), out.projector_v = projector.y();
     out.sigma_mm = static_cast<float>(solved.sigma_mm);
     out.column = static_cast<std::uint16_t>(claim.column), out.row = static_cast<std::uint16_t>(claim.row);

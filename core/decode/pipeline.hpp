@@ -9,12 +9,14 @@
 #include "core/decode/cell_rays.hpp"
 #include "core/decode/classify.hpp"
 #include "core/decode/correspond.hpp"
+#include "core/decode/curvature.hpp"
 #include "core/decode/decode_windows.hpp"
 #include "core/decode/decoder.hpp"
 #include "core/decode/find_regions.hpp"
 #include "core/decode/grey_moments.hpp"
 #include "core/decode/lattice_frame.hpp"
 #include "core/decode/link_grid.hpp"
+#include "core/decode/split_regions.hpp"
 #include "core/geometry/ray_table.hpp"
 #include "core/geometry/triangulator.hpp"
 
@@ -32,13 +34,16 @@ class Decoder::Pipeline {
 
  private:
   void binarize(const GreyView& frame);
-  void find_regions();
+  void find_regions(const GreyView& frame);
+  void split_merged(const GreyView& frame);
   void describe(const GreyView& frame);
   void classify_as_expected();
   void link_grid();
   void classify_as_measured();
   void decode_windows();
   void correspond();
+  void level_shaded(const GreyView& frame);
+  void correct_centres();
   void triangulate();
   void report();
 
@@ -58,10 +63,12 @@ class Decoder::Pipeline {
 
   Binarizer binarizer_;
   RegionFinder region_finder_;
+  RegionSplitter splitter_;
   GreyMomentMeter meter_;
   GridLinker linker_;
   WindowDecoder window_decoder_;
   Correspondence correspondence_;
+  CentreCorrection centre_correction_;
 
   Grey8 mask_;
   Regions regions_;
@@ -74,7 +81,8 @@ class Decoder::Pipeline {
   std::vector<PixelRay> rays_;
   std::vector<EpipolarSegment> segments_;
   std::vector<CellClaim> claims_;
-  std::vector<std::int32_t> node_of_region_;
+  std::vector<std::int8_t> letters_;  // of the nodes' cells
+  std::vector<Eigen::Vector2f> centres_;
   Decoding decoding_;
 };
 

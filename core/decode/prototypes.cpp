@@ -88,7 +88,7 @@ int margin_px(int spacing_px, float camera_px_per_projector_px) {
 
 float threshold_level(int spacing_px, float camera_px_per_projector_px) {
   constexpr float kWideGapPx = 2.2F;
-  return static_cast<float>(spacing_px) * camera_px_per_projector_px >= kWideGapPx ? 0.4F : 0.5F;
+  return static_cast<float>(spacing_px) * camera_px_per_projector_px >= kWideGapPx ? 0.3F : 0.45F;
 }
 
 std::vector<Prototype> make_prototypes(const PrototypeOptions& options) {

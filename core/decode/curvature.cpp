@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/curvature.hpp"
+
+#include <array>
+#include <utility>
+
+#include <Eigen/LU>
+
+namespace slsd {
+
+CentreCorrection::CentreCorrection(const std::vector<Prototype>& prototypes, float pitch_px, float symbol_size_px)
+    : pitch_px_(pitch_px) {
+  for (const Prototype& prototype : prototypes) {
+    const ShapeFeatures& mean = prototype.mean;
+    Eigen::Matrix2f moments;
+    moments << mean[1], mean[2], mean[2], mean[3];
+    centroids_px_.push_back(prototype.centroid_px);
+    second_moments_px2_.push_back(moments * symbol_size_px * symbol_size_px);
+  }
+}
+
+std::int32_t CentreCorrection::named_neighbour(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims,
+                                               std::int32_t node, Direction direction) const {
+  const std::int32_t other = neighbour(nodes, node, direction);
+  if (other < 0 || claims[other].status != RegionStatus::kDecoded) return -1;
+  const Eigen::Vector2f to = step(direction);
+  return claims[other].same_cell(claims[node].row + static_cast<int>(to.y()),
+                                 claims[node].column + static_cast<int>(to.x()))
+             ? other
+             : -1;
+}
+
+void CentreCorrection::measure_bends(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims) {
+  derivatives_.assign(nodes.size(), {});
+  const float per_squared_px = 1 / (pitch_px_ * pitch_px_);
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(nodes.size()); ++i) {
+    if (claims[i].status != RegionStatus::kDecoded) continue;
+    const auto next = [&](std::int32_t from, Direction d) {
+      return from < 0 ? -1 : named_neighbour(nodes, claims, from, d);
+    };
+    const std::int32_t right = next(i, kRight), left = next(i, kLeft), up = next(i, kUp), down = next(i, kDown);
+    Derivatives& at = derivatives_[i];
+    if (right >= 0 && left >= 0) {
+      at.bend.uu = (centres_[right] + centres_[left] - 2 * centres_[i]) * per_squared_px;
+      at.has_uu = true;
+    }
+    if (up >= 0 && down >= 0) {
+      at.bend.vv = (centres_[up] + centres_[down] - 2 * centres_[i]) * per_squared_px;
+      at.has_vv = true;
+    }
+    const std::int32_t up_left = next(up, kLeft), up_right = next(up, kRight), down_left = next(down, kLeft),
+                       down_right = next(down, kRight);
+    if (up_left >= 0 && up_right >= 0 && down_left >= 0 && down_right >= 0) {
+      at.bend.uv = (centres_[down_right] + centres_[up_left] - centres_[up_right] - centres_[down_left]) *
+                   (0.25F * per_squared_px);
+      at.has_uv = true;
+    }
+  }
+}
+
+template <class Part>
+Eigen::Vector2f CentreCorrection::median_around(const std::vector<GridNode>& nodes, std::int32_t node,
+                                                bool Derivatives::*has, Part part) const {
+  std::array<float, 5> x, y;
+  int count = 0;
+  const auto add = [&](std::int32_t other) {
+    if (other < 0 || !(derivatives_[other].*has)) return;
+    const Eigen::Vector2f& value = derivatives_[other].bend.*part;
+    x[count] = value.x(), y[count] = value.y();
+    ++count;
+  };
+  add(node);
+  for (const Direction d : {kRight, kDown, kLeft, kUp}) add(neighbour(nodes, node, d));
+  if (count == 0) return {0, 0};
+  const auto median = [count](std::array<float, 5>& values) {
+    for (int i = 1; i < count; ++i) {
+      for (int k = i; k > 0 && values[k] < values[k - 1]; --k) std::swap(values[k], values[k - 1]);
+    }
+    return 0.5F * (values[(count - 1) / 2] + values[count / 2]);
+  };
+  return {median(x), median(y)};
+}
+
+Bend CentreCorrection::bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const {
+  // The median with the neighbours: less noise, a value where none could be measured, and none from across an edge in
+  // depth.
+  return {median_around(nodes, node, &Derivatives::has_uu, &Bend::uu),
+          median_around(nodes, node, &Derivatives::has_uv, &Bend::uv),
+          median_around(nodes, node, &Derivatives::has_vv, &Bend::vv)};
+}
+
+void CentreCorrection::correct(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
+                               const std::vector<CellClaim>& claims, const std::vector<std::int8_t>& letters,
+                               std::vector<Eigen::Vector2f>& corrected) {
+  corrected.resize(nodes.size());
+  centres_.resize(nodes.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    corrected[i] = {moments[i].x, moments[i].y};
+    centres_[i] = corrected[i];
+    if (letters[i] >= 0) centres_[i] -= nodes[i].frame * centroids_px_[letters[i]];
+  }
+  measure_bends(nodes, claims);
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (claims[i].status != RegionStatus::kDecoded || letters[i] < 0) continue;
+    const Bend bend = bend_of(nodes, static_cast<std::int32_t>(i));
+    const Eigen::Matrix2f& m = second_moments_px2_[letters[i]];
+    const Eigen::Matrix2f inverse = nodes[i].frame.inverse();
+    Eigen::Matrix2f along_u, along_v;
+    along_u << bend.uu, bend.uv;
+    along_v << bend.uv, bend.vv;
+    const Eigen::Vector2f log_area_gradient((inverse * along_u).trace(), (inverse * along_v).trace());
+    corrected[i] -= 0.5F * (bend.uu * m(0, 0) + 2 * bend.uv * m(0, 1) + bend.vv * m(1, 1)) +
+                    nodes[i].frame * (m * log_area_gradient);
+  }
+}
+
+}  // namespace slsd

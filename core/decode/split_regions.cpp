@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/split_regions.hpp"
+
+#include <algorithm>
+
+namespace slsd {
+
+template <class T>
+const Regions& RegionSplitter::split(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
+                                     float level) {
+  T low = frame.at(runs[0].left, runs[0].row), high = low;
+  for (const Run& run : runs) {
+    const auto [least, greatest] = std::minmax_element(frame.row(run.row) + run.left, frame.row(run.row) + run.right);
+    low = std::min(low, *least);
+    high = std::max(high, *greatest);
+  }
+  const float threshold = static_cast<float>(low) + level * static_cast<float>(high - low);
+  mask_ = Grey8(region.width_px(), region.height_px());
+  for (const Run& run : runs) {
+    for (int x = run.left; x < run.right; ++x) {
+      mask_.at(x - region.left, run.row - region.top) = static_cast<float>(frame.at(x, run.row)) > threshold ? 255 : 0;
+    }
+  }
+  finder_.find(mask_.view(), parts_);
+  for (Region& part : parts_.regions) {
+    part.left += region.left, part.right += region.left;
+    part.top += region.top, part.bottom += region.top;
+  }
+  for (Run& run : parts_.runs) {
+    run.row = static_cast<std::int16_t>(run.row + region.top);
+    run.left = static_cast<std::int16_t>(run.left + region.left);
+    run.right = static_cast<std::int16_t>(run.right + region.left);
+  }
+  return parts_;
+}
+
+template const Regions& RegionSplitter::split(const ImageView<std::uint8_t>&, const Region&, std::span<const Run>,
+                                              float);
+template const Regions& RegionSplitter::split(const ImageView<std::uint16_t>&, const Region&, std::span<const Run>,
+                                              float);
+
+}  // namespace slsd
