@@ -71,9 +71,20 @@ Result<> PatternOptions::validate() const {
   return array_options(with_symbols).validate();
 }
 
+// What ./run tables finds best: see docs/alphabet.md. Five letters where they reach minimum distance 3, else six.
 std::vector<int> default_symbols(int symbol_size_px) {
-  if (symbol_size_px >= 14) return {5, 7, 22, 25, 12};
-  return {5, 7, 22, 25, 12, 20};
+  switch (symbol_size_px) {
+    case 16:
+      return {11, 13, 14, 18, 19};
+    case 14:
+      return {11, 13, 14, 16, 24};
+    case 12:
+      return {9, 11, 13, 14, 18, 19};
+    case 10:
+      return {11, 12, 14, 18, 19, 23};
+    default:
+      return {9, 10, 11, 12, 18, 19};
+  }
 }
 
 int Pattern::whole_columns() const {

@@ -30,6 +30,8 @@ bool covers(const Primitive& p, const Lattice& lattice, int x, int y) {
       return (x - at(0)) * (x - at(0)) + (y - at(1)) * (y - at(1)) <= at(2) * at(2);
     case Shape::kTriangle:
       return side(0, 2) >= 0 && side(2, 4) >= 0 && side(4, 0) >= 0;
+    case Shape::kMargin:
+      return std::min({x, y, lattice.of_units(kRuleUnits) - x, lattice.of_units(kRuleUnits) - y}) <= at(0);
   }
   return false;
 }

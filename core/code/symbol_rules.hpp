@@ -16,6 +16,7 @@ enum class Shape : std::uint8_t {
   kRectangle,  ///< a, b: left and top; c, d: right and bottom
   kDisc,       ///< a, b: centre; c: radius
   kTriangle,   ///< a, b; c, d; e, f: corners, clockwise on the screen
+  kMargin,     ///< a: what lies no further than this from one of the cell's edges
 };
 
 /// One step of a symbol's rule: what it covers is lit, or made dark again.

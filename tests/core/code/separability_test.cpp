@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/code/separability.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/code/pattern.hpp"
+
+namespace slsd {
+namespace {
+
+using ::testing::HasSubstr;
+
+Separability assess(const std::vector<int>& symbols, const LookOptions& options = {}) {
+  const auto separability = assess_separability(symbols, options);
+  EXPECT_TRUE(separability);
+  return *separability;
+}
+
+TEST(AssessSeparability, ComparesEveryPairClosestFirst) {
+  const Separability separability = assess({5, 7, 22, 25, 12});
+  EXPECT_EQ(separability.pairs.size(), 10U);
+  EXPECT_EQ(separability.losses.size(), 5U);
+  EXPECT_TRUE(std::ranges::is_sorted(separability.pairs, {}, &SymbolPair::distance));
+  EXPECT_EQ(separability.smallest_distance(), separability.pairs.front().distance);
+}
+
+TEST(AssessSeparability, GivesTheSameAnswerTwice) {
+  EXPECT_EQ(assess({7, 22, 25}).smallest_distance(), assess({7, 22, 25}).smallest_distance());
+}
+
+TEST(AssessSeparability, HoldsTheDefaultSymbolsForSafe) {
+  for (const int size_px : kSymbolSizesPx) {
+    const Separability separability = assess(default_symbols(size_px), {.symbol_size_px = size_px});
+    EXPECT_TRUE(separability.risky_pairs().empty()) << size_px << ": " << separability.smallest_distance();
+    EXPECT_TRUE(separability.risky_symbols().empty()) << size_px;
+  }
+}
+
+TEST(AssessSeparability, HoldsThePapersPatternsAndTheExampleForSafe) {
+  for (const std::vector<int>& symbols :
+       {std::vector<int>{5, 7, 22}, std::vector<int>{25, 7, 22}, std::vector<int>{5, 7, 22, 25, 12}})
+    EXPECT_TRUE(assess(symbols).risky_pairs().empty());
+}
+
+TEST(AssessSeparability, FindsDiscAndSquareRiskyAtEightPixels) {
+  const Separability separability = assess({1, 7, 22}, {.symbol_size_px = 8});
+  ASSERT_EQ(separability.risky_pairs().size(), 1U);
+  EXPECT_EQ(separability.risky_pairs().front().first, 1);
+  EXPECT_EQ(separability.risky_pairs().front().second, 7);
+  EXPECT_THAT(separability_warnings(separability, 8).front(), HasSubstr("1 (disc) and 7 (square) look alike at 8 px"));
+}
+
+TEST(AssessSeparability, SeesThatBlurBringsSymbolsTogether) {
+  const LookOptions sharp{.symbol_size_px = 8, .spacing_px = 4, .blur_px = 0.6};
+  const LookOptions blurred{.symbol_size_px = 8, .spacing_px = 4, .blur_px = 1.8};
+  EXPECT_GT(assess({10, 18, 12}, sharp).smallest_distance(), assess({10, 18, 12}, blurred).smallest_distance());
+}
+
+TEST(AssessSeparability, SeesThatNeighboursGrowTogether) {
+  const LookOptions dense{.symbol_size_px = 8, .spacing_px = 1, .blur_px = 1.5};
+  const Separability separability = assess({7, 3}, dense);
+  EXPECT_FALSE(separability.risky_symbols().empty());
+  EXPECT_THAT(separability_warnings(separability, 8).back(), HasSubstr("grows together"));
+}
+
+TEST(AssessSeparability, RefusesWhatIsOutOfRange) {
+  EXPECT_FALSE(assess_separability({7}, {}));
+  EXPECT_FALSE(assess_separability({7, 7}, {}));
+  EXPECT_FALSE(assess_separability({7, 26}, {}));
+  EXPECT_FALSE(assess_separability({7, 22}, {.symbol_size_px = 9}));
+  EXPECT_FALSE(assess_separability({7, 22}, {.camera_px_per_projector_px = 0}));
+  EXPECT_FALSE(assess_separability({7, 22}, {.blur_px = std::numeric_limits<double>::quiet_NaN()}));
+}
+
+TEST(SymbolObserver, MeasuresASymbolThatItSeesWell) {
+  // A square of side 1 has area 1 and second moments 1/12 and no others.
+  SymbolObserver observer({.spacing_px = 8, .camera_px_per_projector_px = 3, .blur_px = 0.3, .frame_error = 0}, {7}, 1);
+  const auto look = observer.look_at(7);
+  ASSERT_TRUE(look);
+  EXPECT_NEAR((*look)(0), 1, 0.02);
+  EXPECT_NEAR((*look)(1), 1.0 / 12, 0.002);
+  EXPECT_NEAR((*look)(2), 0, 0.001);
+  EXPECT_NEAR((*look)(3), 1.0 / 12, 0.002);
+  EXPECT_NEAR(look->tail<4>().cwiseAbs().maxCoeff(), 0, 0.001);
+}
+
+TEST(SymbolObserver, TellsWhichWayATrianglePoints) {
+  // Mass left and below: x - mean is skewed to the right, y - mean upwards (y is down).
+  SymbolObserver observer({}, {25}, 1);
+  const auto look = observer.look_at(25);
+  ASSERT_TRUE(look);
+  EXPECT_GT((*look)(4), 0.001);
+  EXPECT_LT((*look)(7), -0.001);
+}
+
+}  // namespace
+}  // namespace slsd
