@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include "core/code/pattern.hpp"
+#include "core/decode/decoding.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// What the decoder saw (Elahi et al. 2020, figure 9): the frame dimmed; decoded symbols as discs, a colour to each
+/// letter; every other region as a pink plus; links as thin lines, broken ones as red dashes; a legend with counts
+/// below. Enlarged by 2 or 3 where the symbols are small.
+/// @param decoding  of this frame; regions outside it are cut
+/// @param pattern   whose letters the regions carry
+/// @thread reentrant
+[[nodiscard]] ColourImage draw_decoding(const GreyView& frame, const Decoding& decoding, const Pattern& pattern);
+
+/// Colour of a letter in the picture and its legend.
+/// @param letter  0 to kMaxLetters - 1
+[[nodiscard]] Rgb letter_colour(int letter);
+inline constexpr Rgb kUndecodedColour{255, 92, 168};
+inline constexpr Rgb kLinkColour{150, 166, 190};
+inline constexpr Rgb kBrokenLinkColour{255, 64, 52};
+
+}  // namespace slsd
