@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <limits>
+
+#include <Eigen/Core>
+
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// A corner of a triangle as the viewer sees it.
+struct ReliefVertex {
+  Eigen::Vector3d place;   ///< picture px, and depth in the same scale, growing away from the viewer
+  Eigen::Vector3d normal;  ///< towards the viewer or away; of any length
+  double colour_share;     ///< for depth_colour()
+  double brightness = 1;   ///< of a disc: 0 is black
+};
+
+/// Direction to the light, rig frame: from the upper left, behind the viewer.
+[[nodiscard]] Eigen::Vector3d light_direction();
+
+/// A shaded layer with hidden surfaces removed, sampled kSamples x kSamples times a pixel.
+/// @thread thread-bound
+class Relief {
+ public:
+  /// @param forward  direction in which the viewer looks, rig frame
+  Relief(int width_px, int height_px, const Eigen::Vector3d& forward);
+
+  void triangle(const std::array<ReliefVertex, 3>& corners);
+  /// A disc that faces the viewer.
+  void disc(const ReliefVertex& centre, double radius_px);
+  /// Lays the layer over a picture of its size; where depth jumps, the nearer side gets a thin dark outline.
+  /// @param jump  in the places' scale
+  void compose(ColourImage& picture, double jump) const;
+
+  static constexpr int kSamples = 2;
+
+ private:
+  void sample(int x, int y, double depth, const Eigen::Vector3d& normal, Rgb colour);
+  [[nodiscard]] bool outlined(int x, int y, float jump) const;
+
+  Eigen::Vector3d forward_;
+  Image<float> depth_;
+  ColourImage colour_;
+};
+
+}  // namespace slsd

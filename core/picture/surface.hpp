@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/cloud/cloud.hpp"
+
+namespace slsd {
+
+/// A cloud joined to a surface: neighbours of the pattern's lattice whose distance is that of a smooth surface.
+struct Surface {
+  std::vector<Eigen::Vector3d> points;   ///< mm, rig frame; those of the cloud, in its order
+  std::vector<Eigen::Vector3d> normals;  ///< of unit length, towards the first camera; zero where nothing is joined
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+/// @thread reentrant
+[[nodiscard]] Surface join_surface(const Cloud& cloud);
+
+}  // namespace slsd
