@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include "bench/frame_ring.hpp"
+#include "core/decode/decoder.hpp"
+
+namespace slsd {
+
+/// Reading a frame once, from memory rather than from a cache: what no decoder can be faster than.
+void register_floor();
+
+/// The least that a decoder made of OpenCV's parts does: a local threshold and labelled regions with their moments.
+void register_anchor(FrameRing& ring);
+
+/// Image to points, and each stage of it.
+/// @param decoder  for the ring's pattern and calibration
+void register_decode(FrameRing& ring, Decoder& decoder);
+
+}  // namespace slsd
