@@ -29,6 +29,8 @@ enum Tag : std::uint32_t {
   kSampleFormat = 339,
 };
 constexpr std::uint32_t kUncompressed = 1;
+constexpr std::uint32_t kGrey = 1;
+constexpr std::uint32_t kRgb = 2;
 constexpr std::uint32_t kShort = 3;
 constexpr std::uint32_t kLong = 4;
 constexpr std::uint64_t kEntryBytes = 12;
@@ -87,8 +89,10 @@ std::optional<std::string> find_rare(const Directory& directory, std::uint32_t s
   if (directory.find(kTileWidth)) return "tiles";
   if (!one_of(directory.value(kCompression, kUncompressed), {kUncompressed, 5, 8, 32773, 32946}))
     return "this compression";
-  if (!one_of(directory.value(kPhotometric, 0), {1, 2})) return "inverted grey, a palette or unusual colours";
-  if (!one_of(samples, {1, 3}) || !one_of(bits, {8, 16})) return "other than 1 or 3 channels of 8 or 16 bits";
+  const std::uint32_t photometric = directory.value(kPhotometric, 0);
+  if (!one_of(photometric, {kGrey, kRgb})) return "inverted grey, a palette or unusual colours";
+  if (samples != (photometric == kGrey ? 1 : 3) || !one_of(bits, {8, 16}))
+    return "other than 1 or 3 channels of 8 or 16 bits";
   if (samples > 1 && directory.value(kPlanarConfiguration, 1) != 1) return "separate planes";
   if (directory.value(kOrientation, 1) != 1) return "turned or mirrored rows";
   if (directory.value(kSampleFormat, 1) != 1) return "signed or floating-point pixels";
