@@ -28,6 +28,8 @@ std::string_view to_string(RegionStatus status) {
       return "class_disagrees";
     case RegionStatus::kNeighboursDisagree:
       return "neighbours_disagree";
+    case RegionStatus::kDamagedShape:
+      return "damaged_shape";
     case RegionStatus::kOffEpipolarLine:
       return "off_epipolar_line";
     case RegionStatus::kOutOfDepthRange:

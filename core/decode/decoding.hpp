@@ -26,11 +26,12 @@ enum class RegionStatus : std::uint8_t {
   kAmbiguousCodeword,   ///< the windows around it disagree
   kClassDisagrees,      ///< its shape is not that of the cell which its windows name
   kNeighboursDisagree,  ///< its neighbours' shapes are not those of the cells around that cell
+  kDamagedShape,        ///< its shape is that of its cell, but cut or disturbed: its centre would be wrong
   kOffEpipolarLine,
   kOutOfDepthRange,
   kDuplicateCell,  ///< another region claims the cell with better evidence
 };
-inline constexpr int kRegionStatusCount = 14;
+inline constexpr int kRegionStatusCount = 15;
 
 /// "too_small", as in the counters of `status`.
 [[nodiscard]] std::string_view to_string(RegionStatus status);

@@ -3,7 +3,10 @@
 #include "core/decode/grey_moments.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+
+#include <Eigen/LU>
 
 #include "core/decode/clones.hpp"
 
@@ -90,49 +93,65 @@ GreyMoments central(const double (&m)[4][4], double middle_x, double middle_y) {
 
 template <class T>
 void GreyMomentMeter::copy_patch(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
-  const int left = region.left - margin_px_, top = region.top - margin_px_;
+  left_ = region.left - margin_px_, top_ = region.top - margin_px_;
   width_ = region.width_px() + 2 * margin_px_;
   height_ = region.height_px() + 2 * margin_px_;
   first_.assign(static_cast<std::size_t>(height_), width_);
   last_.assign(static_cast<std::size_t>(height_), -1);
   for (const Run& run : runs) {
-    for (int y = run.row - top - margin_px_; y <= run.row - top + margin_px_; ++y) {
-      first_[y] = std::min(first_[y], run.left - left - margin_px_);
-      last_[y] = std::max(last_[y], run.right - 1 - left + margin_px_);
+    for (int y = run.row - top_ - margin_px_; y <= run.row - top_ + margin_px_; ++y) {
+      first_[y] = std::min(first_[y], run.left - left_ - margin_px_);
+      last_[y] = std::max(last_[y], run.right - 1 - left_ + margin_px_);
     }
   }
   patch_.assign(static_cast<std::size_t>(width_) * height_, kOutside);
   for (int y = 0; y < height_; ++y) {
-    if (top + y < 0 || top + y >= frame.height) continue;
-    const T* pixels = frame.row(top + y);
+    if (top_ + y < 0 || top_ + y >= frame.height) continue;
+    const T* pixels = frame.row(top_ + y);
     float* row = patch_.data() + y * width_;
-    const int end = std::min(last_[y], frame.width - 1 - left);
-    for (int x = std::max(first_[y], -left); x <= end; ++x) row[x] = static_cast<float>(pixels[left + x]);
+    const int end = std::min(last_[y], frame.width - 1 - left_);
+    for (int x = std::max(first_[y], -left_); x <= end; ++x) row[x] = static_cast<float>(pixels[left_ + x]);
   }
 }
 
-void GreyMomentMeter::level_light(const Eigen::Vector2f& shading) {
+template <class T>
+void GreyMomentMeter::copy_cell(const ImageView<T>& frame, const Eigen::Vector2f& centre_px,
+                                const LatticeFrame& lattice_frame, float half_px) {
+  const Eigen::Vector2f reach = half_px * lattice_frame.cwiseAbs().rowwise().sum();
+  left_ = static_cast<int>(std::floor(centre_px.x() - reach.x())),
+  top_ = static_cast<int>(std::floor(centre_px.y() - reach.y()));
+  width_ = static_cast<int>(std::ceil(2 * reach.x())) + 2;
+  height_ = static_cast<int>(std::ceil(2 * reach.y())) + 2;
+  const Eigen::Matrix2f inverse = lattice_frame.inverse();
+  patch_.assign(static_cast<std::size_t>(width_) * height_, kOutside);
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      if (!frame.contains(left_ + x, top_ + y)) continue;
+      const Eigen::Vector2f from_centre(static_cast<float>(left_ + x) - centre_px.x(),
+                                        static_cast<float>(top_ + y) - centre_px.y());
+      if ((inverse * from_centre).cwiseAbs().maxCoeff() > half_px) continue;
+      patch_[y * width_ + x] = static_cast<float>(frame.at(left_ + x, top_ + y));
+    }
+  }
+}
+
+void GreyMomentMeter::level_light(const Eigen::Vector2f& centre_px, const Eigen::Vector2f& shading) {
   const float background = find_levels(patch_.data(), width_ * height_).background;
-  const float middle_x = 0.5F * static_cast<float>(width_ - 1), middle_y = 0.5F * static_cast<float>(height_ - 1);
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
       float& value = patch_[y * width_ + x];
       if (value < 0) continue;
-      const float light =
-          1 + shading.x() * (static_cast<float>(x) - middle_x) + shading.y() * (static_cast<float>(y) - middle_y);
+      const float light = 1 + shading.x() * (static_cast<float>(left_ + x) - centre_px.x()) +
+                          shading.y() * (static_cast<float>(top_ + y) - centre_px.y());
       value = std::max(0.F, background + (value - background) / std::max(light, kLeastLight));
     }
   }
 }
 
-template <class T>
-GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
-                                     const Eigen::Vector2f& shading) {
-  copy_patch(frame, region, runs);
-  if (!shading.isZero()) level_light(shading);
+GreyMoments GreyMomentMeter::weigh_patch() const {
   const Levels levels = find_levels(patch_.data(), width_ * height_);
   const float range = levels.peak - levels.background;
-  if (range <= 0) return {};
+  if (!(range > 0)) return {};
 
   const float offset = levels.background + kRampStart * range;
   const float scale = 1.F / ((kRampEnd - kRampStart) * range);
@@ -152,15 +171,42 @@ GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& re
     m[1][2] += y * y * s.s1;
     m[0][3] += y * y * y * s.s0;
   }
-  GreyMoments moments = central(m, region.left - margin_px_ + middle_x, region.top - margin_px_ + middle_y);
+  GreyMoments moments = central(m, left_ + middle_x, top_ + middle_y);
   moments.background = levels.background;
   moments.peak = levels.peak;
   return moments;
 }
 
-template GreyMoments GreyMomentMeter::measure(const ImageView<std::uint8_t>&, const Region&, std::span<const Run>,
+template <class T>
+GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
+                                     const Eigen::Vector2f& shading) {
+  copy_patch(frame, region, runs);
+  if (!shading.isZero()) {
+    const Eigen::Vector2f middle(0.5F * static_cast<float>(region.left + region.right),
+                                 0.5F * static_cast<float>(region.top + region.bottom));
+    level_light(middle, shading);
+  }
+  return weigh_patch();
+}
+
+template <class T>
+GreyMoments GreyMomentMeter::measure_cell(const ImageView<T>& frame, const Eigen::Vector2f& centre_px,
+                                          const LatticeFrame& lattice_frame, float half_px,
+                                          const Eigen::Vector2f& shading) {
+  copy_cell(frame, centre_px, lattice_frame, half_px);
+  level_light(centre_px, shading);
+  return weigh_patch();
+}
+
+using View8 = ImageView<std::uint8_t>;
+using View16 = ImageView<std::uint16_t>;
+template GreyMoments GreyMomentMeter::measure(const View8&, const Region&, std::span<const Run>,
                                               const Eigen::Vector2f&);
-template GreyMoments GreyMomentMeter::measure(const ImageView<std::uint16_t>&, const Region&, std::span<const Run>,
+template GreyMoments GreyMomentMeter::measure(const View16&, const Region&, std::span<const Run>,
                                               const Eigen::Vector2f&);
+template GreyMoments GreyMomentMeter::measure_cell(const View8&, const Eigen::Vector2f&, const LatticeFrame&, float,
+                                                   const Eigen::Vector2f&);
+template GreyMoments GreyMomentMeter::measure_cell(const View16&, const Eigen::Vector2f&, const LatticeFrame&, float,
+                                                   const Eigen::Vector2f&);
 
 }  // namespace slsd

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "core/decode/find_regions.hpp"
+#include "core/decode/lattice_frame.hpp"
 #include "core/image.hpp"
 
 namespace slsd {
@@ -29,21 +30,33 @@ class GreyMomentMeter {
   /// @param margin_px  how far beyond the mask a region's blurred edge is followed; less than the gap to its neighbours
   explicit GreyMomentMeter(int margin_px) : margin_px_(margin_px) {}
 
-  /// @param shading  how the light falls off over the region: relative change for one camera px, about its box's middle
+  /// @param shading  relative change of the light for one camera px, levelled out about the middle of the region's box
   template <class T>
   [[nodiscard]] GreyMoments measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
                                     const Eigen::Vector2f& shading = Eigen::Vector2f::Zero());
 
+  /// Measures what lies in a cell of the grid, wherever a mask ends, with the light levelled.
+  /// @param centre_px    middle of the symbol's square, in the camera
+  /// @param half_px      from there to the side of the cell, projector px
+  /// @param shading      relative change of the light for one camera px, from the centre
+  template <class T>
+  [[nodiscard]] GreyMoments measure_cell(const ImageView<T>& frame, const Eigen::Vector2f& centre_px,
+                                         const LatticeFrame& lattice_frame, float half_px,
+                                         const Eigen::Vector2f& shading);
+
  private:
   template <class T>
   void copy_patch(const ImageView<T>& frame, const Region& region, std::span<const Run> runs);
-
-  void level_light(const Eigen::Vector2f& shading);
+  template <class T>
+  void copy_cell(const ImageView<T>& frame, const Eigen::Vector2f& centre_px, const LatticeFrame& lattice_frame,
+                 float half_px);
+  void level_light(const Eigen::Vector2f& centre_px, const Eigen::Vector2f& shading);
+  [[nodiscard]] GreyMoments weigh_patch() const;
 
   int margin_px_;
-  int width_ = 0, height_ = 0;
-  std::vector<int> first_, last_;  // extent of the region in each row of the patch
-  std::vector<float> patch_;       // grey values; kOutside where they belong to others
+  int left_ = 0, top_ = 0, width_ = 0, height_ = 0;  // of the patch
+  std::vector<int> first_, last_;                    // extent of the region in each row of the patch
+  std::vector<float> patch_;                         // grey values; kOutside where they belong to others
 };
 
 }  // namespace slsd

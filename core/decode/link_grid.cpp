@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <Eigen/LU>
 
@@ -15,8 +16,29 @@ constexpr Direction kDirections[] = {kRight, kDown, kLeft, kUp};
 /// How much a measured step may differ from the expected one before it is taken for a wrong link.
 constexpr float kFrameChangeMax = 0.5F;
 
+/// From a node to its neighbour, camera px.
 Eigen::Vector2f link_vector(const std::vector<GridNode>& nodes, std::size_t from, Direction direction) {
   return nodes[nodes[from].links[direction]].centre_px - nodes[from].centre_px;
+}
+
+/// One step of the grid in a direction as the links beside a node show it, camera px.
+std::optional<Eigen::Vector2f> measured_step(const std::vector<GridNode>& nodes,
+                                             const std::vector<std::uint8_t>& trusted, std::size_t node,
+                                             Direction forth) {
+  const auto leads = [&](std::size_t from, Direction d) {
+    return nodes[from].links[d] >= 0 && trusted[nodes[from].links[d]] != 0;
+  };
+  const Direction back = opposite(forth);
+  if (leads(node, forth) && leads(node, back))
+    return 0.5F * (link_vector(nodes, node, forth) - link_vector(nodes, node, back));
+  if (!leads(node, forth) && !leads(node, back)) return std::nullopt;
+  const Direction inwards = leads(node, forth) ? forth : back;
+  const Eigen::Vector2f first = link_vector(nodes, node, inwards);
+  const auto next = static_cast<std::size_t>(nodes[node].links[inwards]);
+  // At the edge of a surface the steps shrink; the second one tells how fast.
+  const Eigen::Vector2f step =
+      leads(next, inwards) ? (1.5F * first - 0.5F * link_vector(nodes, next, inwards)).eval() : first;
+  return inwards == forth ? step : (-step).eval();
 }
 
 }  // namespace
@@ -98,19 +120,16 @@ void GridLinker::find_mutual(std::vector<GridNode>& nodes, float radius) {
   }
 }
 
-void GridLinker::measure_frames(std::vector<GridNode>& nodes) const {
+void GridLinker::measure_frames(std::vector<GridNode>& nodes, const std::vector<std::uint8_t>& trusted) const {
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     GridNode& node = nodes[i];
     for (const Direction d : {kRight, kDown}) {
-      Eigen::Vector2f sum = Eigen::Vector2f::Zero();
-      int count = 0;
-      if (node.links[d] >= 0) sum += link_vector(nodes, i, d), ++count;
-      if (node.links[opposite(d)] >= 0) sum -= link_vector(nodes, i, opposite(d)), ++count;
-      if (count == 0) continue;
-      const Eigen::Vector2f measured = sum / (static_cast<float>(count) * options_.pitch_px);
-      const Eigen::Vector2f expected = node.frame.col(d == kRight ? 0 : 1);
+      const auto step = measured_step(nodes, trusted, i, d);
+      if (!step) continue;
+      const Eigen::Vector2f measured = *step / options_.pitch_px;
+      auto expected = node.frame.col(d == kRight ? 0 : 1);
       if ((measured - expected).norm() > kFrameChangeMax * expected.norm()) continue;
-      node.frame.col(d == kRight ? 0 : 1) = measured;
+      expected = measured;
       (d == kRight ? node.measured_u : node.measured_v) = true;
     }
   }
@@ -154,10 +173,11 @@ void GridLinker::break_inconsistent(std::vector<GridNode>& nodes) {
 void GridLinker::link(std::vector<GridNode>& nodes) {
   if (nodes.empty()) return;
   sort_into_buckets(nodes);
+  all_trusted_.assign(nodes.size(), 1);
   find_mutual(nodes, options_.search_radius);
-  measure_frames(nodes);
+  measure_frames(nodes, all_trusted_);
   find_mutual(nodes, options_.refined_radius);
-  measure_frames(nodes);
+  measure_frames(nodes, all_trusted_);
   break_inconsistent(nodes);
 }
 

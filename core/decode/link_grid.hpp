@@ -54,12 +54,16 @@ class GridLinker {
 
   void link(std::vector<GridNode>& nodes);
 
+  /// Measures the frames again from those neighbours alone that are trusted: the fragment of a symbol at the edge of a
+  /// surface draws the frames beside it to itself.
+  /// @param trusted  one to a node, non-zero where it is
+  void measure_frames(std::vector<GridNode>& nodes, const std::vector<std::uint8_t>& trusted) const;
+
  private:
   void sort_into_buckets(const std::vector<GridNode>& nodes);
   [[nodiscard]] std::int32_t nearest(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
                                      float radius) const;
   void find_mutual(std::vector<GridNode>& nodes, float radius);
-  void measure_frames(std::vector<GridNode>& nodes) const;
   void break_inconsistent(std::vector<GridNode>& nodes);
 
   LinkGridOptions options_;
@@ -69,6 +73,7 @@ class GridLinker {
   std::vector<std::int32_t> first_of_bucket_, in_buckets_;
   std::vector<std::array<std::int32_t, 4>> chosen_;
   std::vector<std::array<bool, 4>> inconsistent_;
+  std::vector<std::uint8_t> all_trusted_;
 };
 
 }  // namespace slsd

@@ -21,10 +21,12 @@ constexpr float kMeasuredDistanceMax = 8;
 constexpr float kAreaMin = 0.08F;
 constexpr float kAreaMax = 1.1F;
 constexpr int kAreaMinPx = 6;
-/// Change of the light from cell to cell from which on a symbol is measured again with the light levelled, and how far
-/// its centre may move by that, as a share of its size: more would be a border of the surface's colour, not shading.
-constexpr float kShadingMin = 0.08F;
-constexpr float kShadingMoveMax = 0.1F;
+/// Change of the light from cell to cell from which on a symbol is measured again with the light levelled.
+constexpr float kShadingMin = 0.04F;
+/// Standard deviations from its letter's prototype: a symbol beyond the first is measured again where its neighbours
+/// put it, one that stays beyond the second is damaged (cut by an edge, a shadow, print) and its centre with it.
+constexpr float kDoubtfulDistance = 1.5F;
+constexpr float kDamagedDistance = 2.5F;
 /// Levels between a merged region's dark and light at which it is taken apart.
 constexpr float kSplitLevels[] = {0.35F, 0.6F};
 /// What is larger than this is not a few symbols that ran together.
@@ -56,6 +58,39 @@ float light_change(const std::vector<GridNode>& nodes, const std::vector<GreyMom
   const std::int32_t from = last >= 0 ? last : self, to = next >= 0 ? next : self;
   const float steps = static_cast<float>((last >= 0) + (next >= 0));
   return steps == 0 ? 0.F : (light(to) - light(from)) / (steps * light(self));
+}
+
+/// Where the neighbours put a node, by continuing the steps of those beside it; quadratic, as steps shrink towards a
+/// limb.
+std::optional<Eigen::Vector2f> centre_from_neighbours(const std::vector<GridNode>& nodes, std::size_t node) {
+  Eigen::Vector2f sum = Eigen::Vector2f::Zero();
+  int count = 0;
+  for (const Direction d : {kRight, kDown, kLeft, kUp}) {
+    const std::int32_t first = neighbour(nodes, static_cast<std::int32_t>(node), d),
+                       second = neighbour(nodes, first, d);
+    const std::int32_t third = neighbour(nodes, second, d);
+    if (third < 0) continue;
+    sum += 3 * nodes[first].centre_px - 3 * nodes[second].centre_px + nodes[third].centre_px;
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return sum / static_cast<float>(count);
+}
+
+/// The same along both axes, the mean with the neighbours': small symbols blur to lower peaks, which is not the light's
+/// doing.
+Eigen::Vector2f light_change_around(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
+                                    std::size_t node) {
+  Eigen::Vector2f sum(light_change(nodes, moments, node, kRight), light_change(nodes, moments, node, kDown));
+  float count = 1;
+  for (const Direction d : {kRight, kDown, kLeft, kUp}) {
+    const std::int32_t other = neighbour(nodes, static_cast<std::int32_t>(node), d);
+    if (other < 0) continue;
+    const auto at = static_cast<std::size_t>(other);
+    sum += Eigen::Vector2f(light_change(nodes, moments, at, kRight), light_change(nodes, moments, at, kDown));
+    ++count;
+  }
+  return sum / count;
 }
 
 float grey_levels(const GreyView& frame) {
@@ -98,9 +133,9 @@ const Decoding& Decoder::Pipeline::decode(const GreyView& frame, StageObserver* 
   classify_as_expected(), done(Stage::kClassify);
   link_grid(), done(Stage::kLinkGrid);
   classify_as_measured();
-  decode_windows(), done(Stage::kDecodeWindows);
+  decode_windows();
+  measure_again(frame), done(Stage::kDecodeWindows);
   correspond(), done(Stage::kCorrespond);
-  level_shaded(frame);
   correct_centres();
   triangulate();
   report(), done(Stage::kTriangulate);
@@ -214,21 +249,57 @@ void Decoder::Pipeline::correspond() {
   correspondence_.correspond(cells_, segments_, claims_);
 }
 
-void Decoder::Pipeline::level_shaded(const GreyView& frame) {
+void Decoder::Pipeline::trust_whole_symbols() {
+  trusted_.resize(claims_.size());
+  for (std::size_t i = 0; i < claims_.size(); ++i) trusted_[i] = claims_[i].status == RegionStatus::kDecoded;
+  linker_.measure_frames(nodes_, trusted_);
+  for (std::size_t i = 0; i < claims_.size(); ++i) {
+    if (trusted_[i] != 0) trusted_[i] = distance_from_letter(i, moments_[i]) <= kDamagedDistance;
+  }
+  linker_.measure_frames(nodes_, trusted_);
+}
+
+float Decoder::Pipeline::distance_from_letter(std::size_t node, const GreyMoments& moments) const {
+  const Prototype& prototype = prototypes_as_measured_[pattern_.array.at(claims_[node].row, claims_[node].column)];
   const float size = static_cast<float>(pattern_.options.symbol_size_px);
+  return (prototype.whitening * (shape_features(moments, nodes_[node].frame.inverse(), size) - prototype.mean)).norm();
+}
+
+void Decoder::Pipeline::measure_again(const GreyView& frame) {
+  trust_whole_symbols();
+  const float size = static_cast<float>(pattern_.options.symbol_size_px),
+              pitch = static_cast<float>(pattern_.pitch_px());
   for (std::size_t i = 0; i < claims_.size(); ++i) {
     if (claims_[i].status != RegionStatus::kDecoded) continue;
-    const Eigen::Vector2f per_cell(light_change(nodes_, moments_, i, kRight), light_change(nodes_, moments_, i, kDown));
-    if (per_cell.cwiseAbs().maxCoeff() < kShadingMin) continue;
-    const Eigen::Vector2f shading =
-        nodes_[i].frame.inverse().transpose() * per_cell / static_cast<float>(pattern_.pitch_px());
+    const GridNode& node = nodes_[i];
+    const Prototype& prototype = prototypes_as_measured_[pattern_.array.at(claims_[i].row, claims_[i].column)];
+    const Eigen::Matrix2f inverse = node.frame.inverse();
+    float distance = distance_from_letter(i, moments_[i]);
+    const auto adopt_if_better = [&](const GreyMoments& again, float tolerance) {
+      const float distance_again = distance_from_letter(i, again);
+      if (again.weight > 0 && distance_again < distance + tolerance) moments_[i] = again, distance = distance_again;
+    };
+    const Eigen::Vector2f per_cell = light_change_around(nodes_, moments_, i);
+    const Eigen::Vector2f shading = inverse.transpose() * per_cell / pitch;
     const Region& region = regions_.regions[region_of_node_[i]];
-    const GreyMoments levelled = std::visit(
-        [&](const auto& view) { return meter_.measure(view, region, regions_.runs_of(region), shading); }, frame);
-    const Eigen::Vector2f moved(levelled.x - moments_[i].x, levelled.y - moments_[i].y);
-    if (levelled.weight > 0 && (nodes_[i].frame.inverse() * moved).norm() < kShadingMoveMax * size) {
-      moments_[i].x = levelled.x, moments_[i].y = levelled.y;
+    if (per_cell.cwiseAbs().maxCoeff() > kShadingMin) {
+      adopt_if_better(
+          std::visit([&](const auto& view) { return meter_.measure(view, region, regions_.runs_of(region), shading); },
+                     frame),
+          0.3F);
     }
+    if (distance > kDoubtfulDistance) {
+      const Eigen::Vector2f centroid(moments_[i].x, moments_[i].y);
+      const Eigen::Vector2f centre =
+          centre_from_neighbours(nodes_, i).value_or(centroid - node.frame * prototype.centroid_px);
+      const float half_px = 0.5F * size + 0.25F * (pitch - size);
+      adopt_if_better(
+          std::visit([&](const auto& view) { return meter_.measure_cell(view, centre, node.frame, half_px, shading); },
+                     frame),
+          0);
+    }
+    shapes_[i].distance = distance;
+    if (distance > kDamagedDistance) claims_[i].status = RegionStatus::kDamagedShape;
   }
 }
 

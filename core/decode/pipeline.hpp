@@ -42,7 +42,9 @@ class Decoder::Pipeline {
   void classify_as_measured();
   void decode_windows();
   void correspond();
-  void level_shaded(const GreyView& frame);
+  void trust_whole_symbols();
+  [[nodiscard]] float distance_from_letter(std::size_t node, const GreyMoments& moments) const;
+  void measure_again(const GreyView& frame);
   void correct_centres();
   void triangulate();
   void report();
@@ -81,6 +83,7 @@ class Decoder::Pipeline {
   std::vector<PixelRay> rays_;
   std::vector<EpipolarSegment> segments_;
   std::vector<CellClaim> claims_;
+  std::vector<std::uint8_t> trusted_;
   std::vector<std::int8_t> letters_;  // of the nodes' cells
   std::vector<Eigen::Vector2f> centres_;
   Decoding decoding_;
