@@ -2,37 +2,88 @@
 // Copyright the slsd authors
 #include "drivers/files/encode_png.hpp"
 
-#include <cstdint>
-#include <exception>
-#include <utility>
-#include <variant>
-#include <vector>
+#include <png.h>
 
-#include <opencv2/imgcodecs.hpp>
+#include <bit>
+#include <csetjmp>
+#include <exception>
+#include <type_traits>
+#include <variant>
 
 namespace slsd {
 namespace {
 
-tl::unexpected<Error> fail_empty() {
-  return fail(ErrorCode::kInvalidArgument, "an image without pixels has no PNG");
-}
+// Frames are noisy: the higher levels take many times longer for a few percent.
+constexpr int kCompressionLevel = 1;
 
-Result<std::string> encode(const cv::Mat& image) {
-  try {
-    std::vector<std::uint8_t> bytes;
-    if (cv::imencode(".png", image, bytes)) return std::string(bytes.begin(), bytes.end());
-    return fail(ErrorCode::kIo, "the image could not be turned into PNG");
-  } catch (const std::exception& exception) {
-    return fail(ErrorCode::kIo, std::string("the image could not be turned into PNG: ") + exception.what());
+struct Rows {
+  const void* first = nullptr;
+  std::size_t row_bytes = 0;
+  int width = 0;
+  int height = 0;
+  int bits = 8;
+  int colour_type = PNG_COLOR_TYPE_GRAY;
+};
+
+/// libpng reports errors by longjmp(): the function that calls setjmp() holds no objects that would need a destructor.
+class PngWriter {
+ public:
+  PngWriter()
+      : png_(::png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, on_error, on_warning)),
+        info_(png_ == nullptr ? nullptr : ::png_create_info_struct(png_)) {}
+  PngWriter(const PngWriter&) = delete;
+  PngWriter& operator=(const PngWriter&) = delete;
+  ~PngWriter() { ::png_destroy_write_struct(&png_, &info_); }
+
+  bool write(const Rows& rows) {
+    if (info_ == nullptr || setjmp(png_jmpbuf(png_)) != 0) return false;
+    ::png_set_write_fn(png_, this, on_write, nullptr);
+    ::png_set_compression_level(png_, kCompressionLevel);
+    ::png_set_filter(png_, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
+    ::png_set_IHDR(png_, info_, static_cast<png_uint_32>(rows.width), static_cast<png_uint_32>(rows.height), rows.bits,
+                   rows.colour_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    ::png_write_info(png_, info_);
+    if (rows.bits == 16 && std::endian::native == std::endian::little) ::png_set_swap(png_);
+    for (int y = 0; y < rows.height; ++y)
+      ::png_write_row(png_, static_cast<png_const_bytep>(rows.first) + y * rows.row_bytes);
+    ::png_write_end(png_, nullptr);
+    return true;
   }
+
+  [[nodiscard]] const std::string& bytes() const { return bytes_; }
+
+ private:
+  [[noreturn]] static void on_error(png_structp png, png_const_charp) { ::png_longjmp(png, 1); }
+  static void on_warning(png_structp, png_const_charp) {}
+
+  static void on_write(png_structp png, png_bytep bytes, std::size_t count) {
+    auto* self = static_cast<PngWriter*>(::png_get_io_ptr(png));
+    bool kept = true;
+    try {
+      self->bytes_.append(reinterpret_cast<const char*>(bytes), count);
+    } catch (const std::exception&) {
+      kept = false;
+    }
+    if (!kept) ::png_error(png, "no memory");
+  }
+
+  std::string bytes_;
+  png_structp png_;
+  png_infop info_;
+};
+
+Result<std::string> encode(const Rows& rows) {
+  if (rows.width <= 0 || rows.height <= 0)
+    return fail(ErrorCode::kInvalidArgument, "an image without pixels has no PNG");
+  PngWriter writer;
+  if (!writer.write(rows)) return fail(ErrorCode::kIo, "the image could not be turned into PNG; free some memory");
+  return writer.bytes();
 }
 
 template <class T>
 Result<std::string> encode_grey(const ImageView<T>& image) {
-  if (image.width <= 0 || image.height <= 0) return fail_empty();
-  constexpr int kType = sizeof(T) == 1 ? CV_8UC1 : CV_16UC1;
-  return encode(cv::Mat(image.height, image.width, kType, const_cast<T*>(image.pixels),
-                        static_cast<std::size_t>(image.stride) * sizeof(T)));
+  return encode({image.pixels, static_cast<std::size_t>(image.stride) * sizeof(T), image.width, image.height,
+                 8 * static_cast<int>(sizeof(T)), PNG_COLOR_TYPE_GRAY});
 }
 
 }  // namespace
@@ -49,14 +100,9 @@ Result<std::string> encode_png(const GreyView& image) {
 }
 
 Result<std::string> encode_png(const ColourImage& image) {
-  if (image.empty()) return fail_empty();
-  cv::Mat blue_first(image.height(), image.width(), CV_8UC3);
-  for (int y = 0; y < image.height(); ++y)
-    for (int x = 0; x < image.width(); ++x) {
-      const Rgb& pixel = image.at(x, y);
-      blue_first.at<cv::Vec3b>(y, x) = {pixel[2], pixel[1], pixel[0]};
-    }
-  return encode(blue_first);
+  static_assert(sizeof(Rgb) == 3);
+  return encode({image.data(), sizeof(Rgb) * static_cast<std::size_t>(image.width()), image.width(), image.height(), 8,
+                 PNG_COLOR_TYPE_RGB});
 }
 
 }  // namespace slsd

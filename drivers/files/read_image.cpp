@@ -3,93 +3,46 @@
 #include "drivers/files/read_image.hpp"
 
 #include <algorithm>
-#include <cstdint>
-#include <exception>
-#include <limits>
-#include <optional>
 #include <string>
 #include <utility>
 
-#include <opencv2/imgcodecs.hpp>
-
 #include "drivers/files/file.hpp"
-#include "drivers/files/image_header.hpp"
+#include "drivers/files/image_formats.hpp"
 
 namespace slsd {
 namespace {
 
-// OpenCV's weights of ITU-R BT.601, in 1 / 2^15.
-constexpr std::uint32_t kBlue = 3735;
-constexpr std::uint32_t kGreen = 19235;
-constexpr std::uint32_t kRed = 9798;
-
-template <class T>
-void copy_grey(const T* from, T* to, int width) {
-  std::copy_n(from, width, to);
+/// Formats are told apart by their first bytes, not by the name, which people change.
+Result<DecodedImage> decode(std::string_view bytes, std::size_t limit_bytes) {
+  using namespace std::string_view_literals;
+  if (bytes.empty()) return fail(ErrorCode::kMalformed, "the image file is empty; record or copy it again");
+  if (bytes.starts_with("\x89PNG\r\n\x1a\n"sv)) return decode_png(bytes, limit_bytes);
+  for (const auto mark : {"II*\0"sv, "MM\0*"sv, "II+\0"sv, "MM\0+"sv})
+    if (bytes.starts_with(mark)) return decode_tiff(bytes, limit_bytes);
+  if (bytes.starts_with("BM"sv)) return decode_bmp(bytes, limit_bytes);
+  if (bytes.size() >= 3 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '7') return decode_pnm(bytes, limit_bytes);
+  return fail(ErrorCode::kUnsupported, "is not a PNG, TIFF, PGM, PPM or BMP image; convert it to one of these");
 }
 
-template <class T>
-void weigh_colours(const T* from, int channels, T* to, int width) {
-  for (int x = 0; x < width; ++x, from += channels)
-    to[x] = static_cast<T>((kBlue * from[0] + kGreen * from[1] + kRed * from[2] + (1u << 14)) >> 15);
-}
-
-template <class T>
-Image<T> grey_from(const cv::Mat& decoded, BayerPattern bayer) {
-  Image<T> grey(decoded.cols, decoded.rows);
-  for (int y = 0; y < decoded.rows; ++y) {
-    if (decoded.channels() == 1)
-      copy_grey(decoded.ptr<T>(y), grey.row(y), decoded.cols);
-    else
-      weigh_colours(decoded.ptr<T>(y), decoded.channels(), grey.row(y), decoded.cols);
-  }
-  return bayer != BayerPattern::kNone && decoded.channels() == 1 ? grey_from_mosaic(grey) : grey;
-}
-
-/// Nothing where OpenCV cannot.
-std::optional<cv::Mat> decode(std::string_view bytes) {
-  try {
-    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
-    cv::Mat decoded = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
-    const int channels = decoded.channels();
-    if (decoded.empty() || (decoded.depth() != CV_8U && decoded.depth() != CV_16U) || channels == 2 || channels > 4)
-      return std::nullopt;
-    return decoded;
-  } catch (const std::exception&) {
-    return std::nullopt;
-  }
-}
-
-Result<> check_limits(const ImageHeader& header, const ReadImageOptions& options) {
-  const double limit = static_cast<double>(options.limit_decoded_bytes);
-  constexpr std::uint64_t kSideMax = 1u << 20;  // OpenCV's own
-  if (header.decoded_bytes() <= limit && header.width_px <= kSideMax && header.height_px <= kSideMax) return {};
-  return fail(ErrorCode::kInvalidArgument, "the image declares " + std::to_string(header.width_px) + "x" +
-                                               std::to_string(header.height_px) +
-                                               " pixels, more than are read; save it smaller");
+Result<GreyImage> grey_from(DecodedImage image, BayerPattern bayer) {
+  if (bayer == BayerPattern::kNone || image.colour) return std::move(image.grey);
+  return std::visit(
+      [](const auto& mosaic) -> Result<GreyImage> {
+        if (std::min(mosaic.width(), mosaic.height()) >= 2) return grey_from_mosaic(mosaic);
+        return fail(ErrorCode::kMismatch, "a Bayer mosaic has at least 2x2 pixels; set bayer to none for this image");
+      },
+      image.grey);
 }
 
 Result<GreyImage> decode_at_no_place(std::string_view bytes, const ReadImageOptions& options) {
-  if (bytes.size() > std::min<std::size_t>(options.limit_file_bytes, std::numeric_limits<int>::max()))
+  if (bytes.size() > options.limit_file_bytes)
     return fail(ErrorCode::kInvalidArgument, "the image file is longer than is read; save it smaller");
-  const auto header = read_image_header(bytes);
-  if (!header) return tl::unexpected(header.error());
-  if (auto within = check_limits(*header, options); !within) return tl::unexpected(within.error());
-  const auto decoded = decode(bytes);
-  if (!decoded || static_cast<std::uint64_t>(decoded->cols) != header->width_px ||
-      static_cast<std::uint64_t>(decoded->rows) != header->height_px)
-    return fail(ErrorCode::kMalformed, "the image is damaged; record or copy it again");
-  if (options.bayer != BayerPattern::kNone && std::min(decoded->cols, decoded->rows) < 2)
-    return fail(ErrorCode::kMismatch, "a Bayer mosaic has at least 2x2 pixels; set bayer to none for this image");
-  if (decoded->depth() == CV_16U) return grey_from<std::uint16_t>(*decoded, options.bayer);
-  return grey_from<std::uint8_t>(*decoded, options.bayer);
+  auto image = decode(bytes, options.limit_decoded_bytes);
+  if (!image) return tl::unexpected(std::move(image.error()));
+  return grey_from(std::move(*image), options.bayer);
 }
 
 }  // namespace
-
-GreyView view(const GreyImage& image) {
-  return std::visit([](const auto& pixels) { return GreyView(pixels.view()); }, image);
-}
 
 Result<GreyImage> decode_image(std::string_view bytes, std::string_view name, const ReadImageOptions& options) {
   return decode_at_no_place(bytes, options).map_error([&](Error error) {

@@ -5,18 +5,12 @@
 #include <cstddef>
 #include <filesystem>
 #include <string_view>
-#include <variant>
 
-#include "core/image.hpp"
 #include "core/result.hpp"
 #include "drivers/files/bayer.hpp"
+#include "drivers/files/grey_image.hpp"
 
 namespace slsd {
-
-/// An owned grey image of 8 or 16 bits a pixel.
-using GreyImage = std::variant<Grey8, Grey16>;
-
-[[nodiscard]] GreyView view(const GreyImage& image);
 
 /// How an image file is read, and what it may cost.
 struct ReadImageOptions {

@@ -82,16 +82,19 @@ Samples grey_samples(const Image<T>& image) {
 }
 
 std::string pnm_header(const Samples& samples, int kind) {
-  return "P" + std::to_string(kind) + "\n# a comment\n" + std::to_string(samples.width) + " " +
-         std::to_string(samples.height) + "\n" + (samples.bits == 8 ? "255" : "65535") + "\n";
+  std::string header("P");
+  header.append(std::to_string(kind)).append("\n# a comment\n").append(std::to_string(samples.width));
+  header.append(" ").append(std::to_string(samples.height)).append(samples.bits == 8 ? "\n255\n" : "\n65535\n");
+  return header;
 }
 
 void put_tag(std::string& tiff, bool big_endian, int tag, std::uint32_t count, std::uint32_t value, bool is_short) {
   put(tiff, tag, 2, big_endian);
   put(tiff, is_short ? 3 : 4, 2, big_endian);
   put(tiff, count, 4, big_endian);
-  put(tiff, value, is_short && count == 1 ? 2 : 4, big_endian);
-  if (is_short && count == 1) put(tiff, 0, 2, big_endian);
+  const bool in_place = is_short && count <= 2;
+  put(tiff, value, in_place ? 2 : 4, big_endian);
+  if (in_place) put(tiff, count == 2 ? value : 0, 2, big_endian);
 }
 
 }  // namespace
@@ -176,9 +179,9 @@ std::string tiff_bytes(const Samples& samples, bool big_endian, int rows_per_str
   put(tiff, 9, 2, big_endian);
   put_tag(tiff, big_endian, 256, 1, samples.width, false);
   put_tag(tiff, big_endian, 257, 1, samples.height, false);
-  put_tag(tiff, big_endian, 258, samples.channels, samples.channels == 1 ? samples.bits : bits_at, true);
+  put_tag(tiff, big_endian, 258, samples.channels, samples.channels <= 2 ? samples.bits : bits_at, true);
   put_tag(tiff, big_endian, 259, 1, 1, true);
-  put_tag(tiff, big_endian, 262, 1, samples.channels == 1 ? 1 : 2, true);
+  put_tag(tiff, big_endian, 262, 1, samples.channels < 3 ? 1 : 2, true);
   put_tag(tiff, big_endian, 273, strips, strips == 1 ? pixels_at : lists_at, false);
   put_tag(tiff, big_endian, 277, 1, samples.channels, true);
   put_tag(tiff, big_endian, 278, 1, rows_per_strip, false);

@@ -101,6 +101,8 @@ TEST(DecodeImage, IgnoresTransparency) {
   EXPECT_EQ(decode_image(test::png_bytes(grey_alpha), "file"), GreyImage(grey));
   EXPECT_EQ(decode_image(test::png_bytes(rgb_alpha), "file"), GreyImage(grey));
   EXPECT_EQ(decode_image(test::bmp_bytes(rgb_alpha), "file"), GreyImage(grey));
+  EXPECT_EQ(decode_image(test::tiff_bytes(rgb_alpha, false), "file"), GreyImage(grey));
+  EXPECT_EQ(decode_image(test::tiff_bytes(grey_alpha, true), "file"), GreyImage(grey));
 }
 
 TEST(DecodeImage, LooksUpPalettes) {

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "core/result.hpp"
+#include "drivers/files/grey_image.hpp"
+
+namespace slsd {
+
+/// What a file's bytes are as an image. The errors below have no place; the caller knows it.
+struct DecodedImage {
+  GreyImage grey;
+  bool colour = false;  ///< the file had colours, so that it is no mosaic
+};
+
+/// One function to a format; the bytes begin as that format does. A file that ends early, or is damaged where that can
+/// be told, is an error. The memory that its header asks for is checked before it is taken.
+/// @param limit_bytes  of decoded samples
+/// @errors kMalformed, kUnsupported, kInvalidArgument (larger than the limit)
+/// @thread reentrant
+[[nodiscard]] Result<DecodedImage> decode_png(std::string_view bytes, std::size_t limit_bytes);
+[[nodiscard]] Result<DecodedImage> decode_tiff(std::string_view bytes, std::size_t limit_bytes);
+[[nodiscard]] Result<DecodedImage> decode_pnm(std::string_view bytes, std::size_t limit_bytes);
+[[nodiscard]] Result<DecodedImage> decode_bmp(std::string_view bytes, std::size_t limit_bytes);
+
+/// What a header declares.
+struct ImageLayout {
+  std::uint64_t width_px = 0;
+  std::uint64_t height_px = 0;
+  int channels = 1;  ///< 1 grey; 2 grey, alpha; 3 red, green, blue; 4 red, green, blue, alpha
+  int bytes_per_channel = 1;
+
+  [[nodiscard]] std::size_t row_samples() const { return width_px * static_cast<std::size_t>(channels); }
+  [[nodiscard]] bool colour() const { return channels > 2; }
+  /// As a double, which does not overflow.
+  [[nodiscard]] double bytes() const {
+    return static_cast<double>(width_px) * static_cast<double>(height_px) * channels * bytes_per_channel;
+  }
+};
+
+/// @param file_bytes       how long the whole file is
+/// @param compression_max  how many bytes of samples a byte of the file can hold at most
+/// @errors kMalformed where the file is too short for what it declares, kInvalidArgument beyond the limit
+[[nodiscard]] Result<> check_layout(std::string_view format, const ImageLayout& layout, std::size_t file_bytes,
+                                    double compression_max, std::size_t limit_bytes);
+
+/// A row of samples in the order of ImageLayout to a row of grey, by the weights of ITU-R BT.601 in OpenCV's rounding.
+void grey_row(const std::uint8_t* samples, int channels, std::uint8_t* grey, int width_px);
+void grey_row(const std::uint16_t* samples, int channels, std::uint16_t* grey, int width_px);
+
+/// The same words for every format.
+[[nodiscard]] tl::unexpected<Error> fail_truncated(std::string_view format);
+[[nodiscard]] tl::unexpected<Error> fail_variant(std::string_view format, std::string_view what);
+
+}  // namespace slsd
