@@ -99,7 +99,11 @@ Result<Cloud> read_ply(std::string_view bytes, std::string_view name) {
                 where);
   }
   cloud.points.reserve(count);
-  for (std::uint64_t i = 0; i < count; ++i) cloud.points.push_back(read_point(header.rest().data() + i * kPointBytes));
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const auto point = read_point(header.rest().data() + i * kPointBytes);
+    if (!point) return fail(ErrorCode::kMalformed, "names no cell in point " + std::to_string(i), where);
+    cloud.points.push_back(*point);
+  }
   return cloud;
 }
 

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstdint>
 #include <cstring>
+#include <limits>
 
 namespace slsd {
 namespace {
@@ -18,30 +20,44 @@ constexpr std::size_t field_bytes() {
 }
 static_assert(field_bytes() == kPointBytes);
 
-// Calls visit with each member, in the order of kPointFields.
-template <class Point, class Visit>
-void for_each_field(Point& point, Visit visit) {
+// Column and row are int in a file: not every reader knows PLY's ushort.
+struct Cell {
+  std::int32_t column;
+  std::int32_t row;
+
+  [[nodiscard]] bool valid() const { return fits(column) && fits(row); }
+  static bool fits(std::int32_t value) { return value >= 0 && value <= std::numeric_limits<std::uint16_t>::max(); }
+};
+
+// Calls visit with each field, in the order of kPointFields.
+template <class Point, class Cell, class Visit>
+void for_each_field(Point& point, Cell& cell, Visit visit) {
   visit(point.x), visit(point.y), visit(point.z);
   visit(point.intensity);
   visit(point.camera_u), visit(point.camera_v), visit(point.projector_u), visit(point.projector_v);
   visit(point.camera), visit(point.symbol);
   visit(point.sigma_mm);
-  visit(point.column), visit(point.row);
+  visit(cell.column), visit(cell.row);
 }
 
 }  // namespace
 
 void append_point(const CloudPoint& point, std::string& bytes) {
-  for_each_field(point,
+  const Cell cell{point.column, point.row};
+  for_each_field(point, cell,
                  [&bytes](const auto& field) { bytes.append(reinterpret_cast<const char*>(&field), sizeof field); });
 }
 
-CloudPoint read_point(const char* bytes) {
+std::optional<CloudPoint> read_point(const char* bytes) {
   CloudPoint point;
-  for_each_field(point, [&bytes](auto& field) {
+  Cell cell{};
+  for_each_field(point, cell, [&bytes](auto& field) {
     std::memcpy(&field, bytes, sizeof field);
     bytes += sizeof field;
   });
+  if (!cell.valid()) return std::nullopt;
+  point.column = static_cast<std::uint16_t>(cell.column);
+  point.row = static_cast<std::uint16_t>(cell.row);
   return point;
 }
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -15,7 +16,7 @@ namespace slsd {
 struct PointField {
   std::string_view name;
   std::string_view ply_type;
-  char pcd_type;  ///< F or U
+  char pcd_type;  ///< F, U or I
   int bytes;
 };
 
@@ -30,18 +31,18 @@ inline constexpr std::array<PointField, 13> kPointFields{{{"x", "float", 'F', 4}
                                                           {"camera", "uchar", 'U', 1},
                                                           {"symbol", "uchar", 'U', 1},
                                                           {"sigma_mm", "float", 'F', 4},
-                                                          {"column", "ushort", 'U', 2},
-                                                          {"row", "ushort", 'U', 2}}};
+                                                          {"column", "int", 'I', 4},
+                                                          {"row", "int", 'I', 4}}};
 
 /// Bytes of one point: the fields in their order, little endian, nothing between them.
-inline constexpr std::size_t kPointBytes = 39;
+inline constexpr std::size_t kPointBytes = 43;
 
 /// Appends the kPointBytes of a point.
 void append_point(const CloudPoint& point, std::string& bytes);
 
-/// The point that append_point() wrote.
+/// The point that append_point() wrote; nothing where its cell is none.
 /// @param bytes  at least kPointBytes
-[[nodiscard]] CloudPoint read_point(const char* bytes);
+[[nodiscard]] std::optional<CloudPoint> read_point(const char* bytes);
 
 /// A text fit for a line of a header: control characters become spaces.
 [[nodiscard]] std::string header_text(std::string_view text);

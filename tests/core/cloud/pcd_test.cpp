@@ -16,7 +16,7 @@ namespace {
 using ::testing::HasSubstr;
 
 CloudPoint cell(const std::string& pcd, std::size_t index) {
-  return read_point(pcd.data() + pcd.find("DATA binary\n") + 12 + index * kPointBytes);
+  return read_point(pcd.data() + pcd.find("DATA binary\n") + 12 + index * kPointBytes).value();
 }
 
 TEST(WritePcd, PutsEachPointInItsCellAndNanElsewhere) {

@@ -27,7 +27,7 @@ TEST(WritePly, SaysTheContract) {
   EXPECT_THAT(text, HasSubstr("property float x\nproperty float y\nproperty float z\nproperty uchar intensity\n"
                               "property float camera_u\nproperty float camera_v\nproperty float projector_u\n"
                               "property float projector_v\nproperty uchar camera\nproperty uchar symbol\n"
-                              "property float sigma_mm\nproperty ushort column\nproperty ushort row\nend_header\n"));
+                              "property float sigma_mm\nproperty int column\nproperty int row\nend_header\n"));
 }
 
 TEST(WritePly, KeepsAnIdFromBreakingTheHeader) {
@@ -47,6 +47,12 @@ TEST(ReadPly, RefusesEveryTruncation) {
     EXPECT_EQ(read.error().where, "cloud.ply");
   }
   EXPECT_FALSE(read_ply(whole + "x", "cloud.ply"));
+}
+
+TEST(ReadPly, RefusesACellThatIsNone) {
+  std::string text = write_ply(any_cloud(3, 4, 4));
+  text.back() = '\x80';
+  EXPECT_THAT(to_string(read_ply(text, "cloud.ply").error()), HasSubstr("cloud.ply: names no cell in point"));
 }
 
 TEST(ReadPly, RefusesACountThatWouldOverflow) {
