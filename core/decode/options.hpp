@@ -21,6 +21,7 @@ struct DecodeOptions {
   Method correspond = Method::kDefault;
 
   [[nodiscard]] Result<> validate() const;
+  friend bool operator==(const DecodeOptions&, const DecodeOptions&) = default;
 };
 
 }  // namespace slsd

@@ -30,6 +30,7 @@ struct FileCameraOptions {
   std::size_t cache_bytes = 64u << 20;  ///< decoded images that are kept; what does not fit is decoded each time
 
   [[nodiscard]] Result<> validate() const;
+  friend bool operator==(const FileCameraOptions&, const FileCameraOptions&) = default;
 };
 
 /// A camera that replays images: one to a trigger, a folder's in the order of their names' bytes ("2.png" after
