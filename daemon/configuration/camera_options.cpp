@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/configuration/camera_options.hpp"
+
+namespace slsd {
+
+std::string_view to_string(CameraDriver driver) {
+  switch (driver) {
+    case CameraDriver::kFile:
+      return "file";
+    case CameraDriver::kV4l2:
+      return "v4l2";
+    case CameraDriver::kAravis:
+      return "aravis";
+  }
+  return {};
+}
+
+Result<> CameraOptions::validate() const {
+  if (name().empty() || name().size() > 64) return fail(ErrorCode::kInvalidArgument, "name must have 1 to 64 letters");
+  if (driver != CameraDriver::kFile) return {};
+  if (file.path.empty()) {
+    return fail(ErrorCode::kInvalidArgument, "path must name an image or a folder of images for the driver \"file\"");
+  }
+  return file.validate();
+}
+
+}  // namespace slsd

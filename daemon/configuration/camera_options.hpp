@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/result.hpp"
+#include "drivers/camera/fault.hpp"
+#include "drivers/camera/file_camera.hpp"
+
+namespace slsd {
+
+enum class CameraDriver { kFile, kV4l2, kAravis };
+[[nodiscard]] std::string_view to_string(CameraDriver driver);
+
+/// A [[camera]] table.
+struct CameraOptions {
+  CameraDriver driver = CameraDriver::kFile;
+  FileCameraOptions file;     ///< its name is the camera's, whatever the driver
+  std::vector<Fault> faults;  ///< what the camera does wrong, for the tests of everything above it
+
+  [[nodiscard]] const std::string& name() const { return file.name; }
+  /// @errors kInvalidArgument: the message begins with the key
+  [[nodiscard]] Result<> validate() const;
+  friend bool operator==(const CameraOptions&, const CameraOptions&) = default;
+};
+
+}  // namespace slsd

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/configuration/configuration.hpp"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <utility>
+
+#include "daemon/configuration/table_reader.hpp"
+#include "drivers/files/file.hpp"
+
+namespace slsd {
+namespace {
+
+using std::filesystem::path;
+using std::string_view_literals::operator""sv;
+
+constexpr std::size_t kMaxFileBytes = 1 << 20;
+
+constexpr std::array kProjectorDrivers{std::pair("headless"sv, ProjectorDriver::kHeadless),
+                                       std::pair("glfw"sv, ProjectorDriver::kGlfw)};
+constexpr std::array kCameraDrivers{std::pair("file"sv, CameraDriver::kFile), std::pair("v4l2"sv, CameraDriver::kV4l2),
+                                    std::pair("aravis"sv, CameraDriver::kAravis)};
+constexpr std::array kArrayMethods{std::pair("constructive"sv, ArrayMethod::kConstructive),
+                                   std::pair("paper"sv, ArrayMethod::kPaper)};
+constexpr std::array kMethods{std::pair("default"sv, Method::kDefault), std::pair("paper"sv, Method::kPaper)};
+constexpr std::array kMosaics{std::pair("none"sv, BayerPattern::kNone), std::pair("RGGB"sv, BayerPattern::kRggb),
+                              std::pair("BGGR"sv, BayerPattern::kBggr), std::pair("GRBG"sv, BayerPattern::kGrbg),
+                              std::pair("GBRG"sv, BayerPattern::kGbrg)};
+
+template <class Choices>
+auto span_of(const Choices& choices) {
+  return std::span<const typename Choices::value_type>(choices);
+}
+
+Result<> read_projector(const toml::table* table, const path& file, ProjectorOptions& options) {
+  TableReader reader(table, "[projector]", file);
+  reader.choose("driver", options.driver, span_of(kProjectorDrivers));
+  reader.read("monitor", options.monitor);
+  reader.read("width_px", options.width_px);
+  reader.read("height_px", options.height_px);
+  return reader.finish(options.validate());
+}
+
+// A pattern file holds the whole pattern: another key beside it could only contradict it.
+void refuse_keys_beside_file(TableReader& reader) {
+  for (const char* key :
+       {"symbol_size_px", "spacing_px", "symbols", "seed", "method", "minimum_distance", "half_turn_unique"}) {
+    if (reader.has(key)) reader.refuse(key, "cannot stand beside file, which holds the whole pattern: remove one");
+  }
+}
+
+Result<> read_pattern_table(const toml::table* table, const path& file, Configuration& configuration) {
+  TableReader reader(table, "[pattern]", file);
+  PatternOptions& options = configuration.pattern;
+  options.projector_width_px = configuration.projector.width_px;
+  options.projector_height_px = configuration.projector.height_px;
+  reader.read("file", configuration.pattern_file);
+  reader.read("symbol_size_px", options.symbol_size_px);
+  reader.read("spacing_px", options.spacing_px);
+  reader.read("symbols", options.symbols);
+  reader.read("seed", options.seed);
+  reader.choose("method", options.method, span_of(kArrayMethods));
+  reader.read("minimum_distance", options.minimum_distance);
+  reader.read("half_turn_unique", options.half_turn_unique);
+  if (!configuration.pattern_file.empty()) refuse_keys_beside_file(reader);
+  if (auto read = reader.finish(options.validate()); !read) return read;
+  if (options.symbols.empty()) options.symbols = default_symbols(options.symbol_size_px);
+  return {};
+}
+
+void read_faults(TableReader& reader, CameraOptions& options) {
+  std::vector<std::string> texts;
+  reader.read("faults", texts);
+  if (auto faults = parse_faults(texts)) {
+    options.faults = std::move(*faults);
+  } else {
+    reader.refuse("faults", "has an entry that is no fault: " + faults.error().message);
+  }
+}
+
+void read_frame_size(TableReader& reader, FileCameraOptions& options) {
+  std::optional<int> width;
+  std::optional<int> height;
+  reader.read("width_px", width);
+  reader.read("height_px", height);
+  if (width && height) options.size_px = {*width, *height};
+  if (width && !height) reader.refuse("width_px", "needs height_px beside it");
+  if (height && !width) reader.refuse("height_px", "needs width_px beside it");
+}
+
+Result<CameraOptions> read_camera(const toml::table& table, const path& file) {
+  TableReader reader(&table, "[[camera]]", file);
+  CameraOptions options;
+  reader.read("name", options.file.name);
+  reader.choose("driver", options.driver, span_of(kCameraDrivers));
+  // The keys of a driver that this build lacks cannot be checked; opening the camera says that it is lacking.
+  if (options.driver != CameraDriver::kFile) return options;
+  reader.read("path", options.file.path);
+  reader.read("loop", options.file.loop);
+  reader.read("rate_hz", options.file.rate_hz);
+  read_frame_size(reader, options.file);
+  reader.choose("bayer", options.file.bayer, span_of(kMosaics));
+  read_faults(reader, options);
+  if (auto read = reader.finish(options.validate()); !read) return tl::unexpected(read.error());
+  return options;
+}
+
+Result<> read_cameras(const std::vector<const toml::table*>& tables, const path& file,
+                      std::vector<CameraOptions>& cameras) {
+  for (const toml::table* table : tables) {
+    auto camera = read_camera(*table, file);
+    if (!camera) return tl::unexpected(camera.error());
+    const auto same = [&](const CameraOptions& other) { return other.name() == camera->name(); };
+    if (std::ranges::any_of(cameras, same)) {
+      return fail(ErrorCode::kInvalidArgument,
+                  "[[camera]] name \"" + camera->name() + "\" is taken: give each camera a name of its own",
+                  place_of(table->contains("name") ? table->get("name")->source() : table->source(), file.string()));
+    }
+    cameras.push_back(std::move(*camera));
+  }
+  return {};
+}
+
+Result<> read_decode(const toml::table* table, const path& file, DecodeOptions& options) {
+  TableReader reader(table, "[decode]", file);
+  reader.read("depth_min_mm", options.depth_min_mm);
+  reader.read("depth_max_mm", options.depth_max_mm);
+  reader.choose("binarize", options.binarize, span_of(kMethods));
+  reader.choose("classify", options.classify, span_of(kMethods));
+  reader.choose("centre", options.centre, span_of(kMethods));
+  reader.choose("link_grid", options.link_grid, span_of(kMethods));
+  reader.choose("decode_windows", options.decode_windows, span_of(kMethods));
+  reader.choose("correspond", options.correspond, span_of(kMethods));
+  return reader.finish(options.validate());
+}
+
+Result<> read_calibration_table(const toml::table* table, const path& file, path& calibration_file) {
+  TableReader reader(table, "[calibration]", file);
+  reader.read("file", calibration_file);
+  return reader.finish();
+}
+
+Result<> read_scan(const toml::table* table, const path& file, ScanOptions& options) {
+  TableReader reader(table, "[scan]", file);
+  reader.read("timeout_ms", options.timeout_ms);
+  reader.read("exposure_skew_ms", options.exposure_skew_ms);
+  reader.read("reopen_first_ms", options.reopen_first_ms);
+  reader.read("reopen_longest_ms", options.reopen_longest_ms);
+  return reader.finish(options.validate());
+}
+
+Result<> read_server(const toml::table* table, const path& file, ServerOptions& options) {
+  TableReader reader(table, "[server]", file);
+  reader.read("socket", options.socket);
+  reader.read("socket_mode", options.socket_mode);
+  reader.read("clients_max", options.clients_max);
+  reader.read("request_bytes_max", options.request_bytes_max);
+  reader.read("send_timeout_ms", options.send_timeout_ms);
+  return reader.finish(options.validate());
+}
+
+Result<Configuration> read_tables(const toml::table& document, const path& file) {
+  TableReader top(&document, "", file);
+  const toml::table* projector = top.table("projector");
+  const toml::table* pattern = top.table("pattern");
+  const std::vector<const toml::table*> cameras = top.tables("camera");
+  const toml::table* calibration = top.table("calibration");
+  const toml::table* decode = top.table("decode");
+  const toml::table* scan = top.table("scan");
+  const toml::table* server = top.table("server");
+  Configuration configuration;
+  Result<> read = top.finish();
+  if (read) read = read_projector(projector, file, configuration.projector);
+  if (read) read = read_pattern_table(pattern, file, configuration);
+  if (read) read = read_cameras(cameras, file, configuration.cameras);
+  if (read) read = read_calibration_table(calibration, file, configuration.calibration_file);
+  if (read) read = read_decode(decode, file, configuration.decode);
+  if (read) read = read_scan(scan, file, configuration.scan);
+  if (read) read = read_server(server, file, configuration.server);
+  if (!read) return tl::unexpected(read.error());
+  return configuration;
+}
+
+}  // namespace
+
+Result<Configuration> read_configuration(std::string_view text, const path& file) {
+  try {
+    return read_tables(toml::parse(text, file.string()), file);
+  } catch (const toml::parse_error& error) {
+    return fail(ErrorCode::kMalformed, std::string(error.description()), place_of(error.source(), file.string()));
+  }
+}
+
+Result<Configuration> load_configuration(const path& file) {
+  auto text = read_file(file, kMaxFileBytes);
+  if (!text) return tl::unexpected(text.error());
+  return read_configuration(*text, file);
+}
+
+}  // namespace slsd

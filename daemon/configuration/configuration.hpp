@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "core/code/pattern.hpp"
+#include "core/decode/options.hpp"
+#include "core/result.hpp"
+#include "daemon/configuration/camera_options.hpp"
+#include "daemon/configuration/projector_options.hpp"
+#include "daemon/configuration/scan_options.hpp"
+#include "daemon/configuration/server_options.hpp"
+
+namespace slsd {
+
+inline constexpr const char* kConfigurationFile = "/etc/slsd/slsd.toml";
+
+/// What the configuration file says, a member to a table. Paths are those of the file, joined to its folder.
+struct Configuration {
+  std::filesystem::path pattern_file;  ///< where it is not empty, it takes the place of `pattern`
+  PatternOptions pattern;              ///< with the projector's size, and the symbols named
+  ProjectorOptions projector;
+  std::vector<CameraOptions> cameras;
+  std::filesystem::path calibration_file;  ///< empty: none, and no scan is possible
+  DecodeOptions decode;
+  ScanOptions scan;
+  ServerOptions server;
+};
+
+/// Reads a configuration's text.
+/// @param file  its path, for the places of errors and for relative paths
+/// @errors kMalformed: no TOML; kInvalidArgument: a key that is unknown, of the wrong type or out of range. The place
+///         is file:line:column
+/// @thread reentrant
+[[nodiscard]] Result<Configuration> read_configuration(std::string_view text, const std::filesystem::path& file);
+
+/// Reads a configuration file. @errors as above, and those of read_file() @thread reentrant
+[[nodiscard]] Result<Configuration> load_configuration(const std::filesystem::path& file);
+
+}  // namespace slsd

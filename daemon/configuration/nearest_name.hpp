@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace slsd {
+
+/// How many characters must be inserted, deleted or replaced to turn one word into the other (Levenshtein).
+/// @thread reentrant
+[[nodiscard]] int edit_distance(std::string_view a, std::string_view b);
+
+/// The name that a person most likely meant by a word; empty where none is within a third of its length.
+/// @thread reentrant
+[[nodiscard]] std::optional<std::string> nearest_name(std::string_view word, std::span<const std::string> names);
+
+/// "; did you mean symbols?", or nothing where no name is near.
+[[nodiscard]] std::string nearest_hint(std::string_view word, std::span<const std::string> names);
+
+}  // namespace slsd

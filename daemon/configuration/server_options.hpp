@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// The longest path that a Unix socket can have, in bytes.
+inline constexpr std::size_t kMaxSocketPath = 107;
+
+/// The [server] table.
+struct ServerOptions {
+  std::filesystem::path socket = "/run/slsd/slsd.sock";
+  int socket_mode = 0660;               ///< 0 to 0777
+  int clients_max = 256;                ///< 1 to 10000; one more is told so and closed
+  int request_bytes_max = 1024 * 1024;  ///< 1024 to 16777216; a longer line is an error and ends the connection
+  int send_timeout_ms = 30'000;         ///< 100 to 600000; a client that reads nothing for so long is dropped
+
+  [[nodiscard]] std::chrono::milliseconds send_timeout() const { return std::chrono::milliseconds(send_timeout_ms); }
+  [[nodiscard]] Result<> validate() const;
+  friend bool operator==(const ServerOptions&, const ServerOptions&) = default;
+};
+
+}  // namespace slsd

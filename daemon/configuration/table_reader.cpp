@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/configuration/table_reader.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "daemon/configuration/nearest_name.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kLongestList = 64;
+
+}  // namespace
+
+std::string place_of(const toml::source_region& source, std::string_view file) {
+  return std::string(file) + ":" + std::to_string(source.begin.line) + ":" + std::to_string(source.begin.column);
+}
+
+TableReader::TableReader(const toml::table* table, std::string name, std::filesystem::path file)
+    : table_(table), name_(std::move(name)), file_(std::move(file)) {}
+
+bool TableReader::has(std::string_view key) const {
+  return table_ != nullptr && table_->contains(key);
+}
+
+const toml::node* TableReader::find(std::string_view key) {
+  known_.emplace_back(key);
+  return table_ == nullptr ? nullptr : table_->get(key);
+}
+
+std::string TableReader::place(std::string_view key) const {
+  if (table_ == nullptr) return file_.string();
+  const toml::node* node = table_->get(key);
+  return place_of(node == nullptr ? table_->source() : node->source(), file_.string());
+}
+
+void TableReader::refuse(std::string_view key, std::string_view what) {
+  if (error_) return;
+  const std::string prefix = name_.empty() ? "" : name_ + " ";
+  error_ = Error{ErrorCode::kInvalidArgument, prefix + std::string(key) + " " + std::string(what), place(key)};
+}
+
+std::optional<std::int64_t> TableReader::integer(std::string_view key, std::int64_t low, std::int64_t high) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return std::nullopt;
+  const auto* number = node->as_integer();
+  if (number != nullptr && number->get() >= low && number->get() <= high) return number->get();
+  refuse(key, "must be a whole number from " + std::to_string(low) + " to " + std::to_string(high));
+  return std::nullopt;
+}
+
+void TableReader::read(std::string_view key, bool& value) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return;
+  if (const auto* boolean = node->as_boolean()) {
+    value = boolean->get();
+  } else {
+    refuse(key, "must be true or false");
+  }
+}
+
+void TableReader::read(std::string_view key, int& value) {
+  using Limits = std::numeric_limits<int>;
+  if (const auto number = integer(key, Limits::min(), Limits::max())) value = static_cast<int>(*number);
+}
+
+void TableReader::read(std::string_view key, std::uint32_t& value) {
+  const auto number = integer(key, 0, std::numeric_limits<std::uint32_t>::max());
+  if (number) value = static_cast<std::uint32_t>(*number);
+}
+
+void TableReader::read(std::string_view key, std::optional<int>& value) {
+  using Limits = std::numeric_limits<int>;
+  if (const auto number = integer(key, Limits::min(), Limits::max())) value = static_cast<int>(*number);
+}
+
+void TableReader::read(std::string_view key, double& value) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return;
+  const auto number = node->value<double>();
+  if (number && std::isfinite(*number)) {
+    value = *number;
+  } else {
+    refuse(key, "must be a number");
+  }
+}
+
+void TableReader::read(std::string_view key, std::string& value) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return;
+  const auto* text = node->as_string();
+  if (text != nullptr && text->get().find('\0') == std::string::npos) {
+    value = text->get();
+  } else {
+    refuse(key, "must be a text in quotes");
+  }
+}
+
+void TableReader::read(std::string_view key, std::filesystem::path& value) {
+  std::string text;
+  read(key, text);
+  if (!text.empty()) value = file_.parent_path() / text;
+}
+
+void TableReader::read(std::string_view key, std::vector<int>& value) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return;
+  const toml::array* array = node->as_array();
+  std::vector<int> numbers;
+  for (std::size_t i = 0; array != nullptr && i < std::min(array->size(), kLongestList); ++i) {
+    const auto number = array->get(i)->value_exact<std::int64_t>();
+    if (number && std::abs(*number) <= std::numeric_limits<int>::max()) numbers.push_back(static_cast<int>(*number));
+  }
+  if (array == nullptr || numbers.size() != array->size()) return refuse(key, "must be a list of whole numbers");
+  value = std::move(numbers);
+}
+
+void TableReader::read(std::string_view key, std::vector<std::string>& value) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return;
+  const toml::array* array = node->as_array();
+  std::vector<std::string> words;
+  for (std::size_t i = 0; array != nullptr && i < array->size(); ++i) {
+    if (auto word = array->get(i)->value_exact<std::string>()) words.push_back(std::move(*word));
+  }
+  if (array == nullptr || words.size() != array->size()) return refuse(key, "must be a list of texts");
+  value = std::move(words);
+}
+
+const toml::table* TableReader::table(std::string_view key) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return nullptr;
+  if (!node->is_table()) refuse(key, "must be a table: write [" + std::string(key) + "]");
+  return node->as_table();
+}
+
+std::vector<const toml::table*> TableReader::tables(std::string_view key) {
+  const toml::node* node = find(key);
+  std::vector<const toml::table*> found;
+  if (node == nullptr) return found;
+  const toml::array* array = node->as_array();
+  for (std::size_t i = 0; array != nullptr && i < array->size(); ++i) {
+    if (const toml::table* table = array->get(i)->as_table()) found.push_back(table);
+  }
+  if (array == nullptr || found.size() != array->size()) {
+    refuse(key, "must be a list of tables: write [[" + std::string(key) + "]]");
+  }
+  return found;
+}
+
+std::optional<Error> TableReader::unknown_key() const {
+  if (table_ == nullptr) return std::nullopt;
+  for (const auto& [key, node] : *table_) {
+    if (std::ranges::find(known_, key.str()) != known_.end()) continue;
+    const std::string what = name_.empty() ? "no such table or key: " : "no such key in " + name_ + ": ";
+    return Error{ErrorCode::kInvalidArgument,
+                 what + std::string(key.str().substr(0, 64)) + nearest_hint(key.str(), known_),
+                 place_of(key.source(), file_.string())};
+  }
+  return std::nullopt;
+}
+
+std::string TableReader::place_named_by(std::string_view message) const {
+  std::string_view named;
+  std::size_t first = std::string_view::npos;
+  for (const std::string& key : known_) {
+    const std::size_t at = message.find(key);
+    const bool better = at < first || (at == first && key.size() > named.size());
+    if (at != std::string_view::npos && better && has(key)) {
+      named = key;
+      first = at;
+    }
+  }
+  return place(named);
+}
+
+Result<> TableReader::finish(Result<> valid) const {
+  if (auto unknown = unknown_key()) return tl::unexpected(*unknown);
+  if (error_) return tl::unexpected(*error_);
+  if (valid) return {};
+  const std::string prefix = name_.empty() ? "" : name_ + " ";
+  return fail(valid.error().code, prefix + valid.error().message, place_named_by(valid.error().message));
+}
+
+}  // namespace slsd

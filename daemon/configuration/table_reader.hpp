@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <toml++/toml.h>
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// Where a node stands, as "file:line:column".
+[[nodiscard]] std::string place_of(const toml::source_region& source, std::string_view file);
+
+/// Reads the keys of one TOML table into an options struct. A key that is not there keeps the value's default; the
+/// first wrong type is kept until finish(), which also finds the keys that nobody asked for.
+/// @thread thread-bound
+class TableReader {
+ public:
+  /// @param table  null where the table was left out
+  /// @param name   as a person writes it, "[pattern]"; empty for the file's top
+  /// @param file   the configuration file; relative paths are relative to its folder
+  TableReader(const toml::table* table, std::string name, std::filesystem::path file);
+
+  [[nodiscard]] bool has(std::string_view key) const;
+  void read(std::string_view key, bool& value);
+  void read(std::string_view key, int& value);
+  void read(std::string_view key, std::uint32_t& value);
+  void read(std::string_view key, std::optional<int>& value);
+  void read(std::string_view key, double& value);
+  void read(std::string_view key, std::string& value);
+  void read(std::string_view key, std::filesystem::path& value);
+  void read(std::string_view key, std::vector<int>& value);
+  void read(std::string_view key, std::vector<std::string>& value);
+
+  /// One of several words.
+  template <class Value>
+  void choose(std::string_view key, Value& value, std::span<const std::pair<std::string_view, Value>> choices) {
+    std::string word;
+    read(key, word);
+    if (word.empty() && !has(key)) return;
+    for (const auto& [name, choice] : choices) {
+      if (word == name) {
+        value = choice;
+        return;
+      }
+    }
+    std::string names;
+    for (const auto& choice : choices) (names += names.empty() ? "" : ", ") += choice.first;
+    refuse(key, "must be one of " + names);
+  }
+
+  /// A table below this one; null where it was left out.
+  [[nodiscard]] const toml::table* table(std::string_view key);
+  /// An array of tables below this one; empty where it was left out.
+  [[nodiscard]] std::vector<const toml::table*> tables(std::string_view key);
+
+  /// Notes that a key's value is wrong: "[pattern] seed must be ...".
+  void refuse(std::string_view key, std::string_view what);
+
+  /// The first thing wrong with the table: a key that is unknown, a type, or what the options' own validate() said,
+  /// placed at the key which its message names.
+  [[nodiscard]] Result<> finish(Result<> valid = {}) const;
+
+ private:
+  [[nodiscard]] const toml::node* find(std::string_view key);
+  [[nodiscard]] std::string place(std::string_view key) const;
+  [[nodiscard]] std::string place_named_by(std::string_view message) const;
+  [[nodiscard]] std::optional<Error> unknown_key() const;
+  std::optional<std::int64_t> integer(std::string_view key, std::int64_t low, std::int64_t high);
+
+  const toml::table* table_;
+  std::string name_;
+  std::filesystem::path file_;
+  std::vector<std::string> known_;
+  std::optional<Error> error_;
+};
+
+}  // namespace slsd
