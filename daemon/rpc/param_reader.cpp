@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/rpc/param_reader.hpp"
+
+#include <algorithm>
+
+#include "daemon/configuration/nearest_name.hpp"
+
+namespace slsd {
+
+const nlohmann::json* ParamReader::find(const char* name) {
+  known_.emplace_back(name);
+  const auto found = params_.find(name);
+  return found == params_.end() ? nullptr : &*found;
+}
+
+void ParamReader::refuse(const char* name, const std::string& what) {
+  if (!error_) error_ = invalid_params("\"" + std::string(name) + "\" must be " + what);
+}
+
+bool ParamReader::boolean(const char* name, bool otherwise) {
+  const auto* value = find(name);
+  if (value == nullptr) return otherwise;
+  if (value->is_boolean()) return value->get<bool>();
+  refuse(name, "true or false");
+  return otherwise;
+}
+
+int ParamReader::integer(const char* name, int otherwise, int low, int high) {
+  const auto* value = find(name);
+  if (value == nullptr) return otherwise;
+  // As a double first: a number beyond 64 bits is read as one, and its conversion to int is undefined.
+  const double number = value->is_number() ? value->get<double>() : low - 1.0;
+  if (value->is_number_integer() && number >= low && number <= high) return static_cast<int>(number);
+  refuse(name, "a whole number from " + std::to_string(low) + " to " + std::to_string(high));
+  return otherwise;
+}
+
+std::optional<double> ParamReader::positive(const char* name, double highest) {
+  const auto* value = find(name);
+  if (value == nullptr) return std::nullopt;
+  const double number = value->is_number() ? value->get<double>() : 0.0;
+  if (number > 0 && number <= highest) return number;
+  refuse(name, "a number above 0, up to " + std::to_string(static_cast<long>(highest)));
+  return std::nullopt;
+}
+
+std::string ParamReader::text(const char* name) {
+  const auto* value = find(name);
+  if (value == nullptr) return {};
+  if (value->is_string()) return value->get<std::string>();
+  refuse(name, "a text");
+  return {};
+}
+
+std::string ParamReader::choice(const char* name, std::initializer_list<std::string_view> words) {
+  const auto* value = find(name);
+  if (value == nullptr) return std::string(*words.begin());
+  if (value->is_string() && std::ranges::find(words, value->get<std::string>()) != words.end()) {
+    return value->get<std::string>();
+  }
+  std::string list;
+  for (const std::string_view word : words) list += (list.empty() ? "\"" : "\" or \"") + std::string(word);
+  refuse(name, list + "\"");
+  return std::string(*words.begin());
+}
+
+std::optional<RpcError> ParamReader::error() const {
+  for (const auto& [name, value] : params_.items()) {
+    if (std::ranges::find(known_, name) != known_.end()) continue;
+    return invalid_params("no such parameter: \"" + name.substr(0, 64) + "\"" + nearest_hint(name, known_));
+  }
+  return error_;
+}
+
+}  // namespace slsd

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "daemon/rpc/rpc_error.hpp"
+
+namespace slsd {
+
+/// Reads a request's parameters by name. What is not there keeps its default; the first thing wrong is kept.
+/// @thread thread-bound
+class ParamReader {
+ public:
+  /// @param params  an object, which outlives the reader
+  explicit ParamReader(const nlohmann::json& params) : params_(params) {}
+
+  [[nodiscard]] bool boolean(const char* name, bool otherwise);
+  [[nodiscard]] int integer(const char* name, int otherwise, int low, int high);
+  /// Above 0, up to the highest; nothing where it is not there.
+  [[nodiscard]] std::optional<double> positive(const char* name, double highest);
+  [[nodiscard]] std::string text(const char* name);
+  /// One of the words; the first where it is not there.
+  [[nodiscard]] std::string choice(const char* name, std::initializer_list<std::string_view> words);
+
+  /// The first thing wrong: a type, a range, a name that nobody asked for.
+  [[nodiscard]] std::optional<RpcError> error() const;
+
+ private:
+  [[nodiscard]] const nlohmann::json* find(const char* name);
+  void refuse(const char* name, const std::string& what);
+
+  const nlohmann::json& params_;
+  std::vector<std::string> known_;
+  std::optional<RpcError> error_;
+};
+
+}  // namespace slsd

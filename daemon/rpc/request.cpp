@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/rpc/request.hpp"
+
+#include <algorithm>
+
+namespace slsd {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMaxIdBytes = 256;
+
+tl::unexpected<BadRequest> refuse(json id, RpcError error) {
+  return tl::unexpected(BadRequest{std::move(id), std::move(error)});
+}
+
+bool usable_as_id(const json& id) {
+  if (id.is_string()) return id.get_ref<const std::string&>().size() <= kMaxIdBytes;
+  return id.is_null() || id.is_number();
+}
+
+tl::expected<Request, BadRequest> read_members(json& message, json id) {
+  if (message.value("jsonrpc", json()) != "2.0") {
+    return refuse(id, invalid_request("\"jsonrpc\" must be \"2.0\""));
+  }
+  const auto method = message.find("method");
+  if (method == message.end() || !method->is_string()) {
+    return refuse(id, invalid_request("\"method\" must be a text, such as \"status\""));
+  }
+  json params = message.value("params", json::object());
+  if (!params.is_object()) {
+    return refuse(id, invalid_params("\"params\" must be an object: parameters go by name"));
+  }
+  return Request{std::move(id), message.contains("id"), method->get<std::string>(), std::move(params)};
+}
+
+}  // namespace
+
+int nesting_depth(std::string_view text) {
+  int depth = 0;
+  int deepest = 0;
+  bool in_text = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_text && c == '\\') {
+      ++i;
+    } else if (c == '"') {
+      in_text = !in_text;
+    } else if (!in_text && (c == '{' || c == '[')) {
+      deepest = std::max(deepest, ++depth);
+    } else if (!in_text && (c == '}' || c == ']')) {
+      --depth;
+    }
+  }
+  return deepest;
+}
+
+tl::expected<Request, BadRequest> parse_request(std::string_view line) {
+  if (nesting_depth(line) > kMaxNesting) {
+    return refuse(nullptr, parse_error("nested deeper than " + std::to_string(kMaxNesting) + " levels"));
+  }
+  json message = json::parse(line, nullptr, /*allow_exceptions=*/false);
+  if (message.is_discarded()) {
+    return refuse(nullptr, parse_error("no JSON: send one JSON-RPC 2.0 object to a line, in UTF-8"));
+  }
+  if (message.is_array()) {
+    return refuse(nullptr, invalid_request("batches are not supported: send one request to a line"));
+  }
+  if (!message.is_object()) return refuse(nullptr, invalid_request("a request is a JSON object"));
+  json id = message.value("id", json());
+  if (!usable_as_id(id)) {
+    return refuse(nullptr, invalid_request("\"id\" must be a number, null or a text of at most 256 bytes"));
+  }
+  return read_members(message, std::move(id));
+}
+
+}  // namespace slsd

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json.hpp>
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// What a client is told when its request failed. JSON-RPC's own codes, and ours from -32001 down, listed in
+/// docs/protocol.md.
+struct RpcError {
+  int code;
+  std::string name;     ///< "frame_stale": what a program compares
+  std::string message;  ///< what happened and what to do
+  std::string where;    ///< file:line:column, key, device, or empty
+
+  [[nodiscard]] nlohmann::json to_json() const;
+};
+
+/// "frame_stale".
+[[nodiscard]] std::string_view to_string(ErrorCode code);
+/// The number by which a client knows the code: -32001 to -32018.
+[[nodiscard]] int rpc_code(ErrorCode code);
+
+[[nodiscard]] RpcError parse_error(std::string message);
+[[nodiscard]] RpcError invalid_request(std::string message);
+[[nodiscard]] RpcError method_not_found(std::string message);
+[[nodiscard]] RpcError invalid_params(std::string message);
+[[nodiscard]] RpcError rpc_error(const Error& error);
+
+}  // namespace slsd
