@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/devices.hpp"
+
+#include "drivers/camera/faulty_camera.hpp"
+#include "drivers/camera/file_camera.hpp"
+#include "drivers/projector/headless_projector.hpp"
+
+namespace slsd {
+
+Result<std::unique_ptr<Camera>> make_camera(const CameraOptions& options) {
+  if (options.driver != CameraDriver::kFile) {
+    return fail(ErrorCode::kUnsupported,
+                "the driver \"" + std::string(to_string(options.driver)) +
+                    "\" is not part of this build, whose camera drivers are: file",
+                "camera " + options.name());
+  }
+  std::unique_ptr<Camera> camera = std::make_unique<FileCamera>(options.file);
+  if (!options.faults.empty()) camera = std::make_unique<FaultyCamera>(std::move(camera), options.faults);
+  return camera;
+}
+
+Result<std::unique_ptr<Projector>> make_projector(const ProjectorOptions& options) {
+  if (options.driver != ProjectorDriver::kHeadless) {
+    return fail(ErrorCode::kUnsupported,
+                "the driver \"" + std::string(to_string(options.driver)) +
+                    "\" is not part of this build, whose projector drivers are: headless",
+                "projector");
+  }
+  HeadlessProjectorOptions headless;
+  headless.width_px = options.width_px;
+  headless.height_px = options.height_px;
+  return std::make_unique<HeadlessProjector>(std::move(headless));
+}
+
+}  // namespace slsd

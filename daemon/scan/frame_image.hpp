@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+
+#include "core/code/pattern.hpp"
+#include "core/decode/decoding.hpp"
+#include "core/image.hpp"
+#include "core/result.hpp"
+#include "daemon/scan/scan_result.hpp"
+#include "drivers/camera/frame.hpp"
+
+namespace slsd {
+
+/// A frame as a PNG of its own depth. @errors of encode_png() @thread reentrant
+[[nodiscard]] Result<FrameImage> png_of(const Frame& frame);
+
+/// A frame's pixels row by row, 16 bits little-endian. @thread reentrant
+[[nodiscard]] Result<FrameImage> raw_of(const Frame& frame);
+
+/// What was decoded, drawn into the frame, as a PNG. @errors of encode_png() @thread reentrant
+[[nodiscard]] Result<std::string> picture_of(const GreyView& image, const Decoding& decoding, const Pattern& pattern);
+
+}  // namespace slsd

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <atomic>
+#include <chrono>
+
+namespace slsd {
+
+/// A thread's promise to be heard of again before a certain time, for the watchdog of another thread.
+/// @thread thread-safe
+class Heartbeat {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// To be heard of again within this time from now.
+  void promise(Clock::duration within) { until_ = (Clock::now() + within).time_since_epoch().count(); }
+
+  [[nodiscard]] bool kept(Clock::time_point now = Clock::now()) const {
+    return now.time_since_epoch().count() <= until_.load();
+  }
+
+ private:
+  std::atomic<Clock::rep> until_{Clock::time_point::max().time_since_epoch().count()};
+};
+
+}  // namespace slsd

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/scan_setup.hpp"
+
+#include <algorithm>
+
+#include "drivers/files/file.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kMaxFileBytes = 16 << 20;
+
+std::string size_text(int width_px, int height_px) {
+  return std::to_string(width_px) + "x" + std::to_string(height_px);
+}
+
+Result<> check_size(int width_px, int height_px, const ProjectorOptions& projector, const std::string& what) {
+  if (width_px == projector.width_px && height_px == projector.height_px) return {};
+  return fail(ErrorCode::kMismatch, what + " is for a projector of " + size_text(width_px, height_px) +
+                                        " px, and [projector] says " +
+                                        size_text(projector.width_px, projector.height_px) + ": change one of them");
+}
+
+// Index in the calibration of each configured camera.
+Result<std::vector<std::size_t>> calibrated_cameras(const Calibration& calibration,
+                                                    const Configuration& configuration) {
+  std::vector<std::size_t> indices;
+  const std::string where = configuration.calibration_file.string();
+  for (const CameraOptions& camera : configuration.cameras) {
+    const CalibratedCamera* found = calibration.camera(camera.name());
+    if (found == nullptr) {
+      return fail(ErrorCode::kMismatch,
+                  "no camera \"" + camera.name() + "\" in the calibration: calibrate it, or " +
+                      "give the [[camera]] the name that the calibration has",
+                  where);
+    }
+    const auto index = static_cast<std::size_t>(found - calibration.cameras.data());
+    if (std::ranges::find(indices, index) != indices.end()) {
+      return fail(ErrorCode::kMismatch, "the calibration has one camera and the configuration several", where);
+    }
+    indices.push_back(index);
+  }
+  return indices;
+}
+
+Result<> place_at(Error error, const std::string& where) {
+  if (error.where.empty()) error.where = where;
+  return tl::unexpected(std::move(error));
+}
+
+}  // namespace
+
+Result<Pattern> configured_pattern(const Configuration& configuration) {
+  const auto& file = configuration.pattern_file;
+  if (file.empty()) return make_pattern(configuration.pattern);
+  auto text = read_file(file, kMaxFileBytes);
+  if (!text) return tl::unexpected(text.error());
+  auto pattern = read_pattern(*text, file.string());
+  if (!pattern) return pattern;
+  const PatternOptions& options = pattern->options;
+  const auto fits =
+      check_size(options.projector_width_px, options.projector_height_px, configuration.projector, "this pattern");
+  if (!fits) return tl::unexpected(place_at(fits.error(), file.string()).error());
+  return pattern;
+}
+
+Result<std::optional<Calibration>> configured_calibration(const Configuration& configuration) {
+  const auto& file = configuration.calibration_file;
+  if (file.empty()) return std::nullopt;
+  auto text = read_file(file, kMaxFileBytes);
+  if (!text) return tl::unexpected(text.error());
+  auto calibration = read_calibration(*text, file.string());
+  if (!calibration) return tl::unexpected(calibration.error());
+  const Lens& lens = calibration->projector;
+  const auto fits = check_size(lens.width_px, lens.height_px, configuration.projector, "this calibration");
+  if (!fits) return tl::unexpected(place_at(fits.error(), file.string()).error());
+  if (auto cameras = calibrated_cameras(*calibration, configuration); !cameras) return tl::unexpected(cameras.error());
+  return std::optional(std::move(*calibration));
+}
+
+Result<ScanSetup> ScanSetup::create(const Configuration& configuration) {
+  auto pattern = configured_pattern(configuration);
+  if (!pattern) return tl::unexpected(pattern.error());
+  auto calibration = configured_calibration(configuration);
+  if (!calibration) return tl::unexpected(calibration.error());
+  ScanSetup setup{std::move(*pattern), {}, std::move(*calibration), {}};
+  setup.image = draw_pattern(setup.pattern);
+  if (!setup.calibration) return setup;
+  const auto cameras = calibrated_cameras(*setup.calibration, configuration);
+  if (!cameras) return tl::unexpected(cameras.error());
+  for (const std::size_t index : *cameras) {
+    auto decoder = Decoder::create(setup.pattern, *setup.calibration, index, configuration.decode);
+    if (!decoder) return tl::unexpected(decoder.error());
+    setup.decoders.push_back(std::move(*decoder));
+  }
+  return setup;
+}
+
+}  // namespace slsd

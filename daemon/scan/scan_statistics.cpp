@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/scan_statistics.hpp"
+
+#include <algorithm>
+
+namespace slsd {
+
+void Duration::add(std::chrono::nanoseconds time) {
+  last = time;
+  total += time;
+  longest = std::max(longest, time);
+  ++count;
+}
+
+void ScanStatistics::note(const Result<ScanResult>& scan) {
+  const std::lock_guard lock(mutex_);
+  if (!scan) {
+    ++totals_.failed[scan.error().code];
+    totals_.last_error = scan.error();
+    return;
+  }
+  ++totals_.succeeded;
+  totals_.points = scan->cloud.points.size();
+  totals_.regions_of_last = scan->regions;
+  for (std::size_t i = 0; i < scan->regions.size(); ++i) totals_.regions[i] += scan->regions[i];
+  totals_.capture.add(scan->capture_time);
+  totals_.decode.add(scan->decode_time);
+  for (std::size_t i = 0; i < scan->stage_times.size(); ++i) totals_.stages[i].add(scan->stage_times[i]);
+}
+
+ScanTotals ScanStatistics::totals() const {
+  const std::lock_guard lock(mutex_);
+  return totals_;
+}
+
+}  // namespace slsd
