@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string_view>
+
+#include <asio/io_context.hpp>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/rpc/request.hpp"
+#include "daemon/scan/scanner.hpp"
+#include "daemon/server/reply.hpp"
+#include "daemon/server/server.hpp"
+
+namespace slsd {
+
+/// What the methods act on. Everything outlives the server's sessions.
+struct ServiceState {
+  asio::io_context& events;
+  Scanner& scanner;
+  std::filesystem::path configuration_file;
+  Configuration configuration;  ///< in force; a reload replaces what it may
+  std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
+  Server* server = nullptr;
+  std::function<void(Respond)> reload = {};  ///< reads the configuration anew, then answers
+};
+
+/// One method of the socket's protocol.
+struct RpcMethod {
+  std::string_view name;
+  void (*run)(ServiceState& state, const nlohmann::json& params, Session& session, Respond respond);
+};
+
+/// All methods, by name.
+[[nodiscard]] std::span<const RpcMethod> methods();
+
+/// Carries a request out. @thread thread-bound to the event loop's
+void dispatch(ServiceState& state, const Request& request, Session& session, Respond respond);
+
+}  // namespace slsd

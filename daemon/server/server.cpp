@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/server/server.hpp"
+
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <spdlog/spdlog.h>
+#include <asio/post.hpp>
+
+#include "daemon/rpc/message.hpp"
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kRetryAccept = 200ms;
+
+}  // namespace
+
+Server::Server(asio::io_context& events, const ServerOptions& options, Session::Handler handler,
+               DemandChanged demand_changed)
+    : events_(events),
+      options_(options),
+      handler_(std::move(handler)),
+      demand_changed_(std::move(demand_changed)),
+      acceptor_(events),
+      retry_(events) {}
+
+Server::~Server() {
+  end_all();
+}
+
+Result<> Server::open() {
+  auto socket = ListeningSocket::open(options_.socket, options_.socket_mode);
+  if (!socket) return tl::unexpected(socket.error());
+  socket_.emplace(std::move(*socket));
+  std::error_code error;
+  acceptor_.assign(asio::local::stream_protocol(), socket_->release(), error);
+  if (error) return fail(ErrorCode::kIo, "cannot listen: " + error.message(), options_.socket.string());
+  accept();
+  return {};
+}
+
+void Server::stop_accepting() {
+  std::error_code ignored;
+  acceptor_.close(ignored);
+  retry_.cancel();
+  socket_.reset();
+}
+
+void Server::end_all() {
+  const std::vector<std::shared_ptr<Session>> all(sessions_.begin(), sessions_.end());
+  for (const auto& session : all) session->end();
+}
+
+std::size_t Server::subscribers() const {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(sessions_, [](const auto& session) { return session->subscription().has_value(); }));
+}
+
+void Server::update_demand() {
+  std::optional<double> demand;
+  for (const auto& session : sessions_) {
+    if (!session->subscription()) continue;
+    const double rate = session->subscription()->rate_hz().value_or(std::numeric_limits<double>::infinity());
+    demand = std::max(demand.value_or(0), rate);
+  }
+  demand_changed_(demand);
+}
+
+void Server::accept() {
+  acceptor_.async_accept(
+      [this](const std::error_code& error, Session::Socket socket) { on_accepted(error, std::move(socket)); });
+}
+
+void Server::on_accepted(const std::error_code& error, Session::Socket socket) {
+  if (!acceptor_.is_open() || error == asio::error::operation_aborted) return;
+  if (error) return retry_later(error);
+  retrying_ = false;
+  if (sessions_.size() >= static_cast<std::size_t>(options_.clients_max)) {
+    turn_away(std::move(socket));
+  } else {
+    auto session = std::make_shared<Session>(std::move(socket), options_, handler_, [this](Session& ended) {
+      sessions_.erase(ended.shared_from_this());
+      update_demand();
+    });
+    sessions_.insert(session);
+    session->start();
+  }
+  accept();
+}
+
+void Server::turn_away(Session::Socket socket) const {
+  const Error busy{
+      ErrorCode::kBusy, std::to_string(options_.clients_max) + " clients are connected: try again later", {}};
+  const std::string line = to_line(error_message(nullptr, rpc_error(busy)));
+  ::send(socket.native_handle(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
+// Out of descriptors or memory: the kernel keeps who waits, and accept() would fail again at once.
+void Server::retry_later(const std::error_code& error) {
+  if (!std::exchange(retrying_, true)) spdlog::warn("cannot take another client: {}", error.message());
+  retry_.expires_after(kRetryAccept);
+  retry_.async_wait([this](const std::error_code& cancelled) {
+    if (!cancelled && acceptor_.is_open()) accept();
+  });
+}
+
+void Server::publish(FreeScan scan) {
+  const std::lock_guard lock(mutex_);
+  const bool waiting = newest_ != nullptr;
+  if (waiting && *newest_) ++lost_;
+  newest_ = std::move(scan);
+  if (!waiting) asio::post(events_, [this] { deliver(); });
+}
+
+void Server::deliver() {
+  FreeScan scan;
+  std::uint64_t lost = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    scan = std::exchange(newest_, nullptr);
+    lost = std::exchange(lost_, 0);
+  }
+  if (!scan) return;
+  const auto publication = std::make_shared<Publication>(std::move(scan));
+  const std::vector<std::shared_ptr<Session>> all(sessions_.begin(), sessions_.end());
+  for (const auto& session : all) session->publish(publication, lost);
+}
+
+}  // namespace slsd

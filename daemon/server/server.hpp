@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <unordered_set>
+
+#include <asio/io_context.hpp>
+#include <asio/local/stream_protocol.hpp>
+#include <asio/steady_timer.hpp>
+
+#include "core/result.hpp"
+#include "daemon/configuration/server_options.hpp"
+#include "daemon/server/listening_socket.hpp"
+#include "daemon/server/session.hpp"
+
+namespace slsd {
+
+/// Takes clients in and tells the subscribers among them of free scans.
+/// @thread thread-bound to the event loop's, but for publish()
+class Server {
+ public:
+  /// How fast the subscribers together want scans: nothing where there are none, infinity where one wants all.
+  using DemandChanged = std::function<void(std::optional<double> rate_hz)>;
+
+  Server(asio::io_context& events, const ServerOptions& options, Session::Handler handler,
+         DemandChanged demand_changed);
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  /// Listens; the socket appears. @errors of ListeningSocket::open()
+  [[nodiscard]] Result<> open();
+  /// Takes no more clients; the socket disappears.
+  void stop_accepting();
+  /// Hangs up on everyone.
+  void end_all();
+
+  [[nodiscard]] std::size_t clients() const { return sessions_.size(); }
+  [[nodiscard]] std::size_t subscribers() const;
+  /// To be called when a session's subscription changed.
+  void update_demand();
+
+  /// Hands a free scan over; one that the event loop did not get to yet is replaced and counts as lost.
+  /// @thread thread-safe
+  void publish(FreeScan scan);
+
+ private:
+  void accept();
+  void on_accepted(const std::error_code& error, Session::Socket socket);
+  void turn_away(Session::Socket socket) const;
+  void retry_later(const std::error_code& error);
+  void deliver();
+
+  asio::io_context& events_;
+  ServerOptions options_;
+  Session::Handler handler_;
+  DemandChanged demand_changed_;
+  asio::local::stream_protocol::acceptor acceptor_;
+  asio::steady_timer retry_;
+  bool retrying_ = false;
+  std::optional<ListeningSocket> socket_;
+  std::unordered_set<std::shared_ptr<Session>> sessions_;
+  std::mutex mutex_;  ///< guards the two below
+  FreeScan newest_;
+  std::uint64_t lost_ = 0;
+};
+
+}  // namespace slsd

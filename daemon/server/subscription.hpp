@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "daemon/scan/scanner.hpp"
+#include "daemon/server/cloud_format.hpp"
+#include "daemon/server/outgoing.hpp"
+
+namespace slsd {
+
+/// A free scan on its way to the subscribers: written once in each format that somebody wants.
+/// @thread thread-bound
+class Publication {
+ public:
+  explicit Publication(FreeScan scan) : scan_(std::move(scan)) {}
+
+  [[nodiscard]] const Result<ScanResult>& scan() const { return *scan_; }
+  [[nodiscard]] SharedBytes cloud(CloudFormat format);
+
+ private:
+  FreeScan scan_;
+  SharedBytes ply_;
+  SharedBytes pcd_;
+};
+
+using SharedPublication = std::shared_ptr<Publication>;  // shared: clients send it at their own pace
+
+/// What one client wants of the free scans. Holds the newest that could not be sent yet; a newer one takes its place
+/// and the older counts as lost.
+/// @thread thread-bound
+class Subscription {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  Subscription(CloudFormat format, std::optional<double> rate_hz) : format_(format), rate_hz_(rate_hz) {}
+
+  [[nodiscard]] std::optional<double> rate_hz() const { return rate_hz_; }
+
+  /// Takes a scan in, unless it comes sooner than the client wants one.
+  void offer(SharedPublication publication, Clock::time_point now);
+  /// Clouds that were replaced before this client's session saw them.
+  void note_lost(std::uint64_t count) { lost_ += count; }
+  /// The event to send next, with the number of clouds lost since the one before; nothing where none waits.
+  [[nodiscard]] std::optional<Outgoing> take();
+
+ private:
+  CloudFormat format_;
+  std::optional<double> rate_hz_;
+  Clock::time_point next_{};
+  SharedPublication waiting_;
+  std::uint64_t lost_ = 0;
+};
+
+}  // namespace slsd
