@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+namespace slsd {
+
+/// Tells the service manager how the service is, by sd_notify(3). Without NOTIFY_SOCKET it does nothing.
+/// @thread thread-bound
+class Notifier {
+ public:
+  void ready(const std::string& status) const;
+  void status(const std::string& status) const;
+  void reloading() const;
+  void stopping() const;
+  void ping_watchdog() const;
+
+  /// How long the manager waits for a ping before it acts; nothing where it does not watch.
+  [[nodiscard]] static std::optional<std::chrono::microseconds> watchdog_time();
+};
+
+}  // namespace slsd

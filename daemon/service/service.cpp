@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/service/service.hpp"
+
+#include <csignal>
+#include <cstdlib>
+#include <vector>
+
+#include <spdlog/spdlog.h>
+#include <asio/post.hpp>
+
+#include "daemon/scan/devices.hpp"
+#include "daemon/scan/thread_name.hpp"
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kStopTime = 700ms;
+constexpr auto kStatusPeriod = 5s;
+
+// Tables that a reload cannot put into force.
+nlohmann::json tables_that_need_restart(const Configuration& now, const Configuration& next) {
+  nlohmann::json tables = nlohmann::json::array();
+  if (!(now.projector == next.projector)) tables.push_back("projector");
+  if (!(now.cameras == next.cameras)) tables.push_back("camera");
+  if (!(now.server == next.server)) tables.push_back("server");
+  return tables;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Service>> Service::create(const std::filesystem::path& file) {
+  auto configuration = load_configuration(file);
+  if (!configuration) return tl::unexpected(configuration.error());
+  auto projector = make_projector(configuration->projector);
+  if (!projector) return tl::unexpected(projector.error());
+  std::vector<std::unique_ptr<Camera>> cameras;
+  for (const CameraOptions& options : configuration->cameras) {
+    auto camera = make_camera(options);
+    if (!camera) return tl::unexpected(camera.error());
+    cameras.push_back(std::move(*camera));
+  }
+  auto setup = ScanSetup::create(*configuration);
+  if (!setup) return tl::unexpected(setup.error());
+  auto rig = std::make_unique<Rig>(std::move(*projector), std::move(cameras), std::move(*setup), configuration->scan);
+  return std::unique_ptr<Service>(new Service(std::move(*configuration), file, std::move(rig)));
+}
+
+Service::Service(Configuration configuration, const std::filesystem::path& file, std::unique_ptr<Rig> rig)
+    : signals_(events_),
+      watchdog_(events_),
+      status_(events_),
+      scanner_(std::move(rig)),
+      state_{events_, scanner_, file, std::move(configuration)} {
+  const auto handler = [this](const Request& request, Session& session, Respond respond) {
+    dispatch(state_, request, session, std::move(respond));
+  };
+  const auto demand_changed = [this](std::optional<double> rate_hz) { scanner_.run_freely(rate_hz); };
+  server_ = std::make_unique<Server>(events_, state_.configuration.server, handler, demand_changed);
+  state_.server = server_.get();
+  state_.reload = [this](Respond answered) { reload(std::move(answered)); };
+  scanner_.set_listener([this](FreeScan scan) { server_->publish(std::move(scan)); });
+}
+
+Service::~Service() {
+  scanner_.request_stop();
+}
+
+Result<> Service::run() {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::error_code error;
+  for (const int number : {SIGTERM, SIGINT, SIGHUP}) signals_.add(number, error);
+  if (auto opened = server_->open(); !opened) return opened;
+  await_signal();
+  watch();
+  announce();
+  update_status();
+  events_.run();
+  return {};
+}
+
+void Service::announce() const {
+  const Configuration& configuration = state_.configuration;
+  spdlog::info("ready at {}: {} camera(s), projector {} {}x{}, {}", configuration.server.socket.string(),
+               configuration.cameras.size(), to_string(configuration.projector.driver),
+               configuration.projector.width_px, configuration.projector.height_px,
+               configuration.calibration_file.empty() ? "no calibration"
+                                                      : "calibration " + configuration.calibration_file.string());
+  notifier_.ready("ready");
+}
+
+void Service::await_signal() {
+  signals_.async_wait([this](const std::error_code& error, int number) {
+    if (!error) on_signal(number);
+  });
+}
+
+void Service::on_signal(int number) {
+  if (number != SIGHUP) {
+    spdlog::info("stopping: {}", number == SIGINT ? "SIGINT" : "SIGTERM");
+    return stop();
+  }
+  reload([](Outcome) {});
+  await_signal();
+}
+
+void Service::stop() {
+  notifier_.stopping();
+  server_->stop_accepting();
+  watchdog_.cancel();
+  status_.cancel();
+  scanner_.request_stop();
+  const bool stopped = scanner_.wait_stopped(kStopTime);
+  events_.poll();  // sends the answers of what was cancelled
+  server_->end_all();
+  events_.stop();
+  if (stopped) return spdlog::info("stopped");
+  // A driver or a long computation that cannot be interrupted. Nothing is half written: the service writes no files.
+  spdlog::warn("stopped without waiting for the scanner");
+  std::_Exit(EXIT_SUCCESS);
+}
+
+void Service::reload(Respond answered) {
+  notifier_.reloading();
+  scanner_.reload(state_.configuration_file, state_.configuration,
+                  [this, answered = std::move(answered)](const Result<Configuration>& configuration) {
+                    asio::post(events_, [this, configuration, answered] { on_reloaded(configuration, answered); });
+                  });
+}
+
+void Service::on_reloaded(const Result<Configuration>& configuration, const Respond& answered) {
+  notifier_.ready("ready");
+  if (!configuration) {
+    spdlog::error("reload refused, everything stays as it was: {}", to_string(configuration.error()));
+    return answered(tl::unexpected(rpc_error(configuration.error())));
+  }
+  nlohmann::json restart = tables_that_need_restart(state_.configuration, *configuration);
+  spdlog::info("reloaded {}", state_.configuration_file.string());
+  if (!restart.empty()) spdlog::warn("changes that need a restart: {}", restart.dump());
+  state_.configuration.pattern_file = configuration->pattern_file;
+  state_.configuration.pattern = configuration->pattern;
+  state_.configuration.calibration_file = configuration->calibration_file;
+  state_.configuration.decode = configuration->decode;
+  state_.configuration.scan.timeout_ms = configuration->scan.timeout_ms;
+  answered(Reply{{{"needs_restart", std::move(restart)}}});
+}
+
+void Service::watch() {
+  const auto time = Notifier::watchdog_time();
+  if (!time) return;
+  if (scanner_.heartbeat().kept()) notifier_.ping_watchdog();
+  watchdog_.expires_after(*time / 3);
+  watchdog_.async_wait([this](const std::error_code& error) {
+    if (!error) watch();
+  });
+}
+
+void Service::update_status() {
+  const ScanTotals totals = scanner_.totals();
+  std::uint64_t failed = 0;
+  for (const auto& [code, count] : totals.failed) failed += count;
+  notifier_.status("ready, " + std::to_string(totals.succeeded) + " scans, " + std::to_string(failed) + " failed");
+  status_.expires_after(kStatusPeriod);
+  status_.async_wait([this](const std::error_code& error) {
+    if (!error) update_status();
+  });
+}
+
+}  // namespace slsd

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include <asio/io_context.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+
+#include "core/result.hpp"
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/scan/scanner.hpp"
+#include "daemon/server/methods.hpp"
+#include "daemon/server/server.hpp"
+#include "daemon/service/notifier.hpp"
+
+namespace slsd {
+
+/// The composition root: owns everything, in the order in which it is made. The threads, and why each is one:
+///
+///   main     the event loop: socket, signals, watchdog. Never waits for a device, never computes for long.
+///   scanner  the projector, and each scan from trigger to cloud: waits for devices and uses a processor fully.
+///   cam NAME one to a camera: cameras expose at the same time, and opening one may take seconds.
+///
+/// Between them stand the scanner's bounded queue, the server's slot for the newest cloud, and the event loop's own
+/// queue, which holds at most one answer to a client.
+/// @thread thread-bound: main
+class Service {
+ public:
+  /// Makes everything from the configuration; nothing answers yet.
+  /// @errors of load_configuration(), ScanSetup::create(), make_projector() and make_camera()
+  [[nodiscard]] static Result<std::unique_ptr<Service>> create(const std::filesystem::path& configuration_file);
+  ~Service();
+
+  /// Serves until SIGTERM or SIGINT. @errors of Server::open()
+  [[nodiscard]] Result<> run();
+
+ private:
+  Service(Configuration configuration, const std::filesystem::path& file, std::unique_ptr<Rig> rig);
+  void announce() const;
+  void await_signal();
+  void on_signal(int number);
+  void stop();
+  void reload(Respond answered);
+  void on_reloaded(const Result<Configuration>& configuration, const Respond& answered);
+  void watch();
+  void update_status();
+
+  Notifier notifier_;
+  asio::io_context events_;
+  asio::signal_set signals_;
+  asio::steady_timer watchdog_;
+  asio::steady_timer status_;
+  Scanner scanner_;
+  ServiceState state_;
+  std::unique_ptr<Server> server_;
+};
+
+}  // namespace slsd
