@@ -57,17 +57,39 @@ std::string stored(const std::string& bytes) {
   return out;
 }
 
-std::string png_of(const Samples& samples, int colour_type, const std::string& palette) {
+/// Which pixels a pass of a PNG holds; kWhole those of a picture that is not interlaced.
+struct Pass {
+  int x, y, dx, dy;
+};
+constexpr Pass kWhole{0, 0, 1, 1};
+constexpr Pass kAdam7[] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0, 4, 4, 8}, {2, 0, 4, 4},
+                           {0, 2, 2, 4}, {1, 0, 2, 2}, {0, 1, 1, 2}};
+
+/// A pass row by row, each behind the filter "none" and filled up to whole bytes, the first sample's bits highest.
+void put_pass(std::string& bytes, const Samples& samples, const Pass& pass) {
+  for (int y = pass.y; y < samples.height && pass.x < samples.width; y += pass.dy) {
+    std::string bits;
+    for (int x = pass.x; x < samples.width; x += pass.dx)
+      for (int c = 0; c < samples.channels; ++c)
+        for (int bit = samples.bits - 1; bit >= 0; --bit)
+          bits.push_back(samples.values[(y * samples.width + x) * samples.channels + c] >> bit & 1 ? '1' : '0');
+    bits.resize((bits.size() + 7) / 8 * 8, '0');
+    bytes.push_back(0);
+    for (std::size_t i = 0; i < bits.size(); i += 8)
+      bytes.push_back(static_cast<char>(std::stoi(bits.substr(i, 8), nullptr, 2)));
+  }
+}
+
+std::string png_of(const Samples& samples, int colour_type, const std::string& palette, bool interlaced) {
   std::string png("\x89PNG\r\n\x1a\n"), header, rows;
   put(header, samples.width, 4, true);
   put(header, samples.height, 4, true);
   put(header, samples.bits, 1, true);
   put(header, colour_type, 1, true);
-  put(header, 0, 3, true);
-  for (int y = 0; y < samples.height; ++y) {
-    rows.push_back(0);
-    put_samples(rows, samples, y, true);
-  }
+  put(header, interlaced ? 1 : 0, 3, true);
+  if (!interlaced) put_pass(rows, samples, kWhole);
+  for (const Pass& pass : kAdam7)
+    if (interlaced) put_pass(rows, samples, pass);
   put_chunk(png, "IHDR", header);
   if (!palette.empty()) put_chunk(png, "PLTE", palette);
   put_chunk(png, "IDAT", stored(rows));
@@ -149,15 +171,15 @@ std::string bmp_bytes(const Samples& samples, bool top_down) {
   return bmp;
 }
 
-std::string png_bytes(const Samples& samples) {
+std::string png_bytes(const Samples& samples, bool interlaced) {
   constexpr int kColourTypes[] = {0, 0, 4, 2, 6};
-  return png_of(samples, kColourTypes[samples.channels], "");
+  return png_of(samples, kColourTypes[samples.channels], "", interlaced);
 }
 
 std::string palette_png_bytes(const Grey8& indices, const std::vector<Rgb>& palette) {
   std::string colours;
   for (const Rgb& colour : palette) colours.append(colour.begin(), colour.end());
-  return png_of(samples_of(indices), 3, colours);
+  return png_of(samples_of(indices), 3, colours, false);
 }
 
 std::string tiff_bytes(const Samples& samples, bool big_endian, int rows_per_strip) {

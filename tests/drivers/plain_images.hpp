@@ -10,7 +10,7 @@
 
 namespace slsd::test {
 
-/// Samples row by row, channels red, green, blue (, alpha) side by side.
+/// Samples row by row, 8 or 16 bits each (PNG: also 1, 2 or 4), channels red, green, blue (, alpha) side by side.
 struct Samples {
   int width = 0;
   int height = 0;
@@ -27,7 +27,7 @@ struct Samples {
 [[nodiscard]] std::string pnm_bytes(const Samples& samples);
 [[nodiscard]] std::string plain_pnm_bytes(const Samples& samples);
 [[nodiscard]] std::string bmp_bytes(const Samples& samples, bool top_down = false);
-[[nodiscard]] std::string png_bytes(const Samples& samples);
+[[nodiscard]] std::string png_bytes(const Samples& samples, bool interlaced = false);
 [[nodiscard]] std::string palette_png_bytes(const Grey8& indices, const std::vector<Rgb>& palette);
 [[nodiscard]] std::string tiff_bytes(const Samples& samples, bool big_endian, int rows_per_strip = 3);
 

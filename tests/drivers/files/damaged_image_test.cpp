@@ -71,6 +71,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Format{"BmpColour", [] { return test::bmp_bytes(colour_samples()); }},
                       Format{"PngStored", [] { return test::png_bytes(samples_of(ramp8(9, 7))); }},
                       Format{"PngColour", [] { return test::png_bytes(colour_samples()); }},
+                      Format{"PngInterlaced", [] { return test::png_bytes(samples_of(ramp16(9, 7)), true); }},
                       Format{"PngCompressed", [] { return *encode_png(ramp16(40, 30)); }},
                       Format{"TiffLittle", [] { return test::tiff_bytes(samples_of(ramp8(9, 7)), false); }},
                       Format{"TiffBig16", [] { return test::tiff_bytes(samples_of(ramp16(9, 7)), true); }},

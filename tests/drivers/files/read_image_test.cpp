@@ -35,7 +35,8 @@ RC_GTEST_PROP(DecodeImage, ReadsGreyOfEveryFormat8, ()) {
   const Samples samples = samples_of(image);
   for (const std::string& file :
        {test::pnm_bytes(samples), test::plain_pnm_bytes(samples), test::bmp_bytes(samples), test::png_bytes(samples),
-        test::bmp_bytes(samples, true), test::tiff_bytes(samples, false), test::tiff_bytes(samples, true)})
+        test::png_bytes(samples, true), test::bmp_bytes(samples, true), test::tiff_bytes(samples, false),
+        test::tiff_bytes(samples, true)})
     RC_ASSERT(decode_image(file, "file") == GreyImage(image));
 }
 
@@ -111,6 +112,16 @@ TEST(DecodeImage, LooksUpPalettes) {
   grey.at(0, 0) = 255;
   grey.at(1, 0) = 29;
   EXPECT_EQ(decode_image(test::palette_png_bytes(indices, {{255, 255, 255}, {0, 0, 255}}), "file"), GreyImage(grey));
+}
+
+TEST(DecodeImage, SpreadsFewBitsOverAByte) {
+  const auto read = [](int bits, std::uint16_t value) {
+    const auto image = decode_image(test::png_bytes({3, 1, 1, bits, {0, value, 0}}), "file");
+    return image ? std::get<Grey8>(*image).at(1, 0) : -1;
+  };
+  EXPECT_EQ(read(1, 1), 255);
+  EXPECT_EQ(read(2, 1), 85);
+  EXPECT_EQ(read(4, 3), 51);
 }
 
 TEST(DecodeImage, KeepsTheValuesOfTenBits) {
