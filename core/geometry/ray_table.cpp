@@ -44,8 +44,9 @@ Eigen::Vector2d RayTable::estimate(const Eigen::Vector2d& pixel) const {
 }
 
 PixelRay RayTable::ray(const Eigen::Vector2d& pixel) const {
-  const Eigen::Vector2d direction = lens_.refine(lens_.refine(estimate(pixel), pixel), pixel);
-  return {direction, lens_.distort_jacobian(direction).inverse()};
+  const Eigen::Vector2d near = lens_.refine(estimate(pixel), pixel);
+  const Eigen::Matrix2d turn = lens_.distort_jacobian(near).inverse();
+  return {near - turn * (lens_.distort(near) - pixel), turn};
 }
 
 }  // namespace slsd

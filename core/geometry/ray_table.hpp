@@ -8,8 +8,8 @@
 
 namespace slsd {
 
-/// pixel_ray() at a fixed price: a coarse grid of undistorted directions, then two steps of Newton's method. Agrees
-/// with Lens::undistort to 1e-12 for every lens that is invertible().
+/// pixel_ray() at a fixed price: a coarse grid of undistorted directions, then two steps of Newton's method. The
+/// direction agrees with Lens::undistort to 1e-12 for every lens that is invertible().
 /// @thread reentrant
 class RayTable {
  public:
