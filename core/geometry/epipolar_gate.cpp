@@ -10,7 +10,7 @@ namespace slsd {
 namespace {
 
 // A point nearer than this to the projector's plane is taken for behind it.
-constexpr double kMinProjectorDepth_mm = 1.0;
+constexpr double kMinProjectorDepthMm = 1.0;
 
 }  // namespace
 
@@ -39,7 +39,7 @@ EpipolarSegment EpipolarGate::prepare(const Eigen::Vector2d& camera_direction) c
   segment.depth_start_ = start.z();
   segment.depth_slope_ = slope.z();
 
-  const double crossing = (kMinProjectorDepth_mm - start.z()) / slope.z();
+  const double crossing = (kMinProjectorDepthMm - start.z()) / slope.z();
   const double nearest = slope.z() > 0 ? std::max(depth_min_mm_, crossing) : depth_min_mm_;
   const double farthest = slope.z() < 0 ? std::min(depth_max_mm_, crossing) : depth_max_mm_;
   if (!(nearest <= farthest) || !(start.z() + nearest * slope.z() > 0)) return segment;

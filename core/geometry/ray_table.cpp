@@ -8,10 +8,10 @@ namespace slsd {
 namespace {
 
 // 64 px keep the table of a 1600x1200 image in 8 kB, and its error so small that the second step ends at rounding.
-constexpr int kPitch_px = 64;
+constexpr int kPitchPx = 64;
 
 int nodes_across(int size_px) {
-  return (size_px - 1) / kPitch_px + 2;
+  return (size_px - 1) / kPitchPx + 2;
 }
 
 double nodes_per_px(int size_px) {

@@ -15,9 +15,9 @@ namespace {
 
 constexpr std::size_t kMaxFileSize = 1 << 20;
 constexpr std::size_t kMaxCameras = 64;
-constexpr int kMaxImageSide_px = 65535;
+constexpr int kMaxImageSidePx = 65535;
 constexpr double kMaxLength = 1e7;  // of a focal length in px, of a translation in mm
-constexpr double kMinBaseline_mm = 1e-3;
+constexpr double kMinBaselineMm = 1e-3;
 constexpr double kRotationTolerance = 1e-4;
 
 void read_pinhole(FileSection& section, const char* key, Lens& lens) {
@@ -45,8 +45,8 @@ constexpr LensKeys kCameraKeys{"width", "height", "camera_matrix", "camera_disto
 
 Lens read_lens(FileSection& section, const LensKeys& keys) {
   Lens lens;
-  lens.width_px = section.whole(keys.width, 1, kMaxImageSide_px);
-  lens.height_px = section.whole(keys.height, 1, kMaxImageSide_px);
+  lens.width_px = section.whole(keys.width, 1, kMaxImageSidePx);
+  lens.height_px = section.whole(keys.height, 1, kMaxImageSidePx);
   read_pinhole(section, keys.matrix, lens);
   Eigen::Map<Eigen::Matrix<double, 5, 1>>(lens.distortion.data()) = section.vector(keys.distortion, 5);
   if (!section.error() && !lens.invertible()) {
@@ -71,7 +71,7 @@ RigidTransform read_rig_motion(FileSection& section, bool first) {
   const char* const translation_key = "rig_from_camera_T";
   if (first && !section.has(rotation_key) && !section.has(translation_key)) return {};
   const RigidTransform motion = read_motion(section, rotation_key, translation_key);
-  if (first && (!motion.rotation.isIdentity(kRotationTolerance) || motion.translation.norm() > kMinBaseline_mm)) {
+  if (first && (!motion.rotation.isIdentity(kRotationTolerance) || motion.translation.norm() > kMinBaselineMm)) {
     section.refuse(rotation_key, "must be the identity for the first camera: its frame is the rig's");
   }
   return motion;
@@ -85,7 +85,7 @@ CalibratedCamera read_camera(FileSection& section, std::size_t index) {
   section.set_path(place + " (" + camera.name + "): ");
   camera.lens = read_lens(section, kCameraKeys);
   camera.projector_from_camera = read_motion(section, "R", "T");
-  if (camera.projector_from_camera.translation.norm() < kMinBaseline_mm) {
+  if (camera.projector_from_camera.translation.norm() < kMinBaselineMm) {
     section.refuse("T", "is zero: without a distance between camera and projector there is no depth");
   }
   camera.rig_from_camera = read_rig_motion(section, index == 0);

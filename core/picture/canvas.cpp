@@ -11,7 +11,7 @@ namespace slsd {
 namespace {
 
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
-constexpr double kFontHeight_px = 21.0;  // of a capital at scale 1
+constexpr double kFontHeightPx = 21.0;  // of a capital at scale 1
 constexpr int kFractionBits = 4;
 
 cv::Mat matrix(ColourImage& picture) {
@@ -74,12 +74,12 @@ void Canvas::text(const Eigen::Vector2d& place, const std::string& words, double
   const double share = align == Align::kLeft ? 0.0 : align == Align::kCentre ? 0.5 : 1.0;
   const double left = place.x() - share * text_width_px(words, height_px);
   const cv::Point origin(static_cast<int>(std::lround(left)), static_cast<int>(std::lround(place.y())));
-  cv::putText(matrix(picture_), printable(words), origin, kFont, height_px / kFontHeight_px, scalar(colour),
+  cv::putText(matrix(picture_), printable(words), origin, kFont, height_px / kFontHeightPx, scalar(colour),
               stroke_px(height_px), cv::LINE_AA);
 }
 
 double Canvas::text_width_px(const std::string& words, double height_px) {
-  return cv::getTextSize(printable(words), kFont, height_px / kFontHeight_px, stroke_px(height_px), nullptr).width;
+  return cv::getTextSize(printable(words), kFont, height_px / kFontHeightPx, stroke_px(height_px), nullptr).width;
 }
 
 Rgb mix(Rgb a, Rgb b, double share) {

@@ -9,6 +9,7 @@
 
 #include "core/picture/canvas.hpp"
 #include "core/picture/dimmed_frame.hpp"
+#include "core/picture/legend.hpp"
 
 namespace slsd {
 namespace {
@@ -21,13 +22,11 @@ constexpr std::array<Rgb, kMaxLetters> kLetterColours{{{255, 210, 63},
                                                        {240, 240, 240},
                                                        {0, 204, 184},
                                                        {206, 168, 120}}};
-constexpr Rgb kInk{222, 228, 238};
-constexpr Rgb kSoftInk{150, 158, 174};
 constexpr Rgb kRim{12, 14, 18};
-constexpr double kLegiblePitch_px = 20.0;
+constexpr double kLegiblePitchPx = 20.0;
 constexpr int kMaxScale = 3;
-constexpr int kMaxSide_px = 4096;
-constexpr double kDefaultPitch_px = 16.0;
+constexpr int kMaxSidePx = 4096;
+constexpr double kDefaultPitchPx = 16.0;
 
 bool decoded(const RegionSeen& region) {
   return region.status == RegionStatus::kDecoded && region.letter >= 0;
@@ -44,7 +43,7 @@ double pitch_px(const Decoding& decoding) {
     const std::int32_t right = region.links[kRight];
     if (right >= 0) lengths.push_back((centre(decoding.regions[right]) - centre(region)).norm());
   }
-  if (lengths.empty()) return kDefaultPitch_px;
+  if (lengths.empty()) return kDefaultPitchPx;
   const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
   std::nth_element(lengths.begin(), middle, lengths.end());
   return std::clamp(*middle, 4.0, 64.0);
@@ -56,7 +55,7 @@ int frame_side_px(const GreyView& frame) {
 
 int scale_of(const GreyView& frame, double pitch) {
   int scale = 1;
-  while (scale < kMaxScale && scale * pitch < kLegiblePitch_px && (scale + 1) * frame_side_px(frame) <= kMaxSide_px) {
+  while (scale < kMaxScale && scale * pitch < kLegiblePitchPx && (scale + 1) * frame_side_px(frame) <= kMaxSidePx) {
     ++scale;
   }
   return scale;
@@ -106,48 +105,6 @@ void draw_links(Marker& marker, const Decoding& decoding) {
   }
 }
 
-// Words one after the other in the footer, each behind its mark.
-class Legend {
- public:
-  Legend(ColourImage& picture, int top, double text_px)
-      : canvas_(picture), text_px_(text_px), width_(picture.width()), place_(text_px, top + 2 * text_px) {}
-
-  void symbol(int letter, const std::string& words) {
-    begin(words);
-    canvas_.disc(mark(), 0.55 * text_px_, letter_colour(letter));
-    write(words);
-  }
-  void undecoded(const std::string& words) {
-    begin(words);
-    canvas_.plus(mark(), 0.6 * text_px_, kUndecodedColour, 2);
-    write(words);
-  }
-  void line(Rgb colour, bool dashed, const std::string& words) {
-    begin(words);
-    const Eigen::Vector2d half(0.7 * text_px_, 0);
-    canvas_.dashes(mark() - half, mark() + half, colour, 2, dashed ? 0.35 * text_px_ : 2 * text_px_);
-    write(words);
-  }
-
- private:
-  [[nodiscard]] double width_of(const std::string& words) const {
-    return Canvas::text_width_px(words, text_px_) + 4.0 * text_px_;
-  }
-  void begin(const std::string& words) {
-    if (place_.x() + width_of(words) <= width_ || place_.x() == text_px_) return;
-    place_ = {text_px_, place_.y() + 2.2 * text_px_};
-  }
-  [[nodiscard]] Eigen::Vector2d mark() const { return place_ + Eigen::Vector2d(0.7 * text_px_, -0.5 * text_px_); }
-  void write(const std::string& words) {
-    canvas_.text(place_ + Eigen::Vector2d(1.9 * text_px_, 0), words, text_px_, kInk);
-    place_.x() += width_of(words);
-  }
-  Canvas canvas_;
-  double text_px_;
-  double width_;
-  Eigen::Vector2d place_;
-};
-
 void draw_legend(ColourImage& picture, int top, double text_px, const Decoding& decoding, const Pattern& pattern) {
   std::array<int, kMaxLetters> seen{};
   for (const RegionSeen& region : decoding.regions) {
@@ -155,18 +112,18 @@ void draw_legend(ColourImage& picture, int top, double text_px, const Decoding& 
   }
   Legend legend(picture, top, text_px);
   for (std::size_t letter = 0; letter < pattern.options.symbols.size() && letter < kMaxLetters; ++letter) {
-    const int number = pattern.options.symbols[letter];
-    legend.symbol(static_cast<int>(letter), "symbol " + std::to_string(number) + ": " + std::to_string(seen[letter]));
+    const std::string symbol = "symbol " + std::to_string(pattern.options.symbols[letter]) + ": ";
+    legend.disc(letter_colour(static_cast<int>(letter)), symbol + std::to_string(seen[letter]));
   }
   for (int status = 1; status < kRegionStatusCount; ++status) {
     const auto reason = static_cast<RegionStatus>(status);
     if (decoding.count(reason) == 0) continue;
     std::string words(to_string(reason));
     std::replace(words.begin(), words.end(), '_', ' ');
-    legend.undecoded(words + ": " + std::to_string(decoding.count(reason)));
+    legend.plus(kUndecodedColour, words + ": " + std::to_string(decoding.count(reason)));
   }
-  legend.line(kLinkColour, false, "link");
-  legend.line(kBrokenLinkColour, true, "broken link");
+  legend.line(kLinkColour, "link");
+  legend.dashes(kBrokenLinkColour, "broken link");
 }
 
 }  // namespace

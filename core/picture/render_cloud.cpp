@@ -22,7 +22,7 @@ constexpr Rgb kBottom{232, 236, 243};
 constexpr Rgb kInk{44, 50, 66};
 constexpr double kTrimmedShare = 0.01;  // of the depths, at either end of the colours
 constexpr double kLeastSpan = 0.008;    // of the depth
-constexpr float kFarthest_mm = 1e6F;
+constexpr float kFarthestMm = 1e6F;
 constexpr double kDotBrightness = 0.72;
 constexpr Rgb kSoftInk{104, 112, 130};
 
@@ -50,7 +50,7 @@ DepthRange depths_within(const Surface& surface, const Box& box) {
 // A cloud may come from a file: what is not finite, or absurdly far, cannot be drawn.
 Cloud drawable(Cloud cloud) {
   std::erase_if(cloud.points, [](const CloudPoint& point) {
-    const auto far = [](float value) { return !(std::abs(value) < kFarthest_mm); };
+    const auto far = [](float value) { return !(std::abs(value) < kFarthestMm); };
     return far(point.x) || far(point.y) || far(point.z);
   });
   return cloud;

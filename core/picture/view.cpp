@@ -12,12 +12,12 @@
 namespace slsd {
 namespace {
 
-constexpr double kAzimuth_rad = 0.56;
-constexpr double kElevation_rad = 0.36;
+constexpr double kAzimuthRad = 0.56;
+constexpr double kElevationRad = 0.36;
 constexpr double kTrimmedShare = 0.002;  // at either end of an axis
 constexpr double kMargin = 0.05;
 constexpr double kThinnest = 0.2;  // of the widest side
-constexpr double kSmallest_mm = 1.0;
+constexpr double kSmallestMm = 1.0;
 
 // Nearly all values: a few stray points do not shrink the rest to a dot.
 void span(std::vector<double> values, double& low, double& high) {
@@ -40,7 +40,7 @@ Box box_of(const Cloud& cloud) {
     for (const CloudPoint& point : cloud.points) values.push_back(std::array{point.x, point.y, point.z}[axis]);
     span(std::move(values), box.low[axis], box.high[axis]);
   }
-  const double thinnest = std::max(kThinnest * box.size().maxCoeff(), kSmallest_mm);
+  const double thinnest = std::max(kThinnest * box.size().maxCoeff(), kSmallestMm);
   for (int axis = 0; axis < 3; ++axis) {
     const double missing = std::max(0.0, thinnest - box.size()[axis]);
     box.low[axis] -= 0.5 * missing;
@@ -50,8 +50,8 @@ Box box_of(const Cloud& cloud) {
 }
 
 View::View(const Box& box, const Frame& frame) {
-  const Eigen::Vector3d forward(-std::sin(kAzimuth_rad) * std::cos(kElevation_rad), std::sin(kElevation_rad),
-                                std::cos(kAzimuth_rad) * std::cos(kElevation_rad));
+  const Eigen::Vector3d forward(-std::sin(kAzimuthRad) * std::cos(kElevationRad), std::sin(kElevationRad),
+                                std::cos(kAzimuthRad) * std::cos(kElevationRad));
   const Eigen::Vector3d right = forward.cross(Eigen::Vector3d(0, -1, 0)).normalized();
   axes_ << right.transpose(), forward.cross(right).transpose(), forward.transpose();
   const Eigen::Vector3d extent = axes_.cwiseAbs() * box.size();

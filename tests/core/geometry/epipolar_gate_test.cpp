@@ -11,7 +11,7 @@
 namespace slsd {
 namespace {
 
-constexpr double kMin_mm = 400.0, kMax_mm = 2500.0;
+constexpr double kMinMm = 400.0, kMaxMm = 2500.0;
 
 Eigen::Vector2d projector_direction(const Calibration& rig, const Eigen::Vector3d& point) {
   return (rig.cameras[0].projector_from_camera * point).hnormalized();
@@ -19,8 +19,8 @@ Eigen::Vector2d projector_direction(const Calibration& rig, const Eigen::Vector3
 
 RC_GTEST_PROP(EpipolarGate, PassesEveryPointWithinTheWorkingDepth, ()) {
   const Calibration rig = paper_rig();
-  const EpipolarGate gate(rig.cameras[0], rig.projector, kMin_mm, kMax_mm);
-  const Eigen::Vector3d point = any_point(rig.cameras[0].lens, kMin_mm + 0.1, kMax_mm - 0.1);
+  const EpipolarGate gate(rig.cameras[0], rig.projector, kMinMm, kMaxMm);
+  const Eigen::Vector3d point = any_point(rig.cameras[0].lens, kMinMm + 0.1, kMaxMm - 0.1);
   const EpipolarSegment segment = gate.prepare(point.hnormalized());
   const Eigen::Vector2d direction = projector_direction(rig, point);
   RC_ASSERT(std::abs(segment.residual_px(direction)) < 1e-9);
@@ -30,22 +30,22 @@ RC_GTEST_PROP(EpipolarGate, PassesEveryPointWithinTheWorkingDepth, ()) {
 
 RC_GTEST_PROP(EpipolarGate, StopsEveryPointBeyondTheWorkingDepth, ()) {
   const Calibration rig = paper_rig();
-  const EpipolarGate gate(rig.cameras[0], rig.projector, kMin_mm, kMax_mm);
+  const EpipolarGate gate(rig.cameras[0], rig.projector, kMinMm, kMaxMm);
   const Eigen::Vector2d camera = rig.cameras[0].lens.undistort(any_pixel(rig.cameras[0].lens));
   const EpipolarSegment segment = gate.prepare(camera);
   const auto passes = [&](double depth) {
     return segment.passes(projector_direction(rig, depth * camera.homogeneous()), 1.0);
   };
-  RC_ASSERT(!passes(kMin_mm - uniform(0.01, 300)));
-  RC_ASSERT(!passes(kMax_mm + uniform(0.01, 100000)));
-  RC_ASSERT(passes(kMin_mm + 0.01));
-  RC_ASSERT(passes(kMax_mm - 0.01));
+  RC_ASSERT(!passes(kMinMm - uniform(0.01, 300)));
+  RC_ASSERT(!passes(kMaxMm + uniform(0.01, 100000)));
+  RC_ASSERT(passes(kMinMm + 0.01));
+  RC_ASSERT(passes(kMaxMm - 0.01));
 }
 
 RC_GTEST_PROP(EpipolarGate, ResidualIsThatOfTriangulateToAFewPercent, ()) {
   const Calibration rig = paper_rig();
   const CalibratedCamera& camera = rig.cameras[0];
-  const EpipolarGate gate(camera, rig.projector, kMin_mm, kMax_mm);
+  const EpipolarGate gate(camera, rig.projector, kMinMm, kMaxMm);
   const Match match{any_pixel(camera.lens), any_pixel(rig.projector)};
   const double exact = triangulate(match, camera, rig.projector, 0.1).epipolar_residual_px;
   const double quick = std::abs(
@@ -55,17 +55,17 @@ RC_GTEST_PROP(EpipolarGate, ResidualIsThatOfTriangulateToAFewPercent, ()) {
 
 RC_GTEST_PROP(EpipolarGate, EndsAreTheImagesOfTheDepthLimits, ()) {
   const Calibration rig = paper_rig();
-  const EpipolarGate gate(rig.cameras[0], rig.projector, kMin_mm, kMax_mm);
+  const EpipolarGate gate(rig.cameras[0], rig.projector, kMinMm, kMaxMm);
   const Eigen::Vector2d camera = rig.cameras[0].lens.undistort(any_pixel(rig.cameras[0].lens));
   const EpipolarSegment segment = gate.prepare(camera);
-  RC_ASSERT((segment.near_end() - projector_direction(rig, kMin_mm * camera.homogeneous())).norm() < 1e-12);
-  RC_ASSERT((segment.far_end() - projector_direction(rig, kMax_mm * camera.homogeneous())).norm() < 1e-12);
+  RC_ASSERT((segment.near_end() - projector_direction(rig, kMinMm * camera.homogeneous())).norm() < 1e-12);
+  RC_ASSERT((segment.far_end() - projector_direction(rig, kMaxMm * camera.homogeneous())).norm() < 1e-12);
 }
 
 TEST(EpipolarGate, CutsWhatLiesBehindTheProjector) {
   Calibration rig = paper_rig();
   rig.cameras[0].projector_from_camera = {Eigen::Matrix3d::Identity(), {-180, 0, -1000}};
-  const EpipolarGate gate(rig.cameras[0], rig.projector, kMin_mm, kMax_mm);
+  const EpipolarGate gate(rig.cameras[0], rig.projector, kMinMm, kMaxMm);
   const EpipolarSegment segment = gate.prepare({0.1, 0.05});
   EXPECT_FALSE(segment.empty());
   EXPECT_TRUE(segment.passes(projector_direction(rig, 2000 * Eigen::Vector3d(0.1, 0.05, 1)), 0.1));

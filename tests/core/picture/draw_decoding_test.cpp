@@ -10,9 +10,9 @@
 namespace slsd {
 namespace {
 
-constexpr int kPitch_px = 24;  // so wide that the picture is not enlarged
+constexpr int kPitchPx = 24;  // so wide that the picture is not enlarged
 
-// Regions in rows of art, kPitch_px apart: a letter is decoded, '+' is not; '-' and '|' between them are links, '~' and
+// Regions in rows of art, kPitchPx apart: a letter is decoded, '+' is not; '-' and '|' between them are links, '~' and
 // '!' broken ones.
 struct Scene {
   Grey8 frame;
@@ -22,7 +22,7 @@ struct Scene {
 
 RegionSeen region_of(char mark, int column, int row) {
   RegionSeen region{};
-  region.centre_px = {static_cast<float>(kPitch_px * (column + 1)), static_cast<float>(kPitch_px * (row + 1))};
+  region.centre_px = {static_cast<float>(kPitchPx * (column + 1)), static_cast<float>(kPitchPx * (row + 1))};
   region.status = mark == '+' ? RegionStatus::kNoCodeword : RegionStatus::kDecoded;
   region.letter = static_cast<std::int8_t>(mark == '+' ? -1 : mark - 'a');
   region.links = {-1, -1, -1, -1};
@@ -89,8 +89,7 @@ std::vector<std::string> art_of(const ColourImage& picture, std::size_t rows, st
   std::vector<std::string> art(rows, std::string(columns, ' '));
   for (std::size_t y = 0; y < rows; ++y) {
     for (std::size_t x = 0; x < columns; ++x) {
-      const int px = kPitch_px + static_cast<int>(x) * kPitch_px / 2,
-                py = kPitch_px + static_cast<int>(y) * kPitch_px / 2;
+      const int px = kPitchPx + static_cast<int>(x) * kPitchPx / 2, py = kPitchPx + static_cast<int>(y) * kPitchPx / 2;
       char mark = mark_at(picture, px, py, x % 2 == 1 || y % 2 == 1);
       if (y % 2 == 1) mark = mark == '-' ? '|' : mark == '~' ? '!' : mark;
       art[y][x] = mark;
@@ -128,7 +127,7 @@ TEST(DrawDecoding, EnlargesSmallSymbols) {
   scene.decoding.regions[1].centre_px.x() = scene.decoding.regions[0].centre_px.x() + 8;
   const ColourImage picture = draw_decoding(scene.frame.view(), scene.decoding, scene.pattern);
   EXPECT_EQ(picture.width(), 3 * 240);
-  EXPECT_TRUE(has(picture, 3 * kPitch_px, 3 * kPitch_px, letter_colour(0)));
+  EXPECT_TRUE(has(picture, 3 * kPitchPx, 3 * kPitchPx, letter_colour(0)));
 }
 
 TEST(DrawDecoding, StandsRegionsOutsideTheFrameAndNone) {
