@@ -58,7 +58,7 @@ int FileSection::whole(const char* key, int low, int high) {
 std::string FileSection::text(const char* key) {
   const auto node = find(key);
   if (!node) return {};
-  const std::string value = node->isString() ? node->string() : std::string();
+  std::string value = node->isString() ? node->string() : std::string();
   if (value.empty() || value.size() > kMaxTextLength || std::any_of(value.begin(), value.end(), is_control)) {
     refuse(key, "must be a text in quotes, of 1 to " + std::to_string(kMaxTextLength) + " bytes");
     return {};
