@@ -61,7 +61,7 @@ std::vector<Point> convex_hull(const ImageView<std::uint8_t>& mask) {
   std::sort(points.begin(), points.end(),
             [](const Point& a, const Point& b) { return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y(); });
   std::vector<Point> hull;
-  for (auto point = points.begin(); point != points.end(); ++point) extend(hull, 0, *point);
+  for (const Point& point : points) extend(hull, 0, point);
   const std::size_t turn = hull.size() - 1;
   for (auto point = points.rbegin() + 1; point != points.rend(); ++point) extend(hull, turn, *point);
   hull.pop_back();
