@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <csignal>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -19,6 +20,7 @@ constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
 
 int serve(const std::filesystem::path& configuration_file) {
+  std::signal(SIGHUP, SIG_IGN);  // what a reload would read is about to be read
   spdlog::info("slsd {} starts with {}", SLSD_VERSION, configuration_file.string());
   auto service = slsd::Service::create(configuration_file);
   const auto served = service ? (*service)->run() : slsd::Result<>(tl::unexpected(service.error()));

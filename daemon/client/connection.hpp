@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "core/result.hpp"
+#include "daemon/server/file_descriptor.hpp"
+
+namespace slsd {
+
+/// A line from the daemon and the bytes that followed it.
+struct Received {
+  nlohmann::json message;
+  std::string bytes;
+};
+
+/// A reply, and the events that came before it.
+struct Answered {
+  Received reply;
+  std::vector<Received> events;
+};
+
+/// A connection to the daemon's socket. Waits as long as the daemon works.
+/// @thread thread-bound
+class Connection {
+ public:
+  /// @errors kNotFound: no daemon answers at this path; kPermissionDenied; kInvalidArgument: too long a path; kIo
+  [[nodiscard]] static Result<Connection> open(const std::filesystem::path& socket);
+
+  /// Sends a request and waits for its reply, which may be a JSON-RPC error.
+  /// @errors kDisconnected: the daemon hung up; kMalformed: it is no slsd; kIo
+  [[nodiscard]] Result<Answered> call(std::string_view method, nlohmann::json params);
+
+  /// Waits for the next message. @errors as call()
+  [[nodiscard]] Result<Received> receive();
+
+ private:
+  explicit Connection(FileDescriptor socket) : socket_(std::move(socket)) {}
+  [[nodiscard]] Result<> send(std::string_view bytes);
+  [[nodiscard]] Result<> receive_more();
+  [[nodiscard]] Result<std::string> receive_line();
+  [[nodiscard]] Result<std::string> receive_bytes(std::size_t count);
+
+  FileDescriptor socket_;
+  std::string buffer_;
+  std::int64_t last_id_ = 0;
+};
+
+}  // namespace slsd

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/client/report.hpp"
+
+#include <iostream>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "daemon/rpc/message.hpp"
+
+namespace slsd {
+namespace {
+
+using nlohmann::json;
+
+Failure daemon_failure(const json& error) {
+  RpcError told{error.value("code", 0), "error", error.value("message", "the daemon gave no reason"), {}};
+  const auto data = error.find("data");
+  if (data != error.end() && data->is_object()) told.name = data->value("name", told.name);
+  return {kRequestFailed, std::move(told)};
+}
+
+std::string device_line(const json& device) {
+  std::string line = fmt::format("{:<12}{}, {} {}, {}x{} px", device.value("name", ""), device.value("state", ""),
+                                 device.value("driver", ""), device.value("device", ""), device.value("width_px", 0),
+                                 device.value("height_px", 0));
+  if (device.contains("frames")) {
+    line += fmt::format(", {} frames, {} lost", device.value("frames", 0), device.value("frames_lost", 0));
+  }
+  const std::string problem = device.value("problem", "");
+  return line + (problem.empty() ? "\n" : "\n            " + problem + "\n");
+}
+
+std::string scans_lines(const json& scans) {
+  std::string text = fmt::format("scans       {} succeeded", scans.value("succeeded", 0));
+  const json failed = scans.value("failed", json::object());
+  for (const auto& [name, count] : failed.items()) {
+    text += fmt::format(", {} {}", count.get<std::uint64_t>(), name);
+  }
+  text += '\n';
+  if (scans.contains("last_error") && scans["last_error"].is_object()) {
+    text += "last error  " + scans["last_error"].value("message", "") + "\n";
+  }
+  return text;
+}
+
+std::string duration_line(const std::string& name, const json& duration) {
+  return fmt::format("  {:<20}{:>9.1f}{:>9.1f}{:>9.1f}\n", name, duration.value("last", 0.0),
+                     duration.value("mean", 0.0), duration.value("longest", 0.0));
+}
+
+std::string times_table(const json& scans) {
+  std::string text = fmt::format("  {:<20}{:>9}{:>9}{:>9}\n", "ms", "last", "mean", "longest");
+  text += duration_line("capture", scans.value("capture_ms", json::object()));
+  text += duration_line("decode", scans.value("decode_ms", json::object()));
+  const json stages = scans.value("stages_ms", json::object());
+  for (const auto& [stage, duration] : stages.items()) {
+    text += duration_line("  " + stage, duration);
+  }
+  return text;
+}
+
+std::string regions_table(const json& scans) {
+  std::string text = fmt::format("  {:<24}{:>9}{:>14}\n", "regions", "last", "all");
+  const json last = scans.value("regions_of_last", json::object());
+  const json all = scans.value("regions", json::object());
+  for (const auto& [status, count] : all.items()) {
+    if (count == 0) continue;
+    text += fmt::format("  {:<24}{:>9}{:>14}\n", status, last.value(status, 0), count.get<std::uint64_t>());
+  }
+  return text;
+}
+
+}  // namespace
+
+Failure failure(const Error& error) {
+  return {error.code == ErrorCode::kNotFound ? kNoDaemon : kRequestFailed, rpc_error(error)};
+}
+
+tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_view method, json params) {
+  auto connection = Connection::open(options.socket);
+  if (!connection) return tl::unexpected(failure(connection.error()));
+  auto answered = connection->call(method, std::move(params));
+  if (!answered) return tl::unexpected(failure(answered.error()));
+  const json& message = answered->reply.message;
+  if (message.contains("error") && message["error"].is_object()) {
+    return tl::unexpected(daemon_failure(message["error"]));
+  }
+  if (!message.contains("result") || !message["result"].is_object()) {
+    return tl::unexpected(failure({ErrorCode::kMalformed, "the answer is not slsd's", options.socket.string()}));
+  }
+  return std::move(*answered);
+}
+
+int report(const ClientOptions& options, const Failure& failure) {
+  if (options.json) {
+    std::cout << to_line({{"error", failure.error.to_json()}}) << std::flush;
+  } else {
+    const std::string where = failure.error.where.empty() ? "" : failure.error.where + ": ";
+    std::cerr << "slsctl: " << where << failure.error.message << "\n";
+  }
+  return failure.exit_status;
+}
+
+std::string status_table(const json& status) {
+  const json scans = status.value("scans", json::object());
+  std::string text = fmt::format(
+      "slsd {}   {}, up {:.0f} s, {} client(s), {} subscriber(s), {:.1f} MiB\n", status.value("version", ""),
+      status.value("ready", false) ? "ready to scan" : "not ready to scan", status.value("uptime_s", 0.0),
+      status.value("clients", 0), status.value("subscribers", 0), status.value("resident_bytes", 0.0) / (1024 * 1024));
+  const std::string calibration = status.value("calibration", "");
+  text += "calibration " + (calibration.empty() ? "none" : calibration) + "\n";
+  text += device_line(status.value("projector", json::object()));
+  for (const json& camera : status.value("cameras", json::array())) text += device_line(camera);
+  return text + scans_lines(scans) + times_table(scans) + regions_table(scans);
+}
+
+std::string scan_line(const json& scan) {
+  std::uint64_t regions = 0;
+  const json by_status = scan.value("regions", json::object());
+  for (const auto& [status, count] : by_status.items()) regions += count.get<std::uint64_t>();
+  return fmt::format("scan {}: {} points of {} regions, capture {:.1f} ms, decode {:.1f} ms", scan.value("scan", ""),
+                     scan.value("points", 0), regions, scan.value("capture_ms", 0.0), scan.value("decode_ms", 0.0));
+}
+
+}  // namespace slsd
