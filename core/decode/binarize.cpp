@@ -13,23 +13,36 @@
 namespace slsd {
 namespace {
 
-/// Least and greatest of one row of a tile.
-template <class T>
-inline void extend_extremes(const T* pixels, int count, int& least, int& greatest) {
-  T low = pixels[0], high = pixels[0];
-  for (int x = 1; x < count; ++x) {
-    low = std::min(low, pixels[x]);
-    high = std::max(high, pixels[x]);
+constexpr int kRowsAlike = 4;
+
+/// Least and greatest of each column of a band of rows, one row more.
+SLSD_CLONES void extend_columns(const std::uint8_t* pixels, int width, std::uint8_t* least, std::uint8_t* greatest) {
+  for (int x = 0; x < width; ++x) {
+    least[x] = pixels[x] < least[x] ? pixels[x] : least[x];
+    greatest[x] = pixels[x] > greatest[x] ? pixels[x] : greatest[x];
   }
-  least = std::min<int>(least, low);
-  greatest = std::max<int>(greatest, high);
+}
+SLSD_CLONES void extend_columns(const std::uint16_t* pixels, int width, std::uint16_t* least, std::uint16_t* greatest) {
+  for (int x = 0; x < width; ++x) {
+    least[x] = pixels[x] < least[x] ? pixels[x] : least[x];
+    greatest[x] = pixels[x] > greatest[x] ? pixels[x] : greatest[x];
+  }
 }
 
-SLSD_CLONES void compare_row(const std::uint8_t* pixels, const float* threshold, int width, std::uint8_t* mask) {
-  for (int x = 0; x < width; ++x) mask[x] = static_cast<float>(pixels[x]) > threshold[x] ? 255 : 0;
+SLSD_CLONES void compare_row(const std::uint8_t* pixels, const std::uint8_t* threshold, int width, std::uint8_t* mask) {
+  for (int x = 0; x < width; ++x) mask[x] = pixels[x] > threshold[x] ? 255 : 0;
 }
-SLSD_CLONES void compare_row(const std::uint16_t* pixels, const float* threshold, int width, std::uint8_t* mask) {
-  for (int x = 0; x < width; ++x) mask[x] = static_cast<float>(pixels[x]) > threshold[x] ? 255 : 0;
+SLSD_CLONES void compare_row(const std::uint16_t* pixels, const std::uint16_t* threshold, int width,
+                             std::uint8_t* mask) {
+  for (int x = 0; x < width; ++x) mask[x] = pixels[x] > threshold[x] ? 255 : 0;
+}
+
+/// A straight line of thresholds, rounded down: what is above the whole number is above the threshold.
+template <class T>
+void fill_ramp(T* threshold, int count, float start, float step) {
+  constexpr float kGreatest = static_cast<float>(std::numeric_limits<T>::max());
+  for (int i = 0; i < count; ++i)
+    threshold[i] = static_cast<T>(std::min(start + step * static_cast<float>(i), kGreatest));
 }
 
 /// Standard deviation of the noise, from the median second difference along the rows of a sample of pixels: edges are
@@ -70,15 +83,18 @@ void Binarizer::find_extremes(const ImageView<T>& frame) {
   const int tile = options_.tile_px;
   columns_ = (frame.width + tile - 1) / tile;
   rows_ = (frame.height + tile - 1) / tile;
-  const auto count = static_cast<std::size_t>(columns_) * rows_;
-  least_.assign(count, std::numeric_limits<int>::max());
-  greatest_.assign(count, 0);
-  for (int y = 0; y < frame.height; ++y) {
-    const auto* pixels = frame.row(y);
-    int* least = least_.data() + (y / tile) * columns_;
-    int* greatest = greatest_.data() + (y / tile) * columns_;
-    for (int c = 0; c < columns_; ++c) {
-      extend_extremes(pixels + c * tile, std::min(tile, frame.width - c * tile), least[c], greatest[c]);
+  least_.clear();
+  greatest_.clear();
+  auto& [threshold, least, greatest] = std::get<RowBuffers<T>>(row_buffers_);
+  for (int row = 0; row < rows_; ++row) {
+    const int top = row * tile, bottom = std::min(top + tile, frame.height);
+    least.assign(frame.row(top), frame.row(top) + frame.width);
+    greatest = least;
+    for (int y = top + 1; y < bottom; ++y) extend_columns(frame.row(y), frame.width, least.data(), greatest.data());
+    for (int left = 0; left < frame.width; left += tile) {
+      const int right = std::min(left + tile, frame.width);
+      least_.push_back(*std::min_element(least.begin() + left, least.begin() + right));
+      greatest_.push_back(*std::max_element(greatest.begin() + left, greatest.begin() + right));
     }
   }
 }
@@ -114,29 +130,33 @@ void Binarizer::binarize_as(const ImageView<T>& frame, Grey8& mask) {
   const int contrast_min = std::max(floor, static_cast<int>(options_.contrast_min_sigma * noise_sigma(frame)));
   find_extremes(frame);
   set_thresholds(contrast_min, contrast_min);
-  row_threshold_.resize(static_cast<std::size_t>(frame.width));
-
-  const float tile = static_cast<float>(options_.tile_px);
+  auto& threshold = std::get<RowBuffers<T>>(row_buffers_).threshold;
+  threshold.resize(static_cast<std::size_t>(frame.width));
   for (int y = 0; y < frame.height; ++y) {
-    // Tile centres carry the thresholds; between them they are interpolated in both directions.
-    const float v = std::clamp((static_cast<float>(y) + 0.5F) / tile - 0.5F, 0.F, static_cast<float>(rows_ - 1));
-    const int r0 = static_cast<int>(v), r1 = std::min(r0 + 1, rows_ - 1);
-    const float fv = v - static_cast<float>(r0);
-    const float* upper = threshold_.data() + r0 * columns_;
-    const float* lower = threshold_.data() + r1 * columns_;
-    const int half = options_.tile_px / 2;
-    float left = upper[0] + fv * (lower[0] - upper[0]);
-    int x = 0;
-    for (int c = 0; c <= columns_; ++c) {
-      const int next = std::min(c, columns_ - 1);
-      const float right = upper[next] + fv * (lower[next] - upper[next]);
-      const int end = std::min(c * options_.tile_px + half, frame.width);
-      const float step = (right - left) / tile;
-      for (int i = 0; x < end; ++x, ++i) row_threshold_[x] = left + step * static_cast<float>(i);
-      left = right;
-    }
-    for (; x < frame.width; ++x) row_threshold_[x] = left;
-    compare_row(frame.row(y), row_threshold_.data(), frame.width, mask.row(y));
+    // Thresholds change little from row to row.
+    if (y % kRowsAlike == 0) interpolate_row(y + kRowsAlike / 2, frame.width, threshold.data());
+    compare_row(frame.row(y), threshold.data(), frame.width, mask.row(y));
+  }
+}
+
+/// Tile centres carry the thresholds; between them they are interpolated in both directions.
+template <class T>
+void Binarizer::interpolate_row(int y, int width, T* threshold) const {
+  const float tile = static_cast<float>(options_.tile_px);
+  const float v = std::clamp((static_cast<float>(y) + 0.5F) / tile - 0.5F, 0.F, static_cast<float>(rows_ - 1));
+  const int r0 = static_cast<int>(v), r1 = std::min(r0 + 1, rows_ - 1);
+  const float fraction = v - static_cast<float>(r0);
+  const float* upper = threshold_.data() + r0 * columns_;
+  const float* lower = threshold_.data() + r1 * columns_;
+  const auto at = [&](int column) { return upper[column] + fraction * (lower[column] - upper[column]); };
+  float left = at(0);
+  int x = 0;
+  for (int column = 0; column <= columns_ && x < width; ++column) {
+    const float right = at(std::min(column, columns_ - 1));
+    const int end = column == columns_ ? width : std::min(column * options_.tile_px + options_.tile_px / 2, width);
+    fill_ramp(threshold + x, end - x, left, (right - left) / tile);
+    x = end;
+    left = right;
   }
 }
 

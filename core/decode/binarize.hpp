@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstdint>
+#include <tuple>
 #include <vector>
 
 #include "core/image.hpp"
@@ -36,13 +38,19 @@ class Binarizer {
   void binarize_as(const ImageView<T>& frame, Grey8& mask);
   template <class T>
   void find_extremes(const ImageView<T>& frame);
+  template <class T>
+  void interpolate_row(int y, int width, T* threshold) const;
   void set_thresholds(int contrast_min, int nothing_lit);
 
   BinarizeOptions options_;
   int columns_ = 0, rows_ = 0;  // tiles
   std::vector<int> least_, greatest_;
   std::vector<float> midway_, threshold_;
-  std::vector<float> row_threshold_;
+  template <class T>
+  struct RowBuffers {
+    std::vector<T> threshold, least, greatest;
+  };
+  std::tuple<RowBuffers<std::uint8_t>, RowBuffers<std::uint16_t>> row_buffers_;
 };
 
 }  // namespace slsd

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
+#include <span>
 
 #include "core/decode/cell_rays.hpp"
 #include "core/geometry/epipolar_gate.hpp"
@@ -16,7 +16,7 @@ class CellGate {
  public:
   /// @param segments      one to a node; empty admits every cell (the paper has no gate)
   /// @param tolerance_px  distance from the epipolar line, projector px
-  CellGate(const CellRays& cells, const std::vector<EpipolarSegment>& segments, double tolerance_px)
+  CellGate(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px)
       : cells_(cells), segments_(segments), tolerance_px_(tolerance_px) {}
 
   [[nodiscard]] bool admits(std::int32_t node, int row, int column) const {
@@ -25,7 +25,7 @@ class CellGate {
 
  private:
   const CellRays& cells_;
-  const std::vector<EpipolarSegment>& segments_;
+  std::span<const EpipolarSegment> segments_;
   double tolerance_px_;
 };
 

@@ -2,15 +2,22 @@
 // Copyright the slsd authors
 #include "core/decode/curvature.hpp"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
 #include <Eigen/LU>
 
 namespace slsd {
+namespace {
+
+/// Bend over a symbol's size that moves its centre by a tenth of that, below what noise does.
+constexpr float kNegligiblePx = 0.04F;
+
+}  // namespace
 
 CentreCorrection::CentreCorrection(const std::vector<Prototype>& prototypes, float pitch_px, float symbol_size_px)
-    : pitch_px_(pitch_px) {
+    : pitch_px_(pitch_px), negligible_bend_(kNegligiblePx / (symbol_size_px * symbol_size_px)) {
   for (const Prototype& prototype : prototypes) {
     const ShapeFeatures& mean = prototype.mean;
     Eigen::Matrix2f moments;
@@ -83,6 +90,10 @@ Eigen::Vector2f CentreCorrection::median_around(const std::vector<GridNode>& nod
 }
 
 Bend CentreCorrection::bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const {
+  const Derivatives& own = derivatives_[node];
+  const float largest = std::max(
+      {own.bend.uu.cwiseAbs().maxCoeff(), own.bend.uv.cwiseAbs().maxCoeff(), own.bend.vv.cwiseAbs().maxCoeff()});
+  if (own.has_uu && own.has_uv && own.has_vv && largest < negligible_bend_) return {};
   // The median with the neighbours: less noise, a value where none could be measured, and none from across an edge in
   // depth.
   return {median_around(nodes, node, &Derivatives::has_uu, &Bend::uu),

@@ -51,6 +51,7 @@ class CentreCorrection {
                                              std::int32_t node, Direction direction) const;
 
   float pitch_px_;
+  float negligible_bend_;
   std::vector<Eigen::Vector2f> centroids_px_;
   std::vector<Eigen::Matrix2f> second_moments_px2_;
   std::vector<Eigen::Vector2f> centres_;  // of the squares

@@ -17,7 +17,8 @@ constexpr int kSpreadRounds = 3;
 WindowDecoder::WindowDecoder(const Pattern& pattern, DecodeWindowsOptions options, int radius)
     : array_(pattern.array),
       options_(options),
-      codebook_(pattern.array, options.rows, options.columns, radius),
+      exact_codebook_(pattern.array, options.rows, options.columns, 0),
+      correcting_codebook_(pattern.array, options.rows, options.columns, radius),
       log_letters_(std::log(static_cast<float>(pattern.letters()))) {}
 
 float WindowDecoder::shape_evidence(const Classification& shape, int row, int column) const {
@@ -26,16 +27,27 @@ float WindowDecoder::shape_evidence(const Classification& shape, int row, int co
 }
 
 void WindowDecoder::vote(std::int32_t node, int row, int column, int weight, const CellGate& gate) {
-  if (!shown(row, column) || !gate.admits(node, row, column)) return;
   Ballot& ballot = ballots_[node];
   for (int i = 0; i < ballot.count; ++i) {
     if (ballot.votes[i].row != row || ballot.votes[i].column != column) continue;
     ballot.votes[i].weight = static_cast<std::int16_t>(ballot.votes[i].weight + weight);
     return;
   }
-  if (ballot.count == kVotes) return;
+  if (ballot.count == kVotes || !shown(row, column) || !gate.admits(node, row, column)) return;
   ballot.votes[ballot.count++] = {static_cast<std::int16_t>(row), static_cast<std::int16_t>(column),
                                   static_cast<std::int16_t>(weight)};
+}
+
+std::optional<Codebook::Entry> WindowDecoder::look_up(std::int32_t node, const Codeword& codeword,
+                                                      const CellGate& gate) const {
+  std::optional<Codebook::Entry> hit;
+  int hits = 0;
+  const auto take = [&](const Codebook::Entry& entry) {
+    if (gate.admits(node, entry.row, entry.column)) hit = entry, ++hits;
+  };
+  exact_codebook_.find(codeword, take);
+  if (hits == 0) correcting_codebook_.find(codeword, take);
+  return hits == 1 ? hit : std::nullopt;
 }
 
 void WindowDecoder::look_up_windows(const std::vector<Classification>& shapes, const CellGate& gate) {
@@ -48,15 +60,11 @@ void WindowDecoder::look_up_windows(const std::vector<Classification>& shapes, c
       if (full) codeword[i] = static_cast<std::uint8_t>(shapes[around[i]].letter);
     }
     if (!full) continue;
-    Codebook::Entry hit{};
-    int hits = 0;
-    codebook_.find(codeword, [&](const Codebook::Entry& entry) {
-      if (gate.admits(static_cast<std::int32_t>(node), entry.row, entry.column)) hit = entry, ++hits;
-    });
-    if (hits != 1) continue;
+    const auto hit = look_up(static_cast<std::int32_t>(node), codeword, gate);
+    if (!hit) continue;
+    const int weight = hit->errors == 0 ? kExactWeight : kCorrectedWeight;
     for (int i = 0; i < kWindowCells; ++i) {
-      vote(around[i], hit.row - 1 + i / kWindowSide, hit.column - 1 + i % kWindowSide,
-           hit.errors == 0 ? kExactWeight : kCorrectedWeight, gate);
+      vote(around[i], hit->row - 1 + i / kWindowSide, hit->column - 1 + i % kWindowSide, weight, gate);
     }
   }
 }

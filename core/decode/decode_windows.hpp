@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/code/codebook.hpp"
@@ -63,6 +64,8 @@ class WindowDecoder {
   };
 
   void look_up_windows(const std::vector<Classification>& shapes, const CellGate& gate);
+  [[nodiscard]] std::optional<Codebook::Entry> look_up(std::int32_t node, const Codeword& codeword,
+                                                       const CellGate& gate) const;
   void vote(std::int32_t node, int row, int column, int weight, const CellGate& gate);
   void elect(std::vector<CellClaim>& claims) const;
   void spread(const std::vector<GridNode>& nodes, const CellGate& gate, std::vector<CellClaim>& claims);
@@ -74,7 +77,7 @@ class WindowDecoder {
 
   CodeArray array_;
   DecodeWindowsOptions options_;
-  Codebook codebook_;
+  Codebook exact_codebook_, correcting_codebook_;  // the first is small enough to stay in the cache
   float log_letters_;
   std::vector<Neighbourhood> around_;
   std::vector<Ballot> ballots_;

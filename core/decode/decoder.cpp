@@ -33,7 +33,13 @@ Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calib
                     size_text(pattern.options.projector_width_px, pattern.options.projector_height_px) +
                     "; calibrate with this projector, or set the projector's size to the calibrated one");
   }
-  return Decoder(std::make_unique<Pipeline>(pattern, calibration, camera_index, options));
+  std::optional<PaperWay> paper;
+  if (options.any_paper()) {
+    auto created = PaperWay::create(pattern);
+    if (!created) return tl::unexpected(created.error());
+    paper = std::move(*created);
+  }
+  return Decoder(std::make_unique<Pipeline>(pattern, calibration, camera_index, options, std::move(paper)));
 }
 
 Result<const Decoding*> Decoder::decode(const GreyView& frame, StageObserver* observer) {

@@ -3,18 +3,21 @@
 #include "core/decode/find_regions.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 
 namespace slsd {
 namespace {
 
-/// First pixel from x on that is lit (or dark, where `lit` is false); eight at a time where nothing changes.
+/// First pixel from x on that is lit (or dark, where `lit` is false), eight at a time; the first of them in memory is
+/// the lowest byte.
+static_assert(std::endian::native == std::endian::little);
 inline int next_change(const std::uint8_t* mask, int x, int width, bool lit) {
   const std::uint64_t same = lit ? 0 : ~std::uint64_t{0};
   while (x + 8 <= width) {
     std::uint64_t eight;
     std::memcpy(&eight, mask + x, sizeof eight);
-    if (eight != same) break;
+    if (eight != same) return x + std::countr_zero(eight ^ same) / 8;
     x += 8;
   }
   while (x < width && (mask[x] != 0) != lit) ++x;

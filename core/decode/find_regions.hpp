@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "core/image.hpp"
 
 namespace slsd {
@@ -21,6 +23,9 @@ struct Region {
   int area_px;
   int first_run, run_count;  ///< in Regions::runs, in raster order
 
+  [[nodiscard]] Eigen::Vector2f middle_px() const {
+    return {0.5F * static_cast<float>(left + right), 0.5F * static_cast<float>(top + bottom)};
+  }
   [[nodiscard]] int width_px() const { return right - left + 1; }
   [[nodiscard]] int height_px() const { return bottom - top + 1; }
 };
@@ -46,7 +51,7 @@ struct Regions {
 /// @thread thread-bound: keeps its buffers
 class RegionFinder {
  public:
-  /// @param mask  non-zero where lit; at most 32767 pixels wide and high
+  /// @param mask  255 where lit, 0 elsewhere; at most 32767 pixels wide and high
   void find(const ImageView<std::uint8_t>& mask, Regions& found);
 
  private:

@@ -20,6 +20,7 @@ struct GreyMoments {
   float weight = 0;                          ///< lit area, camera px squared
   float m20 = 0, m11 = 0, m02 = 0;           ///< central, over the weight: px^2
   float m30 = 0, m21 = 0, m12 = 0, m03 = 0;  ///< px^3
+  float noise = 0;                           ///< one standard deviation of a pixel where it is lit
   float background = 0, peak = 0;            ///< grey levels of the frame
 };
 
@@ -54,9 +55,9 @@ class GreyMomentMeter {
   [[nodiscard]] GreyMoments weigh_patch() const;
 
   int margin_px_;
-  int left_ = 0, top_ = 0, width_ = 0, height_ = 0;  // of the patch
-  std::vector<int> first_, last_;                    // extent of the region in each row of the patch
-  std::vector<float> patch_;                         // grey values; kOutside where they belong to others
+  int left_ = 0, top_ = 0, width_ = 0, height_ = 0, stride_ = 0;  // of the patch
+  std::vector<int> first_, last_;                                 // extent of the region in each row of the patch
+  std::vector<float> patch_;                                      // grey values; kOutside where they belong to others
 };
 
 }  // namespace slsd

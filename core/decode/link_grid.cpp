@@ -41,6 +41,14 @@ std::optional<Eigen::Vector2f> measured_step(const std::vector<GridNode>& nodes,
   return inwards == forth ? step : (-step).eval();
 }
 
+/// Whether a neighbour is so near to where the frame puts it that no other can be nearer.
+bool is_evident(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
+                const Eigen::Matrix2f& cells_from_camera) {
+  constexpr float kEvident = 0.15F;
+  return (cells_from_camera * link_vector(nodes, from, direction) - step(direction)).squaredNorm() <
+         kEvident * kEvident;
+}
+
 }  // namespace
 
 Eigen::Vector2f step(Direction direction) {
@@ -86,10 +94,9 @@ void GridLinker::sort_into_buckets(const std::vector<GridNode>& nodes) {
 }
 
 std::int32_t GridLinker::nearest(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
-                                 float radius) const {
+                                 const Eigen::Matrix2f& cells_from_camera, float radius) const {
   const GridNode& node = nodes[from];
   const Eigen::Vector2f target = node.centre_px + node.frame * (options_.pitch_px * step(direction));
-  const Eigen::Matrix2f cells_from_camera = node.frame.inverse() / options_.pitch_px;
   const Eigen::Vector2f at = (target - origin_px_) / bucket_px_;
   const int column = static_cast<int>(std::floor(at.x())), row = static_cast<int>(std::floor(at.y()));
   std::int32_t best = -1;
@@ -110,7 +117,11 @@ std::int32_t GridLinker::nearest(const std::vector<GridNode>& nodes, std::size_t
 void GridLinker::find_mutual(std::vector<GridNode>& nodes, float radius) {
   chosen_.resize(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    for (const Direction d : kDirections) chosen_[i][d] = nearest(nodes, i, d, radius);
+    const Eigen::Matrix2f cells_from_camera = nodes[i].frame.inverse() / options_.pitch_px;
+    for (const Direction d : kDirections) {
+      const bool kept = nodes[i].links[d] >= 0 && is_evident(nodes, i, d, cells_from_camera);
+      chosen_[i][d] = kept ? nodes[i].links[d] : nearest(nodes, i, d, cells_from_camera, radius);
+    }
   }
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     for (const Direction d : kDirections) {

@@ -62,7 +62,7 @@ class GridLinker {
  private:
   void sort_into_buckets(const std::vector<GridNode>& nodes);
   [[nodiscard]] std::int32_t nearest(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
-                                     float radius) const;
+                                     const Eigen::Matrix2f& cells_from_camera, float radius) const;
   void find_mutual(std::vector<GridNode>& nodes, float radius);
   void break_inconsistent(std::vector<GridNode>& nodes);
 

@@ -2,6 +2,9 @@
 // Copyright the slsd authors
 #include "core/decode/options.hpp"
 
+#include <algorithm>
+#include <iterator>
+
 namespace slsd {
 
 Result<> DecodeOptions::validate() const {
@@ -11,6 +14,11 @@ Result<> DecodeOptions::validate() const {
     return fail(ErrorCode::kInvalidArgument, "depth_max_mm has to be greater than depth_min_mm", "decode.depth_max_mm");
   }
   return {};
+}
+
+bool DecodeOptions::any_paper() const {
+  const Method stages[] = {binarize, classify, centre, link_grid, decode_windows, correspond};
+  return std::ranges::find(stages, Method::kPaper) != std::end(stages);
 }
 
 }  // namespace slsd

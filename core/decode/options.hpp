@@ -21,6 +21,8 @@ struct DecodeOptions {
   Method correspond = Method::kDefault;
 
   [[nodiscard]] Result<> validate() const;
+  /// Whether any stage goes the paper's way.
+  [[nodiscard]] bool any_paper() const;
   friend bool operator==(const DecodeOptions&, const DecodeOptions&) = default;
 };
 

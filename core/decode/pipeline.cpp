@@ -7,6 +7,9 @@
 
 #include <Eigen/LU>
 
+#include "core/decode/centre_sigma.hpp"
+#include "core/decode/paper/binarize.hpp"
+
 namespace slsd {
 namespace {
 
@@ -21,12 +24,7 @@ constexpr float kMeasuredDistanceMax = 8;
 constexpr float kAreaMin = 0.08F;
 constexpr float kAreaMax = 1.1F;
 constexpr int kAreaMinPx = 6;
-/// Change of the light from cell to cell from which on a symbol is measured again with the light levelled.
-constexpr float kShadingMin = 0.04F;
-/// Standard deviations from its letter's prototype: a symbol beyond the first is measured again where its neighbours
-/// put it, one that stays beyond the second is damaged (cut by an edge, a shadow, print) and its centre with it.
-constexpr float kDoubtfulDistance = 1.5F;
-constexpr float kDamagedDistance = 2.5F;
+constexpr float kExtentMax = 1.5F;  // of a cell's side
 /// Levels between a merged region's dark and light at which it is taken apart.
 constexpr float kSplitLevels[] = {0.35F, 0.6F};
 /// What is larger than this is not a few symbols that ran together.
@@ -34,8 +32,20 @@ constexpr int kSplitAreaMaxPx = 20000;
 /// Grey levels of 255 between a region's peak and its background.
 constexpr float kContrastMin = 8;
 
-PrototypeOptions prototype_options(const Pattern& pattern, float scale, float frame_error) {
-  return {pattern.options.symbols, pattern.options.symbol_size_px, pattern.options.spacing_px, scale, frame_error};
+std::vector<Prototype> prototypes_for(const Pattern& pattern, float scale, float frame_error) {
+  return make_prototypes(
+      {pattern.options.symbols, pattern.options.symbol_size_px, pattern.options.spacing_px, scale, frame_error});
+}
+
+/// The centroids that the estimator in use finds: the paper's are those of the symbols as they are drawn.
+std::vector<Prototype> with_centroids_of(Method centre, const Pattern& pattern, std::vector<Prototype> prototypes) {
+  if (centre == Method::kDefault) return prototypes;
+  for (std::size_t i = 0; i < prototypes.size(); ++i) {
+    const Descriptors drawn = describe_shape(draw_symbol(pattern.options.symbols[i], pattern.options.symbol_size_px));
+    const double middle = 0.5 * (pattern.options.symbol_size_px - 1);
+    prototypes[i].centroid_px = (drawn.centroid_px.array() - middle).cast<float>();
+  }
+  return prototypes;
 }
 
 BinarizeOptions binarize_options(const Pattern& pattern, float scale) {
@@ -49,50 +59,6 @@ int radius_of(const CodeArray& array) {
   return minimum_window_distance(array) >= 3 ? 1 : 0;
 }
 
-/// Relative change of the light from one cell to the next along a direction, from the peaks of the neighbours.
-float light_change(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments, std::size_t node,
-                   Direction direction) {
-  const auto light = [&](std::int32_t at) { return moments[at].peak - moments[at].background; };
-  const auto self = static_cast<std::int32_t>(node);
-  const std::int32_t next = neighbour(nodes, self, direction), last = neighbour(nodes, self, opposite(direction));
-  const std::int32_t from = last >= 0 ? last : self, to = next >= 0 ? next : self;
-  const float steps = static_cast<float>((last >= 0) + (next >= 0));
-  return steps == 0 ? 0.F : (light(to) - light(from)) / (steps * light(self));
-}
-
-/// Where the neighbours put a node, by continuing the steps of those beside it; quadratic, as steps shrink towards a
-/// limb.
-std::optional<Eigen::Vector2f> centre_from_neighbours(const std::vector<GridNode>& nodes, std::size_t node) {
-  Eigen::Vector2f sum = Eigen::Vector2f::Zero();
-  int count = 0;
-  for (const Direction d : {kRight, kDown, kLeft, kUp}) {
-    const std::int32_t first = neighbour(nodes, static_cast<std::int32_t>(node), d),
-                       second = neighbour(nodes, first, d);
-    const std::int32_t third = neighbour(nodes, second, d);
-    if (third < 0) continue;
-    sum += 3 * nodes[first].centre_px - 3 * nodes[second].centre_px + nodes[third].centre_px;
-    ++count;
-  }
-  if (count == 0) return std::nullopt;
-  return sum / static_cast<float>(count);
-}
-
-/// The same along both axes, the mean with the neighbours': small symbols blur to lower peaks, which is not the light's
-/// doing.
-Eigen::Vector2f light_change_around(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
-                                    std::size_t node) {
-  Eigen::Vector2f sum(light_change(nodes, moments, node, kRight), light_change(nodes, moments, node, kDown));
-  float count = 1;
-  for (const Direction d : {kRight, kDown, kLeft, kUp}) {
-    const std::int32_t other = neighbour(nodes, static_cast<std::int32_t>(node), d);
-    if (other < 0) continue;
-    const auto at = static_cast<std::size_t>(other);
-    sum += Eigen::Vector2f(light_change(nodes, moments, at, kRight), light_change(nodes, moments, at, kDown));
-    ++count;
-  }
-  return sum / count;
-}
-
 float grey_levels(const GreyView& frame) {
   return std::holds_alternative<ImageView<std::uint8_t>>(frame) ? 1.F : 257.F;
 }
@@ -100,17 +66,16 @@ float grey_levels(const GreyView& frame) {
 }  // namespace
 
 Decoder::Pipeline::Pipeline(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
-                            const DecodeOptions& options)
+                            const DecodeOptions& options, std::optional<PaperWay> paper)
     : pattern_(pattern),
       camera_(calibration.cameras[camera_index]),
       camera_index_(static_cast<std::uint8_t>(camera_index)),
       options_(options),
+      paper_(std::move(paper)),
       expected_(camera_, calibration.projector, std::sqrt(options.depth_min_mm * options.depth_max_mm)),
-      prototypes_as_expected_(
-          make_prototypes(prototype_options(pattern, expected_.middle_scale(), kExpectedFrameError))),
-      prototypes_as_measured_(
-          make_prototypes(prototype_options(pattern, expected_.middle_scale(), kMeasuredFrameError))),
-      cells_(pattern, prototypes_as_measured_, calibration.projector),
+      prototypes_as_expected_(prototypes_for(pattern, expected_.middle_scale(), kExpectedFrameError)),
+      prototypes_as_measured_(prototypes_for(pattern, expected_.middle_scale(), kMeasuredFrameError)),
+      cells_(pattern, with_centroids_of(options.centre, pattern, prototypes_as_measured_), calibration.projector),
       camera_rays_(camera_.lens),
       epipolar_gate_(camera_, calibration.projector, options.depth_min_mm, options.depth_max_mm),
       triangulator_(camera_, calibration.projector),
@@ -119,6 +84,7 @@ Decoder::Pipeline::Pipeline(const Pattern& pattern, const Calibration& calibrati
       linker_({.pitch_px = static_cast<float>(pattern.pitch_px())}),
       window_decoder_(pattern, {.rows = pattern.whole_rows(), .columns = pattern.whole_columns()},
                       radius_of(pattern.array)),
+      review_(pattern, prototypes_as_measured_, {}),
       correspondence_({}),
       centre_correction_(prototypes_as_measured_, static_cast<float>(pattern.pitch_px()),
                          static_cast<float>(pattern.options.symbol_size_px)) {}
@@ -130,43 +96,27 @@ const Decoding& Decoder::Pipeline::decode(const GreyView& frame, StageObserver* 
   binarize(frame), done(Stage::kBinarize);
   find_regions(frame), done(Stage::kFindRegions);
   describe(frame), done(Stage::kDescribe);
-  classify_as_expected(), done(Stage::kClassify);
+  classify(), done(Stage::kClassify);
   link_grid(), done(Stage::kLinkGrid);
-  classify_as_measured();
-  decode_windows();
-  measure_again(frame), done(Stage::kDecodeWindows);
+  decode_windows(frame), done(Stage::kDecodeWindows);
   correspond(), done(Stage::kCorrespond);
-  correct_centres();
   triangulate();
   report(), done(Stage::kTriangulate);
   return decoding_;
 }
 
 void Decoder::Pipeline::binarize(const GreyView& frame) {
+  if (options_.binarize == Method::kPaper) return binarize_paper(frame, mask_);
   binarizer_.binarize(frame, mask_);
 }
 
 void Decoder::Pipeline::find_regions(const GreyView& frame) {
   region_finder_.find(mask_.view(), regions_);
-  split_merged(frame);
-}
-
-void Decoder::Pipeline::split_merged(const GreyView& frame) {
+  if (options_.binarize == Method::kPaper) return;
   for (const float level : kSplitLevels) {
-    const std::size_t count = regions_.regions.size();
-    for (std::size_t i = 0; i < count; ++i) {
-      const Region region = regions_.regions[i];
-      if (judge_size(region) != RegionStatus::kTooLarge || region.area_px > kSplitAreaMaxPx) continue;
-      std::visit(
-          [&](const auto& view) {
-            const Regions& parts = splitter_.split(view, region, regions_.runs_of(region), level);
-            if (parts.regions.size() < 2) return;
-            for (const Region& part : parts.regions) regions_.append(part, parts.runs_of(part));
-            regions_.regions[i].area_px = 0;
-          },
-          frame);
-    }
-    std::erase_if(regions_.regions, [](const Region& region) { return region.area_px == 0; });
+    splitter_.split_all(frame, level, regions_, [this](const Region& region) {
+      return region.area_px <= kSplitAreaMaxPx && judge_size(region) == RegionStatus::kTooLarge;
+    });
   }
 }
 
@@ -174,193 +124,165 @@ RegionStatus Decoder::Pipeline::judge_size(const Region& region) const {
   if (region.left == 0 || region.top == 0 || region.right == mask_.width() - 1 || region.bottom == mask_.height() - 1) {
     return RegionStatus::kTouchesBorder;
   }
-  const LatticeFrame& frame = expected_.at(0.5F * static_cast<float>(region.left + region.right),
-                                           0.5F * static_cast<float>(region.top + region.bottom));
-  const float scale_squared = std::abs(frame.determinant());
+  const Eigen::Vector2f middle = region.middle_px();
+  const float square_px = std::abs(expected_.at(middle.x(), middle.y()).determinant());
   const float size = static_cast<float>(pattern_.options.symbol_size_px),
               pitch = static_cast<float>(pattern_.pitch_px());
   const float area = static_cast<float>(region.area_px);
-  if (region.area_px < kAreaMinPx || area < kAreaMin * size * size * scale_squared) return RegionStatus::kTooSmall;
+  if (region.area_px < kAreaMinPx || area < kAreaMin * size * size * square_px) return RegionStatus::kTooSmall;
   const float extent = static_cast<float>(std::max(region.width_px(), region.height_px()));
-  if (area > kAreaMax * pitch * pitch * scale_squared || extent > 1.5F * pitch * std::sqrt(scale_squared))
-    return RegionStatus::kTooLarge;
-  return RegionStatus::kNoNeighbour;
+  const bool too_large =
+      area > kAreaMax * pitch * pitch * square_px || extent > kExtentMax * pitch * std::sqrt(square_px);
+  return too_large ? RegionStatus::kTooLarge : RegionStatus::kNoNeighbour;
 }
 
 void Decoder::Pipeline::describe(const GreyView& frame) {
-  const float contrast_min = kContrastMin * grey_levels(frame);
+  frame_levels_ = grey_levels(frame);
   region_status_.resize(regions_.regions.size());
-  region_of_node_.clear();
-  moments_.clear();
+  seen_.clear();
   for (std::size_t i = 0; i < regions_.regions.size(); ++i) {
     const Region& region = regions_.regions[i];
     region_status_[i] = judge_size(region);
     if (region_status_[i] != RegionStatus::kNoNeighbour) continue;
     const GreyMoments moments =
         std::visit([&](const auto& view) { return meter_.measure(view, region, regions_.runs_of(region)); }, frame);
-    if (moments.peak - moments.background < contrast_min || moments.weight <= 0) {
+    if (moments.weight <= 0 || moments.peak - moments.background < kContrastMin * frame_levels_) {
       region_status_[i] = RegionStatus::kLowContrast;
       continue;
     }
-    region_of_node_.push_back(static_cast<std::int32_t>(i));
-    moments_.push_back(moments);
+    seen_.region.push_back(static_cast<std::int32_t>(i));
+    seen_.moments.push_back(moments);
   }
+  if (paper_) paper_->describe(regions_, seen_);
+  if (options_.centre == Method::kPaper) paper_->centre(seen_);
 }
 
-void Decoder::Pipeline::classify_as_expected() {
+void Decoder::Pipeline::classify() {
   const float size = static_cast<float>(pattern_.options.symbol_size_px);
-  shapes_.resize(moments_.size());
-  nodes_.assign(moments_.size(), {});
-  for (std::size_t i = 0; i < moments_.size(); ++i) {
-    const LatticeFrame& frame = expected_.at(moments_[i].x, moments_[i].y);
-    shapes_[i] =
-        classify(shape_features(moments_[i], frame.inverse(), size), prototypes_as_expected_, kExpectedDistanceMax);
-    nodes_[i].frame = frame;
-    nodes_[i].centre_px = {moments_[i].x, moments_[i].y};
-    if (shapes_[i].letter >= 0) nodes_[i].centre_px -= frame * prototypes_as_expected_[shapes_[i].letter].centroid_px;
+  seen_.shapes.resize(seen_.size());
+  seen_.nodes.assign(seen_.size(), {});
+  if (options_.classify == Method::kPaper) paper_->classify(size * expected_.middle_scale(), seen_);
+  for (std::size_t i = 0; i < seen_.size(); ++i) {
+    const GreyMoments& moments = seen_.moments[i];
+    GridNode& node = seen_.nodes[i];
+    node.frame = expected_.at(moments.x, moments.y);
+    node.centre_px = {moments.x, moments.y};
+    if (options_.classify == Method::kDefault) {
+      seen_.shapes[i] = slsd::classify(shape_features(moments, node.frame.inverse(), size), prototypes_as_expected_,
+                                       kExpectedDistanceMax);
+    }
+    if (seen_.shapes[i].letter >= 0)
+      node.centre_px -= node.frame * prototypes_as_expected_[seen_.shapes[i].letter].centroid_px;
   }
 }
 
 void Decoder::Pipeline::link_grid() {
-  linker_.link(nodes_);
+  if (options_.link_grid == Method::kPaper) return paper_->link_grid(regions_, mask_.width(), mask_.height(), seen_);
+  linker_.link(seen_.nodes);
+  if (options_.classify == Method::kDefault) classify_in_measured_frames();
 }
 
-void Decoder::Pipeline::classify_as_measured() {
+void Decoder::Pipeline::classify_in_measured_frames() {
   const float size = static_cast<float>(pattern_.options.symbol_size_px);
-  for (std::size_t i = 0; i < moments_.size(); ++i) {
-    const bool measured = nodes_[i].measured_u && nodes_[i].measured_v;
-    if (!measured) continue;
-    shapes_[i] = classify(shape_features(moments_[i], nodes_[i].frame.inverse(), size), prototypes_as_measured_,
-                          kMeasuredDistanceMax);
+  for (std::size_t i = 0; i < seen_.size(); ++i) {
+    const GridNode& node = seen_.nodes[i];
+    if (!node.measured_u || !node.measured_v) continue;
+    seen_.shapes[i] = slsd::classify(shape_features(seen_.moments[i], node.frame.inverse(), size),
+                                     prototypes_as_measured_, kMeasuredDistanceMax);
   }
 }
 
-void Decoder::Pipeline::decode_windows() {
-  rays_.resize(moments_.size());
-  segments_.resize(moments_.size());
-  for (std::size_t i = 0; i < moments_.size(); ++i) {
-    rays_[i] = camera_rays_.ray({moments_[i].x, moments_[i].y});
+void Decoder::Pipeline::find_epipolar_segments() {
+  rays_.resize(seen_.size());
+  ray_pixels_.resize(seen_.size());
+  segments_.resize(seen_.size());
+  for (std::size_t i = 0; i < seen_.size(); ++i) {
+    ray_pixels_[i] = {seen_.moments[i].x, seen_.moments[i].y};
+    rays_[i] = camera_rays_.ray(ray_pixels_[i].cast<double>());
     segments_[i] = epipolar_gate_.prepare(rays_[i].direction);
   }
-  window_decoder_.decode(nodes_, shapes_, CellGate(cells_, segments_, CorrespondOptions{}.epipolar_max_px), claims_);
+}
+
+bool Decoder::Pipeline::reviews() const {
+  return options_.classify == Method::kDefault && options_.centre == Method::kDefault &&
+         options_.decode_windows == Method::kDefault;
+}
+
+void Decoder::Pipeline::decode_windows(const GreyView& frame) {
+  find_epipolar_segments();
+  if (options_.decode_windows == Method::kPaper) return paper_->decode_windows(cells_.rows(), cells_.columns(), seen_);
+  const bool gated = options_.correspond == Method::kDefault;
+  const CellGate gate(cells_, gated ? std::span<const EpipolarSegment>(segments_) : std::span<const EpipolarSegment>(),
+                      CorrespondOptions{}.epipolar_max_px);
+  window_decoder_.decode(seen_.nodes, seen_.shapes, gate, seen_.claims);
+  if (reviews()) review_.review(frame, regions_, linker_, meter_, seen_);
 }
 
 void Decoder::Pipeline::correspond() {
-  correspondence_.correspond(cells_, segments_, claims_);
-}
-
-void Decoder::Pipeline::trust_whole_symbols() {
-  trusted_.resize(claims_.size());
-  for (std::size_t i = 0; i < claims_.size(); ++i) trusted_[i] = claims_[i].status == RegionStatus::kDecoded;
-  linker_.measure_frames(nodes_, trusted_);
-  for (std::size_t i = 0; i < claims_.size(); ++i) {
-    if (trusted_[i] != 0) trusted_[i] = distance_from_letter(i, moments_[i]) <= kDamagedDistance;
-  }
-  linker_.measure_frames(nodes_, trusted_);
-}
-
-float Decoder::Pipeline::distance_from_letter(std::size_t node, const GreyMoments& moments) const {
-  const Prototype& prototype = prototypes_as_measured_[pattern_.array.at(claims_[node].row, claims_[node].column)];
-  const float size = static_cast<float>(pattern_.options.symbol_size_px);
-  return (prototype.whitening * (shape_features(moments, nodes_[node].frame.inverse(), size) - prototype.mean)).norm();
-}
-
-void Decoder::Pipeline::measure_again(const GreyView& frame) {
-  trust_whole_symbols();
-  const float size = static_cast<float>(pattern_.options.symbol_size_px),
-              pitch = static_cast<float>(pattern_.pitch_px());
-  for (std::size_t i = 0; i < claims_.size(); ++i) {
-    if (claims_[i].status != RegionStatus::kDecoded) continue;
-    const GridNode& node = nodes_[i];
-    const Prototype& prototype = prototypes_as_measured_[pattern_.array.at(claims_[i].row, claims_[i].column)];
-    const Eigen::Matrix2f inverse = node.frame.inverse();
-    float distance = distance_from_letter(i, moments_[i]);
-    const auto adopt_if_better = [&](const GreyMoments& again, float tolerance) {
-      const float distance_again = distance_from_letter(i, again);
-      if (again.weight > 0 && distance_again < distance + tolerance) moments_[i] = again, distance = distance_again;
-    };
-    const Eigen::Vector2f per_cell = light_change_around(nodes_, moments_, i);
-    const Eigen::Vector2f shading = inverse.transpose() * per_cell / pitch;
-    const Region& region = regions_.regions[region_of_node_[i]];
-    if (per_cell.cwiseAbs().maxCoeff() > kShadingMin) {
-      adopt_if_better(
-          std::visit([&](const auto& view) { return meter_.measure(view, region, regions_.runs_of(region), shading); },
-                     frame),
-          0.3F);
-    }
-    if (distance > kDoubtfulDistance) {
-      const Eigen::Vector2f centroid(moments_[i].x, moments_[i].y);
-      const Eigen::Vector2f centre =
-          centre_from_neighbours(nodes_, i).value_or(centroid - node.frame * prototype.centroid_px);
-      const float half_px = 0.5F * size + 0.25F * (pitch - size);
-      adopt_if_better(
-          std::visit([&](const auto& view) { return meter_.measure_cell(view, centre, node.frame, half_px, shading); },
-                     frame),
-          0);
-    }
-    shapes_[i].distance = distance;
-    if (distance > kDamagedDistance) claims_[i].status = RegionStatus::kDamagedShape;
-  }
-}
-
-void Decoder::Pipeline::correct_centres() {
-  letters_.resize(claims_.size());
-  for (std::size_t i = 0; i < claims_.size(); ++i) {
-    letters_[i] = claims_[i].named() ? static_cast<std::int8_t>(pattern_.array.at(claims_[i].row, claims_[i].column))
-                                     : std::int8_t{-1};
-  }
-  centre_correction_.correct(nodes_, moments_, claims_, letters_, centres_);
+  if (options_.correspond == Method::kDefault) correspondence_.correspond(cells_, segments_, seen_.claims);
 }
 
 void Decoder::Pipeline::triangulate() {
+  letters_.resize(seen_.size());
+  for (std::size_t i = 0; i < seen_.size(); ++i) {
+    const CellClaim& claim = seen_.claims[i];
+    letters_[i] = static_cast<std::int8_t>(claim.named() ? pattern_.array.at(claim.row, claim.column) : -1);
+  }
+  centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, letters_, centres_);
   decoding_.points.clear();
-  for (std::size_t i = 0; i < claims_.size(); ++i) {
-    const CellClaim& claim = claims_[i];
+  for (std::size_t i = 0; i < seen_.size(); ++i) {
+    CellClaim& claim = seen_.claims[i];
     if (claim.status != RegionStatus::kDecoded) continue;
-    const TriangulatedPoint solved = triangulator_.triangulate(camera_rays_.ray(centres_[i].cast<double>()),
-                                                               cells_.ray(claim.row, claim.column), 0.03);
-    if (!(solved.point_in_camera.z() >= options_.depth_min_mm && solved.point_in_camera.z() <= options_.depth_max_mm)) {
-      claims_[i].status = RegionStatus::kOutOfDepthRange;
-      continue;
+    const GreyMoments& moments = seen_.moments[i];
+    if (options_.centre == Method::kPaper) centres_[i] = {moments.x, moments.y};
+    // The correction is some tenths of a pixel, over which the ray turns evenly.
+    PixelRay ray = rays_[i];
+    ray.direction += ray.turn * (centres_[i] - ray_pixels_[i]).cast<double>();
+    const TriangulatedPoint solved =
+        triangulator_.triangulate(ray, cells_.ray(claim.row, claim.column), centre_sigma_px(moments));
+    const double depth = solved.point_in_camera.z();
+    const bool gated = options_.correspond == Method::kDefault;
+    const bool in_range = gated ? depth >= options_.depth_min_mm && depth <= options_.depth_max_mm : depth > 0;
+    if (!in_range || !solved.point_in_camera.allFinite()) {
+      claim.status = RegionStatus::kOutOfDepthRange;
+    } else {
+      add_point(i, solved);
     }
-    const Eigen::Vector3f point = (camera_.rig_from_camera * solved.point_in_camera).cast<float>();
-    const Eigen::Vector2f projector = cells_.pixel(claim.row, claim.column).cast<float>();
-    CloudPoint& out = decoding_.points.emplace_back();
-    out.x = point.x(), out.y = point.y(), out.z = point.z();
-    out.camera_u = centres_[i].x(), out.camera_v = centres_[i].y();
-    out.projector_u = projector.x(), out.projector_v = projector.y();
-    out.sigma_mm = static_cast<float>(solved.sigma_mm);
-    out.column = static_cast<std::uint16_t>(claim.column), out.row = static_cast<std::uint16_t>(claim.row);
-    out.intensity = static_cast<std::uint8_t>(std::clamp(moments_[i].peak, 0.F, 255.F));
-    out.camera = camera_index_;
-    out.symbol = static_cast<std::uint8_t>(pattern_.options.symbols[pattern_.array.at(claim.row, claim.column)]);
   }
 }
 
+void Decoder::Pipeline::add_point(std::size_t node, const TriangulatedPoint& solved) {
+  const CellClaim& claim = seen_.claims[node];
+  const Eigen::Vector3f point = (camera_.rig_from_camera * solved.point_in_camera).cast<float>();
+  const Eigen::Vector2f projector = cells_.pixel(claim.row, claim.column).cast<float>();
+  CloudPoint& out = decoding_.points.emplace_back();
+  out.x = point.x(), out.y = point.y(), out.z = point.z();
+  out.camera_u = centres_[node].x(), out.camera_v = centres_[node].y();
+  out.projector_u = projector.x(), out.projector_v = projector.y();
+  out.sigma_mm = static_cast<float>(solved.sigma_mm);
+  out.column = static_cast<std::uint16_t>(claim.column), out.row = static_cast<std::uint16_t>(claim.row);
+  out.intensity = static_cast<std::uint8_t>(std::clamp(seen_.moments[node].peak / frame_levels_, 0.F, 255.F));
+  out.camera = camera_index_;
+  out.symbol = static_cast<std::uint8_t>(pattern_.options.symbols[letters_[node]]);
+}
+
 void Decoder::Pipeline::report() {
-  decoding_.counts = {};
   decoding_.regions.resize(regions_.regions.size());
   for (std::size_t i = 0; i < regions_.regions.size(); ++i) {
-    const Region& region = regions_.regions[i];
-    RegionSeen& seen = decoding_.regions[i];
-    seen = {};
-    seen.centre_px = {0.5F * static_cast<float>(region.left + region.right),
-                      0.5F * static_cast<float>(region.top + region.bottom)};
-    seen.status = region_status_[i];
-    seen.letter = -1;
-    seen.links.fill(-1);
-    seen.column = seen.row = -1;
+    decoding_.regions[i] = {regions_.regions[i].middle_px(), region_status_[i], -1, {-1, -1, -1, -1}, {}, -1, -1};
   }
-  for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    RegionSeen& seen = decoding_.regions[region_of_node_[i]];
-    seen.centre_px = {moments_[i].x, moments_[i].y};
-    seen.status = claims_[i].status;
-    seen.letter = shapes_[i].letter;
-    for (int d = 0; d < 4; ++d) seen.links[d] = nodes_[i].links[d] < 0 ? -1 : region_of_node_[nodes_[i].links[d]];
-    seen.broken = nodes_[i].broken;
-    if (seen.status == RegionStatus::kDecoded) seen.column = claims_[i].column, seen.row = claims_[i].row;
+  for (std::size_t i = 0; i < seen_.size(); ++i) {
+    RegionSeen& out = decoding_.regions[seen_.region[i]];
+    const GridNode& node = seen_.nodes[i];
+    out.centre_px = {seen_.moments[i].x, seen_.moments[i].y};
+    out.status = seen_.claims[i].status;
+    out.letter = seen_.shapes[i].letter;
+    for (int d = 0; d < 4; ++d) out.links[d] = node.links[d] < 0 ? -1 : seen_.region[node.links[d]];
+    out.broken = node.broken;
+    if (out.status == RegionStatus::kDecoded) out.column = seen_.claims[i].column, out.row = seen_.claims[i].row;
   }
-  for (const RegionSeen& seen : decoding_.regions) ++decoding_.counts[static_cast<std::size_t>(seen.status)];
+  decoding_.counts = {};
+  for (const RegionSeen& region : decoding_.regions) ++decoding_.counts[static_cast<std::size_t>(region.status)];
 }
 
 }  // namespace slsd

@@ -2,12 +2,12 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "core/code/pattern.hpp"
 #include "core/decode/binarize.hpp"
 #include "core/decode/cell_rays.hpp"
-#include "core/decode/classify.hpp"
 #include "core/decode/correspond.hpp"
 #include "core/decode/curvature.hpp"
 #include "core/decode/decode_windows.hpp"
@@ -16,6 +16,9 @@
 #include "core/decode/grey_moments.hpp"
 #include "core/decode/lattice_frame.hpp"
 #include "core/decode/link_grid.hpp"
+#include "core/decode/paper/paper_way.hpp"
+#include "core/decode/review_symbols.hpp"
+#include "core/decode/sightings.hpp"
 #include "core/decode/split_regions.hpp"
 #include "core/geometry/ray_table.hpp"
 #include "core/geometry/triangulator.hpp"
@@ -26,8 +29,9 @@ namespace slsd {
 /// @thread thread-bound
 class Decoder::Pipeline {
  public:
+  /// @param paper  there where a stage is asked for the paper's way
   Pipeline(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
-           const DecodeOptions& options);
+           const DecodeOptions& options, std::optional<PaperWay> paper);
 
   const Decoding& decode(const GreyView& frame, StageObserver* observer);
   [[nodiscard]] const Lens& camera_lens() const { return camera_.lens; }
@@ -35,27 +39,25 @@ class Decoder::Pipeline {
  private:
   void binarize(const GreyView& frame);
   void find_regions(const GreyView& frame);
-  void split_merged(const GreyView& frame);
   void describe(const GreyView& frame);
-  void classify_as_expected();
+  void classify();
   void link_grid();
-  void classify_as_measured();
-  void decode_windows();
+  void decode_windows(const GreyView& frame);
   void correspond();
-  void trust_whole_symbols();
-  [[nodiscard]] float distance_from_letter(std::size_t node, const GreyMoments& moments) const;
-  void measure_again(const GreyView& frame);
-  void correct_centres();
   void triangulate();
   void report();
 
   [[nodiscard]] RegionStatus judge_size(const Region& region) const;
+  void classify_in_measured_frames();
+  void find_epipolar_segments();
+  [[nodiscard]] bool reviews() const;
+  void add_point(std::size_t node, const TriangulatedPoint& solved);
 
   Pattern pattern_;
   CalibratedCamera camera_;
   std::uint8_t camera_index_;
-  RigidTransform rig_from_camera_;
   DecodeOptions options_;
+  std::optional<PaperWay> paper_;
   ExpectedFrames expected_;
   std::vector<Prototype> prototypes_as_expected_, prototypes_as_measured_;
   CellRays cells_;
@@ -69,23 +71,20 @@ class Decoder::Pipeline {
   GreyMomentMeter meter_;
   GridLinker linker_;
   WindowDecoder window_decoder_;
+  SymbolReview review_;
   Correspondence correspondence_;
   CentreCorrection centre_correction_;
 
   Grey8 mask_;
   Regions regions_;
   std::vector<RegionStatus> region_status_;
-  // One to a node of the grid: a region that may be a symbol.
-  std::vector<std::int32_t> region_of_node_;
-  std::vector<GreyMoments> moments_;
-  std::vector<Classification> shapes_;
-  std::vector<GridNode> nodes_;
+  Sightings seen_;
   std::vector<PixelRay> rays_;
+  std::vector<Eigen::Vector2f> ray_pixels_;
   std::vector<EpipolarSegment> segments_;
-  std::vector<CellClaim> claims_;
-  std::vector<std::uint8_t> trusted_;
-  std::vector<std::int8_t> letters_;  // of the nodes' cells
+  std::vector<std::int8_t> letters_;
   std::vector<Eigen::Vector2f> centres_;
+  float frame_levels_ = 1;  // of the frame, for one of 255
   Decoding decoding_;
 };
 

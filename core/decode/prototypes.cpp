@@ -24,6 +24,9 @@ using Covariance = Eigen::Matrix<double, kFeatureCount, kFeatureCount>;
 /// direction is held for more certain than it is.
 constexpr double kFeatureFloor[kFeatureCount] = {0.02, 0.003, 0.003, 0.003, 0.0008, 0.0006, 0.0006, 0.0008};
 
+/// Brings the densities to where floats have room on both sides.
+constexpr double kLogVolumeScale = -40;
+
 struct Look {
   ShapeFeatures features;
   Eigen::Vector2f centroid_px;
@@ -70,7 +73,7 @@ Prototype summarise(const std::vector<Look>& looks) {
   Prototype prototype;
   prototype.mean = mean.cast<float>();
   prototype.whitening = lower.inverse().cast<float>();
-  prototype.log_volume = static_cast<float>(lower.diagonal().array().log().sum());
+  prototype.density = static_cast<float>(std::exp(kLogVolumeScale - lower.diagonal().array().log().sum()));
   return prototype;
 }
 

@@ -15,8 +15,13 @@ struct Prototype {
   ShapeFeatures mean;
   Eigen::Matrix<float, kFeatureCount, kFeatureCount>
       whitening;                ///< features minus mean, times this, have unit covariance
-  float log_volume;             ///< half the logarithm of the covariance's determinant
+  float density;                ///< at the mean, up to a factor common to all: 1 / volume of the covariance
   Eigen::Vector2f centroid_px;  ///< of its grey moments, from the middle of its square, projector px
+
+  /// In standard deviations.
+  [[nodiscard]] float squared_distance(const ShapeFeatures& features) const {
+    return whitening.lazyProduct(features - mean).squaredNorm();
+  }
 };
 
 /// What the prototypes are made for.

@@ -7,8 +7,8 @@
 namespace slsd {
 
 template <class T>
-const Regions& RegionSplitter::split(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
-                                     float level) {
+void RegionSplitter::find_parts(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
+                                float level) {
   T low = frame.at(runs[0].left, runs[0].row), high = low;
   for (const Run& run : runs) {
     const auto [least, greatest] = std::minmax_element(frame.row(run.row) + run.left, frame.row(run.row) + run.right);
@@ -32,12 +32,9 @@ const Regions& RegionSplitter::split(const ImageView<T>& frame, const Region& re
     run.left = static_cast<std::int16_t>(run.left + region.left);
     run.right = static_cast<std::int16_t>(run.right + region.left);
   }
-  return parts_;
 }
 
-template const Regions& RegionSplitter::split(const ImageView<std::uint8_t>&, const Region&, std::span<const Run>,
-                                              float);
-template const Regions& RegionSplitter::split(const ImageView<std::uint16_t>&, const Region&, std::span<const Run>,
-                                              float);
+template void RegionSplitter::find_parts(const ImageView<std::uint8_t>&, const Region&, std::span<const Run>, float);
+template void RegionSplitter::find_parts(const ImageView<std::uint16_t>&, const Region&, std::span<const Run>, float);
 
 }  // namespace slsd

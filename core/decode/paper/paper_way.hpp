@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+
+#include "core/code/pattern.hpp"
+#include "core/decode/find_regions.hpp"
+#include "core/decode/paper/classify.hpp"
+#include "core/decode/paper/link_grid.hpp"
+#include "core/decode/sightings.hpp"
+
+namespace slsd {
+
+/// The paper's way of the stages from the descriptors to the codewords, between the same inputs and outputs as the
+/// decoder's own.
+/// @thread thread-bound: keeps its buffers
+class PaperWay {
+ public:
+  /// @errors kUnsupported: thresholds cannot tell two of the pattern's symbols apart
+  [[nodiscard]] static Result<PaperWay> create(const Pattern& pattern);
+
+  /// The ten descriptors of every sighting.
+  void describe(const Regions& regions, const Sightings& seen);
+  /// Letters by thresholds.
+  /// @param side_px  of a symbol's square in the camera
+  void classify(float side_px, Sightings& seen) const;
+  /// Centroids of the masks, equations (7) and (8).
+  void centre(Sightings& seen) const;
+  /// Links by equations (9) to (22).
+  void link_grid(const Regions& regions, int width_px, int height_px, Sightings& seen);
+  /// Exact codewords.
+  void decode_windows(int rows, int columns, Sightings& seen) const;
+
+ private:
+  PaperWay(const Pattern& pattern, std::vector<LetterThresholds> thresholds);
+
+  Pattern pattern_;
+  std::vector<LetterThresholds> thresholds_;
+  PaperGrid grid_;
+  std::vector<PaperRegion> described_;  // one to a sighting
+  Image<std::int32_t> labels_;
+};
+
+}  // namespace slsd

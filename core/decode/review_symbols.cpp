@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/review_symbols.hpp"
+
+#include <cmath>
+#include <optional>
+
+#include <Eigen/LU>
+
+namespace slsd {
+namespace {
+
+constexpr Direction kDirections[] = {kRight, kDown, kLeft, kUp};
+/// How much farther from its letter a symbol may come to be by levelling the light: its centre gains even so.
+constexpr float kLevellingTolerance = 0.3F;
+
+/// Relative change of the light from one cell to the next along a direction, from the peaks of the neighbours.
+float light_change(const Sightings& seen, std::size_t node, Direction direction) {
+  const auto light = [&](std::int32_t at) { return seen.moments[at].peak - seen.moments[at].background; };
+  const auto self = static_cast<std::int32_t>(node);
+  const std::int32_t next = neighbour(seen.nodes, self, direction),
+                     last = neighbour(seen.nodes, self, opposite(direction));
+  const int steps = (last >= 0) + (next >= 0);
+  if (steps == 0) return 0;
+  return (light(next >= 0 ? next : self) - light(last >= 0 ? last : self)) / (static_cast<float>(steps) * light(self));
+}
+
+/// Where the neighbours put a node, by continuing the steps of those beside it; quadratic, as steps shrink towards a
+/// limb.
+std::optional<Eigen::Vector2f> centre_from_neighbours(const std::vector<GridNode>& nodes, std::size_t node) {
+  Eigen::Vector2f sum = Eigen::Vector2f::Zero();
+  int count = 0;
+  for (const Direction d : kDirections) {
+    const std::int32_t first = neighbour(nodes, static_cast<std::int32_t>(node), d);
+    const std::int32_t second = neighbour(nodes, first, d), third = neighbour(nodes, second, d);
+    if (third < 0) continue;
+    sum += 3 * nodes[first].centre_px - 3 * nodes[second].centre_px + nodes[third].centre_px;
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return sum / static_cast<float>(count);
+}
+
+}  // namespace
+
+SymbolReview::SymbolReview(const Pattern& pattern, const std::vector<Prototype>& prototypes, ReviewOptions options)
+    : array_(pattern.array),
+      prototypes_(prototypes),
+      size_px_(static_cast<float>(pattern.options.symbol_size_px)),
+      pitch_px_(static_cast<float>(pattern.pitch_px())),
+      options_(options) {}
+
+float SymbolReview::distance_from_letter(const Sightings& seen, std::size_t node, const GreyMoments& moments) const {
+  const Prototype& prototype = prototype_of(seen.claims[node]);
+  return std::sqrt(prototype.squared_distance(shape_features(moments, seen.nodes[node].frame.inverse(), size_px_)));
+}
+
+void SymbolReview::trust_whole_symbols(const GridLinker& linker, Sightings& seen) {
+  trusted_.resize(seen.size());
+  for (std::size_t i = 0; i < seen.size(); ++i) trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
+  linker.measure_frames(seen.nodes, trusted_);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (trusted_[i] != 0) trusted_[i] = distance_from_letter(seen, i, seen.moments[i]) <= options_.damaged_distance;
+  }
+  linker.measure_frames(seen.nodes, trusted_);
+}
+
+void SymbolReview::measure_light_changes(const Sightings& seen) {
+  light_changes_.resize(seen.size());
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    light_changes_[i] = {light_change(seen, i, kRight), light_change(seen, i, kDown)};
+}
+
+/// The mean with the neighbours': small symbols blur to lower peaks, which is not the light's doing.
+Eigen::Vector2f SymbolReview::light_change_around(const Sightings& seen, std::size_t node) const {
+  Eigen::Vector2f sum = light_changes_[node];
+  float count = 1;
+  for (const Direction d : kDirections) {
+    const std::int32_t other = neighbour(seen.nodes, static_cast<std::int32_t>(node), d);
+    if (other >= 0) sum += light_changes_[other], ++count;
+  }
+  return sum / count;
+}
+
+template <class T>
+void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions, GreyMomentMeter& meter,
+                               Sightings& seen, std::size_t node) const {
+  GreyMoments& moments = seen.moments[node];
+  float distance = distance_from_letter(seen, node, moments);
+  const auto adopt_if_better = [&](const GreyMoments& again, float tolerance) {
+    const float distance_again = distance_from_letter(seen, node, again);
+    if (again.weight > 0 && distance_again < distance + tolerance) moments = again, distance = distance_again;
+  };
+  const LatticeFrame& lattice_frame = seen.nodes[node].frame;
+  const Eigen::Vector2f per_cell = light_change_around(seen, node);
+  const Eigen::Vector2f shading = lattice_frame.inverse().transpose() * per_cell / pitch_px_;
+  if (per_cell.cwiseAbs().maxCoeff() > options_.shading_min) {
+    const Region& region = regions.regions[seen.region[node]];
+    adopt_if_better(meter.measure(frame, region, regions.runs_of(region), shading), kLevellingTolerance);
+  }
+  if (distance > options_.doubtful_distance) {
+    const Eigen::Vector2f centroid(moments.x, moments.y);
+    const Eigen::Vector2f own_centre = centroid - lattice_frame * prototype_of(seen.claims[node]).centroid_px;
+    const Eigen::Vector2f centre = centre_from_neighbours(seen.nodes, node).value_or(own_centre);
+    const float half_px = 0.25F * (size_px_ + pitch_px_);
+    adopt_if_better(meter.measure_cell(frame, centre, lattice_frame, half_px, shading), 0);
+  }
+  if (distance > options_.damaged_distance) seen.claims[node].status = RegionStatus::kDamagedShape;
+}
+
+void SymbolReview::review(const GreyView& frame, const Regions& regions, const GridLinker& linker,
+                          GreyMomentMeter& meter, Sightings& seen) {
+  trust_whole_symbols(linker, seen);
+  measure_light_changes(seen);
+  std::visit(
+      [&](const auto& view) {
+        for (std::size_t i = 0; i < seen.size(); ++i) {
+          if (seen.claims[i].status == RegionStatus::kDecoded) review_node(view, regions, meter, seen, i);
+        }
+      },
+      frame);
+}
+
+}  // namespace slsd

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/decode/classify.hpp"
+#include "core/decode/decode_windows.hpp"
+#include "core/decode/grey_moments.hpp"
+#include "core/decode/link_grid.hpp"
+
+namespace slsd {
+
+/// The regions that may be symbols, and what the stages find out about them: one entry to each, at the same index.
+struct Sightings {
+  std::vector<std::int32_t> region;  ///< index in Regions
+  std::vector<GreyMoments> moments;
+  std::vector<Classification> shapes;
+  std::vector<GridNode> nodes;
+  std::vector<CellClaim> claims;
+
+  [[nodiscard]] std::size_t size() const { return region.size(); }
+  void clear() { region.clear(), moments.clear(), shapes.clear(), nodes.clear(), claims.clear(); }
+};
+
+}  // namespace slsd
