@@ -17,8 +17,8 @@ constexpr std::int64_t kStepsForDistanceAsked = 6'000'000;
 constexpr std::int64_t kStepsForDistanceTried = 1'500'000;
 
 // Windows times the words that each forbids, over all words. Raster greedy construction succeeds up to about 1.6;
-// beyond 2.5 no trial ever did, and the search for the largest distance does not begin there.
-constexpr double kHopelessDensity = 2.5;
+// beyond 1.9 no trial ever did, and the search for the largest distance does not begin there.
+constexpr double kHopelessDensity = 1.9;
 
 double density(const ArrayOptions& options, int distance) {
   const double windows = static_cast<double>(window_count(options.rows, options.columns));
