@@ -13,14 +13,6 @@ using std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kStaleBy{100};
 
-/// The same frame with other times. Shared, because std::function wants to be able to copy what it holds.
-Frame restamp(Frame frame, MonotonicTime exposure_start, MonotonicTime received) {
-  const GreyView image = frame.image();
-  const std::uint64_t sequence = frame.sequence();
-  auto held = std::make_shared<Frame>(std::move(frame));
-  return {image, sequence, exposure_start, received, [held = std::move(held)] {}};
-}
-
 }  // namespace
 
 FaultyCamera::FaultyCamera(std::unique_ptr<Camera> camera, std::vector<Fault> faults)
@@ -99,7 +91,7 @@ Result<Frame> FaultyCamera::delay_frame(const Fault& fault, MonotonicTime deadli
   const MonotonicTime arrival = fault.duration ? frame->received() + *fault.duration : MonotonicTime::max();
   if (auto waited = wait_until(arrival, deadline); !waited) return tl::unexpected(waited.error());
   const MonotonicTime exposure_start = frame->exposure_start();
-  return restamp(std::move(*frame), exposure_start, arrival);
+  return std::move(*frame).restamped(exposure_start, arrival);
 }
 
 Result<Frame> FaultyCamera::age_frame(const Fault& fault, MonotonicTime deadline) {
@@ -107,7 +99,7 @@ Result<Frame> FaultyCamera::age_frame(const Fault& fault, MonotonicTime deadline
   auto frame = capture_sound(deadline);
   if (!frame) return frame;
   const MonotonicTime received = frame->received();
-  return restamp(std::move(*frame), trigger - fault.duration.value_or(kStaleBy), received);
+  return std::move(*frame).restamped(trigger - fault.duration.value_or(kStaleBy), received);
 }
 
 Result<Frame> FaultyCamera::disconnect(const Fault& fault) {

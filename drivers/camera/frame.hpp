@@ -45,6 +45,11 @@ class Frame {
   [[nodiscard]] MonotonicTime exposure_start() const { return exposure_start_; }
   [[nodiscard]] MonotonicTime received() const { return received_; }
 
+  /// The same lease with other times, for a driver that corrects them.
+  [[nodiscard]] Frame restamped(MonotonicTime exposure_start, MonotonicTime received) && {
+    return {image_, sequence_, exposure_start, received, std::exchange(give_back_, nullptr)};
+  }
+
  private:
   GreyView image_;
   std::uint64_t sequence_;

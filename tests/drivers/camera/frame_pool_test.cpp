@@ -61,6 +61,20 @@ TEST(FramePool, GivesAMovedFrameBackOnce) {
   EXPECT_TRUE(pool.lend(ramp8(5, 3).view(), 1, {}));
 }
 
+TEST(FramePool, TakesARestampedFrameBackOnce) {
+  FramePool pool({5, 3, 1}, 1);
+  const MonotonicTime early = steady_clock::now(), late = early + std::chrono::seconds(1);
+  {
+    const Frame restamped = std::move(*pool.lend(ramp8(5, 3, 4).view(), 7, {})).restamped(early, late);
+    EXPECT_EQ(restamped.exposure_start(), early);
+    EXPECT_EQ(restamped.received(), late);
+    EXPECT_EQ(restamped.sequence(), 7u);
+    EXPECT_EQ(first_pixel(restamped), 4);
+    EXPECT_FALSE(pool.lend(ramp8(5, 3).view(), 8, {}));
+  }
+  EXPECT_TRUE(pool.lend(ramp8(5, 3).view(), 8, {}));
+}
+
 TEST(FramePool, MayEndBeforeItsFrames) {
   std::optional<Frame> frame;
   {
