@@ -19,7 +19,7 @@ Legend::Legend(ColourImage& picture, int top, double text_px)
 
 Eigen::Vector2d Legend::begin(const std::string& words) {
   const double end = place_.x() + kMarkWidth * text_px_ + Canvas::text_width_px(words, text_px_);
-  if (end > width_px_ && place_.x() > text_px_) place_ = {text_px_, place_.y() + kLinePitch * text_px_};
+  if (end + text_px_ > width_px_ && place_.x() > text_px_) place_ = {text_px_, place_.y() + kLinePitch * text_px_};
   return place_ + text_px_ * Eigen::Vector2d(0.7, -0.5);
 }
 
