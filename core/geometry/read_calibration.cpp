@@ -70,7 +70,7 @@ RigidTransform read_rig_motion(FileSection& section, bool first) {
   const char* const rotation_key = "rig_from_camera_R";
   const char* const translation_key = "rig_from_camera_T";
   if (first && !section.has(rotation_key) && !section.has(translation_key)) return {};
-  const RigidTransform motion = read_motion(section, rotation_key, translation_key);
+  RigidTransform motion = read_motion(section, rotation_key, translation_key);
   if (first && (!motion.rotation.isIdentity(kRotationTolerance) || motion.translation.norm() > kMinBaselineMm)) {
     section.refuse(rotation_key, "must be the identity for the first camera: its frame is the rig's");
   }
@@ -128,7 +128,8 @@ Result<Calibration> read_root(const cv::FileNode& root, std::string_view name) {
   calibration.projector = read_lens(section, kProjectorKeys);
   calibration.report = read_report(section);
   const bool listed = section.has("cameras") && root["cameras"].isSeq();
-  if (!listed || root["cameras"].size() == 0 || root["cameras"].size() > kMaxCameras) {
+  const std::size_t count = listed ? root["cameras"].size() : 0;
+  if (count < 1 || count > kMaxCameras) {
     section.refuse("cameras", "must be a sequence of 1 to " + std::to_string(kMaxCameras) + " maps");
   }
   if (section.error()) return tl::unexpected(*section.error());
