@@ -108,7 +108,8 @@ void draw_links(Marker& marker, const Decoding& decoding) {
 void draw_legend(ColourImage& picture, int top, double text_px, const Decoding& decoding, const Pattern& pattern) {
   std::array<int, kMaxLetters> seen{};
   for (const RegionSeen& region : decoding.regions) {
-    if (decoded(region) && region.letter < kMaxLetters) ++seen[static_cast<std::size_t>(region.letter)];
+    const int letter = region.letter;
+    if (decoded(region) && letter < kMaxLetters) ++seen[static_cast<std::size_t>(letter)];
   }
   Legend legend(picture, top, text_px);
   for (std::size_t letter = 0; letter < pattern.options.symbols.size() && letter < kMaxLetters; ++letter) {
