@@ -139,7 +139,8 @@ void WindowDecoder::verify(const std::vector<Classification>& shapes, std::vecto
       claim.status = RegionStatus::kUnknownShape;
     } else if (own < options_.own_class_min) {
       claim.status = RegionStatus::kClassDisagrees;
-    } else if (claim.evidence < options_.evidence_min || against_it >= for_it) {
+    } else if (claim.evidence < options_.evidence_min ||
+               options_.dissent_max * static_cast<float>(for_it) <= static_cast<float>(against_it)) {
       claim.status = RegionStatus::kNeighboursDisagree;
     }
   }

@@ -32,6 +32,9 @@ struct DecodeWindowsOptions {
   float evidence_min = 5;       ///< e^5: odds of 150 to 1 against chance
   float own_class_min = -2.5F;  ///< log-probability of the node's own letter at its cell
   float mismatch = -3;          ///< what one neighbour may count against a cell at the most
+  /// Named neighbours that contradict a cell, for one that agrees, at which it is rejected: beside an edge in depth a
+  /// symbol of the one surface can fit the grid of the other, and be of the right letter by chance.
+  float dissent_max = 0.2F;
 };
 
 /// Names the cell of each node.

@@ -18,8 +18,8 @@ namespace {
 constexpr float kExpectedFrameError = 0.15F;
 constexpr float kMeasuredFrameError = 0.05F;
 /// Standard deviations from the nearest prototype beyond which a shape is none of the pattern's.
-constexpr float kExpectedDistanceMax = 12;
-constexpr float kMeasuredDistanceMax = 8;
+constexpr float kExpectedDistanceMax = 25;
+constexpr float kMeasuredDistanceMax = 20;
 /// Least and greatest area of a region, as a share of a symbol's square and of a cell.
 constexpr float kAreaMin = 0.08F;
 constexpr float kAreaMax = 1.1F;

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include "core/decode/review_symbols.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -55,6 +56,13 @@ float SymbolReview::distance_from_letter(const Sightings& seen, std::size_t node
   return std::sqrt(prototype.squared_distance(shape_features(moments, seen.nodes[node].frame.inverse(), size_px_)));
 }
 
+bool SymbolReview::is_inside(const Sightings& seen, std::size_t node) const {
+  return std::ranges::all_of(kDirections, [&](Direction d) {
+    const std::int32_t other = neighbour(seen.nodes, static_cast<std::int32_t>(node), d);
+    return other >= 0 && seen.claims[other].named();
+  });
+}
+
 void SymbolReview::trust_whole_symbols(const GridLinker& linker, Sightings& seen) {
   trusted_.resize(seen.size());
   for (std::size_t i = 0; i < seen.size(); ++i) trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
@@ -105,7 +113,8 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
     const float half_px = 0.25F * (size_px_ + pitch_px_);
     adopt_if_better(meter.measure_cell(frame, centre, lattice_frame, half_px, shading), 0);
   }
-  if (distance > options_.damaged_distance) seen.claims[node].status = RegionStatus::kDamagedShape;
+  const float distance_max = is_inside(seen, node) ? options_.damaged_distance_inside : options_.damaged_distance;
+  if (distance > distance_max) seen.claims[node].status = RegionStatus::kDamagedShape;
 }
 
 void SymbolReview::review(const GreyView& frame, const Regions& regions, const GridLinker& linker,

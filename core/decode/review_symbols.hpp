@@ -14,8 +14,12 @@ struct ReviewOptions {
   /// Standard deviations from its letter's prototype from which on a symbol is measured again where its neighbours put
   /// it.
   float doubtful_distance = 1.5F;
-  /// The same beyond which it is damaged (cut by an edge, a shadow, print), and its centre with it.
+  /// The same beyond which a symbol at the edge of what is decoded is damaged (cut by an edge or a shadow), and its
+  /// centre with it.
   float damaged_distance = 2.5F;
+  /// The same for a symbol among decoded neighbours on all sides: print on the surface disturbs a shape more than a
+  /// centre.
+  float damaged_distance_inside = 4;
 };
 
 /// Looks again at every symbol whose cell is known: with the frame that its whole neighbours show, with the light
@@ -34,6 +38,7 @@ class SymbolReview {
   void trust_whole_symbols(const GridLinker& linker, Sightings& seen);
   void measure_light_changes(const Sightings& seen);
   [[nodiscard]] Eigen::Vector2f light_change_around(const Sightings& seen, std::size_t node) const;
+  [[nodiscard]] bool is_inside(const Sightings& seen, std::size_t node) const;
   [[nodiscard]] float distance_from_letter(const Sightings& seen, std::size_t node, const GreyMoments& moments) const;
   [[nodiscard]] const Prototype& prototype_of(const CellClaim& claim) const {
     return prototypes_[array_.at(claim.row, claim.column)];
