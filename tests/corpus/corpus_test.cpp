@@ -33,6 +33,7 @@ void expect_reached(const Result<Scene>& scene, const Expectation& expectation) 
   ASSERT_TRUE(score) << to_string(score.error());
   EXPECT_THAT(score->wrong, testing::IsEmpty());
   EXPECT_GE(score->decoded_percent(), expectation.decoded_min_percent) << "of " << score->resolvable;
+  EXPECT_GE(score->inlier_percent(), expectation.inlier_min_percent) << "of " << score->resolvable;
   EXPECT_LE(score->depth_rms_mm, expectation.depth_rms_max_mm) << "worst " << score->depth_worst_mm;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <set>
 #include <utility>
 
@@ -21,22 +22,56 @@ const CellTruth* find(const std::vector<CellTruth>& truth, const CloudPoint& poi
   return nullptr;
 }
 
-/// Adds a point's error at the pixel where the camera sees it.
-void add_depth_error(const CloudPoint& point, const Lens& camera, const SurfaceTruth& surface, Score& score) {
+/// A right point on a smooth surface.
+struct Measurement {
+  double depth_mm, error_mm;
+  bool resolvable;
+};
+
+/// The error at the pixel where the camera sees the point.
+Measurement measure(const CloudPoint& point, const Lens& camera, const SurfaceTruth& surface, bool resolvable) {
   const Eigen::Vector3d position(point.x, point.y, point.z);
-  const double error_mm = point.z - surface.depth_mm(camera.project(position));
-  ++score.measured;
-  score.depth_rms_mm += error_mm * error_mm;
-  score.depth_bias_mm += error_mm;
-  score.depth_worst_mm = std::max(score.depth_worst_mm, std::abs(error_mm));
+  return {point.z, point.z - surface.depth_mm(camera.project(position)), resolvable};
+}
+
+template <class Part>
+double median(const std::vector<Measurement>& measurements, Part part) {
+  std::vector<double> values;
+  for (const Measurement& measurement : measurements) values.push_back(part(measurement));
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+void add_depth(const std::vector<Measurement>& measurements, Score& score) {
+  score.measured = static_cast<int>(measurements.size());
+  if (measurements.empty()) return;
+  const double middle = median(measurements, [](const Measurement& m) { return m.error_mm; });
+  const double deviation = median(measurements, [&](const Measurement& m) { return std::abs(m.error_mm - middle); });
+  const double limit =
+      inlier_limit_mm(deviation, median(measurements, [](const Measurement& m) { return m.depth_mm; }));
+  for (const Measurement& m : measurements) {
+    score.depth_rms_mm += m.error_mm * m.error_mm;
+    score.depth_bias_mm += m.error_mm;
+    score.depth_worst_mm = std::max(score.depth_worst_mm, std::abs(m.error_mm));
+    score.inliers -= m.resolvable && std::abs(m.error_mm - middle) > limit ? 1 : 0;
+  }
+  score.depth_rms_mm = std::sqrt(score.depth_rms_mm / score.measured);
+  score.depth_bias_mm /= score.measured;
 }
 
 }  // namespace
+
+double inlier_limit_mm(double deviation_median_mm, double depth_median_mm) {
+  constexpr double kSigmaOfMedian = 1.4826;  // of a normal distribution
+  return std::max(5 * kSigmaOfMedian * deviation_median_mm, 0.5 * std::pow(depth_median_mm / 2000, 2));
+}
 
 Score score(const Scene& scene, const std::vector<CloudPoint>& points) {
   Score score;
   for (const CellTruth& cell : scene.truth) score.resolvable += cell.resolvable ? 1 : 0;
   std::set<Cell> taken;
+  std::vector<Measurement> measurements;
   for (const CloudPoint& point : points) {
     const CellTruth* cell = find(scene.truth, point);
     const bool first = taken.emplace(point.column, point.row).second;
@@ -45,11 +80,11 @@ Score score(const Scene& scene, const std::vector<CloudPoint>& points) {
       continue;
     }
     score.decoded += cell->resolvable ? 1 : 0;
-    if (cell->surface) add_depth_error(point, scene.calibration.cameras.front().lens, *cell->surface, score);
+    if (cell->surface)
+      measurements.push_back(measure(point, scene.calibration.cameras.front().lens, *cell->surface, cell->resolvable));
   }
-  if (score.measured == 0) return score;
-  score.depth_rms_mm = std::sqrt(score.depth_rms_mm / score.measured);
-  score.depth_bias_mm /= score.measured;
+  score.inliers = score.decoded;
+  add_depth(measurements, score);
   return score;
 }
 

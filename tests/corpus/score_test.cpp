@@ -51,6 +51,26 @@ TEST(Score, FindsTheSecondPointOfACell) {
   EXPECT_EQ(score(two_cells(), {point_of(0, 110, 110, 1000), point_of(0, 111, 110, 1000)}).wrong.size(), 1);
 }
 
+TEST(Score, TakesOutliersFromTheInliers) {
+  Scene scene = two_cells();
+  scene.truth.clear();
+  std::vector<CloudPoint> points;
+  for (int column = 0; column < 9; ++column) {
+    const double u = 100 + 20.0 * column;
+    scene.truth.push_back({column, 0, {u - 8, 92}, {u + 8, 108}, SurfaceTruth{{u, 100}, 1000, {0, 0}}, true});
+    points.push_back(point_of(column, static_cast<float>(u), 100, column == 4 ? 1003 : 1000));
+  }
+  const Score result = score(scene, points);
+  EXPECT_EQ(result.decoded, 9);
+  EXPECT_EQ(result.inliers, 8);
+  EXPECT_THAT(result.wrong, testing::IsEmpty());
+}
+
+TEST(InlierLimit, GrowsWithTheSpreadAndWithTheDepth) {
+  EXPECT_NEAR(inlier_limit_mm(0, 4000), 2, 1e-9);
+  EXPECT_NEAR(inlier_limit_mm(1, 2000), 7.413, 1e-9);
+}
+
 TEST(SurfaceTruth, FollowsAPlane) {
   // z = 1000 / (1 - 0.1 (u - 320) / 1000) is the plane z - 0.1 x = 1000 before a camera with f = 1000 px.
   const auto depth = [](double u) { return 1000 / (1 - 0.1 * (u - 320) / 1000); };
