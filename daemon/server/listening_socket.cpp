@@ -17,7 +17,7 @@ namespace {
 
 using std::filesystem::path;
 
-constexpr int kBacklog = 128;
+constexpr int kBacklog = 4096;  // many short connections at once find the loop busy; the kernel may allow fewer
 
 ErrorCode code_of(int number) {
   switch (number) {
