@@ -181,8 +181,12 @@ Result<> TableReader::finish(Result<> valid) const {
   if (auto unknown = unknown_key()) return tl::unexpected(*unknown);
   if (error_) return tl::unexpected(*error_);
   if (valid) return {};
-  const std::string prefix = name_.empty() ? "" : name_ + " ";
-  return fail(valid.error().code, prefix + valid.error().message, place_named_by(valid.error().message));
+  // Options name the key as the error's place ("rate_hz", "decode.depth_min_mm") or in its message.
+  const Error& error = valid.error();
+  const std::string key = error.where.substr(error.where.find_last_of('.') + 1);
+  const bool named = error.message.find(key) != std::string::npos;
+  const std::string prefix = (name_.empty() ? "" : name_ + " ") + (named ? "" : key + " ");
+  return fail(error.code, prefix + error.message, place_named_by(has(key) ? key : error.message));
 }
 
 }  // namespace slsd

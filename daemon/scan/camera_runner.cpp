@@ -71,7 +71,9 @@ Result<Frame> CameraRunner::end_capture() {
   if (!answer_) return fail(ErrorCode::kCancelled, "the service is stopping", "camera " + status_.name);
   Result<Frame> frame = std::move(*answer_);
   answer_.reset();
-  if (!frame && frame.error().where.empty()) frame.error().where = "camera " + status_.name;
+  if (!frame && (frame.error().where.empty() || frame.error().where == status_.name)) {
+    frame.error().where = "camera " + status_.name;
+  }
   return frame;
 }
 
