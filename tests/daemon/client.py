@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""A client of slsd's socket that shares no code with slsd: the standard library, a socket and JSON."""
+import array
+import json
+import os
+import socket
+
+
+class RpcError(Exception):
+    def __init__(self, error):
+        super().__init__(error["message"])
+        self.code = error["code"]
+        self.name = error["data"]["name"]
+
+
+class Client:
+    def __init__(self, path, timeout=60):
+        self.socket = socket.socket(socket.AF_UNIX)
+        self.socket.settimeout(timeout)
+        self.socket.connect(str(path))
+        self.buffer = b""
+        self.last_id = 0
+        self.events = []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def close(self):
+        self.socket.close()
+
+    def send(self, data):
+        self.socket.sendall(data)
+
+    def more(self):
+        chunk = self.socket.recv(65536)
+        if not chunk:
+            raise ConnectionError("the daemon hung up")
+        self.buffer += chunk
+
+    def receive(self):
+        """One message and the bytes that follow it."""
+        while b"\n" not in self.buffer:
+            self.more()
+        line, self.buffer = self.buffer.split(b"\n", 1)
+        message = json.loads(line)
+        size = (message.get("result") or message.get("params") or {}).get("bytes", 0)
+        while len(self.buffer) < size:
+            self.more()
+        payload, self.buffer = self.buffer[:size], self.buffer[size:]
+        return message, payload
+
+    def request(self, method, **params):
+        self.last_id += 1
+        message = {"jsonrpc": "2.0", "id": self.last_id, "method": method, "params": params}
+        self.send(json.dumps(message).encode() + b"\n")
+
+    def reply(self):
+        """The reply to the last request; events before it are kept."""
+        while True:
+            message, payload = self.receive()
+            if "method" in message:
+                self.events.append((message, payload))
+                continue
+            assert message["jsonrpc"] == "2.0"
+            if "error" in message:
+                raise RpcError(message["error"])
+            assert message["id"] == self.last_id
+            return message["result"], payload
+
+    def call(self, method, **params):
+        self.request(method, **params)
+        return self.reply()
+
+    def call_for_descriptor(self, method, **params):
+        """A call whose reply comes with one descriptor."""
+        self.request(method, **params)
+        line, control, _, _ = self.socket.recvmsg(65536, socket.CMSG_SPACE(array.array("i").itemsize))
+        descriptors = array.array("i")
+        for level, kind, data in control:
+            if level == socket.SOL_SOCKET and kind == socket.SCM_RIGHTS:
+                descriptors.frombytes(data)
+        self.buffer += line
+        result, _ = self.reply()
+        return result, os.fdopen(descriptors[0], "rb")

@@ -1,0 +1,134 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""The two command lines from outside: exit statuses, files, messages."""
+import json
+import pathlib
+import tempfile
+import unittest
+
+from service import SCENE, Service, slsctl, slsd
+
+
+class Slsd(unittest.TestCase):
+    def setUp(self):
+        self.temporary = tempfile.TemporaryDirectory(prefix="slsd-test-")
+        self.addCleanup(self.temporary.cleanup)
+        self.folder = pathlib.Path(self.temporary.name)
+        self.file = self.folder / "slsd.toml"
+
+    def test_helps_and_tells_its_version(self):
+        for program in (slsd, slsctl):
+            self.assertEqual(program("--help").returncode, 0)
+            self.assertRegex(program("--version").stdout, r"^slsd|slsctl \d+\.\d+")
+            self.assertEqual(program("--nonsense").returncode, 2)
+
+    def test_writes_the_pattern_without_a_configuration(self):
+        image = self.folder / "pattern.png"
+        self.assertEqual(slsd("--pattern", image).returncode, 0)
+        header = image.read_bytes()[:24]
+        self.assertEqual(header[:4], b"\x89PNG")
+        self.assertEqual((int.from_bytes(header[16:20], "big"), int.from_bytes(header[20:24], "big")), (1280, 800))
+
+    def test_pattern_follows_the_configuration(self):
+        self.file.write_text("[projector]\ndriver = 'glfw'\nwidth_px = 640\nheight_px = 360\n", encoding="utf-8")
+        image = self.folder / "pattern.png"
+        self.assertEqual(slsd("--pattern", image, "--config", self.file).returncode, 0)
+        self.assertEqual(int.from_bytes(image.read_bytes()[16:20], "big"), 640)
+
+    def test_names_what_is_wrong_with_a_configuration(self):
+        cases = {"[pattern]\nsymbols = [7]\n": ":2:", "[[camera]]\npath = 3\n": ":2:8: [[camera]] path",
+                 "[camera]\n": "[[camera]]", "x = \n": ":1:", "[projector]\ndriver = 'glfw'\n": "not part of this build",
+                 "[[camera]]\ndriver = 'v4l2'\ndevice = '/dev/video0'\n": "not part of this build",
+                 "[calibration]\nfile = 'missing.yml'\n": "missing.yml",
+                 "[pattern]\nfile = 'missing.toml'\n": "missing.toml"}
+        for text, expected in cases.items():
+            with self.subTest(text=text):
+                self.file.write_text(text, encoding="utf-8")
+                result = slsd("--config", self.file)
+                self.assertEqual(result.returncode, 1)
+                self.assertIn(expected, result.stderr)
+        result = slsd("--config", self.folder / "missing.toml")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("missing.toml", result.stderr)
+
+    def test_check_finds_what_forbids_a_scan(self):
+        service = Service(camera_path=SCENE / "small.png")
+        result = slsd("--check", "--config", service.file)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("640x480 px, its calibration is for 1600x1200 px", result.stdout)
+        service = Service()
+        result = slsd("--check", "--config", service.file)
+        self.assertEqual(result.returncode, 0, result.stdout)
+
+    def test_lists_devices(self):
+        service = Service()
+        result = slsd("--list", "--config", service.file)
+        self.assertEqual(result.returncode, 0)
+        self.assertIn("1600x1200 px", result.stdout)
+
+
+class Slsctl(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.service = Service().start()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.service.__exit__()
+
+    def setUp(self):
+        self.temporary = tempfile.TemporaryDirectory(prefix="slsd-test-")
+        self.addCleanup(self.temporary.cleanup)
+        self.folder = pathlib.Path(self.temporary.name)
+
+    def slsctl(self, *arguments):
+        return slsctl("--socket", self.service.socket, *arguments)
+
+    def test_scan_writes_cloud_and_pictures(self):
+        ply, pcd, seen, drawn = (self.folder / name for name in ("c.ply", "c.pcd", "seen.png", "drawn.png"))
+        result = self.slsctl("scan", "-o", ply, "--picture", seen, "--cloud-picture", drawn)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("points", result.stdout)
+        self.assertEqual(self.slsctl("scan", "-o", pcd).returncode, 0)
+        self.assertTrue(ply.read_bytes().startswith(b"ply\n"))
+        self.assertTrue(pcd.read_bytes().startswith(b"# .PCD"))
+        for picture in (seen, drawn):
+            self.assertTrue(picture.read_bytes().startswith(b"\x89PNG"))
+
+    def test_images_are_written(self):
+        for command in ("frame", "pattern", "preview"):
+            file = self.folder / (command + ".png")
+            self.assertEqual(self.slsctl(command, file).returncode, 0)
+            self.assertTrue(file.read_bytes().startswith(b"\x89PNG"))
+
+    def test_json_works_everywhere(self):
+        self.assertIn("points", json.loads(self.slsctl("--json", "scan").stdout))
+        self.assertIn("version", json.loads(self.slsctl("status", "--json").stdout))
+        lines = self.slsctl("watch", "--json", "--count", "2").stdout.splitlines()
+        self.assertEqual([json.loads(line)["method"] for line in lines], ["cloud", "cloud"])
+        self.assertIn("bytes", json.loads(self.slsctl("frame", self.folder / "f.png", "--json").stdout))
+        error = json.loads(slsctl("--socket", self.folder / "none", "--json", "status").stdout)["error"]
+        self.assertEqual(error["data"]["name"], "not_found")
+
+    def test_status_and_watch_read_well(self):
+        self.assertIn("camera      ready, file", self.slsctl("status").stdout)
+        self.assertEqual(len(self.slsctl("watch", "--count", "2").stdout.splitlines()), 2)
+
+    def test_exit_status_tells_the_kind_of_failure(self):
+        self.assertEqual(slsctl("--socket", self.folder / "none", "scan").returncode, 3)
+        self.assertEqual(slsctl("--socket", "x" * 200, "scan").returncode, 1)
+        for usage in (["scan", "-o", "cloud.xyz"], ["frame"], ["nonsense"], [], ["scan", "--timeout-ms", "0"]):
+            self.assertEqual(self.slsctl(*usage).returncode, 2, usage)
+        missing = self.slsctl("scan", "-o", self.folder / "missing" / "c.ply")
+        self.assertEqual(missing.returncode, 1)
+        self.assertIn("missing", missing.stderr)
+
+    def test_full_disk_is_an_error(self):
+        result = self.slsctl("frame", "/dev/full")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("/dev/full", result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

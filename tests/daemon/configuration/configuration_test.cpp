@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/configuration/configuration.hpp"
+
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+#include <gmock/gmock.h>
+
+namespace slsd {
+namespace {
+
+using ::testing::HasSubstr;
+
+Result<Configuration> read(const std::string& text) {
+  return read_configuration(text, "etc/slsd.toml");
+}
+
+std::string error_of(const std::string& text) {
+  const auto configuration = read(text);
+  return configuration ? "" : to_string(configuration.error());
+}
+
+std::string shipped() {
+  std::ifstream file(std::string(SLSD_SOURCE_DIR) + "/config/slsd.toml");
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void expect_equal(const Configuration& a, const Configuration& b) {
+  EXPECT_EQ(a.pattern_file, b.pattern_file);
+  EXPECT_EQ(a.pattern, b.pattern);
+  EXPECT_EQ(a.projector, b.projector);
+  EXPECT_EQ(a.cameras, b.cameras);
+  EXPECT_EQ(a.calibration_file, b.calibration_file);
+  EXPECT_EQ(a.decode, b.decode);
+  EXPECT_EQ(a.scan, b.scan);
+  EXPECT_EQ(a.server, b.server);
+}
+
+TEST(ReadConfiguration, OfNothingGivesTheDefaults) {
+  const auto configuration = read("");
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  Configuration defaults;
+  defaults.pattern.symbols = default_symbols(16);
+  expect_equal(*configuration, defaults);
+  EXPECT_EQ(configuration->pattern.symbol_size_px, 16);
+  EXPECT_EQ(configuration->pattern.spacing_px, 2);
+  EXPECT_EQ(configuration->projector.width_px, 1280);
+  EXPECT_EQ(configuration->projector.height_px, 800);
+}
+
+TEST(ReadConfiguration, ShippedFileEqualsTheDefaults) {
+  const auto configuration = read(shipped());
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  expect_equal(*configuration, *read(""));
+}
+
+// The shipped file shows a camera in comments; taken out of them it is a camera with every default but its path.
+TEST(ReadConfiguration, ShippedCameraEqualsTheDefaults) {
+  std::istringstream lines(shipped());
+  std::string camera;
+  bool within = false;
+  for (std::string line; std::getline(lines, line);) {
+    within = within || line == "# [[camera]]";
+    within = within && !line.empty();
+    if (within) camera += line.substr(2) + "\n";
+  }
+  const auto configuration = read(camera);
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  ASSERT_EQ(configuration->cameras.size(), 1U);
+  CameraOptions expected;
+  expected.file.path = "etc/frames";
+  EXPECT_EQ(configuration->cameras[0], expected);
+}
+
+// Every key of the tables stands in the shipped file, in force or in a comment.
+TEST(ReadConfiguration, ShippedFileHasEveryKey) {
+  for (const char* key : {"file",
+                          "symbol_size_px",
+                          "spacing_px",
+                          "symbols",
+                          "seed",
+                          "method",
+                          "minimum_distance",
+                          "half_turn_unique",
+                          "driver",
+                          "monitor",
+                          "width_px",
+                          "height_px",
+                          "name",
+                          "path",
+                          "loop",
+                          "rate_hz",
+                          "bayer",
+                          "faults",
+                          "depth_min_mm",
+                          "depth_max_mm",
+                          "binarize",
+                          "classify",
+                          "centre",
+                          "link_grid",
+                          "decode_windows",
+                          "correspond",
+                          "timeout_ms",
+                          "exposure_skew_ms",
+                          "reopen_first_ms",
+                          "reopen_longest_ms",
+                          "socket",
+                          "socket_mode",
+                          "clients_max",
+                          "request_bytes_max",
+                          "send_timeout_ms"}) {
+    EXPECT_THAT(shipped(), HasSubstr(std::string(key) + " = "));
+  }
+}
+
+TEST(ReadConfiguration, TakesEveryKey) {
+  const auto configuration = read(R"(
+[pattern]
+symbol_size_px = 8
+spacing_px = 1
+symbols = [7, 22, 25, 5]
+seed = 4294967295
+method = "constructive"
+minimum_distance = 2
+half_turn_unique = true
+[projector]
+driver = "glfw"
+monitor = "HDMI-1"
+width_px = 1920
+height_px = 1080
+[[camera]]
+name = "left"
+path = "/frames"
+loop = false
+rate_hz = 30
+width_px = 640
+height_px = 480
+bayer = "RGGB"
+faults = ["drop@3"]
+[calibration]
+file = "calibration.yml"
+[decode]
+depth_min_mm = 100
+depth_max_mm = 200.5
+classify = "paper"
+[scan]
+timeout_ms = 1
+[server]
+socket = "run/s"
+socket_mode = 0o600
+)");
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  EXPECT_EQ(configuration->pattern.seed, 4294967295U);
+  EXPECT_TRUE(configuration->pattern.half_turn_unique);
+  EXPECT_EQ(configuration->pattern.minimum_distance, 2);
+  EXPECT_EQ(configuration->pattern.projector_width_px, 1920);
+  EXPECT_EQ(configuration->projector.driver, ProjectorDriver::kGlfw);
+  EXPECT_EQ(configuration->cameras.at(0).file.path, "/frames");
+  EXPECT_EQ(configuration->cameras.at(0).file.size_px, std::pair(640, 480));
+  EXPECT_EQ(configuration->cameras.at(0).faults.at(0).capture, 3U);
+  EXPECT_EQ(configuration->calibration_file, "etc/calibration.yml");
+  EXPECT_EQ(configuration->decode.classify, Method::kPaper);
+  EXPECT_EQ(configuration->decode.depth_min_mm, 100.0);
+  EXPECT_EQ(configuration->server.socket, "etc/run/s");
+  EXPECT_EQ(configuration->server.socket_mode, 0600);
+}
+
+TEST(ReadConfiguration, TakesThePapersMethod) {
+  const auto configuration = read("[pattern]\nsymbols = [5, 7, 22]\nmethod = \"paper\"\n");
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  EXPECT_EQ(configuration->pattern.method, ArrayMethod::kPaper);
+}
+
+TEST(ReadConfiguration, NamesThePlaceAndTheRemedy) {
+  EXPECT_EQ(error_of("[pattern]\nsymbol_size = 8\n"),
+            "etc/slsd.toml:2:1: no such key in [pattern]: symbol_size; did you mean symbol_size_px?");
+  EXPECT_EQ(error_of("[patern]\n"), "etc/slsd.toml:1:2: no such table or key: patern; did you mean pattern?");
+  EXPECT_EQ(error_of("[pattern]\nseed = \"x\"\n"),
+            "etc/slsd.toml:2:8: [pattern] seed must be a whole number from 0 to 4294967295");
+  EXPECT_EQ(error_of("[server]\n\nclients_max = 0\n"),
+            "etc/slsd.toml:3:15: [server] clients_max must be 1 to 10000, not 0");
+  EXPECT_EQ(error_of("[projector]\ndriver = \"beamer\"\n"),
+            "etc/slsd.toml:2:10: [projector] driver must be one of headless, glfw");
+  EXPECT_EQ(error_of("[[camera]]\npath = \"a\"\n[[camera]]\npath = \"b\"\nname = \"camera\"\n"),
+            "etc/slsd.toml:5:8: [[camera]] name \"camera\" is taken: give each camera a name of its own");
+}
+
+TEST(ReadConfiguration, PlacesRangesAtTheKey) {
+  EXPECT_THAT(error_of("[pattern]\nspacing_px = 2\nsymbol_size_px = 9\n"), HasSubstr("slsd.toml:3:18: "));
+  EXPECT_THAT(error_of("[pattern]\nsymbols = [7, 7]\n"), HasSubstr("slsd.toml:2:11: "));
+  EXPECT_THAT(error_of("[projector]\nwidth_px = 100\n"), HasSubstr("slsd.toml:2:12: "));
+  EXPECT_THAT(error_of("[decode]\ndepth_min_mm = 900.0\ndepth_max_mm = 800.0\n"), HasSubstr("slsd.toml:"));
+  EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nrate_hz = -1\n"), HasSubstr("slsd.toml:3:11: "));
+  EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nfaults = [\"explode@1\"]\n"), HasSubstr("slsd.toml:3:10: "));
+  EXPECT_THAT(error_of("[[camera]]\n"), HasSubstr("path must name"));
+}
+
+TEST(ReadConfiguration, RefusesWrongTypes) {
+  for (const char* text :
+       {"pattern = 3", "camera = 3", "[camera]", "camera = [3]", "[pattern]\nsymbols = 5",
+        "[pattern]\nsymbols = [\"5\"]", "[pattern]\nsymbols = [99999999999]", "[pattern]\nhalf_turn_unique = 1",
+        "[pattern]\nseed = 1.0", "[pattern]\nseed = -1", "[decode]\ndepth_min_mm = nan", "[decode]\ndepth_min_mm = inf",
+        "[decode]\ndepth_min_mm = \"1\"", "[server]\nsocket = 1", "[server]\nsocket = \"\\u0000\"",
+        "[calibration]\nfile = []", "[[camera]]\npath = \"x\"\nfaults = [1]",
+        "[[camera]]\npath = \"x\"\nwidth_px = 5"}) {
+    EXPECT_THAT(error_of(text), HasSubstr("slsd.toml:")) << text;
+  }
+}
+
+TEST(ReadConfiguration, FileExcludesTheOtherKeysOfAPattern) {
+  EXPECT_TRUE(read("[pattern]\nfile = \"p.toml\"\n"));
+  EXPECT_THAT(error_of("[pattern]\nfile = \"p.toml\"\nseed = 2\n"), HasSubstr("slsd.toml:3:8: [pattern] seed cannot"));
+}
+
+TEST(ReadConfiguration, LeavesTheKeysOfALackingDriverAlone) {
+  const auto configuration = read("[[camera]]\ndriver = \"v4l2\"\ndevice = \"/dev/video0\"\nexposure_us = 5\n");
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  EXPECT_EQ(configuration->cameras.at(0).driver, CameraDriver::kV4l2);
+}
+
+TEST(ReadConfiguration, RefusesWhatIsNoToml) {
+  for (const std::string text : {"[pattern", "a = ", "\xff\xfe", "[a]\n[a]\n", "a = \"\n"}) {
+    const auto configuration = read(text);
+    ASSERT_FALSE(configuration);
+    EXPECT_EQ(configuration.error().code, ErrorCode::kMalformed);
+    EXPECT_THAT(configuration.error().where, HasSubstr("etc/slsd.toml:"));
+  }
+  EXPECT_FALSE(read("a = " + std::string(100000, '[')));
+}
+
+TEST(LoadConfiguration, NamesAFileThatIsMissing) {
+  const auto configuration = load_configuration("/nowhere/slsd.toml");
+  ASSERT_FALSE(configuration);
+  EXPECT_EQ(configuration.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(to_string(configuration.error()), HasSubstr("/nowhere/slsd.toml"));
+}
+
+}  // namespace
+}  // namespace slsd

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/rpc/param_reader.hpp"
+
+#include <gmock/gmock.h>
+
+namespace slsd {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+TEST(ParamReader, GivesValuesAndDefaults) {
+  const json params{{"format", "pcd"}, {"timeout_ms", 7}, {"rate_hz", 2.5}, {"picture", true}};
+  ParamReader reader(params);
+  EXPECT_EQ(reader.choice("format", {"ply", "pcd"}), "pcd");
+  EXPECT_EQ(reader.choice("transport", {"inline", "memfd"}), "inline");
+  EXPECT_EQ(reader.integer("timeout_ms", 5000, 1, 60000), 7);
+  EXPECT_EQ(reader.integer("count", 3, 1, 9), 3);
+  EXPECT_EQ(reader.positive("rate_hz", 100), 2.5);
+  EXPECT_TRUE(reader.boolean("picture", false));
+  EXPECT_EQ(reader.text("camera"), "");
+  EXPECT_FALSE(reader.error());
+}
+
+TEST(ParamReader, NamesTheNearestParameter) {
+  const json params{{"formatt", "pcd"}};
+  ParamReader reader(params);
+  (void)reader.choice("format", {"ply", "pcd"});
+  ASSERT_TRUE(reader.error());
+  EXPECT_EQ(reader.error()->code, -32602);
+  EXPECT_THAT(reader.error()->message, HasSubstr("did you mean format?"));
+}
+
+TEST(ParamReader, RefusesWrongTypesAndRanges) {
+  for (const json& value : {json(0), json(61), json(1.5), json("5"), json(), json::array(), json(1e300),
+                            json(18446744073709551615ULL), json(-9223372036854775807LL)}) {
+    const json params{{"timeout_ms", value}};
+    ParamReader reader(params);
+    EXPECT_EQ(reader.integer("timeout_ms", 5, 1, 60), 5);
+    EXPECT_TRUE(reader.error()) << value;
+  }
+  for (const json& value : {json(0), json(-1), json(101), json("5")}) {
+    const json params{{"rate_hz", value}};
+    ParamReader reader(params);
+    EXPECT_EQ(reader.positive("rate_hz", 100), std::nullopt);
+    EXPECT_TRUE(reader.error()) << value;
+  }
+}
+
+}  // namespace
+}  // namespace slsd

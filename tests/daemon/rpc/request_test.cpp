@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/rpc/request.hpp"
+
+#include <gmock/gmock.h>
+#include <rapidcheck/gtest.h>
+
+#include "daemon/rpc/message.hpp"
+
+namespace slsd {
+namespace {
+
+int code_of(std::string_view line) {
+  const auto request = parse_request(line);
+  return request ? 0 : request.error().error.code;
+}
+
+TEST(ParseRequest, ReadsIdMethodAndParams) {
+  const auto request = parse_request(R"({"jsonrpc":"2.0","id":"a","method":"scan","params":{"format":"pcd"}})");
+  ASSERT_TRUE(request);
+  EXPECT_EQ(request->id, "a");
+  EXPECT_TRUE(request->wants_reply);
+  EXPECT_EQ(request->method, "scan");
+  EXPECT_EQ(request->params["format"], "pcd");
+}
+
+TEST(ParseRequest, WithoutIdWantsNoReply) {
+  const auto request = parse_request(R"({"jsonrpc":"2.0","method":"status"})");
+  ASSERT_TRUE(request);
+  EXPECT_FALSE(request->wants_reply);
+  EXPECT_TRUE(request->params.is_object());
+}
+
+TEST(ParseRequest, TellsWhatIsWrong) {
+  EXPECT_EQ(code_of(""), -32700);
+  EXPECT_EQ(code_of("{"), -32700);
+  EXPECT_EQ(code_of("\xff"), -32700);
+  EXPECT_EQ(code_of("[]"), -32600);
+  EXPECT_EQ(code_of("1"), -32600);
+  EXPECT_EQ(code_of("{}"), -32600);
+  EXPECT_EQ(code_of(R"({"jsonrpc":2.0,"method":"status"})"), -32600);
+  EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","method":[]})"), -32600);
+  EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","id":true,"method":"status"})"), -32600);
+  EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","method":"status","params":3})"), -32602);
+}
+
+TEST(ParseRequest, AnswersToTheIdWhereItCanBeRead) {
+  const auto request = parse_request(R"({"jsonrpc":"2.0","id":7})");
+  ASSERT_FALSE(request);
+  EXPECT_EQ(request.error().id, 7);
+}
+
+TEST(ParseRequest, BoundsTheDepth) {
+  EXPECT_EQ(code_of(std::string(1000000, '[')), -32700);
+  const std::string deep = std::string(kMaxNesting - 2, '[') + std::string(kMaxNesting - 2, ']');
+  EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","method":"status","params":{"a":)" + deep + "}}"), 0);
+  EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","method":"status","params":{"a":[)" + deep + "]}}"), -32700);
+}
+
+TEST(NestingDepth, PassesOverTexts) {
+  EXPECT_EQ(nesting_depth(R"({"[[[": "\"[[["})"), 1);
+  EXPECT_EQ(nesting_depth("[[],[[]]]"), 3);
+  EXPECT_EQ(nesting_depth(""), 0);
+}
+
+RC_GTEST_PROP(ParseRequest, SurvivesAnyBytes, (const std::string& line)) {
+  const auto request = parse_request(line);
+  if (!request) RC_ASSERT(to_line(error_message(request.error().id, request.error().error)).back() == '\n');
+}
+
+TEST(ToLine, ReplacesWhatIsNoUtf8) {
+  EXPECT_EQ(to_line({{"file", "a\xff"}}), "{\"file\":\"a\xef\xbf\xbd\"}\n");
+}
+
+TEST(RpcCode, IsTheSameNumberForGood) {
+  EXPECT_EQ(rpc_code(ErrorCode::kInvalidArgument), -32001);
+  EXPECT_EQ(rpc_code(ErrorCode::kBusy), -32011);
+  EXPECT_EQ(rpc_code(ErrorCode::kFrameStale), -32017);
+  EXPECT_EQ(to_string(ErrorCode::kFrameLate), "frame_late");
+}
+
+}  // namespace
+}  // namespace slsd

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/bounded_queue.hpp"
+
+#include <thread>
+
+#include <gmock/gmock.h>
+
+#include "daemon/scan/backoff.hpp"
+#include "daemon/scan/heartbeat.hpp"
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+
+TEST(BoundedQueue, KeepsOrderAndCapacity) {
+  BoundedQueue<int> queue(2);
+  EXPECT_TRUE(queue.try_push(1));
+  EXPECT_TRUE(queue.try_push(2));
+  EXPECT_FALSE(queue.try_push(3));
+  EXPECT_EQ(queue.try_pop(), 1);
+  EXPECT_EQ(queue.try_pop(), 2);
+  EXPECT_EQ(queue.try_pop(), std::nullopt);
+}
+
+TEST(BoundedQueue, PopEndsWithTheTimeAWakeOrAStop) {
+  BoundedQueue<int> queue(1);
+  std::stop_source stop;
+  EXPECT_EQ(queue.pop_until(steady_clock::now(), stop.get_token()), std::nullopt);
+  queue.wake();
+  EXPECT_EQ(queue.pop_until(steady_clock::now() + 600s, stop.get_token()), std::nullopt);
+  std::jthread stopper([&] { stop.request_stop(); });
+  EXPECT_EQ(queue.pop_until(steady_clock::now() + 600s, stop.get_token()), std::nullopt);
+}
+
+TEST(BoundedQueue, PopWaitsForAnotherThread) {
+  BoundedQueue<int> queue(1);
+  std::jthread pusher([&] { EXPECT_TRUE(queue.try_push(7)); });
+  EXPECT_EQ(queue.pop_until(steady_clock::now() + 600s, std::stop_token()), 7);
+}
+
+TEST(Backoff, DoublesUpToTheLongest) {
+  Backoff backoff({.timeout_ms = 1, .exposure_skew_ms = 1, .reopen_first_ms = 10, .reopen_longest_ms = 50});
+  EXPECT_EQ(backoff.next(), 10ms);
+  EXPECT_EQ(backoff.next(), 20ms);
+  EXPECT_EQ(backoff.next(), 40ms);
+  EXPECT_EQ(backoff.next(), 50ms);
+  EXPECT_EQ(backoff.next(), 50ms);
+  backoff.reset();
+  EXPECT_EQ(backoff.next(), 10ms);
+}
+
+TEST(Heartbeat, IsKeptUntilThePromisedTime) {
+  Heartbeat heartbeat;
+  EXPECT_TRUE(heartbeat.kept());
+  heartbeat.promise(60s);
+  EXPECT_TRUE(heartbeat.kept());
+  EXPECT_FALSE(heartbeat.kept(steady_clock::now() + 61s));
+  heartbeat.promise(-1s);
+  EXPECT_FALSE(heartbeat.kept());
+}
+
+}  // namespace
+}  // namespace slsd
