@@ -29,17 +29,16 @@ class Construction {
         choices_(array_.cells.size()) {}
 
   std::optional<CodeArray> run() {
-    const int restart_after = kRollbacksPerRow * options_.rows;
-    for (int rollbacks = 0; next_ < cell_count(); ++rollbacks) {
-      if (fill_row()) {
-        --rollbacks;
-        continue;
-      }
+    int rollbacks = 0;
+    while (next_ < cell_count()) {
+      if (fill_row()) continue;
       if (steps_left_ <= 0) return std::nullopt;
-      const int row = next_ / options_.columns;
-      const int target = rollbacks < restart_after ? std::max(0, row - 1 - source_.below(kLongestRollbackRows)) : 0;
-      take_back_to(target * options_.columns);
-      if (rollbacks >= restart_after) rollbacks = 0;
+      if (rollbacks++ < kRollbacksPerRow * options_.rows) {
+        roll_back();
+      } else {
+        take_back_to(0);
+        rollbacks = 1;
+      }
     }
     return array_;
   }
@@ -60,7 +59,10 @@ class Construction {
     next_ = first;
     open_cell();
     while (next_ < end) {
-      if (steps-- <= 0 || steps_left_-- <= 0) return take_back_to(first), false;
+      if (steps-- <= 0 || steps_left_-- <= 0) {
+        take_back_to(first);
+        return false;
+      }
       if (try_letter()) {
         ++next_;
         if (next_ < end) open_cell();
@@ -70,6 +72,11 @@ class Construction {
       }
     }
     return true;
+  }
+
+  void roll_back() {
+    const int row = next_ / options_.columns;
+    take_back_to(std::max(0, row - 1 - source_.below(kLongestRollbackRows)) * options_.columns);
   }
 
   void open_cell() {
@@ -99,7 +106,7 @@ class Construction {
     return !index_.has_closer(window);
   }
 
-  bool take_back_to(int cell) {
+  void take_back_to(int cell) {
     while (next_ > cell) {
       --next_;
       if (!ends_window(next_)) continue;
@@ -107,7 +114,6 @@ class Construction {
       if (options_.half_turn_unique) index_.remove_last(half_turned(window));
       index_.remove_last(window);
     }
-    return true;
   }
 
   [[nodiscard]] bool ends_window(int cell) const {
