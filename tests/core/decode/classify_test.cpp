@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/classify.hpp"
+
+#include <cmath>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <Eigen/LU>
+
+#include "core/decode/prototypes.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr float kDistanceMax = 8;
+
+std::vector<Prototype> three_letters() {
+  PrototypeOptions options;
+  options.symbols = {7, 22, 25};
+  return make_prototypes(options);
+}
+
+double total_probability(const Classification& shape, int letters) {
+  double sum = 0;
+  for (int i = 0; i < letters; ++i) sum += std::exp(static_cast<double>(shape.log_probability[i]));
+  return sum;
+}
+
+TEST(Classify, KnowsEachPrototype) {
+  const auto prototypes = three_letters();
+  for (int letter = 0; letter < 3; ++letter) {
+    const Classification shape = classify(prototypes[letter].mean, prototypes, kDistanceMax);
+    EXPECT_EQ(shape.letter, letter);
+    EXPECT_EQ(shape.distance, 0);
+    EXPECT_GT(shape.log_probability[letter], std::log(0.99));
+    EXPECT_NEAR(total_probability(shape, 3), 1, 1e-4);
+  }
+}
+
+TEST(Classify, RejectsWhatIsLikeNone) {
+  const auto prototypes = three_letters();
+  ShapeFeatures odd = prototypes[0].mean;
+  odd[0] *= 3;
+  const Classification shape = classify(odd, prototypes, kDistanceMax);
+  EXPECT_EQ(shape.letter, -1);
+  EXPECT_GT(shape.distance, kDistanceMax);
+}
+
+TEST(Classify, MeasuresTheDistanceInStandardDeviations) {
+  const auto prototypes = three_letters();
+  // Three standard deviations along the fourth whitened axis.
+  ShapeFeatures whitened = ShapeFeatures::Zero();
+  whitened[3] = 3;
+  const ShapeFeatures features = prototypes[1].mean + prototypes[1].whitening.inverse() * whitened;
+  EXPECT_NEAR(classify(features, prototypes, kDistanceMax).distance, 3, 0.01);
+  EXPECT_EQ(classify(features, prototypes, 2.9F).letter, -1);
+  EXPECT_EQ(classify(features, prototypes, 3.1F).letter, 1);
+}
+
+TEST(Classify, NamesTheNearestOfOrdinarySamples) {
+  const auto prototypes = three_letters();
+  std::mt19937 random(2);
+  std::normal_distribution<float> normal;
+  int right = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Prototype& prototype = prototypes[i % 3];
+    const ShapeFeatures whitened = ShapeFeatures::NullaryExpr([&] { return normal(random); });
+    const ShapeFeatures features = prototype.mean + prototype.whitening.inverse() * whitened;
+    right += classify(features, prototypes, kDistanceMax).letter == i % 3;
+  }
+  EXPECT_GE(right, 298);
+}
+
+TEST(Classify, IsLessSureBetweenTwoPrototypes) {
+  const auto prototypes = three_letters();
+  const ShapeFeatures between = 0.5F * (prototypes[0].mean + prototypes[1].mean);
+  const Classification shape = classify(between, prototypes, 1e3F);
+  const Classification sure = classify(prototypes[0].mean, prototypes, 1e3F);
+  EXPECT_LT(shape.log_probability[shape.letter], sure.log_probability[0]);
+  EXPECT_NEAR(total_probability(shape, 3), 1, 1e-4);
+}
+
+TEST(Classify, KeepsProbabilitiesFiniteForAnyShape) {
+  const auto prototypes = three_letters();
+  for (const float extreme : {1e4F, 1e8F}) {
+    const Classification shape = classify(ShapeFeatures::Constant(extreme), prototypes, kDistanceMax);
+    EXPECT_EQ(shape.letter, -1);
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(std::isfinite(shape.log_probability[i]));
+  }
+}
+
+}  // namespace
+}  // namespace slsd

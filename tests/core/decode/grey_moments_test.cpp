@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/grey_moments.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <rapidcheck/gtest.h>
+
+#include "core/decode/find_regions.hpp"
+#include "tests/core/decode/images.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr int kMarginPx = 2;
+constexpr double kDark = 20, kLit = 180;
+
+double rising_edge(double x) {
+  return 0.5 * std::erfc(-x / std::sqrt(2.));  // blurred with a sigma of one pixel
+}
+
+struct Box {
+  double left, top, right, bottom;
+};
+
+/// A box of light through a lens that blurs, brighter by the shading for each pixel to the right of its middle.
+Grey8 blurred_box(const Box& box, double noise_sigma = 0, double shading = 0) {
+  Grey8 frame(48, 40);
+  std::mt19937 random(11);
+  std::normal_distribution<double> noise(0, 1);
+  for (int y = 0; y < frame.height(); ++y) {
+    for (int x = 0; x < frame.width(); ++x) {
+      const double light = (rising_edge(x - box.left) - rising_edge(x - box.right)) *
+                           (rising_edge(y - box.top) - rising_edge(y - box.bottom)) *
+                           (1 + shading * (x - 0.5 * (box.left + box.right)));
+      const double grey = kDark + (kLit - kDark) * light + noise_sigma * noise(random);
+      frame.at(x, y) = static_cast<std::uint8_t>(std::clamp(std::lround(grey), 0L, 255L));
+    }
+  }
+  return frame;
+}
+
+Regions regions_of(const Grey8& frame, int threshold = 70) {
+  Grey8 mask(frame.width(), frame.height());
+  for (std::size_t i = 0; i < mask.size(); ++i) mask.data()[i] = frame.data()[i] > threshold ? 255 : 0;
+  Regions found;
+  RegionFinder().find(mask.view(), found);
+  return found;
+}
+
+GreyMoments measure(const Grey8& frame, const Regions& regions, std::size_t index = 0) {
+  const Region& region = regions.regions[index];
+  return GreyMomentMeter(kMarginPx).measure(frame.view(), region, regions.runs_of(region));
+}
+
+struct Pixel {
+  double x, y, grey;
+};
+
+// The region and its margin: in each row from the leftmost to the rightmost that a run nearby reaches.
+std::vector<Pixel> pixels_around(const Grey8& frame, std::span<const Run> runs) {
+  std::vector<Pixel> pixels;
+  for (int y = 0; y < frame.height(); ++y) {
+    int left = frame.width(), right = -1;
+    for (const Run& run : runs) {
+      if (std::abs(run.row - y) > kMarginPx) continue;
+      left = std::min(left, run.left - kMarginPx);
+      right = std::max(right, run.right - 1 + kMarginPx);
+    }
+    for (int x = std::max(left, 0); x <= std::min(right, frame.width() - 1); ++x)
+      pixels.push_back({static_cast<double>(x), static_cast<double>(y), static_cast<double>(frame.at(x, y))});
+  }
+  return pixels;
+}
+
+struct PlainMoments {
+  double x = 0, y = 0, weight = 0, background = 0, peak = 0;
+  double m20 = 0, m11 = 0, m02 = 0, m30 = 0, m21 = 0, m12 = 0, m03 = 0;
+};
+
+// The same moments by their definition: levels, ramp, centroid first, then the sums about it.
+PlainMoments plain_moments(const std::vector<Pixel>& pixels) {
+  double low = std::numeric_limits<double>::max(), high = 0;
+  for (const Pixel& p : pixels) low = std::min(low, p.grey), high = std::max(high, p.grey);
+  double low_sum = 0, high_sum = 0, low_count = 0, high_count = 0;
+  for (const Pixel& p : pixels) {
+    if (p.grey <= low + 0.25 * (high - low)) low_sum += p.grey, ++low_count;
+    if (p.grey >= high - 0.25 * (high - low)) high_sum += p.grey, ++high_count;
+  }
+  PlainMoments m;
+  m.background = low_sum / low_count, m.peak = high_sum / high_count;
+  const auto weight = [&](const Pixel& p) {
+    return std::clamp(((p.grey - m.background) / (m.peak - m.background) - 0.2) / 0.6, 0., 1.);
+  };
+  for (const Pixel& p : pixels) m.weight += weight(p), m.x += weight(p) * p.x, m.y += weight(p) * p.y;
+  m.x /= m.weight, m.y /= m.weight;
+  for (const Pixel& p : pixels) {
+    const double w = weight(p) / m.weight, x = p.x - m.x, y = p.y - m.y;
+    m.m20 += w * x * x, m.m11 += w * x * y, m.m02 += w * y * y;
+    m.m30 += w * x * x * x, m.m21 += w * x * x * y, m.m12 += w * x * y * y, m.m03 += w * y * y * y;
+  }
+  return m;
+}
+
+// A blob of random grey values, at the frame's border as often as inside it.
+Grey8 random_blob(std::mt19937& random, int left, int top) {
+  Grey8 frame(48, 40, 15);
+  for (int spot = 0; spot < 5; ++spot) {
+    const int cx = left + static_cast<int>(random() % 10), cy = top + static_cast<int>(random() % 10),
+              radius = 2 + static_cast<int>(random() % 4);
+    for (int y = std::max(cy - radius, 0); y <= std::min(cy + radius, 39); ++y) {
+      for (int x = std::max(cx - radius, 0); x <= std::min(cx + radius, 47); ++x)
+        frame.at(x, y) = static_cast<std::uint8_t>(100 + random() % 120);
+    }
+  }
+  return frame;
+}
+
+RC_GTEST_PROP(GreyMoments, EqualPlainSumsInDoublePrecision, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<std::uint32_t>());
+  const int left = static_cast<int>(random() % 40), top = static_cast<int>(random() % 32);
+  const Grey8 frame = random_blob(random, left, top);
+  const Regions regions = regions_of(frame);
+  for (std::size_t i = 0; i < regions.regions.size(); ++i) {
+    const GreyMoments fast = measure(frame, regions, i);
+    const PlainMoments plain = plain_moments(pixels_around(frame, regions.runs_of(regions.regions[i])));
+    const auto near = [](double a, double b, double tolerance) { return std::abs(a - b) <= tolerance; };
+    RC_ASSERT(near(fast.x, plain.x, 1e-4) && near(fast.y, plain.y, 1e-4));
+    RC_ASSERT(near(fast.weight, plain.weight, 1e-4 * plain.weight));
+    RC_ASSERT(near(fast.background, plain.background, 1e-3) && near(fast.peak, plain.peak, 1e-3));
+    RC_ASSERT(near(fast.m20, plain.m20, 1e-3) && near(fast.m11, plain.m11, 1e-3) && near(fast.m02, plain.m02, 1e-3));
+    RC_ASSERT(near(fast.m30, plain.m30, 0.02) && near(fast.m21, plain.m21, 0.02));
+    RC_ASSERT(near(fast.m12, plain.m12, 0.02) && near(fast.m03, plain.m03, 0.02));
+  }
+}
+
+RC_GTEST_PROP(GreyMoments, MoveWithTheRegionAndDoNotChange, ()) {
+  const auto seed = *rc::gen::arbitrary<std::uint32_t>();
+  std::mt19937 one(seed), other(seed);
+  const int dx = *rc::gen::inRange(0, 20), dy = *rc::gen::inRange(0, 14);
+  const Grey8 here = random_blob(one, 8, 8), there = random_blob(other, 8 + dx, 8 + dy);
+  const GreyMoments a = measure(here, regions_of(here)), b = measure(there, regions_of(there));
+  RC_ASSERT(std::abs(b.x - a.x - static_cast<float>(dx)) < 1e-5F);
+  RC_ASSERT(std::abs(b.y - a.y - static_cast<float>(dy)) < 1e-5F);
+  RC_ASSERT(a.weight == b.weight && a.m20 == b.m20 && a.m11 == b.m11 && a.m02 == b.m02);
+  RC_ASSERT(a.m30 == b.m30 && a.m21 == b.m21 && a.m12 == b.m12 && a.m03 == b.m03 && a.noise == b.noise);
+}
+
+RC_GTEST_PROP(GreyMoments, FindTheCentreBetweenPixels, ()) {
+  const double x = 0.01 * *rc::gen::inRange(0, 100), y = 0.01 * *rc::gen::inRange(0, 100);
+  const Box box{14 + x, 12 + y, 26.4 + x, 23 + y};
+  const Grey8 frame = blurred_box(box);
+  const GreyMoments moments = measure(frame, regions_of(frame));
+  RC_ASSERT(std::abs(moments.x - 0.5 * (box.left + box.right)) < 0.08);
+  RC_ASSERT(std::abs(moments.y - 0.5 * (box.top + box.bottom)) < 0.08);
+  RC_ASSERT(std::abs(moments.weight / (12.4 * 11) - 1) < 0.08);
+}
+
+TEST(GreyMoments, OfSixteenBitsAreThoseOfEight) {
+  const Grey8 frame = blurred_box({14.3, 12.8, 26, 23}, 2);
+  const Regions regions = regions_of(frame);
+  const Region& region = regions.regions[0];
+  const GreyMoments eight = measure(frame, regions);
+  const GreyMoments sixteen =
+      GreyMomentMeter(kMarginPx).measure(sixteen_bits(frame).view(), region, regions.runs_of(region));
+  EXPECT_NEAR(sixteen.x, eight.x, 1e-4);
+  EXPECT_NEAR(sixteen.y, eight.y, 1e-4);
+  EXPECT_NEAR(sixteen.weight, eight.weight, 1e-2);
+  EXPECT_NEAR(sixteen.peak / 257, eight.peak, 1e-2);
+  EXPECT_NEAR(sixteen.noise / 257, eight.noise, 1e-2);
+}
+
+TEST(GreyMoments, TellMoreNoiseFromLess) {
+  const Grey8 quiet = blurred_box({8, 8, 40, 32}, 1), noisy = blurred_box({8, 8, 40, 32}, 12);
+  EXPECT_GT(measure(noisy, regions_of(noisy)).noise, measure(quiet, regions_of(quiet)).noise + 1);
+}
+
+TEST(GreyMoments, OfAnEvenPatchWeighNothing) {
+  const Grey8 frame(20, 20, 200);
+  EXPECT_EQ(measure(frame, regions_of(frame)).weight, 0);
+}
+
+TEST(GreyMoments, LevelTheLight) {
+  constexpr double kShading = 0.03;
+  const Box box{14.3, 12.8, 27, 23};
+  const Grey8 frame = blurred_box(box, 0, kShading);
+  const Regions regions = regions_of(frame);
+  const Region& region = regions.regions[0];
+  const double middle = 0.5 * (box.left + box.right);
+  const double as_seen = std::abs(measure(frame, regions).x - middle);
+  const GreyMoments levelled = GreyMomentMeter(kMarginPx).measure(frame.view(), region, regions.runs_of(region),
+                                                                  {static_cast<float>(kShading), 0.F});
+  EXPECT_GT(as_seen, 0.08);
+  EXPECT_LT(std::abs(levelled.x - middle), 0.3 * as_seen);
+}
+
+TEST(GreyMoments, InACellLeaveTheNeighboursOut) {
+  const Box box{14.3, 12.8, 26, 23};
+  Grey8 frame = blurred_box(box);
+  const LatticeFrame lattice_frame = 1.2F * LatticeFrame::Identity();
+  const Eigen::Vector2f centre(20.2F, 17.9F);
+  const auto in_cell = [&] {
+    return GreyMomentMeter(kMarginPx).measure_cell(frame.view(), centre, lattice_frame, 7.F, {0.F, 0.F});
+  };
+  const GreyMoments alone = in_cell();
+  EXPECT_NEAR(alone.x, 20.15, 0.03);
+  EXPECT_NEAR(alone.y, 17.9, 0.03);
+  for (int y = 5; y < 30; ++y) {
+    for (int x = 30; x < 42; ++x) frame.at(x, y) = 180;
+  }
+  const GreyMoments beside = in_cell();
+  EXPECT_EQ(beside.x, alone.x);
+  EXPECT_EQ(beside.weight, alone.weight);
+}
+
+TEST(GreyMoments, InACellBeyondTheFrameWeighNothing) {
+  const Grey8 frame = blurred_box({14, 12, 26, 23});
+  const GreyMoments moments =
+      GreyMomentMeter(kMarginPx).measure_cell(frame.view(), {-60.F, 300.F}, LatticeFrame::Identity(), 9.F, {0.F, 0.F});
+  EXPECT_EQ(moments.weight, 0);
+}
+
+}  // namespace
+}  // namespace slsd

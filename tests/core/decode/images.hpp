@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// A mask from a picture: 255 where it shows '#', 0 elsewhere.
+inline Grey8 ascii_mask(const std::vector<std::string>& rows) {
+  Grey8 mask(static_cast<int>(rows[0].size()), static_cast<int>(rows.size()));
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) mask.at(x, y) = rows[y][x] == '#' ? 255 : 0;
+  }
+  return mask;
+}
+
+/// The same picture with 16 bits: black and white stay what they are.
+inline Grey16 sixteen_bits(const Grey8& image) {
+  Grey16 wide(image.width(), image.height());
+  for (std::size_t i = 0; i < image.size(); ++i) wide.data()[i] = static_cast<std::uint16_t>(image.data()[i] * 257);
+  return wide;
+}
+
+}  // namespace slsd

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/prototypes.hpp"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+
+#include "core/code/pattern.hpp"
+#include "core/code/symbol.hpp"
+#include "core/decode/descriptors.hpp"
+
+namespace slsd {
+namespace {
+
+PrototypeOptions options_of(std::vector<int> symbols) {
+  PrototypeOptions options;
+  options.symbols = std::move(symbols);
+  return options;
+}
+
+TEST(MakePrototypes, ThinksOfEachSymbolAsItIsDrawn) {
+  const std::vector<int> symbols{5, 7, 22, 25};
+  const auto prototypes = make_prototypes(options_of(symbols));
+  ASSERT_EQ(prototypes.size(), symbols.size());
+  for (std::size_t i = 0; i < symbols.size(); ++i) {
+    const Descriptors drawn = describe_shape(draw_symbol(symbols[i], 16));
+    EXPECT_NEAR(prototypes[i].mean[0], drawn.area_px / 256, 0.08 * drawn.area_px / 256) << symbols[i];
+    const Eigen::Vector2d from_middle = drawn.centroid_px.array() - 7.5;
+    EXPECT_NEAR((prototypes[i].centroid_px.cast<double>() - from_middle).norm(), 0, 0.25) << symbols[i];
+  }
+}
+
+TEST(MakePrototypes, PutsTheTriangleASixthOffTheMiddle) {
+  const auto prototypes = make_prototypes(options_of({25, 7}));
+  EXPECT_NEAR(std::abs(prototypes[0].centroid_px.x()), 16. / 6, 0.25);
+  EXPECT_NEAR(std::abs(prototypes[0].centroid_px.y()), 16. / 6, 0.25);
+  EXPECT_NEAR(prototypes[1].centroid_px.norm(), 0, 0.05);
+}
+
+TEST(MakePrototypes, KeepsTheDefaultSymbolsApart) {
+  for (const int size : kSymbolSizesPx) {
+    PrototypeOptions options = options_of(default_symbols(size));
+    options.symbol_size_px = size;
+    const auto prototypes = make_prototypes(options);
+    for (std::size_t a = 0; a < prototypes.size(); ++a) {
+      for (std::size_t b = 0; b < prototypes.size(); ++b) {
+        if (a == b) continue;
+        EXPECT_GT(prototypes[a].squared_distance(prototypes[b].mean), 9) << size << ": " << a << ", " << b;
+      }
+      EXPECT_EQ(prototypes[a].squared_distance(prototypes[a].mean), 0);
+    }
+  }
+}
+
+TEST(MakePrototypes, GivesTheSameForTheSameOptions) {
+  const auto once = make_prototypes(options_of({5, 7, 22}));
+  const auto again = make_prototypes(options_of({5, 7, 22}));
+  for (std::size_t i = 0; i < once.size(); ++i) {
+    EXPECT_EQ(once[i].mean, again[i].mean);
+    EXPECT_EQ(once[i].whitening, again[i].whitening);
+    EXPECT_EQ(once[i].centroid_px, again[i].centroid_px);
+  }
+}
+
+TEST(MarginPx, StaysWithinHalfTheGap) {
+  EXPECT_EQ(margin_px(1, 0.7F), 1);
+  EXPECT_EQ(margin_px(2, 1.4F), 1);
+  EXPECT_EQ(margin_px(4, 1.2F), 2);
+  EXPECT_EQ(margin_px(16, 3), 2);
+}
+
+TEST(ThresholdLevel, IsLowWhereGapsAreWide) {
+  EXPECT_FLOAT_EQ(threshold_level(2, 1.4F), 0.3F);
+  EXPECT_FLOAT_EQ(threshold_level(2, 0.7F), 0.45F);
+}
+
+}  // namespace
+}  // namespace slsd

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "core/decode/link_grid.hpp"
+
+namespace slsd {
+
+/// How a camera sees the plane of the pattern: homogeneous, camera px from projector px.
+using Homography = Eigen::Matrix3f;
+
+/// Cells of a pattern as nodes of the grid, with known truth.
+struct SimulatedGrid {
+  static constexpr float kPitchPx = 18;
+  std::vector<GridNode> nodes;
+  std::vector<std::pair<int, int>> cells;  ///< row and column of each node
+  std::map<std::pair<int, int>, std::int32_t> node_of_cell;
+
+  void add(int row, int column, const Eigen::Vector2f& centre_px, const LatticeFrame& expected) {
+    node_of_cell[{row, column}] = static_cast<std::int32_t>(nodes.size());
+    cells.emplace_back(row, column);
+    nodes.push_back({centre_px, expected});
+  }
+  [[nodiscard]] std::int32_t node_at(int row, int column) const {
+    const auto found = node_of_cell.find({row, column});
+    return found == node_of_cell.end() ? -1 : found->second;
+  }
+  /// The node one step away, -1 where that cell has none.
+  [[nodiscard]] std::int32_t true_neighbour(std::size_t node, Direction direction) const {
+    const Eigen::Vector2f to = step(direction);
+    return node_at(cells[node].first + static_cast<int>(to.y()), cells[node].second + static_cast<int>(to.x()));
+  }
+  /// Links every node with the neighbours that it has.
+  void link_truly() {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      for (const Direction d : {kRight, kDown, kLeft, kUp}) nodes[i].links[d] = true_neighbour(i, d);
+    }
+  }
+};
+
+inline Eigen::Vector2f through(const Homography& camera_from_pattern, int row, int column) {
+  const Eigen::Vector3f cell(SimulatedGrid::kPitchPx * static_cast<float>(column),
+                             SimulatedGrid::kPitchPx * static_cast<float>(row), 1);
+  return (camera_from_pattern * cell).hnormalized();
+}
+
+}  // namespace slsd
