@@ -12,7 +12,7 @@ namespace slsd {
 namespace {
 
 /// Bend over a symbol's size that moves its centre by a tenth of that, below what noise does.
-constexpr float kNegligiblePx = 0.04F;
+constexpr float kNegligiblePx = 0.12F;
 
 }  // namespace
 

@@ -20,6 +20,10 @@ constexpr float kMeasuredFrameError = 0.05F;
 /// Standard deviations from the nearest prototype beyond which a shape is none of the pattern's.
 constexpr float kExpectedDistanceMax = 25;
 constexpr float kMeasuredDistanceMax = 20;
+/// A shape this near to its prototype, and this much likelier than any other, need not be looked at in the measured
+/// frame.
+constexpr float kDecidedDistance = 3;
+constexpr float kDecidedLogProbability = -0.01F;
 /// Least and greatest area of a region, as a share of a symbol's square and of a cell.
 constexpr float kAreaMin = 0.08F;
 constexpr float kAreaMax = 1.1F;
@@ -186,7 +190,10 @@ void Decoder::Pipeline::classify_in_measured_frames() {
   const float size = static_cast<float>(pattern_.options.symbol_size_px);
   for (std::size_t i = 0; i < seen_.size(); ++i) {
     const GridNode& node = seen_.nodes[i];
-    if (!node.measured_u || !node.measured_v) continue;
+    const Classification& before = seen_.shapes[i];
+    const bool decided = before.letter >= 0 && before.distance < kDecidedDistance &&
+                         before.log_probability[before.letter] > kDecidedLogProbability;
+    if (decided || !node.measured_u || !node.measured_v) continue;
     seen_.shapes[i] = slsd::classify(shape_features(seen_.moments[i], node.frame.inverse(), size),
                                      prototypes_as_measured_, kMeasuredDistanceMax);
   }
