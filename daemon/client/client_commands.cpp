@@ -95,8 +95,8 @@ int watch_command(const ClientOptions& options) {
   if (!connection) return report(options, failure(connection.error()));
   json params{{"format", "ply"}};
   if (options.rate_hz) params["rate_hz"] = *options.rate_hz;
-  const auto answered = connection->call("subscribe", std::move(params));
-  if (!answered) return report(options, failure(answered.error()));
+  const auto answered = ask(*connection, "subscribe", std::move(params));
+  if (!answered) return report(options, answered.error());
   std::uint64_t clouds = 0;
   while (options.count == 0 || clouds < options.count) {
     const auto event = connection->receive();

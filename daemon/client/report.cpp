@@ -77,19 +77,23 @@ Failure failure(const Error& error) {
   return {error.code == ErrorCode::kNotFound ? kNoDaemon : kRequestFailed, rpc_error(error)};
 }
 
-tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_view method, json params) {
-  auto connection = Connection::open(options.socket);
-  if (!connection) return tl::unexpected(failure(connection.error()));
-  auto answered = connection->call(method, std::move(params));
+tl::expected<Answered, Failure> ask(Connection& connection, std::string_view method, json params) {
+  auto answered = connection.call(method, std::move(params));
   if (!answered) return tl::unexpected(failure(answered.error()));
   const json& message = answered->reply.message;
   if (message.contains("error") && message["error"].is_object()) {
     return tl::unexpected(daemon_failure(message["error"]));
   }
   if (!message.contains("result") || !message["result"].is_object()) {
-    return tl::unexpected(failure({ErrorCode::kMalformed, "the answer is not slsd's", options.socket.string()}));
+    return tl::unexpected(failure({ErrorCode::kMalformed, "the answer is not slsd's", {}}));
   }
   return std::move(*answered);
+}
+
+tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_view method, json params) {
+  auto connection = Connection::open(options.socket);
+  if (!connection) return tl::unexpected(failure(connection.error()));
+  return ask(*connection, method, std::move(params));
 }
 
 int report(const ClientOptions& options, const Failure& failure) {

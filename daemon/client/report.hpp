@@ -22,7 +22,11 @@ struct Failure {
 /// A failure on this side. @return kNoDaemon where there is none, else kRequestFailed
 [[nodiscard]] Failure failure(const Error& error);
 
-/// One call on a connection of its own; a JSON-RPC error is a failure.
+/// One call; a JSON-RPC error is a failure.
+[[nodiscard]] tl::expected<Answered, Failure> ask(Connection& connection, std::string_view method,
+                                                  nlohmann::json params);
+
+/// One call on a connection of its own.
 [[nodiscard]] tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_view method,
                                                   nlohmann::json params);
 
