@@ -29,6 +29,7 @@ tl::expected<Request, BadRequest> read_members(json& message, json id) {
     return refuse(id, invalid_request("\"method\" must be a text, such as \"status\""));
   }
   json params = message.value("params", json::object());
+  if (params.is_null() || params.empty()) params = json::object();  // some libraries write "no parameters" so
   if (!params.is_object()) {
     return refuse(id, invalid_params("\"params\" must be an object: parameters go by name"));
   }

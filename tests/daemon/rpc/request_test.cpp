@@ -31,6 +31,14 @@ TEST(ParseRequest, WithoutIdWantsNoReply) {
   EXPECT_TRUE(request->params.is_object());
 }
 
+TEST(ParseRequest, TakesNothingForNoParameters) {
+  for (const char* nothing : {"null", "[]", "{}"}) {
+    const auto request = parse_request(R"({"jsonrpc":"2.0","method":"status","params":)" + std::string(nothing) + "}");
+    ASSERT_TRUE(request);
+    EXPECT_TRUE(request->params.is_object());
+  }
+}
+
 TEST(ParseRequest, TellsWhatIsWrong) {
   EXPECT_EQ(code_of(""), -32700);
   EXPECT_EQ(code_of("{"), -32700);
