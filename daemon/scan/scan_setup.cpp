@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/code/separability.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd {
@@ -63,6 +64,15 @@ Result<Pattern> configured_pattern(const Configuration& configuration) {
       check_size(options.projector_width_px, options.projector_height_px, configuration.projector, "this pattern");
   if (!fits) return tl::unexpected(place_at(fits.error(), file.string()).error());
   return pattern;
+}
+
+std::vector<std::string> symbol_warnings(const PatternOptions& pattern) {
+  LookOptions look;
+  look.symbol_size_px = pattern.symbol_size_px;
+  look.spacing_px = pattern.spacing_px;
+  const auto separability = assess_separability(pattern.symbols, look);
+  if (!separability) return {to_string(separability.error())};
+  return separability_warnings(*separability, pattern.symbol_size_px);
 }
 
 Result<std::optional<Calibration>> configured_calibration(const Configuration& configuration) {

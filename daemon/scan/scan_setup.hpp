@@ -20,6 +20,10 @@ namespace slsd {
 /// @errors of make_pattern(), read_file() and read_pattern(); kMismatch: not of the projector's size
 [[nodiscard]] Result<Pattern> configured_pattern(const Configuration& configuration);
 
+/// What is risky about the pattern's choice of symbols, a sentence each; nothing where nothing is. Takes a part of a
+/// second of computing.
+[[nodiscard]] std::vector<std::string> symbol_warnings(const PatternOptions& pattern);
+
 /// The calibration that the configuration names; empty where it names none.
 /// @errors of read_file() and read_calibration(); kMismatch: not of this projector's size, or without one of the
 /// cameras

@@ -71,8 +71,7 @@ Result<> check_free(const path& path) {
   const int connected = ::connect(probe.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
   // A full backlog (EAGAIN) is a sign of life too.
   if (connected == 0 || errno == EAGAIN) {
-    return fail(ErrorCode::kAlreadyExists, "another daemon answers there: stop it, or choose another path",
-                path.string());
+    return fail(ErrorCode::kBusy, "another daemon answers there: stop it, or choose another path", path.string());
   }
   return errno == ECONNREFUSED ? Result<>() : fail_with_errno("cannot tell whether a daemon answers there", path);
 }

@@ -18,8 +18,8 @@ class ListeningSocket {
   /// Listens at the path. The socket of a daemon that is dead is replaced. The socket appears at the path with its
   /// mode, and only once connections are taken.
   /// @param mode  as for chmod
-  /// @errors kInvalidArgument: longer than kMaxSocketPath; kAlreadyExists: a daemon answers there, or something that is
-  ///         no socket is there; kNotFound: no such folder; kPermissionDenied; kNoSpace; kIo
+  /// @errors kInvalidArgument: longer than kMaxSocketPath; kBusy: a daemon answers there; kAlreadyExists: something
+  ///         that is no socket is there; kNotFound: no such folder; kPermissionDenied; kNoSpace; kIo
   [[nodiscard]] static Result<ListeningSocket> open(const std::filesystem::path& path, int mode);
 
   ListeningSocket(ListeningSocket&& other) noexcept = default;

@@ -64,11 +64,21 @@ void check_scan(const Configuration& configuration, Findings& findings) {
                 "projector, " + size_text(configuration.projector.width_px, configuration.projector.height_px));
   const auto pattern = configured_pattern(configuration);
   findings.note(pattern, "pattern");
+  if (pattern) {
+    for (const std::string& warning : symbol_warnings(pattern->options)) findings.warn(warning);
+  }
   const auto calibration = configured_calibration(configuration);
   const bool readable = findings.note(calibration, "calibration");
   if (readable && !*calibration) findings.bad("no calibration: name its file as [calibration] file");
   check_cameras(configuration, readable ? *calibration : std::nullopt, findings);
   if (pattern && readable && *calibration) findings.note(ScanSetup::create(configuration), "decoder");
+}
+
+// A daemon that answers there is most likely the one that is being looked at.
+void check_socket(const path& socket, Findings& findings) {
+  const auto usable = check_socket_path(socket);
+  if (!usable && usable.error().code == ErrorCode::kBusy) return findings.good("socket: a daemon answers there");
+  findings.note(usable, "socket " + socket.string());
 }
 
 }  // namespace
@@ -79,7 +89,7 @@ bool check_everything(const std::optional<path>& configuration_file) {
   const auto configuration = load_configuration(file);
   if (!findings.note(configuration, "configuration " + file.string())) return false;
   check_scan(*configuration, findings);
-  findings.note(check_socket_path(configuration->server.socket), "socket " + configuration->server.socket.string());
+  check_socket(configuration->server.socket, findings);
   return findings.scan_possible();
 }
 

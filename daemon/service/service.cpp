@@ -20,6 +20,12 @@ using namespace std::chrono_literals;
 constexpr auto kStopTime = 700ms;
 constexpr auto kStatusPeriod = 5s;
 
+// The default sets are known to be good, and looking takes a while.
+void warn_of_symbols(const PatternOptions& pattern) {
+  if (pattern.symbols == default_symbols(pattern.symbol_size_px)) return;
+  for (const std::string& warning : symbol_warnings(pattern)) spdlog::warn("pattern: {}", warning);
+}
+
 // Tables that a reload cannot put into force.
 nlohmann::json tables_that_need_restart(const Configuration& now, const Configuration& next) {
   nlohmann::json tables = nlohmann::json::array();
@@ -44,6 +50,7 @@ Result<std::unique_ptr<Service>> Service::create(const std::filesystem::path& fi
   }
   auto setup = ScanSetup::create(*configuration);
   if (!setup) return tl::unexpected(setup.error());
+  warn_of_symbols(setup->pattern.options);
   auto rig = std::make_unique<Rig>(std::move(*projector), std::move(cameras), std::move(*setup), configuration->scan);
   return std::unique_ptr<Service>(new Service(std::move(*configuration), file, std::move(rig)));
 }

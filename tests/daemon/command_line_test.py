@@ -61,6 +61,15 @@ class Slsd(unittest.TestCase):
         result = slsd("--check", "--config", service.file)
         self.assertEqual(result.returncode, 0, result.stdout)
 
+    def test_warns_of_symbols_that_look_alike(self):
+        self.file.write_text("[pattern]\nsymbol_size_px = 8\nsymbols = [3, 7, 22, 25]\n", encoding="utf-8")
+        self.assertIn("warning  symbol", slsd("--check", "--config", self.file).stdout)
+
+    def test_check_of_a_running_service_is_no_error(self):
+        with Service() as service:
+            result = slsd("--check", "--config", service.file)
+            self.assertEqual(result.returncode, 0, result.stdout)
+
     def test_lists_devices(self):
         service = Service()
         result = slsd("--list", "--config", service.file)

@@ -49,7 +49,7 @@ TEST_F(ListeningSocketTest, LeavesALivingOneAlone) {
   const auto first = ListeningSocket::open(socket, 0600);
   const auto second = ListeningSocket::open(socket, 0600);
   ASSERT_FALSE(second);
-  EXPECT_EQ(second.error().code, ErrorCode::kAlreadyExists);
+  EXPECT_EQ(second.error().code, ErrorCode::kBusy);
   EXPECT_TRUE(Connection::open(socket));
 }
 
