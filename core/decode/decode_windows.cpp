@@ -11,6 +11,7 @@ namespace {
 constexpr int kExactWeight = 2;
 constexpr int kCorrectedWeight = 1;
 constexpr int kSpreadRounds = 3;
+constexpr float kCornerSymbols = 3.6F;  // of four, as none is certain
 
 }  // namespace
 
@@ -122,6 +123,8 @@ void WindowDecoder::spread(const std::vector<GridNode>& nodes, const CellGate& g
 }
 
 void WindowDecoder::verify(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims) const {
+  // A corner of the pattern has four symbols to speak for it, each worth the logarithm of the letters.
+  const float evidence_min = std::min(options_.evidence_min, kCornerSymbols * log_letters_);
   for (std::size_t node = 0; node < claims.size(); ++node) {
     CellClaim& claim = claims[node];
     if (!claim.named()) continue;
@@ -139,7 +142,7 @@ void WindowDecoder::verify(const std::vector<Classification>& shapes, std::vecto
       claim.status = RegionStatus::kUnknownShape;
     } else if (own < options_.own_class_min) {
       claim.status = RegionStatus::kClassDisagrees;
-    } else if (claim.evidence < options_.evidence_min ||
+    } else if (claim.evidence < evidence_min ||
                options_.dissent_max * static_cast<float>(for_it) <= static_cast<float>(against_it)) {
       claim.status = RegionStatus::kNeighboursDisagree;
     }
