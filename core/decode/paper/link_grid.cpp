@@ -83,9 +83,9 @@ std::int32_t label_at(const Image<std::int32_t>& labels, const Point& place) {
 // Equations (19) to (22).
 std::int32_t region_near(const Image<std::int32_t>& labels, const Point& expected, double grid_px, std::int32_t from) {
   const Point diagonal = Point(1, -1) * std::cos(pi / 4);
-  for (double distance = 0; distance <= grid_px / 2; distance += 1) {
+  for (int distance_px = 0; distance_px <= grid_px / 2; ++distance_px) {
     for (const double side : {1., -1.}) {
-      const std::int32_t found = label_at(labels, expected + side * distance * diagonal);
+      const std::int32_t found = label_at(labels, expected + side * distance_px * diagonal);
       if (found >= 0 && found != from) return found;
     }
   }
