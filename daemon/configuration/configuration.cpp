@@ -14,7 +14,7 @@ namespace slsd {
 namespace {
 
 using std::filesystem::path;
-using std::string_view_literals::operator""sv;
+using namespace std::string_view_literals;
 
 constexpr std::size_t kMaxFileBytes = 1 << 20;
 

@@ -45,6 +45,17 @@ Result<std::vector<std::size_t>> calibrated_cameras(const Calibration& calibrati
   return indices;
 }
 
+// The decoder's buffers grow with its first frame. One full of symbols here makes the first scan as quick as the
+// others, and the service as large when it starts as it will be.
+Result<> warm_up(Decoder& decoder, const Lens& lens, const Grey8& symbols) {
+  Grey8 frame(lens.width_px, lens.height_px);
+  for (int y = 0; y < frame.height(); ++y) {
+    for (int x = 0; x < frame.width(); ++x) frame.at(x, y) = symbols.at(x % symbols.width(), y % symbols.height());
+  }
+  const auto decoded = decoder.decode(frame.view());
+  return decoded ? Result<>() : tl::unexpected(decoded.error());
+}
+
 Result<> place_at(Error error, const std::string& where) {
   if (error.where.empty()) error.where = where;
   return tl::unexpected(std::move(error));
@@ -103,6 +114,8 @@ Result<ScanSetup> ScanSetup::create(const Configuration& configuration) {
     auto decoder = Decoder::create(setup.pattern, *setup.calibration, index, configuration.decode);
     if (!decoder) return tl::unexpected(decoder.error());
     setup.decoders.push_back(std::move(*decoder));
+    const auto warm = warm_up(setup.decoders.back(), setup.calibration->cameras[index].lens, setup.image);
+    if (!warm) return tl::unexpected(warm.error());
   }
   return setup;
 }
