@@ -12,7 +12,7 @@
 
 namespace slsd {
 
-/// What a region weighs: moments of its grey values through a soft threshold, a ramp from 20 to 80 % of the way from
+/// What a region weighs: moments of its grey values through a soft threshold, a ramp from 20 to 65 % of the way from
 /// the region's own background to its own peak. A pixel on the edge counts by how much of it is lit, so the centre is
 /// good to some hundredths of a pixel, where the binary mask's is eight times worse.
 struct GreyMoments {

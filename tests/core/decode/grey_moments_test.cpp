@@ -95,7 +95,7 @@ PlainMoments plain_moments(const std::vector<Pixel>& pixels) {
   PlainMoments m;
   m.background = low_sum / low_count, m.peak = high_sum / high_count;
   const auto weight = [&](const Pixel& p) {
-    return std::clamp(((p.grey - m.background) / (m.peak - m.background) - 0.2) / 0.6, 0., 1.);
+    return std::clamp(((p.grey - m.background) / (m.peak - m.background) - 0.2) / 0.45, 0., 1.);
   };
   for (const Pixel& p : pixels) m.weight += weight(p), m.x += weight(p) * p.x, m.y += weight(p) * p.y;
   m.x /= m.weight, m.y /= m.weight;
