@@ -128,7 +128,7 @@ TEST_F(ReviewSymbols, LevelsTheLight) {
   look();
   const double before = centre_error();
   review();
-  EXPECT_GT(before, 0.1);
+  EXPECT_GT(before, 0.05);
   EXPECT_LT(centre_error(), 0.6 * before);
   EXPECT_GE(count(RegionStatus::kDecoded), kCells * kCells * 95 / 100);
 }
