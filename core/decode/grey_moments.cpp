@@ -14,8 +14,6 @@ namespace slsd {
 namespace {
 
 constexpr float kOutside = -1.F;
-constexpr float kRampStart = 0.2F;
-constexpr float kRampEnd = 0.65F;
 /// What is left of the light at the dark end of a symbol, at the least.
 constexpr float kLeastLight = 0.3F;
 

@@ -12,6 +12,10 @@
 
 namespace slsd {
 
+/// Where the soft threshold begins and ends, between a region's background and its peak.
+inline constexpr float kRampStart = 0.2F;
+inline constexpr float kRampEnd = 0.65F;
+
 /// What a region weighs: moments of its grey values through a soft threshold, a ramp from 20 to 65 % of the way from
 /// the region's own background to its own peak. A pixel on the edge counts by how much of it is lit, so the centre is
 /// good to some hundredths of a pixel, where the binary mask's is eight times worse.
