@@ -21,7 +21,7 @@ TEST(CentreSigma, WithoutNoiseIsWhatNoiseDoesNotExplain) {
 }
 
 TEST(CentreSigma, FollowsNoiseOverContrast) {
-  const double expected = std::hypot(6 / 60. / std::sqrt(12), 0.015);
+  const double expected = std::hypot(6 / 45. / std::sqrt(12), 0.015);
   EXPECT_NEAR(centre_sigma_px(moments_of(144, 6, 100)), expected, 1e-6);
   EXPECT_NEAR(centre_sigma_px(moments_of(144, 12, 200)), expected, 1e-6);
 }
