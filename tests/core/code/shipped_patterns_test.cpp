@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include <fstream>
 #include <iterator>
+#include <ostream>
 
 #include <gtest/gtest.h>
 
@@ -15,6 +16,10 @@ struct Shipped {
   PatternOptions options;
   int rows, columns, distance;
 };
+
+void PrintTo(const Shipped& shipped, std::ostream* out) {
+  *out << shipped.name;
+}
 
 const Shipped kShipped[] = {
     {"paper-1", {.symbols = {5, 7, 22}, .method = ArrayMethod::kPaper}, 45, 72, 0},
