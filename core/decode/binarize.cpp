@@ -37,13 +37,9 @@ SLSD_CLONES void compare_row(const std::uint16_t* pixels, const std::uint16_t* t
   for (int x = 0; x < width; ++x) mask[x] = pixels[x] > threshold[x] ? 255 : 0;
 }
 
-/// A straight line of thresholds, rounded down: what is above the whole number is above the threshold.
+/// Binary places of a threshold: as many as a pixel's range leaves in 31 bits.
 template <class T>
-void fill_ramp(T* threshold, int count, float start, float step) {
-  constexpr float kGreatest = static_cast<float>(std::numeric_limits<T>::max());
-  for (int i = 0; i < count; ++i)
-    threshold[i] = static_cast<T>(std::min(start + step * static_cast<float>(i), kGreatest));
-}
+constexpr int kFractionBits = sizeof(T) == 1 ? 20 : 14;
 
 /// Standard deviation of the noise, from the median second difference along the rows of a sample of pixels: edges are
 /// too few to move the median.
@@ -65,15 +61,16 @@ float noise_sigma(const ImageView<T>& frame) {
   return static_cast<float>(bin) * (sizeof(T) == 1 ? 1.F : 64.F) / kMedianOfDifference;
 }
 
-/// Mean of the 3x3 neighbours of a tile, fewer at the border.
-float mean_around(const std::vector<float>& tiles, int columns, int rows, int column, int row) {
-  float sum = 0;
-  int count = 0;
-  for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows - 1); ++r) {
-    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns - 1); ++c, ++count)
-      sum += tiles[r * columns + c];
-  }
-  return sum / static_cast<float>(count);
+/// Combines each tile with its eight neighbours. The tiles have a border of one all round, whose values do not count.
+template <class Operation>
+void combine_3x3(const std::vector<float>& tiles, int stride, Operation operation, std::vector<float>& across,
+                 std::vector<float>& combined) {
+  const int count = static_cast<int>(tiles.size());
+  across.resize(tiles.size());
+  combined.resize(tiles.size());
+  for (int i = 1; i + 1 < count; ++i) across[i] = operation(operation(tiles[i - 1], tiles[i]), tiles[i + 1]);
+  for (int i = stride; i + stride < count; ++i)
+    combined[i] = operation(operation(across[i - stride], across[i]), across[i + stride]);
 }
 
 }  // namespace
@@ -83,43 +80,48 @@ void Binarizer::find_extremes(const ImageView<T>& frame) {
   const int tile = options_.tile_px;
   columns_ = (frame.width + tile - 1) / tile;
   rows_ = (frame.height + tile - 1) / tile;
-  least_.clear();
-  greatest_.clear();
+  stride_ = columns_ + 2;
+  least_.assign(static_cast<std::size_t>(stride_) * (rows_ + 2), std::numeric_limits<float>::max());
+  greatest_.assign(least_.size(), 0);
   auto& [threshold, least, greatest] = std::get<RowBuffers<T>>(row_buffers_);
   for (int row = 0; row < rows_; ++row) {
     const int top = row * tile, bottom = std::min(top + tile, frame.height);
     least.assign(frame.row(top), frame.row(top) + frame.width);
     greatest = least;
     for (int y = top + 1; y < bottom; ++y) extend_columns(frame.row(y), frame.width, least.data(), greatest.data());
-    for (int left = 0; left < frame.width; left += tile) {
+    int at = (row + 1) * stride_ + 1;
+    for (int left = 0; left < frame.width; left += tile, ++at) {
       const int right = std::min(left + tile, frame.width);
-      least_.push_back(*std::min_element(least.begin() + left, least.begin() + right));
-      greatest_.push_back(*std::max_element(greatest.begin() + left, greatest.begin() + right));
+      least_[at] = *std::min_element(least.begin() + left, least.begin() + right);
+      greatest_[at] = *std::max_element(greatest.begin() + left, greatest.begin() + right);
     }
   }
 }
 
-void Binarizer::set_thresholds(int contrast_min, int nothing_lit) {
-  midway_.resize(least_.size());
-  threshold_.resize(least_.size());
-  for (int row = 0; row < rows_; ++row) {
-    for (int column = 0; column < columns_; ++column) {
-      int low = std::numeric_limits<int>::max(), high = 0;
-      for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows_ - 1); ++r) {
-        for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns_ - 1); ++c) {
-          low = std::min(low, least_[r * columns_ + c]);
-          high = std::max(high, greatest_[r * columns_ + c]);
-        }
-      }
-      midway_[row * columns_ + column] =
-          high - low < contrast_min ? static_cast<float>(high + nothing_lit)
-                                    : static_cast<float>(low) + options_.level * static_cast<float>(high - low);
+void Binarizer::set_thresholds(float contrast_min, float greatest) {
+  const auto least_of = [](float a, float b) { return a < b ? a : b; };
+  const auto greatest_of = [](float a, float b) { return a > b ? a : b; };
+  const auto sum_of = [](float a, float b) { return a + b; };
+  combine_3x3(least_, stride_, least_of, across_, low_);
+  combine_3x3(greatest_, stride_, greatest_of, across_, high_);
+  midway_.assign(least_.size(), 0);
+  for (int row = 1; row <= rows_; ++row) {
+    for (int i = row * stride_ + 1; i <= row * stride_ + columns_; ++i) {
+      const float contrast = high_[i] - low_[i];
+      const float nothing_lit = high_[i] + contrast_min;
+      midway_[i] = contrast < contrast_min ? nothing_lit : low_[i] + options_.level * contrast;
     }
   }
-  for (int row = 0; row < rows_; ++row) {
-    for (int column = 0; column < columns_; ++column) {
-      threshold_[row * columns_ + column] = mean_around(midway_, columns_, rows_, column, row);
-    }
+  combine_3x3(midway_, stride_, sum_of, across_, threshold_);
+  for (int row = 1; row <= rows_; ++row) {
+    const int tall = 3 - (row == 1) - (row == rows_);
+    float* threshold = threshold_.data() + row * stride_;
+    const auto mean = [&](int column, int wide) {
+      threshold[column] = std::min(threshold[column] / static_cast<float>(tall * wide), greatest);
+    };
+    for (int column = 2; column < columns_; ++column) mean(column, 3);
+    mean(1, columns_ == 1 ? 1 : 2);
+    if (columns_ > 1) mean(columns_, 2);
   }
 }
 
@@ -129,7 +131,7 @@ void Binarizer::binarize_as(const ImageView<T>& frame, Grey8& mask) {
   const int floor = sizeof(T) == 1 ? options_.contrast_min : options_.contrast_min * 257;
   const int contrast_min = std::max(floor, static_cast<int>(options_.contrast_min_sigma * noise_sigma(frame)));
   find_extremes(frame);
-  set_thresholds(contrast_min, contrast_min);
+  set_thresholds(static_cast<float>(contrast_min), static_cast<float>(std::numeric_limits<T>::max()));
   auto& threshold = std::get<RowBuffers<T>>(row_buffers_).threshold;
   threshold.resize(static_cast<std::size_t>(frame.width));
   for (int y = 0; y < frame.height; ++y) {
@@ -139,24 +141,32 @@ void Binarizer::binarize_as(const ImageView<T>& frame, Grey8& mask) {
   }
 }
 
-/// Tile centres carry the thresholds; between them they are interpolated in both directions.
+/// Tile centres carry the thresholds; between them they are interpolated in both directions, and rounded down: what is
+/// above the whole number is above the threshold.
 template <class T>
-void Binarizer::interpolate_row(int y, int width, T* threshold) const {
-  const float tile = static_cast<float>(options_.tile_px);
-  const float v = std::clamp((static_cast<float>(y) + 0.5F) / tile - 0.5F, 0.F, static_cast<float>(rows_ - 1));
-  const int r0 = static_cast<int>(v), r1 = std::min(r0 + 1, rows_ - 1);
-  const float fraction = v - static_cast<float>(r0);
-  const float* upper = threshold_.data() + r0 * columns_;
-  const float* lower = threshold_.data() + r1 * columns_;
-  const auto at = [&](int column) { return upper[column] + fraction * (lower[column] - upper[column]); };
-  float left = at(0);
+void Binarizer::interpolate_row(int y, int width, T* threshold) {
+  constexpr float kUnit = 1 << kFractionBits<T>;
+  const int tile = options_.tile_px;
+  const float v = (static_cast<float>(y) + 0.5F) / static_cast<float>(tile) - 0.5F;
+  const float inside = std::clamp(v, 0.F, static_cast<float>(rows_ - 1));
+  const int above = static_cast<int>(inside), below = std::min(above + 1, rows_ - 1);
+  const float fraction = inside - static_cast<float>(above);
+  const float* upper = threshold_.data() + (above + 1) * stride_ + 1;
+  const float* lower = threshold_.data() + (below + 1) * stride_ + 1;
+  at_centre_.resize(columns_ + 1);
+  step_.assign(columns_ + 1, 0);
+  for (int column = 0; column < columns_; ++column) {
+    at_centre_[column] = static_cast<int>((upper[column] + fraction * (lower[column] - upper[column])) * kUnit);
+  }
+  for (int column = 1; column < columns_; ++column) {
+    step_[column] = (at_centre_[column] - at_centre_[column - 1]) / tile;
+  }
+  // Flat before the first centre and after the last.
   int x = 0;
-  for (int column = 0; column <= columns_ && x < width; ++column) {
-    const float right = at(std::min(column, columns_ - 1));
-    const int end = column == columns_ ? width : std::min(column * options_.tile_px + options_.tile_px / 2, width);
-    fill_ramp(threshold + x, end - x, left, (right - left) / tile);
-    x = end;
-    left = right;
+  for (int column = 0; column <= columns_; ++column) {
+    int value = at_centre_[std::max(column - 1, 0)];
+    const int end = column == columns_ ? width : std::min(column * tile + tile / 2, width);
+    for (; x < end; ++x, value += step_[column]) threshold[x] = static_cast<T>(value >> kFractionBits<T>);
   }
 }
 

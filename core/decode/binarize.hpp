@@ -39,13 +39,14 @@ class Binarizer {
   template <class T>
   void find_extremes(const ImageView<T>& frame);
   template <class T>
-  void interpolate_row(int y, int width, T* threshold) const;
-  void set_thresholds(int contrast_min, int nothing_lit);
+  void interpolate_row(int y, int width, T* threshold);
+  void set_thresholds(float contrast_min, float greatest);
 
   BinarizeOptions options_;
-  int columns_ = 0, rows_ = 0;  // tiles
-  std::vector<int> least_, greatest_;
-  std::vector<float> midway_, threshold_;
+  int columns_ = 0, rows_ = 0;  // of tiles
+  int stride_ = 0;              // of the tiles with a border of one all round
+  std::vector<float> least_, greatest_, across_, low_, high_, midway_, threshold_;
+  std::vector<int> at_centre_, step_;  // of a row of thresholds, binary fractions
   template <class T>
   struct RowBuffers {
     std::vector<T> threshold, least, greatest;

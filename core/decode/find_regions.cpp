@@ -5,81 +5,119 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <limits>
 
 namespace slsd {
 namespace {
 
-/// First pixel from x on that is lit (or dark, where `lit` is false), eight at a time; the first of them in memory is
-/// the lowest byte.
+constexpr int kWordPx = 64;
+
+/// Bit i tells whether pixel i is lit, of at most 64. The product moves the top bits of eight bytes side by side; the
+/// first pixel in memory is the lowest byte.
 static_assert(std::endian::native == std::endian::little);
-inline int next_change(const std::uint8_t* mask, int x, int width, bool lit) {
-  const std::uint64_t same = lit ? 0 : ~std::uint64_t{0};
-  while (x + 8 <= width) {
-    std::uint64_t eight;
-    std::memcpy(&eight, mask + x, sizeof eight);
-    if (eight != same) return x + std::countr_zero(eight ^ same) / 8;
-    x += 8;
+std::uint64_t lit_bits(const std::uint8_t* mask, int count) {
+  std::uint64_t bytes[kWordPx / 8] = {};
+  std::memcpy(bytes, mask, count < kWordPx ? static_cast<std::size_t>(count) : sizeof bytes);
+  std::uint64_t bits = 0;
+  for (int i = 0; i < kWordPx / 8; ++i) {
+    bits |= ((bytes[i] & 0x8080808080808080U) * 0x0002040810204081U >> 56U) << (8 * i);
   }
-  while (x < width && (mask[x] != 0) != lit) ++x;
-  return x;
+  return bits;
+}
+
+/// Writes the runs of a row and returns their end; the caller has room for every second pixel.
+Run* find_runs_of_row(const std::uint8_t* mask, int y, int width, Run* runs) {
+  const auto row = static_cast<std::int16_t>(y);
+  bool inside = false;
+  std::uint64_t last = 0;
+  for (int x = 0; x < width; x += kWordPx) {
+    const std::uint64_t bits = lit_bits(mask + x, std::min(kWordPx, width - x));
+    std::uint64_t changes = bits ^ (bits << 1U | last);
+    last = bits >> 63U;
+    for (; changes != 0; changes &= changes - 1) {
+      const auto at = static_cast<std::int16_t>(x + std::countr_zero(changes));
+      (inside ? runs->right : runs->left) = at;
+      if (inside) runs++->row = row;
+      inside = !inside;
+    }
+  }
+  if (!inside) return runs;
+  runs->right = static_cast<std::int16_t>(width);
+  runs->row = row;
+  return runs + 1;
 }
 
 }  // namespace
 
 void RegionFinder::find_runs(const ImageView<std::uint8_t>& mask) {
-  runs_.clear();
-  first_run_of_row_.assign(static_cast<std::size_t>(mask.height) + 1, 0);
+  const std::size_t row_max = static_cast<std::size_t>(mask.width) / 2 + 1;
+  first_run_of_row_.resize(static_cast<std::size_t>(mask.height) + 1);
+  std::size_t count = 0;
   for (int y = 0; y < mask.height; ++y) {
-    first_run_of_row_[y] = static_cast<int>(runs_.size());
-    const std::uint8_t* row = mask.row(y);
-    for (int x = next_change(row, 0, mask.width, true); x < mask.width;) {
-      const int end = next_change(row, x, mask.width, false);
-      runs_.push_back({static_cast<std::int16_t>(y), static_cast<std::int16_t>(x), static_cast<std::int16_t>(end)});
-      x = next_change(row, end, mask.width, true);
-    }
+    first_run_of_row_[y] = static_cast<int>(count);
+    if (runs_.size() < count + row_max) runs_.resize(2 * (count + row_max));
+    count = static_cast<std::size_t>(find_runs_of_row(mask.row(y), y, mask.width, runs_.data() + count) - runs_.data());
   }
-  first_run_of_row_[mask.height] = static_cast<int>(runs_.size());
+  first_run_of_row_[mask.height] = static_cast<int>(count);
+  run_count_ = count;
 }
 
-int RegionFinder::root(int run) {
-  while (parent_[run] != run) run = parent_[run] = parent_[parent_[run]];
-  return run;
+int RegionFinder::root(int label) {
+  while (parent_[label] != label) label = parent_[label] = parent_[parent_[label]];
+  return label;
 }
 
-void RegionFinder::join_touching_runs(int height) {
-  parent_.resize(runs_.size());
-  for (std::size_t i = 0; i < parent_.size(); ++i) parent_[i] = static_cast<int>(i);
-  for (int y = 1; y < height; ++y) {
-    int above = first_run_of_row_[y - 1];
-    const int above_end = first_run_of_row_[y], below_end = first_run_of_row_[y + 1];
-    for (int below = above_end; below < below_end; ++below) {
-      while (above < above_end && runs_[above].right < runs_[below].left) ++above;
-      for (int i = above; i < above_end && runs_[i].left <= runs_[below].right; ++i) {
-        const int a = root(i), b = root(below);
-        parent_[std::max(a, b)] = std::min(a, b);
-      }
+/// The label of the runs that a run touches in the row above, all made one; a new label where it touches none.
+/// @param above  the first run there that does not end before it; moves on from run to run
+int RegionFinder::label_of(const Run& run, int& above, int above_end) {
+  while (above < above_end && runs_[above].right < run.left) ++above;
+  int label = -1;
+  for (int i = above; i < above_end && runs_[i].left <= run.right; ++i) {
+    if (label < 0) label = label_[i];
+    if (label == label_[i]) continue;
+    const int a = root(label), b = root(label_[i]);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+  if (label >= 0) return label;
+  parent_.push_back(static_cast<int>(parent_.size()));
+  return parent_.back();
+}
+
+void RegionFinder::label_runs(int height) {
+  parent_.clear();
+  label_.resize(run_count_);
+  for (int y = 0, above = 0; y < height; ++y) {
+    const int first = first_run_of_row_[y], end = first_run_of_row_[y + 1];
+    for (int i = first; i < end; ++i) label_[i] = label_of(runs_[i], above, first);
+    above = first;
+  }
+}
+
+/// One region to each label that is its own root, in the order of the labels: that of their first pixels.
+void RegionFinder::number_regions(Regions& found) {
+  found.regions.clear();
+  region_of_label_.resize(parent_.size());
+  for (std::size_t label = 0; label < parent_.size(); ++label) {
+    const int parent = parent_[label];
+    if (parent == static_cast<int>(label)) {
+      region_of_label_[label] = static_cast<int>(found.regions.size());
+      found.regions.push_back({std::numeric_limits<int>::max(), -1, -1, -1, 0, 0, 0});
+    } else {
+      region_of_label_[label] = region_of_label_[parent];
     }
   }
 }
 
 void RegionFinder::gather(Regions& found) {
-  found.regions.clear();
-  region_of_run_.resize(runs_.size());
-  for (int i = 0; i < static_cast<int>(runs_.size()); ++i) {
+  number_regions(found);
+  for (std::size_t i = 0; i < run_count_; ++i) {
     const Run& run = runs_[i];
-    const int first = root(i);
-    if (first == i) {
-      region_of_run_[i] = static_cast<int>(found.regions.size());
-      found.regions.push_back({run.left, run.row, run.right - 1, run.row, 0, 0, 0});
-    } else {
-      region_of_run_[i] = region_of_run_[first];
-    }
-    Region& region = found.regions[region_of_run_[i]];
+    Region& region = found.regions[region_of_label_[label_[i]]];
+    if (region.run_count++ == 0) region.top = run.row;
     region.left = std::min<int>(region.left, run.left);
     region.right = std::max(region.right, run.right - 1);
     region.bottom = run.row;
     region.area_px += run.right - run.left;
-    ++region.run_count;
   }
   int next = 0;
   for (Region& region : found.regions) {
@@ -87,16 +125,16 @@ void RegionFinder::gather(Regions& found) {
     next += region.run_count;
     region.run_count = 0;
   }
-  found.runs.resize(runs_.size());
-  for (std::size_t i = 0; i < runs_.size(); ++i) {
-    Region& region = found.regions[region_of_run_[i]];
+  found.runs.resize(run_count_);
+  for (std::size_t i = 0; i < run_count_; ++i) {
+    Region& region = found.regions[region_of_label_[label_[i]]];
     found.runs[region.first_run + region.run_count++] = runs_[i];
   }
 }
 
 void RegionFinder::find(const ImageView<std::uint8_t>& mask, Regions& found) {
   find_runs(mask);
-  join_touching_runs(mask.height);
+  label_runs(mask.height);
   gather(found);
 }
 

@@ -56,14 +56,18 @@ class RegionFinder {
 
  private:
   void find_runs(const ImageView<std::uint8_t>& mask);
-  void join_touching_runs(int height);
+  void label_runs(int height);
+  [[nodiscard]] int label_of(const Run& run, int& above, int above_end);
+  void number_regions(Regions& found);
   void gather(Regions& found);
-  int root(int run);
+  int root(int label);
 
-  std::vector<Run> runs_;
+  std::vector<Run> runs_;  // run_count_ of them, then room for more
+  std::size_t run_count_ = 0;
   std::vector<int> first_run_of_row_;
-  std::vector<int> parent_;
-  std::vector<int> region_of_run_;
+  std::vector<int> label_;   // of each run
+  std::vector<int> parent_;  // of each label, not above it: labels of one region have one root
+  std::vector<int> region_of_label_;
 };
 
 }  // namespace slsd

@@ -3,6 +3,7 @@
 #include "core/decode/grey_moments.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -13,70 +14,59 @@
 namespace slsd {
 namespace {
 
-constexpr float kOutside = -1.F;
 /// What is left of the light at the dark end of a symbol, at the least.
 constexpr float kLeastLight = 0.3F;
 
-constexpr int kLanes = 8;  // rows of the patch are padded to whole vectors
-
-struct Levels {
-  float background, peak, noise;
-};
-
-/// Background and peak as the means of the lowest and the highest quarter of the range: single noisy pixels do not move
-/// them.
-SLSD_CLONES Levels find_levels(const float* patch, int count) {
-  float low = std::numeric_limits<float>::max(), high = 0;
-#pragma omp simd reduction(max : high) reduction(min : low)
-  for (int i = 0; i < count; ++i) {
-    const float value = patch[i];
-    const float inside = value >= 0 ? value : std::numeric_limits<float>::max();
-    high = value > high ? value : high;
-    low = inside < low ? inside : low;
+void spread_edge(const int* left_edge, const int* right_edge, int rows, int* first, int* last) {
+  for (int y = 0; y < rows; ++y) {
+    first[y] = std::min(first[y], left_edge[y]);
+    last[y] = std::max(last[y], right_edge[y]);
   }
-  const float low_limit = low + 0.25F * (high - low), high_limit = high - 0.25F * (high - low);
-  float low_sum = 0, high_sum = 0, high_squares = 0, low_count = 0, high_count = 0;
-#pragma omp simd reduction(+ : low_sum, high_sum, high_squares, low_count, high_count)
-  for (int i = 0; i < count; ++i) {
-    const float value = patch[i];
-    const float is_low = value >= 0 && value <= low_limit ? 1.F : 0.F;
-    const float is_high = value >= high_limit ? 1.F : 0.F;
-    const float above = is_high * (value - high_limit);
-    low_sum += is_low * value;
-    low_count += is_low;
-    high_sum += above;
-    high_squares += above * above;
-    high_count += is_high;
-  }
-  if (low_count == 0 || high_count == 0) return {0, 0, 0};
-  const float mean = high_sum / high_count;
-  return {low_sum / low_count, high_limit + mean, std::sqrt(std::max(0.F, high_squares / high_count - mean * mean))};
 }
 
-/// Moments of the patch's weights about its first column's and row's pixel centres plus the middle; m[p][q] of x^p y^q.
-SLSD_CLONES void sum_moments(const float* patch, int stride, int height, float middle_x, float middle_y, float offset,
-                             float scale, float (&m)[4][4]) {
-  for (int row = 0; row < height; ++row) {
-    const float* pixels = patch + row * stride;
-    float s0 = 0, s1 = 0, s2 = 0, s3 = 0;
-#pragma omp simd reduction(+ : s0, s1, s2, s3)
-    for (int i = 0; i < stride; ++i) {
-      const float x = static_cast<float>(i) - middle_x;
-      const float ramp = (pixels[i] - offset) * scale;
-      const float lower = ramp > 0 ? ramp : 0.F;
-      const float w = lower < 1 ? lower : 1.F;
-      const float wx = w * x, wxx = wx * x;
-      s0 += w;
-      s1 += wx;
-      s2 += wxx;
-      s3 += wxx * x;
+struct PatchPlace {
+  int left, top, stride, height;
+};
+
+using Words [[gnu::vector_size(2 * kLanes)]] = std::uint16_t;
+using Bytes [[gnu::vector_size(2 * kLanes)]] = std::uint8_t;
+
+// The compiler converts words in one step, bytes one by one.
+inline __attribute__((always_inline)) Words load_pixels(const std::uint16_t* pixels) {
+  Words words;
+  std::memcpy(&words, pixels, sizeof words);
+  return words;
+}
+inline __attribute__((always_inline)) Words load_pixels(const std::uint8_t* pixels) {
+  Bytes bytes{};
+  std::memcpy(&bytes, pixels, kLanes);
+  static_assert(std::endian::native == std::endian::little);
+  return reinterpret_cast<Words>(
+      __builtin_shufflevector(bytes, Bytes{}, 0, 16, 1, 16, 2, 16, 3, 16, 4, 16, 5, 16, 6, 16, 7, 16));
+}
+
+/// Grey values from first[y] to last[y] of each row, kOutside elsewhere; the patch lies in the frame, padding and all.
+template <class T>
+inline __attribute__((always_inline)) void copy_rows_of(const ImageView<T>& frame, const PatchPlace& place,
+                                                        const int* first, const int* last, float* patch) {
+  constexpr IntLanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
+  for (int y = 0; y < place.height; ++y) {
+    const T* row = frame.row(place.top + y) + place.left;
+    for (int x = 0; x < place.stride; x += kLanes, patch += kLanes) {
+      const IntLanes at = kLane + x;
+      const Lanes grey = __builtin_convertvector(__builtin_convertvector(load_pixels(row + x), IntLanes), Lanes);
+      const Lanes value = (at >= first[y]) & (at <= last[y]) ? grey : Lanes{} + kOutside;
+      std::memcpy(patch, &value, sizeof value);
     }
-    const float y = static_cast<float>(row) - middle_y;
-    m[0][0] += s0, m[1][0] += s1, m[2][0] += s2, m[3][0] += s3;
-    m[0][1] += y * s0, m[1][1] += y * s1, m[2][1] += y * s2;
-    m[0][2] += y * y * s0, m[1][2] += y * y * s1;
-    m[0][3] += y * y * y * s0;
   }
+}
+SLSD_CLONES void copy_rows(const ImageView<std::uint8_t>& frame, const PatchPlace& place, const int* first,
+                           const int* last, float* patch) {
+  copy_rows_of(frame, place, first, last, patch);
+}
+SLSD_CLONES void copy_rows(const ImageView<std::uint16_t>& frame, const PatchPlace& place, const int* first,
+                           const int* last, float* patch) {
+  copy_rows_of(frame, place, first, last, patch);
 }
 
 int padded(int width) {
@@ -84,7 +74,8 @@ int padded(int width) {
 }
 
 /// Raw moments about the patch's middle, to central ones over the weight.
-GreyMoments central(const float (&m)[4][4], double middle_x, double middle_y) {
+GreyMoments central(const RawMoments& raw, double middle_x, double middle_y) {
+  const auto& m = raw.m;
   GreyMoments g;
   if (m[0][0] <= 0) return g;
   const double n = 1 / static_cast<double>(m[0][0]);
@@ -105,19 +96,35 @@ GreyMoments central(const float (&m)[4][4], double middle_x, double middle_y) {
 
 }  // namespace
 
+/// In each row of the patch, from the leftmost to the rightmost pixel within the margin of the region.
+void GreyMomentMeter::follow_edge(const Region& region, std::span<const Run> runs) {
+  const auto rows = static_cast<std::size_t>(region.height_px());
+  left_edge_.assign(rows, width_);
+  right_edge_.assign(rows, -1);
+  for (const Run& run : runs) {
+    int& left_edge = left_edge_[run.row - region.top];
+    int& right_edge = right_edge_[run.row - region.top];
+    left_edge = std::min(left_edge, run.left - region.left);
+    right_edge = std::max(right_edge, run.right - 1 - region.left + 2 * margin_px_);
+  }
+  first_.assign(static_cast<std::size_t>(height_), width_);
+  last_.assign(static_cast<std::size_t>(height_), -1);
+  for (int shift = 0; shift <= 2 * margin_px_; ++shift) {
+    spread_edge(left_edge_.data(), right_edge_.data(), static_cast<int>(rows), first_.data() + shift,
+                last_.data() + shift);
+  }
+}
+
 template <class T>
 void GreyMomentMeter::copy_patch(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
   left_ = region.left - margin_px_, top_ = region.top - margin_px_;
   width_ = region.width_px() + 2 * margin_px_;
   height_ = region.height_px() + 2 * margin_px_;
   stride_ = padded(width_);
-  first_.assign(static_cast<std::size_t>(height_), width_);
-  last_.assign(static_cast<std::size_t>(height_), -1);
-  for (const Run& run : runs) {
-    for (int y = run.row - top_ - margin_px_; y <= run.row - top_ + margin_px_; ++y) {
-      first_[y] = std::min(first_[y], run.left - left_ - margin_px_);
-      last_[y] = std::max(last_[y], run.right - 1 - left_ + margin_px_);
-    }
+  follow_edge(region, runs);
+  if (left_ >= 0 && top_ >= 0 && left_ + stride_ <= frame.width && top_ + height_ <= frame.height) {
+    patch_.resize(static_cast<std::size_t>(stride_) * height_);
+    return copy_rows(frame, {left_, top_, stride_, height_}, first_.data(), last_.data(), patch_.data());
   }
   patch_.assign(static_cast<std::size_t>(stride_) * height_, kOutside);
   for (int y = 0; y < height_; ++y) {
@@ -152,29 +159,27 @@ void GreyMomentMeter::copy_cell(const ImageView<T>& frame, const Eigen::Vector2f
 }
 
 void GreyMomentMeter::level_light(const Eigen::Vector2f& centre_px, const Eigen::Vector2f& shading) {
-  const float background = find_levels(patch_.data(), stride_ * height_).background;
+  PatchLevels levels;
+  find_levels(patch_.data(), stride_ * height_, levels);
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
       float& value = patch_[y * stride_ + x];
       if (value < 0) continue;
       const float light = 1 + shading.x() * (static_cast<float>(left_ + x) - centre_px.x()) +
                           shading.y() * (static_cast<float>(top_ + y) - centre_px.y());
-      value = std::max(0.F, background + (value - background) / std::max(light, kLeastLight));
+      value = std::max(0.F, levels.background + (value - levels.background) / std::max(light, kLeastLight));
     }
   }
 }
 
-GreyMoments GreyMomentMeter::weigh_patch() const {
-  const Levels levels = find_levels(patch_.data(), stride_ * height_);
-  const float range = levels.peak - levels.background;
-  if (!(range > 0)) return {};
-
-  const float offset = levels.background + kRampStart * range;
-  const float scale = 1.F / ((kRampEnd - kRampStart) * range);
+GreyMoments GreyMomentMeter::moments_of_patch() const {
+  PatchLevels levels;
+  find_levels(patch_.data(), stride_ * height_, levels);
+  if (!(levels.peak > levels.background)) return {};
   const float middle_x = 0.5F * static_cast<float>(width_ - 1), middle_y = 0.5F * static_cast<float>(height_ - 1);
-  float m[4][4] = {};
-  sum_moments(patch_.data(), stride_, height_, middle_x, middle_y, offset, scale, m);
-  GreyMoments moments = central(m, static_cast<float>(left_) + middle_x, static_cast<float>(top_) + middle_y);
+  RawMoments raw;
+  sum_moments(patch_.data(), stride_, height_, middle_x, middle_y, levels, raw);
+  GreyMoments moments = central(raw, static_cast<float>(left_) + middle_x, static_cast<float>(top_) + middle_y);
   moments.noise = levels.noise;
   moments.background = levels.background;
   moments.peak = levels.peak;
@@ -190,7 +195,7 @@ GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& re
                                  0.5F * static_cast<float>(region.top + region.bottom));
     level_light(middle, shading);
   }
-  return weigh_patch();
+  return moments_of_patch();
 }
 
 template <class T>
@@ -199,7 +204,7 @@ GreyMoments GreyMomentMeter::measure_cell(const ImageView<T>& frame, const Eigen
                                           const Eigen::Vector2f& shading) {
   copy_cell(frame, centre_px, lattice_frame, half_px);
   level_light(centre_px, shading);
-  return weigh_patch();
+  return moments_of_patch();
 }
 
 using View8 = ImageView<std::uint8_t>;

@@ -8,13 +8,10 @@
 
 #include "core/decode/find_regions.hpp"
 #include "core/decode/lattice_frame.hpp"
+#include "core/decode/weigh_patch.hpp"
 #include "core/image.hpp"
 
 namespace slsd {
-
-/// Where the soft threshold begins and ends, between a region's background and its peak.
-inline constexpr float kRampStart = 0.2F;
-inline constexpr float kRampEnd = 0.65F;
 
 /// What a region weighs: moments of its grey values through a soft threshold, a ramp from 20 to 65 % of the way from
 /// the region's own background to its own peak. A pixel on the edge counts by how much of it is lit, so the centre is
@@ -50,17 +47,19 @@ class GreyMomentMeter {
                                          const Eigen::Vector2f& shading);
 
  private:
+  void follow_edge(const Region& region, std::span<const Run> runs);
   template <class T>
   void copy_patch(const ImageView<T>& frame, const Region& region, std::span<const Run> runs);
   template <class T>
   void copy_cell(const ImageView<T>& frame, const Eigen::Vector2f& centre_px, const LatticeFrame& lattice_frame,
                  float half_px);
   void level_light(const Eigen::Vector2f& centre_px, const Eigen::Vector2f& shading);
-  [[nodiscard]] GreyMoments weigh_patch() const;
+  [[nodiscard]] GreyMoments moments_of_patch() const;
 
   int margin_px_;
   int left_ = 0, top_ = 0, width_ = 0, height_ = 0, stride_ = 0;  // of the patch
-  std::vector<int> first_, last_;                                 // extent of the region in each row of the patch
+  std::vector<int> left_edge_, right_edge_;                       // of the region in each of its rows
+  std::vector<int> first_, last_;                                 // the same in each row of the patch, with the margin
   std::vector<float> patch_;                                      // grey values; kOutside where they belong to others
 };
 

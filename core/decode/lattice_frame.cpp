@@ -20,7 +20,7 @@ Eigen::Vector2d projector_pixel(const CalibratedCamera& camera, const Lens& proj
                            Eigen::Vector3d(direction.x() * depth_mm, direction.y() * depth_mm, depth_mm));
 }
 
-LatticeFrame frame_at(const CalibratedCamera& camera, const Lens& projector, double x, double y, double depth_mm) {
+ExpectedFrame frame_at(const CalibratedCamera& camera, const Lens& projector, double x, double y, double depth_mm) {
   constexpr double kStep = 2;
   Eigen::Matrix2d projector_from_camera;
   projector_from_camera.col(0) = (projector_pixel(camera, projector, x + kStep, y, depth_mm) -
@@ -29,11 +29,8 @@ LatticeFrame frame_at(const CalibratedCamera& camera, const Lens& projector, dou
   projector_from_camera.col(1) = (projector_pixel(camera, projector, x, y + kStep, depth_mm) -
                                   projector_pixel(camera, projector, x, y - kStep, depth_mm)) /
                                  (2 * kStep);
-  return projector_from_camera.inverse().cast<float>();
-}
-
-float scale_of(const LatticeFrame& frame) {
-  return std::sqrt(std::abs(frame.determinant()));
+  return {projector_from_camera.inverse().cast<float>(), projector_from_camera.cast<float>(),
+          static_cast<float>(1 / std::sqrt(std::abs(projector_from_camera.determinant())))};
 }
 
 }  // namespace
@@ -46,12 +43,9 @@ ExpectedFrames::ExpectedFrames(const CalibratedCamera& camera, const Lens& proje
       frames_.push_back(frame_at(camera, projector, (column + 0.5) * kSpacingPx, (row + 0.5) * kSpacingPx, depth_mm));
     }
   }
-  middle_scale_ = scale_of(frames_[frames_.size() / 2]);
-  smallest_scale_ = middle_scale_;
-  for (const LatticeFrame& frame : frames_) smallest_scale_ = std::min(smallest_scale_, scale_of(frame));
 }
 
-const LatticeFrame& ExpectedFrames::at(float x, float y) const {
+const ExpectedFrame& ExpectedFrames::at(float x, float y) const {
   const int column = std::clamp(static_cast<int>(x) / kSpacingPx, 0, columns_ - 1);
   const int row = std::clamp(static_cast<int>(y) / kSpacingPx, 0, rows_ - 1);
   return frames_[static_cast<std::size_t>(row) * columns_ + column];

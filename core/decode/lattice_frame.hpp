@@ -14,6 +14,13 @@ namespace slsd {
 /// (first column) and one down (second column).
 using LatticeFrame = Eigen::Matrix2f;
 
+/// A frame and what follows from it.
+struct ExpectedFrame {
+  LatticeFrame frame;
+  Eigen::Matrix2f inverse;  ///< projector px for one camera px
+  float scale;              ///< camera px for one projector px, geometric mean of both axes
+};
+
 /// The frames that the calibration lets one expect: those of a surface that faces the camera in the middle of the
 /// working range. They hardly depend on the depth; what turns them is the tilt of the surface.
 /// @thread reentrant
@@ -22,17 +29,12 @@ class ExpectedFrames {
   ExpectedFrames(const CalibratedCamera& camera, const Lens& projector, double depth_mm);
 
   /// @param camera_px  inside the camera's image
-  [[nodiscard]] const LatticeFrame& at(float x, float y) const;
-
-  /// Camera pixels for one projector pixel, the smallest over the image.
-  [[nodiscard]] float smallest_scale() const { return smallest_scale_; }
-  /// The same in the middle of the image.
-  [[nodiscard]] float middle_scale() const { return middle_scale_; }
+  [[nodiscard]] const ExpectedFrame& at(float x, float y) const;
+  [[nodiscard]] const ExpectedFrame& in_the_middle() const { return frames_[frames_.size() / 2]; }
 
  private:
   int columns_, rows_;
-  float smallest_scale_, middle_scale_;
-  std::vector<LatticeFrame> frames_;
+  std::vector<ExpectedFrame> frames_;
 };
 
 }  // namespace slsd

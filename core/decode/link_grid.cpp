@@ -41,12 +41,12 @@ std::optional<Eigen::Vector2f> measured_step(const std::vector<GridNode>& nodes,
   return inwards == forth ? step : (-step).eval();
 }
 
-/// Whether a neighbour is so near to where the frame puts it that no other can be nearer.
-bool is_evident(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
+/// Whether a node is so near to where the frame puts the neighbour that no other can be nearer.
+bool is_evident(const std::vector<GridNode>& nodes, std::size_t from, std::int32_t other, Direction direction,
                 const Eigen::Matrix2f& cells_from_camera) {
   constexpr float kEvident = 0.15F;
-  return (cells_from_camera * link_vector(nodes, from, direction) - step(direction)).squaredNorm() <
-         kEvident * kEvident;
+  const Eigen::Vector2f there = nodes[other].centre_px - nodes[from].centre_px;
+  return (cells_from_camera * there - step(direction)).squaredNorm() < kEvident * kEvident;
 }
 
 }  // namespace
@@ -73,8 +73,8 @@ void GridLinker::sort_into_buckets(const std::vector<GridNode>& nodes) {
     high = high.cwiseMax(node.centre_px);
     step_px = std::max({step_px, node.frame.col(0).norm(), node.frame.col(1).norm()});
   }
-  // A bucket as wide as the search: the neighbours of a place are in three by three of them.
-  bucket_px_ = std::max(4.F, options_.pitch_px * step_px * options_.search_radius);
+  // A bucket as wide as a cell: what is near a place is in two by two of them at the most.
+  bucket_px_ = std::max(4.F, options_.pitch_px * step_px);
   origin_px_ = low;
   columns_ = static_cast<int>((high.x() - low.x()) / bucket_px_) + 1;
   rows_ = static_cast<int>((high.y() - low.y()) / bucket_px_) + 1;
@@ -86,8 +86,9 @@ void GridLinker::sort_into_buckets(const std::vector<GridNode>& nodes) {
   for (const GridNode& node : nodes) ++first_of_bucket_[bucket(node) + 1];
   for (std::size_t i = 1; i < first_of_bucket_.size(); ++i) first_of_bucket_[i] += first_of_bucket_[i - 1];
   in_buckets_.resize(nodes.size());
-  for (std::size_t i = nodes.size(); i-- > 0;)
-    in_buckets_[--first_of_bucket_[bucket(nodes[i]) + 1]] = static_cast<std::int32_t>(i);
+  for (std::size_t i = nodes.size(); i-- > 0;) {
+    in_buckets_[--first_of_bucket_[bucket(nodes[i]) + 1]] = {nodes[i].centre_px, static_cast<std::int32_t>(i)};
+  }
   // The counting sort has moved each bucket's end to its beginning.
   first_of_bucket_.erase(first_of_bucket_.begin());
   first_of_bucket_.push_back(static_cast<std::int32_t>(nodes.size()));
@@ -97,32 +98,49 @@ std::int32_t GridLinker::nearest(const std::vector<GridNode>& nodes, std::size_t
                                  const Eigen::Matrix2f& cells_from_camera, float radius) const {
   const GridNode& node = nodes[from];
   const Eigen::Vector2f target = node.centre_px + node.frame * (options_.pitch_px * step(direction));
-  const Eigen::Vector2f at = (target - origin_px_) / bucket_px_;
-  const int column = static_cast<int>(std::floor(at.x())), row = static_cast<int>(std::floor(at.y()));
+  // An ellipse in the image; the frame's columns bound its box.
+  const Eigen::Vector2f reach = radius * options_.pitch_px * node.frame.rowwise().norm();
+  const Eigen::Array2f low = (target - reach - origin_px_) / bucket_px_,
+                       high = (target + reach - origin_px_) / bucket_px_;
+  const int left = std::max(static_cast<int>(low.x()), 0), right = std::min(static_cast<int>(high.x()), columns_ - 1);
+  const int bottom = std::min(static_cast<int>(high.y()), rows_ - 1);
   std::int32_t best = -1;
   float best_squared = radius * radius;
-  for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows_ - 1); ++r) {
-    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns_ - 1); ++c) {
-      const int bucket = r * columns_ + c;
-      for (int i = first_of_bucket_[bucket]; i < first_of_bucket_[bucket + 1]; ++i) {
-        const std::int32_t other = in_buckets_[i];
-        const float squared = (cells_from_camera * (nodes[other].centre_px - target)).squaredNorm();
-        if (squared < best_squared && other != static_cast<std::int32_t>(from)) best_squared = squared, best = other;
-      }
+  for (int row = std::max(static_cast<int>(low.y()), 0); row <= bottom && left <= right; ++row) {
+    const std::int32_t end = first_of_bucket_[row * columns_ + right + 1];
+    for (std::int32_t i = first_of_bucket_[row * columns_ + left]; i < end; ++i) {
+      const auto& [centre_px, other] = in_buckets_[i];
+      const float squared = (cells_from_camera * (centre_px - target)).squaredNorm();
+      if (squared < best_squared && other != static_cast<std::int32_t>(from)) best_squared = squared, best = other;
     }
   }
   return best;
 }
 
-void GridLinker::find_mutual(std::vector<GridNode>& nodes, float radius) {
-  chosen_.resize(nodes.size());
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const Eigen::Matrix2f cells_from_camera = nodes[i].frame.inverse() / options_.pitch_px;
-    for (const Direction d : kDirections) {
-      const bool kept = nodes[i].links[d] >= 0 && is_evident(nodes, i, d, cells_from_camera);
-      chosen_[i][d] = kept ? nodes[i].links[d] : nearest(nodes, i, d, cells_from_camera, radius);
-    }
+/// A node that is likely to be the neighbour: the one linked before, or the one that the links beside lead to.
+std::int32_t GridLinker::likely(const std::vector<GridNode>& nodes, std::size_t from, Direction direction) const {
+  if (nodes[from].links[direction] >= 0) return nodes[from].links[direction];
+  const Direction aside = direction == kDown ? kLeft : kUp;
+  const std::int32_t beside = chosen_[from][aside];
+  const std::int32_t corner = beside >= 0 ? chosen_[beside][direction] : -1;
+  return corner >= 0 ? chosen_[corner][opposite(aside)] : -1;
+}
+
+void GridLinker::choose(std::vector<GridNode>& nodes, std::size_t from, float radius) {
+  const Eigen::Matrix2f cells_from_camera = nodes[from].frame.inverse() / options_.pitch_px;
+  for (const Direction d : {kUp, kLeft, kRight, kDown}) {
+    std::int32_t other = likely(nodes, from, d);
+    if (other < 0 || !is_evident(nodes, from, other, d, cells_from_camera))
+      other = nearest(nodes, from, d, cells_from_camera, radius);
+    chosen_[from][d] = other;
+    if (other >= 0 && nodes[other].links[opposite(d)] < 0)
+      nodes[other].links[opposite(d)] = static_cast<std::int32_t>(from);
   }
+}
+
+void GridLinker::find_mutual(std::vector<GridNode>& nodes, float radius) {
+  chosen_.assign(nodes.size(), {-1, -1, -1, -1});
+  for (std::size_t i = 0; i < nodes.size(); ++i) choose(nodes, i, radius);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     for (const Direction d : kDirections) {
       const std::int32_t other = chosen_[i][d];

@@ -63,6 +63,8 @@ class GridLinker {
   void sort_into_buckets(const std::vector<GridNode>& nodes);
   [[nodiscard]] std::int32_t nearest(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
                                      const Eigen::Matrix2f& cells_from_camera, float radius) const;
+  [[nodiscard]] std::int32_t likely(const std::vector<GridNode>& nodes, std::size_t from, Direction direction) const;
+  void choose(std::vector<GridNode>& nodes, std::size_t from, float radius);
   void find_mutual(std::vector<GridNode>& nodes, float radius);
   void break_inconsistent(std::vector<GridNode>& nodes);
 
@@ -70,7 +72,12 @@ class GridLinker {
   float bucket_px_ = 1;
   Eigen::Vector2f origin_px_{0, 0};
   int columns_ = 0, rows_ = 0;
-  std::vector<std::int32_t> first_of_bucket_, in_buckets_;
+  struct Place {
+    Eigen::Vector2f centre_px;
+    std::int32_t node;
+  };
+  std::vector<std::int32_t> first_of_bucket_;
+  std::vector<Place> in_buckets_;
   std::vector<std::array<std::int32_t, 4>> chosen_;
   std::vector<std::array<bool, 4>> inconsistent_;
   std::vector<std::uint8_t> all_trusted_;

@@ -77,14 +77,14 @@ Decoder::Pipeline::Pipeline(const Pattern& pattern, const Calibration& calibrati
       options_(options),
       paper_(std::move(paper)),
       expected_(camera_, calibration.projector, std::sqrt(options.depth_min_mm * options.depth_max_mm)),
-      prototypes_as_expected_(prototypes_for(pattern, expected_.middle_scale(), kExpectedFrameError)),
-      prototypes_as_measured_(prototypes_for(pattern, expected_.middle_scale(), kMeasuredFrameError)),
+      prototypes_as_expected_(prototypes_for(pattern, expected_.in_the_middle().scale, kExpectedFrameError)),
+      prototypes_as_measured_(prototypes_for(pattern, expected_.in_the_middle().scale, kMeasuredFrameError)),
       cells_(pattern, with_centroids_of(options.centre, pattern, prototypes_as_measured_), calibration.projector),
       camera_rays_(camera_.lens),
       epipolar_gate_(camera_, calibration.projector, options.depth_min_mm, options.depth_max_mm),
       triangulator_(camera_, calibration.projector),
-      binarizer_(binarize_options(pattern, expected_.middle_scale())),
-      meter_(margin_px(pattern.options.spacing_px, expected_.middle_scale())),
+      binarizer_(binarize_options(pattern, expected_.in_the_middle().scale)),
+      meter_(margin_px(pattern.options.spacing_px, expected_.in_the_middle().scale)),
       linker_({.pitch_px = static_cast<float>(pattern.pitch_px())}),
       window_decoder_(pattern, {.rows = pattern.whole_rows(), .columns = pattern.whole_columns()},
                       radius_of(pattern.array)),
@@ -117,11 +117,9 @@ void Decoder::Pipeline::binarize(const GreyView& frame) {
 void Decoder::Pipeline::find_regions(const GreyView& frame) {
   region_finder_.find(mask_.view(), regions_);
   if (options_.binarize == Method::kPaper) return;
-  for (const float level : kSplitLevels) {
-    splitter_.split_all(frame, level, regions_, [this](const Region& region) {
-      return region.area_px <= kSplitAreaMaxPx && judge_size(region) == RegionStatus::kTooLarge;
-    });
-  }
+  splitter_.split_all(frame, kSplitLevels, regions_, [this](const Region& region) {
+    return region.area_px <= kSplitAreaMaxPx && judge_size(region) == RegionStatus::kTooLarge;
+  });
 }
 
 RegionStatus Decoder::Pipeline::judge_size(const Region& region) const {
@@ -129,14 +127,13 @@ RegionStatus Decoder::Pipeline::judge_size(const Region& region) const {
     return RegionStatus::kTouchesBorder;
   }
   const Eigen::Vector2f middle = region.middle_px();
-  const float square_px = std::abs(expected_.at(middle.x(), middle.y()).determinant());
+  const float scale = expected_.at(middle.x(), middle.y()).scale, square_px = scale * scale;
   const float size = static_cast<float>(pattern_.options.symbol_size_px),
               pitch = static_cast<float>(pattern_.pitch_px());
   const float area = static_cast<float>(region.area_px);
   if (region.area_px < kAreaMinPx || area < kAreaMin * size * size * square_px) return RegionStatus::kTooSmall;
   const float extent = static_cast<float>(std::max(region.width_px(), region.height_px()));
-  const bool too_large =
-      area > kAreaMax * pitch * pitch * square_px || extent > kExtentMax * pitch * std::sqrt(square_px);
+  const bool too_large = area > kAreaMax * pitch * pitch * square_px || extent > kExtentMax * pitch * scale;
   return too_large ? RegionStatus::kTooLarge : RegionStatus::kNoNeighbour;
 }
 
@@ -165,14 +162,15 @@ void Decoder::Pipeline::classify() {
   const float size = static_cast<float>(pattern_.options.symbol_size_px);
   seen_.shapes.resize(seen_.size());
   seen_.nodes.assign(seen_.size(), {});
-  if (options_.classify == Method::kPaper) paper_->classify(size * expected_.middle_scale(), seen_);
+  if (options_.classify == Method::kPaper) paper_->classify(size * expected_.in_the_middle().scale, seen_);
   for (std::size_t i = 0; i < seen_.size(); ++i) {
     const GreyMoments& moments = seen_.moments[i];
     GridNode& node = seen_.nodes[i];
-    node.frame = expected_.at(moments.x, moments.y);
+    const ExpectedFrame& expected = expected_.at(moments.x, moments.y);
+    node.frame = expected.frame;
     node.centre_px = {moments.x, moments.y};
     if (options_.classify == Method::kDefault) {
-      seen_.shapes[i] = slsd::classify(shape_features(moments, node.frame.inverse(), size), prototypes_as_expected_,
+      seen_.shapes[i] = slsd::classify(shape_features(moments, expected.inverse, size), prototypes_as_expected_,
                                        kExpectedDistanceMax);
     }
     if (seen_.shapes[i].letter >= 0)

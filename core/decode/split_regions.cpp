@@ -6,6 +6,16 @@
 
 namespace slsd {
 
+/// Appends the parts of a region and empties it; leaves it alone where the level does not part it.
+bool RegionSplitter::split(const GreyView& frame, float level, std::size_t index, Regions& regions) {
+  const Region region = regions.regions[index];
+  std::visit([&](const auto& view) { find_parts(view, region, regions.runs_of(region), level); }, frame);
+  if (parts_.regions.size() < 2) return false;
+  for (const Region& part : parts_.regions) regions.append(part, parts_.runs_of(part));
+  regions.regions[index].area_px = 0;
+  return true;
+}
+
 template <class T>
 void RegionSplitter::find_parts(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
                                 float level) {

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstring>
+
+namespace slsd {
+
+/// Eight numbers that are reckoned with at once: one register of AVX2, two of SSE2.
+inline constexpr int kLanes = 8;
+using Lanes [[gnu::vector_size(32)]] = float;
+using IntLanes [[gnu::vector_size(32)]] = int;
+
+// Never passed by value between functions that are not inlined: how that is done depends on the processor.
+static inline __attribute__((always_inline)) void load(const float* from, Lanes& to) {
+  std::memcpy(&to, from, sizeof to);
+}
+
+static inline __attribute__((always_inline)) float sum_of(const Lanes& lanes) {
+  return ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]));
+}
+
+}  // namespace slsd

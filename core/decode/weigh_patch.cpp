@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/weigh_patch.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/decode/clones.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
+constexpr float kGreatest = std::numeric_limits<float>::max();
+
+}  // namespace
+
+SLSD_CLONES void find_levels(const float* patch, int count, PatchLevels& levels) {
+  const Lanes zero{};
+  Lanes lowest = zero + kGreatest, highest = zero;
+  for (int i = 0; i < count; i += kLanes) {
+    Lanes value;
+    load(patch + i, value);
+    const Lanes inside = value < zero ? zero + kGreatest : value;
+    highest = value > highest ? value : highest;
+    lowest = inside < lowest ? inside : lowest;
+  }
+  float low = lowest[0], high = highest[0];
+  for (int lane = 1; lane < kLanes; ++lane) low = std::min(low, lowest[lane]), high = std::max(high, highest[lane]);
+
+  const Lanes low_limit = zero + (low + 0.25F * (high - low)), high_limit = zero + (high - 0.25F * (high - low));
+  const Lanes one = zero + 1;
+  Lanes low_sum{}, low_count{}, high_sum{}, high_squares{}, high_count{};
+  for (int i = 0; i < count; i += kLanes) {
+    Lanes value;
+    load(patch + i, value);
+    const Lanes is_low = (value >= zero) & (value <= low_limit) ? one : zero;
+    const Lanes is_high = value >= high_limit ? one : zero;
+    const Lanes above = is_high * (value - high_limit);
+    low_sum += is_low * value;
+    low_count += is_low;
+    high_sum += above;
+    high_squares += above * above;
+    high_count += is_high;
+  }
+  levels = {};
+  const float lows = sum_of(low_count), highs = sum_of(high_count);
+  if (lows == 0 || highs == 0) return;
+  const float mean = sum_of(high_sum) / highs;
+  levels.background = sum_of(low_sum) / lows;
+  levels.peak = high_limit[0] + mean;
+  levels.noise = std::sqrt(std::max(0.F, sum_of(high_squares) / highs - mean * mean));
+}
+
+SLSD_CLONES void sum_moments(const float* patch, int stride, int height, float middle_x, float middle_y,
+                             const PatchLevels& levels, RawMoments& moments) {
+  const float range = levels.peak - levels.background;
+  const Lanes zero{}, one = zero + 1;
+  const Lanes offset = zero + (levels.background + kRampStart * range);
+  const Lanes scale = zero + 1 / ((kRampEnd - kRampStart) * range);
+  auto& m = moments.m;
+  // Sums over y stay in their columns; only at the end of a column of lanes they are taken over x.
+  for (int left = 0; left < stride; left += kLanes) {
+    Lanes s0{}, s1{}, s2{}, s3{};
+    for (int row = 0; row < height; ++row) {
+      Lanes w;
+      load(patch + row * stride + left, w);
+      w = (w - offset) * scale;
+      w = w > zero ? w : zero;
+      w = w < one ? w : one;
+      const Lanes y = zero + (static_cast<float>(row) - middle_y);
+      const Lanes wy = w * y, wyy = wy * y;
+      s0 += w;
+      s1 += wy;
+      s2 += wyy;
+      s3 += wyy * y;
+    }
+    const Lanes x = kLane + (static_cast<float>(left) - middle_x);
+    const Lanes x0 = s0 * x, x1 = s1 * x, x00 = x0 * x;
+    m[0][0] += sum_of(s0), m[0][1] += sum_of(s1), m[0][2] += sum_of(s2), m[0][3] += sum_of(s3);
+    m[1][0] += sum_of(x0), m[1][1] += sum_of(x1), m[1][2] += sum_of(s2 * x);
+    m[2][0] += sum_of(x00), m[2][1] += sum_of(x1 * x);
+    m[3][0] += sum_of(x00 * x);
+  }
+}
+
+}  // namespace slsd

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include "core/decode/lanes.hpp"
+
+namespace slsd {
+
+/// Where the soft threshold begins and ends, between a region's background and its peak.
+inline constexpr float kRampStart = 0.2F;
+inline constexpr float kRampEnd = 0.65F;
+
+/// Pixels of a patch that belong to others, below every grey value.
+inline constexpr float kOutside = -1;
+
+/// Background and peak of a patch as the means of the lowest and the highest quarter of its range: single noisy pixels
+/// do not move them.
+struct PatchLevels {
+  float background = 0, peak = 0;
+  float noise = 0;  ///< one standard deviation of the highest quarter
+};
+
+/// @param patch  grey values or kOutside
+/// @param count  a multiple of kLanes
+/// @thread reentrant
+void find_levels(const float* patch, int count, PatchLevels& levels);
+
+/// Raw moments of a patch, the sum of w x^p y^q in [p][q], w the soft threshold's weight of a pixel, 0 to 1.
+struct RawMoments {
+  float m[4][4] = {};
+};
+
+/// @param stride              columns of the patch, a multiple of kLanes
+/// @param middle_x, middle_y  origin of x and y, from the first pixel's centre
+/// @thread reentrant
+void sum_moments(const float* patch, int stride, int height, float middle_x, float middle_y, const PatchLevels& levels,
+                 RawMoments& moments);
+
+}  // namespace slsd
