@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -22,28 +23,33 @@ int mirrored(int i, int size) {
 }
 
 template <class T>
-void add_columns(const Image<T>& mosaic, int y, std::vector<std::uint32_t>& sums) {
-  const T* above = mosaic.row(mirrored(y - 1, mosaic.height()));
+void add_columns(const ImageView<T>& mosaic, int y, std::span<std::uint32_t> sums) {
+  const T* above = mosaic.row(mirrored(y - 1, mosaic.height));
   const T* here = mosaic.row(y);
-  const T* below = mosaic.row(mirrored(y + 1, mosaic.height()));
-  for (int x = 0; x < mosaic.width(); ++x) sums[x] = above[x] + 2u * here[x] + below[x];
+  const T* below = mosaic.row(mirrored(y + 1, mosaic.height));
+  for (int x = 0; x < mosaic.width; ++x) sums[x] = above[x] + 2u * here[x] + below[x];
 }
 
 template <class T>
-Image<T> binomial(const Image<T>& mosaic) {
-  const int width = mosaic.width();
-  Image<T> grey(width, mosaic.height());
-  std::vector<std::uint32_t> sums(static_cast<std::size_t>(width));
+void binomial(const ImageView<T>& mosaic, Image<T>& grey, std::span<std::uint32_t> sums) {
+  const int width = mosaic.width;
   const auto blend = [&](int left, int x, int right) {
     return static_cast<T>((sums[left] + 2 * sums[x] + sums[right] + 8) / 16);
   };
-  for (int y = 0; y < mosaic.height(); ++y) {
+  for (int y = 0; y < mosaic.height; ++y) {
     add_columns(mosaic, y, sums);
     T* row = grey.row(y);
     for (int x = 1; x + 1 < width; ++x) row[x] = blend(x - 1, x, x + 1);
     row[0] = blend(1, 0, 1);
     row[width - 1] = blend(width - 2, width - 1, width - 2);
   }
+}
+
+template <class T>
+Image<T> binomial(const Image<T>& mosaic) {
+  Image<T> grey(mosaic.width(), mosaic.height());
+  std::vector<std::uint32_t> sums(static_cast<std::size_t>(mosaic.width()));
+  binomial<T>(mosaic.view(), grey, sums);
   return grey;
 }
 
@@ -67,6 +73,12 @@ Grey8 grey_from_mosaic(const Grey8& mosaic) {
 }
 Grey16 grey_from_mosaic(const Grey16& mosaic) {
   return binomial(mosaic);
+}
+void grey_from_mosaic(const ImageView<std::uint8_t>& mosaic, Grey8& grey, std::span<std::uint32_t> sums) {
+  binomial(mosaic, grey, sums);
+}
+void grey_from_mosaic(const ImageView<std::uint16_t>& mosaic, Grey16& grey, std::span<std::uint32_t> sums) {
+  binomial(mosaic, grey, sums);
 }
 
 }  // namespace slsd

@@ -2,7 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include "core/image.hpp"
@@ -30,5 +32,11 @@ enum class BayerPattern { kNone, kRggb, kBggr, kGrbg, kGbrg };
 /// @thread reentrant
 [[nodiscard]] Grey8 grey_from_mosaic(const Grey8& mosaic);
 [[nodiscard]] Grey16 grey_from_mosaic(const Grey16& mosaic);
+
+/// The same into an image that there is, without an allocation.
+/// @param grey  of the mosaic's size
+/// @param sums  room for a number to a column
+void grey_from_mosaic(const ImageView<std::uint8_t>& mosaic, Grey8& grey, std::span<std::uint32_t> sums);
+void grey_from_mosaic(const ImageView<std::uint16_t>& mosaic, Grey16& grey, std::span<std::uint32_t> sums);
 
 }  // namespace slsd
