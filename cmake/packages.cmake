@@ -11,6 +11,7 @@ find_package(tomlplusplus REQUIRED)
 find_package(PNG REQUIRED)
 find_package(TIFF 4.5 REQUIRED)
 pkg_check_modules(systemd REQUIRED IMPORTED_TARGET libsystemd)
+pkg_check_modules(v4l REQUIRED IMPORTED_TARGET libv4l2 libv4lconvert)
 
 # Debian ships OpenCV's CMake package only with all of OpenCV; these are the parts that slsd uses.
 find_path(OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)

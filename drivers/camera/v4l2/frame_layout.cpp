@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/v4l2/frame_layout.hpp"
+
+#include <linux/videodev2.h>
+
+#include <algorithm>
+#include <tuple>
+
+namespace slsd {
+namespace {
+
+constexpr unsigned kListedMax = 1000;  // a device that never ends its list is broken
+
+bool lies_within(const v4l2_frmsize_stepwise& range, int width_px, int height_px) {
+  const auto on_step = [](std::int64_t value, std::int64_t low, std::int64_t high, std::int64_t step) {
+    return value >= low && value <= high && (step < 2 || (value - low) % step == 0);
+  };
+  return on_step(width_px, range.min_width, range.max_width, range.step_width) &&
+         on_step(height_px, range.min_height, range.max_height, range.step_height);
+}
+
+void add_range(const v4l2_frmsize_stepwise& range, const PixelFormat& format, const V4l2CameraOptions& options,
+               std::vector<FrameMode>& modes) {
+  modes.push_back({format, static_cast<int>(range.min_width), static_cast<int>(range.min_height)});
+  modes.push_back({format, static_cast<int>(range.max_width), static_cast<int>(range.max_height)});
+  if (options.size_px && lies_within(range, options.size_px->first, options.size_px->second))
+    modes.push_back({format, options.size_px->first, options.size_px->second});
+}
+
+// A driver that cannot list its sizes is asked what it makes of the one wanted, or of the one that it has.
+void add_tried(const V4l2Device& device, const PixelFormat& format, const V4l2CameraOptions& options,
+               std::vector<FrameMode>& modes) {
+  v4l2_format tried{};
+  tried.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  if (device.call(VIDIOC_G_FMT, &tried) != 0) return;
+  tried.fmt.pix.pixelformat = format.fourcc;
+  if (options.size_px) {
+    tried.fmt.pix.width = static_cast<__u32>(options.size_px->first);
+    tried.fmt.pix.height = static_cast<__u32>(options.size_px->second);
+  }
+  if (device.call(VIDIOC_TRY_FMT, &tried) != 0 || tried.fmt.pix.pixelformat != format.fourcc) return;
+  modes.push_back({format, static_cast<int>(tried.fmt.pix.width), static_cast<int>(tried.fmt.pix.height)});
+}
+
+void add_sizes(const V4l2Device& device, const PixelFormat& format, const V4l2CameraOptions& options,
+               std::vector<FrameMode>& modes) {
+  for (unsigned i = 0; i < kListedMax; ++i) {
+    v4l2_frmsizeenum size{};
+    size.index = i;
+    size.pixel_format = format.fourcc;
+    if (device.call(VIDIOC_ENUM_FRAMESIZES, &size) != 0) {
+      if (i == 0) add_tried(device, format, options, modes);
+      return;
+    }
+    if (size.type != V4L2_FRMSIZE_TYPE_DISCRETE) return add_range(size.stepwise, format, options, modes);
+    modes.push_back({format, static_cast<int>(size.discrete.width), static_cast<int>(size.discrete.height)});
+  }
+}
+
+std::string list_text(const std::vector<FrameMode>& modes) {
+  std::string text;
+  for (const FrameMode& mode : modes) (text += text.empty() ? "" : ", ") += to_string(mode);
+  return text.empty() ? "nothing that can be decoded" : text;
+}
+
+// Smaller is better.
+auto rank(const FrameMode& mode) {
+  const auto formats = pixel_formats();
+  const auto place = std::find(formats.begin(), formats.end(), mode.format) - formats.begin();
+  return std::tuple(place, -static_cast<std::int64_t>(mode.width_px) * mode.height_px);
+}
+
+bool fits(const FrameMode& mode, const V4l2CameraOptions& options) {
+  if (!options.format.empty() && mode.format.fourcc != fourcc_from(options.format)) return false;
+  return !options.size_px || *options.size_px == std::pair(mode.width_px, mode.height_px);
+}
+
+}  // namespace
+
+std::string to_string(const FrameMode& mode) {
+  return fourcc_name(mode.format.fourcc) + " " + std::to_string(mode.width_px) + "x" + std::to_string(mode.height_px);
+}
+
+std::vector<FrameMode> list_modes(const V4l2Device& device, const V4l2CameraOptions& options) {
+  std::vector<FrameMode> modes;
+  for (unsigned i = 0; i < kListedMax; ++i) {
+    v4l2_fmtdesc description{};
+    description.index = i;
+    description.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    if (device.call(VIDIOC_ENUM_FMT, &description) != 0) break;
+    if (const auto format = find_pixel_format(description.pixelformat)) add_sizes(device, *format, options, modes);
+  }
+  return modes;
+}
+
+Result<FrameMode> choose_mode(const std::vector<FrameMode>& modes, const V4l2CameraOptions& options) {
+  const FrameMode* best = nullptr;
+  for (const FrameMode& mode : modes) {
+    if (fits(mode, options) && (best == nullptr || rank(mode) < rank(*best))) best = &mode;
+  }
+  if (best != nullptr) return *best;
+  return fail(ErrorCode::kUnsupported,
+              "the camera has no such format and size; it has: " + list_text(modes) +
+                  "; choose format, width_px and height_px among them",
+              options.device.string());
+}
+
+Result<FrameLayout> set_mode(const V4l2Device& device, const FrameMode& mode) {
+  v4l2_format format{};
+  format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  format.fmt.pix.width = static_cast<__u32>(mode.width_px);
+  format.fmt.pix.height = static_cast<__u32>(mode.height_px);
+  format.fmt.pix.pixelformat = mode.format.fourcc;
+  format.fmt.pix.field = V4L2_FIELD_NONE;
+  if (const int error = device.call(VIDIOC_S_FMT, &format))
+    return device.fail_call(error, "cannot set the format " + to_string(mode));
+  const v4l2_pix_format& made = format.fmt.pix;
+  const FrameMode got{
+      {made.pixelformat, mode.format.layout}, static_cast<int>(made.width), static_cast<int>(made.height)};
+  const bool progressive = made.field == V4L2_FIELD_NONE || made.field == V4L2_FIELD_ANY;
+  if (got != mode || !progressive) {
+    return fail(ErrorCode::kMismatch,
+                "asked for " + to_string(mode) + " the camera made it " + to_string(got) +
+                    (progressive ? "" : " interlaced") + "; choose another format or size",
+                device.path());
+  }
+  const std::size_t row = row_bytes(mode.format.layout, mode.width_px);
+  const std::size_t stride = std::max<std::size_t>(row, made.bytesperline);
+  const std::size_t bytes = row == 0 ? 1 : stride * static_cast<std::size_t>(mode.height_px - 1) + row;
+  return FrameLayout{mode, stride, bytes};
+}
+
+}  // namespace slsd

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/image.hpp"
+#include "core/result.hpp"
+#include "drivers/camera/v4l2/frame_layout.hpp"
+#include "drivers/files/grey_image.hpp"
+
+struct v4lconvert_data;
+
+namespace slsd {
+
+/// Turns buffers that are no grey image into one: luma of YUYV and UYVY, Bayer as the file camera does it, MJPG by
+/// libv4lconvert. Allocates nothing after it was made, but for what libv4lconvert does.
+/// @thread thread-bound
+class GreyConverter {
+ public:
+  GreyConverter(const V4l2Device& device, const FrameLayout& layout);
+
+  /// The frame's grey, valid until the next call.
+  /// @param bytes  of a whole frame
+  /// @errors kFrameTorn: a JPEG image that is damaged or cut short
+  [[nodiscard]] Result<GreyView> convert(std::span<std::byte> bytes);
+
+ private:
+  [[nodiscard]] Result<GreyView> convert_jpeg(std::span<std::byte> bytes);
+  [[nodiscard]] GreyView take_luma(std::span<const std::byte> bytes, std::size_t first);
+
+  struct Destroy {
+    void operator()(v4lconvert_data* convert) const;
+  };
+
+  FrameLayout layout_;
+  GreyImage grey_;
+  std::vector<std::uint32_t> columns_;
+  std::vector<unsigned char> colours_;
+  std::unique_ptr<v4lconvert_data, Destroy> convert_;
+};
+
+/// A view of a buffer that holds a grey image. @param bytes  aligned to two
+[[nodiscard]] GreyView view_of(std::span<const std::byte> bytes, const FrameLayout& layout);
+
+}  // namespace slsd

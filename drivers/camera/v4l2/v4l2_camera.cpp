@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/v4l2/v4l2_camera.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "drivers/camera/v4l2/v4l2_controls.hpp"
+
+namespace slsd {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr int kBuffersBesideHeld = 3;  // being filled, waiting, and one on its way
+constexpr int kFaultsInARowMax = 8;
+constexpr int kStaleToTell = 3;  // so many stale frames are no longer those in flight
+constexpr std::uint32_t kHalfOfAllSequences = 1u << 31;
+
+std::string path_of(const std::filesystem::path& device) {
+  if (device.has_parent_path()) return device.string();
+  return (std::filesystem::path("/dev/v4l/by-id") / device).string();
+}
+
+}  // namespace
+
+V4l2Camera::V4l2Camera(V4l2CameraOptions options)
+    : options_(std::move(options)), description_{options_.name, "v4l2", path_of(options_.device), 0, 0} {}
+
+Result<> V4l2Camera::open() {
+  converter_.reset();
+  stream_.reset();
+  pool_.reset();
+  wake_.reset();
+  if (auto valid = options_.validate(); !valid) return valid;
+  auto device = V4l2Device::open(description_.device);
+  if (!device) return tl::unexpected(device.error());
+  return configure(std::move(*device));
+}
+
+Result<> V4l2Camera::configure(V4l2Device device) {
+  const auto mode = choose_mode(list_modes(device, options_), options_);
+  if (!mode) return tl::unexpected(mode.error());
+  const auto layout = set_mode(device, *mode);
+  if (!layout) return tl::unexpected(layout.error());
+  if (auto set = set_frame_rate(device, options_); !set) return set;
+  if (auto set = set_controls(device, options_); !set) return set;
+  layout_ = *layout;
+  clock_ = ExposureClock(read_timing(device), options_, device.driver());
+  const bool zero_copy = is_zero_copy(mode->format.layout);
+  if (!zero_copy) {
+    pool_.emplace(FrameFormat{mode->width_px, mode->height_px, bytes_per_pixel(mode->format.layout)},
+                  options_.frames_held_max);
+    converter_.emplace(device, layout_);
+  }
+  auto stream = V4l2Stream::start(std::move(device), kBuffersBesideHeld + (zero_copy ? options_.frames_held_max : 1));
+  if (!stream) return tl::unexpected(stream.error());
+  stream_.emplace(std::move(*stream));
+  held_max_ = std::min<std::size_t>(options_.frames_held_max, stream_->buffers().size() - 2);
+  description_.width_px = mode->width_px;
+  description_.height_px = mode->height_px;
+  settling_ = options_.settle_frames;
+  faults_in_a_row_ = 0;
+  next_sequence_ = 0;
+  last_sequence_.reset();
+  return {};
+}
+
+Result<Frame> V4l2Camera::capture(MonotonicTime deadline) {
+  if (!stream_) return fail_here(ErrorCode::kDisconnected, "the camera is not open; open it");
+  auto frame = capture_after({steady_clock::now(), deadline});
+  if (!frame && frame.error().code == ErrorCode::kDisconnected) {
+    converter_.reset();
+    stream_.reset();
+  }
+  return frame;
+}
+
+Result<Frame> V4l2Camera::capture_after(Capture capture) {
+  if (!pool_ && stream_->lent() >= held_max_)
+    return fail_here(ErrorCode::kBusy, "all " + std::to_string(held_max_) + " frames are held; give some back first");
+  if (auto dropped = drop_waiting(); !dropped) return tl::unexpected(dropped.error());
+  while (true) {
+    if (auto ready = wait(capture); !ready) return tl::unexpected(ready.error());
+    auto frame = take(capture);
+    if (!frame) return tl::unexpected(frame.error());
+    if (*frame) return std::move(**frame);
+  }
+}
+
+// What is filled already was exposed before the trigger.
+Result<> V4l2Camera::drop_waiting() {
+  const std::size_t had = stream_->queued();
+  std::size_t taken = 0;
+  if (auto put = stream_->put_back_returned(); !put) return put;
+  for (; taken < had; ++taken) {
+    const auto buffer = stream_->take();
+    if (!buffer && buffer.error().code == ErrorCode::kDisconnected) return tl::unexpected(buffer.error());
+    if (!buffer || !*buffer) break;
+    counts_.dropped += note_order(**buffer);
+    ++counts_.before_trigger;
+    settling_ = std::max(settling_ - 1, 0);
+    if (auto put = stream_->put_back((*buffer)->index); !put) return put;
+  }
+  // With every buffer filled the driver had to drop frames, which nobody missed.
+  if (taken == had) last_sequence_.reset();
+  return {};
+}
+
+Result<> V4l2Camera::wait(const Capture& capture) {
+  switch (wake_.wait(stream_->device().descriptor(), capture.deadline)) {
+    case WakeEvent::Woken::kCancelled:
+      return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
+    case WakeEvent::Woken::kGone:
+      return fail_here(ErrorCode::kDisconnected, "the camera is gone; check its cable");
+    case WakeEvent::Woken::kLate:
+      break;
+    case WakeEvent::Woken::kReady:
+      return {};
+  }
+  if (capture.stale < kStaleToTell)
+    return fail_here(ErrorCode::kFrameLate,
+                     "no frame came before the deadline; allow more time or raise the frame rate");
+  return fail_here(ErrorCode::kFrameStale, std::to_string(capture.stale) +
+                                               " frames came, all exposed before the trigger by their time stamps; "
+                                               "scan again, then unplug the camera and plug it in again");
+}
+
+Result<std::optional<Frame>> V4l2Camera::take(Capture& capture) {
+  const auto buffer = stream_->take();
+  if (!buffer && buffer.error().code == ErrorCode::kDisconnected) return tl::unexpected(buffer.error());
+  if (!buffer && ++faults_in_a_row_ >= kFaultsInARowMax)
+    return fail_here(ErrorCode::kDisconnected, "the driver reports one fault after another; it is opened again");
+  if (!buffer) {
+    ++counts_.dropped;
+    return lose(ErrorCode::kFrameDropped, 1, buffer.error().message);
+  }
+  if (!*buffer) return std::nullopt;
+  faults_in_a_row_ = 0;
+  auto frame = judge(**buffer, capture);
+  if (frame && *frame && !pool_) return frame;
+  if (auto put = stream_->put_back((*buffer)->index); !put) return tl::unexpected(put.error());
+  return frame;
+}
+
+Result<std::optional<Frame>> V4l2Camera::judge(const v4l2_buffer& buffer, Capture& capture) {
+  const MonotonicTime received = steady_clock::now();
+  const MonotonicTime exposure_start = clock_.exposure_start(buffer, received);
+  const std::uint32_t lost = note_order(buffer);
+  counts_.dropped += lost;
+  if (settling_ > 0 || exposure_start < capture.trigger) {
+    if (settling_ > 0)
+      --settling_;
+    else
+      ++capture.stale;
+    ++counts_.before_trigger;
+    return std::nullopt;
+  }
+  if (lost > 0)  // one of them may have been the one that was asked for
+    return lose(ErrorCode::kFrameDropped, lost, std::to_string(lost) + " frames were lost on their way; scan again");
+  if (!is_whole(buffer)) {
+    ++counts_.torn;
+    return lose(ErrorCode::kFrameTorn, 1, "only a part of the frame arrived; scan again");
+  }
+  if (received > capture.deadline)
+    return fail_here(ErrorCode::kFrameLate, "the frame came after the deadline; allow more time");
+  auto frame = deliver(buffer, exposure_start, received);
+  if (!frame) return tl::unexpected(frame.error());
+  return std::move(*frame);
+}
+
+std::uint32_t V4l2Camera::note_order(const v4l2_buffer& buffer) {
+  const auto last = std::exchange(last_sequence_, buffer.sequence);
+  if (!last) return 0;
+  const std::uint32_t missing = buffer.sequence - *last - 1;
+  return missing < kHalfOfAllSequences ? missing : 0;  // else the device counts anew, or not at all
+}
+
+bool V4l2Camera::is_whole(const v4l2_buffer& buffer) const {
+  if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0) return false;
+  return buffer.bytesused >= layout_.bytes_min && buffer.bytesused <= stream_->buffers().bytes(buffer.index).size();
+}
+
+Result<Frame> V4l2Camera::deliver(const v4l2_buffer& buffer, MonotonicTime exposure_start, MonotonicTime received) {
+  if (pool_) return convert(buffer, exposure_start, received);
+  ++counts_.delivered;
+  return stream_->lend(buffer.index, view_of(stream_->buffers().bytes(buffer.index), layout_), next_sequence_++,
+                       exposure_start, received);
+}
+
+Result<Frame> V4l2Camera::convert(const v4l2_buffer& buffer, MonotonicTime exposure_start, MonotonicTime received) {
+  const auto grey = converter_->convert(stream_->buffers().bytes(buffer.index).first(buffer.bytesused));
+  if (!grey) {
+    ++counts_.torn;
+    return lose(grey.error().code, 1, grey.error().message);
+  }
+  auto frame = pool_->lend(*grey, next_sequence_, exposure_start);
+  if (!frame)
+    return fail_here(ErrorCode::kBusy,
+                     "all " + std::to_string(options_.frames_held_max) + " frames are held; give some back first");
+  ++next_sequence_;
+  ++counts_.delivered;
+  return std::move(*frame).restamped(exposure_start, received);
+}
+
+tl::unexpected<Error> V4l2Camera::lose(ErrorCode code, std::uint64_t frames, std::string message) {
+  next_sequence_ += frames;
+  return fail_here(code, std::move(message));
+}
+
+tl::unexpected<Error> V4l2Camera::fail_here(ErrorCode code, std::string message) const {
+  return fail(code, std::move(message), options_.name);
+}
+
+}  // namespace slsd

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "drivers/camera/camera.hpp"
+#include "drivers/camera/frame_pool.hpp"
+#include "drivers/camera/v4l2/exposure_clock.hpp"
+#include "drivers/camera/v4l2/frame_layout.hpp"
+#include "drivers/camera/v4l2/grey_converter.hpp"
+#include "drivers/camera/v4l2/v4l2_camera_options.hpp"
+#include "drivers/camera/v4l2/v4l2_stream.hpp"
+#include "drivers/camera/v4l2/wake_event.hpp"
+
+namespace slsd {
+
+/// What became of a device's frames since the camera was made.
+struct V4l2FrameCounts {
+  std::uint64_t delivered = 0;
+  std::uint64_t before_trigger = 0;  ///< exposed before anyone asked, or while the camera settled
+  std::uint64_t dropped = 0;         ///< missing in the driver's sequence while buffers were free, or lost by a fault
+  std::uint64_t torn = 0;            ///< flagged by the driver, too short, or not decodable
+};
+
+/// A camera of V4L2: runs freely from open() on, and each capture() waits for the first frame whose exposure began
+/// after the call. Grey frames are the driver's own buffers; others are converted into buffers of a pool. Frame
+/// numbers count the frames delivered and the frames lost, not those that nobody waited for.
+///
+/// A device that was unplugged is opened again by the same name, which therefore should be one of /dev/v4l/by-id.
+/// capture() gives kFrameStale where frames came and all their stamps lie before the trigger.
+/// @thread thread-bound, but for cancel()
+class V4l2Camera final : public Camera {
+ public:
+  explicit V4l2Camera(V4l2CameraOptions options);
+
+  [[nodiscard]] const CameraDescription& description() const override { return description_; }
+  /// @errors kInvalidArgument (an option, or beyond the device's range), kNotFound, kPermissionDenied, kUnsupported,
+  ///         kMismatch (it did not take a setting), kBusy (another program has it), kNoSpace, kDisconnected, kIo
+  [[nodiscard]] Result<> open() override;
+  [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
+  void cancel() override { wake_.cancel(); }
+
+  [[nodiscard]] const V4l2FrameCounts& counts() const { return counts_; }
+
+ private:
+  struct Capture {
+    MonotonicTime trigger;
+    MonotonicTime deadline;
+    int stale = 0;
+  };
+  [[nodiscard]] Result<> configure(V4l2Device device);
+  [[nodiscard]] Result<Frame> capture_after(Capture capture);
+  [[nodiscard]] Result<> drop_waiting();
+  [[nodiscard]] Result<> wait(const Capture& capture);
+  [[nodiscard]] Result<std::optional<Frame>> take(Capture& capture);
+  [[nodiscard]] Result<std::optional<Frame>> judge(const v4l2_buffer& buffer, Capture& capture);
+  [[nodiscard]] std::uint32_t note_order(const v4l2_buffer& buffer);
+  [[nodiscard]] bool is_whole(const v4l2_buffer& buffer) const;
+  [[nodiscard]] Result<Frame> deliver(const v4l2_buffer& buffer, MonotonicTime exposure_start, MonotonicTime received);
+  [[nodiscard]] Result<Frame> convert(const v4l2_buffer& buffer, MonotonicTime exposure_start, MonotonicTime received);
+  [[nodiscard]] tl::unexpected<Error> lose(ErrorCode code, std::uint64_t frames, std::string message);
+  [[nodiscard]] tl::unexpected<Error> fail_here(ErrorCode code, std::string message) const;
+
+  V4l2CameraOptions options_;
+  CameraDescription description_;
+  WakeEvent wake_;
+  V4l2FrameCounts counts_;
+  std::optional<V4l2Stream> stream_;
+  std::optional<GreyConverter> converter_;
+  std::optional<FramePool> pool_;
+  FrameLayout layout_;
+  ExposureClock clock_;
+  std::size_t held_max_ = 0;
+  int settling_ = 0;
+  int faults_in_a_row_ = 0;
+  std::uint64_t next_sequence_ = 0;
+  std::optional<std::uint32_t> last_sequence_;  ///< of the driver's; nothing where a gap would mean nothing
+};
+
+}  // namespace slsd

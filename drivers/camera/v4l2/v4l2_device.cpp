@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/v4l2/v4l2_device.hpp"
+
+#include <fcntl.h>
+#include <libv4l2.h>
+#include <linux/videodev2.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+namespace slsd {
+namespace {
+
+struct Meaning {
+  ErrorCode code;
+  const char* remedy;
+};
+
+Meaning meaning(int error_number) {
+  switch (error_number) {
+    case ENOENT:
+    case ENOTDIR:
+      return {ErrorCode::kNotFound, "plug it in, or correct device"};
+    case EACCES:
+    case EPERM:
+      return {ErrorCode::kPermissionDenied, "add the service's user to the group video"};
+    case ENODEV:
+    case ENXIO:
+      return {ErrorCode::kDisconnected, "check its cable; it is opened again"};
+    case EBUSY:
+      return {ErrorCode::kBusy, "end the other program that uses it"};
+    case ENOTTY:
+      return {ErrorCode::kUnsupported, "it is not a camera of V4L2; correct device"};
+    default:
+      return {ErrorCode::kIo, "unplug it and plug it in again"};
+  }
+}
+
+}  // namespace
+
+V4l2Device::V4l2Device(int descriptor, std::string path) : descriptor_(descriptor), path_(std::move(path)) {}
+
+V4l2Device::V4l2Device(V4l2Device&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)),
+      path_(std::move(other.path_)),
+      driver_(std::move(other.driver_)) {}
+
+V4l2Device& V4l2Device::operator=(V4l2Device&& other) noexcept {
+  std::swap(descriptor_, other.descriptor_);
+  std::swap(path_, other.path_);
+  std::swap(driver_, other.driver_);
+  return *this;
+}
+
+V4l2Device::~V4l2Device() {
+  if (descriptor_ >= 0) v4l2_close(descriptor_);
+}
+
+Result<V4l2Device> V4l2Device::open(const std::string& path) {
+  V4l2Device device(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC), path);
+  if (device.descriptor_ < 0) return device.fail_call(errno, "cannot open the camera");
+  v4l2_capability capability{};
+  if (const int error = device.call(VIDIOC_QUERYCAP, &capability))
+    return device.fail_call(error, "cannot ask what the device can do");
+  const __u32 can =
+      (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? capability.device_caps : capability.capabilities;
+  if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0)
+    return fail(ErrorCode::kUnsupported, "the device captures no video; name another, often the one with index0", path);
+  device.driver_ = reinterpret_cast<const char*>(capability.driver);
+  if (v4l2_fd_open(device.descriptor_, V4L2_DISABLE_CONVERSION) < 0)
+    return device.fail_call(errno, "libv4l2 cannot take the camera");
+  return device;
+}
+
+int V4l2Device::call(unsigned long request, void* argument) const {
+  int result = 0;
+  do {
+    result = v4l2_ioctl(descriptor_, request, argument);
+  } while (result < 0 && errno == EINTR);
+  return result < 0 ? errno : 0;
+}
+
+tl::unexpected<Error> V4l2Device::fail_call(int error_number, const std::string& doing) const {
+  const Meaning what = meaning(error_number);
+  return fail(what.code, doing + ": " + std::generic_category().message(error_number) + "; " + what.remedy, path_);
+}
+
+}  // namespace slsd

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// An open V4L2 device, through libv4l2 with its conversion off.
+/// @thread thread-bound
+class V4l2Device {
+ public:
+  /// @param path  a device node; it need not be a character device
+  /// @errors kNotFound, kPermissionDenied, kDisconnected, kUnsupported (no capture with streaming), kIo
+  [[nodiscard]] static Result<V4l2Device> open(const std::string& path);
+  V4l2Device(V4l2Device&& other) noexcept;
+  V4l2Device& operator=(V4l2Device&& other) noexcept;
+  ~V4l2Device();
+
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+  [[nodiscard]] const std::string& path() const { return path_; }
+  /// "uvcvideo", ...
+  [[nodiscard]] const std::string& driver() const { return driver_; }
+
+  /// 0, or errno. Interrupted calls are made again.
+  [[nodiscard]] int call(unsigned long request, void* argument) const;
+
+  /// The error of a call that failed.
+  /// @param doing  what was tried, as in "cannot start"
+  [[nodiscard]] tl::unexpected<Error> fail_call(int error_number, const std::string& doing) const;
+
+ private:
+  V4l2Device(int descriptor, std::string path);
+
+  int descriptor_ = -1;
+  std::string path_;
+  std::string driver_;
+};
+
+}  // namespace slsd
