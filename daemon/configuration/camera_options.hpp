@@ -8,6 +8,7 @@
 #include "core/result.hpp"
 #include "drivers/camera/fault.hpp"
 #include "drivers/camera/file_camera.hpp"
+#include "drivers/camera/v4l2/v4l2_camera_options.hpp"
 
 namespace slsd {
 
@@ -18,6 +19,7 @@ enum class CameraDriver { kFile, kV4l2, kAravis };
 struct CameraOptions {
   CameraDriver driver = CameraDriver::kFile;
   FileCameraOptions file;     ///< its name is the camera's, whatever the driver
+  V4l2CameraOptions v4l2;     ///< where it is the driver
   std::vector<Fault> faults;  ///< what the camera does wrong, for the tests of everything above it
 
   [[nodiscard]] const std::string& name() const { return file.name; }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "daemon/configuration/table_reader.hpp"
+#include "daemon/configuration/v4l2_keys.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd {
@@ -90,19 +91,44 @@ void read_frame_size(TableReader& reader, FileCameraOptions& options) {
   if (height && !width) reader.refuse("height_px", "needs width_px beside it");
 }
 
+void read_file_camera(TableReader& reader, FileCameraOptions& options) {
+  reader.read("path", options.path);
+  reader.read("loop", options.loop);
+  reader.read("rate_hz", options.rate_hz);
+  read_frame_size(reader, options);
+  reader.choose("bayer", options.bayer, span_of(kMosaics));
+}
+
+void read_driver_keys(TableReader& reader, CameraDriver driver, CameraOptions& options) {
+  if (driver == CameraDriver::kFile) read_file_camera(reader, options.file);
+  if (driver == CameraDriver::kV4l2) read_v4l2_keys(reader, options.v4l2);
+}
+
+void refuse_keys_of_others(TableReader& reader, const toml::table& table, CameraDriver driver) {
+  const std::vector<std::string> own = reader.known();
+  for (const auto& [name, other] : kCameraDrivers) {
+    TableReader others(&table, "", "");
+    CameraOptions ignored;
+    read_driver_keys(others, other, ignored);
+    for (const std::string& key : others.known()) {
+      if (!table.contains(key) || std::ranges::find(own, key) != own.end()) continue;
+      reader.refuse(key, "is a key of the driver \"" + std::string(name) + "\", not of \"" +
+                             std::string(to_string(driver)) + "\": remove it");
+    }
+  }
+}
+
 Result<CameraOptions> read_camera(const toml::table& table, const path& file) {
   TableReader reader(&table, "[[camera]]", file);
   CameraOptions options;
   reader.read("name", options.file.name);
   reader.choose("driver", options.driver, span_of(kCameraDrivers));
   // The keys of a driver that this build lacks cannot be checked; opening the camera says that it is lacking.
-  if (options.driver != CameraDriver::kFile) return options;
-  reader.read("path", options.file.path);
-  reader.read("loop", options.file.loop);
-  reader.read("rate_hz", options.file.rate_hz);
-  read_frame_size(reader, options.file);
-  reader.choose("bayer", options.file.bayer, span_of(kMosaics));
+  if (options.driver == CameraDriver::kAravis) return options;
+  read_driver_keys(reader, options.driver, options);
+  options.v4l2.name = options.name();
   read_faults(reader, options);
+  refuse_keys_of_others(reader, table, options.driver);
   if (auto read = reader.finish(options.validate()); !read) return tl::unexpected(read.error());
   return options;
 }

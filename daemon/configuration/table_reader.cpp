@@ -38,6 +38,7 @@ std::string TableReader::place(std::string_view key) const {
 }
 
 void TableReader::refuse(std::string_view key, std::string_view what) {
+  known_.emplace_back(key);
   if (error_) return;
   const std::string prefix = name_.empty() ? "" : name_ + " ";
   error_ = Error{ErrorCode::kInvalidArgument, prefix + std::string(key) + " " + std::string(what), place(key)};
@@ -86,6 +87,12 @@ void TableReader::read(std::string_view key, double& value) {
   } else {
     refuse(key, "must be a number");
   }
+}
+
+void TableReader::read(std::string_view key, std::optional<double>& value) {
+  double number = 0.0;
+  read(key, number);
+  if (has(key)) value = number;
 }
 
 void TableReader::read(std::string_view key, std::string& value) {

@@ -36,6 +36,7 @@ class TableReader {
   void read(std::string_view key, std::uint32_t& value);
   void read(std::string_view key, std::optional<int>& value);
   void read(std::string_view key, double& value);
+  void read(std::string_view key, std::optional<double>& value);
   void read(std::string_view key, std::string& value);
   void read(std::string_view key, std::filesystem::path& value);
   void read(std::string_view key, std::vector<int>& value);
@@ -62,6 +63,9 @@ class TableReader {
   [[nodiscard]] const toml::table* table(std::string_view key);
   /// An array of tables below this one; empty where it was left out.
   [[nodiscard]] std::vector<const toml::table*> tables(std::string_view key);
+
+  /// The keys asked for so far, whether they are there or not.
+  [[nodiscard]] const std::vector<std::string>& known() const { return known_; }
 
   /// Notes that a key's value is wrong: "[pattern] seed must be ...".
   void refuse(std::string_view key, std::string_view what);

@@ -4,18 +4,26 @@
 
 #include "drivers/camera/faulty_camera.hpp"
 #include "drivers/camera/file_camera.hpp"
+#include "drivers/camera/v4l2/v4l2_camera.hpp"
 #include "drivers/projector/headless_projector.hpp"
 
 namespace slsd {
 
 Result<std::unique_ptr<Camera>> make_camera(const CameraOptions& options) {
-  if (options.driver != CameraDriver::kFile) {
-    return fail(ErrorCode::kUnsupported,
-                "the driver \"" + std::string(to_string(options.driver)) +
-                    "\" is not part of this build, whose camera drivers are: file",
-                "camera " + options.name());
+  std::unique_ptr<Camera> camera;
+  switch (options.driver) {
+    case CameraDriver::kFile:
+      camera = std::make_unique<FileCamera>(options.file);
+      break;
+    case CameraDriver::kV4l2:
+      camera = std::make_unique<V4l2Camera>(options.v4l2);
+      break;
+    case CameraDriver::kAravis:
+      return fail(ErrorCode::kUnsupported,
+                  "the driver \"" + std::string(to_string(options.driver)) +
+                      "\" is not part of this build, whose camera drivers are: file, v4l2",
+                  "camera " + options.name());
   }
-  std::unique_ptr<Camera> camera = std::make_unique<FileCamera>(options.file);
   if (!options.faults.empty()) camera = std::make_unique<FaultyCamera>(std::move(camera), options.faults);
   return camera;
 }

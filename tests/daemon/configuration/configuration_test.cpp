@@ -2,9 +2,11 @@
 // Copyright the slsd authors
 #include "daemon/configuration/configuration.hpp"
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <sstream>
+#include <vector>
 
 #include <gmock/gmock.h>
 
@@ -56,22 +58,40 @@ TEST(ReadConfiguration, ShippedFileEqualsTheDefaults) {
   expect_equal(*configuration, *read(""));
 }
 
-// The shipped file shows a camera in comments; taken out of them it is a camera with every default but its path.
-TEST(ReadConfiguration, ShippedCameraEqualsTheDefaults) {
+// The shipped file shows a camera of each driver in comments; taken out of them, each has every default but where it
+// is.
+std::vector<CameraOptions> shipped_cameras() {
   std::istringstream lines(shipped());
-  std::string camera;
+  std::vector<std::string> texts;
   bool within = false;
   for (std::string line; std::getline(lines, line);) {
-    within = within || line == "# [[camera]]";
+    if (line == "# [[camera]]") texts.emplace_back(), within = true;
     within = within && !line.empty();
-    if (within) camera += line.substr(2) + "\n";
+    if (within) texts.back() += line.substr(2) + "\n";
   }
-  const auto configuration = read(camera);
-  ASSERT_TRUE(configuration) << to_string(configuration.error());
-  ASSERT_EQ(configuration->cameras.size(), 1U);
-  CameraOptions expected;
-  expected.file.path = "etc/frames";
-  EXPECT_EQ(configuration->cameras[0], expected);
+  std::vector<CameraOptions> cameras;
+  for (const std::string& text : texts) {
+    const auto configuration = read(text);
+    EXPECT_TRUE(configuration) << to_string(configuration.error());
+    if (configuration) cameras.insert(cameras.end(), configuration->cameras.begin(), configuration->cameras.end());
+  }
+  return cameras;
+}
+
+const CameraOptions& shipped_camera(const std::vector<CameraOptions>& cameras, CameraDriver driver) {
+  return *std::ranges::find(cameras, driver, &CameraOptions::driver);
+}
+
+TEST(ReadConfiguration, ShippedCamerasEqualTheDefaults) {
+  const auto cameras = shipped_cameras();
+  ASSERT_EQ(cameras.size(), 2U);
+  CameraOptions file;
+  file.file.path = "etc/frames";
+  EXPECT_EQ(shipped_camera(cameras, CameraDriver::kFile), file);
+  CameraOptions v4l2;
+  v4l2.driver = CameraDriver::kV4l2;
+  v4l2.v4l2.device = "/dev/v4l/by-id/usb-maker_camera_serial-video-index0";
+  EXPECT_EQ(shipped_camera(cameras, CameraDriver::kV4l2), v4l2);
 }
 
 // Every key of the tables stands in the shipped file, in force or in a comment.
@@ -94,6 +114,17 @@ TEST(ReadConfiguration, ShippedFileHasEveryKey) {
                           "rate_hz",
                           "bayer",
                           "faults",
+                          "device",
+                          "format",
+                          "frame_rate_hz",
+                          "exposure_us",
+                          "gain_steps",
+                          "focus_steps",
+                          "power_line_hz",
+                          "automatic",
+                          "readout_us",
+                          "settle_frames",
+                          "frames_held_max",
                           "depth_min_mm",
                           "depth_max_mm",
                           "binarize",
@@ -167,6 +198,42 @@ socket_mode = 0o600
   EXPECT_EQ(configuration->server.socket_mode, 0600);
 }
 
+TEST(ReadConfiguration, TakesEveryKeyOfV4l2) {
+  const auto configuration = read(R"(
+[[camera]]
+name = "left"
+driver = "v4l2"
+device = "usb-camera"
+format = "Y16"
+width_px = 640
+height_px = 480
+frame_rate_hz = 30
+exposure_us = 16700
+gain_steps = 12
+focus_steps = 40
+power_line_hz = 50
+automatic = false
+readout_us = 8000.5
+settle_frames = 5
+frames_held_max = 4
+faults = ["drop@3"]
+)");
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  const CameraOptions& camera = configuration->cameras.at(0);
+  const V4l2CameraOptions expected{
+      "left", "usb-camera", "Y16", std::pair(640, 480), 30.0, 16700.0, 12, 40, 50, false, 8000.5, 5, 4};
+  EXPECT_EQ(camera.driver, CameraDriver::kV4l2);
+  EXPECT_EQ(camera.v4l2, expected);
+  EXPECT_EQ(camera.faults.size(), 1U);
+}
+
+TEST(ReadConfiguration, NamesTheDriverWhoseKeyItIs) {
+  EXPECT_THAT(error_of("[[camera]]\ndriver = \"v4l2\"\ndevice = \"x\"\nloop = true\n"),
+              HasSubstr("slsd.toml:4:8: [[camera]] loop is a key of the driver \"file\", not of \"v4l2\""));
+  EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\ngain_steps = 1\n"),
+              HasSubstr("gain_steps is a key of the driver \"v4l2\", not of \"file\""));
+}
+
 TEST(ReadConfiguration, TakesThePapersMethod) {
   const auto configuration = read("[pattern]\nsymbols = [5, 7, 22]\nmethod = \"paper\"\n");
   ASSERT_TRUE(configuration) << to_string(configuration.error());
@@ -195,6 +262,10 @@ TEST(ReadConfiguration, PlacesRangesAtTheKey) {
   EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nrate_hz = -1\n"), HasSubstr("slsd.toml:3:11: "));
   EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nfaults = [\"explode@1\"]\n"), HasSubstr("slsd.toml:3:10: "));
   EXPECT_THAT(error_of("[[camera]]\n"), HasSubstr("path must name"));
+  const std::string v4l2 = "[[camera]]\ndriver = \"v4l2\"\ndevice = \"x\"\n";
+  EXPECT_THAT(error_of(v4l2 + "exposure_us = 0.5\n"), HasSubstr("slsd.toml:4:15: "));
+  EXPECT_THAT(error_of(v4l2 + "power_line_hz = 55\n"), HasSubstr("slsd.toml:4:17: "));
+  EXPECT_THAT(error_of(v4l2 + "width_px = 640\n"), HasSubstr("needs height_px"));
 }
 
 TEST(ReadConfiguration, RefusesWrongTypes) {
@@ -215,9 +286,9 @@ TEST(ReadConfiguration, FileExcludesTheOtherKeysOfAPattern) {
 }
 
 TEST(ReadConfiguration, LeavesTheKeysOfALackingDriverAlone) {
-  const auto configuration = read("[[camera]]\ndriver = \"v4l2\"\ndevice = \"/dev/video0\"\nexposure_us = 5\n");
+  const auto configuration = read("[[camera]]\ndriver = \"aravis\"\nid = \"1\"\nexposure_us = 5\n");
   ASSERT_TRUE(configuration) << to_string(configuration.error());
-  EXPECT_EQ(configuration->cameras.at(0).driver, CameraDriver::kV4l2);
+  EXPECT_EQ(configuration->cameras.at(0).driver, CameraDriver::kAravis);
 }
 
 TEST(ReadConfiguration, RefusesWhatIsNoToml) {
