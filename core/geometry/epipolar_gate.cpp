@@ -34,18 +34,15 @@ EpipolarSegment EpipolarGate::prepare(const Eigen::Vector2d& camera_direction) c
   segment.line_ = line.head<2>() / length;
   segment.line_offset_px_ = line.z() / length;
   segment.axis_ = (Eigen::Array2d(-normal.y(), normal.x()) / length * focal_px_).matrix();
-  segment.along_start_ = segment.axis_.dot(start.head<2>());
-  segment.along_slope_ = segment.axis_.dot(slope.head<2>());
-  segment.depth_start_ = start.z();
-  segment.depth_slope_ = slope.z();
 
   const double crossing = (kMinProjectorDepthMm - start.z()) / slope.z();
   const double nearest = slope.z() > 0 ? std::max(depth_min_mm_, crossing) : depth_min_mm_;
   const double farthest = slope.z() < 0 ? std::min(depth_max_mm_, crossing) : depth_max_mm_;
   if (!(nearest <= farthest) || !(start.z() + nearest * slope.z() > 0)) return segment;
-  segment.near_end_ = (start + nearest * slope).hnormalized();
-  segment.far_end_ = (start + farthest * slope).hnormalized();
-  const double near_px = segment.along_px(segment.near_end_), far_px = segment.along_px(segment.far_end_);
+  // Along the line at a depth: the axis' part of the point over its depth in the projector's frame.
+  const double along_start = segment.axis_.dot(start.head<2>()), along_slope = segment.axis_.dot(slope.head<2>());
+  const double near_px = (along_start + nearest * along_slope) / (start.z() + nearest * slope.z()),
+               far_px = (along_start + farthest * along_slope) / (start.z() + farthest * slope.z());
   segment.along_min_px_ = std::min(near_px, far_px);
   segment.along_max_px_ = std::max(near_px, far_px);
   return segment;

@@ -26,11 +26,6 @@ class EpipolarSegment {
   [[nodiscard]] double along_px(const Eigen::Vector2d& projector_direction) const {
     return axis_.dot(projector_direction);
   }
-  /// Depth along the camera's z axis of the point on this camera ray whose image lies at along_px, mm.
-  [[nodiscard]] double depth_mm(const Eigen::Vector2d& projector_direction) const {
-    const double along = along_px(projector_direction);
-    return (along_start_ - along * depth_start_) / (along * depth_slope_ - along_slope_);
-  }
   /// Whether a projector direction lies within tolerance_px of the segment's line, and between its ends.
   [[nodiscard]] bool passes(const Eigen::Vector2d& projector_direction, double tolerance_px) const {
     const double residual = residual_px(projector_direction);
@@ -38,14 +33,8 @@ class EpipolarSegment {
     return (residual <= tolerance_px) & (residual >= -tolerance_px) & (along >= along_min_px_) &
            (along <= along_max_px_);
   }
-  [[nodiscard]] double along_min_px() const { return along_min_px_; }
-  [[nodiscard]] double along_max_px() const { return along_max_px_; }
   /// No depth of the working range lies in front of the projector.
   [[nodiscard]] bool empty() const { return !(along_min_px_ <= along_max_px_); }
-
-  /// Undistorted, normalised projector directions of the two ends; meaningless where empty().
-  [[nodiscard]] const Eigen::Vector2d& near_end() const { return near_end_; }
-  [[nodiscard]] const Eigen::Vector2d& far_end() const { return far_end_; }
 
  private:
   friend class EpipolarGate;
@@ -53,10 +42,6 @@ class EpipolarSegment {
   Eigen::Vector2d axis_ = Eigen::Vector2d::Zero();
   double line_offset_px_ = std::numeric_limits<double>::infinity();
   double along_min_px_ = 1, along_max_px_ = -1;
-  double along_start_ = 0, along_slope_ = 0;  // along = (start + slope z) / (depth_start + depth_slope z)
-  double depth_start_ = 0, depth_slope_ = 0;
-  Eigen::Vector2d near_end_ = Eigen::Vector2d::Zero();
-  Eigen::Vector2d far_end_ = Eigen::Vector2d::Zero();
 };
 
 /// Makes the segment of any camera ray.

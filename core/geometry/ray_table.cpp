@@ -7,8 +7,9 @@
 namespace slsd {
 namespace {
 
-// 64 px keep the table of a 1600x1200 image in 8 kB, and its error so small that the second step ends at rounding.
+// 64 px keep the table of a 1600x1200 image in 8 kB, and one step is enough for ordinary lenses.
 constexpr int kPitchPx = 64;
+constexpr double kErrorMax = 1e-10;
 
 int nodes_across(int size_px) {
   return (size_px - 1) / kPitchPx + 2;
@@ -31,12 +32,25 @@ RayTable::RayTable(const Lens& lens)
       nodes_.push_back(lens.undistort((Eigen::Array2d(column, row) / nodes_per_px_).matrix()));
     }
   }
+  refines_ = error_between_nodes() > kErrorMax;
+}
+
+/// Of one step, at the places farthest from the nodes, where the estimate is worst.
+double RayTable::error_between_nodes() const {
+  double error = 0;
+  for (int row = 0; row + 1 < rows_; ++row) {
+    for (int column = 0; column + 1 < columns_; ++column) {
+      const Eigen::Vector2d pixel = (Eigen::Array2d(column + 0.5, row + 0.5) / nodes_per_px_).matrix();
+      error = std::max(error, (ray(pixel).direction - lens_.undistort(pixel)).norm());
+    }
+  }
+  return error;
 }
 
 Eigen::Vector2d RayTable::estimate(const Eigen::Vector2d& pixel) const {
-  const double x = std::clamp(pixel.x() * nodes_per_px_.x(), 0.0, columns_ - 1.001);
-  const double y = std::clamp(pixel.y() * nodes_per_px_.y(), 0.0, rows_ - 1.001);
-  const int column = static_cast<int>(x), row = static_cast<int>(y);
+  const double x = pixel.x() * nodes_per_px_.x(), y = pixel.y() * nodes_per_px_.y();
+  const int column = static_cast<int>(std::clamp(x, 0.0, columns_ - 2.0));
+  const int row = static_cast<int>(std::clamp(y, 0.0, rows_ - 2.0));
   const Eigen::Vector2d* node = &nodes_[static_cast<std::size_t>(row) * columns_ + column];
   const double right = x - column, below = y - row;
   return (1 - below) * ((1 - right) * node[0] + right * node[1]) +
@@ -44,7 +58,8 @@ Eigen::Vector2d RayTable::estimate(const Eigen::Vector2d& pixel) const {
 }
 
 PixelRay RayTable::ray(const Eigen::Vector2d& pixel) const {
-  const Eigen::Vector2d near = lens_.refine(estimate(pixel), pixel);
+  Eigen::Vector2d near = estimate(pixel);
+  if (refines_) near = lens_.refine(near, pixel);
   const Eigen::Matrix2d turn = lens_.distort_jacobian(near).inverse();
   return {near - turn * (lens_.distort(near) - pixel), turn};
 }

@@ -58,14 +58,6 @@ Eigen::Matrix<double, 3, 2> point_per_px(const Equations& equations, const Eigen
   return by_direction * turn;
 }
 
-double epipolar_residual_px(const Eigen::Vector2d& camera_direction, const PixelRay& projector_ray,
-                            const RigidTransform& projector_from_camera) {
-  const Eigen::Vector3d line =
-      projector_from_camera.translation.cross(projector_from_camera.rotation * camera_direction.homogeneous());
-  const Eigen::Vector2d slope_per_px = projector_ray.turn.transpose() * line.head<2>();
-  return std::abs(line.dot(projector_ray.direction.homogeneous())) / slope_per_px.norm();
-}
-
 }  // namespace
 
 TriangulatedPoint triangulate(const Match& match, const CalibratedCamera& camera, const Lens& projector,
@@ -81,7 +73,15 @@ TriangulatedPoint triangulate(const Match& match, const CalibratedCamera& camera
   const double sigma_mm =
       camera_sigma_px * (along_ray * point_per_px(equations, point, camera.lens, camera_ray.turn)).norm();
   if (!((camera.projector_from_camera * point).z() > 0)) point.setConstant(std::numeric_limits<double>::quiet_NaN());
-  return {point, sigma_mm, epipolar_residual_px(camera_ray.direction, projector_ray, camera.projector_from_camera)};
+  return {point, sigma_mm};
+}
+
+double epipolar_residual_px(const Match& match, const CalibratedCamera& camera, const Lens& projector) {
+  const PixelRay projector_ray = pixel_ray(projector, match.projector_px);
+  const auto& [rotation, translation] = camera.projector_from_camera;
+  const Eigen::Vector3d line = translation.cross(rotation * camera.lens.undistort(match.camera_px).homogeneous());
+  const Eigen::Vector2d slope_per_px = projector_ray.turn.transpose() * line.head<2>();
+  return std::abs(line.dot(projector_ray.direction.homogeneous())) / slope_per_px.norm();
 }
 
 }  // namespace slsd

@@ -17,8 +17,6 @@ struct Match {
 struct TriangulatedPoint {
   Eigen::Vector3d point_in_camera;  ///< mm
   double sigma_mm;                  ///< one standard deviation along the camera's ray
-  double epipolar_residual_px;      ///< distance of the projector pixel from the epipolar line of the camera pixel, in
-                                    ///< projector px
 };
 
 /// Intersects camera and projector rays in the least-squares sense, both pixels undistorted first.
@@ -28,5 +26,9 @@ struct TriangulatedPoint {
 /// @thread reentrant
 [[nodiscard]] TriangulatedPoint triangulate(const Match& match, const CalibratedCamera& camera, const Lens& projector,
                                             double camera_sigma_px);
+
+/// Distance of the projector pixel from the epipolar line of the camera pixel, in projector px.
+/// @thread reentrant
+[[nodiscard]] double epipolar_residual_px(const Match& match, const CalibratedCamera& camera, const Lens& projector);
 
 }  // namespace slsd

@@ -5,84 +5,57 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Geometry>
-
 namespace slsd {
-namespace {
-
-// Rows of A and b, equations (34) to (36), the principal points taken out.
-struct Rows {
-  Eigen::Vector3d seen_x, seen_y, lit_x, lit_y;
-  double b_x, b_y;  // of the projector; the camera's are zero
-};
-
-Rows rows_of(const Eigen::Vector2d& seen, const Eigen::Vector2d& lit, const RigidTransform& motion,
-             const Eigen::Array2d& camera_focal_px, const Eigen::Array2d& projector_focal_px) {
-  const auto& [rotation, translation] = motion;
-  return {camera_focal_px.x() * Eigen::Vector3d(-1, 0, seen.x()),
-          camera_focal_px.y() * Eigen::Vector3d(0, -1, seen.y()),
-          projector_focal_px.x() * (lit.x() * rotation.row(2) - rotation.row(0)),
-          projector_focal_px.y() * (lit.y() * rotation.row(2) - rotation.row(1)),
-          projector_focal_px.x() * (translation.x() - lit.x() * translation.z()),
-          projector_focal_px.y() * (translation.y() - lit.y() * translation.z())};
-}
-
-// A'A
-Eigen::Matrix3d normal_matrix(const Rows& rows) {
-  return rows.seen_x * rows.seen_x.transpose() + rows.seen_y * rows.seen_y.transpose() +
-         rows.lit_x * rows.lit_x.transpose() + rows.lit_y * rows.lit_y.transpose();
-}
-
-// For a symmetric matrix: half the work of Eigen's inverse.
-Eigen::Matrix3d inverse_of(const Eigen::Matrix3d& m) {
-  const double xx = m(1, 1) * m(2, 2) - m(1, 2) * m(1, 2);
-  const double xy = m(0, 2) * m(1, 2) - m(0, 1) * m(2, 2);
-  const double xz = m(0, 1) * m(1, 2) - m(0, 2) * m(1, 1);
-  const double yy = m(0, 0) * m(2, 2) - m(0, 2) * m(0, 2);
-  const double yz = m(0, 1) * m(0, 2) - m(0, 0) * m(1, 2);
-  const double zz = m(0, 0) * m(1, 1) - m(0, 1) * m(0, 1);
-  const double scale = 1.0 / (m(0, 0) * xx + m(0, 1) * xy + m(0, 2) * xz);
-  Eigen::Matrix3d inverse;
-  inverse << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-  return scale * inverse;
-}
-
-// How far the point moves along the camera's ray for a pixel's move in the steepest direction, mm per px: the normal
-// equations, differentiated.
-double slope_mm_per_px(const Rows& rows, const Eigen::Matrix3d& inverse, const Eigen::Vector3d& point,
-                       const PixelRay& ray, const Eigen::Array2d& focal_px) {
-  const Eigen::Vector3d pull = inverse * ray.direction.homogeneous();
-  const Eigen::RowVector2d slope(
-      focal_px.x() * (point.z() * pull.dot(rows.seen_x) + pull.z() * rows.seen_x.dot(point)),
-      focal_px.y() * (point.z() * pull.dot(rows.seen_y) + pull.z() * rows.seen_y.dot(point)));
-  return std::sqrt((slope * ray.turn).squaredNorm() / (1 + ray.direction.squaredNorm()));
-}
-
-double epipolar_residual_px(const Eigen::Vector2d& seen, const PixelRay& projector_ray, const RigidTransform& motion) {
-  const Eigen::Vector3d line = motion.translation.cross(motion.rotation * seen.homogeneous());
-  const Eigen::Vector2d slope_per_px = projector_ray.turn.transpose() * line.head<2>();
-  return std::abs(line.dot(projector_ray.direction.homogeneous())) / slope_per_px.norm();
-}
-
-}  // namespace
 
 Triangulator::Triangulator(const CalibratedCamera& camera, const Lens& projector)
     : projector_from_camera_(camera.projector_from_camera),
       camera_focal_px_(camera.lens.fx, camera.lens.fy),
       projector_focal_px_(projector.fx, projector.fy) {}
 
+// With d the camera's direction (x, y, 1), a point is P = z d + (u, v, 0), and the camera's rows of (34) leave the
+// residuals w = (fx u, fy v). The projector's rows A read A P = q z + L w = b. What minimises |w|^2 + |q z + L w - b|^2
+// for a given z is w = L' S (b - q z) with S = (I + L L')^-1, two by two; and then
+//
+//     z = q'S b / q'S q
+//
+// The slope along the ray for a pixel's move follows from (37), differentiated: it takes the solution of the same
+// normal equations for d on their right-hand side, here `pull`, found in the same way.
 TriangulatedPoint Triangulator::triangulate(const PixelRay& camera_ray, const PixelRay& projector_ray,
                                             double camera_sigma_px) const {
-  const Rows rows = rows_of(camera_ray.direction, projector_ray.direction, projector_from_camera_, camera_focal_px_,
-                            projector_focal_px_);
-  const Eigen::Matrix3d inverse = inverse_of(normal_matrix(rows));
-  Eigen::Vector3d point = inverse * (rows.b_x * rows.lit_x + rows.b_y * rows.lit_y);  // (37)
-  const double slope = slope_mm_per_px(rows, inverse, point, camera_ray, camera_focal_px_);
   const auto& [rotation, translation] = projector_from_camera_;
+  const Eigen::Vector2d seen = camera_ray.direction, lit = projector_ray.direction;
+  const Eigen::Array2d per_focal = 1 / camera_focal_px_;
+  const Eigen::RowVector3d a0 = projector_focal_px_.x() * (lit.x() * rotation.row(2) - rotation.row(0)),
+                           a1 = projector_focal_px_.y() * (lit.y() * rotation.row(2) - rotation.row(1));
+  const Eigen::Vector2d b(projector_focal_px_.x() * (translation.x() - lit.x() * translation.z()),
+                          projector_focal_px_.y() * (translation.y() - lit.y() * translation.z()));
+  const Eigen::Vector2d q(a0.x() * seen.x() + a0.y() * seen.y() + a0.z(),
+                          a1.x() * seen.x() + a1.y() * seen.y() + a1.z());
+  Eigen::Matrix2d l;
+  l << a0.x() * per_focal.x(), a0.y() * per_focal.y(), a1.x() * per_focal.x(), a1.y() * per_focal.y();
+
+  const double s00 = 1 + l.row(0).squaredNorm(), s11 = 1 + l.row(1).squaredNorm(), s01 = l.row(0).dot(l.row(1));
+  Eigen::Matrix2d s;
+  s << s11, -s01, -s01, s00;
+  s /= s00 * s11 - s01 * s01;
+  const Eigen::Vector2d sq = s * q;
+  const double per_qsq = 1 / q.dot(sq);
+
+  const double z = b.dot(sq) * per_qsq;
+  const Eigen::Vector2d w = l.transpose() * (s * (b - q * z));
+  const Eigen::Vector2d off_ray = (w.array() * per_focal).matrix();
+  Eigen::Vector3d point(seen.x() * z + off_ray.x(), seen.y() * z + off_ray.y(), z);
+
+  const double length_squared = 1 + seen.squaredNorm();
+  const Eigen::Vector2d e = (seen.array() * per_focal).matrix(), le = l * e;
+  const double pull_z = (length_squared - sq.dot(le)) * per_qsq;
+  const Eigen::Vector2d pull_w = e - l.transpose() * (s * le + sq * pull_z);
+  const Eigen::RowVector2d slope = (-camera_focal_px_ * (z * pull_w + pull_z * w).array()).matrix().transpose();
+  const double slope_mm_per_px = std::sqrt((slope * camera_ray.turn).squaredNorm() / length_squared);
+
   const bool in_front = rotation.row(2).dot(point) + translation.z() > 0;
   if (!in_front) point.setConstant(std::numeric_limits<double>::quiet_NaN());
-  return {point, camera_sigma_px * slope,
-          epipolar_residual_px(camera_ray.direction, projector_ray, projector_from_camera_)};
+  return {point, camera_sigma_px * slope_mm_per_px};
 }
 
 }  // namespace slsd

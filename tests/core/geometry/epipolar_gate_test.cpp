@@ -24,7 +24,6 @@ RC_GTEST_PROP(EpipolarGate, PassesEveryPointWithinTheWorkingDepth, ()) {
   const EpipolarSegment segment = gate.prepare(point.hnormalized());
   const Eigen::Vector2d direction = projector_direction(rig, point);
   RC_ASSERT(std::abs(segment.residual_px(direction)) < 1e-9);
-  RC_ASSERT(std::abs(segment.depth_mm(direction) - point.z()) < 1e-6);
   RC_ASSERT(segment.passes(direction, 1e-6));
 }
 
@@ -47,19 +46,10 @@ RC_GTEST_PROP(EpipolarGate, ResidualIsThatOfTriangulateToAFewPercent, ()) {
   const CalibratedCamera& camera = rig.cameras[0];
   const EpipolarGate gate(camera, rig.projector, kMinMm, kMaxMm);
   const Match match{any_pixel(camera.lens), any_pixel(rig.projector)};
-  const double exact = triangulate(match, camera, rig.projector, 0.1).epipolar_residual_px;
+  const double exact = epipolar_residual_px(match, camera, rig.projector);
   const double quick = std::abs(
       gate.prepare(camera.lens.undistort(match.camera_px)).residual_px(rig.projector.undistort(match.projector_px)));
   RC_ASSERT(std::abs(quick - exact) < 0.05 * exact + 1e-9);
-}
-
-RC_GTEST_PROP(EpipolarGate, EndsAreTheImagesOfTheDepthLimits, ()) {
-  const Calibration rig = paper_rig();
-  const EpipolarGate gate(rig.cameras[0], rig.projector, kMinMm, kMaxMm);
-  const Eigen::Vector2d camera = rig.cameras[0].lens.undistort(any_pixel(rig.cameras[0].lens));
-  const EpipolarSegment segment = gate.prepare(camera);
-  RC_ASSERT((segment.near_end() - projector_direction(rig, kMinMm * camera.homogeneous())).norm() < 1e-12);
-  RC_ASSERT((segment.far_end() - projector_direction(rig, kMaxMm * camera.homogeneous())).norm() < 1e-12);
 }
 
 TEST(EpipolarGate, CutsWhatLiesBehindTheProjector) {

@@ -60,7 +60,7 @@ RC_GTEST_PROP(Triangulate, ReturnsTheProjectedPoint, ()) {
   const Seen seen = any_seen(rig);
   const auto found = triangulate(seen.match, rig.cameras[0], rig.projector, 0.1);
   RC_ASSERT((found.point_in_camera - seen.point).norm() < 1e-6);
-  RC_ASSERT(found.epipolar_residual_px < 1e-7);
+  RC_ASSERT(epipolar_residual_px(seen.match, rig.cameras[0], rig.projector) < 1e-7);
 }
 
 RC_GTEST_PROP(Triangulate, AgreesWithOpenCv, ()) {
@@ -89,7 +89,7 @@ RC_GTEST_PROP(Triangulate, SigmaIsTheSlopeAlongTheRay, ()) {
   RC_ASSERT(std::abs(sigma_mm - sigma_px * slope.norm()) < 1e-5 * sigma_mm);
 }
 
-RC_GTEST_PROP(Triangulate, ResidualIsTheDistanceFromTheEpipolarCurve, ()) {
+RC_GTEST_PROP(EpipolarResidual, IsTheDistanceFromTheEpipolarCurve, ()) {
   const Calibration rig = paper_rig();
   const CalibratedCamera& camera = rig.cameras[0];
   const Match match = with_noise(any_seen(rig).match, 1.0);
@@ -100,7 +100,7 @@ RC_GTEST_PROP(Triangulate, ResidualIsTheDistanceFromTheEpipolarCurve, ()) {
     const Eigen::Vector2d curve = rig.projector.project(camera.projector_from_camera * (z * ray).eval());
     nearest = std::min(nearest, (curve - match.projector_px).norm());
   }
-  RC_ASSERT(std::abs(triangulate(match, camera, rig.projector, 0.1).epipolar_residual_px - nearest) < 5e-3);
+  RC_ASSERT(std::abs(epipolar_residual_px(match, camera, rig.projector) - nearest) < 5e-3);
 }
 
 RC_GTEST_PROP(Triangulator, AgreesWithThePlainForm, ()) {
@@ -111,9 +111,8 @@ RC_GTEST_PROP(Triangulator, AgreesWithThePlainForm, ()) {
   const auto plain = triangulate(match, rig.cameras[0], rig.projector, 0.07);
   const auto fast =
       triangulator.triangulate(rays.ray(match.camera_px), pixel_ray(rig.projector, match.projector_px), 0.07);
-  RC_ASSERT((plain.point_in_camera - fast.point_in_camera).norm() < 1e-6);
-  RC_ASSERT(std::abs(plain.sigma_mm - fast.sigma_mm) < 1e-6);
-  RC_ASSERT(std::abs(plain.epipolar_residual_px - fast.epipolar_residual_px) < 1e-7);
+  RC_ASSERT((plain.point_in_camera - fast.point_in_camera).norm() < 1e-4);
+  RC_ASSERT(std::abs(plain.sigma_mm - fast.sigma_mm) < 1e-4 * plain.sigma_mm);
 }
 
 TEST(Triangulate, IsNotInFrontWhereRaysPart) {
