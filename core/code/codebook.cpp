@@ -15,7 +15,10 @@ Codeword codeword_at(const CodeArray& array, int row, int column) {
 }
 
 Codebook::Codebook(const CodeArray& array, int rows, int columns, int radius)
-    : letters_(static_cast<std::uint32_t>(array.letters)) {
+    : letters_(static_cast<std::uint32_t>(array.letters)),
+      rows_(rows),
+      columns_(columns),
+      keys_(static_cast<std::size_t>(rows) * columns, kNoKey) {
   const std::size_t per_window = radius > 0 ? 1 + kWindowCells * (letters_ - 1) : 1;
   const std::size_t entries = static_cast<std::size_t>(rows) * columns * per_window;
   mask_ = std::bit_ceil(2 * entries + 1) - 1;
@@ -23,6 +26,7 @@ Codebook::Codebook(const CodeArray& array, int rows, int columns, int radius)
   for (int row = 1; row + 1 < rows; ++row) {
     for (int column = 1; column + 1 < columns; ++column) {
       Codeword codeword = codeword_at(array, row, column);
+      keys_[static_cast<std::size_t>(row) * columns + column] = key_of(codeword);
       insert(codeword, row, column, 0);
       if (radius == 0) continue;
       for (std::uint8_t& letter : codeword) {
@@ -38,7 +42,7 @@ Codebook::Codebook(const CodeArray& array, int rows, int columns, int radius)
 
 std::uint32_t Codebook::key_of(const Codeword& codeword) const {
   std::uint32_t key = 0;
-  for (const std::uint8_t letter : codeword) key = key * letters_ + letter;
+  for (const std::uint8_t letter : codeword) key = append(key, letter);
   return key;
 }
 

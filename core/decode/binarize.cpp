@@ -6,9 +6,11 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <limits>
 
 #include "core/decode/clones.hpp"
+#include "core/decode/lanes.hpp"
 
 namespace slsd {
 namespace {
@@ -37,9 +39,67 @@ SLSD_CLONES void compare_row(const std::uint16_t* pixels, const std::uint16_t* t
   for (int x = 0; x < width; ++x) mask[x] = pixels[x] > threshold[x] ? 255 : 0;
 }
 
+/// The least (or greatest) of `length` values from each on, by doubling: of one, two, four, and at last of two windows
+/// that overlap.
+template <class T, class Better>
+inline __attribute__((always_inline)) void slide(T* values, int count, int length, Better better) {
+  int window = 1;
+  const auto combine = [&](int step) {
+#pragma omp simd
+    for (int x = 0; x < count - step; ++x) values[x] = better(values[x], values[x + step]);
+  };
+  for (; 2 * window <= length; window *= 2) combine(window);
+  if (window < length) combine(length - window);
+}
+SLSD_CLONES void slide_extremes(std::uint8_t* least, std::uint8_t* greatest, int count, int length) {
+  slide(least, count, length, [](std::uint8_t a, std::uint8_t b) { return a < b ? a : b; });
+  slide(greatest, count, length, [](std::uint8_t a, std::uint8_t b) { return a > b ? a : b; });
+}
+SLSD_CLONES void slide_extremes(std::uint16_t* least, std::uint16_t* greatest, int count, int length) {
+  slide(least, count, length, [](std::uint16_t a, std::uint16_t b) { return a < b ? a : b; });
+  slide(greatest, count, length, [](std::uint16_t a, std::uint16_t b) { return a > b ? a : b; });
+}
+
 /// Binary places of a threshold: as many as a pixel's range leaves in 31 bits.
 template <class T>
 constexpr int kFractionBits = sizeof(T) == 1 ? 20 : 14;
+
+/// A straight line of thresholds from a tile's centre on, `kLanes` at a time: the last ones may lie beyond its end.
+inline __attribute__((always_inline)) void store_pixels(const IntLanes& lanes, std::uint8_t* pixels) {
+  using Bytes [[gnu::vector_size(sizeof(IntLanes))]] = std::uint8_t;
+  const auto bytes = reinterpret_cast<Bytes>(lanes);
+  const auto lowest = __builtin_shufflevector(bytes, bytes, 0, 4, 8, 12, 16, 20, 24, 28);
+  std::memcpy(pixels, &lowest, sizeof lowest);
+}
+inline __attribute__((always_inline)) void store_pixels(const IntLanes& lanes, std::uint16_t* pixels) {
+  using Words [[gnu::vector_size(sizeof(IntLanes))]] = std::uint16_t;
+  const auto words = reinterpret_cast<Words>(lanes);
+  const auto lowest = __builtin_shufflevector(words, words, 0, 2, 4, 6, 8, 10, 12, 14);
+  std::memcpy(pixels, &lowest, sizeof lowest);
+}
+
+struct ThresholdLine {
+  const int *at_centre, *step;  // one to a tile
+  int tiles, tile_px;
+};
+
+/// From the centre of the first tile to that of the last.
+template <class T>
+inline __attribute__((always_inline)) void draw_line(const ThresholdLine& line, T* threshold) {
+  constexpr IntLanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
+  for (int tile = 0; tile + 1 < line.tiles; ++tile) {
+    const int step = line.step[tile];
+    IntLanes value = line.at_centre[tile] + kLane * step;
+    for (int x = 0; x < line.tile_px; x += kLanes, value += kLanes * step)
+      store_pixels(value >> kFractionBits<T>, threshold + tile * line.tile_px + x);
+  }
+}
+SLSD_CLONES void draw(const ThresholdLine& line, std::uint8_t* threshold) {
+  draw_line(line, threshold);
+}
+SLSD_CLONES void draw(const ThresholdLine& line, std::uint16_t* threshold) {
+  draw_line(line, threshold);
+}
 
 /// Standard deviation of the noise, from the median second difference along the rows of a sample of pixels: edges are
 /// too few to move the median.
@@ -89,11 +149,13 @@ void Binarizer::find_extremes(const ImageView<T>& frame) {
     least.assign(frame.row(top), frame.row(top) + frame.width);
     greatest = least;
     for (int y = top + 1; y < bottom; ++y) extend_columns(frame.row(y), frame.width, least.data(), greatest.data());
-    int at = (row + 1) * stride_ + 1;
-    for (int left = 0; left < frame.width; left += tile, ++at) {
-      const int right = std::min(left + tile, frame.width);
-      least_[at] = *std::min_element(least.begin() + left, least.begin() + right);
-      greatest_[at] = *std::max_element(greatest.begin() + left, greatest.begin() + right);
+    // The last tile may reach beyond the frame.
+    least.resize(static_cast<std::size_t>(columns_) * tile, std::numeric_limits<T>::max());
+    greatest.resize(least.size(), 0);
+    slide_extremes(least.data(), greatest.data(), static_cast<int>(least.size()), tile);
+    for (int column = 0; column < columns_; ++column) {
+      least_[(row + 1) * stride_ + 1 + column] = least[column * tile];
+      greatest_[(row + 1) * stride_ + 1 + column] = greatest[column * tile];
     }
   }
 }
@@ -133,7 +195,7 @@ void Binarizer::binarize_as(const ImageView<T>& frame, Grey8& mask) {
   find_extremes(frame);
   set_thresholds(static_cast<float>(contrast_min), static_cast<float>(std::numeric_limits<T>::max()));
   auto& threshold = std::get<RowBuffers<T>>(row_buffers_).threshold;
-  threshold.resize(static_cast<std::size_t>(frame.width));
+  threshold.resize(static_cast<std::size_t>(columns_) * options_.tile_px + kLanes);
   for (int y = 0; y < frame.height; ++y) {
     // Thresholds change little from row to row.
     if (y % kRowsAlike == 0) interpolate_row(y + kRowsAlike / 2, frame.width, threshold.data());
@@ -153,21 +215,20 @@ void Binarizer::interpolate_row(int y, int width, T* threshold) {
   const float fraction = inside - static_cast<float>(above);
   const float* upper = threshold_.data() + (above + 1) * stride_ + 1;
   const float* lower = threshold_.data() + (below + 1) * stride_ + 1;
-  at_centre_.resize(columns_ + 1);
-  step_.assign(columns_ + 1, 0);
+  at_centre_.resize(columns_);
+  step_.resize(columns_);
   for (int column = 0; column < columns_; ++column) {
     at_centre_[column] = static_cast<int>((upper[column] + fraction * (lower[column] - upper[column])) * kUnit);
   }
-  for (int column = 1; column < columns_; ++column) {
-    step_[column] = (at_centre_[column] - at_centre_[column - 1]) / tile;
+  for (int column = 0; column + 1 < columns_; ++column) {
+    step_[column] = (at_centre_[column + 1] - at_centre_[column]) / tile;
   }
   // Flat before the first centre and after the last.
-  int x = 0;
-  for (int column = 0; column <= columns_; ++column) {
-    int value = at_centre_[std::max(column - 1, 0)];
-    const int end = column == columns_ ? width : std::min(column * tile + tile / 2, width);
-    for (; x < end; ++x, value += step_[column]) threshold[x] = static_cast<T>(value >> kFractionBits<T>);
-  }
+  const int first = tile / 2, last = first + (columns_ - 1) * tile;
+  std::fill_n(threshold, std::min(first, width), static_cast<T>(at_centre_.front() >> kFractionBits<T>));
+  draw({at_centre_.data(), step_.data(), columns_, tile}, threshold + first);
+  if (last < width)
+    std::fill(threshold + last, threshold + width, static_cast<T>(at_centre_.back() >> kFractionBits<T>));
 }
 
 void Binarizer::binarize(const GreyView& frame, Grey8& mask) {

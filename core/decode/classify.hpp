@@ -19,13 +19,30 @@ struct Classification {
   std::int8_t letter = -1;  ///< the likeliest, or -1: like none of them
 };
 
-/// Compares features with the prototypes.
+/// Compares features with prototypes, all letters at once.
 ///
 /// The likelihood is Student's t with few degrees of freedom rather than Gaussian: what real surfaces add to the
 /// simulated spread must not make one odd symbol outweigh eight good ones.
-/// @param distance_max  standard deviations from the nearest prototype beyond which a shape is rejected
 /// @thread reentrant
-[[nodiscard]] Classification classify(const ShapeFeatures& features, const std::vector<Prototype>& prototypes,
-                                      float distance_max);
+class Classifier {
+ public:
+  /// @param prototypes    one to a letter, kMaxLetters at most
+  /// @param distance_max  standard deviations from the nearest prototype beyond which a shape is rejected
+  Classifier(const std::vector<Prototype>& prototypes, float distance_max);
+
+  [[nodiscard]] Classification classify(const ShapeFeatures& features) const;
+
+  /// The prototypes' numbers, each with a place for every letter.
+  struct Table {
+    alignas(32) float mean[kFeatureCount][kMaxLetters];
+    alignas(32) float whitening[kFeatureCount * (kFeatureCount + 1) / 2][kMaxLetters];  ///< lower triangle, by rows
+    alignas(32) float density[kMaxLetters];
+    alignas(32) float absent[kMaxLetters];  ///< squared distance that a place without a letter has more
+  };
+
+ private:
+  Table table_;
+  float distance_max_;
+};
 
 }  // namespace slsd

@@ -38,15 +38,21 @@ std::int32_t CentreCorrection::named_neighbour(const std::vector<GridNode>& node
              : -1;
 }
 
-void CentreCorrection::measure_bends(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims) {
-  derivatives_.assign(nodes.size(), {});
-  const float per_squared_px = 1 / (pitch_px_ * pitch_px_);
+void CentreCorrection::find_named_neighbours(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims) {
+  named_.assign(nodes.size(), {-1, -1, -1, -1});
   for (std::int32_t i = 0; i < static_cast<std::int32_t>(nodes.size()); ++i) {
     if (claims[i].status != RegionStatus::kDecoded) continue;
-    const auto next = [&](std::int32_t from, Direction d) {
-      return from < 0 ? -1 : named_neighbour(nodes, claims, from, d);
-    };
-    const std::int32_t right = next(i, kRight), left = next(i, kLeft), up = next(i, kUp), down = next(i, kDown);
+    for (const Direction d : {kRight, kDown, kLeft, kUp}) named_[i][d] = named_neighbour(nodes, claims, i, d);
+  }
+}
+
+void CentreCorrection::measure_bends(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims) {
+  derivatives_.assign(nodes.size(), {});
+  find_named_neighbours(nodes, claims);
+  const auto next = [&](std::int32_t from, Direction d) { return from < 0 ? -1 : named_[from][d]; };
+  const float per_squared_px = 1 / (pitch_px_ * pitch_px_);
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(nodes.size()); ++i) {
+    const auto [right, down, left, up] = named_[i];
     Derivatives& at = derivatives_[i];
     if (right >= 0 && left >= 0) {
       at.bend.uu = (centres_[right] + centres_[left] - 2 * centres_[i]) * per_squared_px;
@@ -89,16 +95,16 @@ Eigen::Vector2f CentreCorrection::median_around(const std::vector<GridNode>& nod
   return {median(x), median(y)};
 }
 
-Bend CentreCorrection::bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const {
+std::optional<Bend> CentreCorrection::bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const {
   const Derivatives& own = derivatives_[node];
   const float largest = std::max(
       {own.bend.uu.cwiseAbs().maxCoeff(), own.bend.uv.cwiseAbs().maxCoeff(), own.bend.vv.cwiseAbs().maxCoeff()});
-  if (own.has_uu && own.has_uv && own.has_vv && largest < negligible_bend_) return {};
+  if (own.has_uu && own.has_uv && own.has_vv && largest < negligible_bend_) return std::nullopt;
   // The median with the neighbours: less noise, a value where none could be measured, and none from across an edge in
   // depth.
-  return {median_around(nodes, node, &Derivatives::has_uu, &Bend::uu),
-          median_around(nodes, node, &Derivatives::has_uv, &Bend::uv),
-          median_around(nodes, node, &Derivatives::has_vv, &Bend::vv)};
+  return Bend{median_around(nodes, node, &Derivatives::has_uu, &Bend::uu),
+              median_around(nodes, node, &Derivatives::has_uv, &Bend::uv),
+              median_around(nodes, node, &Derivatives::has_vv, &Bend::vv)};
 }
 
 void CentreCorrection::correct(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
@@ -114,7 +120,9 @@ void CentreCorrection::correct(const std::vector<GridNode>& nodes, const std::ve
   measure_bends(nodes, claims);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (claims[i].status != RegionStatus::kDecoded || letters[i] < 0) continue;
-    const Bend bend = bend_of(nodes, static_cast<std::int32_t>(i));
+    const std::optional<Bend> found = bend_of(nodes, static_cast<std::int32_t>(i));
+    if (!found) continue;
+    const Bend& bend = *found;
     const Eigen::Matrix2f& m = second_moments_px2_[letters[i]];
     const Eigen::Matrix2f inverse = nodes[i].frame.inverse();
     Eigen::Matrix2f along_u, along_v;

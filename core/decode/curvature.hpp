@@ -2,6 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/decode/decode_windows.hpp"
@@ -42,11 +45,13 @@ class CentreCorrection {
     Bend bend;
     bool has_uu = false, has_uv = false, has_vv = false;
   };
+  void find_named_neighbours(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims);
   void measure_bends(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims);
   template <class Part>
   [[nodiscard]] Eigen::Vector2f median_around(const std::vector<GridNode>& nodes, std::int32_t node,
                                               bool Derivatives::*has, Part part) const;
-  [[nodiscard]] Bend bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const;
+  /// Nothing where it is negligible.
+  [[nodiscard]] std::optional<Bend> bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const;
   [[nodiscard]] std::int32_t named_neighbour(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims,
                                              std::int32_t node, Direction direction) const;
 
@@ -54,7 +59,8 @@ class CentreCorrection {
   float negligible_bend_;
   std::vector<Eigen::Vector2f> centroids_px_;
   std::vector<Eigen::Matrix2f> second_moments_px2_;
-  std::vector<Eigen::Vector2f> centres_;  // of the squares
+  std::vector<Eigen::Vector2f> centres_;            // of the squares
+  std::vector<std::array<std::int32_t, 4>> named_;  // by Direction: neighbours that are decoded, and as such agree
   std::vector<Derivatives> derivatives_;
 };
 

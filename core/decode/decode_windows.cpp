@@ -20,59 +20,90 @@ WindowDecoder::WindowDecoder(const Pattern& pattern, DecodeWindowsOptions option
       options_(options),
       exact_codebook_(pattern.array, options.rows, options.columns, 0),
       correcting_codebook_(pattern.array, options.rows, options.columns, radius),
+      unique_(minimum_window_distance(pattern.array) > 0),
       log_letters_(std::log(static_cast<float>(pattern.letters()))) {}
 
-float WindowDecoder::shape_evidence(const Classification& shape, int row, int column) const {
-  if (shape.letter < 0) return 0;
-  return std::max(shape.log_probability[array_.at(row, column)] + log_letters_, options_.mismatch);
-}
-
-void WindowDecoder::vote(std::int32_t node, int row, int column, int weight, const CellGate& gate) {
-  Ballot& ballot = ballots_[node];
-  for (int i = 0; i < ballot.count; ++i) {
-    if (ballot.votes[i].row != row || ballot.votes[i].column != column) continue;
-    ballot.votes[i].weight = static_cast<std::int16_t>(ballot.votes[i].weight + weight);
-    return;
+std::optional<std::uint32_t> WindowDecoder::key_of(const Neighbourhood& around,
+                                                   const std::vector<Classification>& shapes) const {
+  std::uint32_t key = 0;
+  for (const std::int32_t node : around) {
+    if (node < 0 || shapes[node].letter < 0) return std::nullopt;
+    key = exact_codebook_.append(key, static_cast<std::uint8_t>(shapes[node].letter));
   }
-  if (ballot.count == kVotes || !shown(row, column) || !gate.admits(node, row, column)) return;
-  ballot.votes[ballot.count++] = {static_cast<std::int16_t>(row), static_cast<std::int16_t>(column),
-                                  static_cast<std::int16_t>(weight)};
+  return key;
 }
 
-std::optional<Codebook::Entry> WindowDecoder::look_up(std::int32_t node, const Codeword& codeword,
-                                                      const CellGate& gate) const {
-  std::optional<Codebook::Entry> hit;
+/// Where the window above, or the one to the left, was found, this one lies beside it: one comparison instead of a
+/// search, as long as no other window is like it.
+WindowDecoder::Hit WindowDecoder::continued(std::int32_t node, std::uint32_t key) const {
+  if (!unique_) return {};
+  constexpr int kAbove = 1, kLeftOf = 3;
+  for (const int beside : {kAbove, kLeftOf}) {
+    const Hit& hit = hits_[around_[node][beside]];
+    const int row = hit.row + (beside == kAbove), column = hit.column + (beside == kLeftOf);
+    if (hit.weight == 0 || exact_codebook_.key_at(row, column) != key) continue;
+    return {static_cast<std::int16_t>(row), static_cast<std::int16_t>(column), kExactWeight};
+  }
+  return {};
+}
+
+WindowDecoder::Hit WindowDecoder::look_up(std::int32_t node, std::uint32_t key, const CellGate& gate) const {
+  Hit found;
   int hits = 0;
   const auto take = [&](const Codebook::Entry& entry) {
-    if (gate.admits(node, entry.row, entry.column)) hit = entry, ++hits;
+    if (!gate.admits(node, entry.row, entry.column)) return;
+    found = {entry.row, entry.column, entry.errors == 0 ? kExactWeight : kCorrectedWeight};
+    ++hits;
   };
-  exact_codebook_.find(codeword, take);
-  if (hits == 0) correcting_codebook_.find(codeword, take);
-  return hits == 1 ? hit : std::nullopt;
+  exact_codebook_.find(key, take);
+  if (hits == 0) correcting_codebook_.find(key, take);
+  return hits == 1 ? found : Hit{};
 }
 
 void WindowDecoder::look_up_windows(const std::vector<Classification>& shapes, const CellGate& gate) {
-  for (std::size_t node = 0; node < around_.size(); ++node) {
-    const Neighbourhood& around = around_[node];
-    Codeword codeword;
-    bool full = true;
-    for (int i = 0; i < kWindowCells && full; ++i) {
-      full = around[i] >= 0 && shapes[around[i]].letter >= 0;
-      if (full) codeword[i] = static_cast<std::uint8_t>(shapes[around[i]].letter);
-    }
-    if (!full) continue;
-    const auto hit = look_up(static_cast<std::int32_t>(node), codeword, gate);
-    if (!hit) continue;
-    const int weight = hit->errors == 0 ? kExactWeight : kCorrectedWeight;
-    for (int i = 0; i < kWindowCells; ++i) {
-      vote(around[i], hit->row - 1 + i / kWindowSide, hit->column - 1 + i % kWindowSide, weight, gate);
-    }
+  hits_.assign(around_.size(), {});
+  for (std::size_t i = 0; i < around_.size(); ++i) {
+    const auto key = key_of(around_[i], shapes);
+    if (!key) continue;
+    const auto node = static_cast<std::int32_t>(i);
+    hits_[i] = continued(node, *key);
+    if (hits_[i].weight == 0 || !gate.admits(node, hits_[i].row, hits_[i].column)) hits_[i] = look_up(node, *key, gate);
   }
 }
 
-void WindowDecoder::elect(std::vector<CellClaim>& claims) const {
+void WindowDecoder::vote(std::int32_t node, const Vote& vote, const CellGate& gate, Ballot& ballot) const {
+  for (int i = 1; i < ballot.count; ++i) {
+    if (ballot.votes[i].row != vote.row || ballot.votes[i].column != vote.column) continue;
+    ballot.votes[i].weight += vote.weight;
+    return;
+  }
+  if (ballot.count == kVotes || !shown(vote.row, vote.column) || !gate.admits(node, vote.row, vote.column)) return;
+  ballot.votes[ballot.count++] = vote;
+}
+
+/// The votes of the windows that hold a node: of those around the nodes around it.
+WindowDecoder::Ballot WindowDecoder::collect_votes(std::int32_t node, const CellGate& gate) const {
+  Ballot ballot;
+  Vote& first = ballot.votes[0];
+  for (int i = 0; i < kWindowCells; ++i) {
+    const std::int32_t other = around_[node][i];
+    if (other < 0 || hits_[other].weight == 0) continue;
+    // A corner can be reached from here and not lead back.
+    if (around_[other][kWindowCells - 1 - i] != node) continue;
+    const Hit& hit = hits_[other];
+    const Vote next{hit.row + 1 - i / kWindowSide, hit.column + 1 - i % kWindowSide, hit.weight};
+    if (ballot.count > 0 && first.row == next.row && first.column == next.column) {
+      first.weight += next.weight;
+    } else {
+      vote(node, next, gate, ballot);
+    }
+  }
+  return ballot;
+}
+
+void WindowDecoder::elect(const CellGate& gate, std::vector<CellClaim>& claims) const {
   for (std::size_t node = 0; node < claims.size(); ++node) {
-    const Ballot& ballot = ballots_[node];
+    const Ballot ballot = collect_votes(static_cast<std::int32_t>(node), gate);
     CellClaim& claim = claims[node];
     claim = {};
     const bool linked = std::ranges::count_if(around_[node], [](std::int32_t other) { return other >= 0; }) > 1;
@@ -83,8 +114,8 @@ void WindowDecoder::elect(std::vector<CellClaim>& claims) const {
       if (weight > best) {
         second = best;
         best = weight;
-        claim.row = ballot.votes[i].row;
-        claim.column = ballot.votes[i].column;
+        claim.row = static_cast<std::int16_t>(ballot.votes[i].row);
+        claim.column = static_cast<std::int16_t>(ballot.votes[i].column);
       } else {
         second = std::max(second, weight);
       }
@@ -153,10 +184,9 @@ void WindowDecoder::decode(const std::vector<GridNode>& nodes, const std::vector
                            const CellGate& gate, std::vector<CellClaim>& claims) {
   around_.resize(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i) around_[i] = neighbourhood(nodes, static_cast<std::int32_t>(i));
-  ballots_.assign(nodes.size(), {});
   claims.assign(nodes.size(), {});
   look_up_windows(shapes, gate);
-  elect(claims);
+  elect(gate, claims);
   spread(nodes, gate, claims);
   verify(shapes, claims);
 }

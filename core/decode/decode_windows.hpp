@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -43,7 +44,7 @@ struct DecodeWindowsOptions {
 /// gate
 ///    excludes does not count.
 /// 2. Each window found votes for the cells of all its nine nodes, so a node at an edge, or misread, is named by its
-/// neighbours.
+/// neighbours; what the gate excludes for that node is no vote.
 /// 3. What no window reaches is named by neighbours that are named already.
 /// 4. Every name is verified: the node's own shape, and the shapes around it, have to be those of the cells around that
 /// cell.
@@ -56,9 +57,14 @@ class WindowDecoder {
               std::vector<CellClaim>& claims);
 
  private:
+  /// The cell of a window's middle, where the window was found.
+  struct Hit {
+    std::int16_t row = -1, column = -1;
+    int weight = 0;
+  };
   struct Vote {
-    std::int16_t row, column;
-    std::int16_t weight;
+    int row, column;
+    int weight;
   };
   static constexpr int kVotes = 4;
   struct Ballot {
@@ -67,13 +73,19 @@ class WindowDecoder {
   };
 
   void look_up_windows(const std::vector<Classification>& shapes, const CellGate& gate);
-  [[nodiscard]] std::optional<Codebook::Entry> look_up(std::int32_t node, const Codeword& codeword,
-                                                       const CellGate& gate) const;
-  void vote(std::int32_t node, int row, int column, int weight, const CellGate& gate);
-  void elect(std::vector<CellClaim>& claims) const;
+  [[nodiscard]] std::optional<std::uint32_t> key_of(const Neighbourhood& around,
+                                                    const std::vector<Classification>& shapes) const;
+  [[nodiscard]] Hit continued(std::int32_t node, std::uint32_t key) const;
+  [[nodiscard]] Hit look_up(std::int32_t node, std::uint32_t key, const CellGate& gate) const;
+  [[nodiscard]] Ballot collect_votes(std::int32_t node, const CellGate& gate) const;
+  void vote(std::int32_t node, const Vote& vote, const CellGate& gate, Ballot& ballot) const;
+  void elect(const CellGate& gate, std::vector<CellClaim>& claims) const;
   void spread(const std::vector<GridNode>& nodes, const CellGate& gate, std::vector<CellClaim>& claims);
   void verify(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims) const;
-  [[nodiscard]] float shape_evidence(const Classification& shape, int row, int column) const;
+  [[nodiscard]] float shape_evidence(const Classification& shape, int row, int column) const {
+    if (shape.letter < 0) return 0;
+    return std::max(shape.log_probability[array_.at(row, column)] + log_letters_, options_.mismatch);
+  }
   [[nodiscard]] bool shown(int row, int column) const {
     return row >= 0 && column >= 0 && row < options_.rows && column < options_.columns;
   }
@@ -81,9 +93,10 @@ class WindowDecoder {
   CodeArray array_;
   DecodeWindowsOptions options_;
   Codebook exact_codebook_, correcting_codebook_;  // the first is small enough to stay in the cache
+  bool unique_;                                    // no two windows alike
   float log_letters_;
   std::vector<Neighbourhood> around_;
-  std::vector<Ballot> ballots_;
+  std::vector<Hit> hits_;
 };
 
 }  // namespace slsd

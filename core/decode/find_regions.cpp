@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <limits>
 
 namespace slsd {
 namespace {
@@ -63,7 +62,7 @@ void RegionFinder::find_runs(const ImageView<std::uint8_t>& mask) {
 }
 
 int RegionFinder::root(int label) {
-  while (parent_[label] != label) label = parent_[label] = parent_[parent_[label]];
+  while (labels_[label].parent != label) label = labels_[label].parent = labels_[labels_[label].parent].parent;
   return label;
 }
 
@@ -73,68 +72,72 @@ int RegionFinder::label_of(const Run& run, int& above, int above_end) {
   while (above < above_end && runs_[above].right < run.left) ++above;
   int label = -1;
   for (int i = above; i < above_end && runs_[i].left <= run.right; ++i) {
-    if (label < 0) label = label_[i];
-    if (label == label_[i]) continue;
-    const int a = root(label), b = root(label_[i]);
-    parent_[std::max(a, b)] = std::min(a, b);
+    if (label < 0) label = label_of_run_[i];
+    if (label == label_of_run_[i]) continue;
+    const int a = root(label), b = root(label_of_run_[i]);
+    labels_[std::max(a, b)].parent = std::min(a, b);
   }
   if (label >= 0) return label;
-  parent_.push_back(static_cast<int>(parent_.size()));
-  return parent_.back();
+  labels_.push_back({static_cast<int>(labels_.size()), {run.left, run.row, run.right - 1, run.row, 0, 0, 0}});
+  return labels_.back().parent;
 }
 
 void RegionFinder::label_runs(int height) {
-  parent_.clear();
-  label_.resize(run_count_);
+  labels_.clear();
+  label_of_run_.resize(run_count_);
   for (int y = 0, above = 0; y < height; ++y) {
     const int first = first_run_of_row_[y], end = first_run_of_row_[y + 1];
-    for (int i = first; i < end; ++i) label_[i] = label_of(runs_[i], above, first);
+    for (int i = first; i < end; ++i) {
+      const Run& run = runs_[i];
+      label_of_run_[i] = label_of(run, above, first);
+      Region& region = labels_[label_of_run_[i]].region;
+      region.left = std::min<int>(region.left, run.left);
+      region.right = std::max(region.right, run.right - 1);
+      region.bottom = run.row;
+      region.area_px += run.right - run.left;
+      ++region.run_count;
+    }
     above = first;
   }
 }
 
-/// One region to each label that is its own root, in the order of the labels: that of their first pixels.
+/// One region to each label that is its own parent, in the order of the labels: that of their first pixels. From here
+/// on a label's parent is the number of its region.
 void RegionFinder::number_regions(Regions& found) {
   found.regions.clear();
-  region_of_label_.resize(parent_.size());
-  for (std::size_t label = 0; label < parent_.size(); ++label) {
-    const int parent = parent_[label];
-    if (parent == static_cast<int>(label)) {
-      region_of_label_[label] = static_cast<int>(found.regions.size());
-      found.regions.push_back({std::numeric_limits<int>::max(), -1, -1, -1, 0, 0, 0});
-    } else {
-      region_of_label_[label] = region_of_label_[parent];
+  for (std::size_t i = 0; i < labels_.size(); ++i) {
+    Label& label = labels_[i];
+    if (label.parent == static_cast<int>(i)) {
+      label.parent = static_cast<int>(found.regions.size());
+      found.regions.push_back(label.region);
+      continue;
     }
+    label.parent = labels_[label.parent].parent;
+    Region& whole = found.regions[label.parent];
+    whole.left = std::min(whole.left, label.region.left);
+    whole.right = std::max(whole.right, label.region.right);
+    whole.bottom = std::max(whole.bottom, label.region.bottom);
+    whole.area_px += label.region.area_px;
+    whole.run_count += label.region.run_count;
   }
 }
 
 void RegionFinder::gather(Regions& found) {
-  number_regions(found);
-  for (std::size_t i = 0; i < run_count_; ++i) {
-    const Run& run = runs_[i];
-    Region& region = found.regions[region_of_label_[label_[i]]];
-    if (region.run_count++ == 0) region.top = run.row;
-    region.left = std::min<int>(region.left, run.left);
-    region.right = std::max(region.right, run.right - 1);
-    region.bottom = run.row;
-    region.area_px += run.right - run.left;
-  }
   int next = 0;
+  next_run_.clear();
   for (Region& region : found.regions) {
     region.first_run = next;
+    next_run_.push_back(next);
     next += region.run_count;
-    region.run_count = 0;
   }
   found.runs.resize(run_count_);
-  for (std::size_t i = 0; i < run_count_; ++i) {
-    Region& region = found.regions[region_of_label_[label_[i]]];
-    found.runs[region.first_run + region.run_count++] = runs_[i];
-  }
+  for (std::size_t i = 0; i < run_count_; ++i) found.runs[next_run_[labels_[label_of_run_[i]].parent]++] = runs_[i];
 }
 
 void RegionFinder::find(const ImageView<std::uint8_t>& mask, Regions& found) {
   find_runs(mask);
   label_runs(mask.height);
+  number_regions(found);
   gather(found);
 }
 

@@ -60,14 +60,19 @@ class RegionFinder {
   [[nodiscard]] int label_of(const Run& run, int& above, int above_end);
   void number_regions(Regions& found);
   void gather(Regions& found);
-  int root(int label);
+  [[nodiscard]] int root(int label);
 
   std::vector<Run> runs_;  // run_count_ of them, then room for more
   std::size_t run_count_ = 0;
   std::vector<int> first_run_of_row_;
-  std::vector<int> label_;   // of each run
-  std::vector<int> parent_;  // of each label, not above it: labels of one region have one root
-  std::vector<int> region_of_label_;
+  std::vector<int> label_of_run_;
+  /// A part of a region, found row by row; its parent is not above it: labels of one region have one root.
+  struct Label {
+    int parent;
+    Region region;
+  };
+  std::vector<Label> labels_;
+  std::vector<int> next_run_;  // of each region, where its next run goes
 };
 
 }  // namespace slsd

@@ -17,10 +17,16 @@ namespace {
 /// What is left of the light at the dark end of a symbol, at the least.
 constexpr float kLeastLight = 0.3F;
 
-void spread_edge(const int* left_edge, const int* right_edge, int rows, int* first, int* last) {
+/// Least of the left edges and greatest of the right ones within `reach` rows after each.
+void spread_edge(const int* left_edge, const int* right_edge, int reach, int rows, int* first, int* last) {
   for (int y = 0; y < rows; ++y) {
-    first[y] = std::min(first[y], left_edge[y]);
-    last[y] = std::max(last[y], right_edge[y]);
+    int left = left_edge[y], right = right_edge[y];
+    for (int k = 1; k <= reach; ++k) {
+      left = std::min(left, left_edge[y + k]);
+      right = std::max(right, right_edge[y + k]);
+    }
+    first[y] = left;
+    last[y] = right;
   }
 }
 
@@ -97,22 +103,24 @@ GreyMoments central(const RawMoments& raw, double middle_x, double middle_y) {
 }  // namespace
 
 /// In each row of the patch, from the leftmost to the rightmost pixel within the margin of the region.
-void GreyMomentMeter::follow_edge(const Region& region, std::span<const Run> runs) {
-  const auto rows = static_cast<std::size_t>(region.height_px());
-  left_edge_.assign(rows, width_);
-  right_edge_.assign(rows, -1);
+GreyMomentMeter::Extent GreyMomentMeter::follow_edge(const Region& region, std::span<const Run> runs) {
+  // The edges of the region's rows, with as many empty rows above and below as the margin reaches twice.
+  const int reach = 2 * margin_px_;
+  const auto rows = static_cast<std::size_t>(height_ + reach);
+  edges_.resize(2 * (rows + static_cast<std::size_t>(height_)));
+  int* left_edge = edges_.data();
+  int* right_edge = left_edge + rows;
+  std::fill_n(left_edge, rows, width_);
+  std::fill_n(right_edge, rows, -1);
   for (const Run& run : runs) {
-    int& left_edge = left_edge_[run.row - region.top];
-    int& right_edge = right_edge_[run.row - region.top];
-    left_edge = std::min(left_edge, run.left - region.left);
-    right_edge = std::max(right_edge, run.right - 1 - region.left + 2 * margin_px_);
+    const int y = run.row - region.top + reach;
+    left_edge[y] = std::min(left_edge[y], run.left - region.left);
+    right_edge[y] = std::max(right_edge[y], run.right - 1 - region.left + reach);
   }
-  first_.assign(static_cast<std::size_t>(height_), width_);
-  last_.assign(static_cast<std::size_t>(height_), -1);
-  for (int shift = 0; shift <= 2 * margin_px_; ++shift) {
-    spread_edge(left_edge_.data(), right_edge_.data(), static_cast<int>(rows), first_.data() + shift,
-                last_.data() + shift);
-  }
+  int* first = right_edge + rows;
+  int* last = first + height_;
+  spread_edge(left_edge, right_edge, reach, height_, first, last);
+  return {first, last};
 }
 
 template <class T>
@@ -121,18 +129,18 @@ void GreyMomentMeter::copy_patch(const ImageView<T>& frame, const Region& region
   width_ = region.width_px() + 2 * margin_px_;
   height_ = region.height_px() + 2 * margin_px_;
   stride_ = padded(width_);
-  follow_edge(region, runs);
+  const Extent extent = follow_edge(region, runs);
   if (left_ >= 0 && top_ >= 0 && left_ + stride_ <= frame.width && top_ + height_ <= frame.height) {
     patch_.resize(static_cast<std::size_t>(stride_) * height_);
-    return copy_rows(frame, {left_, top_, stride_, height_}, first_.data(), last_.data(), patch_.data());
+    return copy_rows(frame, {left_, top_, stride_, height_}, extent.first, extent.last, patch_.data());
   }
   patch_.assign(static_cast<std::size_t>(stride_) * height_, kOutside);
   for (int y = 0; y < height_; ++y) {
     if (top_ + y < 0 || top_ + y >= frame.height) continue;
     const T* pixels = frame.row(top_ + y);
     float* row = patch_.data() + y * stride_;
-    const int end = std::min(last_[y], frame.width - 1 - left_);
-    for (int x = std::max(first_[y], -left_); x <= end; ++x) row[x] = static_cast<float>(pixels[left_ + x]);
+    const int end = std::min(extent.last[y], frame.width - 1 - left_);
+    for (int x = std::max(extent.first[y], -left_); x <= end; ++x) row[x] = static_cast<float>(pixels[left_ + x]);
   }
 }
 

@@ -47,7 +47,11 @@ class GreyMomentMeter {
                                          const Eigen::Vector2f& shading);
 
  private:
-  void follow_edge(const Region& region, std::span<const Run> runs);
+  /// First and last pixel of each row of the patch that belongs to the region or its margin; in edges_.
+  struct Extent {
+    const int *first, *last;
+  };
+  [[nodiscard]] Extent follow_edge(const Region& region, std::span<const Run> runs);
   template <class T>
   void copy_patch(const ImageView<T>& frame, const Region& region, std::span<const Run> runs);
   template <class T>
@@ -58,8 +62,7 @@ class GreyMomentMeter {
 
   int margin_px_;
   int left_ = 0, top_ = 0, width_ = 0, height_ = 0, stride_ = 0;  // of the patch
-  std::vector<int> left_edge_, right_edge_;                       // of the region in each of its rows
-  std::vector<int> first_, last_;                                 // the same in each row of the patch, with the margin
+  std::vector<int> edges_;                                        // of the region's rows, then of the patch's
   std::vector<float> patch_;                                      // grey values; kOutside where they belong to others
 };
 

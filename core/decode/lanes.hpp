@@ -17,7 +17,11 @@ static inline __attribute__((always_inline)) void load(const float* from, Lanes&
 }
 
 static inline __attribute__((always_inline)) float sum_of(const Lanes& lanes) {
-  return ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]));
+  using Half [[gnu::vector_size(16)]] = float;
+  const Half half =
+      __builtin_shufflevector(lanes, lanes, 0, 1, 2, 3) + __builtin_shufflevector(lanes, lanes, 4, 5, 6, 7);
+  const Half quarter = half + __builtin_shufflevector(half, half, 2, 3, 0, 1);
+  return quarter[0] + quarter[1];
 }
 
 }  // namespace slsd

@@ -140,27 +140,39 @@ void GridLinker::choose(std::vector<GridNode>& nodes, std::size_t from, float ra
 
 void GridLinker::find_mutual(std::vector<GridNode>& nodes, float radius) {
   chosen_.assign(nodes.size(), {-1, -1, -1, -1});
+  before_.resize(nodes.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i) before_[i] = nodes[i].links;
   for (std::size_t i = 0; i < nodes.size(); ++i) choose(nodes, i, radius);
+  relinked_.clear();
   for (std::size_t i = 0; i < nodes.size(); ++i) {
+    bool relinked = false;
     for (const Direction d : kDirections) {
       const std::int32_t other = chosen_[i][d];
       nodes[i].links[d] = other >= 0 && chosen_[other][opposite(d)] == static_cast<std::int32_t>(i) ? other : -1;
+      relinked |= nodes[i].links[d] != before_[i][d];
     }
+    if (relinked) relinked_.push_back(static_cast<std::int32_t>(i));
   }
 }
 
-void GridLinker::measure_frames(std::vector<GridNode>& nodes, const std::vector<std::uint8_t>& trusted) const {
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    GridNode& node = nodes[i];
-    for (const Direction d : {kRight, kDown}) {
-      const auto step = measured_step(nodes, trusted, i, d);
-      if (!step) continue;
-      const Eigen::Vector2f measured = *step / options_.pitch_px;
-      auto expected = node.frame.col(d == kRight ? 0 : 1);
-      if ((measured - expected).norm() > kFrameChangeMax * expected.norm()) continue;
-      expected = measured;
-      (d == kRight ? node.measured_u : node.measured_v) = true;
-    }
+void GridLinker::measure_frame(std::vector<GridNode>& nodes, const std::vector<std::uint8_t>& trusted,
+                               std::size_t node) const {
+  for (const Direction d : {kRight, kDown}) {
+    const auto step = measured_step(nodes, trusted, node, d);
+    if (!step) continue;
+    const Eigen::Vector2f measured = *step / options_.pitch_px;
+    auto expected = nodes[node].frame.col(d == kRight ? 0 : 1);
+    if ((measured - expected).norm() > kFrameChangeMax * expected.norm()) continue;
+    expected = measured;
+    (d == kRight ? nodes[node].measured_u : nodes[node].measured_v) = true;
+  }
+}
+
+/// Those which the links that changed have a part in; a node that lost a link counts as one that has it.
+void GridLinker::measure_changed_frames(std::vector<GridNode>& nodes) {
+  for (const std::int32_t node : relinked_) {
+    visit_measured_with(
+        nodes, node, [&](std::int32_t other) { measure_frame(nodes, all_trusted_, static_cast<std::size_t>(other)); });
   }
 }
 
@@ -204,9 +216,9 @@ void GridLinker::link(std::vector<GridNode>& nodes) {
   sort_into_buckets(nodes);
   all_trusted_.assign(nodes.size(), 1);
   find_mutual(nodes, options_.search_radius);
-  measure_frames(nodes, all_trusted_);
+  for (std::size_t i = 0; i < nodes.size(); ++i) measure_frame(nodes, all_trusted_, i);
   find_mutual(nodes, options_.refined_radius);
-  measure_frames(nodes, all_trusted_);
+  measure_changed_frames(nodes);
   break_inconsistent(nodes);
 }
 

@@ -37,6 +37,20 @@ struct LinkGridOptions {
 /// One step of the pattern in a direction, in cells.
 [[nodiscard]] Eigen::Vector2f step(Direction direction);
 
+/// Calls visit(other) for a node and for every other whose frame is measured with it: up to two links along a line.
+template <class Visit>
+void visit_measured_with(const std::vector<GridNode>& nodes, std::int32_t node, Visit&& visit) {
+  visit(node);
+  for (const Direction d : {kRight, kDown, kLeft, kUp}) {
+    std::int32_t other = node;
+    for (int links = 0; links < 2; ++links) {
+      other = nodes[other].links[d];
+      if (other < 0) break;
+      visit(other);
+    }
+  }
+}
+
 /// Links each symbol with its four neighbours on the grid. A neighbour is the nearest one to where the local frame puts
 /// it, and the choice has to be mutual. Frames are then measured from the links and the search repeated more narrowly;
 /// last, links whose step disagrees with those beside and behind them are broken: they were carried across an edge in
@@ -54,10 +68,10 @@ class GridLinker {
 
   void link(std::vector<GridNode>& nodes);
 
-  /// Measures the frames again from those neighbours alone that are trusted: the fragment of a symbol at the edge of a
-  /// surface draws the frames beside it to itself.
+  /// Measures a node's frame again from those neighbours alone that are trusted: the fragment of a symbol at the edge
+  /// of a surface draws the frames beside it to itself.
   /// @param trusted  one to a node, non-zero where it is
-  void measure_frames(std::vector<GridNode>& nodes, const std::vector<std::uint8_t>& trusted) const;
+  void measure_frame(std::vector<GridNode>& nodes, const std::vector<std::uint8_t>& trusted, std::size_t node) const;
 
  private:
   void sort_into_buckets(const std::vector<GridNode>& nodes);
@@ -66,6 +80,7 @@ class GridLinker {
   [[nodiscard]] std::int32_t likely(const std::vector<GridNode>& nodes, std::size_t from, Direction direction) const;
   void choose(std::vector<GridNode>& nodes, std::size_t from, float radius);
   void find_mutual(std::vector<GridNode>& nodes, float radius);
+  void measure_changed_frames(std::vector<GridNode>& nodes);
   void break_inconsistent(std::vector<GridNode>& nodes);
 
   LinkGridOptions options_;
@@ -78,8 +93,9 @@ class GridLinker {
   };
   std::vector<std::int32_t> first_of_bucket_;
   std::vector<Place> in_buckets_;
-  std::vector<std::array<std::int32_t, 4>> chosen_;
+  std::vector<std::array<std::int32_t, 4>> chosen_, before_;
   std::vector<std::array<bool, 4>> inconsistent_;
+  std::vector<std::int32_t> relinked_;  // nodes whose links the last search changed
   std::vector<std::uint8_t> all_trusted_;
 };
 

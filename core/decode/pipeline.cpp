@@ -79,6 +79,8 @@ Decoder::Pipeline::Pipeline(const Pattern& pattern, const Calibration& calibrati
       expected_(camera_, calibration.projector, std::sqrt(options.depth_min_mm * options.depth_max_mm)),
       prototypes_as_expected_(prototypes_for(pattern, expected_.in_the_middle().scale, kExpectedFrameError)),
       prototypes_as_measured_(prototypes_for(pattern, expected_.in_the_middle().scale, kMeasuredFrameError)),
+      classifier_as_expected_(prototypes_as_expected_, kExpectedDistanceMax),
+      classifier_as_measured_(prototypes_as_measured_, kMeasuredDistanceMax),
       cells_(pattern, with_centroids_of(options.centre, pattern, prototypes_as_measured_), calibration.projector),
       camera_rays_(camera_.lens),
       epipolar_gate_(camera_, calibration.projector, options.depth_min_mm, options.depth_max_mm),
@@ -170,8 +172,7 @@ void Decoder::Pipeline::classify() {
     node.frame = expected.frame;
     node.centre_px = {moments.x, moments.y};
     if (options_.classify == Method::kDefault) {
-      seen_.shapes[i] = slsd::classify(shape_features(moments, expected.inverse, size), prototypes_as_expected_,
-                                       kExpectedDistanceMax);
+      seen_.shapes[i] = classifier_as_expected_.classify(shape_features(moments, expected.inverse, size));
     }
     if (seen_.shapes[i].letter >= 0)
       node.centre_px -= node.frame * prototypes_as_expected_[seen_.shapes[i].letter].centroid_px;
@@ -192,8 +193,7 @@ void Decoder::Pipeline::classify_in_measured_frames() {
     const bool decided = before.letter >= 0 && before.distance < kDecidedDistance &&
                          before.log_probability[before.letter] > kDecidedLogProbability;
     if (decided || !node.measured_u || !node.measured_v) continue;
-    seen_.shapes[i] = slsd::classify(shape_features(seen_.moments[i], node.frame.inverse(), size),
-                                     prototypes_as_measured_, kMeasuredDistanceMax);
+    seen_.shapes[i] = classifier_as_measured_.classify(shape_features(seen_.moments[i], node.frame.inverse(), size));
   }
 }
 

@@ -60,6 +60,7 @@ class Decoder::Pipeline {
   std::optional<PaperWay> paper_;
   ExpectedFrames expected_;
   std::vector<Prototype> prototypes_as_expected_, prototypes_as_measured_;
+  Classifier classifier_as_expected_, classifier_as_measured_;
   CellRays cells_;
   RayTable camera_rays_;
   EpipolarGate epipolar_gate_;

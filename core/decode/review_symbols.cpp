@@ -63,14 +63,38 @@ bool SymbolReview::is_inside(const Sightings& seen, std::size_t node) const {
   });
 }
 
+/// Frames, and with them distances, are measured anew around those symbols that are no longer trusted.
+void SymbolReview::measure_around_distrusted(const GridLinker& linker, Sightings& seen) {
+  for (const std::int32_t node : distrusted_) {
+    visit_measured_with(seen.nodes, node, [&](std::int32_t other) {
+      const auto i = static_cast<std::size_t>(other);
+      linker.measure_frame(seen.nodes, trusted_, i);
+      if (seen.claims[i].status == RegionStatus::kDecoded)
+        distances_[i] = distance_from_letter(seen, i, seen.moments[i]);
+    });
+  }
+}
+
 void SymbolReview::trust_whole_symbols(const GridLinker& linker, Sightings& seen) {
   trusted_.resize(seen.size());
-  for (std::size_t i = 0; i < seen.size(); ++i) trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
-  linker.measure_frames(seen.nodes, trusted_);
+  distances_.resize(seen.size());
+  distrusted_.clear();
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (trusted_[i] != 0) trusted_[i] = distance_from_letter(seen, i, seen.moments[i]) <= options_.damaged_distance;
+    trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
+    if (trusted_[i] != 0) {
+      distances_[i] = distance_from_letter(seen, i, seen.moments[i]);
+    } else {
+      distrusted_.push_back(static_cast<std::int32_t>(i));
+    }
   }
-  linker.measure_frames(seen.nodes, trusted_);
+  measure_around_distrusted(linker, seen);
+  distrusted_.clear();
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (trusted_[i] == 0 || distances_[i] <= options_.damaged_distance) continue;
+    trusted_[i] = 0;
+    distrusted_.push_back(static_cast<std::int32_t>(i));
+  }
+  measure_around_distrusted(linker, seen);
 }
 
 void SymbolReview::measure_light_changes(const Sightings& seen) {
@@ -94,7 +118,7 @@ template <class T>
 void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions, GreyMomentMeter& meter,
                                Sightings& seen, std::size_t node) const {
   GreyMoments& moments = seen.moments[node];
-  float distance = distance_from_letter(seen, node, moments);
+  float distance = distances_[node];
   const auto adopt_if_better = [&](const GreyMoments& again, float tolerance) {
     const float distance_again = distance_from_letter(seen, node, again);
     if (again.weight > 0 && distance_again < distance + tolerance) moments = again, distance = distance_again;

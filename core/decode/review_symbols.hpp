@@ -35,6 +35,7 @@ class SymbolReview {
               Sightings& seen);
 
  private:
+  void measure_around_distrusted(const GridLinker& linker, Sightings& seen);
   void trust_whole_symbols(const GridLinker& linker, Sightings& seen);
   void measure_light_changes(const Sightings& seen);
   [[nodiscard]] Eigen::Vector2f light_change_around(const Sightings& seen, std::size_t node) const;
@@ -52,6 +53,8 @@ class SymbolReview {
   float size_px_, pitch_px_;
   ReviewOptions options_;
   std::vector<std::uint8_t> trusted_;
+  std::vector<std::int32_t> distrusted_;
+  std::vector<float> distances_;                // of each symbol from its letter, standard deviations
   std::vector<Eigen::Vector2f> light_changes_;  // from cell to cell along u and v, relative
 };
 

@@ -59,8 +59,8 @@ SLSD_CLONES void sum_moments(const float* patch, int stride, int height, float m
   const Lanes zero{}, one = zero + 1;
   const Lanes offset = zero + (levels.background + kRampStart * range);
   const Lanes scale = zero + 1 / ((kRampEnd - kRampStart) * range);
-  auto& m = moments.m;
-  // Sums over y stay in their columns; only at the end of a column of lanes they are taken over x.
+  // Sums over y stay in their columns, and are then taken over x; lanes are summed once at the end.
+  Lanes m00{}, m01{}, m02{}, m03{}, m10{}, m11{}, m12{}, m20{}, m21{}, m30{};
   for (int left = 0; left < stride; left += kLanes) {
     Lanes s0{}, s1{}, s2{}, s3{};
     for (int row = 0; row < height; ++row) {
@@ -77,12 +77,17 @@ SLSD_CLONES void sum_moments(const float* patch, int stride, int height, float m
       s3 += wyy * y;
     }
     const Lanes x = kLane + (static_cast<float>(left) - middle_x);
-    const Lanes x0 = s0 * x, x1 = s1 * x, x00 = x0 * x;
-    m[0][0] += sum_of(s0), m[0][1] += sum_of(s1), m[0][2] += sum_of(s2), m[0][3] += sum_of(s3);
-    m[1][0] += sum_of(x0), m[1][1] += sum_of(x1), m[1][2] += sum_of(s2 * x);
-    m[2][0] += sum_of(x00), m[2][1] += sum_of(x1 * x);
-    m[3][0] += sum_of(x00 * x);
+    const Lanes x0 = s0 * x, x1 = s1 * x, xx0 = x0 * x;
+    m00 += s0, m01 += s1, m02 += s2, m03 += s3;
+    m10 += x0, m11 += x1, m12 += s2 * x;
+    m20 += xx0, m21 += x1 * x;
+    m30 += xx0 * x;
   }
+  auto& m = moments.m;
+  m[0][0] = sum_of(m00), m[0][1] = sum_of(m01), m[0][2] = sum_of(m02), m[0][3] = sum_of(m03);
+  m[1][0] = sum_of(m10), m[1][1] = sum_of(m11), m[1][2] = sum_of(m12);
+  m[2][0] = sum_of(m20), m[2][1] = sum_of(m21);
+  m[3][0] = sum_of(m30);
 }
 
 }  // namespace slsd

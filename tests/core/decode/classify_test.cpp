@@ -30,7 +30,7 @@ double total_probability(const Classification& shape, int letters) {
 TEST(Classify, KnowsEachPrototype) {
   const auto prototypes = three_letters();
   for (int letter = 0; letter < 3; ++letter) {
-    const Classification shape = classify(prototypes[letter].mean, prototypes, kDistanceMax);
+    const Classification shape = Classifier(prototypes, kDistanceMax).classify(prototypes[letter].mean);
     EXPECT_EQ(shape.letter, letter);
     EXPECT_EQ(shape.distance, 0);
     EXPECT_GT(shape.log_probability[letter], std::log(0.99));
@@ -42,7 +42,7 @@ TEST(Classify, RejectsWhatIsLikeNone) {
   const auto prototypes = three_letters();
   ShapeFeatures odd = prototypes[0].mean;
   odd[0] *= 3;
-  const Classification shape = classify(odd, prototypes, kDistanceMax);
+  const Classification shape = Classifier(prototypes, kDistanceMax).classify(odd);
   EXPECT_EQ(shape.letter, -1);
   EXPECT_GT(shape.distance, kDistanceMax);
 }
@@ -53,9 +53,9 @@ TEST(Classify, MeasuresTheDistanceInStandardDeviations) {
   ShapeFeatures whitened = ShapeFeatures::Zero();
   whitened[3] = 3;
   const ShapeFeatures features = prototypes[1].mean + prototypes[1].whitening.inverse() * whitened;
-  EXPECT_NEAR(classify(features, prototypes, kDistanceMax).distance, 3, 0.01);
-  EXPECT_EQ(classify(features, prototypes, 2.9F).letter, -1);
-  EXPECT_EQ(classify(features, prototypes, 3.1F).letter, 1);
+  EXPECT_NEAR(Classifier(prototypes, kDistanceMax).classify(features).distance, 3, 0.01);
+  EXPECT_EQ(Classifier(prototypes, 2.9F).classify(features).letter, -1);
+  EXPECT_EQ(Classifier(prototypes, 3.1F).classify(features).letter, 1);
 }
 
 TEST(Classify, NamesTheNearestOfOrdinarySamples) {
@@ -67,7 +67,7 @@ TEST(Classify, NamesTheNearestOfOrdinarySamples) {
     const Prototype& prototype = prototypes[i % 3];
     const ShapeFeatures whitened = ShapeFeatures::NullaryExpr([&] { return normal(random); });
     const ShapeFeatures features = prototype.mean + prototype.whitening.inverse() * whitened;
-    right += classify(features, prototypes, kDistanceMax).letter == i % 3;
+    right += Classifier(prototypes, kDistanceMax).classify(features).letter == i % 3;
   }
   EXPECT_GE(right, 298);
 }
@@ -75,8 +75,8 @@ TEST(Classify, NamesTheNearestOfOrdinarySamples) {
 TEST(Classify, IsLessSureBetweenTwoPrototypes) {
   const auto prototypes = three_letters();
   const ShapeFeatures between = 0.5F * (prototypes[0].mean + prototypes[1].mean);
-  const Classification shape = classify(between, prototypes, 1e3F);
-  const Classification sure = classify(prototypes[0].mean, prototypes, 1e3F);
+  const Classification shape = Classifier(prototypes, 1e3F).classify(between);
+  const Classification sure = Classifier(prototypes, 1e3F).classify(prototypes[0].mean);
   EXPECT_LT(shape.log_probability[shape.letter], sure.log_probability[0]);
   EXPECT_NEAR(total_probability(shape, 3), 1, 1e-4);
 }
@@ -84,7 +84,7 @@ TEST(Classify, IsLessSureBetweenTwoPrototypes) {
 TEST(Classify, KeepsProbabilitiesFiniteForAnyShape) {
   const auto prototypes = three_letters();
   for (const float extreme : {1e4F, 1e8F}) {
-    const Classification shape = classify(ShapeFeatures::Constant(extreme), prototypes, kDistanceMax);
+    const Classification shape = Classifier(prototypes, kDistanceMax).classify(ShapeFeatures::Constant(extreme));
     EXPECT_EQ(shape.letter, -1);
     for (int i = 0; i < 3; ++i) EXPECT_TRUE(std::isfinite(shape.log_probability[i]));
   }

@@ -135,7 +135,7 @@ TEST(LinkGrid, MeasuresTheFramesOfATiltedPlane) {
   EXPECT_LT(measured_error, 0.07);
 }
 
-TEST(MeasureFrames, LeavesNodesOutThatAreNotTrusted) {
+TEST(MeasureFrame, LeavesNodesOutThatAreNotTrusted) {
   const Homography map = Homography::Identity();
   SimulatedGrid grid = grid_of(map, 0);
   GridLinker linker({});
@@ -143,10 +143,10 @@ TEST(MeasureFrames, LeavesNodesOutThatAreNotTrusted) {
   const std::int32_t fragment = grid.node_at(10, 10), beside = grid.node_at(10, 9);
   grid.nodes[fragment].centre_px.x() -= 4;
   std::vector<std::uint8_t> trusted(grid.nodes.size(), 1);
-  linker.measure_frames(grid.nodes, trusted);
+  linker.measure_frame(grid.nodes, trusted, static_cast<std::size_t>(beside));
   EXPECT_LT(grid.nodes[beside].frame(0, 0), 0.93F);
   trusted[fragment] = 0;
-  linker.measure_frames(grid.nodes, trusted);
+  linker.measure_frame(grid.nodes, trusted, static_cast<std::size_t>(beside));
   EXPECT_NEAR(grid.nodes[beside].frame(0, 0), 1, 0.03);
 }
 
