@@ -1,0 +1,130 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""The whole service on a V4L2 camera over FUSE, which is unplugged and plugged in again while it scans."""
+import pathlib
+import random
+import subprocess
+import sys
+import threading
+import time
+import unittest
+
+from client import RpcError
+from service import BIN, SCENE, Service
+
+CANNOT_MOUNT = 77
+LIVES = 4
+FOR_EVER = 1000000
+CONFIGURATION = """
+[pattern]
+file = "{scene}/pattern.toml"
+[[camera]]
+name = "camera"
+driver = "v4l2"
+device = "{device}"
+exposure_us = 10000.0
+gain_steps = 20
+[calibration]
+file = "{scene}/calibration.yml"
+[server]
+socket = "slsd.sock"
+"""
+
+
+class Double:
+    """A camera that shows the scene."""
+
+    def __init__(self):
+        self.process = subprocess.Popen([BIN / "v4l2-double", SCENE / "frame.png"], stdin=subprocess.PIPE,
+                                        stdout=subprocess.PIPE, text=True)
+        self.device = pathlib.Path(self.process.stdout.readline().strip())
+
+    def tell(self, command):
+        self.process.stdin.write(command + "\n")
+        self.process.stdin.flush()
+        assert self.process.stdout.readline() == "ok\n", command
+
+    def close(self):
+        self.process.stdin.close()
+        self.process.stdout.close()
+        return self.process.wait()
+
+
+def scan_until_it_works(client):
+    """The seconds that it took, and the error of each scan before."""
+    begin = time.monotonic()
+    errors = []
+    while True:
+        try:
+            result, _ = client.call("scan")
+            return time.monotonic() - begin, errors, result
+        except RpcError as error:
+            errors.append(error.name)
+        if time.monotonic() - begin > 60:
+            raise TimeoutError(errors)
+
+
+class V4l2(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.double = Double()
+        cls.service = Service(configuration=CONFIGURATION.format(scene=SCENE, device=cls.double.device)).start()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.service.__exit__()
+        cls.double.close()
+
+    def test_scans_the_plane(self):
+        with self.service.client() as client:
+            result, _ = client.call("scan")
+            self.assertGreater(result["points"], 2000)
+            status, _ = client.call("status")
+        self.assertEqual(status["cameras"][0]["driver"], "v4l2")
+
+    def expect(self, name, fault, remedy, **params):
+        """A scan fails with the name while the fault lasts; the next one works."""
+        self.double.tell(fault)
+        with self.service.client() as client:
+            with self.assertRaises(RpcError) as caught:
+                while True:  # a frame from before the fault may come first
+                    client.call("scan", **params)
+            self.assertEqual(caught.exception.name, name, str(caught.exception))
+            self.double.tell(remedy)
+            scan_until_it_works(client)
+
+    def test_names_each_fault_and_goes_on(self):
+        self.expect("frame_torn", f"flag {FOR_EVER}", "flag 0")
+        self.expect("frame_torn", f"short {FOR_EVER}", "short 0")
+        self.expect("frame_late", f"stall {FOR_EVER}", "stall 0", timeout_ms=300)
+        self.expect("frame_dropped", f"eio {FOR_EVER}", "eio 0")
+
+    def test_scans_again_when_plugged_in_again(self):
+        chance = random.Random(3)
+        worst = 0.0
+        with self.service.client() as client:
+            client.call("scan")
+            for _ in range(LIVES):
+                hand = threading.Timer(chance.uniform(0, 0.3), self.double.tell, ["unplug"])
+                hand.start()
+                with self.assertRaises(RpcError) as caught:
+                    while True:
+                        client.call("scan", timeout_ms=1000)
+                self.assertIn(caught.exception.name, {"disconnected", "timeout"})
+                hand.join()
+                time.sleep(chance.uniform(0, 0.5))
+                self.double.tell("replug")
+                seconds, _, result = scan_until_it_works(client)
+                self.assertGreater(result["points"], 2000)
+                worst = max(worst, seconds)
+        print(f"from the plug to a cloud: {worst:.2f} s at worst of {LIVES}")
+        self.assertIsNone(self.service.process.poll())
+
+
+if __name__ == "__main__":
+    probe = subprocess.run([BIN / "v4l2-double"], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    if probe.returncode == CANNOT_MOUNT:
+        print(probe.stderr)
+        sys.exit(CANNOT_MOUNT)
+    unittest.main()
