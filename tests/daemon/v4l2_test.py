@@ -2,74 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """The whole service on a V4L2 camera over FUSE, which is unplugged and plugged in again while it scans."""
-import pathlib
 import random
-import subprocess
 import sys
 import threading
 import time
 import unittest
 
 from client import RpcError
-from service import BIN, SCENE, Service
+from v4l2_double import CANNOT_MOUNT, Double, can_mount, scan_until_it_works, service_on
 
-CANNOT_MOUNT = 77
 LIVES = 4
 FOR_EVER = 1000000
-CONFIGURATION = """
-[pattern]
-file = "{scene}/pattern.toml"
-[[camera]]
-name = "camera"
-driver = "v4l2"
-device = "{device}"
-exposure_us = 10000.0
-gain_steps = 20
-[calibration]
-file = "{scene}/calibration.yml"
-[server]
-socket = "slsd.sock"
-"""
-
-
-class Double:
-    """A camera that shows the scene."""
-
-    def __init__(self):
-        self.process = subprocess.Popen([BIN / "v4l2-double", SCENE / "frame.png"], stdin=subprocess.PIPE,
-                                        stdout=subprocess.PIPE, text=True)
-        self.device = pathlib.Path(self.process.stdout.readline().strip())
-
-    def tell(self, command):
-        self.process.stdin.write(command + "\n")
-        self.process.stdin.flush()
-        assert self.process.stdout.readline() == "ok\n", command
-
-    def close(self):
-        self.process.stdin.close()
-        self.process.stdout.close()
-        return self.process.wait()
-
-
-def scan_until_it_works(client):
-    """The seconds that it took, and the error of each scan before."""
-    begin = time.monotonic()
-    errors = []
-    while True:
-        try:
-            result, _ = client.call("scan")
-            return time.monotonic() - begin, errors, result
-        except RpcError as error:
-            errors.append(error.name)
-        if time.monotonic() - begin > 60:
-            raise TimeoutError(errors)
 
 
 class V4l2(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.double = Double()
-        cls.service = Service(configuration=CONFIGURATION.format(scene=SCENE, device=cls.double.device)).start()
+        cls.service = service_on(cls.double).start()
 
     @classmethod
     def tearDownClass(cls):
@@ -123,8 +73,6 @@ class V4l2(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    probe = subprocess.run([BIN / "v4l2-double"], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-    if probe.returncode == CANNOT_MOUNT:
-        print(probe.stderr)
+    if not can_mount():
         sys.exit(CANNOT_MOUNT)
     unittest.main()

@@ -44,6 +44,29 @@ int DoubleDevice::ioctl(Owner owner, unsigned command, void* argument, pid_t cal
   const std::lock_guard lock(mutex_);
   if (!present_) return ENODEV;
   switch (command) {
+    case VIDIOC_REQBUFS:
+      return request_buffers(owner, as<v4l2_requestbuffers>(argument));
+    case VIDIOC_QUERYBUF:
+      return describe_buffer(as<v4l2_buffer>(argument));
+    case VIDIOC_QBUF:
+      return queue(owner, as<v4l2_buffer>(argument));
+    case VIDIOC_DQBUF:
+      return dequeue(owner, as<v4l2_buffer>(argument));
+    case VIDIOC_STREAMON:
+      return start(owner);
+    case VIDIOC_STREAMOFF:
+      return stop(owner);
+    case VIDIOC_G_EXT_CTRLS:
+      return controls_.get_extended(as<v4l2_ext_controls>(argument), caller);
+    case VIDIOC_S_EXT_CTRLS:
+      return controls_.set_extended(as<v4l2_ext_controls>(argument), caller);
+    default:
+      return ioctl_setting(command, argument);
+  }
+}
+
+int DoubleDevice::ioctl_setting(unsigned command, void* argument) {
+  switch (command) {
     case VIDIOC_QUERYCAP:
       return query_capability(as<v4l2_capability>(argument));
     case VIDIOC_ENUM_FMT:
@@ -73,22 +96,6 @@ int DoubleDevice::ioctl(Owner owner, unsigned command, void* argument, pid_t cal
       return controls_.get(as<v4l2_control>(argument));
     case VIDIOC_S_CTRL:
       return controls_.set(as<v4l2_control>(argument));
-    case VIDIOC_G_EXT_CTRLS:
-      return controls_.get_extended(as<v4l2_ext_controls>(argument), caller);
-    case VIDIOC_S_EXT_CTRLS:
-      return controls_.set_extended(as<v4l2_ext_controls>(argument), caller);
-    case VIDIOC_REQBUFS:
-      return request_buffers(owner, as<v4l2_requestbuffers>(argument));
-    case VIDIOC_QUERYBUF:
-      return describe_buffer(as<v4l2_buffer>(argument));
-    case VIDIOC_QBUF:
-      return queue(owner, as<v4l2_buffer>(argument));
-    case VIDIOC_DQBUF:
-      return dequeue(owner, as<v4l2_buffer>(argument));
-    case VIDIOC_STREAMON:
-      return start(owner);
-    case VIDIOC_STREAMOFF:
-      return stop(owner);
     default:
       return ENOTTY;
   }

@@ -83,6 +83,7 @@ class DoubleDevice {
     unsigned stream;
   };
 
+  int ioctl_setting(unsigned command, void* argument);
   int query_capability(v4l2_capability& capability) const;
   int enumerate_format(v4l2_fmtdesc& format) const;
   int enumerate_size(v4l2_frmsizeenum& size) const;

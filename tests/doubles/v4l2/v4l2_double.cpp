@@ -2,6 +2,9 @@
 // Copyright the slsd authors
 #include "tests/doubles/v4l2/v4l2_double.hpp"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <cstdlib>
 
 namespace slsd::test {
@@ -15,6 +18,8 @@ Result<std::unique_ptr<V4l2Double>> V4l2Double::create(DoubleOptions options) {
   if (!file) return tl::unexpected(file.error());
   made->file_ = std::move(*file);
   made->replug();
+  // The kernel asks at each close until it was told once that nobody cares; a killed process would wait for itself.
+  close(open(made->path().c_str(), O_RDWR | O_CLOEXEC));
   return made;
 }
 

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""A V4L2 camera over FUSE that shows the scene, and a service on it."""
+import pathlib
+import subprocess
+import time
+
+from client import RpcError
+from service import BIN, SCENE, Service
+
+CANNOT_MOUNT = 77
+CONFIGURATION = """
+[pattern]
+file = "{scene}/pattern.toml"
+[[camera]]
+name = "camera"
+driver = "v4l2"
+device = "{device}"
+exposure_us = 10000.0
+gain_steps = 20
+[calibration]
+file = "{scene}/calibration.yml"
+[server]
+socket = "slsd.sock"
+"""
+
+
+class Double:
+    """A camera that shows the scene."""
+
+    def __init__(self, rate_hz=60):
+        self.process = subprocess.Popen([BIN / "v4l2-double", SCENE / "frame.png", str(rate_hz)], stdin=subprocess.PIPE,
+                                        stdout=subprocess.PIPE, text=True)
+        self.device = pathlib.Path(self.process.stdout.readline().strip())
+
+    def tell(self, command):
+        self.process.stdin.write(command + "\n")
+        self.process.stdin.flush()
+        assert self.process.stdout.readline() == "ok\n", command
+
+    def close(self):
+        self.process.stdin.close()
+        self.process.stdout.close()
+        return self.process.wait()
+
+
+def scan_until_it_works(client):
+    """The seconds that it took, and the error of each scan before."""
+    begin = time.monotonic()
+    errors = []
+    while True:
+        try:
+            result, _ = client.call("scan")
+            return time.monotonic() - begin, errors, result
+        except RpcError as error:
+            errors.append(error.name)
+        if time.monotonic() - begin > 60:
+            raise TimeoutError(errors)
+
+
+def service_on(double):
+    return Service(configuration=CONFIGURATION.format(scene=SCENE, device=double.device))
+
+
+def can_mount():
+    """False, with the reason printed, where this machine or user cannot mount FUSE."""
+    probe = subprocess.run([BIN / "v4l2-double"], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    print(probe.stderr, end="")
+    return probe.returncode != CANNOT_MOUNT
