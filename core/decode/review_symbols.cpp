@@ -15,15 +15,24 @@ constexpr Direction kDirections[] = {kRight, kDown, kLeft, kUp};
 /// How much farther from its letter a symbol may come to be by levelling the light: its centre gains even so.
 constexpr float kLevellingTolerance = 0.3F;
 
-/// Relative change of the light from one cell to the next along a direction, from the peaks of the neighbours.
+float light_of(const Sightings& seen, std::int32_t node) {
+  return seen.moments[node].peak - seen.moments[node].background;
+}
+
+/// Relative change of the light from one cell to the next along a direction, from the peaks of the neighbours. At the
+/// edge of a surface the change grows; the second neighbour tells how fast.
 float light_change(const Sightings& seen, std::size_t node, Direction direction) {
-  const auto light = [&](std::int32_t at) { return seen.moments[at].peak - seen.moments[at].background; };
   const auto self = static_cast<std::int32_t>(node);
   const std::int32_t next = neighbour(seen.nodes, self, direction),
                      last = neighbour(seen.nodes, self, opposite(direction));
-  const int steps = (last >= 0) + (next >= 0);
-  if (steps == 0) return 0;
-  return (light(next >= 0 ? next : self) - light(last >= 0 ? last : self)) / (static_cast<float>(steps) * light(self));
+  const float own = light_of(seen, self);
+  if (next >= 0 && last >= 0) return (light_of(seen, next) - light_of(seen, last)) / (2 * own);
+  if (next < 0 && last < 0) return 0;
+  const Direction inwards = next >= 0 ? direction : opposite(direction);
+  const std::int32_t first = next >= 0 ? next : last, second = neighbour(seen.nodes, first, inwards);
+  const float step = light_of(seen, first) - own;
+  const float change = second >= 0 ? 1.5F * step - 0.5F * (light_of(seen, second) - light_of(seen, first)) : step;
+  return (inwards == direction ? change : -change) / own;
 }
 
 /// Where the neighbours put a node, by continuing the steps of those beside it; quadratic, as steps shrink towards a
@@ -103,15 +112,21 @@ void SymbolReview::measure_light_changes(const Sightings& seen) {
     light_changes_[i] = {light_change(seen, i, kRight), light_change(seen, i, kDown)};
 }
 
-/// The mean with the neighbours': small symbols blur to lower peaks, which is not the light's doing.
+/// The mean with those beside, across the direction of the change: small symbols blur to lower peaks, which is not the
+/// light's doing. Along it the change itself changes.
 Eigen::Vector2f SymbolReview::light_change_around(const Sightings& seen, std::size_t node) const {
-  Eigen::Vector2f sum = light_changes_[node];
-  float count = 1;
-  for (const Direction d : kDirections) {
-    const std::int32_t other = neighbour(seen.nodes, static_cast<std::int32_t>(node), d);
-    if (other >= 0) sum += light_changes_[other], ++count;
-  }
-  return sum / count;
+  const auto mean_with = [&](int axis, Direction one_side, Direction other_side) {
+    float sum = light_changes_[node][axis], count = 1;
+    for (const Direction d : {one_side, other_side}) {
+      const std::int32_t other = neighbour(seen.nodes, static_cast<std::int32_t>(node), d);
+      if (other < 0) continue;
+      sum += light_changes_[other][axis], ++count;
+      const std::int32_t next = neighbour(seen.nodes, other, d);
+      if (next >= 0) sum += light_changes_[next][axis], ++count;
+    }
+    return sum / count;
+  };
+  return {mean_with(0, kUp, kDown), mean_with(1, kLeft, kRight)};
 }
 
 template <class T>
