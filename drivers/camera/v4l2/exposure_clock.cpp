@@ -20,19 +20,26 @@ std::chrono::nanoseconds nanoseconds(const timeval& time) {
 
 ExposureClock::ExposureClock(const ExposureTiming& timing, const V4l2CameraOptions& options, const std::string& driver)
     : stamps_first_packet_(driver == "uvcvideo") {
-  const auto period = timing.period.value_or(kPeriodUnknown);
-  exposure_ = timing.exposure.value_or(period);
-  readout_ = options.readout_us ? std::chrono::nanoseconds(std::llround(1e3 * *options.readout_us)) : period;
+  period_ = timing.period.value_or(kPeriodUnknown);
+  exposure_ = timing.exposure.value_or(period_);
+  readout_ = options.readout_us ? std::chrono::nanoseconds(std::llround(1e3 * *options.readout_us)) : period_;
+}
+
+bool ExposureClock::is_stamped(const v4l2_buffer& buffer) {
+  const bool monotonic = (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+  return monotonic && nanoseconds(buffer.timestamp).count() > 0;
 }
 
 MonotonicTime ExposureClock::exposure_start(const v4l2_buffer& buffer, MonotonicTime received) const {
-  const std::chrono::nanoseconds stamp = nanoseconds(buffer.timestamp);
-  const bool monotonic = (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
-  if (!monotonic || stamp.count() <= 0) return received - readout_ - exposure_;
-  const MonotonicTime stamped = std::min(MonotonicTime(stamp), received);
+  if (!is_stamped(buffer)) return received - readout_ - exposure_;
+  const MonotonicTime stamped = std::min(MonotonicTime(nanoseconds(buffer.timestamp)), received);
   const bool at_start = (buffer.flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
   if (!at_start) return stamped - readout_ - exposure_;
   return stamps_first_packet_ ? stamped - exposure_ : stamped;
+}
+
+int ExposureClock::frames_in_flight() const {
+  return static_cast<int>((exposure_ + readout_ + period_ - std::chrono::nanoseconds(1)) / period_);
 }
 
 }  // namespace slsd

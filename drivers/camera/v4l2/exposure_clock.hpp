@@ -18,9 +18,11 @@ namespace slsd {
 ///     exposure begins ----exposure----> ends, read-out begins ----readout----> last byte
 ///     TSTAMP_SRC_SOE                    uvcvideo's stamp                       TSTAMP_SRC_EOF
 ///
-/// uvcvideo claims the start of exposure and stamps a frame's first packet, which comes after it. A stamp of another
-/// clock, or none, counts as the end of the frame when it was received. What is not known counts as long as it can be,
-/// a frame's period: a frame may be taken for older than it is, never for younger.
+/// uvcvideo claims the start of exposure and stamps a frame's first packet, which comes after it. What is not known
+/// counts as long as it can be, a frame's period: a frame may be taken for older than it is, never for younger.
+///
+/// Without a stamp of CLOCK_MONOTONIC only the order is left: when a frame is received says nothing, because who
+/// receives it may have slept. Then as many frames as may be in flight have to pass after the trigger.
 /// @thread reentrant
 class ExposureClock {
  public:
@@ -28,10 +30,17 @@ class ExposureClock {
   /// @param driver  as V4l2Device::driver()
   ExposureClock(const ExposureTiming& timing, const V4l2CameraOptions& options, const std::string& driver);
 
-  /// @param received  when it was taken from the driver
+  /// The buffer carries a stamp that tells.
+  [[nodiscard]] static bool is_stamped(const v4l2_buffer& buffer);
+
+  /// Of a buffer without a stamp a guess. @param received  when it was taken from the driver
   [[nodiscard]] MonotonicTime exposure_start(const v4l2_buffer& buffer, MonotonicTime received) const;
 
+  /// How many frames at most are exposed or read out at a time.
+  [[nodiscard]] int frames_in_flight() const;
+
  private:
+  std::chrono::nanoseconds period_{1};
   std::chrono::nanoseconds exposure_{0};
   std::chrono::nanoseconds readout_{0};
   bool stamps_first_packet_ = false;

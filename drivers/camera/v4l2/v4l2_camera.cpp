@@ -69,7 +69,7 @@ Result<> V4l2Camera::configure(V4l2Device device) {
 
 Result<Frame> V4l2Camera::capture(MonotonicTime deadline) {
   if (!stream_) return fail_here(ErrorCode::kDisconnected, "the camera is not open; open it");
-  auto frame = capture_after({steady_clock::now(), deadline});
+  auto frame = capture_after({steady_clock::now(), deadline, clock_.frames_in_flight()});
   if (!frame && frame.error().code == ErrorCode::kDisconnected) {
     converter_.reset();
     stream_.reset();
@@ -146,7 +146,7 @@ Result<std::optional<Frame>> V4l2Camera::take(Capture& capture) {
 
 Result<std::optional<Frame>> V4l2Camera::judge(const v4l2_buffer& buffer, Capture& capture) {
   const MonotonicTime received = steady_clock::now();
-  const MonotonicTime exposure_start = clock_.exposure_start(buffer, received);
+  const MonotonicTime exposure_start = this->exposure_start(buffer, received, capture);
   const std::uint32_t lost = note_order(buffer);
   counts_.dropped += lost;
   if (settling_ > 0 || exposure_start < capture.trigger) {
@@ -168,6 +168,14 @@ Result<std::optional<Frame>> V4l2Camera::judge(const v4l2_buffer& buffer, Captur
   auto frame = deliver(buffer, exposure_start, received);
   if (!frame) return tl::unexpected(frame.error());
   return std::move(*frame);
+}
+
+MonotonicTime V4l2Camera::exposure_start(const v4l2_buffer& buffer, MonotonicTime received, Capture& capture) const {
+  const MonotonicTime start = clock_.exposure_start(buffer, received);
+  if (ExposureClock::is_stamped(buffer)) return start;
+  if (capture.in_flight == 0) return std::max(start, capture.trigger);
+  --capture.in_flight;
+  return std::min(start, capture.trigger - std::chrono::nanoseconds(1));
 }
 
 std::uint32_t V4l2Camera::note_order(const v4l2_buffer& buffer) {

@@ -48,6 +48,7 @@ class V4l2Camera final : public Camera {
   struct Capture {
     MonotonicTime trigger;
     MonotonicTime deadline;
+    int in_flight = 0;  ///< unstamped frames still to pass
     int stale = 0;
   };
   [[nodiscard]] Result<> configure(V4l2Device device);
@@ -56,6 +57,7 @@ class V4l2Camera final : public Camera {
   [[nodiscard]] Result<> wait(const Capture& capture);
   [[nodiscard]] Result<std::optional<Frame>> take(Capture& capture);
   [[nodiscard]] Result<std::optional<Frame>> judge(const v4l2_buffer& buffer, Capture& capture);
+  [[nodiscard]] MonotonicTime exposure_start(const v4l2_buffer& buffer, MonotonicTime received, Capture& capture) const;
   [[nodiscard]] std::uint32_t note_order(const v4l2_buffer& buffer);
   [[nodiscard]] bool is_whole(const v4l2_buffer& buffer) const;
   [[nodiscard]] Result<Frame> deliver(const v4l2_buffer& buffer, MonotonicTime exposure_start, MonotonicTime received);

@@ -102,15 +102,15 @@ struct FuseFile::Operations {
   }
 
   static void poll(fuse_req_t request, fuse_ino_t, fuse_file_info* info, fuse_pollhandle* poll) {
-    FuseFile& file = self(request);  // a request that was answered is no more
+    FuseFile& file = self(request);
     const std::lock_guard lock(file.mutex_);
     Handle& polled = handle(info);
     if (poll != nullptr) {
       if (polled.poll != nullptr) fuse_pollhandle_destroy(polled.poll);
       polled.poll = poll;
     }
+    ++file.polls_;  // before the answer, after which the caller may go on
     fuse_reply_poll(request, polled.device->poll(&polled));
-    ++file.polls_;
   }
 
   static void ioctl(fuse_req_t request, fuse_ino_t, unsigned command, void*, fuse_file_info* info, unsigned,

@@ -53,6 +53,19 @@ TEST(ExposureStart, IsCountedFromTheArrivalWithoutAStampOfThisClock) {
   }
 }
 
+TEST(FramesInFlight, AreAsManyAsExposureAndReadoutTouch) {
+  EXPECT_EQ(clock_of({5ms, 16ms}).frames_in_flight(), 2);
+  EXPECT_EQ(clock_of({{}, 16ms}).frames_in_flight(), 2);
+  EXPECT_EQ(clock_of({5ms, 16ms}, "driver", 8000).frames_in_flight(), 1);
+  EXPECT_EQ(clock_of({40ms, 16ms}, "driver", 8000).frames_in_flight(), 3);
+}
+
+TEST(IsStamped, AsksForThisClock) {
+  EXPECT_TRUE(ExposureClock::is_stamped(stamped(kSoe, 999)));
+  EXPECT_FALSE(ExposureClock::is_stamped(stamped(kSoe, 0)));
+  EXPECT_FALSE(ExposureClock::is_stamped(stamped(V4L2_BUF_FLAG_TIMESTAMP_COPY, 999)));
+}
+
 TEST(ExposureStart, IsNeverAfterTheArrival) {
   EXPECT_EQ(clock_of({5ms, 16ms}).exposure_start(stamped(kSoe, 2000), kReceived), kReceived);
 }

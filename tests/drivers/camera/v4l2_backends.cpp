@@ -84,10 +84,6 @@ std::future<Result<Frame>> V4l2Test::begin_capture(std::chrono::nanoseconds time
   return frame;
 }
 
-void V4l2Test::wait_for_poll(std::uint64_t polls) const {
-  while (double_->polls() <= polls) std::this_thread::sleep_for(100us);
-}
-
 Result<Frame> V4l2Test::capture_one() {
   auto frame = begin_capture();
   double_->trigger();

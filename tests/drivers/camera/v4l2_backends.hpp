@@ -29,8 +29,6 @@ class V4l2Test : public ::testing::Test {
 
   /// Captures on another thread, and returns once it waits for its frame.
   [[nodiscard]] std::future<Result<Frame>> begin_capture(std::chrono::nanoseconds time = std::chrono::minutes(1));
-  /// Waits until the capture asks for a frame once more.
-  void wait_for_poll(std::uint64_t polls) const;
   /// One frame of a triggered double.
   [[nodiscard]] Result<Frame> capture_one();
   /// One frame, whatever the double does.
