@@ -4,9 +4,10 @@
 
 #include <linux/videodev2.h>
 
-#include <opencv2/imgcodecs.hpp>
-
+#include <cstdio>
 #include <cstring>
+
+#include <jpeglib.h>
 
 namespace slsd::test {
 namespace {
@@ -44,17 +45,35 @@ void encode_row(const std::uint8_t* from, int width, std::uint32_t fourcc, std::
   }
 }
 
-// With chroma, as cameras make it.
-std::size_t encode_jpeg(const Grey8& image, std::vector<std::byte>& bytes) {
-  cv::Mat colour(image.height(), image.width(), CV_8UC3);
+void write_rows(const Grey8& image, jpeg_compress_struct& encoder) {
+  std::vector<JSAMPLE> row(std::size_t{3} * image.width());
   for (int y = 0; y < image.height(); ++y) {
-    for (int x = 0; x < image.width(); ++x) colour.at<cv::Vec3b>(y, x) = cv::Vec3b::all(image.row(y)[x]);
+    for (std::size_t i = 0; i < row.size(); ++i) row[i] = image.row(y)[i / 3];
+    JSAMPROW rows = row.data();
+    jpeg_write_scanlines(&encoder, &rows, 1);
   }
-  std::vector<unsigned char> jpeg;
-  cv::imencode(".jpg", colour, jpeg, {cv::IMWRITE_JPEG_QUALITY, 90});
-  if (jpeg.size() > bytes.size()) return 0;
-  std::memcpy(bytes.data(), jpeg.data(), jpeg.size());
-  return jpeg.size();
+}
+
+// With chroma, as cameras make it. The buffer holds the image raw, which is always longer.
+std::size_t encode_jpeg(const Grey8& image, std::vector<std::byte>& bytes) {
+  jpeg_compress_struct encoder{};
+  jpeg_error_mgr errors{};
+  encoder.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&encoder);
+  auto* memory = reinterpret_cast<unsigned char*>(bytes.data());
+  unsigned long used = bytes.size();
+  jpeg_mem_dest(&encoder, &memory, &used);
+  encoder.image_width = static_cast<JDIMENSION>(image.width());
+  encoder.image_height = static_cast<JDIMENSION>(image.height());
+  encoder.input_components = 3;
+  encoder.in_color_space = JCS_RGB;
+  jpeg_set_defaults(&encoder);
+  jpeg_set_quality(&encoder, 90, TRUE);
+  jpeg_start_compress(&encoder, TRUE);
+  write_rows(image, encoder);
+  jpeg_finish_compress(&encoder);
+  jpeg_destroy_compress(&encoder);
+  return used;
 }
 
 }  // namespace

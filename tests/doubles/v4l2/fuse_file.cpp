@@ -166,6 +166,7 @@ Result<std::unique_ptr<FuseFile>> FuseFile::mount(const std::string& folder) {
   std::array<char*, 2> words{const_cast<char*>("v4l2-double"), nullptr};
   fuse_args arguments = FUSE_ARGS_INIT(1, words.data());
   file->session_ = fuse_session_new(&arguments, &operations, sizeof operations, file.get());
+  fuse_opt_free_args(&arguments);
   if (file->session_ == nullptr || access("/dev/fuse", R_OK | W_OK) != 0 ||
       fuse_session_mount(file->session_, folder.c_str()) != 0)
     return fail(ErrorCode::kUnsupported, "this user cannot mount FUSE files on this machine", "/dev/fuse");
