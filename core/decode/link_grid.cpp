@@ -176,39 +176,35 @@ void GridLinker::measure_changed_frames(std::vector<GridNode>& nodes) {
   }
 }
 
+/// Whether the same step behind and before a link, or most of those behind, before and on both sides, disagree with it.
+/// Along a straight edge in depth the links on both sides agree with it; those behind and before do not.
+bool GridLinker::is_inconsistent(const std::vector<GridNode>& nodes, std::size_t from, Direction d) const {
+  const Eigen::Vector2f own = link_vector(nodes, from, d);
+  const Eigen::Matrix2f cells_from_camera = nodes[from].frame.inverse() / options_.pitch_px;
+  int count = 0, against = 0;
+  const auto ask = [&](std::int32_t other) {
+    if (other < 0 || nodes[other].links[d] < 0) return;
+    const Eigen::Vector2f difference = own - link_vector(nodes, static_cast<std::size_t>(other), d);
+    ++count;
+    against += (cells_from_camera * difference).squaredNorm() > options_.deviation_max * options_.deviation_max;
+  };
+  ask(nodes[from].links[opposite(d)]);
+  ask(nodes[from].links[d]);
+  if (against == 2) return true;
+  ask(nodes[from].links[(d + 1) % 4]);
+  ask(nodes[from].links[(d + 3) % 4]);
+  return 2 * against > count;
+}
+
 void GridLinker::break_inconsistent(std::vector<GridNode>& nodes) {
   inconsistent_.assign(nodes.size(), {});
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     for (const Direction d : {kRight, kDown}) {
       const std::int32_t other = nodes[i].links[d];
-      if (other < 0) continue;
-      // The same step behind, before, and on both sides of this one.
-      std::array<Eigen::Vector2f, 4> parallel;
-      int count = 0;
-      const auto add = [&](std::int32_t from) {
-        if (from >= 0 && nodes[from].links[d] >= 0)
-          parallel[count++] = link_vector(nodes, static_cast<std::size_t>(from), d);
-      };
-      add(nodes[i].links[opposite(d)]);
-      add(other);
-      add(nodes[i].links[(d + 1) % 4]);
-      add(nodes[i].links[(d + 3) % 4]);
-      if (count == 0) continue;
-      const Eigen::Vector2f own = link_vector(nodes, i, d);
-      const Eigen::Matrix2f cells_from_camera = nodes[i].frame.inverse() / options_.pitch_px;
-      int against = 0;
-      for (int k = 0; k < count; ++k) {
-        against +=
-            (cells_from_camera * (own - parallel[k])).squaredNorm() > options_.deviation_max * options_.deviation_max;
-      }
-      if (2 * against > count) inconsistent_[i][d] = inconsistent_[other][opposite(d)] = true;
+      if (other >= 0 && is_inconsistent(nodes, i, d)) inconsistent_[i][d] = inconsistent_[other][opposite(d)] = true;
     }
   }
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    for (const Direction d : kDirections) {
-      nodes[i].broken[d] = inconsistent_[i][d];
-    }
-  }
+  for (std::size_t i = 0; i < nodes.size(); ++i) nodes[i].broken = inconsistent_[i];
 }
 
 void GridLinker::link(std::vector<GridNode>& nodes) {

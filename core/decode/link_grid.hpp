@@ -81,6 +81,7 @@ class GridLinker {
   void choose(std::vector<GridNode>& nodes, std::size_t from, float radius);
   void find_mutual(std::vector<GridNode>& nodes, float radius);
   void measure_changed_frames(std::vector<GridNode>& nodes);
+  [[nodiscard]] bool is_inconsistent(const std::vector<GridNode>& nodes, std::size_t from, Direction direction) const;
   void break_inconsistent(std::vector<GridNode>& nodes);
 
   LinkGridOptions options_;

@@ -117,6 +117,26 @@ TEST(LinkGrid, BreaksALinkThatLeadsOntoARidge) {
   }
 }
 
+TEST(LinkGrid, BreaksEveryLinkAcrossAStraightEdge) {
+  for (const float roll : kRolls) {
+    const Homography map = tilted(roll);
+    SimulatedGrid grid = grid_of(map, 0);
+    const Eigen::Vector2f jump = 0.25F * SimulatedGrid::kPitchPx * expected_frame(map).col(0);
+    for (int row = 0; row < kRows; ++row) {
+      for (int column = kColumns / 2; column < kColumns; ++column)
+        grid.nodes[grid.node_at(row, column)].centre_px += jump;
+    }
+    GridLinker({}).link(grid.nodes);
+    for (int row = 0; row < kRows; ++row) {
+      for (int column = 0; column + 1 < kColumns; ++column) {
+        const GridNode& node = grid.nodes[grid.node_at(row, column)];
+        const bool linked = node.links[kRight] >= 0 && !node.broken[kRight];
+        EXPECT_EQ(linked, column + 1 != kColumns / 2) << roll << ' ' << row << ' ' << column;
+      }
+    }
+  }
+}
+
 TEST(LinkGrid, MeasuresTheFramesOfATiltedPlane) {
   const Homography map = tilted(0.3F);
   SimulatedGrid grid = grid_of(map, 0);
