@@ -15,6 +15,7 @@
 #include <gmock/gmock.h>
 
 #include "tests/doubles/v4l2/numbered_frame.hpp"
+#include "tests/drivers/allocations.hpp"
 #include "tests/drivers/camera/v4l2_backends.hpp"
 
 namespace slsd {
@@ -85,6 +86,20 @@ TEST_F(V4l2CameraTest, LendsTheDriversOwnBuffers) {
   const auto frame = capture();
   ASSERT_TRUE(frame);
   EXPECT_THAT(mapping_of(std::get<ImageView<std::uint8_t>>(frame->image()).pixels), ::testing::HasSubstr("video0"));
+}
+
+TEST_F(V4l2CameraTest, AllocatesNothingPerFrame) {
+  for (const std::uint32_t fourcc : {V4L2_PIX_FMT_GREY, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_SRGGB8}) {
+    DoubleOptions options = test::quick_double();
+    options.formats = {{fourcc, {{160, 120}}}};
+    if (!make(options)) return;
+    ASSERT_TRUE(camera_->open());
+    for (int i = 0; i < 3; ++i) ASSERT_TRUE(capture());
+    const std::uint64_t before = test::allocations();
+    for (int i = 0; i < 10; ++i) ASSERT_TRUE(capture());
+    EXPECT_EQ(test::allocations(), before);
+    camera_.reset();
+  }
 }
 
 TEST_F(V4l2CameraTest, OpensAnewWhileFramesAreHeldAndLeavesThemAlone) {
