@@ -86,6 +86,7 @@ Result<Frame> V4l2Camera::capture_after(Capture capture) {
     auto frame = take(capture);
     if (!frame) return tl::unexpected(frame.error());
     if (*frame) return std::move(**frame);
+    if (steady_clock::now() > capture.deadline) return fail_late(capture);  // stale frames may come without a pause
   }
 }
 
@@ -115,10 +116,14 @@ Result<> V4l2Camera::wait(const Capture& capture) {
     case WakeEvent::Woken::kGone:
       return fail_here(ErrorCode::kDisconnected, "the camera is gone; check its cable");
     case WakeEvent::Woken::kLate:
-      break;
+      return fail_late(capture);
     case WakeEvent::Woken::kReady:
-      return {};
+      break;
   }
+  return {};
+}
+
+tl::unexpected<Error> V4l2Camera::fail_late(const Capture& capture) const {
   if (capture.stale < kStaleToTell)
     return fail_here(ErrorCode::kFrameLate,
                      "no frame came before the deadline; allow more time or raise the frame rate");

@@ -55,6 +55,7 @@ class V4l2Camera final : public Camera {
   [[nodiscard]] Result<Frame> capture_after(Capture capture);
   [[nodiscard]] Result<> drop_waiting();
   [[nodiscard]] Result<> wait(const Capture& capture);
+  [[nodiscard]] tl::unexpected<Error> fail_late(const Capture& capture) const;
   [[nodiscard]] Result<std::optional<Frame>> take(Capture& capture);
   [[nodiscard]] Result<std::optional<Frame>> judge(const v4l2_buffer& buffer, Capture& capture);
   [[nodiscard]] MonotonicTime exposure_start(const v4l2_buffer& buffer, MonotonicTime received, Capture& capture) const;
