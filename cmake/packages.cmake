@@ -10,6 +10,7 @@ find_package(CLI11 REQUIRED)
 find_package(tomlplusplus REQUIRED)
 find_package(PNG REQUIRED)
 find_package(TIFF 4.5 REQUIRED)
+pkg_check_modules(aravis REQUIRED IMPORTED_TARGET aravis-0.8>=0.8.26)
 pkg_check_modules(systemd REQUIRED IMPORTED_TARGET libsystemd)
 pkg_check_modules(v4l REQUIRED IMPORTED_TARGET libv4l2 libv4lconvert)
 

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <netinet/in.h>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "tests/doubles/gige/register_file.hpp"
+
+namespace slsd::test {
+
+/// What the control port tells of besides what it wrote into the registers itself.
+struct ControlEvents {
+  std::function<void(std::uint32_t address, std::uint32_t value)> written;
+  std::function<void(std::uint16_t frame, std::uint32_t first, std::uint32_t last)> resend_asked;
+  std::function<void()> controller_left;
+};
+
+/// The GVCP side of a GigE Vision device: answers what is asked of its registers, and lets one controller write.
+/// @thread thread-bound
+class ControlPort {
+ public:
+  ControlPort(RegisterFile& registers, ControlEvents events);
+
+  /// The answer to a command; empty where there is none.
+  [[nodiscard]] const std::vector<std::uint8_t>& answer(std::span<const std::uint8_t> command, const sockaddr_in& from);
+
+  /// Ends the control of one that was not heard for longer than its heartbeat allows.
+  void expire_controller();
+  /// As if another application had taken control (true), or had gone (false).
+  void occupy(bool by_another);
+  [[nodiscard]] bool controlled() const { return controller_.has_value(); }
+  [[nodiscard]] int times_taken() const { return times_taken_; }
+
+ private:
+  [[nodiscard]] bool may_write(std::uint32_t address, const sockaddr_in& from) const;
+  void write(std::uint32_t address, std::uint32_t value, const sockaddr_in& from);
+  [[nodiscard]] bool write_block(std::uint32_t address, std::span<const std::uint8_t> block, const sockaddr_in& from);
+  void release();
+
+  RegisterFile& registers_;
+  ControlEvents events_;
+  std::optional<sockaddr_in> controller_;
+  std::chrono::steady_clock::time_point heard_;
+  bool occupied_ = false;
+  int times_taken_ = 0;
+  std::vector<std::uint8_t> answer_;
+  std::vector<std::uint8_t> block_;
+};
+
+}  // namespace slsd::test
