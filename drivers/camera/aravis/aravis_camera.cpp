@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/aravis/aravis_camera.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "drivers/camera/aravis/aravis_session.hpp"
+#include "drivers/camera/aravis/capture_events.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kClosingMax = 4;
+
+}  // namespace
+
+AravisCamera::AravisCamera(AravisCameraOptions options)
+    : options_(std::move(options)),
+      description_{options_.name, "aravis", options_.id, 0, 0},
+      events_(std::make_unique<CaptureEvents>()) {}
+
+AravisCamera::~AravisCamera() {
+  end_session();
+  closing_.clear();
+}
+
+Result<> AravisCamera::open() {
+  end_session();
+  if (auto valid = options_.validate(); !valid) return valid;
+  auto session = AravisSession::open(options_, address_, *events_);
+  if (!session) return tl::unexpected(session.error());
+  session_ = std::move(*session);
+  address_ = session_->address();
+  description_.device = session_->name();
+  description_.width_px = session_->layout().width_px;
+  description_.height_px = session_->layout().height_px;
+  log_warnings();
+  return {};
+}
+
+void AravisCamera::log_warnings() {
+  for (const NetworkWarning& warning : session_->warnings()) {
+    if (std::ranges::find(logged_, warning.name) != logged_.end()) continue;
+    logged_.push_back(warning.name);
+    spdlog::warn("camera {}: {}: {}", options_.name, warning.name, warning.advice);
+  }
+}
+
+// A device that answers must be let go before it can be opened again; for one that does not, nobody waits.
+void AravisCamera::end_session() {
+  if (!session_) return;
+  ended_ = session_->statistics();
+  if (session_->answers()) return session_.reset();
+  session_->abandon();
+  if (closing_.size() >= kClosingMax) closing_.erase(closing_.begin());
+  closing_.emplace_back([dying = std::move(session_)]() mutable { dying.reset(); });
+}
+
+Result<Frame> AravisCamera::capture(MonotonicTime deadline) {
+  if (!session_) return fail(ErrorCode::kDisconnected, "the camera is not open; open it", options_.name);
+  auto frame = session_->capture(deadline);
+  if (!frame && frame.error().code == ErrorCode::kDisconnected) end_session();
+  return frame;
+}
+
+void AravisCamera::cancel() {
+  events_->cancel();
+}
+
+AravisStatistics AravisCamera::statistics() const {
+  return session_ ? session_->statistics() : ended_;
+}
+
+double AravisCamera::clock_drift_ppm() const {
+  return session_ ? session_->clock().drift_ppm() : 0.0;
+}
+
+std::vector<std::string> AravisCamera::warnings() const {
+  std::vector<std::string> names;
+  if (!session_) return names;
+  for (const NetworkWarning& warning : session_->warnings()) names.push_back(warning.name);
+  return names;
+}
+
+}  // namespace slsd

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/result.hpp"
+#include "drivers/camera/aravis/aravis_camera_options.hpp"
+#include "drivers/camera/aravis/aravis_statistics.hpp"
+#include "drivers/camera/camera.hpp"
+
+namespace slsd {
+
+class AravisSession;
+class CaptureEvents;
+
+/// A GigE Vision or USB3 Vision camera, by Aravis. A frame is a lease on the stream's own buffer; only mosaics are
+/// turned into grey in a buffer of this driver's.
+///
+/// A frame is handed out only if it is whole, of the size configured, and its exposure began after capture() was
+/// called. When that was is told by the device's clock, which is read every second; many cameras stamp the exposure's
+/// start, some the start of its readout.
+///
+/// Threads of its own: "aravis control", which talks to the device so that a device which is gone holds up no capture;
+/// Aravis' own for stream and heartbeat; and one to close a session with a device that is gone, which takes seconds.
+/// @thread thread-bound, but for cancel()
+class AravisCamera final : public Camera {
+ public:
+  explicit AravisCamera(AravisCameraOptions options);
+  ~AravisCamera() override;
+  AravisCamera(const AravisCamera&) = delete;
+  AravisCamera& operator=(const AravisCamera&) = delete;
+
+  [[nodiscard]] const CameraDescription& description() const override { return description_; }
+  /// Also proves that frames arrive. Warnings about the system are logged, each once.
+  /// @errors kInvalidArgument (an option), kNotFound, kPermissionDenied (another application controls it), kMismatch
+  /// (it
+  ///         took another value than the one configured), kUnsupported, kDisconnected
+  [[nodiscard]] Result<> open() override;
+  /// kDisconnected also after missed_frames_max frames in a row did not come.
+  [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
+  void cancel() override;
+
+  /// Of the session that is open, or the one before.
+  [[nodiscard]] AravisStatistics statistics() const;
+  /// By how much the device's clock goes faster than the host's; 0 while that cannot be told.
+  [[nodiscard]] double clock_drift_ppm() const;
+  /// The names of what on this system may cost frames: "receive_buffer", "packet_size", "packet_resend",
+  /// "device_clock".
+  [[nodiscard]] std::vector<std::string> warnings() const;
+
+ private:
+  void end_session();
+  void log_warnings();
+
+  AravisCameraOptions options_;
+  CameraDescription description_;
+  std::unique_ptr<CaptureEvents> events_;
+  std::unique_ptr<AravisSession> session_;
+  AravisStatistics ended_;
+  std::string address_;
+  std::vector<std::string> logged_;
+  std::vector<std::jthread> closing_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/aravis/aravis_camera_options.hpp"
+
+#include <arpa/inet.h>
+
+#include "drivers/camera/aravis/pixel_layout.hpp"
+
+namespace slsd {
+namespace {
+
+tl::unexpected<Error> refuse(std::string message) {
+  return fail(ErrorCode::kInvalidArgument, std::move(message));
+}
+
+bool within(double value, double low, double high) {
+  return value >= low && value <= high;
+}
+
+bool is_address(const std::string& text) {
+  in_addr address{};
+  return ::inet_pton(AF_INET, text.c_str(), &address) == 1;
+}
+
+}  // namespace
+
+Result<> AravisCameraOptions::validate() const {
+  if (name.empty()) return refuse("name must not be empty");
+  if (id.empty())
+    return refuse("id must be the camera's serial number, vendor-serial or address; slsd --list shows them");
+  if (!interface.empty() && !is_address(interface)) return refuse("interface must be an IPv4 address of this host");
+  if (trigger == AravisTrigger::kLine && trigger_line.empty()) return refuse("trigger_line must name an input");
+  if (rate_hz != 0.0 && !within(rate_hz, 0.01, 10000.0)) return refuse("rate_hz must be 0, or 0.01 to 10000");
+  if (!within(exposure_us, 1.0, 1e7)) return refuse("exposure_us must be 1 to 10000000");
+  if (!within(gain_db, 0.0, 60.0)) return refuse("gain_db must be 0 to 60");
+  if (!find_pixel_layout(pixel_format)) return refuse("pixel_format must be one of " + pixel_format_names());
+  if (size_px && (size_px->first < 1 || size_px->second < 1))
+    return refuse("width_px and height_px must be at least 1");
+  if (packet_bytes != 0 && !within(packet_bytes, 576, 16000)) return refuse("packet_bytes must be 0, or 576 to 16000");
+  if (!within(packet_delay_us, 0.0, 1e6)) return refuse("packet_delay_us must be 0 to 1000000");
+  if (!within(receive_buffer_bytes, 0, 1 << 30)) return refuse("receive_buffer_bytes must be 0 to 1073741824");
+  if (!within(frame_timeout_ms, 10, 60000)) return refuse("frame_timeout_ms must be 10 to 60000");
+  if (!within(missed_frames_max, 1, 100)) return refuse("missed_frames_max must be 1 to 100");
+  if (!within(frames_held_max, 2, 64)) return refuse("frames_held_max must be 2 to 64");
+  return {};
+}
+
+}  // namespace slsd

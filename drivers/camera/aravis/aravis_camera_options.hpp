@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// What makes the camera expose.
+enum class AravisTrigger {
+  kSoftware,  ///< a command at each capture()
+  kLine,      ///< a rising edge on an input line
+  kFreeRun,   ///< its own clock
+};
+
+/// The keys of a [[camera]] table whose driver is "aravis".
+struct AravisCameraOptions {
+  std::string name = "camera";
+  std::string id = {};         ///< serial number, "vendor-serial", or IPv4 address; an address is found soonest
+  std::string interface = {};  ///< IPv4 address of this host's interface; empty: the one that the route goes through
+  AravisTrigger trigger = AravisTrigger::kSoftware;
+  std::string trigger_line = "Line1";               ///< the input, where the trigger is a line
+  double rate_hz = 0.0;                             ///< where it runs freely, up to 10000; 0: as the camera has it
+  double exposure_us = 10000.0;                     ///< 1 to 10000000
+  double gain_db = 0.0;                             ///< 0 to 60
+  std::string pixel_format = "Mono8";               ///< Mono8, Mono10, Mono12, Mono16, or Bayer in 8 to 16 bits
+  std::optional<std::pair<int, int>> size_px = {};  ///< from the sensor's middle; without it the whole sensor
+  int packet_bytes = 0;          ///< GigE: with headers, 576 to 16000; 0: the largest that gets through
+  double packet_delay_us = 0.0;  ///< GigE: between two packets, where several cameras share a link
+  int receive_buffer_bytes = 0;  ///< GigE: of the socket; 0: two frames. net.core.rmem_max must allow it
+  bool packet_resend = true;     ///< GigE: lost packets are asked for again
+  bool packet_socket = true;     ///< GigE: where CAP_NET_RAW allows, packets are taken before the UDP socket
+  int frame_timeout_ms = 1000;   ///< how long after its trigger or the frame before a frame may take, 10 to 60000
+  int missed_frames_max = 2;     ///< so many in a row missing: the camera is gone
+  int frames_held_max = 8;       ///< how many frames may be held at once, 2 to 64
+
+  /// @errors kInvalidArgument: the message begins with the key
+  [[nodiscard]] Result<> validate() const;
+  friend bool operator==(const AravisCameraOptions&, const AravisCameraOptions&) = default;
+};
+
+}  // namespace slsd

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+#include <string>
+
+#include "drivers/camera/frame.hpp"
+
+namespace slsd {
+
+/// What a capture waits for: buffers that are done, the answer to a trigger, the loss of the camera, and cancel(). What
+/// an earlier session still reports while it is being closed is passed over.
+/// @thread thread-safe
+class CaptureEvents {
+ public:
+  enum class Wake { kBuffer, kTimeout, kCancelled, kLost };
+
+  /// Forgets everything, a cancel() too.
+  /// @return the number by which the new session reports
+  std::uint64_t begin_session();
+
+  void report_buffer(std::uint64_t session);
+  void report_trigger_answered(std::uint64_t session);
+  void report_lost(std::uint64_t session, const std::string& reason);
+  void cancel();
+
+  /// Waits for one buffer, which is then the caller's to take.
+  [[nodiscard]] Wake wait_buffer(MonotonicTime until);
+  [[nodiscard]] bool take_buffer();
+  [[nodiscard]] bool take_cancel();
+
+  void note_trigger_asked();
+  /// Waits until the trigger before is answered: then kBuffer.
+  [[nodiscard]] Wake wait_trigger_answered(MonotonicTime until);
+  [[nodiscard]] bool trigger_answered() const;
+
+  /// Why the camera is lost; empty while it is not.
+  [[nodiscard]] std::string lost_reason() const;
+
+ private:
+  template <class Condition>
+  Wake wait(MonotonicTime until, Condition condition);
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::uint64_t session_ = 0;
+  int buffers_ = 0;
+  int triggers_open_ = 0;
+  bool cancelled_ = false;
+  std::string lost_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/aravis/configure_device.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+namespace slsd {
+namespace {
+
+constexpr double kExposureToleranceShare = 0.01;
+constexpr double kExposureToleranceUs = 20.0;  // sensors expose in whole lines
+constexpr double kGainToleranceDb = 0.1;
+constexpr double kRateToleranceShare = 0.01;
+
+/// What a camera changes by itself would make frames of one scene differ, and decoding with them.
+Result<> turn_automatics_off(const DeviceFeatures& features) {
+  for (const char* name : {"ExposureAuto", "GainAuto", "BlackLevelAuto", "BalanceWhiteAuto"})
+    if (auto done = features.choose_if_there(name, "Off"); !done) return done;
+  if (features.has("GammaEnable")) return features.turn("GammaEnable", false);
+  return {};
+}
+
+Result<> set_extent(const DeviceFeatures& features, const char* size, const char* offset, const char* sensor,
+                    std::optional<int> wanted) {
+  const bool movable = features.has(offset);
+  if (movable)
+    if (auto done = features.set(offset, 0); !done) return done;
+  const auto whole = features.integer(sensor);
+  if (!whole) return tl::unexpected(whole.error());
+  const int extent = wanted.value_or(*whole);
+  if (auto done = features.set(size, extent); !done) return done;
+  // A multiple of 16 suits the steps of every sensor known.
+  const int middle = (*whole - extent) / 2 / 16 * 16;
+  return movable && middle > 0 ? features.set(offset, middle) : Result<>();
+}
+
+Result<> set_region(const DeviceFeatures& features, const AravisCameraOptions& options) {
+  std::optional<int> width;
+  std::optional<int> height;
+  if (options.size_px) width = options.size_px->first, height = options.size_px->second;
+  const bool whole = features.has("WidthMax") && features.has("HeightMax");
+  if (auto done = set_extent(features, "Width", "OffsetX", whole ? "WidthMax" : "SensorWidth", width); !done)
+    return done;
+  return set_extent(features, "Height", "OffsetY", whole ? "HeightMax" : "SensorHeight", height);
+}
+
+Result<> set_exposure(const DeviceFeatures& features, const AravisCameraOptions& options) {
+  if (auto done = features.choose_if_there("ExposureMode", "Timed"); !done) return done;
+  const char* name = features.has("ExposureTime") ? "ExposureTime" : "ExposureTimeAbs";
+  const double tolerance = std::max(kExposureToleranceUs, options.exposure_us * kExposureToleranceShare);
+  return features.set(name, options.exposure_us, std::min(tolerance, options.exposure_us / 2));
+}
+
+Result<> set_gain(const DeviceFeatures& features, const AravisCameraOptions& options) {
+  if (features.has("GainSelector") && features.has_entry("GainSelector", "All"))
+    if (auto done = features.choose("GainSelector", "All"); !done) return done;
+  if (features.has("Gain")) return features.set("Gain", options.gain_db, kGainToleranceDb);
+  if (options.gain_db == 0.0) return {};
+  return fail(ErrorCode::kUnsupported, "the camera has no gain in decibels; remove gain_db", "Gain");
+}
+
+/// Every way to trigger is off, so that none of a former user's stays on.
+Result<> clear_triggers(const DeviceFeatures& features) {
+  for (const char* selector : {"AcquisitionStart", "FrameBurstStart", "ExposureActive", "FrameStart"}) {
+    if (features.has("TriggerSelector") && !features.has_entry("TriggerSelector", selector)) continue;
+    if (auto done = features.choose_if_there("TriggerSelector", selector); !done) return done;
+    if (auto done = features.choose_if_there("TriggerMode", "Off"); !done) return done;
+  }
+  return {};
+}
+
+Result<> set_rate(const DeviceFeatures& features, const AravisCameraOptions& options) {
+  if (options.rate_hz == 0.0) return {};
+  if (auto done = features.turn_if_there("AcquisitionFrameRateEnable", true); !done) return done;
+  const char* name = features.has("AcquisitionFrameRate") ? "AcquisitionFrameRate" : "AcquisitionFrameRateAbs";
+  return features.set(name, options.rate_hz, options.rate_hz * kRateToleranceShare);
+}
+
+}  // namespace
+
+Result<DeviceLayout> configure_image(const DeviceFeatures& features, const AravisCameraOptions& options) {
+  const auto pixels = find_pixel_layout(options.pixel_format);
+  if (!pixels) return fail(ErrorCode::kInvalidArgument, "is no pixel format that can be read", options.pixel_format);
+  // Chunks behind the image would change the size of a frame.
+  Result<> done = features.turn_if_there("ChunkModeActive", false);
+  if (done) done = set_region(features, options);
+  if (done) done = features.choose("PixelFormat", options.pixel_format);
+  if (done) done = turn_automatics_off(features);
+  if (done) done = set_exposure(features, options);
+  if (done) done = set_gain(features, options);
+  if (!done) return tl::unexpected(done.error());
+  const auto width = features.integer("Width");
+  const auto height = features.integer("Height");
+  if (!width) return tl::unexpected(width.error());
+  if (!height) return tl::unexpected(height.error());
+  return DeviceLayout{*width, *height, *pixels};
+}
+
+Result<> configure_trigger(const DeviceFeatures& features, const AravisCameraOptions& options, AravisTrigger trigger) {
+  if (auto done = features.choose_if_there("AcquisitionMode", "Continuous"); !done) return done;
+  if (auto done = clear_triggers(features); !done) return done;
+  if (trigger == AravisTrigger::kFreeRun) return set_rate(features, options);
+  // A rate would hold triggers back.
+  if (auto done = features.turn_if_there("AcquisitionFrameRateEnable", false); !done) return done;
+  if (auto done = features.choose("TriggerMode", "On"); !done) return done;
+  if (trigger == AravisTrigger::kSoftware) return features.choose("TriggerSource", "Software");
+  if (auto done = features.choose_if_there("TriggerActivation", "RisingEdge"); !done) return done;
+  return features.choose("TriggerSource", options.trigger_line);
+}
+
+}  // namespace slsd

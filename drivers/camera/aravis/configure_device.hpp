@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstddef>
+
+#include "core/result.hpp"
+#include "drivers/camera/aravis/aravis_camera_options.hpp"
+#include "drivers/camera/aravis/device_features.hpp"
+#include "drivers/camera/aravis/pixel_layout.hpp"
+
+namespace slsd {
+
+/// The frames of a camera as it is configured.
+struct DeviceLayout {
+  int width_px = 0;
+  int height_px = 0;
+  PixelLayout pixels;
+
+  [[nodiscard]] std::size_t bytes() const {
+    return static_cast<std::size_t>(width_px) * height_px * pixels.bytes_per_pixel;
+  }
+};
+
+/// Sets region, pixel format, exposure and gain, turns everything automatic off, and compares what the camera took.
+/// @errors kUnsupported, kMismatch, kDisconnected
+[[nodiscard]] Result<DeviceLayout> configure_image(const DeviceFeatures& features, const AravisCameraOptions& options);
+
+/// Sets what the camera exposes at. To be called while it does not acquire.
+/// @errors as configure_image()
+[[nodiscard]] Result<> configure_trigger(const DeviceFeatures& features, const AravisCameraOptions& options,
+                                         AravisTrigger trigger);
+
+}  // namespace slsd

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/aravis/configure_network.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <fstream>
+
+#include "drivers/camera/aravis/packet_socket.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr unsigned kJumboBytes = 8000;
+constexpr std::size_t kManyBytes = 500'000;  // frames from which small packets cost a whole core
+constexpr int kLeastBuffer = 1 << 20;
+constexpr double kRequestRatio = 1.0;  // each packet may be lost once on average; by default a quarter of them
+
+Error in_words(const GErrorSlot& error, const char* what) {
+  return Error{error.code(), std::string("the camera refuses the ") + what + ": " + error.message(), what};
+}
+
+std::int64_t receive_buffer_allowed() {
+  std::int64_t bytes = 0;
+  std::ifstream("/proc/sys/net/core/rmem_max") >> bytes;
+  return bytes;
+}
+
+int receive_buffer_wanted(const AravisCameraOptions& options, std::size_t frame_bytes) {
+  if (options.receive_buffer_bytes > 0) return options.receive_buffer_bytes;
+  return static_cast<int>(std::clamp<std::size_t>(2 * frame_bytes, kLeastBuffer, 1u << 28));
+}
+
+Result<> set_packet_size(ArvCamera* camera, const AravisCameraOptions& options) {
+  GErrorSlot error;
+  // The stream would otherwise try sizes again when it is made.
+  arv_camera_gv_set_packet_size_adjustment(camera, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
+  if (options.packet_bytes == 0) {
+    arv_camera_gv_auto_packet_size(camera, error.out());
+    return error.failed() ? tl::unexpected(in_words(error, "packet size")) : Result<>();
+  }
+  arv_camera_gv_set_packet_size(camera, options.packet_bytes, error.out());
+  if (error.failed()) return tl::unexpected(in_words(error, "packet size"));
+  const unsigned taken = arv_camera_gv_get_packet_size(camera, error.out());
+  if (static_cast<int>(taken) == options.packet_bytes) return {};
+  return fail(ErrorCode::kMismatch, "the camera took packets of " + std::to_string(taken) + " bytes", "packet_bytes");
+}
+
+}  // namespace
+
+Result<> configure_packets(ArvCamera* camera, const AravisCameraOptions& options,
+                           std::vector<NetworkWarning>& warnings) {
+  if (!arv_camera_is_gv_device(camera)) return {};
+  arv_camera_gv_set_stream_options(
+      camera, options.packet_socket ? ARV_GV_STREAM_OPTION_NONE : ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+  if (auto done = set_packet_size(camera, options); !done) return done;
+  GErrorSlot error;
+  arv_camera_gv_set_packet_delay(camera, static_cast<gint64>(options.packet_delay_us * 1e3), error.out());
+  if (error.failed() && options.packet_delay_us > 0.0) return tl::unexpected(in_words(error, "packet delay"));
+  const unsigned size = arv_camera_gv_get_packet_size(camera, error.out());
+  const unsigned payload = arv_camera_get_payload(camera, error.out());
+  if (size < kJumboBytes && payload > kManyBytes)
+    warnings.push_back({"packet_size", "packets have " + std::to_string(size) +
+                                           " bytes only; set the MTU of the interface, and of every switch, to 9000"});
+  return {};
+}
+
+void configure_stream(ArvStream* stream, const AravisCameraOptions& options, std::size_t frame_bytes,
+                      std::vector<NetworkWarning>& warnings) {
+  if (!ARV_IS_GV_STREAM(stream)) return;
+  const int wanted = receive_buffer_wanted(options, frame_bytes);
+  // A frame with a hole is given up before a frame that does not come at all, so that it is known for what it is.
+  g_object_set(stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size", wanted,
+               "packet-request-ratio", kRequestRatio, "frame-retention",
+               static_cast<guint>(options.frame_timeout_ms) * 500u, nullptr);
+  ArvGvStreamPacketResend resend = ARV_GV_STREAM_PACKET_RESEND_NEVER;
+  g_object_get(stream, "packet-resend", &resend, nullptr);
+  if (options.packet_resend && resend == ARV_GV_STREAM_PACKET_RESEND_NEVER)
+    warnings.push_back({"packet_resend", "the camera cannot send packets again: each one lost is a frame lost"});
+  if (!options.packet_resend) g_object_set(stream, "packet-resend", ARV_GV_STREAM_PACKET_RESEND_NEVER, nullptr);
+  if (receive_buffer_allowed() >= wanted || (options.packet_socket && packet_socket_allowed())) return;
+  const std::string bytes = std::to_string(wanted);
+  warnings.push_back({"receive_buffer", "net.core.rmem_max is " + std::to_string(receive_buffer_allowed()) +
+                                            " and frames need " + bytes + ": run sysctl -w net.core.rmem_max=" + bytes +
+                                            " and keep it in /etc/sysctl.d, or give slsd CAP_NET_RAW"});
+}
+
+}  // namespace slsd

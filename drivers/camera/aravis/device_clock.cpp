@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/aravis/device_clock.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace slsd {
+namespace {
+
+using std::chrono::nanoseconds;
+
+constexpr double kCrystalError = 100e-6;  // what a clock may be off before its drift is known
+constexpr double kWander = 2e-6;          // by which a drift changes as the device warms up
+
+nanoseconds half_width(const ClockReading& reading) {
+  return (reading.after - reading.before) / 2;
+}
+
+MonotonicTime middle(const ClockReading& reading) {
+  return reading.before + half_width(reading);
+}
+
+double seconds(nanoseconds duration) {
+  return std::chrono::duration<double>(duration).count();
+}
+
+}  // namespace
+
+std::size_t DeviceClock::size() const {
+  return std::min(count_, readings_.size());
+}
+
+void DeviceClock::observe(const ClockReading& reading) {
+  readings_[count_ % readings_.size()] = reading;
+  ++count_;
+  fit_drift();
+  choose_reference();
+}
+
+// Least squares, each reading weighed by how well it is known.
+void DeviceClock::fit_drift() {
+  const ClockReading& origin = readings_[(count_ - 1) % readings_.size()];
+  double weights = 0, x_sum = 0, y_sum = 0, xx_sum = 0, xy_sum = 0;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const double x = seconds(readings_[i].device - origin.device);
+    const double y = seconds(middle(readings_[i]) - middle(origin)) - x;
+    const double weight = 1.0 / std::pow(std::max(seconds(half_width(readings_[i])), 1e-6), 2);
+    weights += weight, x_sum += weight * x, y_sum += weight * y, xx_sum += weight * x * x, xy_sum += weight * x * y;
+  }
+  const double spread = xx_sum - x_sum * x_sum / weights;
+  host_per_device_ = 1.0;
+  drift_error_ = kCrystalError;
+  const double error = kWander + 1.0 / std::sqrt(std::max(spread, 1e-9));
+  if (error > kCrystalError) return;
+  host_per_device_ += (xy_sum - x_sum * y_sum / weights) / spread;
+  drift_error_ = error;
+}
+
+void DeviceClock::choose_reference() {
+  const ClockReading& newest = readings_[(count_ - 1) % readings_.size()];
+  reference_ = newest;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const auto aged = [&](const ClockReading& reading) {
+      return seconds(half_width(reading)) + drift_error_ * seconds(newest.device - reading.device);
+    };
+    if (aged(readings_[i]) < aged(reference_)) reference_ = readings_[i];
+  }
+}
+
+MonotonicTime DeviceClock::host_time(nanoseconds device) const {
+  const auto since = static_cast<double>((device - reference_.device).count());
+  return middle(reference_) + nanoseconds(std::llround(since * host_per_device_));
+}
+
+nanoseconds DeviceClock::uncertainty(nanoseconds device) const {
+  const double since = std::abs(static_cast<double>((device - reference_.device).count()));
+  return half_width(reference_) + nanoseconds(std::llround(since * drift_error_));
+}
+
+}  // namespace slsd

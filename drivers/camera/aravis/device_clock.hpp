@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+
+#include "drivers/camera/frame.hpp"
+
+namespace slsd {
+
+/// The device's clock, read once: it showed `device` at some time between `before` and `after`.
+struct ClockReading {
+  std::chrono::nanoseconds device{0};
+  MonotonicTime before;
+  MonotonicTime after;
+};
+
+/// Maps a device's clock to CLOCK_MONOTONIC by the readings that it is given: the offset by the one that is known best,
+/// the drift by the line through all of them. Without drift a crystal's 100 ppm would put a frame 0.1 ms off after a
+/// second.
+/// @thread thread-bound
+class DeviceClock {
+ public:
+  void observe(const ClockReading& reading);
+
+  [[nodiscard]] bool ready() const { return count_ > 0; }
+  /// When the device's clock showed so much. Precondition: ready().
+  [[nodiscard]] MonotonicTime host_time(std::chrono::nanoseconds device) const;
+  /// How wrong host_time() of this is, as a standard deviation at most.
+  [[nodiscard]] std::chrono::nanoseconds uncertainty(std::chrono::nanoseconds device) const;
+  /// By how much the device's clock goes faster than the host's, in parts per million; 0 until it can be told.
+  [[nodiscard]] double drift_ppm() const { return (1.0 / host_per_device_ - 1.0) * 1e6; }
+
+ private:
+  [[nodiscard]] std::size_t size() const;
+  void fit_drift();
+  void choose_reference();
+
+  std::array<ClockReading, 32> readings_;  ///< a ring
+  std::size_t count_ = 0;
+  ClockReading reference_;
+  double host_per_device_ = 1.0;
+  double drift_error_ = 0.0;  ///< of host_per_device_
+};
+
+}  // namespace slsd

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/aravis/device_control.hpp"
+
+#include <pthread.h>
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+
+constexpr auto kClockPeriod = 1s;
+constexpr std::uint64_t kControlRegister = 0x944;
+constexpr std::uint64_t kLatchedHigh = 0x948;
+constexpr std::uint64_t kLatchedLow = 0x94c;
+constexpr std::uint32_t kLatch = 2;
+constexpr std::uint64_t kSecond = 1'000'000'000;
+
+std::chrono::nanoseconds from_ticks(std::uint64_t ticks, std::uint64_t frequency_hz) {
+  return std::chrono::nanoseconds(ticks / frequency_hz * kSecond + ticks % frequency_hz * kSecond / frequency_hz);
+}
+
+// By the bootstrap registers, which the standard prescribes: features for it differ between cameras.
+std::optional<ClockReading> latch_registers(ArvDevice* device) {
+  GErrorSlot error;
+  const std::uint64_t frequency = arv_gv_device_get_timestamp_tick_frequency(ARV_GV_DEVICE(device), error.out());
+  if (error.failed() || frequency == 0) return std::nullopt;
+  ClockReading reading;
+  guint32 high = 0;
+  guint32 low = 0;
+  reading.before = steady_clock::now();
+  bool done = arv_device_write_register(device, kControlRegister, kLatch, error.out());
+  reading.after = steady_clock::now();
+  done = done && arv_device_read_register(device, kLatchedHigh, &high, error.out());
+  done = done && arv_device_read_register(device, kLatchedLow, &low, error.out());
+  if (!done) return std::nullopt;
+  reading.device = from_ticks(std::uint64_t{high} << 32 | low, frequency);
+  return reading;
+}
+
+std::optional<ClockReading> latch_features(ArvCamera* camera) {
+  GErrorSlot error;
+  if (!arv_camera_is_feature_available(camera, "TimestampLatch", error.out()) || error.failed()) return std::nullopt;
+  ClockReading reading;
+  reading.before = steady_clock::now();
+  arv_camera_execute_command(camera, "TimestampLatch", error.out());
+  reading.after = steady_clock::now();
+  if (error.failed()) return std::nullopt;
+  reading.device = std::chrono::nanoseconds(arv_camera_get_integer(camera, "TimestampLatchValue", error.out()));
+  return error.failed() ? std::nullopt : std::optional(reading);
+}
+
+}  // namespace
+
+std::optional<ClockReading> read_device_clock(ArvCamera* camera) {
+  ArvDevice* device = arv_camera_get_device(camera);
+  return ARV_IS_GV_DEVICE(device) ? latch_registers(device) : latch_features(camera);
+}
+
+DeviceControl::DeviceControl(ArvCamera* camera, CaptureEvents& events, std::uint64_t session, const DeviceClock& clock)
+    : camera_(camera),
+      events_(events),
+      session_(session),
+      clock_(clock),
+      has_clock_(clock.ready()),
+      thread_([this](const std::stop_token& stop) { run(stop); }) {}
+
+void DeviceControl::trigger() {
+  events_.note_trigger_asked();
+  const std::lock_guard lock(mutex_);
+  trigger_ = true;
+  asked_.notify_one();
+}
+
+DeviceClock DeviceControl::clock() const {
+  const std::lock_guard lock(mutex_);
+  return clock_;
+}
+
+void DeviceControl::run(const std::stop_token& stop) {
+  ::pthread_setname_np(::pthread_self(), "aravis control");
+  auto next_reading = steady_clock::now() + kClockPeriod;
+  while (!stop.stop_requested()) {
+    bool asked = false;
+    {
+      std::unique_lock lock(mutex_);
+      asked_.wait_until(lock, stop, next_reading, [this] { return trigger_; });
+      asked = std::exchange(trigger_, false);
+    }
+    if (asked) {
+      send_trigger();
+    } else if (steady_clock::now() >= next_reading) {
+      read_clock();
+      next_reading = steady_clock::now() + kClockPeriod;
+    }
+  }
+}
+
+void DeviceControl::send_trigger() {
+  GErrorSlot error;
+  arv_camera_software_trigger(camera_, error.out());
+  if (error.failed()) events_.report_lost(session_, "the camera refuses a trigger: " + error.message());
+  events_.report_trigger_answered(session_);
+}
+
+void DeviceControl::read_clock() {
+  if (!has_clock_) return;
+  const auto reading = read_device_clock(camera_);
+  if (!reading) return events_.report_lost(session_, "the camera does not answer any more");
+  const std::lock_guard lock(mutex_);
+  clock_.observe(*reading);
+}
+
+}  // namespace slsd

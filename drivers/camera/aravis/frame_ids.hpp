@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+namespace slsd {
+
+/// Follows a camera's frame identifiers and tells how many frames are missing between two. Identifiers of 16 bits go
+/// from 65535 to 1; those of 64 bits do not end.
+/// @thread thread-bound
+class FrameIds {
+ public:
+  /// How many frames went missing between the last identifier and this one; 0 for the first, and for one that goes
+  /// back.
+  std::uint64_t note(std::uint64_t id) {
+    const std::uint64_t before = last_.value_or(id);
+    const bool first = !last_.has_value();
+    last_ = id;
+    if (first || id == before) return 0;
+    if (id > before) return id - before - 1;
+    const bool wrapped = before <= kLastOf16 && before - id > kLastOf16 / 2;
+    return wrapped ? kLastOf16 - before + id - 1 : 0;
+  }
+
+  void forget() { last_.reset(); }
+
+ private:
+  static constexpr std::uint64_t kLastOf16 = 65535;
+
+  std::optional<std::uint64_t> last_;
+};
+
+}  // namespace slsd
