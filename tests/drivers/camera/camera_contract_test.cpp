@@ -14,6 +14,7 @@
 #include "drivers/camera/camera.hpp"
 #include "drivers/camera/faulty_camera.hpp"
 #include "drivers/camera/file_camera.hpp"
+#include "tests/drivers/camera/gige_backend.hpp"
 #include "tests/drivers/camera/recording.hpp"
 #include "tests/drivers/camera/v4l2_backends.hpp"
 
@@ -45,6 +46,13 @@ std::unique_ptr<Camera> sixteen_bits(const test::TemporaryFolder& folder) {
   folder.write("deep/a.tif", test::tiff_bytes(samples_of(test::ramp16(12, 8)), true));
   folder.write("deep/b.png", test::png_bytes(samples_of(test::ramp16(12, 8, 5000))));
   return file_camera(folder, {.path = folder.path() / "deep"});
+}
+
+std::unique_ptr<Camera> on_gige(AravisCameraOptions options = {}) {
+  options.packet_bytes = 1400;
+  options.packet_socket = false;
+  options.frame_timeout_ms = 10000;
+  return std::make_unique<test::CameraOnDouble>(test::GigeCameraOptions{}, std::move(options));
 }
 
 class CameraContract : public ::testing::TestWithParam<Backend> {
@@ -214,7 +222,12 @@ INSTANTIATE_TEST_SUITE_P(
         Backend{"BehindNoFaults",
                 [](const auto& folder) {
                   return std::make_unique<FaultyCamera>(file_camera(folder), std::vector<Fault>{});
-                }}),
+                }},
+        Backend{"AravisTriggered", [](const auto&) { return on_gige(); }},
+        Backend{"AravisFreeRun",
+                [](const auto&) { return on_gige({.trigger = AravisTrigger::kFreeRun, .rate_hz = 500.0}); }},
+        Backend{"AravisTwelveBits", [](const auto&) { return on_gige({.pixel_format = "Mono12"}); }},
+        Backend{"AravisBayer", [](const auto&) { return on_gige({.pixel_format = "BayerRG8"}); }}),
     [](const auto& instance) { return instance.param.name; });
 
 }  // namespace

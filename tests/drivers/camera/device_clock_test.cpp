@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/aravis/device_clock.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::nanoseconds;
+
+constexpr MonotonicTime kHostStart{1'000'000s};
+
+/// A device's clock that goes faster by some parts per million.
+struct Crystal {
+  double ppm = 0.0;
+  nanoseconds start{0};
+
+  [[nodiscard]] nanoseconds at(MonotonicTime host) const {
+    const nanoseconds since = host - kHostStart;
+    return start + since + nanoseconds(std::llround(static_cast<double>(since.count()) * ppm * 1e-6));
+  }
+  /// Read `latency` after the command went out, of a round trip that takes `round_trip`.
+  [[nodiscard]] ClockReading read(MonotonicTime sent, nanoseconds latency, nanoseconds round_trip) const {
+    return {at(sent + latency), sent, sent + round_trip};
+  }
+};
+
+nanoseconds off(MonotonicTime a, MonotonicTime b) {
+  return a > b ? a - b : b - a;
+}
+
+TEST(DeviceClock, IsReadyAfterAReading) {
+  DeviceClock clock;
+  EXPECT_FALSE(clock.ready());
+  clock.observe(Crystal{}.read(kHostStart, 50us, 100us));
+  EXPECT_TRUE(clock.ready());
+  EXPECT_EQ(clock.host_time(Crystal{}.at(kHostStart + 1ms)), kHostStart + 1ms);
+}
+
+TEST(DeviceClock, TrustsTheShortestRoundTripMost) {
+  const Crystal crystal;
+  DeviceClock clock;
+  clock.observe(crystal.read(kHostStart, 900us, 1000us));
+  clock.observe(crystal.read(kHostStart + 2ms, 10us, 20us));
+  clock.observe(crystal.read(kHostStart + 4ms, 100us, 1000us));
+  const nanoseconds device = crystal.at(kHostStart + 5ms);
+  EXPECT_LE(off(clock.host_time(device), kHostStart + 5ms), 1us);
+  EXPECT_LT(clock.uncertainty(device), 20us);
+}
+
+TEST(DeviceClock, LearnsTheDrift) {
+  const Crystal crystal{.ppm = 73.0, .start = 5s};
+  DeviceClock clock;
+  for (int i = 0; i < 20; ++i) clock.observe(crystal.read(kHostStart + i * 1s, 50us, 100us));
+  EXPECT_NEAR(clock.drift_ppm(), 73.0, 1.0);
+  const MonotonicTime later = kHostStart + 21s;
+  EXPECT_LE(off(clock.host_time(crystal.at(later)), later), 10us);
+}
+
+RC_GTEST_PROP(DeviceClock, IsNeverFartherOffThanItSays, (std::uint32_t seed)) {
+  std::mt19937 random(seed);
+  const auto within = [&](int low, int high) { return std::uniform_int_distribution(low, high)(random); };
+  const Crystal crystal{.ppm = within(-80, 80) * 1.0, .start = within(0, 1000) * 1ms};
+  DeviceClock clock;
+  MonotonicTime now = kHostStart;
+  for (int i = 0; i < within(1, 60); ++i) {
+    const nanoseconds round_trip(within(20'000, 2'000'000));
+    clock.observe(crystal.read(now, nanoseconds(within(0, static_cast<int>(round_trip.count()))), round_trip));
+    now += round_trip + nanoseconds(within(1, 1'000'000'000));
+  }
+  const nanoseconds device = crystal.at(now);
+  // It is a deviation, not a bound.
+  RC_ASSERT(off(clock.host_time(device), now) <= 3 * clock.uncertainty(device));
+}
+
+}  // namespace
+}  // namespace slsd
