@@ -19,6 +19,7 @@ std::string_view to_string(CameraDriver driver) {
 Result<> CameraOptions::validate() const {
   if (name().empty() || name().size() > 64) return fail(ErrorCode::kInvalidArgument, "name must have 1 to 64 letters");
   if (driver == CameraDriver::kV4l2) return v4l2.validate();
+  if (driver == CameraDriver::kAravis) return aravis.validate();
   if (driver != CameraDriver::kFile) return {};
   if (file.path.empty()) {
     return fail(ErrorCode::kInvalidArgument, "path must name an image or a folder of images for the driver \"file\"");

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/result.hpp"
+#include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/camera/fault.hpp"
 #include "drivers/camera/file_camera.hpp"
 #include "drivers/camera/v4l2/v4l2_camera_options.hpp"
@@ -18,9 +19,10 @@ enum class CameraDriver { kFile, kV4l2, kAravis };
 /// A [[camera]] table.
 struct CameraOptions {
   CameraDriver driver = CameraDriver::kFile;
-  FileCameraOptions file;     ///< its name is the camera's, whatever the driver
-  V4l2CameraOptions v4l2;     ///< where it is the driver
-  std::vector<Fault> faults;  ///< what the camera does wrong, for the tests of everything above it
+  FileCameraOptions file;      ///< its name is the camera's, whatever the driver
+  V4l2CameraOptions v4l2;      ///< where it is the driver
+  AravisCameraOptions aravis;  ///< where it is the driver
+  std::vector<Fault> faults;   ///< what the camera does wrong, for the tests of everything above it
 
   [[nodiscard]] const std::string& name() const { return file.name; }
   /// @errors kInvalidArgument: the message begins with the key

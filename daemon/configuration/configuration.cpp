@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "daemon/configuration/aravis_keys.hpp"
 #include "daemon/configuration/table_reader.hpp"
 #include "daemon/configuration/v4l2_keys.hpp"
 #include "drivers/files/file.hpp"
@@ -102,6 +103,7 @@ void read_file_camera(TableReader& reader, FileCameraOptions& options) {
 void read_driver_keys(TableReader& reader, CameraDriver driver, CameraOptions& options) {
   if (driver == CameraDriver::kFile) read_file_camera(reader, options.file);
   if (driver == CameraDriver::kV4l2) read_v4l2_keys(reader, options.v4l2);
+  if (driver == CameraDriver::kAravis) read_aravis_keys(reader, options.aravis);
 }
 
 void refuse_keys_of_others(TableReader& reader, const toml::table& table, CameraDriver driver) {
@@ -123,10 +125,9 @@ Result<CameraOptions> read_camera(const toml::table& table, const path& file) {
   CameraOptions options;
   reader.read("name", options.file.name);
   reader.choose("driver", options.driver, span_of(kCameraDrivers));
-  // The keys of a driver that this build lacks cannot be checked; opening the camera says that it is lacking.
-  if (options.driver == CameraDriver::kAravis) return options;
   read_driver_keys(reader, options.driver, options);
   options.v4l2.name = options.name();
+  options.aravis.name = options.name();
   read_faults(reader, options);
   refuse_keys_of_others(reader, table, options.driver);
   if (auto read = reader.finish(options.validate()); !read) return tl::unexpected(read.error());

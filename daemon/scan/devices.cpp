@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include "daemon/scan/devices.hpp"
 
+#include "drivers/camera/aravis/aravis_camera.hpp"
 #include "drivers/camera/faulty_camera.hpp"
 #include "drivers/camera/file_camera.hpp"
 #include "drivers/camera/v4l2/v4l2_camera.hpp"
@@ -19,10 +20,8 @@ Result<std::unique_ptr<Camera>> make_camera(const CameraOptions& options) {
       camera = std::make_unique<V4l2Camera>(options.v4l2);
       break;
     case CameraDriver::kAravis:
-      return fail(ErrorCode::kUnsupported,
-                  "the driver \"" + std::string(to_string(options.driver)) +
-                      "\" is not part of this build, whose camera drivers are: file, v4l2",
-                  "camera " + options.name());
+      camera = std::make_unique<AravisCamera>(options.aravis);
+      break;
   }
   if (!options.faults.empty()) camera = std::make_unique<FaultyCamera>(std::move(camera), options.faults);
   return camera;

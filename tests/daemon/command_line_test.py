@@ -39,7 +39,7 @@ class Slsd(unittest.TestCase):
     def test_names_what_is_wrong_with_a_configuration(self):
         cases = {"[pattern]\nsymbols = [7]\n": ":2:", "[[camera]]\npath = 3\n": ":2:8: [[camera]] path",
                  "[camera]\n": "[[camera]]", "x = \n": ":1:", "[projector]\ndriver = 'glfw'\n": "not part of this build",
-                 "[[camera]]\ndriver = 'aravis'\nid = '1'\n": "not part of this build",
+                 "[[camera]]\ndriver = 'aravis'\n": "id must be the camera's serial number",
                  "[calibration]\nfile = 'missing.yml'\n": "missing.yml",
                  "[pattern]\nfile = 'missing.toml'\n": "missing.toml"}
         for text, expected in cases.items():

@@ -84,7 +84,7 @@ const CameraOptions& shipped_camera(const std::vector<CameraOptions>& cameras, C
 
 TEST(ReadConfiguration, ShippedCamerasEqualTheDefaults) {
   const auto cameras = shipped_cameras();
-  ASSERT_EQ(cameras.size(), 2U);
+  ASSERT_EQ(cameras.size(), 3U);
   CameraOptions file;
   file.file.path = "etc/frames";
   EXPECT_EQ(shipped_camera(cameras, CameraDriver::kFile), file);
@@ -92,6 +92,10 @@ TEST(ReadConfiguration, ShippedCamerasEqualTheDefaults) {
   v4l2.driver = CameraDriver::kV4l2;
   v4l2.v4l2.device = "/dev/v4l/by-id/usb-maker_camera_serial-video-index0";
   EXPECT_EQ(shipped_camera(cameras, CameraDriver::kV4l2), v4l2);
+  CameraOptions aravis;
+  aravis.driver = CameraDriver::kAravis;
+  aravis.aravis.id = "192.0.2.10";
+  EXPECT_EQ(shipped_camera(cameras, CameraDriver::kAravis), aravis);
 }
 
 // Every key of the tables stands in the shipped file, in force or in a comment.
@@ -124,6 +128,19 @@ TEST(ReadConfiguration, ShippedFileHasEveryKey) {
                           "automatic",
                           "readout_us",
                           "settle_frames",
+                          "id",
+                          "interface",
+                          "trigger",
+                          "trigger_line",
+                          "gain_db",
+                          "pixel_format",
+                          "packet_bytes",
+                          "packet_delay_us",
+                          "receive_buffer_bytes",
+                          "packet_resend",
+                          "packet_socket",
+                          "frame_timeout_ms",
+                          "missed_frames_max",
                           "frames_held_max",
                           "depth_min_mm",
                           "depth_max_mm",
@@ -234,6 +251,47 @@ TEST(ReadConfiguration, NamesTheDriverWhoseKeyItIs) {
               HasSubstr("gain_steps is a key of the driver \"v4l2\", not of \"file\""));
 }
 
+TEST(ReadConfiguration, TakesEveryKeyOfAravis) {
+  const auto configuration = read(R"(
+[[camera]]
+name = "left"
+driver = "aravis"
+id = "Vendor-1234"
+interface = "192.0.2.1"
+trigger = "line"
+trigger_line = "Line3"
+rate_hz = 30
+exposure_us = 16667
+gain_db = 3.5
+pixel_format = "BayerRG12"
+width_px = 640
+height_px = 480
+packet_bytes = 1500
+packet_delay_us = 2.5
+receive_buffer_bytes = 100000
+packet_resend = false
+packet_socket = false
+frame_timeout_ms = 50
+missed_frames_max = 3
+frames_held_max = 4
+faults = ["drop@3"]
+)");
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  const CameraOptions& camera = configuration->cameras.at(0);
+  const AravisCameraOptions expected{"left",      "Vendor-1234",
+                                     "192.0.2.1", AravisTrigger::kLine,
+                                     "Line3",     30.0,
+                                     16667.0,     3.5,
+                                     "BayerRG12", std::pair(640, 480),
+                                     1500,        2.5,
+                                     100000,      false,
+                                     false,       50,
+                                     3,           4};
+  EXPECT_EQ(camera.driver, CameraDriver::kAravis);
+  EXPECT_EQ(camera.aravis, expected);
+  EXPECT_EQ(camera.faults.size(), 1U);
+}
+
 TEST(ReadConfiguration, TakesThePapersMethod) {
   const auto configuration = read("[pattern]\nsymbols = [5, 7, 22]\nmethod = \"paper\"\n");
   ASSERT_TRUE(configuration) << to_string(configuration.error());
@@ -262,6 +320,11 @@ TEST(ReadConfiguration, PlacesRangesAtTheKey) {
   EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nrate_hz = -1\n"), HasSubstr("slsd.toml:3:11: "));
   EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nfaults = [\"explode@1\"]\n"), HasSubstr("slsd.toml:3:10: "));
   EXPECT_THAT(error_of("[[camera]]\n"), HasSubstr("path must name"));
+  const std::string aravis = "[[camera]]\ndriver = \"aravis\"\nid = \"1\"\n";
+  EXPECT_THAT(error_of(aravis + "pixel_format = \"Mono12p\"\n"), HasSubstr("slsd.toml:4:16: "));
+  EXPECT_THAT(error_of(aravis + "exposure_us = 0.5\n"), HasSubstr("slsd.toml:4:15: "));
+  EXPECT_THAT(error_of(aravis + "trigger = \"hand\"\n"), HasSubstr("software, line, free_run"));
+  EXPECT_THAT(error_of(aravis + "path = \"x\"\n"), HasSubstr("path is a key of the driver \"file\""));
   const std::string v4l2 = "[[camera]]\ndriver = \"v4l2\"\ndevice = \"x\"\n";
   EXPECT_THAT(error_of(v4l2 + "exposure_us = 0.5\n"), HasSubstr("slsd.toml:4:15: "));
   EXPECT_THAT(error_of(v4l2 + "power_line_hz = 55\n"), HasSubstr("slsd.toml:4:17: "));
@@ -283,12 +346,6 @@ TEST(ReadConfiguration, RefusesWrongTypes) {
 TEST(ReadConfiguration, FileExcludesTheOtherKeysOfAPattern) {
   EXPECT_TRUE(read("[pattern]\nfile = \"p.toml\"\n"));
   EXPECT_THAT(error_of("[pattern]\nfile = \"p.toml\"\nseed = 2\n"), HasSubstr("slsd.toml:3:8: [pattern] seed cannot"));
-}
-
-TEST(ReadConfiguration, LeavesTheKeysOfALackingDriverAlone) {
-  const auto configuration = read("[[camera]]\ndriver = \"aravis\"\nid = \"1\"\nexposure_us = 5\n");
-  ASSERT_TRUE(configuration) << to_string(configuration.error());
-  EXPECT_EQ(configuration->cameras.at(0).driver, CameraDriver::kAravis);
 }
 
 TEST(ReadConfiguration, RefusesWhatIsNoToml) {
