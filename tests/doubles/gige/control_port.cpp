@@ -55,48 +55,50 @@ const std::vector<std::uint8_t>& ControlPort::answer(std::span<const std::uint8_
   reader.u16();
   const std::uint32_t id = reader.u16();
   if (controller_ && same(*controller_, from)) heard_ = std::chrono::steady_clock::now();
-  switch (what) {
-    case kDiscovery: {
-      block_.resize(kDiscoveryBytes);
-      (void)registers_.read_bytes(0, block_);
-      acknowledge(answer_, 0, what, kDiscoveryBytes, id).bytes(block_);
-      break;
-    }
-    case kPacketResend: {
-      const std::uint32_t frame = reader.u32() & 0xffff;
-      const std::uint32_t first = reader.u32() & 0xffffff;
-      events_.resend_asked(static_cast<std::uint16_t>(frame), first, reader.u32() & 0xffffff);
-      break;
-    }
-    case kReadRegister:
-      acknowledge(answer_, 0, what, 4, id).u32(registers_.read(reader.u32()));
-      break;
-    case kWriteRegister: {
-      const std::uint32_t address = reader.u32();
-      const bool allowed = may_write(address, from);
-      if (allowed) write(address, reader.u32(), from);
-      acknowledge(answer_, allowed ? 0 : kAccessDenied, what, 4, id).u16(0).u16(allowed ? 1 : 0);
-      break;
-    }
-    case kReadMemory: {
-      const std::uint32_t address = reader.u32();
-      block_.resize(reader.u32() & 0xffff);
-      const bool there = registers_.read_bytes(address, block_);
-      const auto bytes = static_cast<std::uint32_t>(4 + block_.size());
-      acknowledge(answer_, there ? 0 : kNoSuchAddress, what, bytes, id).u32(address).bytes(block_);
-      break;
-    }
-    case kWriteMemory: {
-      const std::uint32_t address = reader.u32();
-      const bool allowed = may_write(address, from);
-      const bool there = allowed && write_block(address, reader.rest(), from);
-      acknowledge(answer_, !allowed ? kAccessDenied : (there ? 0 : kNoSuchAddress), what, 4, id).u16(0).u16(0);
-      break;
-    }
-    default:
-      acknowledge(answer_, kNoSuchCommand, what, 0, id);
-  }
+  if (what == kDiscovery)
+    answer_read(what, id, 0, kDiscoveryBytes);
+  else if (what == kPacketResend)
+    ask_resend(reader.rest());
+  else if (what == kReadRegister)
+    acknowledge(answer_, 0, what, 4, id).u32(registers_.read(reader.u32()));
+  else if (what == kReadMemory)
+    answer_read_memory(id, reader.rest());
+  else if (what == kWriteRegister || what == kWriteMemory)
+    answer_write(what, id, reader.rest(), from);
+  else
+    acknowledge(answer_, kNoSuchCommand, what, 0, id);
   return answer_;
+}
+
+void ControlPort::answer_read(std::uint32_t what, std::uint32_t id, std::uint32_t address, std::size_t bytes) {
+  block_.resize(bytes);
+  (void)registers_.read_bytes(address, block_);
+  acknowledge(answer_, 0, what, static_cast<std::uint32_t>(bytes), id).bytes(block_);
+}
+
+void ControlPort::answer_read_memory(std::uint32_t id, std::span<const std::uint8_t> body) {
+  WireReader reader(body);
+  const std::uint32_t address = reader.u32();
+  block_.resize(reader.u32() & 0xffff);
+  const bool there = registers_.read_bytes(address, block_);
+  const auto bytes = static_cast<std::uint32_t>(4 + block_.size());
+  acknowledge(answer_, there ? 0 : kNoSuchAddress, kReadMemory, bytes, id).u32(address).bytes(block_);
+}
+
+void ControlPort::answer_write(std::uint32_t what, std::uint32_t id, std::span<const std::uint8_t> body,
+                               const sockaddr_in& from) {
+  WireReader reader(body);
+  const std::uint32_t address = reader.u32();
+  const bool allowed = may_write(address, from);
+  const bool there = allowed && write_block(address, reader.rest(), from);
+  acknowledge(answer_, !allowed ? kAccessDenied : (there ? 0 : kNoSuchAddress), what, 4, id).u16(0).u16(there ? 1 : 0);
+}
+
+void ControlPort::ask_resend(std::span<const std::uint8_t> body) {
+  WireReader reader(body);
+  const std::uint32_t frame = reader.u32() & 0xffff;
+  const std::uint32_t first = reader.u32() & 0xffffff;
+  events_.resend_asked(static_cast<std::uint16_t>(frame), first, reader.u32() & 0xffffff);
 }
 
 void ControlPort::write(std::uint32_t address, std::uint32_t value, const sockaddr_in& from) {

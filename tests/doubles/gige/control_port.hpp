@@ -4,6 +4,7 @@
 
 #include <netinet/in.h>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -39,6 +40,10 @@ class ControlPort {
 
  private:
   [[nodiscard]] bool may_write(std::uint32_t address, const sockaddr_in& from) const;
+  void answer_read(std::uint32_t what, std::uint32_t id, std::uint32_t address, std::size_t bytes);
+  void answer_read_memory(std::uint32_t id, std::span<const std::uint8_t> body);
+  void answer_write(std::uint32_t what, std::uint32_t id, std::span<const std::uint8_t> body, const sockaddr_in& from);
+  void ask_resend(std::span<const std::uint8_t> body);
   void write(std::uint32_t address, std::uint32_t value, const sockaddr_in& from);
   [[nodiscard]] bool write_block(std::uint32_t address, std::span<const std::uint8_t> block, const sockaddr_in& from);
   void release();
