@@ -2,8 +2,10 @@
 // Copyright the slsd authors
 #include "core/decode/classify.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <Eigen/LU>
@@ -79,6 +81,37 @@ TEST(Classify, IsLessSureBetweenTwoPrototypes) {
   const Classification sure = Classifier(prototypes, 1e3F).classify(prototypes[0].mean);
   EXPECT_LT(shape.log_probability[shape.letter], sure.log_probability[0]);
   EXPECT_NEAR(total_probability(shape, 3), 1, 1e-4);
+}
+
+// Student's t with four degrees of freedom in eight dimensions, one letter after the other, in double precision.
+std::vector<double> plain_log_probabilities(const ShapeFeatures& features, const std::vector<Prototype>& prototypes) {
+  std::vector<double> likelihood;
+  double sum = 0;
+  for (const Prototype& prototype : prototypes) {
+    const Eigen::VectorXd deviation = (features - prototype.mean).cast<double>();
+    const double squared = (prototype.whitening.cast<double>() * deviation).squaredNorm();
+    likelihood.push_back(prototype.density * std::pow(1 + squared / 4, -6));
+    sum += likelihood.back();
+  }
+  for (double& value : likelihood) value = std::log(value / sum);
+  return likelihood;
+}
+
+TEST(Classify, AgreesWithThePlainForm) {
+  const auto prototypes = three_letters();
+  const Classifier classifier(prototypes, kDistanceMax);
+  std::mt19937 random(3);
+  std::normal_distribution<float> normal;
+  for (int i = 0; i < 300; ++i) {
+    const Prototype& prototype = prototypes[i % 3];
+    const ShapeFeatures whitened = ShapeFeatures::NullaryExpr([&] { return 2 * normal(random); });
+    const ShapeFeatures features = prototype.mean + prototype.whitening.inverse() * whitened;
+    const Classification shape = classifier.classify(features);
+    const auto plain = plain_log_probabilities(features, prototypes);
+    for (int letter = 0; letter < 3; ++letter) {
+      EXPECT_NEAR(shape.log_probability[letter], std::max(plain[letter], std::log(1e-6)), 2e-3) << i;
+    }
+  }
 }
 
 TEST(Classify, KeepsProbabilitiesFiniteForAnyShape) {
