@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <ostream>
 #include <thread>
 #include <variant>
 #include <vector>
@@ -31,6 +32,10 @@ struct Backend {
   const char* name;
   std::function<std::unique_ptr<Camera>(const test::TemporaryFolder&)> make;
 };
+
+void PrintTo(const Backend& backend, std::ostream* out) {
+  *out << backend.name;
+}
 
 std::unique_ptr<FileCamera> file_camera(const test::TemporaryFolder& folder, FileCameraOptions options = {}) {
   test::record(folder, 5);

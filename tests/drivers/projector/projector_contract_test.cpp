@@ -3,6 +3,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <ostream>
 
 #include <gmock/gmock.h>
 
@@ -20,6 +21,10 @@ struct Backend {
   const char* name;
   std::function<std::unique_ptr<Projector>()> make;
 };
+
+void PrintTo(const Backend& backend, std::ostream* out) {
+  *out << backend.name;
+}
 
 class ProjectorContract : public ::testing::TestWithParam<Backend> {
  protected:
