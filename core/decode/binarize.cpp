@@ -60,11 +60,10 @@ SLSD_CLONES void slide_extremes(std::uint16_t* least, std::uint16_t* greatest, i
   slide(greatest, count, length, [](std::uint16_t a, std::uint16_t b) { return a > b ? a : b; });
 }
 
-/// Binary places of a threshold: as many as a pixel's range leaves in 31 bits.
+/// Binary places of a threshold; a line may run on for kLanes pixels beyond a tile without leaving 31 bits.
 template <class T>
-constexpr int kFractionBits = sizeof(T) == 1 ? 20 : 14;
+constexpr int kFractionBits = sizeof(T) == 1 ? 20 : 12;
 
-/// A straight line of thresholds from a tile's centre on, `kLanes` at a time: the last ones may lie beyond its end.
 inline __attribute__((always_inline)) void store_pixels(const IntLanes& lanes, std::uint8_t* pixels) {
   using Bytes [[gnu::vector_size(sizeof(IntLanes))]] = std::uint8_t;
   const auto bytes = reinterpret_cast<Bytes>(lanes);
@@ -83,7 +82,8 @@ struct ThresholdLine {
   int tiles, tile_px;
 };
 
-/// From the centre of the first tile to that of the last.
+/// From the centre of the first tile to that of the last, kLanes at a time: the last ones of a tile may lie beyond its
+/// end, where the next tile's follow.
 template <class T>
 inline __attribute__((always_inline)) void draw_line(const ThresholdLine& line, T* threshold) {
   constexpr IntLanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
