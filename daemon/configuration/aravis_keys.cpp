@@ -3,7 +3,6 @@
 #include "daemon/configuration/aravis_keys.hpp"
 
 #include <array>
-#include <optional>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -28,13 +27,7 @@ void read_aravis_keys(TableReader& reader, AravisCameraOptions& options) {
   reader.read("exposure_us", options.exposure_us);
   reader.read("gain_db", options.gain_db);
   reader.read("pixel_format", options.pixel_format);
-  std::optional<int> width;
-  std::optional<int> height;
-  reader.read("width_px", width);
-  reader.read("height_px", height);
-  if (width && height) options.size_px = {*width, *height};
-  if (width && !height) reader.refuse("width_px", "needs height_px beside it");
-  if (height && !width) reader.refuse("height_px", "needs width_px beside it");
+  reader.read_both("width_px", "height_px", options.size_px);
   reader.read("packet_bytes", options.packet_bytes);
   reader.read("packet_delay_us", options.packet_delay_us);
   reader.read("receive_buffer_bytes", options.receive_buffer_bytes);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 #include <utility>
 
 #include "daemon/configuration/aravis_keys.hpp"
@@ -82,21 +81,11 @@ void read_faults(TableReader& reader, CameraOptions& options) {
   }
 }
 
-void read_frame_size(TableReader& reader, FileCameraOptions& options) {
-  std::optional<int> width;
-  std::optional<int> height;
-  reader.read("width_px", width);
-  reader.read("height_px", height);
-  if (width && height) options.size_px = {*width, *height};
-  if (width && !height) reader.refuse("width_px", "needs height_px beside it");
-  if (height && !width) reader.refuse("height_px", "needs width_px beside it");
-}
-
 void read_file_camera(TableReader& reader, FileCameraOptions& options) {
   reader.read("path", options.path);
   reader.read("loop", options.loop);
   reader.read("rate_hz", options.rate_hz);
-  read_frame_size(reader, options);
+  reader.read_both("width_px", "height_px", options.size_px);
   reader.choose("bayer", options.bayer, span_of(kMosaics));
 }
 

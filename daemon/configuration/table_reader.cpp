@@ -137,6 +137,17 @@ void TableReader::read(std::string_view key, std::vector<std::string>& value) {
   value = std::move(words);
 }
 
+void TableReader::read_both(std::string_view first_key, std::string_view second_key,
+                            std::optional<std::pair<int, int>>& values) {
+  std::optional<int> first;
+  std::optional<int> second;
+  read(first_key, first);
+  read(second_key, second);
+  if (first && second) values = {*first, *second};
+  if (first && !second) refuse(first_key, "needs " + std::string(second_key) + " beside it");
+  if (second && !first) refuse(second_key, "needs " + std::string(first_key) + " beside it");
+}
+
 const toml::table* TableReader::table(std::string_view key) {
   const toml::node* node = find(key);
   if (node == nullptr) return nullptr;

@@ -42,6 +42,9 @@ class TableReader {
   void read(std::string_view key, std::vector<int>& value);
   void read(std::string_view key, std::vector<std::string>& value);
 
+  /// Two numbers of which each needs the other.
+  void read_both(std::string_view first_key, std::string_view second_key, std::optional<std::pair<int, int>>& values);
+
   /// One of several words.
   template <class Value>
   void choose(std::string_view key, Value& value, std::span<const std::pair<std::string_view, Value>> choices) {

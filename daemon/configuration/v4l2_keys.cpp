@@ -2,7 +2,6 @@
 // Copyright the slsd authors
 #include "daemon/configuration/v4l2_keys.hpp"
 
-#include <optional>
 #include <string>
 
 namespace slsd {
@@ -12,13 +11,7 @@ void read_v4l2_keys(TableReader& reader, V4l2CameraOptions& options) {
   reader.read("device", device);  // not a path: a bare name is one of /dev/v4l/by-id
   options.device = device;
   reader.read("format", options.format);
-  std::optional<int> width;
-  std::optional<int> height;
-  reader.read("width_px", width);
-  reader.read("height_px", height);
-  if (width && height) options.size_px = {*width, *height};
-  if (width && !height) reader.refuse("width_px", "needs height_px beside it");
-  if (height && !width) reader.refuse("height_px", "needs width_px beside it");
+  reader.read_both("width_px", "height_px", options.size_px);
   reader.read("frame_rate_hz", options.frame_rate_hz);
   reader.read("exposure_us", options.exposure_us);
   reader.read("gain_steps", options.gain_steps);
