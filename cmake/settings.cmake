@@ -15,6 +15,14 @@ option(SLSD_BENCHMARKS "Build the benchmarks" ON)
 option(SLSD_FUZZERS "Build the libFuzzer targets (needs clang)" OFF)
 set(SLSD_SANITIZE "" CACHE STRING "Sanitizers to build with, as for -fsanitize=")
 
+include(CheckIPOSupported)
+check_ipo_supported(RESULT SLSD_HAS_IPO LANGUAGES CXX OUTPUT ignored)
+
+# Lets a release's compiler inline from one file of the target into another.
+function(slsd_inline_across_files target)
+  set_target_properties(${target} PROPERTIES INTERPROCEDURAL_OPTIMIZATION_RELEASE ${SLSD_HAS_IPO})
+endfunction()
+
 add_library(slsd_settings INTERFACE)
 target_include_directories(slsd_settings INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(slsd_settings INTERFACE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor)
