@@ -29,6 +29,7 @@ enum class ErrorCode {
   kFrameTorn,     ///< fewer bytes than a frame, or parts of two frames
   kFrameStale,    ///< exposed before the pattern was visible
   kFrameLate,     ///< not there by its deadline
+  kFrameSkewed,   ///< the cameras' frames are not of the same exposure
 };
 
 /// The world failed: a code, a message that says what to do, and where it arose (file:line:column, key, device, or

@@ -20,6 +20,10 @@ struct RigidTransform {
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 
   [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& point) const { return rotation * point + translation; }
+  /// c_from_a, of c_from_b (this) and b_from_a.
+  [[nodiscard]] RigidTransform after(const RigidTransform& b_from_a) const {
+    return {rotation * b_from_a.rotation, rotation * b_from_a.translation + translation};
+  }
   [[nodiscard]] RigidTransform inverse() const { return {rotation.transpose(), -(rotation.transpose() * translation)}; }
 };
 
@@ -34,10 +38,16 @@ struct CalibratedCamera {
 struct CalibrationReport {
   std::optional<double> reprojection_error_camera_px;
   std::optional<double> reprojection_error_projector_px;
+  std::optional<double> held_out_error_px;  ///< of symbols in poses held out, root mean square, in the camera
+  std::optional<std::string> verdict;       ///< "good", "usable" or "bad"
+  /// One standard deviation of fx fy cx cy k1 k2 p1 p2 k3, 0 where a term took no part; 9, or empty.
+  std::vector<double> projector_sigma;
+  std::vector<std::vector<double>> camera_sigma;  ///< one to a camera, or empty
   std::optional<std::string> board;
   std::optional<std::string> date;
   std::optional<std::string> projector_serial;
   std::vector<std::string> camera_serials;  ///< one to a camera, or empty
+  std::optional<double> epipolar_error_px;  ///< root mean square, in the projector
 };
 
 struct Calibration {

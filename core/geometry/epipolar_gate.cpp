@@ -18,6 +18,7 @@ EpipolarGate::EpipolarGate(const CalibratedCamera& camera, const Lens& projector
                            double depth_max_mm)
     : projector_from_camera_(camera.projector_from_camera),
       focal_px_(projector.fx, projector.fy),
+      per_focal_px_(1 / focal_px_),
       depth_min_mm_(depth_min_mm),
       depth_max_mm_(depth_max_mm) {}
 
@@ -26,19 +27,24 @@ EpipolarSegment EpipolarGate::prepare(const Eigen::Vector2d& camera_direction) c
   const Eigen::Vector3d slope = projector_from_camera_.rotation * camera_direction.homogeneous();
   const Eigen::Vector3d& start = projector_from_camera_.translation;
   const Eigen::Vector3d line = start.cross(slope);
-  const Eigen::Vector2d normal = (line.head<2>().array() / focal_px_).matrix();
-  const double length = normal.norm();
+  const Eigen::Array2d normal = line.head<2>().array() * per_focal_px_;
+  const double length = normal.matrix().norm();
   EpipolarSegment segment;
   if (!(length > 0)) return segment;
 
-  segment.line_ = line.head<2>() / length;
-  segment.line_offset_px_ = line.z() / length;
-  segment.axis_ = (Eigen::Array2d(-normal.y(), normal.x()) / length * focal_px_).matrix();
+  const double per_length = 1 / length;
+  segment.line_ = line.head<2>() * per_length;
+  segment.line_offset_px_ = line.z() * per_length;
+  segment.axis_ = (Eigen::Array2d(-normal.y(), normal.x()) * per_length * focal_px_).matrix();
 
-  const double crossing = (kMinProjectorDepthMm - start.z()) / slope.z();
-  const double nearest = slope.z() > 0 ? std::max(depth_min_mm_, crossing) : depth_min_mm_;
-  const double farthest = slope.z() < 0 ? std::min(depth_max_mm_, crossing) : depth_max_mm_;
-  if (!(nearest <= farthest) || !(start.z() + nearest * slope.z() > 0)) return segment;
+  double nearest = depth_min_mm_, farthest = depth_max_mm_;
+  const auto in_front = [&](double depth_mm) { return start.z() + depth_mm * slope.z() >= kMinProjectorDepthMm; };
+  if (!in_front(nearest) || !in_front(farthest)) {
+    const double crossing = (kMinProjectorDepthMm - start.z()) / slope.z();
+    if (slope.z() > 0) nearest = std::max(nearest, crossing);
+    if (slope.z() < 0) farthest = std::min(farthest, crossing);
+    if (!(nearest <= farthest) || !(start.z() + nearest * slope.z() > 0)) return segment;
+  }
   // Along the line at a depth: the axis' part of the point over its depth in the projector's frame.
   const double along_start = segment.axis_.dot(start.head<2>()), along_slope = segment.axis_.dot(slope.head<2>());
   const double near_px = (along_start + nearest * along_slope) / (start.z() + nearest * slope.z()),

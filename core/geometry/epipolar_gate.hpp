@@ -57,6 +57,7 @@ class EpipolarGate {
  private:
   RigidTransform projector_from_camera_;
   Eigen::Array2d focal_px_;
+  Eigen::Array2d per_focal_px_;
   double depth_min_mm_;
   double depth_max_mm_;
 };

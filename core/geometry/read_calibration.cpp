@@ -92,6 +92,12 @@ CalibratedCamera read_camera(FileSection& section, std::size_t index) {
   return camera;
 }
 
+std::vector<double> read_sigma(FileSection& section, const char* key) {
+  if (!section.has(key)) return {};
+  const Eigen::VectorXd sigma = section.vector(key, 9);
+  return {sigma.begin(), sigma.end()};
+}
+
 CalibrationReport read_report(FileSection& section) {
   CalibrationReport report;
   if (section.has("reprojection_error_camera_px")) {
@@ -100,6 +106,10 @@ CalibrationReport read_report(FileSection& section) {
   if (section.has("reprojection_error_projector_px")) {
     report.reprojection_error_projector_px = section.number("reprojection_error_projector_px");
   }
+  if (section.has("epipolar_error_px")) report.epipolar_error_px = section.number("epipolar_error_px");
+  if (section.has("held_out_error_px")) report.held_out_error_px = section.number("held_out_error_px");
+  if (section.has("verdict")) report.verdict = section.text("verdict");
+  report.projector_sigma = read_sigma(section, "projector_sigma");
   if (section.has("board")) report.board = section.text("board");
   if (section.has("date")) report.date = section.text("date");
   if (section.has("projector_serial")) report.projector_serial = section.text("projector_serial");
@@ -109,16 +119,20 @@ CalibrationReport read_report(FileSection& section) {
 std::optional<Error> read_cameras(const cv::FileNode& sequence, std::string_view name, Calibration& calibration) {
   std::set<std::string> names;
   std::vector<std::string> serials;
+  std::vector<std::vector<double>> sigmas;
   for (const cv::FileNode& node : sequence) {
     FileSection section(node, {}, std::string(name));
     CalibratedCamera camera = read_camera(section, calibration.cameras.size());
     if (!names.insert(camera.name).second) section.refuse("name", "is another camera's name already");
     serials.push_back(section.has("serial") ? section.text("serial") : std::string());
+    sigmas.push_back(read_sigma(section, "camera_sigma"));
     if (section.error()) return section.error();
     calibration.cameras.push_back(std::move(camera));
   }
   const bool any = std::any_of(serials.begin(), serials.end(), [](const auto& serial) { return !serial.empty(); });
   if (any) calibration.report.camera_serials = std::move(serials);
+  const bool any_sigma = std::ranges::any_of(sigmas, [](const auto& sigma) { return !sigma.empty(); });
+  if (any_sigma) calibration.report.camera_sigma = std::move(sigmas);
   return std::nullopt;
 }
 

@@ -76,12 +76,16 @@ TriangulatedPoint triangulate(const Match& match, const CalibratedCamera& camera
   return {point, sigma_mm};
 }
 
-double epipolar_residual_px(const Match& match, const CalibratedCamera& camera, const Lens& projector) {
+double signed_epipolar_residual_px(const Match& match, const CalibratedCamera& camera, const Lens& projector) {
   const PixelRay projector_ray = pixel_ray(projector, match.projector_px);
   const auto& [rotation, translation] = camera.projector_from_camera;
   const Eigen::Vector3d line = translation.cross(rotation * camera.lens.undistort(match.camera_px).homogeneous());
   const Eigen::Vector2d slope_per_px = projector_ray.turn.transpose() * line.head<2>();
-  return std::abs(line.dot(projector_ray.direction.homogeneous())) / slope_per_px.norm();
+  return line.dot(projector_ray.direction.homogeneous()) / slope_per_px.norm();
+}
+
+double epipolar_residual_px(const Match& match, const CalibratedCamera& camera, const Lens& projector) {
+  return std::abs(signed_epipolar_residual_px(match, camera, projector));
 }
 
 }  // namespace slsd

@@ -27,7 +27,13 @@ struct TriangulatedPoint {
 [[nodiscard]] TriangulatedPoint triangulate(const Match& match, const CalibratedCamera& camera, const Lens& projector,
                                             double camera_sigma_px);
 
-/// Distance of the projector pixel from the epipolar line of the camera pixel, in projector px.
+/// Distance of the projector pixel from the epipolar line of the camera pixel, in projector px; signed: positive on the
+/// same side of the lines for all pixels that are on the same side of the epipole.
+/// @thread reentrant
+[[nodiscard]] double signed_epipolar_residual_px(const Match& match, const CalibratedCamera& camera,
+                                                 const Lens& projector);
+
+/// The same without its sign.
 /// @thread reentrant
 [[nodiscard]] double epipolar_residual_px(const Match& match, const CalibratedCamera& camera, const Lens& projector);
 

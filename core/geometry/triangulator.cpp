@@ -10,6 +10,7 @@ namespace slsd {
 Triangulator::Triangulator(const CalibratedCamera& camera, const Lens& projector)
     : projector_from_camera_(camera.projector_from_camera),
       camera_focal_px_(camera.lens.fx, camera.lens.fy),
+      per_camera_focal_(1 / camera_focal_px_),
       projector_focal_px_(projector.fx, projector.fy) {}
 
 // With d the camera's direction (x, y, 1), a point is P = z d + (u, v, 0), and the camera's rows of (34) leave the
@@ -24,7 +25,6 @@ TriangulatedPoint Triangulator::triangulate(const PixelRay& camera_ray, const Pi
                                             double camera_sigma_px) const {
   const auto& [rotation, translation] = projector_from_camera_;
   const Eigen::Vector2d seen = camera_ray.direction, lit = projector_ray.direction;
-  const Eigen::Array2d per_focal = 1 / camera_focal_px_;
   const Eigen::RowVector3d a0 = projector_focal_px_.x() * (lit.x() * rotation.row(2) - rotation.row(0)),
                            a1 = projector_focal_px_.y() * (lit.y() * rotation.row(2) - rotation.row(1));
   const Eigen::Vector2d b(projector_focal_px_.x() * (translation.x() - lit.x() * translation.z()),
@@ -32,22 +32,23 @@ TriangulatedPoint Triangulator::triangulate(const PixelRay& camera_ray, const Pi
   const Eigen::Vector2d q(a0.x() * seen.x() + a0.y() * seen.y() + a0.z(),
                           a1.x() * seen.x() + a1.y() * seen.y() + a1.z());
   Eigen::Matrix2d l;
-  l << a0.x() * per_focal.x(), a0.y() * per_focal.y(), a1.x() * per_focal.x(), a1.y() * per_focal.y();
+  l << a0.x() * per_camera_focal_.x(), a0.y() * per_camera_focal_.y(), a1.x() * per_camera_focal_.x(),
+      a1.y() * per_camera_focal_.y();
 
   const double s00 = 1 + l.row(0).squaredNorm(), s11 = 1 + l.row(1).squaredNorm(), s01 = l.row(0).dot(l.row(1));
   Eigen::Matrix2d s;
   s << s11, -s01, -s01, s00;
-  s /= s00 * s11 - s01 * s01;
+  s *= 1 / (s00 * s11 - s01 * s01);
   const Eigen::Vector2d sq = s * q;
   const double per_qsq = 1 / q.dot(sq);
 
   const double z = b.dot(sq) * per_qsq;
   const Eigen::Vector2d w = l.transpose() * (s * (b - q * z));
-  const Eigen::Vector2d off_ray = (w.array() * per_focal).matrix();
+  const Eigen::Vector2d off_ray = (w.array() * per_camera_focal_).matrix();
   Eigen::Vector3d point(seen.x() * z + off_ray.x(), seen.y() * z + off_ray.y(), z);
 
   const double length_squared = 1 + seen.squaredNorm();
-  const Eigen::Vector2d e = (seen.array() * per_focal).matrix(), le = l * e;
+  const Eigen::Vector2d e = (seen.array() * per_camera_focal_).matrix(), le = l * e;
   const double pull_z = (length_squared - sq.dot(le)) * per_qsq;
   const Eigen::Vector2d pull_w = e - l.transpose() * (s * le + sq * pull_z);
   const Eigen::RowVector2d slope = (-camera_focal_px_ * (z * pull_w + pull_z * w).array()).matrix().transpose();

@@ -23,6 +23,7 @@ class Triangulator {
  private:
   RigidTransform projector_from_camera_;
   Eigen::Array2d camera_focal_px_;
+  Eigen::Array2d per_camera_focal_;
   Eigen::Array2d projector_focal_px_;
 };
 

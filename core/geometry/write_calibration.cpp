@@ -30,24 +30,38 @@ void write_optional(cv::FileStorage& storage, const char* key, const std::option
   if (value) storage << key << *value;
 }
 
-void write_camera(cv::FileStorage& storage, const CalibratedCamera& camera, const std::string& serial, bool first) {
+void write_sigma(cv::FileStorage& storage, const char* key, const std::vector<double>& sigma) {
+  if (sigma.empty()) return;
+  write_matrix(storage, key,
+               Eigen::Map<const Eigen::RowVectorXd>(sigma.data(), static_cast<Eigen::Index>(sigma.size())));
+}
+
+void write_camera(cv::FileStorage& storage, const Calibration& calibration, std::size_t index) {
+  const CalibratedCamera& camera = calibration.cameras[index];
+  const CalibrationReport& report = calibration.report;
   storage << "{"
           << "name" << camera.name << "width" << camera.lens.width_px << "height" << camera.lens.height_px;
   write_matrix(storage, "camera_matrix", pinhole(camera.lens));
   write_matrix(storage, "camera_distortion", distortion(camera.lens));
   write_matrix(storage, "R", camera.projector_from_camera.rotation);
   write_matrix(storage, "T", camera.projector_from_camera.translation);
-  if (!first) {
+  if (index > 0) {
     write_matrix(storage, "rig_from_camera_R", camera.rig_from_camera.rotation);
     write_matrix(storage, "rig_from_camera_T", camera.rig_from_camera.translation);
   }
-  if (!serial.empty()) storage << "serial" << serial;
+  if (index < report.camera_sigma.size()) write_sigma(storage, "camera_sigma", report.camera_sigma[index]);
+  const bool has_serial = index < report.camera_serials.size() && !report.camera_serials[index].empty();
+  if (has_serial) storage << "serial" << report.camera_serials[index];
   storage << "}";
 }
 
 void write_report(cv::FileStorage& storage, const CalibrationReport& report) {
   write_optional(storage, "reprojection_error_camera_px", report.reprojection_error_camera_px);
   write_optional(storage, "reprojection_error_projector_px", report.reprojection_error_projector_px);
+  write_optional(storage, "epipolar_error_px", report.epipolar_error_px);
+  write_optional(storage, "held_out_error_px", report.held_out_error_px);
+  write_optional(storage, "verdict", report.verdict);
+  write_sigma(storage, "projector_sigma", report.projector_sigma);
   write_optional(storage, "board", report.board);
   write_optional(storage, "date", report.date);
   write_optional(storage, "projector_serial", report.projector_serial);
@@ -64,10 +78,7 @@ std::string write_calibration(const Calibration& calibration) {
   write_report(storage, calibration.report);
   storage << "cameras"
           << "[";
-  for (std::size_t i = 0; i < calibration.cameras.size(); ++i) {
-    const auto& serials = calibration.report.camera_serials;
-    write_camera(storage, calibration.cameras[i], i < serials.size() ? serials[i] : std::string(), i == 0);
-  }
+  for (std::size_t i = 0; i < calibration.cameras.size(); ++i) write_camera(storage, calibration, i);
   storage << "]";
   return storage.releaseAndGetString();
 }

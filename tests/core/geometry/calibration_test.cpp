@@ -23,7 +23,13 @@ Calibration two_cameras() {
   right.projector_from_camera.translation.x() = 190;
   right.rig_from_camera.translation.x() = 368;
   rig.cameras.push_back(right);
-  rig.report = {0.11, 0.09, "charuco 12x9", "2026-03-01", "P-77", {"C-1", "C-2"}};
+  CalibrationReport& report = rig.report;
+  report.reprojection_error_camera_px = 0.11, report.reprojection_error_projector_px = 0.09;
+  report.epipolar_error_px = 0.12, report.held_out_error_px = 0.13;
+  report.verdict = "good";
+  report.projector_sigma.assign(9, 0.25), report.camera_sigma = {std::vector<double>(9, 0.5), {}};
+  report.board = "charuco 12x9", report.date = "2026-03-01";
+  report.projector_serial = "P-77", report.camera_serials = {"C-1", "C-2"};
   return rig;
 }
 
@@ -67,6 +73,7 @@ TEST(ReadCalibration, ReturnsWhatWasWritten) {
   }
   EXPECT_EQ(read->report.reprojection_error_camera_px, 0.11);
   EXPECT_EQ(read->report.reprojection_error_projector_px, 0.09);
+  EXPECT_EQ(read->report.epipolar_error_px, 0.12);
   EXPECT_EQ(read->report.board, "charuco 12x9");
   EXPECT_EQ(read->report.date, "2026-03-01");
   EXPECT_EQ(read->report.projector_serial, "P-77");
