@@ -11,6 +11,7 @@
 
 #include "core/decode/clones.hpp"
 #include "core/decode/lanes.hpp"
+#include "core/decode/slide.hpp"
 
 namespace slsd {
 namespace {
@@ -31,33 +32,35 @@ SLSD_CLONES void extend_columns(const std::uint16_t* pixels, int width, std::uin
   }
 }
 
-SLSD_CLONES void compare_row(const std::uint8_t* pixels, const std::uint8_t* threshold, int width, std::uint8_t* mask) {
-  for (int x = 0; x < width; ++x) mask[x] = pixels[x] > threshold[x] ? 255 : 0;
+template <class T>
+inline __attribute__((always_inline)) void compare_row_of(const T* pixels, const T* threshold, int width,
+                                                          std::uint64_t* lit) {
+  alignas(Lanes) std::uint8_t bytes[Mask::kWordPx];
+  int x = 0;
+  for (; x + Mask::kWordPx <= width; x += Mask::kWordPx) {
+    for (int i = 0; i < Mask::kWordPx; ++i) bytes[i] = pixels[x + i] > threshold[x + i] ? 255 : 0;
+    *lit++ = top_bits(bytes);
+  }
+  if (x == width) return;
+  std::fill_n(bytes, Mask::kWordPx, 0);
+  for (int i = 0; x + i < width; ++i) bytes[i] = pixels[x + i] > threshold[x + i] ? 255 : 0;
+  *lit = top_bits(bytes);
+}
+SLSD_CLONES void compare_row(const std::uint8_t* pixels, const std::uint8_t* threshold, int width, std::uint64_t* lit) {
+  compare_row_of(pixels, threshold, width, lit);
 }
 SLSD_CLONES void compare_row(const std::uint16_t* pixels, const std::uint16_t* threshold, int width,
-                             std::uint8_t* mask) {
-  for (int x = 0; x < width; ++x) mask[x] = pixels[x] > threshold[x] ? 255 : 0;
+                             std::uint64_t* lit) {
+  compare_row_of(pixels, threshold, width, lit);
 }
 
-/// The least (or greatest) of `length` values from each on, by doubling: of one, two, four, and at last of two windows
-/// that overlap.
-template <class T, class Better>
-inline __attribute__((always_inline)) void slide(T* values, int count, int length, Better better) {
-  int window = 1;
-  const auto combine = [&](int step) {
-#pragma omp simd
-    for (int x = 0; x < count - step; ++x) values[x] = better(values[x], values[x + step]);
-  };
-  for (; 2 * window <= length; window *= 2) combine(window);
-  if (window < length) combine(length - window);
-}
 SLSD_CLONES void slide_extremes(std::uint8_t* least, std::uint8_t* greatest, int count, int length) {
-  slide(least, count, length, [](std::uint8_t a, std::uint8_t b) { return a < b ? a : b; });
-  slide(greatest, count, length, [](std::uint8_t a, std::uint8_t b) { return a > b ? a : b; });
+  slide_least(least, count, length);
+  slide_greatest(greatest, count, length);
 }
 SLSD_CLONES void slide_extremes(std::uint16_t* least, std::uint16_t* greatest, int count, int length) {
-  slide(least, count, length, [](std::uint16_t a, std::uint16_t b) { return a < b ? a : b; });
-  slide(greatest, count, length, [](std::uint16_t a, std::uint16_t b) { return a > b ? a : b; });
+  slide_least(least, count, length);
+  slide_greatest(greatest, count, length);
 }
 
 /// Binary places of a threshold; a line may run on for kLanes pixels beyond a tile without leaving 31 bits.
@@ -188,8 +191,8 @@ void Binarizer::set_thresholds(float contrast_min, float greatest) {
 }
 
 template <class T>
-void Binarizer::binarize_as(const ImageView<T>& frame, Grey8& mask) {
-  if (mask.width() != frame.width || mask.height() != frame.height) mask = Grey8(frame.width, frame.height);
+void Binarizer::binarize_as(const ImageView<T>& frame, Mask& mask) {
+  if (mask.width() != frame.width || mask.height() != frame.height) mask = Mask(frame.width, frame.height);
   const int floor = sizeof(T) == 1 ? options_.contrast_min : options_.contrast_min * 257;
   const int contrast_min = std::max(floor, static_cast<int>(options_.contrast_min_sigma * noise_sigma(frame)));
   find_extremes(frame);
@@ -231,7 +234,7 @@ void Binarizer::interpolate_row(int y, int width, T* threshold) {
     std::fill(threshold + last, threshold + width, static_cast<T>(at_centre_.back() >> kFractionBits<T>));
 }
 
-void Binarizer::binarize(const GreyView& frame, Grey8& mask) {
+void Binarizer::binarize(const GreyView& frame, Mask& mask) {
   std::visit([&](const auto& view) { binarize_as(view, mask); }, frame);
 }
 

@@ -6,6 +6,7 @@
 #include <tuple>
 #include <vector>
 
+#include "core/decode/mask.hpp"
 #include "core/image.hpp"
 
 namespace slsd {
@@ -30,12 +31,12 @@ class Binarizer {
  public:
   explicit Binarizer(BinarizeOptions options) : options_(options) {}
 
-  /// @param mask  becomes of the frame's size: 255 where lit, 0 elsewhere
-  void binarize(const GreyView& frame, Grey8& mask);
+  /// @param mask  becomes of the frame's size
+  void binarize(const GreyView& frame, Mask& mask);
 
  private:
   template <class T>
-  void binarize_as(const ImageView<T>& frame, Grey8& mask);
+  void binarize_as(const ImageView<T>& frame, Mask& mask);
   template <class T>
   void find_extremes(const ImageView<T>& frame);
   template <class T>

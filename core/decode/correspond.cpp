@@ -6,11 +6,12 @@
 
 namespace slsd {
 
-void Correspondence::settle_duplicates(int columns, std::vector<CellClaim>& claims) {
+void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellClaim>& claims) {
+  holder_.assign(static_cast<std::size_t>(cells.rows()) * cells.columns(), -1);
   for (std::size_t node = 0; node < claims.size(); ++node) {
     CellClaim& claim = claims[node];
     if (claim.status != RegionStatus::kDecoded) continue;
-    std::int32_t& holder = holder_[static_cast<std::size_t>(claim.row) * columns + claim.column];
+    std::int32_t& holder = holder_[static_cast<std::size_t>(claim.row) * cells.columns() + claim.column];
     if (holder < 0) {
       holder = static_cast<std::int32_t>(node);
       continue;
@@ -35,8 +36,7 @@ void Correspondence::correspond(const CellRays& cells, const std::vector<Epipola
       claim.status = RegionStatus::kOutOfDepthRange;
     }
   }
-  holder_.assign(static_cast<std::size_t>(cells.rows()) * cells.columns(), -1);
-  settle_duplicates(cells.columns(), claims);
+  settle_duplicates(cells, claims);
 }
 
 }  // namespace slsd

@@ -24,9 +24,10 @@ class Correspondence {
 
   void correspond(const CellRays& cells, const std::vector<EpipolarSegment>& segments, std::vector<CellClaim>& claims);
 
- private:
-  void settle_duplicates(int columns, std::vector<CellClaim>& claims);
+  /// The duplicates alone, where there is no calibration.
+  void settle_duplicates(const CellRays& cells, std::vector<CellClaim>& claims);
 
+ private:
   CorrespondOptions options_;
   std::vector<std::int32_t> holder_;  // of each cell
 };

@@ -42,16 +42,28 @@ Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calib
   return Decoder(std::make_unique<Pipeline>(pattern, calibration, camera_index, options, std::move(paper)));
 }
 
-Result<const Decoding*> Decoder::decode(const GreyView& frame, StageObserver* observer) {
+std::uint8_t Decoder::camera_index() const {
+  return pipeline_->camera_index();
+}
+
+Result<> Decoder::check_size(const GreyView& frame) const {
   const auto [width, height] = std::visit([](const auto& view) { return std::pair(view.width, view.height); }, frame);
   const Lens& lens = pipeline_->camera_lens();
-  if (width != lens.width_px || height != lens.height_px) {
-    return fail(ErrorCode::kMismatch, "the frame has " + size_text(width, height) +
-                                          " pixels, the camera was calibrated with " +
-                                          size_text(lens.width_px, lens.height_px) +
-                                          "; set the camera to the calibrated size, or calibrate again");
-  }
+  if (width == lens.width_px && height == lens.height_px) return {};
+  return fail(ErrorCode::kMismatch, "the frame has " + size_text(width, height) +
+                                        " pixels, the camera was calibrated with " +
+                                        size_text(lens.width_px, lens.height_px) +
+                                        "; set the camera to the calibrated size, or calibrate again");
+}
+
+Result<const Decoding*> Decoder::decode(const GreyView& frame, StageObserver* observer) {
+  if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
   return &pipeline_->decode(frame, observer);
+}
+
+Result<std::vector<SymbolMatch>> Decoder::read_anywhere(const GreyView& frame) {
+  if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
+  return pipeline_->read_anywhere(frame);
 }
 
 }  // namespace slsd

@@ -2,11 +2,14 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "core/code/pattern.hpp"
 #include "core/decode/decoding.hpp"
 #include "core/decode/options.hpp"
+#include "core/decode/symbol_match.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/image.hpp"
 #include "core/result.hpp"
@@ -26,12 +29,20 @@ class Decoder {
   Decoder& operator=(Decoder&&) noexcept;
   ~Decoder();
 
+  [[nodiscard]] std::uint8_t camera_index() const;  ///< in the calibration
+
   /// Image to points. The result stands until the next call. Nothing found is an empty result with its counters.
   /// @errors kMismatch: the frame is not of the calibration's size
   [[nodiscard]] Result<const Decoding*> decode(const GreyView& frame, StageObserver* observer = nullptr);
 
+  /// Symbols wherever they lie, in the image of a rig that is not as the calibration says: without their epipolar lines
+  /// to check them by, some in a thousand are wrong.
+  /// @errors kMismatch: the frame is not of the calibration's size
+  [[nodiscard]] Result<std::vector<SymbolMatch>> read_anywhere(const GreyView& frame);
+
  private:
   class Pipeline;
+  [[nodiscard]] Result<> check_size(const GreyView& frame) const;
   explicit Decoder(std::unique_ptr<Pipeline> pipeline);
   std::unique_ptr<Pipeline> pipeline_;
 };

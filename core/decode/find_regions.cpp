@@ -4,33 +4,18 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 
 namespace slsd {
 namespace {
 
-constexpr int kWordPx = 64;
-
-/// Bit i tells whether pixel i is lit, of at most 64. The product moves the top bits of eight bytes side by side; the
-/// first pixel in memory is the lowest byte.
-static_assert(std::endian::native == std::endian::little);
-std::uint64_t lit_bits(const std::uint8_t* mask, int count) {
-  std::uint64_t bytes[kWordPx / 8] = {};
-  std::memcpy(bytes, mask, count < kWordPx ? static_cast<std::size_t>(count) : sizeof bytes);
-  std::uint64_t bits = 0;
-  for (int i = 0; i < kWordPx / 8; ++i) {
-    bits |= ((bytes[i] & 0x8080808080808080U) * 0x0002040810204081U >> 56U) << (8 * i);
-  }
-  return bits;
-}
-
 /// Writes the runs of a row and returns their end; the caller has room for every second pixel.
-Run* find_runs_of_row(const std::uint8_t* mask, int y, int width, Run* runs) {
+Run* find_runs_of_row(const Mask& mask, int y, Run* runs) {
   const auto row = static_cast<std::int16_t>(y);
   bool inside = false;
   std::uint64_t last = 0;
-  for (int x = 0; x < width; x += kWordPx) {
-    const std::uint64_t bits = lit_bits(mask + x, std::min(kWordPx, width - x));
+  const std::uint64_t* words = mask.row(y);
+  for (int x = 0; x < mask.width(); x += Mask::kWordPx) {
+    const std::uint64_t bits = *words++;
     std::uint64_t changes = bits ^ (bits << 1U | last);
     last = bits >> 63U;
     for (; changes != 0; changes &= changes - 1) {
@@ -41,25 +26,12 @@ Run* find_runs_of_row(const std::uint8_t* mask, int y, int width, Run* runs) {
     }
   }
   if (!inside) return runs;
-  runs->right = static_cast<std::int16_t>(width);
+  runs->right = static_cast<std::int16_t>(mask.width());
   runs->row = row;
   return runs + 1;
 }
 
 }  // namespace
-
-void RegionFinder::find_runs(const ImageView<std::uint8_t>& mask) {
-  const std::size_t row_max = static_cast<std::size_t>(mask.width) / 2 + 1;
-  first_run_of_row_.resize(static_cast<std::size_t>(mask.height) + 1);
-  std::size_t count = 0;
-  for (int y = 0; y < mask.height; ++y) {
-    first_run_of_row_[y] = static_cast<int>(count);
-    if (runs_.size() < count + row_max) runs_.resize(2 * (count + row_max));
-    count = static_cast<std::size_t>(find_runs_of_row(mask.row(y), y, mask.width, runs_.data() + count) - runs_.data());
-  }
-  first_run_of_row_[mask.height] = static_cast<int>(count);
-  run_count_ = count;
-}
 
 int RegionFinder::root(int label) {
   while (labels_[label].parent != label) label = labels_[label].parent = labels_[labels_[label].parent].parent;
@@ -82,22 +54,24 @@ int RegionFinder::label_of(const Run& run, int& above, int above_end) {
   return labels_.back().parent;
 }
 
-void RegionFinder::label_runs(int height) {
-  labels_.clear();
-  label_of_run_.resize(run_count_);
-  for (int y = 0, above = 0; y < height; ++y) {
-    const int first = first_run_of_row_[y], end = first_run_of_row_[y + 1];
-    for (int i = first; i < end; ++i) {
-      const Run& run = runs_[i];
-      label_of_run_[i] = label_of(run, above, first);
-      Region& region = labels_[label_of_run_[i]].region;
-      region.left = std::min<int>(region.left, run.left);
-      region.right = std::max(region.right, run.right - 1);
-      region.bottom = run.row;
-      region.area_px += run.right - run.left;
-      ++region.run_count;
-    }
-    above = first;
+/// Finds the runs of a row and labels them, with those of the row above, from first_above to run_count_, still at hand.
+void RegionFinder::label_row(const Mask& mask, int y, std::size_t first_above) {
+  const std::size_t first = run_count_, row_max = static_cast<std::size_t>(mask.width()) / 2 + 1;
+  if (runs_.size() < first + row_max) {
+    runs_.resize(2 * (first + row_max));
+    label_of_run_.resize(runs_.size());
+  }
+  run_count_ = static_cast<std::size_t>(find_runs_of_row(mask, y, runs_.data() + first) - runs_.data());
+  auto above = static_cast<int>(first_above);
+  for (std::size_t i = first; i < run_count_; ++i) {
+    const Run& run = runs_[i];
+    label_of_run_[i] = label_of(run, above, static_cast<int>(first));
+    Region& region = labels_[label_of_run_[i]].region;
+    region.left = std::min<int>(region.left, run.left);
+    region.right = std::max(region.right, run.right - 1);
+    region.bottom = run.row;
+    region.area_px += run.right - run.left;
+    ++region.run_count;
   }
 }
 
@@ -134,9 +108,14 @@ void RegionFinder::gather(Regions& found) {
   for (std::size_t i = 0; i < run_count_; ++i) found.runs[next_run_[labels_[label_of_run_[i]].parent]++] = runs_[i];
 }
 
-void RegionFinder::find(const ImageView<std::uint8_t>& mask, Regions& found) {
-  find_runs(mask);
-  label_runs(mask.height);
+void RegionFinder::find(const Mask& mask, Regions& found) {
+  labels_.clear();
+  run_count_ = 0;
+  for (std::size_t y = 0, above = 0; y < static_cast<std::size_t>(mask.height()); ++y) {
+    const std::size_t first = run_count_;
+    label_row(mask, static_cast<int>(y), above);
+    above = first;
+  }
   number_regions(found);
   gather(found);
 }

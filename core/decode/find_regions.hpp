@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-#include "core/image.hpp"
+#include "core/decode/mask.hpp"
 
 namespace slsd {
 
@@ -51,12 +51,11 @@ struct Regions {
 /// @thread thread-bound: keeps its buffers
 class RegionFinder {
  public:
-  /// @param mask  255 where lit, 0 elsewhere; at most 32767 pixels wide and high
-  void find(const ImageView<std::uint8_t>& mask, Regions& found);
+  /// @param mask  at most 32767 pixels wide and high
+  void find(const Mask& mask, Regions& found);
 
  private:
-  void find_runs(const ImageView<std::uint8_t>& mask);
-  void label_runs(int height);
+  void label_row(const Mask& mask, int y, std::size_t first_above);
   [[nodiscard]] int label_of(const Run& run, int& above, int above_end);
   void number_regions(Regions& found);
   void gather(Regions& found);
@@ -64,7 +63,6 @@ class RegionFinder {
 
   std::vector<Run> runs_;  // run_count_ of them, then room for more
   std::size_t run_count_ = 0;
-  std::vector<int> first_run_of_row_;
   std::vector<int> label_of_run_;
   /// A part of a region, found row by row; its parent is not above it: labels of one region have one root.
   struct Label {

@@ -10,25 +10,13 @@
 #include <Eigen/LU>
 
 #include "core/decode/clones.hpp"
+#include "core/decode/slide.hpp"
 
 namespace slsd {
 namespace {
 
 /// What is left of the light at the dark end of a symbol, at the least.
 constexpr float kLeastLight = 0.3F;
-
-/// Least of the left edges and greatest of the right ones within `reach` rows after each.
-void spread_edge(const int* left_edge, const int* right_edge, int reach, int rows, int* first, int* last) {
-  for (int y = 0; y < rows; ++y) {
-    int left = left_edge[y], right = right_edge[y];
-    for (int k = 1; k <= reach; ++k) {
-      left = std::min(left, left_edge[y + k]);
-      right = std::max(right, right_edge[y + k]);
-    }
-    first[y] = left;
-    last[y] = right;
-  }
-}
 
 struct PatchPlace {
   int left, top, stride, height;
@@ -44,35 +32,45 @@ inline __attribute__((always_inline)) Words load_pixels(const std::uint16_t* pix
   return words;
 }
 inline __attribute__((always_inline)) Words load_pixels(const std::uint8_t* pixels) {
-  Bytes bytes{};
-  std::memcpy(&bytes, pixels, kLanes);
+  std::uint64_t eight = 0;
+  std::memcpy(&eight, pixels, sizeof eight);
+  using Halves [[gnu::vector_size(2 * kLanes)]] = std::uint64_t;
   static_assert(std::endian::native == std::endian::little);
-  return reinterpret_cast<Words>(
-      __builtin_shufflevector(bytes, Bytes{}, 0, 16, 1, 16, 2, 16, 3, 16, 4, 16, 5, 16, 6, 16, 7, 16));
+  return reinterpret_cast<Words>(__builtin_shufflevector(reinterpret_cast<Bytes>(Halves{eight, 0}), Bytes{}, 0, 16, 1,
+                                                         16, 2, 16, 3, 16, 4, 16, 5, 16, 6, 16, 7, 16));
 }
 
-/// Grey values from first[y] to last[y] of each row, kOutside elsewhere; the patch lies in the frame, padding and all.
+/// Grey values between before[y] and after[y] of each row, kOutside elsewhere; the patch lies in the frame, padding and
+/// all.
 template <class T>
 inline __attribute__((always_inline)) void copy_rows_of(const ImageView<T>& frame, const PatchPlace& place,
-                                                        const int* first, const int* last, float* patch) {
+                                                        const PatchEdges& edges, float* patch, PatchRange& range) {
   constexpr IntLanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
+  Lanes least = Lanes{} + range.least, greatest = Lanes{} + range.greatest;
   for (int y = 0; y < place.height; ++y) {
     const T* row = frame.row(place.top + y) + place.left;
+    const int before = edges.before[y], after = edges.after[y];
     for (int x = 0; x < place.stride; x += kLanes, patch += kLanes) {
       const IntLanes at = kLane + x;
       const Lanes grey = __builtin_convertvector(__builtin_convertvector(load_pixels(row + x), IntLanes), Lanes);
-      const Lanes value = (at >= first[y]) & (at <= last[y]) ? grey : Lanes{} + kOutside;
+      const Lanes value = (at > before) & (at < after) ? grey : Lanes{} + kOutside;
       std::memcpy(patch, &value, sizeof value);
+      least = value < least ? value : least;
+      greatest = value > greatest ? value : greatest;
     }
   }
+  for (int lane = 0; lane < kLanes; ++lane) {
+    range.least = std::min(range.least, least[lane]);
+    range.greatest = std::max(range.greatest, greatest[lane]);
+  }
 }
-SLSD_CLONES void copy_rows(const ImageView<std::uint8_t>& frame, const PatchPlace& place, const int* first,
-                           const int* last, float* patch) {
-  copy_rows_of(frame, place, first, last, patch);
+SLSD_CLONES void copy_rows(const ImageView<std::uint8_t>& frame, const PatchPlace& place, const PatchEdges& edges,
+                           float* patch, PatchRange& range) {
+  copy_rows_of(frame, place, edges, patch, range);
 }
-SLSD_CLONES void copy_rows(const ImageView<std::uint16_t>& frame, const PatchPlace& place, const int* first,
-                           const int* last, float* patch) {
-  copy_rows_of(frame, place, first, last, patch);
+SLSD_CLONES void copy_rows(const ImageView<std::uint16_t>& frame, const PatchPlace& place, const PatchEdges& edges,
+                           float* patch, PatchRange& range) {
+  copy_rows_of(frame, place, edges, patch, range);
 }
 
 int padded(int width) {
@@ -103,24 +101,24 @@ GreyMoments central(const RawMoments& raw, double middle_x, double middle_y) {
 }  // namespace
 
 /// In each row of the patch, from the leftmost to the rightmost pixel within the margin of the region.
-GreyMomentMeter::Extent GreyMomentMeter::follow_edge(const Region& region, std::span<const Run> runs) {
+PatchEdges GreyMomentMeter::follow_edge(const Region& region, std::span<const Run> runs) {
   // The edges of the region's rows, with as many empty rows above and below as the margin reaches twice.
-  const int reach = 2 * margin_px_;
-  const auto rows = static_cast<std::size_t>(height_ + reach);
-  edges_.resize(2 * (rows + static_cast<std::size_t>(height_)));
-  int* left_edge = edges_.data();
-  int* right_edge = left_edge + rows;
-  std::fill_n(left_edge, rows, width_);
-  std::fill_n(right_edge, rows, -1);
+  const int reach = 2 * margin_px_, rows = height_ + reach;
+  edges_.resize(2 * static_cast<std::size_t>(rows));
+  std::int16_t* before = edges_.data();
+  std::int16_t* after = before + rows;
+  std::fill_n(before, rows, std::numeric_limits<std::int16_t>::max());
+  std::fill_n(after, rows, std::numeric_limits<std::int16_t>::min());
+  int row = -1;
   for (const Run& run : runs) {
     const int y = run.row - region.top + reach;
-    left_edge[y] = std::min(left_edge[y], run.left - region.left);
-    right_edge[y] = std::max(right_edge[y], run.right - 1 - region.left + reach);
+    if (run.row != row) before[y] = static_cast<std::int16_t>(run.left - region.left - 1);
+    after[y] = static_cast<std::int16_t>(run.right - region.left + reach);
+    row = run.row;
   }
-  int* first = right_edge + rows;
-  int* last = first + height_;
-  spread_edge(left_edge, right_edge, reach, height_, first, last);
-  return {first, last};
+  slide_least(before, rows, reach + 1);
+  slide_greatest(after, rows, reach + 1);
+  return {before, after};
 }
 
 template <class T>
@@ -129,19 +127,21 @@ void GreyMomentMeter::copy_patch(const ImageView<T>& frame, const Region& region
   width_ = region.width_px() + 2 * margin_px_;
   height_ = region.height_px() + 2 * margin_px_;
   stride_ = padded(width_);
-  const Extent extent = follow_edge(region, runs);
+  const PatchEdges edges = follow_edge(region, runs);
+  range_ = {};
   if (left_ >= 0 && top_ >= 0 && left_ + stride_ <= frame.width && top_ + height_ <= frame.height) {
     patch_.resize(static_cast<std::size_t>(stride_) * height_);
-    return copy_rows(frame, {left_, top_, stride_, height_}, extent.first, extent.last, patch_.data());
+    return copy_rows(frame, {left_, top_, stride_, height_}, edges, patch_.data(), range_);
   }
   patch_.assign(static_cast<std::size_t>(stride_) * height_, kOutside);
   for (int y = 0; y < height_; ++y) {
     if (top_ + y < 0 || top_ + y >= frame.height) continue;
     const T* pixels = frame.row(top_ + y);
     float* row = patch_.data() + y * stride_;
-    const int end = std::min(extent.last[y], frame.width - 1 - left_);
-    for (int x = std::max(extent.first[y], -left_); x <= end; ++x) row[x] = static_cast<float>(pixels[left_ + x]);
+    const int end = std::min<int>(edges.after[y], frame.width - left_);
+    for (int x = std::max(edges.before[y] + 1, -left_); x < end; ++x) row[x] = static_cast<float>(pixels[left_ + x]);
   }
+  range_ = range_of(patch_.data(), stride_ * height_);
 }
 
 template <class T>
@@ -164,25 +164,27 @@ void GreyMomentMeter::copy_cell(const ImageView<T>& frame, const Eigen::Vector2f
       patch_[y * stride_ + x] = static_cast<float>(frame.at(left_ + x, top_ + y));
     }
   }
+  range_ = range_of(patch_.data(), stride_ * height_);
 }
 
 void GreyMomentMeter::level_light(const Eigen::Vector2f& centre_px, const Eigen::Vector2f& shading) {
   PatchLevels levels;
-  find_levels(patch_.data(), stride_ * height_, levels);
+  find_levels(patch_.data(), stride_ * height_, range_, levels);
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
       float& value = patch_[y * stride_ + x];
-      if (value < 0) continue;
+      if (std::isnan(value)) continue;
       const float light = 1 + shading.x() * (static_cast<float>(left_ + x) - centre_px.x()) +
                           shading.y() * (static_cast<float>(top_ + y) - centre_px.y());
       value = std::max(0.F, levels.background + (value - levels.background) / std::max(light, kLeastLight));
     }
   }
+  range_ = range_of(patch_.data(), stride_ * height_);
 }
 
 GreyMoments GreyMomentMeter::moments_of_patch() const {
   PatchLevels levels;
-  find_levels(patch_.data(), stride_ * height_, levels);
+  find_levels(patch_.data(), stride_ * height_, range_, levels);
   if (!(levels.peak > levels.background)) return {};
   const float middle_x = 0.5F * static_cast<float>(width_ - 1), middle_y = 0.5F * static_cast<float>(height_ - 1);
   RawMoments raw;

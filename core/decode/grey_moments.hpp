@@ -25,6 +25,11 @@ struct GreyMoments {
   float background = 0, peak = 0;            ///< grey levels of the frame
 };
 
+/// What of a patch's rows belongs to the region or its margin: the columns between these two.
+struct PatchEdges {
+  const std::int16_t *before, *after;
+};
+
 /// Measures regions one by one.
 /// @thread thread-bound: keeps its buffers
 class GreyMomentMeter {
@@ -47,11 +52,7 @@ class GreyMomentMeter {
                                          const Eigen::Vector2f& shading);
 
  private:
-  /// First and last pixel of each row of the patch that belongs to the region or its margin; in edges_.
-  struct Extent {
-    const int *first, *last;
-  };
-  [[nodiscard]] Extent follow_edge(const Region& region, std::span<const Run> runs);
+  [[nodiscard]] PatchEdges follow_edge(const Region& region, std::span<const Run> runs);
   template <class T>
   void copy_patch(const ImageView<T>& frame, const Region& region, std::span<const Run> runs);
   template <class T>
@@ -62,8 +63,9 @@ class GreyMomentMeter {
 
   int margin_px_;
   int left_ = 0, top_ = 0, width_ = 0, height_ = 0, stride_ = 0;  // of the patch
-  std::vector<int> edges_;                                        // of the region's rows, then of the patch's
-  std::vector<float> patch_;                                      // grey values; kOutside where they belong to others
+  std::vector<std::int16_t> edges_;
+  std::vector<float> patch_;  // grey values; kOutside where they belong to others
+  PatchRange range_;          // of the patch
 };
 
 }  // namespace slsd

@@ -5,12 +5,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 namespace slsd {
 namespace {
 
 constexpr int kSpacingPx = 64;
+
+int spaces(int length_px) {
+  return (length_px + kSpacingPx - 1) / kSpacingPx;
+}
 
 /// Projector pixel that lights what the camera sees at a pixel, on a plane z = depth of the camera.
 Eigen::Vector2d projector_pixel(const CalibratedCamera& camera, const Lens& projector, double x, double y,
@@ -20,29 +25,36 @@ Eigen::Vector2d projector_pixel(const CalibratedCamera& camera, const Lens& proj
                            Eigen::Vector3d(direction.x() * depth_mm, direction.y() * depth_mm, depth_mm));
 }
 
-ExpectedFrame frame_at(const CalibratedCamera& camera, const Lens& projector, double x, double y, double depth_mm) {
-  constexpr double kStep = 2;
-  Eigen::Matrix2d projector_from_camera;
-  projector_from_camera.col(0) = (projector_pixel(camera, projector, x + kStep, y, depth_mm) -
-                                  projector_pixel(camera, projector, x - kStep, y, depth_mm)) /
-                                 (2 * kStep);
-  projector_from_camera.col(1) = (projector_pixel(camera, projector, x, y + kStep, depth_mm) -
-                                  projector_pixel(camera, projector, x, y - kStep, depth_mm)) /
-                                 (2 * kStep);
-  return {projector_from_camera.inverse().cast<float>(), projector_from_camera.cast<float>(),
-          static_cast<float>(1 / std::sqrt(std::abs(projector_from_camera.determinant())))};
-}
-
 }  // namespace
 
-ExpectedFrames::ExpectedFrames(const CalibratedCamera& camera, const Lens& projector, double depth_mm)
-    : columns_((camera.lens.width_px + kSpacingPx - 1) / kSpacingPx),
-      rows_((camera.lens.height_px + kSpacingPx - 1) / kSpacingPx) {
+template <class ProjectorPixelAt>
+void ExpectedFrames::differentiate(const ProjectorPixelAt& projector_pixel_at) {
+  constexpr double kStep = 2;
   for (int row = 0; row < rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
-      frames_.push_back(frame_at(camera, projector, (column + 0.5) * kSpacingPx, (row + 0.5) * kSpacingPx, depth_mm));
+      const double x = (column + 0.5) * kSpacingPx, y = (row + 0.5) * kSpacingPx;
+      Eigen::Matrix2d projector_from_camera;
+      projector_from_camera.col(0) =
+          (projector_pixel_at(x + kStep, y) - projector_pixel_at(x - kStep, y)) / (2 * kStep);
+      projector_from_camera.col(1) =
+          (projector_pixel_at(x, y + kStep) - projector_pixel_at(x, y - kStep)) / (2 * kStep);
+      frames_.push_back({projector_from_camera.inverse().cast<float>(), projector_from_camera.cast<float>(),
+                         static_cast<float>(1 / std::sqrt(std::abs(projector_from_camera.determinant())))});
     }
   }
+}
+
+ExpectedFrames::ExpectedFrames(const CalibratedCamera& camera, const Lens& projector, double depth_mm)
+    : columns_(spaces(camera.lens.width_px)), rows_(spaces(camera.lens.height_px)) {
+  differentiate([&](double x, double y) { return projector_pixel(camera, projector, x, y, depth_mm); });
+}
+
+ExpectedFrames::ExpectedFrames(const Eigen::Matrix3d& camera_from_projector, int camera_width_px, int camera_height_px)
+    : columns_(spaces(camera_width_px)), rows_(spaces(camera_height_px)) {
+  const Eigen::Matrix3d projector_from_camera = camera_from_projector.inverse();
+  differentiate([&](double x, double y) -> Eigen::Vector2d {
+    return (projector_from_camera * Eigen::Vector3d(x, y, 1)).hnormalized();
+  });
 }
 
 const ExpectedFrame& ExpectedFrames::at(float x, float y) const {

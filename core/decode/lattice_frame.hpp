@@ -28,11 +28,18 @@ class ExpectedFrames {
  public:
   ExpectedFrames(const CalibratedCamera& camera, const Lens& projector, double depth_mm);
 
+  /// Those of a plane that is known by its homography alone.
+  /// @param camera_from_projector  maps homogeneous projector px to camera px
+  ExpectedFrames(const Eigen::Matrix3d& camera_from_projector, int camera_width_px, int camera_height_px);
+
   /// @param camera_px  inside the camera's image
   [[nodiscard]] const ExpectedFrame& at(float x, float y) const;
   [[nodiscard]] const ExpectedFrame& in_the_middle() const { return frames_[frames_.size() / 2]; }
 
  private:
+  template <class ProjectorPixelAt>
+  void differentiate(const ProjectorPixelAt& projector_pixel_at);
+
   int columns_, rows_;
   std::vector<ExpectedFrame> frames_;
 };

@@ -35,7 +35,7 @@ struct Look {
 /// The region nearest to the middle of the view, measured as the decoder measures it.
 std::optional<Look> look_at(const SymbolView& view, const PrototypeOptions& options, const LatticeFrame& assumed,
                             Regions& regions) {
-  RegionFinder().find(view.mask.view(), regions);
+  RegionFinder().find(Mask(view.mask.view()), regions);
   const float middle = 0.5F * static_cast<float>(view.image.width() - 1);
   const Region* nearest = nullptr;
   float nearest_px = static_cast<float>(options.symbol_size_px) * 0.5F * options.camera_px_per_projector_px;

@@ -32,7 +32,7 @@ void RegionSplitter::find_parts(const ImageView<T>& frame, const Region& region,
       mask_.at(x - region.left, run.row - region.top) = static_cast<float>(frame.at(x, run.row)) > threshold ? 255 : 0;
     }
   }
-  finder_.find(mask_.view(), parts_);
+  finder_.find(Mask(mask_.view()), parts_);
   for (Region& part : parts_.regions) {
     part.left += region.left, part.right += region.left;
     part.top += region.top, part.bottom += region.top;

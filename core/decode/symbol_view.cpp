@@ -16,6 +16,21 @@ constexpr int kCells = 3;
 constexpr int kSubpixels = 3;
 constexpr float kLight = 160, kDark = 20;
 
+/// From -reach to reach, with the sum 1.
+std::vector<float> gaussian(float sigma_px, int reach) {
+  std::vector<float> weights;
+  float sum = 0;
+  for (int i = -reach; i <= reach; ++i)
+    sum += weights.emplace_back(std::exp(-0.5F * static_cast<float>(i * i) / (sigma_px * sigma_px)));
+  for (float& weight : weights) weight /= sum;
+  return weights;
+}
+
+void add_scaled(float weight, const float* from, int count, float* to) {
+#pragma omp simd
+  for (int x = 0; x < count; ++x) to[x] += weight * from[x];
+}
+
 }  // namespace
 
 SymbolViewer::SymbolViewer(SymbolViewOptions options) : options_(std::move(options)) {
@@ -62,33 +77,34 @@ void SymbolViewer::expose(int side_px) {
         const Eigen::Vector2f at(static_cast<float>(x) + (static_cast<float>(sub % kSubpixels) - 1) / kSubpixels,
                                  static_cast<float>(y) + (static_cast<float>(sub / kSubpixels) - 1) / kSubpixels);
         const Eigen::Vector2f cell = inverse * (at - view_.middle_px) + Eigen::Vector2f::Constant(middle_of_square);
-        const int u = static_cast<int>(std::floor(cell.x())), v = static_cast<int>(std::floor(cell.y()));
-        if (cells_.view().contains(u, v)) lit += cells_.at(u, v);
+        if (cell.x() < 0 || cell.y() < 0) continue;
+        const int u = static_cast<int>(cell.x()), v = static_cast<int>(cell.y());
+        if (u < cells_.width() && v < cells_.height()) lit += cells_.at(u, v);
       }
       light_[y * side_px + x] = static_cast<float>(lit) / (kSubpixels * kSubpixels);
     }
   }
 }
 
+// The edge goes on beyond the image.
 void SymbolViewer::blur(float sigma_px) {
   const int side = view_.image.width(), reach = static_cast<int>(std::ceil(3 * sigma_px));
-  std::vector<float> kernel;
-  float sum = 0;
-  for (int i = -reach; i <= reach; ++i)
-    sum += kernel.emplace_back(std::exp(-0.5F * static_cast<float>(i * i) / (sigma_px * sigma_px)));
-  const auto pass = [&](const std::vector<float>& from, std::vector<float>& to, int step_x, int step_y) {
-    to.assign(from.size(), 0.F);
-    for (int y = 0; y < side; ++y) {
-      for (int x = 0; x < side; ++x) {
-        for (int i = -reach; i <= reach; ++i) {
-          const int from_x = std::clamp(x + i * step_x, 0, side - 1), from_y = std::clamp(y + i * step_y, 0, side - 1);
-          to[y * side + x] += kernel[i + reach] / sum * from[from_y * side + from_x];
-        }
-      }
-    }
+  const std::vector<float> weights = gaussian(sigma_px, reach);
+  const auto row = [side](std::vector<float>& light, int y) {
+    return light.data() + static_cast<std::ptrdiff_t>(y) * side;
   };
-  pass(light_, blurred_, 1, 0);
-  pass(blurred_, light_, 0, 1);
+  blurred_.assign(light_.size(), 0.F);
+  wide_row_.resize(side + 2 * reach);
+  for (int y = 0; y < side; ++y) {
+    for (int x = -reach; x < side + reach; ++x) wide_row_[x + reach] = row(light_, y)[std::clamp(x, 0, side - 1)];
+    for (int i = 0; i <= 2 * reach; ++i) add_scaled(weights[i], wide_row_.data() + i, side, row(blurred_, y));
+  }
+  light_.assign(light_.size(), 0.F);
+  for (int y = 0; y < side; ++y) {
+    for (int i = -reach; i <= reach; ++i) {
+      add_scaled(weights[i + reach], row(blurred_, std::clamp(y + i, 0, side - 1)), side, row(light_, y));
+    }
+  }
 }
 
 const SymbolView& SymbolViewer::view(int letter, float tilt) {

@@ -51,7 +51,7 @@ class SymbolViewer {
   std::mt19937 random_{1};
   std::vector<Grey8> drawings_;
   Grey8 cells_;  // three by three cells
-  std::vector<float> light_, blurred_;
+  std::vector<float> light_, blurred_, wide_row_;
   SymbolView view_;
 };
 

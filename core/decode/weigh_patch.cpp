@@ -12,40 +12,38 @@ namespace slsd {
 namespace {
 
 constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
-constexpr float kGreatest = std::numeric_limits<float>::max();
 
 }  // namespace
 
-SLSD_CLONES void find_levels(const float* patch, int count, PatchLevels& levels) {
-  const Lanes zero{};
-  Lanes lowest = zero + kGreatest, highest = zero;
-  for (int i = 0; i < count; i += kLanes) {
-    Lanes value;
-    load(patch + i, value);
-    const Lanes inside = value < zero ? zero + kGreatest : value;
-    highest = value > highest ? value : highest;
-    lowest = inside < lowest ? inside : lowest;
+PatchRange range_of(const float* patch, int count) {
+  PatchRange range;
+  for (int i = 0; i < count; ++i) {
+    if (patch[i] < range.least) range.least = patch[i];
+    if (patch[i] > range.greatest) range.greatest = patch[i];
   }
-  float low = lowest[0], high = highest[0];
-  for (int lane = 1; lane < kLanes; ++lane) low = std::min(low, lowest[lane]), high = std::max(high, highest[lane]);
+  return range;
+}
 
-  const Lanes low_limit = zero + (low + 0.25F * (high - low)), high_limit = zero + (high - 0.25F * (high - low));
-  const Lanes one = zero + 1;
-  Lanes low_sum{}, low_count{}, high_sum{}, high_squares{}, high_count{};
+SLSD_CLONES void find_levels(const float* patch, int count, const PatchRange& range, PatchLevels& levels) {
+  const float quarter = 0.25F * (range.greatest - range.least);
+  const Lanes low_limit = Lanes{} + (range.least + quarter), high_limit = Lanes{} + (range.greatest - quarter);
+  const Lanes zero{};
+  Lanes low_sum{}, high_sum{}, high_squares{};
+  IntLanes low_count{}, high_count{};  // negative: a comparison that holds is -1
   for (int i = 0; i < count; i += kLanes) {
     Lanes value;
     load(patch + i, value);
-    const Lanes is_low = (value >= zero) & (value <= low_limit) ? one : zero;
-    const Lanes is_high = value >= high_limit ? one : zero;
-    const Lanes above = is_high * (value - high_limit);
-    low_sum += is_low * value;
+    const IntLanes is_low = value <= low_limit, is_high = value >= high_limit;
+    const Lanes above = is_high ? value - high_limit : zero;
+    low_sum += is_low ? value : zero;
     low_count += is_low;
     high_sum += above;
     high_squares += above * above;
     high_count += is_high;
   }
   levels = {};
-  const float lows = sum_of(low_count), highs = sum_of(high_count);
+  const float lows = -sum_of(__builtin_convertvector(low_count, Lanes)),
+              highs = -sum_of(__builtin_convertvector(high_count, Lanes));
   if (lows == 0 || highs == 0) return;
   const float mean = sum_of(high_sum) / highs;
   levels.background = sum_of(low_sum) / lows;
@@ -62,19 +60,19 @@ SLSD_CLONES void sum_moments(const float* patch, int stride, int height, float m
   // Sums over y stay in their columns, and are then taken over x; lanes are summed once at the end.
   Lanes m00{}, m01{}, m02{}, m03{}, m10{}, m11{}, m12{}, m20{}, m21{}, m30{};
   for (int left = 0; left < stride; left += kLanes) {
-    Lanes s0{}, s1{}, s2{}, s3{};
+    Lanes s0{}, s1{}, s2{}, s3{}, y = zero - middle_y;
     for (int row = 0; row < height; ++row) {
       Lanes w;
       load(patch + row * stride + left, w);
       w = (w - offset) * scale;
       w = w > zero ? w : zero;
       w = w < one ? w : one;
-      const Lanes y = zero + (static_cast<float>(row) - middle_y);
       const Lanes wy = w * y, wyy = wy * y;
       s0 += w;
       s1 += wy;
       s2 += wyy;
       s3 += wyy * y;
+      y += one;
     }
     const Lanes x = kLane + (static_cast<float>(left) - middle_x);
     const Lanes x0 = s0 * x, x1 = s1 * x, xx0 = x0 * x;

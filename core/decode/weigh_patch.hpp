@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <limits>
+
 #include "core/decode/lanes.hpp"
 
 namespace slsd {
@@ -10,8 +12,13 @@ namespace slsd {
 inline constexpr float kRampStart = 0.2F;
 inline constexpr float kRampEnd = 0.65F;
 
-/// Pixels of a patch that belong to others, below every grey value.
-inline constexpr float kOutside = -1;
+/// Pixels of a patch that belong to others: every comparison with them is false.
+inline constexpr float kOutside = std::numeric_limits<float>::quiet_NaN();
+
+/// Least and greatest grey value of a patch.
+struct PatchRange {
+  float least = std::numeric_limits<float>::max(), greatest = 0;
+};
 
 /// Background and peak of a patch as the means of the lowest and the highest quarter of its range: single noisy pixels
 /// do not move them.
@@ -23,7 +30,8 @@ struct PatchLevels {
 /// @param patch  grey values or kOutside
 /// @param count  a multiple of kLanes
 /// @thread reentrant
-void find_levels(const float* patch, int count, PatchLevels& levels);
+[[nodiscard]] PatchRange range_of(const float* patch, int count);
+void find_levels(const float* patch, int count, const PatchRange& range, PatchLevels& levels);
 
 /// Raw moments of a patch, the sum of w x^p y^q in [p][q], w the soft threshold's weight of a pixel, 0 to 1.
 struct RawMoments {

@@ -108,7 +108,8 @@ int otsu_threshold(const Histogram& histogram) {
   return threshold;
 }
 
-void binarize_paper(const GreyView& frame, Grey8& mask) {
+Mask binarize_paper(const GreyView& frame) {
+  Grey8 mask;
   std::visit(
       [&](const auto& view) {
         mask = Grey8(view.width, view.height);
@@ -119,6 +120,7 @@ void binarize_paper(const GreyView& frame, Grey8& mask) {
   const int threshold = otsu_threshold(histogram_of(mask));
   std::transform(mask.data(), mask.data() + mask.size(), mask.data(),
                  [&](std::uint8_t value) { return value > threshold ? std::uint8_t{255} : std::uint8_t{0}; });
+  return Mask(mask.view());
 }
 
 }  // namespace slsd

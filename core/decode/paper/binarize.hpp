@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 
+#include "core/decode/mask.hpp"
 #include "core/image.hpp"
 
 namespace slsd {
@@ -22,8 +23,8 @@ using Histogram = std::array<std::uint32_t, 256>;
 /// removed by a 3x3 median, one threshold for the whole frame by Otsu's method. Fails where light falls off over the
 /// frame. Elahi et al. 2020, section III A.
 /// @param frame  8 or 16 bits a pixel
-/// @param mask   becomes of the frame's size: 255 where lit, 0 elsewhere; a frame of one grey value is all dark
+/// @return all dark for a frame of one grey value
 /// @thread reentrant
-void binarize_paper(const GreyView& frame, Grey8& mask);
+[[nodiscard]] Mask binarize_paper(const GreyView& frame);
 
 }  // namespace slsd

@@ -20,7 +20,7 @@ using Labels = Image<int>;  // 0 where dark, regions from 1 on
 
 Regions find(const Grey8& mask) {
   Regions found;
-  RegionFinder().find(mask.view(), found);
+  RegionFinder().find(Mask(mask.view()), found);
   return found;
 }
 
@@ -190,7 +190,7 @@ TEST(FindRegions, ReadsRowsThatAreFartherApartThanWide) {
   const Grey8 mask = ascii_mask({"#.##",  //
                                  "#.##"});
   Regions found;
-  RegionFinder().find(ImageView<std::uint8_t>{mask.data(), 2, 2, 4}, found);
+  RegionFinder().find(Mask(ImageView<std::uint8_t>{mask.data(), 2, 2, 4}), found);
   ASSERT_THAT(found.regions, testing::SizeIs(1));
   EXPECT_EQ(found.regions[0].area_px, 2);
 }
@@ -198,8 +198,8 @@ TEST(FindRegions, ReadsRowsThatAreFartherApartThanWide) {
 TEST(FindRegions, ForgetsTheFrameBefore) {
   RegionFinder finder;
   Regions found;
-  finder.find(Grey8(40, 40, 255).view(), found);
-  finder.find(ascii_mask({"#.#"}).view(), found);
+  finder.find(Mask(Grey8(40, 40, 255).view()), found);
+  finder.find(Mask(ascii_mask({"#.#"}).view()), found);
   EXPECT_THAT(found.regions, testing::SizeIs(2));
   EXPECT_THAT(found.runs, testing::SizeIs(2));
 }

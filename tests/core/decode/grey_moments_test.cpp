@@ -49,7 +49,7 @@ Regions regions_of(const Grey8& frame, int threshold = 70) {
   Grey8 mask(frame.width(), frame.height());
   for (std::size_t i = 0; i < mask.size(); ++i) mask.data()[i] = frame.data()[i] > threshold ? 255 : 0;
   Regions found;
-  RegionFinder().find(mask.view(), found);
+  RegionFinder().find(Mask(mask.view()), found);
   return found;
 }
 

@@ -5,9 +5,19 @@
 #include <string>
 #include <vector>
 
+#include "core/decode/mask.hpp"
 #include "core/image.hpp"
 
 namespace slsd {
+
+/// A mask as an image: 255 where lit, 0 elsewhere.
+inline Grey8 grey_of(const Mask& mask) {
+  Grey8 image(mask.width(), mask.height());
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) image.at(x, y) = mask.at(x, y) ? 255 : 0;
+  }
+  return image;
+}
 
 /// A mask from a picture: 255 where it shows '#', 0 elsewhere.
 inline Grey8 ascii_mask(const std::vector<std::string>& rows) {

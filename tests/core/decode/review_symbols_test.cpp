@@ -44,7 +44,7 @@ class ReviewSymbols : public testing::Test {
     Grey8 mask(kSidePx, kSidePx);
     lit = cv::Mat1b(kSidePx, kSidePx, mask.data());
     cv::threshold(frame, lit, 60, 255, cv::THRESH_BINARY);
-    RegionFinder().find(mask.view(), regions_);
+    RegionFinder().find(Mask(mask.view()), regions_);
     for (std::size_t i = 0; i < regions_.regions.size(); ++i) add(i);
     linker_.link(seen_.nodes);
   }

@@ -32,7 +32,7 @@ Regions regions_of(const Grey8& frame) {
   Grey8 mask(frame.width(), frame.height());
   for (std::size_t i = 0; i < mask.size(); ++i) mask.data()[i] = frame.data()[i] > 50 ? 255 : 0;
   Regions found;
-  RegionFinder().find(mask.view(), found);
+  RegionFinder().find(Mask(mask.view()), found);
   return found;
 }
 

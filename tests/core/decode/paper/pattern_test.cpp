@@ -8,6 +8,7 @@
 #include "core/decode/paper/classify.hpp"
 #include "core/decode/paper/decode_windows.hpp"
 #include "core/decode/paper/link_grid.hpp"
+#include "tests/core/decode/images.hpp"
 #include "tests/simulator/simulator.hpp"
 
 namespace slsd {
@@ -63,8 +64,7 @@ std::vector<PaperRegion> regions_of(Grey8& mask, Image<std::int32_t>& labels) {
 }
 
 Read read(const Pattern& pattern, const Grey8& frame, double scale) {
-  Grey8 mask;
-  binarize_paper(frame.view(), mask);
+  Grey8 mask = grey_of(binarize_paper(frame.view()));
   remove_cut_regions(mask);
   Image<std::int32_t> labels(mask.width(), mask.height());
   Read result{regions_of(mask, labels), {}, {}, {}};

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// Which pixels of a frame are lit, one bit each: so small that it stays in the cache between the stages.
+/// @thread reentrant
+class Mask {
+ public:
+  static constexpr int kWordPx = 64;
+
+  Mask() = default;
+  /// All dark.
+  Mask(int width, int height)
+      : words_(static_cast<std::size_t>(words_across(width)) * height), width_(width), height_(height) {}
+  /// @param image  255 where lit, 0 elsewhere
+  explicit Mask(const ImageView<std::uint8_t>& image);
+
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] bool at(int x, int y) const { return (row(y)[x / kWordPx] >> (x % kWordPx) & 1U) != 0; }
+  /// The first pixel is the lowest bit of the first word; what lies beyond the last one is dark.
+  [[nodiscard]] std::uint64_t* row(int y) {
+    return words_.data() + static_cast<std::ptrdiff_t>(y) * words_across(width_);
+  }
+  [[nodiscard]] const std::uint64_t* row(int y) const {
+    return words_.data() + static_cast<std::ptrdiff_t>(y) * words_across(width_);
+  }
+  friend bool operator==(const Mask&, const Mask&) = default;
+
+ private:
+  [[nodiscard]] static int words_across(int width) { return (width + kWordPx - 1) / kWordPx; }
+
+  std::vector<std::uint64_t> words_;
+  int width_ = 0, height_ = 0;
+};
+
+/// The top bits of as many bytes as a word of a mask has pixels, the first in the lowest bit.
+static inline __attribute__((always_inline)) std::uint64_t top_bits(const std::uint8_t* bytes) {
+  std::uint64_t bits = 0;
+#ifdef __SSE2__
+  constexpr int kAtOnce = 16;
+  for (int i = 0; i < Mask::kWordPx; i += kAtOnce) {
+    const auto tops = _mm_movemask_epi8(_mm_loadu_si128(reinterpret_cast<const __m128i*>(bytes + i)));
+    bits |= static_cast<std::uint64_t>(static_cast<std::uint32_t>(tops)) << i;
+  }
+#else
+  // The product moves the top bits of eight bytes side by side; the first byte in memory is the lowest.
+  static_assert(std::endian::native == std::endian::little);
+  constexpr int kAtOnce = 8;
+  for (int i = 0; i < Mask::kWordPx; i += kAtOnce) {
+    std::uint64_t eight = 0;
+    std::memcpy(&eight, bytes + i, sizeof eight);
+    bits |= ((eight & 0x8080808080808080U) * 0x0002040810204081U >> 56U) << i;
+  }
+#endif
+  return bits;
+}
+
+}  // namespace slsd

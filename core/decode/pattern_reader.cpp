@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/pattern_reader.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "core/decode/symbol_reader.hpp"
+
+namespace slsd {
+namespace {
+
+/// Camera px per projector px that are tried, in this order around 1.
+constexpr double kScaleMin = 0.35, kScaleMax = 4, kScaleStep = 1.3;
+/// Turns of the pattern in the camera's image that are tried, of a full turn.
+constexpr int kTurns = 12;
+/// A scale is likely where shapes have a symbol's size, this part at least of those at the best of all.
+constexpr std::size_t kFewOfMany = 4;
+/// So many symbols on one plane do not agree by chance; of another pattern some in a hundred are read, all over.
+constexpr std::size_t kCertain = 40, kLeast = 12;
+/// The share of symbols that has to lie within this part of a cell from where the plane of the others puts them.
+constexpr double kAgreeingShare = 0.6, kAgreeingCells = 0.6;
+/// How far from the scale that a reader was made for it is still used.
+constexpr double kSameScale = 1.12;
+
+/// Nothing needs the projector's lens before there is a calibration; the cells' pixels do not depend on it.
+Lens any_lens(const PatternOptions& options) {
+  return {.width_px = options.projector_width_px,
+          .height_px = options.projector_height_px,
+          .fx = static_cast<double>(options.projector_width_px),
+          .fy = static_cast<double>(options.projector_width_px)};
+}
+
+std::pair<int, int> size_of(const GreyView& frame) {
+  return std::visit([](const auto& view) { return std::pair(view.width, view.height); }, frame);
+}
+
+/// 1, 1/step, step, 1/step^2, ...
+std::vector<double> scales_to_try() {
+  std::vector<double> scales{1};
+  for (double scale = kScaleStep; scale < kScaleMax; scale *= kScaleStep) {
+    if (1 / scale > kScaleMin) scales.push_back(1 / scale);
+    scales.push_back(scale);
+  }
+  return scales;
+}
+
+Homography turned_and_scaled(double angle, double scale) {
+  Homography homography;
+  homography.matrix.topLeftCorner<2, 2>() << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+  homography.matrix.topLeftCorner<2, 2>() *= scale;
+  return homography;
+}
+
+Homography homography_of(const std::vector<SymbolMatch>& matches) {
+  std::vector<Eigen::Vector2d> from, to;
+  for (const SymbolMatch& match : matches) from.push_back(match.projector_px), to.push_back(match.camera_px);
+  return fit_robust_homography(from, to);
+}
+
+bool lie_on_one_plane(const std::vector<SymbolMatch>& matches, double pitch_px) {
+  if (matches.size() < kLeast) return false;
+  const Homography projector_from_camera = homography_of(matches).inverse();
+  const auto agrees = [&](const SymbolMatch& match) {
+    return (projector_from_camera.map(match.camera_px) - match.projector_px).norm() < kAgreeingCells * pitch_px;
+  };
+  const auto agreeing = static_cast<double>(std::ranges::count_if(matches, agrees));
+  return agreeing >= kAgreeingShare * static_cast<double>(matches.size());
+}
+
+}  // namespace
+
+struct PatternReader::Trial {
+  SymbolReader reader;
+  CellRays cells;
+  double scale;
+
+  Trial(const Pattern& pattern, ExpectedFrames frames)
+      : reader(pattern, std::move(frames), {}, std::nullopt),
+        cells(reader.cell_rays(any_lens(pattern.options))),
+        scale(reader.expected_scale()) {}
+};
+
+PatternReader::PatternReader(const Pattern& pattern) : pattern_(pattern) {}
+PatternReader::PatternReader(PatternReader&&) noexcept = default;
+PatternReader& PatternReader::operator=(PatternReader&&) noexcept = default;
+PatternReader::~PatternReader() = default;
+
+std::vector<SymbolMatch> PatternReader::attempt(const Homography& camera_from_projector, const GreyView& frame) {
+  const auto [width, height] = size_of(frame);
+  ExpectedFrames frames(camera_from_projector.matrix, width, height);
+  const double scale = frames.in_the_middle().scale;
+  auto at = std::ranges::find_if(trials_, [&](const auto& trial) {
+    return scale < kSameScale * trial->scale && trial->scale < kSameScale * scale;
+  });
+  if (at == trials_.end()) {
+    trials_.push_back(std::make_unique<Trial>(pattern_, std::move(frames)));
+    at = trials_.end() - 1;
+  } else {
+    (*at)->reader.expect(std::move(frames));
+  }
+  std::vector<SymbolMatch> matches = (*at)->reader.read_anywhere(frame, (*at)->cells);
+  shapes_ = std::max(shapes_, (*at)->reader.seen().size());
+  return matches;
+}
+
+/// Those at which shapes have a symbol's size, nearly as many as at any other: prototypes are made for these alone.
+std::vector<double> PatternReader::likely_scales(const GreyView& frame) {
+  const auto [width, height] = size_of(frame);
+  const std::vector<double> scales = scales_to_try();
+  std::vector<std::size_t> shapes;
+  Sightings seen;
+  for (const double scale : scales) {
+    ShapeFinder finder(pattern_.options, ExpectedFrames(turned_and_scaled(0, scale).matrix, width, height),
+                       Method::kDefault);
+    finder.binarize(frame);
+    finder.find_regions(frame);
+    finder.describe(frame, seen);
+    shapes.push_back(seen.size());
+  }
+  shapes_ = std::max(shapes_, std::ranges::max(shapes));
+  const std::size_t enough = std::max(kLeast, shapes_ / kFewOfMany);
+  std::vector<double> likely;
+  for (std::size_t i = 0; i < scales.size(); ++i) {
+    if (shapes[i] >= enough) likely.push_back(scales[i]);
+  }
+  return likely;
+}
+
+/// As the camera stands, then at every turn.
+std::vector<SymbolMatch> PatternReader::search(const GreyView& frame) {
+  std::vector<SymbolMatch> best;
+  const auto found_at = [&](double angle, double scale) {
+    std::vector<SymbolMatch> matches = attempt(turned_and_scaled(angle, scale), frame);
+    const bool better = matches.size() > best.size() && lie_on_one_plane(matches, pattern_.pitch_px());
+    if (better) best = std::move(matches);
+    return best.size() >= kCertain;
+  };
+  const std::vector<double> scales = likely_scales(frame);
+  for (int turn = 0; turn < kTurns; ++turn) {
+    for (const double scale : scales) {
+      if (found_at(2 * std::numbers::pi * turn / kTurns, scale)) return best;
+    }
+  }
+  return best;
+}
+
+/// Again with the frames that the symbols found show, until that finds no more.
+std::vector<SymbolMatch> PatternReader::refine(std::vector<SymbolMatch> found, const GreyView& frame) {
+  constexpr int kRounds = 3;
+  constexpr double kWorthwhile = 1.03;
+  for (int round = 0; round < kRounds && found.size() >= kCertain; ++round) {
+    last_ = homography_of(found);
+    auto again = attempt(*last_, frame);
+    const bool grows = static_cast<double>(again.size()) > kWorthwhile * static_cast<double>(found.size());
+    if (again.size() >= found.size()) found = std::move(again);
+    if (!grows) break;
+  }
+  return found;
+}
+
+std::vector<SymbolMatch> PatternReader::read(const GreyView& frame) {
+  std::vector<SymbolMatch> found;
+  shapes_ = 0;
+  if (last_) found = attempt(*last_, frame);
+  if (found.size() < kCertain || !lie_on_one_plane(found, pattern_.pitch_px())) found = search(frame);
+  return refine(std::move(found), frame);
+}
+
+}  // namespace slsd

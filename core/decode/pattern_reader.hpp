@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/code/pattern.hpp"
+#include "core/decode/symbol_match.hpp"
+#include "core/geometry/homography.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// Reads the pattern on one plane, at most a little bent, without any calibration: the scale and the turn of the
+/// pattern in the frame are searched for, and what was found in one frame is where the search begins in the next.
+/// Without the epipolar line to check a symbol by, some in a thousand are wrong.
+/// @thread thread-bound
+class PatternReader {
+ public:
+  explicit PatternReader(const Pattern& pattern);
+  PatternReader(PatternReader&&) noexcept;
+  PatternReader& operator=(PatternReader&&) noexcept;
+  ~PatternReader();
+
+  /// @param frame  any size; best with the light of the surface divided out
+  /// @return empty where the pattern is not seen
+  [[nodiscard]] std::vector<SymbolMatch> read(const GreyView& frame);
+
+  /// How many shapes of a symbol's size the last frame had: many, and none read, is another pattern.
+  [[nodiscard]] std::size_t shapes() const { return shapes_; }
+
+ private:
+  struct Trial;
+  [[nodiscard]] std::vector<SymbolMatch> attempt(const Homography& camera_from_projector, const GreyView& frame);
+  [[nodiscard]] std::vector<double> likely_scales(const GreyView& frame);
+  [[nodiscard]] std::vector<SymbolMatch> search(const GreyView& frame);
+  [[nodiscard]] std::vector<SymbolMatch> refine(std::vector<SymbolMatch> found, const GreyView& frame);
+
+  Pattern pattern_;
+  std::vector<std::unique_ptr<Trial>> trials_;  // one to a scale
+  std::optional<Homography> last_;              // camera from projector
+  std::size_t shapes_ = 0;
+};
+
+}  // namespace slsd

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include "core/code/pattern.hpp"
+#include "core/decode/binarize.hpp"
+#include "core/decode/decoding.hpp"
+#include "core/decode/find_regions.hpp"
+#include "core/decode/grey_moments.hpp"
+#include "core/decode/lattice_frame.hpp"
+#include "core/decode/mask.hpp"
+#include "core/decode/options.hpp"
+#include "core/decode/sightings.hpp"
+#include "core/decode/split_regions.hpp"
+
+namespace slsd {
+
+/// The first stages of a frame, from the grey values to the shapes that may be symbols by their size and contrast:
+/// whatever symbols the pattern has.
+/// @thread thread-bound
+class ShapeFinder {
+ public:
+  /// @param expected  how the pattern lies in the frame, to half a step of the grid
+  ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize);
+
+  /// Of the same scale, to a tenth.
+  void expect(ExpectedFrames expected) { expected_ = std::move(expected); }
+  [[nodiscard]] const ExpectedFrames& expected() const { return expected_; }
+
+  void binarize(const GreyView& frame);
+  void find_regions(const GreyView& frame);
+  /// Puts the shapes that may be symbols into the sightings, in place of what was there.
+  void describe(const GreyView& frame, Sightings& seen);
+
+  [[nodiscard]] const Mask& mask() const { return mask_; }
+  [[nodiscard]] const Regions& regions() const { return regions_; }
+  /// Why a region is no sighting; kNoNeighbour where it is one.
+  [[nodiscard]] RegionStatus status(std::size_t region) const { return status_[region]; }
+  [[nodiscard]] GreyMomentMeter& meter() { return meter_; }
+  /// Of the frame, for one of 255.
+  [[nodiscard]] float frame_levels() const { return frame_levels_; }
+
+ private:
+  [[nodiscard]] RegionStatus judge_size(const Region& region) const;
+
+  float symbol_size_px_, pitch_px_;
+  Method way_;
+  ExpectedFrames expected_;
+  Binarizer binarizer_;
+  RegionFinder region_finder_;
+  RegionSplitter splitter_;
+  GreyMomentMeter meter_;
+
+  Mask mask_;
+  Regions regions_;
+  std::vector<RegionStatus> status_;
+  float frame_levels_ = 1;
+};
+
+}  // namespace slsd
