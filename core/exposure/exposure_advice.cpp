@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/exposure/exposure_advice.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace slsd {
+namespace {
+
+constexpr double kTarget = 0.75;  // of full: below where sensors bend, above where noise counts
+constexpr double kGoodEnough = 1.15;
+constexpr double kClippedMax = 0.05;  // of the tiles: a shiny spot is no reason to darken everything
+constexpr double kMostlyClipped = 0.5;
+constexpr double kPatternedMin = 0.02;
+constexpr double kDarkToLitMax = 0.5;
+// Frames of the corpus have 0.03 to 0.055; blurred further they lose symbols from 0.08 on, and all by 0.1.
+constexpr double kEdgeToPeriodMax = 0.075;
+constexpr double kContrastToNoiseMin = 8.0;
+constexpr double kUnevenMax = 20.0;
+constexpr double kMovedMax = 0.05;
+constexpr double kFlickerMax = 0.03;
+
+double ratio_of(double gain_db) {
+  return std::pow(10.0, gain_db / 20.0);
+}
+
+double decibels_of(double ratio) {
+  return 20.0 * std::log10(ratio);
+}
+
+// How far above full a clipped level lies is not to be seen: steps that halve or more reach it in a few looks.
+double wanted_change(const LightLevels& levels) {
+  if (levels.clipped_share > kMostlyClipped) return 0.25;
+  if (levels.clipped_share > kClippedMax) return 0.5;
+  const double change = kTarget * levels.full / levels.lit_brightest;
+  return change < kGoodEnough && change > 1 / kGoodEnough ? 1.0 : change;
+}
+
+// What the frames themselves show, whatever the setting.
+void find_troubles(const LightLevels& levels, const std::optional<FrameChange>& change,
+                   std::vector<Trouble>& troubles) {
+  const auto note = [&](bool found, Trouble trouble) {
+    if (found) troubles.push_back(trouble);
+  };
+  const bool clipped = levels.clipped_share > kMostlyClipped;
+  note(!clipped && levels.dark > kDarkToLitMax * levels.lit, Trouble::kAmbient);
+  note(levels.edge_px > kEdgeToPeriodMax * levels.period_px, Trouble::kBlurred);
+  note(change && levels.contrast() < kContrastToNoiseMin * change->noise, Trouble::kNoisy);
+  note(levels.lit_brightest > kUnevenMax * std::max(levels.lit_faintest, 1.0), Trouble::kUneven);
+  note(change && change->moved_share > kMovedMax, Trouble::kMoves);
+  note(change && change->flicker() > kFlickerMax, Trouble::kFlickers);
+}
+
+double choose_exposure(double ideal_us, bool shortest, const ExposureLimits& limits) {
+  const std::vector<double> fitting = fitting_exposures(limits.periods, limits.exposure_max_us);
+  if (fitting.empty()) return std::min(ideal_us, limits.exposure_max_us);
+  double chosen_us = fitting.front();
+  for (const double fitting_us : fitting) {
+    if (!shortest && fitting_us <= kGoodEnough * ideal_us) chosen_us = fitting_us;
+  }
+  return chosen_us;
+}
+
+bool has(const std::vector<Trouble>& troubles, Trouble trouble) {
+  return std::ranges::find(troubles, trouble) != troubles.end();
+}
+
+ExposureSetting choose_setting(const ExposureSetting& present, const ExposureLimits& limits, ExposureAdvice& advice) {
+  const double ideal_us = advice.brighter * present.exposure_us * ratio_of(present.gain_db);
+  ExposureSetting setting;
+  setting.exposure_us = choose_exposure(ideal_us, has(advice.troubles, Trouble::kMoves), limits);
+  const double gain_db = decibels_of(ideal_us / setting.exposure_us);
+  setting.gain_db = std::clamp(gain_db, 0.0, limits.gain_max_db);
+  if (gain_db > limits.gain_max_db + 1) advice.troubles.push_back(Trouble::kTooLittleLight);
+  if (gain_db < -2) advice.troubles.push_back(Trouble::kTooMuchLight);
+  return setting;
+}
+
+}  // namespace
+
+std::string_view to_string(Trouble trouble) {
+  switch (trouble) {
+    case Trouble::kNoPattern:
+      return "no_pattern";
+    case Trouble::kTooMuchLight:
+      return "too_much_light";
+    case Trouble::kTooLittleLight:
+      return "too_little_light";
+    case Trouble::kAmbient:
+      return "ambient";
+    case Trouble::kBlurred:
+      return "blurred";
+    case Trouble::kNoisy:
+      return "noisy";
+    case Trouble::kUneven:
+      return "uneven";
+    case Trouble::kMoves:
+      return "moves";
+    case Trouble::kFlickers:
+      return "flickers";
+  }
+  return {};
+}
+
+std::string_view remedy(Trouble trouble) {
+  switch (trouble) {
+    case Trouble::kNoPattern:
+      return "the pattern is not seen: point camera and projector at the object, take the caps off, see slsctl frame; "
+             "if the frame is dark allow a longer exposure";
+    case Trouble::kTooMuchLight:
+      return "too bright even with the shortest exposure that suits the projector: close the aperture, put a grey "
+             "filter on the lens, or dim the projector";
+    case Trouble::kTooLittleLight:
+      return "too dark even with the longest exposure and the highest gain allowed: open the aperture, come nearer, "
+             "take a brighter projector, or coat the object";
+    case Trouble::kAmbient:
+      return "the light of the room is nearly as strong as the projector's, which no exposure changes: darken the "
+             "room, come nearer, or put a filter for the projector's light on the lens";
+    case Trouble::kBlurred:
+      return "the symbols' edges run into one another: focus camera and projector, close the aperture, come nearer, or "
+             "take larger symbols; of what moves a shorter exposure is sharper";
+    case Trouble::kNoisy:
+      return "the symbols hardly stand out of what changes from frame to frame: take less gain and more light, and let "
+             "nothing move";
+    case Trouble::kUneven:
+      return "the brightest symbols are more than 20 times as bright as the faintest: turn the object, move the "
+             "projector away, or coat what shines or is black";
+    case Trouble::kMoves:
+      return "the scene moves between two frames: hold it still and look again, or keep the exposure as short as here";
+    case Trouble::kFlickers:
+      return "the brightness changes from frame to frame: set whole periods of the projector and the lamps, and check "
+             "[projector] refresh_hz and [scan] power_line_hz";
+  }
+  return {};
+}
+
+ExposureAdvice advise_exposure(const LightLevels& levels, const std::optional<FrameChange>& change,
+                               const std::optional<ExposureSetting>& present, const ExposureLimits& limits) {
+  ExposureAdvice advice;
+  if (levels.patterned_share < kPatternedMin) {
+    advice.troubles.push_back(Trouble::kNoPattern);
+    return advice;
+  }
+  advice.brighter = wanted_change(levels);
+  advice.look_again = levels.clipped_share > kClippedMax;
+  find_troubles(levels, change, advice.troubles);
+  if (present) advice.setting = choose_setting(*present, limits, advice);
+  return advice;
+}
+
+}  // namespace slsd

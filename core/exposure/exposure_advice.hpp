@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "core/exposure/frame_change.hpp"
+#include "core/exposure/light_levels.hpp"
+#include "core/exposure/light_periods.hpp"
+
+namespace slsd {
+
+/// What another exposure or gain cannot mend.
+enum class Trouble {
+  kNoPattern,       ///< the pattern is not seen
+  kTooMuchLight,    ///< clipped even with the shortest exposure that suits the projector, and no gain
+  kTooLittleLight,  ///< dark even with the longest exposure and the highest gain allowed
+  kAmbient,         ///< between the symbols it is nearly as bright as on them
+  kBlurred,         ///< the symbols' edges run into one another
+  kNoisy,           ///< between frames pixels change nearly as much as the symbols stand out
+  kUneven,          ///< what is near is clipped, or what is far is dark: no exposure suits both
+  kMoves,           ///< the scene moves, so that a longer exposure blurs it
+  kFlickers,        ///< the brightness changes from frame to frame
+};
+
+/// "ambient", as in the JSON of slsctl exposure.
+[[nodiscard]] std::string_view to_string(Trouble trouble);
+/// What to do about it, a sentence or two.
+[[nodiscard]] std::string_view remedy(Trouble trouble);
+
+/// What a camera exposed with.
+struct ExposureSetting {
+  double exposure_us = 0;
+  double gain_db = 0;
+};
+
+struct ExposureLimits {
+  LightPeriods periods;
+  double exposure_max_us = 100'000;  ///< what moves is smeared over that time
+  double gain_max_db = 24;           ///< noise grows with it
+};
+
+/// What to set.
+struct ExposureAdvice {
+  double brighter = 1;      ///< how much more light, or gain, brings the symbols to where they belong
+  bool look_again = false;  ///< clipped: how far above cannot be seen, so set this and look again
+  std::optional<ExposureSetting> setting = {};  ///< where the present one is known
+  std::vector<Trouble> troubles = {};
+};
+
+/// Proposes exposure and gain with which the brightest symbols reach three quarters of full: as little gain as
+/// possible, and an exposure of whole periods of the light. Where the scene moves it is the shortest such exposure, and
+/// gain makes up for the rest.
+/// @param levels   of one frame
+/// @param change   between two frames taken with the same setting; without it noise, motion and flicker are not found
+/// @param present  the setting of those frames, where it is known
+/// @thread reentrant
+[[nodiscard]] ExposureAdvice advise_exposure(const LightLevels& levels, const std::optional<FrameChange>& change,
+                                             const std::optional<ExposureSetting>& present,
+                                             const ExposureLimits& limits);
+
+}  // namespace slsd

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string_view>
+
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// How the pattern's light arrives in a frame. Levels are the frame's own, 0 to `full`.
+///
+///     full  ------------------------------------
+///     lit   ......_____......._____.............   symbols; where clipped, at full
+///                |     |     |     |                 edge: how soon the level changes
+///     dark  _____|     |_____|     |____________   between them: light of the room, and what the scene scatters
+///     0     ------------------------------------
+struct LightLevels {
+  double full = 255;           ///< of a saturated pixel
+  double dark = 0;             ///< between the symbols, in the middle of all tiles
+  double lit = 0;              ///< of the symbols, in the middle of all tiles
+  double lit_brightest = 0;    ///< of the symbols in the brightest twentieth of the tiles
+  double lit_faintest = 0;     ///< of the symbols in the faintest twentieth
+  double clipped_share = 0;    ///< of the tiles, those whose symbols are clipped; 0 to 1
+  double edge_px = 0;          ///< one standard deviation of the blur at the symbols' edges; a sharp edge has about 0.8
+  double period_px = 0;        ///< from one symbol's edge to the next's on the same side, along rows
+  double patterned_share = 0;  ///< of the tiles, those in which the pattern is seen; 0 to 1. Where it is 0 nothing
+                               ///< above but `full` is known
+
+  [[nodiscard]] double contrast() const { return lit - dark; }
+};
+
+/// Measures tile by tile, 64 px wide, where the pattern is seen and how. Needs no calibration and no decoder, so that
+/// it works on frames of which nothing can be decoded.
+/// @param frame  taken while the pattern was shown
+/// @param full   the level of a saturated pixel: 255, 1023, 65535...
+/// @thread reentrant
+[[nodiscard]] LightLevels measure_light(const GreyView& frame, double full);
+
+/// The level of a saturated pixel where nobody says: 255, or for 16 bits the least of 1023, 4095, 16383 and 65535 that
+/// no pixel exceeds.
+/// @thread reentrant
+[[nodiscard]] double guess_full_level(const GreyView& frame);
+
+/// The level of a saturated pixel. Formats that leave the upper bits of 16 empty say so in their names: "Y10",
+/// "Mono12".
+/// @param format  the camera's name for it; where it says nothing, guess_full_level()
+/// @thread reentrant
+[[nodiscard]] double full_level(std::string_view format, const GreyView& frame);
+
+}  // namespace slsd

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <vector>
+
+namespace slsd {
+
+/// What changes in the light while a camera exposes.
+struct LightPeriods {
+  double refresh_hz = 60.0;  ///< of the projector, whose micromirrors write grey and colour one after the other within
+                             ///< a frame; 0: it lights steadily
+  double power_line_hz = 0.0;  ///< of the lamps around, which are brightest twice a period; 0: none, or not known
+
+  [[nodiscard]] double projector_us() const { return refresh_hz > 0 ? 1e6 / refresh_hz : 0.0; }  ///< 0: none
+  [[nodiscard]] double lamps_us() const { return power_line_hz > 0 ? 0.5e6 / power_line_hz : 0.0; }
+};
+
+/// How an exposure suits the light. Where it lasts n whole periods and a part, the light that the part catches depends
+/// on when the exposure began, and so the brightness varies from frame to frame. Up to 1 % is borne.
+struct ExposureFit {
+  bool projector = true;
+  bool lamps = true;
+  std::optional<double> shorter_us = {};  ///< the nearest that suit both, where it does not; none above a second
+  std::optional<double> longer_us = {};
+
+  [[nodiscard]] bool fits() const { return projector && lamps; }
+};
+
+/// @param exposure_us  above 0
+/// @thread reentrant
+[[nodiscard]] ExposureFit fit_exposure(double exposure_us, const LightPeriods& periods);
+
+/// All exposures that suit both lights, shortest first, in microseconds; none where both are steady and any does.
+/// @param longest_us  up to 10 s
+/// @thread reentrant
+[[nodiscard]] std::vector<double> fitting_exposures(const LightPeriods& periods, double longest_us);
+
+}  // namespace slsd

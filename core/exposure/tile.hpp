@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/image.hpp"
+
+namespace slsd {
+
+inline constexpr int kTilePx = 64;
+
+/// What a tile of a frame shows of the pattern. Levels as in LightLevels.
+struct TileLevels {
+  double dark = 0;
+  double lit = 0;
+  double edge_px = 0;
+  double period_px = 0;
+};
+
+/// One tile's pixels in floating point, with room that is used again for the next.
+/// @thread thread-bound
+class Tile {
+ public:
+  /// Takes the tile whose first pixel is (left, top) and which lies inside the frame.
+  void take(const GreyView& frame, int left, int top);
+
+  /// Nothing where no pattern is seen: too little contrast, fewer edges than symbols have, or as many as noise has.
+  [[nodiscard]] std::optional<TileLevels> measure(double full);
+
+ private:
+  [[nodiscard]] float at(int x, int y) const { return pixels_[static_cast<std::size_t>(y * kTilePx + x)]; }
+  [[nodiscard]] double quantile(double share);
+  [[nodiscard]] double steepest();
+  [[nodiscard]] double period_px(double middle) const;
+
+  std::vector<float> pixels_;
+  std::vector<float> room_;
+};
+
+}  // namespace slsd
