@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "core/board/board.hpp"
+#include "core/board/measured_points.hpp"
+#include "core/board/tie.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// The inner corners of a chessboard or a ChArUco board, gathered one by one.
+/// @thread thread-bound
+class CornerLattice {
+ public:
+  /// Borrows both.
+  CornerLattice(const Image<float>& light, const Board& board);
+
+  /// Fits a corner where a homography of its surroundings has it; keeps it where it is of the right colours.
+  bool look_for(int id, const Homography& local);
+  /// Drops the corners that are not where their neighbours would have them.
+  void drop_outliers();
+  /// Looks for corners beside those there are, until no more are found.
+  void grow();
+
+  [[nodiscard]] std::vector<MeasuredPoint> corners() const;
+
+ private:
+  [[nodiscard]] int columns() const;
+  [[nodiscard]] int rows() const;
+  [[nodiscard]] std::vector<Tie> neighbours(int id) const;
+  [[nodiscard]] bool is_outlier(int id) const;
+
+  const Image<float>* light_;
+  const Board* board_;
+  std::map<int, MeasuredPoint> corners_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "core/geometry/homography.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// A black disc on white, as seen.
+struct Disc {
+  Eigen::Vector2d centroid;  ///< of the ellipse, by grey levels
+  double step = 0;           ///< white less black, levels
+  double blur_px = 0;        ///< one standard deviation at its edge
+};
+
+/// Weighs the pixels about a disc by how much blacker they are than the white around it, which is fitted by a plane.
+/// @param local  of the disc's surroundings
+/// @return       nothing where the disc leaves the image or has no contrast
+/// @thread reentrant
+[[nodiscard]] std::optional<Disc> measure_disc(const Image<float>& light, const Homography& local,
+                                               const Eigen::Vector2d& centre_mm, double radius_mm, double clear_mm);
+
+/// Where the centre of the ellipse lies that a disc is seen as, less where the disc's centre is seen.
+/// @return px
+/// @thread reentrant
+[[nodiscard]] Eigen::Vector2d perspective_bias(const Homography& local, const Eigen::Vector2d& centre_mm,
+                                               double radius_mm);
+
+}  // namespace slsd

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/board/find_chessboard.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/board/corner_lattice.hpp"
+#include "core/board/grid_order.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr int kReducedWidthPx = 900;
+constexpr int kLeastPerCent = 80;  // of the corners
+
+cv::Mat matrix_of(const Grey8& image) {
+  return {image.height(), image.width(), CV_8UC1, const_cast<std::uint8_t*>(image.data())};
+}
+
+std::vector<Eigen::Vector2d> original(const std::vector<cv::Point2f>& corners, double scale) {
+  std::vector<Eigen::Vector2d> pixels;
+  for (const auto& corner : corners) {
+    pixels.emplace_back((Eigen::Vector2d(corner.x, corner.y).array() + 0.5) / scale - 0.5);
+  }
+  return pixels;
+}
+
+cv::Mat reduced(const cv::Mat& image, double scale) {
+  if (scale >= 1) return image;
+  cv::Mat small;
+  cv::resize(image, small, {}, scale, scale, cv::INTER_AREA);
+  return small;
+}
+
+// By the black squares' corners: quick, and sees small squares beside a bright border and a dark room.
+std::vector<cv::Point2f> search_by_squares(const cv::Mat& image, const cv::Size& size) {
+  std::vector<cv::Point2f> corners;
+  constexpr int kFlags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;
+  if (!cv::findChessboardCorners(image, size, corners, kFlags)) corners.clear();
+  return corners;
+}
+
+// By the saddles: slower, and sees blurred boards.
+std::vector<cv::Point2f> search_by_saddles(const cv::Mat& image, const cv::Size& size, int flags) {
+  std::vector<cv::Point2f> corners;
+  if (!cv::findChessboardCornersSB(image, size, corners, flags)) corners.clear();
+  return corners;
+}
+
+std::vector<Eigen::Vector2d> search(const Grey8& image, const Board& board) {
+  const double scale = std::min(1.0, static_cast<double>(kReducedWidthPx) / image.width());
+  const cv::Mat small = reduced(matrix_of(image), scale);
+  const cv::Size size(board.columns, board.rows);
+  auto corners = search_by_squares(small, size);
+  if (corners.empty()) corners = search_by_saddles(small, size, cv::CALIB_CB_EXHAUSTIVE);
+  if (corners.empty()) corners = search_by_saddles(small, size, cv::CALIB_CB_NORMALIZE_IMAGE);
+  if (!corners.empty() || scale == 1) return original(corners, scale);
+  return original(search_by_squares(matrix_of(image), size), 1);
+}
+
+struct Part {
+  int columns = 0;
+  int rows = 0;
+  bool at_edge = false;  ///< of the image
+};
+
+// The largest chessboard of any size that is seen.
+Part largest_part(const Grey8& image) {
+  const double scale = std::min(1.0, static_cast<double>(kReducedWidthPx) / image.width());
+  const cv::Mat small = reduced(matrix_of(image), scale);
+  std::vector<cv::Point2f> corners;
+  cv::Mat cells;
+  constexpr int kFlags = cv::CALIB_CB_LARGER | cv::CALIB_CB_EXHAUSTIVE;
+  if (!cv::findChessboardCornersSB(small, {3, 3}, corners, kFlags, cells) || cells.empty()) return {};
+  Part part{cells.cols, cells.rows, false};
+  const cv::Rect bounds = cv::boundingRect(corners);
+  const int margin_x = bounds.width * 3 / 2 / std::max(1, cells.cols - 1);
+  const int margin_y = bounds.height * 3 / 2 / std::max(1, cells.rows - 1);
+  const cv::Rect inside(margin_x, margin_y, std::max(0, small.cols - 2 * margin_x),
+                        std::max(0, small.rows - 2 * margin_y));
+  part.at_edge = (bounds & inside) != bounds;
+  return part;
+}
+
+tl::unexpected<Error> refuse(const Grey8& image, const Board& board) {
+  const Part part = largest_part(image);
+  const std::string name = describe(board);
+  if (part.columns == 0) {
+    return fail(ErrorCode::kNotFound, name + " is not seen; light it, focus, and hold it so that all of it is in view");
+  }
+  const std::string size = std::to_string(part.columns) + "x" + std::to_string(part.rows) + " inner corners";
+  const bool larger = std::max(part.columns, part.rows) > std::max(board.columns, board.rows) ||
+                      std::min(part.columns, part.rows) > std::min(board.columns, board.rows);
+  if (larger) return fail(ErrorCode::kMismatch, "another board is seen: it has " + size + ", and not those of " + name);
+  if (part.at_edge) {
+    return fail(ErrorCode::kNotFound, name + " is cut off by the image's edge: " + size +
+                                          " are seen; a chessboard must be in view wholly, its white border with it");
+  }
+  return fail(ErrorCode::kNotFound, name + " is hidden in part, unevenly lit, or another one: " + size + " are seen");
+}
+
+// Finds none where the order would have the top left square white.
+std::vector<MeasuredPoint> fitted(const BoardPhoto& photo, const Board& board, const GridOrder& order) {
+  CornerLattice lattice(photo.light, board);
+  for (int id = 0; id < board.point_count(); ++id) {
+    if (const auto local = fit_homography(ties_around(order, board, id, 1))) lattice.look_for(id, *local);
+  }
+  lattice.drop_outliers();
+  return lattice.corners();
+}
+
+}  // namespace
+
+Result<BoardSighting> find_chessboard(const BoardPhoto& photo, const Board& board) {
+  const auto found = search(photo.grey, board);
+  if (found.size() != static_cast<std::size_t>(board.point_count())) return refuse(photo.grey, board);
+  std::vector<MeasuredPoint> most;
+  for (const auto& order : grid_orders(found, board)) {
+    auto corners = fitted(photo, board, order);
+    if (corners.size() > most.size()) most = std::move(corners);
+  }
+  if (100 * most.size() < kLeastPerCent * found.size()) {
+    return fail(ErrorCode::kNotFound, "only " + std::to_string(most.size()) + " of " + std::to_string(found.size()) +
+                                          " corners of " + describe(board) +
+                                          " are sharp enough; hold it still, focus, and give it more light");
+  }
+  auto sighting = summarise(std::move(most), photo, board);
+  sighting.half_turn_ambiguous = (board.columns + board.rows) % 2 == 0;
+  return sighting;
+}
+
+}  // namespace slsd

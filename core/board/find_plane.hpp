@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include "core/board/board_photo.hpp"
+#include "core/board/find_board.hpp"
+
+namespace slsd {
+
+/// find_board() for the reference plane: markers, and the four straight edges of each, fitted.
+/// @errors as find_board()
+/// @thread reentrant
+[[nodiscard]] Result<BoardSighting> find_plane(const BoardPhoto& photo, const Board& board);
+
+}  // namespace slsd

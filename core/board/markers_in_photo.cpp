@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/board/markers_in_photo.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "core/board/layout.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kLeastMirrored = 3;
+
+// Few markers belong to a family by chance in either image; a mirrored board has many, and where the board has them.
+bool is_mirrored(const BoardPhoto& photo, const Board& board) {
+  const auto seen = find_markers(mirrored(photo.grey), *board.family).markers;
+  const auto own = markers_of_board(seen, board);
+  return own && own->size() >= kLeastMirrored;
+}
+
+tl::unexpected<Error> refuse(const BoardPhoto& photo, const Board& board, const SeenMarkers& seen) {
+  if (!seen.unknown.empty() && is_mirrored(photo, board)) {
+    return fail(ErrorCode::kMismatch, "the board is seen mirrored; turn the camera's mirroring off, or a mirror away");
+  }
+  if (const auto* other = find_other_family(photo.grey, seen.unknown, *board.family)) {
+    return fail(ErrorCode::kMismatch, "another board is seen: its markers are of " + std::string(other->name) +
+                                          " and those of " + describe(board) + " are not");
+  }
+  return fail(ErrorCode::kNotFound,
+              "no marker of " + describe(board) + " is seen; light it, focus, and hold it so that the camera sees it");
+}
+
+}  // namespace
+
+Result<std::vector<SeenMarker>> markers_in_photo(const BoardPhoto& photo, const Board& board) {
+  const SeenMarkers seen = find_markers(photo.grey, *board.family);
+  auto own = markers_of_board(seen.markers, board);
+  if (own && own->size() >= kLeastMirrored) return own;
+  if (own && own->empty()) return refuse(photo, board, seen);
+  if (seen.unknown.size() > seen.markers.size() && is_mirrored(photo, board)) return refuse(photo, board, seen);
+  return own;
+}
+
+}  // namespace slsd

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/board/measured_points.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+#include "core/board/tie.hpp"
+
+namespace slsd {
+namespace {
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+template <class Measure>
+double median_of(const std::vector<MeasuredPoint>& points, Measure&& measure) {
+  std::vector<double> values;
+  for (const auto& point : points) values.push_back(measure(point));
+  return median(std::move(values));
+}
+
+std::vector<Tie> ties_of_points(const std::vector<MeasuredPoint>& points, const Board& board) {
+  std::vector<Tie> ties;
+  for (const auto& measured : points) ties.push_back({board.point(measured.point.id).head<2>(), measured.point.pixel});
+  return ties;
+}
+
+double shorter_pitch(const std::vector<MeasuredPoint>& points, const Homography& homography, const Board& board) {
+  return board.pitch_mm * median_of(points, [&](const auto& measured) {
+           const auto jacobian = homography.jacobian(board.point(measured.point.id).template head<2>());
+           return jacobian.colwise().norm().minCoeff();
+         });
+}
+
+bool is_clipped(float level, double full) {
+  return level >= full || level <= 0;
+}
+
+// Looked at once to about a pixel, within the points seen.
+double clipped_share(const std::vector<MeasuredPoint>& points, const Homography& homography, const Board& board,
+                     const BoardPhoto& photo, double pitch_px) {
+  Eigen::AlignedBox2d area;
+  for (const auto& measured : points) area.extend(board.point(measured.point.id).head<2>());
+  const double step = board.pitch_mm / std::max(2.0, pitch_px);
+  int looked = 0;
+  int clipped = 0;
+  for (double y = area.min().y(); y <= area.max().y(); y += step) {
+    for (double x = area.min().x(); x <= area.max().x(); x += step) {
+      const Eigen::Vector2d pixel = homography.map({x, y});
+      const int column = static_cast<int>(std::lround(pixel.x()));
+      const int row = static_cast<int>(std::lround(pixel.y()));
+      if (!photo.light.view().contains(column, row)) continue;
+      ++looked;
+      clipped += is_clipped(photo.light.at(column, row), photo.full) ? 1 : 0;
+    }
+  }
+  return looked == 0 ? 0 : static_cast<double>(clipped) / looked;
+}
+
+}  // namespace
+
+BoardSighting summarise(std::vector<MeasuredPoint> points, const BoardPhoto& photo, const Board& board) {
+  std::ranges::sort(points, {}, [](const auto& measured) { return measured.point.id; });
+  BoardSighting sighting;
+  for (const auto& measured : points) sighting.points.push_back(measured.point);
+  sighting.contrast = median_of(points, [](const auto& measured) { return std::abs(measured.step); }) / photo.full;
+  sighting.edge_px = median_of(points, [](const auto& measured) { return measured.blur_px; });
+  if (const auto homography = fit_homography(ties_of_points(points, board))) {
+    sighting.pitch_px = shorter_pitch(points, *homography, board);
+    sighting.clipped_share = clipped_share(points, *homography, board, photo, sighting.pitch_px);
+  }
+  return sighting;
+}
+
+bool span_a_plane(const std::vector<MeasuredPoint>& points, const Board& board, std::size_t least) {
+  Eigen::AlignedBox2d area;
+  for (const auto& measured : points) area.extend(board.point(measured.point.id).head<2>());
+  return points.size() >= least && area.sizes().minCoeff() > 0;
+}
+
+}  // namespace slsd

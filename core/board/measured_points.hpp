@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include "core/board/board_photo.hpp"
+#include "core/board/find_board.hpp"
+
+namespace slsd {
+
+/// A point of a board with what was measured at it.
+struct MeasuredPoint {
+  SeenPoint point;
+  double step = 0;     ///< white less black, levels
+  double blur_px = 0;  ///< one standard deviation
+};
+
+/// Sums points up into a sighting, sorted by id.
+/// @param points  at least one
+/// @thread reentrant
+[[nodiscard]] BoardSighting summarise(std::vector<MeasuredPoint> points, const BoardPhoto& photo, const Board& board);
+
+/// Whether points are at least `least` and span the plane: not all in one row or one column of it.
+/// @thread reentrant
+[[nodiscard]] bool span_a_plane(const std::vector<MeasuredPoint>& points, const Board& board, std::size_t least);
+
+}  // namespace slsd
