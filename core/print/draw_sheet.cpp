@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/print/draw_sheet.hpp"
+
+#include <cairo-pdf.h>
+#include <cairo-svg.h>
+#include <cairo.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "core/board/board_ink.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr double kPointsToMm = 72 / 25.4;
+constexpr int kMaxSidePx = 32767;  // of Cairo's images
+constexpr double kTextHeightMm = 3;
+constexpr double kNumberHeightMm = 2.2;
+constexpr double kTextBelowRulerMm = 9.5;
+constexpr double kLineMm = 0.12;
+constexpr const char* kTypeface = "@cairo:";  // drawn by Cairo itself: the same with whatever fonts a machine has
+
+using Surface = std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)>;
+using Pen = std::unique_ptr<cairo_t, decltype(&cairo_destroy)>;
+
+// All of it as one path, so that no seam shows between the rectangles of a marker.
+void draw_ink(cairo_t* pen, const Board& board) {
+  const BoardInk ink = ink_of(board);
+  for (const auto& r : ink.rectangles) cairo_rectangle(pen, r.x_mm, r.y_mm, r.width_mm, r.height_mm);
+  for (const auto& d : ink.discs) {
+    cairo_new_sub_path(pen);
+    cairo_arc(pen, d.x_mm, d.y_mm, d.diameter_mm / 2, 0, 2 * std::numbers::pi);
+  }
+  cairo_fill(pen);
+}
+
+double tick_length(int mm) {
+  return mm % 10 == 0 ? 3.2 : mm % 5 == 0 ? 2.2 : 1.4;
+}
+
+void draw_number(cairo_t* pen, int mm) {
+  const std::string text = std::to_string(mm);
+  cairo_text_extents_t extents;
+  cairo_text_extents(pen, text.c_str(), &extents);
+  cairo_move_to(pen, mm - extents.width / 2 - extents.x_bearing, tick_length(0) + 0.6 + extents.height);
+  cairo_show_text(pen, text.c_str());
+}
+
+// Along x from 0, ticks towards positive y.
+void draw_ruler(cairo_t* pen, double length_mm) {
+  cairo_set_line_width(pen, kLineMm);
+  for (int mm = 0; mm <= length_mm + 1e-6; ++mm) {
+    cairo_move_to(pen, mm, 0);
+    cairo_line_to(pen, mm, tick_length(mm));
+  }
+  cairo_stroke(pen);
+  cairo_set_font_size(pen, kNumberHeightMm);
+  for (int mm = 0; mm <= length_mm + 1e-6; mm += 10) draw_number(pen, mm);
+}
+
+void draw_rulers(cairo_t* pen, const Sheet& sheet) {
+  cairo_save(pen);
+  cairo_translate(pen, 0, sheet.board.height_mm() + sheet.clear_mm);
+  draw_ruler(pen, sheet.board.width_mm());
+  cairo_restore(pen);
+  cairo_save(pen);
+  cairo_translate(pen, -sheet.clear_mm, 0);
+  cairo_rotate(pen, std::numbers::pi / 2);
+  draw_ruler(pen, sheet.board.height_mm());
+  cairo_restore(pen);
+}
+
+void draw_text(cairo_t* pen, const Sheet& sheet) {
+  const std::string text = to_string(sheet.board) +
+                           "    print at 100 %, not fit to page; then hold a rule to both "
+                           "rulers: they are in mm";
+  cairo_set_font_size(pen, kTextHeightMm);
+  cairo_text_extents_t extents;
+  cairo_text_extents(pen, text.c_str(), &extents);
+  const double shrunk = std::min(1.0, sheet.board.width_mm() / extents.x_advance);
+  cairo_set_font_size(pen, shrunk * kTextHeightMm);
+  cairo_move_to(pen, 0, sheet.board.height_mm() + sheet.clear_mm + kTextBelowRulerMm);
+  cairo_show_text(pen, text.c_str());
+}
+
+// In units of mm from the sheet's top left.
+void draw(cairo_t* pen, const Sheet& sheet) {
+  cairo_select_font_face(pen, kTypeface, CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+  cairo_translate(pen, sheet.origin_mm.x(), sheet.origin_mm.y());
+  cairo_set_source_rgb(pen, 0, 0, 0);
+  draw_ink(pen, sheet.board);
+  draw_rulers(pen, sheet);
+  draw_text(pen, sheet);
+}
+
+cairo_status_t append(void* bytes, const unsigned char* from, unsigned count) {
+  static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(from), count);
+  return CAIRO_STATUS_SUCCESS;
+}
+
+tl::unexpected<Error> refuse(cairo_status_t status) {
+  return fail(ErrorCode::kIo, std::string("the sheet could not be drawn: ") + cairo_status_to_string(status));
+}
+
+Result<> draw_on(cairo_surface_t* surface, double scale, const Sheet& sheet) {
+  const Pen pen(cairo_create(surface), cairo_destroy);
+  cairo_scale(pen.get(), scale, scale);
+  draw(pen.get(), sheet);
+  if (const auto status = cairo_status(pen.get())) return refuse(status);
+  return {};
+}
+
+// A file's last bytes come when its surface is finished; an image's pixels are gone then.
+Result<std::string> draw_file(cairo_surface_t* surface, double scale, const Sheet& sheet, const std::string& bytes) {
+  const auto drawn = draw_on(surface, scale, sheet);
+  if (!drawn) return tl::unexpected(drawn.error());
+  cairo_surface_finish(surface);
+  if (const auto status = cairo_surface_status(surface)) return refuse(status);
+  return bytes;
+}
+
+}  // namespace
+
+Result<std::string> sheet_pdf(const Sheet& sheet) {
+  std::string bytes;
+  const Surface surface(cairo_pdf_surface_create_for_stream(append, &bytes, sheet.paper.width_mm * kPointsToMm,
+                                                            sheet.paper.height_mm * kPointsToMm),
+                        cairo_surface_destroy);
+  cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_TITLE, to_string(sheet.board).c_str());
+  return draw_file(surface.get(), kPointsToMm, sheet, bytes);
+}
+
+Result<std::string> sheet_svg(const Sheet& sheet) {
+  std::string bytes;
+  const Surface surface(
+      cairo_svg_surface_create_for_stream(append, &bytes, sheet.paper.width_mm, sheet.paper.height_mm),
+      cairo_surface_destroy);
+  cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_MM);
+  return draw_file(surface.get(), 1, sheet, bytes);
+}
+
+Result<Grey8> sheet_image(const Sheet& sheet, double dpi) {
+  const double width = std::round(sheet.paper.width_mm / 25.4 * dpi);
+  const double height = std::round(sheet.paper.height_mm / 25.4 * dpi);
+  if (!(std::max(width, height) <= kMaxSidePx) || !(std::min(width, height) >= 1)) {
+    return fail(ErrorCode::kInvalidArgument, "a side of the sheet would have more than 32767 px; give a smaller --dpi");
+  }
+  Grey8 image(static_cast<int>(width), static_cast<int>(height));
+  const Surface surface(cairo_image_surface_create(CAIRO_FORMAT_A8, image.width(), image.height()),
+                        cairo_surface_destroy);
+  const auto drawn = draw_on(surface.get(), dpi / 25.4, sheet);
+  if (!drawn) return tl::unexpected(drawn.error());
+  cairo_surface_flush(surface.get());
+  const unsigned char* ink = cairo_image_surface_get_data(surface.get());
+  for (int y = 0; y < image.height(); ++y, ink += cairo_image_surface_get_stride(surface.get())) {
+    for (int x = 0; x < image.width(); ++x) image.at(x, y) = static_cast<std::uint8_t>(255 - ink[x]);
+  }
+  return image;
+}
+
+}  // namespace slsd

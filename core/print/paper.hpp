@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// A sheet of paper, lying either way.
+struct Paper {
+  std::string name;
+  double width_mm = 0;
+  double height_mm = 0;
+
+  [[nodiscard]] Paper turned() const { return {name, height_mm, width_mm}; }
+  friend bool operator==(const Paper&, const Paper&) = default;
+};
+
+/// Reads A0 to A4, letter, in either case, or WIDTHxHEIGHT in mm. What has a name lies on its long side.
+/// @errors kInvalidArgument (no such paper, or not of 50 to 10000 mm)
+/// @thread reentrant
+[[nodiscard]] Result<Paper> parse_paper(std::string_view text);
+
+}  // namespace slsd
