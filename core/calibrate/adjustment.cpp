@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/adjustment.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "core/calibrate/initial_rig.hpp"
+#include "core/calibrate/point_residuals.hpp"
+
+namespace slsd {
+namespace {
+
+/// Standard deviations from which a point is no part of the rest.
+constexpr double kOutlyingSigmas = 5;
+/// No estimator is better than this, whatever little noise a few points show.
+constexpr double kSigmaMinPx = 0.005;
+/// A term of distortion counts from so many standard deviations, and so many pixels at the outermost point.
+constexpr double kTermSigmas = 2, kTermPx = 0.02;
+constexpr double kAddedTermSigmas = 4;
+/// A print longer one way than the other by this share, beyond doubt.
+constexpr double kStretchMin = 0.001, kStretchSigmas = 5;
+/// Two prints whose scales differ by this share, beyond doubt. Of one look nobody can tell whether it or the print is
+/// off.
+constexpr double kScaleMin = 0.001, kScaleSigmas = 5;
+constexpr std::size_t kLooksForScale = 2;
+/// A stretch that changes by less than this has settled.
+constexpr double kStretchSettled = 1e-5;
+
+template <class Visit>
+void visit_views(Observations& observations, Visit visit) {
+  for (std::size_t i = 0; i < observations.poses.size(); ++i) {
+    for (PoseView& view : observations.poses[i].views) visit(view, i);
+  }
+}
+
+double outermost_radius(const DeviceModel& device, int index, const Observations& observations) {
+  const Lens lens = to_lens(device.lens, device.size);
+  double radius = 0;
+  const auto take = [&](const Eigen::Vector2d& pixel) { radius = std::max(radius, lens.undistort(pixel).norm()); };
+  for (const PoseObservation& pose : observations.poses) {
+    for (const PoseView& view : pose.views) {
+      if (index >= 0 && view.camera != static_cast<std::size_t>(index)) continue;
+      for (const ProjectedPoint& symbol : view.symbols) {
+        if (!symbol.outlying) take(index < 0 ? symbol.projector_px : symbol.camera_px);
+      }
+      if (index < 0) continue;
+      for (const BoardPoint& corner : view.corners) take(corner.camera_px);
+    }
+  }
+  return radius;
+}
+
+/// Change of the outermost pixel by a term of distortion.
+double effect_px(const LensVector& lens, int index, double radius) {
+  const double value = std::abs(lens[static_cast<std::size_t>(index)]) * lens[0];
+  switch (index) {
+    case 4:
+      return value * std::pow(radius, 3);
+    case 5:
+      return value * std::pow(radius, 5);
+    case 8:
+      return value * std::pow(radius, 7);
+    default:
+      return 3 * value * radius * radius;
+  }
+}
+
+LensTerms without_highest(LensTerms terms) {
+  if (terms.k3) {
+    terms.k3 = false;
+  } else if (terms.k2) {
+    terms.k2 = false;
+  } else {
+    terms.k1 = terms.tangential = false;
+  }
+  return terms;
+}
+
+}  // namespace
+
+std::string short_name_of(const SharedParameter& parameter) {
+  static constexpr const char* kMotionNames[] = {"turn_x", "turn_y", "turn_z", "place_x", "place_y", "place_z"};
+  if (parameter.kind == SharedParameter::Kind::kScale) return "board_scale";
+  if (parameter.kind == SharedParameter::Kind::kStretch) return "board_stretch";
+  return parameter.kind == SharedParameter::Kind::kMotion ? kMotionNames[parameter.index]
+                                                          : std::string(kLensParameterNames[parameter.index]);
+}
+
+double value_of(const SharedParameter& parameter, const RigModel& rig) {
+  if (parameter.kind == SharedParameter::Kind::kScale) return rig.board_scale;
+  if (parameter.kind == SharedParameter::Kind::kStretch) return rig.board_stretch;
+  const DeviceModel& device =
+      parameter.device < 0 ? rig.projector : rig.cameras[static_cast<std::size_t>(parameter.device)];
+  const auto index = static_cast<std::size_t>(parameter.index);
+  return parameter.kind == SharedParameter::Kind::kLens ? device.lens[index] : device.device_from_rig[index];
+}
+
+void Adjustment::measure_noise(const Observations& observations) {
+  std::vector<double> board_corners, plane_corners, symbols;
+  for (std::size_t i = 0; i < observations.poses.size(); ++i) {
+    const PoseSubject subject = observations.poses[i].subject;
+    auto& corners = subject == PoseSubject::kBoard ? board_corners : plane_corners;
+    for (const PoseView& view : observations.poses[i].views) {
+      const ViewResiduals residuals = residuals_of(view, rig_, rig_.rig_from_board[i], subject);
+      for (const Eigen::Vector2d& r : residuals.corners_px) corners.push_back(r.x()), corners.push_back(r.y());
+      if (!options_.with_symbols) continue;
+      for (std::size_t j = 0; j < view.symbols.size(); ++j) {
+        const Eigen::Vector2d r = residuals.symbols_px[j] / view.symbols[j].sigma_px;
+        symbols.push_back(r.x()), symbols.push_back(r.y());
+      }
+    }
+  }
+  options_.corner_sigma_px = std::max(robust_sigma_px(std::move(board_corners)), kSigmaMinPx);
+  options_.plane_corner_sigma_px = options_.corner_sigma_px;
+  if (!plane_corners.empty())
+    options_.plane_corner_sigma_px = std::max(robust_sigma_px(std::move(plane_corners)), kSigmaMinPx);
+  if (options_.with_symbols) options_.symbol_sigma_factor = std::max(robust_sigma_px(std::move(symbols)), 1e-3);
+}
+
+void Adjustment::mark_outlying(Observations& observations) const {
+  visit_views(observations, [&](PoseView& view, std::size_t pose) {
+    const PoseSubject subject = observations.poses[pose].subject;
+    const ViewResiduals residuals = residuals_of(view, rig_, rig_.rig_from_board[pose], subject);
+    const double corner_limit_px = kOutlyingSigmas * options_.corner_sigma_of(subject) * std::sqrt(2.0);
+    for (std::size_t j = 0; j < view.corners.size(); ++j) {
+      view.corners[j].outlying = residuals.corners_px[j].norm() > corner_limit_px;
+    }
+    if (!options_.with_symbols) return;
+    for (std::size_t j = 0; j < view.symbols.size(); ++j) {
+      const double sigma_px = options_.symbol_sigma_factor * view.symbols[j].sigma_px;
+      view.symbols[j].outlying = !(residuals.symbols_px[j].norm() < kOutlyingSigmas * sigma_px * std::sqrt(2.0));
+    }
+  });
+}
+
+Result<> Adjustment::find_influence_of(const Observations& observations) {
+  equations_ = linearise(observations, options_, rig_);
+  auto influence = find_influence(equations_);
+  if (!influence) return tl::unexpected(influence.error());
+  influence_ = std::move(*influence);
+  return {};
+}
+
+Result<Adjustment> Adjustment::begin(Observations& observations, RigModel rig) {
+  Adjustment adjustment(std::move(rig));
+  BundleOptions& options = adjustment.options_;
+  options.cameras.assign(adjustment.rig_.cameras.size(), {});
+  options.with_symbols = false;
+  if (auto solved = adjust(observations, options, adjustment.rig_); !solved) return tl::unexpected(solved.error());
+  adjustment.measure_noise(observations);
+  if (auto estimated = estimate_projector(observations, adjustment.rig_); !estimated)
+    return tl::unexpected(estimated.error());
+  options.with_symbols = true;
+  if (auto solved = adjust(observations, options, adjustment.rig_); !solved) return tl::unexpected(solved.error());
+  if (auto solved = adjustment.adjust_again(observations); !solved) return tl::unexpected(solved.error());
+  // Before poses and terms are judged: under a stretched board they bear its errors.
+  if (auto looked = adjustment.look_for_stretch(observations); !looked) return tl::unexpected(looked.error());
+  return adjustment;
+}
+
+Result<> Adjustment::adjust_again(Observations& observations) {
+  options_.scale = options_.scale && observations.count(PoseSubject::kPlane) >= kLooksForScale;
+  if (!options_.scale) rig_.board_scale = 0;
+  measure_noise(observations);
+  mark_outlying(observations);
+  if (auto solved = adjust(observations, options_, rig_); !solved) return solved;
+  measure_noise(observations);
+  return find_influence_of(observations);
+}
+
+/// The terms less those that are not determined, the highest order first; or k3 more where the others are.
+LensTerms Adjustment::fitting_terms(const DeviceModel& device, int index, LensTerms terms) const {
+  const auto& shared = equations_.shared;
+  const auto counts = [&](int term, double radius, double sigmas) {
+    for (std::size_t i = 0; i < shared.size(); ++i) {
+      if (shared[i].kind != SharedParameter::Kind::kLens || shared[i].device != index || shared[i].index != term)
+        continue;
+      const double value = std::abs(device.lens[static_cast<std::size_t>(term)]);
+      return value > sigmas * influence_.sigma(i) && effect_px(device.lens, term, radius) > kTermPx;
+    }
+    return false;
+  };
+  const double radius = radii_[static_cast<std::size_t>(index + 1)];
+  if (terms.tangential && !counts(6, radius, kTermSigmas) && !counts(7, radius, kTermSigmas)) terms.tangential = false;
+  if (!to_lens(device.lens, device.size).invertible()) return without_highest(terms);
+  if (terms.k3) {
+    terms.k3 = counts(8, radius, kAddedTermSigmas);
+  } else if (terms.k2) {
+    terms.k2 = counts(5, radius, kTermSigmas);
+  } else if (terms.k1) {
+    terms.k1 = counts(4, radius, kTermSigmas);
+  }
+  return terms;
+}
+
+Result<> Adjustment::choose_terms(Observations& observations) {
+  radii_.assign(1, outermost_radius(rig_.projector, -1, observations));
+  for (std::size_t i = 0; i < rig_.cameras.size(); ++i) {
+    radii_.push_back(outermost_radius(rig_.cameras[i], static_cast<int>(i), observations));
+  }
+  constexpr LensTerms kAllTerms{.k3 = true};
+  options_.cameras.assign(rig_.cameras.size(), kAllTerms);
+  options_.projector = kAllTerms;
+  constexpr int kRounds = 4;
+  for (int round = 0; round < kRounds; ++round) {
+    if (auto solved = adjust_again(observations); !solved) return solved;
+    const BundleOptions before = options_;
+    options_.projector = fitting_terms(rig_.projector, -1, before.projector);
+    bool same = options_.projector == before.projector;
+    for (std::size_t i = 0; i < rig_.cameras.size(); ++i) {
+      options_.cameras[i] = fitting_terms(rig_.cameras[i], static_cast<int>(i), before.cameras[i]);
+      same = same && options_.cameras[i] == before.cameras[i];
+    }
+    if (same) break;
+  }
+  if (auto solved = adjust_again(observations); !solved) return solved;
+  return look_for_stretch(observations);
+}
+
+Result<> Adjustment::begin_with_planes(Observations& observations) {
+  options_.scale = observations.count(PoseSubject::kPlane) >= kLooksForScale;
+  if (auto solved = adjust(observations, options_, rig_); !solved) return solved;
+  return adjust_again(observations);
+}
+
+Result<> Adjustment::compare_prints(Observations& observations) {
+  const auto& shared = equations_.shared;
+  const auto at = std::ranges::find(shared, SharedParameter::Kind::kScale, &SharedParameter::kind);
+  if (at == shared.end()) return {};
+  const double scale = rig_.board_scale, sigma = influence_.sigma(static_cast<std::size_t>(at - shared.begin()));
+  if (std::abs(scale) < std::max(kScaleMin, kScaleSigmas * sigma)) {
+    options_.scale = false;
+    return adjust_again(observations);
+  }
+  warnings_.push_back(fmt::format(
+      "the board and the reference plane are not of one scale: by the plane, the board is {:.2f} +- {:.3f} % {} than "
+      "it should be. The plane was taken as the measure; hold a rule to the rulers of both prints, and give what they "
+      "measure by --ruler and --plane-ruler",
+      100 * std::abs(scale), 100 * sigma, scale > 0 ? "larger" : "smaller"));
+  return {};
+}
+
+bool Adjustment::is_stretched() const {
+  const double sigma = influence_.sigma(equations_.shared.size() - 1);
+  return std::abs(rig_.board_stretch) >= std::max(kStretchMin, kStretchSigmas * sigma);
+}
+
+Result<> Adjustment::look_for_stretch(Observations& observations) {
+  if (!options_.stretch) {
+    Adjustment trial = *this;
+    trial.options_.stretch = true;
+    if (auto solved = adjust(observations, trial.options_, trial.rig_); !solved) return solved;
+    if (auto found = trial.find_influence_of(observations); !found) return {};  // the poses do not tell it
+    if (!trial.is_stretched()) return {};
+    *this = std::move(trial);
+  }
+  // The errors without it passed for noise: as they fall, the points weigh more.
+  constexpr int kRounds = 10;
+  for (int round = 0; round < kRounds; ++round) {
+    const double before = rig_.board_stretch;
+    if (auto solved = adjust_again(observations); !solved) return solved;
+    if (std::abs(rig_.board_stretch - before) < kStretchSettled) break;
+  }
+  if (is_stretched()) return {};
+  options_.stretch = false, rig_.board_stretch = 0;
+  return adjust_again(observations);
+}
+
+std::vector<std::string> Adjustment::warnings() const {
+  std::vector<std::string> warnings = warnings_;
+  if (!options_.stretch) return warnings;
+  warnings.push_back(fmt::format(
+      "the print of the board is stretched: it is {:.2f} +- {:.2f} % {} along its columns than along its rows. This "
+      "was taken into account, with the rows as the measure; measure the print, and print it again without \"fit to "
+      "page\"",
+      100 * std::abs(rig_.board_stretch), 100 * influence_.sigma(equations_.shared.size() - 1),
+      rig_.board_stretch > 0 ? "longer" : "shorter"));
+  return warnings;
+}
+
+}  // namespace slsd

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/calibrate/bundle.hpp"
+#include "core/calibrate/pose_influence.hpp"
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// The course of an adjustment: solved, the noise measured, what lies off marked, solved again.
+/// @thread thread-bound
+class Adjustment {
+ public:
+  /// Cameras first, then the projector, then everything together.
+  /// @param observations  in and out: points that lie off are marked
+  /// @param rig           cameras and poses, as estimated
+  /// @errors kImpossible
+  [[nodiscard]] static Result<Adjustment> begin(Observations& observations, RigModel rig);
+
+  /// Everything together, from where it stands.
+  [[nodiscard]] Result<> adjust_again(Observations& observations);
+
+  /// Drops terms of distortion that the poses do not determine or that change nothing, and adds k3 where it does; says
+  /// whether the board is stretched.
+  [[nodiscard]] Result<> choose_terms(Observations& observations);
+
+  /// Goes on with looks at the reference plane among the poses. With two or more of them the board's scale is open, so
+  /// that prints of different scales contradict nothing.
+  [[nodiscard]] Result<> begin_with_planes(Observations& observations);
+
+  /// Holds the board's scale again where the prints agree as far as can be told; otherwise says by how much they do
+  /// not.
+  [[nodiscard]] Result<> compare_prints(Observations& observations);
+
+  [[nodiscard]] RigModel& rig() { return rig_; }
+  [[nodiscard]] const RigModel& rig() const { return rig_; }
+  [[nodiscard]] const BundleEquations& equations() const { return equations_; }
+  [[nodiscard]] const PoseInfluence& influence() const { return influence_; }
+  [[nodiscard]] std::vector<std::string> warnings() const;
+
+ private:
+  explicit Adjustment(RigModel rig) : rig_(std::move(rig)) {}
+  [[nodiscard]] Result<> find_influence_of(const Observations& observations);
+  void measure_noise(const Observations& observations);
+  void mark_outlying(Observations& observations) const;
+  [[nodiscard]] LensTerms fitting_terms(const DeviceModel& device, int index, LensTerms terms) const;
+  [[nodiscard]] bool is_stretched() const;
+  [[nodiscard]] Result<> look_for_stretch(Observations& observations);
+
+  RigModel rig_;
+  BundleOptions options_;
+  BundleEquations equations_;
+  PoseInfluence influence_;
+  std::vector<double> radii_;  // outermost, of the projector and of each camera
+  std::vector<std::string> warnings_;
+};
+
+/// "fx", "turn about x" ...
+[[nodiscard]] std::string short_name_of(const SharedParameter& parameter);
+[[nodiscard]] double value_of(const SharedParameter& parameter, const RigModel& rig);
+
+}  // namespace slsd

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/calibrate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include <fmt/format.h>
+
+#include "core/calibrate/adjustment.hpp"
+#include "core/calibrate/initial_rig.hpp"
+#include "core/calibrate/point_residuals.hpp"
+#include "core/calibrate/pose_list.hpp"
+#include "core/geometry/triangulate.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kPosesMin = 3;
+
+Result<> check_count(const Observations& observations, const PoseList& poses) {
+  if (observations.poses.size() >= kPosesMin) return {};
+  const std::string faults = poses.faults();
+  return fail(ErrorCode::kImpossible, std::to_string(observations.poses.size()) + " of the poses can be used, and " +
+                                          std::to_string(kPosesMin) +
+                                          " are the least; 10 to 15 make a good calibration" +
+                                          (faults.empty() ? "" : ". Left out: " + faults));
+}
+
+/// Leaves out what contradicts the rest, one after the other, and chooses the terms of distortion.
+Result<> settle(Adjustment& adjustment, Observations& observations, PoseList& poses) {
+  while (const auto contradiction = find_contradiction(observations, adjustment.rig(), adjustment.influence())) {
+    poses.leave_out(*contradiction, observations, &adjustment.rig());
+    if (auto enough = check_count(observations, poses); !enough) return enough;
+    if (auto again = adjustment.adjust_again(observations); !again) return again;
+  }
+  return adjustment.choose_terms(observations);
+}
+
+Result<Adjustment> solve(Observations& observations, PoseList& poses) {
+  auto rig = estimate_cameras(observations);
+  if (!rig) return tl::unexpected(rig.error());
+  auto adjustment = Adjustment::begin(observations, std::move(*rig));
+  if (!adjustment) return adjustment;
+  if (auto settled = settle(*adjustment, observations, poses); !settled) return tl::unexpected(settled.error());
+  return adjustment;
+}
+
+/// Takes the looks at the reference plane, which come last, out of the observations.
+std::vector<PoseObservation> set_planes_aside(Observations& observations) {
+  const auto first = std::ranges::find(observations.poses, PoseSubject::kPlane, &PoseObservation::subject);
+  std::vector<PoseObservation> planes(std::make_move_iterator(first),
+                                      std::make_move_iterator(observations.poses.end()));
+  observations.poses.erase(first, observations.poses.end());
+  return planes;
+}
+
+/// What looks that were left out say of distances, as a print of another scale contradicts the poses too.
+void explain_distances(const std::vector<PlaneCheck>& checks, PoseList& poses) {
+  constexpr double kWorthTellingPercent = 0.1;
+  for (const PlaneCheck& check : checks) {
+    if (!check.before || !check.before->trueness) continue;
+    const double percent = check.before->trueness->scale_percent;
+    if (std::abs(percent) < kWorthTellingPercent) continue;
+    poses.explain(check.name, fmt::format("; by the poses of the board, distances on it are measured {:.2f} % too {}",
+                                          std::abs(percent), percent > 0 ? "long" : "short"));
+  }
+}
+
+/// @return what the planes say of the calibration by the poses alone, and of that by both
+Result<std::vector<PlaneCheck>> solve_with_planes(std::vector<PoseObservation> planes, Adjustment& adjustment,
+                                                  Observations& observations, PoseList& poses) {
+  for (PoseObservation& plane : planes) {
+    const auto rig_from_plane = estimate_pose(plane, adjustment.rig());
+    if (!rig_from_plane) return fail(ErrorCode::kImpossible, "the plane's corners fit no plane", plane.name);
+    adjustment.rig().rig_from_board.push_back(*rig_from_plane);
+    observations.poses.push_back(std::move(plane));
+  }
+  auto checks = check_planes(observations, adjustment.rig().calibration(observations.cameras));
+  if (auto begun = adjustment.begin_with_planes(observations); !begun) return tl::unexpected(begun.error());
+  if (auto settled = settle(adjustment, observations, poses); !settled) return tl::unexpected(settled.error());
+  if (auto compared = adjustment.compare_prints(observations); !compared) return tl::unexpected(compared.error());
+  explain_distances(checks, poses);
+  check_again(observations, adjustment.rig().calibration(observations.cameras), checks);
+  return checks;
+}
+
+void report_points(const Adjustment& adjustment, PoseList& poses, CalibrationOutcome& outcome) {
+  std::vector<Eigen::Vector2d> all_corners, all_symbols, all_projected;
+  for (std::size_t i = 0; i < outcome.observations.poses.size(); ++i) {
+    PoseReport& report = poses.used(i);
+    std::vector<Eigen::Vector2d> corners, symbols;
+    for (const PoseView& view : outcome.observations.poses[i].views) {
+      const ViewResiduals residuals =
+          residuals_of(view, adjustment.rig(), adjustment.rig().rig_from_board[i], report.subject);
+      for (std::size_t j = 0; j < view.corners.size(); ++j) {
+        if (view.corners[j].outlying)
+          ++report.outlying_corners;
+        else
+          corners.push_back(residuals.corners_px[j]);
+      }
+      for (std::size_t j = 0; j < view.symbols.size(); ++j) {
+        if (view.symbols[j].outlying) {
+          ++report.outlying_symbols;
+          continue;
+        }
+        symbols.push_back(residuals.symbols_px[j]);
+        all_projected.push_back(residuals.symbols_projector_px[j]);
+      }
+    }
+    report.corner_rms_px = rms_px(corners), report.symbol_rms_px = rms_px(symbols);
+    report.held_out = adjustment.influence().held_out[i];
+    all_corners.insert(all_corners.end(), corners.begin(), corners.end());
+    all_symbols.insert(all_symbols.end(), symbols.begin(), symbols.end());
+  }
+  outcome.camera_rms_px = rms_px(all_corners);
+  outcome.symbol_rms_px = rms_px(all_symbols);
+  outcome.projector_rms_px = rms_px(all_projected);
+}
+
+double epipolar_rms_px(const Observations& observations, const Calibration& calibration) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (const PoseObservation& pose : observations.poses) {
+    for (const PoseView& view : pose.views) {
+      for (const ProjectedPoint& symbol : view.symbols) {
+        if (symbol.outlying) continue;
+        const double residual = epipolar_residual_px({symbol.camera_px, symbol.projector_px},
+                                                     calibration.cameras[view.camera], calibration.projector);
+        sum += residual * residual, ++count;
+      }
+    }
+  }
+  return count == 0 ? 0 : std::sqrt(sum / static_cast<double>(count));
+}
+
+std::vector<ParameterReport> report_parameters(const Adjustment& adjustment, const Observations& observations) {
+  std::vector<ParameterReport> out;
+  const auto& shared = adjustment.equations().shared;
+  for (std::size_t i = 0; i < shared.size(); ++i) {
+    const SharedParameter& parameter = shared[i];
+    const std::string device =
+        parameter.device < 0 ? "projector" : observations.cameras[static_cast<std::size_t>(parameter.device)].name;
+    out.push_back(
+        {device, short_name_of(parameter), value_of(parameter, adjustment.rig()), adjustment.influence().sigma(i)});
+  }
+  return out;
+}
+
+double root_mean_square(const std::vector<HeldOut>& poses, double HeldOut::*what) {
+  double sum = 0;
+  for (const HeldOut& pose : poses) sum += pose.*what * pose.*what / static_cast<double>(poses.size());
+  return std::sqrt(sum);
+}
+
+CalibrationReport file_report(const CalibrationOutcome& outcome, const Adjustment& adjustment) {
+  CalibrationReport report;
+  report.reprojection_error_camera_px = outcome.camera_rms_px;
+  report.reprojection_error_projector_px = outcome.projector_rms_px;
+  report.epipolar_error_px = outcome.epipolar_rms_px;
+  report.held_out_error_px = outcome.held_out_symbol_px;
+  report.verdict = to_string(outcome.verdict.grade);
+  report.projector_sigma.assign(9, 0);
+  report.camera_sigma.assign(outcome.calibration.cameras.size(), std::vector<double>(9, 0));
+  const auto& shared = adjustment.equations().shared;
+  for (std::size_t i = 0; i < shared.size(); ++i) {
+    if (shared[i].kind != SharedParameter::Kind::kLens) continue;
+    auto& sigma =
+        shared[i].device < 0 ? report.projector_sigma : report.camera_sigma[static_cast<std::size_t>(shared[i].device)];
+    sigma[static_cast<std::size_t>(shared[i].index)] = adjustment.influence().sigma(i);
+  }
+  return report;
+}
+
+CalibrationOutcome report(const Adjustment& adjustment, Observations observations, PoseList& poses,
+                          std::vector<PlaneCheck> planes, const CalibrateOptions& options) {
+  CalibrationOutcome outcome;
+  outcome.planes = std::move(planes);
+  outcome.rig = adjustment.rig();
+  outcome.calibration = adjustment.rig().calibration(observations.cameras);
+  outcome.observations = std::move(observations);
+  report_points(adjustment, poses, outcome);
+  outcome.poses = poses.reports();
+  outcome.parameters = report_parameters(adjustment, outcome.observations);
+  outcome.epipolar_rms_px = epipolar_rms_px(outcome.observations, outcome.calibration);
+  outcome.held_out_corner_px = root_mean_square(adjustment.influence().held_out, &HeldOut::corner_rms_px);
+  outcome.held_out_symbol_px = root_mean_square(adjustment.influence().held_out, &HeldOut::symbol_rms_px);
+  outcome.depth = depth_uncertainty(
+      outcome.rig, adjustment.equations().shared, adjustment.influence(), outcome.symbol_rms_px / std::sqrt(2.0),
+      {options.depth_min_mm, std::sqrt(options.depth_min_mm * options.depth_max_mm), options.depth_max_mm});
+  outcome.warnings = adjustment.warnings();
+  if (poses.lacks(PoseSubject::kPlane)) {
+    outcome.warnings.push_back("no look at the reference plane could be used, so that the poses alone were");
+  }
+  outcome.verdict = judge(outcome);
+  outcome.calibration.report = file_report(outcome, adjustment);
+  return outcome;
+}
+
+}  // namespace
+
+Result<CalibrationOutcome> calibrate(Observations observations, const CalibrateOptions& options) {
+  std::ranges::stable_sort(observations.poses, {}, &PoseObservation::subject);
+  PoseList poses(observations);
+  const std::vector<FaultyPose> unusable = find_unusable(observations);
+  for (auto faulty = unusable.rbegin(); faulty != unusable.rend(); ++faulty) {
+    poses.leave_out(*faulty, observations, nullptr);
+  }
+  std::vector<PoseObservation> planes = set_planes_aside(observations);
+  if (auto enough = check_count(observations, poses); !enough) return tl::unexpected(enough.error());
+  auto adjustment = solve(observations, poses);
+  if (!adjustment) return tl::unexpected(adjustment.error());
+  std::vector<PlaneCheck> checks;
+  if (!planes.empty()) {
+    auto checked = solve_with_planes(std::move(planes), *adjustment, observations, poses);
+    if (!checked) return tl::unexpected(checked.error());
+    checks = std::move(*checked);
+  }
+  return report(*adjustment, std::move(observations), poses, std::move(checks), options);
+}
+
+}  // namespace slsd

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <algorithm>
+#include <optional>
+
+namespace slsd {
+
+/// From how far off their epipolar lines on, in projector px, symbols say that the rig is not as it was calibrated.
+/// @param expected_px  what the calibration says of itself; nothing: it does not
+/// @thread reentrant
+[[nodiscard]] constexpr double epipolar_limit_px(std::optional<double> expected_px) {
+  constexpr double kLeastPx = 0.5, kTimes = 3;
+  return std::max(kLeastPx, kTimes * expected_px.value_or(0));
+}
+
+}  // namespace slsd

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+
+#include "core/calibrate/rig_model.hpp"
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// A first estimate of the cameras and of the board's poses: Zhang's method (2000) for the focal lengths, with the
+/// principal points in the middle and no distortion; then each pose by its plane.
+/// @errors kImpossible: too few poses, or all of them parallel, with what to shoot
+/// @thread reentrant
+[[nodiscard]] Result<RigModel> estimate_cameras(const Observations& observations);
+
+/// A first estimate of one more pose, by the first camera that sees enough of it.
+/// @param rig  calibrated
+/// @return     rig from board; nothing where the corners fit no plane
+/// @thread reentrant
+[[nodiscard]] std::optional<MotionVector> estimate_pose(const PoseObservation& pose, const RigModel& rig);
+
+/// A first estimate of the projector, from where the cameras' rays to its pixels meet the board: the direct linear
+/// transformation, robust against wrong pixels.
+/// @param rig  in: cameras and poses; out: the projector too
+/// @errors kImpossible
+/// @thread reentrant
+[[nodiscard]] Result<> estimate_projector(const Observations& observations, RigModel& rig);
+
+}  // namespace slsd

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/observe_pose.hpp"
+
+#include <fmt/format.h>
+
+#include "core/calibrate/board_region.hpp"
+#include "core/calibrate/divide_light.hpp"
+#include "core/calibrate/gray_code.hpp"
+
+namespace slsd {
+namespace {
+
+/// Regions of the size of symbols from which on it is a pattern that is seen, though not this one.
+constexpr std::size_t kPatternRegions = 60;
+/// So few symbols of so many shapes agree by chance.
+constexpr std::size_t kSymbolsCertain = 20;
+
+std::string why_no_symbols(std::size_t shapes) {
+  if (shapes > kPatternRegions) {
+    return fmt::format(
+        "{} shapes are seen, but they are not those of the configured pattern: the pattern that was "
+        "projected, or the projector's size, is another one",
+        shapes);
+  }
+  return "none of the projected pattern is seen on the board; light it with the projector, in focus, without clipping";
+}
+
+}  // namespace
+
+Result<PoseView> observe_board(const PosePictures& pictures, const Board& board, BoardSighting& sighting) {
+  auto found = find_board(pictures.white, board);
+  if (!found) return tl::unexpected(found.error());
+  sighting = std::move(*found);
+  PoseView view;
+  view.blur_px = sighting.edge_px;
+  for (const SeenPoint& point : sighting.points) {
+    view.corners.push_back({point.pixel, board.point(point.id).head<2>()});
+  }
+  return view;
+}
+
+Result<> observe_pattern(const PosePictures& pictures, const Board& board, const BoardSighting& sighting,
+                         PatternReader& reader, PoseView& view) {
+  const auto levelled = divide_light(pictures.coded.at(0), pictures.white);
+  if (!levelled) return tl::unexpected(levelled.error());
+  const BoardRegion region(board, sighting);
+  for (const SymbolMatch& match : reader.read(levelled->view())) {
+    if (region.contains(match.camera_px)) view.symbols.push_back({match.camera_px, match.projector_px, match.sigma_px});
+  }
+  if (view.symbols.size() < kSymbolsCertain && reader.shapes() > kPatternRegions) view.symbols.clear();
+  if (view.symbols.empty()) return fail(ErrorCode::kNotFound, why_no_symbols(reader.shapes()));
+  return {};
+}
+
+Result<> observe_gray_code(const PosePictures& pictures, const Board& board, const BoardSighting& sighting,
+                           const ImageSize& projector, PoseView& view) {
+  if (!pictures.black) return fail(ErrorCode::kNotFound, "the Gray code needs a picture under the black projector too");
+  const BoardRegion region(board, sighting);
+  auto points = read_gray_code({pictures.white, *pictures.black, pictures.coded}, projector, [&](int x, int y) {
+    return region.contains({x, y});
+  });
+  if (!points) return tl::unexpected(points.error());
+  view.symbols = std::move(*points);
+  if (view.symbols.empty()) {
+    return fail(ErrorCode::kNotFound,
+                "none of the Gray code can be read on the board; expose so that it is not clipped");
+  }
+  return {};
+}
+
+}  // namespace slsd

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace slsd {
+
+/// A plane through points of which some lie elsewhere.
+struct PlaneFit {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();   ///< of the points on it
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit length, away from the origin
+  std::vector<std::size_t> on_plane;                  ///< indices of the points that it was fitted to
+  double rms_mm = 0;                                  ///< of these, off the plane
+
+  /// How far a point is off the plane, along its normal.
+  [[nodiscard]] double off_mm(const Eigen::Vector3d& point) const { return normal.dot(point - middle); }
+  /// Where the ray from the origin in a normalised direction (x/z, y/z) meets the plane.
+  [[nodiscard]] Eigen::Vector3d meet(const Eigen::Vector2d& direction) const;
+};
+
+/// The plane that most of the points lie on: the least median of squares over draws from a fixed seed, then least
+/// squares over what is within five robust standard deviations. A bend of all points stays in the residual.
+/// @param points  mm, as seen from the origin
+/// @return        nothing where there are fewer than three points, or all on a line
+/// @thread reentrant
+[[nodiscard]] std::optional<PlaneFit> fit_plane(std::span<const Eigen::Vector3d> points);
+
+}  // namespace slsd

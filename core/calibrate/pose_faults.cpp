@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/pose_faults.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "core/calibrate/corner_pose.hpp"
+#include "core/calibrate/lit_surface.hpp"
+#include "core/geometry/median.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kCornersMin = 8;
+constexpr std::size_t kSymbolsMin = 30;
+/// A blur this much above that of the other poses, both as a factor and in px, moves corners and symbols.
+constexpr double kBlurFactor = 1.5, kBlurMorePx = 0.35;
+/// An error this much above that of the other poses is no chance.
+constexpr double kContradiction = 2.5;
+constexpr double kContradictionMinPx = 0.1;
+/// The same in standard deviations of what the poses say of the rig: about 1 of poses that agree, and one that turned
+/// by 0.1 degrees before the pattern came is at 4, and moves the principal point by 3 px.
+constexpr double kDisagreementMin = 3;
+/// Of a pose's points, those that lie off the rest: above this share they are no wrong points but a wrong pose.
+constexpr double kOutlyingShare = 0.15, kUsualOutlyingShare = 0.05;
+/// A bend or a shift this much above that of the other poses is what explains an error.
+constexpr double kExplains = 3;
+constexpr double kBowShareMin = 0.4;
+/// Corners that are bent say a plane that is off by about the bend; a move without a bend shows none.
+constexpr double kBowOfShiftMin = 0.3;
+
+/// The blurriest view of a pose.
+double blur_of(const PoseObservation& pose) {
+  double blur = 0;
+  for (const PoseView& view : pose.views) blur = std::max(blur, view.blur_px);
+  return blur;
+}
+
+double usual_blur_of(PoseSubject subject, const Observations& observations) {
+  std::vector<double> blurs;
+  for (const PoseObservation& pose : observations.poses) {
+    if (pose.subject == subject && blur_of(pose) > 0) blurs.push_back(blur_of(pose));
+  }
+  return median_of(std::move(blurs));
+}
+
+template <class Count>
+std::size_t most(const PoseObservation& pose, Count count) {
+  std::size_t best = 0;
+  for (const PoseView& view : pose.views) best = std::max(best, count(view));
+  return best;
+}
+
+/// Of the corners or of the symbols of a pose, whichever is more.
+double outlying_share(const PoseObservation& pose) {
+  double corners = 0, outlying_corners = 0, symbols = 0, outlying_symbols = 0;
+  for (const PoseView& view : pose.views) {
+    for (const BoardPoint& corner : view.corners) corners += 1, outlying_corners += corner.outlying ? 1 : 0;
+    for (const ProjectedPoint& symbol : view.symbols) symbols += 1, outlying_symbols += symbol.outlying ? 1 : 0;
+  }
+  return std::max(outlying_corners / std::max(corners, 1.0), outlying_symbols / std::max(symbols, 1.0));
+}
+
+/// Of the poses that show the same.
+double usual(const std::vector<double>& values, PoseSubject subject, const Observations& observations) {
+  std::vector<double> same;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (observations.poses[i].subject == subject) same.push_back(values[i]);
+  }
+  return median_of(std::move(same));
+}
+
+/// The surface of the symbols against the plane that the corners alone say: that of the rig is drawn to both.
+LitSurface surface_of(std::size_t pose, const Observations& observations, const RigModel& rig) {
+  const MotionVector& joint = rig.rig_from_board[pose];
+  const auto by_corners = pose_by_corners(observations.poses[pose], rig, joint);
+  return measure_lit_surface(observations.poses[pose], rig, by_corners.value_or(joint));
+}
+
+FaultyPose explain(std::size_t pose, double times, const Observations& observations, const RigModel& rig) {
+  std::vector<LitSurface> surfaces;
+  std::vector<double> bows, shifts;
+  for (std::size_t i = 0; i < observations.poses.size(); ++i) {
+    surfaces.push_back(surface_of(i, observations, rig));
+    bows.push_back(surfaces.back().bow_mm);
+    shifts.push_back(surfaces.back().shift_mm(half_size_mm(observations.poses[i])));
+  }
+  const LitSurface& surface = surfaces[pose];
+  const char* const subject = observations.poses[pose].subject == PoseSubject::kBoard ? "board" : "plane";
+  const double bow_factor = bows[pose] / std::max(median_of(bows), 1e-6);
+  const double shift_factor = shifts[pose] / std::max(median_of(shifts), 1e-6);
+  if (surface.bow_share > kBowShareMin && bow_factor > kExplains && bows[pose] > kBowOfShiftMin * shifts[pose]) {
+    return {pose, PoseFault::kBent,
+            fmt::format("the {} is not flat: it is bent by {:.1f} mm, {:.0f} times as much as in the other poses; "
+                        "mount the print on a stiff plate",
+                        subject, surface.bow_mm, bow_factor)};
+  }
+  if (shift_factor > kExplains) {
+    return {pose, PoseFault::kMoved,
+            fmt::format("the {} moved between the white picture and the pattern: by {:.1f} mm and {:.2f} degrees; "
+                        "hold it still, or lean it against something",
+                        subject, std::abs(surface.offset_mm), surface.tilt_deg)};
+  }
+  return {pose, PoseFault::kUnlike,
+          fmt::format("it contradicts the other poses: its error is {:.1f} times theirs; take it again", times)};
+}
+
+}  // namespace
+
+std::string_view to_string(PoseFault fault) {
+  switch (fault) {
+    case PoseFault::kNotSeen:
+      return "not_seen";
+    case PoseFault::kTooFewCorners:
+      return "too_few_corners";
+    case PoseFault::kTooFewSymbols:
+      return "too_few_symbols";
+    case PoseFault::kBlurred:
+      return "blurred";
+    case PoseFault::kBent:
+      return "bent";
+    case PoseFault::kMoved:
+      return "moved";
+    case PoseFault::kUnlike:
+      break;
+  }
+  return "unlike_the_others";
+}
+
+std::vector<FaultyPose> find_unusable(const Observations& observations) {
+  std::vector<FaultyPose> faulty;
+  for (std::size_t i = 0; i < observations.poses.size(); ++i) {
+    const PoseObservation& pose = observations.poses[i];
+    const std::size_t corners = most(pose, [](const PoseView& view) { return view.corners.size(); });
+    const std::size_t symbols = most(pose, [](const PoseView& view) { return view.symbols.size(); });
+    const double blur = blur_of(pose), usual_blur = usual_blur_of(pose.subject, observations);
+    if (corners < kCornersMin) {
+      faulty.push_back({i, PoseFault::kTooFewCorners,
+                        fmt::format("only {} of the board's corners were found, {} are the least; bring more of the "
+                                    "board into the picture",
+                                    corners, kCornersMin)});
+    } else if (symbols < kSymbolsMin) {
+      faulty.push_back({i, PoseFault::kTooFewSymbols,
+                        fmt::format("only {} of the pattern's symbols were read on the board, {} are the least; hold "
+                                    "it where the projector lights it, and shade it from other light",
+                                    symbols, kSymbolsMin)});
+    } else if (blur > kBlurFactor * usual_blur && blur > usual_blur + kBlurMorePx) {
+      faulty.push_back({i, PoseFault::kBlurred,
+                        fmt::format("blurred: the board's edges are {:.1f} px wide, {:.1f} px in the other poses; hold "
+                                    "it still, and within the depth of focus",
+                                    blur, usual_blur)});
+    }
+  }
+  return faulty;
+}
+
+std::optional<FaultyPose> find_contradiction(const Observations& observations, const RigModel& rig,
+                                             const PoseInfluence& influence) {
+  std::vector<double> corner, symbol, shares, disagreement;
+  for (const PoseObservation& pose : observations.poses) shares.push_back(outlying_share(pose));
+  for (const HeldOut& held_out : influence.held_out) {
+    corner.push_back(held_out.corner_rms_px), symbol.push_back(held_out.symbol_rms_px);
+    disagreement.push_back(held_out.disagreement);
+  }
+  const double usual_disagreement = std::max(median_of(disagreement), 1.0);
+  // Corners of the board and of the plane are not found equally well.
+  const std::map<PoseSubject, double> usual_corner{
+      {PoseSubject::kBoard, usual(corner, PoseSubject::kBoard, observations)},
+      {PoseSubject::kPlane, usual(corner, PoseSubject::kPlane, observations)}};
+  const double usual_symbol = median_of(symbol), usual_share = median_of(shares);
+  std::size_t worst = 0;
+  double times = 0;
+  for (std::size_t i = 0; i < influence.held_out.size(); ++i) {
+    const double by_corner =
+        corner[i] > kContradictionMinPx ? corner[i] / usual_corner.at(observations.poses[i].subject) : 0;
+    const double by_symbol = symbol[i] > kContradictionMinPx ? symbol[i] / usual_symbol : 0;
+    const double by_share = shares[i] > kOutlyingShare ? shares[i] / std::max(usual_share, kUsualOutlyingShare) : 0;
+    const double by_rig = disagreement[i] > kDisagreementMin ? disagreement[i] / usual_disagreement : 0;
+    const double most = std::max({by_corner, by_symbol, by_share, by_rig});
+    if (most > times) times = most, worst = i;
+  }
+  if (times < kContradiction) return std::nullopt;
+  return explain(worst, times, observations, rig);
+}
+
+}  // namespace slsd

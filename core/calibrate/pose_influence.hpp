@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/calibrate/bundle.hpp"
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// What one pose says about the others' solution.
+struct HeldOut {
+  double corner_rms_px = 0;  ///< of its corners under the rig that the other poses give, its own pose fitted
+  double symbol_rms_px = 0;  ///< the same of its symbols
+  double disagreement = 0;   ///< between what it says of the shared parameters and what the others say: root mean
+                             ///< square, standard deviations of the noise
+};
+
+/// How well the poses determine the shared parameters, from the linear equations at the solution: each pose is left out
+/// in turn, without solving anew.
+struct PoseInfluence {
+  Eigen::MatrixXd noise_covariance;      ///< of the shared parameters, from the residuals' noise alone
+  Eigen::MatrixXd jackknife_covariance;  ///< of the same, from how they change as each pose is left out: it has a part
+                                         ///< for what is common to all points of a pose, as when the board is not flat
+  std::vector<HeldOut> held_out;         ///< one to a pose
+
+  /// One standard deviation of a shared parameter: the larger of both.
+  [[nodiscard]] double sigma(std::size_t parameter) const;
+};
+
+/// @errors kImpossible: the poses leave a parameter open; the message names it
+/// @thread reentrant
+[[nodiscard]] Result<PoseInfluence> find_influence(const BundleEquations& equations);
+
+/// "camera 0's fx", "the projector's place (z)".
+[[nodiscard]] std::string name_of(const SharedParameter& parameter);
+
+}  // namespace slsd

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/pose_list.hpp"
+
+#include <algorithm>
+
+namespace slsd {
+
+PoseList::PoseList(const Observations& observations) {
+  for (const PoseObservation& pose : observations.poses) {
+    PoseReport& report = reports_.emplace_back();
+    report.name = pose.name, report.subject = pose.subject;
+    used_.push_back(used_.size());
+    for (const PoseView& view : pose.views) {
+      report.corners += view.corners.size(), report.symbols += view.symbols.size();
+    }
+  }
+}
+
+void PoseList::leave_out(const FaultyPose& faulty, Observations& observations, RigModel* rig) {
+  const auto at = static_cast<std::ptrdiff_t>(faulty.pose);
+  PoseReport& report = used(faulty.pose);
+  report.fault = faulty.fault, report.reason = faulty.reason;
+  used_.erase(used_.begin() + at);
+  observations.poses.erase(observations.poses.begin() + at);
+  if (rig != nullptr) rig->rig_from_board.erase(rig->rig_from_board.begin() + at);
+}
+
+void PoseList::explain(const std::string& pose, const std::string& more) {
+  const auto report = std::ranges::find(reports_, pose, &PoseReport::name);
+  if (report != reports_.end() && report->fault) report->reason += more;
+}
+
+bool PoseList::lacks(PoseSubject subject) const {
+  const auto same = [&](const PoseReport& report) { return report.subject == subject; };
+  return std::ranges::any_of(reports_, same) &&
+         std::ranges::none_of(used_, [&](std::size_t i) { return same(reports_[i]); });
+}
+
+std::string PoseList::faults() const {
+  std::string text;
+  for (const PoseReport& report : reports_) {
+    if (report.fault) text += (text.empty() ? "" : "; ") + report.name + ": " + report.reason;
+  }
+  return text;
+}
+
+}  // namespace slsd

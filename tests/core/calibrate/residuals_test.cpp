@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/residuals.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+#include <opencv2/calib3d.hpp>
+
+#include "core/calibrate/point_residuals.hpp"
+#include "core/calibrate/pose_influence.hpp"
+#include "core/calibrate/resection.hpp"
+#include "tests/core/calibrate/synthetic_rig.hpp"
+
+namespace slsd {
+namespace {
+
+double between(int low, int high) {
+  return *rc::gen::inRange(low, high);
+}
+
+RC_GTEST_PROP(Distort, IsThatOfTheLens, ()) {
+  const RigModel rig = true_rig();
+  const Lens lens = to_lens(rig.cameras[0].lens, rig.cameras[0].size);
+  const double x = between(-250, 250) / 1000, y = between(-200, 200) / 1000;
+  RC_ASSERT((distort(rig.cameras[0].lens.data(), x, y) - lens.distort({x, y})).norm() < 1e-9);
+}
+
+RC_GTEST_PROP(Moved, IsThatOfOpenCv, ()) {
+  const MotionVector motion{between(-300, 300) / 100, between(-300, 300) / 100, between(-300, 300) / 100,
+                            between(-9, 9),           between(-9, 9),           between(-9, 9)};
+  const Eigen::Vector3d point(between(-50, 50), between(-50, 50), between(100, 200));
+  std::vector<cv::Point2d> pixels;
+  cv::Matx33d turn;
+  cv::Rodrigues(cv::Vec3d(motion[0], motion[1], motion[2]), turn);
+  const cv::Vec3d other =
+      turn * cv::Vec3d(point.x(), point.y(), point.z()) + cv::Vec3d(motion[3], motion[4], motion[5]);
+  const Eigen::Vector3d own = moved(motion.data(), point);
+  RC_ASSERT((own - Eigen::Vector3d(other[0], other[1], other[2])).norm() < 1e-9);
+  RC_ASSERT((moved_back(motion.data(), own) - point).norm() < 1e-9);
+  RC_ASSERT((to_motion(motion) * point - own).norm() < 1e-9);
+}
+
+TEST(SymbolResidual, IsZeroForWhatTheRigSees) {
+  const RigModel rig = true_rig();
+  const auto poses = true_poses(3);
+  const Observations seen = see(rig, poses, {.corner_sigma_px = 0, .symbol_sigma_px = 0});
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const ViewResiduals residuals = residuals_of(seen.poses[i].views[0], rig, poses[i]);
+    EXPECT_LT(rms_px(residuals.corners_px), 1e-9);
+    EXPECT_LT(rms_px(residuals.symbols_px), 1e-9);
+    EXPECT_LT(rms_px(residuals.symbols_projector_px), 1e-9);
+    for (const ProjectedPoint& symbol : seen.poses[i].views[0].symbols) {
+      double residual[2];
+      SymbolResidual{symbol.camera_px, symbol.projector_px, 1}(
+          rig.cameras[0].lens.data(), rig.cameras[0].device_from_rig.data(), rig.projector.lens.data(),
+          rig.projector.device_from_rig.data(), poses[i].data(), residual);
+      EXPECT_LT(std::hypot(residual[0], residual[1]), 1e-9);
+    }
+  }
+}
+
+TEST(Linearise, HasTheDerivativesOfFiniteDifferences) {
+  RigModel rig = true_rig();
+  rig.rig_from_board = true_poses(2);
+  const Observations seen = see(rig, rig.rig_from_board, {.seed = 3});
+  BundleOptions options;
+  options.cameras.assign(1, {});
+  options.corner_sigma_px = 1, options.symbol_sigma_factor = 20;  // so wide that no residual is weighed down
+  const BundleEquations equations = linearise(seen, options, rig);
+  for (std::size_t i = 0; i < equations.shared.size(); ++i) {
+    const SharedParameter& parameter = equations.shared[i];
+    RigModel changed = rig;
+    DeviceModel& device = parameter.device < 0 ? changed.projector : changed.cameras[0];
+    const auto index = static_cast<std::size_t>(parameter.index);
+    const bool lens = parameter.kind == SharedParameter::Kind::kLens;
+    const double step = (lens && index < 4) || (!lens && index > 2) ? 1e-3 : lens ? 1e-5 : 1e-7;
+    (lens ? device.lens[index] : device.device_from_rig[index]) += step;
+    const BundleEquations moved = linearise(seen, options, changed);
+    const Eigen::VectorXd difference = (moved.poses[0].residuals - equations.poses[0].residuals) / step;
+    const Eigen::VectorXd slope = equations.poses[0].by_shared.col(static_cast<Eigen::Index>(i));
+    EXPECT_LT((difference - slope).norm(), 1e-3 * slope.norm() + 1e-4) << name_of(parameter);
+  }
+}
+
+TEST(FindInfluence, FindsTheNoiseInPosesHeldOut) {
+  RigModel rig = true_rig();
+  rig.rig_from_board = true_poses(8);
+  Observations seen = see(rig, rig.rig_from_board);
+  BundleOptions options;
+  options.cameras.assign(1, {});
+  options.corner_sigma_px = 0.03, options.symbol_sigma_factor = 0.08 / 0.05;
+  ASSERT_TRUE(adjust(seen, options, rig));
+  const auto influence = find_influence(linearise(seen, options, rig));
+  ASSERT_TRUE(influence) << influence.error().message;
+  EXPECT_NEAR(influence->held_out.back().corner_rms_px, 0.03 * std::sqrt(2), 0.015);
+  EXPECT_NEAR(influence->held_out.back().symbol_rms_px, 0.08 * std::sqrt(2), 0.02);
+}
+
+TEST(Resect, FindsADeviceInSpiteOfWrongPoints) {
+  const RigModel rig = true_rig();
+  const Lens lens{1280, 800, 2500, 2510, 700, 500, {}};
+  const RigidTransform place = to_motion(rig.projector.device_from_rig);
+  std::vector<SpacePoint> points;
+  for (int i = 0; i < 400; ++i) {
+    const Eigen::Vector3d point((i % 20) * 30 - 300, (i / 20 % 20) * 20 - 200, 1700 + (i * 37) % 500);
+    points.push_back({point, lens.project(place * point)});
+    if (i % 25 == 0) points.back().pixel.x() += 200;
+  }
+  const auto found = resect(points);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_NEAR(found->lens[0], 2500, 1);
+  EXPECT_NEAR(found->lens[3], 500, 1);
+  EXPECT_LT((found->device_from_points.translation - place.translation).norm(), 0.5);
+}
+
+TEST(Resect, RefusesPointsOfOnePlane) {
+  std::vector<SpacePoint> points;
+  for (int i = 0; i < 100; ++i)
+    points.push_back({{10.0 * (i % 10), 10.0 * (i / 10), 1000}, {1.0 * (i % 10), 1.0 * (i / 10)}});
+  const auto found = resect(points);
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().code, ErrorCode::kImpossible);
+}
+
+}  // namespace
+}  // namespace slsd

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/verify.hpp"
+
+#include <cmath>
+#include <random>
+
+#include <gmock/gmock.h>
+
+#include "tests/core/calibrate/knocked_rig.hpp"
+#include "tests/core/calibrate/synthetic_rig.hpp"
+
+namespace slsd {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::Not;
+
+const std::vector<NamedCamera> kNames{{"camera0", {1600, 1200}}};
+
+std::vector<PoseView> views_of(const Observations& observations) {
+  std::vector<PoseView> views;
+  for (const PoseObservation& pose : observations.poses) views.push_back(pose.views.front());
+  return views;
+}
+
+PoseView a_view(const SightOptions& options = {}) {
+  return views_of(see(true_rig(), true_poses(1), options)).front();
+}
+
+Result<ViewCheck> check(const PoseView& view, const RigModel& rig = true_rig()) {
+  const Calibration calibration = rig.calibration(kNames);
+  return check_view(view, calibration.cameras.front(), calibration.projector);
+}
+
+std::vector<VerifyFault> faults(const PoseView& view, const RigModel& rig = true_rig()) {
+  const auto checked = check(view, rig);
+  EXPECT_TRUE(checked) << checked.error().message;
+  return checked ? find_faults(*checked, {}) : std::vector<VerifyFault>{};
+}
+
+TEST(CheckView, PassesTheRigThatWasCalibrated) {
+  for (const PoseView& view : views_of(see(true_rig(), true_poses(6)))) {
+    const auto checked = check(view);
+    ASSERT_TRUE(checked) << checked.error().message;
+    EXPECT_THAT(find_faults(*checked, {}), IsEmpty());
+    EXPECT_LT(checked->epipolar_rms_px, 0.1);
+    EXPECT_NEAR(checked->distance_mm, 1925, 325);
+    ASSERT_TRUE(checked->trueness);
+    EXPECT_EQ(checked->trueness->corners, 70U);
+    EXPECT_NEAR(checked->trueness->scale_percent, 0, 0.05);
+    EXPECT_LT(checked->trueness->long_rms_percent, 0.1);
+  }
+}
+
+TEST(CheckView, ExpectsThePlaneToBeAsFlatAsTheNoiseLetsIt) {
+  SightOptions options;
+  options.symbol_sigma_px = 0.05;  // as the symbols say of themselves
+  const auto checked = check(a_view(options));
+  ASSERT_TRUE(checked) << checked.error().message;
+  EXPECT_NEAR(checked->plane_rms_mm / checked->plane_sigma_mm, 1, 0.15);
+}
+
+TEST(CheckView, FindsAProjectorThatWasTurnedAcrossTheEpipolarLines) {
+  EXPECT_THAT(faults(a_view(), knocked(true_rig(), {1, 0, 0})), Contains(VerifyFault::kEpipolar));
+}
+
+TEST(CheckView, FindsATurnAlongTheEpipolarLinesByTheDistances) {
+  const std::vector<VerifyFault> found = faults(a_view(), knocked(true_rig(), {0, 1, 0}));
+  EXPECT_THAT(found, Not(Contains(VerifyFault::kEpipolar)));
+  EXPECT_THAT(found, Contains(VerifyFault::kScale));
+}
+
+TEST(CheckView, FindsABoardOfAnotherScale) {
+  PoseView view = a_view();
+  for (BoardPoint& corner : view.corners) corner.board_mm /= 1.005;
+  const auto checked = check(view);
+  ASSERT_TRUE(checked) << checked.error().message;
+  EXPECT_NEAR(checked->trueness->scale_percent, 0.5, 0.05);
+  EXPECT_THAT(find_faults(*checked, {}), ElementsAre(VerifyFault::kScale));
+}
+
+TEST(CheckView, FindsDistancesThatAreWrongEachByItsOwnShare) {
+  PoseView view = a_view();
+  for (BoardPoint& corner : view.corners) corner.board_mm.y() *= 1 + 0.0001 * (corner.board_mm.x() - 225);
+  EXPECT_THAT(faults(view), ElementsAre(VerifyFault::kDistances));
+}
+
+TEST(CheckView, FindsABend) {
+  SightOptions options;
+  options.relief = [](int, const Eigen::Vector2d& mm) { return 12 * std::pow(mm.x() / 225 - 1, 2); };
+  EXPECT_THAT(faults(a_view(options)), Contains(VerifyFault::kPlane));
+}
+
+TEST(CheckView, LeavesOutWhatWasMisread) {
+  PoseView view = a_view();
+  std::mt19937 random(3);
+  std::size_t misread = 0;
+  for (ProjectedPoint& symbol : view.symbols) {
+    if (random() % 20 != 0) continue;
+    symbol.projector_px = {static_cast<double>(random() % 1280), static_cast<double>(random() % 800)};
+    ++misread;
+  }
+  const auto checked = check(view);
+  ASSERT_TRUE(checked) << checked.error().message;
+  EXPECT_THAT(find_faults(*checked, {}), IsEmpty());
+  EXPECT_GE(checked->left_out + 2, misread);  // one in some hundred falls where it belongs by chance
+  EXPECT_LE(checked->left_out, misread + 5);
+}
+
+TEST(CheckView, TakesAPlainPlaneWithoutDistances) {
+  PoseView view = a_view();
+  view.corners.clear();
+  const auto checked = check(view);
+  ASSERT_TRUE(checked) << checked.error().message;
+  EXPECT_FALSE(checked->trueness);
+  EXPECT_THAT(find_faults(*checked, {}), IsEmpty());
+}
+
+TEST(CheckView, RefusesTwoPlanes) {
+  const std::vector<PoseView> views = views_of(see(true_rig(), true_poses(2)));
+  PoseView both = views[0];
+  both.symbols.insert(both.symbols.end(), views[1].symbols.begin(), views[1].symbols.begin() + 300);
+  const auto checked = check(both);
+  ASSERT_FALSE(checked);
+  EXPECT_EQ(checked.error().code, ErrorCode::kImpossible);
+}
+
+TEST(CheckView, RefusesTooFewSymbols) {
+  PoseView view = a_view();
+  view.symbols.resize(20);
+  const auto checked = check(view);
+  ASSERT_FALSE(checked);
+  EXPECT_EQ(checked.error().code, ErrorCode::kNotFound);
+}
+
+TEST(EpipolarLimit, FollowsWhatTheCalibrationSays) {
+  EXPECT_EQ(epipolar_limit_px(std::nullopt), 0.5);
+  EXPECT_EQ(epipolar_limit_px(0.1), 0.5);
+  EXPECT_DOUBLE_EQ(epipolar_limit_px(0.3), 0.9);
+}
+
+TEST(Summarise, PoolsTheViewsAndNamesEachFaultOnce) {
+  ViewCheck good{100, 0, 2000, 0.1, 0.3, 0.3, Trueness{50, 0.05, 0.06, 0.1}};
+  ViewCheck off{300, 0, 2000, 0.7, 0.3, 0.3, std::nullopt};
+  const VerifySummary summary = summarise({good, off, off}, {});
+  EXPECT_EQ(summary.views, 3U);
+  EXPECT_EQ(summary.views_with_board, 1U);
+  EXPECT_NEAR(summary.epipolar_rms_px, std::sqrt((100 * 0.01 + 600 * 0.49) / 700), 1e-12);
+  EXPECT_NEAR(summary.plane_percent, 0.015, 1e-12);
+  EXPECT_DOUBLE_EQ(summary.scale_percent, 0.05);
+  EXPECT_THAT(summary.faults, ElementsAre(VerifyFault::kEpipolar));
+  EXPECT_THAT(summarise({good}, {}).faults, IsEmpty());
+}
+
+TEST(FitPlane, FindsThePlaneAmongPointsElsewhere) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> across(-300, 300);
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.2, -0.1, 1).normalized(), middle(10, 20, 2000);
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 500; ++i) {
+    const double x = across(random), y = across(random);
+    const double z = -(normal.x() * x + normal.y() * y) / normal.z() + (i % 5 < 2 ? 50 + std::abs(across(random)) : 0);
+    points.push_back(middle + Eigen::Vector3d(x, y, z));
+  }
+  const auto plane = fit_plane(points);
+  ASSERT_TRUE(plane);
+  EXPECT_EQ(plane->on_plane.size(), 300U);
+  EXPECT_LT((plane->normal - normal).norm(), 1e-9);
+  EXPECT_LT(plane->rms_mm, 1e-5);
+  EXPECT_LT(std::abs(plane->off_mm(plane->meet({0.05, -0.02}))), 1e-9);
+}
+
+TEST(FitPlane, RefusesALine) {
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 50; ++i) points.emplace_back(i, 2 * i, 1000 + 3 * i);
+  EXPECT_FALSE(fit_plane(points));
+  EXPECT_FALSE(fit_plane(std::span(points).first(2)));
+}
+
+}  // namespace
+}  // namespace slsd
