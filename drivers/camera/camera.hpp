@@ -3,7 +3,9 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <string>
+#include <string_view>
 
 #include "core/result.hpp"
 #include "drivers/camera/frame.hpp"
@@ -16,12 +18,22 @@ struct CameraDescription {
   std::string device;  ///< stable name of the device: path, serial number
   int width_px = 0;
   int height_px = 0;
+  double rate_hz = 0.0;  ///< of a camera that runs freely, after open(); 0: exposes at the trigger, or does not tell
 };
+
+/// What the projector shows when a frame is exposed.
+enum class FrameLight { kPattern, kWhite, kDark };
+
+[[nodiscard]] constexpr std::string_view to_string(FrameLight light) {
+  constexpr std::string_view kNames[] = {"pattern", "white", "dark"};
+  return kNames[static_cast<int>(light)];
+}
 
 /// A camera that takes one frame to a trigger. Backends: file. Every backend passes the suite in tests/drivers.
 /// Frames may outlive the camera.
 ///
 ///     made --open()--> ready --capture(): kDisconnected--> gone --open()--> ready
+///                      ready --check(): kDisconnected---> gone
 ///                      ready --capture(): any other-----> ready
 ///
 /// @thread thread-bound, but for cancel()
@@ -32,6 +44,10 @@ class Camera {
   /// Width and height are known after open(), and zero before.
   [[nodiscard]] virtual const CameraDescription& description() const = 0;
 
+  /// Called by open() as soon as something of the camera's name answers, before it is configured. Set before the first
+  /// open(); a backend that opens at once need not call it.
+  virtual void set_found(std::function<void()> /*found*/) {}
+
   /// Opens the device, again after a fault; configures everything anew and starts the sequence numbers at 0.
   /// @errors kNotFound, kPermissionDenied, kMalformed, kUnsupported, kDisconnected: the device's supervisor retries
   [[nodiscard]] virtual Result<> open() = 0;
@@ -41,6 +57,19 @@ class Camera {
   ///         kBusy: too many frames are held, give one back; kDisconnected: it needs open(); kCancelled; any other: as
   ///         the backend documents, this frame is lost
   [[nodiscard]] virtual Result<Frame> capture(MonotonicTime deadline) = 0;
+
+  /// The frame after the one that was given last, for a rig that stands still and wants every frame: its exposure may
+  /// have begun before the call, but not before that of the one given last. A camera that exposes at the trigger does
+  /// as capture() does. @errors as capture()
+  [[nodiscard]] virtual Result<Frame> capture_next(MonotonicTime deadline) { return capture(deadline); }
+
+  /// What lights the captures that follow; the pattern, where nobody says. A camera sees it, a replay chooses its
+  /// images by it.
+  virtual void expect(FrameLight) {}
+
+  /// Whether the open device is still there, as far as can be told without a frame and without waiting.
+  /// @errors kDisconnected: it needs open()
+  [[nodiscard]] virtual Result<> check() { return {}; }
 
   /// Ends the capture() that waits on another thread, soon, with kCancelled; where none waits, ends the next one, so
   /// that a cancel() that comes just before it is not lost. open() forgets it.

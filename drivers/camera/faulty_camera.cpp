@@ -41,6 +41,11 @@ Result<Frame> FaultyCamera::capture(MonotonicTime deadline) {
   return fault != nullptr ? capture_with(*fault, deadline) : capture_sound(deadline);
 }
 
+Result<> FaultyCamera::check() {
+  if (!connected_) return fail_here(ErrorCode::kDisconnected, "the camera is gone; open it again");
+  return camera_->check();
+}
+
 void FaultyCamera::cancel() {
   cancel_.cancel();
   camera_->cancel();

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "drivers/camera/camera.hpp"
@@ -24,8 +26,11 @@ class FaultyCamera final : public Camera {
   FaultyCamera(std::unique_ptr<Camera> camera, std::vector<Fault> faults);
 
   [[nodiscard]] const CameraDescription& description() const override { return camera_->description(); }
+  void set_found(std::function<void()> found) override { camera_->set_found(std::move(found)); }
   [[nodiscard]] Result<> open() override;
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
+  void expect(FrameLight light) override { camera_->expect(light); }
+  [[nodiscard]] Result<> check() override;
   void cancel() override;
 
  private:

@@ -50,9 +50,22 @@ Result<> FileCamera::open() {
   ReadImageOptions reading;
   reading.bayer = options_.bayer;
   if (auto listed = folder_.open(options_.path, reading, options_.cache_bytes); !listed) return listed;
+  if (auto opened = open_beside("white", white_); !opened) return opened;
+  if (auto opened = open_beside("dark", dark_); !opened) return opened;
   const auto first = folder_.image(0);
   if (!first) return tl::unexpected(first.error());
   return configure(format_of(view(**first)));
+}
+
+Result<> FileCamera::open_beside(const char* name, ImageFolder& folder) {
+  folder = {};
+  std::error_code ignored;
+  const bool is_folder = std::filesystem::is_directory(options_.path, ignored);
+  const auto path = (is_folder ? options_.path : options_.path.parent_path()) / name;
+  if (!std::filesystem::is_directory(path, ignored)) return {};
+  ReadImageOptions reading;
+  reading.bayer = options_.bayer;
+  return folder.open(path, reading, options_.cache_bytes);
 }
 
 Result<> FileCamera::configure(const FrameFormat& format) {
@@ -64,9 +77,11 @@ Result<> FileCamera::configure(const FrameFormat& format) {
                 options_.path.string());
   description_.width_px = format.width_px;
   description_.height_px = format.height_px;
+  description_.rate_hz = options_.rate_hz;
   pool_.emplace(format, options_.frames_held_max);
   opened_ = std::chrono::steady_clock::now();
   next_sequence_ = 0;
+  patterns_ = 0;
   return {};
 }
 
@@ -78,6 +93,13 @@ Result<Frame> FileCamera::capture(MonotonicTime deadline) {
   if (!frame && frame.error().code == ErrorCode::kDisconnected) pool_.reset();
   if (frame && frame->received() > deadline) return fail_late();
   return frame;
+}
+
+Result<> FileCamera::check() {
+  std::error_code ignored;
+  if (pool_ && std::filesystem::exists(options_.path, ignored)) return {};
+  pool_.reset();
+  return fail(ErrorCode::kDisconnected, "the folder or file is gone; bring it back", options_.path.string());
 }
 
 Result<MonotonicTime> FileCamera::wait_for_exposure(MonotonicTime deadline) {
@@ -94,21 +116,37 @@ Result<MonotonicTime> FileCamera::wait_for_exposure(MonotonicTime deadline) {
 }
 
 Result<Frame> FileCamera::deliver(MonotonicTime exposure_start) {
-  const std::uint64_t sequence = next_sequence_;
-  if (sequence >= folder_.size() && !options_.loop)
-    return fail(ErrorCode::kNotFound,
-                "all " + std::to_string(folder_.size()) + " images were shown; set loop = true to begin again",
-                options_.path.string());
-  ++next_sequence_;
-  const auto image = folder_.image(sequence % folder_.size());
+  const auto image = light_ == FrameLight::kPattern ? next_image() : image_in_light();
   if (!image) return tl::unexpected(image.error());
   const GreyView pixels = view(**image);
-  if (format_of(pixels) != pool_->format()) return fail_format(sequence, format_of(pixels));
-  auto frame = pool_->lend(pixels, sequence, exposure_start);
+  if (format_of(pixels) != pool_->format()) return fail_format(format_of(pixels));
+  auto frame = pool_->lend(pixels, next_sequence_ - 1, exposure_start);
   if (frame) return std::move(*frame);
   return fail(ErrorCode::kBusy,
               "all " + std::to_string(options_.frames_held_max) + " frames are held; give some back first",
               options_.name);
+}
+
+Result<const GreyImage*> FileCamera::next_image() {
+  if (patterns_ >= folder_.size() && !options_.loop)
+    return fail(ErrorCode::kNotFound,
+                "all " + std::to_string(folder_.size()) + " images were shown; set loop = true to begin again",
+                options_.path.string());
+  ++next_sequence_;
+  return folder_.image(patterns_++ % folder_.size());
+}
+
+// That which belongs to the frame of the pattern that was shown last.
+Result<const GreyImage*> FileCamera::image_in_light() {
+  const bool white = light_ == FrameLight::kWhite;
+  ImageFolder& folder = white ? white_ : dark_;
+  if (folder.size() == 0)
+    return fail(ErrorCode::kNotFound,
+                std::string("a replay has such frames only from a folder \"") + (white ? "white" : "dark") +
+                    "\" beside its images: make one, or scan without",
+                options_.path.string());
+  ++next_sequence_;
+  return folder.image((patterns_ == 0 ? 0 : patterns_ - 1) % folder.size());
 }
 
 tl::unexpected<Error> FileCamera::fail_late() const {
@@ -116,10 +154,13 @@ tl::unexpected<Error> FileCamera::fail_late() const {
               options_.name);
 }
 
-tl::unexpected<Error> FileCamera::fail_format(std::uint64_t sequence, const FrameFormat& format) const {
+tl::unexpected<Error> FileCamera::fail_format(const FrameFormat& format) const {
+  const std::string which =
+      light_ == FrameLight::kPattern
+          ? "image " + std::to_string((patterns_ - 1) % folder_.size() + 1) + " of " + std::to_string(folder_.size())
+          : std::string("an image in the folder \"") + (light_ == FrameLight::kWhite ? "white\"" : "dark\"");
   return fail(ErrorCode::kMismatch,
-              "image " + std::to_string(sequence % folder_.size() + 1) + " of " + std::to_string(folder_.size()) +
-                  " is " + format_text(format) + ", the first is " + format_text(pool_->format()) +
+              which + " is " + format_text(format) + ", the first is " + format_text(pool_->format()) +
                   "; keep images of one kind to a folder",
               options_.path.string());
 }

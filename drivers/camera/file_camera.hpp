@@ -37,6 +37,10 @@ struct FileCameraOptions {
 /// "10.png": number with leading zeros). Hidden files, folders and other extensions are passed over. The list is read
 /// by open(); an image that is rewritten afterwards is read anew, so that one image may be kept up to date by others.
 ///
+/// What the scene looks like in white and without the projector's light is replayed from the folders "white" and "dark"
+/// within the folder, or beside the one image: to the i-th frame of the pattern belongs the i-th image of each, and
+/// where there are fewer they begin anew. Without such a folder such a capture gives kNotFound.
+///
 /// Besides the errors of every camera, capture() gives kNotFound when loop is off and all images were shown;
 /// kMismatch for an image of another size or depth than the first; and what read_image() gives. That image's frame is
 /// lost and the camera goes on with the next. kDisconnected when the folder or file is gone.
@@ -49,19 +53,28 @@ class FileCamera final : public Camera {
   /// @errors kInvalidArgument (an option), kNotFound (path, or no image in it), kMismatch, and as read_image()
   [[nodiscard]] Result<> open() override;
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
+  void expect(FrameLight light) override { light_ = light; }
+  [[nodiscard]] Result<> check() override;
   void cancel() override { cancel_.cancel(); }
 
  private:
   [[nodiscard]] Result<MonotonicTime> wait_for_exposure(MonotonicTime deadline);
   [[nodiscard]] Result<Frame> deliver(MonotonicTime exposure_start);
+  [[nodiscard]] Result<> open_beside(const char* name, ImageFolder& folder);
+  [[nodiscard]] Result<const GreyImage*> next_image();
+  [[nodiscard]] Result<const GreyImage*> image_in_light();
   [[nodiscard]] Result<> configure(const FrameFormat& format);
   [[nodiscard]] tl::unexpected<Error> fail_late() const;
-  [[nodiscard]] tl::unexpected<Error> fail_format(std::uint64_t sequence, const FrameFormat& format) const;
+  [[nodiscard]] tl::unexpected<Error> fail_format(const FrameFormat& format) const;
 
   FileCameraOptions options_;
   CameraDescription description_;
   CancelLatch cancel_;
   ImageFolder folder_;
+  ImageFolder white_;  ///< empty where there is none
+  ImageFolder dark_;
+  FrameLight light_ = FrameLight::kPattern;
+  std::uint64_t patterns_ = 0;  ///< frames of the pattern so far
   std::optional<FramePool> pool_;
   MonotonicTime opened_;
   std::uint64_t next_sequence_ = 0;

@@ -35,7 +35,14 @@ class Frame {
         exposure_start_(other.exposure_start_),
         received_(other.received_),
         give_back_(std::exchange(other.give_back_, nullptr)) {}
-  Frame& operator=(Frame&&) = delete;
+  Frame& operator=(Frame&& other) noexcept {
+    std::swap(image_, other.image_);
+    std::swap(sequence_, other.sequence_);
+    std::swap(exposure_start_, other.exposure_start_);
+    std::swap(received_, other.received_);
+    std::swap(give_back_, other.give_back_);
+    return *this;
+  }
   ~Frame() {
     if (give_back_) give_back_();
   }

@@ -5,6 +5,7 @@
 #include <png.h>
 
 #include <bit>
+#include <cmath>
 #include <csetjmp>
 #include <exception>
 #include <type_traits>
@@ -23,6 +24,7 @@ struct Rows {
   int height = 0;
   int bits = 8;
   int colour_type = PNG_COLOR_TYPE_GRAY;
+  double dpi = 0;  ///< 0: unknown
 };
 
 /// libpng reports errors by longjmp(): the function that calls setjmp() holds no objects that would need a destructor.
@@ -42,6 +44,10 @@ class PngWriter {
     ::png_set_filter(png_, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
     ::png_set_IHDR(png_, info_, static_cast<png_uint_32>(rows.width), static_cast<png_uint_32>(rows.height), rows.bits,
                    rows.colour_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    if (rows.dpi > 0) {
+      const auto per_metre = static_cast<png_uint_32>(std::lround(rows.dpi / 0.0254));
+      ::png_set_pHYs(png_, info_, per_metre, per_metre, PNG_RESOLUTION_METER);
+    }
     ::png_write_info(png_, info_);
     if (rows.bits == 16 && std::endian::native == std::endian::little) ::png_set_swap(png_);
     for (int y = 0; y < rows.height; ++y)
@@ -90,6 +96,10 @@ Result<std::string> encode_grey(const ImageView<T>& image) {
 
 Result<std::string> encode_png(const Grey8& image) {
   return encode_grey(image.view());
+}
+Result<std::string> encode_png(const Grey8& image, double dpi) {
+  return encode({image.data(), static_cast<std::size_t>(image.width()), image.width(), image.height(), 8,
+                 PNG_COLOR_TYPE_GRAY, dpi});
 }
 Result<std::string> encode_png(const Grey16& image) {
   return encode_grey(image.view());

@@ -13,6 +13,8 @@ namespace slsd {
 /// @errors kInvalidArgument (an empty image), kIo (the encoder failed)
 /// @thread reentrant
 [[nodiscard]] Result<std::string> encode_png(const Grey8& image);
+/// @param dpi  pixels to an inch, as the file says
+[[nodiscard]] Result<std::string> encode_png(const Grey8& image, double dpi);
 [[nodiscard]] Result<std::string> encode_png(const Grey16& image);
 [[nodiscard]] Result<std::string> encode_png(const ColourImage& image);
 [[nodiscard]] Result<std::string> encode_png(const GreyView& image);
