@@ -2,8 +2,9 @@
 // Copyright the slsd authors
 #include "drivers/camera/v4l2/v4l2_camera.hpp"
 
+#include <linux/videodev2.h>
+
 #include <algorithm>
-#include <filesystem>
 #include <utility>
 
 #include "drivers/camera/v4l2/v4l2_controls.hpp"
@@ -18,24 +19,25 @@ constexpr int kFaultsInARowMax = 8;
 constexpr int kStaleToTell = 3;  // so many stale frames are no longer those in flight
 constexpr std::uint32_t kHalfOfAllSequences = 1u << 31;
 
-std::string path_of(const std::filesystem::path& device) {
-  if (device.has_parent_path()) return device.string();
-  return (std::filesystem::path("/dev/v4l/by-id") / device).string();
-}
-
 }  // namespace
 
 V4l2Camera::V4l2Camera(V4l2CameraOptions options)
-    : options_(std::move(options)), description_{options_.name, "v4l2", path_of(options_.device), 0, 0} {}
+    : options_(std::move(options)), description_{options_.name, "v4l2", options_.device_path().string(), 0, 0} {}
 
-Result<> V4l2Camera::open() {
+void V4l2Camera::close() {
   converter_.reset();
   stream_.reset();
+  last_start_.reset();
+}
+
+Result<> V4l2Camera::open() {
+  close();
   pool_.reset();
   wake_.reset();
   if (auto valid = options_.validate(); !valid) return valid;
   auto device = V4l2Device::open(description_.device);
   if (!device) return tl::unexpected(device.error());
+  if (found_) found_();
   return configure(std::move(*device));
 }
 
@@ -47,7 +49,9 @@ Result<> V4l2Camera::configure(V4l2Device device) {
   if (auto set = set_frame_rate(device, options_); !set) return set;
   if (auto set = set_controls(device, options_); !set) return set;
   layout_ = *layout;
-  clock_ = ExposureClock(read_timing(device), options_, device.driver());
+  const ExposureTiming timing = read_timing(device);
+  clock_ = ExposureClock(timing, options_, device.driver());
+  description_.rate_hz = timing.period ? std::chrono::seconds(1) / std::chrono::duration<double>(*timing.period) : 0.0;
   const bool zero_copy = is_zero_copy(mode->format.layout);
   if (!zero_copy) {
     pool_.emplace(FrameFormat{mode->width_px, mode->height_px, bytes_per_pixel(mode->format.layout)},
@@ -68,19 +72,38 @@ Result<> V4l2Camera::configure(V4l2Device device) {
 }
 
 Result<Frame> V4l2Camera::capture(MonotonicTime deadline) {
+  return run({steady_clock::now(), deadline, clock_.frames_in_flight()});
+}
+
+Result<Frame> V4l2Camera::capture_next(MonotonicTime deadline) {
+  if (!last_start_) return capture(deadline);
+  Capture next{*last_start_ + std::chrono::nanoseconds(1), deadline};
+  next.next = true;
+  return run(next);
+}
+
+Result<Frame> V4l2Camera::run(const Capture& capture) {
   if (!stream_) return fail_here(ErrorCode::kDisconnected, "the camera is not open; open it");
-  auto frame = capture_after({steady_clock::now(), deadline, clock_.frames_in_flight()});
-  if (!frame && frame.error().code == ErrorCode::kDisconnected) {
-    converter_.reset();
-    stream_.reset();
-  }
+  auto frame = capture_after(capture);
+  if (frame) last_start_ = frame->exposure_start();
+  if (!frame && frame.error().code == ErrorCode::kDisconnected) close();
   return frame;
+}
+
+// The file answers for as long as it is open; a call into the driver does not.
+Result<> V4l2Camera::check() {
+  if (!stream_) return fail_here(ErrorCode::kDisconnected, "the camera is not open; open it");
+  v4l2_capability capability{};
+  if (stream_->device().call(VIDIOC_QUERYCAP, &capability) == 0) return {};
+  close();
+  return fail_here(ErrorCode::kDisconnected, "the camera is gone; check its cable");
 }
 
 Result<Frame> V4l2Camera::capture_after(Capture capture) {
   if (!pool_ && stream_->lent() >= held_max_)
     return fail_here(ErrorCode::kBusy, "all " + std::to_string(held_max_) + " frames are held; give some back first");
-  if (auto dropped = drop_waiting(); !dropped) return tl::unexpected(dropped.error());
+  if (auto ready = capture.next ? stream_->put_back_returned() : drop_waiting(); !ready)
+    return tl::unexpected(ready.error());
   while (true) {
     if (auto ready = wait(capture); !ready) return tl::unexpected(ready.error());
     auto frame = take(capture);
@@ -162,7 +185,8 @@ Result<std::optional<Frame>> V4l2Camera::judge(const v4l2_buffer& buffer, Captur
     ++counts_.before_trigger;
     return std::nullopt;
   }
-  if (lost > 0)  // one of them may have been the one that was asked for
+  if (lost > 0 && capture.next) next_sequence_ += lost;
+  if (lost > 0 && !capture.next)  // one of them may have been the one that was asked for
     return lose(ErrorCode::kFrameDropped, lost, std::to_string(lost) + " frames were lost on their way; scan again");
   if (!is_whole(buffer)) {
     ++counts_.torn;

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <utility>
 
 #include "drivers/camera/camera.hpp"
 #include "drivers/camera/frame_pool.hpp"
@@ -36,10 +38,14 @@ class V4l2Camera final : public Camera {
   explicit V4l2Camera(V4l2CameraOptions options);
 
   [[nodiscard]] const CameraDescription& description() const override { return description_; }
+  void set_found(std::function<void()> found) override { found_ = std::move(found); }
   /// @errors kInvalidArgument (an option, or beyond the device's range), kNotFound, kPermissionDenied, kUnsupported,
   ///         kMismatch (it did not take a setting), kBusy (another program has it), kNoSpace, kDisconnected, kIo
   [[nodiscard]] Result<> open() override;
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
+  /// Frames that the driver dropped in between count as lost, and show as a gap in the numbers.
+  [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override;
+  [[nodiscard]] Result<> check() override;
   void cancel() override { wake_.cancel(); }
 
   [[nodiscard]] const V4l2FrameCounts& counts() const { return counts_; }
@@ -50,7 +56,10 @@ class V4l2Camera final : public Camera {
     MonotonicTime deadline;
     int in_flight = 0;  ///< unstamped frames still to pass
     int stale = 0;
+    bool next = false;  ///< any frame after the one before will do
   };
+  [[nodiscard]] Result<Frame> run(const Capture& capture);
+  void close();
   [[nodiscard]] Result<> configure(V4l2Device device);
   [[nodiscard]] Result<Frame> capture_after(Capture capture);
   [[nodiscard]] Result<> drop_waiting();
@@ -68,6 +77,7 @@ class V4l2Camera final : public Camera {
 
   V4l2CameraOptions options_;
   CameraDescription description_;
+  std::function<void()> found_;
   WakeEvent wake_;
   V4l2FrameCounts counts_;
   std::optional<V4l2Stream> stream_;
@@ -79,6 +89,7 @@ class V4l2Camera final : public Camera {
   int settling_ = 0;
   int faults_in_a_row_ = 0;
   std::uint64_t next_sequence_ = 0;
+  std::optional<MonotonicTime> last_start_;     ///< of the exposure of the frame before
   std::optional<std::uint32_t> last_sequence_;  ///< of the driver's; nothing where a gap would mean nothing
 };
 

@@ -20,15 +20,18 @@ struct V4l2CameraOptions {
   std::optional<std::pair<int, int>> size_px = {};  ///< width and height; without it the largest of the format
   std::optional<double> frame_rate_hz = {};         ///< held to 1 %
   std::optional<double> exposure_us = {};           ///< rounded to the device's step, for UVC 100 us
-  std::optional<int> gain_steps = {};               ///< the device's own steps: V4L2 does not tell what one is worth
-  std::optional<int> focus_steps = {};              ///< the device's own steps
-  std::optional<int> power_line_hz = {};            ///< 0 (no filter), 50 or 60
+  std::optional<double> gain_db = {};   ///< above the camera's least, 0 to 60; held to 0.5 dB where its gain has a unit
+  std::optional<int> gain_steps = {};   ///< the device's own steps: V4L2 does not tell what one is worth
+  std::optional<int> focus_steps = {};  ///< the device's own steps
+  std::optional<int> power_line_hz = {};  ///< 0 (no filter), 50 or 60
   bool automatic = false;                 ///< true leaves automatic exposure, gain, white balance and focus as they are
   std::optional<double> readout_us = {};  ///< from the end of exposure to a frame's last byte, where the device stamps
                                           ///< the end; without it a frame's period, which is safe but may cost a frame
   int settle_frames = 2;                  ///< discarded after open(), 0 to 100: exposed under the settings before
   int frames_held_max = 8;                ///< how many frames may be held at once, 2 to 24
 
+  /// Of the device node, or of the link to it.
+  [[nodiscard]] std::filesystem::path device_path() const;
   /// @errors kInvalidArgument: the message begins with the key
   [[nodiscard]] Result<> validate() const;
   friend bool operator==(const V4l2CameraOptions&, const V4l2CameraOptions&) = default;

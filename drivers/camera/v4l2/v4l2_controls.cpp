@@ -8,13 +8,17 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace slsd {
 namespace {
 
 constexpr double kUnitUs = 100.0;  // of EXPOSURE_ABSOLUTE
 constexpr double kRateTolerance = 0.01;
+constexpr double kGainToleranceDb = 0.5;
 
 /// A control with its key in the configuration.
 struct Setting {
@@ -26,7 +30,7 @@ struct Setting {
 constexpr std::array kAutomatic{__u32{V4L2_CID_EXPOSURE_AUTO_PRIORITY}, __u32{V4L2_CID_AUTOGAIN},
                                 __u32{V4L2_CID_AUTO_WHITE_BALANCE},     __u32{V4L2_CID_FOCUS_AUTO},
                                 __u32{V4L2_CID_AUTOBRIGHTNESS},         __u32{V4L2_CID_HUE_AUTO},
-                                __u32{V4L2_CID_WIDE_DYNAMIC_RANGE}};
+                                __u32{V4L2_CID_WIDE_DYNAMIC_RANGE},     __u32{V4L2_CID_ISO_SENSITIVITY_AUTO}};
 
 std::optional<v4l2_queryctrl> query(const V4l2Device& device, __u32 id) {
   v4l2_queryctrl description{};
@@ -97,9 +101,69 @@ Result<> set(const V4l2Device& device, const Setting& setting, double steps) {
   return write_control(device, *control, static_cast<int>(std::min<double>(on_step, control->maximum)));
 }
 
-Result<> set_gain(const V4l2Device& device, int steps) {
+__u32 gain_control(const V4l2Device& device) {
   const bool analogue = !query(device, V4L2_CID_GAIN) && query(device, V4L2_CID_ANALOGUE_GAIN);
-  return set(device, {"gain_steps", analogue ? __u32{V4L2_CID_ANALOGUE_GAIN} : __u32{V4L2_CID_GAIN}}, steps);
+  return analogue ? __u32{V4L2_CID_ANALOGUE_GAIN} : __u32{V4L2_CID_GAIN};
+}
+
+/// A choice of a menu of ISO sensitivities.
+struct Sensitivity {
+  int index = 0;
+  double gain_db = 0.0;  ///< above the least
+};
+
+std::vector<Sensitivity> sensitivities(const V4l2Device& device, const v4l2_queryctrl& control) {
+  std::vector<std::pair<int, double>> values;
+  for (int i = control.minimum; i <= control.maximum; ++i) {
+    v4l2_querymenu item{};
+    item.id = control.id;
+    item.index = static_cast<__u32>(i);
+    if (device.call(VIDIOC_QUERYMENU, &item) == 0 && item.value > 0)
+      values.emplace_back(i, static_cast<double>(item.value));
+  }
+  std::vector<Sensitivity> choices;
+  const auto least = std::ranges::min_element(values, {}, &std::pair<int, double>::second);
+  for (const auto& [index, value] : values) choices.push_back({index, 20.0 * std::log10(value / least->second)});
+  return choices;
+}
+
+std::string decibels_text(const std::vector<Sensitivity>& choices) {
+  std::string text;
+  for (const Sensitivity& choice : choices) {
+    char number[32];
+    std::snprintf(number, sizeof number, "%s%.1f", text.empty() ? "" : ", ", choice.gain_db);
+    text += number;
+  }
+  return text;
+}
+
+tl::unexpected<Error> fail_unit(const V4l2Device& device) {
+  const auto gain = query(device, gain_control(device));
+  return fail(ErrorCode::kUnsupported,
+              gain ? "gain_db: the driver does not tell what a step of " + name_of(*gain) +
+                         " is worth; set gain_steps instead, " + std::to_string(gain->minimum) + " to " +
+                         std::to_string(gain->maximum)
+                   : "gain_db: the camera has no gain; leave it out",
+              device.path());
+}
+
+// Of the controls for gain only this one has a unit that V4L2 prescribes: ISO sensitivity times 1000.
+Result<> set_gain_db(const V4l2Device& device, double gain_db) {
+  const auto control = query(device, V4L2_CID_ISO_SENSITIVITY);
+  const auto choices = control ? sensitivities(device, *control) : std::vector<Sensitivity>();
+  if (choices.empty()) return fail_unit(device);
+  const auto off_by = [gain_db](const Sensitivity& choice) { return std::abs(choice.gain_db - gain_db); };
+  const auto nearest = std::ranges::min_element(choices, {}, off_by);
+  if (off_by(*nearest) <= kGainToleranceDb) return write_control(device, *control, nearest->index);
+  return fail(ErrorCode::kInvalidArgument,
+              "gain_db: " + name_of(*control) + " has " + decibels_text(choices) + " dB; choose one of these",
+              device.path());
+}
+
+Result<> set_gain(const V4l2Device& device, const V4l2CameraOptions& options) {
+  if (options.gain_db) return set_gain_db(device, *options.gain_db);
+  if (!options.gain_steps) return {};
+  return set(device, {"gain_steps", gain_control(device)}, *options.gain_steps);
 }
 
 int power_line_choice(int hz) {
@@ -130,7 +194,7 @@ Result<> set_controls(const V4l2Device& device, const V4l2CameraOptions& options
     done = set(device, {"power_line_hz", V4L2_CID_POWER_LINE_FREQUENCY}, power_line_choice(*options.power_line_hz));
   if (done && options.exposure_us)
     done = set(device, {"exposure_us", V4L2_CID_EXPOSURE_ABSOLUTE}, *options.exposure_us / kUnitUs);
-  if (done && options.gain_steps) done = set_gain(device, *options.gain_steps);
+  if (done) done = set_gain(device, options);
   if (done && options.focus_steps) done = set(device, {"focus_steps", V4L2_CID_FOCUS_ABSOLUTE}, *options.focus_steps);
   return done;
 }

@@ -47,12 +47,14 @@ V4l2Device::V4l2Device(int descriptor, std::string path) : descriptor_(descripto
 V4l2Device::V4l2Device(V4l2Device&& other) noexcept
     : descriptor_(std::exchange(other.descriptor_, -1)),
       path_(std::move(other.path_)),
-      driver_(std::move(other.driver_)) {}
+      driver_(std::move(other.driver_)),
+      card_(std::move(other.card_)) {}
 
 V4l2Device& V4l2Device::operator=(V4l2Device&& other) noexcept {
   std::swap(descriptor_, other.descriptor_);
   std::swap(path_, other.path_);
   std::swap(driver_, other.driver_);
+  std::swap(card_, other.card_);
   return *this;
 }
 
@@ -71,6 +73,7 @@ Result<V4l2Device> V4l2Device::open(const std::string& path) {
   if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0)
     return fail(ErrorCode::kUnsupported, "the device captures no video; name another, often the one with index0", path);
   device.driver_ = reinterpret_cast<const char*>(capability.driver);
+  device.card_ = reinterpret_cast<const char*>(capability.card);
   if (v4l2_fd_open(device.descriptor_, V4L2_DISABLE_CONVERSION) < 0)
     return device.fail_call(errno, "libv4l2 cannot take the camera");
   return device;

@@ -23,6 +23,8 @@ class V4l2Device {
   [[nodiscard]] const std::string& path() const { return path_; }
   /// "uvcvideo", ...
   [[nodiscard]] const std::string& driver() const { return driver_; }
+  /// The camera's own name for itself.
+  [[nodiscard]] const std::string& card() const { return card_; }
 
   /// 0, or errno. Interrupted calls are made again.
   [[nodiscard]] int call(unsigned long request, void* argument) const;
@@ -37,6 +39,7 @@ class V4l2Device {
   int descriptor_ = -1;
   std::string path_;
   std::string driver_;
+  std::string card_;
 };
 
 }  // namespace slsd
