@@ -31,13 +31,14 @@ AravisCamera::~AravisCamera() {
 Result<> AravisCamera::open() {
   end_session();
   if (auto valid = options_.validate(); !valid) return valid;
-  auto session = AravisSession::open(options_, address_, *events_);
+  auto session = AravisSession::open(options_, address_, *events_, found_);
   if (!session) return tl::unexpected(session.error());
   session_ = std::move(*session);
   address_ = session_->address();
   description_.device = session_->name();
   description_.width_px = session_->layout().width_px;
   description_.height_px = session_->layout().height_px;
+  description_.rate_hz = options_.trigger == AravisTrigger::kFreeRun ? options_.rate_hz : 0.0;
   log_warnings();
   return {};
 }
@@ -52,6 +53,7 @@ void AravisCamera::log_warnings() {
 
 // A device that answers must be let go before it can be opened again; for one that does not, nobody waits.
 void AravisCamera::end_session() {
+  last_start_.reset();
   if (!session_) return;
   ended_ = session_->statistics();
   if (session_->answers()) return session_.reset();
@@ -62,9 +64,25 @@ void AravisCamera::end_session() {
 
 Result<Frame> AravisCamera::capture(MonotonicTime deadline) {
   if (!session_) return fail(ErrorCode::kDisconnected, "the camera is not open; open it", options_.name);
-  auto frame = session_->capture(deadline);
+  return note(session_->capture(deadline));
+}
+
+Result<Frame> AravisCamera::capture_next(MonotonicTime deadline) {
+  if (options_.trigger != AravisTrigger::kFreeRun || !last_start_) return capture(deadline);
+  return note(session_->capture_since(*last_start_ + std::chrono::nanoseconds(1), deadline));
+}
+
+Result<Frame> AravisCamera::note(Result<Frame> frame) {
+  if (frame) last_start_ = frame->exposure_start();
   if (!frame && frame.error().code == ErrorCode::kDisconnected) end_session();
   return frame;
+}
+
+Result<> AravisCamera::check() {
+  if (!session_) return fail(ErrorCode::kDisconnected, "the camera is not open; open it", options_.name);
+  auto there = session_->check();
+  if (!there) end_session();
+  return there;
 }
 
 void AravisCamera::cancel() {

@@ -2,9 +2,12 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "core/result.hpp"
@@ -22,7 +25,8 @@ class CaptureEvents;
 ///
 /// A frame is handed out only if it is whole, of the size configured, and its exposure began after capture() was
 /// called. When that was is told by the device's clock, which is read every second; many cameras stamp the exposure's
-/// start, some the start of its readout.
+/// start, some the start of its readout; one that has chunks tells the start in them. By its chunks too a frame is
+/// refused that was exposed with other settings than configured.
 ///
 /// Threads of its own: "aravis control", which talks to the device so that a device which is gone holds up no capture;
 /// Aravis' own for stream and heartbeat; and one to close a session with a device that is gone, which takes seconds.
@@ -35,32 +39,40 @@ class AravisCamera final : public Camera {
   AravisCamera& operator=(const AravisCamera&) = delete;
 
   [[nodiscard]] const CameraDescription& description() const override { return description_; }
+  void set_found(std::function<void()> found) override { found_ = std::move(found); }
   /// Also proves that frames arrive. Warnings about the system are logged, each once.
   /// @errors kInvalidArgument (an option), kNotFound, kPermissionDenied (another application controls it), kMismatch
   /// (it
   ///         took another value than the one configured), kUnsupported, kDisconnected
   [[nodiscard]] Result<> open() override;
   /// kDisconnected also after missed_frames_max frames in a row did not come.
+  /// @errors kMismatch: the frame was exposed with other settings than configured, and is lost; as Camera::capture()
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
+  [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override;
+  /// Tells what the camera's own clock, which is read every second, or its heartbeat found out.
+  [[nodiscard]] Result<> check() override;
   void cancel() override;
 
   /// Of the session that is open, or the one before.
   [[nodiscard]] AravisStatistics statistics() const;
   /// By how much the device's clock goes faster than the host's; 0 while that cannot be told.
   [[nodiscard]] double clock_drift_ppm() const;
-  /// The names of what on this system may cost frames: "receive_buffer", "packet_size", "packet_resend",
-  /// "device_clock".
+  /// The names of what on this system may cost frames, or could not be made sure of: "receive_buffer", "packet_size",
+  /// "packet_resend", "device_clock", "chunks", "first_frame".
   [[nodiscard]] std::vector<std::string> warnings() const;
 
  private:
   void end_session();
   void log_warnings();
+  [[nodiscard]] Result<Frame> note(Result<Frame> frame);
 
   AravisCameraOptions options_;
   CameraDescription description_;
+  std::function<void()> found_;
   std::unique_ptr<CaptureEvents> events_;
   std::unique_ptr<AravisSession> session_;
   AravisStatistics ended_;
+  std::optional<MonotonicTime> last_start_;  ///< of the exposure of the frame before
   std::string address_;
   std::vector<std::string> logged_;
   std::vector<std::jthread> closing_;

@@ -24,12 +24,20 @@ bool is_address(const std::string& text) {
 
 }  // namespace
 
+bool AravisCameraOptions::names_address() const {
+  return is_address(id);
+}
+
 Result<> AravisCameraOptions::validate() const {
   if (name.empty()) return refuse("name must not be empty");
   if (id.empty())
     return refuse("id must be the camera's serial number, vendor-serial or address; slsd --list shows them");
   if (!interface.empty() && !is_address(interface)) return refuse("interface must be an IPv4 address of this host");
   if (trigger == AravisTrigger::kLine && trigger_line.empty()) return refuse("trigger_line must name an input");
+  if (trigger == AravisTrigger::kAction && action.group_mask == 0)
+    return refuse("action_group_mask must have a bit, where the trigger is an action");
+  if (!within(action_lead_us, 0.0, 1e6)) return refuse("action_lead_us must be 0 to 1000000");
+  if (action_lead_us > 0.0 && !ptp) return refuse("action_lead_us needs ptp = true, without which clocks differ");
   if (rate_hz != 0.0 && !within(rate_hz, 0.01, 10000.0)) return refuse("rate_hz must be 0, or 0.01 to 10000");
   if (!within(exposure_us, 1.0, 1e7)) return refuse("exposure_us must be 1 to 10000000");
   if (!within(gain_db, 0.0, 60.0)) return refuse("gain_db must be 0 to 60");

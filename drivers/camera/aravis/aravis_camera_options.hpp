@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/result.hpp"
+#include "drivers/camera/aravis/gvcp.hpp"
 
 namespace slsd {
 
@@ -15,6 +16,7 @@ enum class AravisTrigger {
   kSoftware,  ///< a command at each capture()
   kLine,      ///< a rising edge on an input line
   kFreeRun,   ///< its own clock
+  kAction,    ///< GigE: one command to all cameras with the same keys
 };
 
 /// The keys of a [[camera]] table whose driver is "aravis".
@@ -23,13 +25,17 @@ struct AravisCameraOptions {
   std::string id = {};         ///< serial number, "vendor-serial", or IPv4 address; an address is found soonest
   std::string interface = {};  ///< IPv4 address of this host's interface; empty: the one that the route goes through
   AravisTrigger trigger = AravisTrigger::kSoftware;
-  std::string trigger_line = "Line1";               ///< the input, where the trigger is a line
-  double rate_hz = 0.0;                             ///< where it runs freely, up to 10000; 0: as the camera has it
-  double exposure_us = 10000.0;                     ///< 1 to 10000000
-  double gain_db = 0.0;                             ///< 0 to 60
-  std::string pixel_format = "Mono8";               ///< Mono8, Mono10, Mono12, Mono16, or Bayer in 8 to 16 bits
+  std::string trigger_line = "Line1";  ///< the input, where the trigger is a line
+  ActionKeys action = {};              ///< GigE, where the trigger is an action: the same for all cameras of a group
+  double action_lead_us = 0.0;   ///< GigE: so long after the command all expose, by their common clock; 0: at once
+  bool ptp = false;              ///< the camera's clock follows the network's (IEEE 1588)
+  double rate_hz = 0.0;          ///< where it runs freely, up to 10000; 0: as the camera has it
+  double exposure_us = 10000.0;  ///< 1 to 10000000
+  double gain_db = 0.0;          ///< 0 to 60
+  std::string pixel_format = "Mono8";               ///< Mono8, Mono10, Mono12, Mono16, packed, or Bayer in 8 to 16 bits
   std::optional<std::pair<int, int>> size_px = {};  ///< from the sensor's middle; without it the whole sensor
-  int packet_bytes = 0;          ///< GigE: with headers, 576 to 16000; 0: the largest that gets through
+  bool chunks = true;    ///< where it has them: what it says of each frame's exposure and gain is compared with these
+  int packet_bytes = 0;  ///< GigE: with headers, 576 to 16000; 0: the largest that gets through
   double packet_delay_us = 0.0;  ///< GigE: between two packets, where several cameras share a link
   int receive_buffer_bytes = 0;  ///< GigE: of the socket; 0: two frames. net.core.rmem_max must allow it
   bool packet_resend = true;     ///< GigE: lost packets are asked for again
@@ -38,6 +44,8 @@ struct AravisCameraOptions {
   int missed_frames_max = 2;     ///< so many in a row missing: the camera is gone
   int frames_held_max = 8;       ///< how many frames may be held at once, 2 to 64
 
+  /// Whether `id` is an address.
+  [[nodiscard]] bool names_address() const;
   /// @errors kInvalidArgument: the message begins with the key
   [[nodiscard]] Result<> validate() const;
   friend bool operator==(const AravisCameraOptions&, const AravisCameraOptions&) = default;

@@ -6,6 +6,11 @@
 #include <chrono>
 #include <utility>
 
+#include "drivers/camera/aravis/frame_patience.hpp"
+#include "drivers/camera/aravis/frame_payload.hpp"
+#include "drivers/camera/aravis/opening_warnings.hpp"
+#include "drivers/camera/aravis/session_reports.hpp"
+
 namespace slsd {
 namespace {
 
@@ -15,44 +20,8 @@ using std::chrono::steady_clock;
 constexpr int kWarmUpTries = 3;
 constexpr int kFirstClockReadings = 8;
 constexpr auto kAnswerTime = 100ms;
-
-/// What the stream's callback and the device's signal report to.
-struct Reporter {
-  CaptureEvents& events;
-  std::uint64_t session;
-};
-
-void free_reporter(void* reporter) {
-  delete static_cast<Reporter*>(reporter);
-}
-
-void free_signal_reporter(void* reporter, GClosure*) {
-  free_reporter(reporter);
-}
-
-// Runs on the stream's thread. Aravis stamps with CLOCK_REALTIME, which jumps.
-void note_stream(void* user, ArvStreamCallbackType type, ArvBuffer* buffer) {
-  if (type != ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE || buffer == nullptr) return;
-  const Reporter& reporter = *static_cast<Reporter*>(user);
-  arv_buffer_set_system_timestamp(buffer, static_cast<guint64>(steady_clock::now().time_since_epoch().count()));
-  reporter.events.report_buffer(reporter.session);
-}
-
-void note_control_lost(ArvDevice*, void* user) {
-  const Reporter& reporter = *static_cast<Reporter*>(user);
-  reporter.events.report_lost(reporter.session, "the camera does not answer, or another application took control");
-}
-
-std::chrono::nanoseconds exposure(const AravisCameraOptions& options) {
-  return std::chrono::nanoseconds(static_cast<std::int64_t>(options.exposure_us * 1e3));
-}
-
-/// How long a frame may take.
-std::chrono::nanoseconds patience(const AravisCameraOptions& options) {
-  const auto period = std::chrono::duration<double>(options.rate_hz > 0.0 ? 1.0 / options.rate_hz : 0.0);
-  return std::chrono::milliseconds(options.frame_timeout_ms) + exposure(options) +
-         std::chrono::duration_cast<std::chrono::nanoseconds>(period);
-}
+constexpr auto kQuietLeast = 50ms;
+constexpr auto kReadoutMost = 1s;
 
 }  // namespace
 
@@ -60,8 +29,10 @@ AravisSession::AravisSession(const AravisCameraOptions& options, OpenedDevice de
     : options_(options), device_(std::move(device)), events_(events), number_(events.begin_session()) {}
 
 AravisSession::~AravisSession() {
-  control_.reset();
   ArvDevice* device = arv_camera_get_device(device_.camera.get());
+  // Soon, so that the next session is not refused where the network comes back meanwhile.
+  if (abandoned_ && ARV_IS_GV_DEVICE(device)) (void)arv_gv_device_leave_control(ARV_GV_DEVICE(device), nullptr);
+  control_.reset();
   if (control_lost_handler_ != 0) g_signal_handler_disconnect(device, control_lost_handler_);
   if (stream_ != nullptr && !abandoned_) (void)stop();
   receiver_.reset();
@@ -69,9 +40,11 @@ AravisSession::~AravisSession() {
 }
 
 Result<std::unique_ptr<AravisSession>> AravisSession::open(const AravisCameraOptions& options,
-                                                           const std::string& address, CaptureEvents& events) {
+                                                           const std::string& address, CaptureEvents& events,
+                                                           const std::function<void()>& found) {
   auto device = open_device(options, address);
   if (!device) return tl::unexpected(device.error());
+  if (found) found();
   std::unique_ptr<AravisSession> session(new AravisSession(options, std::move(*device), events));
   if (auto prepared = session->prepare(); !prepared) return tl::unexpected(prepared.error());
   return session;
@@ -82,76 +55,113 @@ bool AravisSession::answers() {
   return events_.lost_reason().empty() && wake != CaptureEvents::Wake::kTimeout;
 }
 
+Result<> AravisSession::check() {
+  if (const std::string reason = events_.lost_reason(); !reason.empty()) return lost(reason);
+  return {};
+}
+
 Result<> AravisSession::prepare() {
   const DeviceFeatures features(device_.camera.get());
   (void)features.execute("AcquisitionStop");  // one that a former user left running, and most refuse where none runs
   auto layout = configure_image(features, options_);
   if (!layout) return tl::unexpected(layout.error());
   layout_ = *layout;
+  auto chunks = configure_chunks(features, options_);
+  if (!chunks) return tl::unexpected(chunks.error());
+  chunks_ = *chunks;
+  if (auto done = configure_clock(features, options_); !done) return done;
   if (auto done = configure_packets(device_.camera.get(), options_, warnings_); !done) return done;
   read_clock_first();
+  control_lost_handler_ = report_loss(arv_camera_get_device(device_.camera.get()), events_, number_);
   if (auto done = make_stream(); !done) return done;
   if (auto done = warm_up(); !done) return done;
+  if (auto done = join_group(); !done) return done;
   if (auto done = start(options_.trigger); !done) return done;
   control_ = std::make_unique<DeviceControl>(device_.camera.get(), events_, number_, first_clock_);
   return {};
 }
 
+Result<> AravisSession::join_group() {
+  if (options_.trigger != AravisTrigger::kAction) return {};
+  if (device_.address.empty())
+    return fail_here(ErrorCode::kUnsupported, "only GigE Vision cameras expose at an action; set another trigger");
+  action_.emplace(ActionGroup::of(options_.action), device_.address, options_.interface);
+  return {};
+}
+
+void AravisSession::abandon() {
+  abandoned_ = true;
+  action_.reset();
+}
+
 Result<> AravisSession::make_stream() {
   GErrorSlot error;
-  ArvDevice* device = arv_camera_get_device(device_.camera.get());
-  control_lost_handler_ =
-      g_signal_connect_data(device, "control-lost", G_CALLBACK(note_control_lost), new Reporter{events_, number_},
-                            free_signal_reporter, G_CONNECT_DEFAULT);
-  stream_.reset(arv_camera_create_stream_full(device_.camera.get(), note_stream, new Reporter{events_, number_},
-                                              free_reporter, error.out()));
+  const bool again = stream_ != nullptr;
+  receiver_.reset();
+  stream_.reset();
+  stream_ = make_reporting_stream(device_.camera.get(), events_, number_, error);
   if (!stream_) return fail(error.code(), "the camera gives no stream: " + error.message(), options_.name);
-  configure_stream(stream_.get(), options_, layout_.bytes(), warnings_);
-  // After everything else: until now a setting might have changed it.
-  const unsigned payload = arv_camera_get_payload(device_.camera.get(), error.out());
-  if (error.failed()) return fail(error.code(), "the camera tells no frame size: " + error.message(), options_.name);
-  if (payload != layout_.bytes())
-    return fail(ErrorCode::kMismatch,
-                "the camera sends " + std::to_string(payload) +
-                    " bytes a frame, where its size and pixel format make " + std::to_string(layout_.bytes()) +
-                    "; turn off what it adds",
-                "PayloadSize");
-  receiver_ = std::make_unique<FrameReceiver>(stream_.get(), layout_, options_);
+  std::vector<NetworkWarning> told_before;
+  configure_stream(stream_.get(), options_, layout_.bytes(), again ? told_before : warnings_);
+  const auto payload = read_payload_bytes(device_.camera.get(), layout_, chunks_);
+  if (!payload) return tl::unexpected(payload.error());
+  receiver_ = std::make_unique<FrameReceiver>(stream_.get(), layout_, options_, *payload, make_chunk_reader());
   return {};
+}
+
+std::unique_ptr<ChunkReader> AravisSession::make_chunk_reader() const {
+  if (!chunks_.any()) return nullptr;
+  return std::make_unique<ChunkReader>(device_.camera.get(), chunks_, layout_.bytes(),
+                                       from_us(options_.exposure_us) + kReadoutMost);
 }
 
 void AravisSession::read_clock_first() {
   for (int i = 0; i < kFirstClockReadings; ++i)
     if (const auto reading = read_device_clock(device_.camera.get())) first_clock_.observe(*reading);
-  if (!first_clock_.ready())
-    warnings_.push_back({"device_clock",
-                         "the camera's clock cannot be read: exposures are taken to end when frames are "
-                         "there, and a frame that comes too late ends the session"});
+  if (!first_clock_.ready()) warnings_.push_back(device_clock_warning());
 }
 
 // The size of the receive buffer is put in force with the first packet, which is lost with its frame where the buffer
-// was too small; and only a frame proves that the data's way is open.
+// was too small; and only a frame proves that the data's way is open. Aravis hears every packet of the interface before
+// it narrows its packet socket to this stream: after those of another camera it may discard this one's frames as late
+// ones, which a new stream mends.
 Result<> AravisSession::warm_up() {
   const DeviceFeatures features(device_.camera.get());
   const bool software = features.has_entry("TriggerSource", "Software");
-  if (options_.trigger != AravisTrigger::kFreeRun && !software) return {};
-  const AravisTrigger trigger = software ? AravisTrigger::kSoftware : AravisTrigger::kFreeRun;
-  if (auto done = start(trigger); !done) return done;
-  for (int i = 0; i < kWarmUpTries; ++i) {
-    if (wait_for_any_frame(trigger)) return stop();
+  if (options_.trigger != AravisTrigger::kFreeRun && !software) {
+    warnings_.push_back(first_frame_warning());
+    return {};
   }
+  const AravisTrigger trigger = software ? AravisTrigger::kSoftware : AravisTrigger::kFreeRun;
+  bool unreadable = false;
+  for (int i = 0; i < kWarmUpTries; ++i) {
+    if (auto done = i > 0 ? make_stream() : Result<>(); !done) return done;
+    if (auto done = start(trigger); !done) return done;
+    const FirstFrame first =
+        wait_for_first_frame(trigger, i == 0 ? first_frame_patience(options_) : frame_patience(options_));
+    if (auto done = stop(); !done || first == FirstFrame::kCame) return done;
+    unreadable = unreadable || first == FirstFrame::kUnreadable;
+  }
+  if (unreadable) return go_without_chunks();
   return fail_here(ErrorCode::kDisconnected,
                    "the camera answers, and sends no frame; check that it is reached through the right interface, and "
                    "that no firewall holds back UDP from its address");
 }
 
-bool AravisSession::wait_for_any_frame(AravisTrigger trigger) {
+AravisSession::FirstFrame AravisSession::wait_for_first_frame(AravisTrigger trigger, std::chrono::nanoseconds time) {
   GErrorSlot error;
   if (trigger == AravisTrigger::kSoftware) arv_camera_software_trigger(device_.camera.get(), error.out());
-  if (error.failed() || events_.wait_buffer(steady_clock::now() + patience(options_)) != CaptureEvents::Wake::kBuffer)
-    return false;
-  receiver_->discard();
-  return true;
+  if (error.failed() || events_.wait_buffer(steady_clock::now() + time) != CaptureEvents::Wake::kBuffer)
+    return FirstFrame::kMissing;
+  return receiver_->discard_readable() ? FirstFrame::kCame : FirstFrame::kUnreadable;
+}
+
+Result<> AravisSession::go_without_chunks() {
+  chunks_ = {};
+  warnings_.push_back(chunks_warning());
+  if (auto done = turn_chunks_off(DeviceFeatures(device_.camera.get())); !done) return done;
+  if (auto done = make_stream(); !done) return done;
+  return warm_up();
 }
 
 Result<> AravisSession::start(AravisTrigger trigger) {
@@ -172,12 +182,32 @@ Result<Frame> AravisSession::capture(MonotonicTime deadline) {
   if (receiver_->all_held()) return fail_here(ErrorCode::kBusy, "all frames are held; give some back first");
   if (auto settled = settle(deadline); !settled) return tl::unexpected(settled.error());
   const MonotonicTime asked = steady_clock::now();
-  if (options_.trigger == AravisTrigger::kSoftware) {
-    triggered_ = asked;
-    ++frames_due_;
-    control_->trigger();
-  }
+  trigger(asked);
   return await_frame(asked, deadline);
+}
+
+void AravisSession::trigger(MonotonicTime now) {
+  if (action_) return action_->trigger(action_time());
+  if (options_.trigger != AravisTrigger::kSoftware) return;
+  triggered_ = now;
+  ++frames_due_;
+  control_->trigger();
+}
+
+// A clock that follows the network's ticks in nanoseconds.
+std::optional<std::uint64_t> AravisSession::action_time() const {
+  if (options_.action_lead_us == 0.0 || !first_clock_.ready()) return std::nullopt;
+  const MonotonicTime when = steady_clock::now() + from_us(options_.action_lead_us);
+  return static_cast<std::uint64_t>(control_->clock().device_time(when).count());
+}
+
+// After a pause what waits is old, and the time that a frame may take is over.
+Result<Frame> AravisSession::capture_since(MonotonicTime since, MonotonicTime deadline) {
+  if (steady_clock::now() - since > frame_patience(options_) / 2) return capture(deadline);
+  if (events_.take_cancel()) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
+  if (deadline <= steady_clock::now()) return fail_here(ErrorCode::kFrameLate, "the deadline is past");
+  if (receiver_->all_held()) return fail_here(ErrorCode::kBusy, "all frames are held; give some back first");
+  return await_frame(since, deadline);
 }
 
 // Frames of captures that were cancelled or late must have come, or been given up, before the next trigger: a frame
@@ -188,7 +218,9 @@ Result<> AravisSession::settle(MonotonicTime deadline) {
     if (frames_due_ > 0) --frames_due_;
   }
   if (options_.trigger != AravisTrigger::kSoftware) return {};
-  const MonotonicTime limit = std::min(deadline, triggered_ + patience(options_));
+  if (out_of_step_)
+    if (auto quiet = wait_until_quiet(deadline); !quiet) return quiet;
+  const MonotonicTime limit = std::min(deadline, triggered_ + frame_patience(options_));
   while (frames_due_ > 0 || !events_.trigger_answered()) {
     const auto wake = frames_due_ > 0 ? events_.wait_buffer(limit) : events_.wait_trigger_answered(limit);
     if (wake == CaptureEvents::Wake::kLost) return lost(events_.lost_reason());
@@ -206,9 +238,25 @@ Result<> AravisSession::settle(MonotonicTime deadline) {
   return {};
 }
 
+// After a frame of an earlier trigger each capture would else get the frame of the one before it, for ever.
+Result<> AravisSession::wait_until_quiet(MonotonicTime deadline) {
+  const auto quiet = std::min<std::chrono::nanoseconds>(2 * longest_wait_ + kQuietLeast, frame_patience(options_));
+  for (;;) {
+    const auto wake = events_.wait_buffer(std::min(deadline, steady_clock::now() + quiet));
+    if (wake == CaptureEvents::Wake::kLost) return lost(events_.lost_reason());
+    if (wake == CaptureEvents::Wake::kCancelled) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
+    if (wake == CaptureEvents::Wake::kTimeout) break;
+    receiver_->discard();
+  }
+  receiver_->discard_all();
+  frames_due_ = 0;
+  out_of_step_ = false;
+  return {};
+}
+
 Result<Frame> AravisSession::await_frame(MonotonicTime asked, MonotonicTime deadline) {
   const bool paced = options_.trigger != AravisTrigger::kLine;
-  const MonotonicTime limit = paced ? std::min(deadline, asked + patience(options_)) : deadline;
+  const MonotonicTime limit = paced ? std::min(deadline, asked + frame_patience(options_)) : deadline;
   for (;;) {
     switch (events_.wait_buffer(limit)) {
       case CaptureEvents::Wake::kCancelled:
@@ -216,7 +264,7 @@ Result<Frame> AravisSession::await_frame(MonotonicTime asked, MonotonicTime dead
       case CaptureEvents::Wake::kLost:
         return lost(events_.lost_reason());
       case CaptureEvents::Wake::kTimeout:
-        if (deadline <= limit && steady_clock::now() - asked < patience(options_))
+        if (deadline <= limit && steady_clock::now() - asked < frame_patience(options_))
           return fail_here(ErrorCode::kFrameLate, "no frame came before the deadline");
         return missed(deadline);
       case CaptureEvents::Wake::kBuffer:
@@ -232,8 +280,10 @@ std::optional<Result<Frame>> AravisSession::judge(MonotonicTime asked) {
   if (!taken && !software && taken.error().code == ErrorCode::kFrameStale) return std::nullopt;
   if (!taken && software && frames_missed_ > 0) return --frames_missed_, std::nullopt;
   if (frames_due_ > 0) --frames_due_;
+  out_of_step_ = !taken && taken.error().code == ErrorCode::kFrameStale;
   if (!taken) return Result<Frame>(tl::unexpected(taken.error()));
   if (!*taken) return std::nullopt;
+  longest_wait_ = std::max(longest_wait_, steady_clock::now() - asked);
   frames_missed_ = 0;
   return Result<Frame>(std::move(**taken));
 }

@@ -2,15 +2,19 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/result.hpp"
+#include "drivers/camera/aravis/action_group.hpp"
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/camera/aravis/capture_events.hpp"
+#include "drivers/camera/aravis/configure_chunks.hpp"
 #include "drivers/camera/aravis/configure_network.hpp"
 #include "drivers/camera/aravis/device_control.hpp"
 #include "drivers/camera/aravis/frame_receiver.hpp"
@@ -27,9 +31,11 @@ class AravisSession {
   /// Opens and configures everything anew, and proves that frames arrive.
   /// @param address  where the camera was found before, or empty
   /// @param events   outlive the session
+  /// @param found    called once the camera is this host's, before it is configured; may be empty
   /// @errors as open_device(), configure_image(), configure_packets(); kDisconnected: it answers, and no frame arrives
   [[nodiscard]] static Result<std::unique_ptr<AravisSession>> open(const AravisCameraOptions& options,
-                                                                   const std::string& address, CaptureEvents& events);
+                                                                   const std::string& address, CaptureEvents& events,
+                                                                   const std::function<void()>& found);
   /// Takes seconds where the device does not answer any more.
   ~AravisSession();
   AravisSession(const AravisSession&) = delete;
@@ -43,23 +49,37 @@ class AravisSession {
   [[nodiscard]] DeviceClock clock() const { return control_->clock(); }
   /// Whether the device still answers; waits a little for a trigger under way.
   [[nodiscard]] bool answers();
+  /// @errors kDisconnected: it was lost while nobody asked for a frame
+  [[nodiscard]] Result<> check();
   /// What is left is its end, which may then no more stop the device.
-  void abandon() { abandoned_ = true; }
+  void abandon();
 
   /// @errors as Camera::capture(); after kDisconnected only the session's end is left
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline);
+  /// Of a camera that runs freely: the first frame not yet taken whose exposure did not begin before `since`. As
+  /// capture() where that is long ago.
+  [[nodiscard]] Result<Frame> capture_since(MonotonicTime since, MonotonicTime deadline);
 
  private:
+  /// What became of the first frame of a stream.
+  enum class FirstFrame { kCame, kUnreadable, kMissing };
+
   AravisSession(const AravisCameraOptions& options, OpenedDevice device, CaptureEvents& events);
 
   [[nodiscard]] Result<> prepare();
+  [[nodiscard]] Result<> join_group();
   [[nodiscard]] Result<> make_stream();
+  [[nodiscard]] std::unique_ptr<ChunkReader> make_chunk_reader() const;
   [[nodiscard]] Result<> warm_up();
+  [[nodiscard]] Result<> go_without_chunks();
   [[nodiscard]] Result<> start(AravisTrigger trigger);
   [[nodiscard]] Result<> stop();
-  [[nodiscard]] bool wait_for_any_frame(AravisTrigger trigger);
+  [[nodiscard]] FirstFrame wait_for_first_frame(AravisTrigger trigger, std::chrono::nanoseconds time);
   void read_clock_first();
 
+  void trigger(MonotonicTime now);
+  [[nodiscard]] Result<> wait_until_quiet(MonotonicTime deadline);
+  [[nodiscard]] std::optional<std::uint64_t> action_time() const;
   [[nodiscard]] Result<> settle(MonotonicTime deadline);
   [[nodiscard]] Result<Frame> await_frame(MonotonicTime asked, MonotonicTime deadline);
   [[nodiscard]] std::optional<Result<Frame>> judge(MonotonicTime asked);
@@ -72,16 +92,20 @@ class AravisSession {
   CaptureEvents& events_;
   std::uint64_t number_;
   DeviceLayout layout_;
+  ChunkSelection chunks_;
   std::vector<NetworkWarning> warnings_;
   DeviceClock first_clock_;
   GObjectPtr<ArvStream> stream_;
   std::unique_ptr<FrameReceiver> receiver_;
   std::unique_ptr<DeviceControl> control_;
+  std::optional<ActionGroup::Member> action_;  ///< where the trigger is an action
   unsigned long control_lost_handler_ = 0;
   bool abandoned_ = false;
   int frames_due_ = 0;     ///< triggers whose frame has not come
   int frames_missed_ = 0;  ///< frames in a row that did not come; they may still come late
   MonotonicTime triggered_;
+  bool out_of_step_ = false;                  ///< the last frame was of an earlier trigger
+  std::chrono::nanoseconds longest_wait_{0};  ///< for a frame
 };
 
 }  // namespace slsd

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace slsd {
 namespace {
@@ -71,6 +72,18 @@ Result<> clear_triggers(const DeviceFeatures& features) {
   return {};
 }
 
+/// Cameras number their actions from 0 or from 1.
+Result<> set_action(const DeviceFeatures& features, const ActionKeys& keys) {
+  const bool from_one = features.has_entry("TriggerSource", "Action1");
+  if (features.has("ActionSelector"))
+    if (auto done = features.set("ActionSelector", from_one ? 1 : 0); !done) return done;
+  for (const auto& [name, value] :
+       {std::pair("ActionDeviceKey", keys.device_key), std::pair("ActionGroupKey", keys.group_key),
+        std::pair("ActionGroupMask", keys.group_mask)})
+    if (auto done = features.set(name, value); !done) return done;
+  return features.choose("TriggerSource", from_one ? "Action1" : "Action0");
+}
+
 Result<> set_rate(const DeviceFeatures& features, const AravisCameraOptions& options) {
   if (options.rate_hz == 0.0) return {};
   if (auto done = features.turn_if_there("AcquisitionFrameRateEnable", true); !done) return done;
@@ -98,6 +111,13 @@ Result<DeviceLayout> configure_image(const DeviceFeatures& features, const Aravi
   return DeviceLayout{*width, *height, *pixels};
 }
 
+Result<> configure_clock(const DeviceFeatures& features, const AravisCameraOptions& options) {
+  for (const char* name : {"PtpEnable", "GevIEEE1588"})
+    if (features.has(name)) return features.turn(name, options.ptp);
+  if (!options.ptp) return {};
+  return fail(ErrorCode::kUnsupported, "the camera has no precision time protocol; set ptp = false", "PtpEnable");
+}
+
 Result<> configure_trigger(const DeviceFeatures& features, const AravisCameraOptions& options, AravisTrigger trigger) {
   if (auto done = features.choose_if_there("AcquisitionMode", "Continuous"); !done) return done;
   if (auto done = clear_triggers(features); !done) return done;
@@ -106,6 +126,7 @@ Result<> configure_trigger(const DeviceFeatures& features, const AravisCameraOpt
   if (auto done = features.turn_if_there("AcquisitionFrameRateEnable", false); !done) return done;
   if (auto done = features.choose("TriggerMode", "On"); !done) return done;
   if (trigger == AravisTrigger::kSoftware) return features.choose("TriggerSource", "Software");
+  if (trigger == AravisTrigger::kAction) return set_action(features, options.action);
   if (auto done = features.choose_if_there("TriggerActivation", "RisingEdge"); !done) return done;
   return features.choose("TriggerSource", options.trigger_line);
 }

@@ -18,13 +18,17 @@ struct DeviceLayout {
   PixelLayout pixels;
 
   [[nodiscard]] std::size_t bytes() const {
-    return static_cast<std::size_t>(width_px) * height_px * pixels.bytes_per_pixel;
+    return packed_bytes(static_cast<std::size_t>(width_px) * height_px, pixels.bits_per_pixel());
   }
 };
 
 /// Sets region, pixel format, exposure and gain, turns everything automatic off, and compares what the camera took.
 /// @errors kUnsupported, kMismatch, kDisconnected
 [[nodiscard]] Result<DeviceLayout> configure_image(const DeviceFeatures& features, const AravisCameraOptions& options);
+
+/// Lets the camera's clock follow the network's where the options say so, and go by itself where they do not.
+/// @errors kUnsupported: the camera has no PTP; as configure_image()
+[[nodiscard]] Result<> configure_clock(const DeviceFeatures& features, const AravisCameraOptions& options);
 
 /// Sets what the camera exposes at. To be called while it does not acquire.
 /// @errors as configure_image()

@@ -12,9 +12,9 @@
 
 namespace slsd {
 
-/// Something about the system that may cost frames, by name and with what to do.
+/// Something about the system that may cost frames, or that could not be made sure of, by name and with what to do.
 struct NetworkWarning {
-  std::string name;  ///< "receive_buffer", "packet_size", "packet_resend" or "device_clock"
+  std::string name;  ///< "receive_buffer", "packet_size", "packet_resend", "device_clock", "chunks" or "first_frame"
   std::string advice;
 };
 

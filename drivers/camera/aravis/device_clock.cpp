@@ -12,6 +12,7 @@ using std::chrono::nanoseconds;
 
 constexpr double kCrystalError = 100e-6;  // what a clock may be off before its drift is known
 constexpr double kWander = 2e-6;          // by which a drift changes as the device warms up
+constexpr std::uint64_t kSecond = 1'000'000'000;
 
 nanoseconds half_width(const ClockReading& reading) {
   return (reading.after - reading.before) / 2;
@@ -26,6 +27,10 @@ double seconds(nanoseconds duration) {
 }
 
 }  // namespace
+
+nanoseconds from_ticks(std::uint64_t ticks, std::uint64_t frequency_hz) {
+  return nanoseconds(ticks / frequency_hz * kSecond + ticks % frequency_hz * kSecond / frequency_hz);
+}
 
 std::size_t DeviceClock::size() const {
   return std::min(count_, readings_.size());
@@ -71,6 +76,11 @@ void DeviceClock::choose_reference() {
 MonotonicTime DeviceClock::host_time(nanoseconds device) const {
   const auto since = static_cast<double>((device - reference_.device).count());
   return middle(reference_) + nanoseconds(std::llround(since * host_per_device_));
+}
+
+nanoseconds DeviceClock::device_time(MonotonicTime host) const {
+  const auto since = static_cast<double>((host - middle(reference_)).count());
+  return reference_.device + nanoseconds(std::llround(since / host_per_device_));
 }
 
 nanoseconds DeviceClock::uncertainty(nanoseconds device) const {

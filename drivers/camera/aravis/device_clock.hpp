@@ -18,6 +18,11 @@ struct ClockReading {
   MonotonicTime after;
 };
 
+/// So many ticks of a device's clock as a time since it began.
+/// @param frequency_hz  above 0
+/// @thread reentrant
+[[nodiscard]] std::chrono::nanoseconds from_ticks(std::uint64_t ticks, std::uint64_t frequency_hz);
+
 /// Maps a device's clock to CLOCK_MONOTONIC by the readings that it is given: the offset by the one that is known best,
 /// the drift by the line through all of them. Without drift a crystal's 100 ppm would put a frame 0.1 ms off after a
 /// second.
@@ -29,6 +34,8 @@ class DeviceClock {
   [[nodiscard]] bool ready() const { return count_ > 0; }
   /// When the device's clock showed so much. Precondition: ready().
   [[nodiscard]] MonotonicTime host_time(std::chrono::nanoseconds device) const;
+  /// What the device's clock shows at a time. Precondition: ready().
+  [[nodiscard]] std::chrono::nanoseconds device_time(MonotonicTime host) const;
   /// How wrong host_time() of this is, as a standard deviation at most.
   [[nodiscard]] std::chrono::nanoseconds uncertainty(std::chrono::nanoseconds device) const;
   /// By how much the device's clock goes faster than the host's, in parts per million; 0 until it can be told.

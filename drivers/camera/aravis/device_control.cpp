@@ -19,11 +19,6 @@ constexpr std::uint64_t kControlRegister = 0x944;
 constexpr std::uint64_t kLatchedHigh = 0x948;
 constexpr std::uint64_t kLatchedLow = 0x94c;
 constexpr std::uint32_t kLatch = 2;
-constexpr std::uint64_t kSecond = 1'000'000'000;
-
-std::chrono::nanoseconds from_ticks(std::uint64_t ticks, std::uint64_t frequency_hz) {
-  return std::chrono::nanoseconds(ticks / frequency_hz * kSecond + ticks % frequency_hz * kSecond / frequency_hz);
-}
 
 // By the bootstrap registers, which the standard prescribes: features for it differ between cameras.
 std::optional<ClockReading> latch_registers(ArvDevice* device) {

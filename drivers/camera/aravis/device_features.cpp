@@ -23,7 +23,8 @@ std::string text(double value) {
 
 bool DeviceFeatures::has(const char* name) const {
   GErrorSlot error;
-  return arv_camera_is_feature_available(camera_, name, error.out()) && !error.failed();
+  return arv_camera_is_feature_implemented(camera_, name, error.out()) && !error.failed() &&
+         arv_camera_is_feature_available(camera_, name, error.out()) && !error.failed();
 }
 
 bool DeviceFeatures::has_entry(const char* name, const char* entry) const {
@@ -57,13 +58,13 @@ Result<> DeviceFeatures::set(const char* name, double value, double tolerance) c
   return std::abs(taken - value) <= tolerance ? Result<>() : fail_taken(name, text(value), text(taken));
 }
 
-Result<> DeviceFeatures::set(const char* name, int value) const {
+Result<> DeviceFeatures::set(const char* name, std::int64_t value) const {
   GErrorSlot error;
   arv_camera_set_integer(camera_, name, value, error.out());
   if (auto done = check(error, name); !done) return done;
-  const auto taken = integer(name);
-  if (!taken) return tl::unexpected(taken.error());
-  return *taken == value ? Result<>() : fail_taken(name, std::to_string(value), std::to_string(*taken));
+  const std::int64_t taken = arv_camera_get_integer(camera_, name, error.out());
+  if (auto done = check(error, name); !done) return done;
+  return taken == value ? Result<>() : fail_taken(name, std::to_string(value), std::to_string(taken));
 }
 
 Result<> DeviceFeatures::turn(const char* name, bool on) const {

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "core/result.hpp"
@@ -23,7 +24,7 @@ class DeviceFeatures {
   /// @errors for all of these: kUnsupported (lacking or refused), kMismatch (it took another value), kDisconnected
   [[nodiscard]] Result<> choose(const char* name, const std::string& entry) const;
   [[nodiscard]] Result<> set(const char* name, double value, double tolerance) const;
-  [[nodiscard]] Result<> set(const char* name, int value) const;
+  [[nodiscard]] Result<> set(const char* name, std::int64_t value) const;
   [[nodiscard]] Result<> turn(const char* name, bool on) const;
   [[nodiscard]] Result<> execute(const char* name) const;
   [[nodiscard]] Result<int> integer(const char* name) const;

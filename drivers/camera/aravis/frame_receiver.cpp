@@ -7,6 +7,7 @@
 #include <utility>
 #include <variant>
 
+#include "drivers/camera/aravis/frame_patience.hpp"
 #include "drivers/files/bayer.hpp"
 
 namespace slsd {
@@ -14,11 +15,8 @@ namespace {
 
 using std::chrono::nanoseconds;
 
+constexpr std::uint64_t kHandOverUs = 100'000;
 constexpr int kSpareBuffers = 4;  // being filled, or done and not yet taken
-
-nanoseconds from_us(double microseconds) {
-  return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double, std::micro>(microseconds));
-}
 
 /// When its last byte came; noted by the stream's callback.
 MonotonicTime received(ArvBuffer* buffer) {
@@ -41,12 +39,14 @@ std::string status_text(ArvBufferStatus status) {
 
 }  // namespace
 
-FrameReceiver::FrameReceiver(ArvStream* stream, const DeviceLayout& layout, const AravisCameraOptions& options)
+FrameReceiver::FrameReceiver(ArvStream* stream, const DeviceLayout& layout, const AravisCameraOptions& options,
+                             std::size_t payload_bytes, std::unique_ptr<ChunkReader> chunks)
     : stream_(stream),
       layout_(layout),
       options_(options),
-      buffers_(stream, layout.bytes(), options.frames_held_max + kSpareBuffers) {
-  if (!layout.pixels.mosaic) return;
+      buffers_(stream, payload_bytes, options.frames_held_max + kSpareBuffers),
+      chunks_(std::move(chunks)) {
+  if (layout.pixels.is_zero_copy()) return;
   greys_.emplace(FrameFormat{layout.width_px, layout.height_px, layout.pixels.bytes_per_pixel},
                  options.frames_held_max);
   sums_.resize(static_cast<std::size_t>(layout.width_px));
@@ -61,27 +61,64 @@ void FrameReceiver::restart() {
   counted_ = {};
 }
 
+// The stream tells of a buffer before it hands it over. One that was not waited for would be taken for the next frame,
+// and each one after it too.
+ArvBuffer* FrameReceiver::pop() {
+  return arv_stream_timeout_pop_buffer(stream_, kHandOverUs);
+}
+
+void FrameReceiver::return_unread(ArvBuffer* buffer) {
+  if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS) note_identifier(buffer);
+  buffers_.return_unread(buffer);
+}
+
 void FrameReceiver::discard() {
-  if (ArvBuffer* buffer = arv_stream_try_pop_buffer(stream_)) {
-    if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS) note_identifier(buffer);
-    buffers_.return_unread(buffer);
-  }
+  if (ArvBuffer* buffer = pop()) return_unread(buffer);
+}
+
+// A frame with chunks that are more than the camera told is too large for its buffer.
+bool FrameReceiver::discard_readable() {
+  ArvBuffer* buffer = pop();
+  if (buffer == nullptr) return true;
+  const bool too_large = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SIZE_MISMATCH;
+  const bool readable = !chunks_ || (wrong_with(buffer).empty() ? read_chunks(buffer).has_value() : !too_large);
+  return_unread(buffer);
+  return readable;
+}
+
+void FrameReceiver::discard_all() {
+  while (ArvBuffer* buffer = arv_stream_try_pop_buffer(stream_)) return_unread(buffer);
 }
 
 Result<std::optional<Frame>> FrameReceiver::take(MonotonicTime asked, const DeviceClock& clock) {
-  ArvBuffer* buffer = arv_stream_try_pop_buffer(stream_);
+  ArvBuffer* buffer = pop();
   if (buffer == nullptr) return std::nullopt;
-  if (const std::string wrong = wrong_with(buffer); !wrong.empty()) {
-    buffers_.return_unread(buffer);
-    ++counted_.torn;
-    return fail(ErrorCode::kFrameTorn, "the frame is not whole: " + wrong, options_.name);
-  }
+  if (const std::string wrong = wrong_with(buffer); !wrong.empty())
+    return refuse(buffer, counted_.torn, ErrorCode::kFrameTorn, "the frame is not whole: " + wrong);
+  const auto chunks = read_chunks(buffer);
+  if (!chunks)
+    return refuse(buffer, counted_.torn, ErrorCode::kFrameTorn,
+                  "the frame is not whole: its chunks are not as the camera describes them; where that happens with "
+                  "every frame, set chunks = false");
   note_identifier(buffer);
-  const auto start = exposure_start(buffer, asked, clock);
+  if (const std::string unlike = unlike_configured(*chunks, options_); !unlike.empty())
+    return refuse(buffer, counted_.misexposed, ErrorCode::kMismatch,
+                  "the frame was exposed with other settings: " + unlike +
+                      "; scan again, and if it stays so see that nothing else sets the camera, or set chunks = false");
+  const auto start = exposure_start(buffer, *chunks, asked, clock);
   if (start) return deliver(buffer, *start);
+  return refuse(buffer, counted_.stale, ErrorCode::kFrameStale, "the frame was exposed before it was asked for");
+}
+
+tl::unexpected<Error> FrameReceiver::refuse(ArvBuffer* buffer, std::uint64_t& count, ErrorCode code,
+                                            std::string message) {
   buffers_.return_unread(buffer);
-  ++counted_.stale;
-  return fail(ErrorCode::kFrameStale, "the frame was exposed before it was asked for", options_.name);
+  ++count;
+  return fail(code, std::move(message), options_.name);
+}
+
+std::optional<FrameChunks> FrameReceiver::read_chunks(ArvBuffer* buffer) {
+  return chunks_ ? chunks_->read(buffer) : FrameChunks{};
 }
 
 // The status first: what failed keeps the pixels, and often the size, of the frame before. A frame that ends too early
@@ -89,7 +126,9 @@ Result<std::optional<Frame>> FrameReceiver::take(MonotonicTime asked, const Devi
 std::string FrameReceiver::wrong_with(ArvBuffer* buffer) const {
   const ArvBufferStatus status = arv_buffer_get_status(buffer);
   if (status != ARV_BUFFER_STATUS_SUCCESS) return status_text(status);
-  if (arv_buffer_get_payload_type(buffer) != ARV_BUFFER_PAYLOAD_TYPE_IMAGE) return "it is no image";
+  const ArvBufferPayloadType payload = arv_buffer_get_payload_type(buffer);
+  const bool extended = chunks_ && payload == ARV_BUFFER_PAYLOAD_TYPE_EXTENDED_CHUNK_DATA;
+  if (payload != ARV_BUFFER_PAYLOAD_TYPE_IMAGE && !extended) return "it is no image";
   std::size_t bytes = 0;
   arv_buffer_get_image_data(buffer, &bytes);
   if (bytes < layout_.bytes())
@@ -111,15 +150,15 @@ void FrameReceiver::note_identifier(ArvBuffer* buffer) {
   if (std::exchange(underruns_, underruns) == underruns) counted_.lost += missing;
 }
 
-std::optional<MonotonicTime> FrameReceiver::exposure_start(ArvBuffer* buffer, MonotonicTime asked,
-                                                           const DeviceClock& clock) const {
+std::optional<MonotonicTime> FrameReceiver::exposure_start(ArvBuffer* buffer, const FrameChunks& chunks,
+                                                           MonotonicTime asked, const DeviceClock& clock) const {
   const MonotonicTime there = received(buffer);
   if (!clock.ready()) {
     const MonotonicTime start = there - from_us(options_.exposure_us);
     if (options_.trigger == AravisTrigger::kSoftware) return asked;
     return start < asked ? std::nullopt : std::optional(start);
   }
-  const nanoseconds device(arv_buffer_get_timestamp(buffer));
+  const nanoseconds device = chunks.exposure_start.value_or(nanoseconds(arv_buffer_get_timestamp(buffer)));
   const MonotonicTime start = clock.host_time(device);
   if (start + clock.uncertainty(device) < asked) return std::nullopt;
   return std::clamp(start, std::min(asked, there), there);
@@ -132,7 +171,7 @@ Result<std::optional<Frame>> FrameReceiver::deliver(ArvBuffer* buffer, Monotonic
     ++counted_.delivered;
     return std::make_optional<Frame>(view(buffer), sequence, start, there, buffers_.lend(buffer));
   }
-  auto grey = as_grey(view(buffer), start);
+  auto grey = as_grey(buffer, start);
   buffers_.return_unread(buffer);
   if (!grey) return fail(ErrorCode::kBusy, "all frames are held; give some back first", options_.name);
   ++counted_.delivered;
@@ -149,8 +188,15 @@ GreyView FrameReceiver::view(ArvBuffer* buffer) const {
   return ImageView<std::uint16_t>{static_cast<const std::uint16_t*>(pixels), width, height, width};
 }
 
-std::optional<Frame> FrameReceiver::as_grey(const GreyView& mosaic, MonotonicTime start) {
+std::optional<Frame> FrameReceiver::as_grey(ArvBuffer* buffer, MonotonicTime start) {
   const std::uint64_t sequence = counted_.delivered + counted_.lost;
+  if (layout_.pixels.packing != PixelPacking::kNone) {
+    std::size_t bytes = 0;
+    const void* packed = arv_buffer_get_image_data(buffer, &bytes);
+    unpack_pixels({static_cast<const std::uint8_t*>(packed), bytes}, layout_.pixels.packing, grey16_);
+    return greys_->lend(grey16_.view(), sequence, start);
+  }
+  const GreyView mosaic = view(buffer);
   if (const auto* deep = std::get_if<ImageView<std::uint16_t>>(&mosaic)) {
     grey_from_mosaic(*deep, grey16_, sums_);
     return greys_->lend(grey16_.view(), sequence, start);

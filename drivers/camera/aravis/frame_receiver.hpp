@@ -2,7 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +13,7 @@
 #include "core/result.hpp"
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/camera/aravis/aravis_statistics.hpp"
+#include "drivers/camera/aravis/chunk_reader.hpp"
 #include "drivers/camera/aravis/configure_device.hpp"
 #include "drivers/camera/aravis/device_clock.hpp"
 #include "drivers/camera/aravis/frame_ids.hpp"
@@ -25,8 +28,11 @@ namespace slsd {
 /// @thread thread-bound
 class FrameReceiver {
  public:
-  /// @param stream  outlives this
-  FrameReceiver(ArvStream* stream, const DeviceLayout& layout, const AravisCameraOptions& options);
+  /// @param stream         outlives this
+  /// @param payload_bytes  of a frame, with what the camera appends to it
+  /// @param chunks         of the camera; null where it appends none
+  FrameReceiver(ArvStream* stream, const DeviceLayout& layout, const AravisCameraOptions& options,
+                std::size_t payload_bytes, std::unique_ptr<ChunkReader> chunks);
 
   /// Begins to count anew.
   void restart();
@@ -37,30 +43,40 @@ class FrameReceiver {
   /// @param asked  frames exposed before are stale
   /// @param clock  of the device; where it is not ready the exposure is taken to end when the frame is there
   /// @return nothing if the stream gave a buffer up without a frame
-  /// @errors kFrameTorn, kFrameStale, kBusy
+  /// @errors kFrameTorn, kFrameStale, kBusy; kMismatch: exposed with other settings than configured
   [[nodiscard]] Result<std::optional<Frame>> take(MonotonicTime asked, const DeviceClock& clock);
   /// Takes the next buffer and gives it back.
   void discard();
+  /// As discard(). @return false if it is a frame whose chunks cannot be read
+  [[nodiscard]] bool discard_readable();
+  /// Gives back all that are done.
+  void discard_all();
 
   [[nodiscard]] AravisStatistics statistics() const;
 
  private:
+  [[nodiscard]] ArvBuffer* pop();
+  void return_unread(ArvBuffer* buffer);
   [[nodiscard]] std::string wrong_with(ArvBuffer* buffer) const;
+  [[nodiscard]] std::optional<FrameChunks> read_chunks(ArvBuffer* buffer);
+  [[nodiscard]] tl::unexpected<Error> refuse(ArvBuffer* buffer, std::uint64_t& count, ErrorCode code,
+                                             std::string message);
   void note_identifier(ArvBuffer* buffer);
-  [[nodiscard]] std::optional<MonotonicTime> exposure_start(ArvBuffer* buffer, MonotonicTime asked,
-                                                            const DeviceClock& clock) const;
+  [[nodiscard]] std::optional<MonotonicTime> exposure_start(ArvBuffer* buffer, const FrameChunks& chunks,
+                                                            MonotonicTime asked, const DeviceClock& clock) const;
   [[nodiscard]] Result<std::optional<Frame>> deliver(ArvBuffer* buffer, MonotonicTime exposure_start);
   [[nodiscard]] GreyView view(ArvBuffer* buffer) const;
-  [[nodiscard]] std::optional<Frame> as_grey(const GreyView& mosaic, MonotonicTime exposure_start);
+  [[nodiscard]] std::optional<Frame> as_grey(ArvBuffer* buffer, MonotonicTime exposure_start);
 
   ArvStream* stream_;
   DeviceLayout layout_;
   const AravisCameraOptions& options_;
   StreamBuffers buffers_;
+  std::unique_ptr<ChunkReader> chunks_;  ///< ends before the buffers
   FrameIds ids_;
   std::uint64_t underruns_ = 0;
   AravisStatistics counted_;
-  std::optional<FramePool> greys_;  ///< of mosaics turned into grey
+  std::optional<FramePool> greys_;  ///< of mosaics turned into grey, and of packed pixels unpacked
   Grey8 grey8_;
   Grey16 grey16_;
   std::vector<std::uint32_t> sums_;

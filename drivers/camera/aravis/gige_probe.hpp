@@ -3,19 +3,13 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
 
 #include "core/result.hpp"
+#include "drivers/camera/aravis/gvcp.hpp"
 
 namespace slsd {
-
-/// A GigE Vision device that answered, and through which of this host's interfaces.
-struct GigeDevice {
-  std::string address;    ///< IPv4
-  std::string interface;  ///< IPv4 address of this host
-  std::string vendor;
-  std::string serial;
-};
 
 /// Asks the device at the address who it is (GVCP discovery). Aravis itself would wait for seconds for one that is not
 /// there, and may ask through the wrong interface.
@@ -24,5 +18,15 @@ struct GigeDevice {
 /// @thread reentrant
 [[nodiscard]] Result<GigeDevice> probe_gige_device(const std::string& address, const std::string& interface,
                                                    std::chrono::milliseconds timeout);
+
+/// Who controls the device, "10.0.0.5:4711", or "another application" where it does not tell; empty if nobody does.
+/// @return nothing if it does not answer
+/// @thread reentrant
+[[nodiscard]] std::optional<std::string> gige_controller(const GigeDevice& device, std::chrono::milliseconds timeout);
+
+/// Sends the device an action command. One that is lost is noticed by the frame that does not come.
+/// @thread reentrant
+void send_gige_action(const std::string& address, const std::string& interface, const ActionKeys& keys,
+                      std::optional<std::uint64_t> ticks);
 
 }  // namespace slsd

@@ -2,23 +2,33 @@
 // Copyright the slsd authors
 #include "drivers/camera/aravis/open_device.hpp"
 
-#include <arpa/inet.h>
 #include <algorithm>
 #include <chrono>
+#include <mutex>
 #include <optional>
+#include <thread>
 #include <utility>
 
+#include "drivers/camera/aravis/gige_discovery.hpp"
 #include "drivers/camera/aravis/gige_probe.hpp"
-#include "drivers/camera/aravis/list_devices.hpp"
 
 namespace slsd {
 namespace {
 
-constexpr std::chrono::milliseconds kProbe{600};
+using namespace std::chrono_literals;
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
 
-bool is_address(const std::string& text) {
-  in_addr address{};
-  return ::inet_pton(AF_INET, text.c_str(), &address) == 1;
+constexpr milliseconds kProbe{600};
+constexpr milliseconds kRelease{700};  // below a second, in which the service is to stop
+constexpr milliseconds kReleasePoll{30};
+constexpr std::uint64_t kHeartbeatRegister = 0x938;
+constexpr std::uint32_t kHeartbeatMs = 2000;  // Aravis is heard of every second
+
+// Aravis 0.8 builds a device's description with a table of its own that no lock protects.
+std::mutex& description_mutex() {
+  static std::mutex mutex;
+  return mutex;
 }
 
 bool is_named(const std::string& id, const std::string& vendor, const std::string& serial) {
@@ -29,38 +39,45 @@ GObjectPtr<GInetAddress> inet_address(const std::string& text) {
   return GObjectPtr<GInetAddress>(g_inet_address_new_from_string(text.c_str()));
 }
 
+tl::unexpected<Error> fail_controlled(const std::string& by, const std::string& name) {
+  return fail(ErrorCode::kPermissionDenied,
+              "another application controls the camera" + (by.empty() ? "" : ", from " + by) +
+                  "; close it there, or wait until its heartbeat has run out",
+              name);
+}
+
+// A device gives its controller up only when that was not heard for so long, three seconds by default.
+void shorten_heartbeat(ArvDevice* device) {
+  guint32 heartbeat_ms = 0;
+  GErrorSlot error;
+  if (!arv_device_read_register(device, kHeartbeatRegister, &heartbeat_ms, error.out())) return;
+  if (heartbeat_ms > kHeartbeatMs) arv_device_write_register(device, kHeartbeatRegister, kHeartbeatMs, error.out());
+}
+
 Result<OpenedDevice> control(GObjectPtr<ArvDevice> device, std::string name, std::string address) {
   const bool gige = ARV_IS_GV_DEVICE(device.get());
-  if (gige && !arv_gv_device_is_controller(ARV_GV_DEVICE(device.get())))
-    return fail(ErrorCode::kPermissionDenied,
-                "another application controls the camera; close it there, or wait until its heartbeat has run out",
-                name);
+  if (gige && !arv_gv_device_is_controller(ARV_GV_DEVICE(device.get()))) return fail_controlled("", name);
+  if (gige) shorten_heartbeat(device.get());
   GErrorSlot error;
   GObjectPtr<ArvCamera> camera(arv_camera_new_with_device(device.get(), error.out()));
   if (!camera || error.failed()) return fail(error.code(), "the camera cannot be used: " + error.message(), name);
   return OpenedDevice{std::move(camera), std::move(name), std::move(address)};
 }
 
-Result<OpenedDevice> open_gige(const GigeDevice& found) {
-  const std::string name = found.vendor + "-" + found.serial;
-  const auto interface = inet_address(found.interface);
-  const auto address = inet_address(found.address);
-  GErrorSlot error;
-  GObjectPtr<ArvDevice> device(arv_gv_device_new(interface.get(), address.get(), error.out()));
-  if (!device || error.failed()) return fail(error.code(), "the camera cannot be opened: " + error.message(), name);
-  return control(std::move(device), name, found.address);
+/// Who still controls the device after a while; empty if nobody does, or it does not answer.
+std::string controller_that_stays(const GigeDevice& device) {
+  const auto end = steady_clock::now() + kRelease;
+  for (;;) {
+    const std::string controller = gige_controller(device, kProbe / 2).value_or("");
+    if (controller.empty() || steady_clock::now() >= end) return controller;
+    std::this_thread::sleep_for(kReleasePoll);
+  }
 }
 
-Result<OpenedDevice> open_usb3(const AravisDevice& listed) {
-  const std::string name = listed.vendor + "-" + listed.serial;
-  GErrorSlot error;
-  GObjectPtr<ArvDevice> device(arv_open_device(listed.id.c_str(), error.out()));
-  if (!device || error.failed())
-    return fail(error.failed() ? error.code() : ErrorCode::kPermissionDenied,
-                "the camera cannot be opened: " + error.message() +
-                    "; if it is a USB camera, check that the udev rules let this user write to it",
-                name);
-  return control(std::move(device), name, "");
+Result<OpenedDevice> open_when_free(const GigeDevice& found) {
+  if (const std::string controller = controller_that_stays(found); !controller.empty())
+    return fail_controlled(controller, found.name());
+  return open_gige_device(found);
 }
 
 std::optional<GigeDevice> found_before(const AravisCameraOptions& options, const std::string& address) {
@@ -73,23 +90,48 @@ std::optional<GigeDevice> found_before(const AravisCameraOptions& options, const
 }  // namespace
 
 Result<OpenedDevice> open_device(const AravisCameraOptions& options, const std::string& address) {
-  if (is_address(options.id)) {
+  if (options.names_address()) {
     const auto found = probe_gige_device(options.id, options.interface, kProbe);
-    return found ? open_gige(*found) : tl::unexpected(found.error());
+    return found ? open_when_free(*found) : tl::unexpected(found.error());
   }
-  if (const auto found = found_before(options, address)) return open_gige(*found);
-  const auto listed = list_aravis_devices();
-  const auto named = std::ranges::find_if(listed, [&](const AravisDevice& device) {
-    return options.id == device.id || is_named(options.id, device.vendor, device.serial);
-  });
-  if (named == listed.end())
-    return fail(ErrorCode::kNotFound,
-                "no GigE Vision or USB3 Vision camera of this name is found; slsd --list shows those that are. One in "
-                "another network is found by its address only",
-                options.id);
-  if (named->address.empty()) return open_usb3(*named);
-  const auto found = probe_gige_device(named->address, options.interface, kProbe);
-  return found ? open_gige(*found) : tl::unexpected(found.error());
+  if (const auto found = found_before(options, address)) return open_when_free(*found);
+  const auto named = [&](const auto& device) { return is_named(options.id, device.vendor, device.serial); };
+  const auto answered = discover_gige_devices(kProbe, named);
+  if (!answered.empty() && named(answered.back())) {
+    const auto found = probe_gige_device(answered.back().address, options.interface, kProbe);
+    return found ? open_when_free(*found) : tl::unexpected(found.error());
+  }
+  const auto listed = list_usb3_devices();
+  const auto usb3 = std::ranges::find_if(listed, [&](const auto& one) { return named(one) || one.id == options.id; });
+  if (usb3 != listed.end()) return open_usb3_device(*usb3);
+  return fail(ErrorCode::kNotFound,
+              "no GigE Vision or USB3 Vision camera of this name is found; slsd --list shows those that are. One in "
+              "another network is found by its address only",
+              options.id);
+}
+
+Result<OpenedDevice> open_gige_device(const GigeDevice& found) {
+  const std::string name = found.name();
+  const auto interface = inet_address(found.interface);
+  const auto address = inet_address(found.address);
+  const std::lock_guard lock(description_mutex());
+  GErrorSlot error;
+  GObjectPtr<ArvDevice> device(arv_gv_device_new(interface.get(), address.get(), error.out()));
+  if (!device || error.failed()) return fail(error.code(), "the camera cannot be opened: " + error.message(), name);
+  return control(std::move(device), name, found.address);
+}
+
+Result<OpenedDevice> open_usb3_device(const Usb3Device& listed) {
+  const std::string name = listed.vendor + "-" + listed.serial;
+  const std::lock_guard lock(description_mutex());
+  GErrorSlot error;
+  GObjectPtr<ArvDevice> device(arv_open_device(listed.id.c_str(), error.out()));
+  if (!device || error.failed())
+    return fail(error.failed() ? error.code() : ErrorCode::kPermissionDenied,
+                "the camera cannot be opened: " + error.message() +
+                    "; if it is a USB camera, check that the udev rules let this user write to it",
+                name);
+  return control(std::move(device), name, "");
 }
 
 }  // namespace slsd

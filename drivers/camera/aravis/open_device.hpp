@@ -7,6 +7,8 @@
 #include "core/result.hpp"
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/camera/aravis/g_object.hpp"
+#include "drivers/camera/aravis/gvcp.hpp"
+#include "drivers/camera/aravis/usb3_devices.hpp"
 
 namespace slsd {
 
@@ -17,11 +19,18 @@ struct OpenedDevice {
   std::string address;  ///< IPv4, of GigE Vision; else empty
 };
 
-/// Finds the device that the options name and takes control of it.
+/// Finds the device that the options name and takes control of it. Where another still has control, as the session
+/// before may have after a failure of the network, waits a little for its end.
 /// @param address  where it was found before; it is looked for there first, which is sooner; may be empty
 /// @errors kNotFound, kPermissionDenied (another application controls it), kDisconnected, kUnsupported,
 /// kInvalidArgument
 /// @thread thread-safe
 [[nodiscard]] Result<OpenedDevice> open_device(const AravisCameraOptions& options, const std::string& address);
+
+/// Takes control of a device that is known.
+/// @errors as open_device()
+/// @thread thread-safe
+[[nodiscard]] Result<OpenedDevice> open_gige_device(const GigeDevice& found);
+[[nodiscard]] Result<OpenedDevice> open_usb3_device(const Usb3Device& listed);
 
 }  // namespace slsd

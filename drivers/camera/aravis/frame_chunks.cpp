@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/aravis/frame_chunks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "drivers/camera/aravis/device_clock.hpp"
+
+namespace slsd {
+namespace {
+
+using std::chrono::nanoseconds;
+
+// Twice what configuring allows: sensors add a constant to what they were set to.
+constexpr double kExposureToleranceShare = 0.02;
+constexpr double kExposureToleranceUs = 40.0;
+constexpr double kGainToleranceDb = 0.2;
+constexpr std::uint64_t kLongest = 1ull << 62;  // 146 years in nanoseconds
+
+std::string difference(const char* what, double taken, double configured, const char* unit) {
+  char text[128];
+  std::snprintf(text, sizeof(text), "its %s was %.10g %s where %.10g is configured", what, taken, unit, configured);
+  return text;
+}
+
+bool is_nearer(nanoseconds a, nanoseconds b, nanoseconds to) {
+  return std::chrono::abs(a - to) < std::chrono::abs(b - to);
+}
+
+}  // namespace
+
+std::string unlike_configured(const FrameChunks& chunks, const AravisCameraOptions& options) {
+  const double share = options.exposure_us * kExposureToleranceShare;
+  const double tolerance = std::min(std::max(kExposureToleranceUs, share), options.exposure_us / 2);
+  // So that what is no number is refused.
+  if (chunks.exposure_us && !(std::abs(*chunks.exposure_us - options.exposure_us) <= tolerance))
+    return difference("exposure", *chunks.exposure_us, options.exposure_us, "us");
+  if (chunks.gain_db && !(std::abs(*chunks.gain_db - options.gain_db) <= kGainToleranceDb))
+    return difference("gain", *chunks.gain_db, options.gain_db, "dB");
+  return {};
+}
+
+std::optional<nanoseconds> chunk_time(std::uint64_t value, nanoseconds frame_stamp, std::uint64_t tick_frequency_hz,
+                                      nanoseconds apart_max) {
+  // What is no time at all would not fit.
+  if (value > kLongest || frame_stamp < nanoseconds(0)) return std::nullopt;
+  const nanoseconds plain(static_cast<nanoseconds::rep>(value));
+  const bool ticks = tick_frequency_hz > 0 && value / tick_frequency_hz < kLongest / 1'000'000'000;
+  const nanoseconds ticked = ticks ? from_ticks(value, tick_frequency_hz) : plain;
+  const nanoseconds time = is_nearer(ticked, plain, frame_stamp) ? ticked : plain;
+  return std::chrono::abs(time - frame_stamp) <= apart_max ? std::optional(time) : std::nullopt;
+}
+
+}  // namespace slsd

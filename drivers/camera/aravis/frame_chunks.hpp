@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "drivers/camera/aravis/aravis_camera_options.hpp"
+
+namespace slsd {
+
+/// What a camera says of one frame in the chunks behind its image; each where the camera has such a chunk.
+struct FrameChunks {
+  std::optional<std::chrono::nanoseconds> exposure_start;  ///< by the device's clock
+  std::optional<double> exposure_us;                       ///< as it really was
+  std::optional<double> gain_db;                           ///< as it really was
+
+  friend bool operator==(const FrameChunks&, const FrameChunks&) = default;
+};
+
+/// What of the frame's settings is not as configured, in words; empty where all is, or nothing is known.
+/// @thread reentrant
+[[nodiscard]] std::string unlike_configured(const FrameChunks& chunks, const AravisCameraOptions& options);
+
+/// The time stamp of a chunk, which some cameras give in nanoseconds and some in their clock's ticks: whichever is
+/// nearer to the time stamp that the frame begins with. That is of the same clock, and may be of the readout.
+/// @param frame_stamp        the frame's own, by the device's clock
+/// @param tick_frequency_hz  0: its ticks are nanoseconds
+/// @param apart_max          beyond it both are of another clock, or of two frames
+/// @return nothing if neither is within that
+/// @thread reentrant
+[[nodiscard]] std::optional<std::chrono::nanoseconds> chunk_time(std::uint64_t value,
+                                                                 std::chrono::nanoseconds frame_stamp,
+                                                                 std::uint64_t tick_frequency_hz,
+                                                                 std::chrono::nanoseconds apart_max);
+
+}  // namespace slsd

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/aravis/frame_patience.hpp"
+
+#include <algorithm>
+#include <cstdint>
+
+namespace slsd {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+
+constexpr milliseconds kFirstFrame{250};  // readout and transfer
+
+/// Until the exposure has ended.
+nanoseconds exposure_time(const AravisCameraOptions& options) {
+  const double period_us = options.rate_hz > 0.0 ? 1e6 / options.rate_hz : 0.0;
+  return from_us(options.exposure_us + options.action_lead_us + period_us);
+}
+
+}  // namespace
+
+nanoseconds from_us(double duration_us) {
+  return nanoseconds(static_cast<std::int64_t>(duration_us * 1e3));
+}
+
+nanoseconds frame_patience(const AravisCameraOptions& options) {
+  return milliseconds(options.frame_timeout_ms) + exposure_time(options);
+}
+
+nanoseconds first_frame_patience(const AravisCameraOptions& options) {
+  return std::min(milliseconds(options.frame_timeout_ms), kFirstFrame) + exposure_time(options);
+}
+
+}  // namespace slsd
