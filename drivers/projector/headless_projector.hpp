@@ -2,26 +2,33 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "drivers/projector/light_curve.hpp"
+#include "drivers/projector/offscreen_target.hpp"
 #include "drivers/projector/projector.hpp"
+#include "drivers/projector/texel_painter.hpp"
 
 namespace slsd {
 
 /// The keys of the [projector] table that a headless projector reads.
 struct HeadlessProjectorOptions {
-  int width_px = 1280;                            ///< 1 to 16384
-  int height_px = 800;                            ///< 1 to 16384
+  int width_px = 1280;  ///< 1 to 16384
+  int height_px = 800;  ///< 1 to 16384
+  LightOptions light = {};
   double refresh_hz = 60.0;                       ///< 1 to 1000
   std::vector<std::uint64_t> disconnect_at = {};  ///< at which calls of show(), counted from 1, it is found unplugged
 
   [[nodiscard]] Result<> validate() const;
 };
 
-/// A projector that nobody sees: keeps the image, keeps the time of its refreshes.
-/// @thread thread-bound
+/// A projector that nobody sees: draws the image off screen as a monitor would get it, keeps the time of its refreshes.
+/// @thread one at a time
 class HeadlessProjector final : public Projector {
  public:
   explicit HeadlessProjector(HeadlessProjectorOptions options);
@@ -29,18 +36,24 @@ class HeadlessProjector final : public Projector {
   [[nodiscard]] const ProjectorDescription& description() const override { return description_; }
   [[nodiscard]] Result<> open() override;
   [[nodiscard]] Result<MonotonicTime> show(const Grey8& image) override;
+  [[nodiscard]] Result<> check() override;
+  [[nodiscard]] std::vector<std::string> warnings() const override { return {}; }
   [[nodiscard]] Result<Grey8> read_back() override;
 
   /// Pulls the plug: every call but open() gives kDisconnected from now on.
-  void disconnect() { shown_.reset(); }
+  void disconnect() { connected_ = false; }
 
  private:
-  [[nodiscard]] Result<> check_connected() const;
+  [[nodiscard]] Result<> make_target();
+  void draw(const Grey8& image);
+  [[nodiscard]] std::chrono::nanoseconds period() const;
   [[nodiscard]] MonotonicTime next_refresh(MonotonicTime after) const;
 
   HeadlessProjectorOptions options_;
   ProjectorDescription description_;
-  std::optional<Grey8> shown_;  ///< empty while it is not connected
+  std::unique_ptr<OffscreenTarget> target_;  ///< empty until it was opened
+  std::optional<TexelPainter> painter_;
+  bool connected_ = false;
   MonotonicTime first_refresh_;
   std::uint64_t shows_ = 0;
 };

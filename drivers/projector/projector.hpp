@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/image.hpp"
 #include "core/result.hpp"
@@ -17,8 +18,8 @@ struct ProjectorDescription {
   int height_px = 0;
 };
 
-/// A projector that shows one image, pixel for pixel. Backends: headless. Every backend passes the suite in
-/// tests/drivers.
+/// A projector that shows one image, pixel for pixel. Backends: headless, glfw. Every backend passes the suite
+/// in tests/drivers.
 /// After kDisconnected it needs open(), and then shows black until show().
 /// @thread thread-bound
 class Projector {
@@ -30,9 +31,17 @@ class Projector {
   /// @errors kNotFound, kPermissionDenied, kMismatch, kUnsupported, kDisconnected
   [[nodiscard]] virtual Result<> open() = 0;
 
-  /// Shows the image from now on; waits for its first complete refresh to begin and returns when that was.
+  /// Shows the image from now on; waits for its first whole refresh to be complete, from the first row to the last, and
+  /// returns when that was. How long the device itself takes from there to its light, no driver knows.
   /// @errors kMismatch: not of the projector's size; kDisconnected
   [[nodiscard]] virtual Result<MonotonicTime> show(const Grey8& image) = 0;
+
+  /// Whether it still shows what it was told to, now; waits for no refresh. Asked before and after each frame of a
+  /// scan, and while nobody scans. @errors kDisconnected
+  [[nodiscard]] virtual Result<> check() = 0;
+
+  /// What disturbs the light that it gives, as found by open(): a sentence each, with the remedy.
+  [[nodiscard]] virtual std::vector<std::string> warnings() const = 0;
 
   /// What is shown, as read back from where it is shown. @errors kDisconnected
   [[nodiscard]] virtual Result<Grey8> read_back() = 0;

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/projector/glfw/projector_screen.hpp"
+
+#include <utility>
+
+#include <X11/Xlib.h>
+#include <X11/Xutil.h>
+
+#include "drivers/projector/x11/choose_output.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr int kSideMaxPx = 16384;
+
+struct DestroyImage {
+  void operator()(XImage* image) const { XDestroyImage(image); }
+};
+
+std::uint8_t channel(unsigned long pixel, unsigned long mask) {
+  return static_cast<std::uint8_t>((pixel & mask) / (mask & ~(mask - 1)));
+}
+
+}  // namespace
+
+Result<> GlfwProjectorOptions::validate() const {
+  if (width_px < 1 || width_px > kSideMaxPx)
+    return fail(ErrorCode::kInvalidArgument, "must be between 1 and 16384", "width_px");
+  if (height_px < 1 || height_px > kSideMaxPx)
+    return fail(ErrorCode::kInvalidArgument, "must be between 1 and 16384", "height_px");
+  if (auto valid = light.validate(); !valid) return valid;
+  return {};
+}
+
+Result<> ProjectorScreen::open() {
+  close();
+  if (auto opened = open_session(); !opened) return opened;
+  if (auto found = find_output(); !found) return found;
+  if (auto opened = open_window(); !opened) {
+    close();
+    return opened;
+  }
+  const auto shown = show(Grey8(options_.width_px, options_.height_px));
+  if (shown) return {};
+  close();
+  return tl::unexpected(shown.error());
+}
+
+void ProjectorScreen::close() {
+  clock_.reset();
+  painter_.reset();
+  window_.reset();
+}
+
+void ProjectorScreen::end() {
+  close();
+  awake_.reset();
+  session_.reset();
+}
+
+Result<> ProjectorScreen::open_session() {
+  if (session_ && !session_->lost()) return {};
+  end();
+  auto session = GlfwSession::open();
+  if (!session) return tl::unexpected(session.error());
+  session_ = std::move(*session);
+  awake_ = StayAwake::begin(session_->display());
+  return {};
+}
+
+Result<> ProjectorScreen::find_output() {
+  XSync(session_->display(), False);
+  session_->handle_events();
+  const auto outputs = read_outputs(session_->display());
+  auto output = choose_output(outputs, options_.monitor, output_.name);
+  if (!output) return tl::unexpected(output.error());
+  const bool can_switch =
+      output->native_width_px == options_.width_px && output->native_height_px == options_.height_px;
+  const auto fits = check_fit(*output, options_.width_px, options_.height_px);
+  if (!fits && !can_switch) return fits;
+  output_ = std::move(*output);
+  return {};
+}
+
+Result<> ProjectorScreen::open_window() {
+  auto window = FullscreenWindow::open(*session_, output_, options_.width_px, options_.height_px);
+  if (!window) return tl::unexpected(window.error());
+  window_ = std::move(*window);
+  auto painter = TexelPainter::create(options_.width_px, options_.height_px, LightCurve(options_.light));
+  if (!painter) return tl::unexpected(painter.error());
+  painter_ = *painter;
+  const auto outputs = read_outputs(session_->display());
+  auto output = choose_output(outputs, output_.name, {});
+  if (!output) return tl::unexpected(output.error());
+  if (auto fits = check_fit(*output, options_.width_px, options_.height_px); !fits) return fits;
+  output_ = std::move(*output);
+  warnings_ = output_warnings(output_, outputs);
+  clock_ = RefreshClock::open(DisplayString(session_->display()), window_->id(), output_.refresh_hz);
+  window_->set_redraw([this] { redraw(); });
+  return {};
+}
+
+void ProjectorScreen::redraw() {
+  painter_->draw();
+  window_->swap();
+}
+
+Result<> ProjectorScreen::check_open() const {
+  if (is_open()) return {};
+  return fail(ErrorCode::kDisconnected, "the projector is not there; check its cable and its power",
+              output_.name.empty() ? "projector" : "monitor " + output_.name);
+}
+
+Result<MonotonicTime> ProjectorScreen::show(const Grey8& image) {
+  handle_events();
+  if (auto there = check_open(); !there) return tl::unexpected(there.error());
+  painter_->load(image);
+  painter_->draw();
+  clock_->prepare();
+  window_->swap();
+  auto refresh = clock_->wait_refresh();
+  handle_events();
+  if (auto there = check_open(); !there) return tl::unexpected(there.error());
+  return refresh;
+}
+
+Result<Grey8> ProjectorScreen::read_back() {
+  handle_events();
+  if (auto there = check_open(); !there) return tl::unexpected(there.error());
+  const DesktopArea& area = output_.area;
+  const std::unique_ptr<XImage, DestroyImage> screen(
+      XGetImage(session_->display(), DefaultRootWindow(session_->display()), area.x_px, area.y_px,
+                static_cast<unsigned>(area.width_px), static_cast<unsigned>(area.height_px), AllPlanes, ZPixmap));
+  if (!screen) {
+    handle_events();
+    return fail(ErrorCode::kDisconnected, "the X server gives no screenshot of it", "monitor " + output_.name);
+  }
+  Grey8 image(area.width_px, area.height_px);
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      image.at(x, y) = channel(XGetPixel(screen.get(), x, y), screen->green_mask);
+    }
+  }
+  return image;
+}
+
+// GLFW takes a window away from a monitor that was gone for a moment, and puts it elsewhere.
+bool ProjectorScreen::is_in_place() const {
+  return lit_area(session_->display(), output_.id) == output_.area && window_->covers(output_.area);
+}
+
+int ProjectorScreen::handle_events() {
+  if (!session_) return -1;
+  do {  // what is asked of the server may read further events, which then no descriptor tells of
+    session_->handle_events();
+    if (window_ && !session_->lost() && !is_in_place()) close();
+  } while (!session_->lost() && XEventsQueued(session_->display(), QueuedAlready) > 0);
+  if (!session_->lost()) return session_->descriptor();
+  close();
+  return -1;
+}
+
+}  // namespace slsd

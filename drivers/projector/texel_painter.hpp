@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include "core/image.hpp"
+#include "core/result.hpp"
+#include "drivers/projector/light_curve.hpp"
+
+namespace slsd {
+
+/// Draws a grey image with OpenGL ES 3 so that texel (x, y) becomes pixel (x, y), the first row on top: no filter, no
+/// dithering, no sRGB, no scaling. What the headless projector keeps and what a monitor shows is drawn by this alone.
+/// Its objects belong to the context that was current when it was made, and end with it.
+/// @thread thread-bound: the context is current in every call
+class TexelPainter {
+ public:
+  /// @errors kUnsupported: the context cannot draw so large an image, or not as needed
+  /// @param curve  what becomes of each grey value; with the identity every value is exact
+  [[nodiscard]] static Result<TexelPainter> create(int width_px, int height_px, const LightCurve& curve);
+
+  /// Takes the image that is drawn from now on. @param image  of the size that the painter was made for
+  void load(const Grey8& image);
+
+  /// Draws the image over the whole current framebuffer, and waits until that is done.
+  void draw();
+
+  /// Reads the current framebuffer: the value of the green channel.
+  [[nodiscard]] Grey8 read() const;
+
+ private:
+  TexelPainter(int width_px, int height_px, const LightCurve& curve)
+      : width_px_(width_px), height_px_(height_px), curve_(curve) {}
+  [[nodiscard]] Result<> make_program();
+  void make_texture();
+
+  int width_px_;
+  int height_px_;
+  LightCurve curve_;
+  unsigned program_ = 0;
+  unsigned texture_ = 0;
+};
+
+}  // namespace slsd

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/projector/x11/choose_output.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+namespace slsd {
+namespace {
+
+std::string size_text(int width_px, int height_px) {
+  return std::to_string(width_px) + "x" + std::to_string(height_px);
+}
+
+std::string place_text(const DesktopArea& area) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%+d%+d", area.x_px, area.y_px);
+  return text;
+}
+
+bool overlap(const DesktopArea& a, const DesktopArea& b) {
+  return a.x_px < b.x_px + b.width_px && b.x_px < a.x_px + a.width_px && a.y_px < b.y_px + b.height_px &&
+         b.y_px < a.y_px + a.height_px;
+}
+
+std::string names_of(std::span<const RandrOutput> outputs) {
+  std::string names;
+  for (const RandrOutput& output : outputs) (names += names.empty() ? "" : "; ") += describe_output(output);
+  return names.empty() ? "no monitor is plugged in and lit" : "there are: " + names;
+}
+
+tl::unexpected<Error> not_there(const std::string& which, std::span<const RandrOutput> outputs) {
+  return fail(ErrorCode::kNotFound,
+              which + "; " + names_of(outputs) + ". Check its cable and its power, or change [projector] monitor",
+              "projector");
+}
+
+// Where the desktop has no primary monitor the first counts as that.
+std::vector<RandrOutput> others_than_primary(std::span<const RandrOutput> outputs) {
+  auto primary = std::ranges::find_if(outputs, &RandrOutput::primary);
+  if (primary == outputs.end()) primary = outputs.begin();
+  std::vector<RandrOutput> others;
+  for (const RandrOutput& output : outputs) {
+    if (output.id != primary->id) others.push_back(output);
+  }
+  return others;
+}
+
+}  // namespace
+
+std::string describe_output(const RandrOutput& output) {
+  std::string text = output.name;
+  if (!output.model.empty()) text += ", " + output.model;
+  if (!output.serial.empty()) text += ", serial " + output.serial;
+  char refresh[32];
+  std::snprintf(refresh, sizeof refresh, " at %.2f Hz, ", output.refresh_hz);
+  text += ", " + size_text(output.area.width_px, output.area.height_px) + refresh + place_text(output.area);
+  return output.primary ? text + ", primary" : text;
+}
+
+Result<RandrOutput> choose_output(std::span<const RandrOutput> outputs, const std::string& wanted,
+                                  const std::string& last) {
+  const std::string& name = wanted.empty() ? last : wanted;
+  if (!name.empty()) {
+    for (const RandrOutput& output : outputs) {
+      if (output.name == name || output.serial == name || place_text(output.area) == name) return output;
+    }
+    return not_there("the monitor \"" + name + "\" is not there", outputs);
+  }
+  if (outputs.empty()) return not_there("the projector is not there", outputs);
+  if (outputs.size() == 1) return outputs.front();
+  const auto others = others_than_primary(outputs);
+  if (others.size() == 1) return others.front();
+  return fail(ErrorCode::kInvalidArgument,
+              "name the monitor that is the projector as [projector] monitor; " + names_of(outputs), "projector");
+}
+
+Result<> check_fit(const RandrOutput& output, int width_px, int height_px) {
+  const std::string where = "monitor " + output.name;
+  const std::string size = size_text(width_px, height_px);
+  const std::string xrandr = "xrandr --output " + output.name;
+  if (output.transformed) {
+    return fail(ErrorCode::kMismatch, "its picture is scaled: run " + xrandr + " --scale 1x1 --transform none", where);
+  }
+  if (output.area.width_px == width_px && output.area.height_px == height_px) return {};
+  if (output.rotation_deg % 180 != 0 && output.area.width_px == height_px && output.area.height_px == width_px) {
+    return fail(ErrorCode::kMismatch, "its picture is turned: run " + xrandr + " --rotate normal", where);
+  }
+  return fail(ErrorCode::kMismatch,
+              "it shows " + size_text(output.area.width_px, output.area.height_px) + " pixels, and [projector] says " +
+                  size + ": set width_px and height_px to its native size" +
+                  (output.native_width_px > 0 ? ", " + size_text(output.native_width_px, output.native_height_px)
+                                              : std::string()) +
+                  ", or run " + xrandr + " --mode " + size,
+              where);
+}
+
+std::vector<std::string> output_warnings(const RandrOutput& output, std::span<const RandrOutput> outputs) {
+  std::vector<std::string> warnings;
+  const std::string xrandr = "run xrandr --output " + output.name;
+  const bool native =
+      output.mode_width_px == output.native_width_px && output.mode_height_px == output.native_height_px;
+  if (output.native_width_px > 0 && !native) {
+    warnings.push_back("its native size is " + size_text(output.native_width_px, output.native_height_px) +
+                       ": it scales the pattern, which blurs it; use that size");
+  }
+  for (const RandrOutput& other : outputs) {
+    if (other.id == output.id || !overlap(other.area, output.area)) continue;
+    warnings.push_back("it mirrors " + other.name + ": what others show there is in the pattern; " + xrandr +
+                       " --right-of " + other.name);
+  }
+  if (output.rotation_deg != 0 || output.reflected) {
+    warnings.push_back("its picture is turned or reflected: it must stay as it was when calibrating; else " + xrandr +
+                       " --rotate normal --reflect normal");
+  }
+  if (output.gamma_active) {
+    warnings.push_back("a gamma table is active, which changes grey values: " + xrandr +
+                       " --gamma 1:1:1, and end night light and colour management");
+  }
+  if (!output.rgb_range.empty() && output.rgb_range != "Full") {
+    warnings.push_back("its RGB range is \"" + output.rgb_range + "\", with which black may not be dark: " + xrandr +
+                       " --set \"Broadcast RGB\" Full");
+  }
+  if (output.underscan) warnings.push_back("underscan scales the pattern: " + xrandr + " --set underscan off");
+  if (output.name.starts_with("XWAYLAND")) {
+    warnings.push_back("a Wayland session stands between: it may scale, delay and cover the pattern; use an X server");
+  }
+  return warnings;
+}
+
+}  // namespace slsd

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace slsd {
+
+/// Who a monitor says that it is.
+struct EdidIdentity {
+  std::string model;   ///< its name, else maker and product number; empty: unknown
+  std::string serial;  ///< as text where it has one, else as a number; empty: none
+};
+
+/// Reads the first block of a monitor's EDID (VESA E-EDID 1.4). Bytes that are none give an empty identity.
+/// @thread reentrant
+[[nodiscard]] EdidIdentity read_edid(std::span<const std::uint8_t> bytes);
+
+}  // namespace slsd
