@@ -14,10 +14,12 @@ enum Command : std::uint32_t {
   kDiscovery = 0x0002,
   kPacketResend = 0x0040,
   kReadRegister = 0x0080,
+  kAction = 0x0100,
   kWriteRegister = 0x0082,
   kReadMemory = 0x0084,
   kWriteMemory = 0x0086,
 };
+constexpr std::uint32_t kScheduled = 0x80;
 constexpr std::uint32_t kCommandKey = 0x42;
 constexpr std::uint32_t kAccessDenied = 0x8006;
 constexpr std::uint32_t kNoSuchAddress = 0x8003;
@@ -50,7 +52,7 @@ const std::vector<std::uint8_t>& ControlPort::answer(std::span<const std::uint8_
   answer_.clear();
   WireReader reader(command);
   if (command.size() < 8 || reader.u8() != kCommandKey) return answer_;
-  reader.u8();
+  const std::uint32_t flags = reader.u8();
   const std::uint32_t what = reader.u16();
   reader.u16();
   const std::uint32_t id = reader.u16();
@@ -59,6 +61,8 @@ const std::vector<std::uint8_t>& ControlPort::answer(std::span<const std::uint8_
     answer_read(what, id, 0, kDiscoveryBytes);
   else if (what == kPacketResend)
     ask_resend(reader.rest());
+  else if (what == kAction)
+    act((flags & kScheduled) != 0, reader.rest());
   else if (what == kReadRegister)
     acknowledge(answer_, 0, what, 4, id).u32(registers_.read(reader.u32()));
   else if (what == kReadMemory)
@@ -94,6 +98,17 @@ void ControlPort::answer_write(std::uint32_t what, std::uint32_t id, std::span<c
   acknowledge(answer_, !allowed ? kAccessDenied : (there ? 0 : kNoSuchAddress), what, 4, id).u16(0).u16(there ? 1 : 0);
 }
 
+void ControlPort::act(bool scheduled, std::span<const std::uint8_t> body) {
+  WireReader reader(body);
+  const bool device = reader.u32() == registers_.read(kActionDeviceKey);
+  const bool group = reader.u32() == registers_.read(kActionGroupKey);
+  if (!device || !group || (reader.u32() & registers_.read(kActionGroupMask)) == 0) return;
+  std::optional<std::uint64_t> ticks;
+  if (scheduled) ticks = std::uint64_t{reader.u32()} << 32;
+  if (ticks) *ticks |= reader.u32();
+  events_.action(ticks);
+}
+
 void ControlPort::ask_resend(std::span<const std::uint8_t> body) {
   WireReader reader(body);
   const std::uint32_t frame = reader.u32() & 0xffff;
@@ -106,6 +121,8 @@ void ControlPort::write(std::uint32_t address, std::uint32_t value, const sockad
   registers_.write(address, value);
   if (address == kControlPrivilege && !controller_) {
     controller_ = from;
+    registers_.write(kControllerPort, ntohs(from.sin_port));
+    registers_.write(kControllerAddress, ntohl(from.sin_addr.s_addr));
     heard_ = std::chrono::steady_clock::now();
     ++times_taken_;
   }
@@ -121,7 +138,7 @@ bool ControlPort::write_block(std::uint32_t address, std::span<const std::uint8_
 
 void ControlPort::release() {
   controller_.reset();
-  registers_.write(kControlPrivilege, 0);
+  for (const auto address : {kControlPrivilege, kControllerPort, kControllerAddress}) registers_.write(address, 0);
   events_.controller_left();
 }
 

@@ -20,6 +20,8 @@ struct ControlEvents {
   std::function<void(std::uint32_t address, std::uint32_t value)> written;
   std::function<void(std::uint16_t frame, std::uint32_t first, std::uint32_t last)> resend_asked;
   std::function<void()> controller_left;
+  /// One that its keys concern, and when by the device's clock it is to act.
+  std::function<void(std::optional<std::uint64_t> ticks)> action;
 };
 
 /// The GVCP side of a GigE Vision device: answers what is asked of its registers, and lets one controller write.
@@ -43,6 +45,7 @@ class ControlPort {
   void answer_read(std::uint32_t what, std::uint32_t id, std::uint32_t address, std::size_t bytes);
   void answer_read_memory(std::uint32_t id, std::span<const std::uint8_t> body);
   void answer_write(std::uint32_t what, std::uint32_t id, std::span<const std::uint8_t> body, const sockaddr_in& from);
+  void act(bool scheduled, std::span<const std::uint8_t> body);
   void ask_resend(std::span<const std::uint8_t> body);
   void write(std::uint32_t address, std::uint32_t value, const sockaddr_in& from);
   [[nodiscard]] bool write_block(std::uint32_t address, std::span<const std::uint8_t> block, const sockaddr_in& from);

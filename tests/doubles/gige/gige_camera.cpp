@@ -11,50 +11,24 @@
 #include <array>
 #include <stdexcept>
 
+#include "tests/doubles/gige/chunk_trailer.hpp"
+#include "tests/doubles/gige/device_socket.hpp"
+#include "tests/doubles/gige/pack_pixels.hpp"
+
 namespace slsd::test {
 namespace {
 
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr std::uint16_t kControlPort = 3956;
 constexpr std::uint32_t kFireTestPacket = 1u << 31;
 constexpr std::uint32_t kLatch = 2;
 constexpr std::uint32_t kLine0 = 0;
 constexpr std::uint32_t kSoftware = 1;
 constexpr std::uint32_t kLine1 = 2;
-
-sockaddr_in socket_address(in_addr_t address, std::uint16_t port) {
-  sockaddr_in made{};
-  made.sin_family = AF_INET;
-  made.sin_addr.s_addr = address;
-  made.sin_port = htons(port);
-  return made;
-}
-
-int bound_socket(const sockaddr_in& address, bool shared) {
-  const int made = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  const int on = 1;
-  if (shared) ::setsockopt(made, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
-  if (::bind(made, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0) return made;
-  ::close(made);
-  return -1;
-}
-
-/// Binds the address given, or one of 127.77.0.0/16 that no other program has.
-int bind_control(std::string& address) {
-  if (!address.empty()) return bound_socket(socket_address(::inet_addr(address.c_str()), kControlPort), false);
-  const int first = ::getpid() * 7;
-  for (int i = 0; i < 60000; ++i) {
-    const int host = 1 + (first + i) % 60000;
-    const std::string tried = "127.77." + std::to_string(host / 250) + "." + std::to_string(1 + host % 250);
-    const int made = bound_socket(socket_address(::inet_addr(tried.c_str()), kControlPort), false);
-    if (made < 0) continue;
-    address = tried;
-    return made;
-  }
-  return -1;
-}
+constexpr std::uint32_t kAction1 = 3;
+constexpr std::uint64_t kNetworkTicksHz = 1'000'000'000;  // of a clock that follows the network's
+constexpr std::uint32_t kImagePayload = 1;
 
 std::uint16_t id_after(std::uint16_t id) {
   return id == 65535 ? 1 : static_cast<std::uint16_t>(id + 1);
@@ -63,9 +37,9 @@ std::uint16_t id_after(std::uint16_t id) {
 }  // namespace
 
 GigeCamera::GigeCamera(GigeCameraOptions options) : options_(std::move(options)) {
-  control_socket_ = bind_control(options_.address);
+  control_socket_ = bind_control_port(options_.address);
   if (control_socket_ < 0) throw std::runtime_error("the double cannot have the address " + options_.address);
-  broadcast_socket_ = bound_socket(socket_address(INADDR_BROADCAST, kControlPort), true);
+  broadcast_socket_ = bind_broadcast_port();
   wake_event_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   sender_ = std::make_unique<StreamSender>(in_addr{::inet_addr(options_.address.c_str())});
   command_.resize(65536);
@@ -85,8 +59,9 @@ GigeCamera::~GigeCamera() {
 void GigeCamera::power_up() {
   registers_ = std::make_unique<RegisterFile>(options_.serial, options_.width_px, options_.height_px);
   registers_->write(kCurrentAddress, ntohl(::inet_addr(options_.address.c_str())));
-  registers_->write(kTickFrequencyHigh, static_cast<std::uint32_t>(options_.tick_frequency_hz >> 32));
-  registers_->write(kTickFrequencyLow, static_cast<std::uint32_t>(options_.tick_frequency_hz));
+  registers_->write(kHasChunks, options_.chunks ? 1 : 0);
+  registers_->write(kHasSoftwareTrigger, options_.software_trigger ? 1 : 0);
+  set_tick_frequency(options_.tick_frequency_hz);
   ControlEvents events;
   events.written = [this](std::uint32_t address, std::uint32_t value) { note_write(address, value); };
   events.resend_asked = [this](std::uint16_t frame, std::uint32_t first, std::uint32_t last) {
@@ -98,12 +73,22 @@ void GigeCamera::power_up() {
     exposures_.clear();
     sender_->stop();
   };
+  events.action = [this](std::optional<std::uint64_t> ticks) {
+    if (!ticks) return trigger(kAction1);
+    act_at_ = time_at(*ticks);
+  };
   port_ = std::make_unique<ControlPort>(*registers_, std::move(events));
   exposures_.clear();
   sender_->stop();
   next_id_ = options_.first_frame_id;
   next_free_.reset();
+  act_at_.reset();
   power_up_ = steady_clock::now();
+}
+
+void GigeCamera::set_tick_frequency(std::uint64_t frequency_hz) {
+  registers_->write(kTickFrequencyHigh, static_cast<std::uint32_t>(frequency_hz >> 32));
+  registers_->write(kTickFrequencyLow, static_cast<std::uint32_t>(frequency_hz));
 }
 
 void GigeCamera::run(const std::stop_token& stop) {
@@ -118,6 +103,7 @@ void GigeCamera::run(const std::stop_token& stop) {
     read_commands(control_socket_);
     read_commands(broadcast_socket_);
     port_->expire_controller();
+    act_when_due(now);
     run_freely(now);
     send_frames(now);
   }
@@ -133,6 +119,7 @@ void GigeCamera::wait_for_work() {
     Time next = now + 100ms;
     if (sender_->sending() || (!exposures_.empty() && sends(now))) next = now;
     if (next_free_) next = std::min(next, *next_free_);
+    if (act_at_) next = std::min(next, *act_at_);
     if (faults_.stalled_until && *faults_.stalled_until > now) next = std::min(next, *faults_.stalled_until);
     if (back_at_) next = std::min(next, *back_at_);
     timeout.tv_nsec = std::clamp<std::int64_t>((next - now) / 1ns, 0, 100'000'000);
@@ -159,6 +146,7 @@ void GigeCamera::read_commands(int socket) {
 void GigeCamera::note_write(std::uint32_t address, std::uint32_t value) {
   if (address == kTriggerSoftware) return trigger(kSoftware);
   if (address == kAcquisition && value == 0) exposures_.clear();
+  if (address == kPtpEnable) set_tick_frequency(tick_frequency());
   if (address == kTimestampControl && (value & kLatch) != 0) {
     const std::uint64_t ticks = ticks_at(steady_clock::now());
     registers_->write(kTimestampHigh, static_cast<std::uint32_t>(ticks >> 32));
@@ -175,6 +163,12 @@ void GigeCamera::trigger(std::uint32_t source) {
   if (waits && registers_->read(kAcquisition) == 1) expose(steady_clock::now());
 }
 
+void GigeCamera::act_when_due(Time now) {
+  if (!act_at_ || now < *act_at_) return;
+  act_at_.reset();
+  trigger(kAction1);
+}
+
 void GigeCamera::run_freely(Time now) {
   if (registers_->read(kAcquisition) != 1 || registers_->read(kTriggerMode) != 0) return next_free_.reset();
   if (!next_free_) next_free_ = now;
@@ -187,11 +181,17 @@ void GigeCamera::run_freely(Time now) {
 }
 
 void GigeCamera::expose(Time begin) {
+  last_exposure_ = begin;
   exposures_.push_back({next_id_, counter_++, begin});
   next_id_ = id_after(next_id_);
   if (faults_.stale_frames > 0) {
     --faults_.stale_frames;
     exposures_.back().begin -= 1s;
+  }
+  if (faults_.extra_frames > 0) {
+    --faults_.extra_frames;
+    exposures_.push_back({next_id_, counter_++, begin});
+    next_id_ = id_after(next_id_);
   }
   if (faults_.drop_frames > 0) --faults_.drop_frames, exposures_.pop_back();
   if (faults_.silent || faults_.gone || back_at_) exposures_.clear();
@@ -213,17 +213,15 @@ void GigeCamera::send_frames(Time now) {
 void GigeCamera::begin_frame(const Exposure& exposure) {
   WireFrame& frame = sender_->next_frame();
   frame.id = exposure.id;
-  frame.ticks = ticks_at(exposure.begin);
+  frame.ticks = ticks_at(exposure.begin + options_.stamp_delay);
   frame.pixel_format = registers_->read(kPixelFormat);
   frame.width_px = registers_->read(kWidth);
   frame.height_px = registers_->read(kHeight);
-  constexpr std::array<std::pair<std::uint32_t, int>, 4> kDeep{
-      {{0x01100003, 10}, {0x01100005, 12}, {0x01100011, 12}, {0x01100007, 16}}};
-  int bits = 8;
-  for (const auto& [format, used] : kDeep)
-    if (frame.pixel_format == format) bits = used;
-  options_.frames({static_cast<int>(frame.width_px), static_cast<int>(frame.height_px), bits, exposure.counter},
+  options_.frames({static_cast<int>(frame.width_px), static_cast<int>(frame.height_px), used_bits(frame.pixel_format),
+                   exposure.counter},
                   frame.pixels);
+  pack_pixels(frame.pixel_format, frame.pixels);
+  add_chunks(frame, exposure);
   if (faults_.truncate_frames > 0) {
     --faults_.truncate_frames;
     frame.sent_share = 0.5;
@@ -231,7 +229,37 @@ void GigeCamera::begin_frame(const Exposure& exposure) {
   sender_->begin(target());
 }
 
+void GigeCamera::add_chunks(WireFrame& frame, const Exposure& exposure) {
+  const auto due = [](int& count) { return count > 0 && count-- > 0; };
+  frame.payload_type = sends_chunks(*registers_) ? options_.chunk_payload : kImagePayload;
+  if (frame.payload_type == kImagePayload) return;
+  ChunkValues values{ticks_at(exposure.begin), registers_->read_double(kExposureTime), registers_->read_double(kGain)};
+  if (options_.chunks_in_ns)
+    values.timestamp = values.timestamp / tick_frequency() * kNetworkTicksHz +
+                       values.timestamp % tick_frequency() * kNetworkTicksHz / tick_frequency();
+  if (due(faults_.misexposed_frames)) values.exposure_us *= 2.0;
+  if (due(faults_.misgained_frames)) values.gain_db += 1.0;
+  ChunkFault fault = ChunkFault::kNone;
+  if (due(faults_.short_chunk_frames)) fault = ChunkFault::kShort;
+  if (due(faults_.garbage_chunk_frames)) fault = ChunkFault::kGarbage;
+  append_chunks(*registers_, values, fault, frame.pixels);
+}
+
+bool GigeCamera::follows_network() const {
+  return registers_->read(kPtpEnable) != 0;
+}
+
+std::uint64_t GigeCamera::tick_frequency() const {
+  return follows_network() ? kNetworkTicksHz : options_.tick_frequency_hz;
+}
+
+// The network's clock is this host's.
+GigeCamera::Time GigeCamera::time_at(std::uint64_t ticks) const {
+  return Time(std::chrono::nanoseconds(ticks));
+}
+
 std::uint64_t GigeCamera::ticks_at(Time time) const {
+  if (follows_network()) return static_cast<std::uint64_t>(time.time_since_epoch().count());
   const double seconds = std::chrono::duration<double>(time - power_up_).count() + 10.0;
   return static_cast<std::uint64_t>(seconds * (1.0 + options_.drift_ppm * 1e-6) *
                                     static_cast<double>(options_.tick_frequency_hz));
@@ -243,7 +271,7 @@ StreamTarget GigeCamera::target() const {
                                 static_cast<std::uint16_t>(registers_->read(kStreamPort) & 0xffff));
   made.packet_bytes = std::max(registers_->read(kStreamPacketSize) & 0xffff, 100u);
   made.packet_delay = std::chrono::nanoseconds(static_cast<std::uint64_t>(registers_->read(kStreamPacketDelay)) *
-                                               1'000'000'000 / options_.tick_frequency_hz);
+                                               1'000'000'000 / tick_frequency());
   return made;
 }
 
@@ -300,6 +328,11 @@ double GigeCamera::read_double(std::uint32_t address) const {
 std::uint32_t GigeCamera::frames_exposed() const {
   const std::lock_guard lock(mutex_);
   return counter_;
+}
+
+GigeCamera::Time GigeCamera::last_exposure() const {
+  const std::lock_guard lock(mutex_);
+  return last_exposure_;
 }
 
 std::uint64_t GigeCamera::packets_lost() const {

@@ -30,10 +30,16 @@ struct GigeCameraOptions {
   std::uint64_t tick_frequency_hz = 125'000'000;
   double drift_ppm = 40.0;                ///< how much faster than the host's the device's clock goes
   std::uint32_t packet_bytes_max = 9000;  ///< larger test packets get lost, as by a switch without jumbo frames
+  bool chunks = true;                     ///< it has a chunk mode
+  bool chunks_in_ns = false;              ///< the chunks' time stamp is in nanoseconds, and not in ticks
+  std::uint32_t chunk_payload = 0x4001;   ///< how a frame with chunks is called
+  bool software_trigger = true;           ///< it can be triggered by a command
+  /// By how much the time stamp that a frame begins with is later than its exposure's start, as of the readout.
+  std::chrono::milliseconds stamp_delay{0};
 };
 
 /// A GigE Vision camera, real on the wire: GVCP on its address' port 3956, GVSP to whoever controls it; triggered by
-/// software, by a line or running freely. It lives on a thread of its own.
+/// software, by a line, by an action command or running freely. It lives on a thread of its own.
 /// @thread thread-safe
 class GigeCamera {
  public:
@@ -60,6 +66,8 @@ class GigeCamera {
   [[nodiscard]] std::uint32_t read(std::uint32_t address) const;
   [[nodiscard]] double read_double(std::uint32_t address) const;
   [[nodiscard]] std::uint32_t frames_exposed() const;
+  /// When the last frame's exposure began.
+  [[nodiscard]] std::chrono::steady_clock::time_point last_exposure() const;
   [[nodiscard]] std::uint64_t packets_lost() const;
   [[nodiscard]] std::uint64_t packets_sent_again() const;
   [[nodiscard]] int times_taken() const;
@@ -78,11 +86,17 @@ class GigeCamera {
   void read_commands(int socket);
   void note_write(std::uint32_t address, std::uint32_t value);
   void trigger(std::uint32_t source);
+  void set_tick_frequency(std::uint64_t frequency_hz);
+  void act_when_due(Time now);
   void run_freely(Time now);
   void expose(Time begin);
   void send_frames(Time now);
   void begin_frame(const Exposure& exposure);
+  void add_chunks(WireFrame& frame, const Exposure& exposure);
   [[nodiscard]] bool sends(Time now) const;
+  [[nodiscard]] bool follows_network() const;
+  [[nodiscard]] std::uint64_t tick_frequency() const;
+  [[nodiscard]] Time time_at(std::uint64_t ticks) const;
   [[nodiscard]] std::uint64_t ticks_at(Time time) const;
   [[nodiscard]] StreamTarget target() const;
   void wake();
@@ -100,8 +114,10 @@ class GigeCamera {
   std::vector<Exposure> exposures_;  ///< not yet sent
   std::uint16_t next_id_ = 1;
   std::uint32_t counter_ = 0;
+  Time last_exposure_;
   Time power_up_;
   std::optional<Time> next_free_;
+  std::optional<Time> act_at_;
   std::vector<std::uint8_t> command_;
   std::jthread thread_;
 };

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 //
-// A GigE Vision camera on this host: gige-camera [--address A] [--serial S] [--size WxH] [--images FOLDER]
-// Prints its address, and then obeys the commands that it reads, a line each, until "quit" or the end of the input.
+// A GigE Vision camera on this host:
+//   gige-camera [--address A] [--serial S] [--size WxH] [--images PATH] [--chunks 0|1]
+// Serves counted frames, or one image or those of a folder. Prints its address, and then obeys the commands that it
+// reads, a line each, and answers "ok" or "?", until "quit" or the end of the input.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -22,14 +24,16 @@ namespace slsd::test {
 namespace {
 
 constexpr const char* kUsage =
-    "usage: gige-camera [--address A] [--serial S] [--size WxH] [--images FOLDER]\n"
-    "commands: lose SHARE | drop N | truncate N | stale N | silent 0|1 | gone 0|1 | resends 0|1 | stall MS | blip MS "
-    "|\n"
-    "          occupy 0|1 | pulse | status | quit\n";
+    "usage: gige-camera [--address A] [--serial S] [--size WxH] [--images PATH] [--chunks 0|1]\n"
+    "commands: lose SHARE | drop N | truncate N | stale N | silent 0|1 | gone 0|1 | resends 0|1 | stall MS |\n"
+    "          misexpose N | misgain N | cut N | garble N |\n"
+    "          blip MS | occupy 0|1 | pulse | status | quit\n";
 
-std::vector<Grey8> images_of(const std::string& folder) {
+std::vector<Grey8> images_of(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> paths;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) paths.push_back(entry.path());
+  if (std::filesystem::is_regular_file(folder)) paths.push_back(folder);
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) paths.push_back(entry.path());
   std::ranges::sort(paths);
   std::vector<Grey8> images;
   for (const auto& path : paths) {
@@ -43,6 +47,7 @@ bool set_option(const std::string& name, const std::string& value, GigeCameraOpt
   if (name == "--address") return options.address = value, true;
   if (name == "--serial") return options.serial = value, true;
   if (name == "--size") return std::sscanf(value.c_str(), "%dx%d", &options.width_px, &options.height_px) == 2;
+  if (name == "--chunks") return options.chunks = value != "0", true;
   if (name != "--images") return false;
   std::vector<Grey8> images = images_of(value);
   if (images.empty()) return false;
@@ -79,6 +84,10 @@ std::map<std::string, std::function<void(double)>> commands_of(GigeCamera& camer
           {"drop", number(&GigeFaults::drop_frames)},
           {"truncate", number(&GigeFaults::truncate_frames)},
           {"stale", number(&GigeFaults::stale_frames)},
+          {"misexpose", number(&GigeFaults::misexposed_frames)},
+          {"misgain", number(&GigeFaults::misgained_frames)},
+          {"cut", number(&GigeFaults::short_chunk_frames)},
+          {"garble", number(&GigeFaults::garbage_chunk_frames)},
           {"silent", state(&GigeFaults::silent)},
           {"gone", state(&GigeFaults::gone)},
           {"resends", state(&GigeFaults::resends)},
@@ -98,13 +107,13 @@ int obey(GigeCamera& camera) {
     double value = 0.0;
     words >> name >> value;
     const auto command = commands.find(name);
-    if (command == commands.end())
-      std::cerr << kUsage;
-    else
-      command->second(value);
+    const bool known = command != commands.end();
+    if (known) command->second(value);
     // A count is used up by the camera, and must not be set again with the next fault.
     faults.drop_frames = faults.truncate_frames = faults.stale_frames = 0;
-    std::cout << std::flush;
+    faults.misexposed_frames = faults.misgained_frames = 0;
+    faults.short_chunk_frames = faults.garbage_chunk_frames = 0;
+    std::cout << (known ? "ok" : "?") << std::endl;
   }
   return 0;
 }

@@ -28,6 +28,7 @@ RegisterFile::RegisterFile(const std::string& serial, int width_px, int height_p
   write(kGainAuto, 2);
   write_double(kExposureTime, 123.0);
   write_double(kGain, 7.0);
+  write(kChunkImageEnable, 1);
 }
 
 RegisterFile::~RegisterFile() {

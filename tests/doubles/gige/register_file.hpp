@@ -35,6 +35,8 @@ enum Register : std::uint32_t {
   kTimestampHigh = 0x948,
   kTimestampLow = 0x94c,
   kControlPrivilege = 0xa00,
+  kControllerPort = 0xa04,
+  kControllerAddress = 0xa14,
   kStreamPort = 0xd00,
   kStreamPacketSize = 0xd04,
   kStreamPacketDelay = 0xd08,
@@ -43,6 +45,17 @@ enum Register : std::uint32_t {
   kGain = 0x8008,          ///< double, decibels
   kExposureAuto = 0x8010,
   kGainAuto = 0x8014,
+  kActionDeviceKey = 0x8024,
+  kActionGroupKey = 0x8028,
+  kActionGroupMask = 0x802c,
+  kPtpEnable = 0x8030,
+  kChunkMode = 0x8034,
+  kHasChunks = 0x803c,
+  kChunkImageEnable = 0x8040,
+  kChunkTimestampEnable = 0x8044,
+  kChunkExposureTimeEnable = 0x8048,
+  kChunkGainEnable = 0x804c,
+  kHasSoftwareTrigger = 0x8050,
 };
 
 /// The memory of a GigE Vision device: Aravis' register file, with the description in camera.xml.

@@ -20,7 +20,6 @@ constexpr std::uint32_t kUdpBytes = 20 + 8;
 constexpr std::uint32_t kLeader = 1;
 constexpr std::uint32_t kTrailer = 2;
 constexpr std::uint32_t kPayload = 3;
-constexpr std::uint32_t kImage = 1;
 constexpr std::uint32_t kPacketsAtOnce = 32;
 
 std::size_t payload_bytes(const StreamTarget& target) {
@@ -34,7 +33,7 @@ std::uint32_t packet_count(const WireFrame& frame, const StreamTarget& target) {
 }
 
 void write_leader(WireWriter& writer, const WireFrame& frame) {
-  writer.u16(0).u16(kImage);
+  writer.u16(0).u16(frame.payload_type);
   writer.u32(static_cast<std::uint32_t>(frame.ticks >> 32)).u32(static_cast<std::uint32_t>(frame.ticks));
   writer.u32(frame.pixel_format).u32(frame.width_px).u32(frame.height_px).u32(0).u32(0).u32(0);
 }
@@ -105,7 +104,7 @@ void StreamSender::send_block(const WireFrame& frame, std::uint32_t packet, cons
     return send(header_, nullptr, 0, target);
   }
   if (packet == last) {
-    writer.u8(kTrailer).u24(packet).u16(0).u16(kImage).u32(frame.height_px);
+    writer.u8(kTrailer).u24(packet).u16(0).u16(frame.payload_type).u32(frame.height_px);
     return send(header_, nullptr, 0, target);
   }
   writer.u8(kPayload).u24(packet);

@@ -14,12 +14,13 @@ namespace slsd::test {
 /// One frame as GVSP carries it.
 struct WireFrame {
   std::uint16_t id = 0;
-  std::uint64_t ticks = 0;  ///< the device's clock when the exposure began
+  std::uint64_t ticks = 0;         ///< the device's clock when the exposure began
+  std::uint32_t payload_type = 1;  ///< an image
   std::uint32_t pixel_format = 0;
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
-  double sent_share = 1.0;  ///< below 1: so much of it is sent, and then the trailer, as if it were whole
-  std::vector<std::uint8_t> pixels;
+  double sent_share = 1.0;           ///< below 1: so much of it is sent, and then the trailer, as if it were whole
+  std::vector<std::uint8_t> pixels;  ///< and what is behind them
 };
 
 /// Where a stream goes.

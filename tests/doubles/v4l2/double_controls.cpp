@@ -63,6 +63,13 @@ int DoubleControls::query(v4l2_queryctrl& query) const {
   return 0;
 }
 
+int DoubleControls::query_menu(v4l2_querymenu& query) const {
+  const DoubleControl* control = find(query.id);
+  if (control == nullptr || query.index >= control->choices.size()) return EINVAL;
+  query.value = control->choices[query.index];
+  return 0;
+}
+
 int DoubleControls::query_extended(v4l2_query_ext_ctrl& extended) const {
   v4l2_queryctrl plain{};
   plain.id = extended.id;

@@ -21,6 +21,7 @@ class DoubleControls {
   explicit DoubleControls(std::vector<DoubleControl> controls) : controls_(std::move(controls)) {}
 
   int query(v4l2_queryctrl& query) const;
+  int query_menu(v4l2_querymenu& query) const;
   int query_extended(v4l2_query_ext_ctrl& query) const;
   int get(v4l2_control& control) const;
   int set(const v4l2_control& control);

@@ -90,6 +90,8 @@ int DoubleDevice::ioctl_setting(unsigned command, void* argument) {
       return set_rate(as<v4l2_streamparm>(argument));
     case VIDIOC_QUERYCTRL:
       return controls_.query(as<v4l2_queryctrl>(argument));
+    case VIDIOC_QUERYMENU:
+      return controls_.query_menu(as<v4l2_querymenu>(argument));
     case VIDIOC_QUERY_EXT_CTRL:
       return controls_.query_extended(as<v4l2_query_ext_ctrl>(argument));
     case VIDIOC_G_CTRL:

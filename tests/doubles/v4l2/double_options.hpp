@@ -32,6 +32,7 @@ struct DoubleControl {
   int step = 1;
   int value = 0;
   v4l2_ctrl_type type = V4L2_CTRL_TYPE_INTEGER;
+  std::vector<std::int64_t> choices = {};  ///< of a menu of numbers
 };
 
 /// What the double is, until its end.

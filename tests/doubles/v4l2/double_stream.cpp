@@ -117,6 +117,7 @@ void DoubleDevice::end_stream() {
 void DoubleDevice::run(const std::stop_token& stop) {
   Grey8 image;
   std::vector<std::byte> bytes;
+  MonotonicTime due{};  // so that waking late now and then makes the rate no lower
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested() && present_) {
     if (const MonotonicTime until = faults_.stalled_until; until > steady_clock::now()) {
@@ -133,7 +134,9 @@ void DoubleDevice::run(const std::stop_token& stop) {
     const int padding = options_.padding_bytes;
     const FrameSource source = options_.source ? options_.source : numbered_frame;
     const MonotonicTime arrival = exposure.start + options_.exposure + options_.readout;
-    const MonotonicTime next = options_.triggered ? arrival : exposure.start + period;
+    const bool in_time = exposure.start >= due && exposure.start - due < period;
+    due = (in_time ? due : exposure.start) + period;
+    const MonotonicTime next = options_.triggered ? arrival : due;
     lock.unlock();
     if (image.width() != width || image.height() != height) image = Grey8(width, height);
     source(exposure.number, image);
