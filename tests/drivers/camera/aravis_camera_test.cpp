@@ -7,18 +7,15 @@
 #include <cstdint>
 #include <filesystem>
 #include <iterator>
-#include <optional>
 #include <thread>
 #include <variant>
-#include <vector>
 
 #include <gmock/gmock.h>
 
-#include "drivers/camera/aravis/list_devices.hpp"
+#include "drivers/camera/aravis/gige_discovery.hpp"
 #include "drivers/camera/aravis/packet_socket.hpp"
 #include "tests/drivers/allocations.hpp"
-#include "tests/drivers/camera/gige_backend.hpp"
-#include "tests/drivers/camera/recording.hpp"
+#include "tests/drivers/camera/aravis_test.hpp"
 
 namespace slsd {
 namespace {
@@ -32,35 +29,7 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-class AravisCameraTest : public ::testing::Test {
- protected:
-  /// Opens, or says why not.
-  static ::testing::AssertionResult opens(Camera& camera) {
-    const auto opened = camera.open();
-    return opened ? ::testing::AssertionSuccess() : ::testing::AssertionFailure() << to_string(opened.error());
-  }
-
-  /// The counter of the next frame; nothing if it failed or is not as it was sent.
-  static std::optional<std::uint32_t> next(Camera& camera, int bits = 8) {
-    const auto frame = camera.capture(far_away());
-    EXPECT_TRUE(frame) << to_string(frame.error());
-    return frame ? counter_of(frame->image(), bits) : std::nullopt;
-  }
-
-  /// Whether the next frame is whole, and of the exposure that the device made last.
-  static bool next_is_newest(Camera& camera, const test::GigeCamera& device) {
-    const auto counter = next(camera);
-    return counter && *counter == device.frames_exposed() - 1;
-  }
-
-  static ErrorCode error_of(Camera& camera, MonotonicTime deadline = far_away()) {
-    const auto frame = camera.capture(deadline);
-    EXPECT_FALSE(frame);
-    return frame ? ErrorCode{} : frame.error().code;
-  }
-
-  test::GigeCamera device_;
-};
+using AravisCameraTest = test::AravisTest;
 
 TEST_F(AravisCameraTest, TakesOneFrameToATrigger) {
   AravisCamera camera(options_for(device_));
@@ -108,7 +77,9 @@ TEST_F(AravisCameraTest, RefusesAPixelFormatThatTheCameraLacks) {
 }
 
 TEST_F(AravisCameraTest, ReadsDeepPixels) {
-  for (const auto& [format, bits] : {std::pair("Mono10", 10), std::pair("Mono12", 12), std::pair("Mono16", 16)}) {
+  for (const auto& [format, bits] :
+       {std::pair("Mono10", 10), std::pair("Mono12", 12), std::pair("Mono16", 16), std::pair("Mono10p", 10),
+        std::pair("Mono12p", 12), std::pair("Mono10Packed", 10), std::pair("Mono12Packed", 12)}) {
     AravisCameraOptions options = options_for(device_);
     options.pixel_format = format;
     AravisCamera camera(options);
@@ -192,206 +163,13 @@ TEST_F(AravisCameraTest, MapsTheDevicesClock) {
   }
 }
 
-TEST_F(AravisCameraTest, GetsLostPacketsAgain) {
-  test::GigeCameraOptions large;
-  large.width_px = 640;
-  large.height_px = 480;
-  test::GigeCamera device(large);
-  device.lose_packets(0.01, 7);
-  AravisCameraOptions options = options_for(device);
-  options.frame_timeout_ms = 30000;
-  AravisCamera camera(options);
-  ASSERT_TRUE(opens(camera));
-  const std::uint32_t before = device.frames_exposed();
-  for (std::uint32_t i = 0; i < 50; ++i) EXPECT_EQ(next(camera), before + i);
-  EXPECT_GT(device.packets_lost(), 50u);
-  EXPECT_GT(camera.statistics().packets_sent_again, 50u);
-}
-
-TEST_F(AravisCameraTest, GivesUpAFrameWithHolesWhereNothingIsSentAgain) {
-  AravisCameraOptions options = options_for(device_);
-  options.packet_resend = false;
-  options.frame_timeout_ms = 2000;
-  options.missed_frames_max = 100;
-  AravisCamera camera(options);
-  ASSERT_TRUE(opens(camera));
-  device_.lose_packets(0.2, 3);
-  int torn = 0;
-  for (int i = 0; i < 10 && torn == 0; ++i) {
-    const auto frame = camera.capture(far_away());
-    EXPECT_TRUE(!frame || counter_of(frame->image()));
-    if (!frame && frame.error().code == ErrorCode::kFrameTorn) ++torn;
-  }
-  EXPECT_GT(torn, 0);
-  device_.lose_packets(0.0);
-  EXPECT_TRUE(next(camera));
-}
-
-TEST_F(AravisCameraTest, SaysThatAFrameWasLostAndGoesOn) {
-  AravisCameraOptions options = options_for(device_);
-  options.frame_timeout_ms = 1000;
-  AravisCamera camera(options);
-  ASSERT_TRUE(opens(camera));
-  EXPECT_EQ(camera.capture(far_away())->sequence(), 0u);
-  device_.set_faults({.drop_frames = 1});
-  EXPECT_EQ(error_of(camera), ErrorCode::kFrameDropped);
-  const auto frame = camera.capture(far_away());
-  ASSERT_TRUE(frame);
-  EXPECT_EQ(frame->sequence(), 2u);
-  EXPECT_EQ(camera.statistics().lost, 1u);
-}
-
-TEST_F(AravisCameraTest, RefusesAFrameThatEndsTooEarly) {
-  AravisCamera camera(options_for(device_));
-  ASSERT_TRUE(opens(camera));
-  device_.set_faults({.truncate_frames = 1});
-  EXPECT_EQ(error_of(camera), ErrorCode::kFrameTorn);
-  EXPECT_TRUE(next(camera));
-}
-
-TEST_F(AravisCameraTest, RefusesAFrameExposedBeforeTheTrigger) {
-  AravisCamera camera(options_for(device_));
-  ASSERT_TRUE(opens(camera));
-  device_.set_faults({.stale_frames = 1});
-  EXPECT_EQ(error_of(camera), ErrorCode::kFrameStale);
-  EXPECT_EQ(camera.statistics().stale, 1u);
-  EXPECT_TRUE(next(camera));
-}
-
-// The frame of the capture that was late comes later, and must not be taken for the next one's.
-TEST_F(AravisCameraTest, DoesNotMixFramesAfterAStall) {
-  AravisCameraOptions options = options_for(device_);
-  options.frame_timeout_ms = 200;
-  options.missed_frames_max = 100;
-  AravisCamera camera(options);
-  ASSERT_TRUE(opens(camera));
-  device_.stall(700ms);
-  int late = 0;
-  std::optional<std::uint32_t> counter;
-  while (!counter && late < 100) {
-    const auto frame = camera.capture(far_away());
-    if (frame)
-      counter = counter_of(frame->image());
-    else
-      ++late;
-  }
-  EXPECT_GT(late, 0);
-  EXPECT_EQ(counter, device_.frames_exposed() - 1);
-}
-
-TEST_F(AravisCameraTest, KeepsALateFrameFromTheNextCapture) {
-  AravisCamera camera(options_for(device_));
-  ASSERT_TRUE(opens(camera));
-  device_.stall(1000ms);
-  EXPECT_EQ(error_of(camera, steady_clock::now() + 100ms), ErrorCode::kFrameLate);
-  EXPECT_TRUE(next_is_newest(camera, device_));
-}
-
-TEST_F(AravisCameraTest, IsDisconnectedWhenTheCameraSendsNothing) {
-  AravisCameraOptions options = options_for(device_);
-  options.frame_timeout_ms = 400;
-  AravisCamera camera(options);
-  ASSERT_TRUE(opens(camera));
-  device_.set_faults({.silent = true});
-  EXPECT_EQ(error_of(camera), ErrorCode::kFrameDropped);
-  EXPECT_EQ(error_of(camera), ErrorCode::kDisconnected);
-  const auto opened = camera.open();
-  ASSERT_FALSE(opened);
-  EXPECT_EQ(opened.error().code, ErrorCode::kDisconnected);
-  EXPECT_THAT(opened.error().message, HasSubstr("sends no frame"));
-  device_.set_faults({});
-  ASSERT_TRUE(opens(camera));
-  EXPECT_TRUE(next(camera));
-}
-
-TEST_F(AravisCameraTest, HoldsUpNoCaptureWhenTheCameraIsGone) {
-  AravisCameraOptions options = options_for(device_);
-  options.frame_timeout_ms = 1000;
-  AravisCamera camera(options);
-  ASSERT_TRUE(opens(camera));
-  device_.set_faults({.gone = true});
-  EXPECT_EQ(error_of(camera, steady_clock::now() + 100ms), ErrorCode::kFrameLate);
-  EXPECT_EQ(error_of(camera), ErrorCode::kDisconnected);
-  const auto opened = camera.open();
-  ASSERT_FALSE(opened);
-  EXPECT_EQ(opened.error().code, ErrorCode::kNotFound);
-  device_.set_faults({});
-}
-
-/// Opens as the supervisor does, until it succeeds.
-bool opens_again(Camera& camera) {
-  for (int i = 0; i < 200; ++i) {
-    if (camera.open()) return true;
-    std::this_thread::sleep_for(50ms);
-  }
-  return false;
-}
-
-TEST_F(AravisCameraTest, IsBackAfterAPowerFailureWithEverySetting) {
-  AravisCameraOptions options = options_for(device_);
-  options.frame_timeout_ms = 500;
-  options.exposure_us = 4000.0;
-  AravisCamera camera(options);
-  ASSERT_TRUE(opens(camera));
-  EXPECT_TRUE(next(camera));
-  device_.blip(300ms);
-  ErrorCode code{};
-  for (int i = 0; i < 5 && code != ErrorCode::kDisconnected; ++i) code = error_of(camera);
-  EXPECT_EQ(code, ErrorCode::kDisconnected);
-  ASSERT_TRUE(opens_again(camera));
-  EXPECT_EQ(device_.read_double(test::kExposureTime), 4000.0);
-  EXPECT_EQ(device_.read(test::kExposureAuto), 0u);
-  EXPECT_TRUE(next(camera));
-}
-
-TEST_F(AravisCameraTest, RefusesACameraThatAnotherControls) {
-  AravisCamera first(options_for(device_));
-  ASSERT_TRUE(opens(first));
-  AravisCamera second(options_for(device_));
-  const auto opened = second.open();
-  ASSERT_FALSE(opened);
-  EXPECT_EQ(opened.error().code, ErrorCode::kPermissionDenied);
-  EXPECT_THAT(to_string(opened.error()), HasSubstr("another application controls the camera"));
-  EXPECT_TRUE(next(first));
-}
-
-TEST_F(AravisCameraTest, IsDisconnectedWhenAnotherTakesControl) {
-  AravisCamera camera(options_for(device_));
-  ASSERT_TRUE(opens(camera));
-  device_.occupy(true);
-  EXPECT_EQ(error_of(camera), ErrorCode::kDisconnected);
-  EXPECT_EQ(camera.open().error().code, ErrorCode::kPermissionDenied);
-  device_.occupy(false);
-  ASSERT_TRUE(opens_again(camera));
-  EXPECT_TRUE(next(camera));
-}
-
-TEST_F(AravisCameraTest, NamesAnAddressWhereNothingAnswers) {
-  AravisCameraOptions options = options_for(device_);
-  options.id = "127.78.0.1";
-  AravisCamera camera(options);
-  const auto opened = camera.open();
-  ASSERT_FALSE(opened);
-  EXPECT_EQ(opened.error().code, ErrorCode::kNotFound);
-  EXPECT_THAT(to_string(opened.error()), HasSubstr("127.78.0.1: no camera answers"));
-}
-
-TEST_F(AravisCameraTest, RefusesAnInterfaceThatThisHostLacks) {
-  AravisCameraOptions options = options_for(device_);
-  options.interface = "192.0.2.77";
-  AravisCamera camera(options);
-  const auto opened = camera.open();
-  ASSERT_FALSE(opened);
-  EXPECT_EQ(opened.error().code, ErrorCode::kInvalidArgument);
-}
-
 TEST_F(AravisCameraTest, FindsACameraByItsSerialNumber) {
   test::GigeCameraOptions named;
   named.serial = "S" + std::to_string(steady_clock::now().time_since_epoch().count() % 1'000'000'000);
   test::GigeCamera device(named);
-  const auto listed = list_aravis_devices();
-  const auto has_serial = [&](const AravisDevice& seen) { return seen.serial == named.serial; };
-  if (std::ranges::none_of(listed, has_serial)) GTEST_SKIP() << "this host passes no broadcast on to itself";
+  const auto has_serial = [&](const GigeDevice& seen) { return seen.serial == named.serial; };
+  if (std::ranges::none_of(discover_gige_devices(1s, has_serial), has_serial))
+    GTEST_SKIP() << "this host passes no broadcast on to itself";
   for (const std::string& id : {named.serial, "Aravis-" + named.serial}) {
     AravisCameraOptions options = options_for(device);
     options.id = id;

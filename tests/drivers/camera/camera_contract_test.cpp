@@ -53,11 +53,11 @@ std::unique_ptr<Camera> sixteen_bits(const test::TemporaryFolder& folder) {
   return file_camera(folder, {.path = folder.path() / "deep"});
 }
 
-std::unique_ptr<Camera> on_gige(AravisCameraOptions options = {}) {
+std::unique_ptr<Camera> on_gige(AravisCameraOptions options = {}, test::GigeCameraOptions device = {}) {
   options.packet_bytes = 1400;
   options.packet_socket = false;
   options.frame_timeout_ms = 10000;
-  return std::make_unique<test::CameraOnDouble>(test::GigeCameraOptions{}, std::move(options));
+  return std::make_unique<test::CameraOnDouble>(std::move(device), std::move(options));
 }
 
 class CameraContract : public ::testing::TestWithParam<Backend> {
@@ -100,6 +100,32 @@ TEST_P(CameraContract, IsDisconnectedBeforeItIsOpened) {
   const auto frame = capture();
   ASSERT_FALSE(frame);
   EXPECT_EQ(frame.error().code, ErrorCode::kDisconnected);
+}
+
+TEST_P(CameraContract, IsThereOnceItIsOpen) {
+  const auto before = camera_->check();
+  ASSERT_FALSE(before);
+  EXPECT_EQ(before.error().code, ErrorCode::kDisconnected);
+  ASSERT_TRUE(camera_->open());
+  EXPECT_TRUE(camera_->check());
+  ASSERT_TRUE(capture());
+  EXPECT_TRUE(camera_->check());
+}
+
+TEST_P(CameraContract, GivesTheFrameAfterTheOneGivenLast) {
+  ASSERT_TRUE(camera_->open());
+  MonotonicTime last = steady_clock::now();
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    const auto frame = camera_->capture_next(far_away());
+    ASSERT_TRUE(frame) << to_string(frame.error());
+    EXPECT_GE(frame->sequence(), i);
+    EXPECT_GT(frame->exposure_start(), last);
+    last = frame->exposure_start();
+  }
+  const MonotonicTime trigger = steady_clock::now();
+  const auto fresh = capture();
+  ASSERT_TRUE(fresh);
+  EXPECT_GE(fresh->exposure_start(), trigger);
 }
 
 TEST_P(CameraContract, DeliversFramesOfTheSizeThatItSays) {
@@ -231,7 +257,9 @@ INSTANTIATE_TEST_SUITE_P(
         Backend{"AravisTriggered", [](const auto&) { return on_gige(); }},
         Backend{"AravisFreeRun",
                 [](const auto&) { return on_gige({.trigger = AravisTrigger::kFreeRun, .rate_hz = 500.0}); }},
+        Backend{"AravisWithoutChunks", [](const auto&) { return on_gige({}, {.chunks = false}); }},
         Backend{"AravisTwelveBits", [](const auto&) { return on_gige({.pixel_format = "Mono12"}); }},
+        Backend{"AravisPacked", [](const auto&) { return on_gige({.pixel_format = "Mono10p"}); }},
         Backend{"AravisBayer", [](const auto&) { return on_gige({.pixel_format = "BayerRG8"}); }}),
     [](const auto& instance) { return instance.param.name; });
 

@@ -31,6 +31,8 @@ class CameraOnDouble final : public Camera {
   [[nodiscard]] const CameraDescription& description() const override { return camera_->description(); }
   [[nodiscard]] Result<> open() override { return camera_->open(); }
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override { return camera_->capture(deadline); }
+  [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override { return camera_->capture_next(deadline); }
+  [[nodiscard]] Result<> check() override { return camera_->check(); }
   void cancel() override { camera_->cancel(); }
 
  private:

@@ -22,6 +22,7 @@ struct Setting {
   AravisTrigger trigger;
   int packet_bytes;
   bool packet_socket;
+  bool chunks = true;
 };
 
 struct Outcome {
@@ -49,6 +50,7 @@ int measure(const Setting& setting, int frames, double share_lost) {
   options.rate_hz = setting.trigger == AravisTrigger::kFreeRun ? kFreeRateHz : 0.0;
   options.packet_bytes = setting.packet_bytes;
   options.packet_socket = setting.packet_socket;
+  options.chunks = setting.chunks;
   options.exposure_us = 1000.0;
   AravisCamera camera(options);
   if (const auto opened = camera.open(); !opened)
@@ -77,6 +79,7 @@ int main(int arguments, char** words) {
   int wrong = 0;
   for (const Setting& setting : {Setting{"triggered, 1400 bytes", AravisTrigger::kSoftware, 1400, false},
                                  Setting{"triggered, 9000 bytes", AravisTrigger::kSoftware, 9000, false},
+                                 Setting{"triggered, without chunks", AravisTrigger::kSoftware, 9000, false, false},
                                  Setting{"free run at 60 Hz, 9000 bytes", AravisTrigger::kFreeRun, 9000, false},
                                  Setting{"triggered, packet socket", AravisTrigger::kSoftware, 9000, true}})
     wrong += measure(setting, frames, share_lost);

@@ -20,6 +20,8 @@ class CameraOnDouble final : public Camera {
   const CameraDescription& description() const override { return camera_.description(); }
   Result<> open() override { return camera_.open(); }
   Result<Frame> capture(MonotonicTime deadline) override { return camera_.capture(deadline); }
+  Result<Frame> capture_next(MonotonicTime deadline) override { return camera_.capture_next(deadline); }
+  Result<> check() override { return camera_.check(); }
   void cancel() override { camera_.cancel(); }
 
  private:

@@ -143,6 +143,44 @@ TEST_F(V4l2Settings, NameTheKeyThatTheCameraLacks) {
   EXPECT_THAT(error.message, HasSubstr("gain_steps"));
 }
 
+/// A camera whose gain has a unit.
+DoubleOptions with_sensitivity() {
+  DoubleOptions options = uvc();
+  options.controls.push_back({V4L2_CID_ISO_SENSITIVITY_AUTO, "ISO Sensitivity, Auto", 0, 1, 1, 1, V4L2_CTRL_TYPE_MENU});
+  options.controls.push_back({V4L2_CID_ISO_SENSITIVITY,
+                              "ISO Sensitivity",
+                              0,
+                              3,
+                              1,
+                              0,
+                              V4L2_CTRL_TYPE_INTEGER_MENU,
+                              {100'000, 200'000, 400'000, 800'000}});
+  return options;
+}
+
+TEST_F(V4l2Settings, TakeAGainInDecibelsWhereTheDriverKnowsThem) {
+  if (!make(with_sensitivity(), {.gain_db = 12.0})) return;
+  const auto opened = camera_->open();
+  ASSERT_TRUE(opened) << to_string(opened.error());
+  EXPECT_EQ(double_->control(V4L2_CID_ISO_SENSITIVITY), 2);
+  EXPECT_EQ(double_->control(V4L2_CID_ISO_SENSITIVITY_AUTO), V4L2_ISO_SENSITIVITY_MANUAL);
+}
+
+TEST_F(V4l2Settings, NameTheDecibelsThatThereAre) {
+  const Error error = open_error(with_sensitivity(), {.gain_db = 9.0});
+  if (!double_) return;
+  EXPECT_EQ(error.code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(error.message, HasSubstr("has 0.0, 6.0, 12.0, 18.1 dB"));
+}
+
+TEST_F(V4l2Settings, RefuseDecibelsWhereTheGainHasNoUnit) {
+  const Error error = open_error(uvc(), {.gain_db = 6.0});
+  if (!double_) return;
+  EXPECT_EQ(error.code, ErrorCode::kUnsupported);
+  EXPECT_THAT(error.message,
+              HasSubstr("what a step of the control \"Gain\" is worth; set gain_steps instead, 0 to 96"));
+}
+
 TEST_F(V4l2Settings, NameTheRateThatItHasInstead) {
   const Error error = open_error(uvc(), {.frame_rate_hz = 300.0});
   if (!double_) return;
@@ -165,6 +203,8 @@ TEST(V4l2CameraOptions, AreChecked) {
        {V4l2CameraOptions{}, V4l2CameraOptions{.name = "", .device = "x"},
         V4l2CameraOptions{.device = "x", .format = "GREYS"}, V4l2CameraOptions{.device = "x", .size_px = {{0, 5}}},
         V4l2CameraOptions{.device = "x", .frame_rate_hz = 0.0}, V4l2CameraOptions{.device = "x", .exposure_us = 0.0},
+        V4l2CameraOptions{.device = "x", .gain_db = 61.0},
+        V4l2CameraOptions{.device = "x", .gain_db = 6.0, .gain_steps = 1},
         V4l2CameraOptions{.device = "x", .power_line_hz = 55}, V4l2CameraOptions{.device = "x", .readout_us = -1.0},
         V4l2CameraOptions{.device = "x", .settle_frames = -1}, V4l2CameraOptions{.device = "x", .frames_held_max = 25},
         V4l2CameraOptions{.device = "x", .exposure_us = 5.0, .automatic = true}}) {

@@ -29,6 +29,7 @@ TEST(HeadlessProjector, IsGoneFromWhenItIsUnpluggedUntilItIsOpened) {
   projector.disconnect();
   EXPECT_EQ(projector.show(Grey8(16, 9)).error().code, ErrorCode::kDisconnected);
   EXPECT_EQ(projector.read_back().error().code, ErrorCode::kDisconnected);
+  EXPECT_EQ(projector.check().error().code, ErrorCode::kDisconnected);
   ASSERT_TRUE(projector.open());
   EXPECT_TRUE(projector.show(Grey8(16, 9)));
 }

@@ -7,8 +7,10 @@
 
 #include <gmock/gmock.h>
 
+#include "drivers/projector/glfw/glfw_projector.hpp"
 #include "drivers/projector/headless_projector.hpp"
 #include "drivers/projector/projector.hpp"
+#include "tests/doubles/x11/x_server.hpp"
 #include "tests/drivers/plain_images.hpp"
 
 namespace slsd {
@@ -17,6 +19,7 @@ namespace {
 using std::chrono::steady_clock;
 using test::ramp8;
 
+/// A backend, and how to make one; null where this machine has none.
 struct Backend {
   const char* name;
   std::function<std::unique_ptr<Projector>()> make;
@@ -26,9 +29,36 @@ void PrintTo(const Backend& backend, std::ostream* out) {
   *out << backend.name;
 }
 
+/// A projector on a monitor of a server of its own.
+class OnServer final : public Projector {
+ public:
+  OnServer(std::unique_ptr<test::XServer> server, GlfwProjectorOptions options)
+      : server_(std::move(server)), projector_(std::move(options)) {}
+  [[nodiscard]] const ProjectorDescription& description() const override { return projector_.description(); }
+  [[nodiscard]] Result<> open() override { return projector_.open(); }
+  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image) override { return projector_.show(image); }
+  [[nodiscard]] Result<> check() override { return projector_.check(); }
+  [[nodiscard]] std::vector<std::string> warnings() const override { return projector_.warnings(); }
+  [[nodiscard]] Result<Grey8> read_back() override { return projector_.read_back(); }
+
+ private:
+  std::unique_ptr<test::XServer> server_;
+  GlfwProjector projector_;
+};
+
+std::unique_ptr<Projector> on_xvfb(int width_px, int height_px) {
+  auto server = test::XServer::start_virtual(width_px, height_px);
+  if (!server) return nullptr;
+  return std::make_unique<OnServer>(std::move(server),
+                                    GlfwProjectorOptions{.width_px = width_px, .height_px = height_px});
+}
+
 class ProjectorContract : public ::testing::TestWithParam<Backend> {
  protected:
-  void SetUp() override { projector_ = GetParam().make(); }
+  void SetUp() override {
+    projector_ = GetParam().make();
+    if (!projector_) GTEST_SKIP() << "no Xvfb starts here (package xvfb)";
+  }
 
   [[nodiscard]] int width() const { return projector_->description().width_px; }
   [[nodiscard]] int height() const { return projector_->description().height_px; }
@@ -46,6 +76,14 @@ TEST_P(ProjectorContract, SaysWhatItIs) {
 TEST_P(ProjectorContract, IsDisconnectedBeforeItIsOpened) {
   EXPECT_EQ(projector_->show(Grey8(width(), height())).error().code, ErrorCode::kDisconnected);
   EXPECT_EQ(projector_->read_back().error().code, ErrorCode::kDisconnected);
+  EXPECT_EQ(projector_->check().error().code, ErrorCode::kDisconnected);
+}
+
+TEST_P(ProjectorContract, IsThereFromWhenItIsOpened) {
+  ASSERT_TRUE(projector_->open());
+  EXPECT_TRUE(projector_->check());
+  ASSERT_TRUE(projector_->show(Grey8(width(), height())));
+  EXPECT_TRUE(projector_->check());
 }
 
 TEST_P(ProjectorContract, IsBlackWheneverItIsOpened) {
@@ -94,7 +132,8 @@ INSTANTIATE_TEST_SUITE_P(
                               [] {
                                 return std::make_unique<HeadlessProjector>(
                                     HeadlessProjectorOptions{.width_px = 641, .height_px = 3, .refresh_hz = 1000.0});
-                              }}),
+                              }},
+                      Backend{"Glfw", [] { return on_xvfb(641, 363); }}),
     [](const auto& instance) { return instance.param.name; });
 
 }  // namespace

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <chrono>
+#include <cstdint>
+#include <future>
+#include <random>
+
+#include <gmock/gmock.h>
+
+#include "drivers/camera/aravis/device_clock.hpp"
+#include "tests/drivers/camera/aravis_test.hpp"
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+using test::counter_of;
+using test::far_away;
+using ::testing::HasSubstr;
+
+/// Two cameras that expose at one action command. Their keys are of this test only: others may run beside it.
+class ActionGroupTest : public test::AravisTest {
+ protected:
+  [[nodiscard]] AravisCameraOptions options_for(const test::GigeCamera& device) const {
+    AravisCameraOptions options = test::options_for(device);
+    options.trigger = AravisTrigger::kAction;
+    options.action = keys_;
+    return options;
+  }
+
+  /// One frame of each, asked for by a thread each.
+  static std::pair<Result<Frame>, Result<Frame>> capture_both(Camera& left, Camera& right) {
+    auto frame = std::async(std::launch::async, [&] { return left.capture(far_away()); });
+    auto other = right.capture(far_away());
+    return {frame.get(), std::move(other)};
+  }
+
+  ActionKeys keys_{std::random_device{}(), std::random_device{}(), 1};
+  test::GigeCamera other_device_;
+};
+
+TEST_F(ActionGroupTest, ExposesAllCamerasAtOneCommand) {
+  AravisCamera left(options_for(device_));
+  AravisCamera right(options_for(other_device_));
+  ASSERT_TRUE(opens(left));
+  ASSERT_TRUE(opens(right));
+  for (int i = 0; i < 10; ++i) {
+    const MonotonicTime asked = steady_clock::now();
+    const auto [frame, other] = capture_both(left, right);
+    ASSERT_TRUE(frame && other);
+    EXPECT_TRUE(counter_of(frame->image()));
+    EXPECT_TRUE(counter_of(other->image()));
+    EXPECT_GE(frame->exposure_start(), asked);
+    EXPECT_GE(other->exposure_start(), asked);
+  }
+}
+
+TEST_F(ActionGroupTest, ExposesAtOneTimeByACommonClock) {
+  AravisCameraOptions options = options_for(device_);
+  AravisCameraOptions other_options = options_for(other_device_);
+  options.ptp = other_options.ptp = true;
+  options.action_lead_us = other_options.action_lead_us = 50000.0;
+  AravisCamera left(options);
+  AravisCamera right(other_options);
+  ASSERT_TRUE(opens(left));
+  ASSERT_TRUE(opens(right));
+  const MonotonicTime asked = steady_clock::now();
+  const auto [frame, other] = capture_both(left, right);
+  ASSERT_TRUE(frame && other);
+  // A double acts when the time has come, not before; how much later depends on the machine.
+  EXPECT_GE(frame->exposure_start(), asked + 40ms);
+  EXPECT_GE(other->exposure_start(), asked + 40ms);
+}
+
+TEST_F(ActionGroupTest, ExposesOneCameraThatIsAskedAlone) {
+  AravisCamera left(options_for(device_));
+  AravisCamera right(options_for(other_device_));
+  ASSERT_TRUE(opens(left));
+  ASSERT_TRUE(opens(right));
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(next(left));
+  EXPECT_TRUE(next(right));
+}
+
+TEST_F(ActionGroupTest, LeavesCamerasWithOtherKeysAlone) {
+  AravisCameraOptions options = options_for(device_);
+  AravisCamera left(options);
+  options = options_for(other_device_);
+  options.action.group_mask = 2;
+  AravisCamera right(options);
+  ASSERT_TRUE(opens(left));
+  ASSERT_TRUE(opens(right));
+  const std::uint32_t before = other_device_.frames_exposed();
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(next(left));
+  EXPECT_EQ(other_device_.frames_exposed(), before);
+}
+
+TEST_F(ActionGroupTest, IsDisconnectedWhenNoFrameComes) {
+  AravisCameraOptions options = options_for(device_);
+  options.frame_timeout_ms = 300;
+  AravisCamera camera(options);
+  ASSERT_TRUE(opens(camera));
+  device_.set_faults({.silent = true});
+  EXPECT_EQ(error_of(camera), ErrorCode::kFrameDropped);
+  EXPECT_EQ(error_of(camera), ErrorCode::kDisconnected);
+}
+
+TEST(AravisCameraOptions, WantsACommonClockForACommonTime) {
+  AravisCameraOptions options;
+  options.id = "S77";
+  options.action_lead_us = 1000.0;
+  ASSERT_FALSE(options.validate());
+  EXPECT_THAT(options.validate().error().message, HasSubstr("action_lead_us needs ptp"));
+  options.ptp = true;
+  EXPECT_TRUE(options.validate());
+}
+
+TEST(DeviceClock, TellsWhatTheDeviceShows) {
+  DeviceClock clock;
+  const MonotonicTime now = steady_clock::now();
+  clock.observe({5s, now, now + 2us});
+  EXPECT_EQ(clock.device_time(clock.host_time(7s)), 7s);
+}
+
+}  // namespace
+}  // namespace slsd

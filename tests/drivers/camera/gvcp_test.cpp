@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/aravis/gvcp.hpp"
+
+#include <cstddef>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <rapidcheck/gtest.h>
+
+#include "drivers/camera/aravis/host_interface.hpp"
+
+namespace slsd {
+namespace {
+
+using ::testing::ElementsAre;
+
+std::vector<std::uint8_t> discovery_answer() {
+  std::vector<std::uint8_t> answer(8 + 0xf8, 0);
+  answer[3] = 3;
+  const auto write = [&](std::size_t offset, const std::string& text) {
+    std::copy(text.begin(), text.end(), answer.begin() + static_cast<std::ptrdiff_t>(8 + offset));
+  };
+  write(0x48, "Maker");
+  write(0x68, std::string(32, 'M'));
+  write(0xd8, "S77");
+  return answer;
+}
+
+TEST(ReadGvcpDiscovery, ReadsWhoTheDeviceIs) {
+  const auto device = read_gvcp_discovery(discovery_answer());
+  ASSERT_TRUE(device);
+  EXPECT_EQ(device->name(), "Maker-S77");
+  EXPECT_EQ(device->model, std::string(32, 'M'));
+}
+
+TEST(ReadGvcpDiscovery, RefusesOtherAnswers) {
+  for (const std::size_t place : {0, 1, 2, 3}) {
+    auto answer = discovery_answer();
+    answer[place] = 0x80;
+    EXPECT_FALSE(read_gvcp_discovery(answer));
+  }
+  auto short_one = discovery_answer();
+  short_one.pop_back();
+  EXPECT_FALSE(read_gvcp_discovery(short_one));
+}
+
+RC_GTEST_PROP(ReadGvcpDiscovery, TakesAnyBytes, (std::vector<std::uint8_t> bytes)) {
+  bytes.resize(bytes.size() % 600);
+  RC_ASSERT(!read_gvcp_discovery(bytes) || bytes.size() >= 256);
+  RC_ASSERT(!read_gvcp_value(bytes) || bytes.size() >= 12);
+}
+
+TEST(ReadGvcpValue, ReadsTheMostSignificantByteFirst) {
+  const std::vector<std::uint8_t> answer{0, 0, 0, 0x81, 0, 4, 0, 1, 0x12, 0x34, 0x56, 0x78};
+  EXPECT_EQ(read_gvcp_value(answer), 0x12345678u);
+}
+
+TEST(GvcpRead, AsksForARegister) {
+  EXPECT_THAT(gvcp_read(0xa00), ElementsAre(0x42, 1, 0, 0x80, 0, 4, 0, ::testing::Ne(0), 0, 0, 0x0a, 0));
+}
+
+TEST(HostInterface, ReachesTheAddressesOfItsNetwork) {
+  const auto address = [](std::uint32_t value) { return in_addr{htonl(value)}; };
+  const HostInterface interface { "eth1", address(0x0a000001), address(0xffffff00) };
+  EXPECT_TRUE(interface.reaches(address(0x0a0000fe)));
+  EXPECT_FALSE(interface.reaches(address(0x0a0001fe)));
+  EXPECT_EQ(interface.text(), "eth1 (10.0.0.1/24)");
+}
+
+}  // namespace
+}  // namespace slsd

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/projector/glfw/glfw_projector.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <sys/resource.h>
+
+#include "core/code/pattern.hpp"
+#include "drivers/files/file.hpp"
+#include "drivers/projector/headless_projector.hpp"
+#include "tests/doubles/x11/desktop.hpp"
+#include "tests/doubles/x11/x_server.hpp"
+#include "tests/drivers/plain_images.hpp"
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+using test::Desktop;
+using test::ramp8;
+using test::XServer;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+constexpr auto kPatience = 30s;
+
+bool eventually(const std::function<bool()>& holds) {
+  for (const auto end = steady_clock::now() + kPatience; steady_clock::now() < end;) {
+    if (holds()) return true;
+    std::this_thread::sleep_for(5ms);
+  }
+  return false;
+}
+
+ColourImage as_seen(const Grey8& image) {
+  ColourImage seen(image.width(), image.height());
+  for (std::size_t i = 0; i < image.size(); ++i) seen.data()[i].fill(image.data()[i]);
+  return seen;
+}
+
+std::string problem_of(const Result<>& result) {
+  return result ? "none" : to_string(result.error());
+}
+
+double processor_seconds() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+}
+
+/// One monitor of any size.
+class OnXvfb : public ::testing::Test {
+ protected:
+  bool start(int width_px, int height_px) {
+    server_ = XServer::start_virtual(width_px, height_px);
+    return server_ != nullptr;
+  }
+
+  std::unique_ptr<XServer> server_;
+};
+
+// A macro, because a test can be skipped only from within its own body.
+#define START_XVFB(width_px, height_px) \
+  if (!start(width_px, height_px)) GTEST_SKIP() << "no Xvfb starts here (package xvfb)"
+
+TEST_F(OnXvfb, ShowsEveryShippedPatternExactly) {
+  START_XVFB(1280, 800);
+  const Desktop desktop(server_->display());
+  GlfwProjector projector({});
+  ASSERT_EQ(problem_of(projector.open()), "none");
+  int patterns = 0;
+  for (const auto& file : std::filesystem::directory_iterator(SLSD_SOURCE_DIR "/config/patterns")) {
+    const auto text = read_file(file.path(), 1 << 20);
+    ASSERT_TRUE(text);
+    const auto pattern = read_pattern(*text, file.path().string());
+    ASSERT_TRUE(pattern) << to_string(pattern.error());
+    const Grey8 image = draw_pattern(*pattern);
+    ASSERT_TRUE(projector.show(image)) << file.path();
+    EXPECT_EQ(desktop.screenshot(0, 0, 1280, 800), as_seen(image)) << file.path();
+    ++patterns;
+  }
+  EXPECT_GE(patterns, 8);
+}
+
+TEST_F(OnXvfb, ShowsEverySizeAsTheHeadlessProjectorKeepsIt) {
+  const std::pair<int, int> sizes[] = {{640, 360}, {854, 480}, {1920, 1200}, {3840, 2160}};
+  for (const auto& [width, height] : sizes) {
+    START_XVFB(width, height);
+    PatternOptions options;
+    options.projector_width_px = width;
+    options.projector_height_px = height;
+    HeadlessProjector headless({.width_px = width, .height_px = height});
+    GlfwProjector projector({.width_px = width, .height_px = height});
+    ASSERT_EQ(problem_of(headless.open()), "none");
+    ASSERT_EQ(problem_of(projector.open()), "none");
+    const Desktop desktop(server_->display());
+    for (const Grey8& image : {draw_pattern(*make_pattern(options)), ramp8(width, height)}) {
+      ASSERT_TRUE(headless.show(image) && projector.show(image));
+      EXPECT_EQ(*headless.read_back(), image);
+      EXPECT_EQ(desktop.screenshot(0, 0, width, height), as_seen(image)) << width;
+    }
+  }
+}
+
+TEST_F(OnXvfb, DimsAsTheHeadlessProjectorDoes) {
+  START_XVFB(640, 360);
+  HeadlessProjector headless({.width_px = 640, .height_px = 360, .light = {.brightness = 0.4}});
+  GlfwProjector projector({.width_px = 640, .height_px = 360, .light = {.brightness = 0.4}});
+  ASSERT_TRUE(headless.open() && projector.open());
+  const Grey8 image = ramp8(640, 360);
+  ASSERT_TRUE(headless.show(image) && projector.show(image));
+  EXPECT_EQ(*projector.read_back(), *headless.read_back());
+  EXPECT_EQ(headless.read_back()->at(100, 0), std::lround(0.4 * image.at(100, 0)));
+}
+
+TEST_F(OnXvfb, RefusesAMonitorOfAnotherSize) {
+  START_XVFB(1024, 768);
+  const auto opened = GlfwProjector({}).open();
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::kMismatch);
+  EXPECT_THAT(opened.error().message, AllOf(HasSubstr("1024x768"), HasSubstr("1280x800"), HasSubstr("xrandr")));
+}
+
+TEST_F(OnXvfb, DrawsAgainOnlyWhatWasDamaged) {
+  START_XVFB(640, 360);
+  Desktop desktop(server_->display());
+  GlfwProjector projector({.width_px = 640, .height_px = 360});
+  ASSERT_EQ(problem_of(projector.open()), "none");
+  const Grey8 image = ramp8(640, 360);
+  ASSERT_TRUE(projector.show(image));
+  const double before = processor_seconds();
+  std::this_thread::sleep_for(500ms);
+  EXPECT_LT(processor_seconds() - before, 0.05);
+  desktop.cover(10, 10, 300, 200);
+  ASSERT_TRUE(eventually([&] { return desktop.screenshot(0, 0, 640, 360) != as_seen(image); }));
+  desktop.uncover();
+  EXPECT_TRUE(eventually([&] { return desktop.screenshot(0, 0, 640, 360) == as_seen(image); }));
+}
+
+TEST_F(OnXvfb, TellsRefreshesThatFollowOneAnother) {
+  START_XVFB(640, 360);
+  GlfwProjector projector({.width_px = 640, .height_px = 360});
+  ASSERT_EQ(problem_of(projector.open()), "none");
+  const MonotonicTime first = *projector.show(Grey8(640, 360, 1));
+  MonotonicTime last = first;
+  for (int i = 0; i < 30; ++i) {
+    const MonotonicTime next = *projector.show(Grey8(640, 360));
+    EXPECT_GT(next, last);
+    last = next;
+  }
+  EXPECT_GE(last - first, 300ms);  // Xvfb plays 60 refreshes a second, and may tell the first of them late
+}
+
+TEST_F(OnXvfb, OutlivesTheServerAndReturnsWithIt) {
+  START_XVFB(640, 360);
+  GlfwProjector projector({.width_px = 640, .height_px = 360});
+  ASSERT_EQ(problem_of(projector.open()), "none");
+  for (int i = 0; i < 3; ++i) {
+    server_->kill();
+    EXPECT_TRUE(eventually([&] { return !projector.check(); }));
+    EXPECT_EQ(projector.show(Grey8(640, 360)).error().code, ErrorCode::kDisconnected);
+    EXPECT_EQ(projector.open().error().code, ErrorCode::kNotFound);
+    ASSERT_TRUE(server_->restart());
+    ASSERT_EQ(problem_of(projector.open()), "none");
+    const Grey8 image = ramp8(640, 360, i);
+    ASSERT_TRUE(projector.show(image));
+    EXPECT_EQ(Desktop(server_->display()).screenshot(0, 0, 640, 360), as_seen(image));
+  }
+}
+
+TEST(GlfwProjector, SaysWhenThereIsNoDisplay) {
+  GlfwProjector projector({});
+  ::unsetenv("DISPLAY");
+  for (int i = 0; i < 3; ++i) {
+    const auto opened = projector.open();
+    ASSERT_FALSE(opened);
+    EXPECT_EQ(opened.error().code, ErrorCode::kNotFound);
+    EXPECT_THAT(opened.error().message, HasSubstr("DISPLAY is not set"));
+  }
+  ::setenv("DISPLAY", ":60999", 1);
+  EXPECT_THAT(projector.open().error().message, HasSubstr(":60999"));
+}
+
+/// A desktop with an operator's monitor, DUMMY0, and the projector to its right, DUMMY1.
+class OnTwoMonitors : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    server_ = XServer::start_dummy();
+    if (!server_) GTEST_SKIP() << "no Xorg with the dummy driver starts here (xserver-xorg-video-dummy)";
+    desktop_ = std::make_unique<Desktop>(server_->display());
+    if (!plug()) GTEST_SKIP() << "xrandr does not plug a second monitor in (x11-xserver-utils)";
+  }
+
+  [[nodiscard]] bool plug() const { return desktop_->plug("DUMMY1", "1280x800", "--right-of DUMMY0"); }
+
+  void expect_shown_exactly(GlfwProjector& projector, const Grey8& image) const {
+    ASSERT_TRUE(projector.show(image));
+    EXPECT_EQ(desktop_->screenshot(1024, 0, 1280, 800), as_seen(image));
+  }
+
+  std::unique_ptr<XServer> server_;
+  std::unique_ptr<Desktop> desktop_;
+};
+
+TEST_F(OnTwoMonitors, TakesTheOneThatIsNotPrimary) {
+  const ColourImage operators = desktop_->screenshot(0, 0, 1024, 768);
+  GlfwProjector projector({});
+  ASSERT_EQ(problem_of(projector.open()), "none");
+  EXPECT_EQ(projector.description().monitor, "DUMMY1");
+  expect_shown_exactly(projector, ramp8(1280, 800));
+  EXPECT_EQ(desktop_->screenshot(0, 0, 1024, 768), operators);
+}
+
+TEST_F(OnTwoMonitors, TakesTheOneThatIsNamed) {
+  desktop_->set_serial("DUMMY1", "PJ-4711");
+  for (const char* name : {"DUMMY1", "PJ-4711", "+1024+0"}) {
+    GlfwProjector projector({.monitor = name});
+    ASSERT_EQ(problem_of(projector.open()), "none");
+    EXPECT_EQ(projector.description().monitor, "DUMMY1");
+  }
+  const auto opened = GlfwProjector({.monitor = "HDMI-7"}).open();
+  EXPECT_EQ(opened.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(opened.error().message, AllOf(HasSubstr("HDMI-7"), HasSubstr("DUMMY0"), HasSubstr("PJ-4711")));
+}
+
+TEST_F(OnTwoMonitors, ReturnsToTheSameMonitorWheneverItIsPluggedInAgain) {
+  const char* wanted = std::getenv("SLSD_TEST_REPLUGS");
+  const int replugs = wanted != nullptr ? std::atoi(wanted) : 3;
+  GlfwProjector projector({});
+  ASSERT_EQ(problem_of(projector.open()), "none");
+  for (int i = 0; i < replugs; ++i) {
+    expect_shown_exactly(projector, ramp8(1280, 800, i));
+    const ColourImage operators = desktop_->screenshot(0, 0, 1024, 768);
+    ASSERT_TRUE(desktop_->unplug("DUMMY1"));
+    EXPECT_FALSE(projector.check());
+    EXPECT_EQ(projector.show(ramp8(1280, 800)).error().code, ErrorCode::kDisconnected);
+    EXPECT_EQ(projector.open().error().code, ErrorCode::kNotFound);
+    EXPECT_EQ(desktop_->screenshot(0, 0, 1024, 768), operators);
+    ASSERT_TRUE(plug());
+    ASSERT_TRUE(eventually([&] { return projector.open().has_value(); }));
+    EXPECT_EQ(projector.description().monitor, "DUMMY1");
+  }
+  expect_shown_exactly(projector, ramp8(1280, 800));
+}
+
+TEST_F(OnTwoMonitors, NoticesAnotherMode) {
+  GlfwProjector projector({});
+  ASSERT_EQ(problem_of(projector.open()), "none");
+  ASSERT_TRUE(desktop_->plug("DUMMY1", "640x360", "--right-of DUMMY0"));
+  EXPECT_TRUE(eventually([&] { return !projector.check(); }));
+  ASSERT_TRUE(eventually([&] { return projector.open().error().code == ErrorCode::kMismatch; }));
+  ASSERT_TRUE(plug());
+  EXPECT_TRUE(eventually([&] { return projector.open().has_value(); }));
+  expect_shown_exactly(projector, ramp8(1280, 800));
+}
+
+TEST_F(OnTwoMonitors, WarnsOfWhatNoScreenshotShows) {
+  GlfwProjector projector({});
+  ASSERT_EQ(problem_of(projector.open()), "none");
+  EXPECT_THAT(projector.warnings(), ::testing::Not(Contains(HasSubstr("gamma"))));
+  ASSERT_TRUE(desktop_->xrandr("--output DUMMY1 --gamma 1.5:1.5:1.5"));
+  ASSERT_TRUE(desktop_->xrandr("--output DUMMY1 --pos 100x0"));
+  ASSERT_TRUE(eventually([&] { return projector.open().has_value(); }));
+  EXPECT_THAT(projector.warnings(), Contains(HasSubstr("gamma table is active")));
+  EXPECT_THAT(projector.warnings(), Contains(HasSubstr("mirrors DUMMY0")));
+}
+
+}  // namespace
+}  // namespace slsd
