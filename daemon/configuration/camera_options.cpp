@@ -16,6 +16,17 @@ std::string_view to_string(CameraDriver driver) {
   return {};
 }
 
+std::optional<double> CameraOptions::exposure_us() const {
+  if (driver == CameraDriver::kV4l2) return v4l2.exposure_us;
+  if (driver == CameraDriver::kAravis) return aravis.exposure_us;
+  return std::nullopt;
+}
+
+std::string CameraOptions::format() const {
+  if (driver == CameraDriver::kV4l2) return v4l2.format;
+  return driver == CameraDriver::kAravis ? aravis.pixel_format : std::string();
+}
+
 Result<> CameraOptions::validate() const {
   if (name().empty() || name().size() > 64) return fail(ErrorCode::kInvalidArgument, "name must have 1 to 64 letters");
   if (driver == CameraDriver::kV4l2) return v4l2.validate();

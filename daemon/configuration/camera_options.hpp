@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,10 @@ struct CameraOptions {
   std::vector<Fault> faults;   ///< what the camera does wrong, for the tests of everything above it
 
   [[nodiscard]] const std::string& name() const { return file.name; }
+  /// As configured; nothing where the driver keeps the camera's own, or has none.
+  [[nodiscard]] std::optional<double> exposure_us() const;
+  /// Of its pixels, by the driver's name for it; empty where the driver chooses.
+  [[nodiscard]] std::string format() const;
   /// @errors kInvalidArgument: the message begins with the key
   [[nodiscard]] Result<> validate() const;
   friend bool operator==(const CameraOptions&, const CameraOptions&) = default;

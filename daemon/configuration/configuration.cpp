@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "daemon/configuration/aravis_keys.hpp"
+#include "daemon/configuration/given_keys.hpp"
 #include "daemon/configuration/table_reader.hpp"
 #include "daemon/configuration/v4l2_keys.hpp"
 #include "drivers/files/file.hpp"
@@ -21,6 +22,9 @@ constexpr std::size_t kMaxFileBytes = 1 << 20;
 
 constexpr std::array kProjectorDrivers{std::pair("headless"sv, ProjectorDriver::kHeadless),
                                        std::pair("glfw"sv, ProjectorDriver::kGlfw)};
+constexpr std::array kIdlePictures{std::pair("pattern"sv, IdlePicture::kPattern),
+                                   std::pair("black"sv, IdlePicture::kBlack),
+                                   std::pair("white"sv, IdlePicture::kWhite)};
 constexpr std::array kCameraDrivers{std::pair("file"sv, CameraDriver::kFile), std::pair("v4l2"sv, CameraDriver::kV4l2),
                                     std::pair("aravis"sv, CameraDriver::kAravis)};
 constexpr std::array kArrayMethods{std::pair("constructive"sv, ArrayMethod::kConstructive),
@@ -29,6 +33,8 @@ constexpr std::array kMethods{std::pair("default"sv, Method::kDefault), std::pai
 constexpr std::array kMosaics{std::pair("none"sv, BayerPattern::kNone), std::pair("RGGB"sv, BayerPattern::kRggb),
                               std::pair("BGGR"sv, BayerPattern::kBggr), std::pair("GRBG"sv, BayerPattern::kGrbg),
                               std::pair("GBRG"sv, BayerPattern::kGbrg)};
+constexpr std::array kOtherHardware{std::pair("error"sv, OtherHardware::kError),
+                                    std::pair("warn"sv, OtherHardware::kWarn)};
 
 template <class Choices>
 auto span_of(const Choices& choices) {
@@ -41,6 +47,12 @@ Result<> read_projector(const toml::table* table, const path& file, ProjectorOpt
   reader.read("monitor", options.monitor);
   reader.read("width_px", options.width_px);
   reader.read("height_px", options.height_px);
+  reader.read("brightness", options.light.brightness);
+  reader.read("gamma", options.light.gamma);
+  reader.read("black_level", options.light.black_level);
+  reader.read("refresh_hz", options.refresh_hz);
+  reader.choose("idle", options.idle, span_of(kIdlePictures));
+  reader.read("idle_after_ms", options.idle_after_ms);
   return reader.finish(options.validate());
 }
 
@@ -152,9 +164,10 @@ Result<> read_decode(const toml::table* table, const path& file, DecodeOptions& 
   return reader.finish(options.validate());
 }
 
-Result<> read_calibration_table(const toml::table* table, const path& file, path& calibration_file) {
+Result<> read_calibration_table(const toml::table* table, const path& file, Configuration& configuration) {
   TableReader reader(table, "[calibration]", file);
-  reader.read("file", calibration_file);
+  reader.read("file", configuration.calibration_file);
+  reader.choose("other_hardware", configuration.other_hardware, span_of(kOtherHardware));
   return reader.finish();
 }
 
@@ -164,6 +177,8 @@ Result<> read_scan(const toml::table* table, const path& file, ScanOptions& opti
   reader.read("exposure_skew_ms", options.exposure_skew_ms);
   reader.read("reopen_first_ms", options.reopen_first_ms);
   reader.read("reopen_longest_ms", options.reopen_longest_ms);
+  reader.read("projector_latency_ms", options.projector_latency_ms);
+  reader.read("power_line_hz", options.power_line_hz);
   return reader.finish(options.validate());
 }
 
@@ -191,11 +206,12 @@ Result<Configuration> read_tables(const toml::table& document, const path& file)
   if (read) read = read_projector(projector, file, configuration.projector);
   if (read) read = read_pattern_table(pattern, file, configuration);
   if (read) read = read_cameras(cameras, file, configuration.cameras);
-  if (read) read = read_calibration_table(calibration, file, configuration.calibration_file);
+  if (read) read = read_calibration_table(calibration, file, configuration);
   if (read) read = read_decode(decode, file, configuration.decode);
   if (read) read = read_scan(scan, file, configuration.scan);
   if (read) read = read_server(server, file, configuration.server);
   if (!read) return tl::unexpected(read.error());
+  configuration.given = given_keys(document);
   return configuration;
 }
 
@@ -213,6 +229,13 @@ Result<Configuration> load_configuration(const path& file) {
   auto text = read_file(file, kMaxFileBytes);
   if (!text) return tl::unexpected(text.error());
   return read_configuration(*text, file);
+}
+
+Result<Configuration> load_configuration_or_defaults(const std::optional<path>& file) {
+  if (file) return load_configuration(*file);
+  std::error_code ignored;
+  if (std::filesystem::exists(kConfigurationFile, ignored)) return load_configuration(kConfigurationFile);
+  return read_configuration("", "defaults");
 }
 
 }  // namespace slsd

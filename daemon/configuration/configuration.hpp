@@ -3,8 +3,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string_view>
 #include <vector>
+
+#include <nlohmann/json.hpp>
 
 #include "core/code/pattern.hpp"
 #include "core/decode/options.hpp"
@@ -18,6 +21,9 @@ namespace slsd {
 
 inline constexpr const char* kConfigurationFile = "/etc/slsd/slsd.toml";
 
+/// What becomes of a scan whose camera or projector is not the one that was calibrated.
+enum class OtherHardware { kError, kWarn };
+
 /// What the configuration file says, a member to a table. Paths are those of the file, joined to its folder.
 struct Configuration {
   std::filesystem::path pattern_file;  ///< where it is not empty, it takes the place of `pattern`
@@ -25,9 +31,11 @@ struct Configuration {
   ProjectorOptions projector;
   std::vector<CameraOptions> cameras;
   std::filesystem::path calibration_file;  ///< empty: none, and no scan is possible
+  OtherHardware other_hardware = OtherHardware::kError;
   DecodeOptions decode;
   ScanOptions scan;
   ServerOptions server;
+  nlohmann::json given = nlohmann::json::object();  ///< the keys as the file has them, table by table, for a record
 };
 
 /// Reads a configuration's text.
@@ -39,5 +47,10 @@ struct Configuration {
 
 /// Reads a configuration file. @errors as above, and those of read_file() @thread reentrant
 [[nodiscard]] Result<Configuration> load_configuration(const std::filesystem::path& file);
+
+/// The file named; without one kConfigurationFile where that is there, else the defaults: for commands that serve
+/// before anything is configured.
+/// @errors as load_configuration()
+[[nodiscard]] Result<Configuration> load_configuration_or_defaults(const std::optional<std::filesystem::path>& file);
 
 }  // namespace slsd

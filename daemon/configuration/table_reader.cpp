@@ -137,6 +137,21 @@ void TableReader::read(std::string_view key, std::vector<std::string>& value) {
   value = std::move(words);
 }
 
+void TableReader::read(std::string_view key, std::vector<double>& value) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return;
+  const toml::array* array = node->as_array();
+  std::vector<double> numbers;
+  for (std::size_t i = 0; i < (array == nullptr ? 1 : std::min(array->size(), kLongestList)); ++i) {
+    const auto number = (array == nullptr ? *node : *array->get(i)).value<double>();
+    if (number && std::isfinite(*number)) numbers.push_back(*number);
+  }
+  if (numbers.size() != (array == nullptr ? 1 : array->size())) {
+    return refuse(key, "must be a number or a list of numbers");
+  }
+  value = std::move(numbers);
+}
+
 void TableReader::read_both(std::string_view first_key, std::string_view second_key,
                             std::optional<std::pair<int, int>>& values) {
   std::optional<int> first;

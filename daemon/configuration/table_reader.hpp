@@ -41,6 +41,8 @@ class TableReader {
   void read(std::string_view key, std::filesystem::path& value);
   void read(std::string_view key, std::vector<int>& value);
   void read(std::string_view key, std::vector<std::string>& value);
+  /// One number, or a list of them.
+  void read(std::string_view key, std::vector<double>& value);
 
   /// Two numbers of which each needs the other.
   void read_both(std::string_view first_key, std::string_view second_key, std::optional<std::pair<int, int>>& values);

@@ -14,6 +14,7 @@ void read_v4l2_keys(TableReader& reader, V4l2CameraOptions& options) {
   reader.read_both("width_px", "height_px", options.size_px);
   reader.read("frame_rate_hz", options.frame_rate_hz);
   reader.read("exposure_us", options.exposure_us);
+  reader.read("gain_db", options.gain_db);
   reader.read("gain_steps", options.gain_steps);
   reader.read("focus_steps", options.focus_steps);
   reader.read("power_line_hz", options.power_line_hz);

@@ -33,6 +33,7 @@ constexpr std::array kEntries{
     Entry{ErrorCode::kFrameTorn, -32016, "frame_torn"},
     Entry{ErrorCode::kFrameStale, -32017, "frame_stale"},
     Entry{ErrorCode::kFrameLate, -32018, "frame_late"},
+    Entry{ErrorCode::kFrameSkewed, -32019, "frame_skewed"},
 };
 
 constexpr const Entry& entry(ErrorCode code) {

@@ -35,6 +35,7 @@ void expect_equal(const Configuration& a, const Configuration& b) {
   EXPECT_EQ(a.projector, b.projector);
   EXPECT_EQ(a.cameras, b.cameras);
   EXPECT_EQ(a.calibration_file, b.calibration_file);
+  EXPECT_EQ(a.other_hardware, b.other_hardware);
   EXPECT_EQ(a.decode, b.decode);
   EXPECT_EQ(a.scan, b.scan);
   EXPECT_EQ(a.server, b.server);
@@ -98,6 +99,13 @@ TEST(ReadConfiguration, ShippedCamerasEqualTheDefaults) {
   EXPECT_EQ(shipped_camera(cameras, CameraDriver::kAravis), aravis);
 }
 
+TEST(ReadConfiguration, KeepsTheKeysAsTheyWereGiven) {
+  const auto configuration = read("[decode]\ndepth_min_mm = 500.5\n[[camera]]\npath = \"x\"\nloop = false\n");
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  EXPECT_EQ(configuration->given, nlohmann::json::parse(R"({"decode": {"depth_min_mm": 500.5},
+                                                            "camera": [{"path": "x", "loop": false}]})"));
+}
+
 // Every key of the tables stands in the shipped file, in force or in a comment.
 TEST(ReadConfiguration, ShippedFileHasEveryKey) {
   for (const char* key : {"file",
@@ -112,6 +120,12 @@ TEST(ReadConfiguration, ShippedFileHasEveryKey) {
                           "monitor",
                           "width_px",
                           "height_px",
+                          "brightness",
+                          "gamma",
+                          "black_level",
+                          "refresh_hz",
+                          "idle",
+                          "idle_after_ms",
                           "name",
                           "path",
                           "loop",
@@ -134,6 +148,7 @@ TEST(ReadConfiguration, ShippedFileHasEveryKey) {
                           "trigger_line",
                           "gain_db",
                           "pixel_format",
+                          "chunks",
                           "packet_bytes",
                           "packet_delay_us",
                           "receive_buffer_bytes",
@@ -154,6 +169,7 @@ TEST(ReadConfiguration, ShippedFileHasEveryKey) {
                           "exposure_skew_ms",
                           "reopen_first_ms",
                           "reopen_longest_ms",
+                          "projector_latency_ms",
                           "socket",
                           "socket_mode",
                           "clients_max",
@@ -178,6 +194,12 @@ driver = "glfw"
 monitor = "HDMI-1"
 width_px = 1920
 height_px = 1080
+brightness = 0.5
+gamma = [0, 0.25, 1]
+black_level = 16
+refresh_hz = 120
+idle = "black"
+idle_after_ms = 0
 [[camera]]
 name = "left"
 path = "/frames"
@@ -189,12 +211,15 @@ bayer = "RGGB"
 faults = ["drop@3"]
 [calibration]
 file = "calibration.yml"
+other_hardware = "warn"
 [decode]
 depth_min_mm = 100
 depth_max_mm = 200.5
 classify = "paper"
 [scan]
 timeout_ms = 1
+projector_latency_ms = 34.5
+power_line_hz = 60
 [server]
 socket = "run/s"
 socket_mode = 0o600
@@ -205,10 +230,19 @@ socket_mode = 0o600
   EXPECT_EQ(configuration->pattern.minimum_distance, 2);
   EXPECT_EQ(configuration->pattern.projector_width_px, 1920);
   EXPECT_EQ(configuration->projector.driver, ProjectorDriver::kGlfw);
+  EXPECT_EQ(configuration->projector.light.brightness, 0.5);
+  EXPECT_EQ(configuration->projector.light.gamma, (std::vector<double>{0, 0.25, 1}));
+  EXPECT_EQ(configuration->projector.light.black_level, 16);
+  EXPECT_EQ(configuration->projector.refresh_hz, 120.0);
+  EXPECT_EQ(configuration->projector.idle, IdlePicture::kBlack);
+  EXPECT_EQ(configuration->projector.idle_after_ms, 0);
+  EXPECT_EQ(configuration->scan.projector_latency_ms, 34.5);
+  EXPECT_EQ(configuration->scan.power_line_hz, 60);
   EXPECT_EQ(configuration->cameras.at(0).file.path, "/frames");
   EXPECT_EQ(configuration->cameras.at(0).file.size_px, std::pair(640, 480));
   EXPECT_EQ(configuration->cameras.at(0).faults.at(0).capture, 3U);
   EXPECT_EQ(configuration->calibration_file, "etc/calibration.yml");
+  EXPECT_EQ(configuration->other_hardware, OtherHardware::kWarn);
   EXPECT_EQ(configuration->decode.classify, Method::kPaper);
   EXPECT_EQ(configuration->decode.depth_min_mm, 100.0);
   EXPECT_EQ(configuration->server.socket, "etc/run/s");
@@ -238,10 +272,16 @@ faults = ["drop@3"]
   ASSERT_TRUE(configuration) << to_string(configuration.error());
   const CameraOptions& camera = configuration->cameras.at(0);
   const V4l2CameraOptions expected{
-      "left", "usb-camera", "Y16", std::pair(640, 480), 30.0, 16700.0, 12, 40, 50, false, 8000.5, 5, 4};
+      "left", "usb-camera", "Y16", std::pair(640, 480), 30.0, 16700.0, std::nullopt, 12, 40, 50, false, 8000.5, 5, 4};
   EXPECT_EQ(camera.driver, CameraDriver::kV4l2);
   EXPECT_EQ(camera.v4l2, expected);
   EXPECT_EQ(camera.faults.size(), 1U);
+}
+
+TEST(ReadConfiguration, TakesAGainOfV4l2InDecibels) {
+  const auto configuration = read("[[camera]]\ndriver = \"v4l2\"\ndevice = \"x\"\ngain_db = 6\n");
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  EXPECT_EQ(configuration->cameras.at(0).v4l2.gain_db, 6.0);
 }
 
 TEST(ReadConfiguration, NamesTheDriverWhoseKeyItIs) {
@@ -260,12 +300,18 @@ id = "Vendor-1234"
 interface = "192.0.2.1"
 trigger = "line"
 trigger_line = "Line3"
+action_device_key = 4294967295
+action_group_key = 7
+action_group_mask = 2
+action_lead_us = 2000
+ptp = true
 rate_hz = 30
 exposure_us = 16667
 gain_db = 3.5
 pixel_format = "BayerRG12"
 width_px = 640
 height_px = 480
+chunks = false
 packet_bytes = 1500
 packet_delay_us = 2.5
 receive_buffer_bytes = 100000
@@ -278,15 +324,28 @@ faults = ["drop@3"]
 )");
   ASSERT_TRUE(configuration) << to_string(configuration.error());
   const CameraOptions& camera = configuration->cameras.at(0);
-  const AravisCameraOptions expected{"left",      "Vendor-1234",
-                                     "192.0.2.1", AravisTrigger::kLine,
-                                     "Line3",     30.0,
-                                     16667.0,     3.5,
-                                     "BayerRG12", std::pair(640, 480),
-                                     1500,        2.5,
-                                     100000,      false,
-                                     false,       50,
-                                     3,           4};
+  const AravisCameraOptions expected{.name = "left",
+                                     .id = "Vendor-1234",
+                                     .interface = "192.0.2.1",
+                                     .trigger = AravisTrigger::kLine,
+                                     .trigger_line = "Line3",
+                                     .action = {4294967295, 7, 2},
+                                     .action_lead_us = 2000.0,
+                                     .ptp = true,
+                                     .rate_hz = 30.0,
+                                     .exposure_us = 16667.0,
+                                     .gain_db = 3.5,
+                                     .pixel_format = "BayerRG12",
+                                     .size_px = std::pair(640, 480),
+                                     .chunks = false,
+                                     .packet_bytes = 1500,
+                                     .packet_delay_us = 2.5,
+                                     .receive_buffer_bytes = 100000,
+                                     .packet_resend = false,
+                                     .packet_socket = false,
+                                     .frame_timeout_ms = 50,
+                                     .missed_frames_max = 3,
+                                     .frames_held_max = 4};
   EXPECT_EQ(camera.driver, CameraDriver::kAravis);
   EXPECT_EQ(camera.aravis, expected);
   EXPECT_EQ(camera.faults.size(), 1U);
@@ -316,14 +375,17 @@ TEST(ReadConfiguration, PlacesRangesAtTheKey) {
   EXPECT_THAT(error_of("[pattern]\nspacing_px = 2\nsymbol_size_px = 9\n"), HasSubstr("slsd.toml:3:18: "));
   EXPECT_THAT(error_of("[pattern]\nsymbols = [7, 7]\n"), HasSubstr("slsd.toml:2:11: "));
   EXPECT_THAT(error_of("[projector]\nwidth_px = 100\n"), HasSubstr("slsd.toml:2:12: "));
+  EXPECT_THAT(error_of("[projector]\nrefresh_hz = 5.0\n"), HasSubstr("slsd.toml:2:14: "));
+  EXPECT_THAT(error_of("[scan]\nprojector_latency_ms = 1001\n"), HasSubstr("slsd.toml:2:24: "));
+  EXPECT_THAT(error_of("[scan]\npower_line_hz = 55\n"), HasSubstr("slsd.toml:2:17: "));
   EXPECT_THAT(error_of("[decode]\ndepth_min_mm = 900.0\ndepth_max_mm = 800.0\n"), HasSubstr("slsd.toml:"));
   EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nrate_hz = -1\n"), HasSubstr("slsd.toml:3:11: "));
   EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nfaults = [\"explode@1\"]\n"), HasSubstr("slsd.toml:3:10: "));
   EXPECT_THAT(error_of("[[camera]]\n"), HasSubstr("path must name"));
   const std::string aravis = "[[camera]]\ndriver = \"aravis\"\nid = \"1\"\n";
-  EXPECT_THAT(error_of(aravis + "pixel_format = \"Mono12p\"\n"), HasSubstr("slsd.toml:4:16: "));
+  EXPECT_THAT(error_of(aravis + "pixel_format = \"Mono14p\"\n"), HasSubstr("slsd.toml:4:16: "));
   EXPECT_THAT(error_of(aravis + "exposure_us = 0.5\n"), HasSubstr("slsd.toml:4:15: "));
-  EXPECT_THAT(error_of(aravis + "trigger = \"hand\"\n"), HasSubstr("software, line, free_run"));
+  EXPECT_THAT(error_of(aravis + "trigger = \"hand\"\n"), HasSubstr("software, line, free_run, action"));
   EXPECT_THAT(error_of(aravis + "path = \"x\"\n"), HasSubstr("path is a key of the driver \"file\""));
   const std::string v4l2 = "[[camera]]\ndriver = \"v4l2\"\ndevice = \"x\"\n";
   EXPECT_THAT(error_of(v4l2 + "exposure_us = 0.5\n"), HasSubstr("slsd.toml:4:15: "));
