@@ -2,59 +2,100 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <thread>
 
 #include "core/result.hpp"
 #include "daemon/scan/backoff.hpp"
 #include "daemon/scan/device_status.hpp"
+#include "daemon/scan/heartbeat.hpp"
+#include "daemon/scan/sequence_gaps.hpp"
 #include "drivers/camera/camera.hpp"
 
 namespace slsd {
 
-/// A camera and the thread that it lives on: opens it, opens it again after it was lost, with growing pauses, and takes
-/// a frame when told. The first failure and the recovery are logged, not each attempt.
+/// Which frame a capture takes.
+enum class Exposure {
+  kFresh,  ///< the first whose exposure begins after the capture
+  kNext,   ///< the one after the last, where the camera runs freely
+};
+
+/// A camera and the thread that it lives on, its supervisor: opens it, opens it again after it was lost, with growing
+/// pauses and for ever, looks after it while nobody asks for frames, and takes a frame when told. The first failure and
+/// the recovery are logged, not each attempt. docs/supervision.md draws the states.
 /// @thread thread-safe, but for begin_capture() and end_capture(), which belong to one thread
 class CameraRunner {
  public:
   CameraRunner(std::unique_ptr<Camera> camera, const ScanOptions& options);
+  /// Waits for the thread: while a device that is gone is being closed, for seconds.
   ~CameraRunner();
   CameraRunner(const CameraRunner&) = delete;
   CameraRunner& operator=(const CameraRunner&) = delete;
 
   /// Ends what waits, and the thread, soon. What is asked afterwards fails with kCancelled.
   void request_stop();
+  /// Whether the thread has ended and the camera is closed.
+  [[nodiscard]] bool stopped() const { return ended_; }
 
+  [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] DeviceStatus status() const;
+  /// How many times it was opened.
+  [[nodiscard]] std::uint64_t openings() const;
+  [[nodiscard]] const Heartbeat& heartbeat() const { return heartbeat_; }
+  /// Of a camera that runs freely; 0: of any other.
+  [[nodiscard]] double rate_hz() const { return rate_hz_; }
 
   /// Waits until the camera is open.
   /// @errors kTimeout, with the reason why it is not open; kCancelled
   [[nodiscard]] Result<> wait_ready(MonotonicTime deadline);
 
   /// Lets the camera expose one frame, now; end_capture() waits for it.
-  void begin_capture(MonotonicTime deadline);
+  void begin_capture(MonotonicTime deadline, Exposure exposure = Exposure::kFresh,
+                     FrameLight light = FrameLight::kPattern);
+  /// Comes back soon after the deadline also where the driver does not.
   /// @errors as Camera::capture(); kCancelled
   [[nodiscard]] Result<Frame> end_capture();
 
  private:
+  struct Order {
+    MonotonicTime deadline;
+    Exposure exposure = Exposure::kFresh;
+    FrameLight light = FrameLight::kPattern;
+  };
   void run(const std::stop_token& stop);
+  void close();
+  void cancel();
   void open_or_pause(const std::stop_token& stop);
+  void note_found();
   void note_opened(const Result<>& opened);
+  void look_after();
+  void note_lost(const Error& error);
+  [[nodiscard]] std::optional<Order> next_order(const std::stop_token& stop);
+  void take_frame(const Order& order);
   void note_frame(Result<Frame> frame);
-  [[nodiscard]] std::optional<MonotonicTime> next_capture(const std::stop_token& stop);
+  [[nodiscard]] tl::unexpected<Error> give_up();
+  [[nodiscard]] tl::unexpected<Error> fail_not_ready() const;
 
-  std::unique_ptr<Camera> camera_;
+  std::string name_;
   Backoff backoff_;
+  Heartbeat heartbeat_;
+  std::atomic<double> rate_hz_{0};
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
+  std::unique_ptr<Camera> camera_;  ///< used by its thread; from others only to cancel, under the mutex
   DeviceStatus status_;
-  std::optional<MonotonicTime> asked_;  ///< a capture's deadline
+  SequenceGaps gaps_;
+  std::optional<Order> order_;
   std::optional<Result<Frame>> answer_;
+  bool given_up_ = false;  ///< the driver is over its time; its answer is thrown away
   bool stopped_ = false;
+  std::atomic<bool> ended_{false};
   std::jthread thread_;
 };
 

@@ -10,15 +10,28 @@
 
 namespace slsd {
 
+/// How a camera or the projector is; docs/supervision.md draws the ways from one to the other.
 enum class DeviceState {
-  kOpening,  ///< not open yet, nothing has failed
-  kReady,
-  kFailed,  ///< not open, the last attempt or frame failed; it is tried again
+  kAbsent,     ///< nothing of its name answers; it is looked for again
+  kOpening,    ///< being opened and configured
+  kReady,      ///< open, and waits for a trigger
+  kCapturing,  ///< a frame is under way
+  kFaulted,    ///< it failed, or is there and does not open; it is opened again
 };
 
 [[nodiscard]] constexpr std::string_view to_string(DeviceState state) {
-  constexpr std::string_view kNames[] = {"opening", "ready", "failed"};
+  constexpr std::string_view kNames[] = {"absent", "opening", "ready", "capturing", "faulted"};
   return kNames[static_cast<int>(state)];
+}
+
+[[nodiscard]] constexpr bool is_open(DeviceState state) {
+  return state == DeviceState::kReady || state == DeviceState::kCapturing;
+}
+
+/// The state of a device whose open() failed.
+[[nodiscard]] constexpr DeviceState state_after(ErrorCode code) {
+  const bool nothing_there = code == ErrorCode::kNotFound || code == ErrorCode::kDisconnected;
+  return nothing_there ? DeviceState::kAbsent : DeviceState::kFaulted;
 }
 
 /// What `status` says of a projector or a camera.
@@ -29,10 +42,11 @@ struct DeviceStatus {
   int width_px = 0;
   int height_px = 0;
   DeviceState state = DeviceState::kOpening;
-  std::string problem;            ///< empty while it is ready
+  std::string problem;            ///< why it is not open; empty while it is
+  std::string shows;              ///< of a projector: "pattern", "white", "black", "idle" or "held"; empty: nothing
   std::uint64_t opened = 0;       ///< times
   std::uint64_t frames = 0;       ///< delivered
-  std::uint64_t frames_lost = 0;  ///< asked for and not delivered
+  std::uint64_t frames_lost = 0;  ///< asked for and not delivered, or missing between two that were
 };
 
 }  // namespace slsd

@@ -6,6 +6,7 @@
 #include "drivers/camera/faulty_camera.hpp"
 #include "drivers/camera/file_camera.hpp"
 #include "drivers/camera/v4l2/v4l2_camera.hpp"
+#include "drivers/projector/glfw/glfw_projector.hpp"
 #include "drivers/projector/headless_projector.hpp"
 
 namespace slsd {
@@ -28,15 +29,15 @@ Result<std::unique_ptr<Camera>> make_camera(const CameraOptions& options) {
 }
 
 Result<std::unique_ptr<Projector>> make_projector(const ProjectorOptions& options) {
-  if (options.driver != ProjectorDriver::kHeadless) {
-    return fail(ErrorCode::kUnsupported,
-                "the driver \"" + std::string(to_string(options.driver)) +
-                    "\" is not part of this build, whose projector drivers are: headless",
-                "projector");
+  if (options.driver == ProjectorDriver::kGlfw) {
+    return std::make_unique<GlfwProjector>(
+        GlfwProjectorOptions{options.monitor, options.width_px, options.height_px, options.light});
   }
   HeadlessProjectorOptions headless;
   headless.width_px = options.width_px;
   headless.height_px = options.height_px;
+  headless.light = options.light;
+  if (options.refresh_hz > 0) headless.refresh_hz = options.refresh_hz;
   return std::make_unique<HeadlessProjector>(std::move(headless));
 }
 

@@ -16,7 +16,7 @@ namespace slsd {
 /// @errors kUnsupported: this build lacks the driver
 [[nodiscard]] Result<std::unique_ptr<Camera>> make_camera(const CameraOptions& options);
 
-/// Makes the projector that the configuration names; it is not open yet. @errors kUnsupported
+/// Makes the projector that the configuration names; it is not open yet.
 [[nodiscard]] Result<std::unique_ptr<Projector>> make_projector(const ProjectorOptions& options);
 
 }  // namespace slsd

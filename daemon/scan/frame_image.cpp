@@ -27,7 +27,9 @@ FrameImage described(const Frame& frame) {
                           .width_px = image.width,
                           .height_px = image.height,
                           .bits = static_cast<int>(8 * sizeof(T)),
-                          .sequence = frame.sequence()};
+                          .sequence = frame.sequence(),
+                          .exposure_start = frame.exposure_start(),
+                          .received = frame.received()};
       },
       frame.image());
 }
@@ -45,6 +47,12 @@ Result<FrameImage> png_of(const Frame& frame) {
 Result<FrameImage> raw_of(const Frame& frame) {
   FrameImage image = described(frame);
   image.bytes = std::visit([](const auto& pixels) { return bytes_of(pixels); }, frame.image());
+  return image;
+}
+
+Result<FrameImage> image_of(const Frame& frame, FrameCoding coding, std::string camera) {
+  auto image = coding == FrameCoding::kPng ? png_of(frame) : raw_of(frame);
+  if (image) image->camera = std::move(camera);
   return image;
 }
 

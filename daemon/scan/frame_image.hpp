@@ -19,6 +19,9 @@ namespace slsd {
 /// A frame's pixels row by row, 16 bits little-endian. @thread reentrant
 [[nodiscard]] Result<FrameImage> raw_of(const Frame& frame);
 
+/// A frame as it is to be kept. @param coding  not kNone @errors of encode_png() @thread reentrant
+[[nodiscard]] Result<FrameImage> image_of(const Frame& frame, FrameCoding coding, std::string camera);
+
 /// What was decoded, drawn into the frame, as a PNG. @errors of encode_png() @thread reentrant
 [[nodiscard]] Result<std::string> picture_of(const GreyView& image, const Decoding& decoding, const Pattern& pattern);
 

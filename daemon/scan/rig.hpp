@@ -2,76 +2,105 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <memory>
-#include <mutex>
+#include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "core/image.hpp"
 #include "core/result.hpp"
-#include "daemon/scan/backoff.hpp"
 #include "daemon/scan/camera_runner.hpp"
 #include "daemon/scan/device_status.hpp"
-#include "daemon/scan/scan_result.hpp"
-#include "daemon/scan/scan_setup.hpp"
+#include "daemon/scan/frame_set.hpp"
+#include "daemon/scan/projection.hpp"
 #include "drivers/projector/projector.hpp"
 
 namespace slsd {
 
-/// The projector and the cameras, and a scan with them as a transaction: the pattern is shown and visible, every camera
-/// exposes one frame after that, all at the same time, and the frames are decoded: one cloud, or one error.
+/// The projector and the cameras, and a capture with them as a transaction: the pattern is shown and visible, every
+/// camera exposes one frame after that, all at the same time: one set of frames, or one error. Where a scan wants them,
+/// the same follows with white and with black.
 ///
 ///     trigger        exposure_start (each camera)          received        deadline
 ///     --|-----------------|-----------------------------------|---------------|-->
 ///     pattern visible     within exposure_skew_ms of one another
 ///
-/// @thread thread-bound, but for request_stop() and the statuses
+/// @thread thread-bound, but for request_stop(), stopped(), kept() and the statuses
 class Rig {
  public:
-  Rig(std::unique_ptr<Projector> projector, std::vector<std::unique_ptr<Camera>> cameras, ScanSetup setup,
+  /// @param image  the pattern, which the projector shows while scans go on
+  Rig(std::unique_ptr<Projector> projector, std::vector<std::unique_ptr<Camera>> cameras, Grey8 image,
       const ScanOptions& options);
 
-  /// Opens the projector and shows the pattern, if that is due.
-  void supervise();
+  /// Opens the projector and shows what is due; notices that it is gone.
+  void supervise() { projection_.supervise(); }
+  /// When supervise() will have something to do, unless a device is lost; the end of time where it will not.
+  [[nodiscard]] MonotonicTime next_change() const { return projection_.next_change(); }
 
-  /// @errors kNotFound: no camera or no calibration; kTimeout: a device is not ready; kFrameDropped, kFrameTorn,
-  ///         kFrameStale, kFrameLate, kDisconnected; kMismatch: exposures apart, or frames of another size; kCancelled
-  [[nodiscard]] Result<ScanResult> scan(const ScanRequest& request, const std::string& scan_id);
+  /// One frame of each camera. Of cameras that run freely those whose exposures are nearest to one another.
+  /// @param exposure  kNext: the frames need not have begun after the call, only after the pattern was visible, and
+  ///                  after those of the capture before
+  /// @param light     exposed after those of the pattern, white first, each after its own picture was visible
+  /// @errors kTimeout: a device is not ready; kFrameDropped, kFrameTorn, kFrameStale, kFrameLate, kMismatch,
+  /// kDisconnected, kBusy:
+  ///         of one camera; kFrameSkewed: exposures apart; kCancelled
+  [[nodiscard]] Result<FrameSet> capture(MonotonicTime deadline, Exposure exposure = Exposure::kFresh,
+                                         LightFrames light = {});
 
-  /// One frame of one camera while the pattern is visible.
-  /// @param camera  its name; empty: the first
-  /// @param as_png  else the pixels as they are
-  [[nodiscard]] Result<FrameImage> frame(const std::string& camera, bool as_png, MonotonicTime deadline);
+  /// One frame of one camera while the pattern is visible. @errors as capture()
+  /// @param camera    its index
+  /// @param as_shown  leave what the projector shows, whatever that is, in the pattern's place
+  [[nodiscard]] Result<Frame> capture_one(std::size_t camera, MonotonicTime deadline, bool as_shown = false);
 
-  /// Takes another pattern, calibration and decoder from the next scan on.
-  void replace(ScanSetup setup);
-  [[nodiscard]] const ScanSetup& setup() const { return setup_; }
+  /// Shows another pattern from the next capture on.
+  void show(Grey8 image) { projection_.set_pattern(std::move(image)); }
+  /// What is shown when nobody has scanned for a while; nothing: the pattern stays.
+  void set_idle(std::optional<Grey8> picture, std::chrono::milliseconds after) {
+    projection_.set_idle(std::move(picture), after);
+  }
+  /// Shows a picture, at once, until the next capture, hold() or release(). @param picture  nothing: the pattern
+  /// @errors kTimeout: the projector is not ready; kCancelled
+  [[nodiscard]] Result<> hold(std::optional<Grey8> picture, MonotonicTime deadline);
+  /// Shows the idle picture, at once. @errors as hold()
+  [[nodiscard]] Result<> release(MonotonicTime deadline);
 
   void request_stop();
-  [[nodiscard]] DeviceStatus projector_status() const;
+  /// Whether the cameras are closed, after request_stop().
+  [[nodiscard]] bool stopped() const;
+  /// Whether the cameras' threads keep their promises to the watchdog.
+  [[nodiscard]] bool kept() const;
+  [[nodiscard]] DeviceStatus projector_status() const { return projection_.status(); }
   [[nodiscard]] std::vector<DeviceStatus> camera_statuses() const;
+  /// How many times cameras were opened, all together: as it grows, one may be another one than before.
+  [[nodiscard]] std::uint64_t camera_openings() const;
 
  private:
-  [[nodiscard]] Result<> open_projector();
-  void note_projector(const Result<>& opened);
-  [[nodiscard]] Result<> show_pattern(MonotonicTime deadline);
-  [[nodiscard]] Result<std::size_t> find_camera(const std::string& name) const;
-  [[nodiscard]] Result<std::vector<Frame>> capture(const std::vector<std::size_t>& cameras, MonotonicTime deadline);
-  [[nodiscard]] Result<> check_frames(const std::vector<std::size_t>& cameras, const std::vector<Frame>& frames,
-                                      MonotonicTime trigger, MonotonicTime deadline) const;
-  [[nodiscard]] Result<> decode(const std::vector<Frame>& frames, const ScanRequest& request, ScanResult& result);
+  using Cameras = std::span<CameraRunner* const>;
+  /// How one set of frames is exposed.
+  struct Shot {
+    MonotonicTime deadline;
+    Exposure exposure = Exposure::kFresh;
+    FrameLight light = FrameLight::kPattern;
+  };
+  [[nodiscard]] Result<std::vector<Frame>> take_set(const Shot& shot);
+  [[nodiscard]] Result<std::vector<Frame>> expose(Cameras cameras, const Shot& shot);
+  [[nodiscard]] Result<> align(std::vector<Frame>& frames, const Shot& shot);
+  [[nodiscard]] std::chrono::nanoseconds slack(const CameraRunner& camera) const;
+  [[nodiscard]] Result<> check_times(Cameras cameras, const std::vector<Frame>& frames, MonotonicTime since,
+                                     MonotonicTime deadline) const;
+  [[nodiscard]] Result<> check_skew(const std::vector<Frame>& frames) const;
 
-  std::unique_ptr<Projector> projector_;
-  std::vector<std::unique_ptr<CameraRunner>> cameras_;
-  ScanSetup setup_;
+  Projection projection_;
+  std::vector<std::unique_ptr<CameraRunner>> runners_;
+  std::vector<CameraRunner*> cameras_;
   ScanOptions options_;
-  Backoff backoff_;
-  MonotonicTime next_attempt_{};
-  MonotonicTime visible_{};
-  bool shown_ = false;
+  std::uint64_t changes_before_ = 0;  ///< the projection's at the last set of frames
   std::stop_source stopping_;
-  mutable std::mutex mutex_;  ///< guards projector_status_
-  DeviceStatus projector_status_;
 };
 
 }  // namespace slsd

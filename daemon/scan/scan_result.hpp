@@ -5,32 +5,38 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/cloud/cloud.hpp"
 #include "core/decode/decoding.hpp"
 #include "daemon/scan/stage_clock.hpp"
+#include "drivers/camera/camera.hpp"
 #include "drivers/camera/frame.hpp"
 
 namespace slsd {
 
 using RegionCounts = std::array<std::uint32_t, kRegionStatusCount>;
 
+/// How the frames that a cloud was decoded from are kept beside it.
+enum class FrameCoding { kNone, kRaw, kPng };
+
 struct ScanRequest {
-  MonotonicTime deadline;  ///< for the devices to be ready and the frames to be there
-  bool picture = false;    ///< also draw what was decoded in the frame
-  std::string camera;      ///< whose picture; empty: the first's
+  MonotonicTime deadline;                   ///< for the devices to be ready and the frames to be there
+  bool picture = false;                     ///< also draw what was decoded in the frame
+  std::string camera;                       ///< whose picture; empty: the first's
+  FrameCoding frames = FrameCoding::kNone;  ///< what becomes of the frames besides the cloud
+  bool texture = false;                     ///< intensities from frames in white light
+  bool ambient = false;                     ///< less those in the light of the room alone
 };
 
-/// What a scan gave.
-struct ScanResult {
-  Cloud cloud;
-  RegionCounts regions{};  ///< of all cameras, by status
-  std::chrono::nanoseconds capture_time{};
-  std::chrono::nanoseconds decode_time{};
-  StageTimes stage_times{};
-  std::string picture_png;  ///< empty unless asked for
+/// One frame of one camera is asked for.
+struct FrameRequest {
+  MonotonicTime deadline;
+  std::string camera;     ///< empty: the first
+  bool as_png = true;     ///< else row by row
+  bool as_shown = false;  ///< while the projector shows what it does; else the pattern
 };
 
 /// One camera's image as it came.
@@ -40,6 +46,28 @@ struct FrameImage {
   int height_px = 0;
   int bits = 8;
   std::uint64_t sequence = 0;
+  std::string camera = {};  ///< its name; the times are those of the Frame
+  FrameLight light = FrameLight::kPattern;
+  MonotonicTime exposure_start = {};
+  MonotonicTime received = {};
+};
+
+/// What a scan gave.
+struct ScanResult {
+  Cloud cloud;
+  std::vector<CloudPoint> strays;          ///< symbols that a knocked rig has elsewhere: see stray_symbols()
+  RegionCounts regions{};                  ///< of all cameras, by status
+  std::optional<std::uint64_t> saturated;  ///< points without an intensity, as white was too bright; where it was asked
+                                           ///< for
+  MonotonicTime received;                  ///< when the last byte of its frames was there
+  std::chrono::nanoseconds skew{};         ///< from the first camera's exposure to the last one's
+  std::uint64_t skipped = 0;  ///< sets of frames since the scan before that were not decoded: newer ones came
+  std::chrono::nanoseconds capture_time{};
+  std::chrono::nanoseconds decode_time{};
+  StageTimes stage_times{};
+  std::string picture_png;         ///< empty unless asked for
+  std::vector<FrameImage> frames;  ///< one to a camera, in the configuration's order, those of the pattern, of
+                                   ///< white, of dark; empty unless asked for
 };
 
 }  // namespace slsd

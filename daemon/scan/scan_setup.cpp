@@ -3,6 +3,7 @@
 #include "daemon/scan/scan_setup.hpp"
 
 #include <algorithm>
+#include <future>
 
 #include "core/code/separability.hpp"
 #include "drivers/files/file.hpp"
@@ -56,6 +57,19 @@ Result<> warm_up(Decoder& decoder, const Lens& lens, const Grey8& symbols) {
   return decoded ? Result<>() : tl::unexpected(decoded.error());
 }
 
+Result<std::vector<Decoder>> make_lane(const ScanSetup& setup, const std::vector<std::size_t>& cameras,
+                                       const DecodeOptions& options) {
+  std::vector<Decoder> lane;
+  for (const std::size_t index : cameras) {
+    auto decoder = Decoder::create(setup.pattern, *setup.calibration, index, options);
+    if (!decoder) return tl::unexpected(decoder.error());
+    lane.push_back(std::move(*decoder));
+    const auto warm = warm_up(lane.back(), setup.calibration->cameras[index].lens, setup.image);
+    if (!warm) return tl::unexpected(warm.error());
+  }
+  return lane;
+}
+
 Result<> place_at(Error error, const std::string& where) {
   if (error.where.empty()) error.where = where;
   return tl::unexpected(std::move(error));
@@ -100,24 +114,60 @@ Result<std::optional<Calibration>> configured_calibration(const Configuration& c
   return std::optional(std::move(*calibration));
 }
 
-Result<ScanSetup> ScanSetup::create(const Configuration& configuration) {
+Result<ScanSetup> ScanSetup::create(const Configuration& configuration, std::size_t lanes) {
   auto pattern = configured_pattern(configuration);
   if (!pattern) return tl::unexpected(pattern.error());
   auto calibration = configured_calibration(configuration);
   if (!calibration) return tl::unexpected(calibration.error());
-  ScanSetup setup{std::move(*pattern), {}, std::move(*calibration), {}};
+  ScanSetup setup{std::move(*pattern), {}, std::move(*calibration), {}, {}, configuration.other_hardware};
+  for (const CameraOptions& camera : configuration.cameras) {
+    setup.camera_names.push_back(camera.name());
+    setup.camera_formats.push_back(camera.format());
+  }
   setup.image = draw_pattern(setup.pattern);
+  setup.depth_min_mm = configuration.decode.depth_min_mm;
+  setup.depth_max_mm = configuration.decode.depth_max_mm;
   if (!setup.calibration) return setup;
   const auto cameras = calibrated_cameras(*setup.calibration, configuration);
   if (!cameras) return tl::unexpected(cameras.error());
-  for (const std::size_t index : *cameras) {
-    auto decoder = Decoder::create(setup.pattern, *setup.calibration, index, configuration.decode);
-    if (!decoder) return tl::unexpected(decoder.error());
-    setup.decoders.push_back(std::move(*decoder));
-    const auto warm = warm_up(setup.decoders.back(), setup.calibration->cameras[index].lens, setup.image);
-    if (!warm) return tl::unexpected(warm.error());
+  // A decoder takes a part of a second: the lanes are prepared at the same time.
+  std::vector<std::future<Result<std::vector<Decoder>>>> prepared;
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    prepared.push_back(
+        std::async(std::launch::async, [&] { return make_lane(setup, *cameras, configuration.decode); }));
+  }
+  for (auto& each : prepared) {
+    auto lane = each.get();
+    if (!lane) return tl::unexpected(lane.error());
+    setup.lanes.push_back(std::move(*lane));
   }
   return setup;
+}
+
+Result<> ScanSetup::check(const ScanRequest& request) const {
+  if (!calibration) {
+    return fail(ErrorCode::kNotFound, "no calibration: name its file as [calibration] file in the configuration");
+  }
+  return check_camera(request.camera);
+}
+
+Result<> ScanSetup::check_camera(const std::string& name) const {
+  if (camera_names.empty()) {
+    return fail(ErrorCode::kNotFound, "no camera is configured: add a [[camera]] table to the configuration");
+  }
+  if (camera_index(name) < camera_names.size()) return {};
+  std::string names;
+  for (const std::string& each : camera_names) names += (names.empty() ? "" : ", ") + each;
+  return fail(ErrorCode::kNotFound, "no camera is called \"" + name + "\"; there are: " + names);
+}
+
+std::size_t ScanSetup::camera_index(const std::string& name) const {
+  if (name.empty()) return 0;
+  return static_cast<std::size_t>(std::ranges::find(camera_names, name) - camera_names.begin());
+}
+
+ScanFiles ScanSetup::files() const {
+  return {write_pattern(pattern), calibration ? write_calibration(*calibration) : std::string()};
 }
 
 }  // namespace slsd

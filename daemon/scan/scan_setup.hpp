@@ -13,6 +13,7 @@
 #include "core/image.hpp"
 #include "core/result.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/scan/scan_result.hpp"
 
 namespace slsd {
 
@@ -29,16 +30,39 @@ namespace slsd {
 /// cameras
 [[nodiscard]] Result<std::optional<Calibration>> configured_calibration(const Configuration& configuration);
 
+/// What a scan's cloud depends on besides its frames, as text that can be read again.
+struct ScanFiles {
+  std::string pattern;      ///< a pattern file
+  std::string calibration;  ///< a calibration file; empty: none
+};
+
 /// Everything about a scan that a reload replaces at once.
-/// @thread thread-bound
+/// @thread a lane belongs to one thread at a time; the rest does not change
 struct ScanSetup {
   Pattern pattern;
   Grey8 image;  ///< what the projector shows
   std::optional<Calibration> calibration;
-  std::vector<Decoder> decoders;  ///< one to a configured camera; none without a calibration
+  std::vector<std::string> camera_names;    ///< of the configured cameras
+  std::vector<std::vector<Decoder>> lanes;  ///< for each thread that decodes, one to a configured camera; empty without
+                                            ///< a calibration
+  OtherHardware other_hardware = OtherHardware::kError;
+  std::vector<std::string> camera_formats = {};        ///< as configured, "Mono12"; empty where it is left open
+  double depth_min_mm = DecodeOptions{}.depth_min_mm;  ///< where along the cameras' axes there may be something
+  double depth_max_mm = DecodeOptions{}.depth_max_mm;
 
+  /// @param lanes  how many threads decode
   /// @errors of the two above; of Decoder::create()
-  [[nodiscard]] static Result<ScanSetup> create(const Configuration& configuration);
+  [[nodiscard]] static Result<ScanSetup> create(const Configuration& configuration, std::size_t lanes);
+
+  /// Whether a scan is possible. @errors kNotFound: no calibration, or no camera of the name
+  [[nodiscard]] Result<> check(const ScanRequest& request) const;
+  /// @errors kNotFound: no camera of the name
+  [[nodiscard]] Result<> check_camera(const std::string& name) const;
+  /// @param name  of a camera; empty: the first
+  /// @return the number of cameras where there is none of the name
+  [[nodiscard]] std::size_t camera_index(const std::string& name) const;
+
+  [[nodiscard]] ScanFiles files() const;
 };
 
 }  // namespace slsd

@@ -13,8 +13,14 @@ void Duration::add(std::chrono::nanoseconds time) {
   ++count;
 }
 
-void ScanStatistics::note(const Result<ScanResult>& scan) {
+void ScanStatistics::note_latency(std::chrono::nanoseconds time) {
   const std::lock_guard lock(mutex_);
+  totals_.latency.add(time);
+}
+
+void ScanStatistics::note(const Result<ScanResult>& scan, std::uint64_t skipped) {
+  const std::lock_guard lock(mutex_);
+  totals_.skipped += skipped;
   if (!scan) {
     ++totals_.failed[scan.error().code];
     totals_.last_error = scan.error();

@@ -35,15 +35,19 @@ struct ScanTotals {
   std::uint64_t points = 0;  ///< of the last scan
   std::array<std::uint64_t, kRegionStatusCount> regions{};
   RegionCounts regions_of_last{};
+  std::uint64_t skipped = 0;  ///< sets of frames taken in free run and not decoded: newer ones came
   Duration capture;
   Duration decode;
+  Duration latency;  ///< from the last byte of a scan's frames to its cloud at a client's socket
   std::array<Duration, kStageCount> stages{};
 };
 
 /// Counts scans. @thread thread-safe
 class ScanStatistics {
  public:
-  void note(const Result<ScanResult>& scan);
+  /// @param skipped  sets of frames since the scan before
+  void note(const Result<ScanResult>& scan, std::uint64_t skipped);
+  void note_latency(std::chrono::nanoseconds time);
   [[nodiscard]] ScanTotals totals() const;
 
  private:

@@ -23,6 +23,7 @@ constexpr auto kIdlePromise = 10s;
 constexpr auto kWorkPromise = 60s;  // decoding, drawing, or making a pattern
 constexpr auto kFreeScanTimeout = 5s;
 constexpr auto kPauseAfterFailure = 500ms;
+constexpr int kFailuresToPause = 2;
 
 // Tells the scans of one run of the service from those of another.
 std::string make_run_id() {
@@ -38,7 +39,12 @@ double milliseconds(std::chrono::nanoseconds time) {
 
 }  // namespace
 
-Scanner::Scanner(std::unique_ptr<Rig> rig) : rig_(std::move(rig)), queue_(kMaxWaiting), run_id_(make_run_id()) {
+Scanner::Scanner(std::unique_ptr<Rig> rig, ScanSetup setup)
+    : rig_(std::move(rig)),
+      setup_(std::make_shared<ScanSetup>(std::move(setup))),
+      queue_(kMaxWaiting),
+      run_id_(make_run_id()),
+      lanes_(DecodeLanes::lanes_here()) {
   heartbeat_.promise(kIdlePromise);
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
@@ -50,27 +56,33 @@ Scanner::~Scanner() {
 void Scanner::request_stop() {
   thread_.request_stop();
   rig_->request_stop();
+  lanes_.request_stop();
 }
 
 bool Scanner::wait_stopped(std::chrono::milliseconds time) {
   const auto end = steady_clock::now() + time;
-  while (!stopped_ && steady_clock::now() < end) std::this_thread::sleep_for(5ms);
-  return stopped_;
+  const auto all_stopped = [this] { return stopped_ && lanes_.stopped() && rig_->stopped(); };
+  while (!all_stopped() && steady_clock::now() < end) std::this_thread::sleep_for(5ms);
+  return all_stopped();
 }
 
 void Scanner::run(const std::stop_token& stop) {
   name_this_thread("scanner");
   while (!stop.stop_requested()) {
     heartbeat_.promise(kIdlePromise);
-    rig_->supervise();
+    if (!free_scan_due()) rig_->supervise();  // else a scan follows, and the idle picture would only flash
     if (auto job = queue_.pop_until(next_wake(), stop)) {
       (*job)({});
-    } else if (free_rate_hz_ > 0 && steady_clock::now() >= next_free_scan_) {
-      scan_freely(stop);
+    } else if (free_scan_due()) {
+      scan_freely();
     }
   }
   refuse_waiting();
   stopped_ = true;
+}
+
+bool Scanner::free_scan_due() const {
+  return free_rate_hz_ > 0 && steady_clock::now() >= next_free_scan_;
 }
 
 void Scanner::refuse_waiting() {
@@ -78,7 +90,7 @@ void Scanner::refuse_waiting() {
 }
 
 MonotonicTime Scanner::next_wake() const {
-  const MonotonicTime idle = steady_clock::now() + kIdleWake;
+  const MonotonicTime idle = std::min<MonotonicTime>(steady_clock::now() + kIdleWake, rig_->next_change());
   return free_rate_hz_ > 0 ? std::min(idle, next_free_scan_) : idle;
 }
 
@@ -89,25 +101,53 @@ void Scanner::submit(Job job) {
   }
 }
 
-Result<ScanResult> Scanner::transact(const ScanRequest& request) {
+// Where the frames under way are all that a camera lends, its next waits for one of them.
+Result<FrameSet> Scanner::capture(const ScanRequest& request, Exposure exposure) {
   heartbeat_.promise(request.deadline - steady_clock::now() + kWorkPromise);
-  const std::string scan_id = run_id_ + "-" + std::to_string(++scans_);
-  auto result = rig_->scan(request, scan_id);
-  statistics_.note(result);
+  if (auto possible = setup_->check(request); !possible) return tl::unexpected(possible.error());
+  while (true) {
+    const std::uint64_t done = lanes_.done();
+    auto set = rig_->capture(request.deadline, exposure, {request.texture, request.ambient});
+    const bool lacks_frames = !set && set.error().code == ErrorCode::kBusy;
+    if (set) {
+      if (auto same = hardware_.check(setup_, *rig_); !same) return tl::unexpected(same.error());
+    }
+    if (!lacks_frames || !lanes_.wait_done(done, request.deadline)) return set;
+  }
+}
+
+std::unique_ptr<ScanJob> Scanner::decoding(Result<FrameSet> set, const ScanRequest& request, bool listened,
+                                           std::function<void(const Result<ScanResult>&)> answer) {
+  const std::uint64_t number = ++scans_;
+  const std::string scan_id = run_id_ + "-" + std::to_string(number);
+  auto told = [this, setup = setup_, number, scan_id, listened, answer = std::move(answer)](Result<ScanResult> result) {
+    conclude(setup, number, scan_id, result);
+    if (answer) answer(result);
+    if (listened && listener_) listener_(std::make_shared<Result<ScanResult>>(std::move(result)));
+  };
+  return std::make_unique<ScanJob>(std::move(set), setup_, request, scan_id, std::move(told));
+}
+
+void Scanner::conclude(const SharedSetup& setup, std::uint64_t number, const std::string& scan_id,
+                       Result<ScanResult>& result) {
+  const std::uint64_t skipped = lanes_.skipped();
+  const std::uint64_t skipped_now = skipped - std::exchange(skipped_told_, skipped);
+  if (result) result->skipped = skipped_now;
+  statistics_.note(result, skipped_now);
+  if (result) watch_.note(setup, *result, number);
   log_outcome(scan_id, result);
-  return result;
 }
 
 void Scanner::log_outcome(const std::string& scan_id, const Result<ScanResult>& result) {
   if (result) {
     spdlog::debug("scan {}: {} points, capture {:.1f} ms, decode {:.1f} ms", scan_id, result->cloud.points.size(),
                   milliseconds(result->capture_time), milliseconds(result->decode_time));
-    if (failing_) spdlog::info("scan {}: scans succeed again", scan_id);
+    if (failures_in_a_row_ > 0) spdlog::info("scan {}: scans succeed again", scan_id);
   } else {
-    const auto level = failing_ ? spdlog::level::debug : spdlog::level::info;
+    const auto level = failures_in_a_row_ > 0 ? spdlog::level::debug : spdlog::level::info;
     spdlog::log(level, "scan {} failed ({}): {}", scan_id, to_string(result.error().code), to_string(result.error()));
   }
-  failing_ = !result;
+  failures_in_a_row_ = result ? 0 : failures_in_a_row_ + 1;
 }
 
 void Scanner::scan(const ScanRequest& request, Answer<ScanResult> answer) {
@@ -116,17 +156,29 @@ void Scanner::scan(const ScanRequest& request, Answer<ScanResult> answer) {
     if (steady_clock::now() >= request.deadline) {
       return answer(fail(ErrorCode::kTimeout, "other requests took all of its time: allow a longer timeout"));
     }
-    auto result = std::make_shared<Result<ScanResult>>(transact(request));
-    if (free_rate_hz_ > 0 && listener_) listener_(result);
-    answer(*result);
+    lanes_.push(decoding(capture(request, Exposure::kFresh), request, free_rate_hz_ > 0, answer));
   });
 }
 
-void Scanner::frame(const std::string& camera, bool as_png, MonotonicTime deadline, Answer<FrameImage> answer) {
-  submit([this, camera, as_png, deadline, answer = std::move(answer)](const Result<>& permission) {
+void Scanner::frame(const FrameRequest& request, Answer<FrameImage> answer) {
+  submit([this, request, answer = std::move(answer)](const Result<>& permission) {
     if (!permission) return answer(tl::unexpected(permission.error()));
-    heartbeat_.promise(deadline - steady_clock::now() + kWorkPromise);
-    answer(rig_->frame(camera, as_png, deadline));
+    heartbeat_.promise(request.deadline - steady_clock::now() + kWorkPromise);
+    if (auto known = setup_->check_camera(request.camera); !known) return answer(tl::unexpected(known.error()));
+    auto frame = rig_->capture_one(setup_->camera_index(request.camera), request.deadline, request.as_shown);
+    if (!frame) return answer(tl::unexpected(frame.error()));
+    lanes_.push(std::make_unique<ImageJob>(std::move(*frame), request.as_png, answer));
+  });
+}
+
+void Scanner::project(const ProjectRequest& request, Answer<void> answer) {
+  submit([this, request, answer = std::move(answer)](const Result<>& permission) {
+    if (!permission) return answer(permission);
+    heartbeat_.promise(request.deadline - steady_clock::now() + kWorkPromise);
+    if (request.picture == ProjectedPicture::kIdle) return answer(rig_->release(request.deadline));
+    auto drawn = draw_projected(request.picture, request.png, *setup_);
+    if (!drawn) return answer(tl::unexpected(drawn.error()));
+    answer(rig_->hold(std::move(*drawn), request.deadline));
   });
 }
 
@@ -134,7 +186,15 @@ void Scanner::pattern(Answer<std::string> answer) {
   submit([this, answer = std::move(answer)](const Result<>& permission) {
     if (!permission) return answer(tl::unexpected(permission.error()));
     heartbeat_.promise(kWorkPromise);
-    answer(encode_png(rig_->setup().image));
+    answer(encode_png(setup_->image));
+  });
+}
+
+void Scanner::files(Answer<ScanFiles> answer) {
+  submit([this, answer = std::move(answer)](const Result<>& permission) {
+    if (!permission) return answer(tl::unexpected(permission.error()));
+    heartbeat_.promise(kWorkPromise);
+    answer(setup_->files());
   });
 }
 
@@ -149,9 +209,10 @@ void Scanner::reload(const std::filesystem::path& file, const Configuration& run
     with_devices.pattern.projector_width_px = running.projector.width_px;
     with_devices.pattern.projector_height_px = running.projector.height_px;
     with_devices.cameras = running.cameras;
-    auto setup = ScanSetup::create(with_devices);
+    auto setup = ScanSetup::create(with_devices, DecodeLanes::lanes_here());
     if (!setup) return answer(tl::unexpected(setup.error()));
-    rig_->replace(std::move(*setup));
+    setup_ = std::make_shared<ScanSetup>(std::move(*setup));
+    rig_->show(setup_->image);
     answer(configuration);
   });
 }
@@ -161,14 +222,20 @@ void Scanner::run_freely(std::optional<double> rate_hz) {
   queue_.wake();
 }
 
-void Scanner::scan_freely(const std::stop_token& stop) {
+void Scanner::scan_freely() {
   const MonotonicTime begin = steady_clock::now();
   const double rate_hz = free_rate_hz_;
-  auto result = std::make_shared<Result<ScanResult>>(transact({begin + kFreeScanTimeout, false, {}}));
+  const ScanRequest request{begin + kFreeScanTimeout, false, {}};
+  auto set = capture(request, every_frame_ ? Exposure::kNext : Exposure::kFresh);
+  const bool taken = set.has_value();
+  auto job = decoding(std::move(set), request, true, {});
+  taken ? lanes_.offer(std::move(job)) : lanes_.push(std::move(job));
   const auto period = std::chrono::duration<double>(rate_hz > 0 ? 1.0 / rate_hz : 0.0);
   next_free_scan_ = begin + std::chrono::duration_cast<std::chrono::nanoseconds>(period);
-  if (!*result) next_free_scan_ = std::max(next_free_scan_, MonotonicTime(steady_clock::now() + kPauseAfterFailure));
-  if (!stop.stop_requested() && listener_) listener_(std::move(result));
+  const MonotonicTime now = steady_clock::now();
+  if (failures_in_a_row_ >= kFailuresToPause)
+    next_free_scan_ = std::max<MonotonicTime>(next_free_scan_, now + kPauseAfterFailure);
+  every_frame_ = next_free_scan_ <= now;
 }
 
 }  // namespace slsd

@@ -2,10 +2,13 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <atomic>
 #include <deque>
 #include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include "core/image.hpp"
@@ -24,7 +27,13 @@ class ScriptedCamera final : public Camera {
   }
 
   [[nodiscard]] const CameraDescription& description() const override { return description_; }
+  void set_found(std::function<void()> found) override { found_ = std::move(found); }
   [[nodiscard]] Result<> open() override {
+    ++opens;
+    if (gone) return fail(ErrorCode::kNotFound, "unplugged");
+    if (found_) found_();
+    if (configured) configured->wait();
+    if (const auto error = open_error.load()) return fail(*error, "as told");
     if (opens_to_fail > 0 && opens_to_fail-- > 0) return fail(ErrorCode::kNotFound, "no such device");
     return {};
   }
@@ -34,18 +43,30 @@ class ScriptedCamera final : public Camera {
     script_.pop_front();
     return step(*this, deadline);
   }
+  [[nodiscard]] Result<> check() override {
+    if (gone) return fail(ErrorCode::kDisconnected, "unplugged");
+    return {};
+  }
   void cancel() override {}
 
   [[nodiscard]] Frame frame(MonotonicTime exposure_start) {
     return Frame(image_.view(), sequence_++, exposure_start, std::chrono::steady_clock::now(), [] {});
   }
 
+  /// As if the device had lost them.
+  void skip_frames(std::uint64_t count) { sequence_ += count; }
+
   int opens_to_fail = 0;
+  std::atomic<int> opens{0};
+  std::optional<std::shared_future<void>> configured;  ///< what open() waits for once the device is found
+  std::atomic<std::optional<ErrorCode>> open_error{std::nullopt};
+  std::atomic<bool> gone{false};  ///< as check() and open() find it
 
  private:
   const Grey8& image_;
   std::deque<Step> script_;
   CameraDescription description_;
+  std::function<void()> found_;
   std::uint64_t sequence_ = 0;
 };
 

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <thread>
+
+#include "daemon/scan/heartbeat.hpp"
+#include "drivers/camera/frame.hpp"
+
+namespace slsd {
+
+/// What is computed of frames, and then told.
+class FrameJob {
+ public:
+  virtual ~FrameJob() = default;
+  /// The long part; other jobs run at the same time in other lanes.
+  virtual void compute(std::size_t lane) = 0;
+  /// Called once, after compute(), or without it where the service stops; one job at a time, in the order of arrival.
+  virtual void deliver() = 0;
+};
+
+/// The threads that decode while the next frames are taken: a few that wait, and a lane or two behind them. What is
+/// delivered keeps the order in which it came, whichever lane was quicker.
+///
+///     capture --> [ ] +--> lane 0 --+--> deliver, in order
+///                     +--> lane 1 --+
+///
+/// @thread thread-safe
+class DecodeLanes {
+ public:
+  static constexpr std::size_t kMaxLanes = 2;
+  static constexpr std::size_t kWaitingMax = 3;
+  /// How long what was offered may wait when more comes: a lane that is late for once loses nothing, and lanes that are
+  /// slower than the cameras make no cloud older than that.
+  static constexpr std::chrono::milliseconds kTurn{20};
+  /// One where there is but one processor.
+  [[nodiscard]] static std::size_t lanes_here();
+
+  explicit DecodeLanes(std::size_t lanes);
+  ~DecodeLanes();
+  DecodeLanes(const DecodeLanes&) = delete;
+  DecodeLanes& operator=(const DecodeLanes&) = delete;
+
+  /// Waits until no other waits. The job will be delivered.
+  void push(std::unique_ptr<FrameJob> job);
+  /// The newest wins: where too many wait, or the oldest that was offered has waited for too long, that one is
+  /// destroyed undelivered.
+  void offer(std::unique_ptr<FrameJob> job, MonotonicTime now = std::chrono::steady_clock::now());
+  /// How many of those offered were destroyed undelivered, since the start.
+  [[nodiscard]] std::uint64_t skipped() const;
+
+  /// Waits until one more job is done than `done` of them. @return false: none is under way, or the time came first
+  [[nodiscard]] bool wait_done(std::uint64_t done, MonotonicTime deadline);
+  /// Jobs delivered or destroyed so far.
+  [[nodiscard]] std::uint64_t done() const;
+
+  /// Whether the lanes keep their promises to the watchdog.
+  [[nodiscard]] bool kept() const;
+  /// Ends soon: what has not been computed is delivered without. Pushing afterwards delivers at once.
+  void request_stop();
+  [[nodiscard]] bool stopped() const;
+
+ private:
+  struct Waiting {
+    std::unique_ptr<FrameJob> job;
+    bool may_be_skipped = false;
+    MonotonicTime since;  ///< of one that may be skipped
+  };
+  void run(std::size_t lane, const std::stop_token& stop);
+  void append(Waiting waiting, std::unique_lock<std::mutex>& lock);
+  void make_room(MonotonicTime now);
+  void deliver(FrameJob& job, std::uint64_t turn);
+
+  mutable std::mutex mutex_;
+  std::condition_variable_any changed_;
+  std::deque<Waiting> waiting_;
+  std::uint64_t arrived_ = 0;    ///< jobs put in, less those skipped
+  std::uint64_t taken_ = 0;      ///< by lanes
+  std::uint64_t delivered_ = 0;  ///< of those taken
+  std::uint64_t skipped_ = 0;
+  std::size_t running_ = 0;
+  std::array<Heartbeat, kMaxLanes> heartbeats_;
+  std::array<std::jthread, kMaxLanes> threads_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <vector>
+
+#include "drivers/camera/frame.hpp"
+
+namespace slsd {
+
+/// Which frames a scan takes besides those of the pattern.
+struct LightFrames {
+  bool white = false;  ///< while the projector shows white
+  bool dark = false;   ///< while it shows black
+};
+
+/// One frame of each camera, all of one exposure; and where they were asked for, as many in other light.
+/// @thread thread-bound; may be moved between threads
+struct FrameSet {
+  std::vector<Frame> frames;  ///< in the cameras' order; at least one
+  std::vector<Frame> white;   ///< as many, or none
+  std::vector<Frame> dark;
+  std::chrono::nanoseconds capture_time{};  ///< from the request to the last frame
+  std::chrono::nanoseconds skew{};          ///< from the first camera's exposure of the pattern to the last one's
+
+  /// When the last byte of the last frame was there.
+  [[nodiscard]] MonotonicTime received() const {
+    MonotonicTime last{};
+    for (const auto* each : {&frames, &white, &dark}) {
+      for (const Frame& frame : *each) last = std::max(last, frame.received());
+    }
+    return last;
+  }
+  /// Back to the drivers.
+  void give_back() {
+    for (auto* each : {&frames, &white, &dark}) each->clear();
+  }
+};
+
+}  // namespace slsd

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/hardware.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "drivers/projector/x11/monitor_report.hpp"
+
+namespace slsd {
+namespace {
+
+using std::filesystem::path;
+
+constexpr const char* kStableNames = "/dev/v4l/by-id";
+constexpr std::size_t kMaxIdLength = 200;  // a calibration file's texts are bounded
+
+/// A camera's stable name, by whichever name its node is known.
+std::string v4l2_id(const path& device) {
+  if (device.parent_path() == kStableNames) return device.filename().string();
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(kStableNames, error)) {
+    if (std::filesystem::equivalent(entry.path(), device, error)) return entry.path().filename().string();
+  }
+  return {};
+}
+
+/// As a calibration file may hold it.
+std::string printable(std::string text) {
+  text.resize(std::min(text.size(), kMaxIdLength));
+  std::ranges::replace_if(
+      text, [](unsigned char letter) { return letter < 0x20 || letter == 0x7f; }, ' ');
+  return text;
+}
+
+}  // namespace
+
+std::string hardware_id(const std::string& driver, const std::string& device) {
+  if (driver == "v4l2") return printable(v4l2_id(device));
+  return driver == "aravis" ? printable(device) : std::string();
+}
+
+std::string hardware_id(const RandrOutput& output) {
+  if (output.serial.empty()) return {};  // the model alone would let any other of its kind pass for it
+  return printable(output.model.empty() ? output.serial : output.model + " " + output.serial);
+}
+
+void note_hardware(std::span<const DeviceStatus> cameras, const ProjectorOptions& projector, Calibration& calibration) {
+  std::vector<std::string> serials;
+  for (const DeviceStatus& camera : cameras) serials.push_back(hardware_id(camera.driver, camera.device));
+  const bool any = std::ranges::any_of(serials, [](const std::string& serial) { return !serial.empty(); });
+  if (any) calibration.report.camera_serials = std::move(serials);
+  if (projector.driver != ProjectorDriver::kGlfw) return;
+  const auto monitor = report_monitor(projector.monitor, projector.width_px, projector.height_px);
+  const std::string id = monitor ? hardware_id(monitor->output) : std::string();
+  if (!id.empty()) calibration.report.projector_serial = id;
+}
+
+Result<> check_hardware(const std::string& who, const std::string& calibrated, const std::string& connected) {
+  if (calibrated.empty() || connected.empty() || calibrated == connected) return {};
+  return fail(ErrorCode::kMismatch,
+              "is \"" + connected + "\", and the calibration is of \"" + calibrated +
+                  "\": connect that one, calibrate again, or set [calibration] other_hardware = \"warn\"",
+              who);
+}
+
+std::string calibrated_hardware(const Calibration& calibration, const CalibratedCamera& camera) {
+  const auto index = static_cast<std::size_t>(&camera - calibration.cameras.data());
+  const std::vector<std::string>& serials = calibration.report.camera_serials;
+  return index < serials.size() ? serials[index] : std::string();
+}
+
+}  // namespace slsd

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/projection.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <string_view>
+#include <thread>
+#include <utility>
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+
+constexpr auto kLook = 10ms;
+constexpr std::string_view kNames[] = {"pattern", "white", "black", "idle", "held", ""};
+
+}  // namespace
+
+Projection::Projection(std::unique_ptr<Projector> projector, Grey8 pattern, const ScanOptions& options)
+    : projector_(std::move(projector)),
+      pattern_(std::move(pattern)),
+      latency_(options.projector_latency()),
+      backoff_(options) {
+  const ProjectorDescription& description = projector_->description();
+  status_.name = "projector";
+  status_.driver = description.driver;
+  status_.device = description.monitor;
+  status_.width_px = description.width_px;
+  status_.height_px = description.height_px;
+}
+
+DeviceStatus Projection::status() const {
+  const std::lock_guard lock(mutex_);
+  return status_;
+}
+
+void Projection::set_pattern(Grey8 pattern) {
+  pattern_ = std::move(pattern);
+  if (shown_ == Shown::kPattern || holding_) shown_ = Shown::kNothing;
+}
+
+void Projection::set_idle(std::optional<Grey8> picture, std::chrono::milliseconds after) {
+  idle_ = std::move(picture);
+  idle_after_ = after;
+  if (shown_ == Shown::kIdle) shown_ = Shown::kNothing;
+}
+
+void Projection::hold(std::optional<Grey8> picture) {
+  held_picture_ = std::move(picture);
+  holding_ = true;
+  if (shown_ == Shown::kHeld) shown_ = Shown::kNothing;
+}
+
+void Projection::release() {
+  holding_ = false;
+  held_picture_.reset();
+  last_scan_ = {};
+}
+
+Projection::Shown Projection::due() const {
+  if (holding_) return Shown::kHeld;
+  return idle_ && steady_clock::now() - last_scan_ >= idle_after_ ? Shown::kIdle : Shown::kPattern;
+}
+
+MonotonicTime Projection::next_change() const {
+  if (shown_ == Shown::kNothing) return next_attempt_;
+  const bool idle_comes = idle_ && !holding_ && shown_ != Shown::kIdle;
+  return idle_comes ? last_scan_ + idle_after_ : MonotonicTime::max();
+}
+
+const Grey8& Projection::image(Shown which) {
+  if (which == Shown::kIdle) return *idle_;
+  if (which == Shown::kHeld && held_picture_) return *held_picture_;
+  if (which != Shown::kWhite && which != Shown::kBlack) return pattern_;
+  if (plain_.empty()) plain_ = Grey8(pattern_.width(), pattern_.height());
+  std::fill_n(plain_.data(), plain_.size(), which == Shown::kWhite ? 255 : 0);
+  return plain_;
+}
+
+Result<> Projection::open_and_show(Shown which) {
+  if (!is_open(status().state)) {
+    if (auto opened = projector_->open(); !opened) return opened;
+  }
+  const auto complete = projector_->show(image(which));
+  if (!complete) return tl::unexpected(complete.error());
+  visible_ = *complete + latency_;
+  ++changes_;
+  return {};
+}
+
+void Projection::attempt(Shown which) {
+  if (shown_ == which || steady_clock::now() < next_attempt_) return;
+  const Result<> outcome = open_and_show(which);
+  shown_ = outcome ? which : Shown::kNothing;
+  note(outcome);
+  if (outcome) {
+    backoff_.reset();
+  } else {
+    next_attempt_ = steady_clock::now() + backoff_.next();
+  }
+}
+
+void Projection::look() {
+  if (const auto there = shown_ != Shown::kNothing ? projector_->check() : Result<>(); !there) {
+    shown_ = Shown::kNothing;
+    note(there);
+  }
+}
+
+void Projection::supervise() {
+  look();
+  attempt(due());
+}
+
+void Projection::note(const Result<>& outcome) {
+  const std::lock_guard lock(mutex_);
+  status_.shows = kNames[static_cast<int>(shown_)];
+  if (!outcome) {
+    if (status_.problem.empty()) spdlog::warn("projector: {}; trying again until it opens", to_string(outcome.error()));
+    status_.state = state_after(outcome.error().code);
+    status_.problem = to_string(outcome.error());
+    return;
+  }
+  if (!status_.problem.empty()) spdlog::info("projector: open again");
+  if (!is_open(status_.state)) {
+    ++status_.opened;
+    status_.device = projector_->description().monitor;
+    for (const std::string& warning : projector_->warnings()) spdlog::warn("projector {}: {}", status_.device, warning);
+  }
+  status_.state = DeviceState::kReady;
+  status_.problem.clear();
+}
+
+Result<> Projection::await(Shown which, MonotonicTime deadline, const std::stop_token& stop) {
+  look();
+  attempt(which);
+  while (shown_ != which) {
+    if (stop.stop_requested()) return fail(ErrorCode::kCancelled, "the service is stopping");
+    if (steady_clock::now() >= deadline) {
+      return fail(ErrorCode::kTimeout, "the projector did not become ready in time: " + status().problem, "projector");
+    }
+    std::this_thread::sleep_until(std::min<MonotonicTime>(deadline, steady_clock::now() + kLook));
+    attempt(which);
+  }
+  if (visible_ > deadline) return fail(ErrorCode::kTimeout, "the picture is not visible in time", "projector");
+  std::this_thread::sleep_until(visible_);
+  return {};
+}
+
+Result<> Projection::show(Picture picture, MonotonicTime deadline, const std::stop_token& stop) {
+  release();
+  auto shown = await(static_cast<Shown>(picture), deadline, stop);
+  last_scan_ = steady_clock::now();
+  return shown;
+}
+
+Result<> Projection::show_due(MonotonicTime deadline, const std::stop_token& stop) {
+  return await(due(), deadline, stop);
+}
+
+}  // namespace slsd

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+
+#include "core/image.hpp"
+#include "core/result.hpp"
+#include "daemon/scan/backoff.hpp"
+#include "daemon/scan/device_status.hpp"
+#include "drivers/projector/projector.hpp"
+
+namespace slsd {
+
+/// The projector and what it shows. Opens it, opens it again after it was lost, with growing pauses; the first failure
+/// and the recovery are logged, not each attempt.
+///
+///             a scan                    idle_after without a scan
+///     any ------------> pattern (white, black) ------------> idle picture
+///      |                   ^
+///      +--hold()--> held --+ a scan, or release()
+///
+/// @thread thread-bound, but for status()
+class Projection {
+ public:
+  /// What a scan shows: the pattern, and for the light of each point all white and all black.
+  enum class Picture { kPattern, kWhite, kBlack };
+
+  /// @param pattern  of the projector's size
+  Projection(std::unique_ptr<Projector> projector, Grey8 pattern, const ScanOptions& options);
+
+  /// What scans show from the next one on.
+  void set_pattern(Grey8 pattern);
+  /// What is shown when nobody has scanned for a while; nothing: the pattern stays.
+  void set_idle(std::optional<Grey8> picture, std::chrono::milliseconds after);
+
+  /// Shows a picture until a scan, another hold() or release(). @param picture  nothing: the pattern
+  void hold(std::optional<Grey8> picture);
+  /// Goes on to the idle picture, at once.
+  void release();
+
+  /// Opens the projector and shows what is due; notices that it is gone.
+  void supervise();
+  /// When supervise() will have another picture to show; the end of time where it will not.
+  [[nodiscard]] MonotonicTime next_change() const;
+
+  /// Returns when the picture is visible, whatever was shown before. @errors kTimeout, with the reason; kCancelled
+  [[nodiscard]] Result<> show(Picture picture, MonotonicTime deadline, const std::stop_token& stop);
+  /// Returns when what is due is visible. @errors as show()
+  [[nodiscard]] Result<> show_due(MonotonicTime deadline, const std::stop_token& stop);
+
+  /// Whether what was shown still is. Asked after each capture. @errors kDisconnected
+  [[nodiscard]] Result<> check() { return projector_->check(); }
+  /// From when on every exposure sees what is shown, and nothing of what was shown before.
+  [[nodiscard]] MonotonicTime visible() const { return visible_; }
+  /// How often another picture was shown; frames of different counts do not belong together.
+  [[nodiscard]] std::uint64_t changes() const { return changes_; }
+
+  /// @thread thread-safe
+  [[nodiscard]] DeviceStatus status() const;
+
+ private:
+  enum class Shown { kPattern, kWhite, kBlack, kIdle, kHeld, kNothing };
+  [[nodiscard]] Shown due() const;
+  [[nodiscard]] const Grey8& image(Shown which);
+  [[nodiscard]] Result<> open_and_show(Shown which);
+  [[nodiscard]] Result<> await(Shown which, MonotonicTime deadline, const std::stop_token& stop);
+  void look();
+  void attempt(Shown which);
+  void note(const Result<>& outcome);
+
+  std::unique_ptr<Projector> projector_;
+  Grey8 pattern_;
+  Grey8 plain_;  ///< white or black, kept for its memory
+  std::optional<Grey8> idle_;
+  std::optional<Grey8> held_picture_;
+  bool holding_ = false;
+  std::chrono::milliseconds idle_after_{0};
+  std::chrono::microseconds latency_;
+  Backoff backoff_;
+  MonotonicTime next_attempt_{};
+  MonotonicTime last_scan_{};
+  MonotonicTime visible_{};
+  Shown shown_ = Shown::kNothing;
+  std::uint64_t changes_ = 0;
+  mutable std::mutex mutex_;  ///< guards status_
+  DeviceStatus status_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/reconstruct.hpp"
+
+#include <ctime>
+#include <span>
+#include <utility>
+
+#include "core/cloud/shade_points.hpp"
+#include "core/exposure/light_levels.hpp"
+#include "daemon/scan/frame_image.hpp"
+#include "daemon/scan/stray_symbols.hpp"
+
+namespace slsd {
+namespace {
+
+using std::chrono::steady_clock;
+
+std::string utc_time(MonotonicTime time) {
+  const auto when = std::chrono::system_clock::now() - (steady_clock::now() - time);
+  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(when.time_since_epoch()).count();
+  const std::time_t seconds = ms / 1000;
+  std::tm parts{};
+  gmtime_r(&seconds, &parts);
+  char text[40];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &parts);
+  char fraction[8];
+  std::snprintf(fraction, sizeof fraction, ".%03dZ", static_cast<int>(ms % 1000));
+  return std::string(text) + fraction;
+}
+
+void append(const Decoding& decoding, ScanResult& result) {
+  result.cloud.points.insert(result.cloud.points.end(), decoding.points.begin(), decoding.points.end());
+  for (std::size_t i = 0; i < decoding.counts.size(); ++i) result.regions[i] += decoding.counts[i];
+}
+
+ScanResult describe(const FrameSet& set, const ScanSetup& setup, const std::string& scan_id) {
+  ScanResult result;
+  result.capture_time = set.capture_time;
+  result.skew = set.skew;
+  result.received = set.received();
+  result.cloud.lattice_columns = setup.pattern.whole_columns();
+  result.cloud.lattice_rows = setup.pattern.whole_rows();
+  result.cloud.cameras = static_cast<int>(setup.calibration->cameras.size());
+  result.cloud.scan_id = scan_id;
+  result.cloud.time = utc_time(set.frames.front().exposure_start());
+  result.cloud.frame = set.frames.front().sequence();
+  return result;
+}
+
+Result<> keep_frames(const std::vector<Frame>& frames, FrameLight light, const ScanSetup& setup, FrameCoding coding,
+                     ScanResult& result) {
+  for (std::size_t i = 0; coding != FrameCoding::kNone && i < frames.size(); ++i) {
+    auto image = image_of(frames[i], coding, setup.camera_names[i]);
+    if (!image) return tl::unexpected(image.error());
+    image->light = light;
+    result.frames.push_back(std::move(*image));
+  }
+  return {};
+}
+
+Result<> keep_frames(const FrameSet& set, const ScanSetup& setup, FrameCoding coding, ScanResult& result) {
+  auto kept = keep_frames(set.frames, FrameLight::kPattern, setup, coding, result);
+  if (kept) kept = keep_frames(set.white, FrameLight::kWhite, setup, coding, result);
+  if (kept) kept = keep_frames(set.dark, FrameLight::kDark, setup, coding, result);
+  return kept;
+}
+
+// The light of the points of one camera.
+void shade(std::span<CloudPoint> points, const FrameSet& set, const ScanSetup& setup, std::size_t camera,
+           ScanResult& result) {
+  if (set.white.empty() && set.dark.empty()) return;
+  SceneLight light;
+  if (!set.white.empty()) light.white = set.white[camera].image();
+  if (!set.dark.empty()) light.dark = set.dark[camera].image();
+  const std::string format = camera < setup.camera_formats.size() ? setup.camera_formats[camera] : "";
+  light.full = full_level(format, light.white.value_or(set.frames[camera].image()));
+  const std::size_t saturated = shade_points(points, light);
+  if (light.white) result.saturated = result.saturated.value_or(0) + saturated;
+}
+
+}  // namespace
+
+Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_t lane, const ScanRequest& request,
+                               const std::string& scan_id) {
+  ScanResult result = describe(set, setup, scan_id);
+  const std::size_t pictured = setup.camera_index(request.camera);
+  StageClock clock;
+  for (std::size_t i = 0; i < set.frames.size(); ++i) {
+    clock.start();
+    const auto begin = steady_clock::now();
+    Decoder& decoder = setup.lanes[lane][i];
+    const auto decoding = decoder.decode(set.frames[i].image(), &clock);
+    result.decode_time += steady_clock::now() - begin;
+    if (!decoding) {
+      return fail(decoding.error().code, decoding.error().message, "camera " + setup.camera_names[i]);
+    }
+    const std::size_t before = result.cloud.points.size();
+    append(**decoding, result);
+    const std::vector<CloudPoint> strays = stray_symbols(decoder, **decoding, set.frames[i].image());
+    result.strays.insert(result.strays.end(), strays.begin(), strays.end());
+    shade(std::span(result.cloud.points).subspan(before), set, setup, i, result);
+    if (!request.picture || i != pictured) continue;
+    auto picture = picture_of(set.frames[i].image(), **decoding, setup.pattern);
+    if (!picture) return tl::unexpected(picture.error());
+    result.picture_png = std::move(*picture);
+  }
+  result.stage_times = clock.times();
+  if (auto kept = keep_frames(set, setup, request.frames, result); !kept) return tl::unexpected(kept.error());
+  return result;
+}
+
+}  // namespace slsd

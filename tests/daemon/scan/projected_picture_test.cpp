@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/projected_picture.hpp"
+
+#include <gmock/gmock.h>
+
+#include "drivers/files/encode_png.hpp"
+#include "tests/simulator/simulator.hpp"
+
+namespace slsd {
+namespace {
+
+using ::testing::HasSubstr;
+
+ScanSetup setup() {
+  const Pattern pattern = *make_pattern({});
+  return {pattern, draw_pattern(pattern), paper_rig(), {"camera"}, {}};
+}
+
+TEST(DrawProjected, DrawsEach) {
+  const ScanSetup setup = slsd::setup();
+  const auto draw = [&](ProjectedPicture picture) { return *draw_projected(picture, {}, setup); };
+  EXPECT_EQ(draw(ProjectedPicture::kPattern), std::nullopt);
+  EXPECT_EQ(draw(ProjectedPicture::kBlack), Grey8(1280, 800, 0));
+  EXPECT_EQ(draw(ProjectedPicture::kWhite), Grey8(1280, 800, 255));
+  EXPECT_EQ(draw(ProjectedPicture::kFocus)->at(0, 0), 255);
+  EXPECT_EQ(draw(ProjectedPicture::kGrid)->at(0, 0), 255);
+}
+
+TEST(DrawProjected, TakesAnImageOfTheProjectorsSize) {
+  const ScanSetup setup = slsd::setup();
+  const auto draw = [&](const std::string& png) { return draw_projected(ProjectedPicture::kImage, png, setup); };
+  EXPECT_EQ(*draw(*encode_png(Grey8(1280, 800, 42))), Grey8(1280, 800, 42));
+  const auto other = draw(*encode_png(Grey8(1280, 720)));
+  ASSERT_FALSE(other);
+  EXPECT_EQ(other.error().code, ErrorCode::kMismatch);
+  EXPECT_THAT(other.error().message, HasSubstr("1280x720 pixels, the projector 1280x800"));
+  EXPECT_EQ(draw(*encode_png(Grey16(1280, 800))).error().code, ErrorCode::kMismatch);
+  EXPECT_FALSE(draw("no image"));
+}
+
+TEST(DrawProjected, RefusesAnImageThatWouldFillTheMemory) {
+  const auto huge = draw_projected(ProjectedPicture::kImage, "P5 20000 20000 255\n", setup());
+  ASSERT_FALSE(huge);
+  EXPECT_THAT(huge.error().message, HasSubstr("20000"));
+}
+
+TEST(DrawProjected, NeedsACalibrationForTheGrid) {
+  ScanSetup setup = slsd::setup();
+  setup.calibration.reset();
+  EXPECT_EQ(draw_projected(ProjectedPicture::kGrid, {}, setup).error().code, ErrorCode::kNotFound);
+}
+
+TEST(DrawIdle, FollowsTheConfiguration) {
+  EXPECT_EQ(draw_idle({}), std::nullopt);
+  ProjectorOptions options;
+  options.idle = IdlePicture::kWhite;
+  EXPECT_EQ(draw_idle(options), Grey8(1280, 800, 255));
+  options.idle = IdlePicture::kBlack;
+  EXPECT_EQ(draw_idle(options), Grey8(1280, 800, 0));
+}
+
+}  // namespace
+}  // namespace slsd

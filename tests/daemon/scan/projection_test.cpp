@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/projection.hpp"
+
+#include <chrono>
+#include <optional>
+#include <thread>
+
+#include <gmock/gmock.h>
+
+#include "drivers/projector/headless_projector.hpp"
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+using ::testing::HasSubstr;
+using Picture = Projection::Picture;
+
+constexpr int kWidthPx = 96;
+constexpr int kHeightPx = 64;
+
+Grey8 plain(std::uint8_t value) {
+  return Grey8(kWidthPx, kHeightPx, value);
+}
+
+class ProjectionTest : public ::testing::Test {
+ protected:
+  ProjectionTest() { make({}); }
+
+  void make(ScanOptions options) {
+    auto projector = std::make_unique<HeadlessProjector>(
+        HeadlessProjectorOptions{.width_px = kWidthPx, .height_px = kHeightPx, .refresh_hz = 1000.0});
+    projector_ = projector.get();
+    options.reopen_first_ms = 1;
+    options.reopen_longest_ms = 5;
+    projection_ = std::make_unique<Projection>(std::move(projector), plain(100), options);
+  }
+
+  Result<> show(Picture picture = Picture::kPattern) { return projection_->show(picture, in(30s), {}); }
+  Result<> show_due() { return projection_->show_due(in(30s), {}); }
+  Grey8 shown() { return *projector_->read_back(); }
+  static MonotonicTime in(std::chrono::nanoseconds time) { return steady_clock::now() + time; }
+
+  HeadlessProjector* projector_ = nullptr;
+  std::unique_ptr<Projection> projection_;
+};
+
+TEST_F(ProjectionTest, ShowsThePatternWhileNobodyScans) {
+  projection_->supervise();
+  EXPECT_EQ(shown(), plain(100));
+  EXPECT_EQ(projection_->status().state, DeviceState::kReady);
+  EXPECT_EQ(projection_->status().shows, "pattern");
+  const auto changes = projection_->changes();
+  projection_->supervise();
+  ASSERT_TRUE(show());
+  EXPECT_EQ(projection_->changes(), changes);
+  EXPECT_EQ(projection_->next_change(), MonotonicTime::max());
+}
+
+TEST_F(ProjectionTest, ShowsTheIdlePictureBetweenScans) {
+  projection_->set_idle(plain(7), 0ms);
+  projection_->supervise();
+  EXPECT_EQ(shown(), plain(7));
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(show());
+    EXPECT_EQ(shown(), plain(100));
+    EXPECT_LE(projection_->next_change(), steady_clock::now());
+    projection_->supervise();
+    EXPECT_EQ(shown(), plain(7));
+    EXPECT_EQ(projection_->status().shows, "idle");
+    EXPECT_EQ(projection_->next_change(), MonotonicTime::max());
+  }
+}
+
+TEST_F(ProjectionTest, WaitsAfterAScanWithTheIdlePicture) {
+  projection_->set_idle(plain(7), 600s);
+  ASSERT_TRUE(show());
+  projection_->supervise();
+  EXPECT_EQ(shown(), plain(100));
+  EXPECT_GT(projection_->next_change(), in(500s));
+}
+
+TEST_F(ProjectionTest, HoldsAPictureUntilAScan) {
+  projection_->set_idle(plain(7), 0ms);
+  for (const auto value : {std::uint8_t{1}, std::uint8_t{2}}) {
+    projection_->hold(plain(value));
+    ASSERT_TRUE(show_due());
+    projection_->supervise();
+    EXPECT_EQ(shown(), plain(value));
+    EXPECT_EQ(projection_->status().shows, "held");
+  }
+  ASSERT_TRUE(show());
+  EXPECT_EQ(shown(), plain(100));
+  projection_->supervise();
+  EXPECT_EQ(shown(), plain(7));
+}
+
+TEST_F(ProjectionTest, HoldsThePatternAsItIs) {
+  projection_->set_idle(plain(7), 0ms);
+  projection_->hold(std::nullopt);
+  projection_->supervise();
+  EXPECT_EQ(shown(), plain(100));
+  projection_->set_pattern(plain(200));
+  projection_->supervise();
+  EXPECT_EQ(shown(), plain(200));
+  projection_->release();
+  projection_->supervise();
+  EXPECT_EQ(shown(), plain(7));
+}
+
+TEST_F(ProjectionTest, ShowsWhiteAndBlack) {
+  ASSERT_TRUE(show(Picture::kWhite));
+  EXPECT_EQ(shown(), plain(255));
+  ASSERT_TRUE(show(Picture::kBlack));
+  EXPECT_EQ(shown(), plain(0));
+  projection_->supervise();
+  EXPECT_EQ(shown(), plain(100));
+}
+
+TEST_F(ProjectionTest, TakesAnotherPattern) {
+  ASSERT_TRUE(show());
+  projection_->set_pattern(plain(200));
+  ASSERT_TRUE(show());
+  EXPECT_EQ(shown(), plain(200));
+}
+
+TEST_F(ProjectionTest, WaitsAsLongAsTheDeviceIsLate) {
+  make({.projector_latency_ms = 50});
+  const auto before = steady_clock::now();
+  ASSERT_TRUE(show());
+  EXPECT_GE(steady_clock::now() - before, 50ms);
+  EXPECT_LE(projection_->visible(), steady_clock::now());
+  const auto again = projection_->show(Picture::kWhite, in(20ms), {});
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::kTimeout);
+}
+
+TEST_F(ProjectionTest, ShowsWhatItShowedWhenItIsBack) {
+  projection_->hold(plain(3));
+  ASSERT_TRUE(show_due());
+  projector_->disconnect();
+  EXPECT_EQ(projection_->check().error().code, ErrorCode::kDisconnected);
+  ASSERT_TRUE(show_due());
+  EXPECT_EQ(shown(), plain(3));
+  EXPECT_EQ(projection_->status().opened, 2U);
+}
+
+TEST_F(ProjectionTest, TellsWhyThePatternIsNotShown) {
+  projection_->set_pattern(Grey8(1, 1));
+  const auto shown = projection_->show(Picture::kPattern, in(50ms), {});
+  ASSERT_FALSE(shown);
+  EXPECT_EQ(shown.error().code, ErrorCode::kTimeout);
+  EXPECT_THAT(shown.error().message, HasSubstr("the image is 1x1 pixels"));
+  EXPECT_EQ(projection_->status().state, DeviceState::kFaulted);
+  EXPECT_EQ(projection_->status().shows, "");
+}
+
+TEST_F(ProjectionTest, EndsWhenTheServiceStops) {
+  projection_->set_pattern(Grey8(1, 1));
+  std::stop_source stop;
+  stop.request_stop();
+  const auto shown = projection_->show(Picture::kPattern, in(600s), stop.get_token());
+  EXPECT_EQ(shown.error().code, ErrorCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace slsd
