@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/latency/latency_file.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <spdlog/fmt/fmt.h>
+#include <nlohmann/json.hpp>
+
+#include "daemon/configuration/table_reader.hpp"
+
+namespace slsd {
+namespace {
+
+using std::chrono::microseconds;
+using std::filesystem::path;
+
+std::string quoted(const std::string& text) {
+  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string camera_table(const CameraLatency& camera) {
+  return fmt::format(
+      "\n[[camera]]\nname = {}\nflashes = {}\nlatency_us = {}\nmedian_us = {}\np05_us = {}\np95_us = {}\nclipped = "
+      "{}\n",
+      quoted(camera.camera), camera.flashes, camera.latency.count(), camera.median.count(), camera.p05.count(),
+      camera.p95.count(), camera.clipped);
+}
+
+void read_time(TableReader& reader, const char* key, microseconds& time) {
+  int count = 0;
+  reader.read(key, count);
+  time = microseconds(count);
+}
+
+Result<CameraLatency> read_camera(const toml::table& table, const path& file) {
+  TableReader reader(&table, "[[camera]]", file);
+  CameraLatency camera;
+  reader.read("name", camera.camera);
+  reader.read("flashes", camera.flashes);
+  read_time(reader, "latency_us", camera.latency);
+  read_time(reader, "median_us", camera.median);
+  read_time(reader, "p05_us", camera.p05);
+  read_time(reader, "p95_us", camera.p95);
+  reader.read("clipped", camera.clipped);
+  if (auto read = reader.finish(); !read) return tl::unexpected(read.error());
+  return camera;
+}
+
+Result<LatencyReport> read_report(const toml::table& document, const path& file) {
+  TableReader top(&document, "", file);
+  LatencyReport report;
+  top.read("date", report.date);
+  top.read("projector", report.projector);
+  const std::vector<const toml::table*> cameras = top.tables("camera");
+  if (auto read = top.finish(); !read) return tl::unexpected(read.error());
+  for (const toml::table* table : cameras) {
+    auto camera = read_camera(*table, file);
+    if (!camera) return tl::unexpected(camera.error());
+    report.cameras.push_back(std::move(*camera));
+  }
+  return report;
+}
+
+}  // namespace
+
+path latency_file(const Configuration& configuration, const path& configuration_file) {
+  const path& beside = configuration.calibration_file.empty() ? configuration_file : configuration.calibration_file;
+  return beside.parent_path() / "latency.toml";
+}
+
+std::vector<std::string> latency_warnings(const Configuration& configuration, const LatencyReport& report) {
+  std::vector<std::string> warnings;
+  for (const CameraOptions& camera : configuration.cameras) {
+    const auto measured = std::ranges::find(report.cameras, camera.name(), &CameraLatency::camera);
+    if (measured == report.cameras.end()) {
+      warnings.push_back(
+          fmt::format("camera \"{}\": its latency was not measured: slsd --calibrate --latency", camera.name()));
+      continue;
+    }
+    const double needed_ms = std::chrono::duration<double, std::milli>(measured->latency).count();
+    if (needed_ms <= configuration.scan.projector_latency_ms) continue;
+    warnings.push_back(fmt::format(
+        "camera \"{}\" saw images whole only {:.1f} ms after they were shown, and [scan] projector_latency_ms is "
+        "{:g}: set {:.0f}",
+        camera.name(), needed_ms, configuration.scan.projector_latency_ms, std::ceil(needed_ms)));
+  }
+  return warnings;
+}
+
+std::string write_latency(const LatencyReport& report) {
+  std::string text =
+      "# From an image that the projector shows to the first frame that has it whole, by\n"
+      "# slsd --calibrate --latency. [scan] projector_latency_ms is to be at least the largest latency_us.\n";
+  text += "date = " + quoted(report.date) + "\nprojector = " + quoted(report.projector) + "\n";
+  for (const CameraLatency& camera : report.cameras) text += camera_table(camera);
+  return text;
+}
+
+Result<LatencyReport> read_latency(std::string_view text, const path& file) {
+  try {
+    return read_report(toml::parse(text, file.string()), file);
+  } catch (const toml::parse_error& error) {
+    return fail(ErrorCode::kMalformed, std::string(error.description()), place_of(error.source(), file.string()));
+  }
+}
+
+}  // namespace slsd

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/latency/latency_file.hpp"
+
+#include <gmock/gmock.h>
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+LatencyReport report() {
+  LatencyReport report{"2024-05-06T07:08:09Z", "glfw \"HDMI-1\"", {}};
+  report.cameras.push_back({"left", 20, 34567us, 50000us, 36000us, 64000us, true});
+  report.cameras.push_back({"right", 20, 0us, 1us, 2us, 3us, false});
+  return report;
+}
+
+TEST(LatencyFile, IsReadAsItWasWritten) {
+  const auto read = read_latency(write_latency(report()), "latency.toml");
+  ASSERT_TRUE(read) << to_string(read.error());
+  EXPECT_EQ(read->date, report().date);
+  EXPECT_EQ(read->projector, report().projector);
+  EXPECT_EQ(read->cameras, report().cameras);
+}
+
+TEST(LatencyFile, NamesWhatIsWrong) {
+  const auto unknown = read_latency("date = \"x\"\nlatency = 3\n", "latency.toml");
+  ASSERT_FALSE(unknown);
+  EXPECT_THAT(to_string(unknown.error()), HasSubstr("latency.toml:2:1"));
+  EXPECT_FALSE(read_latency("[[camera]\n", "latency.toml"));
+  EXPECT_FALSE(read_latency("[[camera]]\nlatency_us = \"soon\"\n", "latency.toml"));
+}
+
+TEST(LatencyWarnings, AreOfShortSettingsAndOfCamerasThatWereNotMeasured) {
+  Configuration configuration;
+  configuration.cameras.resize(2);
+  configuration.cameras[0].file.name = "left";
+  configuration.cameras[1].file.name = "third";
+  configuration.scan.projector_latency_ms = 30;
+  EXPECT_THAT(latency_warnings(configuration, report()),
+              ElementsAre(AllOf(HasSubstr("\"left\""), HasSubstr("34.6 ms"), HasSubstr("set 35")),
+                          AllOf(HasSubstr("\"third\""), HasSubstr("not measured"))));
+  configuration.scan.projector_latency_ms = 35;
+  configuration.cameras[1].file.name = "right";
+  EXPECT_THAT(latency_warnings(configuration, report()), IsEmpty());
+}
+
+TEST(LatencyFile, LiesBesideTheCalibration) {
+  Configuration configuration;
+  EXPECT_EQ(latency_file(configuration, "etc/slsd.toml"), "etc/latency.toml");
+  configuration.calibration_file = "var/calibration.yml";
+  EXPECT_EQ(latency_file(configuration, "etc/slsd.toml"), "var/latency.toml");
+}
+
+}  // namespace
+}  // namespace slsd
