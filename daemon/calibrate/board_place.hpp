@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/board/board.hpp"
+#include "core/board/find_board.hpp"
+#include "core/board/tie.hpp"
+#include "core/calibrate/observations.hpp"
+
+namespace slsd {
+
+/// How a board is held before a camera that is not calibrated yet: its focal length is guessed, so that angles and
+/// distances serve to compare poses, and no more.
+struct BoardPlace {
+  Eigen::Vector2d centre;  ///< of the board, as a share of the image's width and height
+  Eigen::Vector3d normal;  ///< of the board, away from the camera, in the camera's frame, of length 1
+  double distance_mm = 0;  ///< of the board's centre
+  double turn_rad = 0;     ///< of the board's x axis in the image, from x towards y
+
+  /// Between the board and the image plane, 0 to 90 degrees.
+  [[nodiscard]] double tilt_deg() const;
+};
+
+/// @param ties  places on the board and their pixels
+/// @return nothing where they do not determine it
+/// @thread reentrant
+[[nodiscard]] std::optional<BoardPlace> place_of(std::span<const Tie> ties, const Board& board, const ImageSize& size);
+
+/// Whether two poses are so near each other that the second tells nothing new: the centre within a sixth of the image,
+/// and tilt, turn and distance alike.
+/// @thread reentrant
+[[nodiscard]] bool are_alike(const BoardPlace& a, const BoardPlace& b);
+
+[[nodiscard]] std::vector<Tie> ties_of(const BoardSighting& sighting, const Board& board);
+[[nodiscard]] std::vector<Tie> ties_of(const PoseView& view);
+
+}  // namespace slsd

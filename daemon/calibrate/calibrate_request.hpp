@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace slsd {
+
+/// What `slsd --calibrate` is asked for on its command line.
+struct CalibrateRequest {
+  std::optional<std::filesystem::path> configuration_file;
+  std::filesystem::path from;    ///< a folder of captures; empty: the configured devices
+  std::filesystem::path output;  ///< empty: the configured calibration file
+  std::filesystem::path report;  ///< empty: beside the calibration file, as .html
+  std::string board;             ///< empty: the default board
+  std::string ruler;             ///< "NOMINAL:MEASURED" in mm, as the print's ruler was measured; empty: true to scale
+  std::string plane;             ///< the reference plane; empty: no second step
+  std::string plane_ruler;       ///< as `ruler`, of the plane's print
+  bool gray_code = false;        ///< instead of the pattern
+  std::filesystem::path record;  ///< where a session's captures go; empty: beside the calibration file
+  int poses = 12;                ///< 3 to 99; how many poses a session takes, those recorded before among them
+  int planes = 3;                ///< 1 to 99; how many looks at the reference plane it takes, likewise
+};
+
+}  // namespace slsd

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/calibrate/observations.hpp"
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// The files of one camera's look at one pose.
+struct CaptureFiles {
+  std::filesystem::path white;              ///< empty where there is none and none is needed
+  std::filesystem::path pattern;            ///< empty where there is none
+  std::vector<std::filesystem::path> gray;  ///< in order; empty where there are none
+  std::filesystem::path black;              ///< empty where there is none
+};
+
+struct CapturedPose {
+  std::string name;                             ///< "pose_00"
+  std::map<std::string, CaptureFiles> cameras;  ///< by folder's name; "" where the pose has no folders
+  PoseSubject subject = PoseSubject::kBoard;
+};
+
+/// Whether a pose without white.png is an error: without it there is no board, but a plane can be measured.
+enum class WhitePicture { kNeeded, kOptional };
+
+/// Looks through a folder of captures:
+///
+///     DIR/pose_NN[/CAMERA]/white.png, and pattern.png or gray_00.png, gray_01.png ... with black.png
+///
+/// @return the poses in the order of their names
+/// @errors kNotFound: no folder, no pose, no white.png (a Gray code always needs it) or nothing
+///         projected in a pose; the message names the file
+[[nodiscard]] Result<std::vector<CapturedPose>> list_captures(const std::filesystem::path& folder,
+                                                              WhitePicture white = WhitePicture::kNeeded);
+
+/// The same, and after the poses the looks at the reference plane, in DIR/plane_NN, where there are any.
+/// @param knows_plane  whether its print is known
+/// @errors kInvalidArgument: there are looks at a plane that is not known
+[[nodiscard]] Result<std::vector<CapturedPose>> list_captures_with_planes(const std::filesystem::path& folder,
+                                                                          bool knows_plane);
+
+/// What the folders' names begin with: "pose_" or "plane_".
+[[nodiscard]] std::string_view folder_prefix(PoseSubject subject);
+
+}  // namespace slsd

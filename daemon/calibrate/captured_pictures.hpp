@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/calibrate/observe_pose.hpp"
+#include "drivers/files/grey_image.hpp"
+
+namespace slsd {
+
+/// The pictures of one pose by one camera, owned.
+struct CapturedPictures {
+  GreyImage white;
+  std::vector<GreyImage> coded;  ///< the pattern alone, or the Gray code
+  std::optional<GreyImage> black;
+
+  /// Borrowed from here.
+  [[nodiscard]] PosePictures views() const;
+};
+
+}  // namespace slsd

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/calibrate/finish_calibration.hpp"
+
+#include <algorithm>
+#include <iostream>
+#include <utility>
+
+#include "daemon/calibrate/keep_calibration.hpp"
+#include "daemon/calibrate/outcome_text.hpp"
+#include "daemon/calibrate/report_html.hpp"
+#include "daemon/service/utc_now.hpp"
+#include "drivers/files/file.hpp"
+
+namespace slsd {
+namespace {
+
+using std::filesystem::path;
+
+Result<> write_report(const CalibrateRequest& request, const path& file, const CalibrationOutcome& outcome) {
+  const path report = request.report.empty() ? path(file).replace_extension(".html") : request.report;
+  const auto written = write_file_atomically(report, report_html(outcome));
+  if (written) std::cout << "report: " << report.string() << "\n";
+  return written;
+}
+
+}  // namespace
+
+Result<path> file_to_keep(const CalibrateRequest& request, const Configuration& configuration) {
+  if (!request.output.empty()) return request.output;
+  if (!configuration.calibration_file.empty()) return configuration.calibration_file;
+  return fail(ErrorCode::kInvalidArgument,
+              "nowhere to keep the calibration: name a file by --output, or in [calibration] of the configuration");
+}
+
+CalibrateOptions calibrate_options(const Configuration& configuration) {
+  return {configuration.decode.depth_min_mm, configuration.decode.depth_max_mm};
+}
+
+Result<> finish_calibration(const CalibrateRequest& request, const path& file, const Board& board,
+                            const std::vector<PoseReport>& refused, CalibrationOutcome outcome) {
+  outcome.poses.insert(outcome.poses.end(), refused.begin(), refused.end());
+  std::ranges::sort(outcome.poses, {}, [](const PoseReport& pose) { return std::pair(pose.subject, pose.name); });
+  outcome.calibration.report.board = to_string(board);
+  outcome.calibration.report.date = utc_now();
+  std::cout << outcome_text(outcome) << std::flush;
+  if (outcome.verdict.grade == Grade::kBad && request.output.empty()) {
+    return fail(ErrorCode::kImpossible,
+                "the calibration is bad and was not put in force; take the poses again as advised, or keep it "
+                "nevertheless by --output",
+                file.string());
+  }
+  const auto kept = keep_calibration(outcome, file);
+  if (!kept) return tl::unexpected(kept.error());
+  std::cout << *kept << "\n";
+  return write_report(request, file, outcome);
+}
+
+}  // namespace slsd

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/calibrate/keep_calibration.hpp"
+
+#include <cmath>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "core/geometry/triangulate.hpp"
+#include "drivers/files/file.hpp"
+
+namespace slsd {
+namespace {
+
+using std::filesystem::path;
+
+constexpr std::size_t kMaxFileBytes = 1 << 20;
+
+/// How far the points of the calibrated poses move from one calibration to the other, root mean square.
+std::string difference(const CalibrationOutcome& outcome, const Calibration& before) {
+  if (before.projector.width_px != outcome.calibration.projector.width_px ||
+      before.projector.height_px != outcome.calibration.projector.height_px) {
+    return "it was of a projector of another size";
+  }
+  double sum = 0;
+  std::size_t count = 0;
+  for (const PoseObservation& pose : outcome.observations.poses) {
+    for (const PoseView& view : pose.views) {
+      const CalibratedCamera& camera = outcome.calibration.cameras[view.camera];
+      const CalibratedCamera* const other = before.camera(camera.name);
+      if (other == nullptr || other->lens.width_px != camera.lens.width_px) return "it was of another camera";
+      for (const ProjectedPoint& symbol : view.symbols) {
+        const Match match{symbol.camera_px, symbol.projector_px};
+        const auto now = triangulate(match, camera, outcome.calibration.projector, 1);
+        const auto then = triangulate(match, *other, before.projector, 1);
+        const double moved = (now.point_in_camera - then.point_in_camera).squaredNorm();
+        if (!symbol.outlying && std::isfinite(moved)) sum += moved, ++count;
+      }
+    }
+  }
+  return fmt::format("points on the board move by {:.2f} mm (RMS) against it",
+                     count == 0 ? 0 : std::sqrt(sum / static_cast<double>(count)));
+}
+
+}  // namespace
+
+Result<std::string> keep_calibration(const CalibrationOutcome& outcome, const path& file) {
+  const std::string text = write_calibration(outcome.calibration);
+  if (auto readable = read_calibration(text, file.string()); !readable) return tl::unexpected(readable.error());
+  std::string said = "kept in " + file.string();
+  std::error_code ignored;
+  if (std::filesystem::exists(file, ignored)) {
+    const auto before = read_file(file, kMaxFileBytes);
+    if (!before) return tl::unexpected(before.error());
+    path old = file;
+    old += ".old";
+    if (auto kept = write_file_atomically(old, *before); !kept) return tl::unexpected(kept.error());
+    const auto read = read_calibration(*before, file.string());
+    said += "; the one before is kept in " + old.string() +
+            (read ? ", and " + difference(outcome, *read) : ", which was none that could be read");
+  }
+  if (auto written = write_file_atomically(file, text); !written) return tl::unexpected(written.error());
+  return said;
+}
+
+}  // namespace slsd

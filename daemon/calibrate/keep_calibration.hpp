@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "core/calibrate/calibrate.hpp"
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// Writes a calibration, atomically; one that was there before is kept beside it as FILE.old.
+/// @return what was done, and how far the new one differs from the old one, for a person
+/// @errors of the files; kMalformed: what would be written could not be read again
+[[nodiscard]] Result<std::string> keep_calibration(const CalibrationOutcome& outcome,
+                                                   const std::filesystem::path& file);
+
+}  // namespace slsd

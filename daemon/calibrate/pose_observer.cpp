@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/calibrate/pose_observer.hpp"
+
+namespace slsd {
+
+PoseObserver::PoseObserver(const Board& board, const Pattern& pattern, const ImageSize& projector, bool gray_code)
+    : board_(board), pattern_(pattern), projector_(projector), gray_code_(gray_code) {}
+
+Result<PoseView> PoseObserver::observe(std::size_t camera, const PosePictures& pictures) {
+  BoardSighting sighting;
+  auto view = observe_board(pictures, board_, sighting);
+  if (!view) return view;
+  view->camera = camera;
+  const auto read = gray_code_ ? observe_gray_code(pictures, board_, sighting, projector_, *view)
+                               : observe_pattern(pictures, board_, sighting,
+                                                 readers_.try_emplace(camera, pattern_).first->second, *view);
+  if (!read) return tl::unexpected(read.error());
+  return view;
+}
+
+PoseObservers make_observers(const Board& board, const std::optional<Board>& plane, const Pattern& pattern,
+                             const ImageSize& projector, bool gray_code) {
+  PoseObservers observers{PoseObserver(board, pattern, projector, gray_code), std::nullopt};
+  if (plane) observers.plane.emplace(*plane, pattern, projector, gray_code);
+  return observers;
+}
+
+}  // namespace slsd

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/board/find_board.hpp"
+#include "core/calibrate/observe_pose.hpp"
+#include "core/code/pattern.hpp"
+
+namespace slsd {
+
+/// What the poses show, camera by camera.
+/// @thread thread-bound
+class PoseObserver {
+ public:
+  /// @param gray_code  whether a Gray code is projected instead of the pattern
+  PoseObserver(const Board& board, const Pattern& pattern, const ImageSize& projector, bool gray_code);
+
+  /// @errors what observe_board(), observe_pattern() and observe_gray_code() say
+  [[nodiscard]] Result<PoseView> observe(std::size_t camera, const PosePictures& pictures);
+
+  [[nodiscard]] const Board& board() const { return board_; }
+
+ private:
+  Board board_;
+  Pattern pattern_;
+  ImageSize projector_;
+  bool gray_code_;
+  std::map<std::size_t, PatternReader> readers_;  // one to a camera: each keeps where its pattern lies
+};
+
+/// One for each print.
+struct PoseObservers {
+  PoseObserver board;
+  std::optional<PoseObserver> plane;  ///< nothing without a reference plane, of which nothing may be observed then
+
+  [[nodiscard]] PoseObserver& of(PoseSubject subject) { return subject == PoseSubject::kPlane ? plane.value() : board; }
+};
+
+/// @param plane  nothing: there is none
+[[nodiscard]] PoseObservers make_observers(const Board& board, const std::optional<Board>& plane,
+                                           const Pattern& pattern, const ImageSize& projector, bool gray_code);
+
+}  // namespace slsd

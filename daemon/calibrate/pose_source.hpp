@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/calibrate/observations.hpp"
+#include "core/image.hpp"
+#include "core/result.hpp"
+#include "drivers/files/grey_image.hpp"
+
+namespace slsd {
+
+/// The projector and the cameras, as a session of calibrating needs them.
+/// @thread thread-bound
+class PoseSource {
+ public:
+  virtual ~PoseSource() = default;
+
+  /// Names, in the order of the pictures; at least one.
+  [[nodiscard]] virtual const std::vector<std::string>& cameras() const = 0;
+  [[nodiscard]] virtual ImageSize projector() const = 0;
+
+  /// Shows an image of the projector's size from now on. Where the projector fails, grab() says so.
+  virtual void show(const Grey8& image) = 0;
+
+  /// A picture of each camera, exposed while the image was visible, after the call.
+  /// @errors kTimeout: a device is not ready; those of Rig::capture(). It may be called again
+  [[nodiscard]] virtual Result<std::vector<GreyImage>> grab() = 0;
+};
+
+}  // namespace slsd

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/calibrate/report_html.hpp"
+
+#include <fmt/format.h>
+
+#include "daemon/calibrate/image_figures.hpp"
+#include "daemon/calibrate/rig_figures.hpp"
+#include "daemon/calibrate/svg_figure.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr std::string_view kStyle = R"(
+body { font: 15px/1.45 sans-serif; color: #222; background: #fff; max-width: 980px; margin: 24px auto; padding: 0 12px }
+h1 { font-size: 22px } h2 { font-size: 17px; margin-top: 32px }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums }
+td, th { padding: 2px 10px; border-bottom: 1px solid #ddd; text-align: right }
+td:first-child, th:first-child, td.words { text-align: left }
+tr.out td { color: #b00 }
+figure { display: inline-block; margin: 0 8px 12px 0; width: 460px; vertical-align: top }
+figcaption { font-size: 13px; color: #555 }
+svg { font: 11px sans-serif } svg path { fill: none }
+.grade { display: inline-block; padding: 2px 14px; border-radius: 4px; color: #fff; font-weight: bold }
+.good { background: #2a7d2e } .usable { background: #b06f00 } .bad { background: #b3261e }
+)";
+
+std::string list_of(const std::vector<std::string>& lines) {
+  std::string items;
+  for (const std::string& line : lines) items += "<li>" + escaped(line) + "</li>\n";
+  return items.empty() ? items : "<ul>\n" + items + "</ul>\n";
+}
+
+std::string verdict_of(const CalibrationOutcome& outcome) {
+  const auto grade = to_string(outcome.verdict.grade);
+  std::string html = fmt::format("<p><span class='grade {0}'>{0}</span></p>\n", grade);
+  html += list_of(outcome.verdict.reasons);
+  if (!outcome.warnings.empty()) html += "<h2>Warnings</h2>\n" + list_of(outcome.warnings);
+  if (!outcome.verdict.advice.empty()) html += "<h2>What to shoot next</h2>\n" + list_of(outcome.verdict.advice);
+  return html;
+}
+
+std::string error_row(std::string_view what, double px) {
+  return fmt::format("<tr><td>{}</td><td>{:.3f} px</td></tr>\n", what, px);
+}
+
+std::string errors_of(const CalibrationOutcome& outcome) {
+  return "<h2>Errors, root mean square</h2>\n<table>\n" + error_row("corners, in the cameras", outcome.camera_rms_px) +
+         error_row("symbols, in the projector", outcome.projector_rms_px) +
+         error_row("symbols, in the cameras", outcome.symbol_rms_px) +
+         error_row("symbols off their epipolar lines, in the projector", outcome.epipolar_rms_px) +
+         error_row("corners of each pose under the calibration by the others", outcome.held_out_corner_px) +
+         error_row("symbols of each pose under the calibration by the others", outcome.held_out_symbol_px) +
+         "</table>\n";
+}
+
+std::string plane_cells(const std::optional<ViewCheck>& check) {
+  if (!check) return "<td colspan='4'>not measured</td>";
+  const std::string distances = check->trueness
+                                    ? fmt::format("<td>{:+.3f}</td><td>{:.3f}</td>", check->trueness->scale_percent,
+                                                  check->trueness->long_rms_percent)
+                                    : "<td></td><td></td>";
+  return fmt::format("<td>{:.3f}</td><td>{:.3f}</td>", check->plane_rms_mm, check->plane_sigma_mm) + distances;
+}
+
+/// What the looks at the reference plane say, before they took part and after.
+std::string planes_of(const CalibrationOutcome& outcome) {
+  if (outcome.planes.empty()) return {};
+  std::string html =
+      "<h2>Reference plane</h2>\n<p>Before the second step, when the plane had no part yet, and after it: symbols off "
+      "the plane, mm, and what their noise lets expect; distances between its markers, per cent, as a whole and long "
+      "ones.</p>\n<table>\n<tr><th>look</th><th colspan='4'>before</th><th colspan='4'>after</th></tr>\n<tr><th></th>";
+  for (int i = 0; i < 2; ++i) html += "<th>off</th><th>noise</th><th>as a whole</th><th>long</th>";
+  html += "</tr>\n";
+  for (const PlaneCheck& plane : outcome.planes) {
+    html += fmt::format("<tr><td>{} {}</td>{}{}</tr>\n", escaped(plane.name), escaped(plane.camera),
+                        plane_cells(plane.before), plane_cells(plane.after));
+  }
+  return html + "</table>\n";
+}
+
+std::string image_figures(const CalibrationOutcome& outcome) {
+  std::string coverage;
+  std::string residuals;
+  for (std::size_t i = 0; i < outcome.observations.cameras.size(); ++i) {
+    coverage += camera_coverage_figure(outcome, i);
+    residuals += camera_residual_figure(outcome, i);
+  }
+  return "<h2>What the poses cover</h2>\n" + coverage + projector_coverage_figure(outcome) + "<h2>Residuals</h2>\n" +
+         residuals + projector_residual_figure(outcome);
+}
+
+std::string rig_figures(const CalibrationOutcome& outcome) {
+  std::string html = "<h2>Poses in space</h2>\n" + poses_from_above(outcome) + poses_from_the_right(outcome);
+  const std::string depth = depth_figure(outcome);
+  return depth.empty() ? html : html + "<h2>Uncertainty of depth</h2>\n" + depth;
+}
+
+std::string used_row(const PoseReport& pose, std::size_t index) {
+  return fmt::format(
+      "<tr><td><span style='color:{}'>&#9632;</span> {}</td><td>{}</td><td>{:.3f}</td><td>{:.3f}</td><td>{}</td>"
+      "<td>{:.3f}</td><td>{:.3f}</td><td class='words'>{}</td></tr>\n",
+      pose_colour(index), escaped(pose.name), pose.corners, pose.corner_rms_px, pose.held_out.corner_rms_px,
+      pose.symbols, pose.symbol_rms_px, pose.held_out.symbol_rms_px,
+      pose.outlying_corners + pose.outlying_symbols == 0
+          ? ""
+          : fmt::format("{} corners, {} symbols lie off", pose.outlying_corners, pose.outlying_symbols));
+}
+
+std::string poses_of(const CalibrationOutcome& outcome) {
+  std::string html =
+      "<h2>Poses</h2>\n<table>\n<tr><th>pose</th><th>corners</th><th>px</th><th>held "
+      "out</th><th>symbols</th><th>px</th>"
+      "<th>held out</th><th></th></tr>\n";
+  std::size_t used = 0;
+  for (const PoseReport& pose : outcome.poses) {
+    html += pose.fault
+                ? fmt::format("<tr class='out'><td>{}</td><td class='words' colspan='7'>left out: {}</td></tr>\n",
+                              escaped(pose.name), escaped(pose.reason))
+                : used_row(pose, used++);
+  }
+  return html + "</table>\n";
+}
+
+std::string parameters_of(const CalibrationOutcome& outcome) {
+  std::string html =
+      "<h2>Parameters</h2>\n<table>\n<tr><th>device</th><th>parameter</th><th>value</th><th>one standard deviation</th>"
+      "</tr>\n";
+  for (const ParameterReport& parameter : outcome.parameters) {
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{:.5f}</td><td>{:.5f}</td></tr>\n", escaped(parameter.device),
+                        escaped(parameter.name), parameter.value, parameter.sigma);
+  }
+  return html + "</table>\n";
+}
+
+}  // namespace
+
+std::string report_html(const CalibrationOutcome& outcome) {
+  const CalibrationReport& report = outcome.calibration.report;
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'><title>Calibration</title><style>{}</style></head>"
+      "<body>\n<h1>Calibration</h1>\n<p>{}<br>board {}</p>\n{}{}{}{}{}{}{}</body></html>\n",
+      kStyle, escaped(report.date.value_or("")), escaped(report.board.value_or("not named")), verdict_of(outcome),
+      errors_of(outcome), planes_of(outcome), image_figures(outcome), rig_figures(outcome), poses_of(outcome),
+      parameters_of(outcome));
+}
+
+}  // namespace slsd

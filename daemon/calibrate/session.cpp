@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/calibrate/session.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <iterator>
+#include <optional>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "core/calibrate/gray_code.hpp"
+#include "daemon/calibrate/board_request.hpp"
+#include "daemon/calibrate/device_source.hpp"
+#include "daemon/calibrate/finish_calibration.hpp"
+#include "daemon/calibrate/pose_session.hpp"
+#include "daemon/calibrate/session_record.hpp"
+#include "daemon/client/interrupt.hpp"
+#include "daemon/scan/hardware.hpp"
+
+namespace slsd {
+namespace {
+
+using std::filesystem::path;
+
+constexpr int kPosesMin = 3, kPosesMax = 99, kPlanesMin = 1;
+
+/// What is decided before a device is opened.
+struct Preparation {
+  Configuration configuration;
+  Board board;
+  std::optional<Board> plane;
+  path file;    // where the calibration is kept
+  path folder;  // where the pictures are
+  Pattern pattern;
+};
+
+Result<Preparation> prepare(const CalibrateRequest& request) {
+  if (request.poses < kPosesMin || request.poses > kPosesMax) {
+    return fail(ErrorCode::kInvalidArgument, fmt::format("must be {} to {}", kPosesMin, kPosesMax), "--poses");
+  }
+  if (request.planes < kPlanesMin || request.planes > kPosesMax) {
+    return fail(ErrorCode::kInvalidArgument, fmt::format("must be {} to {}", kPlanesMin, kPosesMax), "--planes");
+  }
+  auto configuration = load_configuration_or_defaults(request.configuration_file);
+  if (!configuration) return tl::unexpected(configuration.error());
+  auto board = requested_board(request);
+  if (!board) return tl::unexpected(board.error());
+  auto plane = requested_plane(request);
+  if (!plane) return tl::unexpected(plane.error());
+  auto file = file_to_keep(request, *configuration);
+  if (!file) return tl::unexpected(file.error());
+  path folder = record_folder(request, *file);
+  auto pattern = session_pattern(folder, *configuration);
+  if (!pattern) return tl::unexpected(pattern.error());
+  return Preparation{std::move(*configuration), *board, *plane, std::move(*file), std::move(folder),
+                     std::move(*pattern)};
+}
+
+std::string resume_text(const path& folder, std::size_t poses) {
+  if (poses == 0) return "no pose was taken";
+  return fmt::format("the {} poses taken are kept; go on with them by --record {}", poses, folder.string());
+}
+
+void print(const std::string& line) {
+  std::cout << line << std::endl;
+}
+
+Result<> take_poses(const CalibrateRequest& request, const Preparation& prepared, PoseSource& source,
+                    PoseObserver& observer, PoseRecorder& recorder, PoseCollection& poses) {
+  if (Interrupt::came()) return {};
+  PoseTaker taker(source, observer,
+                  request.gray_code ? draw_gray_code(source.projector()) : std::vector{draw_pattern(prepared.pattern)},
+                  request.gray_code);
+  const Timepiece time;
+  SessionTerminal terminal(std::cout, SessionTerminal::columns_of_stdout(), time.now);
+  PoseSessionOptions options;
+  options.poses = static_cast<std::size_t>(poses.subject() == PoseSubject::kBoard ? request.poses : request.planes);
+  return PoseSession({source, taker, recorder, poses, terminal, time, Interrupt::came}, options).run();
+}
+
+/// The poses, then the looks at the reference plane; what was recorded before is among them.
+Result<Observations> take_all(const CalibrateRequest& request, const Preparation& prepared, PoseSource& source,
+                              PoseObservers& observers, PoseRecorder& recorder, const Observations& recorded) {
+  PoseCollection poses(prepared.board, recorded);
+  auto taken = take_poses(request, prepared, source, observers.board, recorder, poses);
+  Observations observations = poses.observations();
+  if (taken && prepared.plane) {
+    Observations so_far = recorded;
+    so_far.cameras = observations.cameras;
+    PoseCollection planes(*prepared.plane, so_far, PoseSubject::kPlane);
+    taken = take_poses(request, prepared, source, *observers.plane, recorder, planes);
+    std::ranges::copy(planes.observations().poses, std::back_inserter(observations.poses));
+  }
+  if (taken) return observations;
+  Error error = taken.error();
+  if (!observations.poses.empty()) error.message += "; " + resume_text(recorder.folder(), observations.poses.size());
+  return tl::unexpected(std::move(error));
+}
+
+Result<> calibrate_from(const CalibrateRequest& request, const Preparation& prepared, const Observations& observations,
+                        const std::vector<PoseReport>& refused, const std::vector<DeviceStatus>& cameras) {
+  const std::size_t poses = observations.count(PoseSubject::kBoard);
+  if (poses < static_cast<std::size_t>(kPosesMin)) {
+    return fail(ErrorCode::kCancelled, fmt::format("ended with {} poses, and {} are the least; {}", poses, kPosesMin,
+                                                   resume_text(prepared.folder, poses)));
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  auto outcome = calibrate(observations, calibrate_options(prepared.configuration));
+  if (!outcome) {
+    Error error = outcome.error();
+    error.message += "; " + resume_text(prepared.folder, poses);
+    return tl::unexpected(std::move(error));
+  }
+  print(fmt::format("calibrated in {:.1f} s from {} poses, recorded in {}",
+                    std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), poses,
+                    prepared.folder.string()));
+  note_hardware(cameras, prepared.configuration.projector, outcome->calibration);
+  return finish_calibration(request, prepared.file, prepared.board, refused, std::move(*outcome));
+}
+
+}  // namespace
+
+Result<> calibrate_by_session(const CalibrateRequest& request) {
+  const auto prepared = prepare(request);
+  if (!prepared) return tl::unexpected(prepared.error());
+  auto source = DeviceSource::create(prepared->configuration);
+  if (!source) return tl::unexpected(source.error());
+  const ImageSize projector = (*source)->projector();
+  Interrupt::watch();
+  print(fmt::format("board {}{}, projector {}x{}, pictures in {}; Ctrl-C ends it with the poses that are there",
+                    to_string(prepared->board),
+                    prepared->plane ? ", reference plane " + to_string(*prepared->plane) : "", projector.width_px,
+                    projector.height_px, prepared->folder.string()));
+  PoseObservers observers =
+      make_observers(prepared->board, prepared->plane, prepared->pattern, projector, request.gray_code);
+  auto record = read_record(prepared->folder, (*source)->cameras(), projector, request.gray_code, observers, print);
+  if (!record) return tl::unexpected(record.error());
+  auto recorder = PoseRecorder::create(prepared->folder, (*source)->cameras(), prepared->pattern);
+  if (!recorder) return tl::unexpected(recorder.error());
+  const auto observations = take_all(request, *prepared, **source, observers, *recorder, record->observations);
+  if (!observations) return tl::unexpected(observations.error());
+  const std::vector<DeviceStatus> cameras = (*source)->camera_statuses();
+  source->reset();
+  return calibrate_from(request, *prepared, *observations, record->refused, cameras);
+}
+
+}  // namespace slsd

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+
+#include "core/calibrate/verify.hpp"
+
+namespace slsd {
+
+/// What one look says of the calibration, for a person at a terminal: a line, with PASS or FAIL at its end.
+[[nodiscard]] std::string check_text(const ViewCheck& check, const VerifyLimits& limits);
+
+/// All looks together.
+[[nodiscard]] std::string summary_text(const VerifySummary& summary, const VerifyLimits& limits);
+
+/// What to do, a sentence to each fault.
+[[nodiscard]] std::string advice(const VerifySummary& summary);
+
+}  // namespace slsd

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <Eigen/Geometry>
+
+#include "daemon/calibrate/calibrate_from_files.hpp"
+#include "drivers/files/encode_png.hpp"
+#include "drivers/files/file.hpp"
+#include "tests/daemon/calibrate/simulated_captures.hpp"
+
+namespace slsd {
+namespace {
+
+using std::filesystem::path;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr char kBoard[] = "charuco:7x5:60:45:DICT_5X5_100";
+constexpr char kPlane[] = "plane:6x4:70:35:DICT_4X4_50";
+constexpr int kPoses = 7, kPlanes = 2;
+
+path new_folder() {
+  std::string name = testing::TempDir() + "slsd-calibrate-XXXXXX";
+  if (mkdtemp(name.data()) == nullptr) std::abort();
+  return name;
+}
+
+void write_text(const path& file, const std::string& text) {
+  std::ofstream(file) << text;
+}
+
+std::string configuration_text(int seed = 1, int width_px = 640) {
+  return "[pattern]\nseed = " + std::to_string(seed) +
+         "\n[projector]\ndriver = \"headless\"\nwidth_px = " + std::to_string(width_px) +
+         "\nheight_px = 400\n[calibration]\nfile = \"calibration.yml\"\n";
+}
+
+/// Captures that all tests read: drawing them takes seconds.
+class FromFiles : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    captures_ = new_folder();
+    PatternOptions options;
+    options.projector_width_px = 640, options.projector_height_px = 400;
+    const auto pattern = make_pattern(options);
+    const auto board = parse_board(kBoard);
+    const auto plane = parse_board(kPlane);
+    if (!pattern || !board || !plane) std::abort();
+    for (int i = 0; i < kPoses; ++i) {
+      write_simulated_pose(captures_ / ("pose_0" + std::to_string(i)), small_rig(), *board, *pattern,
+                           simulated_pose(i));
+    }
+    planes_ = new_folder();
+    for (int i = 0; i < kPlanes; ++i) {
+      write_simulated_pose(planes_ / ("plane_0" + std::to_string(i)), small_rig(), *plane, *pattern,
+                           simulated_pose(3 * i));
+    }
+  }
+  static void TearDownTestSuite() {
+    std::filesystem::remove_all(captures_);
+    std::filesystem::remove_all(planes_);
+  }
+  void SetUp() override {
+    home_ = new_folder();
+    write_text(home_ / "slsd.toml", configuration_text());
+    request_.configuration_file = home_ / "slsd.toml";
+    request_.from = captures_;
+    request_.board = kBoard;
+  }
+  void TearDown() override { std::filesystem::remove_all(home_); }
+
+  /// A copy of the captures, to be spoilt.
+  void copy_captures() {
+    request_.from = home_ / "captures";
+    std::filesystem::copy(captures_, request_.from, std::filesystem::copy_options::recursive);
+  }
+  /// Poses and looks at the plane.
+  void copy_all() {
+    copy_captures();
+    std::filesystem::copy(planes_, request_.from, std::filesystem::copy_options::recursive);
+  }
+  Calibration kept() {
+    const auto text = read_file(home_ / "calibration.yml", 1 << 20);
+    return read_calibration(text ? *text : "", "calibration.yml").value_or(Calibration{});
+  }
+  std::string refusal() {
+    const auto done = calibrate_from_files(request_);
+    EXPECT_FALSE(done);
+    EXPECT_FALSE(std::filesystem::exists(home_ / "calibration.yml"));
+    return done ? std::string() : to_string(done.error());
+  }
+
+  static path captures_, planes_;
+  path home_;
+  CalibrateRequest request_;
+};
+path FromFiles::captures_, FromFiles::planes_;
+
+TEST_F(FromFiles, KeepsACalibrationNearTheTruth) {
+  const auto done = calibrate_from_files(request_);
+  ASSERT_TRUE(done) << to_string(done.error());
+  const auto text = read_file(home_ / "calibration.yml", 1 << 20);
+  ASSERT_TRUE(text);
+  const auto found = read_calibration(*text, "calibration.yml");
+  ASSERT_TRUE(found) << found.error().message;
+  const Calibration truth = small_rig();
+  EXPECT_NEAR(found->projector.fx / truth.projector.fx, 1, 0.003);
+  EXPECT_NEAR(found->cameras[0].lens.fx / truth.cameras[0].lens.fx, 1, 0.003);
+  const RigidTransform &rig = found->cameras[0].projector_from_camera, &is = truth.cameras[0].projector_from_camera;
+  EXPECT_LT(Eigen::AngleAxisd(rig.rotation * is.rotation.transpose()).angle() * 57.3, 0.15);
+  EXPECT_NEAR(rig.translation.norm(), is.translation.norm(), 1);
+  EXPECT_EQ(found->report.board, kBoard);
+  EXPECT_LT(*found->report.reprojection_error_camera_px, 0.1);
+  EXPECT_LT(*found->report.reprojection_error_projector_px, 0.15);
+}
+
+TEST_F(FromFiles, KeepsTheCalibrationBeforeBesideIt) {
+  write_text(home_ / "calibration.yml", "what was there");
+  ASSERT_TRUE(calibrate_from_files(request_));
+  EXPECT_EQ(*read_file(home_ / "calibration.yml.old", 100), "what was there");
+  EXPECT_NE(*read_file(home_ / "calibration.yml", 1 << 20), "what was there");
+}
+
+TEST_F(FromFiles, TakesThePrintAsItsRulerWasMeasured) {
+  request_.ruler = "200:210";
+  ASSERT_TRUE(calibrate_from_files(request_));
+  const auto found = read_calibration(*read_file(home_ / "calibration.yml", 1 << 20), "");
+  const double baseline = small_rig().cameras[0].projector_from_camera.translation.norm();
+  EXPECT_NEAR(found->cameras[0].projector_from_camera.translation.norm(), 1.05 * baseline, 1);
+}
+
+TEST_F(FromFiles, GoesOnWithTheReferencePlane) {
+  copy_all();
+  request_.plane = kPlane;
+  testing::internal::CaptureStdout();
+  const auto done = calibrate_from_files(request_);
+  const std::string said = testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_THAT(said, HasSubstr("reference plane " + std::string(kPlane)));
+  EXPECT_THAT(said, HasSubstr("plane_01   before: off it by"));
+  EXPECT_THAT(said, HasSubstr("after it: off it by"));
+  EXPECT_THAT(said, Not(HasSubstr("warning")));
+  const Calibration truth = small_rig();
+  EXPECT_NEAR(kept().projector.fx / truth.projector.fx, 1, 0.003);
+  const double baseline = truth.cameras[0].projector_from_camera.translation.norm();
+  EXPECT_NEAR(kept().cameras.at(0).projector_from_camera.translation.norm(), baseline, 1);
+  EXPECT_THAT(*read_file(home_ / "calibration.html", 1 << 24), HasSubstr("<td>plane_00 camera</td>"));
+}
+
+TEST_F(FromFiles, SaysThatThePlaneIsOfAnotherScale) {
+  copy_all();
+  for (const char* pose : {"pose_05", "pose_06"}) std::filesystem::remove_all(request_.from / pose);
+  request_.plane = kPlane;
+  request_.plane_ruler = "200:204";
+  testing::internal::CaptureStdout();
+  const auto done = calibrate_from_files(request_);
+  const std::string said = testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_THAT(said, HasSubstr("warning: the board and the reference plane are not of one scale"));
+  const double baseline = small_rig().cameras[0].projector_from_camera.translation.norm();
+  EXPECT_NEAR(kept().cameras.at(0).projector_from_camera.translation.norm(), 1.02 * baseline, 1);
+}
+
+TEST_F(FromFiles, RefusesAPlaneWithoutItsPrintAndAPrintWithoutAPlane) {
+  request_.plane = kPlane;
+  EXPECT_THAT(refusal(), HasSubstr("holds no look at the reference plane that --plane names"));
+  copy_all();
+  request_.plane.clear();
+  EXPECT_THAT(refusal(), HasSubstr("plane_00: is a look at a reference plane: name its print by --plane"));
+  request_.plane_ruler = "200:201";
+  EXPECT_THAT(refusal(), HasSubstr("--plane-ruler: is the ruler of a plane that --plane does not name"));
+}
+
+TEST_F(FromFiles, LeavesAPoseOutThatShowsNothing) {
+  copy_captures();
+  const auto black = encode_png(Grey8(800, 600, 3));
+  ASSERT_TRUE(write_file_atomically(request_.from / "pose_02/white.png", *black));
+  EXPECT_TRUE(calibrate_from_files(request_));
+}
+
+TEST_F(FromFiles, RefusesWhatIsMissing) {
+  copy_captures();
+  std::filesystem::remove(request_.from / "pose_03/white.png");
+  EXPECT_THAT(refusal(), HasSubstr("pose_03/white.png: is missing"));
+  request_.from = home_ / "nowhere";
+  EXPECT_THAT(refusal(), HasSubstr("nowhere: is no folder"));
+}
+
+TEST_F(FromFiles, RefusesPicturesOfTwoSizes) {
+  copy_captures();
+  ASSERT_TRUE(write_file_atomically(request_.from / "pose_03/pattern.png", *encode_png(Grey8(640, 480))));
+  EXPECT_THAT(refusal(), HasSubstr("pose_03/pattern.png: has 640x480 pixels, the pictures before it 800x600"));
+}
+
+TEST_F(FromFiles, RefusesAnotherBoard) {
+  request_.board = "charuco:7x5:60:45:DICT_4X4_50";
+  EXPECT_THAT(refusal(), HasSubstr("no pose can be used"));
+}
+
+TEST_F(FromFiles, RefusesAnotherPattern) {
+  write_text(home_ / "slsd.toml", configuration_text(77));
+  EXPECT_THAT(refusal(), HasSubstr("not those of the configured pattern"));
+}
+
+TEST_F(FromFiles, RefusesOnePose) {
+  copy_captures();
+  for (int i = 1; i < kPoses; ++i) std::filesystem::remove_all(request_.from / ("pose_0" + std::to_string(i)));
+  EXPECT_THAT(refusal(), HasSubstr("1 of the poses can be used, and 3 are the least"));
+}
+
+TEST_F(FromFiles, NeedsAPlaceToKeepIt) {
+  write_text(home_ / "slsd.toml", "[projector]\nwidth_px = 640\nheight_px = 400\n");
+  EXPECT_THAT(refusal(), HasSubstr("nowhere to keep the calibration"));
+}
+
+}  // namespace
+}  // namespace slsd
