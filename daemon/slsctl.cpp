@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <algorithm>
 #include <functional>
 #include <map>
 
@@ -7,6 +8,10 @@
 
 #include "daemon/client/client_commands.hpp"
 #include "daemon/client/client_options.hpp"
+#include "daemon/client/exposure_command.hpp"
+#include "daemon/client/project_command.hpp"
+#include "daemon/client/record_command.hpp"
+#include "daemon/scan/projected_picture.hpp"
 
 namespace {
 
@@ -29,6 +34,8 @@ void add_scan(CLI::App& app, ClientOptions& options) {
   scan->add_option("-o,--output", options.output, "write the cloud, as PLY or PCD")->check(kCloudFile);
   scan->add_option("--picture", options.picture, "write the frame with what was decoded, as a PNG");
   scan->add_option("--cloud-picture", options.cloud_picture, "write a picture of the cloud, as a PNG");
+  scan->add_flag("--texture", options.texture, "also light the scene in white: intensities are those of the points");
+  scan->add_flag("--ambient", options.ambient, "also take a frame without light, and subtract the light of the room");
   add_timeout(scan, options);
 }
 
@@ -38,10 +45,48 @@ void add_watch(CLI::App& app, ClientOptions& options) {
   watch->add_option("--rate", options.rate_hz, "at most so many a second")->check(CLI::Range(0.001, 1000.0));
 }
 
+void add_exposure(CLI::App& app, ClientOptions& options) {
+  CLI::App* exposure =
+      app.add_subcommand("exposure", "look at the scene, propose exposure and gain, say what else is wrong");
+  exposure->add_option("--camera", options.camera, "the camera's name; without it the first");
+  exposure->add_option("--exposure-max-us", options.exposure_max_us, "the longest exposure to propose (100000)")
+      ->check(CLI::Range(1.0, 1e7));
+  exposure->add_option("--gain-max-db", options.gain_max_db, "the highest gain to propose (24)")
+      ->check(CLI::Range(0.0, 60.0));
+  add_timeout(exposure, options);
+}
+
+void add_record(CLI::App& app, ClientOptions& options) {
+  CLI::App* record = app.add_subcommand("record", "scan on and on, and write the frames, to be replayed");
+  record->add_option("DIR", options.folder, "a folder that is not there yet, or empty")->required();
+  record->add_option("--frames", options.count, "end after so many scans")->check(CLI::Range(1, 1'000'000'000));
+  record->add_option("--seconds", options.seconds, "end after so long")->check(CLI::Range(0.001, 1e9));
+  record->add_flag("--clouds", options.clouds, "write the clouds too");
+  add_timeout(record, options);
+}
+
+const CLI::Validator kPicture(
+    [](const std::string& picture) {
+      const bool named =
+          picture != "image" && std::ranges::find(slsd::kProjectedPictures, picture) != slsd::kProjectedPictures.end();
+      return named || std::filesystem::path(picture).extension() == ".png" ? ""
+                                                                           : "no such picture; a file ends in .png";
+    },
+    "pattern|idle|white|black|focus|grid|FILE.png");
+
+void add_project(CLI::App& app, ClientOptions& options) {
+  CLI::App* project = app.add_subcommand("project", "show a picture until the next scan");
+  project->add_option("PICTURE", options.picture, "what to show; a file's image has the projector's size")
+      ->required()
+      ->check(kPicture);
+  add_timeout(project, options);
+}
+
 void add_image(CLI::App& app, ClientOptions& options, const std::string& name, const std::string& what) {
   CLI::App* command = app.add_subcommand(name, what);
   command->add_option("FILE", options.image, "the PNG to write")->required();
   if (name != "pattern") add_timeout(command, options);
+  if (name == "frame") command->add_flag("--as-shown", options.as_shown, "leave what the projector shows");
 }
 
 int run(const CLI::App& app, const ClientOptions& options) {
@@ -49,6 +94,9 @@ int run(const CLI::App& app, const ClientOptions& options) {
   if (command == "scan") return slsd::scan_command(options);
   if (command == "status") return slsd::status_command(options);
   if (command == "watch") return slsd::watch_command(options);
+  if (command == "exposure") return slsd::exposure_command(options);
+  if (command == "project") return slsd::project_command(options);
+  if (command == "record") return slsd::record_command(options);
   return slsd::image_command(options, command);
 }
 
@@ -65,8 +113,11 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.fallthrough();
   add_image(app, options, "frame", "write what the camera sees");
-  add_image(app, options, "pattern", "write what the projector shows");
+  add_image(app, options, "pattern", "write the pattern that the projector shows");
   add_image(app, options, "preview", "scan, and write the frame with what was decoded");
+  add_exposure(app, options);
+  add_project(app, options);
+  add_record(app, options);
   add_scan(app, options);
   app.add_subcommand("status", "the state of the service, and what its scans came to");
   add_watch(app, options);

@@ -73,6 +73,8 @@ int print_event(const ClientOptions& options, const json& event) {
 int scan_command(const ClientOptions& options) {
   const bool as_ply = options.output.extension() != ".pcd" || !options.cloud_picture.empty();
   json params{{"format", as_ply ? "ply" : "pcd"}, {"picture", !options.picture.empty()}};
+  if (options.texture) params["texture"] = true;
+  if (options.ambient) params["ambient"] = true;
   if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;
   const auto answered = ask(options, "scan", std::move(params));
   if (!answered) return report(options, answered.error());
@@ -110,6 +112,7 @@ int watch_command(const ClientOptions& options) {
 int image_command(const ClientOptions& options, const std::string& method) {
   json params = json::object();
   if (options.timeout_ms && method != "pattern") params["timeout_ms"] = *options.timeout_ms;
+  if (options.as_shown) params["as_shown"] = true;
   const auto answered = ask(options, method, std::move(params));
   if (!answered) return report(options, answered.error());
   if (auto written = write(options.image, answered->reply.bytes); !written) return report(options, written.error());

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 namespace slsd {
 
@@ -16,13 +17,22 @@ inline constexpr int kNoDaemon = 3;
 struct ClientOptions {
   std::filesystem::path socket = "/run/slsd/slsd.sock";
   bool json = false;
-  std::filesystem::path output;         ///< scan: the cloud, .ply or .pcd; empty: not kept
-  std::filesystem::path picture;        ///< scan: the frame with what was decoded
-  std::filesystem::path cloud_picture;  ///< scan: the cloud, drawn
-  std::filesystem::path image;          ///< preview, frame, pattern: the PNG to write
+  std::filesystem::path output;           ///< scan: the cloud, .ply or .pcd; empty: not kept
+  std::filesystem::path picture;          ///< scan: the frame with what was decoded; project: what to show
+  std::filesystem::path cloud_picture;    ///< scan: the cloud, drawn
+  std::filesystem::path image;            ///< preview, frame, pattern: the PNG to write
+  bool texture = false;                   ///< scan: intensities from a frame in white light
+  bool ambient = false;                   ///< scan: less the light of the room
+  bool as_shown = false;                  ///< frame: whatever the projector shows
+  std::filesystem::path folder;           ///< record: where to
+  bool clouds = false;                    ///< record: the clouds too
+  std::optional<double> seconds;          ///< record: ends after so long
+  std::string camera;                     ///< exposure: its name; empty: the first
+  std::optional<double> exposure_max_us;  ///< exposure: the longest that is proposed
+  std::optional<double> gain_max_db;      ///< exposure: the highest that is proposed
   std::optional<int> timeout_ms;
   std::optional<double> rate_hz;  ///< watch
-  std::uint64_t count = 0;        ///< watch: clouds after which it ends; 0: none
+  std::uint64_t count = 0;        ///< watch: clouds, record: scans, after which it ends; 0: none
 };
 
 }  // namespace slsd

@@ -115,9 +115,15 @@ Result<Received> Connection::receive() {
 }
 
 Result<Answered> Connection::call(std::string_view method, nlohmann::json params) {
-  if (auto sent = send(to_line(request_message(++last_id_, method, std::move(params)))); !sent) {
-    return tl::unexpected(sent.error());
-  }
+  if (auto sent = request(method, std::move(params)); !sent) return tl::unexpected(sent.error());
+  return reply();
+}
+
+Result<> Connection::request(std::string_view method, nlohmann::json params) {
+  return send(to_line(request_message(++last_id_, method, std::move(params))));
+}
+
+Result<Answered> Connection::reply() {
   std::vector<Received> events;
   while (true) {
     auto received = receive();

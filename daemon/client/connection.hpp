@@ -37,6 +37,11 @@ class Connection {
   /// @errors kDisconnected: the daemon hung up; kMalformed: it is no slsd; kIo
   [[nodiscard]] Result<Answered> call(std::string_view method, nlohmann::json params);
 
+  /// Sends a request and does not wait; reply() does. @errors as call()
+  [[nodiscard]] Result<> request(std::string_view method, nlohmann::json params);
+  /// Waits for the reply to the oldest request that has none. @errors as call()
+  [[nodiscard]] Result<Answered> reply();
+
   /// Waits for the next message. @errors as call()
   [[nodiscard]] Result<Received> receive();
 

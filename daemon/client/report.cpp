@@ -20,15 +20,25 @@ Failure daemon_failure(const json& error) {
   return {kRequestFailed, std::move(told)};
 }
 
+/// Nothing while a camera is as it was calibrated.
+std::string drift_line(const json& camera) {
+  const json drift = camera.value("calibration", json());
+  if (!drift.is_object() || !drift.value("off_since_scan", json()).is_number()) return {};
+  return fmt::format(
+      "            knocked out of its calibration since scan {}: {:.2f} px off the epipolar lines, {:.2f} are fine\n",
+      drift.value("off_since_scan", 0), drift.value("epipolar_px", 0.0), drift.value("limit_px", 0.0));
+}
+
 std::string device_line(const json& device) {
   std::string line = fmt::format("{:<12}{}, {} {}, {}x{} px", device.value("name", ""), device.value("state", ""),
                                  device.value("driver", ""), device.value("device", ""), device.value("width_px", 0),
                                  device.value("height_px", 0));
+  if (const std::string shows = device.value("shows", ""); !shows.empty()) line += ", shows " + shows;
   if (device.contains("frames")) {
     line += fmt::format(", {} frames, {} lost", device.value("frames", 0), device.value("frames_lost", 0));
   }
   const std::string problem = device.value("problem", "");
-  return line + (problem.empty() ? "\n" : "\n            " + problem + "\n");
+  return line + (problem.empty() ? "\n" : "\n            " + problem + "\n") + drift_line(device);
 }
 
 std::string scans_lines(const json& scans) {
@@ -37,6 +47,7 @@ std::string scans_lines(const json& scans) {
   for (const auto& [name, count] : failed.items()) {
     text += fmt::format(", {} {}", count.get<std::uint64_t>(), name);
   }
+  if (const auto skipped = scans.value("skipped", std::uint64_t{0})) text += fmt::format(", {} skipped", skipped);
   text += '\n';
   if (scans.contains("last_error") && scans["last_error"].is_object()) {
     text += "last error  " + scans["last_error"].value("message", "") + "\n";
@@ -53,6 +64,7 @@ std::string times_table(const json& scans) {
   std::string text = fmt::format("  {:<20}{:>9}{:>9}{:>9}\n", "ms", "last", "mean", "longest");
   text += duration_line("capture", scans.value("capture_ms", json::object()));
   text += duration_line("decode", scans.value("decode_ms", json::object()));
+  text += duration_line("latency", scans.value("latency_ms", json::object()));
   const json stages = scans.value("stages_ms", json::object());
   for (const auto& [stage, duration] : stages.items()) {
     text += duration_line("  " + stage, duration);
@@ -77,8 +89,7 @@ Failure failure(const Error& error) {
   return {error.code == ErrorCode::kNotFound ? kNoDaemon : kRequestFailed, rpc_error(error)};
 }
 
-tl::expected<Answered, Failure> ask(Connection& connection, std::string_view method, json params) {
-  auto answered = connection.call(method, std::move(params));
+tl::expected<Answered, Failure> judge(Result<Answered> answered) {
   if (!answered) return tl::unexpected(failure(answered.error()));
   const json& message = answered->reply.message;
   if (message.contains("error") && message["error"].is_object()) {
@@ -88,6 +99,10 @@ tl::expected<Answered, Failure> ask(Connection& connection, std::string_view met
     return tl::unexpected(failure({ErrorCode::kMalformed, "the answer is not slsd's", {}}));
   }
   return std::move(*answered);
+}
+
+tl::expected<Answered, Failure> ask(Connection& connection, std::string_view method, json params) {
+  return judge(connection.call(method, std::move(params)));
 }
 
 tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_view method, json params) {
@@ -123,8 +138,12 @@ std::string scan_line(const json& scan) {
   std::uint64_t regions = 0;
   const json by_status = scan.value("regions", json::object());
   for (const auto& [status, count] : by_status.items()) regions += count.get<std::uint64_t>();
-  return fmt::format("scan {}: {} points of {} regions, capture {:.1f} ms, decode {:.1f} ms", scan.value("scan", ""),
-                     scan.value("points", 0), regions, scan.value("capture_ms", 0.0), scan.value("decode_ms", 0.0));
+  std::string line =
+      fmt::format("scan {}: {} points of {} regions, capture {:.1f} ms, decode {:.1f} ms, latency {:.1f} ms",
+                  scan.value("scan", ""), scan.value("points", 0), regions, scan.value("capture_ms", 0.0),
+                  scan.value("decode_ms", 0.0), scan.value("latency_ms", 0.0));
+  if (scan.contains("saturated")) line += fmt::format(", {} saturated", scan.value("saturated", 0));
+  return line;
 }
 
 }  // namespace slsd

@@ -22,6 +22,9 @@ struct Failure {
 /// A failure on this side. @return kNoDaemon where there is none, else kRequestFailed
 [[nodiscard]] Failure failure(const Error& error);
 
+/// A call's outcome; a JSON-RPC error is a failure.
+[[nodiscard]] tl::expected<Answered, Failure> judge(Result<Answered> answered);
+
 /// One call; a JSON-RPC error is a failure.
 [[nodiscard]] tl::expected<Answered, Failure> ask(Connection& connection, std::string_view method,
                                                   nlohmann::json params);

@@ -8,6 +8,7 @@
 
 #include "daemon/configuration/nearest_name.hpp"
 #include "daemon/rpc/param_reader.hpp"
+#include "daemon/server/project_method.hpp"
 #include "daemon/server/scan_methods.hpp"
 #include "daemon/server/status_json.hpp"
 
@@ -52,8 +53,9 @@ void run_reload(ServiceState& state, const json& params, Session&, Respond respo
 
 constexpr std::array kMethods{
     RpcMethod{"frame", run_frame},         RpcMethod{"pattern", run_pattern},
-    RpcMethod{"preview", run_preview},     RpcMethod{"reload", run_reload},
-    RpcMethod{"scan", run_scan},           RpcMethod{"status", run_status},
+    RpcMethod{"preview", run_preview},     RpcMethod{"project", run_project},
+    RpcMethod{"reload", run_reload},       RpcMethod{"scan", run_scan},
+    RpcMethod{"settings", run_settings},   RpcMethod{"status", run_status},
     RpcMethod{"subscribe", run_subscribe}, RpcMethod{"unsubscribe", run_unsubscribe},
 };
 

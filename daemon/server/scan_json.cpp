@@ -34,17 +34,38 @@ std::string stage_name(std::size_t index) {
 
 }  // namespace
 
+double latency_ms(MonotonicTime received) {
+  return milliseconds(std::chrono::steady_clock::now() - received);
+}
+
 json scan_json(const ScanResult& scan) {
   json stages = json::object();
   for (std::size_t i = 0; i < scan.stage_times.size(); ++i) stages[stage_name(i)] = milliseconds(scan.stage_times[i]);
-  return {{"scan", scan.cloud.scan_id},
-          {"time", scan.cloud.time},
-          {"frame", scan.cloud.frame},
-          {"points", scan.cloud.points.size()},
-          {"regions", regions_json(scan.regions)},
-          {"capture_ms", milliseconds(scan.capture_time)},
-          {"decode_ms", milliseconds(scan.decode_time)},
-          {"stages_ms", std::move(stages)}};
+  json result{{"scan", scan.cloud.scan_id},
+              {"time", scan.cloud.time},
+              {"frame", scan.cloud.frame},
+              {"points", scan.cloud.points.size()},
+              {"regions", regions_json(scan.regions)},
+              {"received_monotonic_us",
+               std::chrono::duration_cast<std::chrono::microseconds>(scan.received.time_since_epoch()).count()},
+              {"skipped", scan.skipped},
+              {"skew_ms", milliseconds(scan.skew)},
+              {"capture_ms", milliseconds(scan.capture_time)},
+              {"decode_ms", milliseconds(scan.decode_time)},
+              {"stages_ms", std::move(stages)}};
+  if (scan.saturated) result["saturated"] = *scan.saturated;
+  return result;
+}
+
+json frame_json(const FrameImage& frame) {
+  json result{{"width_px", frame.width_px},
+              {"height_px", frame.height_px},
+              {"bits", frame.bits},
+              {"frame", frame.sequence},
+              {"exposure_start_ns", frame.exposure_start.time_since_epoch().count()},
+              {"received_ns", frame.received.time_since_epoch().count()}};
+  if (!frame.camera.empty()) result["camera"] = frame.camera;
+  return result;
 }
 
 json totals_json(const ScanTotals& totals) {
@@ -54,11 +75,13 @@ json totals_json(const ScanTotals& totals) {
   for (std::size_t i = 0; i < totals.stages.size(); ++i) stages[stage_name(i)] = duration_json(totals.stages[i]);
   json result{{"succeeded", totals.succeeded},
               {"failed", std::move(failed)},
+              {"skipped", totals.skipped},
               {"points_of_last", totals.points},
               {"regions", regions_json(totals.regions)},
               {"regions_of_last", regions_json(totals.regions_of_last)},
               {"capture_ms", duration_json(totals.capture)},
               {"decode_ms", duration_json(totals.decode)},
+              {"latency_ms", duration_json(totals.latency)},
               {"stages_ms", std::move(stages)}};
   result["last_error"] = totals.last_error ? rpc_error(*totals.last_error).to_json() : json();
   return result;

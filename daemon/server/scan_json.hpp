@@ -12,6 +12,12 @@ namespace slsd {
 /// What a client is told of a scan besides its cloud: id, time, number of points, regions by status, times.
 [[nodiscard]] nlohmann::json scan_json(const ScanResult& scan);
 
+/// The time since the last byte of a scan's frames, in milliseconds, for its `latency_ms`.
+[[nodiscard]] double latency_ms(MonotonicTime received);
+
+/// A frame's size, depth, number and times. The camera only where the image names it.
+[[nodiscard]] nlohmann::json frame_json(const FrameImage& frame);
+
 /// What `status` tells of all scans.
 [[nodiscard]] nlohmann::json totals_json(const ScanTotals& totals);
 

@@ -8,6 +8,7 @@
 #include "daemon/rpc/param_reader.hpp"
 #include "daemon/server/scan_json.hpp"
 #include "daemon/server/sealed_memory.hpp"
+#include "daemon/server/settings_json.hpp"
 
 namespace slsd {
 namespace {
@@ -35,6 +36,21 @@ Scanner::Answer<Value> carry(ServiceState& state, Respond respond, MakeReply mak
   };
 }
 
+// As carry(); the reply tells how long after the last byte of its frames it was handed to the socket.
+template <class MakeReply>
+Scanner::Answer<ScanResult> carry_scan(ServiceState& state, Respond respond, MakeReply make_reply) {
+  return [&state, respond = std::move(respond), make_reply](const Result<ScanResult>& scan) {
+    auto outcome = std::make_shared<Outcome>(scan ? make_reply(*scan) : tl::unexpected(rpc_error(scan.error())));
+    const MonotonicTime received = scan ? scan->received : MonotonicTime();
+    const bool pictured = scan && !scan->picture_png.empty();
+    asio::post(state.events, [&state, respond, outcome, received, pictured] {
+      if (*outcome) (*outcome)->result["latency_ms"] = latency_ms(received);
+      if (*outcome && !pictured) state.scanner.note_latency(std::chrono::steady_clock::now() - received);
+      respond(std::move(*outcome));
+    });
+  };
+}
+
 Outgoing picture_event(const ScanResult& scan) {
   Outgoing event;
   event.kind = Outgoing::Kind::kEvent;
@@ -44,7 +60,25 @@ Outgoing picture_event(const ScanResult& scan) {
   return event;
 }
 
-Outcome scan_reply(const ScanResult& scan, CloudFormat format, bool as_memfd) {
+FrameCoding frame_coding(const std::string& name) {
+  if (name == "png") return FrameCoding::kPng;
+  return name == "raw" ? FrameCoding::kRaw : FrameCoding::kNone;
+}
+
+Outgoing frame_event(const std::string& scan_id, const FrameImage& frame, FrameCoding coding) {
+  Outgoing event;
+  event.kind = Outgoing::Kind::kEvent;
+  event.bytes = share(frame.bytes);
+  json params = frame_json(frame);
+  params["scan"] = scan_id;
+  params["light"] = to_string(frame.light);
+  params["format"] = coding == FrameCoding::kPng ? "png" : "raw";
+  params["bytes"] = event.bytes->size();
+  event.line = to_line(event_message("frame", std::move(params)));
+  return event;
+}
+
+Outcome scan_reply(const ScanResult& scan, CloudFormat format, bool as_memfd, FrameCoding frames) {
   Reply reply{scan_json(scan)};
   reply.result["format"] = to_string(format);
   std::string cloud = write_cloud(scan.cloud, format);
@@ -58,6 +92,7 @@ Outcome scan_reply(const ScanResult& scan, CloudFormat format, bool as_memfd) {
     reply.bytes = share(std::move(cloud));
   }
   if (!scan.picture_png.empty()) reply.first.push_back(picture_event(scan));
+  for (const FrameImage& frame : scan.frames) reply.first.push_back(frame_event(scan.cloud.scan_id, frame, frames));
   return reply;
 }
 
@@ -76,12 +111,28 @@ void run_scan(ServiceState& state, const json& params, Session&, Respond respond
   const bool as_memfd = reader.choice("transport", {"inline", "memfd"}) == "memfd";
   const int timeout_ms = read_timeout(reader, state);
   const bool picture = reader.boolean("picture", false);
+  const FrameCoding frames = frame_coding(reader.choice("frames", {"none", "raw", "png"}));
   const std::string camera = reader.text("camera");
+  const bool texture = reader.boolean("texture", false);
+  const bool ambient = reader.boolean("ambient", false);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
-  state.scanner.scan({deadline_in(timeout_ms), picture, camera},
-                     carry<ScanResult>(state, std::move(respond), [format, as_memfd](const ScanResult& scan) {
-                       return scan_reply(scan, format, as_memfd);
+  state.scanner.scan({deadline_in(timeout_ms), picture, camera, frames, texture, ambient},
+                     carry_scan(state, std::move(respond), [format, as_memfd, frames](const ScanResult& scan) {
+                       return scan_reply(scan, format, as_memfd, frames);
                      }));
+}
+
+void run_settings(ServiceState& state, const json& params, Session&, Respond respond) {
+  const ParamReader reader(params);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  json result = settings_json(state.configuration);
+  state.scanner.files(
+      carry<ScanFiles>(state, std::move(respond), [result = std::move(result)](const ScanFiles& files) -> Outcome {
+        Reply reply{result};
+        reply.result["pattern"] = files.pattern;
+        reply.result["calibration"] = files.calibration;
+        return reply;
+      }));
 }
 
 void run_preview(ServiceState& state, const json& params, Session&, Respond respond) {
@@ -90,7 +141,7 @@ void run_preview(ServiceState& state, const json& params, Session&, Respond resp
   const std::string camera = reader.text("camera");
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
   state.scanner.scan({deadline_in(timeout_ms), true, camera},
-                     carry<ScanResult>(state, std::move(respond), [](const ScanResult& scan) {
+                     carry_scan(state, std::move(respond), [](const ScanResult& scan) -> Outcome {
                        json result = scan_json(scan);
                        result["format"] = "png";
                        return image_reply(scan.picture_png, std::move(result));
@@ -102,14 +153,13 @@ void run_frame(ServiceState& state, const json& params, Session&, Respond respon
   const std::string format = reader.choice("format", {"png", "raw"});
   const int timeout_ms = read_timeout(reader, state);
   const std::string camera = reader.text("camera");
+  const bool as_shown = reader.boolean("as_shown", false);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
-  state.scanner.frame(camera, format == "png", deadline_in(timeout_ms),
+  state.scanner.frame({deadline_in(timeout_ms), camera, format == "png", as_shown},
                       carry<FrameImage>(state, std::move(respond), [format](const FrameImage& image) {
-                        return image_reply(image.bytes, {{"format", format},
-                                                         {"width_px", image.width_px},
-                                                         {"height_px", image.height_px},
-                                                         {"bits", image.bits},
-                                                         {"frame", image.sequence}});
+                        json result = frame_json(image);
+                        result["format"] = format;
+                        return image_reply(image.bytes, std::move(result));
                       }));
 }
 

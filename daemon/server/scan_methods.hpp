@@ -12,6 +12,7 @@ namespace slsd {
 void run_frame(ServiceState& state, const nlohmann::json& params, Session& session, Respond respond);
 void run_pattern(ServiceState& state, const nlohmann::json& params, Session& session, Respond respond);
 void run_preview(ServiceState& state, const nlohmann::json& params, Session& session, Respond respond);
+void run_settings(ServiceState& state, const nlohmann::json& params, Session& session, Respond respond);
 void run_scan(ServiceState& state, const nlohmann::json& params, Session& session, Respond respond);
 
 }  // namespace slsd

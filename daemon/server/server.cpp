@@ -20,6 +20,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kRetryAccept = 200ms;
+constexpr std::size_t kWaitingMax = 4;  // lanes that finish together give more than one
 
 }  // namespace
 
@@ -114,24 +115,29 @@ void Server::retry_later(const std::error_code& error) {
 
 void Server::publish(FreeScan scan) {
   const std::lock_guard lock(mutex_);
-  const bool waiting = newest_ != nullptr;
-  if (waiting && *newest_) ++lost_;
-  newest_ = std::move(scan);
-  if (!waiting) asio::post(events_, [this] { deliver(); });
+  if (waiting_.size() == kWaitingMax) {
+    if (*waiting_.front()) ++lost_;
+    waiting_.pop_front();
+  }
+  waiting_.push_back(std::move(scan));
+  if (waiting_.size() == 1) asio::post(events_, [this] { deliver(); });
 }
 
 void Server::deliver() {
-  FreeScan scan;
+  std::deque<FreeScan> scans;
   std::uint64_t lost = 0;
   {
     const std::lock_guard lock(mutex_);
-    scan = std::exchange(newest_, nullptr);
+    scans.swap(waiting_);
     lost = std::exchange(lost_, 0);
   }
-  if (!scan) return;
-  const auto publication = std::make_shared<Publication>(std::move(scan));
-  const std::vector<std::shared_ptr<Session>> all(sessions_.begin(), sessions_.end());
-  for (const auto& session : all) session->publish(publication, lost);
+  for (FreeScan& scan : scans) {
+    const auto publication = std::make_shared<Publication>(std::move(scan));
+    const std::vector<std::shared_ptr<Session>> all(sessions_.begin(), sessions_.end());
+    for (const auto& session : all) session->publish(publication, lost);
+    lost = 0;
+    if (delivered_ && publication->scan()) delivered_(*publication->scan());
+  }
 }
 
 }  // namespace slsd

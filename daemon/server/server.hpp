@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -44,9 +45,11 @@ class Server {
   /// To be called when a session's subscription changed.
   void update_demand();
 
-  /// Hands a free scan over; one that the event loop did not get to yet is replaced and counts as lost.
+  /// Hands a free scan over; of those that the event loop did not get to yet the oldest are lost, and counted.
   /// @thread thread-safe
   void publish(FreeScan scan);
+  /// Called with each free scan that was handed to the subscribers' sockets. Set before the first.
+  void set_delivered(std::function<void(const ScanResult&)> delivered) { delivered_ = std::move(delivered); }
 
  private:
   void accept();
@@ -59,13 +62,14 @@ class Server {
   ServerOptions options_;
   Session::Handler handler_;
   DemandChanged demand_changed_;
+  std::function<void(const ScanResult&)> delivered_;
   asio::local::stream_protocol::acceptor acceptor_;
   asio::steady_timer retry_;
   bool retrying_ = false;
   std::optional<ListeningSocket> socket_;
   std::unordered_set<std::shared_ptr<Session>> sessions_;
   std::mutex mutex_;  ///< guards the two below
-  FreeScan newest_;
+  std::deque<FreeScan> waiting_;
   std::uint64_t lost_ = 0;
 };
 

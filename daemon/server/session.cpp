@@ -140,7 +140,7 @@ void Session::publish(const SharedPublication& publication, std::uint64_t lost) 
 void Session::send_waiting_event() {
   const auto is_event = [](const Outgoing& outgoing) { return outgoing.kind == Outgoing::Kind::kEvent; };
   if (over_ || !subscription_ || std::ranges::any_of(outgoing_, is_event)) return;
-  if (auto event = subscription_->take()) send(std::move(*event));
+  if (auto event = subscription_->take(Subscription::Clock::now())) send(std::move(*event));
 }
 
 void Session::send(Outgoing outgoing) {

@@ -21,7 +21,7 @@
 namespace slsd {
 
 /// One client. Requests are answered one after the other: the next is read when the reply to the one before is sent, so
-/// that what waits for a client is at most one reply and two events.
+/// that what waits for a client is at most one reply, one event and what its subscription holds.
 ///
 ///     reading --a line--> answering --reply sent--> reading
 ///     any --the client hung up, read nothing for send_timeout, sent too long a line--> ended

@@ -19,10 +19,24 @@ json device_json(const DeviceStatus& device) {
           {"problem", device.problem},   {"opened", device.opened}};
 }
 
-json camera_json(const DeviceStatus& camera) {
+json drift_json(const DriftState& drift) {
+  json result{{"epipolar_px", drift.epipolar_px}, {"limit_px", drift.limit_px}, {"scans", drift.scans}};
+  result["off_since_scan"] = drift.off_since_scan ? json(*drift.off_since_scan) : json();
+  return result;
+}
+
+/// @param drift  nothing before the first scan
+json camera_json(const DeviceStatus& camera, const DriftState* drift) {
   json result = device_json(camera);
+  result["calibration"] = drift != nullptr ? drift_json(*drift) : json();
   result["frames"] = camera.frames;
   result["frames_lost"] = camera.frames_lost;
+  return result;
+}
+
+json projector_json(const DeviceStatus& projector) {
+  json result = device_json(projector);
+  result["shows"] = projector.shows;
   return result;
 }
 
@@ -48,10 +62,11 @@ std::uint64_t resident_bytes() {
 json status_json(const ServiceState& state) {
   const Rig& rig = state.scanner.rig();
   json cameras = json::array();
-  bool ready = rig.projector_status().state == DeviceState::kReady && !state.configuration.calibration_file.empty();
+  bool ready = is_open(rig.projector_status().state) && !state.configuration.calibration_file.empty();
+  const std::vector<DriftState> drifts = state.scanner.drifts();
   for (const DeviceStatus& camera : rig.camera_statuses()) {
-    cameras.push_back(camera_json(camera));
-    ready = ready && camera.state == DeviceState::kReady;
+    cameras.push_back(camera_json(camera, cameras.size() < drifts.size() ? &drifts[cameras.size()] : nullptr));
+    ready = ready && is_open(camera.state);
   }
   const auto uptime = std::chrono::duration<double>(std::chrono::steady_clock::now() - state.started);
   return {{"version", SLSD_VERSION},
@@ -64,7 +79,7 @@ json status_json(const ServiceState& state) {
           {"configuration", state.configuration_file.string()},
           {"calibration", state.configuration.calibration_file.string()},
           {"pattern", pattern_json(state.configuration)},
-          {"projector", device_json(rig.projector_status())},
+          {"projector", projector_json(rig.projector_status())},
           {"cameras", std::move(cameras)},
           {"scans", totals_json(state.scanner.totals())}};
 }

@@ -22,13 +22,22 @@ void Subscription::offer(SharedPublication publication, Clock::time_point now) {
     if (now + period / 10 < next_) return;
     next_ = next_ + period > now ? next_ + period : now + period;
   }
-  if (waiting_ && waiting_->scan()) ++lost_;
-  waiting_ = std::move(publication);
+  waiting_.push_back({std::move(publication), now});
+  drop_old(now);
 }
 
-std::optional<Outgoing> Subscription::take() {
-  const SharedPublication publication = std::exchange(waiting_, nullptr);
-  if (!publication) return std::nullopt;
+void Subscription::drop_old(Clock::time_point now) {
+  while (waiting_.size() > 1 && (waiting_.size() > kWaitingMax || now - waiting_.front().since > kTurn)) {
+    if (waiting_.front().publication->scan()) ++lost_;
+    waiting_.pop_front();
+  }
+}
+
+std::optional<Outgoing> Subscription::take(Clock::time_point now) {
+  drop_old(now);
+  if (waiting_.empty()) return std::nullopt;
+  const SharedPublication publication = std::move(waiting_.front().publication);
+  waiting_.pop_front();
   Outgoing event;
   event.kind = Outgoing::Kind::kEvent;
   if (!publication->scan()) {
@@ -39,6 +48,7 @@ std::optional<Outgoing> Subscription::take() {
   nlohmann::json params = scan_json(*publication->scan());
   params["format"] = to_string(format_);
   params["bytes"] = event.bytes->size();
+  params["latency_ms"] = latency_ms(publication->scan()->received);
   params["lost"] = std::exchange(lost_, 0);
   event.line = to_line(event_message("cloud", std::move(params)));
   return event;

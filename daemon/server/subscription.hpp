@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 
@@ -30,12 +31,15 @@ class Publication {
 
 using SharedPublication = std::shared_ptr<Publication>;  // shared: clients send it at their own pace
 
-/// What one client wants of the free scans. Holds the newest that could not be sent yet; a newer one takes its place
-/// and the older counts as lost.
+/// What one client wants of the free scans. Clouds that could not be sent yet keep their turn, so that those that come
+/// together all arrive; the newest wins: where there are too many, or they have waited too long, the oldest are lost
+/// and counted.
 /// @thread thread-bound
 class Subscription {
  public:
   using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t kWaitingMax = 4;
+  static constexpr std::chrono::milliseconds kTurn{100};  ///< after which a newer one takes its place
 
   Subscription(CloudFormat format, std::optional<double> rate_hz) : format_(format), rate_hz_(rate_hz) {}
 
@@ -46,13 +50,19 @@ class Subscription {
   /// Clouds that were replaced before this client's session saw them.
   void note_lost(std::uint64_t count) { lost_ += count; }
   /// The event to send next, with the number of clouds lost since the one before; nothing where none waits.
-  [[nodiscard]] std::optional<Outgoing> take();
+  [[nodiscard]] std::optional<Outgoing> take(Clock::time_point now);
 
  private:
+  struct Waiting {
+    SharedPublication publication;
+    Clock::time_point since;
+  };
+  void drop_old(Clock::time_point now);
+
   CloudFormat format_;
   std::optional<double> rate_hz_;
   Clock::time_point next_{};
-  SharedPublication waiting_;
+  std::deque<Waiting> waiting_;
   std::uint64_t lost_ = 0;
 };
 

@@ -3,15 +3,24 @@
 #include <iostream>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/latency/latency_file.hpp"
 #include "daemon/scan/devices.hpp"
+#include "daemon/scan/hardware.hpp"
 #include "daemon/scan/scan_setup.hpp"
 #include "daemon/server/listening_socket.hpp"
+#include "daemon/service/camera_list.hpp"
 #include "daemon/service/commands.hpp"
+#include "daemon/service/exposure_warnings.hpp"
+#include "drivers/files/file.hpp"
+#include "drivers/projector/x11/choose_output.hpp"
+#include "drivers/projector/x11/monitor_report.hpp"
 
 namespace slsd {
 namespace {
 
 using std::filesystem::path;
+
+constexpr std::size_t kMaxLatencyBytes = 1 << 20;
 
 /// Prints findings, and keeps whether one of them forbids a scan.
 class Findings {
@@ -27,6 +36,10 @@ class Findings {
     result ? good(what) : bad(what + ": " + to_string(result.error()));
     return result.has_value();
   }
+  void other_hardware(const Result<>& same, OtherHardware severity) {
+    if (same) return;
+    severity == OtherHardware::kError ? bad(to_string(same.error())) : warn(to_string(same.error()));
+  }
   [[nodiscard]] bool scan_possible() const { return scan_possible_; }
 
  private:
@@ -37,14 +50,26 @@ std::string size_text(int width_px, int height_px) {
   return std::to_string(width_px) + "x" + std::to_string(height_px) + " px";
 }
 
-void check_camera(const CameraOptions& options, const std::optional<Calibration>& calibration, Findings& findings) {
+std::string advice_for(const Error& error, const CameraOptions& absent, const Configuration& configuration) {
+  if (error.code != ErrorCode::kNotFound || absent.driver == CameraDriver::kFile) return {};
+  return "; " + CameraList::look(configuration).similar_to(absent);
+}
+
+void check_camera(const CameraOptions& options, const Configuration& configuration,
+                  const std::optional<Calibration>& calibration, Findings& findings) {
   const std::string name = "camera \"" + options.name() + "\"";
   auto camera = make_camera(options);
   if (!camera) return findings.bad(name + ": " + camera.error().message);
-  if (!findings.note((*camera)->open(), name + " opens")) return;
+  if (const auto opened = (*camera)->open(); !opened)
+    return findings.bad(name + " does not open: " + to_string(opened.error()) +
+                        advice_for(opened.error(), options, configuration));
+  findings.good(name + " opens");
   const CameraDescription& seen = (*camera)->description();
   const CalibratedCamera* known = calibration ? calibration->camera(options.name()) : nullptr;
   if (known == nullptr) return;
+  findings.other_hardware(
+      check_hardware(name, calibrated_hardware(*calibration, *known), hardware_id(seen.driver, seen.device)),
+      configuration.other_hardware);
   if (known->lens.width_px == seen.width_px && known->lens.height_px == seen.height_px) {
     return findings.good(name + " has the size of its calibration, " + size_text(seen.width_px, seen.height_px));
   }
@@ -56,22 +81,59 @@ void check_camera(const CameraOptions& options, const std::optional<Calibration>
 void check_cameras(const Configuration& configuration, const std::optional<Calibration>& calibration,
                    Findings& findings) {
   if (configuration.cameras.empty()) findings.bad("no camera: add a [[camera]] table to the configuration");
-  for (const CameraOptions& camera : configuration.cameras) check_camera(camera, calibration, findings);
+  for (const CameraOptions& camera : configuration.cameras) check_camera(camera, configuration, calibration, findings);
+}
+
+// Only looks: the service that runs may be showing its pattern there.
+void check_monitor(const Configuration& configuration, const std::optional<Calibration>& calibration,
+                   Findings& findings) {
+  const ProjectorOptions& options = configuration.projector;
+  const auto report = report_monitor(options.monitor, options.width_px, options.height_px);
+  if (!report) return findings.bad(to_string(report.error()));
+  findings.good("projector: monitor " + describe_output(report->output));
+  for (const std::string& warning : report->warnings) {
+    findings.warn("projector: monitor " + report->output.name + ": " + warning);
+  }
+  if (!calibration) return;
+  const std::string calibrated = calibration->report.projector_serial.value_or("");
+  findings.other_hardware(check_hardware("projector", calibrated, hardware_id(report->output)),
+                          configuration.other_hardware);
+}
+
+void check_projector(const Configuration& configuration, const std::optional<Calibration>& calibration,
+                     Findings& findings) {
+  const ProjectorOptions& options = configuration.projector;
+  if (options.driver == ProjectorDriver::kGlfw) return check_monitor(configuration, calibration, findings);
+  const auto projector = make_projector(options);
+  findings.note((*projector)->open(), "projector headless, " + size_text(options.width_px, options.height_px));
 }
 
 void check_scan(const Configuration& configuration, Findings& findings) {
-  findings.note(make_projector(configuration.projector),
-                "projector, " + size_text(configuration.projector.width_px, configuration.projector.height_px));
+  const auto calibration = configured_calibration(configuration);
+  check_projector(configuration, calibration ? *calibration : std::nullopt, findings);
   const auto pattern = configured_pattern(configuration);
   findings.note(pattern, "pattern");
   if (pattern) {
     for (const std::string& warning : symbol_warnings(pattern->options)) findings.warn(warning);
   }
-  const auto calibration = configured_calibration(configuration);
   const bool readable = findings.note(calibration, "calibration");
   if (readable && !*calibration) findings.bad("no calibration: name its file as [calibration] file");
   check_cameras(configuration, readable ? *calibration : std::nullopt, findings);
-  if (pattern && readable && *calibration) findings.note(ScanSetup::create(configuration), "decoder");
+  for (const std::string& warning : exposure_warnings(configuration)) findings.warn(warning);
+  if (pattern && readable && *calibration) findings.note(ScanSetup::create(configuration, 1), "decoder");
+}
+
+// A projector in memory has no light to wait for.
+void check_latency(const Configuration& configuration, const path& configuration_file, Findings& findings) {
+  const path file = latency_file(configuration, configuration_file);
+  const auto text = read_file(file, kMaxLatencyBytes);
+  if (!text && text.error().code == ErrorCode::kNotFound) {
+    if (configuration.projector.driver == ProjectorDriver::kHeadless) return;
+    return findings.warn("the latency of projector and cameras was not measured: slsd --calibrate --latency");
+  }
+  const auto report = text ? read_latency(*text, file) : tl::unexpected(text.error());
+  if (!findings.note(report, "latency " + file.string())) return;
+  for (const std::string& warning : latency_warnings(configuration, *report)) findings.warn(warning);
 }
 
 // A daemon that answers there is most likely the one that is being looked at.
@@ -89,6 +151,7 @@ bool check_everything(const std::optional<path>& configuration_file) {
   const auto configuration = load_configuration(file);
   if (!findings.note(configuration, "configuration " + file.string())) return false;
   check_scan(*configuration, findings);
+  check_latency(*configuration, file, findings);
   check_socket(configuration->server.socket, findings);
   return findings.scan_possible();
 }

@@ -6,40 +6,17 @@
 
 #include "core/code/pattern.hpp"
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/scan/devices.hpp"
 #include "daemon/scan/scan_setup.hpp"
+#include "daemon/service/camera_list.hpp"
+#include "daemon/service/monitor_list.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd {
-namespace {
-
 using std::filesystem::path;
 
-// These commands serve before anything is configured: without any file the defaults hold.
-Result<Configuration> configuration_or_defaults(const std::optional<path>& file) {
-  if (file) return load_configuration(*file);
-  std::error_code ignored;
-  if (std::filesystem::exists(kConfigurationFile, ignored)) return load_configuration(kConfigurationFile);
-  return read_configuration("", "defaults");
-}
-
-void list_camera(const CameraOptions& options) {
-  std::cout << "camera \"" << options.name() << "\": driver " << to_string(options.driver);
-  auto camera = make_camera(options);
-  const Result<> opened = camera ? (*camera)->open() : Result<>(tl::unexpected(camera.error()));
-  if (opened) {
-    const CameraDescription& description = (*camera)->description();
-    std::cout << ", " << description.device << ", " << description.width_px << "x" << description.height_px << " px\n";
-  } else {
-    std::cout << ", not available: " << to_string(opened.error()) << "\n";
-  }
-}
-
-}  // namespace
-
 Result<> write_pattern_image(const std::optional<path>& configuration_file, const path& image) {
-  const auto configuration = configuration_or_defaults(configuration_file);
+  const auto configuration = load_configuration_or_defaults(configuration_file);
   if (!configuration) return tl::unexpected(configuration.error());
   const auto pattern = configured_pattern(*configuration);
   if (!pattern) return tl::unexpected(pattern.error());
@@ -48,14 +25,21 @@ Result<> write_pattern_image(const std::optional<path>& configuration_file, cons
   return write_file_atomically(image, *png);
 }
 
-Result<> list_devices(const std::optional<path>& configuration_file) {
-  const auto configuration = configuration_or_defaults(configuration_file);
+Result<> list_devices(const std::optional<path>& configuration_file, bool as_json) {
+  const auto configuration = load_configuration_or_defaults(configuration_file);
   if (!configuration) return tl::unexpected(configuration.error());
+  const CameraList cameras = CameraList::look(*configuration);
+  const MonitorList monitors = MonitorList::look();
+  if (as_json) {
+    nlohmann::json devices = cameras.json();
+    devices["monitors"] = monitors.json();
+    std::cout << devices.dump(2) << "\n";
+    return {};
+  }
   const ProjectorOptions& projector = configuration->projector;
-  std::cout << "projector: driver headless, keeps the image in memory, any size (configured: "
-            << to_string(projector.driver) << ", " << projector.width_px << "x" << projector.height_px << " px)\n";
-  if (configuration->cameras.empty()) std::cout << "no camera is configured\n";
-  for (const CameraOptions& camera : configuration->cameras) list_camera(camera);
+  std::cout << "projector: driver " << to_string(projector.driver) << ", " << projector.width_px << "x"
+            << projector.height_px << " px\n"
+            << monitors.text() << cameras.text();
   return {};
 }
 

@@ -17,8 +17,15 @@ namespace slsd {
                                            const std::filesystem::path& image);
 
 /// Prints the cameras and projectors that it can see, by the names that the configuration uses.
+/// @param as_json  one JSON object, else text for people
 /// @errors of the configuration
-[[nodiscard]] Result<> list_devices(const std::optional<std::filesystem::path>& configuration_file);
+[[nodiscard]] Result<> list_devices(const std::optional<std::filesystem::path>& configuration_file, bool as_json);
+
+/// Flashes the projector, measures how late each camera sees it, prints that and keeps it.
+/// @param output  where it is kept; empty: latency_file()
+/// @errors of the configuration, the devices, measure_latency() and the file
+[[nodiscard]] Result<> calibrate_latency(const std::optional<std::filesystem::path>& configuration_file,
+                                         const std::filesystem::path& output);
 
 /// Looks at everything that a scan needs and prints each finding with what to do about it.
 /// @return whether a scan is possible

@@ -10,7 +10,9 @@
 #include <asio/post.hpp>
 
 #include "daemon/scan/devices.hpp"
+#include "daemon/scan/projected_picture.hpp"
 #include "daemon/scan/thread_name.hpp"
+#include "daemon/service/exposure_warnings.hpp"
 
 namespace slsd {
 namespace {
@@ -48,18 +50,21 @@ Result<std::unique_ptr<Service>> Service::create(const std::filesystem::path& fi
     if (!camera) return tl::unexpected(camera.error());
     cameras.push_back(std::move(*camera));
   }
-  auto setup = ScanSetup::create(*configuration);
+  auto setup = ScanSetup::create(*configuration, DecodeLanes::lanes_here());
   if (!setup) return tl::unexpected(setup.error());
   warn_of_symbols(setup->pattern.options);
-  auto rig = std::make_unique<Rig>(std::move(*projector), std::move(cameras), std::move(*setup), configuration->scan);
-  return std::unique_ptr<Service>(new Service(std::move(*configuration), file, std::move(rig)));
+  for (const std::string& warning : exposure_warnings(*configuration)) spdlog::warn("{}", warning);
+  auto rig = std::make_unique<Rig>(std::move(*projector), std::move(cameras), setup->image, configuration->scan);
+  rig->set_idle(draw_idle(configuration->projector), std::chrono::milliseconds(configuration->projector.idle_after_ms));
+  return std::unique_ptr<Service>(new Service(std::move(*configuration), file, std::move(rig), std::move(*setup)));
 }
 
-Service::Service(Configuration configuration, const std::filesystem::path& file, std::unique_ptr<Rig> rig)
+Service::Service(Configuration configuration, const std::filesystem::path& file, std::unique_ptr<Rig> rig,
+                 ScanSetup setup)
     : signals_(events_),
       watchdog_(events_),
       status_(events_),
-      scanner_(std::move(rig)),
+      scanner_(std::move(rig), std::move(setup)),
       state_{events_, scanner_, file, std::move(configuration)} {
   const auto handler = [this](const Request& request, Session& session, Respond respond) {
     dispatch(state_, request, session, std::move(respond));
@@ -68,6 +73,8 @@ Service::Service(Configuration configuration, const std::filesystem::path& file,
   server_ = std::make_unique<Server>(events_, state_.configuration.server, handler, demand_changed);
   state_.server = server_.get();
   state_.reload = [this](Respond answered) { reload(std::move(answered)); };
+  server_->set_delivered(
+      [this](const ScanResult& scan) { scanner_.note_latency(std::chrono::steady_clock::now() - scan.received); });
   scanner_.set_listener([this](FreeScan scan) { server_->publish(std::move(scan)); });
 }
 
@@ -125,7 +132,7 @@ void Service::stop() {
   events_.stop();
   if (stopped) return spdlog::info("stopped");
   // A driver or a long computation that cannot be interrupted. Nothing is half written: the service writes no files.
-  spdlog::warn("stopped without waiting for the scanner");
+  spdlog::warn("stopped without waiting for a device or a computation");
   std::_Exit(EXIT_SUCCESS);
 }
 
@@ -149,15 +156,19 @@ void Service::on_reloaded(const Result<Configuration>& configuration, const Resp
   state_.configuration.pattern_file = configuration->pattern_file;
   state_.configuration.pattern = configuration->pattern;
   state_.configuration.calibration_file = configuration->calibration_file;
+  state_.configuration.other_hardware = configuration->other_hardware;
   state_.configuration.decode = configuration->decode;
   state_.configuration.scan.timeout_ms = configuration->scan.timeout_ms;
+  for (const char* table : {"pattern", "calibration", "decode"}) {
+    state_.configuration.given[table] = configuration->given.value(table, nlohmann::json::object());
+  }
   answered(Reply{{{"needs_restart", std::move(restart)}}});
 }
 
 void Service::watch() {
   const auto time = Notifier::watchdog_time();
   if (!time) return;
-  if (scanner_.heartbeat().kept()) notifier_.ping_watchdog();
+  if (scanner_.kept()) notifier_.ping_watchdog();
   watchdog_.expires_after(*time / 3);
   watchdog_.async_wait([this](const std::error_code& error) {
     if (!error) watch();

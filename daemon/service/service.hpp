@@ -23,11 +23,12 @@ namespace slsd {
 /// The composition root: owns everything, in the order in which it is made. The threads, and why each is one:
 ///
 ///   main     the event loop: socket, signals, watchdog. Never waits for a device, never computes for long.
-///   scanner  the projector, and each scan from trigger to cloud: waits for devices and uses a processor fully.
+///   scanner  the projector, and each scan's frames: waits for devices.
 ///   cam NAME one to a camera: cameras expose at the same time, and opening one may take seconds.
+///   decode N one or two, from frames to clouds and pictures: each uses a processor fully while the next frames come.
 ///
-/// Between them stand the scanner's bounded queue, the server's slot for the newest cloud, and the event loop's own
-/// queue, which holds at most one answer to a client.
+/// Between them stand the scanner's bounded queue, the lanes' few sets of frames, the server's few newest clouds, and
+/// the event loop's own queue, which holds at most one answer to a client.
 /// @thread thread-bound: main
 class Service {
  public:
@@ -40,7 +41,7 @@ class Service {
   [[nodiscard]] Result<> run();
 
  private:
-  Service(Configuration configuration, const std::filesystem::path& file, std::unique_ptr<Rig> rig);
+  Service(Configuration configuration, const std::filesystem::path& file, std::unique_ptr<Rig> rig, ScanSetup setup);
   void announce() const;
   void await_signal();
   void on_signal(int number);

@@ -21,24 +21,48 @@ SharedPublication failed_scan() {
   return std::make_shared<Publication>(std::make_shared<const Result<ScanResult>>(fail(ErrorCode::kFrameTorn, "torn")));
 }
 
-nlohmann::json take(Subscription& subscription) {
-  const auto event = subscription.take();
+nlohmann::json take(Subscription& subscription, Time now = Time()) {
+  const auto event = subscription.take(now);
   return event ? nlohmann::json::parse(event->line) : nlohmann::json();
 }
 
-TEST(Subscription, GivesTheNewestAndCountsTheLost) {
+TEST(Subscription, GivesThoseThatCameTogetherInTheirOrder) {
   Subscription subscription(CloudFormat::kPly, std::nullopt);
-  EXPECT_FALSE(subscription.take());
+  EXPECT_FALSE(subscription.take(Time()));
   for (const std::uint64_t frame : {1, 2, 3}) subscription.offer(scan_number(frame), Time());
-  auto event = take(subscription);
-  EXPECT_EQ(event["method"], "cloud");
+  for (const std::uint64_t frame : {1, 2, 3}) {
+    const auto event = take(subscription);
+    EXPECT_EQ(event["method"], "cloud");
+    EXPECT_EQ(event["params"]["frame"], frame);
+    EXPECT_EQ(event["params"]["lost"], 0);
+  }
+  EXPECT_FALSE(subscription.take(Time()));
+}
+
+TEST(Subscription, LosesTheOldestOfTooManyAndCountsThem) {
+  Subscription subscription(CloudFormat::kPly, std::nullopt);
+  for (std::uint64_t frame = 1; frame <= Subscription::kWaitingMax + 2; ++frame)
+    subscription.offer(scan_number(frame), Time());
+  const auto event = take(subscription);
   EXPECT_EQ(event["params"]["frame"], 3);
   EXPECT_EQ(event["params"]["lost"], 2);
-  subscription.offer(scan_number(4), Time());
   EXPECT_EQ(take(subscription)["params"]["lost"], 0);
   subscription.note_lost(5);
-  subscription.offer(scan_number(5), Time());
   EXPECT_EQ(take(subscription)["params"]["lost"], 5);
+}
+
+TEST(Subscription, GivesWhoReadsLateTheNewestOnly) {
+  Subscription subscription(CloudFormat::kPly, std::nullopt);
+  for (const std::uint64_t frame : {1, 2, 3}) subscription.offer(scan_number(frame), Time() + frame * 10ms);
+  const auto event = take(subscription, Time() + 1h);
+  EXPECT_EQ(event["params"]["frame"], 3);
+  EXPECT_EQ(event["params"]["lost"], 2);
+}
+
+TEST(Subscription, GivesAnOldOneWhereNoneIsNewer) {
+  Subscription subscription(CloudFormat::kPly, std::nullopt);
+  subscription.offer(scan_number(1), Time());
+  EXPECT_EQ(take(subscription, Time() + 1h)["params"]["frame"], 1);
 }
 
 TEST(Subscription, TellsOfFailures) {
@@ -55,7 +79,7 @@ TEST(Subscription, KeepsItsRate) {
   int taken = 0;
   for (int i = 0; i < 1000; ++i) {
     subscription.offer(scan_number(static_cast<std::uint64_t>(i)), begin + i * 10ms);
-    if (subscription.take()) ++taken;
+    if (subscription.take(begin + i * 10ms)) ++taken;
   }
   EXPECT_NEAR(taken, 100, 2);
 }
@@ -65,14 +89,14 @@ TEST(Subscription, TakesEveryScanMadeAtItsOwnRate) {
   const Time begin = Time() + 1h;
   for (int i = 0; i < 100; ++i) {
     subscription.offer(scan_number(1), begin + i * 100ms + (i % 2 == 0 ? 3ms : -3ms));
-    EXPECT_TRUE(subscription.take()) << i;
+    EXPECT_TRUE(subscription.take(begin + i * 100ms)) << i;
   }
 }
 
 TEST(Subscription, FollowsTheLineWithTheBytes) {
   Subscription subscription(CloudFormat::kPcd, std::nullopt);
   subscription.offer(scan_number(1), Time());
-  const auto event = subscription.take();
+  const auto event = subscription.take(Time());
   ASSERT_TRUE(event && event->bytes);
   EXPECT_EQ(nlohmann::json::parse(event->line)["params"]["bytes"], event->bytes->size());
   EXPECT_EQ(event->bytes->substr(0, 6), "# .PCD");

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/service/camera_list.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <sstream>
+#include <utility>
+
+namespace slsd {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kIndent = "\n    ";
+
+ListingPlaces places_of(const Configuration& configuration) {
+  ListingPlaces places;
+  for (const CameraOptions& camera : configuration.cameras) {
+    if (camera.driver == CameraDriver::kV4l2) places.configured_nodes.push_back(camera.v4l2.device_path());
+    if (camera.driver == CameraDriver::kAravis) places.configured_ids.push_back(camera.aravis.id);
+  }
+  return places;
+}
+
+std::string size_text(const std::pair<int, int>& size) {
+  return std::to_string(size.first) + "x" + std::to_string(size.second);
+}
+
+std::string formats_text(const ListedCamera& camera) {
+  std::string text;
+  for (const ListedFormat& format : camera.formats) {
+    text += (text.empty() ? "" : "; ") + format.name;
+    for (const auto& size : format.sizes_px) (text += " ") += size_text(size);
+  }
+  return text;
+}
+
+std::string place_text(const ListedCamera& camera) {
+  std::string text = camera.node.empty() ? camera.address + " through " + camera.interface : camera.node;
+  if (!camera.kernel_driver.empty()) (text += " by ") += camera.kernel_driver;
+  if (camera.link_mbps) text += ", link of " + std::to_string(*camera.link_mbps) + " Mbit/s";
+  return text;
+}
+
+std::string maker_text(const ListedCamera& camera) {
+  std::string text = camera.standard;
+  for (const std::string& part : {camera.vendor, camera.model})
+    if (!part.empty()) (text += ", ") += part;
+  if (!camera.serial.empty()) (text += ", serial ") += camera.serial;
+  return text;
+}
+
+std::string camera_text(const ListedCamera& camera, const CameraOptions* configured) {
+  std::ostringstream text;
+  text << "camera " << camera.name << kIndent << maker_text(camera) << kIndent << "at " << place_text(camera);
+  if (!camera.formats.empty()) text << kIndent << "formats: " << formats_text(camera);
+  if (!camera.user.empty()) text << kIndent << "controlled by " << camera.user;
+  if (!camera.problem.empty()) text << kIndent << "problem: " << camera.problem;
+  if (configured != nullptr) text << kIndent << "configured as \"" << configured->name() << "\"";
+  text << "\n";
+  return text.str();
+}
+
+/// What is to say of a camera that the configuration names and nobody sees.
+std::string unseen_text(const CameraOptions& camera) {
+  std::ostringstream text;
+  text << "configured camera \"" << camera.name() << "\", driver " << to_string(camera.driver) << ": ";
+  if (camera.driver == CameraDriver::kFile)
+    text << "replays " << camera.file.path.string() << "\n";
+  else
+    text << "is not seen\n";
+  return text.str();
+}
+
+json format_json(const ListedFormat& format) {
+  json sizes = json::array();
+  for (const auto& [width, height] : format.sizes_px) sizes.push_back({{"width_px", width}, {"height_px", height}});
+  return {{"name", format.name}, {"sizes", sizes}};
+}
+
+json camera_json(const ListedCamera& camera, const CameraOptions* configured) {
+  json result{{"name", camera.name}, {"standard", camera.standard}, {"driver", camera.driver}};
+  const std::pair<const char*, const std::string&> texts[]{{"vendor", camera.vendor},
+                                                           {"model", camera.model},
+                                                           {"serial", camera.serial},
+                                                           {"node", camera.node},
+                                                           {"kernel_driver", camera.kernel_driver},
+                                                           {"address", camera.address},
+                                                           {"interface", camera.interface},
+                                                           {"controlled_by", camera.user},
+                                                           {"problem", camera.problem}};
+  for (const auto& [name, text] : texts)
+    if (!text.empty()) result[name] = text;
+  if (camera.link_mbps) result["link_mbps"] = *camera.link_mbps;
+  result["formats"] = json::array();
+  for (const ListedFormat& format : camera.formats) result["formats"].push_back(format_json(format));
+  if (configured != nullptr) result["configured_as"] = configured->name();
+  return result;
+}
+
+}  // namespace
+
+bool names(const CameraOptions& options, const ListedCamera& camera) {
+  if (to_string(options.driver) != camera.driver) return false;
+  if (options.driver == CameraDriver::kAravis) {
+    const std::string& id = options.aravis.id;
+    return id == camera.name || id == camera.serial || id == camera.address;
+  }
+  std::error_code error;
+  return std::filesystem::equivalent(options.v4l2.device_path(), camera.node, error);
+}
+
+CameraList CameraList::look(const Configuration& configuration) {
+  return {configuration, list_cameras(places_of(configuration))};
+}
+
+CameraList::CameraList(const Configuration& configuration, CameraListing listing)
+    : configuration_(&configuration), listing_(std::move(listing)) {}
+
+const ListedCamera* CameraList::find(const CameraOptions& configured) const {
+  const auto found =
+      std::ranges::find_if(listing_.cameras, [&](const ListedCamera& seen) { return names(configured, seen); });
+  return found == listing_.cameras.end() ? nullptr : &*found;
+}
+
+const CameraOptions* CameraList::find(const ListedCamera& seen) const {
+  const auto found =
+      std::ranges::find_if(configuration_->cameras, [&](const CameraOptions& one) { return names(one, seen); });
+  return found == configuration_->cameras.end() ? nullptr : &*found;
+}
+
+std::string CameraList::text() const {
+  std::string text;
+  for (const ListedCamera& camera : listing_.cameras) text += camera_text(camera, find(camera));
+  if (listing_.cameras.empty()) {
+    text += "no camera is seen; looked at:";
+    for (const std::string& place : listing_.looked_at) text += kIndent + place;
+    text += "\n";
+  }
+  for (const CameraOptions& camera : configuration_->cameras)
+    if (find(camera) == nullptr) text += unseen_text(camera);
+  return text;
+}
+
+json CameraList::json() const {
+  nlohmann::json result{{"cameras", json::array()}, {"configured", json::array()}, {"looked_at", listing_.looked_at}};
+  for (const ListedCamera& camera : listing_.cameras) result["cameras"].push_back(camera_json(camera, find(camera)));
+  for (const CameraOptions& camera : configuration_->cameras)
+    result["configured"].push_back({{"name", camera.name()},
+                                    {"driver", to_string(camera.driver)},
+                                    {"seen", camera.driver == CameraDriver::kFile || find(camera) != nullptr}});
+  return result;
+}
+
+std::string CameraList::similar_to(const CameraOptions& absent) const {
+  std::string similar;
+  for (const ListedCamera& camera : listing_.cameras)
+    if (camera.driver == to_string(absent.driver)) similar += (similar.empty() ? "" : ", ") + camera.name;
+  return similar.empty() ? "no other camera of this driver is seen; slsd --list says where was looked"
+                         : "of this driver are seen: " + similar;
+}
+
+}  // namespace slsd

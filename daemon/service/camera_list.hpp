@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "daemon/configuration/configuration.hpp"
+#include "drivers/camera/listing/list_cameras.hpp"
+
+namespace slsd {
+
+/// The cameras that this host can see, and those that the configuration names.
+/// @thread reentrant
+class CameraList {
+ public:
+  /// Looks for cameras, which takes a second or two.
+  [[nodiscard]] static CameraList look(const Configuration& configuration);
+  /// @param configuration  outlives this
+  CameraList(const Configuration& configuration, CameraListing listing);
+
+  /// For people: several lines to a camera; where there is none, what was looked at.
+  [[nodiscard]] std::string text() const;
+  /// `cameras`, `configured` and `looked_at`, as slsd(8) says.
+  [[nodiscard]] nlohmann::json json() const;
+  /// What to choose in the place of a camera that is absent: the names of those of its driver.
+  [[nodiscard]] std::string similar_to(const CameraOptions& absent) const;
+
+ private:
+  [[nodiscard]] const ListedCamera* find(const CameraOptions& configured) const;
+  [[nodiscard]] const CameraOptions* find(const ListedCamera& seen) const;
+
+  const Configuration* configuration_;
+  CameraListing listing_;
+};
+
+/// Whether this is the camera that the options name.
+[[nodiscard]] bool names(const CameraOptions& options, const ListedCamera& camera);
+
+}  // namespace slsd

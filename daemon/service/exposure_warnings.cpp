@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/service/exposure_warnings.hpp"
+
+#include <optional>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "core/exposure/light_periods.hpp"
+
+namespace slsd {
+namespace {
+
+std::string misfits(const ExposureFit& fit, const LightPeriods& periods) {
+  std::string text;
+  if (!fit.projector) {
+    text += fmt::format("a frame of the projector, {:.0f} us at {:g} Hz", periods.projector_us(), periods.refresh_hz);
+  }
+  if (!fit.lamps) {
+    text += fmt::format("{}half a period of the lamps, {:.0f} us at {} Hz", text.empty() ? "" : ", nor of ",
+                        periods.lamps_us(), periods.power_line_hz);
+  }
+  return text;
+}
+
+std::string nearest(const ExposureFit& fit) {
+  if (!fit.shorter_us && !fit.longer_us) return "no exposure up to a second suits both: shade the lamps";
+  if (!fit.shorter_us) return fmt::format("set {:.0f}", *fit.longer_us);
+  if (!fit.longer_us) return fmt::format("set {:.0f}", *fit.shorter_us);
+  return fmt::format("set {:.0f} or {:.0f}", *fit.shorter_us, *fit.longer_us);
+}
+
+}  // namespace
+
+std::vector<std::string> exposure_warnings(const Configuration& configuration) {
+  const LightPeriods periods{.refresh_hz = configuration.projector.refresh_hz,
+                             .power_line_hz = static_cast<double>(configuration.scan.power_line_hz)};
+  std::vector<std::string> warnings;
+  for (const CameraOptions& camera : configuration.cameras) {
+    const std::optional<double> exposure_us = camera.exposure_us();
+    if (!exposure_us || *exposure_us <= 0) continue;
+    const ExposureFit fit = fit_exposure(*exposure_us, periods);
+    if (fit.fits()) continue;
+    warnings.push_back(fmt::format(
+        "camera \"{}\": exposure_us = {:g} is no whole multiple of {}, so that frames come out differently bright: {}",
+        camera.name(), *exposure_us, misfits(fit, periods), nearest(fit)));
+  }
+  return warnings;
+}
+
+}  // namespace slsd
