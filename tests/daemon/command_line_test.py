@@ -4,10 +4,13 @@
 """The two command lines from outside: exit statuses, files, messages."""
 import json
 import pathlib
+import shutil
+import signal
+import subprocess
 import tempfile
 import unittest
 
-from service import SCENE, Service, slsctl, slsd
+from service import BIN, SCENE, Service, slsctl, slsd
 
 
 class Slsd(unittest.TestCase):
@@ -38,7 +41,7 @@ class Slsd(unittest.TestCase):
 
     def test_names_what_is_wrong_with_a_configuration(self):
         cases = {"[pattern]\nsymbols = [7]\n": ":2:", "[[camera]]\npath = 3\n": ":2:8: [[camera]] path",
-                 "[camera]\n": "[[camera]]", "x = \n": ":1:", "[projector]\ndriver = 'glfw'\n": "not part of this build",
+                 "[camera]\n": "[[camera]]", "x = \n": ":1:", "[projector]\nbrightness = 2\n": "brightness must be 0 to 1",
                  "[[camera]]\ndriver = 'aravis'\n": "id must be the camera's serial number",
                  "[calibration]\nfile = 'missing.yml'\n": "missing.yml",
                  "[pattern]\nfile = 'missing.toml'\n": "missing.toml"}
@@ -65,6 +68,49 @@ class Slsd(unittest.TestCase):
         self.file.write_text("[pattern]\nsymbol_size_px = 8\nsymbols = [3, 7, 22, 25]\n", encoding="utf-8")
         self.assertIn("warning  symbol", slsd("--check", "--config", self.file).stdout)
 
+    def test_latency_refuses_what_sees_no_flash(self):
+        service = Service()
+        result = slsd("--calibrate", "--latency", "--config", service.file)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("camera camera: no flash is seen", result.stderr)
+        self.assertEqual(slsd("--latency", "--config", service.file).returncode, 2)
+
+    def test_a_session_ends_at_an_interrupt_and_says_what_it_has(self):
+        service = Service()
+        with subprocess.Popen([BIN / "slsd", "--calibrate", "--config", service.file], stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, text=True) as session:
+            self.assertIn("Ctrl-C ends it", session.stdout.readline())
+            session.send_signal(signal.SIGINT)
+            _, problem = session.communicate(timeout=120)
+        self.assertEqual(session.returncode, 1)
+        self.assertIn("ended with 0 poses", problem)
+
+    def test_calibrating_and_verifying_say_what_they_lack(self):
+        service = Service()
+        for command in ("--calibrate", "--verify"):
+            result = slsd(command, "--from", self.folder, "--config", service.file)
+            self.assertEqual(result.returncode, 1, command)
+            self.assertIn("holds no pose", result.stderr)
+        for usage in (["--from", self.folder], ["--board", "charuco"], ["--calibrate", "--verify"], ["--poses", "5"],
+                      ["--plane", "plane:8x5:100:40:DICT_4X4_50"], ["--calibrate", "--planes", "2"]):
+            self.assertEqual(slsd(*usage).returncode, 2, usage)
+
+    def test_check_compares_latency_and_exposure_with_the_configuration(self):
+        service = Service()
+        latency = "[[camera]]\nname = 'camera'\nflashes = 20\nlatency_us = 51234\n"
+        text = service.file.read_text(encoding="utf-8").replace(f"{SCENE}/calibration.yml", "calibration.yml")
+        service.file.write_text(text, encoding="utf-8")
+        shutil.copy(SCENE / "calibration.yml", service.folder)
+        (service.folder / "latency.toml").write_text(latency, encoding="utf-8")
+        result = slsd("--check", "--config", service.file)
+        self.assertEqual(result.returncode, 0, result.stdout)
+        self.assertIn("warning  camera \"camera\" saw images whole only 51.2 ms", result.stdout)
+        self.assertIn("set 52", result.stdout)
+        (service.folder / "latency.toml").write_text("latency = 1\n", encoding="utf-8")
+        self.assertEqual(slsd("--check", "--config", service.file).returncode, 1)
+        self.file.write_text("[[camera]]\ndriver = 'v4l2'\ndevice = '/nothing'\nexposure_us = 20000\n", encoding="utf-8")
+        self.assertIn("set 16667 or 33333", slsd("--check", "--config", self.file).stdout)
+
     def test_check_of_a_running_service_is_no_error(self):
         with Service() as service:
             result = slsd("--check", "--config", service.file)
@@ -74,7 +120,24 @@ class Slsd(unittest.TestCase):
         service = Service()
         result = slsd("--list", "--config", service.file)
         self.assertEqual(result.returncode, 0)
-        self.assertIn("1600x1200 px", result.stdout)
+        self.assertIn('configured camera "camera", driver file: replays', result.stdout)
+
+    def test_lists_devices_as_json(self):
+        service = Service()
+        result = slsd("--list", "--json", "--config", service.file)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        listed = json.loads(result.stdout)
+        self.assertEqual(listed["configured"], [{"name": "camera", "driver": "file", "seen": True}])
+        self.assertTrue(any(place.startswith("GigE Vision: by broadcast on") for place in listed["looked_at"]))
+
+    def test_json_is_for_lists(self):
+        self.assertEqual(slsd("--json", "--check").returncode, 2)
+
+    def test_check_names_cameras_to_choose_for_one_that_is_absent(self):
+        service = Service(configuration='[[camera]]\ndriver = "v4l2"\ndevice = "/dev/no-such-camera"\n')
+        result = slsd("--check", "--config", service.file)
+        self.assertEqual(result.returncode, 1)
+        self.assertRegex(result.stdout, "(?s)no-such-camera.*No such file.*of this driver (are|is) seen")
 
 
 class Slsctl(unittest.TestCase):
@@ -119,6 +182,18 @@ class Slsctl(unittest.TestCase):
         self.assertIn("bytes", json.loads(self.slsctl("frame", self.folder / "f.png", "--json").stdout))
         error = json.loads(slsctl("--socket", self.folder / "none", "--json", "status").stdout)["error"]
         self.assertEqual(error["data"]["name"], "not_found")
+
+    def test_exposure_proposes_and_names_what_it_cannot_mend(self):
+        seen = json.loads(self.slsctl("--json", "exposure").stdout)
+        self.assertEqual((seen["camera"], seen["full"], seen["present"]), ("camera", 255, None))
+        self.assertEqual((seen["noise"], seen["moved_share"], seen["troubles"]), (0, 0, []))
+        self.assertGreater(seen["lit"], 100)
+        self.assertGreater(seen["patterned_share"], 0.5)
+        self.assertIn("brightness: ", self.slsctl("exposure", "--camera", "camera").stdout)
+        self.assertEqual(self.slsctl("exposure", "--camera", "other").returncode, 1)
+        self.assertEqual(self.slsctl("exposure", "--gain-max-db", "-1").returncode, 2)
+        with Service(camera_path=SCENE / "black.png") as dark:
+            self.assertIn("no_pattern: ", slsctl("--socket", dark.socket, "exposure").stdout)
 
     def test_status_and_watch_read_well(self):
         self.assertIn("camera      ready, file", self.slsctl("status").stdout)

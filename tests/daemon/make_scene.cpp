@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 
 // Writes what a service needs to scan without hardware: make_scene DIR makes frame.png, black.png, white.png,
-// small.png, pattern.toml and calibration.yml of a plane at 2 m that the simulator drew.
+// grey.png, dim.png, small.png, pattern.toml and calibration.yml of a plane at 2 m that the simulator drew.
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
@@ -38,6 +38,8 @@ int main(int argc, char** argv) {
   write(folder / "frame.png", encode_png(simulate(draw_pattern(*pattern), calibration, wall)));
   write(folder / "black.png", encode_png(Grey8(1600, 1200, 0)));
   write(folder / "white.png", encode_png(Grey8(1600, 1200, 255)));
+  write(folder / "grey.png", encode_png(Grey8(1600, 1200, 90)));
+  write(folder / "dim.png", encode_png(Grey8(1600, 1200, 30)));
   write(folder / "small.png", encode_png(Grey8(640, 480, 90)));
   write(folder / "pattern.toml", write_pattern(*pattern));
   write(folder / "calibration.yml", write_calibration(calibration));

@@ -14,7 +14,7 @@ from client import Client
 
 BIN = pathlib.Path(os.environ["SLSD_BIN"])
 SCENE = pathlib.Path(os.environ["SLSD_SCENE"])
-PATIENCE_S = 60
+PATIENCE_S = 120
 
 CONFIGURATION = """
 [pattern]
@@ -71,6 +71,11 @@ class Service:
         if self.process.poll() is not None:
             raise RuntimeError(self.log_text())
         return self
+
+    def wait_ready(self):
+        """Until the projector and the cameras are open: what a scan then takes is its own."""
+        with self.client() as client:
+            wait_until(lambda: client.call("status")[0]["ready"], "the devices")
 
     def log_text(self):
         return self.log.read_text(encoding="utf-8")

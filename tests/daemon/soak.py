@@ -10,6 +10,7 @@ import argparse
 import json
 import socket
 import sys
+import time
 
 WARM_UP_SCANS = 10
 GROWTH_MAX = 1.05
@@ -27,15 +28,23 @@ class Client:
         connection.connect(path)
         self.stream = connection.makefile("rwb")
 
-    def scan(self, number):
-        """One scan; the number of its points."""
-        request = {"jsonrpc": "2.0", "id": number, "method": "scan", "params": {"format": "ply"}}
+    def call(self, number, method, params):
+        request = {"jsonrpc": "2.0", "id": number, "method": method, "params": params}
         self.stream.write(json.dumps(request).encode() + b"\n")
         self.stream.flush()
         reply = json.loads(self.stream.readline())
         if "error" in reply:
-            sys.exit(f"soak: scan {number}: {reply['error']['message']}")
-        result = reply["result"]
+            sys.exit(f"soak: {method} {number}: {reply['error']['message']}")
+        return reply["result"]
+
+    def wait_ready(self):
+        """Until the projector and the cameras are open."""
+        while not self.call(0, "status", {})["ready"]:
+            time.sleep(0.1)
+
+    def scan(self, number):
+        """One scan; the number of its points."""
+        result = self.call(number, "scan", {"format": "ply"})
         if len(self.stream.read(result["bytes"])) != result["bytes"]:
             sys.exit(f"soak: scan {number}: the cloud is cut short")
         return result["points"]
@@ -48,9 +57,10 @@ def main():
     arguments.add_argument("--scans", type=int, default=10000)
     arguments = arguments.parse_args()
 
+    client = Client(arguments.socket)
+    client.wait_ready()
     at_rest = resident_kib(arguments.pid)
     print(f"{'at rest':>20}: {at_rest:8} KiB", flush=True)
-    client = Client(arguments.socket)
     warm = at_rest
     report_each = max(1, arguments.scans // 10)
     for number in range(1, arguments.scans + 1):

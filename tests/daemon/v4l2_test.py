@@ -4,12 +4,11 @@
 """The whole service on a V4L2 camera over FUSE, which is unplugged and plugged in again while it scans."""
 import random
 import sys
-import threading
 import time
 import unittest
 
-from client import RpcError
-from v4l2_double import CANNOT_MOUNT, Double, can_mount, scan_until_it_works, service_on
+from recovery import LOST, scan_until_it_fails, scan_until_it_works, soon
+from v4l2_double import CANNOT_MOUNT, Double, can_mount, service_on
 
 LIVES = 4
 FOR_EVER = 1000000
@@ -26,21 +25,25 @@ class V4l2(unittest.TestCase):
         cls.service.__exit__()
         cls.double.close()
 
+    def setUp(self):
+        with self.service.client() as client:
+            scan_until_it_works(client)
+
+    def tearDown(self):
+        self.double.mend()
+
     def test_scans_the_plane(self):
         with self.service.client() as client:
-            result, _ = client.call("scan")
+            result = scan_until_it_works(client)[2]
             self.assertGreater(result["points"], 2000)
             status, _ = client.call("status")
         self.assertEqual(status["cameras"][0]["driver"], "v4l2")
 
     def expect(self, name, fault, remedy, **params):
-        """A scan fails with the name while the fault lasts; the next one works."""
+        """Scans fail with the name while the fault lasts; and work again after it."""
         self.double.tell(fault)
         with self.service.client() as client:
-            with self.assertRaises(RpcError) as caught:
-                while True:  # a frame from before the fault may come first
-                    client.call("scan", **params)
-            self.assertEqual(caught.exception.name, name, str(caught.exception))
+            scan_until_it_fails(client, name, **params)
             self.double.tell(remedy)
             scan_until_it_works(client)
 
@@ -54,15 +57,10 @@ class V4l2(unittest.TestCase):
         chance = random.Random(3)
         worst = 0.0
         with self.service.client() as client:
-            client.call("scan")
             for _ in range(LIVES):
-                hand = threading.Timer(chance.uniform(0, 0.3), self.double.tell, ["unplug"])
-                hand.start()
-                with self.assertRaises(RpcError) as caught:
-                    while True:
-                        client.call("scan", timeout_ms=1000)
-                self.assertIn(caught.exception.name, {"disconnected", "timeout"})
-                hand.join()
+                with soon(chance.uniform(0, 0.3), self.double.tell, "unplug"):
+                    error = scan_until_it_fails(client, timeout_ms=1000)
+                self.assertIn(error.name, LOST, str(error))
                 time.sleep(chance.uniform(0, 0.5))
                 self.double.tell("replug")
                 seconds, _, result = scan_until_it_works(client)

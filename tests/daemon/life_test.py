@@ -1,0 +1,183 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""The whole service from its start to its end: its socket, its signals, what it loads anew and what it uses up."""
+import os
+import resource
+import signal
+import socket
+import tempfile
+import time
+import unittest
+
+from client import Client, RpcError
+from service import Service, slsd, wait_until
+
+
+class Life(unittest.TestCase):
+    def test_sigterm_ends_a_waiting_scan_at_once(self):
+        with Service(camera='faults = ["stall@1"]') as service, service.client() as client:
+            client.request("scan", timeout_ms=60000)
+            with service.client() as other:
+                wait_until(lambda: other.call("status")[0]["cameras"][0]["state"] == "capturing", "the camera")
+            time.sleep(0.2)
+            status, seconds = service.stop()
+            self.assertEqual(status, 0)
+            self.assertLess(seconds, 30)  # of the 60 that the scan would wait
+            with self.assertRaises(RpcError) as caught:
+                client.reply()
+            self.assertEqual(caught.exception.name, "cancelled")
+            self.assertFalse(service.socket.exists())
+
+    def test_sigterm_while_clouds_flow(self):
+        with Service() as service, service.client() as client:
+            client.call("subscribe")
+            client.receive()
+            status, _ = service.stop(signal.SIGINT)
+            self.assertEqual(status, 0)
+
+    def test_socket_of_a_dead_daemon_is_replaced(self):
+        service = Service()
+        with service:
+            service.process.kill()
+            service.process.wait()
+            self.assertTrue(service.socket.exists())
+            service.launch()
+
+            def answers():
+                try:
+                    with service.client() as client:
+                        return bool(client.call("status"))
+                except OSError:
+                    return False
+            wait_until(answers, "an answer")
+
+    def test_socket_of_a_living_daemon_is_left_alone(self):
+        with Service() as service:
+            second = slsd("--config", service.file)
+            self.assertEqual(second.returncode, 1)
+            self.assertIn("another daemon answers there", second.stderr)
+            with service.client() as client:
+                self.assertIn("version", client.call("status")[0])
+
+    def test_path_that_is_no_socket_is_left_alone(self):
+        service = Service()
+        service.socket.write_text("precious", encoding="utf-8")
+        result = slsd("--config", service.file)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("no socket", result.stderr)
+        self.assertEqual(service.socket.read_text(encoding="utf-8"), "precious")
+
+    def test_path_too_long_is_refused(self):
+        service = Service()
+        service.file.write_text('[server]\nsocket = "/' + "x" * 107 + '"\n', encoding="utf-8")
+        result = slsd("--config", service.file)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("slsd.toml:2:10: [server] socket must be a path of 1 to 107 bytes", result.stderr)
+
+    def test_folder_that_is_missing_is_named(self):
+        service = Service()
+        service.file.write_text('[server]\nsocket = "missing/slsd.sock"\n', encoding="utf-8")
+        result = slsd("--config", service.file)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("missing/slsd.sock", result.stderr)
+
+    def test_mode_of_the_socket_is_as_configured(self):
+        with Service(server="socket_mode = 0o600") as service:
+            self.assertEqual(service.socket.stat().st_mode & 0o777, 0o600)
+        with Service() as service:
+            self.assertEqual(service.socket.stat().st_mode & 0o777, 0o660)
+
+    def test_bad_reload_changes_nothing(self):
+        with Service() as service, service.client() as client:
+            client.call("scan")
+            service.file.write_text("[pattern]\nsymbol_size = 8\n", encoding="utf-8")
+            with self.assertRaises(RpcError) as caught:
+                client.call("reload")
+            self.assertIn("slsd.toml:2:1", str(caught.exception))
+            self.assertIn("did you mean symbol_size_px?", str(caught.exception))
+            self.assertGreater(client.call("scan")[0]["points"], 2000)
+
+    def test_reload_takes_decode_options_and_names_what_needs_a_restart(self):
+        with Service() as service, service.client() as client:
+            text = service.file.read_text(encoding="utf-8")
+            service.file.write_text(text + "clients_max = 7\n[decode]\ndepth_max_mm = 600.0\n", encoding="utf-8")
+            self.assertEqual(client.call("reload")[0], {"needs_restart": ["server"]})
+            self.assertEqual(client.call("scan")[0]["points"], 0)
+
+    def test_sighup_reloads(self):
+        with Service() as service, service.client() as client:
+            text = service.file.read_text(encoding="utf-8")
+            service.file.write_text(text + "[decode]\ndepth_max_mm = 600.0\n", encoding="utf-8")
+            service.send_signal(signal.SIGHUP)
+            wait_until(lambda: "reloaded" in service.log_text(), "the reload")
+            self.assertEqual(client.call("scan")[0]["points"], 0)
+
+    def test_manager_is_notified(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "notify")
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+                manager.bind(path)
+                manager.settimeout(60)
+                service = Service(environment={"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "300000"})
+                service.launch()
+                messages = []
+
+                def await_message(part):
+                    while not messages or part not in messages[-1]:
+                        messages.append(manager.recv(4096).decode())
+                try:
+                    await_message("READY=1")
+                    with service.client() as client:
+                        client.call("status")
+                    await_message("WATCHDOG=1")
+                    await_message("WATCHDOG=1")
+                    service.send_signal(signal.SIGHUP)
+                    await_message("RELOADING=1")
+                    self.assertIn("MONOTONIC_USEC=", messages[-1])
+                    await_message("READY=1")
+                    service.stop()
+                    await_message("STOPPING=1")
+                finally:
+                    service.__exit__()
+
+    def test_runs_out_of_descriptors_and_recovers(self):
+        def few_descriptors():
+            resource.setrlimit(resource.RLIMIT_NOFILE, (48, 48))
+        with Service(preexec=few_descriptors) as service:
+            with service.client() as first:
+                first.call("status")
+                clients = [Client(service.socket) for _ in range(60)]
+                wait_until(lambda: "cannot take another client" in service.log_text(), "the limit")
+                self.assertIn("version", first.call("status")[0])
+                for client in clients:
+                    client.close()
+            with service.client() as client:
+                self.assertIn("version", client.call("status")[0])
+
+    def test_memory_stays_level(self):
+        with Service() as service, service.client() as client:
+            with service.client() as subscriber:  # both lanes decode, each with memory of its own
+                subscriber.call("subscribe")
+                for _ in range(20):
+                    subscriber.receive()
+            before = client.call("status")[0]["resident_bytes"]
+            for _ in range(150):
+                client.call("scan")
+            for _ in range(200):
+                with service.client() as other:
+                    other.send(b"rubbish\n")
+            after = client.call("status")[0]["resident_bytes"]
+            self.assertLess(after, before * 1.05 + 1e6)
+
+    def test_starts_without_camera_and_calibration(self):
+        with Service(configuration='[server]\nsocket = "slsd.sock"\n') as service, service.client() as client:
+            self.assertFalse(client.call("status")[0]["ready"])
+            with self.assertRaises(RpcError) as caught:
+                client.call("scan")
+            self.assertEqual(caught.exception.name, "not_found")
+            self.assertTrue(client.call("pattern")[1].startswith(b"\x89PNG"))
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

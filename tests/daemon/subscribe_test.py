@@ -1,0 +1,70 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""Subscriptions to the clouds of the whole service."""
+import time
+import unittest
+
+from point_cloud import vertices
+from service import Service, wait_until
+
+
+class Subscription(unittest.TestCase):
+    def test_gives_every_cloud_to_who_reads(self):
+        with Service() as service, service.client() as client:
+            client.call("subscribe", format="ply")
+            events = [client.receive() for _ in range(5)]
+            frames = [message["params"]["frame"] for message, _ in events]
+            self.assertEqual(frames, sorted(set(frames)))
+            for message, cloud in events:
+                self.assertEqual(message["method"], "cloud")
+                self.assertEqual(len(vertices(cloud)), message["params"]["points"])
+            client.call("scan")
+            client.call("unsubscribe")
+            with service.client() as other:
+                wait_until(lambda: other.call("status")[0]["subscribers"] == 0, "no subscriber")
+
+                def rests():
+                    before = other.call("status")[0]["scans"]["succeeded"]
+                    time.sleep(0.5)
+                    return other.call("status")[0]["scans"]["succeeded"] == before
+                wait_until(rests, "an end of the scans")  # some may be under way still
+
+    def test_slow_reader_loses_clouds_and_holds_nobody_up(self):
+        with Service() as service, service.client() as slow, service.client() as quick:
+            slow.call("subscribe")
+            quick.call("subscribe")
+            for _ in range(20):
+                quick.receive()
+            with service.client() as other:
+                other.call("scan")
+            lost = [slow.receive()[0]["params"].get("lost", 0) for _ in range(10)]
+            self.assertGreater(sum(lost), 0)
+            numbers = [slow.receive()[0]["params"]["frame"] for _ in range(3)]
+            self.assertEqual(numbers, sorted(set(numbers)))
+
+    def test_reader_that_stopped_is_dropped(self):
+        with Service(server="send_timeout_ms = 300") as service, service.client() as stuck:
+            stuck.call("subscribe")
+            with service.client() as other:
+                wait_until(lambda: other.call("status")[0]["clients"] == 1, "the stuck client to be dropped")
+
+    def test_rate_is_kept(self):
+        with Service() as service, service.client() as client:
+            begin = time.monotonic()
+            client.call("subscribe", rate_hz=4)
+            for _ in range(5):
+                client.receive()
+            self.assertGreater(time.monotonic() - begin, 0.9)
+
+    def test_tells_of_failed_scans(self):
+        faults = [f"drop@{capture}" for capture in range(2, 200, 2)]  # one may be passed over for a newer cloud
+        with Service(camera=f"faults = {faults}") as service, service.client() as client:
+            client.call("subscribe")
+            methods = set()
+            while methods != {"scan_failed", "cloud"}:
+                methods.add(client.receive()[0]["method"])
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
