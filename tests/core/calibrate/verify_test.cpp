@@ -122,7 +122,7 @@ TEST(CheckView, TakesAPlainPlaneWithoutDistances) {
 TEST(CheckView, RefusesTwoPlanes) {
   const std::vector<PoseView> views = views_of(see(true_rig(), true_poses(2)));
   PoseView both = views[0];
-  both.symbols.insert(both.symbols.end(), views[1].symbols.begin(), views[1].symbols.begin() + 300);
+  both.symbols.insert(both.symbols.end(), views[1].symbols.begin(), views[1].symbols.end());
   const auto checked = check(both);
   ASSERT_FALSE(checked);
   EXPECT_EQ(checked.error().code, ErrorCode::kImpossible);
