@@ -48,11 +48,12 @@ Result<> Server::open() {
   return {};
 }
 
-void Server::stop_accepting() {
+void Server::wind_down() {
   std::error_code ignored;
   acceptor_.close(ignored);
   retry_.cancel();
   socket_.reset();
+  for (const auto& session : sessions_) session->wind_down();
 }
 
 void Server::end_all() {

@@ -35,8 +35,8 @@ class Server {
 
   /// Listens; the socket appears. @errors of ListeningSocket::open()
   [[nodiscard]] Result<> open();
-  /// Takes no more clients; the socket disappears.
-  void stop_accepting();
+  /// Takes no more clients, and no more requests of those that are there; the socket disappears.
+  void wind_down();
   /// Hangs up on everyone.
   void end_all();
 

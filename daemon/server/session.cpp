@@ -66,7 +66,7 @@ void Session::read() {
 }
 
 void Session::on_read(const std::error_code& error, std::size_t size) {
-  if (over_) return;
+  if (over_ || last_reply_) return;
   if (error) {
     hung_up_ = true;
     if (error != asio::error::eof) return end();

@@ -37,6 +37,8 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
   Session(Socket socket, const ServerOptions& options, const Handler& handler, Ended ended);
 
   void start() { read(); }
+  /// Reads no further request; the connection ends when all that is under way is sent.
+  void wind_down() { last_reply_ = true; }
   void end();
 
   void subscribe(const Subscription& subscription) { subscription_ = subscription; }

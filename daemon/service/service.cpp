@@ -34,6 +34,9 @@ nlohmann::json tables_that_need_restart(const Configuration& now, const Configur
   if (!(now.projector == next.projector)) tables.push_back("projector");
   if (!(now.cameras == next.cameras)) tables.push_back("camera");
   if (!(now.server == next.server)) tables.push_back("server");
+  ScanOptions in_force = now.scan;
+  in_force.timeout_ms = next.scan.timeout_ms;  // taken at once
+  if (!(in_force == next.scan)) tables.push_back("scan");
   return tables;
 }
 
@@ -122,7 +125,7 @@ void Service::on_signal(int number) {
 
 void Service::stop() {
   notifier_.stopping();
-  server_->stop_accepting();
+  server_->wind_down();
   watchdog_.cancel();
   status_.cancel();
   scanner_.request_stop();

@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """The whole service from its start to its end: its socket, its signals, what it loads anew and what it uses up."""
+import contextlib
 import os
 import resource
 import signal
 import socket
 import tempfile
+import threading
 import time
 import unittest
 
@@ -34,6 +36,27 @@ class Life(unittest.TestCase):
             client.call("subscribe")
             client.receive()
             status, _ = service.stop(signal.SIGINT)
+            self.assertEqual(status, 0)
+
+    def test_sigterm_while_clients_never_stop_asking(self):
+        request = b'{"jsonrpc":"2.0","id":1,"method":"status"}\n' * 16
+
+        def ask(client):
+            with contextlib.suppress(OSError):
+                while True:
+                    client.send(request)
+                    client.more()
+                    client.buffer = b""
+        with Service() as service:
+            clients = [service.client() for _ in range(4)]
+            threads = [threading.Thread(target=ask, args=[client]) for client in clients]
+            for thread in threads:
+                thread.start()
+            time.sleep(0.5)
+            status, _ = service.stop()
+            for thread, client in zip(threads, clients):
+                thread.join()
+                client.close()
             self.assertEqual(status, 0)
 
     def test_socket_of_a_dead_daemon_is_replaced(self):
@@ -101,8 +124,9 @@ class Life(unittest.TestCase):
     def test_reload_takes_decode_options_and_names_what_needs_a_restart(self):
         with Service() as service, service.client() as client:
             text = service.file.read_text(encoding="utf-8")
-            service.file.write_text(text + "clients_max = 7\n[decode]\ndepth_max_mm = 600.0\n", encoding="utf-8")
-            self.assertEqual(client.call("reload")[0], {"needs_restart": ["server"]})
+            changed = text.replace("[scan]", "[scan]\ntimeout_ms = 4000\nprojector_latency_ms = 50.0")
+            service.file.write_text(changed + "clients_max = 7\n[decode]\ndepth_max_mm = 600.0\n", encoding="utf-8")
+            self.assertEqual(client.call("reload")[0], {"needs_restart": ["server", "scan"]})
             self.assertEqual(client.call("scan")[0]["points"], 0)
 
     def test_sighup_reloads(self):
