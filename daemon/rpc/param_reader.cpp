@@ -36,12 +36,12 @@ int ParamReader::integer(const char* name, int otherwise, int low, int high) {
   return otherwise;
 }
 
-std::optional<double> ParamReader::positive(const char* name, double highest) {
+std::optional<double> ParamReader::number(const char* name, double low, double high) {
   const auto* value = find(name);
   if (value == nullptr) return std::nullopt;
-  const double number = value->is_number() ? value->get<double>() : 0.0;
-  if (number > 0 && number <= highest) return number;
-  refuse(name, "a number above 0, up to " + std::to_string(static_cast<long>(highest)));
+  const double number = value->is_number() ? value->get<double>() : low - 1.0;
+  if (number >= low && number <= high) return number;
+  refuse(name, "a number from " + nlohmann::json(low).dump() + " to " + nlohmann::json(high).dump());
   return std::nullopt;
 }
 

@@ -23,8 +23,8 @@ class ParamReader {
 
   [[nodiscard]] bool boolean(const char* name, bool otherwise);
   [[nodiscard]] int integer(const char* name, int otherwise, int low, int high);
-  /// Above 0, up to the highest; nothing where it is not there.
-  [[nodiscard]] std::optional<double> positive(const char* name, double highest);
+  /// Nothing where it is not there.
+  [[nodiscard]] std::optional<double> number(const char* name, double low, double high);
   [[nodiscard]] std::string text(const char* name);
   /// One of the words; the first where it is not there.
   [[nodiscard]] std::string choice(const char* name, std::initializer_list<std::string_view> words);

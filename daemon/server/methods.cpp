@@ -17,7 +17,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kMaxRateHz = 1000.0;
+constexpr double kRateMinHz = 0.001;
+constexpr double kRateMaxHz = 1000.0;
 
 void run_status(ServiceState& state, const json& params, Session&, Respond respond) {
   const ParamReader reader(params);
@@ -28,7 +29,7 @@ void run_status(ServiceState& state, const json& params, Session&, Respond respo
 void run_subscribe(ServiceState& state, const json& params, Session& session, Respond respond) {
   ParamReader reader(params);
   const CloudFormat format = cloud_format(reader.choice("format", {"ply", "pcd"}));
-  const std::optional<double> rate_hz = reader.positive("rate_hz", kMaxRateHz);
+  const std::optional<double> rate_hz = reader.number("rate_hz", kRateMinHz, kRateMaxHz);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
   json result{{"format", to_string(format)}};
   result["rate_hz"] = rate_hz ? json(*rate_hz) : json();

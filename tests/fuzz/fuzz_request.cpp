@@ -16,7 +16,7 @@ void read_params(const nlohmann::json& params) {
   slsd::ParamReader reader(params);
   (void)reader.choice("format", {"ply", "pcd"});
   (void)reader.integer("timeout_ms", 5000, 1, 600000);
-  (void)reader.positive("rate_hz", 1000);
+  (void)reader.number("rate_hz", 0.001, 1000);
   (void)reader.boolean("picture", false);
   (void)reader.text("camera");
   if (const auto error = reader.error()) (void)slsd::to_line(slsd::error_message(nullptr, *error));

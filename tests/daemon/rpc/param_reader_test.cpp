@@ -17,7 +17,7 @@ TEST(ParamReader, GivesValuesAndDefaults) {
   EXPECT_EQ(reader.choice("transport", {"inline", "memfd"}), "inline");
   EXPECT_EQ(reader.integer("timeout_ms", 5000, 1, 60000), 7);
   EXPECT_EQ(reader.integer("count", 3, 1, 9), 3);
-  EXPECT_EQ(reader.positive("rate_hz", 100), 2.5);
+  EXPECT_EQ(reader.number("rate_hz", 0.5, 100), 2.5);
   EXPECT_TRUE(reader.boolean("picture", false));
   EXPECT_EQ(reader.text("camera"), "");
   EXPECT_FALSE(reader.error());
@@ -40,10 +40,10 @@ TEST(ParamReader, RefusesWrongTypesAndRanges) {
     EXPECT_EQ(reader.integer("timeout_ms", 5, 1, 60), 5);
     EXPECT_TRUE(reader.error()) << value;
   }
-  for (const json& value : {json(0), json(-1), json(101), json("5")}) {
+  for (const json& value : {json(0), json(-1), json(0.4999), json(1e-300), json(101), json("5")}) {
     const json params{{"rate_hz", value}};
     ParamReader reader(params);
-    EXPECT_EQ(reader.positive("rate_hz", 100), std::nullopt);
+    EXPECT_EQ(reader.number("rate_hz", 0.5, 100), std::nullopt);
     EXPECT_TRUE(reader.error()) << value;
   }
 }
