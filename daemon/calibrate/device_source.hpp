@@ -24,7 +24,7 @@ class DeviceSource final : public PoseSource {
   [[nodiscard]] ImageSize projector() const override { return projector_; }
   void show(const Grey8& image) override;
   [[nodiscard]] Result<std::vector<GreyImage>> grab() override;
-  [[nodiscard]] std::vector<DeviceStatus> camera_statuses() const { return rig_.camera_statuses(); }
+  [[nodiscard]] RigStatus status() const { return rig_.status(); }
 
  private:
   DeviceSource(std::unique_ptr<Projector> projector, std::vector<std::unique_ptr<Camera>> cameras,

@@ -100,7 +100,7 @@ Result<Observations> take_all(const CalibrateRequest& request, const Preparation
 }
 
 Result<> calibrate_from(const CalibrateRequest& request, const Preparation& prepared, const Observations& observations,
-                        const std::vector<PoseReport>& refused, const std::vector<DeviceStatus>& cameras) {
+                        const std::vector<PoseReport>& refused, const RigStatus& rig) {
   const std::size_t poses = observations.count(PoseSubject::kBoard);
   if (poses < static_cast<std::size_t>(kPosesMin)) {
     return fail(ErrorCode::kCancelled, fmt::format("ended with {} poses, and {} are the least; {}", poses, kPosesMin,
@@ -116,7 +116,7 @@ Result<> calibrate_from(const CalibrateRequest& request, const Preparation& prep
   print(fmt::format("calibrated in {:.1f} s from {} poses, recorded in {}",
                     std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), poses,
                     prepared.folder.string()));
-  note_hardware(cameras, prepared.configuration.projector, outcome->calibration);
+  note_hardware(rig, outcome->calibration);
   return finish_calibration(request, prepared.file, prepared.board, refused, std::move(*outcome));
 }
 
@@ -141,9 +141,9 @@ Result<> calibrate_by_session(const CalibrateRequest& request) {
   if (!recorder) return tl::unexpected(recorder.error());
   const auto observations = take_all(request, *prepared, **source, observers, *recorder, record->observations);
   if (!observations) return tl::unexpected(observations.error());
-  const std::vector<DeviceStatus> cameras = (*source)->camera_statuses();
+  const RigStatus rig = (*source)->status();
   source->reset();
-  return calibrate_from(request, *prepared, *observations, record->refused, cameras);
+  return calibrate_from(request, *prepared, *observations, record->refused, rig);
 }
 
 }  // namespace slsd

@@ -6,6 +6,7 @@
 
 #include <utility>
 
+#include "daemon/scan/hardware.hpp"
 #include "daemon/scan/thread_name.hpp"
 
 namespace slsd {
@@ -164,6 +165,7 @@ void CameraRunner::note_opened(const Result<>& opened) {
   }
   const CameraDescription& description = camera_->description();
   status_.device = description.device;
+  status_.hardware = camera_hardware(description.driver, description.device);
   status_.width_px = description.width_px;
   status_.height_px = description.height_px;
   rate_hz_ = description.rate_hz;

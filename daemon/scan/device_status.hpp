@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/result.hpp"
 
@@ -39,6 +40,7 @@ struct DeviceStatus {
   std::string name;
   std::string driver;
   std::string device;
+  std::string hardware;  ///< tells it from others of its kind, wherever it is plugged in; empty: nothing does
   int width_px = 0;
   int height_px = 0;
   DeviceState state = DeviceState::kOpening;
@@ -47,6 +49,12 @@ struct DeviceStatus {
   std::uint64_t opened = 0;       ///< times
   std::uint64_t frames = 0;       ///< delivered
   std::uint64_t frames_lost = 0;  ///< asked for and not delivered, or missing between two that were
+};
+
+/// All of a rig's.
+struct RigStatus {
+  DeviceStatus projector;
+  std::vector<DeviceStatus> cameras;  ///< as configured
 };
 
 }  // namespace slsd

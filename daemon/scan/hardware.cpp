@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "drivers/projector/x11/monitor_report.hpp"
-
 namespace slsd {
 namespace {
 
@@ -35,25 +33,22 @@ std::string printable(std::string text) {
 
 }  // namespace
 
-std::string hardware_id(const std::string& driver, const std::string& device) {
+std::string camera_hardware(const std::string& driver, const std::string& device) {
   if (driver == "v4l2") return printable(v4l2_id(device));
   return driver == "aravis" ? printable(device) : std::string();
 }
 
-std::string hardware_id(const RandrOutput& output) {
-  if (output.serial.empty()) return {};  // the model alone would let any other of its kind pass for it
-  return printable(output.model.empty() ? output.serial : output.model + " " + output.serial);
+std::string projector_hardware(const std::string& model, const std::string& serial) {
+  if (serial.empty()) return {};  // the model alone would let any other of its kind pass for it
+  return printable(model.empty() ? serial : model + " " + serial);
 }
 
-void note_hardware(std::span<const DeviceStatus> cameras, const ProjectorOptions& projector, Calibration& calibration) {
+void note_hardware(const RigStatus& rig, Calibration& calibration) {
   std::vector<std::string> serials;
-  for (const DeviceStatus& camera : cameras) serials.push_back(hardware_id(camera.driver, camera.device));
+  for (const DeviceStatus& camera : rig.cameras) serials.push_back(camera.hardware);
   const bool any = std::ranges::any_of(serials, [](const std::string& serial) { return !serial.empty(); });
   if (any) calibration.report.camera_serials = std::move(serials);
-  if (projector.driver != ProjectorDriver::kGlfw) return;
-  const auto monitor = report_monitor(projector.monitor, projector.width_px, projector.height_px);
-  const std::string id = monitor ? hardware_id(monitor->output) : std::string();
-  if (!id.empty()) calibration.report.projector_serial = id;
+  if (!rig.projector.hardware.empty()) calibration.report.projector_serial = rig.projector.hardware;
 }
 
 Result<> check_hardware(const std::string& who, const std::string& calibrated, const std::string& connected) {
@@ -62,6 +57,16 @@ Result<> check_hardware(const std::string& who, const std::string& calibrated, c
               "is \"" + connected + "\", and the calibration is of \"" + calibrated +
                   "\": connect that one, calibrate again, or set [calibration] other_hardware = \"warn\"",
               who);
+}
+
+Result<> check_hardware(const Calibration& calibration, const RigStatus& rig) {
+  auto same = check_hardware("projector", calibration.report.projector_serial.value_or(""), rig.projector.hardware);
+  for (const DeviceStatus& camera : rig.cameras) {
+    const CalibratedCamera* const known = calibration.camera(camera.name);
+    if (!same || known == nullptr) continue;
+    same = check_hardware("camera " + camera.name, calibrated_hardware(calibration, *known), camera.hardware);
+  }
+  return same;
 }
 
 std::string calibrated_hardware(const Calibration& calibration, const CalibratedCamera& camera) {

@@ -2,15 +2,11 @@
 // Copyright the slsd authors
 #pragma once
 
-#include <span>
 #include <string>
-#include <vector>
 
 #include "core/geometry/calibration.hpp"
 #include "core/result.hpp"
-#include "daemon/configuration/configuration.hpp"
 #include "daemon/scan/device_status.hpp"
-#include "drivers/projector/x11/randr_output.hpp"
 
 namespace slsd {
 
@@ -18,21 +14,24 @@ namespace slsd {
 /// Vision and USB3 Vision, both with the serial number.
 /// @param driver, device  of DeviceStatus or CameraDescription, of an open camera
 /// @return empty where that cannot be told
-[[nodiscard]] std::string hardware_id(const std::string& driver, const std::string& device);
+[[nodiscard]] std::string camera_hardware(const std::string& driver, const std::string& device);
 
 /// The same of a projector, from its EDID: maker and model with the serial number.
-[[nodiscard]] std::string hardware_id(const RandrOutput& output);
+[[nodiscard]] std::string projector_hardware(const std::string& model, const std::string& serial);
 
 /// Writes down what a calibration was made with, as far as it can be told.
-/// @param cameras      open, in the order of the calibration's
+/// @param rig          all open; the cameras in the order of the calibration's
 /// @param calibration  gets the serials of its report
-void note_hardware(std::span<const DeviceStatus> cameras, const ProjectorOptions& projector, Calibration& calibration);
+void note_hardware(const RigStatus& rig, Calibration& calibration);
 
 /// Whether a device is the one that was calibrated. Where either is not known, it is taken to be.
 /// @param who  for the message: "camera left"
 /// @errors kMismatch: it is another one; the message says what to do
 [[nodiscard]] Result<> check_hardware(const std::string& who, const std::string& calibrated,
                                       const std::string& connected);
+
+/// The same of all devices of a scan. @param rig  all open
+[[nodiscard]] Result<> check_hardware(const Calibration& calibration, const RigStatus& rig);
 
 /// The calibrated one's id; empty where the file does not say.
 [[nodiscard]] std::string calibrated_hardware(const Calibration& calibration, const CalibratedCamera& camera);

@@ -11,12 +11,13 @@
 
 namespace slsd {
 
-/// Keeps a calibration to the cameras that it was made with: compares them as one was opened, or the setup replaced.
+/// Keeps a calibration to the projector and the cameras that it was made with: compares them as one was opened, or the
+/// setup replaced.
 /// @thread thread-bound
 class HardwareGuard {
  public:
-  /// @param rig  its cameras are open, in the order of the setup's
-  /// @errors kMismatch: another camera, unless the configuration only wants a warning; that is logged once
+  /// @param rig  its devices are open, the cameras in the order of the setup's
+  /// @errors kMismatch: another device, unless the configuration only wants a warning; that is logged once
   [[nodiscard]] Result<> check(const std::shared_ptr<ScanSetup>& setup, const Rig& rig);
 
  private:

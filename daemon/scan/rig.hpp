@@ -64,7 +64,7 @@ class Rig {
     projection_.set_idle(std::move(picture), after);
   }
   /// Shows a picture, at once, until the next capture, hold() or release(). @param picture  nothing: the pattern
-  /// @errors kTimeout: the projector is not ready; kCancelled
+  /// @errors kTimeout: the projector is not ready; kCancelled; what was shown before then stays due
   [[nodiscard]] Result<> hold(std::optional<Grey8> picture, MonotonicTime deadline);
   /// Shows the idle picture, at once. @errors as hold()
   [[nodiscard]] Result<> release(MonotonicTime deadline);
@@ -76,8 +76,9 @@ class Rig {
   [[nodiscard]] bool kept() const;
   [[nodiscard]] DeviceStatus projector_status() const { return projection_.status(); }
   [[nodiscard]] std::vector<DeviceStatus> camera_statuses() const;
-  /// How many times cameras were opened, all together: as it grows, one may be another one than before.
-  [[nodiscard]] std::uint64_t camera_openings() const;
+  [[nodiscard]] RigStatus status() const { return {projector_status(), camera_statuses()}; }
+  /// How many times devices were opened, all together: as it grows, one may be another one than before.
+  [[nodiscard]] std::uint64_t openings() const;
 
  private:
   using Cameras = std::span<CameraRunner* const>;

@@ -68,7 +68,7 @@ void check_camera(const CameraOptions& options, const Configuration& configurati
   const CalibratedCamera* known = calibration ? calibration->camera(options.name()) : nullptr;
   if (known == nullptr) return;
   findings.other_hardware(
-      check_hardware(name, calibrated_hardware(*calibration, *known), hardware_id(seen.driver, seen.device)),
+      check_hardware(name, calibrated_hardware(*calibration, *known), camera_hardware(seen.driver, seen.device)),
       configuration.other_hardware);
   if (known->lens.width_px == seen.width_px && known->lens.height_px == seen.height_px) {
     return findings.good(name + " has the size of its calibration, " + size_text(seen.width_px, seen.height_px));
@@ -96,8 +96,9 @@ void check_monitor(const Configuration& configuration, const std::optional<Calib
   }
   if (!calibration) return;
   const std::string calibrated = calibration->report.projector_serial.value_or("");
-  findings.other_hardware(check_hardware("projector", calibrated, hardware_id(report->output)),
-                          configuration.other_hardware);
+  findings.other_hardware(
+      check_hardware("projector", calibrated, projector_hardware(report->output.model, report->output.serial)),
+      configuration.other_hardware);
 }
 
 void check_projector(const Configuration& configuration, const std::optional<Calibration>& calibration,

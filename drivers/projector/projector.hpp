@@ -16,6 +16,8 @@ struct ProjectorDescription {
   std::string monitor;
   int width_px = 0;
   int height_px = 0;
+  std::string model = {};   ///< as the monitor's EDID says, once it is open; empty: unknown
+  std::string serial = {};  ///< likewise; empty: none
 };
 
 /// A projector that shows one image, pixel for pixel. Backends: headless, glfw. Every backend passes the suite

@@ -29,6 +29,8 @@ Result<> GlfwProjector::open() {
     connected_ = screen_.is_open();
     if (!opened) return;
     description_.monitor = screen_.output().name;
+    description_.model = screen_.output().model;
+    description_.serial = screen_.output().serial;
     warnings_ = screen_.warnings();
   });
   return opened;

@@ -12,38 +12,60 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-DeviceStatus device(const std::string& driver, const std::string& name) {
+DeviceStatus device(const std::string& name, const std::string& hardware) {
   DeviceStatus status;
-  status.driver = driver;
-  status.device = name;
+  status.name = name;
+  status.hardware = hardware;
   return status;
 }
 
-TEST(HardwareId, IsOfDevicesThatHaveASerialNumber) {
-  EXPECT_EQ(hardware_id("aravis", "Maker-Model-17"), "Maker-Model-17");
-  EXPECT_EQ(hardware_id("aravis", "Maker\nModel"), "Maker Model");
-  EXPECT_EQ(hardware_id("v4l2", "/dev/v4l/by-id/usb-Maker_Model_17-video-index0"), "usb-Maker_Model_17-video-index0");
-  EXPECT_EQ(hardware_id("v4l2", "/nowhere/video0"), "");
-  EXPECT_EQ(hardware_id("file", "frames"), "");
-  RandrOutput output;
-  output.model = "Maker Model";
-  EXPECT_EQ(hardware_id(output), "");
-  output.serial = "17";
-  EXPECT_EQ(hardware_id(output), "Maker Model 17");
+/// A calibration of two cameras, and of the devices.
+Calibration calibrated_with(const RigStatus& rig) {
+  Calibration calibration = paper_rig();
+  calibration.cameras.front().name = "left";
+  calibration.cameras.push_back(calibration.cameras.front());
+  calibration.cameras.back().name = "right";
+  note_hardware(rig, calibration);
+  return calibration;
+}
+
+TEST(CameraHardware, IsOfDevicesThatHaveASerialNumber) {
+  EXPECT_EQ(camera_hardware("aravis", "Maker-Model-17"), "Maker-Model-17");
+  EXPECT_EQ(camera_hardware("aravis", "Maker\nModel"), "Maker Model");
+  EXPECT_EQ(camera_hardware("v4l2", "/dev/v4l/by-id/usb-Maker_Model_17-video-index0"),
+            "usb-Maker_Model_17-video-index0");
+  EXPECT_EQ(camera_hardware("v4l2", "/nowhere/video0"), "");
+  EXPECT_EQ(camera_hardware("file", "frames"), "");
+}
+
+TEST(ProjectorHardware, IsOfDevicesThatHaveASerialNumber) {
+  EXPECT_EQ(projector_hardware("Maker Model", ""), "");
+  EXPECT_EQ(projector_hardware("Maker Model", "17"), "Maker Model 17");
+  EXPECT_EQ(projector_hardware("", "17"), "17");
 }
 
 TEST(NoteHardware, WritesDownWhatCanBeTold) {
-  Calibration calibration = paper_rig();
-  calibration.cameras.push_back(calibration.cameras.front());
-  note_hardware({}, {}, calibration);
-  EXPECT_TRUE(calibration.report.camera_serials.empty());
-  const std::vector<DeviceStatus> cameras{device("file", "frames"), device("aravis", "Maker-Model-17")};
-  note_hardware(cameras, {}, calibration);
-  EXPECT_THAT(calibration.report.camera_serials, ElementsAre("", "Maker-Model-17"));
-  EXPECT_FALSE(calibration.report.projector_serial);
-  EXPECT_EQ(calibrated_hardware(calibration, calibration.cameras[1]), "Maker-Model-17");
-  const Calibration unknown = paper_rig();
+  const Calibration unknown = calibrated_with({device("projector", ""), {device("left", ""), device("right", "")}});
+  EXPECT_TRUE(unknown.report.camera_serials.empty());
+  EXPECT_FALSE(unknown.report.projector_serial);
   EXPECT_EQ(calibrated_hardware(unknown, unknown.cameras[0]), "");
+  const Calibration known = calibrated_with({device("projector", "P-1"), {device("left", ""), device("right", "C-1")}});
+  EXPECT_THAT(known.report.camera_serials, ElementsAre("", "C-1"));
+  EXPECT_EQ(known.report.projector_serial, "P-1");
+  EXPECT_EQ(calibrated_hardware(known, known.cameras[1]), "C-1");
+}
+
+TEST(CheckHardware, NamesTheDeviceOfARigThatIsAnother) {
+  const RigStatus rig{device("projector", "P-1"), {device("left", "C-1"), device("right", "C-2")}};
+  const Calibration calibration = calibrated_with(rig);
+  EXPECT_TRUE(check_hardware(calibration, rig));
+  EXPECT_TRUE(check_hardware(paper_rig(), rig));
+  RigStatus other = rig;
+  other.cameras[1].hardware = "C-3";
+  EXPECT_EQ(check_hardware(calibration, other).error().where, "camera right");
+  other = rig;
+  other.projector.hardware = "P-2";
+  EXPECT_EQ(check_hardware(calibration, other).error().where, "projector");
 }
 
 TEST(CheckHardware, RefusesAnotherDeviceWhereBothAreKnown) {
