@@ -9,6 +9,8 @@
 #include <thread>
 #include <utility>
 
+#include "daemon/scan/hardware.hpp"
+
 namespace slsd {
 namespace {
 
@@ -40,7 +42,7 @@ DeviceStatus Projection::status() const {
 
 void Projection::set_pattern(Grey8 pattern) {
   pattern_ = std::move(pattern);
-  if (shown_ == Shown::kPattern || holding_) shown_ = Shown::kNothing;
+  if (shown_ == Shown::kPattern || held_) shown_ = Shown::kNothing;
 }
 
 void Projection::set_idle(std::optional<Grey8> picture, std::chrono::milliseconds after) {
@@ -49,32 +51,26 @@ void Projection::set_idle(std::optional<Grey8> picture, std::chrono::millisecond
   if (shown_ == Shown::kIdle) shown_ = Shown::kNothing;
 }
 
-void Projection::hold(std::optional<Grey8> picture) {
-  held_picture_ = std::move(picture);
-  holding_ = true;
+void Projection::set_held(std::optional<Held> held) {
+  if (!held) last_scan_ = {};
+  held_ = std::move(held);
   if (shown_ == Shown::kHeld) shown_ = Shown::kNothing;
 }
 
-void Projection::release() {
-  holding_ = false;
-  held_picture_.reset();
-  last_scan_ = {};
-}
-
 Projection::Shown Projection::due() const {
-  if (holding_) return Shown::kHeld;
+  if (held_) return Shown::kHeld;
   return idle_ && steady_clock::now() - last_scan_ >= idle_after_ ? Shown::kIdle : Shown::kPattern;
 }
 
 MonotonicTime Projection::next_change() const {
   if (shown_ == Shown::kNothing) return next_attempt_;
-  const bool idle_comes = idle_ && !holding_ && shown_ != Shown::kIdle;
+  const bool idle_comes = idle_ && !held_ && shown_ != Shown::kIdle;
   return idle_comes ? last_scan_ + idle_after_ : MonotonicTime::max();
 }
 
 const Grey8& Projection::image(Shown which) {
   if (which == Shown::kIdle) return *idle_;
-  if (which == Shown::kHeld && held_picture_) return *held_picture_;
+  if (which == Shown::kHeld && held_->picture) return *held_->picture;
   if (which != Shown::kWhite && which != Shown::kBlack) return pattern_;
   if (plain_.empty()) plain_ = Grey8(pattern_.width(), pattern_.height());
   std::fill_n(plain_.data(), plain_.size(), which == Shown::kWhite ? 255 : 0);
@@ -128,7 +124,9 @@ void Projection::note(const Result<>& outcome) {
   if (!status_.problem.empty()) spdlog::info("projector: open again");
   if (!is_open(status_.state)) {
     ++status_.opened;
-    status_.device = projector_->description().monitor;
+    const ProjectorDescription& description = projector_->description();
+    status_.device = description.monitor;
+    status_.hardware = projector_hardware(description.model, description.serial);
     for (const std::string& warning : projector_->warnings()) spdlog::warn("projector {}: {}", status_.device, warning);
   }
   status_.state = DeviceState::kReady;
@@ -152,9 +150,25 @@ Result<> Projection::await(Shown which, MonotonicTime deadline, const std::stop_
 }
 
 Result<> Projection::show(Picture picture, MonotonicTime deadline, const std::stop_token& stop) {
-  release();
+  set_held(std::nullopt);
   auto shown = await(static_cast<Shown>(picture), deadline, stop);
   last_scan_ = steady_clock::now();
+  return shown;
+}
+
+Result<> Projection::hold(std::optional<Grey8> picture, MonotonicTime deadline, const std::stop_token& stop) {
+  return show_held(Held{std::move(picture)}, deadline, stop);
+}
+
+Result<> Projection::release(MonotonicTime deadline, const std::stop_token& stop) {
+  return show_held(std::nullopt, deadline, stop);
+}
+
+Result<> Projection::show_held(std::optional<Held> held, MonotonicTime deadline, const std::stop_token& stop) {
+  std::optional<Held> before = held_;
+  set_held(std::move(held));
+  auto shown = show_due(deadline, stop);
+  if (!shown) set_held(std::move(before));
   return shown;
 }
 

@@ -39,10 +39,12 @@ class Projection {
   /// What is shown when nobody has scanned for a while; nothing: the pattern stays.
   void set_idle(std::optional<Grey8> picture, std::chrono::milliseconds after);
 
-  /// Shows a picture until a scan, another hold() or release(). @param picture  nothing: the pattern
-  void hold(std::optional<Grey8> picture);
-  /// Goes on to the idle picture, at once.
-  void release();
+  /// Shows a picture until a scan, another hold() or release(); returns when it is visible.
+  /// @param picture  nothing: the pattern
+  /// @errors as show(); what was held before then still is
+  [[nodiscard]] Result<> hold(std::optional<Grey8> picture, MonotonicTime deadline, const std::stop_token& stop);
+  /// Goes on to the idle picture, at once. @errors as hold()
+  [[nodiscard]] Result<> release(MonotonicTime deadline, const std::stop_token& stop);
 
   /// Opens the projector and shows what is due; notices that it is gone.
   void supervise();
@@ -66,10 +68,15 @@ class Projection {
 
  private:
   enum class Shown { kPattern, kWhite, kBlack, kIdle, kHeld, kNothing };
+  struct Held {
+    std::optional<Grey8> picture;  ///< nothing: the pattern
+  };
   [[nodiscard]] Shown due() const;
   [[nodiscard]] const Grey8& image(Shown which);
   [[nodiscard]] Result<> open_and_show(Shown which);
   [[nodiscard]] Result<> await(Shown which, MonotonicTime deadline, const std::stop_token& stop);
+  [[nodiscard]] Result<> show_held(std::optional<Held> held, MonotonicTime deadline, const std::stop_token& stop);
+  void set_held(std::optional<Held> held);
   void look();
   void attempt(Shown which);
   void note(const Result<>& outcome);
@@ -78,8 +85,7 @@ class Projection {
   Grey8 pattern_;
   Grey8 plain_;  ///< white or black, kept for its memory
   std::optional<Grey8> idle_;
-  std::optional<Grey8> held_picture_;
-  bool holding_ = false;
+  std::optional<Held> held_;
   std::chrono::milliseconds idle_after_{0};
   std::chrono::microseconds latency_;
   Backoff backoff_;

@@ -71,20 +71,18 @@ std::vector<DeviceStatus> Rig::camera_statuses() const {
   return statuses;
 }
 
-std::uint64_t Rig::camera_openings() const {
-  std::uint64_t openings = 0;
+std::uint64_t Rig::openings() const {
+  std::uint64_t openings = projection_.status().opened;
   for (const CameraRunner* camera : cameras_) openings += camera->openings();
   return openings;
 }
 
 Result<> Rig::hold(std::optional<Grey8> picture, MonotonicTime deadline) {
-  projection_.hold(std::move(picture));
-  return projection_.show_due(deadline, stopping_.get_token());
+  return projection_.hold(std::move(picture), deadline, stopping_.get_token());
 }
 
 Result<> Rig::release(MonotonicTime deadline) {
-  projection_.release();
-  return projection_.show_due(deadline, stopping_.get_token());
+  return projection_.release(deadline, stopping_.get_token());
 }
 
 Result<std::vector<Frame>> Rig::expose(Cameras cameras, const Shot& shot) {

@@ -39,6 +39,7 @@ class ProjectionTest : public ::testing::Test {
   }
 
   Result<> show(Picture picture = Picture::kPattern) { return projection_->show(picture, in(30s), {}); }
+  Result<> hold(std::optional<Grey8> picture) { return projection_->hold(std::move(picture), in(30s), {}); }
   Result<> show_due() { return projection_->show_due(in(30s), {}); }
   Grey8 shown() { return *projector_->read_back(); }
   static MonotonicTime in(std::chrono::nanoseconds time) { return steady_clock::now() + time; }
@@ -85,8 +86,7 @@ TEST_F(ProjectionTest, WaitsAfterAScanWithTheIdlePicture) {
 TEST_F(ProjectionTest, HoldsAPictureUntilAScan) {
   projection_->set_idle(plain(7), 0ms);
   for (const auto value : {std::uint8_t{1}, std::uint8_t{2}}) {
-    projection_->hold(plain(value));
-    ASSERT_TRUE(show_due());
+    ASSERT_TRUE(hold(plain(value)));
     projection_->supervise();
     EXPECT_EQ(shown(), plain(value));
     EXPECT_EQ(projection_->status().shows, "held");
@@ -99,15 +99,28 @@ TEST_F(ProjectionTest, HoldsAPictureUntilAScan) {
 
 TEST_F(ProjectionTest, HoldsThePatternAsItIs) {
   projection_->set_idle(plain(7), 0ms);
-  projection_->hold(std::nullopt);
-  projection_->supervise();
+  ASSERT_TRUE(hold(std::nullopt));
   EXPECT_EQ(shown(), plain(100));
   projection_->set_pattern(plain(200));
   projection_->supervise();
   EXPECT_EQ(shown(), plain(200));
-  projection_->release();
-  projection_->supervise();
+  ASSERT_TRUE(projection_->release(in(30s), {}));
   EXPECT_EQ(shown(), plain(7));
+}
+
+TEST_F(ProjectionTest, GoesBackToWhatWasHeldWhereAnotherPictureIsNotShownInTime) {
+  projection_->set_idle(plain(7), 0ms);
+  for (const bool held : {false, true}) {
+    if (held) {
+      ASSERT_TRUE(hold(plain(1)));
+    }
+    EXPECT_EQ(projection_->hold(plain(2), in(-1s), {}).error().code, ErrorCode::kTimeout);
+    projection_->supervise();
+    EXPECT_EQ(shown(), plain(held ? 1 : 7));
+  }
+  EXPECT_EQ(projection_->release(in(-1s), {}).error().code, ErrorCode::kTimeout);
+  projection_->supervise();
+  EXPECT_EQ(shown(), plain(1));
 }
 
 TEST_F(ProjectionTest, ShowsWhiteAndBlack) {
@@ -138,8 +151,7 @@ TEST_F(ProjectionTest, WaitsAsLongAsTheDeviceIsLate) {
 }
 
 TEST_F(ProjectionTest, ShowsWhatItShowedWhenItIsBack) {
-  projection_->hold(plain(3));
-  ASSERT_TRUE(show_due());
+  ASSERT_TRUE(hold(plain(3)));
   projector_->disconnect();
   EXPECT_EQ(projection_->check().error().code, ErrorCode::kDisconnected);
   ASSERT_TRUE(show_due());
