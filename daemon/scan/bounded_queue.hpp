@@ -19,8 +19,8 @@ class BoundedQueue {
  public:
   explicit BoundedQueue(std::size_t capacity) : capacity_(capacity) {}
 
-  /// Whether there was room.
-  [[nodiscard]] bool try_push(Item item) {
+  /// Whether there was room; where there was none the item is left as it is.
+  [[nodiscard]] bool try_push(Item&& item) {
     {
       const std::lock_guard lock(mutex_);
       if (items_.size() >= capacity_) return false;

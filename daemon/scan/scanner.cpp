@@ -70,8 +70,12 @@ void Scanner::run(const std::stop_token& stop) {
   name_this_thread("scanner");
   while (!stop.stop_requested()) {
     heartbeat_.promise(kIdlePromise);
-    if (!free_scan_due()) rig_->supervise();  // else a scan follows, and the idle picture would only flash
+    if (!free_scan_due()) {
+      every_frame_ = false;  // by the next free scan the cameras' frames may be of long ago
+      rig_->supervise();     // not before a scan: the idle picture would only flash
+    }
     if (auto job = queue_.pop_until(next_wake(), stop)) {
+      every_frame_ = false;
       (*job)({});
     } else if (free_scan_due()) {
       scan_freely();
@@ -95,29 +99,35 @@ MonotonicTime Scanner::next_wake() const {
 }
 
 void Scanner::submit(Job job) {
-  Job refused = job;
   if (!queue_.try_push(std::move(job))) {
-    refused(fail(ErrorCode::kBusy, std::to_string(kMaxWaiting) + " requests wait already: ask again later"));
+    job(fail(ErrorCode::kBusy, std::to_string(kMaxWaiting) + " requests wait already: ask again later"));
   }
 }
 
 // Where the frames under way are all that a camera lends, its next waits for one of them.
-Result<FrameSet> Scanner::capture(const ScanRequest& request, Exposure exposure) {
-  heartbeat_.promise(request.deadline - steady_clock::now() + kWorkPromise);
-  if (auto possible = setup_->check(request); !possible) return tl::unexpected(possible.error());
+template <class Take>
+auto Scanner::take_frames(MonotonicTime deadline, Take take) {
   while (true) {
     const std::uint64_t done = lanes_.done();
-    auto set = rig_->capture(request.deadline, exposure, {request.texture, request.ambient});
-    const bool lacks_frames = !set && set.error().code == ErrorCode::kBusy;
-    if (set) {
-      if (auto same = hardware_.check(setup_, *rig_); !same) return tl::unexpected(same.error());
-    }
-    if (!lacks_frames || !lanes_.wait_done(done, request.deadline)) return set;
+    auto taken = take();
+    const bool lacks_frames = !taken && taken.error().code == ErrorCode::kBusy;
+    if (!lacks_frames || !lanes_.wait_done(done, deadline)) return taken;
   }
 }
 
+Result<FrameSet> Scanner::capture(const ScanRequest& request, Exposure exposure) {
+  heartbeat_.promise(request.deadline - steady_clock::now() + kWorkPromise);
+  if (auto possible = setup_->check(request); !possible) return tl::unexpected(possible.error());
+  return take_frames(request.deadline, [&]() -> Result<FrameSet> {
+    auto set = rig_->capture(request.deadline, exposure, {request.texture, request.ambient});
+    if (!set) return set;
+    if (auto same = hardware_.check(setup_, *rig_); !same) return tl::unexpected(same.error());
+    return set;
+  });
+}
+
 std::unique_ptr<ScanJob> Scanner::decoding(Result<FrameSet> set, const ScanRequest& request, bool listened,
-                                           std::function<void(const Result<ScanResult>&)> answer) {
+                                           Answer<ScanResult> answer) {
   const std::uint64_t number = ++scans_;
   const std::string scan_id = run_id_ + "-" + std::to_string(number);
   auto told = [this, setup = setup_, number, scan_id, listened, answer = std::move(answer)](Result<ScanResult> result) {
@@ -165,7 +175,9 @@ void Scanner::frame(const FrameRequest& request, Answer<FrameImage> answer) {
     if (!permission) return answer(tl::unexpected(permission.error()));
     heartbeat_.promise(request.deadline - steady_clock::now() + kWorkPromise);
     if (auto known = setup_->check_camera(request.camera); !known) return answer(tl::unexpected(known.error()));
-    auto frame = rig_->capture_one(setup_->camera_index(request.camera), request.deadline, request.as_shown);
+    const std::size_t camera = setup_->camera_index(request.camera);
+    auto frame =
+        take_frames(request.deadline, [&] { return rig_->capture_one(camera, request.deadline, request.as_shown); });
     if (!frame) return answer(tl::unexpected(frame.error()));
     lanes_.push(std::make_unique<ImageJob>(std::move(*frame), request.as_png, answer));
   });

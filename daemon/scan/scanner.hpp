@@ -35,7 +35,7 @@ using FreeScan = std::shared_ptr<const Result<ScanResult>>;  // shared: every su
 class Scanner {
  public:
   template <class Value>
-  using Answer = std::function<void(Result<Value>)>;
+  using Answer = std::function<void(const Result<Value>&)>;
 
   Scanner(std::unique_ptr<Rig> rig, ScanSetup setup);
   ~Scanner();
@@ -85,9 +85,11 @@ class Scanner {
   void scan_freely();
   [[nodiscard]] MonotonicTime next_wake() const;
   [[nodiscard]] bool free_scan_due() const;
+  template <class Take>
+  [[nodiscard]] auto take_frames(MonotonicTime deadline, Take take);
   [[nodiscard]] Result<FrameSet> capture(const ScanRequest& request, Exposure exposure);
   [[nodiscard]] std::unique_ptr<ScanJob> decoding(Result<FrameSet> set, const ScanRequest& request, bool listened,
-                                                  std::function<void(const Result<ScanResult>&)> answer);
+                                                  Answer<ScanResult> answer);
   void conclude(const SharedSetup& setup, std::uint64_t number, const std::string& scan_id, Result<ScanResult>& result);
   void submit(Job job);
   void log_outcome(const std::string& scan_id, const Result<ScanResult>& result);
