@@ -48,6 +48,7 @@ Result<> ProjectorScreen::open() {
 }
 
 void ProjectorScreen::close() {
+  swapped_ = false;
   clock_.reset();
   painter_.reset();
   window_.reset();
@@ -103,7 +104,15 @@ Result<> ProjectorScreen::open_window() {
 
 void ProjectorScreen::redraw() {
   painter_->draw();
+  settle();
+  clock_->prepare();
   window_->swap();
+  swapped_ = true;
+}
+
+// One swap at a time: what tells that one is complete does not tell which.
+void ProjectorScreen::settle() {
+  if (std::exchange(swapped_, false)) static_cast<void>(clock_->wait_refresh());
 }
 
 Result<> ProjectorScreen::check_open() const {
@@ -117,6 +126,7 @@ Result<MonotonicTime> ProjectorScreen::show(const Grey8& image) {
   if (auto there = check_open(); !there) return tl::unexpected(there.error());
   painter_->load(image);
   painter_->draw();
+  settle();
   clock_->prepare();
   window_->swap();
   auto refresh = clock_->wait_refresh();

@@ -62,6 +62,7 @@ class ProjectorScreen {
   [[nodiscard]] Result<> check_open() const;
   [[nodiscard]] bool is_in_place() const;
   void redraw();
+  void settle();
 
   GlfwProjectorOptions options_;
   RandrOutput output_;
@@ -71,6 +72,7 @@ class ProjectorScreen {
   std::unique_ptr<FullscreenWindow> window_;
   std::optional<TexelPainter> painter_;
   std::unique_ptr<RefreshClock> clock_;
+  bool swapped_ = false;  ///< and nobody waited for it
 };
 
 }  // namespace slsd
