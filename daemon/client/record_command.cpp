@@ -28,8 +28,8 @@ constexpr auto kPatience = 60s;
 
 // What passes by itself, or when a hand plugs something in again.
 bool passes(const Failure& failure) {
-  constexpr std::array kPassing{"frame_dropped", "frame_torn",   "frame_stale", "frame_late",
-                                "timeout",       "disconnected", "busy"};
+  constexpr std::array kPassing{"frame_dropped", "frame_torn", "frame_stale",  "frame_late",
+                                "frame_skewed",  "timeout",    "disconnected", "busy"};
   for (const char* name : kPassing) {
     if (failure.error.name == name) return true;
   }

@@ -9,6 +9,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr int kSkewMaxMs = 10'000;  // files have no exposure; the skew is that of two threads
+
 bool plain(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
 }
@@ -38,7 +40,7 @@ std::vector<RecordedCamera> recorded_cameras(const json& settings) {
     std::ranges::replace_if(
         folder, [](char c) { return !plain(c); }, '_');
     const auto taken = [&](const RecordedCamera& other) { return other.folder == folder; };
-    if (folder.empty() || folder == "clouds" || std::ranges::any_of(cameras, taken)) {
+    while (folder.empty() || folder == "clouds" || std::ranges::any_of(cameras, taken)) {
       folder.append("-").append(std::to_string(cameras.size()));
     }
     cameras.push_back({name, folder});
@@ -53,6 +55,7 @@ std::string replay_configuration(const json& settings, const std::vector<Recorde
   text += "\n[projector]\n" + line("driver", "headless") + lines(settings.value("projector", json::object()));
   for (const RecordedCamera& camera : cameras) text += camera_table(camera);
   text += "\n[calibration]\n" + line("file", "calibration.yml");
+  text += "\n[scan]\n" + line("exposure_skew_ms", kSkewMaxMs);
   text += "\n[decode]\n" + lines(decode);
   text += "\n[server]\n" + line("socket", "slsd.sock");
   return text;

@@ -26,7 +26,7 @@ std::string drift_line(const json& camera) {
   if (!drift.is_object() || !drift.value("off_since_scan", json()).is_number()) return {};
   return fmt::format(
       "            knocked out of its calibration since scan {}: {:.2f} px off the epipolar lines, {:.2f} are fine\n",
-      drift.value("off_since_scan", 0), drift.value("epipolar_px", 0.0), drift.value("limit_px", 0.0));
+      drift.value("off_since_scan", std::uint64_t{0}), drift.value("epipolar_px", 0.0), drift.value("limit_px", 0.0));
 }
 
 std::string device_line(const json& device) {
@@ -35,14 +35,15 @@ std::string device_line(const json& device) {
                                  device.value("height_px", 0));
   if (const std::string shows = device.value("shows", ""); !shows.empty()) line += ", shows " + shows;
   if (device.contains("frames")) {
-    line += fmt::format(", {} frames, {} lost", device.value("frames", 0), device.value("frames_lost", 0));
+    line += fmt::format(", {} frames, {} lost", device.value("frames", std::uint64_t{0}),
+                        device.value("frames_lost", std::uint64_t{0}));
   }
   const std::string problem = device.value("problem", "");
   return line + (problem.empty() ? "\n" : "\n            " + problem + "\n") + drift_line(device);
 }
 
 std::string scans_lines(const json& scans) {
-  std::string text = fmt::format("scans       {} succeeded", scans.value("succeeded", 0));
+  std::string text = fmt::format("scans       {} succeeded", scans.value("succeeded", std::uint64_t{0}));
   const json failed = scans.value("failed", json::object());
   for (const auto& [name, count] : failed.items()) {
     text += fmt::format(", {} {}", count.get<std::uint64_t>(), name);
