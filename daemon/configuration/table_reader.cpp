@@ -119,7 +119,7 @@ void TableReader::read(std::string_view key, std::vector<int>& value) {
   std::vector<int> numbers;
   for (std::size_t i = 0; array != nullptr && i < std::min(array->size(), kLongestList); ++i) {
     const auto number = array->get(i)->value_exact<std::int64_t>();
-    if (number && std::abs(*number) <= std::numeric_limits<int>::max()) numbers.push_back(static_cast<int>(*number));
+    if (number && std::in_range<int>(*number)) numbers.push_back(static_cast<int>(*number));
   }
   if (array == nullptr || numbers.size() != array->size()) return refuse(key, "must be a list of whole numbers");
   value = std::move(numbers);
