@@ -48,7 +48,9 @@ class Subscription {
   /// Takes a scan in, unless it comes sooner than the client wants one.
   void offer(SharedPublication publication, Clock::time_point now);
   /// Clouds that were replaced before this client's session saw them.
-  void note_lost(std::uint64_t count) { lost_ += count; }
+  void note_lost(std::uint64_t count) {
+    if (!rate_hz_) lost_ += count;  // else the next cloud is as good
+  }
   /// The event to send next, with the number of clouds lost since the one before; nothing where none waits.
   [[nodiscard]] std::optional<Outgoing> take(Clock::time_point now);
 
