@@ -24,7 +24,7 @@ struct RpcError {
 
 /// "frame_stale".
 [[nodiscard]] std::string_view to_string(ErrorCode code);
-/// The number by which a client knows the code: -32001 to -32018.
+/// The number by which a client knows the code: -32001 to -32019.
 [[nodiscard]] int rpc_code(ErrorCode code);
 
 [[nodiscard]] RpcError parse_error(std::string message);
