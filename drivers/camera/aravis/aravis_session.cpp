@@ -2,7 +2,6 @@
 // Copyright the slsd authors
 #include "drivers/camera/aravis/aravis_session.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -20,7 +19,6 @@ using std::chrono::steady_clock;
 constexpr int kWarmUpTries = 3;
 constexpr int kFirstClockReadings = 8;
 constexpr auto kAnswerTime = 100ms;
-constexpr auto kQuietLeast = 50ms;
 constexpr auto kReadoutMost = 1s;
 
 }  // namespace
@@ -56,8 +54,7 @@ bool AravisSession::answers() {
 }
 
 Result<> AravisSession::check() {
-  if (const std::string reason = events_.lost_reason(); !reason.empty()) return lost(reason);
-  return {};
+  return frame_capture_->check();
 }
 
 Result<> AravisSession::prepare() {
@@ -78,6 +75,7 @@ Result<> AravisSession::prepare() {
   if (auto done = join_group(); !done) return done;
   if (auto done = start(options_.trigger); !done) return done;
   control_ = std::make_unique<DeviceControl>(device_.camera.get(), events_, number_, first_clock_);
+  frame_capture_.emplace(options_, device_.name, events_, *receiver_, *control_, action_ ? &*action_ : nullptr);
   return {};
 }
 
@@ -91,6 +89,7 @@ Result<> AravisSession::join_group() {
 
 void AravisSession::abandon() {
   abandoned_ = true;
+  frame_capture_.reset();
   action_.reset();
 }
 
@@ -177,132 +176,11 @@ Result<> AravisSession::stop() {
 }
 
 Result<Frame> AravisSession::capture(MonotonicTime deadline) {
-  if (events_.take_cancel()) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
-  if (deadline <= steady_clock::now()) return fail_here(ErrorCode::kFrameLate, "the deadline is past");
-  if (receiver_->all_held()) return fail_here(ErrorCode::kBusy, "all frames are held; give some back first");
-  if (auto settled = settle(deadline); !settled) return tl::unexpected(settled.error());
-  const MonotonicTime asked = steady_clock::now();
-  trigger(asked);
-  return await_frame(asked, deadline);
+  return frame_capture_->capture(deadline);
 }
 
-void AravisSession::trigger(MonotonicTime now) {
-  if (action_) return action_->trigger(action_time());
-  if (options_.trigger != AravisTrigger::kSoftware) return;
-  triggered_ = now;
-  ++frames_due_;
-  control_->trigger();
-}
-
-// A clock that follows the network's ticks in nanoseconds.
-std::optional<std::uint64_t> AravisSession::action_time() const {
-  if (options_.action_lead_us == 0.0 || !first_clock_.ready()) return std::nullopt;
-  const MonotonicTime when = steady_clock::now() + from_us(options_.action_lead_us);
-  return static_cast<std::uint64_t>(control_->clock().device_time(when).count());
-}
-
-// After a pause what waits is old, and the time that a frame may take is over.
 Result<Frame> AravisSession::capture_since(MonotonicTime since, MonotonicTime deadline) {
-  if (steady_clock::now() - since > frame_patience(options_) / 2) return capture(deadline);
-  if (events_.take_cancel()) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
-  if (deadline <= steady_clock::now()) return fail_here(ErrorCode::kFrameLate, "the deadline is past");
-  if (receiver_->all_held()) return fail_here(ErrorCode::kBusy, "all frames are held; give some back first");
-  return await_frame(since, deadline);
-}
-
-// Frames of captures that were cancelled or late must have come, or been given up, before the next trigger: a frame
-// tells which trigger it answers by its time only.
-Result<> AravisSession::settle(MonotonicTime deadline) {
-  while (events_.take_buffer()) {
-    receiver_->discard();
-    if (frames_due_ > 0) --frames_due_;
-  }
-  if (options_.trigger != AravisTrigger::kSoftware) return {};
-  if (out_of_step_)
-    if (auto quiet = wait_until_quiet(deadline); !quiet) return quiet;
-  const MonotonicTime limit = std::min(deadline, triggered_ + frame_patience(options_));
-  while (frames_due_ > 0 || !events_.trigger_answered()) {
-    const auto wake = frames_due_ > 0 ? events_.wait_buffer(limit) : events_.wait_trigger_answered(limit);
-    if (wake == CaptureEvents::Wake::kLost) return lost(events_.lost_reason());
-    if (wake == CaptureEvents::Wake::kCancelled) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
-    if (wake == CaptureEvents::Wake::kTimeout) {
-      if (deadline <= limit)
-        return fail_here(ErrorCode::kFrameLate, "the frame of the trigger before has not come yet");
-      const auto error = missed(deadline);
-      if (error.value().code == ErrorCode::kDisconnected) return error;
-    } else if (frames_due_ > 0) {
-      receiver_->discard();
-      --frames_due_;
-    }
-  }
-  return {};
-}
-
-// After a frame of an earlier trigger each capture would else get the frame of the one before it, for ever.
-Result<> AravisSession::wait_until_quiet(MonotonicTime deadline) {
-  const auto quiet = std::min<std::chrono::nanoseconds>(2 * longest_wait_ + kQuietLeast, frame_patience(options_));
-  for (;;) {
-    const auto wake = events_.wait_buffer(std::min(deadline, steady_clock::now() + quiet));
-    if (wake == CaptureEvents::Wake::kLost) return lost(events_.lost_reason());
-    if (wake == CaptureEvents::Wake::kCancelled) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
-    if (wake == CaptureEvents::Wake::kTimeout) break;
-    receiver_->discard();
-  }
-  receiver_->discard_all();
-  frames_due_ = 0;
-  out_of_step_ = false;
-  return {};
-}
-
-Result<Frame> AravisSession::await_frame(MonotonicTime asked, MonotonicTime deadline) {
-  const bool paced = options_.trigger != AravisTrigger::kLine;
-  const MonotonicTime limit = paced ? std::min(deadline, asked + frame_patience(options_)) : deadline;
-  for (;;) {
-    switch (events_.wait_buffer(limit)) {
-      case CaptureEvents::Wake::kCancelled:
-        return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
-      case CaptureEvents::Wake::kLost:
-        return lost(events_.lost_reason());
-      case CaptureEvents::Wake::kTimeout:
-        if (deadline <= limit && steady_clock::now() - asked < frame_patience(options_))
-          return fail_here(ErrorCode::kFrameLate, "no frame came before the deadline");
-        return missed(deadline);
-      case CaptureEvents::Wake::kBuffer:
-        if (auto judged = judge(asked)) return std::move(*judged);
-    }
-  }
-}
-
-// Passed over is a stale frame of a line or clock that runs on, and what still comes of a trigger given up before.
-std::optional<Result<Frame>> AravisSession::judge(MonotonicTime asked) {
-  auto taken = receiver_->take(asked, control_->clock());
-  const bool software = options_.trigger == AravisTrigger::kSoftware;
-  if (!taken && !software && taken.error().code == ErrorCode::kFrameStale) return std::nullopt;
-  if (!taken && software && frames_missed_ > 0) return --frames_missed_, std::nullopt;
-  if (frames_due_ > 0) --frames_due_;
-  out_of_step_ = !taken && taken.error().code == ErrorCode::kFrameStale;
-  if (!taken) return Result<Frame>(tl::unexpected(taken.error()));
-  if (!*taken) return std::nullopt;
-  longest_wait_ = std::max(longest_wait_, steady_clock::now() - asked);
-  frames_missed_ = 0;
-  return Result<Frame>(std::move(**taken));
-}
-
-tl::unexpected<Error> AravisSession::missed(MonotonicTime deadline) {
-  if (options_.trigger == AravisTrigger::kSoftware && !events_.trigger_answered())
-    return lost("the camera does not answer a trigger");
-  frames_due_ = 0;
-  ++frames_missed_;
-  // Without the device's clock a frame that comes after all would be taken for the next.
-  const bool enough = frames_missed_ >= options_.missed_frames_max || !first_clock_.ready();
-  if (options_.trigger != AravisTrigger::kLine && enough) return lost("the camera answers, and sends no frames");
-  if (steady_clock::now() >= deadline) return fail_here(ErrorCode::kFrameLate, "no frame came before the deadline");
-  return fail_here(ErrorCode::kFrameDropped, "no frame came within " + std::to_string(options_.frame_timeout_ms) +
-                                                 " ms; it is lost, or frame_timeout_ms is too short");
-}
-
-tl::unexpected<Error> AravisSession::lost(const std::string& reason) {
-  return fail_here(ErrorCode::kDisconnected, reason + "; check power, cable and network of " + device_.name);
+  return frame_capture_->capture_since(since, deadline);
 }
 
 tl::unexpected<Error> AravisSession::fail_here(ErrorCode code, std::string message) const {

@@ -17,6 +17,7 @@
 #include "drivers/camera/aravis/configure_chunks.hpp"
 #include "drivers/camera/aravis/configure_network.hpp"
 #include "drivers/camera/aravis/device_control.hpp"
+#include "drivers/camera/aravis/frame_capture.hpp"
 #include "drivers/camera/aravis/frame_receiver.hpp"
 #include "drivers/camera/aravis/g_object.hpp"
 #include "drivers/camera/aravis/open_device.hpp"
@@ -76,15 +77,6 @@ class AravisSession {
   [[nodiscard]] Result<> stop();
   [[nodiscard]] FirstFrame wait_for_first_frame(AravisTrigger trigger, std::chrono::nanoseconds time);
   void read_clock_first();
-
-  void trigger(MonotonicTime now);
-  [[nodiscard]] Result<> wait_until_quiet(MonotonicTime deadline);
-  [[nodiscard]] std::optional<std::uint64_t> action_time() const;
-  [[nodiscard]] Result<> settle(MonotonicTime deadline);
-  [[nodiscard]] Result<Frame> await_frame(MonotonicTime asked, MonotonicTime deadline);
-  [[nodiscard]] std::optional<Result<Frame>> judge(MonotonicTime asked);
-  [[nodiscard]] tl::unexpected<Error> missed(MonotonicTime deadline);
-  [[nodiscard]] tl::unexpected<Error> lost(const std::string& reason);
   [[nodiscard]] tl::unexpected<Error> fail_here(ErrorCode code, std::string message) const;
 
   AravisCameraOptions options_;
@@ -99,13 +91,9 @@ class AravisSession {
   std::unique_ptr<FrameReceiver> receiver_;
   std::unique_ptr<DeviceControl> control_;
   std::optional<ActionGroup::Member> action_;  ///< where the trigger is an action
+  std::optional<FrameCapture> frame_capture_;  ///< once it is prepared, until it is abandoned
   unsigned long control_lost_handler_ = 0;
   bool abandoned_ = false;
-  int frames_due_ = 0;     ///< triggers whose frame has not come
-  int frames_missed_ = 0;  ///< frames in a row that did not come; they may still come late
-  MonotonicTime triggered_;
-  bool out_of_step_ = false;                  ///< the last frame was of an earlier trigger
-  std::chrono::nanoseconds longest_wait_{0};  ///< for a frame
 };
 
 }  // namespace slsd

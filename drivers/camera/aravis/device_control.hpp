@@ -31,6 +31,8 @@ class DeviceControl {
   DeviceControl& operator=(const DeviceControl&) = delete;
 
   void trigger();
+  /// Whether the device has a clock that can be read.
+  [[nodiscard]] bool has_clock() const { return has_clock_; }
   [[nodiscard]] DeviceClock clock() const;
 
  private:
@@ -45,7 +47,7 @@ class DeviceControl {
   std::condition_variable_any asked_;
   bool trigger_ = false;
   DeviceClock clock_;
-  bool has_clock_;
+  const bool has_clock_;
   std::jthread thread_;
 };
 

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/camera/aravis/frame_capture.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "drivers/camera/aravis/frame_patience.hpp"
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+
+constexpr auto kQuietLeast = 50ms;
+
+}  // namespace
+
+FrameCapture::FrameCapture(const AravisCameraOptions& options, const std::string& device_name, CaptureEvents& events,
+                           FrameReceiver& receiver, DeviceControl& control, ActionGroup::Member* action)
+    : options_(options),
+      device_name_(device_name),
+      events_(events),
+      receiver_(receiver),
+      control_(control),
+      action_(action) {}
+
+Result<> FrameCapture::check() const {
+  if (const std::string reason = events_.lost_reason(); !reason.empty()) return lost(reason);
+  return {};
+}
+
+Result<Frame> FrameCapture::capture(MonotonicTime deadline) {
+  if (events_.take_cancel()) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
+  if (deadline <= steady_clock::now()) return fail_here(ErrorCode::kFrameLate, "the deadline is past");
+  if (receiver_.all_held()) return fail_here(ErrorCode::kBusy, "all frames are held; give some back first");
+  if (auto settled = settle(deadline); !settled) return tl::unexpected(settled.error());
+  const MonotonicTime asked = steady_clock::now();
+  trigger(asked);
+  return await_frame(asked, deadline);
+}
+
+void FrameCapture::trigger(MonotonicTime now) {
+  if (action_) return action_->trigger(action_time());
+  if (options_.trigger != AravisTrigger::kSoftware) return;
+  triggered_ = now;
+  ++frames_due_;
+  control_.trigger();
+}
+
+// A clock that follows the network's ticks in nanoseconds.
+std::optional<std::uint64_t> FrameCapture::action_time() const {
+  if (options_.action_lead_us == 0.0 || !control_.has_clock()) return std::nullopt;
+  const MonotonicTime when = steady_clock::now() + from_us(options_.action_lead_us);
+  return static_cast<std::uint64_t>(control_.clock().device_time(when).count());
+}
+
+// After a pause what waits is old, and the time that a frame may take is over.
+Result<Frame> FrameCapture::capture_since(MonotonicTime since, MonotonicTime deadline) {
+  if (steady_clock::now() - since > frame_patience(options_) / 2) return capture(deadline);
+  if (events_.take_cancel()) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
+  if (deadline <= steady_clock::now()) return fail_here(ErrorCode::kFrameLate, "the deadline is past");
+  if (receiver_.all_held()) return fail_here(ErrorCode::kBusy, "all frames are held; give some back first");
+  return await_frame(since, deadline);
+}
+
+// Frames of captures that were cancelled or late must have come, or been given up, before the next trigger: a frame
+// tells which trigger it answers by its time only.
+Result<> FrameCapture::settle(MonotonicTime deadline) {
+  while (events_.take_buffer()) {
+    receiver_.discard();
+    if (frames_due_ > 0) --frames_due_;
+  }
+  if (options_.trigger != AravisTrigger::kSoftware) return {};
+  if (out_of_step_)
+    if (auto quiet = wait_until_quiet(deadline); !quiet) return quiet;
+  const MonotonicTime limit = std::min(deadline, triggered_ + frame_patience(options_));
+  while (frames_due_ > 0 || !events_.trigger_answered()) {
+    const auto wake = frames_due_ > 0 ? events_.wait_buffer(limit) : events_.wait_trigger_answered(limit);
+    if (wake == CaptureEvents::Wake::kLost) return lost(events_.lost_reason());
+    if (wake == CaptureEvents::Wake::kCancelled) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
+    if (wake == CaptureEvents::Wake::kTimeout) {
+      if (deadline <= limit)
+        return fail_here(ErrorCode::kFrameLate, "the frame of the trigger before has not come yet");
+      const auto error = missed(deadline);
+      if (error.value().code == ErrorCode::kDisconnected) return error;
+    } else if (frames_due_ > 0) {
+      receiver_.discard();
+      --frames_due_;
+    }
+  }
+  return {};
+}
+
+// After a frame of an earlier trigger each capture would else get the frame of the one before it, for ever.
+Result<> FrameCapture::wait_until_quiet(MonotonicTime deadline) {
+  const auto quiet = std::min<std::chrono::nanoseconds>(2 * longest_wait_ + kQuietLeast, frame_patience(options_));
+  for (;;) {
+    const auto wake = events_.wait_buffer(std::min(deadline, steady_clock::now() + quiet));
+    if (wake == CaptureEvents::Wake::kLost) return lost(events_.lost_reason());
+    if (wake == CaptureEvents::Wake::kCancelled) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
+    if (wake == CaptureEvents::Wake::kTimeout) break;
+    receiver_.discard();
+  }
+  receiver_.discard_all();
+  frames_due_ = 0;
+  out_of_step_ = false;
+  return {};
+}
+
+Result<Frame> FrameCapture::await_frame(MonotonicTime asked, MonotonicTime deadline) {
+  const bool paced = options_.trigger != AravisTrigger::kLine;
+  const MonotonicTime limit = paced ? std::min(deadline, asked + frame_patience(options_)) : deadline;
+  for (;;) {
+    switch (events_.wait_buffer(limit)) {
+      case CaptureEvents::Wake::kCancelled:
+        return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
+      case CaptureEvents::Wake::kLost:
+        return lost(events_.lost_reason());
+      case CaptureEvents::Wake::kTimeout:
+        if (deadline <= limit && steady_clock::now() - asked < frame_patience(options_))
+          return fail_here(ErrorCode::kFrameLate, "no frame came before the deadline");
+        return missed(deadline);
+      case CaptureEvents::Wake::kBuffer:
+        if (auto judged = judge(asked)) return std::move(*judged);
+    }
+  }
+}
+
+// Passed over is a stale frame of a line or clock that runs on, and what still comes of a trigger given up before.
+std::optional<Result<Frame>> FrameCapture::judge(MonotonicTime asked) {
+  auto taken = receiver_.take(asked, control_.clock());
+  const bool software = options_.trigger == AravisTrigger::kSoftware;
+  if (!taken && !software && taken.error().code == ErrorCode::kFrameStale) return std::nullopt;
+  if (!taken && software && frames_missed_ > 0) return --frames_missed_, std::nullopt;
+  if (frames_due_ > 0) --frames_due_;
+  out_of_step_ = !taken && taken.error().code == ErrorCode::kFrameStale;
+  if (!taken) return Result<Frame>(tl::unexpected(taken.error()));
+  if (!*taken) return std::nullopt;
+  longest_wait_ = std::max(longest_wait_, steady_clock::now() - asked);
+  frames_missed_ = 0;
+  return Result<Frame>(std::move(**taken));
+}
+
+tl::unexpected<Error> FrameCapture::missed(MonotonicTime deadline) {
+  if (options_.trigger == AravisTrigger::kSoftware && !events_.trigger_answered())
+    return lost("the camera does not answer a trigger");
+  frames_due_ = 0;
+  ++frames_missed_;
+  // Without the device's clock a frame that comes after all would be taken for the next.
+  const bool enough = frames_missed_ >= options_.missed_frames_max || !control_.has_clock();
+  if (options_.trigger != AravisTrigger::kLine && enough) return lost("the camera answers, and sends no frames");
+  if (steady_clock::now() >= deadline) return fail_here(ErrorCode::kFrameLate, "no frame came before the deadline");
+  return fail_here(ErrorCode::kFrameDropped, "no frame came within " + std::to_string(options_.frame_timeout_ms) +
+                                                 " ms; it is lost, or frame_timeout_ms is too short");
+}
+
+tl::unexpected<Error> FrameCapture::lost(const std::string& reason) const {
+  return fail_here(ErrorCode::kDisconnected, reason + "; check power, cable and network of " + device_name_);
+}
+
+tl::unexpected<Error> FrameCapture::fail_here(ErrorCode code, std::string message) const {
+  return fail(code, std::move(message), options_.name);
+}
+
+}  // namespace slsd

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/result.hpp"
+#include "drivers/camera/aravis/action_group.hpp"
+#include "drivers/camera/aravis/aravis_camera_options.hpp"
+#include "drivers/camera/aravis/capture_events.hpp"
+#include "drivers/camera/aravis/device_control.hpp"
+#include "drivers/camera/aravis/frame_receiver.hpp"
+#include "drivers/camera/frame.hpp"
+
+namespace slsd {
+
+/// Has a camera that is sending expose, and waits for the frame of that exposure: not for one of a trigger before,
+/// whose capture was cancelled or late.
+/// @thread thread-bound
+class FrameCapture {
+ public:
+  /// All outlive this.
+  /// @param device_name  by which the user knows it
+  /// @param action       null where the trigger is another
+  FrameCapture(const AravisCameraOptions& options, const std::string& device_name, CaptureEvents& events,
+               FrameReceiver& receiver, DeviceControl& control, ActionGroup::Member* action);
+
+  /// @errors kDisconnected: the camera was lost while nobody asked for a frame
+  [[nodiscard]] Result<> check() const;
+  /// @errors as Camera::capture()
+  [[nodiscard]] Result<Frame> capture(MonotonicTime deadline);
+  /// As AravisSession::capture_since().
+  [[nodiscard]] Result<Frame> capture_since(MonotonicTime since, MonotonicTime deadline);
+
+ private:
+  void trigger(MonotonicTime now);
+  [[nodiscard]] std::optional<std::uint64_t> action_time() const;
+  [[nodiscard]] Result<> settle(MonotonicTime deadline);
+  [[nodiscard]] Result<> wait_until_quiet(MonotonicTime deadline);
+  [[nodiscard]] Result<Frame> await_frame(MonotonicTime asked, MonotonicTime deadline);
+  [[nodiscard]] std::optional<Result<Frame>> judge(MonotonicTime asked);
+  [[nodiscard]] tl::unexpected<Error> missed(MonotonicTime deadline);
+  [[nodiscard]] tl::unexpected<Error> lost(const std::string& reason) const;
+  [[nodiscard]] tl::unexpected<Error> fail_here(ErrorCode code, std::string message) const;
+
+  const AravisCameraOptions& options_;
+  const std::string& device_name_;
+  CaptureEvents& events_;
+  FrameReceiver& receiver_;
+  DeviceControl& control_;
+  ActionGroup::Member* action_;
+  int frames_due_ = 0;     ///< triggers whose frame has not come
+  int frames_missed_ = 0;  ///< frames in a row that did not come; they may still come late
+  MonotonicTime triggered_;
+  bool out_of_step_ = false;                  ///< the last frame was of an earlier trigger
+  std::chrono::nanoseconds longest_wait_{0};  ///< for a frame
+};
+
+}  // namespace slsd
