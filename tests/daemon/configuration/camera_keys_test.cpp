@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+
+// The keys of a [[camera]] table, driver by driver.
+#include <optional>
+#include <utility>
+
+#include <gmock/gmock.h>
+
+#include "tests/daemon/configuration/read_text.hpp"
+
+namespace slsd {
+namespace {
+
+using test::error_of;
+using test::read;
+using ::testing::HasSubstr;
+
+TEST(ReadConfiguration, TakesEveryKeyOfV4l2) {
+  const auto configuration = read(R"(
+[[camera]]
+name = "left"
+driver = "v4l2"
+device = "usb-camera"
+format = "Y16"
+width_px = 640
+height_px = 480
+frame_rate_hz = 30
+exposure_us = 16700
+gain_steps = 12
+focus_steps = 40
+power_line_hz = 50
+automatic = false
+readout_us = 8000.5
+settle_frames = 5
+frames_held_max = 4
+faults = ["drop@3"]
+)");
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  const CameraOptions& camera = configuration->cameras.at(0);
+  const V4l2CameraOptions expected{
+      "left", "usb-camera", "Y16", std::pair(640, 480), 30.0, 16700.0, std::nullopt, 12, 40, 50, false, 8000.5, 5, 4};
+  EXPECT_EQ(camera.driver, CameraDriver::kV4l2);
+  EXPECT_EQ(camera.v4l2, expected);
+  EXPECT_EQ(camera.faults.size(), 1U);
+}
+
+TEST(ReadConfiguration, TakesAGainOfV4l2InDecibels) {
+  const auto configuration = read("[[camera]]\ndriver = \"v4l2\"\ndevice = \"x\"\ngain_db = 6\n");
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  EXPECT_EQ(configuration->cameras.at(0).v4l2.gain_db, 6.0);
+}
+
+TEST(ReadConfiguration, TakesEveryKeyOfAravis) {
+  const auto configuration = read(R"(
+[[camera]]
+name = "left"
+driver = "aravis"
+id = "Vendor-1234"
+interface = "192.0.2.1"
+trigger = "line"
+trigger_line = "Line3"
+action_device_key = 4294967295
+action_group_key = 7
+action_group_mask = 2
+action_lead_us = 2000
+ptp = true
+rate_hz = 30
+exposure_us = 16667
+gain_db = 3.5
+pixel_format = "BayerRG12"
+width_px = 640
+height_px = 480
+chunks = false
+packet_bytes = 1500
+packet_delay_us = 2.5
+receive_buffer_bytes = 100000
+packet_resend = false
+packet_socket = false
+frame_timeout_ms = 50
+missed_frames_max = 3
+frames_held_max = 4
+faults = ["drop@3"]
+)");
+  ASSERT_TRUE(configuration) << to_string(configuration.error());
+  const CameraOptions& camera = configuration->cameras.at(0);
+  const AravisCameraOptions expected{.name = "left",
+                                     .id = "Vendor-1234",
+                                     .interface = "192.0.2.1",
+                                     .trigger = AravisTrigger::kLine,
+                                     .trigger_line = "Line3",
+                                     .action = {4294967295, 7, 2},
+                                     .action_lead_us = 2000.0,
+                                     .ptp = true,
+                                     .rate_hz = 30.0,
+                                     .exposure_us = 16667.0,
+                                     .gain_db = 3.5,
+                                     .pixel_format = "BayerRG12",
+                                     .size_px = std::pair(640, 480),
+                                     .chunks = false,
+                                     .packet_bytes = 1500,
+                                     .packet_delay_us = 2.5,
+                                     .receive_buffer_bytes = 100000,
+                                     .packet_resend = false,
+                                     .packet_socket = false,
+                                     .frame_timeout_ms = 50,
+                                     .missed_frames_max = 3,
+                                     .frames_held_max = 4};
+  EXPECT_EQ(camera.driver, CameraDriver::kAravis);
+  EXPECT_EQ(camera.aravis, expected);
+  EXPECT_EQ(camera.faults.size(), 1U);
+}
+
+TEST(ReadConfiguration, NamesTheDriverWhoseKeyItIs) {
+  EXPECT_THAT(error_of("[[camera]]\ndriver = \"v4l2\"\ndevice = \"x\"\nloop = true\n"),
+              HasSubstr("slsd.toml:4:8: [[camera]] loop is a key of the driver \"file\", not of \"v4l2\""));
+  EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\ngain_steps = 1\n"),
+              HasSubstr("gain_steps is a key of the driver \"v4l2\", not of \"file\""));
+}
+
+}  // namespace
+}  // namespace slsd
