@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+
+// What the camera makes of images and folders that are not as they should be.
+#include <filesystem>
+
+#include <gmock/gmock.h>
+
+#include "tests/drivers/camera/file_camera_test.hpp"
+#include "tests/drivers/plain_images.hpp"
+
+namespace slsd {
+namespace {
+
+using test::far_away;
+using test::FileCameraTest;
+using test::ramp16;
+using test::ramp8;
+using test::samples_of;
+using ::testing::HasSubstr;
+
+TEST_F(FileCameraTest, LosesOnlyTheFrameOfABadImage) {
+  test::record(folder_, 4);
+  folder_.write("frame-1.pgm", "P5 12 8 255\nshort");
+  folder_.write("frame-2.pgm", test::pnm_bytes(samples_of(ramp8(12, 9))));
+  FileCamera camera(options());
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(next(camera), 0);
+  EXPECT_EQ(next_error(camera), ErrorCode::kMalformed);
+  const auto other_size = camera.capture(far_away());
+  EXPECT_EQ(other_size.error().code, ErrorCode::kMismatch);
+  EXPECT_THAT(other_size.error().message, HasSubstr("12x9"));
+  EXPECT_EQ(camera.capture(far_away())->sequence(), 3u);
+}
+
+TEST_F(FileCameraTest, RefusesAnotherDepthThanTheFirst) {
+  test::record(folder_, 1);
+  folder_.write("frame-1.pgm", test::pnm_bytes(samples_of(ramp16(12, 8))));
+  FileCamera camera(options());
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(next(camera), 0);
+  EXPECT_EQ(next_error(camera), ErrorCode::kMismatch);
+}
+
+TEST_F(FileCameraTest, RefusesAnotherSizeThanExpected) {
+  test::record(folder_, 1);
+  FileCameraOptions expecting = options();
+  expecting.size_px = {12, 8};
+  EXPECT_TRUE(FileCamera(expecting).open());
+  expecting.size_px = {1600, 1200};
+  const auto refused = FileCamera(expecting).open();
+  EXPECT_EQ(refused.error().code, ErrorCode::kMismatch);
+  EXPECT_THAT(refused.error().message, HasSubstr("12x8"));
+  EXPECT_THAT(refused.error().message, HasSubstr("1600x1200"));
+}
+
+TEST_F(FileCameraTest, NamesWhatIsWrongWithItsPath) {
+  EXPECT_EQ(FileCamera(options()).open().error().code, ErrorCode::kNotFound);
+  FileCameraOptions nowhere = options();
+  nowhere.path = folder_.path() / "nowhere";
+  const auto refused = FileCamera(nowhere).open();
+  EXPECT_EQ(refused.error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(refused.error().where, nowhere.path.string());
+  folder_.write("a.png", "");
+  EXPECT_EQ(FileCamera(options()).open().error().code, ErrorCode::kMalformed);
+}
+
+TEST_F(FileCameraTest, IsDisconnectedWhenItsFolderGoes) {
+  const std::filesystem::path path = folder_.path() / "frames";
+  std::filesystem::create_directory(path);
+  folder_.write("frames/a.pgm", test::pnm_bytes(samples_of(ramp8(12, 8))));
+  FileCameraOptions below = options();
+  below.path = path;
+  FileCamera camera(below);
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(next(camera), 0);
+  std::filesystem::rename(path, folder_.path() / "elsewhere");
+  EXPECT_EQ(next_error(camera), ErrorCode::kDisconnected);
+  std::filesystem::rename(folder_.path() / "elsewhere", path);
+  EXPECT_EQ(next_error(camera), ErrorCode::kDisconnected);
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(next(camera), 0);
+}
+
+}  // namespace
+}  // namespace slsd

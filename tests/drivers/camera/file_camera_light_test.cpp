@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+
+// The folders of frames in white light and in the dark, beside those under the pattern.
+#include <string>
+
+#include <gmock/gmock.h>
+
+#include "tests/drivers/camera/file_camera_test.hpp"
+#include "tests/drivers/plain_images.hpp"
+
+namespace slsd {
+namespace {
+
+using test::far_away;
+using test::FileCameraTest;
+using test::ramp8;
+using test::samples_of;
+using ::testing::HasSubstr;
+
+class FileCameraInLightTest : public FileCameraTest {
+ protected:
+  void put(const std::string& name, int number) {
+    folder_.write(name, test::pnm_bytes(samples_of(ramp8(12, 8, 10 * number))));
+  }
+  static int next_in(Camera& camera, FrameLight light) {
+    camera.expect(light);
+    return next(camera);
+  }
+};
+
+TEST_F(FileCameraInLightTest, ReplaysWhatBelongsToTheFrameOfThePattern) {
+  for (const int i : {0, 1, 2}) put("0" + std::to_string(i) + ".pgm", i);
+  for (const int i : {3, 4, 5}) put("white/0" + std::to_string(i) + ".pgm", i);
+  put("dark/0.pgm", 6);
+  FileCamera camera(options());
+  ASSERT_TRUE(camera.open());
+  for (const int frame : {0, 1, 2, 0, 1}) {
+    EXPECT_EQ(next_in(camera, FrameLight::kPattern), frame);
+    EXPECT_EQ(next_in(camera, FrameLight::kDark), 6);
+    if (frame == 1) continue;
+    EXPECT_EQ(next_in(camera, FrameLight::kWhite), frame + 3);
+    EXPECT_EQ(next_in(camera, FrameLight::kWhite), frame + 3);
+  }
+}
+
+TEST_F(FileCameraInLightTest, CountsEveryFrame) {
+  put("0.pgm", 0);
+  put("white/0.pgm", 1);
+  auto once = options();
+  once.loop = false;
+  FileCamera camera(once);
+  ASSERT_TRUE(camera.open());
+  const auto pattern = camera.capture(far_away());
+  camera.expect(FrameLight::kWhite);
+  const auto white = camera.capture(far_away());
+  ASSERT_TRUE(pattern && white);
+  EXPECT_EQ(white->sequence(), pattern->sequence() + 1);
+  camera.expect(FrameLight::kPattern);
+  EXPECT_EQ(next_error(camera), ErrorCode::kNotFound);
+}
+
+TEST_F(FileCameraInLightTest, TakesTheFoldersBesideOneImage) {
+  put("a.pgm", 0);
+  put("white/0.pgm", 1);
+  auto one = options();
+  one.path = folder_.path() / "a.pgm";
+  FileCamera camera(one);
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(next_in(camera, FrameLight::kWhite), 1);
+  EXPECT_EQ(next_in(camera, FrameLight::kPattern), 0);
+}
+
+TEST_F(FileCameraInLightTest, SaysWhichFolderIsMissingOrOfAnotherSize) {
+  put("a.pgm", 0);
+  folder_.write("white/0.pgm", test::pnm_bytes(samples_of(ramp8(10, 8, 0))));
+  FileCamera camera(options());
+  ASSERT_TRUE(camera.open());
+  camera.expect(FrameLight::kDark);
+  const auto dark = camera.capture(far_away());
+  ASSERT_FALSE(dark);
+  EXPECT_EQ(dark.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(dark.error().message, HasSubstr("\"dark\""));
+  camera.expect(FrameLight::kWhite);
+  const auto white = camera.capture(far_away());
+  ASSERT_FALSE(white);
+  EXPECT_EQ(white.error().code, ErrorCode::kMismatch);
+  EXPECT_THAT(white.error().message, HasSubstr("folder \"white\" is 10x8"));
+  EXPECT_EQ(next_in(camera, FrameLight::kPattern), 0);
+}
+
+}  // namespace
+}  // namespace slsd
