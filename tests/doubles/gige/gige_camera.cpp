@@ -11,9 +11,8 @@
 #include <array>
 #include <stdexcept>
 
-#include "tests/doubles/gige/chunk_trailer.hpp"
+#include "tests/doubles/gige/compose_frame.hpp"
 #include "tests/doubles/gige/device_socket.hpp"
-#include "tests/doubles/gige/pack_pixels.hpp"
 
 namespace slsd::test {
 namespace {
@@ -23,16 +22,6 @@ using std::chrono::steady_clock;
 
 constexpr std::uint32_t kFireTestPacket = 1u << 31;
 constexpr std::uint32_t kLatch = 2;
-constexpr std::uint32_t kLine0 = 0;
-constexpr std::uint32_t kSoftware = 1;
-constexpr std::uint32_t kLine1 = 2;
-constexpr std::uint32_t kAction1 = 3;
-constexpr std::uint64_t kNetworkTicksHz = 1'000'000'000;  // of a clock that follows the network's
-constexpr std::uint32_t kImagePayload = 1;
-
-std::uint16_t id_after(std::uint16_t id) {
-  return id == 65535 ? 1 : static_cast<std::uint16_t>(id + 1);
-}
 
 }  // namespace
 
@@ -43,7 +32,6 @@ GigeCamera::GigeCamera(GigeCameraOptions options) : options_(std::move(options))
   wake_event_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   sender_ = std::make_unique<StreamSender>(in_addr{::inet_addr(options_.address.c_str())});
   command_.resize(65536);
-  exposures_.reserve(1024);
   power_up();
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
@@ -61,34 +49,29 @@ void GigeCamera::power_up() {
   registers_->write(kCurrentAddress, ntohl(::inet_addr(options_.address.c_str())));
   registers_->write(kHasChunks, options_.chunks ? 1 : 0);
   registers_->write(kHasSoftwareTrigger, options_.software_trigger ? 1 : 0);
-  set_tick_frequency(options_.tick_frequency_hz);
+  clock_.emplace(*registers_, options_.tick_frequency_hz, options_.drift_ppm);
+  port_ = std::make_unique<ControlPort>(*registers_, control_events());
+  sensor_.power_up(*registers_, options_.first_frame_id);
+  sender_->stop();
+}
+
+ControlEvents GigeCamera::control_events() {
   ControlEvents events;
   events.written = [this](std::uint32_t address, std::uint32_t value) { note_write(address, value); };
   events.resend_asked = [this](std::uint16_t frame, std::uint32_t first, std::uint32_t last) {
-    if (faults_.resends && !faults_.silent) sender_->send_again(frame, first, last, target());
+    if (trouble_.faults.resends && !trouble_.faults.silent) sender_->send_again(frame, first, last, target());
   };
   events.controller_left = [this] {
     registers_->write(kAcquisition, 0);
     registers_->write(kStreamPort, 0);
-    exposures_.clear();
+    sensor_.discard_exposures();
     sender_->stop();
   };
   events.action = [this](std::optional<std::uint64_t> ticks) {
-    if (!ticks) return trigger(kAction1);
-    act_at_ = time_at(*ticks);
+    if (!ticks) return sensor_.trigger(Sensor::Source::kAction1);
+    sensor_.act_at(TickClock::network_time(*ticks));
   };
-  port_ = std::make_unique<ControlPort>(*registers_, std::move(events));
-  exposures_.clear();
-  sender_->stop();
-  next_id_ = options_.first_frame_id;
-  next_free_.reset();
-  act_at_.reset();
-  power_up_ = steady_clock::now();
-}
-
-void GigeCamera::set_tick_frequency(std::uint64_t frequency_hz) {
-  registers_->write(kTickFrequencyHigh, static_cast<std::uint32_t>(frequency_hz >> 32));
-  registers_->write(kTickFrequencyLow, static_cast<std::uint32_t>(frequency_hz));
+  return events;
 }
 
 void GigeCamera::run(const std::stop_token& stop) {
@@ -96,15 +79,14 @@ void GigeCamera::run(const std::stop_token& stop) {
     wait_for_work();
     const std::lock_guard lock(mutex_);
     const Time now = steady_clock::now();
-    if (back_at_ && now >= *back_at_) {
-      back_at_.reset();
+    if (trouble_.off_until && now >= *trouble_.off_until) {
+      trouble_.off_until.reset();
       power_up();
     }
     read_commands(control_socket_);
     read_commands(broadcast_socket_);
     port_->expire_controller();
-    act_when_due(now);
-    run_freely(now);
+    sensor_.expose_when_due(now);
     send_frames(now);
   }
 }
@@ -116,17 +98,16 @@ void GigeCamera::wait_for_work() {
   {
     const std::lock_guard lock(mutex_);
     const Time now = steady_clock::now();
-    Time next = now + 100ms;
-    if (sender_->sending() || (!exposures_.empty() && sends(now))) next = now;
-    if (next_free_) next = std::min(next, *next_free_);
-    if (act_at_) next = std::min(next, *act_at_);
-    if (faults_.stalled_until && *faults_.stalled_until > now) next = std::min(next, *faults_.stalled_until);
-    if (back_at_) next = std::min(next, *back_at_);
-    timeout.tv_nsec = std::clamp<std::int64_t>((next - now) / 1ns, 0, 100'000'000);
+    timeout.tv_nsec = std::clamp<std::int64_t>((next_work(now) - now) / 1ns, 0, 100'000'000);
   }
   ::ppoll(waited.data(), waited.size(), &timeout, nullptr);
   std::uint64_t wakes = 0;
   (void)!::read(wake_event_, &wakes, sizeof(wakes));
+}
+
+GigeCamera::Time GigeCamera::next_work(Time now) const {
+  if (sender_->sending() || (sensor_.has_exposures() && !trouble_.stalled(now))) return now;
+  return std::min({now + 100ms, sensor_.next_due(), trouble_.next_end(now)});
 }
 
 void GigeCamera::read_commands(int socket) {
@@ -136,7 +117,7 @@ void GigeCamera::read_commands(int socket) {
     const auto bytes =
         ::recvfrom(socket, command_.data(), command_.size(), 0, reinterpret_cast<sockaddr*>(&from), &from_bytes);
     if (bytes < 0) return;
-    if (faults_.gone || back_at_) continue;
+    if (trouble_.off()) continue;
     const auto& answer = port_->answer({command_.data(), static_cast<std::size_t>(bytes)}, from);
     if (answer.empty()) continue;
     ::sendto(control_socket_, answer.data(), answer.size(), 0, reinterpret_cast<const sockaddr*>(&from), from_bytes);
@@ -144,125 +125,23 @@ void GigeCamera::read_commands(int socket) {
 }
 
 void GigeCamera::note_write(std::uint32_t address, std::uint32_t value) {
-  if (address == kTriggerSoftware) return trigger(kSoftware);
-  if (address == kAcquisition && value == 0) exposures_.clear();
-  if (address == kPtpEnable) set_tick_frequency(tick_frequency());
-  if (address == kTimestampControl && (value & kLatch) != 0) {
-    const std::uint64_t ticks = ticks_at(steady_clock::now());
-    registers_->write(kTimestampHigh, static_cast<std::uint32_t>(ticks >> 32));
-    registers_->write(kTimestampLow, static_cast<std::uint32_t>(ticks));
-  }
+  if (address == kTriggerSoftware) return sensor_.trigger(Sensor::Source::kSoftware);
+  if (address == kAcquisition && value == 0) sensor_.discard_exposures();
+  if (address == kPtpEnable) clock_->show_frequency();
+  if (address == kTimestampControl && (value & kLatch) != 0) clock_->latch();
   if (address == kStreamPacketSize && (value & kFireTestPacket) != 0) {
     registers_->write(kStreamPacketSize, value & ~kFireTestPacket);
     if (target().packet_bytes <= options_.packet_bytes_max) sender_->send_test_packet(target());
   }
 }
 
-void GigeCamera::trigger(std::uint32_t source) {
-  const bool waits = registers_->read(kTriggerMode) == 1 && registers_->read(kTriggerSource) == source;
-  if (waits && registers_->read(kAcquisition) == 1) expose(steady_clock::now());
-}
-
-void GigeCamera::act_when_due(Time now) {
-  if (!act_at_ || now < *act_at_) return;
-  act_at_.reset();
-  trigger(kAction1);
-}
-
-void GigeCamera::run_freely(Time now) {
-  if (registers_->read(kAcquisition) != 1 || registers_->read(kTriggerMode) != 0) return next_free_.reset();
-  if (!next_free_) next_free_ = now;
-  if (now < *next_free_) return;
-  const std::chrono::microseconds period(std::max(registers_->read(kFramePeriodUs), 1u));
-  // A camera whose link is slower than its sensor exposes less often.
-  if (exposures_.size() < 2) expose(*next_free_);
-  *next_free_ += period;
-  if (*next_free_ < now) next_free_ = now;
-}
-
-void GigeCamera::expose(Time begin) {
-  last_exposure_ = begin;
-  exposures_.push_back({next_id_, counter_++, begin});
-  next_id_ = id_after(next_id_);
-  if (faults_.stale_frames > 0) {
-    --faults_.stale_frames;
-    exposures_.back().begin -= 1s;
-  }
-  if (faults_.extra_frames > 0) {
-    --faults_.extra_frames;
-    exposures_.push_back({next_id_, counter_++, begin});
-    next_id_ = id_after(next_id_);
-  }
-  if (faults_.drop_frames > 0) --faults_.drop_frames, exposures_.pop_back();
-  if (faults_.silent || faults_.gone || back_at_) exposures_.clear();
-}
-
-bool GigeCamera::sends(Time now) const {
-  return !faults_.stalled_until || now >= *faults_.stalled_until;
-}
-
 void GigeCamera::send_frames(Time now) {
-  if (faults_.gone || back_at_ || !sends(now)) return;
-  if (!sender_->sending() && !exposures_.empty()) {
-    begin_frame(exposures_.front());
-    exposures_.erase(exposures_.begin());
+  if (trouble_.off() || trouble_.stalled(now)) return;
+  if (!sender_->sending() && sensor_.has_exposures()) {
+    compose_frame(sensor_.take_exposure(), *registers_, *clock_, options_, trouble_.faults, sender_->next_frame());
+    sender_->begin(target());
   }
   if (sender_->sending()) sender_->send_some();
-}
-
-void GigeCamera::begin_frame(const Exposure& exposure) {
-  WireFrame& frame = sender_->next_frame();
-  frame.id = exposure.id;
-  frame.ticks = ticks_at(exposure.begin + options_.stamp_delay);
-  frame.pixel_format = registers_->read(kPixelFormat);
-  frame.width_px = registers_->read(kWidth);
-  frame.height_px = registers_->read(kHeight);
-  options_.frames({static_cast<int>(frame.width_px), static_cast<int>(frame.height_px), used_bits(frame.pixel_format),
-                   exposure.counter},
-                  frame.pixels);
-  pack_pixels(frame.pixel_format, frame.pixels);
-  add_chunks(frame, exposure);
-  if (faults_.truncate_frames > 0) {
-    --faults_.truncate_frames;
-    frame.sent_share = 0.5;
-  }
-  sender_->begin(target());
-}
-
-void GigeCamera::add_chunks(WireFrame& frame, const Exposure& exposure) {
-  const auto due = [](int& count) { return count > 0 && count-- > 0; };
-  frame.payload_type = sends_chunks(*registers_) ? options_.chunk_payload : kImagePayload;
-  if (frame.payload_type == kImagePayload) return;
-  ChunkValues values{ticks_at(exposure.begin), registers_->read_double(kExposureTime), registers_->read_double(kGain)};
-  if (options_.chunks_in_ns)
-    values.timestamp = values.timestamp / tick_frequency() * kNetworkTicksHz +
-                       values.timestamp % tick_frequency() * kNetworkTicksHz / tick_frequency();
-  if (due(faults_.misexposed_frames)) values.exposure_us *= 2.0;
-  if (due(faults_.misgained_frames)) values.gain_db += 1.0;
-  ChunkFault fault = ChunkFault::kNone;
-  if (due(faults_.short_chunk_frames)) fault = ChunkFault::kShort;
-  if (due(faults_.garbage_chunk_frames)) fault = ChunkFault::kGarbage;
-  append_chunks(*registers_, values, fault, frame.pixels);
-}
-
-bool GigeCamera::follows_network() const {
-  return registers_->read(kPtpEnable) != 0;
-}
-
-std::uint64_t GigeCamera::tick_frequency() const {
-  return follows_network() ? kNetworkTicksHz : options_.tick_frequency_hz;
-}
-
-// The network's clock is this host's.
-GigeCamera::Time GigeCamera::time_at(std::uint64_t ticks) const {
-  return Time(std::chrono::nanoseconds(ticks));
-}
-
-std::uint64_t GigeCamera::ticks_at(Time time) const {
-  if (follows_network()) return static_cast<std::uint64_t>(time.time_since_epoch().count());
-  const double seconds = std::chrono::duration<double>(time - power_up_).count() + 10.0;
-  return static_cast<std::uint64_t>(seconds * (1.0 + options_.drift_ppm * 1e-6) *
-                                    static_cast<double>(options_.tick_frequency_hz));
 }
 
 StreamTarget GigeCamera::target() const {
@@ -271,7 +150,7 @@ StreamTarget GigeCamera::target() const {
                                 static_cast<std::uint16_t>(registers_->read(kStreamPort) & 0xffff));
   made.packet_bytes = std::max(registers_->read(kStreamPacketSize) & 0xffff, 100u);
   made.packet_delay = std::chrono::nanoseconds(static_cast<std::uint64_t>(registers_->read(kStreamPacketDelay)) *
-                                               1'000'000'000 / tick_frequency());
+                                               1'000'000'000 / clock_->frequency_hz());
   return made;
 }
 
@@ -282,19 +161,19 @@ void GigeCamera::lose_packets(double share, std::uint32_t seed) {
 
 void GigeCamera::set_faults(const GigeFaults& faults) {
   const std::lock_guard lock(mutex_);
-  faults_ = faults;
+  trouble_.faults = faults;
   wake();
 }
 
 void GigeCamera::stall(std::chrono::milliseconds duration) {
   const std::lock_guard lock(mutex_);
-  faults_.stalled_until = steady_clock::now() + duration;
+  trouble_.faults.stalled_until = steady_clock::now() + duration;
   wake();
 }
 
 void GigeCamera::blip(std::chrono::milliseconds off) {
   const std::lock_guard lock(mutex_);
-  back_at_ = steady_clock::now() + off;
+  trouble_.off_until = steady_clock::now() + off;
   wake();
 }
 
@@ -305,8 +184,7 @@ void GigeCamera::occupy(bool by_another) {
 
 void GigeCamera::pulse_line() {
   const std::lock_guard lock(mutex_);
-  trigger(kLine0);
-  trigger(kLine1);
+  for (const auto line : {Sensor::Source::kLine0, Sensor::Source::kLine1}) sensor_.trigger(line);
   wake();
 }
 
@@ -327,12 +205,12 @@ double GigeCamera::read_double(std::uint32_t address) const {
 
 std::uint32_t GigeCamera::frames_exposed() const {
   const std::lock_guard lock(mutex_);
-  return counter_;
+  return sensor_.counter();
 }
 
 GigeCamera::Time GigeCamera::last_exposure() const {
   const std::lock_guard lock(mutex_);
-  return last_exposure_;
+  return sensor_.last_exposure();
 }
 
 std::uint64_t GigeCamera::packets_lost() const {

@@ -13,30 +13,14 @@
 #include <vector>
 
 #include "tests/doubles/gige/control_port.hpp"
-#include "tests/doubles/gige/counter_frame.hpp"
+#include "tests/doubles/gige/gige_camera_options.hpp"
 #include "tests/doubles/gige/gige_faults.hpp"
 #include "tests/doubles/gige/register_file.hpp"
+#include "tests/doubles/gige/sensor.hpp"
 #include "tests/doubles/gige/stream_sender.hpp"
+#include "tests/doubles/gige/tick_clock.hpp"
 
 namespace slsd::test {
-
-struct GigeCameraOptions {
-  std::string serial = "DOUBLE-1";  ///< at most 15 letters; the vendor is "Aravis"
-  std::string address = {};         ///< of this host; empty: one of 127.0.0.0/8 that is free
-  int width_px = 64;
-  int height_px = 48;
-  ExposureSource frames = counter_frames();
-  std::uint16_t first_frame_id = 65530;  ///< near its end, where many a receiver is wrong
-  std::uint64_t tick_frequency_hz = 125'000'000;
-  double drift_ppm = 40.0;                ///< how much faster than the host's the device's clock goes
-  std::uint32_t packet_bytes_max = 9000;  ///< larger test packets get lost, as by a switch without jumbo frames
-  bool chunks = true;                     ///< it has a chunk mode
-  bool chunks_in_ns = false;              ///< the chunks' time stamp is in nanoseconds, and not in ticks
-  std::uint32_t chunk_payload = 0x4001;   ///< how a frame with chunks is called
-  bool software_trigger = true;           ///< it can be triggered by a command
-  /// By how much the time stamp that a frame begins with is later than its exposure's start, as of the readout.
-  std::chrono::milliseconds stamp_delay{0};
-};
 
 /// A GigE Vision camera, real on the wire: GVCP on its address' port 3956, GVSP to whoever controls it; triggered by
 /// software, by a line, by an action command or running freely. It lives on a thread of its own.
@@ -74,30 +58,15 @@ class GigeCamera {
 
  private:
   using Time = std::chrono::steady_clock::time_point;
-  struct Exposure {
-    std::uint16_t id;
-    std::uint32_t counter;
-    Time begin;
-  };
 
   void run(const std::stop_token& stop);
   void wait_for_work();
+  [[nodiscard]] Time next_work(Time now) const;
   void power_up();
+  [[nodiscard]] ControlEvents control_events();
   void read_commands(int socket);
   void note_write(std::uint32_t address, std::uint32_t value);
-  void trigger(std::uint32_t source);
-  void set_tick_frequency(std::uint64_t frequency_hz);
-  void act_when_due(Time now);
-  void run_freely(Time now);
-  void expose(Time begin);
   void send_frames(Time now);
-  void begin_frame(const Exposure& exposure);
-  void add_chunks(WireFrame& frame, const Exposure& exposure);
-  [[nodiscard]] bool sends(Time now) const;
-  [[nodiscard]] bool follows_network() const;
-  [[nodiscard]] std::uint64_t tick_frequency() const;
-  [[nodiscard]] Time time_at(std::uint64_t ticks) const;
-  [[nodiscard]] std::uint64_t ticks_at(Time time) const;
   [[nodiscard]] StreamTarget target() const;
   void wake();
 
@@ -107,17 +76,11 @@ class GigeCamera {
   int wake_event_ = -1;
   mutable std::mutex mutex_;
   std::unique_ptr<RegisterFile> registers_;
+  std::optional<TickClock> clock_;
   std::unique_ptr<ControlPort> port_;
   std::unique_ptr<StreamSender> sender_;
-  GigeFaults faults_;
-  std::optional<Time> back_at_;
-  std::vector<Exposure> exposures_;  ///< not yet sent
-  std::uint16_t next_id_ = 1;
-  std::uint32_t counter_ = 0;
-  Time last_exposure_;
-  Time power_up_;
-  std::optional<Time> next_free_;
-  std::optional<Time> act_at_;
+  GigeTrouble trouble_;
+  Sensor sensor_{trouble_};
   std::vector<std::uint8_t> command_;
   std::jthread thread_;
 };

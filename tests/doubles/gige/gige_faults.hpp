@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 
@@ -21,6 +22,22 @@ struct GigeFaults {
   bool gone = false;             ///< neither answers nor sends
   bool resends = true;           ///< sends packets again when asked
   std::optional<std::chrono::steady_clock::time_point> stalled_until = {};  ///< exposes, and sends only then
+};
+
+/// What such a camera suffers now.
+struct GigeTrouble {
+  using Time = std::chrono::steady_clock::time_point;
+  GigeFaults faults = {};
+  std::optional<Time> off_until = {};  ///< without power
+
+  /// Neither answers nor sends.
+  [[nodiscard]] bool off() const { return faults.gone || off_until; }
+  /// Exposes, and does not send yet.
+  [[nodiscard]] bool stalled(Time now) const { return faults.stalled_until && now < *faults.stalled_until; }
+  /// When part of it ends by itself; Time::max() where none does.
+  [[nodiscard]] Time next_end(Time now) const {
+    return std::min(off_until.value_or(Time::max()), stalled(now) ? *faults.stalled_until : Time::max());
+  }
 };
 
 }  // namespace slsd::test
