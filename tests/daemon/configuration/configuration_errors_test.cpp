@@ -63,6 +63,12 @@ TEST(ReadConfiguration, RefusesWrongTypes) {
   }
 }
 
+TEST(ReadConfiguration, RefusesNumbersThatNoIntHolds) {
+  for (const char* number : {"-9223372036854775808", "9223372036854775807", "-2147483649", "2147483648"}) {
+    EXPECT_THAT(error_of("[pattern]\nsymbols = [" + std::string(number) + "]\n"), HasSubstr("a list of whole numbers"));
+  }
+}
+
 TEST(ReadConfiguration, RefusesWhatIsNoToml) {
   for (const std::string text : {"[pattern", "a = ", "\xff\xfe", "[a]\n[a]\n", "a = \"\n"}) {
     const auto configuration = read(text);
