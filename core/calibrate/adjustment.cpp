@@ -136,10 +136,18 @@ void Adjustment::mark_outlying(Observations& observations) const {
   });
 }
 
+std::string Adjustment::unplaced_text(const Observations& observations) const {
+  std::string names;
+  for (std::size_t i = 0; i < equations_.poses.size(); ++i) {
+    if (!is_placed(equations_.poses[i])) names += (names.empty() ? "" : ", ") + observations.poses[i].name;
+  }
+  return names.empty() ? "" : "; these contradict the others, so that nothing of them counts: " + names;
+}
+
 Result<> Adjustment::find_influence_of(const Observations& observations) {
   equations_ = linearise(observations, options_, rig_);
   auto influence = find_influence(equations_);
-  if (!influence) return tl::unexpected(influence.error());
+  if (!influence) return fail(influence.error().code, influence.error().message + unplaced_text(observations));
   influence_ = std::move(*influence);
   return {};
 }

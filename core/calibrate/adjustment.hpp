@@ -45,6 +45,7 @@ class Adjustment {
  private:
   explicit Adjustment(RigModel rig) : rig_(std::move(rig)) {}
   [[nodiscard]] Result<> find_influence_of(const Observations& observations);
+  [[nodiscard]] std::string unplaced_text(const Observations& observations) const;
   void measure_noise(const Observations& observations);
   void mark_outlying(Observations& observations) const;
   [[nodiscard]] LensTerms fitting_terms(const DeviceModel& device, int index, LensTerms terms) const;

@@ -34,7 +34,8 @@ struct BundleOptions {
 /// @thread reentrant
 [[nodiscard]] Result<> adjust(const Observations& observations, const BundleOptions& options, RigModel& rig);
 
-/// The equations of the adjustment at its solution, linear: residuals of each pose and their derivatives.
+/// The equations of the adjustment at its solution, linear: residuals of each pose and their derivatives. Empty where
+/// all points of a pose are outlying.
 struct PoseEquations {
   Eigen::MatrixXd by_shared;  ///< residuals x shared parameters
   Eigen::MatrixXd by_pose;    ///< residuals x 6

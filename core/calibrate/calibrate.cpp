@@ -30,12 +30,15 @@ Result<> check_count(const Observations& observations, const PoseList& poses) {
 
 /// Leaves out what contradicts the rest, one after the other, and chooses the terms of distortion.
 Result<> settle(Adjustment& adjustment, Observations& observations, PoseList& poses) {
-  while (const auto contradiction = find_contradiction(observations, adjustment.rig(), adjustment.influence())) {
-    poses.leave_out(*contradiction, observations, &adjustment.rig());
-    if (auto enough = check_count(observations, poses); !enough) return enough;
-    if (auto again = adjustment.adjust_again(observations); !again) return again;
-  }
-  return adjustment.choose_terms(observations);
+  do {
+    while (const auto contradiction = find_contradiction(observations, adjustment.rig(), adjustment.influence())) {
+      poses.leave_out(*contradiction, observations, &adjustment.rig());
+      if (auto enough = check_count(observations, poses); !enough) return enough;
+      if (auto again = adjustment.adjust_again(observations); !again) return again;
+    }
+    if (auto chosen = adjustment.choose_terms(observations); !chosen) return chosen;
+  } while (find_unplaced(observations, adjustment.rig(), adjustment.influence()));
+  return {};
 }
 
 Result<Adjustment> solve(Observations& observations, PoseList& poses) {

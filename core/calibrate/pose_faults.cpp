@@ -81,7 +81,8 @@ LitSurface surface_of(std::size_t pose, const Observations& observations, const 
   return measure_lit_surface(observations.poses[pose], rig, by_corners.value_or(joint));
 }
 
-FaultyPose explain(std::size_t pose, double times, const Observations& observations, const RigModel& rig) {
+/// @param error  what is said where nothing explains it
+FaultyPose explain(std::size_t pose, const std::string& error, const Observations& observations, const RigModel& rig) {
   std::vector<LitSurface> surfaces;
   std::vector<double> bows, shifts;
   for (std::size_t i = 0; i < observations.poses.size(); ++i) {
@@ -105,8 +106,7 @@ FaultyPose explain(std::size_t pose, double times, const Observations& observati
                         "hold it still, or lean it against something",
                         subject, std::abs(surface.offset_mm), surface.tilt_deg)};
   }
-  return {pose, PoseFault::kUnlike,
-          fmt::format("it contradicts the other poses: its error is {:.1f} times theirs; take it again", times)};
+  return {pose, PoseFault::kUnlike, fmt::format("it contradicts the other poses: {}; take it again", error)};
 }
 
 }  // namespace
@@ -158,8 +158,17 @@ std::vector<FaultyPose> find_unusable(const Observations& observations) {
   return faulty;
 }
 
+std::optional<FaultyPose> find_unplaced(const Observations& observations, const RigModel& rig,
+                                        const PoseInfluence& influence) {
+  const auto at = std::ranges::find(influence.held_out, false, &HeldOut::placed);
+  if (at == influence.held_out.end()) return std::nullopt;
+  return explain(static_cast<std::size_t>(at - influence.held_out.begin()), "hardly a point of it agrees with them",
+                 observations, rig);
+}
+
 std::optional<FaultyPose> find_contradiction(const Observations& observations, const RigModel& rig,
                                              const PoseInfluence& influence) {
+  if (auto unplaced = find_unplaced(observations, rig, influence)) return unplaced;
   std::vector<double> corner, symbol, shares, disagreement;
   for (const PoseObservation& pose : observations.poses) shares.push_back(outlying_share(pose));
   for (const HeldOut& held_out : influence.held_out) {
@@ -184,7 +193,7 @@ std::optional<FaultyPose> find_contradiction(const Observations& observations, c
     if (most > times) times = most, worst = i;
   }
   if (times < kContradiction) return std::nullopt;
-  return explain(worst, times, observations, rig);
+  return explain(worst, fmt::format("its error is {:.1f} times theirs", times), observations, rig);
 }
 
 }  // namespace slsd

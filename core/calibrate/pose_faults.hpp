@@ -35,8 +35,14 @@ struct FaultyPose {
 /// @thread reentrant
 [[nodiscard]] std::vector<FaultyPose> find_unusable(const Observations& observations);
 
-/// The pose that contradicts the others most, if one does: its error under the rig that they give is far above theirs.
-/// Why follows from what its points show: a symbol plane of its own is a board that moved, a smooth bow is a bent one.
+/// A pose that lies so far off the others that what is left of its points does not say where it is, if there is one.
+/// @thread reentrant
+[[nodiscard]] std::optional<FaultyPose> find_unplaced(const Observations& observations, const RigModel& rig,
+                                                      const PoseInfluence& influence);
+
+/// The pose that contradicts the others most, if one does, those that are not placed first: its error under the rig
+/// that they give is far above theirs. Why follows from what its points show: a symbol plane of its own is a board that
+/// moved, a smooth bow is a bent one.
 /// @param rig  at its solution, one pose to each of the observations
 /// @thread reentrant
 [[nodiscard]] std::optional<FaultyPose> find_contradiction(const Observations& observations, const RigModel& rig,

@@ -15,6 +15,10 @@ namespace {
 constexpr double kRankTolerance = 1e-13;
 /// Of what all poses say of a parameter: of less a pose says nothing.
 constexpr double kShareMin = 1e-4;
+/// Points below which a pose that fits them tells nothing.
+constexpr Eigen::Index kPointsMin = 4;
+/// Of the smallest to the largest eigenvalue of the correlations between a pose's own six parameters.
+constexpr double kPlacedTolerance = 1e-12;
 
 /// The equations of one pose with its own place eliminated (Schur's complement).
 struct Reduced {
@@ -22,12 +26,15 @@ struct Reduced {
   Eigen::VectorXd gradient;  // shared
 };
 
-Eigen::LLT<Eigen::Matrix<double, 6, 6>> pose_normal(const PoseEquations& pose) {
-  const Eigen::Matrix<double, 6, 6> normal = pose.by_pose.transpose() * pose.by_pose;
+using PoseNormal = Eigen::Matrix<double, 6, 6>;
+
+Eigen::LLT<PoseNormal> pose_normal(const PoseEquations& pose) {
+  const PoseNormal normal = pose.by_pose.transpose() * pose.by_pose;
   return normal.llt();
 }
 
-Reduced reduce(const PoseEquations& pose) {
+Reduced reduce(const PoseEquations& pose, Eigen::Index shared) {
+  if (!is_placed(pose)) return {Eigen::MatrixXd::Zero(shared, shared), Eigen::VectorXd::Zero(shared)};
   const Eigen::MatrixXd cross = pose.by_shared.transpose() * pose.by_pose;
   const auto own = pose_normal(pose);
   return {pose.by_shared.transpose() * pose.by_shared - cross * own.solve(cross.transpose()),
@@ -45,7 +52,7 @@ HeldOut hold_out(const PoseEquations& pose, const Eigen::VectorXd& change) {
   const Eigen::VectorXd moved = pose.residuals + pose.by_shared * change;
   const Eigen::VectorXd own = -pose_normal(pose).solve(Eigen::VectorXd(pose.by_pose.transpose() * moved));
   const Eigen::VectorXd left_px = (moved + pose.by_pose * own).cwiseProduct(pose.sigmas_px);
-  return {rms(left_px.head(pose.corner_residuals)), rms(left_px.tail(left_px.size() - pose.corner_residuals)), 0};
+  return {rms(left_px.head(pose.corner_residuals)), rms(left_px.tail(left_px.size() - pose.corner_residuals))};
 }
 
 /// What a pose asks to be changed, against what the others leave open. In coordinates in which all poses together have
@@ -100,13 +107,21 @@ double PoseInfluence::sigma(std::size_t parameter) const {
   return std::sqrt(std::max({noise_covariance(i, i), jackknife_covariance(i, i), 0.0}));
 }
 
+bool is_placed(const PoseEquations& pose) {
+  if (pose.residuals.size() < 2 * kPointsMin) return false;
+  const PoseNormal normal = pose.by_pose.transpose() * pose.by_pose;
+  const Eigen::Matrix<double, 6, 1> scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<PoseNormal> solver(scale.asDiagonal() * normal * scale.asDiagonal());
+  return solver.eigenvalues()(0) > kPlacedTolerance * solver.eigenvalues()(5);
+}
+
 Result<PoseInfluence> find_influence(const BundleEquations& equations) {
   const auto size = static_cast<Eigen::Index>(equations.shared.size());
   std::vector<Reduced> reduced;
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(size);
   for (const PoseEquations& pose : equations.poses) {
-    reduced.push_back(reduce(pose));
+    reduced.push_back(reduce(pose, size));
     normal += reduced.back().normal, gradient += reduced.back().gradient;
   }
   auto covariance = invert(normal, equations.shared);
@@ -114,8 +129,12 @@ Result<PoseInfluence> find_influence(const BundleEquations& equations) {
   PoseInfluence influence{*covariance, Eigen::MatrixXd::Zero(size, size), {}};
   std::vector<Eigen::VectorXd> changes;
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(size);
-  const auto count = static_cast<double>(equations.poses.size());
+  const auto count = static_cast<double>(std::ranges::count_if(equations.poses, is_placed));
   for (std::size_t i = 0; i < reduced.size(); ++i) {
+    if (!is_placed(equations.poses[i])) {
+      influence.held_out.push_back({.placed = false});
+      continue;
+    }
     const auto without = invert(normal - reduced[i].normal, equations.shared);
     if (!without) return tl::unexpected(without.error());
     changes.emplace_back(-*without * (gradient - reduced[i].gradient));

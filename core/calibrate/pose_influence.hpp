@@ -17,6 +17,7 @@ struct HeldOut {
   double symbol_rms_px = 0;  ///< the same of its symbols
   double disagreement = 0;   ///< between what it says of the shared parameters and what the others say: root mean
                              ///< square, standard deviations of the noise
+  bool placed = true;        ///< whether its own points say where it is; if not, it says nothing, and the rest is 0
 };
 
 /// How well the poses determine the shared parameters, from the linear equations at the solution: each pose is left out
@@ -31,6 +32,12 @@ struct PoseInfluence {
   [[nodiscard]] double sigma(std::size_t parameter) const;
 };
 
+/// Whether what is left of a pose's points says where it is: four points at the least, that are not all symbols.
+/// Symbols alone tell the board's plane, and not where on it the board is.
+/// @thread reentrant
+[[nodiscard]] bool is_placed(const PoseEquations& pose);
+
+/// Poses that are not placed have no part.
 /// @errors kImpossible: the poses leave a parameter open; the message names it
 /// @thread reentrant
 [[nodiscard]] Result<PoseInfluence> find_influence(const BundleEquations& equations);

@@ -188,6 +188,49 @@ TEST(Calibrate, SaysHowFarABoardMovedInSpiteOfMisreadSymbols) {
   EXPECT_NEAR(std::stod(moved.reason.substr(at + 3)), along_normal_mm, 0.5) << moved.reason;
 }
 
+/// The symbols of a view as they are seen where the board was taken away before the pattern came: on a round thing
+/// behind it, an upright cylinder.
+void take_board_away(PoseView& view, const RigModel& rig, double distance_mm, double radius_mm) {
+  const Lens camera = to_lens(rig.cameras[0].lens, rig.cameras[0].size),
+             projector = to_lens(rig.projector.lens, rig.projector.size);
+  const RigidTransform projector_from_rig = to_motion(rig.projector.device_from_rig);
+  const double axis_mm = distance_mm + radius_mm;
+  for (ProjectedPoint& symbol : view.symbols) {
+    const Eigen::Vector3d ray = camera.undistort(symbol.camera_px).homogeneous();
+    const double square = ray.x() * ray.x() + 1;
+    const double root = axis_mm * axis_mm - square * (axis_mm * axis_mm - radius_mm * radius_mm);
+    const double depth_mm = root > 0 ? (axis_mm - std::sqrt(root)) / square : distance_mm + 300;
+    symbol.projector_px = projector.project(projector_from_rig * (depth_mm * ray));
+  }
+}
+
+template <class Point>
+void keep_each(std::vector<Point>& points, std::size_t step) {
+  std::size_t i = 0;
+  std::erase_if(points, [&](const Point&) { return i++ % step != 0; });
+}
+
+// No point of such a pose may be left that fits the others, or so few that they do not say where it is.
+TEST(Calibrate, NamesAPoseOfWhichNothingFits) {
+  const RigModel truth = true_rig();
+  struct Case {
+    double distance_mm, radius_mm;
+    std::size_t corner_step, symbol_step;
+  };
+  for (const Case& gone : {Case{1700, 100, 1, 1}, {1900, 100, 5, 9}, {2300, 100, 5, 1}, {2300, 300, 1, 4}}) {
+    Observations observations = see(truth, true_poses(12));
+    PoseView& view = observations.poses[5].views[0];
+    take_board_away(view, truth, gone.distance_mm, gone.radius_mm);
+    keep_each(view.corners, gone.corner_step);
+    keep_each(view.symbols, gone.symbol_step);
+    const auto outcome = calibrate(observations, {});
+    ASSERT_TRUE(outcome) << outcome.error().message;
+    EXPECT_EQ(left_out(*outcome), 1U);
+    EXPECT_TRUE(report_of(*outcome, "pose_5").fault);
+    expect_near_truth(*outcome, truth);
+  }
+}
+
 TEST(Calibrate, NamesBlurredPoses) {
   const RigModel truth = true_rig();
   Observations observations = see(truth, true_poses(12));

@@ -96,6 +96,27 @@ TEST(FindInfluence, FindsTheNoiseInPosesHeldOut) {
   EXPECT_NEAR(influence->held_out.back().symbol_rms_px, 0.08 * std::sqrt(2), 0.02);
 }
 
+TEST(FindInfluence, PassesPosesOverOfWhichTooLittleIsLeft) {
+  RigModel rig = true_rig();
+  rig.rig_from_board = true_poses(8);
+  Observations seen = see(rig, rig.rig_from_board);
+  const auto leave = [](auto& points, std::size_t count) {
+    for (std::size_t i = count; i < points.size(); ++i) points[i].outlying = true;
+  };
+  const auto leave_of = [&](std::size_t pose, std::size_t corners, std::size_t symbols) {
+    leave(seen.poses[pose].views[0].corners, corners), leave(seen.poses[pose].views[0].symbols, symbols);
+  };
+  leave_of(1, 0, 0), leave_of(2, 2, 0), leave_of(3, 0, 1), leave_of(4, 0, 280);
+  BundleOptions options;
+  options.cameras.assign(1, {});
+  options.corner_sigma_px = 0.03, options.symbol_sigma_factor = 0.08 / 0.05;
+  const auto influence = find_influence(linearise(seen, options, rig));
+  ASSERT_TRUE(influence) << influence.error().message;
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(influence->held_out[i].placed, i == 0 || i > 4) << i;
+  EXPECT_TRUE(influence->noise_covariance.allFinite());
+  EXPECT_TRUE(influence->jackknife_covariance.allFinite());
+}
+
 TEST(Resect, FindsADeviceInSpiteOfWrongPoints) {
   const RigModel rig = true_rig();
   const Lens lens{1280, 800, 2500, 2510, 700, 500, {}};
