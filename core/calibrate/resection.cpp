@@ -75,7 +75,7 @@ std::vector<double> weigh(std::span<const SpacePoint> points, const Scaling& sca
   return errors;
 }
 
-/// K [R | t] by an RQ decomposition, with the points in front.
+/// K [R | t] by an RQ decomposition, with a rotation that does not mirror.
 Resection decompose(Projection projection) {
   if (projection.leftCols<3>().determinant() < 0) projection = -projection;
   const Eigen::Matrix3d left = projection.leftCols<3>();
@@ -91,6 +91,13 @@ Resection decompose(Projection projection) {
   const Eigen::Vector3d translation = upper.inverse() * projection.col(3);
   const Eigen::Matrix3d k = upper / upper(2, 2);
   return {{k(0, 0), k(1, 1), k(0, 2), k(1, 2), 0, 0, 0, 0, 0}, {rotation, translation}};
+}
+
+/// Of a mirrored picture the rotation that does not mirror has the points behind the device.
+bool lie_behind(std::span<const SpacePoint> points, const RigidTransform& device_from_points) {
+  std::vector<double> depths;
+  for (const SpacePoint& point : points) depths.push_back((device_from_points * point.point_mm).z());
+  return median_of(std::move(depths)) < 0;
 }
 
 }  // namespace
@@ -114,7 +121,12 @@ Result<Resection> resect(std::span<const SpacePoint> points) {
     projection = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(solution.data());
     weights = weigh(points, scaling, projection);
   }
-  return decompose(scaling.undo(projection));
+  const Resection solved = decompose(scaling.undo(projection));
+  if (lie_behind(points, solved.device_from_points)) {
+    return fail(ErrorCode::kImpossible,
+                "the projector's picture, or the camera's, is mirrored: turn off rear projection and mirroring");
+  }
+  return solved;
 }
 
 }  // namespace slsd

@@ -22,9 +22,9 @@ struct Resection {
   RigidTransform device_from_points;
 };
 
-/// Lens and place of a device from points that do not all lie on one plane: the direct linear transformation,
+/// Lens and place of a projector from points that do not all lie on one plane: the direct linear transformation,
 /// reweighted so that points far off count little.
-/// @errors kImpossible: too few points, or all on one plane
+/// @errors kImpossible: too few points, all on one plane, or a mirrored picture
 /// @thread reentrant
 [[nodiscard]] Result<Resection> resect(std::span<const SpacePoint> points);
 

@@ -94,7 +94,14 @@ Verdict judge(const CalibrationOutcome& outcome) {
   jury.judge(outcome.epipolar_rms_px, kEpipolarPx,
              fmt::format("symbols lie off their epipolar lines by {:.2f} px, {:.1f} px are good",
                          outcome.epipolar_rms_px, kEpipolarPx.good));
-  if (!outcome.depth.empty()) {
+  if (outcome.depth.empty()) {
+    jury.lower(Grade::kBad);
+    jury.verdict.reasons.emplace_back(
+        "nowhere in the working range do the first camera and the projector see the same place");
+    jury.verdict.advice.emplace_back(
+        "set depth_min_mm and depth_max_mm of [decode] to the distances that are scanned, or turn camera and projector "
+        "towards each other and calibrate again");
+  } else {
     const DepthUncertainty& middle = outcome.depth[outcome.depth.size() / 2];
     jury.judge(middle.calibration_mm / middle.depth_mm, kDepthShare,
                fmt::format("the calibration leaves the depth at {:.0f} mm uncertain by {:.2f} mm, {:.2f} mm are good",

@@ -262,6 +262,25 @@ TEST(Calibrate, FindsThatAPrintIsStretched) {
   expect_near_truth(*outcome, truth);
 }
 
+TEST(Calibrate, RefusesAMirroredProjector) {
+  Observations observations = see(true_rig(), true_poses(12));
+  for (PoseObservation& pose : observations.poses) {
+    for (ProjectedPoint& symbol : pose.views[0].symbols) symbol.projector_px.x() = 1279 - symbol.projector_px.x();
+  }
+  const auto outcome = calibrate(observations, {});
+  ASSERT_FALSE(outcome);
+  EXPECT_EQ(outcome.error().code, ErrorCode::kImpossible);
+  EXPECT_THAT(outcome.error().message, HasSubstr("mirrored"));
+}
+
+TEST(Calibrate, IsBadWhereNothingOfTheWorkingRangeIsSeen) {
+  const auto outcome = calibrate(see(true_rig(), true_poses(12)), {.depth_min_mm = 100, .depth_max_mm = 300});
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_TRUE(outcome->depth.empty());
+  EXPECT_EQ(outcome->verdict.grade, Grade::kBad);
+  EXPECT_THAT(outcome->verdict.reasons, testing::ElementsAre(HasSubstr("nowhere in the working range")));
+}
+
 TEST(Calibrate, RefusesParallelPoses) {
   std::vector<MotionVector> poses;
   for (int i = 0; i < 8; ++i) poses.push_back({0, 0, 0.1 * i, -225.0 + 10 * i, -150, 2000.0 + 5 * i});

@@ -134,6 +134,26 @@ TEST(Resect, FindsADeviceInSpiteOfWrongPoints) {
   EXPECT_LT((found->device_from_points.translation - place.translation).norm(), 0.5);
 }
 
+TEST(Resect, RefusesAMirroredPicture) {
+  const RigModel rig = true_rig();
+  const Lens lens{1280, 800, 2500, 2510, 700, 500, {}};
+  const RigidTransform place = to_motion(rig.projector.device_from_rig);
+  for (const bool upright : {true, false}) {
+    std::vector<SpacePoint> points;
+    for (int i = 0; i < 400; ++i) {
+      const Eigen::Vector3d point((i % 20) * 30 - 300, (i / 20 % 20) * 20 - 200, 1700 + (i * 37) % 500);
+      Eigen::Vector2d pixel = lens.project(place * point);
+      double& mirrored = upright ? pixel.x() : pixel.y();
+      mirrored = 1000 - mirrored;
+      points.push_back({point, pixel});
+    }
+    const auto found = resect(points);
+    ASSERT_FALSE(found);
+    EXPECT_EQ(found.error().code, ErrorCode::kImpossible);
+    EXPECT_NE(found.error().message.find("is mirrored: turn off rear projection"), std::string::npos);
+  }
+}
+
 TEST(Resect, RefusesPointsOfOnePlane) {
   std::vector<SpacePoint> points;
   for (int i = 0; i < 100; ++i)
