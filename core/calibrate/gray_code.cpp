@@ -15,6 +15,7 @@
 #include <opencv2/structured_light/graycodepattern.hpp>
 
 #include "core/calibrate/gray_axis.hpp"
+#include "core/exposure/light_levels.hpp"
 
 namespace slsd {
 namespace {
@@ -35,15 +36,16 @@ constexpr double kMemberOffPx = 0.75;
 constexpr std::ptrdiff_t kPixelsTelling = 2000;
 constexpr double kBeyondShareMax = 0.02, kFittingShareMin = 0.3;
 
-cv::Mat to_mat(const GreyView& view) {
+/// @param full  the level of a saturated pixel, which becomes 255
+cv::Mat to_mat(const GreyView& view, double full) {
   return std::visit(
-      [](const auto& image) {
+      [full](const auto& image) {
         using Pixel = std::remove_cvref_t<decltype(*image.pixels)>;
         const cv::Mat borrowed(image.height, image.width, sizeof(Pixel) == 1 ? CV_8U : CV_16U,
                                const_cast<Pixel*>(image.pixels),
                                static_cast<std::size_t>(image.stride) * sizeof(Pixel));
         cv::Mat copy;
-        borrowed.convertTo(copy, CV_8U, sizeof(Pixel) == 1 ? 1 : 1.0 / 257);
+        borrowed.convertTo(copy, CV_8U, 255 / full);
         return copy;
       },
       view);
@@ -121,8 +123,9 @@ Result<std::vector<cv::Mat>> checked_images(const GrayCapture& capture, const Im
                     std::to_string(expected) + " belong to a projector of " + std::to_string(projector.width_px) + "x" +
                     std::to_string(projector.height_px) + " pixels; set the projector's size to that of the captures");
   }
-  std::vector<cv::Mat> images{to_mat(capture.white), to_mat(capture.black)};
-  for (const GreyView& image : capture.code) images.push_back(to_mat(image));
+  const double full = guess_full_level(capture.white);  // of all: what is compared needs one scale
+  std::vector<cv::Mat> images{to_mat(capture.white, full), to_mat(capture.black, full)};
+  for (const GreyView& image : capture.code) images.push_back(to_mat(image, full));
   if (std::ranges::any_of(images, [&](const cv::Mat& image) { return image.size() != images[0].size(); })) {
     return fail(ErrorCode::kMismatch, "the images of the Gray code are not all of one size");
   }

@@ -47,6 +47,28 @@ TEST(ReadGrayCode, TiesMeansOfSquaresToEachOther) {
   }
 }
 
+/// The same by a camera of more than 8 bits, which leaves the upper ones of 16 empty.
+Grey16 seen(const Grey8& projected, int full) {
+  const Grey8 narrow = seen(projected);
+  Grey16 image(narrow.width(), narrow.height());
+  std::transform(narrow.data(), narrow.data() + narrow.size(), image.data(),
+                 [&](std::uint8_t level) { return static_cast<std::uint16_t>(level * full / 255); });
+  return image;
+}
+
+TEST(ReadGrayCode, ReadsLevelsOfAnyCountOfBits) {
+  for (const int full : {1023, 4095, 16383, 65535}) {
+    std::vector<Grey16> captured;
+    for (const Grey8& image : draw_gray_code(kProjector)) captured.push_back(seen(image, full));
+    const Grey16 white = seen(Grey8(640, 400, 255), full), black = seen(Grey8(640, 400, 0), full);
+    GrayCapture capture{white.view(), black.view(), {}};
+    for (const Grey16& image : captured) capture.code.emplace_back(image.view());
+    const auto points = read_gray_code(capture, kProjector, [](int, int) { return true; });
+    ASSERT_TRUE(points) << points.error().message;
+    EXPECT_GT(points->size(), 2000U) << full;
+  }
+}
+
 /// The same with a projector out of focus: stripes of 2 px are gone, those of 4 px faint.
 Grey8 seen_blurred(const Grey8& projected) {
   constexpr int kReach = 5;
