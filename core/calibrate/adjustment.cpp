@@ -158,6 +158,7 @@ Result<Adjustment> Adjustment::begin(Observations& observations, RigModel rig) {
   options.cameras.assign(adjustment.rig_.cameras.size(), {});
   options.with_symbols = false;
   if (auto solved = adjust(observations, options, adjustment.rig_); !solved) return tl::unexpected(solved.error());
+  if (auto tilted = check_tilts(adjustment.rig_); !tilted) return tl::unexpected(tilted.error());
   adjustment.measure_noise(observations);
   if (auto estimated = estimate_projector(observations, adjustment.rig_); !estimated)
     return tl::unexpected(estimated.error());

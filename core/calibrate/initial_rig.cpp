@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <optional>
 
+#include <fmt/format.h>
 #include <opencv2/calib3d.hpp>
 
 #include "core/calibrate/board_plane.hpp"
@@ -18,6 +20,8 @@ namespace {
 constexpr std::size_t kPosesMin = 3;
 /// A focal length beyond these, in widths of the image, is not of a camera but of poses that do not tell it.
 constexpr double kFocalMin = 0.2, kFocalMax = 50;
+/// Between the two boards that face ways the farthest apart.
+constexpr double kTiltsApartMinDeg = 8;
 constexpr char kTilt[] =
     "hold the board at an angle of 20 to 40 degrees to the camera in most poses, each time towards another side";
 
@@ -138,6 +142,20 @@ Result<RigModel> estimate_cameras(const Observations& observations) {
         to_vector(to_motion(rig.cameras[camera].device_from_rig).inverse().after(camera_from_board)));
   }
   return rig;
+}
+
+Result<> check_tilts(const RigModel& rig) {
+  double least_cosine = 1;
+  for (const MotionVector& a : rig.rig_from_board) {
+    for (const MotionVector& b : rig.rig_from_board) {
+      least_cosine = std::min(least_cosine, to_motion(a).rotation.col(2).dot(to_motion(b).rotation.col(2)));
+    }
+  }
+  const double apart_deg = std::acos(std::max(least_cosine, -1.0)) * 180 / std::numbers::pi;
+  if (apart_deg >= kTiltsApartMinDeg) return {};
+  return fail(ErrorCode::kImpossible,
+              fmt::format("the poses are all parallel, within {:.1f} degrees, which leaves the focal lengths open; {}",
+                          apart_deg, kTilt));
 }
 
 std::optional<MotionVector> estimate_pose(const PoseObservation& pose, const RigModel& rig) {

@@ -15,6 +15,12 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] Result<RigModel> estimate_cameras(const Observations& observations);
 
+/// Poses that all face one way fit lenses of any focal length, which then follow the noise.
+/// @param rig  cameras and poses, adjusted to what the cameras saw
+/// @errors kImpossible: no two of its poses differ enough, with what to shoot
+/// @thread reentrant
+[[nodiscard]] Result<> check_tilts(const RigModel& rig);
+
 /// A first estimate of one more pose, by the first camera that sees enough of it.
 /// @param rig  calibrated
 /// @return     rig from board; nothing where the corners fit no plane

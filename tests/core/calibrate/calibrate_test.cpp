@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -282,13 +283,39 @@ TEST(Calibrate, IsBadWhereNothingOfTheWorkingRangeIsSeen) {
 }
 
 TEST(Calibrate, RefusesParallelPoses) {
-  std::vector<MotionVector> poses;
-  for (int i = 0; i < 8; ++i) poses.push_back({0, 0, 0.1 * i, -225.0 + 10 * i, -150, 2000.0 + 5 * i});
-  const auto outcome = calibrate(see(true_rig(), poses), {});
-  ASSERT_FALSE(outcome && outcome->verdict.grade == Grade::kGood);
-  if (!outcome) {
-    EXPECT_THAT(outcome.error().message,
-                testing::AnyOf(HasSubstr("parallel"), HasSubstr("open"), HasSubstr("focal length")));
+  for (const double tilt_deg : {0, 5, 17, 30, 45}) {
+    for (const double turn_rad : {0.0, 0.1}) {
+      for (const double step_mm : {5, 60}) {
+        const Eigen::Matrix3d tilted =
+            Eigen::AngleAxisd(tilt_deg / 57.29578, Eigen::Vector3d(0.8, 0.6, 0)).toRotationMatrix();
+        std::vector<MotionVector> poses;
+        for (int i = 0; i < 8; ++i) {
+          const Eigen::Matrix3d turn =
+              tilted * Eigen::AngleAxisd(turn_rad * i, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+          const Eigen::Vector3d middle(40 * (i % 3) - 40, 30 * (i % 4) - 45, 1700 + step_mm * i);
+          poses.push_back(to_vector(RigidTransform{turn, middle - turn * Eigen::Vector3d(225, 150, 0)}));
+        }
+        const auto outcome = calibrate(see(true_rig(), poses), {});
+        ASSERT_FALSE(outcome) << tilt_deg << " degrees, " << turn_rad << " rad, " << step_mm << " mm";
+        EXPECT_THAT(outcome.error().message, HasSubstr("parallel")) << tilt_deg << ", " << turn_rad << ", " << step_mm;
+      }
+    }
+  }
+}
+
+TEST(Calibrate, TakesFewPosesThatAreTiltedALittle) {
+  const double tilt = 6 / 57.29578;
+  for (const std::size_t count : {3, 4}) {
+    std::vector<MotionVector> poses;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double towards = 2 * std::numbers::pi / static_cast<double>(count) * static_cast<double>(i);
+      const Eigen::Matrix3d turn =
+          Eigen::AngleAxisd(tilt, Eigen::Vector3d(std::cos(towards), std::sin(towards), 0)).toRotationMatrix();
+      const Eigen::Vector3d middle(50 * std::cos(towards), 40 * std::sin(towards), 1800 + 80 * static_cast<double>(i));
+      poses.push_back(to_vector(RigidTransform{turn, middle - turn * Eigen::Vector3d(225, 150, 0)}));
+    }
+    const auto outcome = calibrate(see(true_rig(), poses), {});
+    EXPECT_TRUE(outcome) << outcome.error().message;
   }
 }
 
