@@ -10,15 +10,12 @@
 
 #include "core/calibrate/corner_pose.hpp"
 #include "core/calibrate/lit_surface.hpp"
+#include "core/calibrate/view_demands.hpp"
 #include "core/geometry/median.hpp"
 
 namespace slsd {
 namespace {
 
-constexpr std::size_t kCornersMin = 8;
-constexpr std::size_t kSymbolsMin = 30;
-/// A blur this much above that of the other poses, both as a factor and in px, moves corners and symbols.
-constexpr double kBlurFactor = 1.5, kBlurMorePx = 0.35;
 /// An error this much above that of the other poses is no chance.
 constexpr double kContradiction = 2.5;
 constexpr double kContradictionMinPx = 0.1;
@@ -48,11 +45,25 @@ double usual_blur_of(PoseSubject subject, const Observations& observations) {
   return median_of(std::move(blurs));
 }
 
-template <class Count>
-std::size_t most(const PoseObservation& pose, Count count) {
-  std::size_t best = 0;
-  for (const PoseView& view : pose.views) best = std::max(best, count(view));
-  return best;
+/// What the view with the most corners lacks of them, where all views lack some.
+std::string least_lack_of_corners(const PoseObservation& pose) {
+  std::string lack = "the board was not found";
+  std::size_t most = 0;
+  for (const PoseView& view : pose.views) {
+    std::string of_view = lack_of_corners(view);
+    if (of_view.empty()) return {};
+    if (view.corners.size() >= most) most = view.corners.size(), lack = std::move(of_view);
+  }
+  return lack;
+}
+
+/// Of views that have corners enough.
+std::string least_lack_of_symbols(const PoseObservation& pose) {
+  std::size_t most = 0;
+  for (const PoseView& view : pose.views) {
+    if (lack_of_corners(view).empty()) most = std::max(most, view.symbols.size());
+  }
+  return lack_of_symbols(most);
 }
 
 /// Of the corners or of the symbols of a pose, whichever is more.
@@ -135,20 +146,13 @@ std::vector<FaultyPose> find_unusable(const Observations& observations) {
   std::vector<FaultyPose> faulty;
   for (std::size_t i = 0; i < observations.poses.size(); ++i) {
     const PoseObservation& pose = observations.poses[i];
-    const std::size_t corners = most(pose, [](const PoseView& view) { return view.corners.size(); });
-    const std::size_t symbols = most(pose, [](const PoseView& view) { return view.symbols.size(); });
+    std::string corners = least_lack_of_corners(pose), symbols = least_lack_of_symbols(pose);
     const double blur = blur_of(pose), usual_blur = usual_blur_of(pose.subject, observations);
-    if (corners < kCornersMin) {
-      faulty.push_back({i, PoseFault::kTooFewCorners,
-                        fmt::format("only {} of the board's corners were found, {} are the least; bring more of the "
-                                    "board into the picture",
-                                    corners, kCornersMin)});
-    } else if (symbols < kSymbolsMin) {
-      faulty.push_back({i, PoseFault::kTooFewSymbols,
-                        fmt::format("only {} of the pattern's symbols were read on the board, {} are the least; hold "
-                                    "it where the projector lights it, and shade it from other light",
-                                    symbols, kSymbolsMin)});
-    } else if (blur > kBlurFactor * usual_blur && blur > usual_blur + kBlurMorePx) {
+    if (!corners.empty()) {
+      faulty.push_back({i, PoseFault::kTooFewCorners, std::move(corners)});
+    } else if (!symbols.empty()) {
+      faulty.push_back({i, PoseFault::kTooFewSymbols, std::move(symbols)});
+    } else if (is_blurred(blur, usual_blur)) {
       faulty.push_back({i, PoseFault::kBlurred,
                         fmt::format("blurred: the board's edges are {:.1f} px wide, {:.1f} px in the other poses; hold "
                                     "it still, and within the depth of focus",

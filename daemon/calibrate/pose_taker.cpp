@@ -6,15 +6,14 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "core/calibrate/view_demands.hpp"
+
 namespace slsd {
 namespace {
 
 constexpr double kMovedPx = 0.5;
 constexpr double kClippedShare = 0.02;
 constexpr double kBlurMaxPx = 2.5;
-/// A blur this much above that of the other poses, both as a factor and in px, moves corners and symbols.
-constexpr double kBlurFactor = 1.5, kBlurMorePx = 0.35;
-constexpr std::size_t kSymbolsMin = 30;
 constexpr double kFlatDeg = 60;
 
 Result<> judge_light(const BoardSighting& sighting, double usual_blur_px) {
@@ -25,7 +24,7 @@ Result<> judge_light(const BoardSighting& sighting, double usual_blur_px) {
                             100 * sighting.clipped_share));
   }
   const double blur = sighting.edge_px;
-  const bool unlike = usual_blur_px > 0 && blur > kBlurFactor * usual_blur_px && blur > usual_blur_px + kBlurMorePx;
+  const bool unlike = is_blurred(blur, usual_blur_px);
   if (blur > kBlurMaxPx || unlike) {
     return fail(ErrorCode::kImpossible,
                 fmt::format("blurred: edges of {:.1f} px{}; hold the board where the camera is in focus, and still",
@@ -91,12 +90,11 @@ Result<PoseView> PoseTaker::judge(std::size_t camera, const Result<BoardSighting
   if (!sighting) return tl::unexpected(sighting.error());
   if (auto fit = judge_light(*sighting, usual_blur_px); !fit) return tl::unexpected(fit.error());
   auto view = observer_.observe(camera, pictures.views());
-  if (!view || view->symbols.size() >= kSymbolsMin) return view;
-  return fail(
-      ErrorCode::kNotFound,
-      fmt::format("too few symbols: {} are read on the board, {} are needed; hold it where the projector lights "
-                  "all of it, in focus",
-                  view->symbols.size(), kSymbolsMin));
+  if (!view) return view;
+  for (std::string lack : {lack_of_corners(*view), lack_of_symbols(view->symbols.size())}) {
+    if (!lack.empty()) return fail(ErrorCode::kNotFound, std::move(lack));
+  }
+  return view;
 }
 
 Result<PoseTrial> PoseTaker::take(BoardLook before, const PoseCollection& taken) {

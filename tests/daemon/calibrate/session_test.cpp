@@ -62,7 +62,7 @@ class CalibrationSession : public ::testing::Test {
 
   [[nodiscard]] bool says(const std::string& words) const { return out_.str().find(words) != std::string::npos; }
 
-  const Board board_ = *parse_board("charuco:11x7:25:18.75:DICT_5X5_1000");
+  Board board_ = *parse_board("charuco:11x7:25:18.75:DICT_5X5_1000");
   const Board plane_ = *parse_board("plane:6x4:45:18:DICT_4X4_50");
   PoseSubject subject_ = PoseSubject::kBoard;  ///< what begin() begins with
   const ImageSize projector_{pattern().options.projector_width_px, pattern().options.projector_height_px};
@@ -221,6 +221,15 @@ TEST_F(CalibrationSession, RefusesAClippedBoard) {
 }
 
 TEST_F(CalibrationSession, SaysWhatToDoWhereNoBoardIsSeen) {
+// Six corners are enough to find a board, but not for the calibration.
+TEST_F(CalibrationSession, RefusesABoardOfWhichTooLittleIsSeen) {
+  board_ = *parse_board("charuco:4x3:50:37.5:DICT_5X5_1000");
+  begin();
+  ASSERT_TRUE(run(1, [&] { return says("not taken"); }));
+  EXPECT_THAT(out_.str(), HasSubstr("not taken: only 6 of the board's corners were found, 8 are the least"));
+  EXPECT_EQ(poses_->size(), 0u);
+}
+
   begin();
   stage_->operate = [](const auto&) { return std::nullopt; };
   stage_->frame = 20s;
