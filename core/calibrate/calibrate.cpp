@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <ranges>
 
 #include <fmt/format.h>
 
@@ -28,6 +29,10 @@ Result<> check_count(const Observations& observations, const PoseList& poses) {
                                           (faults.empty() ? "" : ". Left out: " + faults));
 }
 
+FaultyPose fits_no_plane(std::size_t pose) {
+  return {pose, PoseFault::kUnlike, "its corners fit no plane; take it again"};
+}
+
 /// Leaves out what contradicts the rest, one after the other, and chooses the terms of distortion.
 Result<> settle(Adjustment& adjustment, Observations& observations, PoseList& poses) {
   do {
@@ -42,9 +47,13 @@ Result<> settle(Adjustment& adjustment, Observations& observations, PoseList& po
 }
 
 Result<Adjustment> solve(Observations& observations, PoseList& poses) {
-  auto rig = estimate_cameras(observations);
-  if (!rig) return tl::unexpected(rig.error());
-  auto adjustment = Adjustment::begin(observations, std::move(*rig));
+  auto initial = estimate_cameras(observations);
+  if (!initial) return tl::unexpected(initial.error());
+  for (const std::size_t pose : std::views::reverse(initial->unplaced)) {
+    poses.leave_out(fits_no_plane(pose), observations, &initial->rig);
+  }
+  if (auto enough = check_count(observations, poses); !enough) return tl::unexpected(enough.error());
+  auto adjustment = Adjustment::begin(observations, std::move(initial->rig));
   if (!adjustment) return adjustment;
   if (auto settled = settle(*adjustment, observations, poses); !settled) return tl::unexpected(settled.error());
   return adjustment;
@@ -76,9 +85,9 @@ Result<std::vector<PlaneCheck>> solve_with_planes(std::vector<PoseObservation> p
                                                   Observations& observations, PoseList& poses) {
   for (PoseObservation& plane : planes) {
     const auto rig_from_plane = estimate_pose(plane, adjustment.rig());
-    if (!rig_from_plane) return fail(ErrorCode::kImpossible, "the plane's corners fit no plane", plane.name);
-    adjustment.rig().rig_from_board.push_back(*rig_from_plane);
+    adjustment.rig().rig_from_board.push_back(rig_from_plane.value_or(MotionVector{}));
     observations.poses.push_back(std::move(plane));
+    if (!rig_from_plane) poses.leave_out(fits_no_plane(observations.poses.size() - 1), observations, &adjustment.rig());
   }
   auto checks = check_planes(observations, adjustment.rig().calibration(observations.cameras));
   if (auto begun = adjustment.begin_with_planes(observations); !begun) return tl::unexpected(begun.error());
@@ -210,6 +219,7 @@ Result<CalibrationOutcome> calibrate(Observations observations, const CalibrateO
   for (auto faulty = unusable.rbegin(); faulty != unusable.rend(); ++faulty) {
     poses.leave_out(*faulty, observations, nullptr);
   }
+  poses.leave_views_out(observations);
   std::vector<PoseObservation> planes = set_planes_aside(observations);
   if (auto enough = check_count(observations, poses); !enough) return tl::unexpected(enough.error());
   auto adjustment = solve(observations, poses);

@@ -123,8 +123,9 @@ Result<> place_cameras(const Observations& observations, const ViewPoses& poses,
 
 }  // namespace
 
-Result<RigModel> estimate_cameras(const Observations& observations) {
-  RigModel rig;
+Result<InitialRig> estimate_cameras(const Observations& observations) {
+  InitialRig initial;
+  RigModel& rig = initial.rig;
   rig.projector.size = observations.projector;
   for (std::size_t camera = 0; camera < observations.cameras.size(); ++camera) {
     const auto lens = estimate_lens(observations, camera);
@@ -135,13 +136,15 @@ Result<RigModel> estimate_cameras(const Observations& observations) {
   if (auto placed = place_cameras(observations, poses, rig); !placed) return tl::unexpected(placed.error());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (poses[i].empty()) {
-      return fail(ErrorCode::kImpossible, "the board's corners fit no plane", observations.poses[i].name);
+      initial.unplaced.push_back(i);
+      rig.rig_from_board.emplace_back();
+      continue;
     }
     const auto& [camera, camera_from_board] = *poses[i].begin();
     rig.rig_from_board.push_back(
         to_vector(to_motion(rig.cameras[camera].device_from_rig).inverse().after(camera_from_board)));
   }
-  return rig;
+  return initial;
 }
 
 Result<> check_tilts(const RigModel& rig) {

@@ -9,11 +9,16 @@
 
 namespace slsd {
 
+struct InitialRig {
+  RigModel rig;                       ///< with a pose to each of the observations
+  std::vector<std::size_t> unplaced;  ///< ascending: poses whose corners fit no plane; in the rig they lie anywhere
+};
+
 /// A first estimate of the cameras and of the board's poses: Zhang's method (2000) for the focal lengths, with the
 /// principal points in the middle and no distortion; then each pose by its plane.
 /// @errors kImpossible: too few poses, or all of them parallel, with what to shoot
 /// @thread reentrant
-[[nodiscard]] Result<RigModel> estimate_cameras(const Observations& observations);
+[[nodiscard]] Result<InitialRig> estimate_cameras(const Observations& observations);
 
 /// Poses that all face one way fit lenses of any focal length, which then follow the noise.
 /// @param rig  cameras and poses, adjusted to what the cameras saw

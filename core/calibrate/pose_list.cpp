@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "core/calibrate/view_demands.hpp"
+
 namespace slsd {
 
 PoseList::PoseList(const Observations& observations) {
@@ -24,6 +26,19 @@ void PoseList::leave_out(const FaultyPose& faulty, Observations& observations, R
   used_.erase(used_.begin() + at);
   observations.poses.erase(observations.poses.begin() + at);
   if (rig != nullptr) rig->rig_from_board.erase(rig->rig_from_board.begin() + at);
+}
+
+void PoseList::leave_views_out(Observations& observations) {
+  for (std::size_t i = 0; i < observations.poses.size(); ++i) {
+    PoseReport& report = used(i);
+    std::erase_if(observations.poses[i].views, [&](const PoseView& view) {
+      const std::string lack = lack_of_corners(view);
+      if (lack.empty()) return false;
+      report.without.push_back("camera " + observations.cameras[view.camera].name + ": " + lack);
+      report.corners -= view.corners.size(), report.symbols -= view.symbols.size();
+      return true;
+    });
+  }
 }
 
 void PoseList::explain(const std::string& pose, const std::string& more) {

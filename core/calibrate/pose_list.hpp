@@ -16,8 +16,9 @@ namespace slsd {
 struct PoseReport {
   std::string name;
   PoseSubject subject = PoseSubject::kBoard;
-  std::optional<PoseFault> fault;  ///< why it was left out
-  std::string reason;              ///< the same for a person, with the figure; empty where it was used
+  std::optional<PoseFault> fault;    ///< why it was left out
+  std::string reason;                ///< the same for a person, with the figure; empty where it was used
+  std::vector<std::string> without;  ///< of a pose that was used: cameras whose view was left out, and why
   std::size_t corners = 0, symbols = 0;
   std::size_t outlying_corners = 0, outlying_symbols = 0;
   double corner_rms_px = 0, symbol_rms_px = 0;  ///< in the camera
@@ -34,6 +35,8 @@ class PoseList {
   /// Takes a pose, by its index among those that take part, out of everything.
   /// @param rig  nothing: it has no poses yet
   void leave_out(const FaultyPose& faulty, Observations& observations, RigModel* rig);
+  /// Takes the views that cannot take part out of the poses that take part.
+  void leave_views_out(Observations& observations);
   /// Adds to why a pose was left out, where it was.
   void explain(const std::string& pose, const std::string& more);
 

@@ -96,15 +96,22 @@ std::string rig_figures(const CalibrationOutcome& outcome) {
   return depth.empty() ? html : html + "<h2>Uncertainty of depth</h2>\n" + depth;
 }
 
+/// What is not as in other poses.
+std::string remarks_on(const PoseReport& pose) {
+  std::string text;
+  if (pose.outlying_corners + pose.outlying_symbols > 0) {
+    text = fmt::format("{} corners, {} symbols lie off", pose.outlying_corners, pose.outlying_symbols);
+  }
+  for (const std::string& view : pose.without) text += (text.empty() ? "without " : "; without ") + view;
+  return text;
+}
+
 std::string used_row(const PoseReport& pose, std::size_t index) {
   return fmt::format(
       "<tr><td><span style='color:{}'>&#9632;</span> {}</td><td>{}</td><td>{:.3f}</td><td>{:.3f}</td><td>{}</td>"
       "<td>{:.3f}</td><td>{:.3f}</td><td class='words'>{}</td></tr>\n",
       pose_colour(index), escaped(pose.name), pose.corners, pose.corner_rms_px, pose.held_out.corner_rms_px,
-      pose.symbols, pose.symbol_rms_px, pose.held_out.symbol_rms_px,
-      pose.outlying_corners + pose.outlying_symbols == 0
-          ? ""
-          : fmt::format("{} corners, {} symbols lie off", pose.outlying_corners, pose.outlying_symbols));
+      pose.symbols, pose.symbol_rms_px, pose.held_out.symbol_rms_px, escaped(remarks_on(pose)));
 }
 
 std::string poses_of(const CalibrationOutcome& outcome) {

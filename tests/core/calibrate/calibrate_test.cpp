@@ -213,11 +213,11 @@ void keep_each(std::vector<Point>& points, std::size_t step) {
 
 // No point of such a pose may be left that fits the others, or so few that they do not say where it is.
 TEST(Calibrate, NamesAPoseOfWhichNothingFits) {
-  const RigModel truth = true_rig();
   struct Case {
     double distance_mm, radius_mm;
     std::size_t corner_step, symbol_step;
   };
+  const RigModel truth = true_rig();
   for (const Case& gone : {Case{1700, 100, 1, 1}, {1900, 100, 5, 9}, {2300, 100, 5, 1}, {2300, 300, 1, 4}}) {
     Observations observations = see(truth, true_poses(12));
     PoseView& view = observations.poses[5].views[0];
@@ -334,6 +334,40 @@ TEST(Calibrate, SaysWhyTooFewPosesAreLeft) {
   ASSERT_FALSE(outcome);
   EXPECT_THAT(outcome.error().message, HasSubstr("pose_1: only 5 of the pattern's symbols"));
   EXPECT_THAT(outcome.error().message, HasSubstr("pose_3: only 5 of the board's corners"));
+}
+
+/// Corners in one row of the board, and one more: the box about them has an area.
+void leave_a_row(PoseView& view) {
+  std::erase_if(view.corners, [](const BoardPoint& corner) {
+    return corner.board_mm.y() > 1 && (corner.board_mm.y() > 51 || corner.board_mm.x() > 1);
+  });
+}
+
+TEST(Calibrate, LeavesOutPosesWhoseCornersAreInARow) {
+  const RigModel truth = true_rig();
+  Observations observations = see(truth, true_poses(12));
+  leave_a_row(observations.poses[2].views[0]), leave_a_row(observations.poses[7].views[0]);
+  const auto outcome = calibrate(observations, {});
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(left_out(*outcome), 2U);
+  EXPECT_EQ(report_of(*outcome, "pose_2").fault, PoseFault::kTooFewCorners);
+  EXPECT_THAT(report_of(*outcome, "pose_7").reason, HasSubstr("11 corners found are along a line"));
+  expect_near_truth(*outcome, truth);
+}
+
+TEST(Calibrate, LeavesOutViewsOfOneCameraThatShowTooLittle) {
+  const RigModel truth = true_rig(2);
+  Observations observations = see(truth, true_poses(12));
+  leave_a_row(observations.poses[0].views[1]);
+  observations.poses[4].views[1].corners.resize(3);
+  const auto outcome = calibrate(observations, {});
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(left_out(*outcome), 0U);
+  EXPECT_THAT(report_of(*outcome, "pose_0").without, testing::ElementsAre(HasSubstr("camera camera1: the 11 corners")));
+  EXPECT_THAT(report_of(*outcome, "pose_4").without, testing::ElementsAre(HasSubstr("camera camera1: only 3 of")));
+  EXPECT_EQ(report_of(*outcome, "pose_4").corners, 70U);
+  EXPECT_EQ(outcome->observations.poses[4].views.size(), 1U);
+  expect_near_truth(*outcome, truth);
 }
 
 }  // namespace
