@@ -13,7 +13,6 @@ struct CalibrateRequest {
   std::optional<std::filesystem::path> configuration_file;
   std::filesystem::path from;    ///< a folder of captures; empty: the configured devices
   std::filesystem::path output;  ///< empty: the configured calibration file
-  std::filesystem::path report;  ///< empty: beside the calibration file, as .html
   std::string board;             ///< empty: the default board
   std::string ruler;             ///< "NOMINAL:MEASURED" in mm, as the print's ruler was measured; empty: true to scale
   std::string plane;             ///< the reference plane; empty: no second step

@@ -17,8 +17,20 @@ namespace {
 
 using std::filesystem::path;
 
-Result<> write_report(const CalibrateRequest& request, const path& file, const CalibrationOutcome& outcome) {
-  const path report = request.report.empty() ? path(file).replace_extension(".html") : request.report;
+path report_of(path file) {
+  return file.replace_extension(".html");
+}
+
+Result<path> checked(path file, const std::string& named_by) {
+  if (report_of(file) != file) return file;
+  return fail(ErrorCode::kInvalidArgument,
+              "is where the report goes, which is written beside the calibration as .html: name it otherwise, such as "
+              "calibration.yml",
+              named_by);
+}
+
+Result<> write_report(const path& file, const CalibrationOutcome& outcome) {
+  const path report = report_of(file);
   const auto written = write_file_atomically(report, report_html(outcome));
   if (written) std::cout << "report: " << report.string() << "\n";
   return written;
@@ -27,8 +39,10 @@ Result<> write_report(const CalibrateRequest& request, const path& file, const C
 }  // namespace
 
 Result<path> file_to_keep(const CalibrateRequest& request, const Configuration& configuration) {
-  if (!request.output.empty()) return request.output;
-  if (!configuration.calibration_file.empty()) return configuration.calibration_file;
+  if (!request.output.empty()) return checked(request.output, "--output " + request.output.string());
+  if (!configuration.calibration_file.empty()) {
+    return checked(configuration.calibration_file, "[calibration] file " + configuration.calibration_file.string());
+  }
   return fail(ErrorCode::kInvalidArgument,
               "nowhere to keep the calibration: name a file by --output, or in [calibration] of the configuration");
 }
@@ -50,10 +64,11 @@ Result<> finish_calibration(const CalibrateRequest& request, const path& file, c
                 "nevertheless by --output",
                 file.string());
   }
+  if (auto reported = write_report(file, outcome); !reported) return reported;
   const auto kept = keep_calibration(outcome, file);
   if (!kept) return tl::unexpected(kept.error());
   std::cout << *kept << "\n";
-  return write_report(request, file, outcome);
+  return {};
 }
 
 }  // namespace slsd

@@ -14,13 +14,14 @@
 namespace slsd {
 
 /// Where a calibration is to be kept: as asked for, or where the configuration has it.
-/// @errors kInvalidArgument: neither says
+/// @errors kInvalidArgument: neither says, or it is the place of the report
 [[nodiscard]] Result<std::filesystem::path> file_to_keep(const CalibrateRequest& request,
                                                          const Configuration& configuration);
 
 [[nodiscard]] CalibrateOptions calibrate_options(const Configuration& configuration);
 
-/// Prints the result, writes the report, and keeps the calibration.
+/// Prints the result, writes the report, and keeps the calibration: last, so that where something fails what is in
+/// force stays.
 /// @param refused  poses that took no part, for the report
 /// @errors of the files; kImpossible: the verdict is bad and no output was asked for, so that what is in force stays
 [[nodiscard]] Result<> finish_calibration(const CalibrateRequest& request, const std::filesystem::path& file,

@@ -87,10 +87,16 @@ class FromFiles : public testing::Test {
     const auto text = read_file(home_ / "calibration.yml", 1 << 20);
     return read_calibration(text ? *text : "", "calibration.yml").value_or(Calibration{});
   }
+  /// The calibration in force and the one before it survive a failure, to the last byte.
   std::string refusal() {
+    const path in_force = home_ / "calibration.yml", before = home_ / "calibration.yml.old";
+    if (!std::filesystem::exists(in_force)) write_text(in_force, "what is in force");
+    const std::string bytes = *read_file(in_force, 1 << 20);
+    write_text(before, "what was before it");
     const auto done = calibrate_from_files(request_);
     EXPECT_FALSE(done);
-    EXPECT_FALSE(std::filesystem::exists(home_ / "calibration.yml"));
+    EXPECT_EQ(*read_file(in_force, 1 << 20), bytes);
+    EXPECT_EQ(*read_file(before, 1 << 20), "what was before it");
     return done ? std::string() : to_string(done.error());
   }
 
@@ -210,6 +216,28 @@ TEST_F(FromFiles, RefusesOnePose) {
   copy_captures();
   for (int i = 1; i < kPoses; ++i) std::filesystem::remove_all(request_.from / ("pose_0" + std::to_string(i)));
   EXPECT_THAT(refusal(), HasSubstr("1 of the poses can be used, and 3 are the least"));
+}
+
+TEST_F(FromFiles, KeepsNothingWhereTheReportCannotBeWritten) {
+  std::filesystem::create_directories(home_ / "calibration.html/in the way");
+  EXPECT_THAT(refusal(), HasSubstr("calibration.html"));
+}
+
+TEST_F(FromFiles, RefusesTheReportsOwnPlace) {
+  request_.output = home_ / "result.html";
+  EXPECT_THAT(refusal(), HasSubstr("result.html: is where the report goes"));
+  EXPECT_FALSE(std::filesystem::exists(request_.output));
+}
+
+// The working range lies where neither device sees anything: bad for certain.
+TEST_F(FromFiles, PutsNoBadCalibrationInForceUnlessAskedTo) {
+  write_text(home_ / "slsd.toml", configuration_text() + "[decode]\ndepth_min_mm = 20.0\ndepth_max_mm = 40.0\n");
+  EXPECT_THAT(refusal(), HasSubstr("the calibration is bad and was not put in force"));
+  request_.output = home_ / "calibration.yml";
+  const auto done = calibrate_from_files(request_);
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_EQ(kept().report.verdict, "bad");
+  EXPECT_EQ(*read_file(home_ / "calibration.yml.old", 100), "what is in force");
 }
 
 TEST_F(FromFiles, NeedsAPlaceToKeepIt) {
