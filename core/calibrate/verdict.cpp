@@ -83,6 +83,13 @@ std::string_view to_string(Grade grade) {
   return "bad";
 }
 
+std::optional<Grade> parse_grade(std::string_view name) {
+  for (const Grade grade : {Grade::kGood, Grade::kUsable, Grade::kBad}) {
+    if (to_string(grade) == name) return grade;
+  }
+  return std::nullopt;
+}
+
 Verdict judge(const CalibrationOutcome& outcome) {
   Jury jury;
   jury.judge(outcome.held_out_corner_px, kHeldOutPx,

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +11,8 @@ namespace slsd {
 
 enum class Grade { kGood, kUsable, kBad };
 [[nodiscard]] std::string_view to_string(Grade grade);
+/// Nothing: it is the name of none.
+[[nodiscard]] std::optional<Grade> parse_grade(std::string_view name);
 
 /// One word on a calibration, why, and what to shoot next.
 struct Verdict {

@@ -9,8 +9,8 @@ namespace slsd {
 
 /// Calibrates from captures on disk, without any hardware; prints what each pose shows, the result and the verdict, and
 /// keeps it.
-/// @errors of the configuration, the files, the board's text and calibrate(); kImpossible: the verdict is bad and no
-///         output was asked for: what is in force stays
+/// @errors of the configuration, the files, the board's text and calibrate(); kImpossible: the verdict is bad,
+///         or worse than that in force, and no output was asked for: what is in force stays
 [[nodiscard]] Result<> calibrate_from_files(const CalibrateRequest& request);
 
 }  // namespace slsd

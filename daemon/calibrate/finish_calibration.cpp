@@ -6,6 +6,8 @@
 #include <iostream>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "daemon/calibrate/keep_calibration.hpp"
 #include "daemon/calibrate/outcome_text.hpp"
 #include "daemon/calibrate/report_html.hpp"
@@ -36,6 +38,25 @@ Result<> write_report(const path& file, const CalibrationOutcome& outcome) {
   return written;
 }
 
+/// Whether a calibration may replace the one in force without being asked to.
+Result<> check_gain(const CalibrationOutcome& outcome, const path& file) {
+  const Grade grade = outcome.verdict.grade;
+  const std::string nevertheless = ", or keep it nevertheless by --output " + file.string();
+  if (grade == Grade::kBad) {
+    return fail(ErrorCode::kImpossible,
+                "the calibration is bad and was not put in force; take the poses again as advised" + nevertheless,
+                file.string());
+  }
+  const auto in_force = grade_in_force(outcome.calibration, file);
+  if (!in_force || *in_force >= grade) return {};
+  return fail(
+      ErrorCode::kImpossible,
+      fmt::format("the calibration is {}, and the one in force is {}: that stays; take more poses, as advised{}, "
+                  "such as where the rig has changed since",
+                  to_string(grade), to_string(*in_force), nevertheless),
+      file.string());
+}
+
 }  // namespace
 
 Result<path> file_to_keep(const CalibrateRequest& request, const Configuration& configuration) {
@@ -58,11 +79,8 @@ Result<> finish_calibration(const CalibrateRequest& request, const path& file, c
   outcome.calibration.report.board = to_string(board);
   outcome.calibration.report.date = utc_now();
   std::cout << outcome_text(outcome) << std::flush;
-  if (outcome.verdict.grade == Grade::kBad && request.output.empty()) {
-    return fail(ErrorCode::kImpossible,
-                "the calibration is bad and was not put in force; take the poses again as advised, or keep it "
-                "nevertheless by --output",
-                file.string());
+  if (request.output.empty()) {
+    if (auto gain = check_gain(outcome, file); !gain) return gain;
   }
   if (auto reported = write_report(file, outcome); !reported) return reported;
   const auto kept = keep_calibration(outcome, file);

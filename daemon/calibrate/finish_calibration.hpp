@@ -23,7 +23,8 @@ namespace slsd {
 /// Prints the result, writes the report, and keeps the calibration: last, so that where something fails what is in
 /// force stays.
 /// @param refused  poses that took no part, for the report
-/// @errors of the files; kImpossible: the verdict is bad and no output was asked for, so that what is in force stays
+/// @errors of the files; kImpossible: no output was asked for, and the verdict is bad, or worse than that of the
+///         calibration in force of the same devices, so that what is in force stays
 [[nodiscard]] Result<> finish_calibration(const CalibrateRequest& request, const std::filesystem::path& file,
                                           const Board& board, const std::vector<PoseReport>& refused,
                                           CalibrationOutcome outcome);

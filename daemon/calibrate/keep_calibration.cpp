@@ -7,6 +7,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "core/geometry/triangulate.hpp"
+#include "daemon/scan/hardware.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd {
@@ -42,7 +43,34 @@ std::string difference(const CalibrationOutcome& outcome, const Calibration& bef
                      count == 0 ? 0 : std::sqrt(sum / static_cast<double>(count)));
 }
 
+bool are_other(const std::string& one, const std::string& other) {
+  return !one.empty() && !other.empty() && one != other;
+}
+
+bool same_size(const Lens& one, const Lens& other) {
+  return one.width_px == other.width_px && one.height_px == other.height_px;
+}
+
+/// As far as sizes, names and serials tell.
+bool of_the_same_devices(const Calibration& one, const Calibration& other) {
+  if (!same_size(one.projector, other.projector) || one.cameras.size() != other.cameras.size()) return false;
+  if (are_other(one.report.projector_serial.value_or(""), other.report.projector_serial.value_or(""))) return false;
+  for (const CalibratedCamera& camera : one.cameras) {
+    const CalibratedCamera* const counterpart = other.camera(camera.name);
+    if (counterpart == nullptr || !same_size(camera.lens, counterpart->lens)) return false;
+    if (are_other(calibrated_hardware(one, camera), calibrated_hardware(other, *counterpart))) return false;
+  }
+  return true;
+}
+
 }  // namespace
+
+std::optional<Grade> grade_in_force(const Calibration& calibration, const path& file) {
+  const auto text = read_file(file, kMaxFileBytes);
+  const auto before = text ? read_calibration(*text, file.string()) : tl::unexpected(text.error());
+  if (!before || !before->report.verdict || !of_the_same_devices(calibration, *before)) return std::nullopt;
+  return parse_grade(*before->report.verdict);
+}
 
 Result<std::string> keep_calibration(const CalibrationOutcome& outcome, const path& file) {
   const std::string text = write_calibration(outcome.calibration);

@@ -240,6 +240,32 @@ TEST_F(FromFiles, PutsNoBadCalibrationInForceUnlessAskedTo) {
   EXPECT_EQ(*read_file(home_ / "calibration.yml.old", 100), "what is in force");
 }
 
+TEST_F(FromFiles, ReplacesABetterCalibrationOnlyIfAskedTo) {
+  Calibration better = small_rig();
+  better.cameras[0].name = "camera", better.report.verdict = "good";
+  write_text(home_ / "calibration.yml", write_calibration(better));
+  EXPECT_THAT(refusal(), HasSubstr("the calibration is usable, and the one in force is good: that stays; take more"));
+  request_.output = home_ / "calibration.yml";
+  const auto asked = calibrate_from_files(request_);
+  ASSERT_TRUE(asked) << to_string(asked.error());
+  EXPECT_EQ(kept().report.verdict, "usable");
+  request_.output.clear();
+  better.report.verdict = "usable";
+  write_text(home_ / "calibration.yml", write_calibration(better));
+  EXPECT_TRUE(calibrate_from_files(request_)) << "one that is as good";
+}
+
+// That of another projector is of no use, however good.
+TEST_F(FromFiles, ReplacesABetterCalibrationOfOtherDevices) {
+  Calibration other = small_rig();
+  other.cameras[0].name = "camera", other.report.verdict = "good";
+  other.projector.width_px = 1280;
+  write_text(home_ / "calibration.yml", write_calibration(other));
+  const auto done = calibrate_from_files(request_);
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_EQ(kept().projector.width_px, 640);
+}
+
 TEST_F(FromFiles, NeedsAPlaceToKeepIt) {
   write_text(home_ / "slsd.toml", "[projector]\nwidth_px = 640\nheight_px = 400\n");
   EXPECT_THAT(refusal(), HasSubstr("nowhere to keep the calibration"));
