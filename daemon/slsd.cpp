@@ -125,6 +125,9 @@ void add_options(CLI::App& app, CommandLine& line) {
 
 /// --from, --board and --ruler belong to several commands.
 void check_commands(const CLI::App& app, const CommandLine& line) {
+  if (line.verify && app.count("--ruler") > 0 && app.count("--board") == 0) {
+    throw CLI::RequiresError("--ruler with --verify", "--board");
+  }
   if (line.calibrate || line.verify) return;
   for (const char* option : {"--from", "--ruler"}) {
     if (app.count(option) > 0) throw CLI::RequiresError(option, "--calibrate or --verify");

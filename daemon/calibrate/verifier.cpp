@@ -16,7 +16,13 @@ namespace {
 
 /// The board that is asked for; else the one of the calibration, as far as its file names it in our words.
 Result<Board> board_to_look_for(const CalibrateRequest& request, const Calibration& calibration) {
-  if (request.board.empty() && request.ruler.empty() && calibration.report.board) {
+  if (request.board.empty() && !request.ruler.empty()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "name the print whose ruler it is by --board too: the board of the calibration file is already as it "
+                "was measured",
+                "--ruler " + request.ruler);
+  }
+  if (request.board.empty() && calibration.report.board) {
     if (auto board = parse_board(*calibration.report.board)) return board;
   }
   return requested_board(request);

@@ -23,8 +23,8 @@ namespace slsd {
 class Verifier {
  public:
   /// @param pattern    what is projected, unless it is a Gray code
-  /// @errors kNotFound: no calibration is configured; those of its file and of the board's text; kMismatch: the pattern
-  ///         is for another projector
+  /// @errors kNotFound: no calibration is configured; those of its file and of the board's text; kInvalidArgument: a
+  ///         ruler of no board; kMismatch: the pattern is for another projector
   [[nodiscard]] static Result<Verifier> create(const CalibrateRequest& request, const Configuration& configuration,
                                                Pattern pattern, bool gray_code);
 

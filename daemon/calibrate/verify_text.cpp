@@ -30,8 +30,8 @@ std::string advice_for(VerifyFault fault, double scale_percent) {
              "so again, calibrate again, with poses over the whole of both images";
     case VerifyFault::kScale:
       return fmt::format(
-          "all distances are {:.2f} % too {}: measure the board's ruler and give it by --ruler; if the "
-          "board is right, calibrate again with it",
+          "all distances are {:.2f} % too {}: measure the board's ruler, and give the board by --board and "
+          "the ruler by --ruler; if the board is right, calibrate again with both",
           std::abs(scale_percent), scale_percent > 0 ? "long" : "short");
     case VerifyFault::kDistances:
       break;

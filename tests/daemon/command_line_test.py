@@ -92,6 +92,7 @@ class Slsd(unittest.TestCase):
             self.assertEqual(result.returncode, 1, command)
             self.assertIn("holds no pose", result.stderr)
         for usage in (["--from", self.folder], ["--board", "charuco"], ["--calibrate", "--verify"], ["--poses", "5"],
+                      ["--verify", "--ruler", "200:201"],
                       ["--plane", "plane:8x5:100:40:DICT_4X4_50"], ["--calibrate", "--planes", "2"]):
             self.assertEqual(slsd(*usage).returncode, 2, usage)
 

@@ -81,6 +81,17 @@ TEST_F(VerifyFromFiles, FailsOfABoardOfAnotherSize) {
   EXPECT_THAT(done.error().message, HasSubstr("--ruler"));
 }
 
+TEST_F(VerifyFromFiles, TakesTheRulerOfABoardThatIsNamed) {
+  request_.ruler = "200:200";
+  const auto alone = verify();
+  ASSERT_FALSE(alone);
+  EXPECT_EQ(alone.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(to_string(alone.error()), HasSubstr("--ruler 200:200: name the print whose ruler it is by --board too"));
+  request_.board = kBoard;
+  const auto done = verify();
+  EXPECT_TRUE(done) << to_string(done.error());
+}
+
 TEST_F(VerifyFromFiles, NeedsACalibration) {
   std::ofstream(home_ / "slsd.toml") << "[projector]\nwidth_px = 640\nheight_px = 400\n";
   const auto done = verify();
