@@ -29,6 +29,10 @@ constexpr double kExplains = 3;
 constexpr double kBowShareMin = 0.4;
 /// Corners that are bent say a plane that is off by about the bend; a move without a bend shows none.
 constexpr double kBowOfShiftMin = 0.3;
+/// Of half the board's size: root mean square off a plane beyond which it is no board.
+constexpr double kUnevenShareMax = 0.1;
+/// Times the usual error from which on the figure tells nothing more.
+constexpr double kTimesTelling = 100;
 
 /// The blurriest view of a pose.
 double blur_of(const PoseObservation& pose) {
@@ -92,30 +96,66 @@ LitSurface surface_of(std::size_t pose, const Observations& observations, const 
   return measure_lit_surface(observations.poses[pose], rig, by_corners.value_or(joint));
 }
 
-/// @param error  what is said where nothing explains it
-FaultyPose explain(std::size_t pose, const std::string& error, const Observations& observations, const RigModel& rig) {
+/// Surfaces of a pose and how they compare with the others'.
+struct Explanation {
+  LitSurface surface;
+  double shift_mm = 0;
+  double bow_factor = 0, shift_factor = 0, flatness_factor = 0;
+  double believable_mm = 0;  ///< what lies off farther than this is no board that was held
+
+  /// Of second order, like a print that is mounted on cardboard.
+  [[nodiscard]] bool is_bowed() const {
+    return surface.bow_share > kBowShareMin && bow_factor > kExplains && surface.bow_mm > kBowOfShiftMin * shift_mm &&
+           surface.bow_mm < believable_mm;
+  }
+  /// Of any shape: the symbols lie on no plane.
+  [[nodiscard]] bool is_uneven() const {
+    return flatness_factor > kExplains && surface.flatness_mm < kUnevenShareMax * believable_mm;
+  }
+  /// The symbols lie on a plane as those of other poses do, but not on that of the corners.
+  [[nodiscard]] bool is_moved() const {
+    return shift_factor > kExplains && flatness_factor <= kExplains && shift_mm < believable_mm;
+  }
+};
+
+Explanation compare(std::size_t pose, const Observations& observations, const RigModel& rig) {
   std::vector<LitSurface> surfaces;
-  std::vector<double> bows, shifts;
+  std::vector<double> bows, shifts, flatnesses;
   for (std::size_t i = 0; i < observations.poses.size(); ++i) {
     surfaces.push_back(surface_of(i, observations, rig));
     bows.push_back(surfaces.back().bow_mm);
     shifts.push_back(surfaces.back().shift_mm(half_size_mm(observations.poses[i])));
+    flatnesses.push_back(surfaces.back().flatness_mm);
   }
-  const LitSurface& surface = surfaces[pose];
+  const auto factor = [pose](const std::vector<double>& values) {
+    return values[pose] / std::max(median_of(values), 1e-6);
+  };
+  return {surfaces[pose], shifts[pose],       factor(bows),
+          factor(shifts), factor(flatnesses), half_size_mm(observations.poses[pose])};
+}
+
+/// @param error  what is said where nothing explains it
+FaultyPose explain(std::size_t pose, const std::string& error, const Observations& observations, const RigModel& rig) {
+  const Explanation shown = compare(pose, observations, rig);
   const char* const subject = observations.poses[pose].subject == PoseSubject::kBoard ? "board" : "plane";
-  const double bow_factor = bows[pose] / std::max(median_of(bows), 1e-6);
-  const double shift_factor = shifts[pose] / std::max(median_of(shifts), 1e-6);
-  if (surface.bow_share > kBowShareMin && bow_factor > kExplains && bows[pose] > kBowOfShiftMin * shifts[pose]) {
+  if (shown.is_bowed()) {
     return {pose, PoseFault::kBent,
             fmt::format("the {} is not flat: it is bent by {:.1f} mm, {:.0f} times as much as in the other poses; "
                         "mount the print on a stiff plate",
-                        subject, surface.bow_mm, bow_factor)};
+                        subject, shown.surface.bow_mm, shown.bow_factor)};
   }
-  if (shift_factor > kExplains) {
+  if (shown.is_uneven()) {
+    return {
+        pose, PoseFault::kBent,
+        fmt::format("the {} is not flat: its symbols lie off any plane by {:.1f} mm, {:.0f} times as much as in the "
+                    "other poses; mount the print on a stiff plate, and hold it still",
+                    subject, shown.surface.flatness_mm, shown.flatness_factor)};
+  }
+  if (shown.is_moved()) {
     return {pose, PoseFault::kMoved,
             fmt::format("the {} moved between the white picture and the pattern: by {:.1f} mm and {:.2f} degrees; "
                         "hold it still, or lean it against something",
-                        subject, std::abs(surface.offset_mm), surface.tilt_deg)};
+                        subject, std::abs(shown.surface.offset_mm), shown.surface.tilt_deg)};
   }
   return {pose, PoseFault::kUnlike, fmt::format("it contradicts the other poses: {}; take it again", error)};
 }
@@ -197,7 +237,10 @@ std::optional<FaultyPose> find_contradiction(const Observations& observations, c
     if (most > times) times = most, worst = i;
   }
   if (times < kContradiction) return std::nullopt;
-  return explain(worst, fmt::format("its error is {:.1f} times theirs", times), observations, rig);
+  return explain(worst,
+                 times < kTimesTelling ? fmt::format("its error is {:.1f} times theirs", times)
+                                       : fmt::format("its error is more than {:.0f} times theirs", kTimesTelling),
+                 observations, rig);
 }
 
 }  // namespace slsd

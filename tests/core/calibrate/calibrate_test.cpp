@@ -132,6 +132,37 @@ TEST(Calibrate, NamesAPoseWithABentBoard) {
   expect_near_truth(*outcome, truth);
 }
 
+// Of no second order: a plane through it is tilted, which is no move.
+TEST(Calibrate, NamesAPoseWithABoardThatIsBentLikeAnS) {
+  const RigModel truth = true_rig();
+  for (const double bend_mm : {3, 10}) {
+    SightOptions options;
+    options.relief = [bend_mm](int pose, const Eigen::Vector2d& mm) {
+      return pose == 5 ? bend_mm * std::sin(2 * std::numbers::pi * mm.x() / 450) : 0;
+    };
+    const auto outcome = calibrate(see(truth, true_poses(12), options), {});
+    ASSERT_TRUE(outcome) << outcome.error().message;
+    EXPECT_EQ(left_out(*outcome), 1U);
+    EXPECT_EQ(report_of(*outcome, "pose_5").fault, PoseFault::kBent) << report_of(*outcome, "pose_5").reason;
+    expect_near_truth(*outcome, truth);
+  }
+}
+
+TEST(Calibrate, ExplainsNoSkewedPictureByAMove) {
+  const RigModel truth = true_rig();
+  for (const double skew : {0.1, 0.3, 1.0}) {
+    Observations observations = see(truth, true_poses(12));
+    PoseView& view = observations.poses[5].views[0];
+    for (BoardPoint& corner : view.corners) corner.camera_px.x() += skew * corner.camera_px.y();
+    for (ProjectedPoint& symbol : view.symbols) symbol.camera_px.x() += skew * symbol.camera_px.y();
+    const auto outcome = calibrate(observations, {});
+    ASSERT_TRUE(outcome) << outcome.error().message;
+    EXPECT_EQ(left_out(*outcome), 1U);
+    EXPECT_NE(report_of(*outcome, "pose_5").fault, PoseFault::kMoved) << report_of(*outcome, "pose_5").reason;
+    expect_near_truth(*outcome, truth);
+  }
+}
+
 TEST(Calibrate, NamesAPoseWhoseBoardMoved) {
   const RigModel truth = true_rig();
   SightOptions options;
