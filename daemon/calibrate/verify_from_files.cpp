@@ -43,7 +43,7 @@ Result<> verify_from_files(const CalibrateRequest& request) {
   if (!poses) return tl::unexpected(poses.error());
   auto pattern = captured_pattern(request.from, *configuration);
   if (!pattern) return tl::unexpected(pattern.error());
-  const bool gray_code = request.gray_code || captured_in_gray(*poses);
+  const bool gray_code = captured_in_gray(*poses);
   auto verifier = Verifier::create(request, *configuration, std::move(*pattern), gray_code);
   if (!verifier) return tl::unexpected(verifier.error());
   for (const CapturedPose& pose : *poses) {

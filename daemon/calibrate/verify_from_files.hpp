@@ -9,7 +9,7 @@ namespace slsd {
 
 /// Looks at captures of a board or of a plain plane by the calibration in force, without any hardware, and says whether
 /// it holds.
-/// @param request  its folder, board, ruler and code; the configuration names the calibration
+/// @param request  its folder, board and ruler; the configuration names the calibration
 /// @errors of the configuration and the files; what Verifier says
 [[nodiscard]] Result<> verify_from_files(const CalibrateRequest& request);
 

@@ -19,9 +19,6 @@ Result<std::vector<GreyImage>> look_under(const Grey8& image, PoseSource& source
 }  // namespace
 
 Result<> verify_live(const CalibrateRequest& request) {
-  if (request.gray_code) {
-    return fail(ErrorCode::kUnsupported, "one look takes the pattern; a Gray code can be verified by --from", "--code");
-  }
   const auto configuration = load_configuration_or_defaults(request.configuration_file);
   if (!configuration) return tl::unexpected(configuration.error());
   auto pattern = configured_pattern(*configuration);

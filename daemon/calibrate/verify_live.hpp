@@ -10,7 +10,7 @@ namespace slsd {
 /// Takes one look with the configured projector and cameras, at a board or a plain plane, and says whether the
 /// calibration in force holds. The devices must be free: the service stopped.
 /// @param request  its board and ruler
-/// @errors of the configuration and the devices; kUnsupported: a Gray code; what Verifier says
+/// @errors of the configuration and the devices; what Verifier says
 [[nodiscard]] Result<> verify_live(const CalibrateRequest& request);
 
 }  // namespace slsd
