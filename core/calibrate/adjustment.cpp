@@ -175,7 +175,9 @@ Result<> Adjustment::adjust_again(Observations& observations) {
   if (!options_.scale) rig_.board_scale = 0;
   measure_noise(observations);
   mark_outlying(observations);
-  if (auto solved = adjust(observations, options_, rig_); !solved) return solved;
+  const auto settled = adjust(observations, options_, rig_);
+  if (!settled) return tl::unexpected(settled.error());
+  settled_ = *settled;
   measure_noise(observations);
   return find_influence_of(observations);
 }
@@ -231,7 +233,7 @@ Result<> Adjustment::choose_terms(Observations& observations) {
 
 Result<> Adjustment::begin_with_planes(Observations& observations) {
   options_.scale = observations.count(PoseSubject::kPlane) >= kLooksForScale;
-  if (auto solved = adjust(observations, options_, rig_); !solved) return solved;
+  if (auto solved = adjust(observations, options_, rig_); !solved) return tl::unexpected(solved.error());
   return adjust_again(observations);
 }
 
@@ -261,7 +263,7 @@ Result<> Adjustment::look_for_stretch(Observations& observations) {
   if (!options_.stretch) {
     Adjustment trial = *this;
     trial.options_.stretch = true;
-    if (auto solved = adjust(observations, trial.options_, trial.rig_); !solved) return solved;
+    if (auto solved = adjust(observations, trial.options_, trial.rig_); !solved) return tl::unexpected(solved.error());
     if (auto found = trial.find_influence_of(observations); !found) return {};  // the poses do not tell it
     if (!trial.is_stretched()) return {};
     *this = std::move(trial);
@@ -280,6 +282,12 @@ Result<> Adjustment::look_for_stretch(Observations& observations) {
 
 std::vector<std::string> Adjustment::warnings() const {
   std::vector<std::string> warnings = warnings_;
+  if (!settled_) {
+    warnings.push_back(fmt::format(
+        "the adjustment had not settled after {} rounds, so that the result is not as good as its deviations say; take "
+        "more poses, at more angles and distances",
+        options_.iterations_max));
+  }
   if (!options_.stretch) return warnings;
   warnings.push_back(fmt::format(
       "the print of the board is stretched: it is {:.2f} +- {:.2f} % {} along its columns than along its rows. This "

@@ -56,6 +56,7 @@ class Adjustment {
   BundleOptions options_;
   BundleEquations equations_;
   PoseInfluence influence_;
+  bool settled_ = true;        // the last time that all was adjusted
   std::vector<double> radii_;  // outermost, of the projector and of each camera
   std::vector<std::string> warnings_;
 };

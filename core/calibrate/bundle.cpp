@@ -13,7 +13,6 @@ namespace slsd {
 namespace {
 
 constexpr double kHuberSigmas = 3;
-constexpr int kIterationsMax = 60;
 
 /// The problem of Ceres, and which of its blocks belong to what.
 class Problem {
@@ -156,7 +155,7 @@ Eigen::MatrixXd dense(const ceres::CRSMatrix& sparse) {
 
 }  // namespace
 
-Result<> adjust(const Observations& observations, const BundleOptions& options, RigModel& rig) {
+Result<bool> adjust(const Observations& observations, const BundleOptions& options, RigModel& rig) {
   Problem problem(observations, options, rig);
   ceres::Solver::Options how;
   how.linear_solver_type = ceres::DENSE_SCHUR;
@@ -168,7 +167,7 @@ Result<> adjust(const Observations& observations, const BundleOptions& options, 
     if (problem.ceres().HasParameterBlock(problem.pose_block(i)))
       how.linear_solver_ordering->AddElementToGroup(problem.pose_block(i), 0);
   }
-  how.max_num_iterations = kIterationsMax;
+  how.max_num_iterations = options.iterations_max;
   how.function_tolerance = 1e-6;
   how.num_threads = 2;
   how.logging_type = ceres::SILENT;
@@ -177,7 +176,7 @@ Result<> adjust(const Observations& observations, const BundleOptions& options, 
   if (!summary.IsSolutionUsable() || !std::isfinite(summary.final_cost)) {
     return fail(ErrorCode::kImpossible, "the adjustment does not converge: the poses do not determine the rig");
   }
-  return {};
+  return summary.termination_type == ceres::CONVERGENCE;
 }
 
 BundleEquations linearise(const Observations& observations, const BundleOptions& options, RigModel rig) {

@@ -18,6 +18,7 @@ struct BundleOptions {
   bool with_symbols = true;  ///< otherwise the cameras and poses alone are adjusted
   bool scale = false;        ///< whether the board's scale is adjusted too, against that of the reference plane
   bool stretch = false;      ///< whether the board's aspect is adjusted too
+  int iterations_max = 60;
   double corner_sigma_px = 0.1;
   double plane_corner_sigma_px = 0.1;  ///< of the reference plane's corners
   double symbol_sigma_factor = 1;      ///< of ProjectedPoint::sigma_px
@@ -30,9 +31,10 @@ struct BundleOptions {
 /// Adjusts a rig to what was seen of it: all lenses, the devices' places and all poses at once (Ceres, Huber's
 /// loss). Points marked as outlying have no part.
 /// @param rig  in: near the solution; out: the solution
+/// @return whether it settled within its iterations; where not, the rig is the best so far
 /// @errors kImpossible: no solution was reached
 /// @thread reentrant
-[[nodiscard]] Result<> adjust(const Observations& observations, const BundleOptions& options, RigModel& rig);
+[[nodiscard]] Result<bool> adjust(const Observations& observations, const BundleOptions& options, RigModel& rig);
 
 /// The equations of the adjustment at its solution, linear: residuals of each pose and their derivatives. Empty where
 /// all points of a pose are outlying.

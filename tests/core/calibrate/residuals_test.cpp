@@ -82,6 +82,23 @@ TEST(Linearise, HasTheDerivativesOfFiniteDifferences) {
   }
 }
 
+TEST(Adjust, SaysWhetherItSettled) {
+  const RigModel truth = true_rig();
+  const auto poses = true_poses(4);
+  const Observations seen = see(truth, poses);
+  BundleOptions options;
+  options.cameras.assign(1, {});
+  for (const int iterations : {1, 60}) {
+    RigModel rig = truth;
+    rig.rig_from_board = poses;
+    rig.cameras[0].lens[0] *= 1.1, rig.projector.lens[2] += 20;
+    options.iterations_max = iterations;
+    const auto settled = adjust(seen, options, rig);
+    ASSERT_TRUE(settled) << settled.error().message;
+    EXPECT_EQ(*settled, iterations > 1);
+  }
+}
+
 TEST(FindInfluence, FindsTheNoiseInPosesHeldOut) {
   RigModel rig = true_rig();
   rig.rig_from_board = true_poses(8);
