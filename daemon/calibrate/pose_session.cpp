@@ -39,6 +39,7 @@ std::string counts_text(const std::vector<PoseView>& views) {
 PoseSession::PoseSession(PoseSessionParts parts, const PoseSessionOptions& options)
     : parts_(std::move(parts)),
       options_(options),
+      begun_(options.begun),
       sign_centre_px_(0.5 * parts_.source.projector().width_px, 0.5 * parts_.source.projector().height_px) {}
 
 Result<> PoseSession::run() {
@@ -54,10 +55,10 @@ Result<> PoseSession::step() {
   auto look = parts_.taker.look();
   if (!look) return bear(look.error());
   bear_until_.reset();
-  if (!begun_) {
+  if (!sized_) {
     if (auto sizes = parts_.poses.set_sizes(look->pictures); !sizes) return sizes;
   }
-  begun_ = true;
+  begun_ = sized_ = true;
   const double moved = moved_px(last_, look->sightings);
   if (handled_ && is_seen(look->sightings) && !(moved_px(*handled_, look->sightings) < kGonePx)) handled_.reset();
   watch_for_board(look->sightings);

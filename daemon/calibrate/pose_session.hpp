@@ -24,6 +24,7 @@ struct PoseSessionOptions {
   std::chrono::seconds patience{60};     ///< without a board until the operator is told what to do; without the devices
                                          ///< until the session ends
   std::chrono::milliseconds retry{500};  ///< between two tries of devices that fail
+  bool begun = false;                    ///< the devices have given a picture before: they are worth patience at once
 };
 
 /// What a session works with; all of it outlives it.
@@ -71,7 +72,8 @@ class PoseSession {
   MonotonicTime next_attempt_{};
   MonotonicTime tell_at_{};                  // when there has been no board for long
   std::optional<MonotonicTime> bear_until_;  // while the devices fail
-  bool begun_ = false;                       // the devices have given a picture
+  bool begun_;                               // the devices have given a picture
+  bool sized_ = false;                       // the sizes of the cameras' pictures are known
   Eigen::Vector2d sign_centre_px_;
 };
 

@@ -67,8 +67,9 @@ void print(const std::string& line) {
   std::cout << line << std::endl;
 }
 
+/// @param begun  the devices have given pictures already
 Result<> take_poses(const CalibrateRequest& request, const Preparation& prepared, PoseSource& source,
-                    PoseObserver& observer, PoseRecorder& recorder, PoseCollection& poses) {
+                    PoseObserver& observer, PoseRecorder& recorder, PoseCollection& poses, bool begun) {
   if (Interrupt::came()) return {};
   PoseTaker taker(source, observer,
                   request.gray_code ? draw_gray_code(source.projector()) : std::vector{draw_pattern(prepared.pattern)},
@@ -77,6 +78,7 @@ Result<> take_poses(const CalibrateRequest& request, const Preparation& prepared
   SessionTerminal terminal(std::cout, SessionTerminal::columns_of_stdout(), time.now);
   PoseSessionOptions options;
   options.poses = static_cast<std::size_t>(poses.subject() == PoseSubject::kBoard ? request.poses : request.planes);
+  options.begun = begun;
   return PoseSession({source, taker, recorder, poses, terminal, time, Interrupt::came}, options).run();
 }
 
@@ -84,13 +86,14 @@ Result<> take_poses(const CalibrateRequest& request, const Preparation& prepared
 Result<Observations> take_all(const CalibrateRequest& request, const Preparation& prepared, PoseSource& source,
                               PoseObservers& observers, PoseRecorder& recorder, const Observations& recorded) {
   PoseCollection poses(prepared.board, recorded);
-  auto taken = take_poses(request, prepared, source, observers.board, recorder, poses);
+  auto taken = take_poses(request, prepared, source, observers.board, recorder, poses, false);
   Observations observations = poses.observations();
   if (taken && prepared.plane) {
     Observations so_far = recorded;
     so_far.cameras = observations.cameras;
     PoseCollection planes(*prepared.plane, so_far, PoseSubject::kPlane);
-    taken = take_poses(request, prepared, source, *observers.plane, recorder, planes);
+    const bool begun = poses.size() > recorded.count(PoseSubject::kBoard);
+    taken = take_poses(request, prepared, source, *observers.plane, recorder, planes, begun);
     std::ranges::copy(planes.observations().poses, std::back_inserter(observations.poses));
   }
   if (taken) return observations;

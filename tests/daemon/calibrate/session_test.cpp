@@ -53,7 +53,7 @@ class CalibrationSession : public ::testing::Test {
       std::size_t poses, std::function<bool()> interrupted = [] { return false; }) {
     const Timepiece time = stage_->timepiece();
     SessionTerminal terminal(out_, 0, time.now);
-    PoseSessionOptions options;
+    PoseSessionOptions options = options_;
     options.poses = poses;
     // What goes wrong ends a test too.
     const auto ends = [&] { return interrupted() || stage_->pictures() > 300; };
@@ -71,6 +71,7 @@ class CalibrationSession : public ::testing::Test {
   std::unique_ptr<PoseObservers> observers_;
   std::unique_ptr<PoseCollection> poses_;
   std::optional<PoseRecorder> recorder_;
+  PoseSessionOptions options_;
   std::unique_ptr<PoseTaker> taker_;
   std::ostringstream out_;
 };
@@ -220,7 +221,6 @@ TEST_F(CalibrationSession, RefusesAClippedBoard) {
   EXPECT_FALSE(holds_poses(folder_.path()));
 }
 
-TEST_F(CalibrationSession, SaysWhatToDoWhereNoBoardIsSeen) {
 // Six corners are enough to find a board, but not for the calibration.
 TEST_F(CalibrationSession, RefusesABoardOfWhichTooLittleIsSeen) {
   board_ = *parse_board("charuco:4x3:50:37.5:DICT_5X5_1000");
@@ -230,6 +230,7 @@ TEST_F(CalibrationSession, RefusesABoardOfWhichTooLittleIsSeen) {
   EXPECT_EQ(poses_->size(), 0u);
 }
 
+TEST_F(CalibrationSession, SaysWhatToDoWhereNoBoardIsSeen) {
   begin();
   stage_->operate = [](const auto&) { return std::nullopt; };
   stage_->frame = 20s;
@@ -268,6 +269,16 @@ TEST_F(CalibrationSession, EndsAtOnceWhereTheDevicesDoNotBegin) {
   ASSERT_FALSE(taken);
   EXPECT_EQ(taken.error().code, ErrorCode::kTimeout);
   EXPECT_EQ(stage_->pictures(), 1);
+}
+
+// As at the first look at the reference plane, after the poses.
+TEST_F(CalibrationSession, OutlivesDevicesThatAreLostAtTheFirstLookAfterOtherPoses) {
+  begin();
+  options_.begun = true;
+  stage_->lost = [](const BoardStage& stage) { return stage.pictures() < 4; };
+  const auto taken = run(1);
+  ASSERT_TRUE(taken) << to_string(taken.error());
+  EXPECT_EQ(poses_->size(), 1u) << out_.str();
 }
 
 TEST_F(CalibrationSession, OutlivesDevicesThatAreLostForAWhile) {
