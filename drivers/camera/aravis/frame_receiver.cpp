@@ -58,6 +58,7 @@ FrameReceiver::FrameReceiver(ArvStream* stream, const DeviceLayout& layout, cons
 
 void FrameReceiver::restart() {
   ids_.forget();
+  ran_out_ = false;
   counted_ = {};
 }
 
@@ -142,12 +143,14 @@ std::string FrameReceiver::wrong_with(ArvBuffer* buffer) const {
   return same && x_padding == 0 ? "" : "its size or pixel format is not as configured";
 }
 
-// Where the stream ran out of buffers, nobody asked for the frames that are missing.
+// Where the stream ran out of buffers, nobody asked for the frames that are missing. They are missing behind those that
+// filled its buffers.
 void FrameReceiver::note_identifier(ArvBuffer* buffer) {
   guint64 underruns = 0;
   arv_stream_get_statistics(stream_, nullptr, nullptr, &underruns);
+  if (std::exchange(underruns_, underruns) != underruns) ran_out_ = true;
   const std::uint64_t missing = ids_.note(arv_buffer_get_frame_id(buffer));
-  if (std::exchange(underruns_, underruns) == underruns) counted_.lost += missing;
+  if (missing > 0 && !std::exchange(ran_out_, false)) counted_.lost += missing;
 }
 
 std::optional<MonotonicTime> FrameReceiver::exposure_start(ArvBuffer* buffer, const FrameChunks& chunks,

@@ -75,6 +75,7 @@ class FrameReceiver {
   std::unique_ptr<ChunkReader> chunks_;  ///< ends before the buffers
   FrameIds ids_;
   std::uint64_t underruns_ = 0;
+  bool ran_out_ = false;  ///< of buffers, before a gap in the identifiers that has not come yet
   AravisStatistics counted_;
   std::optional<FramePool> greys_;  ///< of mosaics turned into grey, and of packed pixels unpacked
   Grey8 grey8_;
