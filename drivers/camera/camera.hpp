@@ -59,8 +59,8 @@ class Camera {
   [[nodiscard]] virtual Result<Frame> capture(MonotonicTime deadline) = 0;
 
   /// The frame after the one that was given last, for a rig that stands still and wants every frame: its exposure may
-  /// have begun before the call, but not before that of the one given last. A camera that exposes at the trigger does
-  /// as capture() does. @errors as capture()
+  /// have begun before the call, but not before that of the one given last. After a pause of more than a few periods,
+  /// and of a camera that exposes at the trigger, as capture(). @errors as capture()
   [[nodiscard]] virtual Result<Frame> capture_next(MonotonicTime deadline) { return capture(deadline); }
 
   /// What lights the captures that follow; the pattern, where nobody says. A camera sees it, a replay chooses its

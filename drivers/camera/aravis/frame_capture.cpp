@@ -58,7 +58,8 @@ std::optional<std::uint64_t> FrameCapture::action_time() const {
 
 // After a pause what waits is old, and the time that a frame may take is over.
 Result<Frame> FrameCapture::capture_since(MonotonicTime since, MonotonicTime deadline) {
-  if (steady_clock::now() - since > frame_patience(options_) / 2) return capture(deadline);
+  const auto age_max = std::min(next_frame_age_max(options_), frame_patience(options_) / 2);
+  if (steady_clock::now() - since > age_max) return capture(deadline);
   if (events_.take_cancel()) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
   if (deadline <= steady_clock::now()) return fail_here(ErrorCode::kFrameLate, "the deadline is past");
   if (receiver_.all_held()) return fail_here(ErrorCode::kBusy, "all frames are held; give some back first");

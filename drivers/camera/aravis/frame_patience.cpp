@@ -12,6 +12,9 @@ using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 
 constexpr milliseconds kFirstFrame{250};  // readout and transfer
+constexpr milliseconds kPeriodUnknown{100};
+constexpr int kPeriodsToNext = 5;         // one of them for readout and transfer
+constexpr milliseconds kPauseLeast{100};  // which a busy host makes without anyone's doing
 
 /// Until the exposure has ended.
 nanoseconds exposure_time(const AravisCameraOptions& options) {
@@ -31,6 +34,11 @@ nanoseconds frame_patience(const AravisCameraOptions& options) {
 
 nanoseconds first_frame_patience(const AravisCameraOptions& options) {
   return std::min(milliseconds(options.frame_timeout_ms), kFirstFrame) + exposure_time(options);
+}
+
+nanoseconds next_frame_age_max(const AravisCameraOptions& options) {
+  const nanoseconds period = options.rate_hz > 0.0 ? from_us(1e6 / options.rate_hz) : kPeriodUnknown;
+  return from_us(options.exposure_us) + std::max<nanoseconds>(kPeriodsToNext * period, kPauseLeast);
 }
 
 }  // namespace slsd

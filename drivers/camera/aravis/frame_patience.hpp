@@ -18,4 +18,9 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] std::chrono::nanoseconds first_frame_patience(const AravisCameraOptions& options);
 
+/// How long ago the exposure of a frame of a camera that runs freely may have begun for the one after it still to be of
+/// now: a few periods.
+/// @thread reentrant
+[[nodiscard]] std::chrono::nanoseconds next_frame_age_max(const AravisCameraOptions& options);
+
 }  // namespace slsd

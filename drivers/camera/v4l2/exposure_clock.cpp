@@ -11,6 +11,8 @@ namespace slsd {
 namespace {
 
 constexpr std::chrono::milliseconds kPeriodUnknown{100};
+constexpr int kPeriodsToNext = 4;
+constexpr std::chrono::milliseconds kPauseLeast{100};  // which a busy host makes without anyone's doing
 
 std::chrono::nanoseconds nanoseconds(const timeval& time) {
   return std::chrono::seconds(time.tv_sec) + std::chrono::microseconds(time.tv_usec);
@@ -40,6 +42,10 @@ MonotonicTime ExposureClock::exposure_start(const v4l2_buffer& buffer, Monotonic
 
 int ExposureClock::frames_in_flight() const {
   return static_cast<int>((exposure_ + readout_ + period_ - std::chrono::nanoseconds(1)) / period_);
+}
+
+std::chrono::nanoseconds ExposureClock::next_frame_age_max() const {
+  return exposure_ + readout_ + std::max<std::chrono::nanoseconds>(kPeriodsToNext * period_, kPauseLeast);
 }
 
 }  // namespace slsd

@@ -39,6 +39,9 @@ class ExposureClock {
   /// How many frames at most are exposed or read out at a time.
   [[nodiscard]] int frames_in_flight() const;
 
+  /// How long ago the exposure of a frame may have begun for the one after it still to be of now: a few periods.
+  [[nodiscard]] std::chrono::nanoseconds next_frame_age_max() const;
+
  private:
   std::chrono::nanoseconds period_{1};
   std::chrono::nanoseconds exposure_{0};

@@ -75,8 +75,9 @@ Result<Frame> V4l2Camera::capture(MonotonicTime deadline) {
   return run({steady_clock::now(), deadline, clock_.frames_in_flight()});
 }
 
+// After a pause the buffers are full of what was to be seen when it began.
 Result<Frame> V4l2Camera::capture_next(MonotonicTime deadline) {
-  if (!last_start_) return capture(deadline);
+  if (!last_start_ || steady_clock::now() - *last_start_ > clock_.next_frame_age_max()) return capture(deadline);
   Capture next{*last_start_ + std::chrono::nanoseconds(1), deadline};
   next.next = true;
   return run(next);

@@ -43,7 +43,8 @@ class V4l2Camera final : public Camera {
   ///         kMismatch (it did not take a setting), kBusy (another program has it), kNoSpace, kDisconnected, kIo
   [[nodiscard]] Result<> open() override;
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
-  /// Frames that the driver dropped in between count as lost, and show as a gap in the numbers.
+  /// Frames that the driver dropped in between count as lost, and show as a gap in the numbers. Where the frame before
+  /// is older than a few periods, as capture().
   [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override;
   [[nodiscard]] Result<> check() override;
   void cancel() override { wake_.cancel(); }

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -126,6 +127,23 @@ TEST_P(CameraContract, GivesTheFrameAfterTheOneGivenLast) {
   const auto fresh = capture();
   ASSERT_TRUE(fresh);
   EXPECT_GE(fresh->exposure_start(), trigger);
+}
+
+// What waits by then is of a scene that is over, and what was passed over nobody missed.
+TEST_P(CameraContract, GivesNoOldFrameForTheNextAfterAPause) {
+  ASSERT_TRUE(camera_->open());
+  if (camera_->description().rate_hz == 0.0) GTEST_SKIP() << "does not run freely";
+  const auto before = camera_->capture_next(far_away());
+  ASSERT_TRUE(before) << to_string(before.error());
+  const auto periods = [this](double count) {
+    return std::chrono::nanoseconds(std::llround(1e9 * count / camera_->description().rate_hz));
+  };
+  std::this_thread::sleep_for(700ms + periods(10));
+  const MonotonicTime asked = steady_clock::now();
+  const auto frame = camera_->capture_next(far_away());
+  ASSERT_TRUE(frame) << to_string(frame.error());
+  EXPECT_GE(frame->exposure_start(), asked - 300ms - periods(6));
+  EXPECT_EQ(frame->sequence(), before->sequence() + 1);
 }
 
 TEST_P(CameraContract, DeliversFramesOfTheSizeThatItSays) {
