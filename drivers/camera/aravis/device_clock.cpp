@@ -13,6 +13,7 @@ using std::chrono::nanoseconds;
 constexpr double kCrystalError = 100e-6;  // what a clock may be off before its drift is known
 constexpr double kWander = 2e-6;          // by which a drift changes as the device warms up
 constexpr std::uint64_t kSecond = 1'000'000'000;
+constexpr nanoseconds kSlack = std::chrono::milliseconds(1);  // beyond what readings tell of each other
 
 nanoseconds half_width(const ClockReading& reading) {
   return (reading.after - reading.before) / 2;
@@ -36,11 +37,25 @@ std::size_t DeviceClock::size() const {
   return std::min(count_, readings_.size());
 }
 
+// Readings of both sides of a step would be fitted by a drift that no clock has.
 void DeviceClock::observe(const ClockReading& reading) {
+  if (!ready() || has_stepped(reading)) {
+    count_ = 0;
+    steady_since_ = reading.after;
+  }
   readings_[count_ % readings_.size()] = reading;
   ++count_;
   fit_drift();
   choose_reference();
+}
+
+bool DeviceClock::has_stepped(const ClockReading& reading) const {
+  const nanoseconds off = std::chrono::abs(host_time(reading.device) - middle(reading));
+  return off > uncertainty(reading.device) + half_width(reading) + kSlack;
+}
+
+bool DeviceClock::may_have_shown(nanoseconds device, MonotonicTime before) const {
+  return host_time(device) <= before + uncertainty(device) + kSlack;
 }
 
 // Least squares, each reading weighed by how well it is known.

@@ -25,13 +25,19 @@ struct ClockReading {
 
 /// Maps a device's clock to CLOCK_MONOTONIC by the readings that it is given: the offset by the one that is known best,
 /// the drift by the line through all of them. Without drift a crystal's 100 ppm would put a frame 0.1 ms off after a
-/// second.
+/// second. A device's clock may be set, as one is that begins to follow the network's: from the first reading after it
+/// on, what was read before is forgotten.
 /// @thread thread-bound
 class DeviceClock {
  public:
   void observe(const ClockReading& reading);
 
   [[nodiscard]] bool ready() const { return count_ > 0; }
+  /// Since when all readings were of one course of the clock. Precondition: ready().
+  [[nodiscard]] MonotonicTime steady_since() const { return steady_since_; }
+  /// Whether the device's clock can have shown so much before a time. What it shows only later was shown before it was
+  /// set back. Precondition: ready().
+  [[nodiscard]] bool may_have_shown(std::chrono::nanoseconds device, MonotonicTime before) const;
   /// When the device's clock showed so much. Precondition: ready().
   [[nodiscard]] MonotonicTime host_time(std::chrono::nanoseconds device) const;
   /// What the device's clock shows at a time. Precondition: ready().
@@ -43,11 +49,13 @@ class DeviceClock {
 
  private:
   [[nodiscard]] std::size_t size() const;
+  [[nodiscard]] bool has_stepped(const ClockReading& reading) const;
   void fit_drift();
   void choose_reference();
 
   std::array<ClockReading, 32> readings_;  ///< a ring
   std::size_t count_ = 0;
+  MonotonicTime steady_since_;
   ClockReading reference_;
   double host_per_device_ = 1.0;
   double drift_error_ = 0.0;  ///< of host_per_device_

@@ -163,7 +163,7 @@ std::optional<MonotonicTime> FrameReceiver::exposure_start(ArvBuffer* buffer, co
   }
   const nanoseconds device = chunks.exposure_start.value_or(nanoseconds(arv_buffer_get_timestamp(buffer)));
   const MonotonicTime start = clock.host_time(device);
-  if (start + clock.uncertainty(device) < asked) return std::nullopt;
+  if (start + clock.uncertainty(device) < asked || !clock.may_have_shown(device, there)) return std::nullopt;
   return std::clamp(start, std::min(asked, there), there);
 }
 

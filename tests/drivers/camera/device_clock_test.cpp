@@ -64,6 +64,59 @@ TEST(DeviceClock, LearnsTheDrift) {
   EXPECT_LE(off(clock.host_time(crystal.at(later)), later), 10us);
 }
 
+/// A clock that is set by so much after it was read eight times at once and then once a second, and read once more.
+struct SteppedClock {
+  explicit SteppedClock(nanoseconds by, Crystal before = {.ppm = 30.0, .start = 5s}) : crystal(before) {
+    for (int i = 0; i < 8; ++i) observe(kHostStart + i * 1ms);
+    for (int i = 1; i < 20; ++i) observe(kHostStart + i * 1s);
+    crystal.start += by;
+    observe(kHostStart + 20s);
+  }
+  void observe(MonotonicTime sent) { clock.observe(crystal.read(sent, 50us, 100us)); }
+
+  Crystal crystal;
+  DeviceClock clock;
+};
+
+constexpr nanoseconds kToTai = 1'700'000'000s;
+
+TEST(DeviceClock, GoesByTheReadingsAfterAStep) {
+  for (const nanoseconds step : {nanoseconds(kToTai), nanoseconds(37s), nanoseconds(5ms), nanoseconds(-5ms),
+                                 nanoseconds(-3s), nanoseconds(-24s)}) {
+    SteppedClock stepped(step);
+    const Crystal& crystal = stepped.crystal;
+    for (int i = 20; i < 60; ++i) {
+      if (i > 20) stepped.observe(kHostStart + i * 1s);
+      const MonotonicTime later = kHostStart + i * 1s + 500ms;
+      EXPECT_LE(off(stepped.clock.host_time(crystal.at(later)), later), 200us) << step.count() << " after " << i;
+      EXPECT_LE(std::chrono::abs(stepped.clock.device_time(later) - crystal.at(later)), 200us) << step.count();
+      EXPECT_LE(std::abs(stepped.clock.drift_ppm()), 100.0) << step.count();
+      EXPECT_EQ(stepped.clock.steady_since(), kHostStart + 20s + 100us);
+    }
+  }
+}
+
+TEST(DeviceClock, KeepsItsReadingsWhereTheDeviceIsSlowToAnswer) {
+  const Crystal crystal{.ppm = -60.0, .start = 5s};
+  DeviceClock clock;
+  for (int i = 0; i < 8; ++i) clock.observe(crystal.read(kHostStart + i * 1ms, 50us, 100us));
+  for (int i = 1; i < 40; ++i) {
+    const bool slow = i % 3 == 0;
+    clock.observe(crystal.read(kHostStart + i * 1s, slow ? 90ms : 50us, slow ? 100ms : 100us));
+  }
+  EXPECT_EQ(clock.steady_since(), kHostStart + 100us);
+}
+
+// Such a frame would seem to be exposed at any time after its trigger.
+TEST(DeviceClock, KnowsWhatWasShownBeforeItWasSetBack) {
+  for (const nanoseconds step : {nanoseconds(-24s), nanoseconds(-10ms)}) {
+    const SteppedClock stepped(step);
+    const MonotonicTime received = kHostStart + 19s + 900ms;
+    EXPECT_FALSE(stepped.clock.may_have_shown(stepped.crystal.at(received) - step, received));
+    EXPECT_TRUE(stepped.clock.may_have_shown(stepped.crystal.at(received), received));
+  }
+}
+
 RC_GTEST_PROP(DeviceClock, IsNeverFartherOffThanItSays, (std::uint32_t seed)) {
   std::mt19937 random(seed);
   const auto within = [&](int low, int high) { return std::uniform_int_distribution(low, high)(random); };
