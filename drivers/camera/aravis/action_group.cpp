@@ -38,25 +38,37 @@ ActionGroup::Member::~Member() {
   std::erase(group_->members_, this);
 }
 
-void ActionGroup::Member::trigger(std::optional<std::uint64_t> ticks) {
+void ActionGroup::Member::trigger(const ActionTime& time) {
   ActionGroup& group = *group_;
   std::unique_lock lock(group.mutex_);
-  asks_ = true;
+  asks_ = &time;
   const std::uint64_t before = group.commands_;
   const auto sent = [&] { return group.commands_ != before; };
   if (!group.all_ask()) group.changed_.wait_for(lock, kWindow, sent);
-  if (!sent()) group.send(ticks);
+  if (!sent()) group.send();
 }
 
 bool ActionGroup::all_ask() const {
-  return std::ranges::all_of(members_, &Member::asks_);
+  return std::ranges::all_of(members_, [](const Member* member) { return member->asks_ != nullptr; });
+}
+
+std::optional<std::uint64_t> ActionGroup::time() const {
+  std::uint64_t latest = 0;
+  for (const Member* member : members_) {
+    if (member->asks_ == nullptr) continue;
+    const auto time = (*member->asks_)();
+    if (!time) return std::nullopt;
+    latest = std::max(latest, *time);
+  }
+  return latest;
 }
 
 // To each by itself, as no broadcast goes through a router. Those that did not ask expose too, and let the frame go.
-void ActionGroup::send(std::optional<std::uint64_t> ticks) {
+void ActionGroup::send() {
+  const auto ticks = time();
   for (Member* member : members_) {
     send_gige_action(member->address_, member->interface_, keys_, ticks);
-    member->asks_ = false;
+    member->asks_ = nullptr;
   }
   ++commands_;
   changed_.notify_all();

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,6 +14,9 @@
 #include "drivers/camera/aravis/gvcp.hpp"
 
 namespace slsd {
+
+/// When to expose, by the device's clock; nothing: at once. @thread any member's
+using ActionTime = std::function<std::optional<std::uint64_t>()>;
 
 /// The GigE Vision cameras of this process that expose at one action command. Each member asks for its exposure, and
 /// when all have, or after a short wait for the others, the command goes to every member at once.
@@ -32,15 +36,16 @@ class ActionGroup {
     Member& operator=(const Member&) = delete;
 
     /// Waits for the others, for a few milliseconds at most, and sees to it that the command is sent.
-    /// @param ticks  by the device's clock, which all members then share; nothing: at once
-    void trigger(std::optional<std::uint64_t> ticks);
+    /// @param time  asked for when the command is sent, of every member that asks: all expose at the latest of their
+    ///              times, by the clock that they share, or at once where one has none
+    void trigger(const ActionTime& time);
 
    private:
     friend class ActionGroup;
     std::shared_ptr<ActionGroup> group_;
     std::string address_;
     std::string interface_;
-    bool asks_ = false;
+    const ActionTime* asks_ = nullptr;  ///< while it waits for the command
   };
 
   /// The group of this process that has these keys; it ends with its last member.
@@ -49,7 +54,8 @@ class ActionGroup {
 
  private:
   [[nodiscard]] bool all_ask() const;
-  void send(std::optional<std::uint64_t> ticks);
+  [[nodiscard]] std::optional<std::uint64_t> time() const;
+  void send();
 
   const ActionKeys keys_;
   std::mutex mutex_;

@@ -42,7 +42,7 @@ Result<Frame> FrameCapture::capture(MonotonicTime deadline) {
 }
 
 void FrameCapture::trigger(MonotonicTime now) {
-  if (action_) return action_->trigger(action_time());
+  if (action_) return action_->trigger([this] { return action_time(); });
   if (options_.trigger != AravisTrigger::kSoftware) return;
   triggered_ = now;
   ++frames_due_;

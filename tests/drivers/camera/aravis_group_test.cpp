@@ -3,10 +3,13 @@
 #include <chrono>
 #include <cstdint>
 #include <future>
+#include <memory>
+#include <optional>
 #include <random>
 
 #include <gmock/gmock.h>
 
+#include "drivers/camera/aravis/action_group.hpp"
 #include "drivers/camera/aravis/device_clock.hpp"
 #include "tests/drivers/camera/aravis_test.hpp"
 
@@ -71,6 +74,20 @@ TEST_F(ActionGroupTest, ExposesAtOneTimeByACommonClock) {
   // A double acts when the time has come, not before; how much later depends on the machine.
   EXPECT_GE(frame->exposure_start(), asked + 40ms);
   EXPECT_GE(other->exposure_start(), asked + 40ms);
+}
+
+// One that was taken before would be past when the command is sent.
+TEST_F(ActionGroupTest, TakesTheTimeWhenTheOthersHaveBeenWaitedFor) {
+  const auto group = std::make_shared<ActionGroup>(keys_);
+  ActionGroup::Member asked(group, device_.address(), "");
+  const ActionGroup::Member other(group, other_device_.address(), "");
+  const MonotonicTime begin = steady_clock::now();
+  MonotonicTime taken = begin;
+  asked.trigger([&] {
+    taken = steady_clock::now();
+    return std::nullopt;
+  });
+  EXPECT_GE(taken - begin, 5ms);
 }
 
 TEST_F(ActionGroupTest, ExposesOneCameraThatIsAskedAlone) {
