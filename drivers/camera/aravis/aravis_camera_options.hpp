@@ -27,7 +27,8 @@ struct AravisCameraOptions {
   AravisTrigger trigger = AravisTrigger::kSoftware;
   std::string trigger_line = "Line1";  ///< the input, where the trigger is a line
   ActionKeys action = {};              ///< GigE, where the trigger is an action: the same for all cameras of a group
-  double action_lead_us = 0.0;   ///< GigE: so long after the command all expose, by their common clock; 0: at once
+  double action_lead_us = 0.0;   ///< GigE: so long after the command all expose, by their common clock; 0, and until
+                                 ///< they have one: at once
   bool ptp = false;              ///< the camera's clock follows the network's (IEEE 1588)
   double rate_hz = 0.0;          ///< where it runs freely, up to 10000; 0: as the camera has it
   double exposure_us = 10000.0;  ///< 1 to 10000000

@@ -74,7 +74,7 @@ Result<> AravisSession::prepare() {
   if (auto done = warm_up(); !done) return done;
   if (auto done = join_group(); !done) return done;
   if (auto done = start(options_.trigger); !done) return done;
-  control_ = std::make_unique<DeviceControl>(device_.camera.get(), events_, number_, first_clock_);
+  control_ = std::make_unique<DeviceControl>(device_.camera.get(), events_, number_, first_clock_, first_ptp_);
   frame_capture_.emplace(options_, device_.name, events_, *receiver_, *control_, action_ ? &*action_ : nullptr);
   return {};
 }
@@ -114,7 +114,9 @@ std::unique_ptr<ChunkReader> AravisSession::make_chunk_reader() const {
                                        from_us(options_.exposure_us) + kReadoutMost);
 }
 
+// The lock before the clock, which then was set already where it is locked.
 void AravisSession::read_clock_first() {
+  if (options_.ptp) first_ptp_ = read_ptp_lock(device_.camera.get());
   for (int i = 0; i < kFirstClockReadings; ++i)
     if (const auto reading = read_device_clock(device_.camera.get())) first_clock_.observe(*reading);
   if (!first_clock_.ready()) warnings_.push_back(device_clock_warning());

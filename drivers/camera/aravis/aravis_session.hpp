@@ -21,6 +21,7 @@
 #include "drivers/camera/aravis/frame_receiver.hpp"
 #include "drivers/camera/aravis/g_object.hpp"
 #include "drivers/camera/aravis/open_device.hpp"
+#include "drivers/camera/aravis/ptp_lock.hpp"
 #include "drivers/camera/frame.hpp"
 
 namespace slsd {
@@ -87,6 +88,7 @@ class AravisSession {
   ChunkSelection chunks_;
   std::vector<NetworkWarning> warnings_;
   DeviceClock first_clock_;
+  std::optional<PtpLock> first_ptp_;  ///< where the clock is to follow the network's
   GObjectPtr<ArvStream> stream_;
   std::unique_ptr<FrameReceiver> receiver_;
   std::unique_ptr<DeviceControl> control_;

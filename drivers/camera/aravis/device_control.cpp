@@ -15,6 +15,7 @@ using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
 constexpr auto kClockPeriod = 1s;
+constexpr auto kSteady = 10s;  // a clock that is about to follow the network's is set before
 constexpr std::uint64_t kControlRegister = 0x944;
 constexpr std::uint64_t kLatchedHigh = 0x948;
 constexpr std::uint64_t kLatchedLow = 0x94c;
@@ -57,11 +58,13 @@ std::optional<ClockReading> read_device_clock(ArvCamera* camera) {
   return ARV_IS_GV_DEVICE(device) ? latch_registers(device) : latch_features(camera);
 }
 
-DeviceControl::DeviceControl(ArvCamera* camera, CaptureEvents& events, std::uint64_t session, const DeviceClock& clock)
+DeviceControl::DeviceControl(ArvCamera* camera, CaptureEvents& events, std::uint64_t session, const DeviceClock& clock,
+                             std::optional<PtpLock> ptp)
     : camera_(camera),
       events_(events),
       session_(session),
       clock_(clock),
+      ptp_(ptp),
       has_clock_(clock.ready()),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
@@ -75,6 +78,13 @@ void DeviceControl::trigger() {
 DeviceClock DeviceControl::clock() const {
   const std::lock_guard lock(mutex_);
   return clock_;
+}
+
+bool DeviceControl::follows_network() const {
+  const std::lock_guard lock(mutex_);
+  if (!ptp_ || !clock_.ready()) return false;
+  if (*ptp_ == PtpLock::kUnknown) return steady_clock::now() - clock_.steady_since() >= kSteady;
+  return *ptp_ == PtpLock::kLocked;
 }
 
 void DeviceControl::run(const std::stop_token& stop) {
@@ -103,12 +113,24 @@ void DeviceControl::send_trigger() {
   events_.report_trigger_answered(session_);
 }
 
+// The clock first, by which a device that is gone is known soonest; and once more, as it is set before it is locked.
 void DeviceControl::read_clock() {
-  if (!has_clock_) return;
+  if (!has_clock_ || !observe_clock() || !ptp_) return;
+  const PtpLock ptp = read_ptp_lock(camera_);
+  if (!observe_clock()) return;
+  const std::lock_guard lock(mutex_);
+  ptp_ = ptp;
+}
+
+bool DeviceControl::observe_clock() {
   const auto reading = read_device_clock(camera_);
-  if (!reading) return events_.report_lost(session_, "the camera does not answer any more");
+  if (!reading) {
+    events_.report_lost(session_, "the camera does not answer any more");
+    return false;
+  }
   const std::lock_guard lock(mutex_);
   clock_.observe(*reading);
+  return true;
 }
 
 }  // namespace slsd

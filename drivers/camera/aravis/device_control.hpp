@@ -11,6 +11,7 @@
 #include "drivers/camera/aravis/capture_events.hpp"
 #include "drivers/camera/aravis/device_clock.hpp"
 #include "drivers/camera/aravis/g_object.hpp"
+#include "drivers/camera/aravis/ptp_lock.hpp"
 
 namespace slsd {
 
@@ -24,7 +25,9 @@ namespace slsd {
 class DeviceControl {
  public:
   /// @param camera  outlives this, and is used by nobody else meanwhile
-  DeviceControl(ArvCamera* camera, CaptureEvents& events, std::uint64_t session, const DeviceClock& clock);
+  /// @param ptp     as it is now, where the device's clock is to follow the network's; else nothing
+  DeviceControl(ArvCamera* camera, CaptureEvents& events, std::uint64_t session, const DeviceClock& clock,
+                std::optional<PtpLock> ptp);
   /// Waits for the command under way, for seconds if the device is gone.
   ~DeviceControl() = default;
   DeviceControl(const DeviceControl&) = delete;
@@ -34,11 +37,14 @@ class DeviceControl {
   /// Whether the device has a clock that can be read.
   [[nodiscard]] bool has_clock() const { return has_clock_; }
   [[nodiscard]] DeviceClock clock() const;
+  /// Whether the device's clock is the network's: as it says itself, or because it was not set for a while.
+  [[nodiscard]] bool follows_network() const;
 
  private:
   void run(const std::stop_token& stop);
   void send_trigger();
   void read_clock();
+  [[nodiscard]] bool observe_clock();
 
   ArvCamera* camera_;
   CaptureEvents& events_;
@@ -47,6 +53,7 @@ class DeviceControl {
   std::condition_variable_any asked_;
   bool trigger_ = false;
   DeviceClock clock_;
+  std::optional<PtpLock> ptp_;
   const bool has_clock_;
   std::jthread thread_;
 };

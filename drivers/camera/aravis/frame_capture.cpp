@@ -51,7 +51,7 @@ void FrameCapture::trigger(MonotonicTime now) {
 
 // A clock that follows the network's ticks in nanoseconds.
 std::optional<std::uint64_t> FrameCapture::action_time() const {
-  if (options_.action_lead_us == 0.0 || !control_.has_clock()) return std::nullopt;
+  if (options_.action_lead_us == 0.0 || !control_.follows_network()) return std::nullopt;
   const MonotonicTime when = steady_clock::now() + from_us(options_.action_lead_us);
   return static_cast<std::uint64_t>(control_.clock().device_time(when).count());
 }

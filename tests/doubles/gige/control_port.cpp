@@ -99,6 +99,8 @@ void ControlPort::answer_write(std::uint32_t what, std::uint32_t id, std::span<c
 }
 
 void ControlPort::act(bool scheduled, std::span<const std::uint8_t> body) {
+  ++actions_.received;
+  if (scheduled) ++actions_.scheduled;
   WireReader reader(body);
   const bool device = reader.u32() == registers_.read(kActionDeviceKey);
   const bool group = reader.u32() == registers_.read(kActionGroupKey);

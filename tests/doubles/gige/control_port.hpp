@@ -24,6 +24,12 @@ struct ControlEvents {
   std::function<void(std::optional<std::uint64_t> ticks)> action;
 };
 
+/// The action commands that came, whatever their keys.
+struct ActionCounts {
+  int received = 0;
+  int scheduled = 0;  ///< of these for a certain time
+};
+
 /// The GVCP side of a GigE Vision device: answers what is asked of its registers, and lets one controller write.
 /// @thread thread-bound
 class ControlPort {
@@ -39,6 +45,7 @@ class ControlPort {
   void occupy(bool by_another);
   [[nodiscard]] bool controlled() const { return controller_.has_value(); }
   [[nodiscard]] int times_taken() const { return times_taken_; }
+  [[nodiscard]] const ActionCounts& actions() const { return actions_; }
 
  private:
   [[nodiscard]] bool may_write(std::uint32_t address, const sockaddr_in& from) const;
@@ -57,6 +64,7 @@ class ControlPort {
   std::chrono::steady_clock::time_point heard_;
   bool occupied_ = false;
   int times_taken_ = 0;
+  ActionCounts actions_;
   std::vector<std::uint8_t> answer_;
   std::vector<std::uint8_t> block_;
 };

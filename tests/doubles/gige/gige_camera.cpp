@@ -49,6 +49,7 @@ void GigeCamera::power_up() {
   registers_->write(kCurrentAddress, ntohl(::inet_addr(options_.address.c_str())));
   registers_->write(kHasChunks, options_.chunks ? 1 : 0);
   registers_->write(kHasSoftwareTrigger, options_.software_trigger ? 1 : 0);
+  registers_->write(kPtpStatus, options_.ptp_status);
   clock_.emplace(*registers_, options_.tick_frequency_hz, options_.drift_ppm);
   port_ = std::make_unique<ControlPort>(*registers_, control_events());
   sensor_.power_up(*registers_, options_.first_frame_id);
@@ -226,6 +227,11 @@ std::uint64_t GigeCamera::packets_sent_again() const {
 int GigeCamera::times_taken() const {
   const std::lock_guard lock(mutex_);
   return port_->times_taken();
+}
+
+ActionCounts GigeCamera::actions() const {
+  const std::lock_guard lock(mutex_);
+  return port_->actions();
 }
 
 void GigeCamera::wake() {

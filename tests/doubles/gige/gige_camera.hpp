@@ -55,6 +55,7 @@ class GigeCamera {
   [[nodiscard]] std::uint64_t packets_lost() const;
   [[nodiscard]] std::uint64_t packets_sent_again() const;
   [[nodiscard]] int times_taken() const;
+  [[nodiscard]] ActionCounts actions() const;
 
  private:
   using Time = std::chrono::steady_clock::time_point;

@@ -24,6 +24,7 @@ struct GigeCameraOptions {
   bool chunks_in_ns = false;              ///< the chunks' time stamp is in nanoseconds, and not in ticks
   std::uint32_t chunk_payload = 0x4001;   ///< how a frame with chunks is called
   bool software_trigger = true;           ///< it can be triggered by a command
+  std::uint32_t ptp_status = 9;           ///< 8: uncalibrated, 9: slave, 0: it does not tell
   /// By how much the time stamp that a frame begins with is later than its exposure's start, as of the readout.
   std::chrono::milliseconds stamp_delay{0};
 };

@@ -56,6 +56,7 @@ enum Register : std::uint32_t {
   kChunkExposureTimeEnable = 0x8048,
   kChunkGainEnable = 0x804c,
   kHasSoftwareTrigger = 0x8050,
+  kPtpStatus = 0x8054,
 };
 
 /// The memory of a GigE Vision device: Aravis' register file, with the description in camera.xml.

@@ -76,6 +76,23 @@ TEST_F(ActionGroupTest, ExposesAtOneTimeByACommonClock) {
   EXPECT_GE(other->exposure_start(), asked + 40ms);
 }
 
+// By a clock of its own a camera would expose at any time, or never.
+TEST_F(ActionGroupTest, ExposesAtOnceUntilTheClockIsTheNetworks) {
+  for (const auto& [status, scheduled] : {std::pair(8u, 0), std::pair(0u, 0), std::pair(9u, 1)}) {
+    test::GigeCameraOptions following;
+    following.ptp_status = status;
+    test::GigeCamera device(following);
+    AravisCameraOptions options = options_for(device);
+    options.ptp = true;
+    options.action_lead_us = 50000.0;
+    AravisCamera camera(options);
+    ASSERT_TRUE(opens(camera));
+    EXPECT_TRUE(next(camera));
+    EXPECT_EQ(device.actions().received, 1) << status;
+    EXPECT_EQ(device.actions().scheduled, scheduled) << status;
+  }
+}
+
 // One that was taken before would be past when the command is sent.
 TEST_F(ActionGroupTest, TakesTheTimeWhenTheOthersHaveBeenWaitedFor) {
   const auto group = std::make_shared<ActionGroup>(keys_);
