@@ -49,8 +49,12 @@ class Camera {
   virtual void set_found(std::function<void()> /*found*/) {}
 
   /// Opens the device, again after a fault; configures everything anew and starts the sequence numbers at 0.
-  /// @errors kNotFound, kPermissionDenied, kMalformed, kUnsupported, kDisconnected: the device's supervisor retries
+  /// @errors kNotFound, kPermissionDenied, kMalformed, kUnsupported, kDisconnected: the device's supervisor retries;
+  ///         kCancelled: a cancel() came meanwhile
   [[nodiscard]] virtual Result<> open() = 0;
+
+  /// How long open() may take, for who watches over it.
+  [[nodiscard]] virtual std::chrono::nanoseconds open_time_max() const { return std::chrono::minutes(1); }
 
   /// Exposes one frame that begins after the call, and waits for it until the deadline at most.
   /// @errors kFrameDropped, kFrameTorn, kFrameStale, kFrameLate: this frame is lost, the camera goes on;
@@ -72,7 +76,8 @@ class Camera {
   [[nodiscard]] virtual Result<> check() { return {}; }
 
   /// Ends the capture() that waits on another thread, soon, with kCancelled; where none waits, ends the next one, so
-  /// that a cancel() that comes just before it is not lost. open() forgets it.
+  /// that a cancel() that comes just before it is not lost. open() forgets it; one that comes while a backend waits
+  /// in open() may end that, too.
   /// @thread thread-safe
   virtual void cancel() = 0;
 };

@@ -28,6 +28,7 @@ class FaultyCamera final : public Camera {
   [[nodiscard]] const CameraDescription& description() const override { return camera_->description(); }
   void set_found(std::function<void()> found) override { camera_->set_found(std::move(found)); }
   [[nodiscard]] Result<> open() override;
+  [[nodiscard]] std::chrono::nanoseconds open_time_max() const override { return camera_->open_time_max(); }
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
   void expect(FrameLight light) override { camera_->expect(light); }
   [[nodiscard]] Result<> check() override;

@@ -10,6 +10,7 @@
 
 #include "drivers/camera/aravis/aravis_session.hpp"
 #include "drivers/camera/aravis/capture_events.hpp"
+#include "drivers/camera/aravis/frame_patience.hpp"
 
 namespace slsd {
 namespace {
@@ -41,6 +42,11 @@ Result<> AravisCamera::open() {
   description_.rate_hz = options_.trigger == AravisTrigger::kFreeRun ? options_.rate_hz : 0.0;
   log_warnings();
   return {};
+}
+
+// A device that is busy answers each of many questions late, before the first frame is asked for.
+std::chrono::nanoseconds AravisCamera::open_time_max() const {
+  return Camera::open_time_max() + first_frame_time_max(options_);
 }
 
 void AravisCamera::log_warnings() {

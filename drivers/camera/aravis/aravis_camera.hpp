@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -42,9 +43,9 @@ class AravisCamera final : public Camera {
   void set_found(std::function<void()> found) override { found_ = std::move(found); }
   /// Also proves that frames arrive. Warnings about the system are logged, each once.
   /// @errors kInvalidArgument (an option), kNotFound, kPermissionDenied (another application controls it), kMismatch
-  /// (it
-  ///         took another value than the one configured), kUnsupported, kDisconnected
+  ///         (it took another value than the one configured), kUnsupported, kDisconnected; kCancelled
   [[nodiscard]] Result<> open() override;
+  [[nodiscard]] std::chrono::nanoseconds open_time_max() const override;
   /// kDisconnected also after missed_frames_max frames in a row did not come.
   /// @errors kMismatch: the frame was exposed with other settings than configured, and is lost; as Camera::capture()
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;

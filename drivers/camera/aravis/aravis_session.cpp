@@ -16,7 +16,6 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr int kWarmUpTries = 3;
 constexpr int kFirstClockReadings = 8;
 constexpr auto kAnswerTime = 100ms;
 constexpr auto kReadoutMost = 1s;
@@ -135,13 +134,13 @@ Result<> AravisSession::warm_up() {
   }
   const AravisTrigger trigger = software ? AravisTrigger::kSoftware : AravisTrigger::kFreeRun;
   bool unreadable = false;
-  for (int i = 0; i < kWarmUpTries; ++i) {
+  for (int i = 0; i < kFirstFrameTries; ++i) {
     if (auto done = i > 0 ? make_stream() : Result<>(); !done) return done;
     if (auto done = start(trigger); !done) return done;
-    const FirstFrame first =
-        wait_for_first_frame(trigger, i == 0 ? first_frame_patience(options_) : frame_patience(options_));
-    if (auto done = stop(); !done || first == FirstFrame::kCame) return done;
-    unreadable = unreadable || first == FirstFrame::kUnreadable;
+    const auto first = wait_for_first_frame(trigger, first_frame_patience(options_, trigger, i));
+    if (!first) return tl::unexpected(first.error());
+    if (auto done = stop(); !done || *first == FirstFrame::kCame) return done;
+    unreadable = unreadable || *first == FirstFrame::kUnreadable;
   }
   if (unreadable) return go_without_chunks();
   return fail_here(ErrorCode::kDisconnected,
@@ -149,11 +148,21 @@ Result<> AravisSession::warm_up() {
                    "that no firewall holds back UDP from its address");
 }
 
-AravisSession::FirstFrame AravisSession::wait_for_first_frame(AravisTrigger trigger, std::chrono::nanoseconds time) {
+Result<AravisSession::FirstFrame> AravisSession::wait_for_first_frame(AravisTrigger trigger,
+                                                                      std::chrono::nanoseconds time) {
   GErrorSlot error;
   if (trigger == AravisTrigger::kSoftware) arv_camera_software_trigger(device_.camera.get(), error.out());
-  if (error.failed() || events_.wait_buffer(steady_clock::now() + time) != CaptureEvents::Wake::kBuffer)
-    return FirstFrame::kMissing;
+  if (error.failed()) return FirstFrame::kMissing;
+  switch (events_.wait_buffer(steady_clock::now() + time)) {
+    case CaptureEvents::Wake::kCancelled:
+      return fail_here(ErrorCode::kCancelled, "opening was cancelled");
+    case CaptureEvents::Wake::kLost:
+      return fail_here(ErrorCode::kDisconnected, events_.lost_reason() + "; check power, cable and network");
+    case CaptureEvents::Wake::kTimeout:
+      return FirstFrame::kMissing;
+    case CaptureEvents::Wake::kBuffer:
+      break;
+  }
   return receiver_->discard_readable() ? FirstFrame::kCame : FirstFrame::kUnreadable;
 }
 

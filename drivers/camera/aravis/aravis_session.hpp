@@ -34,7 +34,8 @@ class AravisSession {
   /// @param address  where the camera was found before, or empty
   /// @param events   outlive the session
   /// @param found    called once the camera is this host's, before it is configured; may be empty
-  /// @errors as open_device(), configure_image(), configure_packets(); kDisconnected: it answers, and no frame arrives
+  /// @errors as open_device(), configure_image(), configure_packets(); kDisconnected: it answers, and no frame arrives;
+  ///         kCancelled
   [[nodiscard]] static Result<std::unique_ptr<AravisSession>> open(const AravisCameraOptions& options,
                                                                    const std::string& address, CaptureEvents& events,
                                                                    const std::function<void()>& found);
@@ -76,7 +77,7 @@ class AravisSession {
   [[nodiscard]] Result<> go_without_chunks();
   [[nodiscard]] Result<> start(AravisTrigger trigger);
   [[nodiscard]] Result<> stop();
-  [[nodiscard]] FirstFrame wait_for_first_frame(AravisTrigger trigger, std::chrono::nanoseconds time);
+  [[nodiscard]] Result<FirstFrame> wait_for_first_frame(AravisTrigger trigger, std::chrono::nanoseconds time);
   void read_clock_first();
   [[nodiscard]] tl::unexpected<Error> fail_here(ErrorCode code, std::string message) const;
 

@@ -11,7 +11,9 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 
-constexpr milliseconds kFirstFrame{250};  // readout and transfer
+constexpr milliseconds kFirstFrame{250};   // readout and transfer
+constexpr milliseconds kLaterFrame{3000};  // of the slowest, over a busy network
+constexpr int kWaysToOpen = 2;             // with chunks, and without
 constexpr milliseconds kPeriodUnknown{100};
 constexpr int kPeriodsToNext = 5;         // one of them for readout and transfer
 constexpr milliseconds kPauseLeast{100};  // which a busy host makes without anyone's doing
@@ -32,8 +34,16 @@ nanoseconds frame_patience(const AravisCameraOptions& options) {
   return milliseconds(options.frame_timeout_ms) + exposure_time(options);
 }
 
-nanoseconds first_frame_patience(const AravisCameraOptions& options) {
-  return std::min(milliseconds(options.frame_timeout_ms), kFirstFrame) + exposure_time(options);
+nanoseconds first_frame_patience(const AravisCameraOptions& options, AravisTrigger trigger, int tries_before) {
+  const double period_us = trigger == AravisTrigger::kFreeRun && options.rate_hz > 0.0 ? 1e6 / options.rate_hz : 0.0;
+  const milliseconds transfer = tries_before == 0 ? kFirstFrame : kLaterFrame;
+  return std::min(milliseconds(options.frame_timeout_ms), transfer) + from_us(options.exposure_us + period_us);
+}
+
+nanoseconds first_frame_time_max(const AravisCameraOptions& options) {
+  nanoseconds time{0};
+  for (int i = 0; i < kFirstFrameTries; ++i) time += first_frame_patience(options, options.trigger, i);
+  return kWaysToOpen * time;
 }
 
 nanoseconds next_frame_age_max(const AravisCameraOptions& options) {

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include <chrono>
 #include <cstdint>
+#include <future>
 #include <optional>
 #include <set>
 #include <string>
@@ -84,6 +85,20 @@ TEST_F(AravisFaultsTest, BeginsItsStreamAnewWhereTheFirstFrameDoesNotCome) {
   EXPECT_EQ(camera.statistics().lost, 0u);
   const auto warnings = camera.warnings();
   EXPECT_EQ(std::set<std::string>(warnings.begin(), warnings.end()).size(), warnings.size());
+}
+
+TEST_F(AravisFaultsTest, EndsItsOpeningWhenCancelled) {
+  device_.set_faults({.silent = true});
+  AravisCamera camera(options_for(device_));
+  auto opened = std::async(std::launch::async, [&] { return camera.open(); });
+  while (device_.frames_exposed() == 0) std::this_thread::sleep_for(1ms);
+  camera.cancel();
+  const auto result = opened.get();
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, ErrorCode::kCancelled);
+  device_.set_faults({});
+  ASSERT_TRUE(opens(camera));
+  EXPECT_TRUE(next(camera));
 }
 
 TEST_F(AravisFaultsTest, RefusesAFrameThatEndsTooEarly) {
