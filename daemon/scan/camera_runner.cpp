@@ -19,7 +19,6 @@ using std::chrono::steady_clock;
 constexpr auto kGrace = 500ms;
 constexpr auto kLookPeriod = 200ms;
 constexpr auto kPromise = 10s;
-constexpr auto kOpenPromise = 60s;  // finding a camera on the network and proving that frames arrive
 
 }  // namespace
 
@@ -135,17 +134,20 @@ void CameraRunner::close() {
 }
 
 void CameraRunner::open_or_pause(const std::stop_token& stop) {
-  heartbeat_.promise(kOpenPromise);
+  heartbeat_.promise(camera_->open_time_max());
   {
     const std::lock_guard lock(mutex_);
     if (status_.state != DeviceState::kAbsent) status_.state = DeviceState::kOpening;
   }
   const Result<> opened = camera_->open();
-  heartbeat_.promise(kOpenPromise);
+  heartbeat_.promise(kPromise);
+  if (!opened && opened.error().code == ErrorCode::kCancelled) return;
   note_opened(opened);
   if (opened) return backoff_.reset();
+  const auto pause = backoff_.next();
+  heartbeat_.promise(pause + kPromise);
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, stop, backoff_.next(), [] { return false; });
+  changed_.wait_for(lock, stop, pause, [] { return false; });
 }
 
 // While nothing answers the camera stays absent, however often it is looked for.

@@ -84,6 +84,42 @@ TEST(CameraRunner, IsAbsentUntilSomethingAnswersAndThenOpening) {
   run.wait_for(DeviceState::kReady);
 }
 
+TEST(CameraRunner, PromisesToBeHeardOfAsSoonAsItsCameraMayTakeToOpen) {
+  std::promise<void> configured;
+  auto camera = std::make_unique<ScriptedCamera>("left", picture());
+  camera->open_time = 10min;
+  camera->configured = configured.get_future().share();
+  const std::atomic<int>& opens = camera->opens;
+  const CameraRunner runner(std::move(camera), kOptions);
+  while (opens == 0) std::this_thread::sleep_for(100us);
+  EXPECT_TRUE(runner.heartbeat().kept(steady_clock::now() + 9min));
+  EXPECT_FALSE(runner.heartbeat().kept(steady_clock::now() + 11min));
+  configured.set_value();
+}
+
+TEST(CameraRunner, PromisesToBeHeardOfAfterThePauseBetweenTwoAttempts) {
+  auto camera = std::make_unique<ScriptedCamera>("left", picture());
+  camera->gone = true;
+  ScanOptions options = kOptions;
+  options.reopen_first_ms = options.reopen_longest_ms = 600'000;
+  const CameraRunner runner(std::move(camera), options);
+  const auto promises = [&] { return runner.heartbeat().kept(steady_clock::now() + 9min); };
+  for (const auto end = steady_clock::now() + 30s; !promises() && steady_clock::now() < end;)
+    std::this_thread::sleep_for(1ms);
+  EXPECT_TRUE(promises());
+}
+
+TEST(CameraRunner, OpensAgainAtOnceWhereOpeningWasCancelled) {
+  auto camera = std::make_unique<ScriptedCamera>("left", picture());
+  camera->open_error = std::optional(ErrorCode::kCancelled);
+  ScriptedCamera& scripted = *camera;
+  CameraRunner runner(std::move(camera), kOptions);
+  while (scripted.opens < 3) std::this_thread::sleep_for(100us);
+  EXPECT_EQ(runner.status().problem, "");
+  scripted.open_error = std::nullopt;
+  EXPECT_TRUE(runner.wait_ready(steady_clock::now() + 30s));
+}
+
 TEST(CameraRunner, IsCapturingWhileAFrameIsUnderWay) {
   std::promise<void> expose;
   Watched run({[&](ScriptedCamera& camera, MonotonicTime) -> Result<Frame> {

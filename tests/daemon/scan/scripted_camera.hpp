@@ -37,6 +37,7 @@ class ScriptedCamera final : public Camera {
     if (opens_to_fail > 0 && opens_to_fail-- > 0) return fail(ErrorCode::kNotFound, "no such device");
     return {};
   }
+  [[nodiscard]] std::chrono::nanoseconds open_time_max() const override { return open_time; }
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override {
     if (script_.empty()) return frame(std::chrono::steady_clock::now());
     const Step step = std::move(script_.front());
@@ -56,6 +57,7 @@ class ScriptedCamera final : public Camera {
   /// As if the device had lost them.
   void skip_frames(std::uint64_t count) { sequence_ += count; }
 
+  std::chrono::nanoseconds open_time = Camera::open_time_max();
   int opens_to_fail = 0;
   std::atomic<int> opens{0};
   std::optional<std::shared_future<void>> configured;  ///< what open() waits for once the device is found
