@@ -116,15 +116,13 @@ Result<MonotonicTime> FileCamera::wait_for_exposure(MonotonicTime deadline) {
 }
 
 Result<Frame> FileCamera::deliver(MonotonicTime exposure_start) {
+  if (pool_->all_lent()) return fail_busy();  // first, so that no image is passed over
   const auto image = light_ == FrameLight::kPattern ? next_image() : image_in_light();
   if (!image) return tl::unexpected(image.error());
   const GreyView pixels = view(**image);
   if (format_of(pixels) != pool_->format()) return fail_format(format_of(pixels));
   auto frame = pool_->lend(pixels, next_sequence_ - 1, exposure_start);
-  if (frame) return std::move(*frame);
-  return fail(ErrorCode::kBusy,
-              "all " + std::to_string(options_.frames_held_max) + " frames are held; give some back first",
-              options_.name);
+  return frame ? Result<Frame>(std::move(*frame)) : fail_busy();
 }
 
 Result<const GreyImage*> FileCamera::next_image() {
@@ -151,6 +149,12 @@ Result<const GreyImage*> FileCamera::image_in_light() {
 
 tl::unexpected<Error> FileCamera::fail_late() const {
   return fail(ErrorCode::kFrameLate, "no frame came before the deadline; allow more time or raise rate_hz",
+              options_.name);
+}
+
+tl::unexpected<Error> FileCamera::fail_busy() const {
+  return fail(ErrorCode::kBusy,
+              "all " + std::to_string(options_.frames_held_max) + " frames are held; give some back first",
               options_.name);
 }
 

@@ -65,6 +65,7 @@ class FileCamera final : public Camera {
   [[nodiscard]] Result<const GreyImage*> image_in_light();
   [[nodiscard]] Result<> configure(const FrameFormat& format);
   [[nodiscard]] tl::unexpected<Error> fail_late() const;
+  [[nodiscard]] tl::unexpected<Error> fail_busy() const;
   [[nodiscard]] tl::unexpected<Error> fail_format(const FrameFormat& format) const;
 
   FileCameraOptions options_;

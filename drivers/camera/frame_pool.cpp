@@ -83,6 +83,10 @@ const FrameFormat& FramePool::format() const {
   return buffers_->format;
 }
 
+bool FramePool::all_lent() const {
+  return std::ranges::all_of(buffers_->lent, [](const auto& lent) { return lent.load(std::memory_order_acquire); });
+}
+
 std::optional<Frame> FramePool::lend(const GreyView& image, std::uint64_t sequence, MonotonicTime exposure_start) {
   assert(format_of(image) == buffers_->format);
   const auto buffer = buffers_->take();

@@ -33,6 +33,9 @@ class FramePool {
 
   [[nodiscard]] const FrameFormat& format() const;
 
+  /// Whether lend() has no buffer left; one that ends meanwhile on another thread may count or not.
+  [[nodiscard]] bool all_lent() const;
+
   /// A copy of the pixels in a free buffer, or nothing if all are lent.
   /// @param image  of the pool's format
   [[nodiscard]] std::optional<Frame> lend(const GreyView& image, std::uint64_t sequence, MonotonicTime exposure_start);

@@ -33,6 +33,24 @@ TEST_F(FileCameraTest, LosesOnlyTheFrameOfABadImage) {
   EXPECT_EQ(camera.capture(far_away())->sequence(), 3u);
 }
 
+TEST_F(FileCameraTest, PassesOverNoImageWhileItIsBusy) {
+  test::record(folder_, 5);
+  FileCameraOptions few = options();
+  few.frames_held_max = 2;
+  FileCamera camera(few);
+  ASSERT_TRUE(camera.open());
+  {
+    const auto first = camera.capture(far_away());
+    const auto second = camera.capture(far_away());
+    ASSERT_TRUE(first && second);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(next_error(camera), ErrorCode::kBusy);
+  }
+  const auto third = camera.capture(far_away());
+  ASSERT_TRUE(third);
+  EXPECT_EQ(test::number_of(*third), 2);
+  EXPECT_EQ(third->sequence(), 2u);
+}
+
 TEST_F(FileCameraTest, RefusesAnotherDepthThanTheFirst) {
   test::record(folder_, 1);
   folder_.write("frame-1.pgm", test::pnm_bytes(samples_of(ramp16(12, 8))));
