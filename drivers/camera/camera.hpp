@@ -14,7 +14,7 @@ namespace slsd {
 
 struct CameraDescription {
   std::string name;    ///< as configured
-  std::string driver;  ///< "file", ...
+  std::string driver;  ///< "file", "v4l2" or "aravis"
   std::string device;  ///< stable name of the device: path, serial number
   int width_px = 0;
   int height_px = 0;
@@ -29,8 +29,8 @@ enum class FrameLight { kPattern, kWhite, kDark };
   return kNames[static_cast<int>(light)];
 }
 
-/// A camera that takes one frame to a trigger. Backends: file. Every backend passes the suite in tests/drivers.
-/// Frames may outlive the camera.
+/// A camera that takes one frame to a trigger. Backends: file, v4l2, aravis. Every backend passes the suite in
+/// tests/drivers. Frames may outlive the camera.
 ///
 ///     made --open()--> ready --capture(): kDisconnected--> gone --open()--> ready
 ///                      ready --check(): kDisconnected---> gone
