@@ -197,7 +197,7 @@ TEST_F(AravisChunksTest, ProvesTheFirstFrameAtALineByACommand) {
   AravisCamera camera(at_a_line(device_));
   ASSERT_TRUE(opens(camera));
   EXPECT_THAT(camera.warnings(), Not(Contains("first_frame")));
-  EXPECT_EQ(device_.frames_exposed(), 1u);
+  EXPECT_GE(device_.frames_exposed(), 1u);
 }
 
 }  // namespace

@@ -145,7 +145,7 @@ TEST_F(ActionGroupTest, LeavesCamerasWithOtherKeysAlone) {
 
 TEST_F(ActionGroupTest, IsDisconnectedWhenNoFrameComes) {
   AravisCameraOptions options = options_for(device_);
-  options.frame_timeout_ms = 300;
+  options.frame_timeout_ms = 1500;
   AravisCamera camera(options);
   ASSERT_TRUE(opens(camera));
   device_.set_faults({.silent = true});

@@ -170,7 +170,11 @@ TEST_P(CameraContract, ExposesAfterTheTriggerAndReceivesAfterTheExposure) {
 TEST_P(CameraContract, NumbersFramesWithoutGapsAndAnewAfterOpen) {
   for (int opened = 0; opened < 2; ++opened) {
     ASSERT_TRUE(camera_->open());
-    for (std::uint64_t i = 0; i < 7; ++i) EXPECT_EQ(capture()->sequence(), i);
+    for (std::uint64_t i = 0; i < 7; ++i) {
+      const auto frame = capture();
+      ASSERT_TRUE(frame) << to_string(frame.error());
+      EXPECT_EQ(frame->sequence(), i);
+    }
   }
 }
 
