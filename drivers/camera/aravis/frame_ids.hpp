@@ -21,7 +21,7 @@ class FrameIds {
     if (first || id == before) return 0;
     if (id > before) return id - before - 1;
     const bool wrapped = before <= kLastOf16 && before - id > kLastOf16 / 2;
-    return wrapped ? kLastOf16 - before + id - 1 : 0;
+    return wrapped ? kLastOf16 - before + (id > 0 ? id - 1 : 0) : 0;  // a camera that counts from 0 misses none by it
   }
 
   void forget() { last_.reset(); }

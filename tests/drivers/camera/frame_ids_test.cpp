@@ -23,6 +23,16 @@ TEST(FrameIds, GoesOnAfterTheLastOfSixteenBits) {
   EXPECT_EQ(ids.note(2), 2u);
 }
 
+TEST(FrameIds, MissesNoneWhereACameraGoesOnWithZero) {
+  FrameIds ids;
+  EXPECT_EQ(ids.note(65535), 0u);
+  EXPECT_EQ(ids.note(0), 0u);
+  EXPECT_EQ(ids.note(1), 0u);
+  ids.forget();
+  EXPECT_EQ(ids.note(65534), 0u);
+  EXPECT_EQ(ids.note(0), 1u);
+}
+
 TEST(FrameIds, DoesNotWrapSixtyFourBits) {
   FrameIds ids;
   EXPECT_EQ(ids.note(65535), 0u);
