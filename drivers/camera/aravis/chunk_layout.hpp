@@ -14,7 +14,8 @@ namespace slsd {
 ///
 ///     | image | id length | chunk | id length | chunk | id length |      id and length: 4 bytes each
 ///
-/// A frame that ends too early, or whose end was written over, has another layout.
+/// A frame that ends too early, or whose end was written over, has another layout: unless what then stands at its end
+/// happens to be a length that leads to another, as the id of a chunk cannot be, which is above any length.
 /// @param frame        all that came
 /// @param image_bytes  how many the image has; up to 3 more fill up its last word
 /// @param order        of the bytes in an id or length: big on GigE Vision, little on USB3 Vision

@@ -29,12 +29,15 @@ void put_word(std::vector<std::uint8_t>& frame, std::size_t value, std::endian o
   }
 }
 
+// Cameras number their chunks so: above any length that a frame has.
+constexpr std::size_t kFirstId = 0xa0000001;
+
 /// The first is the image.
 std::vector<std::uint8_t> frame_of(const std::vector<std::size_t>& lengths, std::endian order = std::endian::big) {
   std::vector<std::uint8_t> frame;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     frame.insert(frame.end(), lengths[i], 0x55);
-    put_word(frame, i + 1, order);
+    put_word(frame, kFirstId + i, order);
     put_word(frame, lengths[i], order);
   }
   return frame;
