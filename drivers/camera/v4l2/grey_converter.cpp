@@ -37,7 +37,7 @@ bool ends_whole(std::span<const std::byte> jpeg) {
 }
 
 GreyImage make_grey(const FrameMode& mode) {
-  if (mode.format.layout == PixelLayout::kMosaic16) return Grey16(mode.width_px, mode.height_px);
+  if (mode.format.layout == GreyLayout::kMosaic16) return Grey16(mode.width_px, mode.height_px);
   return Grey8(mode.width_px, mode.height_px);
 }
 
@@ -49,24 +49,24 @@ void GreyConverter::Destroy::operator()(v4lconvert_data* convert) const {
 
 GreyConverter::GreyConverter(const V4l2Device& device, const FrameLayout& layout)
     : layout_(layout), grey_(make_grey(layout.mode)), columns_(static_cast<std::size_t>(layout.mode.width_px)) {
-  if (layout.mode.format.layout != PixelLayout::kJpeg) return;
+  if (layout.mode.format.layout != GreyLayout::kJpeg) return;
   colours_.resize(format_of(layout.mode, V4L2_PIX_FMT_RGB24).fmt.pix.sizeimage);
   convert_.reset(v4lconvert_create(device.descriptor()));
 }
 
 Result<GreyView> GreyConverter::convert(std::span<std::byte> bytes) {
   switch (layout_.mode.format.layout) {
-    case PixelLayout::kYuyv:
+    case GreyLayout::kYuyv:
       return take_luma(bytes, 0);
-    case PixelLayout::kUyvy:
+    case GreyLayout::kUyvy:
       return take_luma(bytes, 1);
-    case PixelLayout::kMosaic8:
+    case GreyLayout::kMosaic8:
       grey_from_mosaic(view_as<std::uint8_t>(bytes, layout_), std::get<Grey8>(grey_), columns_);
       return view(grey_);
-    case PixelLayout::kMosaic16:
+    case GreyLayout::kMosaic16:
       grey_from_mosaic(view_as<std::uint16_t>(bytes, layout_), std::get<Grey16>(grey_), columns_);
       return view(grey_);
-    case PixelLayout::kJpeg:
+    case GreyLayout::kJpeg:
       return convert_jpeg(bytes);
     default:
       return view_of(bytes, layout_);
@@ -103,7 +103,7 @@ Result<GreyView> GreyConverter::convert_jpeg(std::span<std::byte> bytes) {
 }
 
 GreyView view_of(std::span<const std::byte> bytes, const FrameLayout& layout) {
-  if (layout.mode.format.layout == PixelLayout::kGrey8) return view_as<std::uint8_t>(bytes, layout);
+  if (layout.mode.format.layout == GreyLayout::kGrey8) return view_as<std::uint8_t>(bytes, layout);
   return view_as<std::uint16_t>(bytes, layout);
 }
 

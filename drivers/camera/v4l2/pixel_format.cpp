@@ -10,33 +10,21 @@
 namespace slsd {
 namespace {
 
-constexpr std::array kFormats{PixelFormat{V4L2_PIX_FMT_GREY, PixelLayout::kGrey8},
-                              PixelFormat{V4L2_PIX_FMT_Y16, PixelLayout::kGrey16},
-                              PixelFormat{V4L2_PIX_FMT_Y14, PixelLayout::kGrey16},
-                              PixelFormat{V4L2_PIX_FMT_Y12, PixelLayout::kGrey16},
-                              PixelFormat{V4L2_PIX_FMT_Y10, PixelLayout::kGrey16},
-                              PixelFormat{V4L2_PIX_FMT_SRGGB8, PixelLayout::kMosaic8},
-                              PixelFormat{V4L2_PIX_FMT_SBGGR8, PixelLayout::kMosaic8},
-                              PixelFormat{V4L2_PIX_FMT_SGRBG8, PixelLayout::kMosaic8},
-                              PixelFormat{V4L2_PIX_FMT_SGBRG8, PixelLayout::kMosaic8},
-                              PixelFormat{V4L2_PIX_FMT_SRGGB16, PixelLayout::kMosaic16},
-                              PixelFormat{V4L2_PIX_FMT_SBGGR16, PixelLayout::kMosaic16},
-                              PixelFormat{V4L2_PIX_FMT_SGRBG16, PixelLayout::kMosaic16},
-                              PixelFormat{V4L2_PIX_FMT_SGBRG16, PixelLayout::kMosaic16},
-                              PixelFormat{V4L2_PIX_FMT_SRGGB12, PixelLayout::kMosaic16},
-                              PixelFormat{V4L2_PIX_FMT_SBGGR12, PixelLayout::kMosaic16},
-                              PixelFormat{V4L2_PIX_FMT_SGRBG12, PixelLayout::kMosaic16},
-                              PixelFormat{V4L2_PIX_FMT_SGBRG12, PixelLayout::kMosaic16},
-                              PixelFormat{V4L2_PIX_FMT_SRGGB10, PixelLayout::kMosaic16},
-                              PixelFormat{V4L2_PIX_FMT_SBGGR10, PixelLayout::kMosaic16},
-                              PixelFormat{V4L2_PIX_FMT_SGRBG10, PixelLayout::kMosaic16},
-                              PixelFormat{V4L2_PIX_FMT_SGBRG10, PixelLayout::kMosaic16},
-                              PixelFormat{V4L2_PIX_FMT_NV12, PixelLayout::kGrey8},
-                              PixelFormat{V4L2_PIX_FMT_YUV420, PixelLayout::kGrey8},
-                              PixelFormat{V4L2_PIX_FMT_YUYV, PixelLayout::kYuyv},
-                              PixelFormat{V4L2_PIX_FMT_UYVY, PixelLayout::kUyvy},
-                              PixelFormat{V4L2_PIX_FMT_MJPEG, PixelLayout::kJpeg},
-                              PixelFormat{V4L2_PIX_FMT_JPEG, PixelLayout::kJpeg}};
+constexpr std::array kFormats{
+    PixelFormat{V4L2_PIX_FMT_GREY, GreyLayout::kGrey8},       PixelFormat{V4L2_PIX_FMT_Y16, GreyLayout::kGrey16},
+    PixelFormat{V4L2_PIX_FMT_Y14, GreyLayout::kGrey16},       PixelFormat{V4L2_PIX_FMT_Y12, GreyLayout::kGrey16},
+    PixelFormat{V4L2_PIX_FMT_Y10, GreyLayout::kGrey16},       PixelFormat{V4L2_PIX_FMT_SRGGB8, GreyLayout::kMosaic8},
+    PixelFormat{V4L2_PIX_FMT_SBGGR8, GreyLayout::kMosaic8},   PixelFormat{V4L2_PIX_FMT_SGRBG8, GreyLayout::kMosaic8},
+    PixelFormat{V4L2_PIX_FMT_SGBRG8, GreyLayout::kMosaic8},   PixelFormat{V4L2_PIX_FMT_SRGGB16, GreyLayout::kMosaic16},
+    PixelFormat{V4L2_PIX_FMT_SBGGR16, GreyLayout::kMosaic16}, PixelFormat{V4L2_PIX_FMT_SGRBG16, GreyLayout::kMosaic16},
+    PixelFormat{V4L2_PIX_FMT_SGBRG16, GreyLayout::kMosaic16}, PixelFormat{V4L2_PIX_FMT_SRGGB12, GreyLayout::kMosaic16},
+    PixelFormat{V4L2_PIX_FMT_SBGGR12, GreyLayout::kMosaic16}, PixelFormat{V4L2_PIX_FMT_SGRBG12, GreyLayout::kMosaic16},
+    PixelFormat{V4L2_PIX_FMT_SGBRG12, GreyLayout::kMosaic16}, PixelFormat{V4L2_PIX_FMT_SRGGB10, GreyLayout::kMosaic16},
+    PixelFormat{V4L2_PIX_FMT_SBGGR10, GreyLayout::kMosaic16}, PixelFormat{V4L2_PIX_FMT_SGRBG10, GreyLayout::kMosaic16},
+    PixelFormat{V4L2_PIX_FMT_SGBRG10, GreyLayout::kMosaic16}, PixelFormat{V4L2_PIX_FMT_NV12, GreyLayout::kGrey8},
+    PixelFormat{V4L2_PIX_FMT_YUV420, GreyLayout::kGrey8},     PixelFormat{V4L2_PIX_FMT_YUYV, GreyLayout::kYuyv},
+    PixelFormat{V4L2_PIX_FMT_UYVY, GreyLayout::kUyvy},        PixelFormat{V4L2_PIX_FMT_MJPEG, GreyLayout::kJpeg},
+    PixelFormat{V4L2_PIX_FMT_JPEG, GreyLayout::kJpeg}};
 
 }  // namespace
 
@@ -70,25 +58,25 @@ std::string fourcc_name(std::uint32_t fourcc) {
   return name;
 }
 
-std::size_t row_bytes(PixelLayout layout, int width_px) {
+std::size_t row_bytes(GreyLayout layout, int width_px) {
   const auto width = static_cast<std::size_t>(width_px);
   switch (layout) {
-    case PixelLayout::kGrey8:
-    case PixelLayout::kMosaic8:
+    case GreyLayout::kGrey8:
+    case GreyLayout::kMosaic8:
       return width;
-    case PixelLayout::kJpeg:
+    case GreyLayout::kJpeg:
       return 0;
     default:
       return 2 * width;
   }
 }
 
-int bytes_per_pixel(PixelLayout layout) {
-  return layout == PixelLayout::kGrey16 || layout == PixelLayout::kMosaic16 ? 2 : 1;
+int bytes_per_pixel(GreyLayout layout) {
+  return layout == GreyLayout::kGrey16 || layout == GreyLayout::kMosaic16 ? 2 : 1;
 }
 
-bool is_zero_copy(PixelLayout layout) {
-  return layout == PixelLayout::kGrey8 || layout == PixelLayout::kGrey16;
+bool is_zero_copy(GreyLayout layout) {
+  return layout == GreyLayout::kGrey8 || layout == GreyLayout::kGrey16;
 }
 
 }  // namespace slsd

@@ -12,7 +12,7 @@
 namespace slsd {
 
 /// How a pixel format holds its grey.
-enum class PixelLayout {
+enum class GreyLayout {
   kGrey8,     ///< a byte a pixel, row by row; what follows the rows is chroma
   kGrey16,    ///< two bytes a pixel, little-endian
   kMosaic8,   ///< a Bayer mosaic of bytes
@@ -25,7 +25,7 @@ enum class PixelLayout {
 /// A pixel format of V4L2 that can be decoded.
 struct PixelFormat {
   std::uint32_t fourcc = 0;
-  PixelLayout layout = PixelLayout::kGrey8;
+  GreyLayout layout = GreyLayout::kGrey8;
 
   friend bool operator==(const PixelFormat&, const PixelFormat&) = default;
 };
@@ -41,12 +41,12 @@ struct PixelFormat {
 [[nodiscard]] std::string fourcc_name(std::uint32_t fourcc);
 
 /// Of a row's first to its last pixel; 0 for JPEG.
-[[nodiscard]] std::size_t row_bytes(PixelLayout layout, int width_px);
+[[nodiscard]] std::size_t row_bytes(GreyLayout layout, int width_px);
 
 /// Of the grey that it becomes: 1 or 2.
-[[nodiscard]] int bytes_per_pixel(PixelLayout layout);
+[[nodiscard]] int bytes_per_pixel(GreyLayout layout);
 
 /// Frames are views of the driver's own buffers.
-[[nodiscard]] bool is_zero_copy(PixelLayout layout);
+[[nodiscard]] bool is_zero_copy(GreyLayout layout);
 
 }  // namespace slsd
