@@ -20,13 +20,14 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-constexpr int kQuestions = 2;  // one may be lost
+constexpr int kQuestions = 2;             // one may be lost
+constexpr std::uint16_t kQuestionId = 1;  // of both: either answer will do
 
 using ControlBuffer = std::array<char, CMSG_SPACE(sizeof(in_pktinfo))>;
 
 /// Sends to everyone on the interface's network, whatever the routes say.
 void ask_everyone(int socket, const HostInterface& interface) {
-  auto question = gvcp_discovery();
+  auto question = gvcp_discovery(kQuestionId);
   iovec part{question.data(), question.size()};
   sockaddr_in everyone{};
   everyone.sin_family = AF_INET;
@@ -87,7 +88,7 @@ std::optional<GigeDevice> receive(int socket, const std::vector<HostInterface>& 
   message.msg_controllen = control.size();
   const auto count = ::recvmsg(socket, &message, MSG_DONTWAIT);
   if (count < 0) return std::nullopt;
-  auto device = read_gvcp_discovery(std::span(bytes).first(static_cast<std::size_t>(count)));
+  auto device = read_gvcp_discovery(std::span(bytes).first(static_cast<std::size_t>(count)), kQuestionId);
   if (!device) return std::nullopt;
   device->address = address_text(from.sin_addr);
   device->interface = local_address(interfaces, interface_of(message), from.sin_addr);

@@ -4,7 +4,9 @@
 
 #include <arpa/inet.h>
 #include <poll.h>
+#include <sys/types.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -16,6 +18,7 @@ namespace slsd {
 namespace {
 
 using std::chrono::milliseconds;
+using std::chrono::steady_clock;
 using Bytes = std::span<const std::uint8_t>;
 
 constexpr int kTries = 3;
@@ -57,17 +60,16 @@ class ControlChannel {
     return {};
   }
 
-  /// What the reader makes of an answer, if one comes in time.
-  template <class Reader>
-  [[nodiscard]] auto ask(Bytes question, Reader read, milliseconds timeout) const -> decltype(read(Bytes())) {
-    std::vector<std::uint8_t> answer(1024);
+  /// What the reader makes of the answer to the question, if it comes in time; that to an earlier one may come late.
+  template <class Question, class Reader>
+  [[nodiscard]] auto ask(Question question, Reader read, milliseconds timeout) -> decltype(read(Bytes(), 0)) {
+    const std::uint16_t id = ++id_ == 0 ? ++id_ : id_;
+    const auto asked = question(id);
     for (int i = 0; i < kTries; ++i) {
-      if (::send(socket_.get(), question.data(), question.size(), MSG_NOSIGNAL) < 0) continue;
-      pollfd waited{socket_.get(), POLLIN, 0};
-      if (::poll(&waited, 1, static_cast<int>(timeout.count()) / kTries) <= 0) continue;
-      const auto bytes = ::recv(socket_.get(), answer.data(), answer.size(), 0);
-      if (bytes < 0) continue;
-      if (auto value = read(Bytes(answer).first(static_cast<std::size_t>(bytes)))) return value;
+      if (::send(socket_.get(), asked.data(), asked.size(), MSG_NOSIGNAL) < 0) continue;
+      const auto end = steady_clock::now() + timeout / kTries;
+      for (Bytes answer = receive(end); !answer.empty(); answer = receive(end))
+        if (auto value = read(answer, id)) return value;
     }
     return std::nullopt;
   }
@@ -77,15 +79,26 @@ class ControlChannel {
   [[nodiscard]] std::string interface() const { return local_address(socket_.get()); }
 
  private:
+  /// What comes next; empty if nothing does before the end.
+  [[nodiscard]] Bytes receive(steady_clock::time_point end) {
+    const auto left = std::chrono::ceil<milliseconds>(end - steady_clock::now());
+    pollfd waited{socket_.get(), POLLIN, 0};
+    if (left.count() <= 0 || ::poll(&waited, 1, static_cast<int>(left.count())) <= 0) return {};
+    const auto bytes = ::recv(socket_.get(), answer_.data(), answer_.size(), 0);
+    return Bytes(answer_).first(static_cast<std::size_t>(std::max<ssize_t>(bytes, 0)));
+  }
+
   UdpSocket socket_;
+  std::uint16_t id_ = 0;
+  std::vector<std::uint8_t> answer_ = std::vector<std::uint8_t>(1024);
 };
 
 }  // namespace
 
 Result<GigeDevice> probe_gige_device(const std::string& address, const std::string& interface, milliseconds timeout) {
-  const ControlChannel channel;
+  ControlChannel channel;
   if (auto connected = channel.connect(address, interface); !connected) return tl::unexpected(connected.error());
-  auto device = channel.ask(gvcp_discovery(), read_gvcp_discovery, timeout);
+  auto device = channel.ask(gvcp_discovery, read_gvcp_discovery, timeout);
   if (!device)
     return fail(ErrorCode::kNotFound,
                 "no camera answers at this address; check its power and cable, that it is in the network of this "
@@ -97,9 +110,11 @@ Result<GigeDevice> probe_gige_device(const std::string& address, const std::stri
 }
 
 std::optional<std::string> gige_controller(const GigeDevice& device, milliseconds timeout) {
-  const ControlChannel channel;
+  ControlChannel channel;
   if (!channel.connect(device.address, device.interface)) return std::nullopt;
-  const auto read = [&](std::uint32_t address) { return channel.ask(gvcp_read(address), read_gvcp_value, timeout); };
+  const auto read = [&](std::uint32_t address) {
+    return channel.ask([&](std::uint16_t id) { return gvcp_read(address, id); }, read_gvcp_value, timeout);
+  };
   const auto privilege = read(kControlPrivilege);
   if (!privilege) return std::nullopt;
   if ((*privilege & kControlled) == 0) return "";

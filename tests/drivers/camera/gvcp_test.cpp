@@ -15,9 +15,13 @@ namespace {
 
 using ::testing::ElementsAre;
 
+constexpr std::uint16_t kId = 0x1234;
+
 std::vector<std::uint8_t> discovery_answer() {
   std::vector<std::uint8_t> answer(8 + 0xf8, 0);
   answer[3] = 3;
+  answer[6] = 0x12;
+  answer[7] = 0x34;
   const auto write = [&](std::size_t offset, const std::string& text) {
     std::copy(text.begin(), text.end(), answer.begin() + static_cast<std::ptrdiff_t>(8 + offset));
   };
@@ -28,36 +32,37 @@ std::vector<std::uint8_t> discovery_answer() {
 }
 
 TEST(ReadGvcpDiscovery, ReadsWhoTheDeviceIs) {
-  const auto device = read_gvcp_discovery(discovery_answer());
+  const auto device = read_gvcp_discovery(discovery_answer(), kId);
   ASSERT_TRUE(device);
   EXPECT_EQ(device->name(), "Maker-S77");
   EXPECT_EQ(device->model, std::string(32, 'M'));
 }
 
 TEST(ReadGvcpDiscovery, RefusesOtherAnswers) {
-  for (const std::size_t place : {0, 1, 2, 3}) {
+  for (const std::size_t place : {0, 1, 2, 3, 6, 7}) {
     auto answer = discovery_answer();
     answer[place] = 0x80;
-    EXPECT_FALSE(read_gvcp_discovery(answer));
+    EXPECT_FALSE(read_gvcp_discovery(answer, kId));
   }
   auto short_one = discovery_answer();
   short_one.pop_back();
-  EXPECT_FALSE(read_gvcp_discovery(short_one));
+  EXPECT_FALSE(read_gvcp_discovery(short_one, kId));
 }
 
 RC_GTEST_PROP(ReadGvcpDiscovery, TakesAnyBytes, (std::vector<std::uint8_t> bytes)) {
   bytes.resize(bytes.size() % 600);
-  RC_ASSERT(!read_gvcp_discovery(bytes) || bytes.size() >= 256);
-  RC_ASSERT(!read_gvcp_value(bytes) || bytes.size() >= 12);
+  RC_ASSERT(!read_gvcp_discovery(bytes, 0) || bytes.size() >= 256);
+  RC_ASSERT(!read_gvcp_value(bytes, 0) || bytes.size() >= 12);
 }
 
 TEST(ReadGvcpValue, ReadsTheMostSignificantByteFirst) {
-  const std::vector<std::uint8_t> answer{0, 0, 0, 0x81, 0, 4, 0, 1, 0x12, 0x34, 0x56, 0x78};
-  EXPECT_EQ(read_gvcp_value(answer), 0x12345678u);
+  const std::vector<std::uint8_t> answer{0, 0, 0, 0x81, 0, 4, 0x12, 0x34, 0x12, 0x34, 0x56, 0x78};
+  EXPECT_EQ(read_gvcp_value(answer, kId), 0x12345678u);
+  EXPECT_EQ(read_gvcp_value(answer, kId + 1), std::nullopt);
 }
 
 TEST(GvcpRead, AsksForARegister) {
-  EXPECT_THAT(gvcp_read(0xa00), ElementsAre(0x42, 1, 0, 0x80, 0, 4, 0, ::testing::Ne(0), 0, 0, 0x0a, 0));
+  EXPECT_THAT(gvcp_read(0xa00, kId), ElementsAre(0x42, 1, 0, 0x80, 0, 4, 0x12, 0x34, 0, 0, 0x0a, 0));
 }
 
 TEST(HostInterface, ReachesTheAddressesOfItsNetwork) {
