@@ -28,21 +28,22 @@ std::string camera_table(const CameraLatency& camera) {
       camera.p95.count(), camera.clipped);
 }
 
-void read_time(TableReader& reader, const char* key, microseconds& time) {
+int read_count(TableReader& reader, const char* key) {
   int count = 0;
   reader.read(key, count);
-  time = microseconds(count);
+  if (count < 0) reader.refuse(key, "must not be negative: measure again, by slsd --calibrate --latency");
+  return count;
 }
 
 Result<CameraLatency> read_camera(const toml::table& table, const path& file) {
   TableReader reader(&table, "[[camera]]", file);
   CameraLatency camera;
   reader.read("name", camera.camera);
-  reader.read("flashes", camera.flashes);
-  read_time(reader, "latency_us", camera.latency);
-  read_time(reader, "median_us", camera.median);
-  read_time(reader, "p05_us", camera.p05);
-  read_time(reader, "p95_us", camera.p95);
+  camera.flashes = read_count(reader, "flashes");
+  camera.latency = microseconds(read_count(reader, "latency_us"));
+  camera.median = microseconds(read_count(reader, "median_us"));
+  camera.p05 = microseconds(read_count(reader, "p05_us"));
+  camera.p95 = microseconds(read_count(reader, "p95_us"));
   reader.read("clipped", camera.clipped);
   if (auto read = reader.finish(); !read) return tl::unexpected(read.error());
   return camera;
@@ -70,8 +71,18 @@ path latency_file(const Configuration& configuration, const path& configuration_
   return beside.parent_path() / "latency.toml";
 }
 
-std::vector<std::string> latency_warnings(const Configuration& configuration, const LatencyReport& report) {
+std::string projector_name(const std::string& driver, const std::string& monitor) {
+  return monitor.empty() ? driver : driver + " " + monitor;
+}
+
+std::vector<std::string> latency_warnings(const Configuration& configuration, const LatencyReport& report,
+                                          const std::string& projector) {
   std::vector<std::string> warnings;
+  if (!projector.empty() && !report.projector.empty() && projector != report.projector)
+    warnings.push_back(
+        fmt::format("the latency was measured with the projector \"{}\", and this one is \"{}\": slsd "
+                    "--calibrate --latency",
+                    report.projector, projector));
   for (const CameraOptions& camera : configuration.cameras) {
     const auto measured = std::ranges::find(report.cameras, camera.name(), &CameraLatency::camera);
     if (measured == report.cameras.end()) {
@@ -79,6 +90,11 @@ std::vector<std::string> latency_warnings(const Configuration& configuration, co
           fmt::format("camera \"{}\": its latency was not measured: slsd --calibrate --latency", camera.name()));
       continue;
     }
+    if (measured->clipped)
+      warnings.push_back(fmt::format(
+          "camera \"{}\": its latency was measured on overexposed frames, and may be too short by an exposure: expose "
+          "less, then slsd --calibrate --latency",
+          camera.name()));
     const double needed_ms = std::chrono::duration<double, std::milli>(measured->latency).count();
     if (needed_ms <= configuration.scan.projector_latency_ms) continue;
     warnings.push_back(fmt::format(

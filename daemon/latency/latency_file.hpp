@@ -16,8 +16,8 @@ namespace slsd {
 
 /// What slsd --calibrate --latency keeps.
 struct LatencyReport {
-  std::string date;  ///< ISO 8601, UTC
-  std::string projector;
+  std::string date;       ///< ISO 8601, UTC
+  std::string projector;  ///< as projector_name()
   std::vector<CameraLatency> cameras;
 };
 
@@ -26,10 +26,15 @@ struct LatencyReport {
 [[nodiscard]] std::filesystem::path latency_file(const Configuration& configuration,
                                                  const std::filesystem::path& configuration_file);
 
-/// What in the configuration does not go with what was measured, a sentence each: a [scan] projector_latency_ms that is
-/// too short, cameras that were not measured. Nothing where all is well. @thread reentrant
-[[nodiscard]] std::vector<std::string> latency_warnings(const Configuration& configuration,
-                                                        const LatencyReport& report);
+/// A projector as the report names it, "glfw HDMI-1". @thread reentrant
+[[nodiscard]] std::string projector_name(const std::string& driver, const std::string& monitor);
+
+/// What does not go with what was measured, a sentence each: a [scan] projector_latency_ms that is too short, cameras
+/// that were not measured or were overexposed, another projector. Nothing where all is well.
+/// @param projector  the one in use, as projector_name(); empty where that cannot be told
+/// @thread reentrant
+[[nodiscard]] std::vector<std::string> latency_warnings(const Configuration& configuration, const LatencyReport& report,
+                                                        const std::string& projector);
 
 /// As TOML. @thread reentrant
 [[nodiscard]] std::string write_latency(const LatencyReport& report);

@@ -44,8 +44,9 @@ struct CameraLatency {
 ///                                      |               of every flash that was not
 ///
 /// @param projector, camera  open
-/// @errors kNotFound: no flash is seen; kTimeout: a flash is not seen, or too many frames are lost; those of
-///         Projector::show() and Camera::capture()
+/// @errors kNotFound: no flash is seen; kTimeout: a flash is not seen; where too many frames in a row are lost, the
+/// error
+///         of the last; those of Projector::show() and Camera::capture()
 /// @thread thread-bound, as projector and camera are
 [[nodiscard]] Result<CameraLatency> measure_latency(Projector& projector, Camera& camera, const LatencyOptions& options,
                                                     const Timepiece& time = {});

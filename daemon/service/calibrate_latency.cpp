@@ -30,8 +30,6 @@ void print(const CameraLatency& camera) {
              camera.camera, milliseconds(camera.median), camera.flashes, milliseconds(camera.p05),
              milliseconds(camera.p95), milliseconds(camera.latency))
       << std::flush;
-  if (!camera.clipped) return;
-  std::cout << "  its frames are overexposed, so that the figures may be too short by an exposure: expose less\n";
 }
 
 Result<LatencyReport> measure(const Configuration& configuration, const LatencyOptions& options) {
@@ -39,7 +37,7 @@ Result<LatencyReport> measure(const Configuration& configuration, const LatencyO
   if (!projector) return tl::unexpected(projector.error());
   if (auto opened = (*projector)->open(); !opened) return tl::unexpected(opened.error());
   const ProjectorDescription& description = (*projector)->description();
-  LatencyReport report{utc_now(), description.driver + " " + description.monitor, {}};
+  LatencyReport report{utc_now(), projector_name(description.driver, description.monitor), {}};
   for (const CameraOptions& camera_options : configuration.cameras) {
     auto camera = make_camera(camera_options);
     if (!camera) return tl::unexpected(camera.error());
@@ -70,7 +68,8 @@ Result<> calibrate_latency(const std::optional<path>& configuration_file, const 
   const path kept = output.empty() ? latency_file(*configuration, file) : output;
   if (auto written = write_file_atomically(kept, write_latency(*report)); !written) return written;
   std::cout << "kept in " << kept.string() << "\n";
-  for (const std::string& warning : latency_warnings(*configuration, *report)) std::cout << warning << "\n";
+  for (const std::string& warning : latency_warnings(*configuration, *report, report->projector))
+    std::cout << warning << "\n";
   return {};
 }
 

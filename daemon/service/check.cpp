@@ -124,6 +124,16 @@ void check_scan(const Configuration& configuration, Findings& findings) {
   if (pattern && readable && *calibration) findings.note(ScanSetup::create(configuration, 1), "decoder");
 }
 
+/// As the latency's report names it; empty where that cannot be told.
+std::string projector_in_use(const ProjectorOptions& options) {
+  const auto projector = make_projector(options);
+  if (!projector) return {};
+  const ProjectorDescription& description = (*projector)->description();
+  if (options.driver == ProjectorDriver::kHeadless) return projector_name(description.driver, description.monitor);
+  const auto report = report_monitor(options.monitor, options.width_px, options.height_px);
+  return report ? projector_name(description.driver, report->output.name) : "";
+}
+
 // A projector in memory has no light to wait for.
 void check_latency(const Configuration& configuration, const path& configuration_file, Findings& findings) {
   const path file = latency_file(configuration, configuration_file);
@@ -134,7 +144,8 @@ void check_latency(const Configuration& configuration, const path& configuration
   }
   const auto report = text ? read_latency(*text, file) : tl::unexpected(text.error());
   if (!findings.note(report, "latency " + file.string())) return;
-  for (const std::string& warning : latency_warnings(configuration, *report)) findings.warn(warning);
+  const std::string projector = projector_in_use(configuration.projector);
+  for (const std::string& warning : latency_warnings(configuration, *report, projector)) findings.warn(warning);
 }
 
 // A daemon that answers there is most likely the one that is being looked at.
