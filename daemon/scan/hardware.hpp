@@ -11,7 +11,8 @@
 namespace slsd {
 
 /// What tells one camera from the others, wherever it is plugged in: the name under /dev/v4l/by-id, or the id of GigE
-/// Vision and USB3 Vision, both with the serial number.
+/// Vision and USB3 Vision, both with the serial number. Many a camera of USB Video Class has none: then the name is of
+/// the model only, and another of that model passes for it.
 /// @param driver, device  of DeviceStatus or CameraDescription, of an open camera
 /// @return empty where that cannot be told
 [[nodiscard]] std::string camera_hardware(const std::string& driver, const std::string& device);
