@@ -5,22 +5,19 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "drivers/camera/v4l2/stable_link.hpp"
+
 namespace slsd {
 namespace {
 
 using std::filesystem::path;
 
-constexpr const char* kStableNames = "/dev/v4l/by-id";
 constexpr std::size_t kMaxIdLength = 200;  // a calibration file's texts are bounded
 
 /// A camera's stable name, by whichever name its node is known.
 std::string v4l2_id(const path& device) {
-  if (device.parent_path() == kStableNames) return device.filename().string();
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(kStableNames, error)) {
-    if (std::filesystem::equivalent(entry.path(), device, error)) return entry.path().filename().string();
-  }
-  return {};
+  const auto link = find_stable_link(device, "/dev");
+  return link ? link->filename().string() : std::string();
 }
 
 /// As a calibration file may hold it.

@@ -11,6 +11,7 @@
 #include "drivers/camera/listing/sysfs.hpp"
 #include "drivers/camera/listing/usb_device.hpp"
 #include "drivers/camera/v4l2/frame_layout.hpp"
+#include "drivers/camera/v4l2/stable_link.hpp"
 #include "drivers/camera/v4l2/v4l2_device.hpp"
 
 namespace slsd {
@@ -41,14 +42,6 @@ std::vector<path> nodes_in(const path& devices, const std::vector<path>& more) {
   return nodes;
 }
 
-/// The link of v4l/by-id that leads to the node.
-std::string stable_name(const path& node, const path& devices) {
-  std::error_code error;
-  for (const path& link : entries_of(devices / "v4l/by-id"))
-    if (std::filesystem::equivalent(link, node, error)) return link.string();
-  return node.string();
-}
-
 void note_modes(const V4l2Device& device, ListedCamera& camera) {
   for (const FrameMode& mode : list_modes(device, {})) {
     const std::string name = fourcc_name(mode.format.fourcc);
@@ -64,7 +57,7 @@ std::optional<ListedCamera> look_at(const path& node, const path& devices, const
   ListedCamera camera;
   camera.standard = "V4L2";
   camera.driver = "v4l2";
-  camera.name = stable_name(node, devices);
+  camera.name = find_stable_link(node, devices).value_or(node).string();
   camera.node = node.string();
   camera.model = first_line(kernel / "name");
   if (const auto usb = usb_device_of(kernel / "device")) {

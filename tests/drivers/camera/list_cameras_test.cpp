@@ -14,6 +14,7 @@
 
 #include "drivers/camera/aravis/aravis_camera.hpp"
 #include "drivers/camera/v4l2/list_v4l2_cameras.hpp"
+#include "drivers/camera/v4l2/stable_link.hpp"
 #include "tests/drivers/camera/gige_backend.hpp"
 #include "tests/drivers/camera/v4l2_backends.hpp"
 #include "tests/drivers/temporary_folder.hpp"
@@ -165,6 +166,19 @@ TEST_F(ListCameras, SaysWhereItLooked) {
               ElementsAre("V4L2: " + (places_.devices / "video*").string(), StartsWith("GigE Vision: by broadcast on "),
                           "USB3 Vision: " + (places_.sysfs / "bus/usb/devices").string(),
                           "GigE Vision, USB3 Vision: 127.78.0.1"));
+}
+
+TEST(FindStableLink, FindsTheLinkByAnyNameOfTheNode) {
+  const test::TemporaryFolder devices;
+  const auto node = devices.write("video3", "");
+  const auto other = devices.write("video4", "");
+  std::filesystem::create_directories(devices.path() / "v4l/by-id");
+  const auto link = devices.path() / "v4l/by-id/usb-Maker-video-index0";
+  std::filesystem::create_symlink(node, link);
+  EXPECT_EQ(find_stable_link(node, devices.path()), link);
+  EXPECT_EQ(find_stable_link(link, devices.path()), link);
+  EXPECT_EQ(find_stable_link(other, devices.path()), std::nullopt);
+  EXPECT_EQ(find_stable_link(node, devices.path() / "nowhere"), std::nullopt);
 }
 
 }  // namespace
