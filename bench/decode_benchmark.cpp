@@ -48,7 +48,7 @@ void stage(benchmark::State& state, FrameRing& ring, Decoder& decoder, Stage sta
   StageTimer timer;
   for (auto _ : state) {
     timer.start();
-    benchmark::DoNotOptimize(decoder.decode(ring.next().view(), &timer));
+    benchmark::DoNotOptimize(decoder.decode(ring.next().view(), 255, &timer));
     state.SetIterationTime(timer.seconds(stage));
   }
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -107,21 +108,23 @@ SLSD_CLONES void draw(const ThresholdLine& line, std::uint16_t* threshold) {
 /// Standard deviation of the noise, from the median second difference along the rows of a sample of pixels: edges are
 /// too few to move the median.
 template <class T>
-float noise_sigma(const ImageView<T>& frame) {
-  constexpr int kStep = 7, kBins = 1024;
+float noise_sigma(const ImageView<T>& frame, double full) {
+  constexpr int kStep = 7, kBinBits = 10, kBins = 1 << kBinBits;
+  // A bin to a level up to 10 bits; of more, as many bins.
+  const int shift = std::max(0, static_cast<int>(std::bit_width(static_cast<unsigned>(full))) - kBinBits);
   std::array<int, kBins> histogram{};
   int count = 0;
   for (int y = kStep; y < frame.height; y += kStep) {
     const T* row = frame.row(y);
     for (int x = 1; x + 1 < frame.width; x += kStep, ++count) {
-      ++histogram[std::min(std::abs(row[x - 1] - 2 * row[x] + row[x + 1]) / (sizeof(T) == 1 ? 1 : 64), kBins - 1)];
+      ++histogram[std::min(std::abs(row[x - 1] - 2 * row[x] + row[x + 1]) >> shift, kBins - 1)];
     }
   }
   int bin = 0;
   for (int below = histogram[0]; 2 * below < count; below += histogram[++bin]) {
   }
   constexpr float kMedianOfDifference = 0.6745F * 2.4495F;  // of |a - 2b + c|, sigma 1
-  return static_cast<float>(bin) * (sizeof(T) == 1 ? 1.F : 64.F) / kMedianOfDifference;
+  return static_cast<float>(bin << shift) / kMedianOfDifference;
 }
 
 /// Combines each tile with its eight neighbours. The tiles have a border of one all round, whose values do not count.
@@ -191,12 +194,12 @@ void Binarizer::set_thresholds(float contrast_min, float greatest) {
 }
 
 template <class T>
-void Binarizer::binarize_as(const ImageView<T>& frame, Mask& mask) {
+void Binarizer::binarize_as(const ImageView<T>& frame, double full, Mask& mask) {
   if (mask.width() != frame.width || mask.height() != frame.height) mask = Mask(frame.width, frame.height);
-  const int floor = sizeof(T) == 1 ? options_.contrast_min : options_.contrast_min * 257;
-  const int contrast_min = std::max(floor, static_cast<int>(options_.contrast_min_sigma * noise_sigma(frame)));
+  const auto floor = static_cast<int>(options_.contrast_min * full / 255);
+  const int contrast_min = std::max(floor, static_cast<int>(options_.contrast_min_sigma * noise_sigma(frame, full)));
   find_extremes(frame);
-  set_thresholds(static_cast<float>(contrast_min), static_cast<float>(std::numeric_limits<T>::max()));
+  set_thresholds(static_cast<float>(contrast_min), static_cast<float>(full));
   auto& threshold = std::get<RowBuffers<T>>(row_buffers_).threshold;
   threshold.resize(static_cast<std::size_t>(columns_) * options_.tile_px + kLanes);
   for (int y = 0; y < frame.height; ++y) {
@@ -234,8 +237,8 @@ void Binarizer::interpolate_row(int y, int width, T* threshold) {
     std::fill(threshold + last, threshold + width, static_cast<T>(at_centre_.back() >> kFractionBits<T>));
 }
 
-void Binarizer::binarize(const GreyView& frame, Mask& mask) {
-  std::visit([&](const auto& view) { binarize_as(view, mask); }, frame);
+void Binarizer::binarize(const GreyView& frame, double full, Mask& mask) {
+  std::visit([&](const auto& view) { binarize_as(view, full, mask); }, frame);
 }
 
 }  // namespace slsd

@@ -18,7 +18,7 @@ struct BinarizeOptions {
   /// Where the threshold lies between dark and light. Below the middle keeps a symbol whose parts touch at a corner in
   /// one piece; at the middle keeps neighbours apart that are less than two pixels from each other.
   float level = 0.5F;
-  /// Smallest difference between light and dark, in grey levels of 255, that is taken for the pattern.
+  /// Smallest difference between light and dark that is taken for the pattern, of 255 levels.
   int contrast_min = 8;
   /// The same in standard deviations of the frame's noise: the range that plain noise spans in a window, and some more.
   float contrast_min_sigma = 9;
@@ -31,12 +31,13 @@ class Binarizer {
  public:
   explicit Binarizer(BinarizeOptions options) : options_(options) {}
 
+  /// @param full  the level of a saturated pixel of the frame
   /// @param mask  becomes of the frame's size
-  void binarize(const GreyView& frame, Mask& mask);
+  void binarize(const GreyView& frame, double full, Mask& mask);
 
  private:
   template <class T>
-  void binarize_as(const ImageView<T>& frame, Mask& mask);
+  void binarize_as(const ImageView<T>& frame, double full, Mask& mask);
   template <class T>
   void find_extremes(const ImageView<T>& frame);
   template <class T>

@@ -3,6 +3,7 @@
 #include "core/decode/decoder.hpp"
 
 #include "core/decode/pipeline.hpp"
+#include "core/exposure/light_levels.hpp"
 
 namespace slsd {
 namespace {
@@ -56,14 +57,14 @@ Result<> Decoder::check_size(const GreyView& frame) const {
                                         "; set the camera to the calibrated size, or calibrate again");
 }
 
-Result<const Decoding*> Decoder::decode(const GreyView& frame, StageObserver* observer) {
+Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<double> full, StageObserver* observer) {
   if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
-  return &pipeline_->decode(frame, observer);
+  return &pipeline_->decode(frame, full ? *full : guess_full_level(frame), observer);
 }
 
-Result<std::vector<SymbolMatch>> Decoder::read_anywhere(const GreyView& frame) {
+Result<std::vector<SymbolMatch>> Decoder::read_anywhere(const GreyView& frame, std::optional<double> full) {
   if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
-  return pipeline_->read_anywhere(frame);
+  return pipeline_->read_anywhere(frame, full ? *full : guess_full_level(frame));
 }
 
 }  // namespace slsd

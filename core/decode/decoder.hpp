@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/code/pattern.hpp"
@@ -32,13 +33,16 @@ class Decoder {
   [[nodiscard]] std::uint8_t camera_index() const;  ///< in the calibration
 
   /// Image to points. The result stands until the next call. Nothing found is an empty result with its counters.
+  /// @param full  the level of a saturated pixel: 255, 1023, 65535...; without it guess_full_level() of the frame
   /// @errors kMismatch: the frame is not of the calibration's size
-  [[nodiscard]] Result<const Decoding*> decode(const GreyView& frame, StageObserver* observer = nullptr);
+  [[nodiscard]] Result<const Decoding*> decode(const GreyView& frame, std::optional<double> full = std::nullopt,
+                                               StageObserver* observer = nullptr);
 
   /// Symbols wherever they lie, in the image of a rig that is not as the calibration says: without their epipolar lines
   /// to check them by, some in a thousand are wrong.
   /// @errors kMismatch: the frame is not of the calibration's size
-  [[nodiscard]] Result<std::vector<SymbolMatch>> read_anywhere(const GreyView& frame);
+  [[nodiscard]] Result<std::vector<SymbolMatch>> read_anywhere(const GreyView& frame,
+                                                               std::optional<double> full = std::nullopt);
 
  private:
   class Pipeline;

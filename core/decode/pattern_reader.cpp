@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "core/decode/symbol_reader.hpp"
+#include "core/exposure/light_levels.hpp"
 
 namespace slsd {
 namespace {
@@ -101,7 +102,7 @@ std::vector<SymbolMatch> PatternReader::attempt(const Homography& camera_from_pr
   } else {
     (*at)->reader.expect(std::move(frames));
   }
-  std::vector<SymbolMatch> matches = (*at)->reader.read_anywhere(frame, (*at)->cells);
+  std::vector<SymbolMatch> matches = (*at)->reader.read_anywhere(frame, full_, (*at)->cells);
   shapes_ = std::max(shapes_, (*at)->reader.seen().size());
   return matches;
 }
@@ -115,7 +116,7 @@ std::vector<double> PatternReader::likely_scales(const GreyView& frame) {
   for (const double scale : scales) {
     ShapeFinder finder(pattern_.options, ExpectedFrames(turned_and_scaled(0, scale).matrix, width, height),
                        Method::kDefault);
-    finder.binarize(frame);
+    finder.binarize(frame, full_);
     finder.find_regions(frame);
     finder.describe(frame, seen);
     shapes.push_back(seen.size());
@@ -164,6 +165,7 @@ std::vector<SymbolMatch> PatternReader::refine(std::vector<SymbolMatch> found, c
 std::vector<SymbolMatch> PatternReader::read(const GreyView& frame) {
   std::vector<SymbolMatch> found;
   shapes_ = 0;
+  full_ = guess_full_level(frame);
   if (last_) found = attempt(*last_, frame);
   if (found.size() < kCertain || !lie_on_one_plane(found, pattern_.pitch_px())) found = search(frame);
   return refine(std::move(found), frame);

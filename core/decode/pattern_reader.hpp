@@ -43,6 +43,7 @@ class PatternReader {
   Pattern pattern_;
   std::vector<std::unique_ptr<Trial>> trials_;  // one to a scale
   std::optional<Homography> last_;              // camera from projector
+  double full_ = 255;                           // of the frame that is read
   std::size_t shapes_ = 0;
 };
 

@@ -23,11 +23,11 @@ Decoder::Pipeline::Pipeline(const Pattern& pattern, const Calibration& calibrati
       triangulator_(camera_, calibration.projector),
       correspondence_({}) {}
 
-const Decoding& Decoder::Pipeline::decode(const GreyView& frame, StageObserver* observer) {
+const Decoding& Decoder::Pipeline::decode(const GreyView& frame, double full, StageObserver* observer) {
   const auto done = [&](Stage stage) {
     if (observer != nullptr) observer->stage_done(stage);
   };
-  reader_.binarize(frame), done(Stage::kBinarize);
+  reader_.binarize(frame, full), done(Stage::kBinarize);
   reader_.find_regions(frame), done(Stage::kFindRegions);
   reader_.describe(frame), done(Stage::kDescribe);
   reader_.classify(), done(Stage::kClassify);

@@ -23,9 +23,9 @@ class Decoder::Pipeline {
   Pipeline(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
            const DecodeOptions& options, std::optional<PaperWay> paper);
 
-  const Decoding& decode(const GreyView& frame, StageObserver* observer);
-  [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame) {
-    return reader_.read_anywhere(frame, cells_);
+  const Decoding& decode(const GreyView& frame, double full, StageObserver* observer);
+  [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, double full) {
+    return reader_.read_anywhere(frame, full, cells_);
   }
   [[nodiscard]] std::uint8_t camera_index() const { return camera_index_; }
   [[nodiscard]] const Lens& camera_lens() const { return camera_.lens; }

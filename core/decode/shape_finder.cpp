@@ -20,17 +20,13 @@ constexpr float kExtentMax = 1.5F;  // of a cell's side
 constexpr float kSplitLevels[] = {0.35F, 0.6F};
 /// What is larger than this is not a few symbols that ran together.
 constexpr int kSplitAreaMaxPx = 20000;
-/// Grey levels of 255 between a region's peak and its background.
+/// Between a region's peak and its background, of 255 levels.
 constexpr float kContrastMin = 8;
 
 BinarizeOptions binarize_options(const PatternOptions& pattern, float scale) {
   const float pitch = static_cast<float>(pattern.symbol_size_px + pattern.spacing_px) * scale;
   return {.tile_px = std::clamp(static_cast<int>(std::lround(0.5F * pitch)), 4, 64),
           .level = threshold_level(pattern.spacing_px, scale)};
-}
-
-float grey_levels(const GreyView& frame) {
-  return std::holds_alternative<ImageView<std::uint8_t>>(frame) ? 1.F : 257.F;
 }
 
 }  // namespace
@@ -43,11 +39,12 @@ ShapeFinder::ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected,
       binarizer_(binarize_options(pattern, expected_.in_the_middle().scale)),
       meter_(margin_px(pattern.spacing_px, expected_.in_the_middle().scale)) {}
 
-void ShapeFinder::binarize(const GreyView& frame) {
+void ShapeFinder::binarize(const GreyView& frame, double full) {
+  frame_levels_ = static_cast<float>(full / 255);
   if (way_ == Method::kPaper) {
     mask_ = binarize_paper(frame);
   } else {
-    binarizer_.binarize(frame, mask_);
+    binarizer_.binarize(frame, full, mask_);
   }
 }
 
@@ -75,7 +72,6 @@ RegionStatus ShapeFinder::judge_size(const Region& region) const {
 }
 
 void ShapeFinder::describe(const GreyView& frame, Sightings& seen) {
-  frame_levels_ = grey_levels(frame);
   status_.resize(regions_.regions.size());
   seen.clear();
   for (std::size_t i = 0; i < regions_.regions.size(); ++i) {

@@ -29,7 +29,8 @@ class ShapeFinder {
   void expect(ExpectedFrames expected) { expected_ = std::move(expected); }
   [[nodiscard]] const ExpectedFrames& expected() const { return expected_; }
 
-  void binarize(const GreyView& frame);
+  /// @param full  the level of a saturated pixel of the frame; the stages that follow go by it too
+  void binarize(const GreyView& frame, double full);
   void find_regions(const GreyView& frame);
   /// Puts the shapes that may be symbols into the sightings, in place of what was there.
   void describe(const GreyView& frame, Sightings& seen);
@@ -39,7 +40,7 @@ class ShapeFinder {
   /// Why a region is no sighting; kNoNeighbour where it is one.
   [[nodiscard]] RegionStatus status(std::size_t region) const { return status_[region]; }
   [[nodiscard]] GreyMomentMeter& meter() { return meter_; }
-  /// Of the frame, for one of 255.
+  /// Levels of the frame for one of 255.
   [[nodiscard]] float frame_levels() const { return frame_levels_; }
 
  private:

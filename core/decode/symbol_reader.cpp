@@ -138,8 +138,8 @@ const std::vector<Eigen::Vector2f>& SymbolReader::find_centres() {
   return centres_;
 }
 
-std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, const CellRays& cells) {
-  binarize(frame);
+std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, double full, const CellRays& cells) {
+  binarize(frame, full);
   find_regions(frame);
   describe(frame);
   std::vector<SymbolMatch> matches;

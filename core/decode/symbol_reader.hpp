@@ -35,7 +35,8 @@ class SymbolReader {
   void expect(ExpectedFrames expected) { shapes_.expect(std::move(expected)); }
   [[nodiscard]] float expected_scale() const { return shapes_.expected().in_the_middle().scale; }
 
-  void binarize(const GreyView& frame) { shapes_.binarize(frame); }
+  /// @param full  the level of a saturated pixel of the frame
+  void binarize(const GreyView& frame, double full) { shapes_.binarize(frame, full); }
   void find_regions(const GreyView& frame) { shapes_.find_regions(frame); }
   void describe(const GreyView& frame);
   void classify();
@@ -45,7 +46,7 @@ class SymbolReader {
   [[nodiscard]] const std::vector<Eigen::Vector2f>& find_centres();
   /// All of these, for symbols that lie wherever they may: without their epipolar lines to check them by, some in a
   /// thousand are wrong.
-  [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, const CellRays& cells);
+  [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, double full, const CellRays& cells);
   /// What became of every region, with the counters.
   void report(Decoding& decoding) const;
 
@@ -56,7 +57,7 @@ class SymbolReader {
   [[nodiscard]] const Sightings& seen() const { return seen_; }
   /// Index of a sighting's cell in the pattern's symbols, or -1; found with the centres.
   [[nodiscard]] std::int8_t letter_of_cell(std::size_t node) const { return letters_[node]; }
-  /// Of the frame, for one of 255.
+  /// Levels of the frame for one of 255.
   [[nodiscard]] float frame_levels() const { return shapes_.frame_levels(); }
 
  private:

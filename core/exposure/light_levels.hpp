@@ -38,7 +38,8 @@ struct LightLevels {
 [[nodiscard]] LightLevels measure_light(const GreyView& frame, double full);
 
 /// The level of a saturated pixel where nobody says: 255, or for 16 bits the least of 1023, 4095, 16383 and 65535 that
-/// no pixel exceeds.
+/// no pixel exceeds. A frame of which not one pixel reaches a quarter of full gets too low a level: the decoder then
+/// takes fainter light for the pattern, and intensities come out brighter.
 /// @thread reentrant
 [[nodiscard]] double guess_full_level(const GreyView& frame);
 

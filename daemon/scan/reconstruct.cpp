@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include "daemon/scan/reconstruct.hpp"
 
+#include <algorithm>
 #include <ctime>
 #include <span>
 #include <utility>
@@ -66,15 +67,24 @@ Result<> keep_frames(const FrameSet& set, const ScanSetup& setup, FrameCoding co
   return kept;
 }
 
+// The level of a saturated pixel of a camera, one for all its frames of a scan: what is guessed of a dark one alone
+// would be lower.
+double full_level_of(const FrameSet& set, const ScanSetup& setup, std::size_t camera) {
+  const std::string format = camera < setup.camera_formats.size() ? setup.camera_formats[camera] : "";
+  double full = 0;
+  for (const auto* frames : {&set.frames, &set.white, &set.dark}) {
+    if (!frames->empty()) full = std::max(full, full_level(format, (*frames)[camera].image()));
+  }
+  return full;
+}
+
 // The light of the points of one camera.
-void shade(std::span<CloudPoint> points, const FrameSet& set, const ScanSetup& setup, std::size_t camera,
-           ScanResult& result) {
+void shade(std::span<CloudPoint> points, const FrameSet& set, std::size_t camera, double full, ScanResult& result) {
   if (set.white.empty() && set.dark.empty()) return;
   SceneLight light;
   if (!set.white.empty()) light.white = set.white[camera].image();
   if (!set.dark.empty()) light.dark = set.dark[camera].image();
-  const std::string format = camera < setup.camera_formats.size() ? setup.camera_formats[camera] : "";
-  light.full = full_level(format, light.white.value_or(set.frames[camera].image()));
+  light.full = full;
   const std::size_t saturated = shade_points(points, light);
   if (light.white) result.saturated = result.saturated.value_or(0) + saturated;
 }
@@ -90,16 +100,17 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     clock.start();
     const auto begin = steady_clock::now();
     Decoder& decoder = setup.lanes[lane][i];
-    const auto decoding = decoder.decode(set.frames[i].image(), &clock);
+    const double full = full_level_of(set, setup, i);
+    const auto decoding = decoder.decode(set.frames[i].image(), full, &clock);
     result.decode_time += steady_clock::now() - begin;
     if (!decoding) {
       return fail(decoding.error().code, decoding.error().message, "camera " + setup.camera_names[i]);
     }
     const std::size_t before = result.cloud.points.size();
     append(**decoding, result);
-    const std::vector<CloudPoint> strays = stray_symbols(decoder, **decoding, set.frames[i].image());
+    const std::vector<CloudPoint> strays = stray_symbols(decoder, **decoding, set.frames[i].image(), full);
     result.strays.insert(result.strays.end(), strays.begin(), strays.end());
-    shade(std::span(result.cloud.points).subspan(before), set, setup, i, result);
+    shade(std::span(result.cloud.points).subspan(before), set, i, full, result);
     if (!request.picture || i != pictured) continue;
     auto picture = picture_of(set.frames[i].image(), **decoding, setup.pattern);
     if (!picture) return tl::unexpected(picture.error());

@@ -13,11 +13,11 @@ constexpr std::size_t kMost = 2;     // of another pattern some in a hundred are
 
 }  // namespace
 
-std::vector<CloudPoint> stray_symbols(Decoder& decoder, const Decoding& decoding, const GreyView& frame) {
+std::vector<CloudPoint> stray_symbols(Decoder& decoder, const Decoding& decoding, const GreyView& frame, double full) {
   const auto symbols = static_cast<std::size_t>(
       std::ranges::count_if(decoding.regions, [](const RegionSeen& region) { return region.letter >= 0; }));
   if (symbols < kSymbolsMin || decoding.points.size() * kHardly > symbols) return {};
-  const auto matches = decoder.read_anywhere(frame);
+  const auto matches = decoder.read_anywhere(frame, full);
   if (!matches || matches->size() * kMost < symbols) return {};
   std::vector<CloudPoint> strays;
   for (const SymbolMatch& match : *matches) {

@@ -17,9 +17,9 @@
 namespace slsd {
 namespace {
 
-Mask binarize(const GreyView& frame, const BinarizeOptions& options = {}) {
+Mask binarize(const GreyView& frame, const BinarizeOptions& options = {}, double full = 0) {
   Mask mask;
-  Binarizer(options).binarize(frame, mask);
+  Binarizer(options).binarize(frame, full > 0 ? full : frame.index() == 0 ? 255 : 65535, mask);
   return mask;
 }
 
@@ -153,6 +153,13 @@ TEST(Binarize, OfSixteenBitsIsThatOfEight) {
   EXPECT_EQ(binarize(sixteen_bits(frame).view()), binarize(frame.view()));
 }
 
+TEST(Binarize, OfEveryDepthIsThatOfEight) {
+  const Grey8 frame = uneven_light(1008, 216);
+  for (const int times : {1, 4, 16, 64}) {
+    EXPECT_EQ(binarize(deep(frame, 255.0 * times).view(), {}, 255.0 * times), binarize(frame.view())) << times;
+  }
+}
+
 TEST(Binarize, FindsNothingInUniformFrames) {
   for (const int grey : {0, 1, 128, 255}) {
     const Grey8 frame(333, 251, static_cast<std::uint8_t>(grey));
@@ -191,10 +198,10 @@ TEST(Binarize, ReadsFramesSmallerThanATile) {
 TEST(Binarize, TakesAMaskOfAnotherSize) {
   Binarizer binarizer({});
   Mask mask(Grey8(5, 5, 255).view());
-  binarizer.binarize(uneven_light(360, 90).view(), mask);
+  binarizer.binarize(uneven_light(360, 90).view(), 255, mask);
   EXPECT_EQ(mask.width(), 360);
   EXPECT_EQ(wrong_pixels(mask), 0);
-  binarizer.binarize(Grey8(40, 30, 90).view(), mask);
+  binarizer.binarize(Grey8(40, 30, 90).view(), 255, mask);
   EXPECT_EQ(mask, Mask(40, 30));
 }
 

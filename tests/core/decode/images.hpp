@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -28,11 +29,16 @@ inline Grey8 ascii_mask(const std::vector<std::string>& rows) {
   return mask;
 }
 
-/// The same picture with 16 bits: black and white stay what they are.
-inline Grey16 sixteen_bits(const Grey8& image) {
+/// The same picture as a camera of more bits takes it, from 0 to full; where full is no multiple of 255, rounded.
+inline Grey16 deep(const Grey8& image, double full) {
   Grey16 wide(image.width(), image.height());
-  for (std::size_t i = 0; i < image.size(); ++i) wide.data()[i] = static_cast<std::uint16_t>(image.data()[i] * 257);
+  for (std::size_t i = 0; i < image.size(); ++i)
+    wide.data()[i] = static_cast<std::uint16_t>(std::lround(image.data()[i] * full / 255));
   return wide;
+}
+
+inline Grey16 sixteen_bits(const Grey8& image) {
+  return deep(image, 65535);
 }
 
 }  // namespace slsd
