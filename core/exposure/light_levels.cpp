@@ -3,8 +3,8 @@
 #include "core/exposure/light_levels.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <initializer_list>
-#include <string>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -31,6 +31,14 @@ std::vector<TileLevels> measure_tiles(const GreyView& frame, double full, int& t
     }
   }
   return seen;
+}
+
+/// The first number in a text; 0 where there is none.
+int first_number(std::string_view text) {
+  int number = 0;
+  const auto first = std::ranges::find_if(text, [](char letter) { return letter >= '0' && letter <= '9'; });
+  std::from_chars(text.data() + (first - text.begin()), text.data() + text.size(), number);
+  return number;
 }
 
 double quantile(const std::vector<TileLevels>& tiles, double TileLevels::*level, double share) {
@@ -81,10 +89,9 @@ double guess_full_level(const GreyView& frame) {
 
 double full_level(std::string_view format, const GreyView& frame) {
   if (frame.index() == 0) return 255;
-  for (const int bits : {10, 12, 14}) {
-    if (format.ends_with(std::to_string(bits))) return (1 << bits) - 1;
-  }
-  return guess_full_level(frame);
+  const double guessed = guess_full_level(frame);
+  const int bits = first_number(format);
+  return bits == 10 || bits == 12 || bits == 14 ? std::max<double>((1 << bits) - 1, guessed) : guessed;
 }
 
 }  // namespace slsd

@@ -43,9 +43,9 @@ struct LightLevels {
 /// @thread reentrant
 [[nodiscard]] double guess_full_level(const GreyView& frame);
 
-/// The level of a saturated pixel. Formats that leave the upper bits of 16 empty say so in their names: "Y10",
-/// "Mono12".
-/// @param format  the camera's name for it; where it says nothing, guess_full_level()
+/// The level of a saturated pixel. Formats that leave the upper bits of 16 empty say so by the first number in their
+/// names: "Y10", "Mono12", "Mono10p", "BayerRG12Packed". Those of 16 say nothing: what fills them may be less.
+/// @param format  the camera's name for it; where it says nothing, or a pixel is above what it says, guess_full_level()
 /// @thread reentrant
 [[nodiscard]] double full_level(std::string_view format, const GreyView& frame);
 

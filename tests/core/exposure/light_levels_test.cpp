@@ -82,5 +82,33 @@ TEST(GuessFullLevel, IsOfTheBitsInUse) {
   EXPECT_EQ(guess_full_level(Grey16(4, 4, 65535).view()), 65535);
 }
 
+TEST(FullLevel, IsWhatTheFormatSays) {
+  const Grey16 faint(4, 4, 20);
+  for (const char* format : {"Y10", "Mono10", "Mono10p", "Mono10Packed", "BayerRG10", "BayerRG10p", "RG10", "Y10P"})
+    EXPECT_EQ(full_level(format, faint.view()), 1023) << format;
+  for (const char* format : {"Y12", "Mono12", "Mono12p", "Mono12Packed", "BayerGB12Packed", "BG12", "Mono12g24IDS"})
+    EXPECT_EQ(full_level(format, faint.view()), 4095) << format;
+  for (const char* format : {"Y14", "Mono14", "Mono14p", "BayerBG14"})
+    EXPECT_EQ(full_level(format, faint.view()), 16383) << format;
+}
+
+TEST(FullLevel, IsGuessedWhereTheFormatDoesNotSay) {
+  for (const char* format : {"", "Y16", "Y16 ", "Mono16", "GREY", "pBAA", "Mono", "999999999999"}) {
+    EXPECT_EQ(full_level(format, Grey16(4, 4, 1000).view()), 1023) << format;
+    EXPECT_EQ(full_level(format, Grey16(4, 4, 3000).view()), 4095) << format;
+    EXPECT_EQ(full_level(format, Grey16(4, 4, 40000).view()), 65535) << format;
+  }
+}
+
+TEST(FullLevel, OfAByteIs255WhateverTheFormat) {
+  for (const char* format : {"", "GREY", "Mono8", "Mono12p", "JPEG"})
+    EXPECT_EQ(full_level(format, Grey8(4, 4, 200).view()), 255) << format;
+}
+
+// Some cameras fill the upper bits in spite of the name.
+TEST(FullLevel, IsNotBelowAPixel) {
+  EXPECT_EQ(full_level("Y10", Grey16(4, 4, 64 * 900).view()), 65535);
+}
+
 }  // namespace
 }  // namespace slsd
