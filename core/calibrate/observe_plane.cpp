@@ -22,8 +22,10 @@ Result<PoseView> observe_plane(const GreyView& pattern, const std::optional<Grey
     if (!divided) return tl::unexpected(divided.error());
     levelled = std::move(*divided);
   }
+  const auto matches = reader.read(white ? GreyView(levelled.view()) : pattern);
+  if (!matches) return tl::unexpected(matches.error());
   PoseView view;
-  for (const SymbolMatch& match : reader.read(white ? GreyView(levelled.view()) : pattern)) {
+  for (const SymbolMatch& match : *matches) {
     view.symbols.push_back({match.camera_px, match.projector_px, match.sigma_px});
   }
   if (view.symbols.empty()) return nothing_seen();

@@ -44,8 +44,10 @@ Result<> observe_pattern(const PosePictures& pictures, const Board& board, const
                          PatternReader& reader, PoseView& view) {
   const auto levelled = divide_light(pictures.coded.at(0), pictures.white);
   if (!levelled) return tl::unexpected(levelled.error());
+  const auto matches = reader.read(levelled->view());
+  if (!matches) return tl::unexpected(matches.error());
   const BoardRegion region(board, sighting);
-  for (const SymbolMatch& match : reader.read(levelled->view())) {
+  for (const SymbolMatch& match : *matches) {
     if (region.contains(match.camera_px)) view.symbols.push_back({match.camera_px, match.projector_px, match.sigma_px});
   }
   if (view.symbols.size() < kSymbolsCertain && reader.shapes() > kPatternRegions) view.symbols.clear();

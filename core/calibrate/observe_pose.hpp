@@ -27,7 +27,7 @@ struct PosePictures {
 
 /// Reads the pattern on the board, with the light and the print divided out.
 /// @param view  gets the symbols; those beside the board are left out
-/// @errors kMismatch; kNotFound: none of the pattern is seen
+/// @errors kMismatch; kNotFound: none of the pattern is seen; kUnsupported: the pictures are too large
 [[nodiscard]] Result<> observe_pattern(const PosePictures& pictures, const Board& board, const BoardSighting& sighting,
                                        PatternReader& reader, PoseView& view);
 

@@ -4,6 +4,7 @@
 
 #include "core/decode/pipeline.hpp"
 #include "core/exposure/light_levels.hpp"
+#include "core/image_size.hpp"
 
 namespace slsd {
 namespace {
@@ -24,6 +25,10 @@ Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calib
   if (auto valid = options.validate(); !valid) return tl::unexpected(valid.error());
   if (camera_index >= calibration.cameras.size()) {
     return fail(ErrorCode::kInvalidArgument, "the calibration has no camera " + std::to_string(camera_index));
+  }
+  const CalibratedCamera& camera = calibration.cameras[camera_index];
+  if (auto fits = check_image_size(camera.lens.width_px, camera.lens.height_px); !fits) {
+    return fail(fits.error().code, fits.error().message, "camera " + camera.name);
   }
   const Lens& projector = calibration.projector;
   if (projector.width_px != pattern.options.projector_width_px ||

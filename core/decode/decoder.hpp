@@ -23,7 +23,8 @@ namespace slsd {
 class Decoder {
  public:
   /// Prepares the codebook, the prototypes and the rays of the pattern's cells.
-  /// @errors kMismatch: the calibration's projector is not of the pattern's size; kInvalidArgument
+  /// @errors kMismatch: the calibration's projector is not of the pattern's size; kInvalidArgument; kUnsupported: the
+  ///         camera's images are too large
   [[nodiscard]] static Result<Decoder> create(const Pattern& pattern, const Calibration& calibration,
                                               std::size_t camera_index, const DecodeOptions& options);
   Decoder(Decoder&&) noexcept;

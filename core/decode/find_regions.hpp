@@ -51,7 +51,7 @@ struct Regions {
 /// @thread thread-bound: keeps its buffers
 class RegionFinder {
  public:
-  /// @param mask  at most 32767 pixels wide and high
+  /// @param mask  of a readable size
   void find(const Mask& mask, Regions& found);
 
  private:

@@ -9,6 +9,7 @@
 
 #include "core/decode/symbol_reader.hpp"
 #include "core/exposure/light_levels.hpp"
+#include "core/image_size.hpp"
 
 namespace slsd {
 namespace {
@@ -162,7 +163,9 @@ std::vector<SymbolMatch> PatternReader::refine(std::vector<SymbolMatch> found, c
   return found;
 }
 
-std::vector<SymbolMatch> PatternReader::read(const GreyView& frame) {
+Result<std::vector<SymbolMatch>> PatternReader::read(const GreyView& frame) {
+  const auto [width, height] = size_of(frame);
+  if (auto fits = check_image_size(width, height); !fits) return tl::unexpected(fits.error());
   std::vector<SymbolMatch> found;
   shapes_ = 0;
   full_ = guess_full_level(frame);

@@ -12,6 +12,7 @@
 #include "core/decode/symbol_match.hpp"
 #include "core/geometry/homography.hpp"
 #include "core/image.hpp"
+#include "core/result.hpp"
 
 namespace slsd {
 
@@ -26,9 +27,10 @@ class PatternReader {
   PatternReader& operator=(PatternReader&&) noexcept;
   ~PatternReader();
 
-  /// @param frame  any size; best with the light of the surface divided out
+  /// @param frame  best with the light of the surface divided out
   /// @return empty where the pattern is not seen
-  [[nodiscard]] std::vector<SymbolMatch> read(const GreyView& frame);
+  /// @errors kUnsupported: the frame is too large
+  [[nodiscard]] Result<std::vector<SymbolMatch>> read(const GreyView& frame);
 
   /// How many shapes of a symbol's size the last frame had: many, and none read, is another pattern.
   [[nodiscard]] std::size_t shapes() const { return shapes_; }

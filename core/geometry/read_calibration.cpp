@@ -9,13 +9,13 @@
 #include "core/geometry/calibration.hpp"
 #include "core/geometry/file_section.hpp"
 #include "core/geometry/file_syntax.hpp"
+#include "core/image_size.hpp"
 
 namespace slsd {
 namespace {
 
 constexpr std::size_t kMaxFileSize = 1 << 20;
 constexpr std::size_t kMaxCameras = 64;
-constexpr int kMaxImageSidePx = 65535;
 constexpr double kMaxLength = 1e7;  // of a focal length in px, of a translation in mm
 constexpr double kMinBaselineMm = 1e-3;
 constexpr double kRotationTolerance = 1e-4;
@@ -47,6 +47,10 @@ Lens read_lens(FileSection& section, const LensKeys& keys) {
   Lens lens;
   lens.width_px = section.whole(keys.width, 1, kMaxImageSidePx);
   lens.height_px = section.whole(keys.height, 1, kMaxImageSidePx);
+  if (!section.error() && !is_readable_size(lens.width_px, lens.height_px)) {
+    section.refuse(keys.height, "times " + std::string(keys.width) + " must be at most " + std::to_string(kMaxImagePx) +
+                                    " pixels; have the camera bin or crop its images, and calibrate with those");
+  }
   read_pinhole(section, keys.matrix, lens);
   Eigen::Map<Eigen::Matrix<double, 5, 1>>(lens.distortion.data()) = section.vector(keys.distortion, 5);
   if (!section.error() && !lens.invertible()) {

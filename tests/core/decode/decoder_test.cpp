@@ -304,6 +304,35 @@ TEST(CreateDecoder, RefusesACameraThatTheCalibrationLacks) {
   EXPECT_EQ(decoder.error().code, ErrorCode::kInvalidArgument);
 }
 
+TEST(CreateDecoder, RefusesImagesThatAreTooLarge) {
+  Calibration rig = paper_rig();
+  for (const auto& [width, height] : {std::pair(32768, 100), std::pair(100, 32768), std::pair(20000, 20000)}) {
+    rig.cameras[0].lens.width_px = width, rig.cameras[0].lens.height_px = height;
+    const auto decoder = Decoder::create(shipped_pattern("16px-5.toml"), rig, 0, {});
+    ASSERT_FALSE(decoder);
+    EXPECT_EQ(decoder.error().code, ErrorCode::kUnsupported);
+    EXPECT_THAT(decoder.error().message, testing::HasSubstr("bin or crop"));
+  }
+}
+
+// As wide and as high as may be; the length of a row once was kept in 16 bits.
+TEST(Decode, ReadsTheLongestRowsAndColumns) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  const Grey8 symbols = draw_pattern(pattern);
+  Calibration rig = paper_rig();
+  for (const auto& [width, height] : {std::pair(32767, 70), std::pair(70, 32767)}) {
+    rig.cameras[0].lens.width_px = width, rig.cameras[0].lens.height_px = height;
+    auto decoder = Decoder::create(pattern, rig, 0, {});
+    ASSERT_TRUE(decoder) << to_string(decoder.error());
+    Grey8 frame(width, height);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) frame.at(x, y) = symbols.at(x % symbols.width(), y % symbols.height());
+    }
+    EXPECT_GT(decode(*decoder, frame.view()).regions.size(), 1000U);
+    EXPECT_EQ(decode(*decoder, Grey8(width, height, 255).view()).points.size(), 0U);
+  }
+}
+
 TEST(CreateDecoder, RefusesAnEmptyDepthRange) {
   const auto decoder =
       Decoder::create(shipped_pattern("16px-5.toml"), paper_rig(), 0, {.depth_min_mm = 900, .depth_max_mm = 800});
