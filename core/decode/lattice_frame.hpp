@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include <Eigen/Core>
@@ -34,7 +35,9 @@ class ExpectedFrames {
 
   /// @param camera_px  inside the camera's image
   [[nodiscard]] const ExpectedFrame& at(float x, float y) const;
-  [[nodiscard]] const ExpectedFrame& in_the_middle() const { return frames_[frames_.size() / 2]; }
+  [[nodiscard]] const ExpectedFrame& in_the_middle() const {
+    return frames_[static_cast<std::size_t>(rows_ / 2) * columns_ + columns_ / 2];
+  }
 
  private:
   template <class ProjectorPixelAt>
