@@ -35,11 +35,11 @@ std::string searched_in_vain(const ArrayOptions& options, int distance) {
 }
 
 Result<CodeArray> verified(CodeArray array, const ArrayOptions& options, int distance) {
-  const int found = minimum_window_distance(array, options.half_turn_unique);
-  assert(found >= distance);
-  if (found >= distance) return array;
+  array.minimum_distance = minimum_window_distance(array, options.half_turn_unique);
+  assert(array.minimum_distance >= distance);
+  if (array.minimum_distance >= distance) return array;
   return fail(ErrorCode::kImpossible,
-              "the array that was constructed fails its check: distance " + std::to_string(found));
+              "the array that was constructed fails its check: distance " + std::to_string(array.minimum_distance));
 }
 
 Result<CodeArray> construct_with(const ArrayOptions& options, int distance) {
@@ -67,7 +67,7 @@ Result<CodeArray> draw_by_rejection(const ArrayOptions& options) {
                                             std::to_string(word_count(options.letters)) +
                                             " words of 3x3: use more letters or larger symbols");
   auto array = draw_paper_array(options.rows, options.columns, options.letters, options.seed, kPaperDraws);
-  if (array) return std::move(*array);
+  if (array) return verified(std::move(*array), options, 0);
   return fail(ErrorCode::kImpossible, "none of " + std::to_string(kPaperDraws) +
                                           " random arrays has different aligned windows; no bound forbids it: use more "
                                           "letters, larger symbols or the constructive method");

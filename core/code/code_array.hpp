@@ -22,6 +22,9 @@ struct CodeArray {
   int columns = 0;
   int letters = 0;
   std::vector<std::uint8_t> cells;
+  /// What minimum_window_distance() found when the array was made or read, turned windows included where they were
+  /// asked for; 0 where nobody looked. Computing it takes seconds for the largest arrays.
+  int minimum_distance = 0;
 
   [[nodiscard]] int at(int row, int column) const { return cells[static_cast<std::size_t>(row) * columns + column]; }
   friend bool operator==(const CodeArray&, const CodeArray&) = default;
@@ -45,7 +48,7 @@ struct ArrayOptions {
   [[nodiscard]] Result<> validate() const;
 };
 
-/// Makes the array; the same options give the same array on every machine.
+/// Makes the array and checks it; the same options give the same array on every machine.
 /// @errors kInvalidArgument; kImpossible with the bound that forbids it
 /// @thread reentrant
 [[nodiscard]] Result<CodeArray> make_code_array(const ArrayOptions& options);

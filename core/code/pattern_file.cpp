@@ -108,10 +108,11 @@ CodeArray read_array(KeyReader& reader, const toml::table& table, const PatternO
 }
 
 // What the file promises is computed anew: a letter changed by hand or in transit must not become a wrong point.
-void check_promises(KeyReader& reader, const toml::table& table, const Pattern& pattern) {
+void check_promises(KeyReader& reader, const toml::table& table, Pattern& pattern) {
   const int promised = read_int(reader, table, "minimum_distance", 0, kWindowCells);
   if (reader.error()) return;
   const int found = minimum_window_distance(pattern.array, pattern.options.half_turn_unique);
+  pattern.array.minimum_distance = found;
   if (found < std::max(promised, pattern.options.minimum_distance.value_or(0)))
     reader.refuse(table, ErrorCode::kMismatch,
                   "the windows of \"letters\" have minimum distance " + std::to_string(found) +
@@ -145,11 +146,10 @@ Result<Pattern> pattern_from(const toml::table& document, std::string_view name)
 
 std::string write_pattern(const Pattern& pattern) {
   const CodeArray& array = pattern.array;
-  const int distance = minimum_window_distance(array, pattern.options.half_turn_unique);
   std::string text = "# A pattern of slsd. Letter i of the array is shown as symbols[i].\n" +
                      options_in_toml(pattern.options) + "\n[array]\nrows = " + std::to_string(array.rows) +
                      "\ncolumns = " + std::to_string(array.columns) + "\n# Hamming, between any two 3x3 windows.\n" +
-                     "minimum_distance = " + std::to_string(distance) + "\nletters = [\n";
+                     "minimum_distance = " + std::to_string(array.minimum_distance) + "\nletters = [\n";
   for (int row = 0; row < array.rows; ++row) text += "  \"" + row_of_letters(array, row) + "\",\n";
   return text + "]\n";
 }

@@ -20,7 +20,7 @@ WindowDecoder::WindowDecoder(const Pattern& pattern, DecodeWindowsOptions option
       options_(options),
       exact_codebook_(pattern.array, options.rows, options.columns, 0),
       correcting_codebook_(pattern.array, options.rows, options.columns, radius),
-      unique_(minimum_window_distance(pattern.array) > 0),
+      unique_(pattern.array.minimum_distance > 0),
       log_letters_(std::log(static_cast<float>(pattern.letters()))) {}
 
 std::optional<std::uint32_t> WindowDecoder::key_of(const Neighbourhood& around,

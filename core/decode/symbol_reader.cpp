@@ -40,7 +40,7 @@ std::vector<Prototype> with_centroids_of(Method centre, const Pattern& pattern, 
 
 /// Errors that the array's distance corrects; more than one costs more memory than it gains.
 int radius_of(const CodeArray& array) {
-  return minimum_window_distance(array) >= 3 ? 1 : 0;
+  return array.minimum_distance >= 3 ? 1 : 0;
 }
 
 }  // namespace

@@ -82,7 +82,7 @@ std::string table_4() {
 std::string distance_reached(int rows, int columns, int letters, bool half_turn) {
   const auto array =
       make_code_array({.rows = rows, .columns = columns, .letters = letters, .half_turn_unique = half_turn});
-  return array ? std::to_string(minimum_window_distance(*array, half_turn)) : "-";
+  return array ? std::to_string(array->minimum_distance) : "-";
 }
 
 void add_robustness(Table& table, int size_px, int spacing_px, int letters) {

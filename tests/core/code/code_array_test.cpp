@@ -64,13 +64,15 @@ RC_GTEST_PROP(MakeCodeArray, KeepsTheDistanceAskedFor, ()) {
   RC_ASSERT(array.has_value());
   RC_ASSERT(array->rows == options.rows);
   RC_ASSERT(array->cells.size() == static_cast<std::size_t>(options.rows) * options.columns);
-  RC_ASSERT(naive_minimum_distance(*array, options.half_turn_unique) >= *options.minimum_distance);
+  RC_ASSERT(array->minimum_distance == naive_minimum_distance(*array, options.half_turn_unique));
+  RC_ASSERT(array->minimum_distance >= *options.minimum_distance);
 }
 
 TEST(MakeCodeArray, DrawsAlignedWindowsThatDifferThePapersWay) {
   const auto array =
       make_code_array({.rows = 45, .columns = 72, .letters = 3, .seed = 5, .method = ArrayMethod::kPaper});
   ASSERT_TRUE(array);
+  EXPECT_EQ(array->minimum_distance, 0);
   EXPECT_TRUE(aligned_windows_differ(*array));
   for (int top = 0; top < 45; top += 3)
     for (int left = 0; left < 72; left += 3)
