@@ -155,12 +155,16 @@ std::string risky_pairs_table(const std::vector<AlphabetSurvey>& surveys) {
 
 }  // namespace
 
+std::string descriptor_section() {
+  return kDescriptorText + descriptor_table();
+}
+
 std::string alphabet_document() {
   std::vector<AlphabetSurvey> surveys;
   for (const int size_px : kSymbolSizesPx) surveys.push_back(survey_alphabet(size_px, kSpacing_px));
   return kIntroduction + rules_table() + kSeparabilityText + "### Sets\n\n" + sets_table(surveys) +
          "### Symbols that are lost\n\n" + loss_table(surveys) + "### Risky pairs\n\n" + risky_pairs_table(surveys) +
-         kDescriptorText + descriptor_table();
+         descriptor_section();
 }
 
 }  // namespace slsd

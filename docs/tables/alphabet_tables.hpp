@@ -10,4 +10,8 @@ namespace slsd {
 /// the symbols look.
 [[nodiscard]] std::string alphabet_document();
 
+/// The part of it that the decoder determines, at its end: the ten descriptors and the centroid of all 125 shapes. The
+/// other parts take minutes.
+[[nodiscard]] std::string descriptor_section();
+
 }  // namespace slsd
