@@ -74,6 +74,10 @@ TEST(ReadCalibration, ReturnsWhatWasWritten) {
   EXPECT_EQ(read->report.reprojection_error_camera_px, 0.11);
   EXPECT_EQ(read->report.reprojection_error_projector_px, 0.09);
   EXPECT_EQ(read->report.epipolar_error_px, 0.12);
+  EXPECT_EQ(read->report.held_out_error_px, 0.13);
+  EXPECT_EQ(read->report.verdict, "good");
+  EXPECT_EQ(read->report.projector_sigma, written.report.projector_sigma);
+  EXPECT_EQ(read->report.camera_sigma, written.report.camera_sigma);
   EXPECT_EQ(read->report.board, "charuco 12x9");
   EXPECT_EQ(read->report.date, "2026-03-01");
   EXPECT_EQ(read->report.projector_serial, "P-77");
