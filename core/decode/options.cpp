@@ -17,7 +17,7 @@ Result<> DecodeOptions::validate() const {
 }
 
 bool DecodeOptions::any_paper() const {
-  const Method stages[] = {binarize, classify, centre, link_grid, decode_windows, correspond};
+  const Method stages[] = {binarize, find_regions, classify, centre, link_grid, decode_windows, correspond};
   return std::ranges::find(stages, Method::kPaper) != std::end(stages);
 }
 

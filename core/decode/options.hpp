@@ -14,6 +14,7 @@ struct DecodeOptions {
   double depth_min_mm = 400.0;  ///< working range along the camera's z axis; cuts the candidates of a codeword
   double depth_max_mm = 2500.0;
   Method binarize = Method::kDefault;
+  Method find_regions = Method::kDefault;  ///< the paper's way leaves regions merged that ran together
   Method classify = Method::kDefault;
   Method centre = Method::kDefault;
   Method link_grid = Method::kDefault;

@@ -116,7 +116,7 @@ std::vector<double> PatternReader::likely_scales(const GreyView& frame) {
   Sightings seen;
   for (const double scale : scales) {
     ShapeFinder finder(pattern_.options, ExpectedFrames(turned_and_scaled(0, scale).matrix, width, height),
-                       Method::kDefault);
+                       Method::kDefault, Method::kDefault);
     finder.binarize(frame, full_);
     finder.find_regions(frame);
     finder.describe(frame, seen);

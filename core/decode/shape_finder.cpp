@@ -31,17 +31,18 @@ BinarizeOptions binarize_options(const PatternOptions& pattern, float scale) {
 
 }  // namespace
 
-ShapeFinder::ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize)
+ShapeFinder::ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize, Method find_regions)
     : symbol_size_px_(static_cast<float>(pattern.symbol_size_px)),
       pitch_px_(static_cast<float>(pattern.symbol_size_px + pattern.spacing_px)),
-      way_(binarize),
+      binarize_(binarize),
+      find_regions_(find_regions),
       expected_(std::move(expected)),
       binarizer_(binarize_options(pattern, expected_.in_the_middle().scale)),
       meter_(margin_px(pattern.spacing_px, expected_.in_the_middle().scale)) {}
 
 void ShapeFinder::binarize(const GreyView& frame, double full) {
   frame_levels_ = static_cast<float>(full / 255);
-  if (way_ == Method::kPaper) {
+  if (binarize_ == Method::kPaper) {
     mask_ = binarize_paper(frame);
   } else {
     binarizer_.binarize(frame, full, mask_);
@@ -50,7 +51,7 @@ void ShapeFinder::binarize(const GreyView& frame, double full) {
 
 void ShapeFinder::find_regions(const GreyView& frame) {
   region_finder_.find(mask_, regions_);
-  if (way_ == Method::kPaper) return;
+  if (find_regions_ == Method::kPaper) return;
   splitter_.split_all(frame, kSplitLevels, regions_, [this](const Region& region) {
     return region.area_px <= kSplitAreaMaxPx && judge_size(region) == RegionStatus::kTooLarge;
   });

@@ -23,7 +23,7 @@ namespace slsd {
 class ShapeFinder {
  public:
   /// @param expected  how the pattern lies in the frame, to half a step of the grid
-  ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize);
+  ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize, Method find_regions);
 
   /// Of the same scale, to a tenth.
   void expect(ExpectedFrames expected) { expected_ = std::move(expected); }
@@ -47,7 +47,7 @@ class ShapeFinder {
   [[nodiscard]] RegionStatus judge_size(const Region& region) const;
 
   float symbol_size_px_, pitch_px_;
-  Method way_;
+  Method binarize_, find_regions_;
   ExpectedFrames expected_;
   Binarizer binarizer_;
   RegionFinder region_finder_;

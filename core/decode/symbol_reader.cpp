@@ -50,7 +50,7 @@ SymbolReader::SymbolReader(const Pattern& pattern, ExpectedFrames expected, cons
     : pattern_(pattern),
       options_(options),
       paper_(std::move(paper)),
-      shapes_(pattern.options, std::move(expected), options.binarize),
+      shapes_(pattern.options, std::move(expected), options.binarize, options.find_regions),
       prototypes_as_expected_(prototypes_for(pattern, expected_scale(), kExpectedFrameError)),
       prototypes_as_measured_(prototypes_for(pattern, expected_scale(), kMeasuredFrameError)),
       classifier_as_expected_(prototypes_as_expected_, kExpectedDistanceMax),

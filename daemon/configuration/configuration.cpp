@@ -156,6 +156,7 @@ Result<> read_decode(const toml::table* table, const path& file, DecodeOptions& 
   reader.read("depth_min_mm", options.depth_min_mm);
   reader.read("depth_max_mm", options.depth_max_mm);
   reader.choose("binarize", options.binarize, span_of(kMethods));
+  reader.choose("find_regions", options.find_regions, span_of(kMethods));
   reader.choose("classify", options.classify, span_of(kMethods));
   reader.choose("centre", options.centre, span_of(kMethods));
   reader.choose("link_grid", options.link_grid, span_of(kMethods));

@@ -11,7 +11,7 @@ namespace {
 
 DecodeOptions papers_way() {
   DecodeOptions options;
-  options.binarize = options.classify = options.centre = Method::kPaper;
+  options.binarize = options.find_regions = options.classify = options.centre = Method::kPaper;
   options.link_grid = options.decode_windows = options.correspond = Method::kPaper;
   return options;
 }

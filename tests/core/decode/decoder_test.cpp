@@ -40,6 +40,7 @@ Decoding decode(Decoder& decoder, const GreyView& frame) {
 
 DecodeOptions the_papers_way() {
   return {.binarize = Method::kPaper,
+          .find_regions = Method::kPaper,
           .classify = Method::kPaper,
           .centre = Method::kPaper,
           .link_grid = Method::kPaper,
@@ -181,6 +182,18 @@ TEST(Decode, ThePapersWayGivesMostSymbols) {
     EXPECT_GE(static_cast<double>(decoding.points.size()), 0.85 * visible_cells(pattern, kPlane)) << name;
     EXPECT_LE(wrong_points(decoding, kPlane, 3), static_cast<int>(decoding.points.size()) / 10) << name;
     expect_counts_sum_up(decoding);
+  }
+}
+
+// Out of focus the gaps between symbols fill up. What ran together is taken apart whatever the mask came from, unless
+// regions are to be as the paper has them.
+TEST(Decode, TakesRegionsApartAfterEitherMask) {
+  const Pattern pattern = shipped_pattern("8px-6-dense.toml");
+  const Grey8 frame = simulate(draw_pattern(pattern), paper_rig(), kPlane, {.blur_sigma_px = 1.6});
+  for (const Method binarize : {Method::kDefault, Method::kPaper}) {
+    Decoder apart = decoder_of(pattern, {.binarize = binarize});
+    Decoder merged = decoder_of(pattern, {.binarize = binarize, .find_regions = Method::kPaper});
+    EXPECT_GT(decode(apart, frame.view()).regions.size(), decode(merged, frame.view()).regions.size() + 10);
   }
 }
 

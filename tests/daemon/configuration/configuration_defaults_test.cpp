@@ -115,7 +115,8 @@ TEST(ReadConfiguration, ShippedFileHasEveryKey) {
        "packet_delay_us receive_buffer_bytes packet_resend packet_socket frame_timeout_ms missed_frames_max "
        "frames_held_max"},
       {"[calibration]", "file other_hardware"},
-      {"[decode]", "depth_min_mm depth_max_mm binarize classify centre link_grid decode_windows correspond"},
+      {"[decode]",
+       "depth_min_mm depth_max_mm binarize find_regions classify centre link_grid decode_windows correspond"},
       {"[scan]", "timeout_ms exposure_skew_ms reopen_first_ms reopen_longest_ms projector_latency_ms power_line_hz"},
       {"[server]", "socket socket_mode clients_max request_bytes_max send_timeout_ms"}};
   for (const auto& [heading, keys] : tables) {

@@ -52,6 +52,7 @@ other_hardware = "warn"
 [decode]
 depth_min_mm = 100
 depth_max_mm = 200.5
+find_regions = "paper"
 classify = "paper"
 [scan]
 timeout_ms = 1
@@ -80,6 +81,8 @@ socket_mode = 0o600
   EXPECT_EQ(configuration->cameras.at(0).faults.at(0).capture, 3U);
   EXPECT_EQ(configuration->calibration_file, "etc/calibration.yml");
   EXPECT_EQ(configuration->other_hardware, OtherHardware::kWarn);
+  EXPECT_EQ(configuration->decode.binarize, Method::kDefault);
+  EXPECT_EQ(configuration->decode.find_regions, Method::kPaper);
   EXPECT_EQ(configuration->decode.classify, Method::kPaper);
   EXPECT_EQ(configuration->decode.depth_min_mm, 100.0);
   EXPECT_EQ(configuration->server.socket, "etc/run/s");
