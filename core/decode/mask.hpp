@@ -26,6 +26,12 @@ class Mask {
   /// All dark.
   Mask(int width, int height)
       : words_(static_cast<std::size_t>(words_across(width)) * height), width_(width), height_(height) {}
+  /// Makes it all dark and of this size, in the memory that it has.
+  void clear(int width, int height) {
+    words_.assign(static_cast<std::size_t>(words_across(width)) * height, 0);
+    width_ = width, height_ = height;
+  }
+  void light(int x, int y) { row(y)[x / kWordPx] |= std::uint64_t{1} << (x % kWordPx); }
   /// @param image  255 where lit, 0 elsewhere
   explicit Mask(const ImageView<std::uint8_t>& image);
 

@@ -25,7 +25,7 @@ class ShapeFinder {
   /// @param expected  how the pattern lies in the frame, to half a step of the grid
   ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize, Method find_regions);
 
-  /// Of the same scale, to a tenth.
+  /// Of the same scale, to an eighth.
   void expect(ExpectedFrames expected) { expected_ = std::move(expected); }
   [[nodiscard]] const ExpectedFrames& expected() const { return expected_; }
 

@@ -26,13 +26,13 @@ void RegionSplitter::find_parts(const ImageView<T>& frame, const Region& region,
     high = std::max(high, *greatest);
   }
   const float threshold = static_cast<float>(low) + level * static_cast<float>(high - low);
-  mask_ = Grey8(region.width_px(), region.height_px());
+  mask_.clear(region.width_px(), region.height_px());
   for (const Run& run : runs) {
     for (int x = run.left; x < run.right; ++x) {
-      mask_.at(x - region.left, run.row - region.top) = static_cast<float>(frame.at(x, run.row)) > threshold ? 255 : 0;
+      if (static_cast<float>(frame.at(x, run.row)) > threshold) mask_.light(x - region.left, run.row - region.top);
     }
   }
-  finder_.find(Mask(mask_.view()), parts_);
+  finder_.find(mask_, parts_);
   for (Region& part : parts_.regions) {
     part.left += region.left, part.right += region.left;
     part.top += region.top, part.bottom += region.top;

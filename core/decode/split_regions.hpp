@@ -49,7 +49,7 @@ class RegionSplitter {
   template <class T>
   void find_parts(const ImageView<T>& frame, const Region& region, std::span<const Run> runs, float level);
 
-  Grey8 mask_;
+  Mask mask_;
   RegionFinder finder_;
   Regions parts_;
   std::vector<std::size_t> suspects_, asked_;

@@ -31,7 +31,7 @@ class SymbolReader {
   SymbolReader(const Pattern& pattern, ExpectedFrames expected, const DecodeOptions& options,
                std::optional<PaperWay> paper);
 
-  /// Of the same scale, to a tenth.
+  /// Of the same scale, to an eighth.
   void expect(ExpectedFrames expected) { shapes_.expect(std::move(expected)); }
   [[nodiscard]] float expected_scale() const { return shapes_.expected().in_the_middle().scale; }
 
