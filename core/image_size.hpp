@@ -19,11 +19,16 @@ inline constexpr std::int64_t kMaxImagePx = std::int64_t{1} << 28;
          std::int64_t{width_px} * height_px <= kMaxImagePx;
 }
 
+/// "1600x1200". @thread reentrant
+[[nodiscard]] inline std::string size_text(int width_px, int height_px) {
+  return std::to_string(width_px) + "x" + std::to_string(height_px);
+}
+
 /// @errors kUnsupported: the decoder cannot read images of this size
 /// @thread reentrant
 [[nodiscard]] inline Result<> check_image_size(int width_px, int height_px) {
   if (is_readable_size(width_px, height_px)) return {};
-  return fail(ErrorCode::kUnsupported, "images of " + std::to_string(width_px) + "x" + std::to_string(height_px) +
+  return fail(ErrorCode::kUnsupported, "images of " + size_text(width_px, height_px) +
                                            " pixels cannot be decoded: 1 to " + std::to_string(kMaxImageSidePx) +
                                            " to a side and at most " + std::to_string(kMaxImagePx) +
                                            " altogether; have the camera bin or crop them");

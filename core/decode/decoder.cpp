@@ -7,14 +7,6 @@
 #include "core/image_size.hpp"
 
 namespace slsd {
-namespace {
-
-std::string size_text(int width, int height) {
-  return std::to_string(width) + "x" + std::to_string(height);
-}
-
-}  // namespace
-
 Decoder::Decoder(std::unique_ptr<Pipeline> pipeline) : pipeline_(std::move(pipeline)) {}
 Decoder::Decoder(Decoder&&) noexcept = default;
 Decoder& Decoder::operator=(Decoder&&) noexcept = default;

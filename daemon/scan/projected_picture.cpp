@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "core/image_size.hpp"
 #include "core/picture/focus_chart.hpp"
 #include "core/picture/view_grid.hpp"
 #include "drivers/files/read_image.hpp"
@@ -21,9 +22,8 @@ Result<std::optional<Grey8>> read_picture(std::string_view png, int width_px, in
   auto* grey = std::get_if<Grey8>(&*decoded);
   if (grey == nullptr) return fail(ErrorCode::kMismatch, "the image has 16 bits a pixel, a projector 8: convert it");
   if (grey->width() == width_px && grey->height() == height_px) return std::move(*grey);
-  return fail(ErrorCode::kMismatch, "the image is " + std::to_string(grey->width()) + "x" +
-                                        std::to_string(grey->height()) + " pixels, the projector " +
-                                        std::to_string(width_px) + "x" + std::to_string(height_px) +
+  return fail(ErrorCode::kMismatch, "the image is " + size_text(grey->width(), grey->height()) +
+                                        " pixels, the projector " + size_text(width_px, height_px) +
                                         ": it is shown pixel for pixel, make it of that size");
 }
 

@@ -6,16 +6,13 @@
 #include <future>
 
 #include "core/code/separability.hpp"
+#include "core/image_size.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd {
 namespace {
 
 constexpr std::size_t kMaxFileBytes = 16 << 20;
-
-std::string size_text(int width_px, int height_px) {
-  return std::to_string(width_px) + "x" + std::to_string(height_px);
-}
 
 Result<> check_size(int width_px, int height_px, const ProjectorOptions& projector, const std::string& what) {
   if (width_px == projector.width_px && height_px == projector.height_px) return {};

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include <iostream>
 
+#include "core/image_size.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/latency/latency_file.hpp"
 #include "daemon/scan/devices.hpp"
@@ -46,10 +47,6 @@ class Findings {
   bool scan_possible_ = true;
 };
 
-std::string size_text(int width_px, int height_px) {
-  return std::to_string(width_px) + "x" + std::to_string(height_px) + " px";
-}
-
 std::string advice_for(const Error& error, const CameraOptions& absent, const Configuration& configuration) {
   if (error.code != ErrorCode::kNotFound || absent.driver == CameraDriver::kFile) return {};
   return "; " + CameraList::look(configuration).similar_to(absent);
@@ -71,11 +68,12 @@ void check_camera(const CameraOptions& options, const Configuration& configurati
       check_hardware(name, calibrated_hardware(*calibration, *known), camera_hardware(seen.driver, seen.device)),
       configuration.other_hardware);
   if (known->lens.width_px == seen.width_px && known->lens.height_px == seen.height_px) {
-    return findings.good(name + " has the size of its calibration, " + size_text(seen.width_px, seen.height_px));
+    return findings.good(name + " has the size of its calibration, " + size_text(seen.width_px, seen.height_px) +
+                         " px");
   }
-  findings.bad(name + " gives frames of " + size_text(seen.width_px, seen.height_px) + ", its calibration is for " +
+  findings.bad(name + " gives frames of " + size_text(seen.width_px, seen.height_px) + " px, its calibration is for " +
                size_text(known->lens.width_px, known->lens.height_px) +
-               ": set the camera's size, or calibrate it again");
+               " px: set the camera's size, or calibrate it again");
 }
 
 void check_cameras(const Configuration& configuration, const std::optional<Calibration>& calibration,
@@ -106,7 +104,7 @@ void check_projector(const Configuration& configuration, const std::optional<Cal
   const ProjectorOptions& options = configuration.projector;
   if (options.driver == ProjectorDriver::kGlfw) return check_monitor(configuration, calibration, findings);
   const auto projector = make_projector(options);
-  findings.note((*projector)->open(), "projector headless, " + size_text(options.width_px, options.height_px));
+  findings.note((*projector)->open(), "projector headless, " + size_text(options.width_px, options.height_px) + " px");
 }
 
 void check_scan(const Configuration& configuration, Findings& findings) {

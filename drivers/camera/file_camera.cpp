@@ -7,14 +7,12 @@
 #include <cstdint>
 #include <variant>
 
+#include "core/image_size.hpp"
+
 namespace slsd {
 namespace {
 
 constexpr double kRateMaxHz = 1000.0;
-
-std::string size_text(int width_px, int height_px) {
-  return std::to_string(width_px) + "x" + std::to_string(height_px);
-}
 
 std::string format_text(const FrameFormat& format) {
   return size_text(format.width_px, format.height_px) + " with " + std::to_string(8 * format.bytes_per_pixel) + " bits";

@@ -9,14 +9,12 @@
 #include <thread>
 #include <utility>
 
+#include "core/image_size.hpp"
+
 namespace slsd {
 namespace {
 
 constexpr int kSideMaxPx = 16384;
-
-std::string size_text(int width_px, int height_px) {
-  return std::to_string(width_px) + "x" + std::to_string(height_px);
-}
 
 }  // namespace
 

@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "core/image_size.hpp"
+
 namespace slsd {
 
 GlfwProjector::GlfwProjector(GlfwProjectorOptions options)
@@ -40,9 +42,8 @@ Result<MonotonicTime> GlfwProjector::show(const Grey8& image) {
   if (auto there = check(); !there) return tl::unexpected(there.error());
   if (image.width() != options_.width_px || image.height() != options_.height_px) {
     return fail(ErrorCode::kMismatch,
-                "the image is " + std::to_string(image.width()) + "x" + std::to_string(image.height()) +
-                    " pixels, the projector " + std::to_string(options_.width_px) + "x" +
-                    std::to_string(options_.height_px) + "; make the pattern for this projector",
+                "the image is " + size_text(image.width(), image.height()) + " pixels, the projector " +
+                    size_text(options_.width_px, options_.height_px) + "; make the pattern for this projector",
                 "monitor " + description_.monitor);
   }
   Result<MonotonicTime> shown;

@@ -5,12 +5,10 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "core/image_size.hpp"
+
 namespace slsd {
 namespace {
-
-std::string size_text(int width_px, int height_px) {
-  return std::to_string(width_px) + "x" + std::to_string(height_px);
-}
 
 std::string place_text(const DesktopArea& area) {
   char text[32];
