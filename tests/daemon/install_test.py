@@ -38,7 +38,7 @@ class Install(unittest.TestCase):
         if not shutil.which("systemd-analyze"):
             self.skipTest("no systemd-analyze here (package systemd)")
         install("/usr", str(self.root))
-        for program in ("usr/lib/xorg/Xorg", "bin/kill"):
+        for program in ("usr/lib/xorg/Xorg", "bin/kill", "bin/sh"):
             (self.root / program).parent.mkdir(parents=True, exist_ok=True)
             (self.root / program).write_text("#!/bin/sh\n", encoding="utf-8")
             (self.root / program).chmod(0o755)
