@@ -10,40 +10,16 @@
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>
 
+#include "tests/core/calibrate/outcome.hpp"
 #include "tests/core/calibrate/synthetic_rig.hpp"
 
 namespace slsd {
 namespace {
 
+using test::expect_near_truth;
+using test::left_out;
+using test::turn_between_deg;
 using testing::HasSubstr;
-
-double turn_between_deg(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
-  return Eigen::AngleAxisd(a * b.transpose()).angle() * 57.29578;
-}
-
-void expect_near_truth(const CalibrationOutcome& outcome, const RigModel& truth) {
-  const auto near = [](const LensVector& found, const LensVector& is) {
-    EXPECT_NEAR(found[0] / is[0], 1, 0.001);
-    EXPECT_NEAR(found[1] / is[1], 1, 0.001);
-    EXPECT_NEAR(found[2], is[2], 3);
-    EXPECT_NEAR(found[3], is[3], 3);
-  };
-  for (std::size_t i = 0; i < truth.cameras.size(); ++i) near(outcome.rig.cameras[i].lens, truth.cameras[i].lens);
-  near(outcome.rig.projector.lens, truth.projector.lens);
-  const RigidTransform found = to_motion(outcome.rig.projector.device_from_rig),
-                       is = to_motion(truth.projector.device_from_rig);
-  EXPECT_LT(turn_between_deg(found.rotation, is.rotation), 0.02);
-  EXPECT_NEAR(found.translation.norm(), is.translation.norm(), 0.2);
-}
-
-const PoseReport& report_of(const CalibrationOutcome& outcome, const std::string& pose) {
-  return *std::ranges::find(outcome.poses, pose, &PoseReport::name);
-}
-
-std::size_t left_out(const CalibrationOutcome& outcome) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(outcome.poses, [](const PoseReport& pose) { return pose.fault.has_value(); }));
-}
 
 TEST(Calibrate, RecoversTheRig) {
   const RigModel truth = true_rig();
@@ -117,162 +93,6 @@ TEST(Calibrate, LeavesWrongSymbolsOut) {
   for (const PoseReport& pose : outcome->poses) outlying += pose.outlying_symbols;
   EXPECT_GE(outlying, wrong);
   EXPECT_LT(outlying, wrong + 30);
-}
-
-TEST(Calibrate, NamesAPoseWithABentBoard) {
-  const RigModel truth = true_rig();
-  SightOptions options;
-  options.relief = [](int pose, const Eigen::Vector2d& mm) {
-    return pose == 4 ? 4 * std::pow((mm.x() - 225) / 225, 2) : 0;
-  };
-  const auto outcome = calibrate(see(truth, true_poses(12), options), {});
-  ASSERT_TRUE(outcome) << outcome.error().message;
-  EXPECT_EQ(left_out(*outcome), 1U);
-  EXPECT_EQ(report_of(*outcome, "pose_4").fault, PoseFault::kBent) << report_of(*outcome, "pose_4").reason;
-  expect_near_truth(*outcome, truth);
-}
-
-// Of no second order: a plane through it is tilted, which is no move.
-TEST(Calibrate, NamesAPoseWithABoardThatIsBentLikeAnS) {
-  const RigModel truth = true_rig();
-  for (const double bend_mm : {3, 10}) {
-    SightOptions options;
-    options.relief = [bend_mm](int pose, const Eigen::Vector2d& mm) {
-      return pose == 5 ? bend_mm * std::sin(2 * std::numbers::pi * mm.x() / 450) : 0;
-    };
-    const auto outcome = calibrate(see(truth, true_poses(12), options), {});
-    ASSERT_TRUE(outcome) << outcome.error().message;
-    EXPECT_EQ(left_out(*outcome), 1U);
-    EXPECT_EQ(report_of(*outcome, "pose_5").fault, PoseFault::kBent) << report_of(*outcome, "pose_5").reason;
-    expect_near_truth(*outcome, truth);
-  }
-}
-
-TEST(Calibrate, ExplainsNoSkewedPictureByAMove) {
-  const RigModel truth = true_rig();
-  for (const double skew : {0.1, 0.3, 1.0}) {
-    Observations observations = see(truth, true_poses(12));
-    PoseView& view = observations.poses[5].views[0];
-    for (BoardPoint& corner : view.corners) corner.camera_px.x() += skew * corner.camera_px.y();
-    for (ProjectedPoint& symbol : view.symbols) symbol.camera_px.x() += skew * symbol.camera_px.y();
-    const auto outcome = calibrate(observations, {});
-    ASSERT_TRUE(outcome) << outcome.error().message;
-    EXPECT_EQ(left_out(*outcome), 1U);
-    EXPECT_NE(report_of(*outcome, "pose_5").fault, PoseFault::kMoved) << report_of(*outcome, "pose_5").reason;
-    expect_near_truth(*outcome, truth);
-  }
-}
-
-TEST(Calibrate, NamesAPoseWhoseBoardMoved) {
-  const RigModel truth = true_rig();
-  SightOptions options;
-  options.moved = [](int pose, const MotionVector& before) {
-    MotionVector after = before;
-    if (pose == 7) after[5] += 6, after[1] += 0.005;
-    return after;
-  };
-  const auto outcome = calibrate(see(truth, true_poses(12), options), {});
-  ASSERT_TRUE(outcome) << outcome.error().message;
-  EXPECT_EQ(left_out(*outcome), 1U);
-  EXPECT_EQ(report_of(*outcome, "pose_7").fault, PoseFault::kMoved) << report_of(*outcome, "pose_7").reason;
-  EXPECT_THAT(report_of(*outcome, "pose_7").reason, HasSubstr("moved"));
-  expect_near_truth(*outcome, truth);
-}
-
-TEST(Calibrate, NamesAPoseWhoseBoardTurnedALittle) {
-  const RigModel truth = true_rig();
-  SightOptions options;
-  options.moved = [](int pose, const MotionVector& before) {
-    if (pose != 5) return before;
-    const RigidTransform turn{
-        Eigen::AngleAxisd(0.3 / 57.29578, Eigen::Vector3d(0.3, 1, 0).normalized()).toRotationMatrix(),
-        Eigen::Vector3d::Zero()};
-    const RigidTransform to_middle{Eigen::Matrix3d::Identity(), {225, 150, 0}};
-    return to_vector(to_motion(before).after(to_middle).after(turn).after(to_middle.inverse()));
-  };
-  const auto outcome = calibrate(see(truth, true_poses(8), options), {});
-  ASSERT_TRUE(outcome) << outcome.error().message;
-  EXPECT_EQ(left_out(*outcome), 1U);
-  EXPECT_EQ(report_of(*outcome, "pose_5").fault, PoseFault::kMoved) << report_of(*outcome, "pose_5").reason;
-  expect_near_truth(*outcome, truth);
-}
-
-TEST(Calibrate, SaysHowFarABoardMovedInSpiteOfMisreadSymbols) {
-  const RigModel truth = true_rig();
-  SightOptions options;
-  options.moved = [](int pose, const MotionVector& before) {
-    MotionVector after = before;
-    if (pose == 3) after[5] += 10;
-    return after;
-  };
-  Observations observations = see(truth, true_poses(8), options);
-  std::mt19937 random(5);
-  for (ProjectedPoint& symbol : observations.poses[3].views[0].symbols) {
-    if (random() % 12 == 0) symbol.projector_px.x() += 18.0 * static_cast<double>(1 + random() % 20);
-  }
-  const auto outcome = calibrate(observations, {});
-  ASSERT_TRUE(outcome) << outcome.error().message;
-  const PoseReport& moved = report_of(*outcome, "pose_3");
-  EXPECT_EQ(moved.fault, PoseFault::kMoved);
-  const double along_normal_mm = 10 * to_motion(true_poses(8)[3]).rotation(2, 2);
-  const auto at = moved.reason.find("by ");
-  ASSERT_NE(at, std::string::npos) << moved.reason;
-  EXPECT_NEAR(std::stod(moved.reason.substr(at + 3)), along_normal_mm, 0.5) << moved.reason;
-}
-
-/// The symbols of a view as they are seen where the board was taken away before the pattern came: on a round thing
-/// behind it, an upright cylinder.
-void take_board_away(PoseView& view, const RigModel& rig, double distance_mm, double radius_mm) {
-  const Lens camera = to_lens(rig.cameras[0].lens, rig.cameras[0].size),
-             projector = to_lens(rig.projector.lens, rig.projector.size);
-  const RigidTransform projector_from_rig = to_motion(rig.projector.device_from_rig);
-  const double axis_mm = distance_mm + radius_mm;
-  for (ProjectedPoint& symbol : view.symbols) {
-    const Eigen::Vector3d ray = camera.undistort(symbol.camera_px).homogeneous();
-    const double square = ray.x() * ray.x() + 1;
-    const double root = axis_mm * axis_mm - square * (axis_mm * axis_mm - radius_mm * radius_mm);
-    const double depth_mm = root > 0 ? (axis_mm - std::sqrt(root)) / square : distance_mm + 300;
-    symbol.projector_px = projector.project(projector_from_rig * (depth_mm * ray));
-  }
-}
-
-template <class Point>
-void keep_each(std::vector<Point>& points, std::size_t step) {
-  std::size_t i = 0;
-  std::erase_if(points, [&](const Point&) { return i++ % step != 0; });
-}
-
-// No point of such a pose may be left that fits the others, or so few that they do not say where it is.
-TEST(Calibrate, NamesAPoseOfWhichNothingFits) {
-  struct Case {
-    double distance_mm, radius_mm;
-    std::size_t corner_step, symbol_step;
-  };
-  const RigModel truth = true_rig();
-  for (const Case& gone : {Case{1700, 100, 1, 1}, {1900, 100, 5, 9}, {2300, 100, 5, 1}, {2300, 300, 1, 4}}) {
-    Observations observations = see(truth, true_poses(12));
-    PoseView& view = observations.poses[5].views[0];
-    take_board_away(view, truth, gone.distance_mm, gone.radius_mm);
-    keep_each(view.corners, gone.corner_step);
-    keep_each(view.symbols, gone.symbol_step);
-    const auto outcome = calibrate(observations, {});
-    ASSERT_TRUE(outcome) << outcome.error().message;
-    EXPECT_EQ(left_out(*outcome), 1U);
-    EXPECT_TRUE(report_of(*outcome, "pose_5").fault);
-    expect_near_truth(*outcome, truth);
-  }
-}
-
-TEST(Calibrate, NamesBlurredPoses) {
-  const RigModel truth = true_rig();
-  Observations observations = see(truth, true_poses(12));
-  observations.poses[2].views[0].blur_px = 2.1;
-  observations.poses[9].views[0].blur_px = 1.4;
-  const auto outcome = calibrate(observations, {});
-  ASSERT_TRUE(outcome) << outcome.error().message;
-  EXPECT_EQ(left_out(*outcome), 2U);
-  EXPECT_EQ(report_of(*outcome, "pose_2").fault, PoseFault::kBlurred);
-  EXPECT_EQ(report_of(*outcome, "pose_9").fault, PoseFault::kBlurred);
 }
 
 TEST(Calibrate, FindsThatAPrintIsStretched) {
@@ -368,38 +188,5 @@ TEST(Calibrate, SaysWhyTooFewPosesAreLeft) {
 }
 
 /// Corners in one row of the board, and one more: the box about them has an area.
-void leave_a_row(PoseView& view) {
-  std::erase_if(view.corners, [](const BoardPoint& corner) {
-    return corner.board_mm.y() > 1 && (corner.board_mm.y() > 51 || corner.board_mm.x() > 1);
-  });
-}
-
-TEST(Calibrate, LeavesOutPosesWhoseCornersAreInARow) {
-  const RigModel truth = true_rig();
-  Observations observations = see(truth, true_poses(12));
-  leave_a_row(observations.poses[2].views[0]), leave_a_row(observations.poses[7].views[0]);
-  const auto outcome = calibrate(observations, {});
-  ASSERT_TRUE(outcome) << outcome.error().message;
-  EXPECT_EQ(left_out(*outcome), 2U);
-  EXPECT_EQ(report_of(*outcome, "pose_2").fault, PoseFault::kTooFewCorners);
-  EXPECT_THAT(report_of(*outcome, "pose_7").reason, HasSubstr("11 corners found are along a line"));
-  expect_near_truth(*outcome, truth);
-}
-
-TEST(Calibrate, LeavesOutViewsOfOneCameraThatShowTooLittle) {
-  const RigModel truth = true_rig(2);
-  Observations observations = see(truth, true_poses(12));
-  leave_a_row(observations.poses[0].views[1]);
-  observations.poses[4].views[1].corners.resize(3);
-  const auto outcome = calibrate(observations, {});
-  ASSERT_TRUE(outcome) << outcome.error().message;
-  EXPECT_EQ(left_out(*outcome), 0U);
-  EXPECT_THAT(report_of(*outcome, "pose_0").without, testing::ElementsAre(HasSubstr("camera camera1: the 11 corners")));
-  EXPECT_THAT(report_of(*outcome, "pose_4").without, testing::ElementsAre(HasSubstr("camera camera1: only 3 of")));
-  EXPECT_EQ(report_of(*outcome, "pose_4").corners, 70U);
-  EXPECT_EQ(outcome->observations.poses[4].views.size(), 1U);
-  expect_near_truth(*outcome, truth);
-}
-
 }  // namespace
 }  // namespace slsd

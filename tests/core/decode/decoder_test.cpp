@@ -9,6 +9,7 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/core/decode/decoded_scene.hpp"
 #include "tests/core/decode/images.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
 #include "tests/simulator/simulator.hpp"
@@ -16,27 +17,13 @@
 namespace slsd {
 namespace {
 
-const Surface kPlane = plane({0, 0, 2000}, {0, 0, 1});
-const Surface kTilted = plane({0, 0, 2000}, {0.4, 0.15, -1});
-const Surface kCylinder = cylinder({0, 0, 2000}, {0, 1, 0}, 150);
-
-Grey8 frame_of(const Pattern& pattern, const Surface& surface, std::uint32_t seed = 1) {
-  SimulationOptions options;
-  options.seed = seed;
-  return simulate(draw_pattern(pattern), paper_rig(), surface, options);
-}
-
-Decoder decoder_of(const Pattern& pattern, const DecodeOptions& options = {}) {
-  auto decoder = Decoder::create(pattern, paper_rig(), 0, options);
-  EXPECT_TRUE(decoder) << (decoder ? "" : decoder.error().message);
-  return std::move(*decoder);
-}
-
-Decoding decode(Decoder& decoder, const GreyView& frame) {
-  const auto decoding = decoder.decode(frame);
-  EXPECT_TRUE(decoding);
-  return **decoding;
-}
+using test::decode;
+using test::decoder_of;
+using test::frame_of;
+using test::kCylinder;
+using test::kPlane;
+using test::kTilted;
+using test::wrong_points;
 
 DecodeOptions the_papers_way() {
   return {.binarize = Method::kPaper,
@@ -48,18 +35,6 @@ DecodeOptions the_papers_way() {
           .correspond = Method::kPaper};
 }
 
-/// Points whose cell is not the one that lights what the camera sees there.
-int wrong_points(const Decoding& decoding, const Surface& surface, double tolerance_px) {
-  const Calibration rig = paper_rig();
-  int wrong = 0;
-  for (const CloudPoint& point : decoding.points) {
-    const auto truth = projector_from_camera({point.camera_u, point.camera_v}, rig, surface);
-    wrong += !truth || (*truth - Eigen::Vector2d(point.projector_u, point.projector_v)).norm() > tolerance_px;
-  }
-  return wrong;
-}
-
-/// Cells whose middle the camera sees, a symbol's size inside its frame.
 int visible_cells(const Pattern& pattern, const Surface& surface) {
   const Calibration rig = paper_rig();
   const double margin = 2 * pattern.options.symbol_size_px;
@@ -114,63 +89,6 @@ INSTANTIATE_TEST_SUITE_P(Simulated, DecodeScene,
                                          Case{"tilted8", "8px-6.toml", kTilted, 0.9, 1},
                                          Case{"cylinder8", "8px-6.toml", kCylinder, 0.75, 2}),
                          [](const auto& scene) { return std::string(scene.param.name); });
-
-class DeepFrame : public testing::TestWithParam<int> {};
-
-/// A point of the same cell; nothing where there is none.
-const CloudPoint* same_cell(const Decoding& decoding, const CloudPoint& point) {
-  const auto same = [&](const CloudPoint& other) { return other.row == point.row && other.column == point.column; };
-  const auto found = std::ranges::find_if(decoding.points, same);
-  return found == decoding.points.end() ? nullptr : &*found;
-}
-
-// Grey values are rounded anew, at 10 bits to an eighth of a level, and what lies at a limit falls to its other side:
-// that moves one centre in fifty by more than a hundredth of a pixel, none by more than four. What is at the limit
-// of being a symbol may come or go, one in five hundred.
-TEST_P(DeepFrame, GivesThePointsOfEightBits) {
-  const double full = (1 << GetParam()) - 1;
-  const Pattern pattern = shipped_pattern("16px-5.toml");
-  for (const double light : {1.0, 0.3}) {
-    const Grey8 frame =
-        simulate(draw_pattern(pattern), paper_rig(), kCylinder, {.dark = 20 * light, .lit = 170 * light});
-    Decoder decoder = decoder_of(pattern);
-    const Decoding eight = decode(decoder, frame.view());
-    const auto decoded = decoder.decode(deep(frame, full).view(), full);
-    ASSERT_TRUE(decoded);
-    const Decoding& wide = **decoded;
-    ASSERT_GT(eight.points.size(), 500U);
-    EXPECT_NEAR(static_cast<double>(wide.points.size()), static_cast<double>(eight.points.size()),
-                0.002 * static_cast<double>(eight.points.size()));
-    EXPECT_EQ(wrong_points(wide, kCylinder, 2), 0);
-    std::size_t shared = 0, moved = 0;
-    for (const CloudPoint& point : eight.points) {
-      const CloudPoint* same = same_cell(wide, point);
-      if (same == nullptr) continue;
-      ++shared;
-      const double by_px = std::hypot(same->camera_u - point.camera_u, same->camera_v - point.camera_v);
-      EXPECT_LT(by_px, 0.04);
-      moved += by_px > 0.01 ? 1 : 0;
-      EXPECT_NEAR(same->intensity, point.intensity, 1);
-    }
-    EXPECT_LE(static_cast<double>(moved), 0.02 * static_cast<double>(shared));
-    EXPECT_GE(static_cast<double>(shared), 0.998 * static_cast<double>(eight.points.size()));
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(Bits, DeepFrame, testing::Values(10, 12, 14, 16));
-
-TEST(Decode, GuessesTheLevelsOfADeepFrame) {
-  const Pattern pattern = shipped_pattern("16px-5.toml");
-  const Grey8 frame = frame_of(pattern, kPlane);
-  Decoder decoder = decoder_of(pattern);
-  for (const int bits : {10, 12, 14, 16}) {
-    const double full = (1 << bits) - 1;
-    const Grey16 wide = deep(frame, full);
-    const Decoding told = **decoder.decode(wide.view(), full);
-    EXPECT_EQ(decode(decoder, wide.view()).points, told.points) << bits;
-    EXPECT_GT(told.points.size(), 1000U) << bits;
-  }
-}
 
 // The paper's array is unique in its aligned windows only, and its decoder knows neither phase nor epipolar line: one
 // in twenty cells is wrong.
