@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <chrono>
-#include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
 
+#include "drivers/camera/aravis/description_lock.hpp"
 #include "drivers/camera/aravis/gige_discovery.hpp"
 #include "drivers/camera/aravis/gige_probe.hpp"
 
@@ -24,12 +24,6 @@ constexpr milliseconds kRelease{700};  // below a second, in which the service i
 constexpr milliseconds kReleasePoll{30};
 constexpr std::uint64_t kHeartbeatRegister = 0x938;
 constexpr std::uint32_t kHeartbeatMs = 2000;  // Aravis is heard of every second
-
-// Aravis 0.8 builds a device's description with a table of its own that no lock protects.
-std::mutex& description_mutex() {
-  static std::mutex mutex;
-  return mutex;
-}
 
 bool is_named(const std::string& id, const std::string& vendor, const std::string& serial) {
   return id == serial || id == vendor + "-" + serial;
@@ -114,7 +108,7 @@ Result<OpenedDevice> open_gige_device(const GigeDevice& found) {
   const std::string name = found.name();
   const auto interface = inet_address(found.interface);
   const auto address = inet_address(found.address);
-  const std::lock_guard lock(description_mutex());
+  const auto lock = lock_descriptions();
   GErrorSlot error;
   GObjectPtr<ArvDevice> device(arv_gv_device_new(interface.get(), address.get(), error.out()));
   if (!device || error.failed()) return fail(error.code(), "the camera cannot be opened: " + error.message(), name);
@@ -123,7 +117,7 @@ Result<OpenedDevice> open_gige_device(const GigeDevice& found) {
 
 Result<OpenedDevice> open_usb3_device(const Usb3Device& listed) {
   const std::string name = listed.vendor + "-" + listed.serial;
-  const std::lock_guard lock(description_mutex());
+  const auto lock = lock_descriptions();
   GErrorSlot error;
   GObjectPtr<ArvDevice> device(arv_open_device(listed.id.c_str(), error.out()));
   if (!device || error.failed())
