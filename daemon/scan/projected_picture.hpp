@@ -4,6 +4,7 @@
 
 #include <array>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 
@@ -25,8 +26,9 @@ inline constexpr std::array<std::string_view, 7> kProjectedPictures{"idle",  "pa
 /// A picture is to be shown.
 struct ProjectRequest {
   ProjectedPicture picture = ProjectedPicture::kIdle;
-  std::string png;         ///< for kImage
-  MonotonicTime deadline;  ///< for the projector to be ready
+  std::string png;            ///< for kImage
+  MonotonicTime deadline;     ///< for the projector to be ready
+  std::stop_token gone = {};  ///< requested when nobody waits for the outcome any more
 };
 
 /// The picture in the projector's size; nothing for the pattern.

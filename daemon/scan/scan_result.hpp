@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -29,14 +30,16 @@ struct ScanRequest {
   FrameCoding frames = FrameCoding::kNone;  ///< what becomes of the frames besides the cloud
   bool texture = false;                     ///< intensities from frames in white light
   bool ambient = false;                     ///< less those in the light of the room alone
+  std::stop_token gone = {};                ///< requested when nobody waits for the outcome any more
 };
 
 /// One frame of one camera is asked for.
 struct FrameRequest {
   MonotonicTime deadline;
-  std::string camera;     ///< empty: the first
-  bool as_png = true;     ///< else row by row
-  bool as_shown = false;  ///< while the projector shows what it does; else the pattern
+  std::string camera;         ///< empty: the first
+  bool as_png = true;         ///< else row by row
+  bool as_shown = false;      ///< while the projector shows what it does; else the pattern
+  std::stop_token gone = {};  ///< requested when nobody waits for the outcome any more
 };
 
 /// One camera's image as it came.
