@@ -3,13 +3,15 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <tl/expected.hpp>
 
 namespace slsd {
 
-/// What failed. A caller may act on the code; a person acts on the message.
+/// What failed. A caller may act on the code; a person acts on the message. A new one goes to the end: clients know
+/// each by its number.
 enum class ErrorCode {
   kInvalidArgument,  ///< a value outside its range: a configuration key, an option, a request's parameter
   kMalformed,        ///< a file or message that does not parse, or lacks a required part
@@ -31,6 +33,51 @@ enum class ErrorCode {
   kFrameLate,     ///< not there by its deadline
   kFrameSkewed,   ///< the cameras' frames are not of the same exposure
 };
+
+/// "frame_stale": the name that programs outside compare, so it stays for good.
+[[nodiscard]] constexpr std::string_view to_string(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kInvalidArgument:
+      return "invalid_argument";
+    case ErrorCode::kMalformed:
+      return "malformed";
+    case ErrorCode::kMismatch:
+      return "mismatch";
+    case ErrorCode::kImpossible:
+      return "impossible";
+    case ErrorCode::kNotFound:
+      return "not_found";
+    case ErrorCode::kPermissionDenied:
+      return "permission_denied";
+    case ErrorCode::kAlreadyExists:
+      return "already_exists";
+    case ErrorCode::kNoSpace:
+      return "no_space";
+    case ErrorCode::kIo:
+      return "io";
+    case ErrorCode::kUnsupported:
+      return "unsupported";
+    case ErrorCode::kBusy:
+      return "busy";
+    case ErrorCode::kTimeout:
+      return "timeout";
+    case ErrorCode::kCancelled:
+      return "cancelled";
+    case ErrorCode::kDisconnected:
+      return "disconnected";
+    case ErrorCode::kFrameDropped:
+      return "frame_dropped";
+    case ErrorCode::kFrameTorn:
+      return "frame_torn";
+    case ErrorCode::kFrameStale:
+      return "frame_stale";
+    case ErrorCode::kFrameLate:
+      return "frame_late";
+    case ErrorCode::kFrameSkewed:
+      return "frame_skewed";
+  }
+  return {};
+}
 
 /// The world failed: a code, a message that says what to do, and where it arose (file:line:column, key, device, or
 /// empty).

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 
 #include <nlohmann/json.hpp>
 
@@ -22,8 +21,6 @@ struct RpcError {
   [[nodiscard]] nlohmann::json to_json() const;
 };
 
-/// "frame_stale".
-[[nodiscard]] std::string_view to_string(ErrorCode code);
 /// The number by which a client knows the code: -32001 to -32019.
 [[nodiscard]] int rpc_code(ErrorCode code);
 

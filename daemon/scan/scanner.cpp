@@ -7,7 +7,6 @@
 #include <limits>
 #include <random>
 
-#include "daemon/rpc/rpc_error.hpp"
 #include "daemon/scan/thread_name.hpp"
 #include "drivers/files/encode_png.hpp"
 

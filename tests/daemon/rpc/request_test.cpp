@@ -81,10 +81,17 @@ TEST(ToLine, ReplacesWhatIsNoUtf8) {
 }
 
 TEST(RpcCode, IsTheSameNumberForGood) {
-  EXPECT_EQ(rpc_code(ErrorCode::kInvalidArgument), -32001);
-  EXPECT_EQ(rpc_code(ErrorCode::kBusy), -32011);
-  EXPECT_EQ(rpc_code(ErrorCode::kFrameStale), -32017);
-  EXPECT_EQ(to_string(ErrorCode::kFrameLate), "frame_late");
+  constexpr std::string_view kNames[] = {"invalid_argument", "malformed",    "mismatch",
+                                         "impossible",       "not_found",    "permission_denied",
+                                         "already_exists",   "no_space",     "io",
+                                         "unsupported",      "busy",         "timeout",
+                                         "cancelled",        "disconnected", "frame_dropped",
+                                         "frame_torn",       "frame_stale",  "frame_late",
+                                         "frame_skewed"};
+  for (int index = 0; index < static_cast<int>(std::size(kNames)); ++index) {
+    EXPECT_EQ(to_string(static_cast<ErrorCode>(index)), kNames[index]);
+    EXPECT_EQ(rpc_code(static_cast<ErrorCode>(index)), -32001 - index);
+  }
 }
 
 }  // namespace
