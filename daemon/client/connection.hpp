@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/result.hpp"
-#include "daemon/server/file_descriptor.hpp"
+#include "drivers/system/file_descriptor.hpp"
 
 namespace slsd {
 

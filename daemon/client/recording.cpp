@@ -11,7 +11,7 @@
 #include "daemon/rpc/message.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/files/file.hpp"
-#include "drivers/files/system_error.hpp"
+#include "drivers/system/system_error.hpp"
 
 namespace slsd {
 namespace {

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "core/result.hpp"
-#include "daemon/server/file_descriptor.hpp"
+#include "drivers/system/file_descriptor.hpp"
 
 namespace slsd {
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "daemon/server/file_descriptor.hpp"
+#include "drivers/system/file_descriptor.hpp"
 
 namespace slsd {
 

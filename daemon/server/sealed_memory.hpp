@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "core/result.hpp"
-#include "daemon/server/file_descriptor.hpp"
+#include "drivers/system/file_descriptor.hpp"
 
 namespace slsd {
 

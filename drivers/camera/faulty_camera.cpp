@@ -22,7 +22,8 @@ Result<> FaultyCamera::open() {
   if (back_at_ && steady_clock::now() < *back_at_)
     return fail_here(ErrorCode::kDisconnected, "still unplugged; try again");
   stalled_until_.reset();
-  cancel_.reset();
+  wake_.reset();
+  if (auto wake = wake_.open(); !wake) return wake;
   auto opened = camera_->open();
   connected_ = opened.has_value();
   return opened;
@@ -47,7 +48,7 @@ Result<> FaultyCamera::check() {
 }
 
 void FaultyCamera::cancel() {
-  cancel_.cancel();
+  wake_.wake();
   camera_->cancel();
 }
 
@@ -79,8 +80,8 @@ Result<Frame> FaultyCamera::capture_sound(MonotonicTime deadline) {
   while (true) {
     auto frame = camera_->capture(deadline);
     if (frame || frame.error().code != ErrorCode::kCancelled) return frame;
-    // cancel() sets both latches. Where ours is open, this one is left from a cancel() that was answered here.
-    if (cancel_.wait_until(MonotonicTime::min())) return frame;
+    // cancel() wakes both. Where ours was not woken, this one is left from a cancel() that was answered here.
+    if (wake_.sleep_until(MonotonicTime::min())) return frame;
   }
 }
 
@@ -114,8 +115,7 @@ Result<Frame> FaultyCamera::disconnect(const Fault& fault) {
 }
 
 Result<> FaultyCamera::wait_until(MonotonicTime time, MonotonicTime deadline) {
-  if (cancel_.wait_until(std::min(time, deadline)))
-    return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
+  if (wake_.sleep_until(std::min(time, deadline))) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
   if (time > deadline) return fail_here(ErrorCode::kFrameLate, "no frame came before the deadline; scan again");
   return {};
 }

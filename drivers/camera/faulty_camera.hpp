@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "drivers/camera/camera.hpp"
-#include "drivers/camera/cancel_latch.hpp"
 #include "drivers/camera/fault.hpp"
+#include "drivers/system/wake_event.hpp"
 
 namespace slsd {
 
@@ -47,7 +47,7 @@ class FaultyCamera final : public Camera {
 
   std::unique_ptr<Camera> camera_;
   std::vector<Fault> faults_;
-  CancelLatch cancel_;
+  WakeEvent wake_;
   std::uint64_t captures_ = 0;
   bool connected_ = true;
   std::optional<MonotonicTime> back_at_;  ///< open() fails until then

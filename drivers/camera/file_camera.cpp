@@ -43,7 +43,8 @@ FileCamera::FileCamera(FileCameraOptions options)
 
 Result<> FileCamera::open() {
   pool_.reset();
-  cancel_.reset();
+  wake_.reset();
+  if (auto wake = wake_.open(); !wake) return wake;
   if (auto valid = options_.validate(); !valid) return valid;
   ReadImageOptions reading;
   reading.bayer = options_.bayer;
@@ -107,7 +108,7 @@ Result<MonotonicTime> FileCamera::wait_for_exposure(MonotonicTime deadline) {
     const auto period = std::chrono::nanoseconds(std::llround(1e9 / options_.rate_hz));
     exposure_start = next_tick(opened_, period, now);
   }
-  const bool cancelled = cancel_.wait_until(std::min(exposure_start, deadline));
+  const bool cancelled = wake_.sleep_until(std::min(exposure_start, deadline));
   if (cancelled) return fail(ErrorCode::kCancelled, "the capture was cancelled", options_.name);
   if (exposure_start > deadline) return fail_late();
   return exposure_start;

@@ -11,10 +11,10 @@
 
 #include "core/result.hpp"
 #include "drivers/camera/camera.hpp"
-#include "drivers/camera/cancel_latch.hpp"
 #include "drivers/camera/frame_pool.hpp"
 #include "drivers/camera/image_folder.hpp"
 #include "drivers/files/bayer.hpp"
+#include "drivers/system/wake_event.hpp"
 
 namespace slsd {
 
@@ -55,7 +55,7 @@ class FileCamera final : public Camera {
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
   void expect(FrameLight light) override { light_ = light; }
   [[nodiscard]] Result<> check() override;
-  void cancel() override { cancel_.cancel(); }
+  void cancel() override { wake_.wake(); }
 
  private:
   [[nodiscard]] Result<MonotonicTime> wait_for_exposure(MonotonicTime deadline);
@@ -70,7 +70,7 @@ class FileCamera final : public Camera {
 
   FileCameraOptions options_;
   CameraDescription description_;
-  CancelLatch cancel_;
+  WakeEvent wake_;
   ImageFolder folder_;
   ImageFolder white_;  ///< empty where there is none
   ImageFolder dark_;

@@ -13,7 +13,7 @@
 #include <utility>
 #include <variant>
 
-#include "drivers/files/system_error.hpp"
+#include "drivers/system/system_error.hpp"
 
 namespace slsd {
 namespace {
@@ -43,7 +43,7 @@ Result<> ImageFolder::open(const fs::path& path, const ReadImageOptions& options
   images_.clear();
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
-  if (error) return tl::unexpected<Error>(system_error(error.value(), "cannot read", path));
+  if (error) return fail_system(error.value(), "cannot read", path);
   if (fs::is_directory(status)) return list_folder();
   images_.push_back({path, {}, std::nullopt});
   return {};
@@ -55,7 +55,7 @@ Result<> ImageFolder::list_folder() {
     std::error_code ignored;
     if (is_image_name(it->path()) && !it->is_directory(ignored)) images_.push_back({it->path(), {}, std::nullopt});
   }
-  if (error) return tl::unexpected<Error>(system_error(error.value(), "cannot list", path_));
+  if (error) return fail_system(error.value(), "cannot list", path_);
   if (images_.empty())
     return fail(ErrorCode::kNotFound,
                 "no PNG, TIFF, PGM, PPM or BMP image is in this folder; record some, or check the path",

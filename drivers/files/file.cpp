@@ -12,35 +12,19 @@
 #include <system_error>
 #include <utility>
 
-#include "drivers/files/system_error.hpp"
+#include "drivers/system/file_descriptor.hpp"
+#include "drivers/system/system_error.hpp"
 
 namespace slsd {
 namespace {
 
 namespace fs = std::filesystem;
 
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
-  Descriptor& operator=(Descriptor&&) = delete;
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  [[nodiscard]] bool valid() const { return number_ >= 0; }
-  [[nodiscard]] int number() const { return number_; }
-  /// Zero or errno: a network file system may report a full disk only here.
-  [[nodiscard]] int close() { return ::close(std::exchange(number_, -1)) == 0 ? 0 : errno; }
-
- private:
-  int number_;
-};
-
 tl::unexpected<Error> fail_call(std::string_view doing, const fs::path& path) {
-  return tl::unexpected<Error>(system_error(errno, doing, path));
+  return fail_system(errno, doing, path);
 }
 
-Result<> check_readable(const Descriptor& file, const fs::path& path, std::size_t limit_bytes) {
+Result<> check_readable(const FileDescriptor& file, const fs::path& path, std::size_t limit_bytes) {
   struct stat status {};
   if (::fstat(file.number(), &status) != 0) return fail_call("cannot read", path);
   if (S_ISDIR(status.st_mode))
@@ -54,7 +38,7 @@ Result<> check_readable(const Descriptor& file, const fs::path& path, std::size_
   return {};
 }
 
-Result<std::string> read_to_end(const Descriptor& file, const fs::path& path, std::size_t limit_bytes) {
+Result<std::string> read_to_end(const FileDescriptor& file, const fs::path& path, std::size_t limit_bytes) {
   struct stat status {};
   if (::fstat(file.number(), &status) != 0) return fail_call("cannot read", path);
   std::string bytes(static_cast<std::size_t>(status.st_size) + 1, '\0');
@@ -72,7 +56,7 @@ Result<std::string> read_to_end(const Descriptor& file, const fs::path& path, st
   return bytes;
 }
 
-Result<> write_all(const Descriptor& file, std::string_view bytes, const fs::path& path) {
+Result<> write_all(const FileDescriptor& file, std::string_view bytes, const fs::path& path) {
   while (!bytes.empty()) {
     const ssize_t count = ::write(file.number(), bytes.data(), bytes.size());
     if (count < 0 && errno == EINTR) continue;
@@ -95,22 +79,21 @@ fs::path temporary_beside(const fs::path& path) {
 }
 
 Result<> write_temporary(const fs::path& temporary, const fs::path& path, mode_t mode, std::string_view bytes) {
-  Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-  if (!file.valid()) return fail_call("cannot write", path);
+  FileDescriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (!file) return fail_call("cannot write", path);
   const mode_t permissions = mode & 07777;
   if (permissions != 0 && ::fchmod(file.number(), permissions) != 0) return fail_call("cannot write", path);
   if (auto written = write_all(file, bytes, path); !written) return written;
   if (::fsync(file.number()) != 0) return fail_call("cannot write", path);
-  if (const int error = file.close(); error != 0)
-    return tl::unexpected<Error>(system_error(error, "cannot write", path));
+  if (const int error = file.close(); error != 0) return fail_system(error, "cannot write", path);
   return {};
 }
 
 /// Makes the new name last through a power cut; not every file system can, so that its failure is none.
 void synchronise_folder_of(const fs::path& path) {
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  const Descriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (file.valid()) static_cast<void>(::fsync(file.number()));
+  const FileDescriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (file) static_cast<void>(::fsync(file.number()));
 }
 
 Result<> replace_file(const fs::path& path, mode_t mode, std::string_view bytes) {
@@ -138,8 +121,8 @@ fs::path follow_links(fs::path path) {
 }
 
 Result<> write_in_place(const fs::path& path, std::string_view bytes) {
-  const Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
-  if (!file.valid()) return fail_call("cannot write", path);
+  const FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  if (!file) return fail_call("cannot write", path);
   return write_all(file, bytes, path);
 }
 
@@ -147,8 +130,8 @@ Result<> write_in_place(const fs::path& path, std::string_view bytes) {
 
 Result<std::string> read_file(const fs::path& path, std::size_t limit_bytes) {
   // Without O_NONBLOCK a pipe that nobody writes would hold us here.
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (!file.valid()) return fail_call("cannot read", path);
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!file) return fail_call("cannot read", path);
   if (auto readable = check_readable(file, path, limit_bytes); !readable) return tl::unexpected(readable.error());
   return read_to_end(file, path, limit_bytes);
 }

@@ -35,6 +35,7 @@ Result<> V4l2Camera::open() {
   pool_.reset();
   wake_.reset();
   if (auto valid = options_.validate(); !valid) return valid;
+  if (auto wake = wake_.open(); !wake) return wake;
   auto device = V4l2Device::open(description_.device);
   if (!device) return tl::unexpected(device.error());
   if (found_) found_();
@@ -135,7 +136,7 @@ Result<> V4l2Camera::drop_waiting() {
 
 Result<> V4l2Camera::wait(const Capture& capture) {
   switch (wake_.wait(stream_->device().descriptor(), capture.deadline)) {
-    case WakeEvent::Woken::kCancelled:
+    case WakeEvent::Woken::kWoken:
       return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
     case WakeEvent::Woken::kGone:
       return fail_here(ErrorCode::kDisconnected, "the camera is gone; check its cable");

@@ -14,7 +14,7 @@
 #include "drivers/camera/v4l2/grey_converter.hpp"
 #include "drivers/camera/v4l2/v4l2_camera_options.hpp"
 #include "drivers/camera/v4l2/v4l2_stream.hpp"
-#include "drivers/camera/v4l2/wake_event.hpp"
+#include "drivers/system/wake_event.hpp"
 
 namespace slsd {
 
@@ -47,7 +47,7 @@ class V4l2Camera final : public Camera {
   /// is older than a few periods, as capture().
   [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override;
   [[nodiscard]] Result<> check() override;
-  void cancel() override { wake_.cancel(); }
+  void cancel() override { wake_.wake(); }
 
   [[nodiscard]] const V4l2FrameCounts& counts() const { return counts_; }
 

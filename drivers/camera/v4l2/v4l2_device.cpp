@@ -9,36 +9,23 @@
 
 #include <cerrno>
 #include <cstring>
-#include <system_error>
 #include <utility>
+
+#include "drivers/system/system_error.hpp"
 
 namespace slsd {
 namespace {
 
-struct Meaning {
-  ErrorCode code;
-  const char* remedy;
+constexpr SystemErrorMeaning kMeanings[] = {
+    {ENOENT, ErrorCode::kNotFound, "plug it in, or correct device"},
+    {ENOTDIR, ErrorCode::kNotFound, "plug it in, or correct device"},
+    {EACCES, ErrorCode::kPermissionDenied, "add the service's user to the group video"},
+    {EPERM, ErrorCode::kPermissionDenied, "add the service's user to the group video"},
+    {ENODEV, ErrorCode::kDisconnected, "check its cable; it is opened again"},
+    {ENXIO, ErrorCode::kDisconnected, "check its cable; it is opened again"},
+    {ENOTTY, ErrorCode::kUnsupported, "it is not a camera of V4L2; correct device"},
+    {0, ErrorCode::kIo, "unplug it and plug it in again"},
 };
-
-Meaning meaning(int error_number) {
-  switch (error_number) {
-    case ENOENT:
-    case ENOTDIR:
-      return {ErrorCode::kNotFound, "plug it in, or correct device"};
-    case EACCES:
-    case EPERM:
-      return {ErrorCode::kPermissionDenied, "add the service's user to the group video"};
-    case ENODEV:
-    case ENXIO:
-      return {ErrorCode::kDisconnected, "check its cable; it is opened again"};
-    case EBUSY:
-      return {ErrorCode::kBusy, "end the other program that uses it"};
-    case ENOTTY:
-      return {ErrorCode::kUnsupported, "it is not a camera of V4L2; correct device"};
-    default:
-      return {ErrorCode::kIo, "unplug it and plug it in again"};
-  }
-}
 
 }  // namespace
 
@@ -88,8 +75,7 @@ int V4l2Device::call(unsigned long request, void* argument) const {
 }
 
 tl::unexpected<Error> V4l2Device::fail_call(int error_number, const std::string& doing) const {
-  const Meaning what = meaning(error_number);
-  return fail(what.code, doing + ": " + std::generic_category().message(error_number) + "; " + what.remedy, path_);
+  return fail_system(error_number, doing, path_, kMeanings);
 }
 
 }  // namespace slsd
