@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/printable.hpp"
+#include "drivers/camera/v4l2/stable_link.hpp"
 #include "drivers/camera/v4l2/v4l2_controls.hpp"
 
 namespace slsd {
@@ -18,6 +20,13 @@ constexpr int kBuffersBesideHeld = 3;  // being filled, waiting, and one on its 
 constexpr int kFaultsInARowMax = 8;
 constexpr int kStaleToTell = 3;  // so many stale frames are no longer those in flight
 constexpr std::uint32_t kHalfOfAllSequences = 1u << 31;
+
+/// A camera's name under /dev/v4l/by-id, with maker, model and serial number. Many a camera of USB Video Class has no
+/// serial number: then another of that model passes for it.
+std::string hardware_of(const std::string& device) {
+  const auto link = find_stable_link(device, "/dev");
+  return link ? printable(link->filename().string()) : std::string();
+}
 
 }  // namespace
 
@@ -63,6 +72,7 @@ Result<> V4l2Camera::configure(V4l2Device device) {
   if (!stream) return tl::unexpected(stream.error());
   stream_.emplace(std::move(*stream));
   held_max_ = std::min<std::size_t>(options_.frames_held_max, stream_->buffers().size() - 2);
+  description_.hardware = hardware_of(description_.device);
   description_.width_px = mode->width_px;
   description_.height_px = mode->height_px;
   settling_ = options_.settle_frames;
