@@ -22,6 +22,7 @@ void read_v4l2_keys(TableReader& reader, V4l2CameraOptions& options) {
   reader.read("readout_us", options.readout_us);
   reader.read("settle_frames", options.settle_frames);
   reader.read("frames_held_max", options.frames_held_max);
+  reader.read("missed_frames_max", options.missed_frames_max);
 }
 
 }  // namespace slsd

@@ -19,8 +19,8 @@ struct CameraDescription {
   int width_px = 0;
   int height_px = 0;
   double rate_hz = 0.0;  ///< of a camera that runs freely, after open(); 0: exposes at the trigger, or does not tell
-  std::string hardware;  ///< after open(): what tells the device from others of its kind, wherever it is plugged in;
-                         ///< printable, at most 200 bytes; empty where nothing does
+  std::string hardware = {};  ///< after open(): what tells the device from others of its kind, wherever it is plugged
+                              ///< in; printable, at most 200 bytes; empty where nothing does
 };
 
 /// What the projector shows when a frame is exposed.

@@ -12,7 +12,10 @@ namespace {
 
 constexpr std::chrono::milliseconds kPeriodUnknown{100};
 constexpr int kPeriodsToNext = 4;
-constexpr std::chrono::milliseconds kPauseLeast{100};  // which a busy host makes without anyone's doing
+constexpr std::chrono::milliseconds kPauseLeast{100};     // which a busy host makes without anyone's doing
+constexpr std::chrono::milliseconds kSilenceLeast{1000};  // a bus that others use stalls for less
+constexpr std::chrono::milliseconds kFuture{1};           // no stamp is later than its frame; clocks are rounded
+constexpr int kSameStampsMax = 3;
 
 std::chrono::nanoseconds nanoseconds(const timeval& time) {
   return std::chrono::seconds(time.tv_sec) + std::chrono::microseconds(time.tv_usec);
@@ -27,9 +30,18 @@ ExposureClock::ExposureClock(const ExposureTiming& timing, const V4l2CameraOptio
   readout_ = options.readout_us ? std::chrono::nanoseconds(std::llround(1e3 * *options.readout_us)) : period_;
 }
 
-bool ExposureClock::is_stamped(const v4l2_buffer& buffer) {
+void ExposureClock::note(const v4l2_buffer& buffer, MonotonicTime received) {
+  if (!is_stamped(buffer)) return;
+  const auto stamp = nanoseconds(buffer.timestamp);
+  same_stamps_ = stamp == last_stamp_ && buffer.sequence != last_sequence_ ? same_stamps_ + 1 : 0;
+  last_stamp_ = stamp;
+  last_sequence_ = buffer.sequence;
+  trusted_ = MonotonicTime(stamp) <= received + kFuture && same_stamps_ < kSameStampsMax;
+}
+
+bool ExposureClock::is_stamped(const v4l2_buffer& buffer) const {
   const bool monotonic = (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
-  return monotonic && nanoseconds(buffer.timestamp).count() > 0;
+  return trusted_ && monotonic && nanoseconds(buffer.timestamp).count() > 0;
 }
 
 MonotonicTime ExposureClock::exposure_start(const v4l2_buffer& buffer, MonotonicTime received) const {
@@ -42,6 +54,11 @@ MonotonicTime ExposureClock::exposure_start(const v4l2_buffer& buffer, Monotonic
 
 int ExposureClock::frames_in_flight() const {
   return static_cast<int>((exposure_ + readout_ + period_ - std::chrono::nanoseconds(1)) / period_);
+}
+
+std::chrono::nanoseconds ExposureClock::silence_max(int missed_frames_max) const {
+  const auto frame = std::max(period_, exposure_);
+  return std::max<std::chrono::nanoseconds>(exposure_ + readout_ + missed_frames_max * frame, kSilenceLeast);
 }
 
 std::chrono::nanoseconds ExposureClock::next_frame_age_max() const {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <string>
 
 #include "drivers/camera/frame.hpp"
@@ -22,16 +23,24 @@ namespace slsd {
 /// counts as long as it can be, a frame's period: a frame may be taken for older than it is, never for younger.
 ///
 /// Without a stamp of CLOCK_MONOTONIC only the order is left: when a frame is received says nothing, because who
-/// receives it may have slept. Then as many frames as may be in flight have to pass after the trigger.
-/// @thread reentrant
+/// receives it may have slept. Then as many frames as may be in flight have to pass after the trigger. So it is where
+/// a driver claims CLOCK_MONOTONIC and stamps by another: uvcvideo with clock=realtime, which is far in the future, or
+/// a clock that stands still.
+/// @thread thread-bound
 class ExposureClock {
  public:
   ExposureClock() = default;
   /// @param driver  as V4l2Device::driver()
   ExposureClock(const ExposureTiming& timing, const V4l2CameraOptions& options, const std::string& driver);
 
+  /// Looks at the stamp of each buffer that is taken, in their order: one that cannot be makes all worthless.
+  /// @param received  when it was taken from the driver
+  void note(const v4l2_buffer& buffer, MonotonicTime received);
+  /// Nothing was found wrong with the driver's clock.
+  [[nodiscard]] bool is_trusted() const { return trusted_; }
+
   /// The buffer carries a stamp that tells.
-  [[nodiscard]] static bool is_stamped(const v4l2_buffer& buffer);
+  [[nodiscard]] bool is_stamped(const v4l2_buffer& buffer) const;
 
   /// Of a buffer without a stamp a guess. @param received  when it was taken from the driver
   [[nodiscard]] MonotonicTime exposure_start(const v4l2_buffer& buffer, MonotonicTime received) const;
@@ -42,11 +51,18 @@ class ExposureClock {
   /// How long ago the exposure of a frame may have begun for the one after it still to be of now: a few periods.
   [[nodiscard]] std::chrono::nanoseconds next_frame_age_max() const;
 
+  /// How long a stream that runs freely may bring nothing, before it is dead: so many frames, and a second at least.
+  [[nodiscard]] std::chrono::nanoseconds silence_max(int missed_frames_max) const;
+
  private:
   std::chrono::nanoseconds period_{1};
   std::chrono::nanoseconds exposure_{0};
   std::chrono::nanoseconds readout_{0};
   bool stamps_first_packet_ = false;
+  bool trusted_ = true;
+  std::chrono::nanoseconds last_stamp_{0};
+  std::uint32_t last_sequence_ = 0;
+  int same_stamps_ = 0;  ///< in a row
 };
 
 }  // namespace slsd

@@ -4,6 +4,8 @@
 
 #include <linux/videodev2.h>
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -14,12 +16,16 @@
 namespace slsd {
 namespace {
 
+using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
 constexpr int kBuffersBesideHeld = 3;  // being filled, waiting, and one on its way
 constexpr int kFaultsInARowMax = 8;
 constexpr int kStaleToTell = 3;  // so many stale frames are no longer those in flight
 constexpr std::uint32_t kHalfOfAllSequences = 1u << 31;
+constexpr std::size_t kQueuedWhileIdle = 3;  // some drivers need as many to run at all
+constexpr auto kFirstFrameLeast = 3s;        // many a camera of USB takes a second
+constexpr auto kFirstFrameMost = 10s;        // for a slower one nobody waits
 
 /// A camera's name under /dev/v4l/by-id, with maker, model and serial number. Many a camera of USB Video Class has no
 /// serial number: then another of that model passes for it.
@@ -79,7 +85,23 @@ Result<> V4l2Camera::configure(V4l2Device device) {
   faults_in_a_row_ = 0;
   next_sequence_ = 0;
   last_sequence_.reset();
-  return {};
+  return wait_for_first_frame();
+}
+
+// A stream that starts and brings nothing would else be opened, found dead and opened again without end, and be called
+// ready in between.
+Result<> V4l2Camera::wait_for_first_frame() {
+  const auto longest =
+      std::max<std::chrono::nanoseconds>(clock_.silence_max(options_.missed_frames_max), kFirstFrameLeast);
+  if (options_.missed_frames_max == 0 || longest > kFirstFrameMost) return {};
+  const auto woken = wake_.wait(stream_->device().descriptor(), steady_clock::now() + longest);
+  if (woken == WakeEvent::Woken::kReady) return {};
+  close();
+  if (woken == WakeEvent::Woken::kWoken) return fail_here(ErrorCode::kCancelled, "the opening was cancelled");
+  if (woken == WakeEvent::Woken::kGone) return fail_gone();
+  return fail_here(ErrorCode::kTimeout,
+                   "it starts and sends no frame; unplug it and plug it in again, try another cable or port; for one "
+                   "that waits for a trigger set missed_frames_max = 0");
 }
 
 Result<Frame> V4l2Camera::capture(MonotonicTime deadline) {
@@ -102,20 +124,28 @@ Result<Frame> V4l2Camera::run(const Capture& capture) {
   return frame;
 }
 
-// The file answers for as long as it is open; a call into the driver does not.
+// The file answers for as long as it is open; a call into the driver does not. Filled buffers say nothing of now, and
+// what follows the last frame may still be asked for: only after a pause they are emptied, to see whether more come.
 Result<> V4l2Camera::check() {
   if (!stream_) return fail_here(ErrorCode::kDisconnected, "the camera is not open; open it");
   v4l2_capability capability{};
-  if (stream_->device().call(VIDIOC_QUERYCAP, &capability) == 0) return {};
+  if (stream_->device().call(VIDIOC_QUERYCAP, &capability) != 0) return close(), fail_gone();
+  if (last_start_ && steady_clock::now() - *last_start_ <= clock_.next_frame_age_max()) return {};
+  if (auto dropped = drop_waiting(); !dropped) return close(), dropped;
+  if (auto put = stream_->put_back_returned(kQueuedWhileIdle); !put) return close(), put;
+  if (steady_clock::now() < dead_at()) return {};
+  const auto dead = fail_dead();
   close();
-  return fail_here(ErrorCode::kDisconnected, "the camera is gone; check its cable");
+  return dead;
 }
 
 Result<Frame> V4l2Camera::capture_after(Capture capture) {
   if (!pool_ && stream_->lent() >= held_max_)
     return fail_here(ErrorCode::kBusy, "all " + std::to_string(held_max_) + " frames are held; give some back first");
-  if (auto ready = capture.next ? stream_->put_back_returned() : drop_waiting(); !ready)
-    return tl::unexpected(ready.error());
+  if (!capture.next) {
+    if (auto dropped = drop_waiting(); !dropped) return tl::unexpected(dropped.error());
+  }
+  if (auto put = stream_->put_back_returned(); !put) return tl::unexpected(put.error());
   while (true) {
     if (auto ready = wait(capture); !ready) return tl::unexpected(ready.error());
     auto frame = take(capture);
@@ -125,33 +155,52 @@ Result<Frame> V4l2Camera::capture_after(Capture capture) {
   }
 }
 
-// What is filled already was exposed before the trigger.
+// What is filled already was exposed before anyone asked.
 Result<> V4l2Camera::drop_waiting() {
   const std::size_t had = stream_->queued();
   std::size_t taken = 0;
-  if (auto put = stream_->put_back_returned(); !put) return put;
   for (; taken < had; ++taken) {
     const auto buffer = stream_->take();
     if (!buffer && buffer.error().code == ErrorCode::kDisconnected) return tl::unexpected(buffer.error());
     if (!buffer || !*buffer) break;
+    note_stamp(**buffer, steady_clock::now());
     counts_.dropped += note_order(**buffer);
     ++counts_.before_trigger;
     settling_ = std::max(settling_ - 1, 0);
-    if (auto put = stream_->put_back((*buffer)->index); !put) return put;
   }
   // With every buffer filled the driver had to drop frames, which nobody missed.
   if (taken == had) last_sequence_.reset();
   return {};
 }
 
+MonotonicTime V4l2Camera::dead_at() const {
+  const MonotonicTime quiet_since = stream_->quiet_since();
+  if (options_.missed_frames_max == 0 || quiet_since == MonotonicTime::max()) return MonotonicTime::max();
+  return quiet_since + clock_.silence_max(options_.missed_frames_max);
+}
+
+tl::unexpected<Error> V4l2Camera::fail_dead() const {
+  const auto silence =
+      std::chrono::duration_cast<std::chrono::milliseconds>(steady_clock::now() - stream_->quiet_since());
+  return fail_here(ErrorCode::kDisconnected,
+                   "its stream has brought no frame for " + std::to_string(silence.count()) +
+                       " ms and is started anew; check its cable if this comes again, and for a camera that waits for "
+                       "a trigger set missed_frames_max = 0");
+}
+
+tl::unexpected<Error> V4l2Camera::fail_gone() const {
+  return fail_here(ErrorCode::kDisconnected, "the camera is gone; check its cable");
+}
+
 Result<> V4l2Camera::wait(const Capture& capture) {
-  switch (wake_.wait(stream_->device().descriptor(), capture.deadline)) {
+  const MonotonicTime dead_at = this->dead_at();
+  switch (wake_.wait(stream_->device().descriptor(), std::min(capture.deadline, dead_at))) {
     case WakeEvent::Woken::kWoken:
       return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
     case WakeEvent::Woken::kGone:
-      return fail_here(ErrorCode::kDisconnected, "the camera is gone; check its cable");
+      return fail_gone();
     case WakeEvent::Woken::kLate:
-      return fail_late(capture);
+      return steady_clock::now() < dead_at ? fail_late(capture) : fail_dead();
     case WakeEvent::Woken::kReady:
       break;
   }
@@ -186,6 +235,7 @@ Result<std::optional<Frame>> V4l2Camera::take(Capture& capture) {
 
 Result<std::optional<Frame>> V4l2Camera::judge(const v4l2_buffer& buffer, Capture& capture) {
   const MonotonicTime received = steady_clock::now();
+  note_stamp(buffer, received);
   const MonotonicTime exposure_start = this->exposure_start(buffer, received, capture);
   const std::uint32_t lost = note_order(buffer);
   counts_.dropped += lost;
@@ -213,10 +263,19 @@ Result<std::optional<Frame>> V4l2Camera::judge(const v4l2_buffer& buffer, Captur
 
 MonotonicTime V4l2Camera::exposure_start(const v4l2_buffer& buffer, MonotonicTime received, Capture& capture) const {
   const MonotonicTime start = clock_.exposure_start(buffer, received);
-  if (ExposureClock::is_stamped(buffer)) return start;
+  if (clock_.is_stamped(buffer)) return start;
   if (capture.in_flight == 0) return std::max(start, capture.trigger);
   --capture.in_flight;
   return std::min(start, capture.trigger - std::chrono::nanoseconds(1));
+}
+
+void V4l2Camera::note_stamp(const v4l2_buffer& buffer, MonotonicTime received) {
+  clock_.note(buffer, received);
+  if (clock_.is_trusted() || std::exchange(clock_warned_, true)) return;
+  spdlog::warn(
+      "camera {}: time_stamps: its driver's stamps are not of the monotonic clock; the order of the frames is "
+      "used in their place, and a scan may wait for one more",
+      options_.name);
 }
 
 std::uint32_t V4l2Camera::note_order(const v4l2_buffer& buffer) {

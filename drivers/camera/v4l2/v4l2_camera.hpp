@@ -32,6 +32,9 @@ struct V4l2FrameCounts {
 ///
 /// A device that was unplugged is opened again by the same name, which therefore should be one of /dev/v4l/by-id.
 /// capture() gives kFrameStale where frames came and all their stamps lie before the trigger.
+///
+/// A stream may die without a word: uvcvideo does not queue those transfers again that failed. One that brings nothing
+/// for missed_frames_max frames is closed, by capture() or check(), with kDisconnected; open() proves that frames come.
 /// @thread thread-bound, but for cancel()
 class V4l2Camera final : public Camera {
  public:
@@ -40,7 +43,8 @@ class V4l2Camera final : public Camera {
   [[nodiscard]] const CameraDescription& description() const override { return description_; }
   void set_found(std::function<void()> found) override { found_ = std::move(found); }
   /// @errors kInvalidArgument (an option, or beyond the device's range), kNotFound, kPermissionDenied, kUnsupported,
-  ///         kMismatch (it did not take a setting), kBusy (another program has it), kNoSpace, kDisconnected, kIo
+  ///         kMismatch (it did not take a setting), kBusy (another program has it), kNoSpace, kDisconnected, kIo,
+  ///         kTimeout (it sends no frame), kCancelled
   [[nodiscard]] Result<> open() override;
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
   /// Frames that the driver dropped in between count as lost, and show as a gap in the numbers. Where the frame before
@@ -62,8 +66,13 @@ class V4l2Camera final : public Camera {
   [[nodiscard]] Result<Frame> run(const Capture& capture);
   void close();
   [[nodiscard]] Result<> configure(V4l2Device device);
+  [[nodiscard]] Result<> wait_for_first_frame();
   [[nodiscard]] Result<Frame> capture_after(Capture capture);
   [[nodiscard]] Result<> drop_waiting();
+  [[nodiscard]] MonotonicTime dead_at() const;
+  [[nodiscard]] tl::unexpected<Error> fail_dead() const;
+  [[nodiscard]] tl::unexpected<Error> fail_gone() const;
+  void note_stamp(const v4l2_buffer& buffer, MonotonicTime received);
   [[nodiscard]] Result<> wait(const Capture& capture);
   [[nodiscard]] tl::unexpected<Error> fail_late(const Capture& capture) const;
   [[nodiscard]] Result<std::optional<Frame>> take(Capture& capture);
@@ -86,6 +95,7 @@ class V4l2Camera final : public Camera {
   std::optional<FramePool> pool_;
   FrameLayout layout_;
   ExposureClock clock_;
+  bool clock_warned_ = false;
   std::size_t held_max_ = 0;
   int settling_ = 0;
   int faults_in_a_row_ = 0;

@@ -34,6 +34,7 @@ Result<> V4l2CameraOptions::validate() const {
   if (outside(readout_us, 0.0, 1e7)) return refuse("readout_us must be 0 to 10000000");
   if (settle_frames < 0 || settle_frames > 100) return refuse("settle_frames must be 0 to 100");
   if (frames_held_max < 2 || frames_held_max > 24) return refuse("frames_held_max must be 2 to 24");
+  if (missed_frames_max < 0 || missed_frames_max > 100) return refuse("missed_frames_max must be 0 to 100");
   if (automatic && exposure_us) return refuse("exposure_us cannot be set while automatic is true");
   if (automatic && gain_db) return refuse("gain_db cannot be set while automatic is true");
   if (automatic && gain_steps) return refuse("gain_steps cannot be set while automatic is true");

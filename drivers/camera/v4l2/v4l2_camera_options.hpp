@@ -29,6 +29,8 @@ struct V4l2CameraOptions {
                                           ///< the end; without it a frame's period, which is safe but may cost a frame
   int settle_frames = 2;                  ///< discarded after open(), 0 to 100: exposed under the settings before
   int frames_held_max = 8;                ///< how many frames may be held at once, 2 to 24
+  int missed_frames_max = 3;  ///< so many in a row missing, and a second at least: the stream is dead, 0 to 100; 0 for
+                              ///< a camera that a signal triggers, whose silence says nothing
 
   /// Of the device node, or of the link to it.
   [[nodiscard]] std::filesystem::path device_path() const;

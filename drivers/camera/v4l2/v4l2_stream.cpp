@@ -35,6 +35,7 @@ Result<V4l2Stream> V4l2Stream::start(V4l2Device device, int buffers) {
                 stream.device_.path());
   }
   if (error != 0) return stream.device_.fail_call(error, "cannot start the camera");
+  stream.quiet_since_ = std::chrono::steady_clock::now();
   return stream;
 }
 
@@ -58,6 +59,7 @@ Result<std::optional<v4l2_buffer>> V4l2Stream::take() {
     return fail(ErrorCode::kDisconnected, "the camera is gone; check its cable", device_.path());
   with_driver_[filled.index] = false;
   --queued_;
+  quiet_since_ = std::chrono::steady_clock::now();
   return filled;
 }
 
@@ -66,12 +68,12 @@ Result<> V4l2Stream::put_back(std::size_t buffer) {
   if (device_.call(VIDIOC_QBUF, &empty) != 0)
     return fail(ErrorCode::kDisconnected, "the camera takes no buffers any more; check its cable", device_.path());
   with_driver_[buffer] = true;
-  ++queued_;
+  if (queued_++ == 0) quiet_since_ = std::chrono::steady_clock::now();
   return {};
 }
 
-Result<> V4l2Stream::put_back_returned() {
-  for (std::size_t i = 0; i < buffers_.size(); ++i) {
+Result<> V4l2Stream::put_back_returned(std::size_t queued_max) {
+  for (std::size_t i = 0; i < buffers_.size() && queued_ < queued_max; ++i) {
     if (with_driver_[i] || buffers_.is_lent(i)) continue;
     if (auto put = put_back(i); !put) return put;
   }

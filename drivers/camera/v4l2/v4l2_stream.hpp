@@ -35,11 +35,14 @@ class V4l2Stream {
   [[nodiscard]] Result<std::optional<v4l2_buffer>> take();
   /// Gives it to the driver again. @errors kDisconnected
   [[nodiscard]] Result<> put_back(std::size_t buffer);
-  /// Gives the driver those that frames gave back. @errors kDisconnected
-  [[nodiscard]] Result<> put_back_returned();
+  /// Gives the driver those that frames gave back, until it has so many. @errors kDisconnected
+  [[nodiscard]] Result<> put_back_returned(std::size_t queued_max = VIDEO_MAX_FRAME);
 
   [[nodiscard]] Frame lend(std::size_t buffer, const GreyView& image, std::uint64_t sequence,
                            MonotonicTime exposure_start, MonotonicTime received);
+
+  /// Since when the driver has had buffers to fill and has filled none; never, where it has none.
+  [[nodiscard]] MonotonicTime quiet_since() const { return queued_ > 0 ? quiet_since_ : MonotonicTime::max(); }
 
   /// How many the driver has.
   [[nodiscard]] std::size_t queued() const { return queued_; }
@@ -52,6 +55,7 @@ class V4l2Stream {
   MappedBuffers buffers_;
   std::array<bool, VIDEO_MAX_FRAME> with_driver_{};
   std::size_t queued_ = 0;
+  MonotonicTime quiet_since_{};
 };
 
 }  // namespace slsd

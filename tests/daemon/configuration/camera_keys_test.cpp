@@ -34,12 +34,14 @@ automatic = false
 readout_us = 8000.5
 settle_frames = 5
 frames_held_max = 4
+missed_frames_max = 7
 faults = ["drop@3"]
 )");
   ASSERT_TRUE(configuration) << to_string(configuration.error());
   const CameraOptions& camera = configuration->cameras.at(0);
   const V4l2CameraOptions expected{
-      "left", "usb-camera", "Y16", std::pair(640, 480), 30.0, 16700.0, std::nullopt, 12, 40, 50, false, 8000.5, 5, 4};
+      "left", "usb-camera", "Y16", std::pair(640, 480), 30.0, 16700.0, std::nullopt, 12, 40, 50, false, 8000.5, 5, 4,
+      7};
   EXPECT_EQ(camera.driver, CameraDriver::kV4l2);
   EXPECT_EQ(camera.v4l2, expected);
   EXPECT_EQ(camera.faults.size(), 1U);

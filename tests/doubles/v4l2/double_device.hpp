@@ -32,6 +32,7 @@ struct DoubleFaults {
   int age = 0;           ///< frames whose stamps are old, by age_by
   int fail_dequeue = 0;  ///< DQBUF calls that fail with EIO
   std::chrono::nanoseconds age_by{std::chrono::seconds(1)};
+  bool dead = false;              ///< the stream brings nothing more until it ends; every call is answered as before
   MonotonicTime stalled_until{};  ///< no exposure begins before
 };
 

@@ -44,6 +44,7 @@ struct DoubleOptions {
   bool triggered = false;                            ///< one frame to a trigger; else one to each period
   bool waits_for_buffer = true;  ///< without a free buffer it exposes nothing; else it drops the frame and counts on
   std::uint32_t stamp_flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
+  std::chrono::nanoseconds stamp_offset{0};  ///< of the clock that stamps, to CLOCK_MONOTONIC
   std::chrono::microseconds exposure{500};
   std::chrono::microseconds readout{500};
   int buffers_max = VIDEO_MAX_FRAME;

@@ -108,6 +108,7 @@ int DoubleDevice::stop(Owner owner) {
 
 void DoubleDevice::end_stream() {
   streaming_ = false;
+  faults_.dead = false;
   queued_.clear();
   done_.clear();
   for (Buffer& buffer : buffers_) buffer.state = State::kDequeued;
@@ -161,7 +162,7 @@ bool DoubleDevice::is_stalled() const {
 }
 
 bool DoubleDevice::may_expose() const {
-  if (!streaming_) return false;
+  if (!streaming_ || faults_.dead) return false;
   if (options_.triggered) return triggers_ > 0;
   return !options_.waits_for_buffer || !queued_.empty();
 }
@@ -173,7 +174,7 @@ DoubleDevice::Exposure DoubleDevice::begin_exposure() {
 
 void DoubleDevice::finish_exposure(const Exposure& exposure, std::span<const std::byte> bytes) {
   std::unique_lock lock(mutex_);
-  if (!streaming_ || stream_ != exposure.stream) return;
+  if (!streaming_ || faults_.dead || stream_ != exposure.stream) return;
   if (faults_.drop > 0 || queued_.empty()) {
     faults_.drop = std::max(faults_.drop - 1, 0);
     ++sequence_;
@@ -209,6 +210,7 @@ v4l2_buffer DoubleDevice::fill(Buffer& buffer, const Exposure& exposure, std::sp
   MonotonicTime stamp = exposure.start;
   if (!at_start) stamp += options_.exposure + options_.readout;
   if (count_down(faults_.age)) stamp -= faults_.age_by;
+  stamp += options_.stamp_offset;
   filled.timestamp = time_of(stamp);
   const std::size_t used = count_down(faults_.shorten) ? bytes.size() / 2 : bytes.size();
   std::copy_n(bytes.begin(), used, content.begin());

@@ -3,8 +3,8 @@
 
 // A V4L2 double as a program: v4l2-double [IMAGE [RATE_HZ]] serves one image, or numbered frames of 160x120. It prints
 // the path of its device, then takes a command to a line on standard input and answers "ok" or "?": unplug, replug,
-// trigger, drop N, flag N, short N, age N, stall MILLISECONDS, eio N. It ends with its input. Exit status 77: no FUSE
-// here.
+// trigger, drop N, flag N, short N, age N, stall MILLISECONDS, eio N, die. It ends with its input. Exit status 77: no
+// FUSE here.
 #include <cstdlib>
 #include <iostream>
 #include <map>
@@ -50,6 +50,8 @@ bool obey(V4l2Double& camera, const std::string& command, int count) {
     camera.replug();
   else if (command == "trigger")
     camera.trigger();
+  else if (command == "die")
+    camera.inject([](DoubleFaults& faults) { faults.dead = true; });
   else if (command == "stall")
     camera.stall(std::chrono::milliseconds(count));
   else

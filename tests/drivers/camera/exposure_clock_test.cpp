@@ -61,13 +61,46 @@ TEST(FramesInFlight, AreAsManyAsExposureAndReadoutTouch) {
 }
 
 TEST(IsStamped, AsksForThisClock) {
-  EXPECT_TRUE(ExposureClock::is_stamped(stamped(kSoe, 999)));
-  EXPECT_FALSE(ExposureClock::is_stamped(stamped(kSoe, 0)));
-  EXPECT_FALSE(ExposureClock::is_stamped(stamped(V4L2_BUF_FLAG_TIMESTAMP_COPY, 999)));
+  const ExposureClock clock;
+  EXPECT_TRUE(clock.is_stamped(stamped(kSoe, 999)));
+  EXPECT_FALSE(clock.is_stamped(stamped(kSoe, 0)));
+  EXPECT_FALSE(clock.is_stamped(stamped(V4L2_BUF_FLAG_TIMESTAMP_COPY, 999)));
 }
 
 TEST(ExposureStart, IsNeverAfterTheArrival) {
   EXPECT_EQ(clock_of({5ms, 16ms}).exposure_start(stamped(kSoe, 2000), kReceived), kReceived);
+}
+
+/// Notes buffers one after the other, each stamped so many seconds after the one before.
+ExposureClock clock_after(int first, int step, int count) {
+  ExposureClock clock = clock_of({5ms, 16ms});
+  for (int i = 0; i < count; ++i) {
+    v4l2_buffer buffer = stamped(kSoe, first + i * step);
+    buffer.sequence = static_cast<std::uint32_t>(i);
+    clock.note(buffer, kReceived);
+  }
+  return clock;
+}
+
+// uvcvideo with clock=realtime says CLOCK_MONOTONIC and stamps the time of day, which others set.
+TEST(ExposureClock, TrustsNoStampOfTheFuture) {
+  EXPECT_TRUE(clock_after(900, 10, 11).is_trusted());
+  const ExposureClock clock = clock_after(1'800'000'000, 0, 1);
+  EXPECT_FALSE(clock.is_trusted());
+  EXPECT_FALSE(clock.is_stamped(stamped(kSoe, 999)));
+  EXPECT_EQ(clock.exposure_start(stamped(kSoe, 999), kReceived), kReceived - 21ms);
+}
+
+TEST(ExposureClock, TrustsNoClockThatStandsStill) {
+  EXPECT_TRUE(clock_after(999, 0, 3).is_trusted());
+  EXPECT_FALSE(clock_after(999, 0, 4).is_trusted());
+}
+
+TEST(SilenceMax, IsSoManyFramesAndASecondAtLeast) {
+  EXPECT_EQ(clock_of({5ms, 16ms}).silence_max(3), 1s);
+  EXPECT_EQ(clock_of({5ms, 500ms}).silence_max(3), 2005ms);  // a period for the readout
+  EXPECT_EQ(clock_of({2s, 500ms}).silence_max(3), 8500ms);   // no camera gives frames faster than it exposes
+  EXPECT_EQ(clock_of({5ms, 500ms}).silence_max(10), 5505ms);
 }
 
 }  // namespace

@@ -65,7 +65,10 @@ std::unique_ptr<Camera> real_v4l2_camera() {
 }
 
 bool V4l2Test::make(DoubleOptions options, V4l2CameraOptions camera) {
-  if (options.triggered) camera.settle_frames = 0;
+  if (options.triggered) {
+    camera.settle_frames = 0;
+    camera.missed_frames_max = 0;
+  }
   auto device = V4l2Double::create(std::move(options));
   if (!device) {
     [&] { GTEST_SKIP() << to_string(device.error()); }();

@@ -49,6 +49,24 @@ TEST_F(V4l2CameraTest, NeverGivesAFrameThatWasInFlightBeforeTheTrigger) {
   }
 }
 
+// The time of day in the place of CLOCK_MONOTONIC, and someone sets it.
+TEST_F(V4l2CameraTest, NeverGivesAnOldFrameWhereTheDriverStampsTheTimeOfDay) {
+  static constexpr auto kFiftyYears = std::chrono::hours(24 * 365 * 50);
+  DoubleOptions options = test::quick_double();
+  options.stamp_offset = kFiftyYears;
+  if (!make(options, {.settle_frames = 0})) return;
+  ASSERT_TRUE(camera_->open());
+  std::mt19937 random(3);
+  for (int i = 0; i < 40; ++i) {
+    if (i == 20) double_->configure([](DoubleOptions& changed) { changed.stamp_offset = kFiftyYears - 1h; });
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % 6000));
+    const std::uint64_t next = double_->next_number();
+    const auto frame = capture();
+    ASSERT_TRUE(frame) << to_string(frame.error());
+    EXPECT_GE(*test::number_of(frame->image()), next);
+  }
+}
+
 TEST_F(V4l2CameraTest, GivesTheFrameOfTheTrigger) {
   if (!make(test::triggered_double())) return;
   ASSERT_TRUE(camera_->open());

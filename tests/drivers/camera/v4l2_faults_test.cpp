@@ -14,6 +14,7 @@
 
 #include "tests/doubles/v4l2/numbered_frame.hpp"
 #include "tests/drivers/camera/v4l2_backends.hpp"
+#include "tests/drivers/no_descriptors.hpp"
 
 namespace slsd {
 namespace {
@@ -22,6 +23,7 @@ using namespace std::chrono_literals;
 using test::DoubleFaults;
 using test::DoubleOptions;
 using ::testing::AnyOf;
+using ::testing::HasSubstr;
 
 class V4l2Faults : public test::V4l2Test {
  protected:
@@ -146,6 +148,134 @@ TEST_F(V4l2Faults, AnUnpluggedCameraIsGoneToTheNextCapture) {
   double_->unplug();
   double_->replug();
   EXPECT_EQ(code_of(capture()), ErrorCode::kDisconnected);
+}
+
+/// Looks at the camera again and again, as its supervisor does, for the time or until it is found dead.
+Result<> look_after(Camera& camera, std::chrono::nanoseconds time) {
+  const auto end = std::chrono::steady_clock::now() + time;
+  Result<> there = camera.check();
+  while (there && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(20ms);
+    there = camera.check();
+  }
+  return there;
+}
+
+class V4l2DeadStream : public V4l2Faults {
+ protected:
+  bool open_on(DoubleOptions options, V4l2CameraOptions camera = {}) {
+    if (!make(std::move(options), std::move(camera))) return false;
+    EXPECT_TRUE(camera_->open());
+    return !HasFailure();
+  }
+  void die() {
+    double_->inject([](DoubleFaults& faults) { faults.dead = true; });
+  }
+  void expect_back() {
+    EXPECT_EQ(code_of(capture()), ErrorCode::kDisconnected);
+    EXPECT_TRUE(camera_->open());
+    EXPECT_TRUE(capture());
+  }
+};
+
+TEST_F(V4l2DeadStream, IsClosedByTheCaptureThatWaits) {
+  if (!open_on(test::quick_double())) return;
+  EXPECT_TRUE(capture());
+  die();
+  EXPECT_EQ(capture_until_it_fails(), ErrorCode::kDisconnected);
+  expect_back();
+}
+
+TEST_F(V4l2DeadStream, IsClosedByCapturesOfShortDeadlines) {
+  if (!open_on(test::quick_double())) return;
+  EXPECT_TRUE(capture());
+  die();
+  const auto capture_shortly = [&] {
+    const auto frame = camera_->capture(std::chrono::steady_clock::now() + 30ms);
+    return frame ? ErrorCode::kFrameLate : frame.error().code;
+  };
+  ErrorCode code = ErrorCode::kFrameLate;
+  while (code == ErrorCode::kFrameLate) code = capture_shortly();
+  EXPECT_EQ(code, ErrorCode::kDisconnected);
+  expect_back();
+}
+
+TEST_F(V4l2DeadStream, IsClosedWhileNobodyAsks) {
+  if (!open_on(test::quick_double())) return;
+  EXPECT_TRUE(look_after(*camera_, 100ms));
+  die();
+  const auto there = look_after(*camera_, 1h);
+  ASSERT_FALSE(there);
+  EXPECT_EQ(there.error().code, ErrorCode::kDisconnected);
+  EXPECT_THAT(there.error().message, HasSubstr("missed_frames_max"));
+  expect_back();
+}
+
+TEST_F(V4l2DeadStream, IsNotOneThatNobodyAsks) {
+  if (!open_on(test::quick_double())) return;
+  EXPECT_TRUE(capture());
+  EXPECT_TRUE(look_after(*camera_, 1500ms));
+  const std::uint64_t next = double_->next_number();
+  const auto frame = capture();
+  ASSERT_TRUE(frame);
+  EXPECT_GE(*test::number_of(frame->image()), next);
+}
+
+TEST_F(V4l2DeadStream, IsNotOneWhoseFramesAreAllHeld) {
+  if (!open_on(test::quick_double(), {.frames_held_max = 2})) return;
+  std::vector<Frame> held;
+  for (auto frame = capture(); frame; frame = capture()) held.push_back(std::move(*frame));
+  EXPECT_TRUE(look_after(*camera_, 1500ms));
+  held.clear();
+  EXPECT_TRUE(capture());
+}
+
+TEST_F(V4l2DeadStream, IsNotOneThatWaitsForItsTrigger) {
+  if (!open_triggered()) return;
+  EXPECT_TRUE(look_after(*camera_, 1200ms));
+  EXPECT_EQ(code_of(camera_->capture(std::chrono::steady_clock::now() + 50ms)), ErrorCode::kFrameLate);
+  EXPECT_TRUE(capture_one());
+}
+
+TEST_F(V4l2DeadStream, IsNotOpenedAsReady) {
+  if (!make(test::quick_double())) return;
+  double_->stall(1h);
+  const auto opened = camera_->open();
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::kTimeout);
+  double_->stall(0s);
+  EXPECT_TRUE(camera_->open());
+}
+
+TEST_F(V4l2DeadStream, IsNotWaitedForOnceCancelled) {
+  if (!make(test::quick_double())) return;
+  double_->stall(1h);
+  const std::uint64_t polls = double_->polls();
+  auto opened = std::async(std::launch::async, [&] { return camera_->open(); });
+  while (double_->polls() == polls) std::this_thread::sleep_for(100us);
+  camera_->cancel();
+  const auto result = opened.get();
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, ErrorCode::kCancelled);
+}
+
+TEST_F(V4l2Faults, WithoutDescriptorsACameraSaysSoAndHealsWithThem) {
+  if (!make(test::quick_double())) return;
+  {
+    const test::NoDescriptors none;
+    const auto opened = camera_->open();
+    ASSERT_FALSE(opened);
+    EXPECT_EQ(opened.error().code, ErrorCode::kNoSpace);
+    EXPECT_THAT(opened.error().message, HasSubstr("LimitNOFILE"));
+    camera_->cancel();
+  }
+  ASSERT_TRUE(camera_->open());
+  EXPECT_TRUE(capture());
+  double_->stall(1h);
+  auto frame = begin_capture(10s);
+  const test::NoDescriptors none;
+  camera_->cancel();
+  EXPECT_THAT(code_of(frame.get()), AnyOf(ErrorCode::kCancelled, ErrorCode::kDisconnected));
 }
 
 std::ptrdiff_t open_descriptors() {

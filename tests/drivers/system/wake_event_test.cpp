@@ -85,14 +85,14 @@ TEST(WakeEvent, KeepsAWakeThatComesBeforeOpening) {
 TEST(WakeEvent, SaysThatNoDescriptorIsLeftAndHealsWithOne) {
   WakeEvent event;
   {
-    const NoDescriptors none;
+    const test::NoDescriptors none;
     const auto opened = event.open();
     ASSERT_FALSE(opened);
     EXPECT_EQ(opened.error().code, ErrorCode::kNoSpace);
     EXPECT_THAT(opened.error().message, testing::HasSubstr("LimitNOFILE"));
   }
   ASSERT_TRUE(event.open());
-  const NoDescriptors none;
+  const test::NoDescriptors none;
   event.wake();
   EXPECT_TRUE(event.sleep_until(WakeEvent::Time::max()));
 }
