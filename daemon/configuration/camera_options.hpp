@@ -4,6 +4,8 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
+#include <variant>
 #include <vector>
 
 #include "core/result.hpp"
@@ -14,22 +16,28 @@
 
 namespace slsd {
 
-enum class CameraDriver { kFile, kV4l2, kAravis };
-[[nodiscard]] std::string_view to_string(CameraDriver driver);
+/// What to do with the options of each driver, for std::visit: one that is forgotten does not compile.
+template <class... Visits>
+struct Overloaded : Visits... {
+  using Visits::operator()...;
+};
+template <class... Visits>
+Overloaded(Visits...) -> Overloaded<Visits...>;
 
-/// A [[camera]] table.
+/// A [[camera]] table: the keys of its driver, and what all drivers have in common.
 struct CameraOptions {
-  CameraDriver driver = CameraDriver::kFile;
-  FileCameraOptions file;      ///< its name is the camera's, whatever the driver
-  V4l2CameraOptions v4l2;      ///< where it is the driver
-  AravisCameraOptions aravis;  ///< where it is the driver
-  std::vector<Fault> faults;   ///< what the camera does wrong, for the tests of everything above it
+  std::variant<FileCameraOptions, V4l2CameraOptions, AravisCameraOptions> of_driver;
+  std::vector<Fault> faults;  ///< what the camera does wrong, for the tests of everything above it
 
-  [[nodiscard]] const std::string& name() const { return file.name; }
+  [[nodiscard]] const std::string& name() const;
+  [[nodiscard]] std::string_view driver() const;  ///< "file", "v4l2" or "aravis"
   /// As configured; nothing where the driver keeps the camera's own, or has none.
   [[nodiscard]] std::optional<double> exposure_us() const;
+  [[nodiscard]] std::optional<double> gain_db() const;
   /// Of its pixels, by the driver's name for it; empty where the driver chooses.
   [[nodiscard]] std::string format() const;
+  /// Its frames are files': no device is looked for.
+  [[nodiscard]] bool replays() const { return std::holds_alternative<FileCameraOptions>(of_driver); }
   /// @errors kInvalidArgument: the message begins with the key
   [[nodiscard]] Result<> validate() const;
   friend bool operator==(const CameraOptions&, const CameraOptions&) = default;

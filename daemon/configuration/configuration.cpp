@@ -6,15 +6,14 @@
 #include <array>
 #include <utility>
 
-#include "daemon/configuration/aravis_keys.hpp"
-#include "daemon/configuration/given_keys.hpp"
+#include "daemon/configuration/camera_keys.hpp"
 #include "daemon/configuration/table_reader.hpp"
-#include "daemon/configuration/v4l2_keys.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd {
 namespace {
 
+using nlohmann::json;
 using std::filesystem::path;
 using namespace std::string_view_literals;
 
@@ -25,14 +24,9 @@ constexpr std::array kProjectorDrivers{std::pair("headless"sv, ProjectorDriver::
 constexpr std::array kIdlePictures{std::pair("pattern"sv, IdlePicture::kPattern),
                                    std::pair("black"sv, IdlePicture::kBlack),
                                    std::pair("white"sv, IdlePicture::kWhite)};
-constexpr std::array kCameraDrivers{std::pair("file"sv, CameraDriver::kFile), std::pair("v4l2"sv, CameraDriver::kV4l2),
-                                    std::pair("aravis"sv, CameraDriver::kAravis)};
 constexpr std::array kArrayMethods{std::pair("constructive"sv, ArrayMethod::kConstructive),
                                    std::pair("paper"sv, ArrayMethod::kPaper)};
 constexpr std::array kMethods{std::pair("default"sv, Method::kDefault), std::pair("paper"sv, Method::kPaper)};
-constexpr std::array kMosaics{std::pair("none"sv, BayerPattern::kNone), std::pair("RGGB"sv, BayerPattern::kRggb),
-                              std::pair("BGGR"sv, BayerPattern::kBggr), std::pair("GRBG"sv, BayerPattern::kGrbg),
-                              std::pair("GBRG"sv, BayerPattern::kGbrg)};
 constexpr std::array kOtherHardware{std::pair("error"sv, OtherHardware::kError),
                                     std::pair("warn"sv, OtherHardware::kWarn)};
 
@@ -83,74 +77,6 @@ Result<> read_pattern_table(const toml::table* table, const path& file, Configur
   return {};
 }
 
-void read_faults(TableReader& reader, CameraOptions& options) {
-  std::vector<std::string> texts;
-  reader.read("faults", texts);
-  if (auto faults = parse_faults(texts)) {
-    options.faults = std::move(*faults);
-  } else {
-    reader.refuse("faults", "has an entry that is no fault: " + faults.error().message);
-  }
-}
-
-void read_file_camera(TableReader& reader, FileCameraOptions& options) {
-  reader.read("path", options.path);
-  reader.read("loop", options.loop);
-  reader.read("rate_hz", options.rate_hz);
-  reader.read_both("width_px", "height_px", options.size_px);
-  reader.choose("bayer", options.bayer, span_of(kMosaics));
-}
-
-void read_driver_keys(TableReader& reader, CameraDriver driver, CameraOptions& options) {
-  if (driver == CameraDriver::kFile) read_file_camera(reader, options.file);
-  if (driver == CameraDriver::kV4l2) read_v4l2_keys(reader, options.v4l2);
-  if (driver == CameraDriver::kAravis) read_aravis_keys(reader, options.aravis);
-}
-
-void refuse_keys_of_others(TableReader& reader, const toml::table& table, CameraDriver driver) {
-  const std::vector<std::string> own = reader.known();
-  for (const auto& [name, other] : kCameraDrivers) {
-    TableReader others(&table, "", "");
-    CameraOptions ignored;
-    read_driver_keys(others, other, ignored);
-    for (const std::string& key : others.known()) {
-      if (!table.contains(key) || std::ranges::find(own, key) != own.end()) continue;
-      reader.refuse(key, "is a key of the driver \"" + std::string(name) + "\", not of \"" +
-                             std::string(to_string(driver)) + "\": remove it");
-    }
-  }
-}
-
-Result<CameraOptions> read_camera(const toml::table& table, const path& file) {
-  TableReader reader(&table, "[[camera]]", file);
-  CameraOptions options;
-  reader.read("name", options.file.name);
-  reader.choose("driver", options.driver, span_of(kCameraDrivers));
-  read_driver_keys(reader, options.driver, options);
-  options.v4l2.name = options.name();
-  options.aravis.name = options.name();
-  read_faults(reader, options);
-  refuse_keys_of_others(reader, table, options.driver);
-  if (auto read = reader.finish(options.validate()); !read) return tl::unexpected(read.error());
-  return options;
-}
-
-Result<> read_cameras(const std::vector<const toml::table*>& tables, const path& file,
-                      std::vector<CameraOptions>& cameras) {
-  for (const toml::table* table : tables) {
-    auto camera = read_camera(*table, file);
-    if (!camera) return tl::unexpected(camera.error());
-    const auto same = [&](const CameraOptions& other) { return other.name() == camera->name(); };
-    if (std::ranges::any_of(cameras, same)) {
-      return fail(ErrorCode::kInvalidArgument,
-                  "[[camera]] name \"" + camera->name() + "\" is taken: give each camera a name of its own",
-                  place_of(table->contains("name") ? table->get("name")->source() : table->source(), file.string()));
-    }
-    cameras.push_back(std::move(*camera));
-  }
-  return {};
-}
-
 Result<> read_decode(const toml::table* table, const path& file, DecodeOptions& options) {
   TableReader reader(table, "[decode]", file);
   reader.read("depth_min_mm", options.depth_min_mm);
@@ -193,6 +119,31 @@ Result<> read_server(const toml::table* table, const path& file, ServerOptions& 
   return reader.finish(options.validate());
 }
 
+// The keys as they were given, table by table. Dates and times, which no key has, become null.
+json given_keys(const toml::node& node);
+
+json keys_of(const toml::table& table) {
+  json keys = json::object();
+  for (const auto& [key, value] : table) keys[std::string(key.str())] = given_keys(value);
+  return keys;
+}
+
+json values_of(const toml::array& array) {
+  json values = json::array();
+  for (const toml::node& value : array) values.push_back(given_keys(value));
+  return values;
+}
+
+json given_keys(const toml::node& node) {
+  if (const auto* table = node.as_table()) return keys_of(*table);
+  if (const auto* array = node.as_array()) return values_of(*array);
+  if (const auto* text = node.as_string()) return text->get();
+  if (const auto* number = node.as_integer()) return number->get();
+  if (const auto* number = node.as_floating_point()) return number->get();
+  if (const auto* flag = node.as_boolean()) return flag->get();
+  return nullptr;
+}
+
 Result<Configuration> read_tables(const toml::table& document, const path& file) {
   TableReader top(&document, "", file);
   const toml::table* projector = top.table("projector");
@@ -206,7 +157,11 @@ Result<Configuration> read_tables(const toml::table& document, const path& file)
   Result<> read = top.finish();
   if (read) read = read_projector(projector, file, configuration.projector);
   if (read) read = read_pattern_table(pattern, file, configuration);
-  if (read) read = read_cameras(cameras, file, configuration.cameras);
+  if (read) {
+    auto listed = read_cameras(cameras, file);
+    if (!listed) return tl::unexpected(listed.error());
+    configuration.cameras = std::move(*listed);
+  }
   if (read) read = read_calibration_table(calibration, file, configuration);
   if (read) read = read_decode(decode, file, configuration.decode);
   if (read) read = read_scan(scan, file, configuration.scan);

@@ -167,7 +167,7 @@ void CameraRunner::note_opened(const Result<>& opened) {
   }
   const CameraDescription& description = camera_->description();
   status_.device = description.device;
-  status_.hardware = camera_hardware(description.driver, description.device);
+  status_.hardware = description.hardware;
   status_.width_px = description.width_px;
   status_.height_px = description.height_px;
   rate_hz_ = description.rate_hz;

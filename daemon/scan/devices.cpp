@@ -12,18 +12,12 @@
 namespace slsd {
 
 Result<std::unique_ptr<Camera>> make_camera(const CameraOptions& options) {
-  std::unique_ptr<Camera> camera;
-  switch (options.driver) {
-    case CameraDriver::kFile:
-      camera = std::make_unique<FileCamera>(options.file);
-      break;
-    case CameraDriver::kV4l2:
-      camera = std::make_unique<V4l2Camera>(options.v4l2);
-      break;
-    case CameraDriver::kAravis:
-      camera = std::make_unique<AravisCamera>(options.aravis);
-      break;
-  }
+  using Made = std::unique_ptr<Camera>;
+  auto camera = std::visit(
+      Overloaded{[](const FileCameraOptions& file) -> Made { return std::make_unique<FileCamera>(file); },
+                 [](const V4l2CameraOptions& v4l2) -> Made { return std::make_unique<V4l2Camera>(v4l2); },
+                 [](const AravisCameraOptions& aravis) -> Made { return std::make_unique<AravisCamera>(aravis); }},
+      options.of_driver);
   if (!options.faults.empty()) camera = std::make_unique<FaultyCamera>(std::move(camera), options.faults);
   return camera;
 }

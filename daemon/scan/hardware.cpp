@@ -3,37 +3,10 @@
 #include "daemon/scan/hardware.hpp"
 
 #include <algorithm>
-#include <filesystem>
 
-#include "drivers/camera/v4l2/stable_link.hpp"
+#include "core/printable.hpp"
 
 namespace slsd {
-namespace {
-
-using std::filesystem::path;
-
-constexpr std::size_t kMaxIdLength = 200;  // a calibration file's texts are bounded
-
-/// A camera's stable name, by whichever name its node is known.
-std::string v4l2_id(const path& device) {
-  const auto link = find_stable_link(device, "/dev");
-  return link ? link->filename().string() : std::string();
-}
-
-/// As a calibration file may hold it.
-std::string printable(std::string text) {
-  text.resize(std::min(text.size(), kMaxIdLength));
-  std::ranges::replace_if(
-      text, [](unsigned char letter) { return letter < 0x20 || letter == 0x7f; }, ' ');
-  return text;
-}
-
-}  // namespace
-
-std::string camera_hardware(const std::string& driver, const std::string& device) {
-  if (driver == "v4l2") return printable(v4l2_id(device));
-  return driver == "aravis" ? printable(device) : std::string();
-}
 
 std::string projector_hardware(const std::string& model, const std::string& serial) {
   if (serial.empty()) return {};  // the model alone would let any other of its kind pass for it

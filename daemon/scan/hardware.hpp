@@ -10,14 +10,8 @@
 
 namespace slsd {
 
-/// What tells one camera from the others, wherever it is plugged in: the name under /dev/v4l/by-id, or the id of GigE
-/// Vision and USB3 Vision, both with the serial number. Many a camera of USB Video Class has none: then the name is of
-/// the model only, and another of that model passes for it.
-/// @param driver, device  of DeviceStatus or CameraDescription, of an open camera
-/// @return empty where that cannot be told
-[[nodiscard]] std::string camera_hardware(const std::string& driver, const std::string& device);
-
-/// The same of a projector, from its EDID: maker and model with the serial number.
+/// What tells one projector from the others, from its EDID: maker and model with the serial number; empty where that
+/// cannot be told. As CameraDescription::hardware.
 [[nodiscard]] std::string projector_hardware(const std::string& model, const std::string& serial);
 
 /// Writes down what a calibration was made with, as far as it can be told.

@@ -9,13 +9,10 @@ using nlohmann::json;
 namespace {
 
 json camera_json(const CameraOptions& camera) {
-  json about{{"name", camera.name()}, {"driver", to_string(camera.driver)}};
+  json about{{"name", camera.name()}, {"driver", camera.driver()}};
   if (const auto exposure_us = camera.exposure_us()) about["exposure_us"] = *exposure_us;
-  if (camera.driver == CameraDriver::kV4l2) about["format"] = camera.v4l2.format;
-  if (camera.driver == CameraDriver::kV4l2 && camera.v4l2.gain_db) about["gain_db"] = *camera.v4l2.gain_db;
-  if (camera.driver != CameraDriver::kAravis) return about;
-  about["gain_db"] = camera.aravis.gain_db;
-  about["format"] = camera.aravis.pixel_format;
+  if (const auto gain_db = camera.gain_db()) about["gain_db"] = *gain_db;
+  if (!camera.replays()) about["format"] = camera.format();
   return about;
 }
 

@@ -17,8 +17,10 @@ constexpr const char* kIndent = "\n    ";
 ListingPlaces places_of(const Configuration& configuration) {
   ListingPlaces places;
   for (const CameraOptions& camera : configuration.cameras) {
-    if (camera.driver == CameraDriver::kV4l2) places.configured_nodes.push_back(camera.v4l2.device_path());
-    if (camera.driver == CameraDriver::kAravis) places.configured_ids.push_back(camera.aravis.id);
+    std::visit(Overloaded{[](const FileCameraOptions&) {},
+                          [&](const V4l2CameraOptions& v4l2) { places.configured_nodes.push_back(v4l2.device_path()); },
+                          [&](const AravisCameraOptions& aravis) { places.configured_ids.push_back(aravis.id); }},
+               camera.of_driver);
   }
   return places;
 }
@@ -65,11 +67,9 @@ std::string camera_text(const ListedCamera& camera, const CameraOptions* configu
 /// What is to say of a camera that the configuration names and nobody sees.
 std::string unseen_text(const CameraOptions& camera) {
   std::ostringstream text;
-  text << "configured camera \"" << camera.name() << "\", driver " << to_string(camera.driver) << ": ";
-  if (camera.driver == CameraDriver::kFile)
-    text << "replays " << camera.file.path.string() << "\n";
-  else
-    text << "is not seen\n";
+  text << "configured camera \"" << camera.name() << "\", driver " << camera.driver() << ": ";
+  const auto* const file = std::get_if<FileCameraOptions>(&camera.of_driver);
+  text << (file != nullptr ? "replays " + file->path.string() : "is not seen") << "\n";
   return text.str();
 }
 
@@ -102,13 +102,17 @@ json camera_json(const ListedCamera& camera, const CameraOptions* configured) {
 }  // namespace
 
 bool names(const CameraOptions& options, const ListedCamera& camera) {
-  if (to_string(options.driver) != camera.driver) return false;
-  if (options.driver == CameraDriver::kAravis) {
-    const std::string& id = options.aravis.id;
-    return id == camera.name || id == camera.serial || id == camera.address;
-  }
-  std::error_code error;
-  return std::filesystem::equivalent(options.v4l2.device_path(), camera.node, error);
+  if (options.driver() != camera.driver) return false;
+  return std::visit(Overloaded{[](const FileCameraOptions&) { return false; },
+                               [&](const V4l2CameraOptions& v4l2) {
+                                 std::error_code ignored;
+                                 return std::filesystem::equivalent(v4l2.device_path(), camera.node, ignored);
+                               },
+                               [&](const AravisCameraOptions& aravis) {
+                                 return aravis.id == camera.name || aravis.id == camera.serial ||
+                                        aravis.id == camera.address;
+                               }},
+                    options.of_driver);
 }
 
 CameraList CameraList::look(const Configuration& configuration) {
@@ -147,16 +151,15 @@ json CameraList::json() const {
   nlohmann::json result{{"cameras", json::array()}, {"configured", json::array()}, {"looked_at", listing_.looked_at}};
   for (const ListedCamera& camera : listing_.cameras) result["cameras"].push_back(camera_json(camera, find(camera)));
   for (const CameraOptions& camera : configuration_->cameras)
-    result["configured"].push_back({{"name", camera.name()},
-                                    {"driver", to_string(camera.driver)},
-                                    {"seen", camera.driver == CameraDriver::kFile || find(camera) != nullptr}});
+    result["configured"].push_back(
+        {{"name", camera.name()}, {"driver", camera.driver()}, {"seen", camera.replays() || find(camera) != nullptr}});
   return result;
 }
 
 std::string CameraList::similar_to(const CameraOptions& absent) const {
   std::string similar;
   for (const ListedCamera& camera : listing_.cameras)
-    if (camera.driver == to_string(absent.driver)) similar += (similar.empty() ? "" : ", ") + camera.name;
+    if (camera.driver == absent.driver()) similar += (similar.empty() ? "" : ", ") + camera.name;
   return similar.empty() ? "no other camera of this driver is seen; slsd --list says where was looked"
                          : "of this driver are seen: " + similar;
 }

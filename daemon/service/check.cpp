@@ -48,7 +48,7 @@ class Findings {
 };
 
 std::string advice_for(const Error& error, const CameraOptions& absent, const Configuration& configuration) {
-  if (error.code != ErrorCode::kNotFound || absent.driver == CameraDriver::kFile) return {};
+  if (error.code != ErrorCode::kNotFound || absent.replays()) return {};
   return "; " + CameraList::look(configuration).similar_to(absent);
 }
 
@@ -64,9 +64,8 @@ void check_camera(const CameraOptions& options, const Configuration& configurati
   const CameraDescription& seen = (*camera)->description();
   const CalibratedCamera* known = calibration ? calibration->camera(options.name()) : nullptr;
   if (known == nullptr) return;
-  findings.other_hardware(
-      check_hardware(name, calibrated_hardware(*calibration, *known), camera_hardware(seen.driver, seen.device)),
-      configuration.other_hardware);
+  findings.other_hardware(check_hardware(name, calibrated_hardware(*calibration, *known), seen.hardware),
+                          configuration.other_hardware);
   if (known->lens.width_px == seen.width_px && known->lens.height_px == seen.height_px) {
     return findings.good(name + " has the size of its calibration, " + size_text(seen.width_px, seen.height_px) +
                          " px");

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -20,6 +21,7 @@ namespace slsd {
 
 /// The keys of a [[camera]] table whose driver is "file".
 struct FileCameraOptions {
+  static constexpr std::string_view kDriver = "file";
   std::string name = "camera";
   std::filesystem::path path = {};  ///< a folder of PNG, TIFF, PGM, PPM or BMP images, or one image
   bool loop = true;                 ///< after the last image from the first on again; else kNotFound

@@ -8,6 +8,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "core/printable.hpp"
 #include "drivers/camera/aravis/aravis_session.hpp"
 #include "drivers/camera/aravis/capture_events.hpp"
 #include "drivers/camera/aravis/frame_patience.hpp"
@@ -37,6 +38,7 @@ Result<> AravisCamera::open() {
   session_ = std::move(*session);
   address_ = session_->address();
   description_.device = session_->name();
+  description_.hardware = printable(session_->name());
   description_.width_px = session_->layout().width_px;
   description_.height_px = session_->layout().height_px;
   description_.rate_hz = options_.trigger == AravisTrigger::kFreeRun ? options_.rate_hz : 0.0;

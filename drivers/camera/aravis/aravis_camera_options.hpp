@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "core/result.hpp"
@@ -21,6 +22,7 @@ enum class AravisTrigger {
 
 /// The keys of a [[camera]] table whose driver is "aravis".
 struct AravisCameraOptions {
+  static constexpr std::string_view kDriver = "aravis";
   std::string name = "camera";
   std::string id = {};         ///< serial number, "vendor-serial", or IPv4 address; an address is found soonest
   std::string interface = {};  ///< IPv4 address of this host's interface; empty: the one that the route goes through

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "core/result.hpp"
@@ -14,6 +15,7 @@ namespace slsd {
 /// The keys of a [[camera]] table whose driver is "v4l2". What is not given stays as the device has it, except that
 /// everything automatic is turned off.
 struct V4l2CameraOptions {
+  static constexpr std::string_view kDriver = "v4l2";
   std::string name = "camera";
   std::filesystem::path device = {};  ///< "/dev/v4l/by-id/...", or a name in that folder; /dev/videoN may renumber
   std::string format = {};            ///< a pixel format as "GREY", "Y16", "YUYV", "MJPG"; empty: the best for decoding

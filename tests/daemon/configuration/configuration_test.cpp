@@ -76,8 +76,9 @@ socket_mode = 0o600
   EXPECT_EQ(configuration->projector.idle_after_ms, 0);
   EXPECT_EQ(configuration->scan.projector_latency_ms, 34.5);
   EXPECT_EQ(configuration->scan.power_line_hz, 60);
-  EXPECT_EQ(configuration->cameras.at(0).file.path, "/frames");
-  EXPECT_EQ(configuration->cameras.at(0).file.size_px, std::pair(640, 480));
+  const auto& file = std::get<FileCameraOptions>(configuration->cameras.at(0).of_driver);
+  EXPECT_EQ(file.path, "/frames");
+  EXPECT_EQ(file.size_px, std::pair(640, 480));
   EXPECT_EQ(configuration->cameras.at(0).faults.at(0).capture, 3U);
   EXPECT_EQ(configuration->calibration_file, "etc/calibration.yml");
   EXPECT_EQ(configuration->other_hardware, OtherHardware::kWarn);

@@ -49,12 +49,16 @@ TEST(LatencyFile, RefusesNegativeTimes) {
   }
 }
 
+CameraOptions camera(const std::string& name) {
+  FileCameraOptions options;
+  options.name = name;
+  return {options, {}};
+}
+
 /// A configuration that the report goes with.
 Configuration configuration_of_report() {
   Configuration configuration;
-  configuration.cameras.resize(2);
-  configuration.cameras[0].file.name = "left";
-  configuration.cameras[1].file.name = "right";
+  configuration.cameras = {camera("left"), camera("right")};
   configuration.scan.projector_latency_ms = 35;
   return configuration;
 }
@@ -75,15 +79,13 @@ TEST(LatencyWarnings, AreOfOverexposedCameras) {
 
 TEST(LatencyWarnings, AreOfShortSettingsAndOfCamerasThatWereNotMeasured) {
   Configuration configuration;
-  configuration.cameras.resize(2);
-  configuration.cameras[0].file.name = "left";
-  configuration.cameras[1].file.name = "third";
+  configuration.cameras = {camera("left"), camera("third")};
   configuration.scan.projector_latency_ms = 30;
   EXPECT_THAT(latency_warnings(configuration, report(), ""),
               ElementsAre(AllOf(HasSubstr("\"left\""), HasSubstr("34.6 ms"), HasSubstr("set 35")),
                           AllOf(HasSubstr("\"third\""), HasSubstr("not measured"))));
   configuration.scan.projector_latency_ms = 35;
-  configuration.cameras[1].file.name = "right";
+  configuration.cameras[1] = camera("right");
   EXPECT_THAT(latency_warnings(configuration, report(), ""), IsEmpty());
 }
 

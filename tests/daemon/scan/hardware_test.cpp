@@ -29,15 +29,6 @@ Calibration calibrated_with(const RigStatus& rig) {
   return calibration;
 }
 
-TEST(CameraHardware, IsOfDevicesThatHaveASerialNumber) {
-  EXPECT_EQ(camera_hardware("aravis", "Maker-Model-17"), "Maker-Model-17");
-  EXPECT_EQ(camera_hardware("aravis", "Maker\nModel"), "Maker Model");
-  EXPECT_EQ(camera_hardware("v4l2", "/dev/v4l/by-id/usb-Maker_Model_17-video-index0"),
-            "usb-Maker_Model_17-video-index0");
-  EXPECT_EQ(camera_hardware("v4l2", "/nowhere/video0"), "");
-  EXPECT_EQ(camera_hardware("file", "frames"), "");
-}
-
 TEST(ProjectorHardware, IsOfDevicesThatHaveASerialNumber) {
   EXPECT_EQ(projector_hardware("Maker Model", ""), "");
   EXPECT_EQ(projector_hardware("Maker Model", "17"), "Maker Model 17");

@@ -24,11 +24,10 @@ ListedCamera gige_camera() {
 }
 
 CameraOptions configured(const std::string& id) {
-  CameraOptions options;
-  options.driver = CameraDriver::kAravis;
-  options.file.name = "left";
-  options.aravis.id = id;
-  return options;
+  AravisCameraOptions options;
+  options.name = "left";
+  options.id = id;
+  return {options, {}};
 }
 
 TEST(CameraList, KnowsAnAravisCameraByEachOfItsNames) {

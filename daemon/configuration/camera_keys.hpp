@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "daemon/configuration/camera_options.hpp"
+#include "daemon/configuration/table_reader.hpp"
+
+namespace slsd {
+
+/// Reads the [[camera]] tables.
+/// @param file  for the places of errors and for relative paths
+/// @errors kInvalidArgument: a key that is unknown, of another driver, of the wrong type or out of range, or a name
+/// twice
+/// @thread reentrant
+[[nodiscard]] Result<std::vector<CameraOptions>> read_cameras(const std::vector<const toml::table*>& tables,
+                                                              const std::filesystem::path& file);
+
+}  // namespace slsd

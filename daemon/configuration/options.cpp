@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <cstdint>
+#include <string>
+
+#include "daemon/configuration/camera_options.hpp"
+#include "daemon/configuration/projector_options.hpp"
+#include "daemon/configuration/scan_options.hpp"
+#include "daemon/configuration/server_options.hpp"
+
+namespace slsd {
+namespace {
+
+Result<> in_range(const char* key, std::int64_t value, std::int64_t low, std::int64_t high) {
+  if (value >= low && value <= high) return {};
+  return fail(ErrorCode::kInvalidArgument, std::string(key) + " must be " + std::to_string(low) + " to " +
+                                               std::to_string(high) + ", not " + std::to_string(value));
+}
+
+}  // namespace
+
+const std::string& CameraOptions::name() const {
+  return std::visit([](const auto& options) -> const std::string& { return options.name; }, of_driver);
+}
+
+std::string_view CameraOptions::driver() const {
+  return std::visit([](const auto& options) { return options.kDriver; }, of_driver);
+}
+
+std::optional<double> CameraOptions::exposure_us() const {
+  return std::visit(Overloaded{[](const FileCameraOptions&) { return std::optional<double>(); },
+                               [](const auto& options) { return std::optional<double>(options.exposure_us); }},
+                    of_driver);
+}
+
+std::optional<double> CameraOptions::gain_db() const {
+  return std::visit(Overloaded{[](const FileCameraOptions&) { return std::optional<double>(); },
+                               [](const auto& options) { return std::optional<double>(options.gain_db); }},
+                    of_driver);
+}
+
+std::string CameraOptions::format() const {
+  return std::visit(Overloaded{[](const FileCameraOptions&) { return std::string(); },
+                               [](const V4l2CameraOptions& options) { return options.format; },
+                               [](const AravisCameraOptions& options) { return options.pixel_format; }},
+                    of_driver);
+}
+
+Result<> CameraOptions::validate() const {
+  if (name().empty() || name().size() > 64) return fail(ErrorCode::kInvalidArgument, "name must have 1 to 64 letters");
+  const auto* const file = std::get_if<FileCameraOptions>(&of_driver);
+  if (file != nullptr && file->path.empty()) {
+    return fail(ErrorCode::kInvalidArgument, "path must name an image or a folder of images for the driver \"file\"");
+  }
+  return std::visit([](const auto& options) { return options.validate(); }, of_driver);
+}
+
+std::string_view to_string(ProjectorDriver driver) {
+  return driver == ProjectorDriver::kHeadless ? "headless" : "glfw";
+}
+
+Result<> ProjectorOptions::validate() const {
+  if (auto valid = in_range("width_px", width_px, 640, 3840); !valid) return valid;
+  if (auto valid = in_range("height_px", height_px, 360, 2160); !valid) return valid;
+  if (auto valid = light.validate(); !valid) return valid;
+  if (auto valid = in_range("idle_after_ms", idle_after_ms, 0, 3'600'000); !valid) return valid;
+  if (refresh_hz == 0 || (refresh_hz >= 10 && refresh_hz <= 1000)) return {};
+  return fail(ErrorCode::kInvalidArgument, "refresh_hz must be 10 to 1000, or 0 for a projector that lights steadily");
+}
+
+Result<> ScanOptions::validate() const {
+  if (auto valid = in_range("timeout_ms", timeout_ms, 1, kMaxTimeoutMs); !valid) return valid;
+  if (auto valid = in_range("exposure_skew_ms", exposure_skew_ms, 0, 10'000); !valid) return valid;
+  if (auto valid = in_range("reopen_first_ms", reopen_first_ms, 1, 60'000); !valid) return valid;
+  if (auto valid = in_range("reopen_longest_ms", reopen_longest_ms, reopen_first_ms, 600'000); !valid) return valid;
+  if (!(projector_latency_ms >= 0 && projector_latency_ms <= 1000)) {
+    return fail(ErrorCode::kInvalidArgument, "projector_latency_ms must be 0 to 1000");
+  }
+  if (power_line_hz == 0 || power_line_hz == 50 || power_line_hz == 60) return {};
+  return fail(ErrorCode::kInvalidArgument, "power_line_hz must be 50, 60, or 0 where no lamps are near");
+}
+
+Result<> ServerOptions::validate() const {
+  const std::size_t length = socket.string().size();
+  if (length == 0 || length > kMaxSocketPath) {
+    return fail(ErrorCode::kInvalidArgument, "socket must be a path of 1 to " + std::to_string(kMaxSocketPath) +
+                                                 " bytes, not " + std::to_string(length) + ": choose a shorter one");
+  }
+  if (auto valid = in_range("socket_mode", socket_mode, 0, 0777); !valid) return valid;
+  if (auto valid = in_range("clients_max", clients_max, 1, 10'000); !valid) return valid;
+  if (auto valid = in_range("request_bytes_max", request_bytes_max, 1024, 16 * 1024 * 1024); !valid) return valid;
+  return in_range("send_timeout_ms", send_timeout_ms, 100, 600'000);
+}
+
+}  // namespace slsd
