@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include <algorithm>
-#include <functional>
-#include <map>
+#include <array>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 
 #include "daemon/client/client_commands.hpp"
 #include "daemon/client/client_options.hpp"
-#include "daemon/client/exposure_command.hpp"
-#include "daemon/client/project_command.hpp"
-#include "daemon/client/record_command.hpp"
-#include "daemon/scan/projected_picture.hpp"
 
 namespace {
 
@@ -67,8 +63,8 @@ void add_record(CLI::App& app, ClientOptions& options) {
 
 const CLI::Validator kPicture(
     [](const std::string& picture) {
-      const bool named =
-          picture != "image" && std::ranges::find(slsd::kProjectedPictures, picture) != slsd::kProjectedPictures.end();
+      constexpr std::array<std::string_view, 6> kNames{"pattern", "idle", "white", "black", "focus", "grid"};
+      const bool named = std::ranges::find(kNames, picture) != kNames.end();
       return named || std::filesystem::path(picture).extension() == ".png" ? ""
                                                                            : "no such picture; a file ends in .png";
     },

@@ -15,9 +15,8 @@
 #include "daemon/calibrate/session.hpp"
 #include "daemon/calibrate/verify_from_files.hpp"
 #include "daemon/calibrate/verify_live.hpp"
-#include "daemon/service/commands.hpp"
+#include "daemon/commands/commands.hpp"
 #include "daemon/service/logging.hpp"
-#include "daemon/service/print_board.hpp"
 #include "daemon/service/service.hpp"
 
 namespace {

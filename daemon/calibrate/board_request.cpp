@@ -6,7 +6,7 @@
 #include <iostream>
 #include <optional>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 namespace slsd {
 namespace {

@@ -6,7 +6,7 @@
 #include <iostream>
 #include <set>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 #include "daemon/calibrate/board_request.hpp"
 #include "daemon/calibrate/captured_pattern.hpp"

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include "daemon/calibrate/finish_calibration.hpp"
+#include "core/utc_text.hpp"
 
 #include <algorithm>
 #include <iostream>
 #include <utility>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 #include "daemon/calibrate/keep_calibration.hpp"
 #include "daemon/calibrate/outcome_text.hpp"
 #include "daemon/calibrate/report_html.hpp"
-#include "daemon/service/utc_now.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd {
@@ -77,7 +77,7 @@ Result<> finish_calibration(const CalibrateRequest& request, const path& file, c
   outcome.poses.insert(outcome.poses.end(), refused.begin(), refused.end());
   std::ranges::sort(outcome.poses, {}, [](const PoseReport& pose) { return std::pair(pose.subject, pose.name); });
   outcome.calibration.report.board = to_string(board);
-  outcome.calibration.report.date = utc_now();
+  outcome.calibration.report.date = utc_text(std::chrono::system_clock::now());
   std::cout << outcome_text(outcome) << std::flush;
   if (request.output.empty()) {
     if (auto gain = check_gain(outcome, file); !gain) return gain;

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 #include "core/geometry/triangulate.hpp"
 #include "daemon/scan/hardware.hpp"

@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 #include "daemon/calibrate/outcome_text.hpp"
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 namespace slsd {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <system_error>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 #include "daemon/calibrate/capture_folder.hpp"
 #include "drivers/files/encode_png.hpp"

@@ -4,7 +4,7 @@
 
 #include <numeric>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 #include "daemon/calibrate/coverage_text.hpp"
 #include "daemon/calibrate/look_text.hpp"

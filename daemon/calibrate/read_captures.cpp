@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 #include "daemon/calibrate/captured_pictures.hpp"
 #include "drivers/files/read_image.hpp"

@@ -8,7 +8,7 @@
 #include <iterator>
 #include <optional>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 #include "core/calibrate/gray_code.hpp"
 #include "daemon/calibrate/board_request.hpp"
@@ -16,8 +16,8 @@
 #include "daemon/calibrate/finish_calibration.hpp"
 #include "daemon/calibrate/pose_session.hpp"
 #include "daemon/calibrate/session_record.hpp"
-#include "daemon/client/interrupt.hpp"
 #include "daemon/scan/hardware.hpp"
+#include "drivers/system/interrupt.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include "daemon/calibrate/session_record.hpp"
+#include "core/utc_text.hpp"
 
 #include <string>
 #include <system_error>
@@ -8,7 +9,6 @@
 #include "daemon/calibrate/capture_folder.hpp"
 #include "daemon/calibrate/captured_pattern.hpp"
 #include "daemon/scan/scan_setup.hpp"
-#include "daemon/service/utc_now.hpp"
 
 namespace slsd {
 
@@ -16,7 +16,7 @@ using std::filesystem::path;
 
 path record_folder(const CalibrateRequest& request, const path& file) {
   if (!request.record.empty()) return request.record;
-  std::string time = utc_now();
+  std::string time = utc_text(std::chrono::system_clock::now());
   std::erase_if(time, [](char letter) { return letter == '-' || letter == ':'; });
   return file.parent_path() / ("calibration-" + time);
 }

@@ -4,7 +4,7 @@
 
 #include <iostream>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 #include "core/calibrate/observe_plane.hpp"
 #include "daemon/calibrate/board_request.hpp"

@@ -9,6 +9,7 @@
 #include "core/picture/render_cloud.hpp"
 #include "daemon/client/connection.hpp"
 #include "daemon/client/report.hpp"
+#include "daemon/rpc/base64.hpp"
 #include "daemon/rpc/message.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/files/file.hpp"
@@ -18,6 +19,8 @@ namespace {
 
 using nlohmann::json;
 using std::filesystem::path;
+
+constexpr std::size_t kMaxImageBytes = 64 << 20;
 
 // A file that cannot be written is a failed request, and never a daemon that is not there.
 tl::expected<void, Failure> write(const path& file, std::string_view bytes) {
@@ -118,6 +121,20 @@ int image_command(const ClientOptions& options, const std::string& method) {
   if (auto written = write(options.image, answered->reply.bytes); !written) return report(options, written.error());
   const json& result = answered->reply.message["result"];
   if (options.json) std::cout << to_line(result);
+  return kDone;
+}
+
+int project_command(const ClientOptions& options) {
+  json params{{"picture", options.picture.string()}};
+  if (options.picture.extension() == ".png") {
+    const auto image = read_file(options.picture, kMaxImageBytes);
+    if (!image) return report(options, Failure{kRequestFailed, rpc_error(image.error())});
+    params = {{"picture", "image"}, {"png", to_base64(*image)}};
+  }
+  if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;
+  const auto answered = ask(options, "project", std::move(params));
+  if (!answered) return report(options, answered.error());
+  if (options.json) std::cout << to_line(answered->reply.message["result"]);
   return kDone;
 }
 

@@ -16,4 +16,12 @@ namespace slsd {
 /// Asks for an image and writes it. @param method  "preview", "frame" or "pattern"
 [[nodiscard]] int image_command(const ClientOptions& options, const std::string& method);
 
+/// Has the projector show a picture, by its name or from a file.
+[[nodiscard]] int project_command(const ClientOptions& options);
+/// Looks at two frames of a camera while the pattern is shown, and proposes exposure and gain.
+[[nodiscard]] int exposure_command(const ClientOptions& options);
+/// Scans on and on, each while the frames of the one before are written, until as many as asked for are
+/// there, the time is over, or an interrupt comes.
+[[nodiscard]] int record_command(const ClientOptions& options);
+
 }  // namespace slsd

@@ -10,7 +10,6 @@
 #include <cerrno>
 #include <cstring>
 
-#include "daemon/configuration/server_options.hpp"
 #include "daemon/rpc/message.hpp"
 
 namespace slsd {
@@ -41,15 +40,31 @@ std::size_t bytes_after(const nlohmann::json& message) {
   return 0;
 }
 
+template <class T>
+Result<GreyView> view_of(const std::string& bytes, int width_px, int height_px) {
+  const std::size_t pixels = static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
+  if (width_px <= 0 || height_px <= 0 || bytes.size() != pixels * sizeof(T)) {
+    return fail(ErrorCode::kMalformed, "the daemon's frame has not as many bytes as its size asks for");
+  }
+  return ImageView<T>{reinterpret_cast<const T*>(bytes.data()), width_px, height_px, width_px};
+}
+
 }  // namespace
 
+Result<GreyView> Received::image(const nlohmann::json& about) const {
+  const int width_px = about.value("width_px", 0);
+  const int height_px = about.value("height_px", 0);
+  if (about.value("bits", 8) == 16) return view_of<std::uint16_t>(bytes, width_px, height_px);
+  return view_of<std::uint8_t>(bytes, width_px, height_px);
+}
+
 Result<Connection> Connection::open(const std::filesystem::path& path) {
-  if (path.string().size() > kMaxSocketPath) {
-    return fail(ErrorCode::kInvalidArgument, "a socket's path has at most 107 bytes", path.string());
-  }
   FileDescriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
   if (!socket) return no_connection(errno, path);
   sockaddr_un address{};
+  if (path.string().size() >= sizeof address.sun_path) {
+    return fail(ErrorCode::kInvalidArgument, "a socket's path has at most 107 bytes", path.string());
+  }
   address.sun_family = AF_UNIX;
   std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
   if (::connect(socket.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {

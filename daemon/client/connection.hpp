@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/image.hpp"
 #include "core/result.hpp"
 #include "drivers/system/file_descriptor.hpp"
 
@@ -18,6 +19,11 @@ namespace slsd {
 struct Received {
   nlohmann::json message;
   std::string bytes;
+
+  /// The bytes as raw pixels, 8 or 16 bits; it lives as long as they do.
+  /// @param about  the message's part that describes them: `width_px`, `height_px`, `bits`
+  /// @errors kMalformed: not as many bytes as that asks for
+  [[nodiscard]] Result<GreyView> image(const nlohmann::json& about) const;
 };
 
 /// A reply, and the events that came before it.

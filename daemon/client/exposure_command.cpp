@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/client/exposure_command.hpp"
-
 #include <iostream>
 #include <optional>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 #include "core/exposure/exposure_advice.hpp"
-#include "daemon/client/received_image.hpp"
+#include "daemon/client/client_commands.hpp"
+#include "daemon/client/connection.hpp"
 #include "daemon/client/report.hpp"
 #include "daemon/rpc/message.hpp"
 
@@ -63,8 +62,8 @@ tl::expected<Look, Failure> look(const ClientOptions& options) {
   if (!first) return tl::unexpected(first.error());
   const auto second = ask_for_frame(*connection, options);
   if (!second) return tl::unexpected(second.error());
-  const auto frame = image_of(first->reply.message["result"], first->reply);
-  const auto next = image_of(second->reply.message["result"], second->reply);
+  const auto frame = first->reply.image(first->reply.message["result"]);
+  const auto next = second->reply.image(second->reply.message["result"]);
   if (!frame || !next) return tl::unexpected(failure((frame ? next : frame).error()));
   const json& told = settings->reply.message["result"];
   Look look;

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/client/record_command.hpp"
-
 #include <unistd.h>
 
 #include <array>
@@ -9,12 +7,13 @@
 #include <iostream>
 #include <optional>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
-#include "daemon/client/interrupt.hpp"
+#include "daemon/client/client_commands.hpp"
 #include "daemon/client/recording.hpp"
 #include "daemon/client/report.hpp"
 #include "daemon/rpc/message.hpp"
+#include "drivers/system/interrupt.hpp"
 
 namespace slsd {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <iostream>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 #include "daemon/rpc/message.hpp"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "daemon/configuration/nearest_name.hpp"
+#include "core/nearest_name.hpp"
 
 namespace slsd {
 namespace {

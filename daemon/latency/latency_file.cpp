@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "daemon/configuration/table_reader.hpp"

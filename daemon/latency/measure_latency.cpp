@@ -3,11 +3,14 @@
 #include "daemon/latency/measure_latency.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <optional>
 #include <random>
+#include <variant>
 #include <vector>
 
-#include "daemon/latency/flash_pixels.hpp"
+#include "core/image.hpp"
 
 namespace slsd {
 namespace {
@@ -17,6 +20,92 @@ using std::chrono::nanoseconds;
 
 constexpr double kWhole = 0.9;  // lamps and a DLP's flashes let whole ones differ by some percent
 constexpr int kLostMax = 5;
+
+constexpr int kSamplesAcross = 200;
+constexpr double kBrightest = 0.99;
+constexpr double kChosen = 0.5;    // of the flash's own brightest
+constexpr double kAboveNoise = 4;  // times the brightest difference of two dark frames
+constexpr double kClipped = 0.985;
+
+double brightest_difference(const std::vector<double>& from, const std::vector<double>& to) {
+  std::vector<double> differences(from.size());
+  std::ranges::transform(to, from, differences.begin(), [](double b, double a) { return b - a; });
+  const auto nth = differences.begin() + static_cast<std::ptrdiff_t>(kBrightest * static_cast<double>(from.size() - 1));
+  std::nth_element(differences.begin(), nth, differences.end());
+  return *nth;
+}
+
+/// The pixels of a camera that see the projector turn from black to white, and how bright both look there.
+class FlashPixels {
+ public:
+  /// Some of a frame's pixels, always the same ones: few enough to cost little, and a copy, so that the frame can go
+  /// back to its driver.
+  using Samples = std::vector<double>;
+  [[nodiscard]] static Samples sample(const GreyView& frame);
+
+  /// @param dark, dark_again  of two frames of black: what differs between them is noise, or somebody walking by
+  /// @param lit               of a frame of white
+  /// @errors kNotFound: no flash is seen; kMismatch: frames of different sizes
+  [[nodiscard]] static Result<FlashPixels> find(const Samples& dark, const Samples& dark_again, const Samples& lit);
+
+  /// How much of the white is there. @param frame  of the same size @return about 0 for black, 1 for white
+  [[nodiscard]] double share_of_white(const Samples& frame) const;
+
+  /// Most of the pixels are saturated: a part of the white is enough for all of it, and an onset looks early.
+  [[nodiscard]] bool clipped() const { return clipped_; }
+
+ private:
+  std::vector<std::size_t> chosen_;  ///< indices in the samples of a frame
+  double dark_ = 0;                  ///< sum over them
+  double lit_ = 0;
+  bool clipped_ = false;
+};
+
+FlashPixels::Samples FlashPixels::sample(const GreyView& frame) {
+  Samples samples;
+  std::visit(
+      [&](const auto& image) {
+        const int step = std::max(1, image.width / kSamplesAcross);
+        for (int y = 0; y < image.height; y += step) {
+          for (int x = 0; x < image.width; x += step) samples.push_back(image.at(x, y));
+        }
+      },
+      frame);
+  return samples;
+}
+
+Result<FlashPixels> FlashPixels::find(const Samples& dark, const Samples& dark_again, const Samples& lit) {
+  if (dark.empty() || dark.size() != lit.size() || dark.size() != dark_again.size()) {
+    return fail(ErrorCode::kMismatch, "the camera's frames are not all of the same size: set its size");
+  }
+  const double flash = brightest_difference(dark, lit);
+  const double noise = std::abs(brightest_difference(dark, dark_again));
+  if (flash < kAboveNoise * noise + 1) {
+    return fail(ErrorCode::kNotFound,
+                "no flash is seen: point the camera at what the projector lights, take the caps off, darken the room, "
+                "and allow a longer exposure");
+  }
+  FlashPixels pixels;
+  const double highest = *std::ranges::max_element(lit);
+  std::size_t saturated = 0;
+  for (std::size_t i = 0; i < dark.size(); ++i) {
+    if (lit[i] - dark[i] < kChosen * flash) continue;
+    pixels.chosen_.push_back(i);
+    pixels.dark_ += dark[i];
+    pixels.lit_ += lit[i];
+    saturated += lit[i] >= kClipped * highest ? 1 : 0;
+  }
+  // The highest level of 8, 10, 12 or 16 bits, and of nothing in between.
+  const bool at_end = highest >= 255 && std::fmod(std::log2(highest + 1), 1.0) == 0;
+  pixels.clipped_ = at_end && 2 * saturated > pixels.chosen_.size();
+  return pixels;
+}
+
+double FlashPixels::share_of_white(const Samples& frame) const {
+  double sum = 0;
+  for (const std::size_t i : chosen_) sum += i < frame.size() ? frame[i] : 0;
+  return (sum - dark_) / (lit_ - dark_);
+}
 
 bool only_this_frame(ErrorCode code) {
   return code == ErrorCode::kFrameDropped || code == ErrorCode::kFrameTorn || code == ErrorCode::kFrameStale ||

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "daemon/configuration/nearest_name.hpp"
+#include "core/nearest_name.hpp"
 
 namespace slsd {
 

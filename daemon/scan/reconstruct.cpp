@@ -3,12 +3,12 @@
 #include "daemon/scan/reconstruct.hpp"
 
 #include <algorithm>
-#include <ctime>
 #include <span>
 #include <utility>
 
 #include "core/cloud/shade_points.hpp"
 #include "core/exposure/light_levels.hpp"
+#include "core/utc_text.hpp"
 #include "daemon/scan/frame_image.hpp"
 #include "daemon/scan/stray_symbols.hpp"
 
@@ -18,16 +18,7 @@ namespace {
 using std::chrono::steady_clock;
 
 std::string utc_time(MonotonicTime time) {
-  const auto when = std::chrono::system_clock::now() - (steady_clock::now() - time);
-  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(when.time_since_epoch()).count();
-  const std::time_t seconds = ms / 1000;
-  std::tm parts{};
-  gmtime_r(&seconds, &parts);
-  char text[40];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &parts);
-  char fraction[8];
-  std::snprintf(fraction, sizeof fraction, ".%03dZ", static_cast<int>(ms % 1000));
-  return std::string(text) + fraction;
+  return utc_text_ms(std::chrono::system_clock::now() - (steady_clock::now() - time));
 }
 
 void append(const Decoding& decoding, ScanResult& result) {

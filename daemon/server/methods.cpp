@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "daemon/configuration/nearest_name.hpp"
+#include "core/nearest_name.hpp"
 #include "daemon/rpc/param_reader.hpp"
 #include "daemon/server/project_method.hpp"
 #include "daemon/server/scan_methods.hpp"

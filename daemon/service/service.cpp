@@ -9,10 +9,10 @@
 #include <spdlog/spdlog.h>
 #include <asio/post.hpp>
 
+#include "daemon/configuration/exposure_warnings.hpp"
 #include "daemon/scan/devices.hpp"
 #include "daemon/scan/projected_picture.hpp"
 #include "daemon/scan/thread_name.hpp"
-#include "daemon/service/exposure_warnings.hpp"
 
 namespace slsd {
 namespace {

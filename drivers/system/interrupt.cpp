@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/client/interrupt.hpp"
+#include "drivers/system/interrupt.hpp"
 
 #include <csignal>
 #include <initializer_list>

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "core/result.hpp"
 
@@ -30,5 +31,19 @@ namespace slsd {
 /// Looks at everything that a scan needs and prints each finding with what to do about it.
 /// @return whether a scan is possible
 [[nodiscard]] bool check_everything(const std::optional<std::filesystem::path>& configuration_file);
+
+/// What --print-board is to write.
+struct PrintRequest {
+  std::filesystem::path file;  ///< .pdf, .svg or .png
+  std::string board;           ///< as parse_board() reads it; empty: that which fills the paper
+  std::string paper = "A4";    ///< as parse_paper() reads it
+  double dpi = 300;            ///< of a PNG, 20 to 2400
+};
+
+/// Writes a board for calibrating, to be printed to true scale.
+/// @errors of the board, the paper and the file; kImpossible where the board does not fit, kInvalidArgument of another
+///         kind of file
+/// @thread reentrant
+[[nodiscard]] Result<> print_board(const PrintRequest& request);
 
 }  // namespace slsd

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/service/camera_list.hpp"
+#include "daemon/commands/device_list.hpp"
 
 #include <algorithm>
 #include <filesystem>
+#include <iostream>
 #include <sstream>
 #include <utility>
+
+#include "daemon/commands/commands.hpp"
+#include "drivers/projector/x11/choose_output.hpp"
 
 namespace slsd {
 namespace {
@@ -162,6 +166,49 @@ std::string CameraList::similar_to(const CameraOptions& absent) const {
     if (camera.driver == absent.driver()) similar += (similar.empty() ? "" : ", ") + camera.name;
   return similar.empty() ? "no other camera of this driver is seen; slsd --list says where was looked"
                          : "of this driver are seen: " + similar;
+}
+
+std::string MonitorList::text() const {
+  if (!outputs_) return "no monitor: " + outputs_.error().message + "\n";
+  if (outputs_->empty()) return "no monitor is plugged in and lit\n";
+  std::string text;
+  for (const RandrOutput& output : *outputs_) text += "monitor " + describe_output(output) + "\n";
+  return text;
+}
+
+nlohmann::json MonitorList::json() const {
+  nlohmann::json monitors = nlohmann::json::array();
+  if (!outputs_) return monitors;
+  for (const RandrOutput& output : *outputs_) {
+    monitors.push_back({{"name", output.name},
+                        {"model", output.model},
+                        {"serial", output.serial},
+                        {"x_px", output.area.x_px},
+                        {"y_px", output.area.y_px},
+                        {"width_px", output.area.width_px},
+                        {"height_px", output.area.height_px},
+                        {"refresh_hz", output.refresh_hz},
+                        {"primary", output.primary}});
+  }
+  return monitors;
+}
+
+Result<> list_devices(const std::optional<std::filesystem::path>& configuration_file, bool as_json) {
+  const auto configuration = load_configuration_or_defaults(configuration_file);
+  if (!configuration) return tl::unexpected(configuration.error());
+  const CameraList cameras = CameraList::look(*configuration);
+  const MonitorList monitors = MonitorList::look();
+  if (as_json) {
+    nlohmann::json devices = cameras.json();
+    devices["monitors"] = monitors.json();
+    std::cout << devices.dump(2) << "\n";
+    return {};
+  }
+  const ProjectorOptions& projector = configuration->projector;
+  std::cout << "projector: driver " << to_string(projector.driver) << ", " << projector.width_px << "x"
+            << projector.height_px << " px\n"
+            << monitors.text() << cameras.text();
+  return {};
 }
 
 }  // namespace slsd

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/service/camera_list.hpp"
+#include "daemon/commands/device_list.hpp"
 
 #include <gmock/gmock.h>
 

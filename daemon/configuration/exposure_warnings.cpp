@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/service/exposure_warnings.hpp"
+#include "daemon/configuration/exposure_warnings.hpp"
 
 #include <optional>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
 #include "core/exposure/light_periods.hpp"
 

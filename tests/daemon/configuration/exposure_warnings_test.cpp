@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/service/exposure_warnings.hpp"
+#include "daemon/configuration/exposure_warnings.hpp"
 
 #include <gmock/gmock.h>
 

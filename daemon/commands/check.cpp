@@ -3,15 +3,15 @@
 #include <iostream>
 
 #include "core/image_size.hpp"
+#include "daemon/commands/commands.hpp"
+#include "daemon/commands/device_list.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/configuration/exposure_warnings.hpp"
 #include "daemon/latency/latency_file.hpp"
 #include "daemon/scan/devices.hpp"
 #include "daemon/scan/hardware.hpp"
 #include "daemon/scan/scan_setup.hpp"
 #include "daemon/server/listening_socket.hpp"
-#include "daemon/service/camera_list.hpp"
-#include "daemon/service/commands.hpp"
-#include "daemon/service/exposure_warnings.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/projector/x11/choose_output.hpp"
 #include "drivers/projector/x11/monitor_report.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/client/replay_configuration.hpp"
+#include "daemon/client/recording.hpp"
 
 #include <set>
 #include <string>

@@ -3,14 +3,14 @@
 #include <chrono>
 #include <iostream>
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/format.h>
 
+#include "core/utc_text.hpp"
+#include "daemon/commands/commands.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/latency/latency_file.hpp"
 #include "daemon/latency/measure_latency.hpp"
 #include "daemon/scan/devices.hpp"
-#include "daemon/service/commands.hpp"
-#include "daemon/service/utc_now.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd {
@@ -37,7 +37,8 @@ Result<LatencyReport> measure(const Configuration& configuration, const LatencyO
   if (!projector) return tl::unexpected(projector.error());
   if (auto opened = (*projector)->open(); !opened) return tl::unexpected(opened.error());
   const ProjectorDescription& description = (*projector)->description();
-  LatencyReport report{utc_now(), projector_name(description.driver, description.monitor), {}};
+  LatencyReport report{
+      utc_text(std::chrono::system_clock::now()), projector_name(description.driver, description.monitor), {}};
   for (const CameraOptions& camera_options : configuration.cameras) {
     auto camera = make_camera(camera_options);
     if (!camera) return tl::unexpected(camera.error());

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "daemon/configuration/configuration.hpp"
 #include "drivers/camera/listing/list_cameras.hpp"
+#include "drivers/projector/x11/randr_output.hpp"
 
 namespace slsd {
 
@@ -37,5 +39,21 @@ class CameraList {
 
 /// Whether this is the camera that the options name.
 [[nodiscard]] bool names(const CameraOptions& options, const ListedCamera& camera);
+
+/// The monitors of the X server that DISPLAY names.
+/// @thread reentrant
+class MonitorList {
+ public:
+  [[nodiscard]] static MonitorList look() { return MonitorList(list_outputs()); }
+  explicit MonitorList(Result<std::vector<RandrOutput>> outputs) : outputs_(std::move(outputs)) {}
+
+  /// For people: a line to a monitor; where there is none, why.
+  [[nodiscard]] std::string text() const;
+  /// An array of monitors, as slsd(8) says.
+  [[nodiscard]] nlohmann::json json() const;
+
+ private:
+  Result<std::vector<RandrOutput>> outputs_;
+};
 
 }  // namespace slsd
