@@ -27,7 +27,7 @@ void add_timeout(CLI::App* command, ClientOptions& options) {
 
 void add_scan(CLI::App& app, ClientOptions& options) {
   CLI::App* scan = app.add_subcommand("scan", "trigger one scan, wait, write the cloud");
-  scan->add_option("-o,--output", options.output, "write the cloud, as PLY or PCD")->check(kCloudFile);
+  scan->add_option("-o,--output,CLOUD", options.output, "write the cloud, as PLY or PCD")->check(kCloudFile);
   scan->add_option("--picture", options.picture, "write the frame with what was decoded, as a PNG");
   scan->add_option("--cloud-picture", options.cloud_picture, "write a picture of the cloud, as a PNG");
   scan->add_flag("--texture", options.texture, "also light the scene in white: intensities are those of the points");
@@ -80,7 +80,7 @@ void add_project(CLI::App& app, ClientOptions& options) {
 
 void add_image(CLI::App& app, ClientOptions& options, const std::string& name, const std::string& what) {
   CLI::App* command = app.add_subcommand(name, what);
-  command->add_option("FILE", options.image, "the PNG to write")->required();
+  command->add_option("-o,--output,FILE", options.image, "the PNG to write")->required();
   if (name != "pattern") add_timeout(command, options);
   if (name == "frame") command->add_flag("--as-shown", options.as_shown, "leave what the projector shows");
 }

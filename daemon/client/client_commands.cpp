@@ -7,6 +7,7 @@
 #include "core/cloud/pcd.hpp"
 #include "core/cloud/ply.hpp"
 #include "core/picture/render_cloud.hpp"
+#include "core/printable.hpp"
 #include "daemon/client/connection.hpp"
 #include "daemon/client/report.hpp"
 #include "daemon/rpc/base64.hpp"
@@ -66,7 +67,7 @@ int print_event(const ClientOptions& options, const json& event) {
   } else if (event.value("method", "") == "cloud") {
     std::cout << scan_line(params) << ", " << params.value("lost", 0) << " lost\n" << std::flush;
   } else if (params.contains("error")) {
-    std::cout << "scan failed: " << params["error"].value("message", "") << "\n" << std::flush;
+    std::cout << "scan failed: " << printable(params["error"].value("message", "")) << "\n" << std::flush;
   }
   return event.value("method", "") == "cloud" ? 1 : 0;
 }

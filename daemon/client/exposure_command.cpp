@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "core/exposure/exposure_advice.hpp"
+#include "core/printable.hpp"
 #include "daemon/client/client_commands.hpp"
 #include "daemon/client/connection.hpp"
 #include "daemon/client/report.hpp"
@@ -123,8 +124,9 @@ std::string text_of(const Look& look) {
   std::string text = fmt::format(
       "camera \"{}\": symbols {:.0f} of {:.0f} (brightest {:.0f}, faintest {:.0f}), between them {:.0f}, noise {:.1f}\n"
       "pattern on {:.0f} % of the frame, clipped on {:.0f} % of that; edges {:.1f} px wide, every {:.0f} px\n",
-      look.camera.value("name", ""), levels.lit, levels.full, levels.lit_brightest, levels.lit_faintest, levels.dark,
-      look.change.noise, 100 * levels.patterned_share, 100 * levels.clipped_share, levels.edge_px, levels.period_px);
+      printable(look.camera.value("name", "")), levels.lit, levels.full, levels.lit_brightest, levels.lit_faintest,
+      levels.dark, look.change.noise, 100 * levels.patterned_share, 100 * levels.clipped_share, levels.edge_px,
+      levels.period_px);
   text += proposal(look);
   for (const Trouble trouble : look.advice.troubles)
     text += fmt::format("{}: {}\n", to_string(trouble), remedy(trouble));

@@ -6,12 +6,20 @@
 
 #include <fmt/format.h>
 
+#include "core/printable.hpp"
 #include "daemon/rpc/message.hpp"
 
 namespace slsd {
 namespace {
 
 using nlohmann::json;
+
+constexpr std::size_t kLongestText = 1000;
+
+/// A text of the daemon's, as a terminal may show it: much of what it tells came from clients, devices and files.
+std::string text_of(const json& about, const char* key) {
+  return printable(about.value(key, ""), kLongestText);
+}
 
 Failure daemon_failure(const json& error) {
   RpcError told{error.value("code", 0), "error", error.value("message", "the daemon gave no reason"), {}};
@@ -30,15 +38,15 @@ std::string drift_line(const json& camera) {
 }
 
 std::string device_line(const json& device) {
-  std::string line = fmt::format("{:<12}{}, {} {}, {}x{} px", device.value("name", ""), device.value("state", ""),
-                                 device.value("driver", ""), device.value("device", ""), device.value("width_px", 0),
+  std::string line = fmt::format("{:<12}{}, {} {}, {}x{} px", text_of(device, "name"), text_of(device, "state"),
+                                 text_of(device, "driver"), text_of(device, "device"), device.value("width_px", 0),
                                  device.value("height_px", 0));
-  if (const std::string shows = device.value("shows", ""); !shows.empty()) line += ", shows " + shows;
+  if (const std::string shows = text_of(device, "shows"); !shows.empty()) line += ", shows " + shows;
   if (device.contains("frames")) {
     line += fmt::format(", {} frames, {} lost", device.value("frames", std::uint64_t{0}),
                         device.value("frames_lost", std::uint64_t{0}));
   }
-  const std::string problem = device.value("problem", "");
+  const std::string problem = text_of(device, "problem");
   return line + (problem.empty() ? "\n" : "\n            " + problem + "\n") + drift_line(device);
 }
 
@@ -46,12 +54,12 @@ std::string scans_lines(const json& scans) {
   std::string text = fmt::format("scans       {} succeeded", scans.value("succeeded", std::uint64_t{0}));
   const json failed = scans.value("failed", json::object());
   for (const auto& [name, count] : failed.items()) {
-    text += fmt::format(", {} {}", count.get<std::uint64_t>(), name);
+    text += fmt::format(", {} {}", count.get<std::uint64_t>(), printable(name));
   }
   if (const auto skipped = scans.value("skipped", std::uint64_t{0})) text += fmt::format(", {} skipped", skipped);
   text += '\n';
   if (scans.contains("last_error") && scans["last_error"].is_object()) {
-    text += "last error  " + scans["last_error"].value("message", "") + "\n";
+    text += "last error  " + text_of(scans["last_error"], "message") + "\n";
   }
   return text;
 }
@@ -68,7 +76,7 @@ std::string times_table(const json& scans) {
   text += duration_line("latency", scans.value("latency_ms", json::object()));
   const json stages = scans.value("stages_ms", json::object());
   for (const auto& [stage, duration] : stages.items()) {
-    text += duration_line("  " + stage, duration);
+    text += duration_line("  " + printable(stage), duration);
   }
   return text;
 }
@@ -79,7 +87,7 @@ std::string regions_table(const json& scans) {
   const json all = scans.value("regions", json::object());
   for (const auto& [status, count] : all.items()) {
     if (count == 0) continue;
-    text += fmt::format("  {:<24}{:>9}{:>14}\n", status, last.value(status, 0), count.get<std::uint64_t>());
+    text += fmt::format("  {:<24}{:>9}{:>14}\n", printable(status), last.value(status, 0), count.get<std::uint64_t>());
   }
   return text;
 }
@@ -117,7 +125,7 @@ int report(const ClientOptions& options, const Failure& failure) {
     std::cout << to_line({{"error", failure.error.to_json()}}) << std::flush;
   } else {
     const std::string where = failure.error.where.empty() ? "" : failure.error.where + ": ";
-    std::cerr << "slsctl: " << where << failure.error.message << "\n";
+    std::cerr << "slsctl: " << printable(where + failure.error.message, kLongestText) << "\n";
   }
   return failure.exit_status;
 }
@@ -125,11 +133,14 @@ int report(const ClientOptions& options, const Failure& failure) {
 std::string status_table(const json& status) {
   const json scans = status.value("scans", json::object());
   std::string text = fmt::format(
-      "slsd {}   {}, up {:.0f} s, {} client(s), {} subscriber(s), {:.1f} MiB\n", status.value("version", ""),
+      "slsd {}   {}, up {:.0f} s, {} client(s), {} subscriber(s), {:.1f} MiB\n", text_of(status, "version"),
       status.value("ready", false) ? "ready to scan" : "not ready to scan", status.value("uptime_s", 0.0),
       status.value("clients", 0), status.value("subscribers", 0), status.value("resident_bytes", 0.0) / (1024 * 1024));
-  const std::string calibration = status.value("calibration", "");
+  const std::string calibration = text_of(status, "calibration");
   text += "calibration " + (calibration.empty() ? "none" : calibration) + "\n";
+  if (const auto dropped = status.value("log_lines_dropped", std::uint64_t{0})) {
+    text += fmt::format("log         {} lines were dropped, as nobody read them in time\n", dropped);
+  }
   text += device_line(status.value("projector", json::object()));
   for (const json& camera : status.value("cameras", json::array())) text += device_line(camera);
   return text + scans_lines(scans) + times_table(scans) + regions_table(scans);
@@ -141,7 +152,7 @@ std::string scan_line(const json& scan) {
   for (const auto& [status, count] : by_status.items()) regions += count.get<std::uint64_t>();
   std::string line =
       fmt::format("scan {}: {} points of {} regions, capture {:.1f} ms, decode {:.1f} ms, latency {:.1f} ms",
-                  scan.value("scan", ""), scan.value("points", 0), regions, scan.value("capture_ms", 0.0),
+                  text_of(scan, "scan"), scan.value("points", 0), regions, scan.value("capture_ms", 0.0),
                   scan.value("decode_ms", 0.0), scan.value("latency_ms", 0.0));
   if (scan.contains("saturated")) line += fmt::format(", {} saturated", scan.value("saturated", 0));
   return line;

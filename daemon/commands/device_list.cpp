@@ -8,6 +8,7 @@
 #include <sstream>
 #include <utility>
 
+#include "core/printable.hpp"
 #include "daemon/commands/commands.hpp"
 #include "drivers/projector/x11/choose_output.hpp"
 
@@ -36,7 +37,7 @@ std::string size_text(const std::pair<int, int>& size) {
 std::string formats_text(const ListedCamera& camera) {
   std::string text;
   for (const ListedFormat& format : camera.formats) {
-    text += (text.empty() ? "" : "; ") + format.name;
+    text += (text.empty() ? "" : "; ") + printable(format.name);
     for (const auto& size : format.sizes_px) (text += " ") += size_text(size);
   }
   return text;
@@ -44,7 +45,7 @@ std::string formats_text(const ListedCamera& camera) {
 
 std::string place_text(const ListedCamera& camera) {
   std::string text = camera.node.empty() ? camera.address + " through " + camera.interface : camera.node;
-  if (!camera.kernel_driver.empty()) (text += " by ") += camera.kernel_driver;
+  if (!camera.kernel_driver.empty()) (text += " by ") += printable(camera.kernel_driver);
   if (camera.link_mbps) text += ", link of " + std::to_string(*camera.link_mbps) + " Mbit/s";
   return text;
 }
@@ -52,17 +53,18 @@ std::string place_text(const ListedCamera& camera) {
 std::string maker_text(const ListedCamera& camera) {
   std::string text = camera.standard;
   for (const std::string& part : {camera.vendor, camera.model})
-    if (!part.empty()) (text += ", ") += part;
-  if (!camera.serial.empty()) (text += ", serial ") += camera.serial;
+    if (!part.empty()) (text += ", ") += printable(part);
+  if (!camera.serial.empty()) (text += ", serial ") += printable(camera.serial);
   return text;
 }
 
 std::string camera_text(const ListedCamera& camera, const CameraOptions* configured) {
   std::ostringstream text;
-  text << "camera " << camera.name << kIndent << maker_text(camera) << kIndent << "at " << place_text(camera);
+  text << "camera " << printable(camera.name) << kIndent << maker_text(camera) << kIndent << "at "
+       << place_text(camera);
   if (!camera.formats.empty()) text << kIndent << "formats: " << formats_text(camera);
-  if (!camera.user.empty()) text << kIndent << "controlled by " << camera.user;
-  if (!camera.problem.empty()) text << kIndent << "problem: " << camera.problem;
+  if (!camera.user.empty()) text << kIndent << "controlled by " << printable(camera.user);
+  if (!camera.problem.empty()) text << kIndent << "problem: " << printable(camera.problem, 1000);
   if (configured != nullptr) text << kIndent << "configured as \"" << configured->name() << "\"";
   text << "\n";
   return text.str();
@@ -163,7 +165,7 @@ json CameraList::json() const {
 std::string CameraList::similar_to(const CameraOptions& absent) const {
   std::string similar;
   for (const ListedCamera& camera : listing_.cameras)
-    if (camera.driver == absent.driver()) similar += (similar.empty() ? "" : ", ") + camera.name;
+    if (camera.driver == absent.driver()) similar += (similar.empty() ? "" : ", ") + printable(camera.name);
   return similar.empty() ? "no other camera of this driver is seen; slsd --list says where was looked"
                          : "of this driver are seen: " + similar;
 }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 
+#include "core/printable.hpp"
 #include "daemon/configuration/camera_options.hpp"
 #include "daemon/configuration/projector_options.hpp"
 #include "daemon/configuration/scan_options.hpp"
@@ -47,7 +48,9 @@ std::string CameraOptions::format() const {
 }
 
 Result<> CameraOptions::validate() const {
-  if (name().empty() || name().size() > 64) return fail(ErrorCode::kInvalidArgument, "name must have 1 to 64 letters");
+  if (name().empty() || name().size() > 64 || printable(name()) != name()) {
+    return fail(ErrorCode::kInvalidArgument, "name must have 1 to 64 letters, of UTF-8 and no control characters");
+  }
   const auto* const file = std::get_if<FileCameraOptions>(&of_driver);
   if (file != nullptr && file->path.empty()) {
     return fail(ErrorCode::kInvalidArgument, "path must name an image or a folder of images for the driver \"file\"");

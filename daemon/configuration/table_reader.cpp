@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/nearest_name.hpp"
+#include "core/printable.hpp"
 
 namespace slsd {
 namespace {
@@ -189,8 +190,7 @@ std::optional<Error> TableReader::unknown_key() const {
   for (const auto& [key, node] : *table_) {
     if (std::ranges::find(known_, key.str()) != known_.end()) continue;
     const std::string what = name_.empty() ? "no such table or key: " : "no such key in " + name_ + ": ";
-    return Error{ErrorCode::kInvalidArgument,
-                 what + std::string(key.str().substr(0, 64)) + nearest_hint(key.str(), known_),
+    return Error{ErrorCode::kInvalidArgument, what + printable(key.str(), 64) + nearest_hint(key.str(), known_),
                  place_of(key.source(), file_.string())};
   }
   return std::nullopt;
