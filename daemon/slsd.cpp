@@ -2,11 +2,14 @@
 // Copyright the slsd authors
 #include <malloc.h>
 
+#include <algorithm>
+#include <array>
 #include <csignal>
 #include <filesystem>
 #include <iostream>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
@@ -16,6 +19,7 @@
 #include "daemon/calibrate/verify_from_files.hpp"
 #include "daemon/calibrate/verify_live.hpp"
 #include "daemon/commands/commands.hpp"
+#include "daemon/configuration/configuration.hpp"
 #include "daemon/service/logging.hpp"
 #include "daemon/service/service.hpp"
 
@@ -24,18 +28,37 @@ namespace {
 constexpr int kDone = 0;
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
+constexpr int kWrongConfiguration = 78;  // EX_CONFIG; the unit does not start the service again
 constexpr int kOwnPagesBytes = 1 << 20;
+
+/// Whether the same start may succeed later, with nobody having changed anything: when a volume is mounted, or another
+/// daemon ends.
+bool may_pass(slsd::ErrorCode code) {
+  using slsd::ErrorCode;
+  constexpr std::array kLasting{ErrorCode::kInvalidArgument, ErrorCode::kMalformed,   ErrorCode::kMismatch,
+                                ErrorCode::kImpossible,      ErrorCode::kUnsupported, ErrorCode::kPermissionDenied,
+                                ErrorCode::kAlreadyExists};
+  return std::ranges::find(kLasting, code) == kLasting.end();
+}
+
+int not_served(const slsd::Error& error, bool passes) {
+  spdlog::critical("{}{}", to_string(error), passes ? "" : "; not tried again until somebody starts it");
+  return passes ? kFailed : kWrongConfiguration;
+}
 
 int serve(const std::filesystem::path& configuration_file) {
   // Else the first frame's buffer that is freed raises this, and those of cameras that come and go fragment the heap:
   // by 20 % in 240 losses of one.
   ::mallopt(M_MMAP_THRESHOLD, kOwnPagesBytes);
+  std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGHUP, SIG_IGN);  // what a reload would read is about to be read
   spdlog::info("slsd {} starts with {}", SLSD_VERSION, configuration_file.string());
-  auto service = slsd::Service::create(configuration_file);
+  slsd::queue_log();
+  auto configuration = slsd::load_configuration(configuration_file);
+  if (!configuration) return not_served(configuration.error(), configuration.error().code == slsd::ErrorCode::kIo);
+  auto service = slsd::Service::create(std::move(*configuration), configuration_file);
   const auto served = service ? (*service)->run() : slsd::Result<>(tl::unexpected(service.error()));
-  if (!served) spdlog::critical("{}", to_string(served.error()));
-  return served ? kDone : kFailed;
+  return served ? kDone : not_served(served.error(), may_pass(served.error().code));
 }
 
 int report(const slsd::Result<>& result) {
@@ -168,5 +191,7 @@ int main(int argc, char** argv) {
   line.request.configuration_file = line.configuration;
   line.print.board = line.request.board;
   slsd::start_logging(spdlog::level::from_str(line.level));
-  return carry_out(line);
+  const int status = carry_out(line);
+  slsd::flush_log(slsd::kLogPatience);
+  return status;
 }

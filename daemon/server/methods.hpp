@@ -26,6 +26,7 @@ struct ServiceState {
   Configuration configuration;  ///< in force; a reload replaces what it may
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   Server* server = nullptr;
+  std::function<std::uint64_t()> log_lines_dropped = {};
   std::function<void(Respond)> reload = {};  ///< reads the configuration anew, then answers
 };
 

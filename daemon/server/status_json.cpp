@@ -16,7 +16,7 @@ using nlohmann::json;
 json device_json(const DeviceStatus& device) {
   return {{"name", device.name},         {"driver", device.driver},       {"device", device.device},
           {"width_px", device.width_px}, {"height_px", device.height_px}, {"state", to_string(device.state)},
-          {"problem", device.problem},   {"opened", device.opened}};
+          {"problem", device.problem},   {"opened", device.opened},       {"hardware", device.hardware}};
 }
 
 json drift_json(const DriftState& drift) {
@@ -74,6 +74,7 @@ json status_json(const ServiceState& state) {
           {"uptime_s", uptime.count()},
           {"ready", ready && !cameras.empty()},
           {"resident_bytes", resident_bytes()},
+          {"log_lines_dropped", state.log_lines_dropped()},
           {"clients", state.server->clients()},
           {"subscribers", state.server->subscribers()},
           {"configuration", state.configuration_file.string()},

@@ -2,50 +2,200 @@
 // Copyright the slsd authors
 #include "daemon/service/logging.hpp"
 
-#include <cstdlib>
-#include <memory>
+#include <poll.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
-#include <spdlog/pattern_formatter.h>
-#include <spdlog/sinks/stdout_sinks.h>
+#include <cerrno>
+#include <condition_variable>
+#include <cstdlib>
+#include <deque>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <fmt/chrono.h>
+#include <spdlog/sinks/systemd_sink.h>
 #include <spdlog/spdlog.h>
+
+#include "core/printable.hpp"
+#include "daemon/scan/thread_name.hpp"
 
 namespace slsd {
 namespace {
 
-// %*: the level as sd-daemon(3) writes it.
-class JournalLevel final : public spdlog::custom_flag_formatter {
- public:
-  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& out) override {
-    const std::string_view prefix = prefix_of(message.level);
-    out.append(prefix.data(), prefix.data() + prefix.size());
-  }
-  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
-    return std::make_unique<JournalLevel>();
-  }
+using spdlog::details::log_msg;
+using spdlog::level::level_enum;
 
- private:
-  static std::string_view prefix_of(spdlog::level::level_enum level) {
-    if (level >= spdlog::level::critical) return "<2>";
-    if (level == spdlog::level::err) return "<3>";
-    if (level == spdlog::level::warn) return "<4>";
-    return level == spdlog::level::info ? "<6>" : "<7>";
+constexpr const char* kJournalSocket = "/run/systemd/journal/socket";
+
+std::shared_ptr<LogSink> log_sink;  // of this program
+
+/// As sd-daemon(3) writes a level.
+std::string_view journal_prefix(level_enum level) {
+  if (level >= spdlog::level::critical) return "<2>";
+  if (level == spdlog::level::err) return "<3>";
+  if (level == spdlog::level::warn) return "<4>";
+  return level == spdlog::level::info ? "<6>" : "<7>";
+}
+
+std::string time_and_level(const log_msg& message) {
+  const auto time = std::chrono::floor<std::chrono::seconds>(message.time);
+  const auto ms = std::chrono::floor<std::chrono::milliseconds>(message.time - time);
+  const std::tm local = fmt::localtime(std::chrono::system_clock::to_time_t(time));
+  const auto level = spdlog::level::to_string_view(message.level);
+  return fmt::format("{:%F %T}.{:03} {:<7} ", local, ms.count(), std::string_view(level.data(), level.size()));
+}
+
+/// Whether systemd reads standard error, as systemd.exec(5) says of JOURNAL_STREAM: another program's may be inherited.
+bool journal_reads_stderr() {
+  const char* const stream = std::getenv("JOURNAL_STREAM");
+  struct stat status {};
+  if (stream == nullptr || ::fstat(STDERR_FILENO, &status) != 0) return false;
+  return stream == fmt::format("{}:{}", status.st_dev, status.st_ino);
+}
+
+// Not by stdio: its lock would be held while the reader stands still, and whoever else writes there would wait, too.
+void write_stderr(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(STDERR_FILENO, bytes.data(), bytes.size());
+    if (written >= 0) {
+      bytes.remove_prefix(static_cast<std::size_t>(written));
+    } else if (errno == EAGAIN) {  // whoever shares it has made it so
+      pollfd writable{STDERR_FILENO, POLLOUT, 0};
+      ::poll(&writable, 1, -1);
+    } else if (errno != EINTR) {
+      return;
+    }
   }
-};
+}
+
+LogSink::Output standard_error(std::function<std::string(const log_msg&)> prefix) {
+  return {std::move(prefix), [](level_enum, std::string_view line) { write_stderr(std::string(line) + "\n"); }};
+}
+
+LogSink::Output journal() {
+  const auto sink = std::make_shared<spdlog::sinks::systemd_sink_mt>("slsd");
+  return {[](const log_msg&) { return std::string(); },
+          [sink](level_enum level, std::string_view line) {
+            try {
+              sink->log(log_msg("slsd", level, spdlog::string_view_t(line.data(), line.size())));
+            } catch (const spdlog::spdlog_ex&) {
+              write_stderr(fmt::format("{}{}\n", journal_prefix(level), line));  // which the journal reads, too
+            }
+          }};
+}
 
 }  // namespace
 
-void start_logging(spdlog::level::level_enum level) {
-  auto logger = std::make_shared<spdlog::logger>("slsd", std::make_shared<spdlog::sinks::stderr_sink_mt>());
-  auto formatter = std::make_unique<spdlog::pattern_formatter>();
-  if (std::getenv("JOURNAL_STREAM") != nullptr) {
-    formatter->add_flag<JournalLevel>('*').set_pattern("%*%v");
-  } else {
-    formatter->set_pattern("%Y-%m-%d %H:%M:%S.%e %-7l %v");
+struct LogSink::Queue {
+  struct Line {
+    level_enum level;
+    std::string text;
+  };
+  mutable std::mutex mutex;
+  mutable std::condition_variable changed;
+  std::deque<Line> lines;
+  bool queued = false;   // else lines are written by those who log
+  bool writing = false;  // a line that is no longer in the queue
+  bool dropping = false;
+  bool ends = false;
+  std::uint64_t dropped = 0;
+  std::uint64_t told = 0;  // of these
+
+  // One line for all that was dropped, where they are missing.
+  void take_up_again() {
+    const auto missing = std::exchange(told, dropped);
+    dropping = false;
+    lines.push_back({spdlog::level::warn, fmt::format("{} lines of the log were dropped here: nobody read them in time",
+                                                      dropped - missing)});
   }
-  logger->set_formatter(std::move(formatter));
+
+  void write_lines(const Output& output) {
+    std::unique_lock lock(mutex);
+    while (true) {
+      changed.wait(lock, [&] { return !lines.empty() || ends; });
+      if (lines.empty()) return;
+      const Line line = std::move(lines.front());
+      lines.pop_front();
+      if (dropping && lines.size() <= kLogLinesMax / 2) take_up_again();
+      writing = true;
+      lock.unlock();
+      output.write(line.level, line.text);
+      lock.lock();
+      writing = false;
+      changed.notify_all();
+    }
+  }
+};
+
+LogSink::LogSink(Output output) : output_(std::move(output)), queue_(std::make_shared<Queue>()) {}
+
+LogSink::~LogSink() {
+  const std::lock_guard lock(queue_->mutex);
+  queue_->ends = true;
+  queue_->changed.notify_all();
+}
+
+void LogSink::log(const log_msg& message) {
+  std::string line = output_.prefix(message);
+  line += printable({message.payload.data(), message.payload.size()}, kLogLineBytesMax - line.size() - 1);
+  const std::lock_guard lock(queue_->mutex);
+  if (!queue_->queued) return output_.write(message.level, line);
+  if (queue_->lines.size() >= kLogLinesMax) queue_->dropping = true;
+  if (queue_->dropping) {
+    ++queue_->dropped;
+    return;
+  }
+  queue_->lines.push_back({message.level, std::move(line)});
+  queue_->changed.notify_all();
+}
+
+void LogSink::queue_lines() {
+  {
+    const std::lock_guard lock(queue_->mutex);
+    if (std::exchange(queue_->queued, true)) return;
+  }
+  // Left to itself, as a write to a reader that stands still can neither be ended nor waited for.
+  std::thread([queue = queue_, output = output_] {
+    name_this_thread("log");
+    queue->write_lines(output);
+  }).detach();
+}
+
+bool LogSink::wait_written(std::chrono::milliseconds patience) const {
+  std::unique_lock lock(queue_->mutex);
+  return queue_->changed.wait_for(lock, patience, [&] { return queue_->lines.empty() && !queue_->writing; });
+}
+
+std::uint64_t LogSink::dropped() const {
+  const std::lock_guard lock(queue_->mutex);
+  return queue_->dropped;
+}
+
+void start_logging(level_enum level) {
+  const auto output = [] {
+    if (!journal_reads_stderr()) return standard_error(time_and_level);
+    if (::access(kJournalSocket, W_OK) == 0) return journal();
+    return standard_error([](const log_msg& message) { return std::string(journal_prefix(message.level)); });
+  };
+  log_sink = std::make_shared<LogSink>(output());
+  auto logger = std::make_shared<spdlog::logger>("slsd", log_sink);
   logger->set_level(level);
-  logger->flush_on(spdlog::level::debug);
   spdlog::set_default_logger(std::move(logger));
+}
+
+void queue_log() {
+  log_sink->queue_lines();
+}
+
+void flush_log(std::chrono::milliseconds patience) {
+  static_cast<void>(log_sink->wait_written(patience));
+}
+
+std::uint64_t log_lines_dropped() {
+  return log_sink->dropped();
 }
 
 }  // namespace slsd

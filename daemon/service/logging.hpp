@@ -2,14 +2,64 @@
 // Copyright the slsd authors
 #pragma once
 
-#include <string>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string_view>
 
 #include <spdlog/common.h>
+#include <spdlog/sinks/sink.h>
 
 namespace slsd {
 
-/// Sends the log to standard error: with time and level in a terminal, with the journal's own level prefix ("<6>")
-/// where systemd reads it.
+/// The longest line of the log, with its end. What would be longer ends in an ellipsis.
+inline constexpr std::size_t kLogLineBytesMax = 2048;
+/// How long the end of the program waits for whoever reads the log.
+inline constexpr std::chrono::milliseconds kLogPatience{300};
+/// So many lines wait for whoever reads the log; what comes then is dropped and counted, until half of them are read.
+inline constexpr std::size_t kLogLinesMax = 1024;
+
+/// Writes each line of the log so that nothing in it can be taken for another: printable, and at most kLogLineBytesMax.
+/// Writes at once, or, after queue_lines(), through a bounded queue and a thread of its own, so that nobody who logs
+/// waits for whoever reads. spdlog's own queue holds lines whole before they are cut, and its thread cannot be left
+/// behind: at exit it would wait for a reader that stands still.
+/// @thread thread-safe
+class LogSink final : public spdlog::sinks::sink {
+ public:
+  /// How a line begins and where it goes.
+  struct Output {
+    std::function<std::string(const spdlog::details::log_msg&)> prefix;
+    std::function<void(spdlog::level::level_enum, std::string_view line)> write;  ///< may wait for its reader
+  };
+  explicit LogSink(Output output);
+  ~LogSink() override;
+
+  void log(const spdlog::details::log_msg& message) override;
+  void flush() override {}
+  void set_pattern(const std::string&) override {}
+  void set_formatter(std::unique_ptr<spdlog::formatter>) override {}
+
+  /// From now on.
+  void queue_lines();
+  /// Waits until all is written that was logged before, at most so long. @return whether it is
+  [[nodiscard]] bool wait_written(std::chrono::milliseconds patience) const;
+  [[nodiscard]] std::uint64_t dropped() const;
+
+ private:
+  struct Queue;
+  Output output_;
+  std::shared_ptr<Queue> queue_;  // shared with the thread, which may outlive this in a write that does not end
+};
+
+/// Sends the log to the journal where systemd reads standard error, with each line's priority; elsewhere to standard
+/// error, with time and level. At once; a command's log and its output come in the order in which they are told.
 void start_logging(spdlog::level::level_enum level);
+/// From now on no line of the log holds up anybody: for the service.
+void queue_log();
+/// Before the program ends: gives the log's reader so long to take what is left.
+void flush_log(std::chrono::milliseconds patience);
+/// Lines that nobody took in time, since queue_log().
+[[nodiscard]] std::uint64_t log_lines_dropped();
 
 }  // namespace slsd

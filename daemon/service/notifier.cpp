@@ -6,6 +6,10 @@
 
 namespace slsd {
 
+void Notifier::starting(const std::string& status, std::chrono::microseconds time_max) const {
+  sd_notifyf(0, "EXTEND_TIMEOUT_USEC=%lld\nSTATUS=%s", static_cast<long long>(time_max.count()), status.c_str());
+}
+
 void Notifier::ready(const std::string& status) const {
   sd_notifyf(0, "READY=1\nSTATUS=%s", status.c_str());
 }

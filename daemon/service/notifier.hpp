@@ -12,6 +12,8 @@ namespace slsd {
 /// @thread thread-bound
 class Notifier {
  public:
+  /// It is not ready yet, and takes at most so long for what comes next, whatever TimeoutStartSec= says.
+  void starting(const std::string& status, std::chrono::microseconds time_max) const;
   void ready(const std::string& status) const;
   void status(const std::string& status) const;
   void reloading() const;

@@ -12,7 +12,7 @@
 #include "daemon/configuration/exposure_warnings.hpp"
 #include "daemon/scan/devices.hpp"
 #include "daemon/scan/projected_picture.hpp"
-#include "daemon/scan/thread_name.hpp"
+#include "daemon/service/logging.hpp"
 
 namespace slsd {
 namespace {
@@ -21,6 +21,7 @@ using namespace std::chrono_literals;
 
 constexpr auto kStopTime = 700ms;
 constexpr auto kStatusPeriod = 5s;
+constexpr auto kPrepareTime = 5min;  // half a second of computing, on a host that has none to spare
 
 // The default sets are known to be good, and looking takes a while.
 void warn_of_symbols(const PatternOptions& pattern) {
@@ -42,24 +43,26 @@ nlohmann::json tables_that_need_restart(const Configuration& now, const Configur
 
 }  // namespace
 
-Result<std::unique_ptr<Service>> Service::create(const std::filesystem::path& file) {
-  auto configuration = load_configuration(file);
-  if (!configuration) return tl::unexpected(configuration.error());
-  auto projector = make_projector(configuration->projector);
+Result<std::unique_ptr<Service>> Service::create(Configuration configuration, const std::filesystem::path& file) {
+  auto projector = make_projector(configuration.projector);
   if (!projector) return tl::unexpected(projector.error());
   std::vector<std::unique_ptr<Camera>> cameras;
-  for (const CameraOptions& options : configuration->cameras) {
+  for (const CameraOptions& options : configuration.cameras) {
     auto camera = make_camera(options);
     if (!camera) return tl::unexpected(camera.error());
     cameras.push_back(std::move(*camera));
   }
-  auto setup = ScanSetup::create(*configuration, DecodeLanes::lanes_here());
+  Notifier().starting("starting: prepares the decoder", kPrepareTime);
+  auto setup = ScanSetup::create(configuration, DecodeLanes::lanes_here());
   if (!setup) return tl::unexpected(setup.error());
   warn_of_symbols(setup->pattern.options);
-  for (const std::string& warning : exposure_warnings(*configuration)) spdlog::warn("{}", warning);
-  auto rig = std::make_unique<Rig>(std::move(*projector), std::move(cameras), setup->image, configuration->scan);
-  rig->set_idle(draw_idle(configuration->projector), std::chrono::milliseconds(configuration->projector.idle_after_ms));
-  return std::unique_ptr<Service>(new Service(std::move(*configuration), file, std::move(rig), std::move(*setup)));
+  for (const std::string& warning : exposure_warnings(configuration)) spdlog::warn("{}", warning);
+  auto rig = std::make_unique<Rig>(std::move(*projector), std::move(cameras), setup->image, configuration.scan);
+  rig->set_idle(draw_idle(configuration.projector), std::chrono::milliseconds(configuration.projector.idle_after_ms));
+  std::error_code ignored;
+  const auto known_from_anywhere = std::filesystem::absolute(file, ignored);
+  return std::unique_ptr<Service>(
+      new Service(std::move(configuration), known_from_anywhere, std::move(rig), std::move(*setup)));
 }
 
 Service::Service(Configuration configuration, const std::filesystem::path& file, std::unique_ptr<Rig> rig,
@@ -75,6 +78,7 @@ Service::Service(Configuration configuration, const std::filesystem::path& file,
   const auto demand_changed = [this](std::optional<double> rate_hz) { scanner_.run_freely(rate_hz); };
   server_ = std::make_unique<Server>(events_, state_.configuration.server, handler, demand_changed);
   state_.server = server_.get();
+  state_.log_lines_dropped = log_lines_dropped;
   state_.reload = [this](Respond answered) { reload(std::move(answered)); };
   server_->set_delivered(
       [this](const ScanResult& scan) { scanner_.note_latency(std::chrono::steady_clock::now() - scan.received); });
@@ -86,7 +90,6 @@ Service::~Service() {
 }
 
 Result<> Service::run() {
-  std::signal(SIGPIPE, SIG_IGN);
   std::error_code error;
   for (const int number : {SIGTERM, SIGINT, SIGHUP}) signals_.add(number, error);
   if (auto opened = server_->open(); !opened) return opened;
@@ -136,6 +139,7 @@ void Service::stop() {
   if (stopped) return spdlog::info("stopped");
   // A driver or a long computation that cannot be interrupted. Nothing is half written: the service writes no files.
   spdlog::warn("stopped without waiting for a device or a computation");
+  flush_log(kLogPatience);
   std::_Exit(EXIT_SUCCESS);
 }
 

@@ -25,6 +25,7 @@ namespace slsd {
 ///   main     the event loop: socket, signals, watchdog. Never waits for a device, never computes for long.
 ///   scanner  the projector, and each scan's frames: waits for devices.
 ///   cam NAME one to a camera: cameras expose at the same time, and opening one may take seconds.
+///   log      writes the log: whoever reads that may stand still.
 ///   decode N one or two, from frames to clouds and pictures: each uses a processor fully while the next frames come.
 ///
 /// Between them stand the scanner's bounded queue, the lanes' few sets of frames, the server's few newest clouds, and
@@ -33,8 +34,10 @@ namespace slsd {
 class Service {
  public:
   /// Makes everything from the configuration; nothing answers yet.
-  /// @errors of load_configuration(), ScanSetup::create(), make_projector() and make_camera()
-  [[nodiscard]] static Result<std::unique_ptr<Service>> create(const std::filesystem::path& configuration_file);
+  /// @param file  the configuration's, to be read again by a reload
+  /// @errors of ScanSetup::create(), make_projector() and make_camera()
+  [[nodiscard]] static Result<std::unique_ptr<Service>> create(Configuration configuration,
+                                                               const std::filesystem::path& file);
   ~Service();
 
   /// Serves until SIGTERM or SIGINT. @errors of Server::open()

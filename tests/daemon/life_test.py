@@ -87,7 +87,7 @@ class Life(unittest.TestCase):
         service = Service()
         service.socket.write_text("precious", encoding="utf-8")
         result = slsd("--config", service.file)
-        self.assertEqual(result.returncode, 1)
+        self.assertEqual(result.returncode, 78)
         self.assertIn("no socket", result.stderr)
         self.assertEqual(service.socket.read_text(encoding="utf-8"), "precious")
 
@@ -95,7 +95,7 @@ class Life(unittest.TestCase):
         service = Service()
         service.file.write_text('[server]\nsocket = "/' + "x" * 107 + '"\n', encoding="utf-8")
         result = slsd("--config", service.file)
-        self.assertEqual(result.returncode, 1)
+        self.assertEqual(result.returncode, 78)
         self.assertIn("slsd.toml:2:10: [server] socket must be a path of 1 to 107 bytes", result.stderr)
 
     def test_folder_that_is_missing_is_named(self):
@@ -151,6 +151,8 @@ class Life(unittest.TestCase):
                     while not messages or part not in messages[-1]:
                         messages.append(manager.recv(4096).decode())
                 try:
+                    await_message("EXTEND_TIMEOUT_USEC=")
+                    self.assertGreater(int(messages[-1].split("EXTEND_TIMEOUT_USEC=")[1].split()[0]), 60_000_000)
                     await_message("READY=1")
                     with service.client() as client:
                         client.call("status")

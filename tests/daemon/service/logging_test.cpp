@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/service/logging.hpp"
+
+#include <condition_variable>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+constexpr auto kPatience = 120s;
+
+/// Reads the log, or stands still.
+class Reader {
+ public:
+  [[nodiscard]] LogSink::Output output() {
+    return {[](const auto&) { return std::string("> "); },
+            [this](spdlog::level::level_enum, std::string_view line) { take(line); }};
+  }
+  void set_reading(bool reading) {
+    const std::lock_guard lock(mutex_);
+    reading_ = reading;
+    changed_.notify_all();
+  }
+  [[nodiscard]] std::vector<std::string> lines() {
+    const std::lock_guard lock(mutex_);
+    return lines_;
+  }
+
+ private:
+  void take(std::string_view line) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return reading_; });
+    lines_.emplace_back(line);
+  }
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool reading_ = true;
+  std::vector<std::string> lines_;
+};
+
+void log_line(LogSink& sink, const std::string& text) {
+  sink.log({"slsd", spdlog::level::info, text});
+}
+
+TEST(LogSink, WritesAtOnceUnlessToldToQueue) {
+  Reader reader;
+  LogSink sink(reader.output());
+  log_line(sink, "one");
+  EXPECT_THAT(reader.lines(), ElementsAre("> one"));
+}
+
+TEST(LogSink, LetsNoTextPassForALineOfItsOwn) {
+  Reader reader;
+  LogSink sink(reader.output());
+  log_line(sink, "camera x\n<2>kernel panic\x1b[31m");
+  EXPECT_THAT(reader.lines(), ElementsAre(R"(> camera x\n<2>kernel panic\x1b[31m)"));
+}
+
+TEST(LogSink, CutsLongLines) {
+  Reader reader;
+  LogSink sink(reader.output());
+  log_line(sink, std::string(900'000, 'x'));
+  log_line(sink, std::string(900'000, '\n'));
+  for (const std::string& line : reader.lines()) EXPECT_LT(line.size(), kLogLineBytesMax);
+}
+
+TEST(LogSink, HoldsNobodyUpAndTellsOnceWhatWasDropped) {
+  Reader reader;
+  LogSink sink(reader.output());
+  sink.queue_lines();
+  reader.set_reading(false);
+  constexpr std::size_t kLogged = 5 * kLogLinesMax;
+  for (std::size_t i = 0; i < kLogged; ++i) log_line(sink, std::to_string(i));
+  EXPECT_FALSE(sink.wait_written(10ms));
+  const std::uint64_t dropped = sink.dropped();
+  EXPECT_GE(dropped, kLogged - kLogLinesMax - 1);
+  reader.set_reading(true);
+  ASSERT_TRUE(sink.wait_written(kPatience));
+  EXPECT_EQ(sink.dropped(), dropped);
+  const auto lines = reader.lines();
+  ASSERT_THAT(lines, SizeIs(kLogged - dropped + 1));
+  for (std::size_t i = 0; i + 1 < lines.size(); ++i) EXPECT_EQ(lines[i], "> " + std::to_string(i));
+  EXPECT_THAT(lines.back(), HasSubstr(std::to_string(dropped) + " lines of the log were dropped here"));
+  log_line(sink, "flows again");
+  ASSERT_TRUE(sink.wait_written(kPatience));
+  EXPECT_EQ(reader.lines().back(), "> flows again");
+}
+
+}  // namespace
+}  // namespace slsd
