@@ -3,6 +3,7 @@
 #include "daemon/client/connection.hpp"
 
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <sys/un.h>
 
 #include <algorithm>
@@ -27,6 +28,10 @@ tl::unexpected<Error> no_connection(int number, const std::filesystem::path& soc
     return fail(ErrorCode::kPermissionDenied, "not allowed: join the group that owns the socket", where);
   }
   return fail(ErrorCode::kIo, std::strerror(number), where);
+}
+
+tl::unexpected<Error> no_answer() {
+  return fail(ErrorCode::kTimeout, "the daemon does not answer: look at its log, or restart it");
 }
 
 // The bytes that follow a message, as it says itself.
@@ -73,12 +78,20 @@ Result<Connection> Connection::open(const std::filesystem::path& path) {
   return Connection(std::move(socket));
 }
 
+void Connection::set_patience(std::chrono::seconds patience) const {
+  const timeval time{patience.count(), 0};
+  for (const int direction : {SO_RCVTIMEO, SO_SNDTIMEO}) {
+    ::setsockopt(socket_.number(), SOL_SOCKET, direction, &time, sizeof time);
+  }
+}
+
 Result<> Connection::send(std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t sent = ::send(socket_.number(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent < 0 && errno == EINTR) continue;
     // What the daemon said before it hung up is worth more than that it did.
     if (sent < 0 && (errno == EPIPE || errno == ECONNRESET)) return {};
+    if (sent < 0 && errno == EAGAIN) return no_answer();
     if (sent < 0) return fail(ErrorCode::kIo, std::string("cannot send: ") + std::strerror(errno));
     bytes.remove_prefix(static_cast<std::size_t>(sent));
   }
@@ -91,6 +104,7 @@ Result<> Connection::receive_more() {
   do {
     size = ::recv(socket_.number(), chunk.data(), chunk.size(), 0);
   } while (size < 0 && errno == EINTR);
+  if (size < 0 && errno == EAGAIN) return no_answer();
   if (size <= 0) return fail(ErrorCode::kDisconnected, "the daemon hung up");
   buffer_.append(chunk.data(), static_cast<std::size_t>(size));
   return {};

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -32,12 +33,15 @@ struct Answered {
   std::vector<Received> events;
 };
 
-/// A connection to the daemon's socket. Waits as long as the daemon works.
+/// A connection to the daemon's socket. Waits as long as the daemon works, unless told otherwise.
 /// @thread thread-bound
 class Connection {
  public:
   /// @errors kNotFound: no daemon answers at this path; kPermissionDenied; kInvalidArgument: too long a path; kIo
   [[nodiscard]] static Result<Connection> open(const std::filesystem::path& socket);
+
+  /// From now on at most so long for each part of a message, to be sent or received; then kTimeout.
+  void set_patience(std::chrono::seconds patience) const;
 
   /// Sends a request and waits for its reply, which may be a JSON-RPC error.
   /// @errors kDisconnected: the daemon hung up; kMalformed: it is no slsd; kIo

@@ -1,8 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
 #include <iostream>
+#include <thread>
+
+#include <fmt/format.h>
 
 #include "core/image_size.hpp"
+#include "core/printable.hpp"
+#include "daemon/client/connection.hpp"
 #include "daemon/commands/commands.hpp"
 #include "daemon/commands/device_list.hpp"
 #include "daemon/configuration/configuration.hpp"
@@ -19,9 +27,11 @@
 namespace slsd {
 namespace {
 
+using nlohmann::json;
 using std::filesystem::path;
 
 constexpr std::size_t kMaxLatencyBytes = 1 << 20;
+constexpr std::size_t kLongestProblem = 1000;
 
 /// Prints findings, and keeps whether one of them forbids a scan.
 class Findings {
@@ -37,120 +47,265 @@ class Findings {
     result ? good(what) : bad(what + ": " + to_string(result.error()));
     return result.has_value();
   }
-  void other_hardware(const Result<>& same, OtherHardware severity) {
-    if (same) return;
-    severity == OtherHardware::kError ? bad(to_string(same.error())) : warn(to_string(same.error()));
-  }
   [[nodiscard]] bool scan_possible() const { return scan_possible_; }
 
  private:
   bool scan_possible_ = true;
 };
 
-std::string advice_for(const Error& error, const CameraOptions& absent, const Configuration& configuration) {
-  if (error.code != ErrorCode::kNotFound || absent.replays()) return {};
-  return "; " + CameraList::look(configuration).similar_to(absent);
-}
-
-void check_camera(const CameraOptions& options, const Configuration& configuration,
-                  const std::optional<Calibration>& calibration, Findings& findings) {
-  const std::string name = "camera \"" + options.name() + "\"";
-  auto camera = make_camera(options);
-  if (!camera) return findings.bad(name + ": " + camera.error().message);
-  if (const auto opened = (*camera)->open(); !opened)
-    return findings.bad(name + " does not open: " + to_string(opened.error()) +
-                        advice_for(opened.error(), options, configuration));
-  findings.good(name + " opens");
-  const CameraDescription& seen = (*camera)->description();
-  const CalibratedCamera* known = calibration ? calibration->camera(options.name()) : nullptr;
-  if (known == nullptr) return;
-  findings.other_hardware(check_hardware(name, calibrated_hardware(*calibration, *known), seen.hardware),
-                          configuration.other_hardware);
-  if (known->lens.width_px == seen.width_px && known->lens.height_px == seen.height_px) {
-    return findings.good(name + " has the size of its calibration, " + size_text(seen.width_px, seen.height_px) +
-                         " px");
+/// What the service that runs says of itself: it holds the devices, which nobody else can open meanwhile.
+class LiveService {
+ public:
+  /// Asks it, and waits some seconds for devices that it is opening.
+  /// @return nothing where none answers at this socket
+  /// @errors kPermissionDenied; kTimeout: it does not answer; kMalformed: it is no slsd
+  static Result<std::optional<LiveService>> ask(const path& socket) {
+    auto connection = Connection::open(socket);
+    if (!connection && connection.error().code == ErrorCode::kNotFound) return std::nullopt;
+    if (!connection) return tl::unexpected(connection.error());
+    connection->set_patience(kPatience);
+    const auto settings = result_of(connection->call("settings", json::object()), socket);
+    if (!settings) return tl::unexpected(settings.error());
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    while (true) {
+      const auto status = result_of(connection->call("status", json::object()), socket);
+      if (!status) return tl::unexpected(status.error());
+      LiveService service(*status, *settings);
+      if (!service.opens_devices() || std::chrono::steady_clock::now() > end) return service;
+      std::this_thread::sleep_for(kPause);
+    }
   }
-  findings.bad(name + " gives frames of " + size_text(seen.width_px, seen.height_px) + " px, its calibration is for " +
-               size_text(known->lens.width_px, known->lens.height_px) +
-               " px: set the camera's size, or calibrate it again");
-}
 
-void check_cameras(const Configuration& configuration, const std::optional<Calibration>& calibration,
-                   Findings& findings) {
-  if (configuration.cameras.empty()) findings.bad("no camera: add a [[camera]] table to the configuration");
-  for (const CameraOptions& camera : configuration.cameras) check_camera(camera, configuration, calibration, findings);
-}
-
-// Only looks: the service that runs may be showing its pattern there.
-void check_monitor(const Configuration& configuration, const std::optional<Calibration>& calibration,
-                   Findings& findings) {
-  const ProjectorOptions& options = configuration.projector;
-  const auto report = report_monitor(options.monitor, options.width_px, options.height_px);
-  if (!report) return findings.bad(to_string(report.error()));
-  findings.good("projector: monitor " + describe_output(report->output));
-  for (const std::string& warning : report->warnings) {
-    findings.warn("projector: monitor " + report->output.name + ": " + warning);
+  [[nodiscard]] path configuration_file() const { return status_.value("configuration", ""); }
+  [[nodiscard]] bool serves(const path& file) const {
+    std::error_code ignored;
+    return std::filesystem::equivalent(configuration_file(), file, ignored);
   }
-  if (!calibration) return;
-  const std::string calibrated = calibration->report.projector_serial.value_or("");
-  findings.other_hardware(
-      check_hardware("projector", calibrated, projector_hardware(report->output.model, report->output.serial)),
-      configuration.other_hardware);
-}
-
-void check_projector(const Configuration& configuration, const std::optional<Calibration>& calibration,
-                     Findings& findings) {
-  const ProjectorOptions& options = configuration.projector;
-  if (options.driver == ProjectorDriver::kGlfw) return check_monitor(configuration, calibration, findings);
-  const auto projector = make_projector(options);
-  findings.note((*projector)->open(), "projector headless, " + size_text(options.width_px, options.height_px) + " px");
-}
-
-void check_scan(const Configuration& configuration, Findings& findings) {
-  const auto calibration = configured_calibration(configuration);
-  check_projector(configuration, calibration ? *calibration : std::nullopt, findings);
-  const auto pattern = configured_pattern(configuration);
-  findings.note(pattern, "pattern");
-  if (pattern) {
-    for (const std::string& warning : symbol_warnings(pattern->options)) findings.warn(warning);
+  /// The tables whose keys are not those that it has in force.
+  [[nodiscard]] std::vector<std::string> tables_behind(const Configuration& configuration) const {
+    const json in_force = settings_.value("configuration", json::object());
+    const json differences = json::diff(in_force, configuration.given);
+    std::vector<std::string> tables;
+    for (const json& difference : differences) {
+      const std::string place = difference.value("path", "/").substr(1);
+      const std::string table = place.substr(0, place.find('/'));
+      if (std::ranges::find(tables, table) == tables.end()) tables.push_back(table);
+    }
+    return tables;
   }
-  const bool readable = findings.note(calibration, "calibration");
-  if (readable && !*calibration) findings.bad("no calibration: name its file as [calibration] file");
-  check_cameras(configuration, readable ? *calibration : std::nullopt, findings);
-  for (const std::string& warning : exposure_warnings(configuration)) findings.warn(warning);
-  if (pattern && readable && *calibration) findings.note(ScanSetup::create(configuration, 1), "decoder");
-}
-
-/// As the latency's report names it; empty where that cannot be told.
-std::string projector_in_use(const ProjectorOptions& options) {
-  const auto projector = make_projector(options);
-  if (!projector) return {};
-  const ProjectorDescription& description = (*projector)->description();
-  if (options.driver == ProjectorDriver::kHeadless) return projector_name(description.driver, description.monitor);
-  const auto report = report_monitor(options.monitor, options.width_px, options.height_px);
-  return report ? projector_name(description.driver, report->output.name) : "";
-}
-
-// A projector in memory has no light to wait for.
-void check_latency(const Configuration& configuration, const path& configuration_file, Findings& findings) {
-  const path file = latency_file(configuration, configuration_file);
-  const auto text = read_file(file, kMaxLatencyBytes);
-  if (!text && text.error().code == ErrorCode::kNotFound) {
-    if (configuration.projector.driver == ProjectorDriver::kHeadless) return;
-    return findings.warn("the latency of projector and cameras was not measured: slsd --calibrate --latency");
+  [[nodiscard]] json projector() const { return status_.value("projector", json::object()); }
+  [[nodiscard]] json camera(const std::string& name) const {
+    for (const json& camera : status_.value("cameras", json::array()))
+      if (camera.value("name", "") == name) return camera;
+    return json::object();
   }
-  const auto report = text ? read_latency(*text, file) : tl::unexpected(text.error());
-  if (!findings.note(report, "latency " + file.string())) return;
-  const std::string projector = projector_in_use(configuration.projector);
-  for (const std::string& warning : latency_warnings(configuration, *report, projector)) findings.warn(warning);
-}
+  [[nodiscard]] std::uint64_t log_lines_dropped() const { return status_.value("log_lines_dropped", std::uint64_t{0}); }
 
-// A daemon that answers there is most likely the one that is being looked at.
-void check_socket(const path& socket, Findings& findings) {
-  const auto usable = check_socket_path(socket);
-  if (!usable && usable.error().code == ErrorCode::kBusy) return findings.good("socket: a daemon answers there");
-  findings.note(usable, "socket " + socket.string());
-}
+ private:
+  static constexpr std::chrono::seconds kPatience{10};
+  static constexpr std::chrono::milliseconds kPause{100};
+
+  LiveService(json status, json settings) : status_(std::move(status)), settings_(std::move(settings)) {}
+
+  static Result<json> result_of(const Result<Answered>& answered, const path& socket) {
+    if (!answered) return fail(answered.error().code, answered.error().message, socket.string());
+    const json& message = answered->reply.message;
+    if (message.contains("result") && message["result"].is_object()) return message["result"];
+    return fail(ErrorCode::kMalformed, "what answers there is no slsd", socket.string());
+  }
+
+  [[nodiscard]] bool opens_devices() const {
+    const auto opens = [](const json& device) { return device.value("state", "") == to_string(DeviceState::kOpening); };
+    const json cameras = status_.value("cameras", json::array());
+    return opens(projector()) || std::ranges::any_of(cameras, opens);
+  }
+
+  json status_;
+  json settings_;
+};
+
+/// One after the other, what a scan needs.
+class Check {
+ public:
+  Check(const Configuration& configuration, const path& file, Findings& findings)
+      : configuration_(configuration), file_(file), findings_(findings) {}
+
+  void look() {
+    look_for_service();
+    const auto calibration = configured_calibration(configuration_);
+    if (calibration) calibration_ = *calibration;
+    check_projector();
+    const auto pattern = configured_pattern(configuration_);
+    findings_.note(pattern, "pattern");
+    if (pattern) {
+      for (const std::string& warning : symbol_warnings(pattern->options)) findings_.warn(warning);
+    }
+    if (findings_.note(calibration, "calibration") && !calibration_) {
+      findings_.bad("no calibration: name its file as [calibration] file");
+    }
+    if (configuration_.cameras.empty()) findings_.bad("no camera: add a [[camera]] table to the configuration");
+    for (const CameraOptions& camera : configuration_.cameras) check_camera(camera);
+    for (const std::string& warning : exposure_warnings(configuration_)) findings_.warn(warning);
+    if (pattern && calibration_) findings_.note(ScanSetup::create(configuration_, 1), "decoder");
+    check_latency();
+  }
+
+ private:
+  // One that runs is asked of its devices; one that does not answer is left alone with them.
+  void look_for_service() {
+    const path& socket = configuration_.server.socket;
+    auto service = LiveService::ask(socket);
+    if (!service) {
+      held_ = true;
+      return findings_.bad("service: " + to_string(service.error()));
+    }
+    if (!*service) {
+      findings_.note(check_socket_path(socket), "socket " + socket.string());
+      return;
+    }
+    if (!(*service)->serves(file_)) {
+      return findings_.bad("socket " + socket.string() + ": the service there runs with another configuration, " +
+                           printable((*service)->configuration_file().string()) +
+                           ": check that one, stop the service, or give one of both another [server] socket");
+    }
+    live_ = std::move(**service);
+    findings_.good("service: it runs, at " + socket.string());
+    for (const std::string& table : live_->tables_behind(configuration_)) {
+      findings_.warn("service: [" + printable(table) +
+                     "] is not yet as in this file: reload the service; what is left then needs a restart");
+    }
+    if (const std::uint64_t dropped = live_->log_lines_dropped(); dropped > 0) {
+      findings_.warn("service: " + std::to_string(dropped) +
+                     " lines of its log were dropped: whoever reads it is too slow");
+    }
+  }
+
+  /// What the service says of a device that it holds. @return whether it is open
+  bool note_held(const std::string& name, const json& device) {
+    const std::string state = device.value("state", "not there, as it was started with other cameras");
+    const std::string problem = printable(device.value("problem", ""), kLongestProblem);
+    if (state == to_string(DeviceState::kReady) || state == to_string(DeviceState::kCapturing)) {
+      findings_.good(name + ": the service holds it, and it is " + state);
+      return true;
+    }
+    findings_.bad(name + ": to the service it is " + printable(state) + (problem.empty() ? "" : ": " + problem));
+    return false;
+  }
+
+  void check_hardware_of(const std::string& who, const std::string& calibrated, const std::string& connected) {
+    const auto same = check_hardware(who, calibrated, connected);
+    if (same) return;
+    const std::string text = to_string(same.error());
+    configuration_.other_hardware == OtherHardware::kError ? findings_.bad(text) : findings_.warn(text);
+  }
+
+  void check_projector() {
+    const ProjectorOptions& options = configuration_.projector;
+    const bool open = live_ && note_held("projector", live_->projector());
+    if (options.driver == ProjectorDriver::kGlfw) return check_monitor(open);
+    if (live_ || held_) return;
+    const auto projector = make_projector(options);
+    findings_.note((*projector)->open(),
+                   "projector headless, " + size_text(options.width_px, options.height_px) + " px");
+  }
+
+  // Only looks: the service that runs may be showing its pattern there, on a display that is not this user's.
+  void check_monitor(bool open) {
+    const ProjectorOptions& options = configuration_.projector;
+    const auto report = report_monitor(options.monitor, options.width_px, options.height_px);
+    if (!report && open) return;
+    if (!report) return findings_.bad(to_string(report.error()));
+    monitor_ = report->output.name;
+    findings_.good("projector: monitor " + describe_output(report->output));
+    for (const std::string& warning : report->warnings) {
+      findings_.warn("projector: monitor " + report->output.name + ": " + warning);
+    }
+    if (!calibration_) return;
+    check_hardware_of("projector", calibration_->report.projector_serial.value_or(""),
+                      projector_hardware(report->output.model, report->output.serial));
+  }
+
+  void check_camera(const CameraOptions& options) {
+    const std::string name = "camera \"" + options.name() + "\"";
+    if (live_) {
+      const json camera = live_->camera(options.name());
+      if (note_held(name, camera)) {
+        check_calibrated(name, options, camera.value("hardware", ""), camera.value("width_px", 0),
+                         camera.value("height_px", 0));
+      }
+      return check_drift(name, camera.value("calibration", json()));
+    }
+    if (held_) return;
+    auto camera = make_camera(options);
+    if (!camera) return findings_.bad(name + ": " + camera.error().message);
+    if (const auto opened = (*camera)->open(); !opened) {
+      return findings_.bad(name + " does not open: " + to_string(opened.error()) + advice_for(opened.error(), options));
+    }
+    findings_.good(name + " opens");
+    const CameraDescription& seen = (*camera)->description();
+    check_calibrated(name, options, seen.hardware, seen.width_px, seen.height_px);
+  }
+
+  [[nodiscard]] std::string advice_for(const Error& error, const CameraOptions& absent) const {
+    if (error.code != ErrorCode::kNotFound || absent.replays()) return {};
+    return "; " + CameraList::look(configuration_).similar_to(absent);
+  }
+
+  void check_calibrated(const std::string& name, const CameraOptions& options, const std::string& hardware,
+                        int width_px, int height_px) {
+    const CalibratedCamera* const known = calibration_ ? calibration_->camera(options.name()) : nullptr;
+    if (known == nullptr) return;
+    check_hardware_of(name, calibrated_hardware(*calibration_, *known), hardware);
+    const std::string size = size_text(width_px, height_px);
+    if (known->lens.width_px == width_px && known->lens.height_px == height_px) {
+      return findings_.good(name + " has the size of its calibration, " + size + " px");
+    }
+    findings_.bad(name + " gives frames of " + size + " px, its calibration is for " +
+                  size_text(known->lens.width_px, known->lens.height_px) +
+                  " px: set the camera's size, or calibrate it again");
+  }
+
+  void check_drift(const std::string& name, const json& drift) {
+    if (!drift.is_object() || !drift.value("off_since_scan", json()).is_number()) return;
+    findings_.warn(fmt::format(
+        "{}: knocked out of its calibration since scan {}: fasten it and the projector, and calibrate again", name,
+        drift.value("off_since_scan", std::uint64_t{0})));
+  }
+
+  /// As the latency's report names it; empty where that cannot be told.
+  [[nodiscard]] std::string projector_in_use() const {
+    if (live_) return projector_name(live_->projector().value("driver", ""), live_->projector().value("device", ""));
+    const auto projector = make_projector(configuration_.projector);
+    if (!projector) return {};
+    const ProjectorDescription& description = (*projector)->description();
+    const bool headless = configuration_.projector.driver == ProjectorDriver::kHeadless;
+    if (!headless && monitor_.empty()) return {};
+    return projector_name(description.driver, headless ? description.monitor : monitor_);
+  }
+
+  // A projector in memory has no light to wait for.
+  void check_latency() {
+    const path file = latency_file(configuration_, file_);
+    const auto text = read_file(file, kMaxLatencyBytes);
+    if (!text && text.error().code == ErrorCode::kNotFound) {
+      if (configuration_.projector.driver == ProjectorDriver::kHeadless) return;
+      return findings_.warn("the latency of projector and cameras was not measured: slsd --calibrate --latency");
+    }
+    const auto report = text ? read_latency(*text, file) : tl::unexpected(text.error());
+    if (!findings_.note(report, "latency " + file.string())) return;
+    for (const std::string& warning : latency_warnings(configuration_, *report, projector_in_use())) {
+      findings_.warn(warning);
+    }
+  }
+
+  const Configuration& configuration_;
+  const path& file_;
+  Findings& findings_;
+  std::optional<Calibration> calibration_;
+  std::optional<LiveService> live_;  ///< with this configuration
+  bool held_ = false;                ///< the devices, by a service that cannot be asked
+  std::string monitor_;              ///< seen; empty: none
+};
 
 }  // namespace
 
@@ -159,9 +314,7 @@ bool check_everything(const std::optional<path>& configuration_file) {
   const path file = configuration_file.value_or(kConfigurationFile);
   const auto configuration = load_configuration(file);
   if (!findings.note(configuration, "configuration " + file.string())) return false;
-  check_scan(*configuration, findings);
-  check_latency(*configuration, file, findings);
-  check_socket(configuration->server.socket, findings);
+  Check(*configuration, file, findings).look();
   return findings.scan_possible();
 }
 

@@ -3,6 +3,7 @@
 # Copyright the slsd authors
 """The two command lines from outside: exit statuses, files, messages."""
 import json
+import os
 import pathlib
 import shutil
 import signal
@@ -10,7 +11,9 @@ import subprocess
 import tempfile
 import unittest
 
-from service import BIN, SCENE, Service, slsctl, slsd
+from service import BIN, SCENE, Service, slsctl, slsd, wait_until
+
+WRONG_CONFIGURATION = 78
 
 
 class Slsd(unittest.TestCase):
@@ -40,20 +43,42 @@ class Slsd(unittest.TestCase):
         self.assertEqual(int.from_bytes(image.read_bytes()[16:20], "big"), 640)
 
     def test_names_what_is_wrong_with_a_configuration(self):
-        cases = {"[pattern]\nsymbols = [7]\n": ":2:", "[[camera]]\npath = 3\n": ":2:8: [[camera]] path",
+        cases = {"[pattern]\nsymbols = [7]\n": ":2:", '"x\\u001b[31m" = 1\n': "no such table or key: x\\x1b[31m",
+                 "[[camera]]\npath = 'x'\nname = \"\\n\"\n": "no control characters", "[[camera]]\npath = 3\n": ":2:8: [[camera]] path",
                  "[camera]\n": "[[camera]]", "x = \n": ":1:", "[projector]\nbrightness = 2\n": "brightness must be 0 to 1",
                  "[[camera]]\ndriver = 'aravis'\n": "id must be the camera's serial number",
-                 "[calibration]\nfile = 'missing.yml'\n": "missing.yml",
-                 "[pattern]\nfile = 'missing.toml'\n": "missing.toml"}
+                 "[calibration]\nfile = 'slsd.toml'\n": "slsd.toml:1:",
+                 "[calibration]\nfile = '.'\n": "is a folder",
+                 "#" * 10_000_000: "is 10000000 bytes long; at most 1048576 are read"}
         for text, expected in cases.items():
             with self.subTest(text=text):
                 self.file.write_text(text, encoding="utf-8")
-                result = slsd("--config", self.file)
-                self.assertEqual(result.returncode, 1)
-                self.assertIn(expected, result.stderr)
-        result = slsd("--config", self.folder / "missing.toml")
-        self.assertEqual(result.returncode, 1)
-        self.assertIn("missing.toml", result.stderr)
+                self.assert_not_started(self.file, expected, WRONG_CONFIGURATION)
+        self.assert_not_started(self.folder / "missing.toml", "missing.toml", WRONG_CONFIGURATION)
+        self.assert_not_started(self.folder, "is a folder", WRONG_CONFIGURATION)
+        self.assert_not_started("/dev/null", "is not a regular file", WRONG_CONFIGURATION)
+
+    def test_configuration_that_may_not_be_read_is_named(self):
+        if os.geteuid() == 0:
+            self.skipTest("root may read everything")
+        self.file.write_text("", encoding="utf-8")
+        self.file.chmod(0)
+        self.assert_not_started(self.file, "Permission denied", WRONG_CONFIGURATION)
+
+    def test_start_that_may_succeed_later_is_told_from_one_that_may_not(self):
+        for text in ("[calibration]\nfile = 'missing.yml'\n", "[pattern]\nfile = 'missing.toml'\n",
+                     "[server]\nsocket = 'missing/slsd.sock'\n"):
+            with self.subTest(text=text):
+                self.file.write_text(text, encoding="utf-8")
+                self.assert_not_started(self.file, "missing", 1)
+
+    def assert_not_started(self, file, expected, status):
+        """By one error, in one line, and nothing else."""
+        result = slsd("--config", file)
+        self.assertEqual(result.returncode, status, result.stderr)
+        lines = [line for line in result.stderr.splitlines() if " critical " in line]
+        self.assertEqual(len(lines), 1, result.stderr)
+        self.assertIn(expected, lines[0])
 
     def test_check_finds_what_forbids_a_scan(self):
         service = Service(camera_path=SCENE / "small.png")
@@ -114,8 +139,49 @@ class Slsd(unittest.TestCase):
 
     def test_check_of_a_running_service_is_no_error(self):
         with Service() as service:
+            service.wait_ready()
             result = slsd("--check", "--config", service.file)
             self.assertEqual(result.returncode, 0, result.stdout)
+            self.assertIn('ok       camera "camera": the service holds it, and it is ready', result.stdout)
+            self.assertIn("ok       projector: the service holds it, and it is ready", result.stdout)
+            self.assertNotIn("opens", result.stdout)
+            text = service.file.read_text(encoding="utf-8")
+            service.file.write_text(text + "clients_max = 7\n", encoding="utf-8")
+            result = slsd("--check", "--config", service.file)
+            self.assertEqual(result.returncode, 0, result.stdout)
+            self.assertIn("warning  service: [server] is not yet as in this file", result.stdout)
+
+    def test_check_asks_the_service_of_a_camera_that_it_has_lost(self):
+        folder = self.folder / "frames"
+        folder.mkdir()
+        shutil.copy(SCENE / "frame.png", folder)
+        with Service(camera_path=folder) as service:
+            service.wait_ready()
+            shutil.rmtree(folder)
+            with service.client() as client:
+                wait_until(lambda: client.call("status")[0]["cameras"][0]["state"] == "absent", "the loss")
+            result = slsd("--check", "--config", service.file)
+            self.assertEqual(result.returncode, 1, result.stdout)
+            self.assertRegex(result.stdout, 'error    camera "camera": to the service it is absent: .*frames')
+
+    def test_check_names_the_configuration_of_another_service(self):
+        with Service() as service:
+            other = service.folder / "other.toml"
+            shutil.copy(service.file, other)
+            result = slsd("--check", "--config", other)
+            self.assertEqual(result.returncode, 1, result.stdout)
+            self.assertIn(f"the service there runs with another configuration, {service.file}", result.stdout)
+            self.assertIn('ok       camera "camera" opens', result.stdout)
+
+    def test_check_leaves_the_devices_of_a_service_that_hangs_alone(self):
+        with Service() as service:
+            service.wait_ready()
+            service.send_signal(signal.SIGSTOP)
+            result = slsd("--check", "--config", service.file)
+            service.send_signal(signal.SIGCONT)
+            self.assertEqual(result.returncode, 1, result.stdout)
+            self.assertIn("the daemon does not answer", result.stdout)
+            self.assertNotIn("opens", result.stdout)
 
     def test_lists_devices(self):
         service = Service()
@@ -174,6 +240,17 @@ class Slsctl(unittest.TestCase):
             file = self.folder / (command + ".png")
             self.assertEqual(self.slsctl(command, file).returncode, 0)
             self.assertTrue(file.read_bytes().startswith(b"\x89PNG"))
+            for option in ("-o", "--output"):
+                file.unlink()
+                self.assertEqual(self.slsctl(command, option, file).returncode, 0)
+                self.assertTrue(file.read_bytes().startswith(b"\x89PNG"))
+
+    def test_cloud_is_named_with_or_without_an_option(self):
+        cloud = self.folder / "c.ply"
+        self.assertEqual(self.slsctl("scan", cloud).returncode, 0)
+        self.assertTrue(cloud.read_bytes().startswith(b"ply\n"))
+        self.assertEqual(self.slsctl("scan", self.folder / "c.xyz").returncode, 2)
+        self.assertEqual(self.slsctl("scan", cloud, "-o", cloud).returncode, 2)
 
     def test_json_works_everywhere(self):
         self.assertIn("points", json.loads(self.slsctl("--json", "scan").stdout))
