@@ -2,7 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -21,6 +23,7 @@ struct CameraDescription {
   double rate_hz = 0.0;  ///< of a camera that runs freely, after open(); 0: exposes at the trigger, or does not tell
   std::string hardware = {};  ///< after open(): what tells the device from others of its kind, wherever it is plugged
                               ///< in; printable, at most 200 bytes; empty where nothing does
+  bool external_trigger = false;  ///< exposes when a line outside of this host says so: it may be silent for long
 };
 
 /// What the projector shows when a frame is exposed.
@@ -57,6 +60,15 @@ class Camera {
 
   /// How long open() may take, for who watches over it.
   [[nodiscard]] virtual std::chrono::nanoseconds open_time_max() const { return std::chrono::minutes(1); }
+
+  /// How long capture() may take where nothing is wrong, whatever its deadline: who watches over it has it asked again
+  /// after that, and takes a driver that does not come back for stuck.
+  [[nodiscard]] virtual std::chrono::nanoseconds frame_time_max() const {
+    constexpr double kFloorS = 5;
+    const double rate_hz = description().rate_hz;
+    const double seconds = rate_hz > 0 ? std::max(kFloorS, 3 / rate_hz) : kFloorS;
+    return std::chrono::nanoseconds(static_cast<std::int64_t>(std::min(seconds, 3600.0) * 1e9));
+  }
 
   /// Exposes one frame that begins after the call, and waits for it until the deadline at most.
   /// @errors kFrameDropped, kFrameTorn, kFrameStale, kFrameLate: this frame is lost, the camera goes on;

@@ -10,11 +10,12 @@
 namespace slsd {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, FaultKind>, 6> kKinds{{{"drop", FaultKind::kDrop},
+constexpr std::array<std::pair<std::string_view, FaultKind>, 7> kKinds{{{"drop", FaultKind::kDrop},
                                                                         {"tear", FaultKind::kTear},
                                                                         {"late", FaultKind::kLate},
                                                                         {"stale", FaultKind::kStale},
                                                                         {"stall", FaultKind::kStall},
+                                                                        {"hang", FaultKind::kHang},
                                                                         {"disconnect", FaultKind::kDisconnect}}};
 constexpr std::array<std::pair<std::string_view, double>, 3> kUnitsNs{{{"us", 1e3}, {"ms", 1e6}, {"s", 1e9}}};
 constexpr double kDurationMaxNs = 3600e9;
@@ -54,7 +55,7 @@ Result<Fault> parse_fault(std::string_view text) {
   if (at == std::string_view::npos)
     return fail_fault(text, "write KIND@CAPTURE or KIND@CAPTURE:DURATION, as in drop@3 or late@5:200ms");
   const auto kind = look_up(kKinds, text.substr(0, at));
-  if (!kind) return fail_fault(text, "the kinds are drop, tear, late, stale, stall and disconnect");
+  if (!kind) return fail_fault(text, "the kinds are drop, tear, late, stale, stall, hang and disconnect");
   const std::string_view rest = text.substr(at + 1);
   const std::size_t colon = std::min(rest.find(':'), rest.size());
   const auto capture = parse_capture(rest.substr(0, colon));

@@ -20,6 +20,7 @@ enum class FaultKind {
   kLate,        ///< the frame arrives `duration` late (without one: never): kFrameLate where that is past its deadline
   kStale,       ///< the frame was exposed `duration` before the trigger (100 ms), and says so in exposure_start()
   kStall,       ///< for `duration` (without one: until open()) no frame arrives: kFrameLate for those that wait less
+  kHang,        ///< the driver does not come back for `duration` (without one: never), whoever tells it to
   kDisconnect,  ///< the device goes: kDisconnected, also from open() for `duration` (0 s)
 };
 
@@ -33,7 +34,7 @@ struct Fault {
 };
 
 /// Reads a fault as the configuration writes it: KIND@CAPTURE or KIND@CAPTURE:DURATION, KIND being drop, tear, late,
-/// stale, stall or disconnect, DURATION a number and us, ms or s: "drop@3", "late@5:200ms", "disconnect@7:1.5s".
+/// stale, stall, hang or disconnect, DURATION a number and us, ms or s: "drop@3", "late@5:200ms", "disconnect@7:1.5s".
 /// @errors kInvalidArgument
 /// @thread reentrant
 [[nodiscard]] Result<Fault> parse_fault(std::string_view text);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <thread>
 #include <utility>
 
 namespace slsd {
@@ -35,6 +36,9 @@ Result<Frame> FaultyCamera::capture(MonotonicTime deadline) {
   const Fault* fault = fault_now();
   if (fault != nullptr && fault->kind == FaultKind::kStall)
     stalled_until_ = fault->duration ? steady_clock::now() + *fault->duration : MonotonicTime::max();
+  if (fault != nullptr && fault->kind == FaultKind::kHang) {
+    std::this_thread::sleep_for(fault->duration.value_or(std::chrono::hours(24 * 365)));
+  }
   if (stalled_until_) {
     if (auto waited = wait_until(*stalled_until_, deadline); !waited) return tl::unexpected(waited.error());
     stalled_until_.reset();
@@ -71,6 +75,7 @@ Result<Frame> FaultyCamera::capture_with(const Fault& fault, MonotonicTime deadl
     case FaultKind::kDisconnect:
       return disconnect(fault);
     case FaultKind::kStall:
+    case FaultKind::kHang:
       break;
   }
   return capture_sound(deadline);

@@ -19,6 +19,7 @@ TEST(ParseFault, ReadsEachKind) {
   EXPECT_EQ(parse_fault("late@5:200ms"), (Fault{FaultKind::kLate, 5, 200ms}));
   EXPECT_EQ(parse_fault("late@5"), (Fault{FaultKind::kLate, 5, {}}));
   EXPECT_EQ(parse_fault("stale@18446744073709551615:20us"), (Fault{FaultKind::kStale, ~std::uint64_t{0}, 20us}));
+  EXPECT_EQ(parse_fault("hang@3"), (Fault{FaultKind::kHang, 3, std::nullopt}));
   EXPECT_EQ(parse_fault("stall@2:0s"), (Fault{FaultKind::kStall, 2, 0s}));
   EXPECT_EQ(parse_fault("disconnect@7:1.5s"), (Fault{FaultKind::kDisconnect, 7, 1500ms}));
 }
