@@ -43,6 +43,13 @@ class BoundedQueue {
     return take();
   }
 
+  /// Takes those out that nobody needs any more.
+  template <class Needless>
+  void erase_if(Needless needless) {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(items_, needless);
+  }
+
   /// Ends the present pop_until(), or the next, with nothing.
   void wake() {
     {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/calibrate/drift_watch.hpp"
-#include "daemon/scan/frame_jobs.hpp"
+#include "daemon/scan/scan_setup.hpp"
 
 namespace slsd {
 

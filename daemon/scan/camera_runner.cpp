@@ -15,10 +15,9 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-// A driver answers by its deadline; one that does not is told to, and then left alone.
-constexpr auto kGrace = 500ms;
 constexpr auto kLookPeriod = 200ms;
-constexpr auto kPromise = 10s;
+constexpr auto kPromise = 3s;  // of a step that takes no time
+constexpr auto kPausePromise = 10s;
 
 }  // namespace
 
@@ -60,11 +59,13 @@ std::uint64_t CameraRunner::openings() const {
   return status_.opened;
 }
 
-Result<> CameraRunner::wait_ready(MonotonicTime deadline) {
+Result<> CameraRunner::wait_ready(const Patience& patience) {
   std::unique_lock lock(mutex_);
-  changed_.wait_until(lock, deadline, [this] { return stopped_ || status_.state == DeviceState::kReady; });
+  const auto decided = [this] { return stopped_ || status_.state == DeviceState::kReady; };
+  const bool ready = patience.wait_until(patience.deadline, changed_, lock, decided) && !stopped_;
+  if (ready) return {};
   if (stopped_) return fail(ErrorCode::kCancelled, "the service is stopping");
-  if (status_.state == DeviceState::kReady) return {};
+  if (patience.over.stop_requested()) return fail(ErrorCode::kCancelled, "nobody waits for it any more");
   return fail_not_ready();
 }
 
@@ -82,30 +83,35 @@ void CameraRunner::begin_capture(MonotonicTime deadline, Exposure exposure, Fram
   changed_.notify_all();
 }
 
-Result<Frame> CameraRunner::end_capture() {
+bool CameraRunner::wait_captured(const Patience& patience, MonotonicTime until) {
   std::unique_lock lock(mutex_);
-  const auto answered = [this] { return stopped_ || answer_.has_value(); };
-  if (order_ && !changed_.wait_until(lock, order_->deadline + kGrace, answered)) {
-    if (status_.state != DeviceState::kCapturing) return order_.reset(), fail_not_ready();
-    cancel();
-    if (!changed_.wait_for(lock, kGrace, answered)) return give_up();
-  }
-  order_.reset();
-  if (!answer_) return fail(ErrorCode::kCancelled, "the service is stopping", "camera " + name_);
-  Result<Frame> frame = std::move(*answer_);
-  answer_.reset();
-  if (!frame && (frame.error().where.empty() || frame.error().where == name_)) {
-    frame.error().where = "camera " + name_;
-  }
-  return frame;
+  return patience.wait_until(until, changed_, lock, [this] { return stopped_ || answer_.has_value(); });
 }
 
-tl::unexpected<Error> CameraRunner::give_up() {
-  given_up_ = true;
+void CameraRunner::cancel_capture() {
+  const std::lock_guard lock(mutex_);
+  if (!order_ || answer_) return;
+  order_->cancelled = true;
+  if (status_.state == DeviceState::kCapturing) cancel();
+}
+
+Result<Frame> CameraRunner::end_capture() {
+  std::unique_lock lock(mutex_);
   order_.reset();
+  if (answer_) {
+    Result<Frame> frame = std::move(*answer_);
+    answer_.reset();
+    if (!frame && (frame.error().where.empty() || frame.error().where == name_)) {
+      frame.error().where = "camera " + name_;
+    }
+    return frame;
+  }
+  if (stopped_) return fail(ErrorCode::kCancelled, "the service is stopping", "camera " + name_);
+  if (status_.state != DeviceState::kCapturing) return fail_not_ready();
+  given_up_ = true;
   const Error error{ErrorCode::kDisconnected, "the camera's driver does not answer; it is opened again when it does",
                     "camera " + name_};
-  note_lost(error);
+  note_lost(error, std::move(lock));
   return tl::unexpected(error);
 }
 
@@ -145,7 +151,7 @@ void CameraRunner::open_or_pause(const std::stop_token& stop) {
   note_opened(opened);
   if (opened) return backoff_.reset();
   const auto pause = backoff_.next();
-  heartbeat_.promise(pause + kPromise);
+  heartbeat_.promise(pause + kPausePromise);
   std::unique_lock lock(mutex_);
   changed_.wait_for(lock, stop, pause, [] { return false; });
 }
@@ -157,12 +163,14 @@ void CameraRunner::note_found() {
 }
 
 void CameraRunner::note_opened(const Result<>& opened) {
-  const std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
+  const bool had_problem = !status_.problem.empty();
   if (!opened) {
     const std::string problem = to_string(opened.error());
-    if (status_.problem.empty()) spdlog::warn("camera {}: {}; trying again until it opens", name_, problem);
     status_.state = state_after(opened.error().code);
     status_.problem = problem;
+    lock.unlock();
+    if (!had_problem) spdlog::warn("camera {}: {}; trying again until it opens", name_, problem);
     return;
   }
   const CameraDescription& description = camera_->description();
@@ -172,11 +180,12 @@ void CameraRunner::note_opened(const Result<>& opened) {
   status_.height_px = description.height_px;
   rate_hz_ = description.rate_hz;
   gaps_.restart();
-  if (!status_.problem.empty()) spdlog::info("camera {}: open again", name_);
   status_.problem.clear();
   status_.state = DeviceState::kReady;
   ++status_.opened;
+  lock.unlock();
   changed_.notify_all();
+  if (had_problem) spdlog::info("camera {}: open again", name_);
 }
 
 std::optional<CameraRunner::Order> CameraRunner::next_order(const std::stop_token& stop) {
@@ -190,26 +199,40 @@ std::optional<CameraRunner::Order> CameraRunner::next_order(const std::stop_toke
 
 void CameraRunner::look_after() {
   const Result<> there = camera_->check();
-  if (there) return;
-  const std::lock_guard lock(mutex_);
-  note_lost(there.error());
+  if (!there) note_lost(there.error(), std::unique_lock(mutex_));
 }
 
-void CameraRunner::note_lost(const Error& error) {
+void CameraRunner::note_lost(const Error& error, std::unique_lock<std::mutex> lock) {
   status_.state = DeviceState::kFaulted;
   status_.problem = error.message;
-  spdlog::warn("camera {}: {}; trying again until it opens", name_, status_.problem);
+  lock.unlock();
+  spdlog::warn("camera {}: {}; trying again until it opens", name_, error.message);
 }
 
 void CameraRunner::take_frame(const Order& order) {
-  heartbeat_.promise(order.deadline - steady_clock::now() + kPromise);
   camera_->expect(order.light);
-  note_frame(order.exposure == Exposure::kNext ? camera_->capture_next(order.deadline)
-                                               : camera_->capture(order.deadline));
+  for (;;) {
+    const auto longest = camera_->frame_time_max();
+    heartbeat_.promise(longest + kPromise);
+    const MonotonicTime end = std::min<MonotonicTime>(order.deadline, steady_clock::now() + longest);
+    auto frame = order.exposure == Exposure::kNext ? camera_->capture_next(end) : camera_->capture(end);
+    if (frame || !goes_on(order, frame.error())) return note_frame(std::move(frame));
+  }
+}
+
+// A cancel() that came as a capture ended ends the next one, which nobody meant. And a line that was silent for the
+// longest time that a frame may take has lost none: the driver is only asked anew, so that one that hangs is noticed.
+bool CameraRunner::goes_on(const Order& order, const Error& error) const {
+  if (steady_clock::now() >= order.deadline) return false;
+  const std::lock_guard lock(mutex_);
+  if (stopped_ || !order_ || order_->cancelled || given_up_) return false;
+  if (error.code == ErrorCode::kCancelled) return true;
+  const bool nothing_came = error.code == ErrorCode::kFrameDropped || error.code == ErrorCode::kFrameLate;
+  return nothing_came && camera_->description().external_trigger;
 }
 
 void CameraRunner::note_frame(Result<Frame> frame) {
-  const std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
   if (std::exchange(given_up_, false)) return;
   status_.state = DeviceState::kReady;
   if (frame) {
@@ -219,9 +242,11 @@ void CameraRunner::note_frame(Result<Frame> frame) {
     ++status_.frames_lost;
     gaps_.note_failure();
   }
-  if (!frame && frame.error().code == ErrorCode::kDisconnected) note_lost(frame.error());
-  answer_.emplace(std::move(frame));
+  const bool lost = !frame && frame.error().code == ErrorCode::kDisconnected;
+  const Error error = lost ? frame.error() : Error{};
+  if (order_) answer_.emplace(std::move(frame));
   changed_.notify_all();
+  if (lost) note_lost(error, std::move(lock));
 }
 
 }  // namespace slsd

@@ -15,6 +15,7 @@
 #include "daemon/scan/backoff.hpp"
 #include "daemon/scan/device_status.hpp"
 #include "daemon/scan/heartbeat.hpp"
+#include "daemon/scan/patience.hpp"
 #include "daemon/scan/sequence_gaps.hpp"
 #include "drivers/camera/camera.hpp"
 
@@ -29,7 +30,7 @@ enum class Exposure {
 /// A camera and the thread that it lives on, its supervisor: opens it, opens it again after it was lost, with growing
 /// pauses and for ever, looks after it while nobody asks for frames, and takes a frame when told. The first failure and
 /// the recovery are logged, not each attempt. docs/supervision.md draws the states.
-/// @thread thread-safe, but for begin_capture() and end_capture(), which belong to one thread
+/// @thread thread-safe, but for the captures, which belong to one thread
 class CameraRunner {
  public:
   CameraRunner(std::unique_ptr<Camera> camera, const ScanOptions& options);
@@ -53,13 +54,17 @@ class CameraRunner {
 
   /// Waits until the camera is open.
   /// @errors kTimeout, with the reason why it is not open; kCancelled
-  [[nodiscard]] Result<> wait_ready(MonotonicTime deadline);
+  [[nodiscard]] Result<> wait_ready(const Patience& patience);
 
-  /// Lets the camera expose one frame, now; end_capture() waits for it.
+  /// Lets the camera expose one frame, now; wait_captured() and end_capture() belong to it.
   void begin_capture(MonotonicTime deadline, Exposure exposure = Exposure::kFresh,
                      FrameLight light = FrameLight::kPattern);
-  /// Comes back soon after the deadline also where the driver does not.
-  /// @errors as Camera::capture(); kCancelled
+  /// Waits for the driver's answer. @return whether it is there, or never will be
+  [[nodiscard]] bool wait_captured(const Patience& patience, MonotonicTime until);
+  /// Tells a driver that has not answered yet to do so, now.
+  void cancel_capture();
+  /// Takes the answer. A driver that has none is left alone: it is opened anew when it answers.
+  /// @errors as Camera::capture(); kCancelled, kTimeout: it was not ready any more
   [[nodiscard]] Result<Frame> end_capture();
 
  private:
@@ -67,6 +72,7 @@ class CameraRunner {
     MonotonicTime deadline;
     Exposure exposure = Exposure::kFresh;
     FrameLight light = FrameLight::kPattern;
+    bool cancelled = false;
   };
   void run(const std::stop_token& stop);
   void close();
@@ -75,9 +81,10 @@ class CameraRunner {
   void note_found();
   void note_opened(const Result<>& opened);
   void look_after();
-  void note_lost(const Error& error);
+  void note_lost(const Error& error, std::unique_lock<std::mutex> lock);
   [[nodiscard]] std::optional<Order> next_order(const std::stop_token& stop);
   void take_frame(const Order& order);
+  [[nodiscard]] bool goes_on(const Order& order, const Error& error) const;
   void note_frame(Result<Frame> frame);
   [[nodiscard]] tl::unexpected<Error> give_up();
   [[nodiscard]] tl::unexpected<Error> fail_not_ready() const;

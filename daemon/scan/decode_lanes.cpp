@@ -54,21 +54,21 @@ std::uint64_t DecodeLanes::done() const {
   return delivered_ + skipped_;
 }
 
-bool DecodeLanes::wait_done(std::uint64_t done, MonotonicTime deadline) {
+bool DecodeLanes::wait_done(std::uint64_t done, const Patience& patience) {
   std::unique_lock lock(mutex_);
   const auto another = [&] { return delivered_ + skipped_ > done; };
   if (another()) return true;
   if (delivered_ == arrived_) return false;
-  return changed_.wait_until(lock, deadline, another);
+  return patience.wait_until(patience.deadline, changed_, lock, another);
 }
 
-void DecodeLanes::push(std::unique_ptr<FrameJob> job) {
+void DecodeLanes::push(std::shared_ptr<FrameJob> job) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return waiting_.empty() || running_ == 0; });
   append({std::move(job), false, {}}, lock);
 }
 
-void DecodeLanes::offer(std::unique_ptr<FrameJob> job, MonotonicTime now) {
+void DecodeLanes::offer(std::shared_ptr<FrameJob> job, MonotonicTime now) {
   std::unique_lock lock(mutex_);
   make_room(now);
   append({std::move(job), true, now}, lock);
@@ -102,7 +102,7 @@ void DecodeLanes::run(std::size_t lane, const std::stop_token& stop) {
   name_this_thread("decode " + std::to_string(lane));
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [this] { return !waiting_.empty(); })) {
-    std::unique_ptr<FrameJob> job = std::move(waiting_.front().job);
+    std::shared_ptr<FrameJob> job = std::move(waiting_.front().job);
     waiting_.pop_front();
     const std::uint64_t turn = taken_++;
     lock.unlock();

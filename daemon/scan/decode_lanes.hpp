@@ -14,11 +14,12 @@
 #include <thread>
 
 #include "daemon/scan/heartbeat.hpp"
+#include "daemon/scan/patience.hpp"
 #include "drivers/camera/frame.hpp"
 
 namespace slsd {
 
-/// What is computed of frames, and then told.
+/// What is computed of frames, and then told. Shared by the lanes and those who may end it meanwhile.
 class FrameJob {
  public:
   virtual ~FrameJob() = default;
@@ -51,15 +52,15 @@ class DecodeLanes {
   DecodeLanes& operator=(const DecodeLanes&) = delete;
 
   /// Waits until no other waits. The job will be delivered.
-  void push(std::unique_ptr<FrameJob> job);
+  void push(std::shared_ptr<FrameJob> job);
   /// The newest wins: where too many wait, or the oldest that was offered has waited for too long, that one is
   /// destroyed undelivered.
-  void offer(std::unique_ptr<FrameJob> job, MonotonicTime now = std::chrono::steady_clock::now());
+  void offer(std::shared_ptr<FrameJob> job, MonotonicTime now = std::chrono::steady_clock::now());
   /// How many of those offered were destroyed undelivered, since the start.
   [[nodiscard]] std::uint64_t skipped() const;
 
-  /// Waits until one more job is done than `done` of them. @return false: none is under way, or the time came first
-  [[nodiscard]] bool wait_done(std::uint64_t done, MonotonicTime deadline);
+  /// Waits until one more job is done than `done` of them. @return false: none is under way, or patience ended first
+  [[nodiscard]] bool wait_done(std::uint64_t done, const Patience& patience);
   /// Jobs delivered or destroyed so far.
   [[nodiscard]] std::uint64_t done() const;
 
@@ -71,7 +72,7 @@ class DecodeLanes {
 
  private:
   struct Waiting {
-    std::unique_ptr<FrameJob> job;
+    std::shared_ptr<FrameJob> job;
     bool may_be_skipped = false;
     MonotonicTime since;  ///< of one that may be skipped
   };

@@ -9,9 +9,14 @@
 namespace slsd {
 namespace {
 
+using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
 constexpr std::size_t kAlignTriesMax = 32;
+// A driver answers by its deadline. One that does not is told to a little later, and then left alone.
+constexpr auto kLate = 300ms;
+constexpr auto kCancelTime = 400ms;
+constexpr auto kHangUpTime = 1s;  // where nobody waits for it any more
 
 std::string milliseconds_text(std::chrono::nanoseconds time) {
   char text[32];
@@ -61,8 +66,8 @@ bool Rig::stopped() const {
   return std::ranges::all_of(cameras_, &CameraRunner::stopped);
 }
 
-bool Rig::kept() const {
-  return std::ranges::all_of(cameras_, [](const CameraRunner* camera) { return camera->heartbeat().kept(); });
+bool Rig::kept(MonotonicTime now) const {
+  return std::ranges::all_of(cameras_, [now](const CameraRunner* camera) { return camera->heartbeat().kept(now); });
 }
 
 std::vector<DeviceStatus> Rig::camera_statuses() const {
@@ -77,55 +82,89 @@ std::uint64_t Rig::openings() const {
   return openings;
 }
 
-Result<> Rig::hold(std::optional<Grey8> picture, MonotonicTime deadline) {
-  return projection_.hold(std::move(picture), deadline, stopping_.get_token());
-}
-
-Result<> Rig::release(MonotonicTime deadline) {
-  return projection_.release(deadline, stopping_.get_token());
-}
-
-Result<std::vector<Frame>> Rig::expose(Cameras cameras, const Shot& shot) {
-  for (CameraRunner* camera : cameras) {
-    if (auto ready = camera->wait_ready(shot.deadline); !ready) return tl::unexpected(ready.error());
+// The projection waits in steps, as the deadline may be far.
+template <class Show>
+Result<> Rig::show(const Patience& patience, Show show) {
+  patience.note("projector");
+  for (;;) {
+    const MonotonicTime end = patience.step(patience.deadline);
+    auto shown = show(end);
+    const bool out_of_time = !shown && shown.error().code == ErrorCode::kTimeout;
+    if (!out_of_time || end >= patience.deadline) return shown;
+    if (stopping_.stop_requested()) return fail(ErrorCode::kCancelled, "the service is stopping");
   }
-  const MonotonicTime since = shot.exposure == Exposure::kNext ? projection_.visible() : steady_clock::now();
-  for (CameraRunner* camera : cameras) camera->begin_capture(shot.deadline, shot.exposure, shot.light);
+}
+
+Result<> Rig::hold(const std::optional<Grey8>& picture, const Patience& patience) {
+  return show(patience, [&](MonotonicTime end) { return projection_.hold(picture, end, patience.over); });
+}
+
+Result<> Rig::release(const Patience& patience) {
+  return show(patience, [&](MonotonicTime end) { return projection_.release(end, patience.over); });
+}
+
+Result<std::vector<Frame>> Rig::collect(Cameras cameras, const Patience& patience) {
+  for (CameraRunner* camera : cameras) {
+    patience.note("camera " + camera->name());
+    if (!camera->wait_captured(patience, patience.deadline + kLate)) break;
+  }
+  for (CameraRunner* camera : cameras) camera->cancel_capture();
+  const Patience last(steady_clock::now() + (patience.over.stop_requested() ? kHangUpTime : kCancelTime));
   std::vector<Frame> frames;
   frames.reserve(cameras.size());
   Result<> outcome;
   for (CameraRunner* camera : cameras) {
+    (void)camera->wait_captured(last, last.deadline);
     auto frame = camera->end_capture();
     if (frame) {
       frames.push_back(std::move(*frame));
     } else if (outcome) {
+      patience.note("camera " + camera->name());
       outcome = tl::unexpected(incomplete(frame.error(), cameras.size()));
     }
   }
-  if (outcome) outcome = check_times(cameras, frames, since, shot.deadline);
+  if (!outcome) return tl::unexpected(outcome.error());
+  return frames;
+}
+
+Result<std::vector<Frame>> Rig::expose(Cameras cameras, const Shot& shot) {
+  for (CameraRunner* camera : cameras) {
+    shot.patience.note("camera " + camera->name());
+    if (auto ready = camera->wait_ready(shot.patience); !ready) return tl::unexpected(ready.error());
+  }
+  const MonotonicTime since = shot.exposure == Exposure::kNext ? projection_.visible() : steady_clock::now();
+  for (CameraRunner* camera : cameras) camera->begin_capture(shot.patience.deadline, shot.exposure, shot.light);
+  auto frames = collect(cameras, shot.patience);
+  if (!frames) return frames;
+  Result<> outcome = check_times(cameras, *frames, since, shot.patience.deadline);
   if (outcome) outcome = projection_.check();
   if (!outcome) return tl::unexpected(outcome.error());
   return frames;
 }
 
 Result<std::vector<Frame>> Rig::take_set(const Shot& shot) {
-  const auto shown = projection_.show(picture_for(shot.light), shot.deadline, stopping_.get_token());
+  const auto shown = show(shot.patience, [&](MonotonicTime end) {
+    return projection_.show(picture_for(shot.light), end, shot.patience.over);
+  });
   if (!shown) return tl::unexpected(shown.error());
   const bool going_on = std::exchange(changes_before_, projection_.changes()) == projection_.changes();
-  auto frames = expose(cameras_, {shot.deadline, going_on ? shot.exposure : Exposure::kFresh, shot.light});
+  auto frames = expose(cameras_, {shot.patience, going_on ? shot.exposure : Exposure::kFresh, shot.light});
   if (!frames) return frames;
   if (auto aligned = align(*frames, shot); !aligned) return tl::unexpected(aligned.error());
   if (auto together = check_skew(*frames); !together) return tl::unexpected(together.error());
   return frames;
 }
 
-Result<FrameSet> Rig::capture(MonotonicTime deadline, Exposure exposure, LightFrames light) {
+Result<FrameSet> Rig::capture(const Patience& patience, Exposure exposure, LightFrames light) {
   const auto begin = steady_clock::now();
   FrameSet set;
   for (const FrameLight now : {FrameLight::kPattern, FrameLight::kWhite, FrameLight::kDark}) {
     if (now == FrameLight::kWhite && !light.white) continue;
     if (now == FrameLight::kDark && !light.dark) continue;
-    auto frames = take_set({deadline, exposure, now});
+    auto frames = take_set({patience, exposure, now});
+    while (!frames && patience.again && patience.again(frames.error())) {
+      frames = take_set({patience, Exposure::kFresh, now});
+    }
     if (!frames) return tl::unexpected(frames.error());
     (now == FrameLight::kPattern ? set.frames : now == FrameLight::kWhite ? set.white : set.dark) = std::move(*frames);
   }
@@ -134,14 +173,17 @@ Result<FrameSet> Rig::capture(MonotonicTime deadline, Exposure exposure, LightFr
   return set;
 }
 
-Result<Frame> Rig::capture_one(std::size_t camera, MonotonicTime deadline, bool as_shown) {
-  const std::stop_token stop = stopping_.get_token();
-  const auto shown =
-      as_shown ? projection_.show_due(deadline, stop) : projection_.show(Projection::Picture::kPattern, deadline, stop);
-  if (!shown) return tl::unexpected(shown.error());
-  auto frames = expose(Cameras(cameras_).subspan(camera, 1), {deadline});
-  if (!frames) return tl::unexpected(frames.error());
-  return std::move(frames->front());
+Result<Frame> Rig::capture_one(std::size_t camera, const Patience& patience, bool as_shown) {
+  for (;;) {
+    const auto shown = show(patience, [&](MonotonicTime end) {
+      return as_shown ? projection_.show_due(end, patience.over)
+                      : projection_.show(Projection::Picture::kPattern, end, patience.over);
+    });
+    if (!shown) return tl::unexpected(shown.error());
+    auto frames = expose(Cameras(cameras_).subspan(camera, 1), {patience});
+    if (frames) return std::move(frames->front());
+    if (!patience.again || !patience.again(frames.error())) return tl::unexpected(frames.error());
+  }
 }
 
 // Cameras that run freely begin at any moment of their period: where one has begun too early for the others, its next
@@ -150,7 +192,7 @@ Result<> Rig::align(std::vector<Frame>& frames, const Shot& shot) {
   for (std::size_t tries = 0; frames.size() > 1 && tries < kAlignTriesMax; ++tries) {
     const auto first = static_cast<std::size_t>(exposures(frames).min - frames.begin());
     if (skew_of(frames) <= slack(*cameras_[first])) return {};
-    auto next = expose(Cameras(cameras_).subspan(first, 1), {shot.deadline, Exposure::kNext, shot.light});
+    auto next = expose(Cameras(cameras_).subspan(first, 1), {shot.patience, Exposure::kNext, shot.light});
     if (!next) return tl::unexpected(next.error());
     frames[first] = std::move(next->front());
   }

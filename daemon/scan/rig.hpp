@@ -42,20 +42,21 @@ class Rig {
   /// When supervise() will have something to do, unless a device is lost; the end of time where it will not.
   [[nodiscard]] MonotonicTime next_change() const { return projection_.next_change(); }
 
-  /// One frame of each camera. Of cameras that run freely those whose exposures are nearest to one another.
+  /// One frame of each camera. Of cameras that run freely those whose exposures are nearest to one another. Where the
+  /// frames of one light are lost and patience says so, they are taken again.
   /// @param exposure  kNext: the frames need not have begun after the call, only after the pattern was visible, and
   ///                  after those of the capture before
   /// @param light     exposed after those of the pattern, white first, each after its own picture was visible
   /// @errors kTimeout: a device is not ready; kFrameDropped, kFrameTorn, kFrameStale, kFrameLate, kMismatch,
   /// kDisconnected, kBusy:
   ///         of one camera; kFrameSkewed: exposures apart; kCancelled
-  [[nodiscard]] Result<FrameSet> capture(MonotonicTime deadline, Exposure exposure = Exposure::kFresh,
+  [[nodiscard]] Result<FrameSet> capture(const Patience& patience, Exposure exposure = Exposure::kFresh,
                                          LightFrames light = {});
 
   /// One frame of one camera while the pattern is visible. @errors as capture()
   /// @param camera    its index
   /// @param as_shown  leave what the projector shows, whatever that is, in the pattern's place
-  [[nodiscard]] Result<Frame> capture_one(std::size_t camera, MonotonicTime deadline, bool as_shown = false);
+  [[nodiscard]] Result<Frame> capture_one(std::size_t camera, const Patience& patience, bool as_shown = false);
 
   /// Shows another pattern from the next capture on.
   void show(Grey8 image) { projection_.set_pattern(std::move(image)); }
@@ -65,15 +66,15 @@ class Rig {
   }
   /// Shows a picture, at once, until the next capture, hold() or release(). @param picture  nothing: the pattern
   /// @errors kTimeout: the projector is not ready; kCancelled; what was shown before then stays due
-  [[nodiscard]] Result<> hold(std::optional<Grey8> picture, MonotonicTime deadline);
+  [[nodiscard]] Result<> hold(const std::optional<Grey8>& picture, const Patience& patience);
   /// Shows the idle picture, at once. @errors as hold()
-  [[nodiscard]] Result<> release(MonotonicTime deadline);
+  [[nodiscard]] Result<> release(const Patience& patience);
 
   void request_stop();
   /// Whether the cameras are closed, after request_stop().
   [[nodiscard]] bool stopped() const;
   /// Whether the cameras' threads keep their promises to the watchdog.
-  [[nodiscard]] bool kept() const;
+  [[nodiscard]] bool kept(MonotonicTime now = std::chrono::steady_clock::now()) const;
   [[nodiscard]] DeviceStatus projector_status() const { return projection_.status(); }
   [[nodiscard]] std::vector<DeviceStatus> camera_statuses() const;
   [[nodiscard]] RigStatus status() const { return {projector_status(), camera_statuses()}; }
@@ -84,12 +85,15 @@ class Rig {
   using Cameras = std::span<CameraRunner* const>;
   /// How one set of frames is exposed.
   struct Shot {
-    MonotonicTime deadline;
+    const Patience& patience;
     Exposure exposure = Exposure::kFresh;
     FrameLight light = FrameLight::kPattern;
   };
+  template <class Show>
+  [[nodiscard]] Result<> show(const Patience& patience, Show show);
   [[nodiscard]] Result<std::vector<Frame>> take_set(const Shot& shot);
   [[nodiscard]] Result<std::vector<Frame>> expose(Cameras cameras, const Shot& shot);
+  [[nodiscard]] Result<std::vector<Frame>> collect(Cameras cameras, const Patience& patience);
   [[nodiscard]] Result<> align(std::vector<Frame>& frames, const Shot& shot);
   [[nodiscard]] std::chrono::nanoseconds slack(const CameraRunner& camera) const;
   [[nodiscard]] Result<> check_times(Cameras cameras, const std::vector<Frame>& frames, MonotonicTime since,

@@ -12,6 +12,7 @@
 
 #include "core/cloud/cloud.hpp"
 #include "core/decode/decoding.hpp"
+#include "daemon/scan/cloud_files.hpp"
 #include "daemon/scan/stage_clock.hpp"
 #include "drivers/camera/camera.hpp"
 #include "drivers/camera/frame.hpp"
@@ -19,6 +20,12 @@
 namespace slsd {
 
 using RegionCounts = std::array<std::uint32_t, kRegionStatusCount>;
+
+/// The tries of a scan whose frames were lost, torn or late, before the one that it ended with.
+struct LostTries {
+  std::uint64_t count = 0;
+  std::vector<Error> last;  ///< the newest few, oldest first
+};
 
 /// How the frames that a cloud was decoded from are kept beside it.
 enum class FrameCoding { kNone, kRaw, kPng };
@@ -30,6 +37,7 @@ struct ScanRequest {
   FrameCoding frames = FrameCoding::kNone;  ///< what becomes of the frames besides the cloud
   bool texture = false;                     ///< intensities from frames in white light
   bool ambient = false;                     ///< less those in the light of the room alone
+  CloudFormats formats = {};                ///< in which the cloud is written
   std::stop_token gone = {};                ///< requested when nobody waits for the outcome any more
 };
 
@@ -58,6 +66,8 @@ struct FrameImage {
 /// What a scan gave.
 struct ScanResult {
   Cloud cloud;
+  CloudFiles files = {};  ///< the cloud's, in the formats that were asked for
+  LostTries lost = {};
   std::vector<CloudPoint> strays;          ///< symbols that a knocked rig has elsewhere: see stray_symbols()
   RegionCounts regions{};                  ///< of all cameras, by status
   std::optional<std::uint64_t> saturated;  ///< points without an intensity, as white was too bright; where it was asked

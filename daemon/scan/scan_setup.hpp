@@ -65,4 +65,7 @@ struct ScanSetup {
   [[nodiscard]] ScanFiles files() const;
 };
 
+// The decoders of the scans under way; shared, as a reload may replace them meanwhile.
+using SharedSetup = std::shared_ptr<ScanSetup>;
+
 }  // namespace slsd

@@ -4,7 +4,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include <limits>
+#include <algorithm>
 #include <random>
 
 #include "daemon/scan/thread_name.hpp"
@@ -17,12 +17,15 @@ using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
 constexpr std::size_t kMaxWaiting = 64;
+constexpr std::size_t kMaxChores = 16;
 constexpr auto kIdleWake = 1s;
-constexpr auto kIdlePromise = 10s;
-constexpr auto kWorkPromise = 60s;  // decoding, drawing, or making a pattern
+constexpr auto kStepPromise = 7s;   // waiting goes by steps of a second
+constexpr auto kWorkPromise = 60s;  // drawing, or making a pattern and its decoders
 constexpr auto kFreeScanTimeout = 5s;
 constexpr auto kPauseAfterFailure = 500ms;
 constexpr int kFailuresToPause = 2;
+constexpr auto kTryPauseFirst = 5ms;
+constexpr auto kTryPauseLongest = 200ms;
 
 // Tells the scans of one run of the service from those of another.
 std::string make_run_id() {
@@ -36,15 +39,23 @@ double milliseconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double, std::milli>(time).count();
 }
 
+Error stopping() {
+  return {ErrorCode::kCancelled, "the service is stopping", {}};
+}
+
 }  // namespace
 
 Scanner::Scanner(std::unique_ptr<Rig> rig, ScanSetup setup)
     : rig_(std::move(rig)),
       setup_(std::make_shared<ScanSetup>(std::move(setup))),
+      adopted_(setup_),
       queue_(kMaxWaiting),
+      chores_(kMaxChores),
       run_id_(make_run_id()),
-      lanes_(DecodeLanes::lanes_here()) {
-  heartbeat_.promise(kIdlePromise);
+      lanes_(DecodeLanes::lanes_here()),
+      deadlines_([this](const Task& task) { return overdue(task); }) {
+  heartbeat_.promise(kStepPromise);
+  chores_thread_ = std::jthread([this](const std::stop_token& stop) { run_chores(stop); });
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
@@ -54,42 +65,80 @@ Scanner::~Scanner() {
 
 void Scanner::request_stop() {
   thread_.request_stop();
+  chores_thread_.request_stop();
   rig_->request_stop();
+  std::shared_ptr<Task> under_way;
+  {
+    const std::lock_guard lock(mutex_);
+    under_way = under_way_;
+  }
+  if (under_way) under_way->fail_with(stopping());
   lanes_.request_stop();
 }
 
 bool Scanner::wait_stopped(std::chrono::milliseconds time) {
   const auto end = steady_clock::now() + time;
-  const auto all_stopped = [this] { return stopped_ && lanes_.stopped() && rig_->stopped(); };
+  const auto all_stopped = [this] { return running_ == 0 && lanes_.stopped() && rig_->stopped(); };
   while (!all_stopped() && steady_clock::now() < end) std::this_thread::sleep_for(5ms);
   return all_stopped();
 }
 
+bool Scanner::kept() const {
+  return heartbeat_.kept() && chore_heartbeat_.kept() && lanes_.kept() && rig_->kept();
+}
+
+SharedSetup Scanner::setup() const {
+  const std::lock_guard lock(mutex_);
+  return setup_;
+}
+
+// --- the scanner's thread ---
+
 void Scanner::run(const std::stop_token& stop) {
   name_this_thread("scanner");
   while (!stop.stop_requested()) {
-    heartbeat_.promise(kIdlePromise);
+    heartbeat_.promise(kStepPromise);
+    adopt_setup();
     if (!free_scan_due()) {
       every_frame_ = false;  // by the next free scan the cameras' frames may be of long ago
       rig_->supervise();     // not before a scan: the idle picture would only flash
     }
-    if (auto job = queue_.pop_until(next_wake(), stop)) {
+    if (const auto turn = queue_.pop_until(next_wake(), stop)) {
       every_frame_ = false;
-      (*job)({});
+      adopt_setup();
+      take_turn(*turn);
     } else if (free_scan_due()) {
       scan_freely();
     }
   }
-  refuse_waiting();
-  stopped_ = true;
+  while (const auto turn = queue_.try_pop()) turn->task->fail_with(stopping());
+  heartbeat_.rest();
+  --running_;
+}
+
+void Scanner::adopt_setup() {
+  SharedSetup setup = this->setup();
+  if (setup == adopted_) return;
+  adopted_ = std::move(setup);
+  rig_->show(adopted_->image);
+}
+
+void Scanner::take_turn(const Turn& turn) {
+  if (turn.task->over()) return;
+  {
+    const std::lock_guard lock(mutex_);
+    under_way_ = turn.task;
+  }
+  // A stop that came before could not see it.
+  if (thread_.get_stop_token().stop_requested()) turn.task->fail_with(stopping());
+  heartbeat_.promise(kStepPromise);
+  turn.take();
+  const std::lock_guard lock(mutex_);
+  under_way_.reset();
 }
 
 bool Scanner::free_scan_due() const {
   return free_rate_hz_ > 0 && steady_clock::now() >= next_free_scan_;
-}
-
-void Scanner::refuse_waiting() {
-  while (auto job = queue_.try_pop()) (*job)(fail(ErrorCode::kCancelled, "the service is stopping"));
 }
 
 MonotonicTime Scanner::next_wake() const {
@@ -97,122 +146,185 @@ MonotonicTime Scanner::next_wake() const {
   return free_rate_hz_ > 0 ? std::min(idle, next_free_scan_) : idle;
 }
 
-void Scanner::submit(Job job) {
-  if (!queue_.try_push(std::move(job))) {
-    job(fail(ErrorCode::kBusy, std::to_string(kMaxWaiting) + " requests wait already: ask again later"));
-  }
+void Scanner::scan_freely() {
+  const MonotonicTime begin = steady_clock::now();
+  const double rate_hz = free_rate_hz_;
+  ScanRequest request;
+  request.deadline = begin + kFreeScanTimeout;
+  const auto scan = make_scan(std::move(request), true, {});
+  take_turn({scan, [&] {
+               Patience patience = patience_of(*scan);
+               patience.again = wait_for_frames(*scan);
+               scan->expose(*rig_, hardware_, adopted_, patience, every_frame_ ? Exposure::kNext : Exposure::kFresh,
+                            free_formats_);
+             }});
+  heartbeat_.promise(kWorkPromise);
+  scan->exposed() ? lanes_.offer(scan) : lanes_.push(scan);
+  const auto period = std::chrono::duration<double>(rate_hz > 0 ? 1.0 / rate_hz : 0.0);
+  next_free_scan_ = begin + std::chrono::duration_cast<std::chrono::nanoseconds>(period);
+  const MonotonicTime now = steady_clock::now();
+  if (failures_in_a_row_ >= kFailuresToPause)
+    next_free_scan_ = std::max<MonotonicTime>(next_free_scan_, now + kPauseAfterFailure);
+  every_frame_ = next_free_scan_ <= now;
+}
+
+Patience Scanner::patience_of(Task& task) {
+  Patience patience = task.patience();
+  patience.alive = [this] { heartbeat_.promise(kStepPromise); };
+  return patience;
 }
 
 // Where the frames under way are all that a camera lends, its next waits for one of them.
-template <class Take>
-auto Scanner::take_frames(MonotonicTime deadline, Take take) {
-  while (true) {
-    const std::uint64_t done = lanes_.done();
-    auto taken = take();
-    const bool lacks_frames = !taken && taken.error().code == ErrorCode::kBusy;
-    if (!lacks_frames || !lanes_.wait_done(done, deadline)) return taken;
-  }
-}
-
-Result<FrameSet> Scanner::capture(const ScanRequest& request, Exposure exposure) {
-  heartbeat_.promise(request.deadline - steady_clock::now() + kWorkPromise);
-  if (auto possible = setup_->check(request); !possible) return tl::unexpected(possible.error());
-  return take_frames(request.deadline, [&]() -> Result<FrameSet> {
-    auto set = rig_->capture(request.deadline, exposure, {request.texture, request.ambient});
-    if (!set) return set;
-    if (auto same = hardware_.check(setup_, *rig_); !same) return tl::unexpected(same.error());
-    return set;
-  });
-}
-
-std::unique_ptr<ScanJob> Scanner::decoding(Result<FrameSet> set, const ScanRequest& request, bool listened,
-                                           Answer<ScanResult> answer) {
-  const std::uint64_t number = ++scans_;
-  const std::string scan_id = run_id_ + "-" + std::to_string(number);
-  auto told = [this, setup = setup_, number, scan_id, listened, answer = std::move(answer)](Result<ScanResult> result) {
-    conclude(setup, number, scan_id, result);
-    if (answer) answer(result);
-    if (listened && listener_) listener_(std::make_shared<Result<ScanResult>>(std::move(result)));
+std::function<bool(const Error&)> Scanner::wait_for_frames(Task& task) {
+  return [this, &task, done = lanes_.done()](const Error& error) mutable {
+    if (error.code != ErrorCode::kBusy || !lanes_.wait_done(done, patience_of(task))) return false;
+    done = lanes_.done();
+    return true;
   };
-  return std::make_unique<ScanJob>(std::move(set), setup_, request, scan_id, std::move(told));
 }
 
-void Scanner::conclude(const SharedSetup& setup, std::uint64_t number, const std::string& scan_id,
-                       Result<ScanResult>& result) {
-  const std::uint64_t skipped = lanes_.skipped();
-  const std::uint64_t skipped_now = skipped - std::exchange(skipped_told_, skipped);
-  if (result) result->skipped = skipped_now;
-  statistics_.note(result, skipped_now);
-  if (result) watch_.note(setup, *result, number);
-  log_outcome(scan_id, result);
+// Frames that were lost are taken again. The pauses keep a camera that loses everything at once from using a whole
+// processor.
+std::function<bool(const Error&)> Scanner::try_again(Task& task, std::function<void(const Error&)> note) {
+  return [this, &task, lent = wait_for_frames(task), note = std::move(note),
+          pause = std::chrono::milliseconds::zero()](const Error& error) mutable {
+    if (lent(error)) return true;
+    if (!may_be_taken_again(error) || steady_clock::now() + pause >= task.deadline()) return false;
+    note(error);
+    task.pause(pause);
+    pause = std::clamp<std::chrono::milliseconds>(2 * pause, kTryPauseFirst, kTryPauseLongest);
+    return !task.over();
+  };
 }
 
-void Scanner::log_outcome(const std::string& scan_id, const Result<ScanResult>& result) {
-  if (result) {
-    spdlog::debug("scan {}: {} points, capture {:.1f} ms, decode {:.1f} ms", scan_id, result->cloud.points.size(),
-                  milliseconds(result->capture_time), milliseconds(result->decode_time));
-    if (failures_in_a_row_ > 0) spdlog::info("scan {}: scans succeed again", scan_id);
-  } else {
-    const auto level = failures_in_a_row_ > 0 ? spdlog::level::debug : spdlog::level::info;
-    spdlog::log(level, "scan {} failed ({}): {}", scan_id, to_string(result.error().code), to_string(result.error()));
+// --- requests ---
+
+void Scanner::submit(Turn turn, const std::stop_token& gone) {
+  const std::shared_ptr<Task> task = turn.task;
+  deadlines_.watch(task);
+  task->end_with(gone);
+  // Those that are over give their place to others.
+  queue_.erase_if([](const Turn& each) { return each.task->over(); });
+  if (queue_.try_push(std::move(turn))) {
+    if (thread_.get_stop_token().stop_requested()) task->fail_with(stopping());
+    return;
   }
-  failures_in_a_row_ = result ? 0 : failures_in_a_row_ + 1;
+  task->fail_with({ErrorCode::kBusy, std::to_string(kMaxWaiting) + " requests wait already: ask again later", {}});
 }
 
-void Scanner::scan(const ScanRequest& request, Answer<ScanResult> answer) {
-  submit([this, request, answer = std::move(answer)](const Result<>& permission) {
-    if (!permission) return answer(tl::unexpected(permission.error()));
-    if (steady_clock::now() >= request.deadline) {
-      return answer(fail(ErrorCode::kTimeout, "other requests took all of its time: allow a longer timeout"));
-    }
-    lanes_.push(decoding(capture(request, Exposure::kFresh), request, free_rate_hz_ > 0, answer));
-  });
+Error Scanner::overdue(const Task& task) const {
+  std::string holder = task.waits_for();
+  const bool had_its_turn = !holder.empty();
+  if (!had_its_turn) {
+    const std::lock_guard lock(mutex_);
+    if (under_way_) holder = under_way_->waits_for();
+  }
+  if (holder.empty()) {
+    return {ErrorCode::kTimeout, "other requests took all of its time: allow a longer timeout", {}};
+  }
+  const RigStatus rig = rig_->status();
+  std::string problem = holder == "projector" ? rig.projector.problem : "";
+  for (const DeviceStatus& camera : rig.cameras) {
+    if (holder == "camera " + camera.name) problem = camera.problem;
+  }
+  std::string message = had_its_turn ? "its time is over: it waited for this"
+                                     : "its time is over: a request before it still waits for this";
+  if (!problem.empty()) message += "; " + problem;
+  return {ErrorCode::kTimeout, std::move(message), std::move(holder)};
 }
 
-void Scanner::frame(const FrameRequest& request, Answer<FrameImage> answer) {
-  submit([this, request, answer = std::move(answer)](const Result<>& permission) {
-    if (!permission) return answer(tl::unexpected(permission.error()));
-    heartbeat_.promise(request.deadline - steady_clock::now() + kWorkPromise);
-    if (auto known = setup_->check_camera(request.camera); !known) return answer(tl::unexpected(known.error()));
-    const std::size_t camera = setup_->camera_index(request.camera);
-    auto frame =
-        take_frames(request.deadline, [&] { return rig_->capture_one(camera, request.deadline, request.as_shown); });
-    if (!frame) return answer(tl::unexpected(frame.error()));
-    lanes_.push(std::make_unique<ImageJob>(std::move(*frame), request.as_png, answer));
-  });
+std::shared_ptr<Scan> Scanner::make_scan(ScanRequest request, bool listened, Answer<ScanResult> answer) {
+  const std::uint64_t number = ++scans_;
+  return std::make_shared<Scan>(
+      std::move(request), number, run_id_ + "-" + std::to_string(number),
+      [this, listened, answer = std::move(answer)](const Scan& scan, Result<ScanResult> result) {
+        conclude(scan, result);
+        if (answer) answer(result);
+        const bool for_all = listened && (result || result.error().code != ErrorCode::kCancelled);
+        if (for_all && listener_) listener_(std::make_shared<Result<ScanResult>>(std::move(result)));
+      });
 }
 
-void Scanner::project(const ProjectRequest& request, Answer<void> answer) {
-  submit([this, request, answer = std::move(answer)](const Result<>& permission) {
-    if (!permission) return answer(permission);
-    heartbeat_.promise(request.deadline - steady_clock::now() + kWorkPromise);
-    if (request.picture == ProjectedPicture::kIdle) return answer(rig_->release(request.deadline));
-    auto drawn = draw_projected(request.picture, request.png, *setup_);
-    if (!drawn) return answer(tl::unexpected(drawn.error()));
-    answer(rig_->hold(std::move(*drawn), request.deadline));
-  });
+void Scanner::scan(ScanRequest request, Answer<ScanResult> answer) {
+  const std::stop_token gone = request.gone;
+  auto scan = make_scan(std::move(request), free_rate_hz_ > 0, std::move(answer));
+  submit({scan,
+          [this, scan] {
+            Patience patience = patience_of(*scan);
+            patience.again = try_again(*scan, [&](const Error& error) { scan->note_lost(error); });
+            scan->expose(*rig_, hardware_, adopted_, patience, Exposure::kFresh, free_formats_);
+            patience.note("decoding");
+            heartbeat_.promise(kWorkPromise);
+            lanes_.push(scan);
+          }},
+         gone);
+}
+
+void Scanner::frame(FrameRequest request, Answer<FrameImage> answer) {
+  const std::stop_token gone = request.gone;
+  auto frame = std::make_shared<FrameTask>(std::move(request), std::move(answer));
+  submit({frame,
+          [this, frame] {
+            Patience patience = patience_of(*frame);
+            patience.again = try_again(*frame, [](const Error&) {});
+            frame->expose(*rig_, *adopted_, patience);
+            patience.note("decoding");
+            heartbeat_.promise(kWorkPromise);
+            lanes_.push(frame);
+          }},
+         gone);
+}
+
+void Scanner::project(ProjectRequest request, Answer<void> answer) {
+  const std::stop_token gone = request.gone;
+  auto task = std::make_shared<TaskOf<void>>(request.deadline, std::move(answer));
+  submit({task,
+          [this, task, request = std::move(request)] {
+            const Patience patience = patience_of(*task);
+            if (request.picture == ProjectedPicture::kIdle) return task->end(rig_->release(patience));
+            heartbeat_.promise(kWorkPromise);
+            auto drawn = draw_projected(request.picture, request.png, *adopted_);
+            task->end(drawn ? rig_->hold(std::move(*drawn), patience) : tl::unexpected(drawn.error()));
+          }},
+         gone);
+}
+
+// --- what needs no device ---
+
+void Scanner::run_chores(const std::stop_token& stop) {
+  name_this_thread("chores");
+  while (!stop.stop_requested()) {
+    const auto chore = chores_.pop_until(steady_clock::now() + 1h, stop);
+    if (!chore) continue;
+    chore_heartbeat_.promise(kWorkPromise);
+    (*chore)({});
+    chore_heartbeat_.rest();
+  }
+  refuse_chores();
+  --running_;
+}
+
+void Scanner::refuse_chores() {
+  while (const auto chore = chores_.try_pop()) (*chore)(tl::unexpected(stopping()));
+}
+
+void Scanner::submit_chore(Chore chore) {
+  if (!chores_.try_push(std::move(chore))) {
+    return chore(fail(ErrorCode::kBusy, std::to_string(kMaxChores) + " such requests wait already: ask again later"));
+  }
+  if (chores_thread_.get_stop_token().stop_requested()) refuse_chores();  // its thread may have ended before
 }
 
 void Scanner::pattern(Answer<std::string> answer) {
-  submit([this, answer = std::move(answer)](const Result<>& permission) {
+  submit_chore([this, answer = std::move(answer)](const Result<>& permission) {
     if (!permission) return answer(tl::unexpected(permission.error()));
-    heartbeat_.promise(kWorkPromise);
-    answer(encode_png(setup_->image));
-  });
-}
-
-void Scanner::files(Answer<ScanFiles> answer) {
-  submit([this, answer = std::move(answer)](const Result<>& permission) {
-    if (!permission) return answer(tl::unexpected(permission.error()));
-    heartbeat_.promise(kWorkPromise);
-    answer(setup_->files());
+    answer(encode_png(setup()->image));
   });
 }
 
 void Scanner::reload(const std::filesystem::path& file, const Configuration& running, Answer<Configuration> answer) {
-  submit([this, file, running, answer = std::move(answer)](const Result<>& permission) {
+  submit_chore([this, file, running, answer = std::move(answer)](const Result<>& permission) {
     if (!permission) return answer(tl::unexpected(permission.error()));
-    heartbeat_.promise(kWorkPromise);
     auto configuration = load_configuration(file);
     if (!configuration) return answer(configuration);
     Configuration with_devices = *configuration;
@@ -220,33 +332,49 @@ void Scanner::reload(const std::filesystem::path& file, const Configuration& run
     with_devices.pattern.projector_width_px = running.projector.width_px;
     with_devices.pattern.projector_height_px = running.projector.height_px;
     with_devices.cameras = running.cameras;
-    auto setup = ScanSetup::create(with_devices, DecodeLanes::lanes_here());
-    if (!setup) return answer(tl::unexpected(setup.error()));
-    setup_ = std::make_shared<ScanSetup>(std::move(*setup));
-    rig_->show(setup_->image);
+    auto made = ScanSetup::create(with_devices, DecodeLanes::lanes_here());
+    if (!made) return answer(tl::unexpected(made.error()));
+    auto setup = std::make_shared<ScanSetup>(std::move(*made));
+    {
+      const std::lock_guard lock(mutex_);
+      setup_.swap(setup);
+    }
+    queue_.wake();
     answer(configuration);
   });
 }
 
-void Scanner::run_freely(std::optional<double> rate_hz) {
-  free_rate_hz_ = rate_hz.value_or(0);
+void Scanner::run_freely(std::optional<FreeRun> demand) {
+  if (demand) free_formats_ = demand->formats;
+  free_rate_hz_ = demand ? demand->rate_hz : 0;
   queue_.wake();
 }
 
-void Scanner::scan_freely() {
-  const MonotonicTime begin = steady_clock::now();
-  const double rate_hz = free_rate_hz_;
-  const ScanRequest request{begin + kFreeScanTimeout, false, {}};
-  auto set = capture(request, every_frame_ ? Exposure::kNext : Exposure::kFresh);
-  const bool taken = set.has_value();
-  auto job = decoding(std::move(set), request, true, {});
-  taken ? lanes_.offer(std::move(job)) : lanes_.push(std::move(job));
-  const auto period = std::chrono::duration<double>(rate_hz > 0 ? 1.0 / rate_hz : 0.0);
-  next_free_scan_ = begin + std::chrono::duration_cast<std::chrono::nanoseconds>(period);
-  const MonotonicTime now = steady_clock::now();
-  if (failures_in_a_row_ >= kFailuresToPause)
-    next_free_scan_ = std::max<MonotonicTime>(next_free_scan_, now + kPauseAfterFailure);
-  every_frame_ = next_free_scan_ <= now;
+// --- outcomes ---
+
+void Scanner::conclude(const Scan& scan, Result<ScanResult>& result) {
+  const std::lock_guard lock(concluding_);
+  const std::uint64_t skipped = lanes_.skipped();
+  const std::uint64_t skipped_now = skipped - std::exchange(skipped_told_, skipped);
+  if (result) result->skipped = skipped_now;
+  statistics_.note(result, skipped_now);
+  if (result) watch_.note(scan.setup(), *result, scan.number());
+  log_outcome(scan.id(), result);
+}
+
+void Scanner::log_outcome(const std::string& scan_id, const Result<ScanResult>& result) {
+  if (result) {
+    spdlog::debug("scan {}: {} points, capture {:.1f} ms, decode {:.1f} ms, {} lost tries", scan_id,
+                  result->cloud.points.size(), milliseconds(result->capture_time), milliseconds(result->decode_time),
+                  result->lost.count);
+    if (failures_in_a_row_ > 0) spdlog::info("scan {}: scans succeed again", scan_id);
+    failures_in_a_row_ = 0;
+    return;
+  }
+  const bool of_the_client = result.error().code == ErrorCode::kCancelled;
+  const auto level = of_the_client || failures_in_a_row_ > 0 ? spdlog::level::debug : spdlog::level::info;
+  spdlog::log(level, "scan {} failed ({}): {}", scan_id, to_string(result.error().code), to_string(result.error()));
+  if (!of_the_client) ++failures_in_a_row_;
 }
 
 }  // namespace slsd

@@ -5,12 +5,10 @@
 #include <memory>
 #include <string>
 
+#include "daemon/scan/cloud_files.hpp"
 #include "drivers/system/file_descriptor.hpp"
 
 namespace slsd {
-
-/// Bytes that may go to several clients, which send them at their own pace: hence shared.
-using SharedBytes = std::shared_ptr<const std::string>;
 
 /// What goes to a client in one piece: a line, the bytes that follow it, and a descriptor that comes with the line.
 struct Outgoing {

@@ -54,6 +54,12 @@ json scan_json(const ScanResult& scan) {
               {"decode_ms", milliseconds(scan.decode_time)},
               {"stages_ms", std::move(stages)}};
   if (scan.saturated) result["saturated"] = *scan.saturated;
+  result["tries"] = scan.lost.count + 1;
+  if (scan.lost.count > 0) {
+    json lost = json::array();
+    for (const Error& error : scan.lost.last) lost.push_back(rpc_error(error).to_json());
+    result["lost_tries"] = std::move(lost);
+  }
   return result;
 }
 

@@ -81,15 +81,16 @@ Outgoing frame_event(const std::string& scan_id, const FrameImage& frame, FrameC
 Outcome scan_reply(const ScanResult& scan, CloudFormat format, bool as_memfd, FrameCoding frames) {
   Reply reply{scan_json(scan)};
   reply.result["format"] = to_string(format);
-  std::string cloud = write_cloud(scan.cloud, format);
+  CloudFiles files = scan.files;
+  const SharedBytes cloud = files.file(scan.cloud, format);
   if (as_memfd) {
-    auto memory = sealed_memory(cloud);
+    auto memory = sealed_memory(*cloud);
     if (!memory) return tl::unexpected(rpc_error(memory.error()));
-    reply.result["memfd_bytes"] = cloud.size();
+    reply.result["memfd_bytes"] = cloud->size();
     reply.descriptor = std::move(*memory);
   } else {
-    reply.result["bytes"] = cloud.size();
-    reply.bytes = share(std::move(cloud));
+    reply.result["bytes"] = cloud->size();
+    reply.bytes = cloud;
   }
   if (!scan.picture_png.empty()) reply.first.push_back(picture_event(scan));
   for (const FrameImage& frame : scan.frames) reply.first.push_back(frame_event(scan.cloud.scan_id, frame, frames));
@@ -116,7 +117,7 @@ void run_scan(ServiceState& state, const json& params, Session&, Respond respond
   const bool texture = reader.boolean("texture", false);
   const bool ambient = reader.boolean("ambient", false);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
-  state.scanner.scan({deadline_in(timeout_ms), picture, camera, frames, texture, ambient},
+  state.scanner.scan({deadline_in(timeout_ms), picture, camera, frames, texture, ambient, CloudFormats::only(format)},
                      carry_scan(state, std::move(respond), [format, as_memfd, frames](const ScanResult& scan) {
                        return scan_reply(scan, format, as_memfd, frames);
                      }));
@@ -125,14 +126,11 @@ void run_scan(ServiceState& state, const json& params, Session&, Respond respond
 void run_settings(ServiceState& state, const json& params, Session&, Respond respond) {
   const ParamReader reader(params);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
-  json result = settings_json(state.configuration);
-  state.scanner.files(
-      carry<ScanFiles>(state, std::move(respond), [result = std::move(result)](const ScanFiles& files) -> Outcome {
-        Reply reply{result};
-        reply.result["pattern"] = files.pattern;
-        reply.result["calibration"] = files.calibration;
-        return reply;
-      }));
+  const ScanFiles files = state.scanner.setup()->files();
+  Reply reply{settings_json(state.configuration)};
+  reply.result["pattern"] = files.pattern;
+  reply.result["calibration"] = files.calibration;
+  respond(std::move(reply));
 }
 
 void run_preview(ServiceState& state, const json& params, Session&, Respond respond) {

@@ -67,11 +67,13 @@ std::size_t Server::subscribers() const {
 }
 
 void Server::update_demand() {
-  std::optional<double> demand;
+  std::optional<FreeRun> demand;
   for (const auto& session : sessions_) {
     if (!session->subscription()) continue;
-    const double rate = session->subscription()->rate_hz().value_or(std::numeric_limits<double>::infinity());
-    demand = std::max(demand.value_or(0), rate);
+    if (!demand) demand.emplace();
+    const double rate_hz = session->subscription()->rate_hz().value_or(std::numeric_limits<double>::infinity());
+    demand->rate_hz = std::max(demand->rate_hz, rate_hz);
+    demand->formats = demand->formats | CloudFormats::only(session->subscription()->format());
   }
   demand_changed_(demand);
 }

@@ -24,8 +24,8 @@ namespace slsd {
 /// @thread thread-bound to the event loop's, but for publish()
 class Server {
  public:
-  /// How fast the subscribers together want scans: nothing where there are none, infinity where one wants all.
-  using DemandChanged = std::function<void(std::optional<double> rate_hz)>;
+  /// What the subscribers together want; nothing where there are none.
+  using DemandChanged = std::function<void(std::optional<FreeRun> demand)>;
 
   Server(asio::io_context& events, const ServerOptions& options, Session::Handler handler,
          DemandChanged demand_changed);

@@ -9,12 +9,6 @@
 
 namespace slsd {
 
-SharedBytes Publication::cloud(CloudFormat format) {
-  SharedBytes& bytes = format == CloudFormat::kPly ? ply_ : pcd_;
-  if (!bytes) bytes = std::make_shared<const std::string>(write_cloud((*scan_)->cloud, format));
-  return bytes;
-}
-
 void Subscription::offer(SharedPublication publication, Clock::time_point now) {
   if (rate_hz_) {
     const auto period = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / *rate_hz_));

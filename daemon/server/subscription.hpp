@@ -8,25 +8,27 @@
 #include <memory>
 #include <optional>
 
+#include "daemon/scan/cloud_files.hpp"
 #include "daemon/scan/scanner.hpp"
-#include "daemon/server/cloud_format.hpp"
 #include "daemon/server/outgoing.hpp"
 
 namespace slsd {
 
-/// A free scan on its way to the subscribers: written once in each format that somebody wants.
+/// A free scan on its way to the subscribers: written once in each format that somebody wants, mostly where it was
+/// decoded.
 /// @thread thread-bound
 class Publication {
  public:
-  explicit Publication(FreeScan scan) : scan_(std::move(scan)) {}
+  explicit Publication(FreeScan scan) : scan_(std::move(scan)) {
+    if (*scan_) files_ = (*scan_)->files;
+  }
 
   [[nodiscard]] const Result<ScanResult>& scan() const { return *scan_; }
-  [[nodiscard]] SharedBytes cloud(CloudFormat format);
+  [[nodiscard]] SharedBytes cloud(CloudFormat format) { return files_.file((*scan_)->cloud, format); }
 
  private:
   FreeScan scan_;
-  SharedBytes ply_;
-  SharedBytes pcd_;
+  CloudFiles files_;
 };
 
 using SharedPublication = std::shared_ptr<Publication>;  // shared: clients send it at their own pace
@@ -44,6 +46,7 @@ class Subscription {
   Subscription(CloudFormat format, std::optional<double> rate_hz) : format_(format), rate_hz_(rate_hz) {}
 
   [[nodiscard]] std::optional<double> rate_hz() const { return rate_hz_; }
+  [[nodiscard]] CloudFormat format() const { return format_; }
 
   /// Takes a scan in, unless it comes sooner than the client wants one.
   void offer(SharedPublication publication, Clock::time_point now);

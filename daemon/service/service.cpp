@@ -75,7 +75,7 @@ Service::Service(Configuration configuration, const std::filesystem::path& file,
   const auto handler = [this](const Request& request, Session& session, Respond respond) {
     dispatch(state_, request, session, std::move(respond));
   };
-  const auto demand_changed = [this](std::optional<double> rate_hz) { scanner_.run_freely(rate_hz); };
+  const auto demand_changed = [this](std::optional<FreeRun> demand) { scanner_.run_freely(demand); };
   server_ = std::make_unique<Server>(events_, state_.configuration.server, handler, demand_changed);
   state_.server = server_.get();
   state_.log_lines_dropped = log_lines_dropped;

@@ -27,6 +27,8 @@ namespace slsd {
 ///   cam NAME one to a camera: cameras expose at the same time, and opening one may take seconds.
 ///   log      writes the log: whoever reads that may stand still.
 ///   decode N one or two, from frames to clouds and pictures: each uses a processor fully while the next frames come.
+///   deadlines  ends requests whose time is over, whatever the others wait for.
+///   chores   what needs no device and takes long: a reload's pattern and decoders, the pattern as a PNG.
 ///
 /// Between them stand the scanner's bounded queue, the lanes' few sets of frames, the server's few newest clouds, and
 /// the event loop's own queue, which holds at most one answer to a client.

@@ -36,6 +36,13 @@ struct Watched {
   Result<Frame> capture(std::chrono::milliseconds time) {
     if (auto ready = runner->wait_ready(steady_clock::now() + 30s); !ready) return tl::unexpected(ready.error());
     runner->begin_capture(steady_clock::now() + time);
+    return end_capture(time);
+  }
+  /// As the rig does it.
+  Result<Frame> end_capture(std::chrono::milliseconds time) {
+    const Patience patience(steady_clock::now() + time);
+    if (!runner->wait_captured(patience, patience.deadline)) runner->cancel_capture();
+    (void)runner->wait_captured(patience, steady_clock::now() + 100ms);
     return runner->end_capture();
   }
   void wait_for(DeviceState state) const {
@@ -130,7 +137,7 @@ TEST(CameraRunner, IsCapturingWhileAFrameIsUnderWay) {
   run.runner->begin_capture(steady_clock::now() + 30s);
   run.wait_for(DeviceState::kCapturing);
   expose.set_value();
-  EXPECT_TRUE(run.runner->end_capture());
+  EXPECT_TRUE(run.end_capture(30s));
   EXPECT_EQ(run.runner->status().state, DeviceState::kReady);
 }
 

@@ -173,7 +173,7 @@ TEST_F(LateLightTest, FreeRunHasNoCloudFromAWrongPicture) {
     ++clouds;
     if (is_wrong(**scan)) ++wrong;
   });
-  scanner_->run_freely(std::numeric_limits<double>::infinity());
+  scanner_->run_freely(FreeRun{std::numeric_limits<double>::infinity(), {}});
   while (clouds < 40) {
     project_something().wait();  // else requests take all of a slow machine's time from the scans
     pause(30);

@@ -63,7 +63,7 @@ TEST_F(ScannerTest, EveryFrameInFreeRunIsDecodedOrCounted) {
     if (*scan) frames.push_back((*scan)->cloud.frame);
     ++clouds;
   });
-  scanner_->run_freely(kEveryFrame);
+  scanner_->run_freely(FreeRun{kEveryFrame, {}});
   while (clouds < 20) std::this_thread::sleep_for(1ms);
   scanner_->run_freely(std::nullopt);
   const auto last = scan();
@@ -80,14 +80,14 @@ TEST_F(ScannerTest, FreeRunAfterAPauseTakesNoFrameOfBefore) {
     frame = *scan ? (*scan)->cloud.frame : 0;
     ++clouds;
   });
-  scanner_->run_freely(kEveryFrame);
+  scanner_->run_freely(FreeRun{kEveryFrame, {}});
   while (clouds < 5) std::this_thread::sleep_for(1ms);
   scanner_->run_freely(std::nullopt);
   std::this_thread::sleep_for(100ms);
   while (!idle()) std::this_thread::sleep_for(1ms);
   const std::uint64_t before = clouds;
   const auto resumed = static_cast<std::uint64_t>((steady_clock::now() - start_) / kPeriod);
-  scanner_->run_freely(kEveryFrame);
+  scanner_->run_freely(FreeRun{kEveryFrame, {}});
   while (clouds == before) std::this_thread::sleep_for(1ms);
   EXPECT_GE(frame, resumed);
 }

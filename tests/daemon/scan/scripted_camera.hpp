@@ -13,6 +13,7 @@
 
 #include "core/image.hpp"
 #include "drivers/camera/camera.hpp"
+#include "drivers/camera/cancel_latch.hpp"
 
 namespace slsd {
 
@@ -38,7 +39,9 @@ class ScriptedCamera final : public Camera {
     return {};
   }
   [[nodiscard]] std::chrono::nanoseconds open_time_max() const override { return open_time; }
+  [[nodiscard]] std::chrono::nanoseconds frame_time_max() const override { return frame_time; }
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override {
+    ++captures;
     if (script_.empty()) return frame(std::chrono::steady_clock::now());
     const Step step = std::move(script_.front());
     script_.pop_front();
@@ -48,7 +51,13 @@ class ScriptedCamera final : public Camera {
     if (gone) return fail(ErrorCode::kDisconnected, "unplugged");
     return {};
   }
-  void cancel() override {}
+  void cancel() override { cancelled_.cancel(); }
+
+  /// As a capture that nothing else ends.
+  [[nodiscard]] Result<Frame> wait_cancelled(MonotonicTime deadline) {
+    if (cancelled_.wait_until(deadline)) return fail(ErrorCode::kCancelled, "the capture was cancelled");
+    return fail(ErrorCode::kFrameLate, "no frame came");
+  }
 
   [[nodiscard]] Frame frame(MonotonicTime exposure_start) {
     return Frame(image_.view(), sequence_++, exposure_start, std::chrono::steady_clock::now(), [] {});
@@ -58,6 +67,8 @@ class ScriptedCamera final : public Camera {
   void skip_frames(std::uint64_t count) { sequence_ += count; }
 
   std::chrono::nanoseconds open_time = Camera::open_time_max();
+  std::chrono::nanoseconds frame_time = std::chrono::seconds(5);
+  std::atomic<int> captures{0};
   int opens_to_fail = 0;
   std::atomic<int> opens{0};
   std::optional<std::shared_future<void>> configured;  ///< what open() waits for once the device is found
@@ -70,6 +81,7 @@ class ScriptedCamera final : public Camera {
   CameraDescription description_;
   std::function<void()> found_;
   std::uint64_t sequence_ = 0;
+  CancelLatch cancelled_;
 };
 
 }  // namespace slsd

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <stop_token>
+#include <string>
+#include <utility>
+
+#include "core/result.hpp"
+#include "drivers/camera/frame.hpp"
+
+namespace slsd {
+
+/// How long somebody waits for devices, what ends that sooner, and who is told of it meanwhile. What waits does so in
+/// steps of a second at most, however far the deadline is.
+/// @thread thread-bound
+struct Patience {
+  static constexpr std::chrono::milliseconds kStep{1000};
+
+  Patience(MonotonicTime until, std::stop_token ended = {}) : deadline(until), over(std::move(ended)) {}  // NOLINT
+
+  MonotonicTime deadline;
+  std::stop_token over;                               ///< requested: nobody waits any more
+  std::function<void(const std::string&)> waits_for;  ///< before each device that is waited for: "camera left"
+  std::function<void()> alive;                        ///< before each step
+  std::function<bool(const Error&)> again;  ///< whether lost frames are worth another try; empty: they are not
+
+  /// Tells of the device that is waited for from now on.
+  void note(const std::string& device) const {
+    if (waits_for) waits_for(device);
+  }
+
+  /// The end of the present step.
+  [[nodiscard]] MonotonicTime step(MonotonicTime until) const {
+    if (alive) alive();
+    return std::min<MonotonicTime>(until, std::chrono::steady_clock::now() + kStep);
+  }
+
+  /// Waits until the condition holds. @return whether it does; else the time came, or nobody waits any more
+  template <class Holds>
+  bool wait_until(MonotonicTime until, std::condition_variable_any& changed, std::unique_lock<std::mutex>& lock,
+                  Holds holds) const {
+    while (!holds()) {
+      if (over.stop_requested() || std::chrono::steady_clock::now() >= until) return false;
+      changed.wait_until(lock, over, step(until), holds);
+    }
+    return true;
+  }
+};
+
+}  // namespace slsd

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/scan.hpp"
+
+#include <utility>
+
+#include "daemon/scan/frame_image.hpp"
+#include "daemon/scan/reconstruct.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kLostKept = 8;
+
+tl::unexpected<Error> fail_stopping() {
+  return fail(ErrorCode::kCancelled, "the service is stopping");
+}
+
+// What came of all tries. One that the deadline cut short says less than those before it.
+Error after_tries(Error error, const LostTries& lost) {
+  if (lost.count == 0) return error;
+  const bool cut_short = error.code == ErrorCode::kFrameLate || error.code == ErrorCode::kTimeout;
+  if (cut_short) error = lost.last.back();
+  error.message += " (" + std::to_string(lost.count + 1) +
+                   " tries; the one before: " + std::string(to_string(lost.last.back().code)) + ")";
+  return error;
+}
+
+}  // namespace
+
+bool may_be_taken_again(const Error& error) {
+  switch (error.code) {
+    case ErrorCode::kFrameDropped:
+    case ErrorCode::kFrameTorn:
+    case ErrorCode::kFrameStale:
+    case ErrorCode::kFrameLate:
+      return true;
+    default:
+      return false;
+  }
+}
+
+Scan::Scan(ScanRequest request, std::uint64_t number, std::string id, Told told)
+    : TaskOf(request.deadline,
+             [this, told = std::move(told)](Result<ScanResult> result) { told(*this, std::move(result)); }),
+      request_(std::move(request)),
+      number_(number),
+      id_(std::move(id)),
+      set_(fail_stopping()),
+      result_(fail_stopping()) {}
+
+void Scan::note_lost(const Error& error) {
+  ++lost_.count;
+  if (lost_.last.size() == kLostKept) lost_.last.erase(lost_.last.begin());
+  lost_.last.push_back(error);
+}
+
+void Scan::expose(Rig& rig, HardwareGuard& hardware, SharedSetup setup, const Patience& patience, Exposure exposure,
+                  CloudFormats formats) {
+  setup_ = std::move(setup);
+  formats_ = request_.formats | formats;
+  if (auto possible = setup_->check(request_); !possible) {
+    set_ = tl::unexpected(possible.error());
+    return;
+  }
+  set_ = rig.capture(patience, exposure, {request_.texture, request_.ambient});
+  if (!set_) set_ = tl::unexpected(after_tries(set_.error(), lost_));
+  if (!set_) return;
+  if (auto same = hardware.check(setup_, rig); !same) set_ = tl::unexpected(same.error());
+}
+
+void Scan::compute(std::size_t lane) {
+  if (set_ && over()) return set_->give_back();
+  result_ = set_ ? reconstruct(*set_, *setup_, lane, request_, id_) : tl::unexpected(set_.error());
+  if (set_) set_->give_back();  // back to the driver before others have had their turn
+  if (!result_) return;
+  result_->lost = std::move(lost_);
+  result_->files = CloudFiles(result_->cloud, formats_);
+}
+
+FrameTask::FrameTask(FrameRequest request, Answer answer)
+    : TaskOf(request.deadline, std::move(answer)),
+      request_(std::move(request)),
+      frame_(fail_stopping()),
+      result_(fail_stopping()) {}
+
+void FrameTask::expose(Rig& rig, const ScanSetup& setup, const Patience& patience) {
+  if (auto known = setup.check_camera(request_.camera); !known) {
+    frame_ = tl::unexpected(known.error());
+  } else {
+    frame_ = rig.capture_one(setup.camera_index(request_.camera), patience, request_.as_shown);
+  }
+}
+
+void FrameTask::compute(std::size_t) {
+  if (!frame_) {
+    result_ = tl::unexpected(frame_.error());
+    return;
+  }
+  result_ = request_.as_png ? png_of(*frame_) : raw_of(*frame_);
+  frame_ = fail_stopping();
+}
+
+}  // namespace slsd

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "core/result.hpp"
+#include "daemon/scan/decode_lanes.hpp"
+#include "daemon/scan/frame_set.hpp"
+#include "daemon/scan/hardware_guard.hpp"
+#include "daemon/scan/rig.hpp"
+#include "daemon/scan/scan_result.hpp"
+#include "daemon/scan/scan_setup.hpp"
+#include "daemon/scan/task.hpp"
+
+namespace slsd {
+
+/// One scan, from its request to its outcome: waits for its turn, takes the frames, again where some are lost and there
+/// is time, decodes them, writes the cloud, and answers in its turn.
+///
+///     waiting --> expose() --> compute() --> deliver() --> over
+///                 scanner      a lane        in order
+///
+/// @thread thread-safe as a Task; each step belongs to one thread
+class Scan final : public TaskOf<ScanResult>, public FrameJob {
+ public:
+  using Told = std::function<void(const Scan&, Result<ScanResult>)>;
+  /// @param number  counts the scans of this run
+  /// @param id      its name for clients
+  /// @param told    called once, with the outcome
+  Scan(ScanRequest request, std::uint64_t number, std::string id, Told told);
+
+  [[nodiscard]] const ScanRequest& request() const { return request_; }
+  [[nodiscard]] std::uint64_t number() const { return number_; }
+  [[nodiscard]] const std::string& id() const { return id_; }
+  /// By which it is decoded; null before its turn.
+  [[nodiscard]] const SharedSetup& setup() const { return setup_; }
+  [[nodiscard]] bool exposed() const { return set_.has_value(); }
+
+  /// Takes the frames, or finds out why there are none.
+  /// @param patience  this task's
+  /// @param formats   those that subscribers want besides the request's
+  void expose(Rig& rig, HardwareGuard& hardware, SharedSetup setup, const Patience& patience, Exposure exposure,
+              CloudFormats formats);
+  /// A try lost its frames, and another one follows: the outcome tells.
+  void note_lost(const Error& error);
+
+  void compute(std::size_t lane) override;
+  void deliver() override { end(std::move(result_)); }
+
+ private:
+  ScanRequest request_;
+  std::uint64_t number_;
+  std::string id_;
+  SharedSetup setup_;
+  CloudFormats formats_;
+  LostTries lost_;
+  Result<FrameSet> set_;
+  Result<ScanResult> result_;
+};
+
+/// One frame of one camera, from the request to its image.
+class FrameTask final : public TaskOf<FrameImage>, public FrameJob {
+ public:
+  FrameTask(FrameRequest request, Answer answer);
+
+  [[nodiscard]] const FrameRequest& request() const { return request_; }
+  void expose(Rig& rig, const ScanSetup& setup, const Patience& patience);
+
+  void compute(std::size_t lane) override;
+  void deliver() override { end(std::move(result_)); }
+
+ private:
+  FrameRequest request_;
+  Result<Frame> frame_;
+  Result<FrameImage> result_;
+};
+
+/// Whether such a frame may be whole the next time: it was lost, torn or late on its way.
+[[nodiscard]] bool may_be_taken_again(const Error& error);
+
+}  // namespace slsd

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <utility>
+
+#include "core/result.hpp"
+#include "daemon/scan/patience.hpp"
+
+namespace slsd {
+
+/// What a client asked of the devices, from its arrival to its one outcome. Whoever comes first ends it: the work that
+/// is done, the deadline, the client that hung up, or the service that stops. What comes later is thrown away.
+///
+///     waiting --its turn--> under way --done--> over
+///        \______________________\____ deadline, hang-up, stop ____/
+///
+/// @thread thread-safe
+class Task : public std::enable_shared_from_this<Task> {  // shared: whoever ends it may be the last to know it
+ public:
+  explicit Task(MonotonicTime deadline) : deadline_(deadline) {}
+  virtual ~Task() = default;
+  Task(const Task&) = delete;
+  Task& operator=(const Task&) = delete;
+
+  [[nodiscard]] MonotonicTime deadline() const { return deadline_; }
+  [[nodiscard]] bool over() const { return over_.stop_requested(); }
+
+  /// How long its work may wait; that tells of whom it waits for.
+  [[nodiscard]] Patience patience() {
+    Patience patience(deadline_, over_.get_token());
+    patience.waits_for = [this](const std::string& device) {
+      const std::lock_guard lock(mutex_);
+      waits_for_ = device;
+    };
+    return patience;
+  }
+  /// The device that it waits for, or waited for last: "camera left". Empty before its turn.
+  [[nodiscard]] std::string waits_for() const {
+    const std::lock_guard lock(mutex_);
+    return waits_for_;
+  }
+
+  /// Waits, until it is over at most.
+  void pause(std::chrono::milliseconds time) const {
+    std::mutex none;
+    std::unique_lock lock(none);
+    std::condition_variable_any never;
+    never.wait_for(lock, over_.get_token(), time, [] { return false; });
+  }
+
+  /// Ends it without what was asked for.
+  virtual void fail_with(Error error) = 0;
+
+  /// Ends it when its client hangs up.
+  void end_with(const std::stop_token& gone) { hung_up_.emplace(gone, HungUp{weak_from_this()}); }
+
+ protected:
+  /// @return whether it was not over yet: then the caller answers
+  [[nodiscard]] bool finish() { return over_.request_stop(); }
+
+ private:
+  struct HungUp {
+    std::weak_ptr<Task> task;
+    void operator()() const {
+      if (const auto known = task.lock()) known->fail_with({ErrorCode::kCancelled, "the client hung up", {}});
+    }
+  };
+
+  MonotonicTime deadline_;
+  std::stop_source over_;
+  mutable std::mutex mutex_;
+  std::string waits_for_;
+  std::optional<std::stop_callback<HungUp>> hung_up_;
+};
+
+/// A task with its answer, which is called exactly once.
+template <class Value>
+class TaskOf : public Task {
+ public:
+  using Answer = std::function<void(Result<Value>)>;
+  TaskOf(MonotonicTime deadline, Answer answer) : Task(deadline), answer_(std::move(answer)) {}
+
+  void end(Result<Value> outcome) {
+    if (finish() && answer_) answer_(std::move(outcome));
+  }
+  void fail_with(Error error) override { end(tl::unexpected(std::move(error))); }
+
+ private:
+  Answer answer_;
+};
+
+}  // namespace slsd
