@@ -42,6 +42,7 @@ Result<> AravisCamera::open() {
   description_.width_px = session_->layout().width_px;
   description_.height_px = session_->layout().height_px;
   description_.rate_hz = options_.trigger == AravisTrigger::kFreeRun ? options_.rate_hz : 0.0;
+  description_.external_trigger = options_.trigger == AravisTrigger::kLine;
   log_warnings();
   return {};
 }
