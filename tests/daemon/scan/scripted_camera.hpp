@@ -13,7 +13,7 @@
 
 #include "core/image.hpp"
 #include "drivers/camera/camera.hpp"
-#include "drivers/camera/cancel_latch.hpp"
+#include "drivers/system/wake_event.hpp"
 
 namespace slsd {
 
@@ -51,11 +51,12 @@ class ScriptedCamera final : public Camera {
     if (gone) return fail(ErrorCode::kDisconnected, "unplugged");
     return {};
   }
-  void cancel() override { cancelled_.cancel(); }
+  void cancel() override { cancelled_.wake(); }
 
   /// As a capture that nothing else ends.
   [[nodiscard]] Result<Frame> wait_cancelled(MonotonicTime deadline) {
-    if (cancelled_.wait_until(deadline)) return fail(ErrorCode::kCancelled, "the capture was cancelled");
+    if (auto opened = cancelled_.open(); !opened) return tl::unexpected(opened.error());
+    if (cancelled_.sleep_until(deadline)) return fail(ErrorCode::kCancelled, "the capture was cancelled");
     return fail(ErrorCode::kFrameLate, "no frame came");
   }
 
@@ -81,7 +82,7 @@ class ScriptedCamera final : public Camera {
   CameraDescription description_;
   std::function<void()> found_;
   std::uint64_t sequence_ = 0;
-  CancelLatch cancelled_;
+  WakeEvent cancelled_;  // left set by a cancel() that met nobody
 };
 
 }  // namespace slsd
