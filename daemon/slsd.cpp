@@ -14,6 +14,7 @@
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
+#include "core/printable.hpp"
 #include "daemon/calibrate/calibrate_from_files.hpp"
 #include "daemon/calibrate/session.hpp"
 #include "daemon/calibrate/verify_from_files.hpp"
@@ -21,6 +22,7 @@
 #include "daemon/commands/commands.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/service/logging.hpp"
+#include "daemon/service/notifier.hpp"
 #include "daemon/service/service.hpp"
 
 namespace {
@@ -42,7 +44,9 @@ bool may_pass(slsd::ErrorCode code) {
 }
 
 int not_served(const slsd::Error& error, bool passes) {
-  spdlog::critical("{}{}", to_string(error), passes ? "" : "; not tried again until somebody starts it");
+  const std::string why = to_string(error);
+  spdlog::critical("{}", why);
+  slsd::Notifier().status("does not start: " + slsd::printable(why, 1000));  // as `systemctl status` shows it
   return passes ? kFailed : kWrongConfiguration;
 }
 

@@ -182,13 +182,13 @@ class Check {
 
   /// What the service says of a device that it holds. @return whether it is open
   bool note_held(const std::string& name, const json& device) {
-    const std::string state = device.value("state", "not there, as it was started with other cameras");
+    const std::string state = device.value("state", "not among its cameras");
     const std::string problem = printable(device.value("problem", ""), kLongestProblem);
     if (state == to_string(DeviceState::kReady) || state == to_string(DeviceState::kCapturing)) {
       findings_.good(name + ": the service holds it, and it is " + state);
       return true;
     }
-    findings_.bad(name + ": to the service it is " + printable(state) + (problem.empty() ? "" : ": " + problem));
+    findings_.bad(name + ": the service says that it is " + printable(state) + (problem.empty() ? "" : ": " + problem));
     return false;
   }
 

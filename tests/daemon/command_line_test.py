@@ -162,7 +162,7 @@ class Slsd(unittest.TestCase):
                 wait_until(lambda: client.call("status")[0]["cameras"][0]["state"] == "absent", "the loss")
             result = slsd("--check", "--config", service.file)
             self.assertEqual(result.returncode, 1, result.stdout)
-            self.assertRegex(result.stdout, 'error    camera "camera": to the service it is absent: .*frames')
+            self.assertRegex(result.stdout, 'error    camera "camera": the service says that it is absent: .*frames')
 
     def test_check_names_the_configuration_of_another_service(self):
         with Service() as service:

@@ -167,6 +167,20 @@ class Life(unittest.TestCase):
                 finally:
                     service.__exit__()
 
+    def test_manager_is_told_why_nothing_starts(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "notify")
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+                manager.bind(path)
+                manager.settimeout(60)
+                service = Service(configuration='"a\\nREADY=1" = 1\n', environment={"NOTIFY_SOCKET": path})
+                service.launch()
+                self.assertEqual(service.process.wait(60), 78)
+                told = manager.recv(4096).decode()
+                self.assertIn("STATUS=does not start: ", told)
+                self.assertIn("no such table or key: a\\nREADY=1", told)
+                self.assertNotIn("\n", told.strip())
+
     def test_runs_out_of_descriptors_and_recovers(self):
         def few_descriptors():
             resource.setrlimit(resource.RLIMIT_NOFILE, (48, 48))
