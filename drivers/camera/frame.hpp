@@ -2,10 +2,15 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
-#include <functional>
+#include <memory>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "core/image.hpp"
 
@@ -14,6 +19,74 @@ namespace slsd {
 /// CLOCK_MONOTONIC.
 using MonotonicTime = std::chrono::time_point<std::chrono::steady_clock, std::chrono::nanoseconds>;
 
+class FrameLease;
+
+/// The buffers of a driver or a pool, each lent to one frame at a time. Shared by who lends and each frame, because
+/// frames may outlive their camera: the last of them frees the memory. Lending allocates nothing.
+/// @thread lend() and what it asks belong to one thread; a lease may end on any
+class LentBuffers : public std::enable_shared_from_this<LentBuffers> {
+ public:
+  explicit LentBuffers(std::size_t count) : lent_(count) {}
+  virtual ~LentBuffers() = default;
+  LentBuffers(const LentBuffers&) = delete;
+  LentBuffers& operator=(const LentBuffers&) = delete;
+
+  [[nodiscard]] std::size_t size() const { return lent_.size(); }
+  [[nodiscard]] bool is_lent(std::size_t buffer) const { return lent_[buffer].load(std::memory_order_acquire); }
+  /// How many are; one that ends meanwhile on another thread may count or not.
+  [[nodiscard]] std::size_t lent() const {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(lent_, [](const auto& lent) { return lent.load(std::memory_order_acquire); }));
+  }
+  [[nodiscard]] std::optional<std::size_t> find_free() const {
+    for (std::size_t i = 0; i < lent_.size(); ++i)
+      if (!is_lent(i)) return i;
+    return std::nullopt;
+  }
+
+  /// @param buffer  that is not lent
+  [[nodiscard]] FrameLease lend(std::size_t buffer);
+
+ private:
+  friend class FrameLease;
+  void end_lease(std::size_t buffer) {
+    lent_[buffer].store(false, std::memory_order_release);
+    take_back(buffer);
+  }
+  /// For a driver that wants its buffer back at once; on whichever thread ends the lease.
+  virtual void take_back(std::size_t /*buffer*/) {}
+
+  std::vector<std::atomic<bool>> lent_;
+};
+
+/// A buffer that is lent, until the end of this.
+class FrameLease {
+ public:
+  FrameLease() = default;  ///< of nothing
+  FrameLease(FrameLease&&) noexcept = default;
+  FrameLease& operator=(FrameLease&& other) noexcept {
+    std::swap(buffers_, other.buffers_);
+    std::swap(buffer_, other.buffer_);
+    return *this;
+  }
+  ~FrameLease() {
+    if (buffers_) buffers_->end_lease(buffer_);
+  }
+
+ private:
+  friend class LentBuffers;
+  FrameLease(std::shared_ptr<LentBuffers> buffers, std::size_t buffer)
+      : buffers_(std::move(buffers)), buffer_(buffer) {}
+
+  std::shared_ptr<LentBuffers> buffers_;
+  std::size_t buffer_ = 0;
+};
+
+inline FrameLease LentBuffers::lend(std::size_t buffer) {
+  lent_[buffer].store(true, std::memory_order_relaxed);
+  return {shared_from_this(), buffer};
+}
+
 /// One frame of one camera: a lease on a buffer of the driver's, given back by the destructor.
 /// @thread thread-bound; may be moved between threads
 class Frame {
@@ -21,31 +94,14 @@ class Frame {
   /// @param sequence        counts the device's frames from open() on; a gap tells of a lost frame
   /// @param exposure_start  when its exposure began, as the device says; an old one tells of a stale frame
   /// @param received        when its last byte was there
-  /// @param give_back       called once, on whichever thread ends the lease, even after the camera's end
+  /// @param lease           on the buffer that the image lies in; nothing where it outlives every frame
   Frame(GreyView image, std::uint64_t sequence, MonotonicTime exposure_start, MonotonicTime received,
-        std::function<void()> give_back)
+        FrameLease lease = {})
       : image_(image),
         sequence_(sequence),
         exposure_start_(exposure_start),
         received_(received),
-        give_back_(std::move(give_back)) {}
-  Frame(Frame&& other) noexcept
-      : image_(other.image_),
-        sequence_(other.sequence_),
-        exposure_start_(other.exposure_start_),
-        received_(other.received_),
-        give_back_(std::exchange(other.give_back_, nullptr)) {}
-  Frame& operator=(Frame&& other) noexcept {
-    std::swap(image_, other.image_);
-    std::swap(sequence_, other.sequence_);
-    std::swap(exposure_start_, other.exposure_start_);
-    std::swap(received_, other.received_);
-    std::swap(give_back_, other.give_back_);
-    return *this;
-  }
-  ~Frame() {
-    if (give_back_) give_back_();
-  }
+        lease_(std::move(lease)) {}
 
   [[nodiscard]] const GreyView& image() const { return image_; }
   [[nodiscard]] std::uint64_t sequence() const { return sequence_; }
@@ -54,7 +110,7 @@ class Frame {
 
   /// The same lease with other times, for a driver that corrects them.
   [[nodiscard]] Frame restamped(MonotonicTime exposure_start, MonotonicTime received) && {
-    return {image_, sequence_, exposure_start, received, std::exchange(give_back_, nullptr)};
+    return {image_, sequence_, exposure_start, received, std::move(lease_)};
   }
 
  private:
@@ -62,7 +118,7 @@ class Frame {
   std::uint64_t sequence_;
   MonotonicTime exposure_start_;
   MonotonicTime received_;
-  std::function<void()> give_back_;
+  FrameLease lease_;
 };
 
 }  // namespace slsd

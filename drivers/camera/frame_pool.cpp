@@ -3,7 +3,6 @@
 #include "drivers/camera/frame_pool.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cassert>
 #include <cstddef>
 #include <type_traits>
@@ -13,37 +12,16 @@
 
 namespace slsd {
 
-/// The memory, and who holds it: the pool and each frame count once, and the last to go deletes it.
-struct FramePool::Buffers {
+struct FramePool::Buffers final : LentBuffers {
   Buffers(FrameFormat of, int count)
-      : format(of),
+      : LentBuffers(static_cast<std::size_t>(count)),
+        format(of),
         words_each((static_cast<std::size_t>(of.width_px) * of.height_px * of.bytes_per_pixel + 1) / 2),
-        memory(words_each * count),
-        lent(static_cast<std::size_t>(count)) {}
-
-  void release() {
-    if (holders.fetch_sub(1, std::memory_order_acq_rel) == 1) delete this;
-  }
-
-  void give_back(std::size_t buffer) {
-    lent[buffer].store(false, std::memory_order_release);
-    release();
-  }
-
-  std::optional<std::size_t> take() {
-    for (std::size_t i = 0; i < lent.size(); ++i) {
-      if (lent[i].exchange(true, std::memory_order_acquire)) continue;
-      holders.fetch_add(1, std::memory_order_relaxed);
-      return i;
-    }
-    return std::nullopt;
-  }
+        memory(words_each * size()) {}
 
   FrameFormat format;
   std::size_t words_each;
   std::vector<std::uint16_t> memory;
-  std::vector<std::atomic<bool>> lent;
-  std::atomic<int> holders{1};
 };
 
 namespace {
@@ -66,35 +44,24 @@ FrameFormat format_of(const GreyView& image) {
       image);
 }
 
-FramePool::FramePool(FrameFormat format, int buffers) : buffers_(new Buffers(format, buffers)) {}
-
-FramePool::FramePool(FramePool&& other) noexcept : buffers_(std::exchange(other.buffers_, nullptr)) {}
-
-FramePool& FramePool::operator=(FramePool&& other) noexcept {
-  std::swap(buffers_, other.buffers_);
-  return *this;
-}
-
-FramePool::~FramePool() {
-  if (buffers_ != nullptr) buffers_->release();
-}
+FramePool::FramePool(FrameFormat format, int buffers) : buffers_(std::make_shared<Buffers>(format, buffers)) {}
 
 const FrameFormat& FramePool::format() const {
   return buffers_->format;
 }
 
 bool FramePool::all_lent() const {
-  return std::ranges::all_of(buffers_->lent, [](const auto& lent) { return lent.load(std::memory_order_acquire); });
+  return !buffers_->find_free();
 }
 
 std::optional<Frame> FramePool::lend(const GreyView& image, std::uint64_t sequence, MonotonicTime exposure_start) {
   assert(format_of(image) == buffers_->format);
-  const auto buffer = buffers_->take();
+  const auto buffer = buffers_->find_free();
   if (!buffer) return std::nullopt;
   void* memory = buffers_->memory.data() + *buffer * buffers_->words_each;
   const GreyView pixels = std::visit([&](const auto& view) { return copy_pixels(view, memory); }, image);
   return std::make_optional<Frame>(pixels, sequence, exposure_start, std::chrono::steady_clock::now(),
-                                   [buffers = buffers_, i = *buffer] { buffers->give_back(i); });
+                                   buffers_->lend(*buffer));
 }
 
 }  // namespace slsd

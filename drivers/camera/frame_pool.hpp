@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include "core/image.hpp"
@@ -27,9 +28,6 @@ struct FrameFormat {
 class FramePool {
  public:
   FramePool(FrameFormat format, int buffers);
-  ~FramePool();
-  FramePool(FramePool&& other) noexcept;
-  FramePool& operator=(FramePool&& other) noexcept;
 
   [[nodiscard]] const FrameFormat& format() const;
 
@@ -42,7 +40,7 @@ class FramePool {
 
  private:
   struct Buffers;
-  Buffers* buffers_;  ///< counted by itself, so that a lease fits into std::function without an allocation
+  std::shared_ptr<Buffers> buffers_;  ///< with the frames
 };
 
 }  // namespace slsd

@@ -2,14 +2,13 @@
 // Copyright the slsd authors
 #include "drivers/camera/aravis/stream_buffers.hpp"
 
-#include <atomic>
 #include <mutex>
 
 namespace slsd {
 
-/// The stream, and who may still give back to it: the owner and each lease count once, and the last to go deletes it.
-struct StreamBuffers::Shared {
-  explicit Shared(ArvStream* of) : stream(of) {}
+/// Shared with the frames that hold a buffer; the stream ends before them.
+struct StreamBuffers::Shared final : LentBuffers {
+  Shared(ArvStream* of, std::size_t count) : LentBuffers(count), stream(of), buffers(count) {}
 
   void give_back(ArvBuffer* buffer) {
     const std::lock_guard lock(mutex);
@@ -18,43 +17,32 @@ struct StreamBuffers::Shared {
     else
       g_object_unref(buffer);
   }
-
-  void end_lease(ArvBuffer* buffer) {
-    give_back(buffer);
-    lent.fetch_sub(1, std::memory_order_release);
-    release();
-  }
-
-  void release() {
-    if (holders.fetch_sub(1, std::memory_order_acq_rel) == 1) delete this;
-  }
+  void take_back(std::size_t buffer) override { give_back(buffers[buffer]); }
 
   std::mutex mutex;
   ArvStream* stream;
-  std::atomic<int> lent{0};
-  std::atomic<int> holders{1};
+  std::vector<ArvBuffer*> buffers;
 };
 
-StreamBuffers::StreamBuffers(ArvStream* stream, std::size_t bytes_each, int buffers) : shared_(new Shared(stream)) {
-  for (int i = 0; i < buffers; ++i) arv_stream_push_buffer(stream, arv_buffer_new_allocate(bytes_each));
+StreamBuffers::StreamBuffers(ArvStream* stream, std::size_t bytes_each, int buffers)
+    : shared_(std::make_shared<Shared>(stream, static_cast<std::size_t>(buffers))) {
+  for (std::size_t i = 0; i < shared_->size(); ++i) {
+    shared_->buffers[i] = arv_buffer_new_full(bytes_each, nullptr, GSIZE_TO_POINTER(i), nullptr);
+    arv_stream_push_buffer(stream, shared_->buffers[i]);
+  }
 }
 
 StreamBuffers::~StreamBuffers() {
-  {
-    const std::lock_guard lock(shared_->mutex);
-    shared_->stream = nullptr;
-  }
-  shared_->release();
+  const std::lock_guard lock(shared_->mutex);
+  shared_->stream = nullptr;
 }
 
 int StreamBuffers::lent() const {
-  return shared_->lent.load(std::memory_order_acquire);
+  return static_cast<int>(shared_->lent());
 }
 
-std::function<void()> StreamBuffers::lend(ArvBuffer* buffer) {
-  shared_->lent.fetch_add(1, std::memory_order_relaxed);
-  shared_->holders.fetch_add(1, std::memory_order_relaxed);
-  return [shared = shared_, buffer] { shared->end_lease(buffer); };
+FrameLease StreamBuffers::lend(ArvBuffer* buffer) {
+  return shared_->lend(GPOINTER_TO_SIZE(arv_buffer_get_user_data(buffer)));
 }
 
 void StreamBuffers::return_unread(ArvBuffer* buffer) {

@@ -3,15 +3,17 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
+#include <memory>
+#include <vector>
 
 #include "drivers/camera/aravis/g_object.hpp"
+#include "drivers/camera/frame.hpp"
 
 namespace slsd {
 
 /// The buffers of one stream, each with the stream or lent to a frame. Frames may outlive the stream: a buffer that is
 /// given back after its end is freed.
-/// @thread thread-bound; give_back() may be called from any thread
+/// @thread thread-bound; the frames that it lends may end on any thread
 class StreamBuffers {
  public:
   /// Allocates the buffers and hands them to the stream.
@@ -22,14 +24,14 @@ class StreamBuffers {
   StreamBuffers& operator=(const StreamBuffers&) = delete;
 
   [[nodiscard]] int lent() const;
-  /// Notes that a buffer taken from the stream is lent; what is returned gives it back, once.
-  [[nodiscard]] std::function<void()> lend(ArvBuffer* buffer);
+  /// A lease on a buffer that was taken from the stream.
+  [[nodiscard]] FrameLease lend(ArvBuffer* buffer);
   /// For a buffer that was not lent.
   void return_unread(ArvBuffer* buffer);
 
  private:
   struct Shared;
-  Shared* shared_;  ///< counted by itself, so that a lease fits into std::function without an allocation
+  std::shared_ptr<Shared> shared_;  ///< with the frames
 };
 
 }  // namespace slsd

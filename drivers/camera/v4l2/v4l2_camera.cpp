@@ -140,7 +140,7 @@ Result<> V4l2Camera::check() {
 }
 
 Result<Frame> V4l2Camera::capture_after(Capture capture) {
-  if (!pool_ && stream_->lent() >= held_max_)
+  if (!pool_ && stream_->buffers().lent() >= held_max_)
     return fail_here(ErrorCode::kBusy, "all " + std::to_string(held_max_) + " frames are held; give some back first");
   if (!capture.next) {
     if (auto dropped = drop_waiting(); !dropped) return tl::unexpected(dropped.error());
@@ -293,8 +293,8 @@ bool V4l2Camera::is_whole(const v4l2_buffer& buffer) const {
 Result<Frame> V4l2Camera::deliver(const v4l2_buffer& buffer, MonotonicTime exposure_start, MonotonicTime received) {
   if (pool_) return convert(buffer, exposure_start, received);
   ++counts_.delivered;
-  return stream_->lend(buffer.index, view_of(stream_->buffers().bytes(buffer.index), layout_), next_sequence_++,
-                       exposure_start, received);
+  return Frame(view_of(stream_->buffers().bytes(buffer.index), layout_), next_sequence_++, exposure_start, received,
+               stream_->lend(buffer.index));
 }
 
 Result<Frame> V4l2Camera::convert(const v4l2_buffer& buffer, MonotonicTime exposure_start, MonotonicTime received) {

@@ -2,12 +2,17 @@
 // Copyright the slsd authors
 #include "drivers/camera/v4l2/v4l2_stream.hpp"
 
+#include <libv4l2.h>
+#include <sys/mman.h>
+
 #include <cerrno>
 #include <string>
 #include <utility>
 
 namespace slsd {
 namespace {
+
+constexpr std::size_t kFewest = 3;  // one lent, one being filled, one waiting
 
 v4l2_buffer describe(std::size_t buffer) {
   v4l2_buffer described{};
@@ -19,7 +24,39 @@ v4l2_buffer describe(std::size_t buffer) {
 
 }  // namespace
 
-V4l2Stream::V4l2Stream(V4l2Device device, MappedBuffers buffers)
+Result<std::shared_ptr<MappedBuffers>> MappedBuffers::request(const V4l2Device& device, int count) {
+  v4l2_requestbuffers request{};
+  request.count = static_cast<__u32>(count);
+  request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  request.memory = V4L2_MEMORY_MMAP;
+  if (const int error = device.call(VIDIOC_REQBUFS, &request))
+    return device.fail_call(error, "cannot get buffers of the camera");
+  if (request.count < kFewest || request.count > VIDEO_MAX_FRAME)
+    return fail(ErrorCode::kUnsupported, "the driver gives " + std::to_string(request.count) + " buffers, 3 are needed",
+                device.path());
+  auto buffers = std::make_shared<MappedBuffers>(request.count);
+  for (std::size_t i = 0; i < request.count; ++i) {
+    if (auto mapped = buffers->map(device, i); !mapped) return tl::unexpected(mapped.error());
+  }
+  return buffers;
+}
+
+MappedBuffers::~MappedBuffers() {
+  for (const auto& mapping : mapped_)
+    if (!mapping.empty()) munmap(mapping.data(), mapping.size());
+}
+
+Result<> MappedBuffers::map(const V4l2Device& device, std::size_t buffer) {
+  v4l2_buffer described = describe(buffer);
+  if (const int error = device.call(VIDIOC_QUERYBUF, &described))
+    return device.fail_call(error, "cannot find the camera's buffers");
+  void* memory = v4l2_mmap(nullptr, described.length, PROT_READ, MAP_SHARED, device.descriptor(), described.m.offset);
+  if (memory == MAP_FAILED) return device.fail_call(errno, "cannot map the camera's buffers");
+  mapped_[buffer] = {static_cast<std::byte*>(memory), described.length};
+  return {};
+}
+
+V4l2Stream::V4l2Stream(V4l2Device device, std::shared_ptr<MappedBuffers> buffers)
     : device_(std::move(device)), buffers_(std::move(buffers)) {}
 
 Result<V4l2Stream> V4l2Stream::start(V4l2Device device, int buffers) {
@@ -55,7 +92,7 @@ Result<std::optional<v4l2_buffer>> V4l2Stream::take() {
   const int error = device_.call(VIDIOC_DQBUF, &filled);
   if (error == EAGAIN) return std::nullopt;
   if (error == EIO) return fail(ErrorCode::kIo, "the driver reports a passing fault; scan again", device_.path());
-  if (error != 0 || filled.index >= buffers_.size() || !with_driver_[filled.index])
+  if (error != 0 || filled.index >= buffers_->size() || !with_driver_[filled.index])
     return fail(ErrorCode::kDisconnected, "the camera is gone; check its cable", device_.path());
   with_driver_[filled.index] = false;
   --queued_;
@@ -73,22 +110,11 @@ Result<> V4l2Stream::put_back(std::size_t buffer) {
 }
 
 Result<> V4l2Stream::put_back_returned(std::size_t queued_max) {
-  for (std::size_t i = 0; i < buffers_.size() && queued_ < queued_max; ++i) {
-    if (with_driver_[i] || buffers_.is_lent(i)) continue;
+  for (std::size_t i = 0; i < buffers_->size() && queued_ < queued_max; ++i) {
+    if (with_driver_[i] || buffers_->is_lent(i)) continue;
     if (auto put = put_back(i); !put) return put;
   }
   return {};
-}
-
-Frame V4l2Stream::lend(std::size_t buffer, const GreyView& image, std::uint64_t sequence, MonotonicTime exposure_start,
-                       MonotonicTime received) {
-  return buffers_.lend(buffer, image, sequence, exposure_start, received);
-}
-
-std::size_t V4l2Stream::lent() const {
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < buffers_.size(); ++i) count += buffers_.is_lent(i) ? 1 : 0;
-  return count;
 }
 
 }  // namespace slsd

@@ -99,7 +99,7 @@ class RoomCamera final : public Camera {
         image.at(x, y) = static_cast<std::uint8_t>(std::min(255.0, room_.ambient + light));
       }
     }
-    return Frame(image.view(), sequence_, start, start + room_.exposure, [] {});
+    return Frame(image.view(), sequence_, start, start + room_.exposure);
   }
   void cancel() override {}
 

@@ -37,7 +37,7 @@ class ClockedCamera final : public Camera {
     last_ = number;
     const MonotonicTime exposure_start = start_ + static_cast<std::int64_t>(number) * period_;
     std::this_thread::sleep_until(exposure_start);
-    return {image_.view(), number, exposure_start, std::chrono::steady_clock::now(), [] {}};
+    return {image_.view(), number, exposure_start, std::chrono::steady_clock::now()};
   }
 
   const Grey8& image_;

@@ -61,7 +61,7 @@ class ScriptedCamera final : public Camera {
   }
 
   [[nodiscard]] Frame frame(MonotonicTime exposure_start) {
-    return Frame(image_.view(), sequence_++, exposure_start, std::chrono::steady_clock::now(), [] {});
+    return Frame(image_.view(), sequence_++, exposure_start, std::chrono::steady_clock::now());
   }
 
   /// As if the device had lost them.
