@@ -12,7 +12,7 @@
 #include "drivers/camera/aravis/host_interface.hpp"
 #include "drivers/camera/aravis/open_device.hpp"
 #include "drivers/camera/aravis/pixel_layout.hpp"
-#include "drivers/camera/listing/usb_device.hpp"
+#include "drivers/camera/listing/sysfs.hpp"
 
 namespace slsd {
 namespace {

@@ -9,7 +9,8 @@
 
 namespace slsd {
 
-/// The first line of a file; empty where it cannot be read.
+/// The first line of a file, printable: what a device says of itself stands there as it sent it. Empty where it cannot
+/// be read.
 [[nodiscard]] std::string first_line(const std::filesystem::path& file);
 
 /// The whole number that the first line begins with.
@@ -17,5 +18,24 @@ namespace slsd {
 
 /// What is in a folder, sorted; nothing where it cannot be read.
 [[nodiscard]] std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder);
+
+/// A device on USB, by what the kernel tells of it in sysfs.
+struct UsbDevice {
+  std::string vendor;
+  std::string model;
+  std::string serial;
+  std::string vendor_number;  ///< "2676"
+  std::string node;           ///< "/dev/bus/usb/001/004"
+  std::optional<int> speed_mbps;
+  bool usb3_vision = false;  ///< has an interface of that class
+};
+
+/// The device that something in sysfs is a part of; nothing if it is not on USB.
+/// @param part  a folder of sysfs, as /sys/class/video4linux/video0/device
+[[nodiscard]] std::optional<UsbDevice> usb_device_of(const std::filesystem::path& part);
+
+/// All that there are.
+/// @param sysfs  "/sys"
+[[nodiscard]] std::vector<UsbDevice> list_usb_devices(const std::filesystem::path& sysfs);
 
 }  // namespace slsd

@@ -9,9 +9,7 @@
 #include <utility>
 
 #include "drivers/camera/listing/sysfs.hpp"
-#include "drivers/camera/listing/usb_device.hpp"
 #include "drivers/camera/v4l2/frame_layout.hpp"
-#include "drivers/camera/v4l2/stable_link.hpp"
 #include "drivers/camera/v4l2/v4l2_device.hpp"
 
 namespace slsd {

@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "core/printable.hpp"
-#include "drivers/camera/v4l2/stable_link.hpp"
 #include "drivers/camera/v4l2/v4l2_controls.hpp"
 
 namespace slsd {
@@ -79,6 +78,7 @@ Result<> V4l2Camera::configure(V4l2Device device) {
   stream_.emplace(std::move(*stream));
   held_max_ = std::min<std::size_t>(options_.frames_held_max, stream_->buffers().size() - 2);
   description_.hardware = hardware_of(description_.device);
+  description_.external_trigger = options_.missed_frames_max == 0;
   description_.width_px = mode->width_px;
   description_.height_px = mode->height_px;
   settling_ = options_.settle_frames;

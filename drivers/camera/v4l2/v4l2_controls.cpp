@@ -41,7 +41,7 @@ std::optional<v4l2_queryctrl> query(const V4l2Device& device, __u32 id) {
 }
 
 std::string name_of(const v4l2_queryctrl& control) {
-  return "the control \"" + std::string(reinterpret_cast<const char*>(control.name)) + "\"";
+  return "the control \"" + device_text(control.name) + "\"";
 }
 
 std::optional<int> read_control(const V4l2Device& device, __u32 id) {

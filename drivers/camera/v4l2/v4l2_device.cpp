@@ -7,10 +7,13 @@
 #include <linux/videodev2.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <utility>
 
+#include "core/printable.hpp"
+#include "drivers/camera/listing/sysfs.hpp"
 #include "drivers/system/system_error.hpp"
 
 namespace slsd {
@@ -28,6 +31,21 @@ constexpr SystemErrorMeaning kMeanings[] = {
 };
 
 }  // namespace
+
+std::string device_text(std::span<const unsigned char> field) {
+  const auto end = std::ranges::find(field, '\0');
+  return printable({reinterpret_cast<const char*>(field.data()), static_cast<std::size_t>(end - field.begin())});
+}
+
+std::optional<std::filesystem::path> find_stable_link(const std::filesystem::path& node,
+                                                      const std::filesystem::path& devices) {
+  const std::filesystem::path links = devices / "v4l/by-id";
+  if (node.parent_path() == links) return node;
+  std::error_code error;
+  for (const std::filesystem::path& link : entries_of(links))
+    if (std::filesystem::equivalent(link, node, error)) return link;
+  return std::nullopt;
+}
 
 V4l2Device::V4l2Device(int descriptor, std::string path) : descriptor_(descriptor), path_(std::move(path)) {}
 
@@ -59,8 +77,8 @@ Result<V4l2Device> V4l2Device::open(const std::string& path) {
       (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? capability.device_caps : capability.capabilities;
   if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0)
     return fail(ErrorCode::kUnsupported, "the device captures no video; name another, often the one with index0", path);
-  device.driver_ = reinterpret_cast<const char*>(capability.driver);
-  device.card_ = reinterpret_cast<const char*>(capability.card);
+  device.driver_ = device_text(capability.driver);
+  device.card_ = device_text(capability.card);
   if (v4l2_fd_open(device.descriptor_, V4L2_DISABLE_CONVERSION) < 0)
     return device.fail_call(errno, "libv4l2 cannot take the camera");
   return device;

@@ -2,11 +2,26 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <filesystem>
+#include <optional>
+#include <span>
 #include <string>
 
 #include "core/result.hpp"
 
 namespace slsd {
+
+/// What a field of a driver's says, which may come from the device itself: printable, whatever bytes it sent, and
+/// whether or not it ended them.
+[[nodiscard]] std::string device_text(std::span<const unsigned char> field);
+
+/// The link of v4l/by-id that leads to a device node, which is the same wherever the camera is plugged in.
+/// @param node     by any of its names
+/// @param devices  "/dev"
+/// @return nothing where there is none
+/// @thread reentrant
+[[nodiscard]] std::optional<std::filesystem::path> find_stable_link(const std::filesystem::path& node,
+                                                                    const std::filesystem::path& devices);
 
 /// An open V4L2 device, through libv4l2 with its conversion off.
 /// @thread thread-bound

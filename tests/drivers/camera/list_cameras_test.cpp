@@ -14,7 +14,7 @@
 
 #include "drivers/camera/aravis/aravis_camera.hpp"
 #include "drivers/camera/v4l2/list_v4l2_cameras.hpp"
-#include "drivers/camera/v4l2/stable_link.hpp"
+#include "drivers/camera/v4l2/v4l2_device.hpp"
 #include "tests/drivers/camera/gige_backend.hpp"
 #include "tests/drivers/camera/v4l2_backends.hpp"
 #include "tests/drivers/temporary_folder.hpp"
@@ -179,6 +179,13 @@ TEST(FindStableLink, FindsTheLinkByAnyNameOfTheNode) {
   EXPECT_EQ(find_stable_link(link, devices.path()), link);
   EXPECT_EQ(find_stable_link(other, devices.path()), std::nullopt);
   EXPECT_EQ(find_stable_link(node, devices.path() / "nowhere"), std::nullopt);
+}
+
+TEST(DeviceText, IsPrintableAndEndsWithItsField) {
+  const unsigned char text[8] = "card\033\n";
+  EXPECT_EQ(device_text(text), "card\\x1b\\n");
+  const unsigned char without_end[4] = {'c', 'a', 'r', 'd'};
+  EXPECT_EQ(device_text(without_end), "card");
 }
 
 }  // namespace
