@@ -56,6 +56,20 @@ def soon(seconds, strike, *arguments):
         hand.join()
 
 
+def openings(client):
+    """How often the first camera was opened."""
+    return client.call("status")[0]["cameras"][0]["opened"]
+
+
+def scan_until_opened_again(client, opened, **params):
+    """Whatever comes of the scans: one may fail, another may wait for the camera."""
+    while openings(client) == opened:
+        try:
+            client.call("scan", **params)
+        except RpcError as error:
+            assert error.name in LOST, str(error)
+
+
 def resident_kib(process):
     with open(f"/proc/{process.pid}/smaps_rollup", encoding="ascii") as lines:
         return next(int(line.split()[1]) for line in lines if line.startswith("Rss:"))

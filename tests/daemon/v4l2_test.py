@@ -7,7 +7,8 @@ import sys
 import time
 import unittest
 
-from recovery import LOST, scan_until_it_fails, scan_until_it_works, soon
+from recovery import LOST, openings, scan_until_it_fails, scan_until_it_works, scan_until_opened_again, soon
+from service import wait_until
 from v4l2_double import CANNOT_MOUNT, Double, can_mount, service_on
 
 LIVES = 4
@@ -52,6 +53,20 @@ class V4l2(unittest.TestCase):
         self.expect("frame_torn", f"short {FOR_EVER}", "short 0")
         self.expect("frame_late", f"stall {FOR_EVER}", "stall 0", timeout_ms=300)
         self.expect("frame_dropped", f"eio {FOR_EVER}", "eio 0")
+
+    def test_a_stream_that_died_is_started_anew(self):
+        for params in ({}, {"timeout_ms": 100}):
+            with self.service.client() as client:
+                opened = openings(client)
+                self.double.tell("die")
+                scan_until_opened_again(client, opened, **params)
+                self.assertGreater(scan_until_it_works(client)[2]["points"], 2000)
+
+    def test_a_stream_that_died_is_started_anew_though_nobody_scans(self):
+        with self.service.client() as client:
+            opened = openings(client)
+            self.double.tell("die")
+            wait_until(lambda: openings(client) > opened, "the camera")
 
     def test_scans_again_when_plugged_in_again(self):
         chance = random.Random(3)
