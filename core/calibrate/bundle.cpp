@@ -31,6 +31,24 @@ class Problem {
   [[nodiscard]] const std::vector<double>& sigmas_of(std::size_t pose) const { return sigmas_px_[pose]; }
   double* pose_block(std::size_t pose) { return rig_.rig_from_board[pose].data(); }
 
+  /// The poses are eliminated first. Each other block has a group of its own: within one Ceres goes by the addresses,
+  /// and sums in another order give other last digits.
+  std::shared_ptr<ceres::ParameterBlockOrdering> ordering() {
+    auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    const auto add = [&](double* block, int group) {
+      if (problem_.HasParameterBlock(block)) ordering->AddElementToGroup(block, group);
+    };
+    for (std::size_t i = 0; i < rig_.rig_from_board.size(); ++i) add(pose_block(i), 0);
+    int group = 0;
+    const auto add_device = [&](DeviceModel& device) {
+      add(device.lens.data(), ++group), add(device.device_from_rig.data(), ++group);
+    };
+    for (DeviceModel& camera : rig_.cameras) add_device(camera);
+    add_device(rig_.projector);
+    for (double* print : {&rig_.board_scale, &rig_.board_stretch, &true_scale_, &true_stretch_}) add(print, ++group);
+    return ordering;
+  }
+
   /// Blocks that all poses share and that are adjusted, with their parameters in the order of the columns.
   void list_shared(std::vector<double*>& blocks, std::vector<SharedParameter>& parameters) {
     const auto add_device = [&](DeviceModel& device, int index, const LensTerms& terms) {
@@ -159,17 +177,10 @@ Result<bool> adjust(const Observations& observations, const BundleOptions& optio
   Problem problem(observations, options, rig);
   ceres::Solver::Options how;
   how.linear_solver_type = ceres::DENSE_SCHUR;
-  how.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  std::vector<double*> blocks;
-  problem.ceres().GetParameterBlocks(&blocks);
-  for (double* block : blocks) how.linear_solver_ordering->AddElementToGroup(block, 1);
-  for (std::size_t i = 0; i < rig.rig_from_board.size(); ++i) {
-    if (problem.ceres().HasParameterBlock(problem.pose_block(i)))
-      how.linear_solver_ordering->AddElementToGroup(problem.pose_block(i), 0);
-  }
+  how.linear_solver_ordering = problem.ordering();
   how.max_num_iterations = options.iterations_max;
   how.function_tolerance = 1e-6;
-  how.num_threads = 2;
+  how.num_threads = 1;  // of more, each sums what it happens to get: other last digits in every run
   how.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(how, &problem.ceres(), &summary);

@@ -29,10 +29,6 @@ Result<> check_count(const Observations& observations, const PoseList& poses) {
                                           (faults.empty() ? "" : ". Left out: " + faults));
 }
 
-FaultyPose fits_no_plane(std::size_t pose) {
-  return {pose, PoseFault::kUnlike, "its corners fit no plane; take it again"};
-}
-
 /// Leaves out what contradicts the rest, one after the other, and chooses the terms of distortion.
 Result<> settle(Adjustment& adjustment, Observations& observations, PoseList& poses) {
   do {
@@ -49,8 +45,8 @@ Result<> settle(Adjustment& adjustment, Observations& observations, PoseList& po
 Result<Adjustment> solve(Observations& observations, PoseList& poses) {
   auto initial = estimate_cameras(observations);
   if (!initial) return tl::unexpected(initial.error());
-  for (const std::size_t pose : std::views::reverse(initial->unplaced)) {
-    poses.leave_out(fits_no_plane(pose), observations, &initial->rig);
+  for (const FaultyPose& faulty : std::views::reverse(initial->faulty)) {
+    poses.leave_out(faulty, observations, &initial->rig);
   }
   if (auto enough = check_count(observations, poses); !enough) return tl::unexpected(enough.error());
   auto adjustment = Adjustment::begin(observations, std::move(initial->rig));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -12,7 +13,10 @@
 #include <opencv2/calib3d.hpp>
 
 #include "core/calibrate/board_plane.hpp"
+#include "core/calibrate/bundle.hpp"
+#include "core/calibrate/point_residuals.hpp"
 #include "core/calibrate/resection.hpp"
+#include "core/geometry/median.hpp"
 
 namespace slsd {
 namespace {
@@ -20,6 +24,15 @@ namespace {
 constexpr std::size_t kPosesMin = 3;
 /// A focal length beyond these, in widths of the image, is not of a camera but of poses that do not tell it.
 constexpr double kFocalMin = 0.2, kFocalMax = 50;
+/// Focal lengths that are tried are this far apart: near enough for Zhang's method to take over.
+constexpr double kFocalStep = 1.12;
+/// A focal length is judged by this share of the views, those that it suits best, so that wrong ones have no say; one
+/// at which they are off by this factor more than at the best suits the wrong ones.
+constexpr double kJudgingShare = 0.6, kNearlyBest = 2;
+/// A view this much farther off than most, and so many px, has no part in the first estimate. One that is so many px
+/// off still, when its camera's distortion is known, shows no board; a bent or a moved one is off by less, and is told
+/// apart later.
+constexpr double kGrossFactor = 8, kDoubtfulPx = 4, kNoBoardPx = 20;
 /// Between the two boards that face ways the farthest apart.
 constexpr double kTiltsApartMinDeg = 8;
 constexpr char kTilt[] =
@@ -39,32 +52,33 @@ void append(const PoseView& view, CornerLists& lists) {
   }
 }
 
-Result<LensVector> estimate_lens(const Observations& observations, std::size_t camera) {
-  CornerLists lists;
+using Views = std::vector<const PoseView*>;
+
+Views views_of(std::size_t camera, const Observations& observations) {
+  Views views;
   for (const PoseObservation& pose : observations.poses) {
     for (const PoseView& view : pose.views) {
-      if (view.camera == camera) append(view, lists);
+      if (view.camera == camera) views.push_back(&view);
     }
   }
-  const auto& [name, size] = observations.cameras[camera];
-  if (lists.board.size() < kPosesMin) {
-    return fail(ErrorCode::kImpossible,
-                "only " + std::to_string(lists.board.size()) + " of the poses can be used, and " +
-                    std::to_string(kPosesMin) + " are the least; 10 to 15 make a good calibration",
-                "camera " + name);
-  }
+  return views;
+}
+
+LensVector plain_lens(double focal, const ImageSize& size) {
+  return {focal, focal, 0.5 * (size.width_px - 1), 0.5 * (size.height_px - 1), 0, 0, 0, 0, 0};
+}
+
+/// Zhang's estimate; 0 where the views leave it open.
+double zhang_focal(const Views& views, const ImageSize& size) {
+  CornerLists lists;
+  for (const PoseView* view : views) append(*view, lists);
   double focal = 0;
   try {
     focal = cv::initCameraMatrix2D(lists.board, lists.image, {size.width_px, size.height_px}, 1).at<double>(0, 0);
   } catch (const cv::Exception&) {
-    focal = 0;
+    return 0;
   }
-  if (!(focal > kFocalMin * size.width_px && focal < kFocalMax * size.width_px)) {
-    return fail(ErrorCode::kImpossible,
-                std::string("the poses are all parallel, which leaves the focal length open; ") + kTilt,
-                "camera " + name);
-  }
-  return LensVector{focal, focal, 0.5 * (size.width_px - 1), 0.5 * (size.height_px - 1), 0, 0, 0, 0, 0};
+  return focal > kFocalMin * size.width_px && focal < kFocalMax * size.width_px ? focal : 0;
 }
 
 std::optional<RigidTransform> pose_of(const PoseView& view, const LensVector& lens) {
@@ -80,6 +94,76 @@ std::optional<RigidTransform> pose_of(const PoseView& view, const LensVector& le
     return std::nullopt;
   }
   return to_motion({turn[0], turn[1], turn[2], shift[0], shift[1], shift[2]});
+}
+
+/// By how much the corners are off the pose that suits them best under a lens without distortion.
+double error_px(const PoseView& view, const LensVector& lens, const ImageSize& size) {
+  const auto camera_from_board = pose_of(view, lens);
+  if (!camera_from_board) return std::numeric_limits<double>::infinity();
+  const Lens camera = to_lens(lens, size);
+  std::vector<Eigen::Vector2d> errors;
+  for (const BoardPoint& corner : view.corners) {
+    const Eigen::Vector3d on_board(corner.board_mm.x(), corner.board_mm.y(), 0);
+    errors.push_back(camera.project(*camera_from_board * on_board) - corner.camera_px);
+  }
+  return rms_px(errors);
+}
+
+std::vector<double> errors_px(const Views& views, const LensVector& lens, const ImageSize& size) {
+  std::vector<double> errors;
+  for (const PoseView* view : views) errors.push_back(error_px(*view, lens, size));
+  return errors;
+}
+
+/// Root mean square of the smallest.
+double judged_px(std::vector<double> errors) {
+  std::ranges::sort(errors);
+  const auto count = static_cast<std::size_t>(std::ceil(kJudgingShare * static_cast<double>(errors.size())));
+  double sum = 0;
+  for (std::size_t i = 0; i < count; ++i) sum += errors[i] * errors[i];
+  return std::sqrt(sum / static_cast<double>(count));
+}
+
+double limit_px(const std::vector<double>& errors, double least_px) {
+  return std::max(kGrossFactor * median_of(errors), least_px);
+}
+
+/// Zhang's estimate, of all views or, where it suits most of them badly, of those that agree; 0 where they leave it
+/// open.
+double estimate_focal(const Views& views, const ImageSize& size) {
+  const double of_all = zhang_focal(views, size);
+  std::vector<double> least;
+  for (double focal = kFocalMin * size.width_px; focal < kFocalMax * size.width_px; focal *= kFocalStep) {
+    std::vector<double> errors = errors_px(views, plain_lens(focal, size), size);
+    if (least.empty() || judged_px(errors) < judged_px(least)) least = std::move(errors);
+  }
+  if (of_all > 0 && judged_px(errors_px(views, plain_lens(of_all, size), size)) <= kNearlyBest * judged_px(least)) {
+    return of_all;
+  }
+  Views agreeing;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (least[i] <= limit_px(least, kDoubtfulPx)) agreeing.push_back(views[i]);
+  }
+  const double of_agreeing = agreeing.size() < kPosesMin ? 0 : zhang_focal(agreeing, size);
+  return of_agreeing > 0 ? of_agreeing : of_all;
+}
+
+Result<LensVector> estimate_lens(const Observations& observations, std::size_t camera) {
+  const auto& [name, size] = observations.cameras[camera];
+  const Views views = views_of(camera, observations);
+  if (views.size() < kPosesMin) {
+    return fail(ErrorCode::kImpossible,
+                "only " + std::to_string(views.size()) + " of the poses can be used, and " + std::to_string(kPosesMin) +
+                    " are the least; 10 to 15 make a good calibration",
+                "camera " + name);
+  }
+  const double focal = estimate_focal(views, size);
+  if (focal == 0) {
+    return fail(ErrorCode::kImpossible,
+                std::string("the poses are all parallel, which leaves the focal length open; ") + kTilt,
+                "camera " + name);
+  }
+  return plain_lens(focal, size);
 }
 
 /// Camera from board, of every view.
@@ -121,7 +205,79 @@ Result<> place_cameras(const Observations& observations, const ViewPoses& poses,
   return {};
 }
 
+/// Ascending: poses with a view that is far off under the first estimate of its camera; none where too few others are
+/// left.
+std::vector<std::size_t> find_doubtful(const Observations& observations, const RigModel& rig) {
+  std::vector<bool> doubtful(observations.poses.size());
+  for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
+    const auto& [size, lens, _] = rig.cameras[camera];
+    const std::vector<double> errors = errors_px(views_of(camera, observations), lens, size);
+    auto error = errors.begin();
+    for (std::size_t i = 0; i < doubtful.size(); ++i) {
+      for (const PoseView& view : observations.poses[i].views) {
+        if (view.camera != camera) continue;
+        doubtful[i] = doubtful[i] || (std::isfinite(*error) && *error > limit_px(errors, kDoubtfulPx));
+        ++error;
+      }
+    }
+  }
+  std::vector<std::size_t> indices;
+  std::vector<std::size_t> left(rig.cameras.size());
+  for (std::size_t i = 0; i < doubtful.size(); ++i) {
+    if (doubtful[i]) indices.push_back(i);
+    for (const PoseView& view : observations.poses[i].views) left[view.camera] += doubtful[i] ? 0 : 1;
+  }
+  return std::ranges::min(left) < kPosesMin ? std::vector<std::size_t>() : indices;
+}
+
+/// Adjusts the cameras to the other poses, and judges the doubtful ones by them.
+/// @param initial  those that are faulty already have no part
+Result<> judge_doubtful(const std::vector<std::size_t>& doubtful, const Observations& observations,
+                        InitialRig& initial) {
+  std::vector<std::size_t> aside = doubtful;
+  for (const FaultyPose& faulty : initial.faulty) aside.push_back(faulty.pose);
+  std::ranges::sort(aside);
+  Observations others = observations;
+  RigModel rig = initial.rig;
+  for (auto i = aside.rbegin(); i != aside.rend(); ++i) {
+    others.poses.erase(others.poses.begin() + static_cast<std::ptrdiff_t>(*i));
+    rig.rig_from_board.erase(rig.rig_from_board.begin() + static_cast<std::ptrdiff_t>(*i));
+  }
+  BundleOptions cameras_alone;
+  cameras_alone.cameras.assign(rig.cameras.size(), {});
+  cameras_alone.with_symbols = false;
+  if (auto solved = adjust(others, cameras_alone, rig); !solved) return tl::unexpected(solved.error());
+  const auto error_of = [&](const PoseObservation& pose, const MotionVector& place) {
+    std::vector<Eigen::Vector2d> all;
+    for (const PoseView& view : pose.views) {
+      const auto residuals = residuals_of(view, rig, place).corners_px;
+      all.insert(all.end(), residuals.begin(), residuals.end());
+    }
+    return rms_px(all);
+  };
+  std::vector<double> usual;
+  for (std::size_t i = 0; i < others.poses.size(); ++i)
+    usual.push_back(error_of(others.poses[i], rig.rig_from_board[i]));
+  for (const std::size_t i : aside) {
+    const MotionVector place = estimate_pose(observations.poses[i], rig).value_or(initial.rig.rig_from_board[i]);
+    const double error = error_of(observations.poses[i], place);
+    rig.rig_from_board.insert(rig.rig_from_board.begin() + static_cast<std::ptrdiff_t>(i), place);
+    if (error <= limit_px(usual, kNoBoardPx) || !std::ranges::binary_search(doubtful, i)) continue;
+    initial.faulty.push_back(
+        {i, PoseFault::kUnlike,
+         fmt::format("it contradicts the other poses: its corners are off by {:.0f} px, theirs by {:.2f} px; no camera "
+                     "that saw those can have seen it. Take it again",
+                     error, median_of(usual))});
+  }
+  initial.rig = std::move(rig);
+  return {};
+}
+
 }  // namespace
+
+FaultyPose fits_no_plane(std::size_t pose) {
+  return {pose, PoseFault::kUnlike, "its corners fit no plane; take it again"};
+}
 
 Result<InitialRig> estimate_cameras(const Observations& observations) {
   InitialRig initial;
@@ -133,16 +289,23 @@ Result<InitialRig> estimate_cameras(const Observations& observations) {
     rig.cameras.push_back({observations.cameras[camera].size, *lens, {}});
   }
   const ViewPoses poses = poses_of_views(observations, rig);
-  if (auto placed = place_cameras(observations, poses, rig); !placed) return tl::unexpected(placed.error());
+  const std::vector<std::size_t> doubtful = find_doubtful(observations, rig);
+  ViewPoses trusted = poses;
+  for (const std::size_t i : doubtful) trusted[i].clear();
+  if (auto placed = place_cameras(observations, trusted, rig); !placed) return tl::unexpected(placed.error());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (poses[i].empty()) {
-      initial.unplaced.push_back(i);
+      initial.faulty.push_back(fits_no_plane(i));
       rig.rig_from_board.emplace_back();
       continue;
     }
     const auto& [camera, camera_from_board] = *poses[i].begin();
     rig.rig_from_board.push_back(
         to_vector(to_motion(rig.cameras[camera].device_from_rig).inverse().after(camera_from_board)));
+  }
+  if (!doubtful.empty()) {
+    if (auto judged = judge_doubtful(doubtful, observations, initial); !judged) return tl::unexpected(judged.error());
+    std::ranges::sort(initial.faulty, {}, &FaultyPose::pose);
   }
   return initial;
 }
