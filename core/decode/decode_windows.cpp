@@ -18,8 +18,9 @@ constexpr float kCornerSymbols = 3.6F;  // of four, as none is certain
 WindowDecoder::WindowDecoder(const Pattern& pattern, DecodeWindowsOptions options, int radius)
     : array_(pattern.array),
       options_(options),
-      exact_codebook_(pattern.array, options.rows, options.columns, 0),
-      correcting_codebook_(pattern.array, options.rows, options.columns, radius),
+      codebooks_(
+          std::make_shared<const Codebooks>(Codebooks{Codebook(pattern.array, options.rows, options.columns, 0),
+                                                      Codebook(pattern.array, options.rows, options.columns, radius)})),
       unique_(pattern.array.minimum_distance > 0),
       log_letters_(std::log(static_cast<float>(pattern.letters()))) {}
 
@@ -28,7 +29,7 @@ std::optional<std::uint32_t> WindowDecoder::key_of(const Neighbourhood& around,
   std::uint32_t key = 0;
   for (const std::int32_t node : around) {
     if (node < 0 || shapes[node].letter < 0) return std::nullopt;
-    key = exact_codebook_.append(key, static_cast<std::uint8_t>(shapes[node].letter));
+    key = codebooks_->exact.append(key, static_cast<std::uint8_t>(shapes[node].letter));
   }
   return key;
 }
@@ -41,7 +42,7 @@ WindowDecoder::Hit WindowDecoder::continued(std::int32_t node, std::uint32_t key
   for (const int beside : {kAbove, kLeftOf}) {
     const Hit& hit = hits_[around_[node][beside]];
     const int row = hit.row + (beside == kAbove), column = hit.column + (beside == kLeftOf);
-    if (hit.weight == 0 || exact_codebook_.key_at(row, column) != key) continue;
+    if (hit.weight == 0 || codebooks_->exact.key_at(row, column) != key) continue;
     return {static_cast<std::int16_t>(row), static_cast<std::int16_t>(column), kExactWeight};
   }
   return {};
@@ -55,8 +56,8 @@ WindowDecoder::Hit WindowDecoder::look_up(std::int32_t node, std::uint32_t key, 
     found = {entry.row, entry.column, entry.errors == 0 ? kExactWeight : kCorrectedWeight};
     ++hits;
   };
-  exact_codebook_.find(key, take);
-  if (hits == 0) correcting_codebook_.find(key, take);
+  codebooks_->exact.find(key, take);
+  if (hits == 0) codebooks_->correcting.find(key, take);
   return hits == 1 ? found : Hit{};
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -90,10 +91,14 @@ class WindowDecoder {
     return row >= 0 && column >= 0 && row < options_.rows && column < options_.columns;
   }
 
+  struct Codebooks {
+    Codebook exact, correcting;  // the first is small enough to stay in the cache
+  };
+
   CodeArray array_;
   DecodeWindowsOptions options_;
-  Codebook exact_codebook_, correcting_codebook_;  // the first is small enough to stay in the cache
-  bool unique_;                                    // no two windows alike
+  std::shared_ptr<const Codebooks> codebooks_;  // shared with copies: the larger part of a decoder, and never changes
+  bool unique_;                                 // no two windows alike
   float log_letters_;
   std::vector<Neighbourhood> around_;
   std::vector<Hit> hits_;

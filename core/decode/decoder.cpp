@@ -40,6 +40,10 @@ Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calib
   return Decoder(std::make_unique<Pipeline>(pattern, calibration, camera_index, options, std::move(paper)));
 }
 
+Decoder Decoder::another() const {
+  return Decoder(std::make_unique<Pipeline>(*pipeline_));
+}
+
 std::uint8_t Decoder::camera_index() const {
   return pipeline_->camera_index();
 }

@@ -17,7 +17,7 @@ Decoder::Pipeline::Pipeline(const Pattern& pattern, const Calibration& calibrati
       reader_(pattern,
               ExpectedFrames(camera_, calibration.projector, std::sqrt(options.depth_min_mm * options.depth_max_mm)),
               options, std::move(paper)),
-      cells_(reader_.cell_rays(calibration.projector)),
+      cells_(std::make_shared<const CellRays>(reader_.cell_rays(calibration.projector))),
       camera_rays_(camera_.lens),
       epipolar_gate_(camera_, calibration.projector, options.depth_min_mm, options.depth_max_mm),
       triangulator_(camera_, calibration.projector),
@@ -54,13 +54,13 @@ void Decoder::Pipeline::find_epipolar_segments() {
 void Decoder::Pipeline::decode_windows(const GreyView& frame) {
   find_epipolar_segments();
   const bool gated = options_.correspond == Method::kDefault;
-  const CellGate gate(cells_, gated ? std::span<const EpipolarSegment>(segments_) : std::span<const EpipolarSegment>(),
+  const CellGate gate(*cells_, gated ? std::span<const EpipolarSegment>(segments_) : std::span<const EpipolarSegment>(),
                       CorrespondOptions{}.epipolar_max_px);
   reader_.decode_windows(frame, gate);
 }
 
 void Decoder::Pipeline::correspond() {
-  if (options_.correspond == Method::kDefault) correspondence_.correspond(cells_, segments_, reader_.seen().claims);
+  if (options_.correspond == Method::kDefault) correspondence_.correspond(*cells_, segments_, reader_.seen().claims);
 }
 
 void Decoder::Pipeline::triangulate() {
@@ -74,7 +74,7 @@ void Decoder::Pipeline::triangulate() {
     PixelRay ray = rays_[i];
     ray.direction += ray.turn * (centres[i] - ray_pixels_[i]).cast<double>();
     const TriangulatedPoint solved =
-        triangulator_.triangulate(ray, cells_.ray(claim.row, claim.column), centre_sigma_px(seen.moments[i]));
+        triangulator_.triangulate(ray, cells_->ray(claim.row, claim.column), centre_sigma_px(seen.moments[i]));
     const double depth = solved.point_in_camera.z();
     const bool gated = options_.correspond == Method::kDefault;
     const bool in_range = gated ? depth >= options_.depth_min_mm && depth <= options_.depth_max_mm : depth > 0;
@@ -89,7 +89,7 @@ void Decoder::Pipeline::triangulate() {
 void Decoder::Pipeline::add_point(std::size_t node, const Eigen::Vector2f& centre_px, const TriangulatedPoint& solved) {
   const CellClaim& claim = reader_.seen().claims[node];
   const Eigen::Vector3f point = (camera_.rig_from_camera * solved.point_in_camera).cast<float>();
-  const Eigen::Vector2f projector = cells_.pixel(claim.row, claim.column).cast<float>();
+  const Eigen::Vector2f projector = cells_->pixel(claim.row, claim.column).cast<float>();
   CloudPoint& out = decoding_.points.emplace_back();
   out.x = point.x(), out.y = point.y(), out.z = point.z();
   out.camera_u = centre_px.x(), out.camera_v = centre_px.y();

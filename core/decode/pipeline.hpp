@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -15,7 +16,8 @@
 
 namespace slsd {
 
-/// The way of one frame through the stages, from the symbols to the points.
+/// The way of one frame through the stages, from the symbols to the points. A copy is for another thread: what is large
+/// and never changes is shared.
 /// @thread thread-bound
 class Decoder::Pipeline {
  public:
@@ -25,7 +27,7 @@ class Decoder::Pipeline {
 
   const Decoding& decode(const GreyView& frame, double full, StageObserver* observer);
   [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, double full) {
-    return reader_.read_anywhere(frame, full, cells_);
+    return reader_.read_anywhere(frame, full, *cells_);
   }
   [[nodiscard]] std::uint8_t camera_index() const { return camera_index_; }
   [[nodiscard]] const Lens& camera_lens() const { return camera_.lens; }
@@ -42,7 +44,7 @@ class Decoder::Pipeline {
   std::uint8_t camera_index_;
   DecodeOptions options_;
   SymbolReader reader_;
-  CellRays cells_;
+  std::shared_ptr<const CellRays> cells_;  // shared with copies, as they never change
   RayTable camera_rays_;
   EpipolarGate epipolar_gate_;
   Triangulator triangulator_;

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <random>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -28,13 +28,12 @@ constexpr double kFeatureFloor[kFeatureCount] = {0.02, 0.003, 0.003, 0.003, 0.00
 constexpr double kLogVolumeScale = -40;
 
 struct Look {
-  ShapeFeatures features;
+  GreyMoments moments;
   Eigen::Vector2f centroid_px;
 };
 
 /// The region nearest to the middle of the view, measured as the decoder measures it.
-std::optional<Look> look_at(const SymbolView& view, const PrototypeOptions& options, const LatticeFrame& assumed,
-                            Regions& regions) {
+std::optional<Look> look_at(const SymbolView& view, const PrototypeOptions& options, Regions& regions) {
   RegionFinder().find(Mask(view.mask.view()), regions);
   const float middle = 0.5F * static_cast<float>(view.image.width() - 1);
   const Region* nearest = nullptr;
@@ -55,17 +54,16 @@ std::optional<Look> look_at(const SymbolView& view, const PrototypeOptions& opti
   GreyMomentMeter meter(margin_px(options.spacing_px, options.camera_px_per_projector_px));
   const GreyMoments moments = meter.measure(view.image.view(), *nearest, regions.runs_of(*nearest));
   const Eigen::Vector2f from_middle = Eigen::Vector2f(moments.x, moments.y) - view.middle_px;
-  return Look{shape_features(moments, assumed.inverse(), static_cast<float>(options.symbol_size_px)),
-              view.frame.inverse() * from_middle};
+  return Look{moments, view.frame.inverse() * from_middle};
 }
 
-Prototype summarise(const std::vector<Look>& looks) {
+Prototype summarise(const std::vector<ShapeFeatures>& looks) {
   Eigen::Matrix<double, kFeatureCount, 1> mean = decltype(mean)::Zero();
-  for (const Look& look : looks) mean += look.features.cast<double>() / static_cast<double>(looks.size());
+  for (const ShapeFeatures& look : looks) mean += look.cast<double>() / static_cast<double>(looks.size());
   Covariance covariance = Covariance::Zero();
   for (int i = 0; i < kFeatureCount; ++i) covariance(i, i) = kFeatureFloor[i] * kFeatureFloor[i];
-  for (const Look& look : looks) {
-    const auto deviation = (look.features.cast<double>() - mean).eval();
+  for (const ShapeFeatures& look : looks) {
+    const auto deviation = (look.cast<double>() - mean).eval();
     covariance += deviation * deviation.transpose() / static_cast<double>(looks.size());
   }
   const Eigen::LLT<Covariance> root(covariance);
@@ -95,23 +93,36 @@ float threshold_level(int spacing_px, float camera_px_per_projector_px) {
 }
 
 std::vector<Prototype> make_prototypes(const PrototypeOptions& options) {
-  std::vector<Prototype> prototypes;
+  return std::move(make_prototypes(options, std::span(&options.frame_error, 1)).front());
+}
+
+std::vector<std::vector<Prototype>> make_prototypes(const PrototypeOptions& options,
+                                                    std::span<const float> frame_errors) {
+  std::vector<std::vector<Prototype>> prototypes(frame_errors.size());
+  const auto size_px = static_cast<float>(options.symbol_size_px);
   Regions regions;
   SymbolViewer viewer({options.symbols, options.symbol_size_px, options.spacing_px, options.camera_px_per_projector_px,
                        threshold_level(options.spacing_px, options.camera_px_per_projector_px)});
-  const auto look = [&](std::size_t letter, float tilt) {
-    const SymbolView& view = viewer.view(static_cast<int>(letter), tilt);
-    return look_at(view, options, view.frame * viewer.frame_error(options.frame_error), regions);
-  };
   for (std::size_t letter = 0; letter < options.symbols.size(); ++letter) {
-    std::vector<Look> looks;
+    std::vector<std::vector<ShapeFeatures>> looks(frame_errors.size());
     std::vector<Eigen::Vector2f> centroids;
     for (int sample = 0; sample < options.samples; ++sample) {
-      if (const auto tilted = look(letter, 1)) looks.push_back(*tilted);
-      if (const auto upright = look(letter, 0)) centroids.push_back(upright->centroid_px);
+      const SymbolView& tilted = viewer.view(static_cast<int>(letter), 1);
+      const FrameError error = viewer.frame_error();
+      if (const auto look = look_at(tilted, options, regions)) {
+        for (std::size_t i = 0; i < frame_errors.size(); ++i) {
+          const LatticeFrame assumed = tilted.frame * error.of_size(frame_errors[i]);
+          looks[i].push_back(shape_features(look->moments, assumed.inverse(), size_px));
+        }
+      }
+      const SymbolView& upright = viewer.view(static_cast<int>(letter), 0);
+      (void)viewer.frame_error();  // as for the tilted one, so that both see the same numbers of the series
+      if (const auto look = look_at(upright, options, regions)) centroids.push_back(look->centroid_px);
     }
-    prototypes.push_back(summarise(looks));
-    prototypes.back().centroid_px = mean_of(centroids);
+    for (std::size_t i = 0; i < frame_errors.size(); ++i) {
+      prototypes[i].push_back(summarise(looks[i]));
+      prototypes[i].back().centroid_px = mean_of(centroids);
+    }
   }
   return prototypes;
 }

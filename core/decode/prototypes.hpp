@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -41,6 +42,13 @@ struct PrototypeOptions {
 /// @return one to a letter, in the order of `symbols`
 /// @thread reentrant
 [[nodiscard]] std::vector<Prototype> make_prototypes(const PrototypeOptions& options);
+
+/// The same for frames that are off by more than one amount, in hardly more time than for one: the looks are the same.
+/// @param frame_errors  in place of that of the options
+/// @return one set to each of them
+/// @thread reentrant
+[[nodiscard]] std::vector<std::vector<Prototype>> make_prototypes(const PrototypeOptions& options,
+                                                                  std::span<const float> frame_errors);
 
 /// Largest margin that a region's edge can be followed by without reaching its neighbour.
 [[nodiscard]] int margin_px(int spacing_px, float camera_px_per_projector_px);

@@ -22,11 +22,6 @@ constexpr float kMeasuredDistanceMax = 20;
 constexpr float kDecidedDistance = 3;
 constexpr float kDecidedLogProbability = -0.01F;
 
-std::vector<Prototype> prototypes_for(const Pattern& pattern, float scale, float frame_error) {
-  return make_prototypes(
-      {pattern.options.symbols, pattern.options.symbol_size_px, pattern.options.spacing_px, scale, frame_error});
-}
-
 /// The centroids that the estimator in use finds: the paper's are those of the symbols as they are drawn.
 std::vector<Prototype> with_centroids_of(Method centre, const Pattern& pattern, std::vector<Prototype> prototypes) {
   if (centre == Method::kDefault) return prototypes;
@@ -45,25 +40,36 @@ int radius_of(const CodeArray& array) {
 
 }  // namespace
 
+SymbolReader::Prototypes SymbolReader::prototypes_for(const Pattern& pattern, float scale) {
+  constexpr float kFrameErrors[] = {kExpectedFrameError, kMeasuredFrameError};
+  auto made = make_prototypes(
+      {pattern.options.symbols, pattern.options.symbol_size_px, pattern.options.spacing_px, scale}, kFrameErrors);
+  return {std::move(made[0]), std::move(made[1])};
+}
+
 SymbolReader::SymbolReader(const Pattern& pattern, ExpectedFrames expected, const DecodeOptions& options,
                            std::optional<PaperWay> paper)
+    : SymbolReader(prototypes_for(pattern, expected.in_the_middle().scale), pattern, std::move(expected), options,
+                   std::move(paper)) {}
+
+SymbolReader::SymbolReader(Prototypes prototypes, const Pattern& pattern, ExpectedFrames&& expected,
+                           const DecodeOptions& options, std::optional<PaperWay>&& paper)
     : pattern_(pattern),
       options_(options),
       paper_(std::move(paper)),
       shapes_(pattern.options, std::move(expected), options.binarize, options.find_regions),
-      prototypes_as_expected_(prototypes_for(pattern, expected_scale(), kExpectedFrameError)),
-      prototypes_as_measured_(prototypes_for(pattern, expected_scale(), kMeasuredFrameError)),
-      classifier_as_expected_(prototypes_as_expected_, kExpectedDistanceMax),
-      classifier_as_measured_(prototypes_as_measured_, kMeasuredDistanceMax),
+      prototypes_(std::move(prototypes)),
+      classifier_as_expected_(prototypes_.as_expected, kExpectedDistanceMax),
+      classifier_as_measured_(prototypes_.as_measured, kMeasuredDistanceMax),
       linker_({.pitch_px = static_cast<float>(pattern.pitch_px())}),
       window_decoder_(pattern, {.rows = pattern.whole_rows(), .columns = pattern.whole_columns()},
                       radius_of(pattern.array)),
-      review_(pattern, prototypes_as_measured_, {}),
-      centre_correction_(prototypes_as_measured_, static_cast<float>(pattern.pitch_px()),
+      review_(pattern, prototypes_.as_measured, {}),
+      centre_correction_(prototypes_.as_measured, static_cast<float>(pattern.pitch_px()),
                          static_cast<float>(pattern.options.symbol_size_px)) {}
 
 CellRays SymbolReader::cell_rays(const Lens& projector) const {
-  return {pattern_, with_centroids_of(options_.centre, pattern_, prototypes_as_measured_), projector};
+  return {pattern_, with_centroids_of(options_.centre, pattern_, prototypes_.as_measured), projector};
 }
 
 void SymbolReader::describe(const GreyView& frame) {
@@ -87,7 +93,7 @@ void SymbolReader::classify() {
       seen_.shapes[i] = classifier_as_expected_.classify(shape_features(moments, expected.inverse, size));
     }
     if (seen_.shapes[i].letter >= 0)
-      node.centre_px -= node.frame * prototypes_as_expected_[seen_.shapes[i].letter].centroid_px;
+      node.centre_px -= node.frame * prototypes_.as_expected[seen_.shapes[i].letter].centroid_px;
   }
 }
 

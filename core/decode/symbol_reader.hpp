@@ -61,6 +61,13 @@ class SymbolReader {
   [[nodiscard]] float frame_levels() const { return shapes_.frame_levels(); }
 
  private:
+  struct Prototypes {
+    std::vector<Prototype> as_expected, as_measured;
+  };
+  [[nodiscard]] static Prototypes prototypes_for(const Pattern& pattern, float scale);
+  SymbolReader(Prototypes prototypes, const Pattern& pattern, ExpectedFrames&& expected, const DecodeOptions& options,
+               std::optional<PaperWay>&& paper);
+
   void classify_in_measured_frames();
   [[nodiscard]] bool reviews() const;
 
@@ -68,7 +75,7 @@ class SymbolReader {
   DecodeOptions options_;
   std::optional<PaperWay> paper_;
   ShapeFinder shapes_;
-  std::vector<Prototype> prototypes_as_expected_, prototypes_as_measured_;
+  Prototypes prototypes_;
   Classifier classifier_as_expected_, classifier_as_measured_;
 
   GridLinker linker_;

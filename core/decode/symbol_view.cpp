@@ -26,6 +26,10 @@ std::vector<float> gaussian(float sigma_px, int reach) {
   return weights;
 }
 
+float between(float low, float high, float share) {
+  return low + (high - low) * share;
+}
+
 void add_scaled(float weight, const float* from, int count, float* to) {
 #pragma omp simd
   for (int x = 0; x < count; ++x) to[x] += weight * from[x];
@@ -37,28 +41,38 @@ SymbolViewer::SymbolViewer(SymbolViewOptions options) : options_(std::move(optio
   for (const int number : options_.symbols) drawings_.push_back(draw_symbol(number, options_.symbol_size_px));
 }
 
-float SymbolViewer::uniform(float low, float high) {
-  return low + (high - low) * static_cast<float>(random_()) * 0x1p-32F;
+float SymbolViewer::share() {
+  return static_cast<float>(random_()) * 0x1p-32F;
 }
 
-Eigen::Matrix2f SymbolViewer::frame_error(float size) {
+float SymbolViewer::uniform(float low, float high) {
+  return between(low, high, share());
+}
+
+Eigen::Matrix2f FrameError::of_size(float size) const {
+  const auto within = [](float reach, float share) { return between(-reach, reach, share); };
   Eigen::Matrix2f error;
   // A tilted surface stretches and shears along the base line, which is mostly the pattern's u; the rest is smaller.
-  error << 1 + uniform(-size, size), uniform(-size, size), uniform(-0.5F * size, 0.5F * size),
-      1 + uniform(-0.5F * size, 0.5F * size);
+  error << 1 + within(size, shares[0]), within(size, shares[1]), within(0.5F * size, shares[2]),
+      1 + within(0.5F * size, shares[3]);
   return error;
+}
+
+FrameError SymbolViewer::frame_error() {
+  return {{share(), share(), share(), share()}};
 }
 
 void SymbolViewer::draw_cells(int letter) {
   const int pitch = options_.symbol_size_px + options_.spacing_px;
-  cells_ = Grey8(kCells * pitch, kCells * pitch);
+  cells_ = Grey8(kCells * pitch + 2, kCells * pitch + 2);
   for (int row = 0; row < kCells; ++row) {
     for (int column = 0; column < kCells; ++column) {
       const bool middle = row == 1 && column == 1;
       const Grey8& drawing = drawings_[middle ? static_cast<std::size_t>(letter) : random_() % drawings_.size()];
       for (int y = 0; y < drawing.height(); ++y) {
-        std::copy_n(drawing.row(y), drawing.width(),
-                    cells_.row(row * pitch + y + options_.spacing_px / 2) + column * pitch + options_.spacing_px / 2);
+        std::copy_n(
+            drawing.row(y), drawing.width(),
+            cells_.row(row * pitch + y + options_.spacing_px / 2 + 1) + column * pitch + options_.spacing_px / 2 + 1);
       }
     }
   }
@@ -69,20 +83,39 @@ void SymbolViewer::expose(int side_px) {
   const float middle_of_square =
       static_cast<float>(options_.symbol_size_px + options_.spacing_px + options_.spacing_px / 2) +
       0.5F * static_cast<float>(options_.symbol_size_px);
+  const auto subpixel = [](int index) {
+    return static_cast<float>(index / kSubpixels) + (static_cast<float>(index % kSubpixels) - 1) / kSubpixels;
+  };
+  const int across = kSubpixels * side_px, width = cells_.width(), last = width - 1;
+  column_u_.resize(across), column_v_.resize(across), pixels_.resize(across);
+  for (int i = 0; i < across; ++i) {
+    const float x = subpixel(i) - view_.middle_px.x();
+    column_u_[i] = inverse(0, 0) * x, column_v_[i] = inverse(1, 0) * x;
+  }
   light_.assign(static_cast<std::size_t>(side_px) * side_px, 0.F);
-  for (int y = 0; y < side_px; ++y) {
-    for (int x = 0; x < side_px; ++x) {
-      int lit = 0;
-      for (int sub = 0; sub < kSubpixels * kSubpixels; ++sub) {
-        const Eigen::Vector2f at(static_cast<float>(x) + (static_cast<float>(sub % kSubpixels) - 1) / kSubpixels,
-                                 static_cast<float>(y) + (static_cast<float>(sub / kSubpixels) - 1) / kSubpixels);
-        const Eigen::Vector2f cell = inverse * (at - view_.middle_px) + Eigen::Vector2f::Constant(middle_of_square);
-        if (cell.x() < 0 || cell.y() < 0) continue;
-        const int u = static_cast<int>(cell.x()), v = static_cast<int>(cell.y());
-        if (u < cells_.width() && v < cells_.height()) lit += cells_.at(u, v);
-      }
-      light_[y * side_px + x] = static_cast<float>(lit) / (kSubpixels * kSubpixels);
+  lit_.resize(side_px);
+  for (int row = 0; row < across; ++row) {
+    if (row % kSubpixels == 0) lit_.assign(side_px, 0);
+    const float y = subpixel(row) - view_.middle_px.y();
+    const float row_u = inverse(0, 1) * y, row_v = inverse(1, 1) * y;
+    const float *const columns_u = column_u_.data(), *const columns_v = column_v_.data();
+    std::int32_t* const pixels = pixels_.data();
+#pragma omp simd
+    for (int i = 0; i < across; ++i) {
+      // One further for the border, onto which everything outside falls.
+      const float u = columns_u[i] + row_u + middle_of_square, v = columns_v[i] + row_v + middle_of_square;
+      const int right = u < 0 ? 0 : std::min(static_cast<int>(u) + 1, last);
+      const int down = v < 0 ? 0 : std::min(static_cast<int>(v) + 1, last);
+      pixels[i] = down * width + right;
     }
+    const std::uint8_t* const cells = cells_.data();
+    for (int x = 0; x < side_px; ++x) {
+      const std::int32_t* const three = pixels + kSubpixels * x;
+      lit_[x] += cells[three[0]] + cells[three[1]] + cells[three[2]];
+    }
+    if (row % kSubpixels != kSubpixels - 1) continue;
+    float* const light = light_.data() + static_cast<std::ptrdiff_t>(row / kSubpixels) * side_px;
+    for (int x = 0; x < side_px; ++x) light[x] = static_cast<float>(lit_[x]) / (kSubpixels * kSubpixels);
   }
 }
 
@@ -127,14 +160,20 @@ const SymbolView& SymbolViewer::view(int letter, float tilt) {
   expose(side);
   blur(uniform(0.5F, std::max(1.1F, 0.07F * size_px)));
 
-  const float noise = uniform(0.F, 6.F);
-  for (int i = 0; i < side * side; ++i) {
-    const float gauss = uniform(-1, 1) + uniform(-1, 1) + uniform(-1, 1);  // variance 1
-    const float level = kDark + (kLight - kDark) * light_[i] + noise * gauss;
-    view_.image.data()[i] = static_cast<std::uint8_t>(std::clamp(level, 0.F, 255.F));
-    view_.mask.data()[i] = level > kDark + options_.threshold_level * (kLight - kDark) ? 255 : 0;
-  }
+  add_noise(uniform(0.F, 6.F));
   return view_;
+}
+
+void SymbolViewer::add_noise(float size) {
+  const int pixels = view_.image.width() * view_.image.height();
+  std::uint8_t *const image = view_.image.data(), *const mask = view_.mask.data();
+  const float threshold = kDark + options_.threshold_level * (kLight - kDark);
+  for (int i = 0; i < pixels; ++i) {
+    const float gauss = uniform(-1, 1) + uniform(-1, 1) + uniform(-1, 1);  // variance 1
+    const float level = kDark + (kLight - kDark) * light_[i] + size * gauss;
+    image[i] = static_cast<std::uint8_t>(std::clamp(level, 0.F, 255.F));
+    mask[i] = level > threshold ? 255 : 0;
+  }
 }
 
 }  // namespace slsd

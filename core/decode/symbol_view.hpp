@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <random>
 #include <vector>
 
@@ -28,6 +30,14 @@ struct SymbolView {
   Eigen::Vector2f middle_px;  ///< of the symbol's square, in the image
 };
 
+/// The error of an assumed frame, up to its size.
+struct FrameError {
+  std::array<float, 4> shares;  ///< of its range, of each entry by rows
+
+  /// A matrix near the identity.
+  [[nodiscard]] Eigen::Matrix2f of_size(float size) const;
+};
+
 /// Draws symbols in random tilt, blur, noise and position on the pixels, the same in every run.
 /// @thread thread-bound
 class SymbolViewer {
@@ -38,20 +48,27 @@ class SymbolViewer {
   /// @param tilt  0 for a surface that faces the devices, 1 for every tilt that occurs
   [[nodiscard]] const SymbolView& view(int letter, float tilt);
 
-  /// A random matrix near the identity, the error of an assumed frame.
-  [[nodiscard]] Eigen::Matrix2f frame_error(float size);
+  [[nodiscard]] FrameError frame_error();
 
  private:
+  /// std::mt19937's numbers from half the memory, in half the time.
+  using Random = std::mersenne_twister_engine<std::uint32_t, 32, 624, 397, 31, 0x9908b0df, 11, 0xffffffff, 7,
+                                              0x9d2c5680, 15, 0xefc60000, 18, 1812433253>;
+  float share();
   float uniform(float low, float high);
   void draw_cells(int letter);
   void expose(int side_px);
   void blur(float sigma_px);
+  void add_noise(float size);
 
   SymbolViewOptions options_;
-  std::mt19937 random_{1};
+  Random random_{1};
   std::vector<Grey8> drawings_;
-  Grey8 cells_;  // three by three cells
+  Grey8 cells_;  // three by three cells, with a dark border of one pixel
   std::vector<float> light_, blurred_, wide_row_;
+  std::vector<float> column_u_, column_v_;  // what a subpixel's column adds to its place among the cells
+  std::vector<std::int32_t> pixels_;        // that subpixels of a row see
+  std::vector<int> lit_;                    // sums of a row's pixels
   SymbolView view_;
 };
 

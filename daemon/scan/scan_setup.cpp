@@ -54,16 +54,31 @@ Result<> warm_up(Decoder& decoder, const Lens& lens, const Grey8& symbols) {
   return decoded ? Result<>() : tl::unexpected(decoded.error());
 }
 
+// Each in a thread of its own, as each takes some hundredths of a second.
 Result<std::vector<Decoder>> make_lane(const ScanSetup& setup, const std::vector<std::size_t>& cameras,
                                        const DecodeOptions& options) {
-  std::vector<Decoder> lane;
+  std::vector<std::future<Result<Decoder>>> prepared;
   for (const std::size_t index : cameras) {
-    auto decoder = Decoder::create(setup.pattern, *setup.calibration, index, options);
+    prepared.push_back(std::async(std::launch::async, [&, index]() -> Result<Decoder> {
+      auto decoder = Decoder::create(setup.pattern, *setup.calibration, index, options);
+      if (!decoder) return decoder;
+      const auto warm = warm_up(*decoder, setup.calibration->cameras[index].lens, setup.image);
+      if (!warm) return tl::unexpected(warm.error());
+      return decoder;
+    }));
+  }
+  std::vector<Decoder> lane;
+  for (auto& each : prepared) {
+    auto decoder = each.get();
     if (!decoder) return tl::unexpected(decoder.error());
     lane.push_back(std::move(*decoder));
-    const auto warm = warm_up(lane.back(), setup.calibration->cameras[index].lens, setup.image);
-    if (!warm) return tl::unexpected(warm.error());
   }
+  return lane;
+}
+
+std::vector<Decoder> another_lane(const std::vector<Decoder>& first) {
+  std::vector<Decoder> lane;
+  for (const Decoder& decoder : first) lane.push_back(decoder.another());
   return lane;
 }
 
@@ -127,17 +142,10 @@ Result<ScanSetup> ScanSetup::create(const Configuration& configuration, std::siz
   if (!setup.calibration) return setup;
   const auto cameras = calibrated_cameras(*setup.calibration, configuration);
   if (!cameras) return tl::unexpected(cameras.error());
-  // A decoder takes a part of a second: the lanes are prepared at the same time.
-  std::vector<std::future<Result<std::vector<Decoder>>>> prepared;
-  for (std::size_t lane = 0; lane < lanes; ++lane) {
-    prepared.push_back(
-        std::async(std::launch::async, [&] { return make_lane(setup, *cameras, configuration.decode); }));
-  }
-  for (auto& each : prepared) {
-    auto lane = each.get();
-    if (!lane) return tl::unexpected(lane.error());
-    setup.lanes.push_back(std::move(*lane));
-  }
+  auto first = make_lane(setup, *cameras, configuration.decode);
+  if (!first) return tl::unexpected(first.error());
+  for (std::size_t lane = 1; lane < lanes; ++lane) setup.lanes.push_back(another_lane(*first));
+  if (lanes > 0) setup.lanes.push_back(std::move(*first));
   return setup;
 }
 

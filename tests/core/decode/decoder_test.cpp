@@ -4,8 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numeric>
 #include <random>
+#include <thread>
+#include <tuple>
+#include <vector>
 
 #include <gmock/gmock.h>
 
@@ -262,6 +266,44 @@ TEST(Decode, ReadsTheLongestRowsAndColumns) {
     EXPECT_GT(decode(*decoder, frame.view()).regions.size(), 1000U);
     EXPECT_EQ(decode(*decoder, Grey8(width, height, 255).view()).points.size(), 0U);
   }
+}
+
+bool same_points(const Decoding& a, const Decoding& b) {
+  const auto values = [](const CloudPoint& p) {
+    return std::tuple(p.x, p.y, p.z, p.camera_u, p.camera_v, p.projector_u, p.projector_v, p.sigma_mm, p.symbol);
+  };
+  return a.counts == b.counts && std::ranges::equal(a.points, b.points, {}, values, values);
+}
+
+TEST(AnotherDecoder, ReadsAsTheFirstDoesInAThreadOfItsOwn) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  const Grey8 frames[] = {frame_of(pattern, kPlane), frame_of(pattern, kCylinder), frame_of(pattern, kTilted)};
+  Decoder fresh = decoder_of(pattern);
+  Decoder second = fresh.another();  // before the first frame: nothing has grown
+  std::vector<Decoding> expected;
+  for (const Grey8& frame : frames) expected.push_back(decode(fresh, frame.view()));
+  Decoder third = fresh.another();
+  const auto reads_the_same = [&](Decoder& decoder, bool& same) {
+    for (int i = 0; i < 12; ++i) same = same && same_points(**decoder.decode(frames[i % 3].view()), expected[i % 3]);
+  };
+  bool first_same = true, second_same = true, third_same = true;
+  {
+    const std::jthread beside([&] { reads_the_same(second, second_same); });
+    const std::jthread too([&] { reads_the_same(third, third_same); });
+    reads_the_same(fresh, first_same);
+  }
+  EXPECT_TRUE(first_same && second_same && third_same);
+  EXPECT_GT(expected[0].points.size(), 1000U);
+}
+
+TEST(AnotherDecoder, OutlivesTheFirst) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  const Grey8 frame = frame_of(pattern, kPlane);
+  auto first = std::make_unique<Decoder>(decoder_of(pattern));
+  const Decoding expected = decode(*first, frame.view());
+  Decoder second = first->another();
+  first.reset();
+  EXPECT_TRUE(same_points(decode(second, frame.view()), expected));
 }
 
 TEST(CreateDecoder, RefusesAnEmptyDepthRange) {

@@ -53,6 +53,22 @@ TEST(MakePrototypes, KeepsTheDefaultSymbolsApart) {
   }
 }
 
+TEST(MakePrototypes, GivesEachFrameErrorWhatItWouldGetAlone) {
+  PrototypeOptions options = options_of({5, 7, 22});
+  constexpr float kErrors[] = {0.15F, 0.05F};
+  const auto together = make_prototypes(options, kErrors);
+  for (std::size_t error = 0; error < 2; ++error) {
+    options.frame_error = kErrors[error];
+    const auto alone = make_prototypes(options);
+    for (std::size_t i = 0; i < alone.size(); ++i) {
+      EXPECT_EQ(together[error][i].mean, alone[i].mean);
+      EXPECT_EQ(together[error][i].whitening, alone[i].whitening);
+      EXPECT_EQ(together[error][i].centroid_px, alone[i].centroid_px);
+    }
+  }
+  EXPECT_NE(together[0][0].whitening, together[1][0].whitening);
+}
+
 TEST(MakePrototypes, GivesTheSameForTheSameOptions) {
   const auto once = make_prototypes(options_of({5, 7, 22}));
   const auto again = make_prototypes(options_of({5, 7, 22}));
