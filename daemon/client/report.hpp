@@ -9,7 +9,7 @@
 
 #include "daemon/client/client_options.hpp"
 #include "daemon/client/connection.hpp"
-#include "daemon/rpc/rpc_error.hpp"
+#include "daemon/rpc/message.hpp"
 
 namespace slsd {
 

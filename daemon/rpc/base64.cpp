@@ -2,12 +2,21 @@
 // Copyright the slsd authors
 #include "daemon/rpc/base64.hpp"
 
+#include <array>
 #include <cstdint>
 
 namespace slsd {
 namespace {
 
 constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+constexpr std::uint8_t kNoLetter = 64;
+
+constexpr std::array<std::uint8_t, 256> kValues = [] {
+  std::array<std::uint8_t, 256> values{};
+  values.fill(kNoLetter);
+  for (std::uint8_t i = 0; i < 64; ++i) values[static_cast<std::uint8_t>(kLetters[i])] = i;
+  return values;
+}();
 
 }  // namespace
 
@@ -25,20 +34,24 @@ std::string to_base64(std::string_view bytes) {
 }
 
 std::optional<std::string> from_base64(std::string_view text) {
+  const std::string_view letters = text.substr(0, text.find_last_not_of('=') + 1);
+  const std::size_t filling = text.size() - letters.size();
+  if (text.size() % 4 != 0 || filling > 2) return std::nullopt;
   std::string bytes;
   bytes.reserve(text.size() / 4 * 3);
   std::uint32_t bits = 0;
   int held = 0;
-  for (const char letter : text.substr(0, text.find_last_not_of('=') + 1)) {
-    const std::size_t value = kLetters.find(letter);
-    if (value == std::string_view::npos) return std::nullopt;
-    bits = bits << 6U | static_cast<std::uint32_t>(value);
+  for (const char letter : letters) {
+    const std::uint8_t value = kValues[static_cast<std::uint8_t>(letter)];
+    if (value == kNoLetter) return std::nullopt;
+    bits = bits << 6U | value;
     held += 6;
     if (held < 8) continue;
     held -= 8;
     bytes += static_cast<char>(bits >> held & 0xFFU);
   }
-  if (to_base64(bytes) != text) return std::nullopt;
+  // What the last letter has beyond the last byte is zero, or another text would give the same bytes.
+  if ((bits & ((1U << held) - 1)) != 0) return std::nullopt;
   return bytes;
 }
 

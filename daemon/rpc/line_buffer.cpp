@@ -2,37 +2,52 @@
 // Copyright the slsd authors
 #include "daemon/rpc/line_buffer.hpp"
 
-#include <utility>
-
 namespace slsd {
 namespace {
 
-void cut_carriage_return(std::string& line) {
-  if (!line.empty() && line.back() == '\r') line.pop_back();
+constexpr std::size_t kKeptBytes = 64 << 10;  // a longer buffer is given back when it is empty
+
+std::string_view without_carriage_return(std::string_view line) {
+  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  return line;
 }
 
 }  // namespace
 
-std::optional<std::string> LineBuffer::next_line() {
-  const std::size_t end = bytes_.find('\n', searched_);
-  if (end == std::string::npos || end > limit_bytes_) {
-    searched_ = bytes_.size();
-    return std::nullopt;
+// What was read is cut off here, once for all the lines of a chunk: cut off line by line it would cost the square of
+// their number.
+void LineBuffer::append(std::string_view bytes) {
+  if (begin_ > 0) {
+    bytes_.erase(0, begin_);
+    searched_ -= begin_;
+    begin_ = 0;
   }
-  std::string line = bytes_.substr(0, end);
-  bytes_.erase(0, end + 1);
-  searched_ = 0;
-  if (bytes_.empty() && bytes_.capacity() > 65536) bytes_.shrink_to_fit();
-  cut_carriage_return(line);
-  return line;
+  bytes_.append(bytes);
 }
 
-std::optional<std::string> LineBuffer::rest() {
-  if (bytes_.empty()) return std::nullopt;
-  searched_ = 0;
-  std::string line = std::exchange(bytes_, {});
-  cut_carriage_return(line);
-  return line;
+std::optional<std::string_view> LineBuffer::next_line() {
+  const std::size_t end = bytes_.find('\n', searched_);
+  if (end == std::string::npos || end - begin_ > limit_bytes_) {
+    searched_ = bytes_.size();
+    if (begin_ == bytes_.size()) clear();
+    return std::nullopt;
+  }
+  const auto line = std::string_view(bytes_).substr(begin_, end - begin_);
+  begin_ = searched_ = end + 1;
+  return without_carriage_return(line);
+}
+
+std::optional<std::string_view> LineBuffer::rest() {
+  if (begin_ == bytes_.size()) return std::nullopt;
+  const auto line = std::string_view(bytes_).substr(begin_);
+  begin_ = searched_ = bytes_.size();
+  return without_carriage_return(line);
+}
+
+void LineBuffer::clear() {
+  if (bytes_.capacity() > kKeptBytes) std::string().swap(bytes_);
+  bytes_.clear();
+  begin_ = searched_ = 0;
 }
 
 }  // namespace slsd

@@ -9,28 +9,35 @@
 
 namespace slsd {
 
-/// Cuts a stream of bytes into lines. Holds at most one line's limit and what was appended last.
+/// Cuts a stream of bytes into lines, in a time that grows with the bytes alone, however many lines they are. Holds at
+/// most one line's limit and what was appended last.
 /// @thread thread-bound
 class LineBuffer {
  public:
   /// @param limit_bytes  the longest line, without its line feed
   explicit LineBuffer(std::size_t limit_bytes) : limit_bytes_(limit_bytes) {}
 
-  void append(std::string_view bytes) { bytes_.append(bytes); }
+  void append(std::string_view bytes);
 
-  /// The next whole line without its line feed or carriage return and line feed; nothing where none is whole.
-  [[nodiscard]] std::optional<std::string> next_line();
-  /// What is left when no more bytes come: a last line that lacks its line feed. Nothing where nothing is left.
-  [[nodiscard]] std::optional<std::string> rest();
+  /// The next whole line without its line feed or carriage return and line feed; nothing where none is whole. Valid
+  /// until the next call.
+  [[nodiscard]] std::optional<std::string_view> next_line();
+  /// What is left when no more bytes come: a last line that lacks its line feed. Nothing where nothing is left. Valid
+  /// until the next call.
+  [[nodiscard]] std::optional<std::string_view> rest();
 
   /// Whether the line that has begun is longer than the limit.
-  [[nodiscard]] bool overflown() const { return bytes_.size() > limit_bytes_ && searched_ == bytes_.size(); }
-  [[nodiscard]] bool empty() const { return bytes_.empty(); }
+  [[nodiscard]] bool overflown() const { return bytes_.size() - begin_ > limit_bytes_ && searched_ == bytes_.size(); }
+  /// What it holds of memory.
+  [[nodiscard]] std::size_t capacity() const { return bytes_.capacity(); }
+  /// Gives back what it holds, lines that are not read yet with it.
+  void clear();
 
  private:
   std::size_t limit_bytes_;
   std::string bytes_;
-  std::size_t searched_ = 0;  ///< no line feed before
+  std::size_t begin_ = 0;     ///< of the next line; what is before was read
+  std::size_t searched_ = 0;  ///< no line feed from begin_ to here
 };
 
 }  // namespace slsd

@@ -2,9 +2,56 @@
 // Copyright the slsd authors
 #include "daemon/rpc/message.hpp"
 
+#include "core/printable.hpp"
+
 namespace slsd {
 
 using nlohmann::json;
+
+namespace {
+
+// JSON-RPC leaves -32000 to -32099 to servers. Numbers stay for good, as the order of the codes does: programs outside
+// compare them.
+constexpr int kFirstOfOurs = -32001;
+static_assert(static_cast<int>(ErrorCode::kInvalidArgument) == 0 && static_cast<int>(ErrorCode::kFrameSkewed) == 18);
+
+constexpr std::size_t kMaxMessageBytes = 1500;
+constexpr std::size_t kMaxWhereBytes = 300;
+
+}  // namespace
+
+int rpc_code(ErrorCode code) {
+  return kFirstOfOurs - static_cast<int>(code);
+}
+
+// A message may quote what a client, a device or a file said; what quotes it cuts it. This is for the one forgotten.
+json RpcError::to_json() const {
+  const std::string place = printable(where, kMaxWhereBytes);
+  const std::string text = printable(message, kMaxMessageBytes);
+  json data{{"name", name}};
+  if (!place.empty()) data["where"] = place;
+  return {{"code", code}, {"message", place.empty() ? text : place + ": " + text}, {"data", std::move(data)}};
+}
+
+RpcError parse_error(std::string message) {
+  return {-32700, "parse_error", std::move(message), {}};
+}
+
+RpcError invalid_request(std::string message) {
+  return {-32600, "invalid_request", std::move(message), {}};
+}
+
+RpcError method_not_found(std::string message) {
+  return {-32601, "method_not_found", std::move(message), {}};
+}
+
+RpcError invalid_params(std::string message) {
+  return {-32602, "invalid_params", std::move(message), {}};
+}
+
+RpcError rpc_error(const Error& error) {
+  return {rpc_code(error.code), std::string(to_string(error.code)), error.message, error.where};
+}
 
 std::string to_line(const json& message) {
   return message.dump(-1, ' ', false, json::error_handler_t::replace) + '\n';

@@ -8,9 +8,30 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/rpc/rpc_error.hpp"
+#include "core/result.hpp"
 
 namespace slsd {
+
+/// What a client is told when its request failed. JSON-RPC's own codes, and ours from -32001 down, listed in
+/// docs/protocol.md.
+struct RpcError {
+  int code;
+  std::string name;     ///< "frame_stale": what a program compares
+  std::string message;  ///< what happened and what to do
+  std::string where;    ///< file:line:column, key, device, or empty
+
+  /// Printable, and at most about 2 kB, whatever it quotes.
+  [[nodiscard]] nlohmann::json to_json() const;
+};
+
+/// The number by which a client knows the code: -32001 to -32019.
+[[nodiscard]] int rpc_code(ErrorCode code);
+
+[[nodiscard]] RpcError parse_error(std::string message);
+[[nodiscard]] RpcError invalid_request(std::string message);
+[[nodiscard]] RpcError method_not_found(std::string message);
+[[nodiscard]] RpcError invalid_params(std::string message);
+[[nodiscard]] RpcError rpc_error(const Error& error);
 
 /// One JSON object to a line, line feed included. A text that is no UTF-8 (a file's name may be any bytes) gets
 /// replacement characters.

@@ -5,8 +5,14 @@
 #include <algorithm>
 
 #include "core/nearest_name.hpp"
+#include "core/printable.hpp"
 
 namespace slsd {
+namespace {
+
+constexpr std::size_t kMaxQuotedBytes = 64;
+
+}  // namespace
 
 const nlohmann::json* ParamReader::find(const char* name) {
   known_.emplace_back(name);
@@ -45,18 +51,18 @@ std::optional<double> ParamReader::number(const char* name, double low, double h
   return std::nullopt;
 }
 
-std::string ParamReader::text(const char* name) {
+std::string ParamReader::text(const char* name, std::size_t bytes_max) {
   const auto* value = find(name);
   if (value == nullptr) return {};
-  if (value->is_string()) return value->get<std::string>();
-  refuse(name, "a text");
+  if (value->is_string() && value->get_ref<const std::string&>().size() <= bytes_max) return value->get<std::string>();
+  refuse(name, "a text of at most " + std::to_string(bytes_max) + " bytes");
   return {};
 }
 
 std::string ParamReader::choice(const char* name, std::initializer_list<std::string_view> words) {
   const auto* value = find(name);
   if (value == nullptr) return std::string(*words.begin());
-  if (value->is_string() && std::ranges::find(words, value->get<std::string>()) != words.end()) {
+  if (value->is_string() && std::ranges::find(words, value->get_ref<const std::string&>()) != words.end()) {
     return value->get<std::string>();
   }
   std::string list;
@@ -68,7 +74,8 @@ std::string ParamReader::choice(const char* name, std::initializer_list<std::str
 std::optional<RpcError> ParamReader::error() const {
   for (const auto& [name, value] : params_.items()) {
     if (std::ranges::find(known_, name) != known_.end()) continue;
-    return invalid_params("no such parameter: \"" + name.substr(0, 64) + "\"" + nearest_hint(name, known_));
+    return invalid_params("no such parameter: \"" + printable(name, kMaxQuotedBytes) + "\"" +
+                          nearest_hint(name, known_));
   }
   return error_;
 }

@@ -10,9 +10,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/rpc/rpc_error.hpp"
+#include "daemon/rpc/message.hpp"
 
 namespace slsd {
+
+/// The longest text that a parameter has, but for one that is a file.
+inline constexpr std::size_t kMaxTextBytes = 1024;
 
 /// Reads a request's parameters by name. What is not there keeps its default; the first thing wrong is kept.
 /// @thread thread-bound
@@ -25,7 +28,8 @@ class ParamReader {
   [[nodiscard]] int integer(const char* name, int otherwise, int low, int high);
   /// Nothing where it is not there.
   [[nodiscard]] std::optional<double> number(const char* name, double low, double high);
-  [[nodiscard]] std::string text(const char* name);
+  /// Any text of so many bytes, control characters with it: printable() before it is quoted.
+  [[nodiscard]] std::string text(const char* name, std::size_t bytes_max = kMaxTextBytes);
   /// One of the words; the first where it is not there.
   [[nodiscard]] std::string choice(const char* name, std::initializer_list<std::string_view> words);
 

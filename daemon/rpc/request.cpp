@@ -20,46 +20,59 @@ bool usable_as_id(const json& id) {
   return id.is_null() || id.is_number();
 }
 
+// A member, moved out of the message: it may be as long as the line.
+json take(json& message, const char* name, json otherwise) {
+  const auto found = message.find(name);
+  return found == message.end() ? std::move(otherwise) : std::move(*found);
+}
+
 tl::expected<Request, BadRequest> read_members(json& message, json id) {
-  if (message.value("jsonrpc", json()) != "2.0") {
+  if (const auto version = message.find("jsonrpc"); version == message.end() || *version != "2.0") {
     return refuse(id, invalid_request("\"jsonrpc\" must be \"2.0\""));
   }
   const auto method = message.find("method");
   if (method == message.end() || !method->is_string()) {
     return refuse(id, invalid_request("\"method\" must be a text, such as \"status\""));
   }
-  json params = message.value("params", json::object());
+  json params = take(message, "params", json::object());
   if (params.is_null() || params.empty()) params = json::object();  // some libraries write "no parameters" so
   if (!params.is_object()) {
     return refuse(id, invalid_params("\"params\" must be an object: parameters go by name"));
   }
-  return Request{std::move(id), message.contains("id"), method->get<std::string>(), std::move(params)};
+  return Request{std::move(id), message.contains("id"), std::move(method->get_ref<std::string&>()), std::move(params)};
 }
 
 }  // namespace
 
-int nesting_depth(std::string_view text) {
+JsonShape shape_of(std::string_view text) {
+  JsonShape shape;
   int depth = 0;
-  int deepest = 0;
   bool in_text = false;
-  for (std::size_t i = 0; i < text.size(); ++i) {
+  for (std::size_t i = 0; i < text.size() && shape.depth <= kMaxNesting && shape.values <= kMaxValues; ++i) {
     const char c = text[i];
     if (in_text && c == '\\') {
       ++i;
     } else if (c == '"') {
       in_text = !in_text;
     } else if (!in_text && (c == '{' || c == '[')) {
-      deepest = std::max(deepest, ++depth);
+      shape.depth = std::max(shape.depth, ++depth);
+      ++shape.values;
     } else if (!in_text && (c == '}' || c == ']')) {
       --depth;
+    } else if (!in_text && c == ',') {
+      ++shape.values;
     }
   }
-  return deepest;
+  return shape;
 }
 
 tl::expected<Request, BadRequest> parse_request(std::string_view line) {
-  if (nesting_depth(line) > kMaxNesting) {
+  const JsonShape shape = shape_of(line);
+  if (shape.depth > kMaxNesting) {
     return refuse(nullptr, parse_error("nested deeper than " + std::to_string(kMaxNesting) + " levels"));
+  }
+  if (shape.values > kMaxValues) {
+    return refuse(nullptr, parse_error("more than " + std::to_string(kMaxValues) + " values: a request has a few"));
   }
   json message = json::parse(line, nullptr, /*allow_exceptions=*/false);
   if (message.is_discarded()) {
@@ -69,7 +82,7 @@ tl::expected<Request, BadRequest> parse_request(std::string_view line) {
     return refuse(nullptr, invalid_request("batches are not supported: send one request to a line"));
   }
   if (!message.is_object()) return refuse(nullptr, invalid_request("a request is a JSON object"));
-  json id = message.value("id", json());
+  json id = message.contains("id") ? message["id"] : json();
   if (!usable_as_id(id)) {
     return refuse(nullptr, invalid_request("\"id\" must be a number, null or a text of at most 256 bytes"));
   }

@@ -8,12 +8,13 @@
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
-#include "daemon/rpc/rpc_error.hpp"
+#include "daemon/rpc/message.hpp"
 
 namespace slsd {
 
-/// Deeper JSON is refused before it is parsed.
+/// Deeper JSON, and more of it, is refused before it is parsed: a line's cost is its length, whatever it says.
 inline constexpr int kMaxNesting = 32;
+inline constexpr int kMaxValues = 1000;
 
 /// A JSON-RPC 2.0 request.
 struct Request {
@@ -33,7 +34,12 @@ struct BadRequest {
 /// @thread reentrant
 [[nodiscard]] tl::expected<Request, BadRequest> parse_request(std::string_view line);
 
-/// How deep objects and arrays are nested in a JSON text; brackets within texts do not count.
-[[nodiscard]] int nesting_depth(std::string_view json);
+/// What a JSON text will take to read: how deep objects and arrays are nested, and how many values there are at most.
+/// Brackets and commas within texts do not count. Looks no further where one is beyond its limit.
+struct JsonShape {
+  int depth = 0;
+  int values = 1;
+};
+[[nodiscard]] JsonShape shape_of(std::string_view json);
 
 }  // namespace slsd

@@ -7,6 +7,7 @@
 
 #include "core/code/separability.hpp"
 #include "core/image_size.hpp"
+#include "core/printable.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd {
@@ -163,7 +164,7 @@ Result<> ScanSetup::check_camera(const std::string& name) const {
   if (camera_index(name) < camera_names.size()) return {};
   std::string names;
   for (const std::string& each : camera_names) names += (names.empty() ? "" : ", ") + each;
-  return fail(ErrorCode::kNotFound, "no camera is called \"" + name + "\"; there are: " + names);
+  return fail(ErrorCode::kNotFound, "no camera is called \"" + printable(name, 64) + "\"; there are: " + names);
 }
 
 std::size_t ScanSetup::camera_index(const std::string& name) const {

@@ -44,6 +44,24 @@ TEST(LineBuffer, ManyShortLinesDoNotOverflow) {
   EXPECT_FALSE(lines.overflown());
 }
 
+// A chunk of line feeds alone cost the square of their number: a minute for these.
+TEST(LineBuffer, TakesATimeThatGrowsWithTheBytesAlone) {
+  constexpr std::size_t kLines = 4 << 20;
+  LineBuffer lines(1000);
+  lines.append(std::string(kLines, '\n'));
+  std::size_t count = 0;
+  while (lines.next_line()) ++count;
+  EXPECT_EQ(count, kLines);
+}
+
+TEST(LineBuffer, GivesItsMemoryBack) {
+  LineBuffer lines(4 << 20);
+  lines.append(std::string(2 << 20, 'x') + "\n");
+  EXPECT_TRUE(lines.next_line());
+  EXPECT_FALSE(lines.next_line());
+  EXPECT_LT(lines.capacity(), 1U << 20);
+}
+
 // However the bytes are cut on their way, the lines are those of the whole.
 RC_GTEST_PROP(LineBuffer, GivesTheSameLinesHoweverTheBytesCome, ()) {
   const auto text = *rc::gen::container<std::string>(rc::gen::element('a', 'b', '\n'));
@@ -53,7 +71,7 @@ RC_GTEST_PROP(LineBuffer, GivesTheSameLinesHoweverTheBytesCome, ()) {
     const auto size = *rc::gen::inRange<std::size_t>(1, 5);
     lines.append(std::string_view(text).substr(at, size));
     at += size;
-    while (auto line = lines.next_line()) got.push_back(*line);
+    while (auto line = lines.next_line()) got.emplace_back(*line);
   }
   std::vector<std::string> expected;
   std::istringstream stream(text.substr(0, text.find_last_of('\n') + 1));

@@ -65,10 +65,23 @@ TEST(ParseRequest, BoundsTheDepth) {
   EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","method":"status","params":{"a":[)" + deep + "]}}"), -32700);
 }
 
-TEST(NestingDepth, PassesOverTexts) {
-  EXPECT_EQ(nesting_depth(R"({"[[[": "\"[[["})"), 1);
-  EXPECT_EQ(nesting_depth("[[],[[]]]"), 3);
-  EXPECT_EQ(nesting_depth(""), 0);
+TEST(ParseRequest, BoundsTheNumberOfValues) {
+  const auto with_values = [](int count) {
+    std::string values = "0";
+    for (int i = 1; i < count; ++i) values += ",0";
+    return R"({"jsonrpc":"2.0","method":"status","params":{"a":[)" + values + "]}}";
+  };
+  EXPECT_EQ(code_of(with_values(kMaxValues - 10)), 0);
+  EXPECT_EQ(code_of(with_values(kMaxValues)), -32700);
+  EXPECT_EQ(code_of("[" + std::string(1000000, ',')), -32700);
+}
+
+TEST(ShapeOf, PassesOverTexts) {
+  EXPECT_EQ(shape_of(R"({"[[[": "\"[[[,,"})").depth, 1);
+  EXPECT_EQ(shape_of(R"({"[[[": "\"[[[,,"})").values, 2);
+  EXPECT_EQ(shape_of("[[],[[]]]").depth, 3);
+  EXPECT_EQ(shape_of("[1,[2,3]]").values, 5) << "an upper bound, as an empty array is counted with an element";
+  EXPECT_EQ(shape_of("").depth, 0);
 }
 
 RC_GTEST_PROP(ParseRequest, SurvivesAnyBytes, (const std::string& line)) {
