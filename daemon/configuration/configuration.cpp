@@ -115,6 +115,7 @@ Result<> read_server(const toml::table* table, const path& file, ServerOptions& 
   reader.read("socket_mode", options.socket_mode);
   reader.read("clients_max", options.clients_max);
   reader.read("request_bytes_max", options.request_bytes_max);
+  reader.read("memory_max_mb", options.memory_max_mb);
   reader.read("send_timeout_ms", options.send_timeout_ms);
   return reader.finish(options.validate());
 }

@@ -92,6 +92,7 @@ Result<> ServerOptions::validate() const {
   if (auto valid = in_range("socket_mode", socket_mode, 0, 0777); !valid) return valid;
   if (auto valid = in_range("clients_max", clients_max, 1, 10'000); !valid) return valid;
   if (auto valid = in_range("request_bytes_max", request_bytes_max, 1024, 16 * 1024 * 1024); !valid) return valid;
+  if (auto valid = in_range("memory_max_mb", memory_max_mb, 16, 65'536); !valid) return valid;
   return in_range("send_timeout_ms", send_timeout_ms, 100, 600'000);
 }
 

@@ -8,9 +8,12 @@
 #include <sys/un.h>
 
 #include <cerrno>
+#include <charconv>
+#include <csignal>
 #include <cstring>
 
 #include "daemon/configuration/server_options.hpp"
+#include "drivers/system/system_error.hpp"
 
 namespace slsd {
 namespace {
@@ -18,27 +21,6 @@ namespace {
 using std::filesystem::path;
 
 constexpr int kBacklog = 4096;  // many short connections at once find the loop busy; the kernel may allow fewer
-
-ErrorCode code_of(int number) {
-  switch (number) {
-    case ENOENT:
-    case ENOTDIR:
-      return ErrorCode::kNotFound;
-    case EACCES:
-    case EPERM:
-    case EROFS:
-      return ErrorCode::kPermissionDenied;
-    case ENOSPC:
-      return ErrorCode::kNoSpace;
-    default:
-      return ErrorCode::kIo;
-  }
-}
-
-tl::unexpected<Error> fail_with_errno(const std::string& what, const path& where) {
-  const int number = errno;
-  return fail(code_of(number), what + ": " + std::strerror(number), where.string());
-}
 
 sockaddr_un address_of(const path& path) {
   sockaddr_un address{};
@@ -59,37 +41,56 @@ FileDescriptor new_socket() {
 Result<> check_free(const path& path) {
   struct stat status {};
   if (::lstat(path.c_str(), &status) != 0) {
-    return errno == ENOENT ? Result<>() : fail_with_errno("cannot look at the socket's path", path);
+    return errno == ENOENT ? Result<>() : fail_system(errno, "cannot look at the socket's path", path.string());
   }
   if (!S_ISSOCK(status.st_mode)) {
     return fail(ErrorCode::kAlreadyExists, "there is something that is no socket: choose another path, or remove it",
                 path.string());
   }
   const FileDescriptor probe = new_socket();
-  if (!probe) return fail_with_errno("cannot make a socket", path);
+  if (!probe) return fail_system(errno, "cannot make a socket", path.string());
   const sockaddr_un address = address_of(path);
   const int connected = ::connect(probe.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
   // A full backlog (EAGAIN) is a sign of life too.
   if (connected == 0 || errno == EAGAIN) {
     return fail(ErrorCode::kBusy, "another daemon answers there: stop it, or choose another path", path.string());
   }
-  return errno == ECONNREFUSED ? Result<>() : fail_with_errno("cannot tell whether a daemon answers there", path);
+  return errno == ECONNREFUSED ? Result<>()
+                               : fail_system(errno, "cannot tell whether a daemon answers there", path.string());
+}
+
+constexpr std::string_view kTemporary = ".slsd-";  // and the process
+
+// What daemons left that were killed in the middle of listen_in(). Of those that live nothing is touched.
+void remove_left_behind(const path& folder) {
+  std::error_code error;
+  std::error_code ignored;
+  const std::filesystem::directory_iterator last;
+  for (std::filesystem::directory_iterator entry(folder, error); !error && entry != last; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!name.starts_with(kTemporary) || !entry->is_socket(ignored)) continue;
+    pid_t process = 0;
+    const char* end = name.data() + name.size();
+    const auto [read_to, failed] = std::from_chars(name.data() + kTemporary.size(), end, process);
+    if (failed != std::errc() || read_to != end || process <= 0) continue;
+    if (::kill(process, 0) != 0 && errno == ESRCH) std::filesystem::remove(entry->path(), ignored);
+  }
 }
 
 // Binds under a name of its own and renames when connections are taken. By way of /proc, as a temporary name may not
 // fit where the path just fits.
 Result<> listen_in(const FileDescriptor& socket, const FileDescriptor& folder, const path& path, mode_t mode) {
-  const std::string temporary = ".slsd-" + std::to_string(::getpid());
+  const std::string temporary = std::string(kTemporary) + std::to_string(::getpid());
   const sockaddr_un address = address_of("/proc/self/fd/" + std::to_string(folder.number()) + "/" + temporary);
   ::unlinkat(folder.number(), temporary.c_str(), 0);
   if (::bind(socket.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    return fail_with_errno("cannot make the socket", path);
+    return fail_system(errno, "cannot make the socket", path.string());
   }
   const bool listening = ::fchmodat(folder.number(), temporary.c_str(), mode, 0) == 0 &&
                          ::listen(socket.number(), kBacklog) == 0 &&
                          ::renameat(folder.number(), temporary.c_str(), AT_FDCWD, path.c_str()) == 0;
   if (listening) return {};
-  auto failed = fail_with_errno("cannot listen at the socket", path);
+  auto failed = fail_system(errno, "cannot listen at the socket", path.string());
   ::unlinkat(folder.number(), temporary.c_str(), 0);
   return failed;
 }
@@ -103,22 +104,23 @@ Result<> check_socket_path(const path& path) {
                 path.string());
   }
   if (::access(folder_of(path).c_str(), W_OK | X_OK) != 0) {
-    return fail_with_errno("cannot make the socket in this folder", path);
+    return fail_system(errno, "cannot make the socket in this folder", path.string());
   }
   return check_free(path);
 }
 
 Result<ListeningSocket> ListeningSocket::open(const path& path, int mode) {
   if (auto usable = check_socket_path(path); !usable) return tl::unexpected(usable.error());
+  remove_left_behind(folder_of(path));
   const FileDescriptor folder(::open(folder_of(path).c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
-  if (!folder) return fail_with_errno("cannot open the socket's folder", path);
+  if (!folder) return fail_system(errno, "cannot open the socket's folder", path.string());
   FileDescriptor socket = new_socket();
-  if (!socket) return fail_with_errno("cannot make a socket", path);
+  if (!socket) return fail_system(errno, "cannot make a socket", path.string());
   if (auto listening = listen_in(socket, folder, path, static_cast<mode_t>(mode)); !listening) {
     return tl::unexpected(listening.error());
   }
   struct stat status {};
-  if (::lstat(path.c_str(), &status) != 0) return fail_with_errno("the socket is gone again", path);
+  if (::lstat(path.c_str(), &status) != 0) return fail_system(errno, "the socket is gone again", path.string());
   return ListeningSocket(std::move(socket), path, status.st_ino);
 }
 

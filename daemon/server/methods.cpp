@@ -6,11 +6,14 @@
 #include <array>
 #include <vector>
 
+#include <asio/post.hpp>
+
 #include "core/nearest_name.hpp"
+#include "core/printable.hpp"
+#include "daemon/rpc/base64.hpp"
+#include "daemon/rpc/message.hpp"
 #include "daemon/rpc/param_reader.hpp"
-#include "daemon/server/project_method.hpp"
-#include "daemon/server/scan_methods.hpp"
-#include "daemon/server/status_json.hpp"
+#include "daemon/server/report_json.hpp"
 
 namespace slsd {
 namespace {
@@ -19,6 +22,213 @@ using nlohmann::json;
 
 constexpr double kRateMinHz = 0.001;
 constexpr double kRateMaxHz = 1000.0;
+
+MonotonicTime deadline_in(int timeout_ms) {
+  return std::chrono::steady_clock::now() + std::chrono::milliseconds(timeout_ms);
+}
+
+int read_timeout(ParamReader& reader, const ServiceState& state) {
+  return reader.integer("timeout_ms", state.configuration.scan.timeout_ms, 1, kMaxTimeoutMs);
+}
+
+SharedBytes share(std::string bytes) {
+  return std::make_shared<const std::string>(std::move(bytes));
+}
+
+// An answer of the scanner's thread, made into a reply there and carried to the event loop's.
+template <class Value, class MakeReply>
+Scanner::Answer<Value> carry(ServiceState& state, Respond respond, MakeReply make_reply) {
+  return [&events = state.events, respond = std::move(respond), make_reply](Result<Value> value) {
+    auto outcome = std::make_shared<Outcome>(value ? make_reply(*value) : tl::unexpected(rpc_error(value.error())));
+    asio::post(events, [respond, outcome] { respond(std::move(*outcome)); });
+  };
+}
+
+// As carry(); the reply tells how long after the last byte of its frames it was handed to the socket.
+template <class MakeReply>
+Scanner::Answer<ScanResult> carry_scan(ServiceState& state, Respond respond, MakeReply make_reply) {
+  return [&state, respond = std::move(respond), make_reply](const Result<ScanResult>& scan) {
+    auto outcome = std::make_shared<Outcome>(scan ? make_reply(*scan) : tl::unexpected(rpc_error(scan.error())));
+    const MonotonicTime received = scan ? scan->received : MonotonicTime();
+    const bool pictured = scan && !scan->picture_png.empty();
+    asio::post(state.events, [&state, respond, outcome, received, pictured] {
+      if (*outcome) (*outcome)->result["latency_ms"] = latency_ms(received);
+      if (*outcome && !pictured) state.scanner.note_latency(std::chrono::steady_clock::now() - received);
+      respond(std::move(*outcome));
+    });
+  };
+}
+
+// At most what the pixels of a picture take, however it is coded, before its camera took it. 0: no camera of the name,
+// or one whose size is not known, as it was not open yet; what it gives is weighed when it is there.
+std::size_t picture_bytes(const ServiceState& state, const std::string& camera, std::size_t bytes_a_pixel) {
+  for (const DeviceStatus& each : state.scanner.rig().camera_statuses()) {
+    if (!camera.empty() && each.name != camera) continue;
+    return static_cast<std::size_t>(each.width_px) * static_cast<std::size_t>(each.height_px) * bytes_a_pixel;
+  }
+  return 0;
+}
+
+constexpr std::size_t kFrameBytes = 2;    // a pixel's: grey, as deep as it comes
+constexpr std::size_t kPictureBytes = 3;  // a pixel's: what was decoded is drawn in colours
+
+// What a scan gives besides its cloud, of which nobody knows how large it will be.
+std::size_t expected_bytes(const ServiceState& state, const ScanRequest& request) {
+  std::size_t bytes = request.picture ? picture_bytes(state, request.camera, kPictureBytes) : 0;
+  if (request.frames == FrameCoding::kNone) return bytes;
+  const std::size_t lights = 1 + (request.texture ? 1U : 0U) + (request.ambient ? 1U : 0U);
+  for (const DeviceStatus& camera : state.scanner.rig().camera_statuses()) {
+    bytes +=
+        lights * static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px) * kFrameBytes;
+  }
+  return bytes;
+}
+
+Outgoing picture_event(const ScanResult& scan) {
+  Outgoing event;
+  event.kind = Outgoing::Kind::kEvent;
+  event.bytes = share(scan.picture_png);
+  event.line = to_line(
+      event_message("picture", {{"scan", scan.cloud.scan_id}, {"format", "png"}, {"bytes", event.bytes->size()}}));
+  return event;
+}
+
+FrameCoding frame_coding(const std::string& name) {
+  if (name == "png") return FrameCoding::kPng;
+  return name == "raw" ? FrameCoding::kRaw : FrameCoding::kNone;
+}
+
+Outgoing frame_event(const std::string& scan_id, const FrameImage& frame, FrameCoding coding) {
+  Outgoing event;
+  event.kind = Outgoing::Kind::kEvent;
+  event.bytes = share(frame.bytes);
+  json params = frame_json(frame);
+  params["scan"] = scan_id;
+  params["light"] = to_string(frame.light);
+  params["format"] = coding == FrameCoding::kPng ? "png" : "raw";
+  params["bytes"] = event.bytes->size();
+  event.line = to_line(event_message("frame", std::move(params)));
+  return event;
+}
+
+Outcome scan_reply(const ScanResult& scan, CloudFormat format, bool as_memfd, FrameCoding frames) {
+  Reply reply{scan_json(scan)};
+  reply.result["format"] = to_string(format);
+  CloudFiles files = scan.files;
+  const SharedBytes cloud = files.file(scan.cloud, format);
+  if (as_memfd) {
+    auto memory = sealed_memory(*cloud);
+    if (!memory) return tl::unexpected(rpc_error(memory.error()));
+    reply.result["memfd_bytes"] = cloud->size();
+    reply.memory = std::move(*memory);
+  } else {
+    reply.result["bytes"] = cloud->size();
+    reply.bytes = cloud;
+  }
+  if (!scan.picture_png.empty()) reply.first.push_back(picture_event(scan));
+  for (const FrameImage& frame : scan.frames) reply.first.push_back(frame_event(scan.cloud.scan_id, frame, frames));
+  return reply;
+}
+
+Outcome image_reply(std::string bytes, json result) {
+  Reply reply{std::move(result)};
+  reply.result["bytes"] = bytes.size();
+  reply.bytes = share(std::move(bytes));
+  return reply;
+}
+
+void run_scan(ServiceState& state, const json& params, Session& session, Respond respond) {
+  ParamReader reader(params);
+  const CloudFormat format = cloud_format(reader.choice("format", {"ply", "pcd"}));
+  const bool as_memfd = reader.choice("transport", {"inline", "memfd"}) == "memfd";
+  const int timeout_ms = read_timeout(reader, state);
+  const bool picture = reader.boolean("picture", false);
+  const FrameCoding frames = frame_coding(reader.choice("frames", {"none", "raw", "png"}));
+  const std::string camera = reader.text("camera");
+  const bool texture = reader.boolean("texture", false);
+  const bool ambient = reader.boolean("ambient", false);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  const ScanRequest request{deadline_in(timeout_ms),    picture,       camera, frames, texture, ambient,
+                            CloudFormats::only(format), session.gone()};
+  if (auto refused = session.reserve(expected_bytes(state, request))) return respond(tl::unexpected(*refused));
+  state.scanner.scan(request, carry_scan(state, std::move(respond), [format, as_memfd, frames](const ScanResult& scan) {
+                       return scan_reply(scan, format, as_memfd, frames);
+                     }));
+}
+
+void run_settings(ServiceState& state, const json& params, Session&, Respond respond) {
+  const ParamReader reader(params);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  const ScanFiles files = state.scanner.setup()->files();
+  Reply reply{settings_json(state.configuration)};
+  reply.result["pattern"] = files.pattern;
+  reply.result["calibration"] = files.calibration;
+  respond(std::move(reply));
+}
+
+void run_preview(ServiceState& state, const json& params, Session& session, Respond respond) {
+  ParamReader reader(params);
+  const int timeout_ms = read_timeout(reader, state);
+  const std::string camera = reader.text("camera");
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  ScanRequest request{deadline_in(timeout_ms), true, camera};
+  request.gone = session.gone();
+  if (auto refused = session.reserve(expected_bytes(state, request))) return respond(tl::unexpected(*refused));
+  state.scanner.scan(request, carry_scan(state, std::move(respond), [](const ScanResult& scan) -> Outcome {
+                       json result = scan_json(scan);
+                       result["format"] = "png";
+                       return image_reply(scan.picture_png, std::move(result));
+                     }));
+}
+
+void run_frame(ServiceState& state, const json& params, Session& session, Respond respond) {
+  ParamReader reader(params);
+  const std::string format = reader.choice("format", {"png", "raw"});
+  const int timeout_ms = read_timeout(reader, state);
+  const std::string camera = reader.text("camera");
+  const bool as_shown = reader.boolean("as_shown", false);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  const std::size_t expected = picture_bytes(state, camera, kFrameBytes);
+  if (auto refused = session.reserve(expected)) return respond(tl::unexpected(*refused));
+  state.scanner.frame({deadline_in(timeout_ms), camera, format == "png", as_shown, session.gone()},
+                      carry<FrameImage>(state, std::move(respond), [format](const FrameImage& image) {
+                        json result = frame_json(image);
+                        result["format"] = format;
+                        return image_reply(image.bytes, std::move(result));
+                      }));
+}
+
+void run_pattern(ServiceState& state, const json& params, Session&, Respond respond) {
+  ParamReader reader(params);
+  (void)reader.choice("format", {"png"});
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  state.scanner.pattern(carry<std::string>(state, std::move(respond), [](const std::string& png) {
+    return image_reply(png, {{"format", "png"}});
+  }));
+}
+
+ProjectedPicture picture_named(const std::string& name) {
+  const auto found = std::ranges::find(kProjectedPictures, name);
+  return static_cast<ProjectedPicture>(found - kProjectedPictures.begin());
+}
+
+void run_project(ServiceState& state, const json& params, Session& session, Respond respond) {
+  ParamReader reader(params);
+  const std::string name = reader.choice("picture", {"pattern", "idle", "black", "white", "focus", "grid", "image"});
+  const auto png_bytes_max = static_cast<std::size_t>(state.configuration.server.request_bytes_max);
+  std::optional<std::string> png = from_base64(reader.text("png", png_bytes_max));
+  const int timeout_ms = read_timeout(reader, state);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  if (!png || (name == "image") == png->empty()) {
+    return respond(tl::unexpected(invalid_params("\"png\" must be an image as base64, and only with \"image\"")));
+  }
+  state.scanner.project({picture_named(name), std::move(*png), deadline_in(timeout_ms), session.gone()},
+                        [&events = state.events, respond = std::move(respond), name](const Result<>& shown) {
+                          auto outcome = std::make_shared<Outcome>(Reply{{{"picture", name}}});
+                          if (!shown) *outcome = tl::unexpected(rpc_error(shown.error()));
+                          asio::post(events, [respond, outcome] { respond(std::move(*outcome)); });
+                        });
+}
 
 void run_status(ServiceState& state, const json& params, Session&, Respond respond) {
   const ParamReader reader(params);
@@ -73,7 +283,7 @@ void dispatch(ServiceState& state, const Request& request, Session& session, Res
   }
   std::vector<std::string> names;
   for (const RpcMethod& method : kMethods) names.emplace_back(method.name);
-  respond(tl::unexpected(method_not_found("no such method: \"" + request.method.substr(0, 64) + "\"" +
+  respond(tl::unexpected(method_not_found("no such method: \"" + printable(request.method, 64) + "\"" +
                                           nearest_hint(request.method, names))));
 }
 

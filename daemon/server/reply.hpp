@@ -3,22 +3,36 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
-#include "daemon/rpc/rpc_error.hpp"
-#include "daemon/server/outgoing.hpp"
+#include "daemon/rpc/message.hpp"
+#include "daemon/scan/cloud_files.hpp"
+#include "daemon/server/lent_memory.hpp"
 
 namespace slsd {
 
-/// What a method gives: its result, the bytes that follow the reply, a descriptor, and events that go out before it.
+/// What goes to a client in one piece: a line, the bytes that follow it, and a descriptor that comes with the line.
+struct Outgoing {
+  enum class Kind { kReply, kEvent };
+  Kind kind = Kind::kReply;
+  std::string line;
+  SharedBytes bytes;          ///< null: none
+  FileDescriptor descriptor;  ///< sent with the line's first byte
+
+  [[nodiscard]] std::size_t size() const { return line.size() + (bytes ? bytes->size() : 0); }
+};
+
+/// What a method gives: its result, the bytes that follow the reply or a memfd, and events that go out before it.
 struct Reply {
   nlohmann::json result;
   SharedBytes bytes = nullptr;
-  FileDescriptor descriptor = {};
+  std::optional<SealedMemory> memory = {};
   std::vector<Outgoing> first = {};
 };
 

@@ -24,26 +24,31 @@ constexpr std::size_t kWaitingMax = 4;  // lanes that finish together give more 
 
 }  // namespace
 
-Server::Server(asio::io_context& events, const ServerOptions& options, Session::Handler handler,
-               DemandChanged demand_changed)
+Server::Server(asio::io_context& events, const ServerOptions& options, Handler handler, DemandChanged demand_changed)
     : events_(events),
-      options_(options),
-      handler_(std::move(handler)),
+      room_(std::make_shared<SessionRoom>(events, options)),
       demand_changed_(std::move(demand_changed)),
       acceptor_(events),
-      retry_(events) {}
+      retry_(events) {
+  room_->handler = std::move(handler);
+  room_->ended = [this](Session& ended, bool subscribed) {
+    sessions_.erase(ended.shared_from_this());
+    if (subscribed) update_demand();
+  };
+}
 
 Server::~Server() {
   end_all();
+  room_->turns.clear();
 }
 
 Result<> Server::open() {
-  auto socket = ListeningSocket::open(options_.socket, options_.socket_mode);
+  auto socket = ListeningSocket::open(room_->options.socket, room_->options.socket_mode);
   if (!socket) return tl::unexpected(socket.error());
   socket_.emplace(std::move(*socket));
   std::error_code error;
   acceptor_.assign(asio::local::stream_protocol(), socket_->release(), error);
-  if (error) return fail(ErrorCode::kIo, "cannot listen: " + error.message(), options_.socket.string());
+  if (error) return fail(ErrorCode::kIo, "cannot listen: " + error.message(), room_->options.socket.string());
   accept();
   return {};
 }
@@ -53,7 +58,12 @@ void Server::wind_down() {
   acceptor_.close(ignored);
   retry_.cancel();
   socket_.reset();
-  for (const auto& session : sessions_) session->wind_down();
+  const std::vector<std::shared_ptr<Session>> all(sessions_.begin(), sessions_.end());
+  for (const auto& session : all) session->wind_down();
+}
+
+bool Server::is_sending_since(std::chrono::steady_clock::time_point time) const {
+  return std::ranges::any_of(sessions_, [&](const auto& session) { return session->is_sending_since(time); });
 }
 
 void Server::end_all() {
@@ -87,13 +97,10 @@ void Server::on_accepted(const std::error_code& error, Session::Socket socket) {
   if (!acceptor_.is_open() || error == asio::error::operation_aborted) return;
   if (error) return retry_later(error);
   retrying_ = false;
-  if (sessions_.size() >= static_cast<std::size_t>(options_.clients_max)) {
+  if (sessions_.size() >= static_cast<std::size_t>(room_->options.clients_max)) {
     turn_away(std::move(socket));
   } else {
-    auto session = std::make_shared<Session>(std::move(socket), options_, handler_, [this](Session& ended) {
-      sessions_.erase(ended.shared_from_this());
-      update_demand();
-    });
+    const auto session = std::make_shared<Session>(std::move(socket), room_);
     sessions_.insert(session);
     session->start();
   }
@@ -102,7 +109,7 @@ void Server::on_accepted(const std::error_code& error, Session::Socket socket) {
 
 void Server::turn_away(Session::Socket socket) const {
   const Error busy{
-      ErrorCode::kBusy, std::to_string(options_.clients_max) + " clients are connected: try again later", {}};
+      ErrorCode::kBusy, std::to_string(room_->options.clients_max) + " clients are connected: try again later", {}};
   const std::string line = to_line(error_message(nullptr, rpc_error(busy)));
   ::send(socket.native_handle(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
 }

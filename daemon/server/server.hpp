@@ -27,21 +27,29 @@ class Server {
   /// What the subscribers together want; nothing where there are none.
   using DemandChanged = std::function<void(std::optional<FreeRun> demand)>;
 
-  Server(asio::io_context& events, const ServerOptions& options, Session::Handler handler,
-         DemandChanged demand_changed);
+  /// Carries a request out; answers through respond, now or later.
+  using Handler = std::function<void(const Request&, Session&, Respond respond)>;
+
+  Server(asio::io_context& events, const ServerOptions& options, Handler handler, DemandChanged demand_changed);
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
   /// Listens; the socket appears. @errors of ListeningSocket::open()
   [[nodiscard]] Result<> open();
-  /// Takes no more clients, and no more requests of those that are there; the socket disappears.
+  /// Takes no more clients, and no more requests of those that are there; the socket disappears. Each client's
+  /// connection ends when what is under way for it is sent.
   void wind_down();
+  /// Whether a client took bytes of what is being sent to it since the time.
+  [[nodiscard]] bool is_sending_since(std::chrono::steady_clock::time_point time) const;
   /// Hangs up on everyone.
   void end_all();
 
   [[nodiscard]] std::size_t clients() const { return sessions_.size(); }
   [[nodiscard]] std::size_t subscribers() const;
+  /// How many were too slow to take what was sent to them.
+  [[nodiscard]] std::uint64_t dropped() const { return room_->dropped; }
+  [[nodiscard]] const MemoryBudget& memory() const { return room_->memory; }
   /// To be called when a session's subscription changed.
   void update_demand();
 
@@ -59,8 +67,7 @@ class Server {
   void deliver();
 
   asio::io_context& events_;
-  ServerOptions options_;
-  Session::Handler handler_;
+  std::shared_ptr<SessionRoom> room_;  // shared with the sessions
   DemandChanged demand_changed_;
   std::function<void(const ScanResult&)> delivered_;
   asio::local::stream_protocol::acceptor acceptor_;

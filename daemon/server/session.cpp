@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include "daemon/server/session.hpp"
 
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/uio.h>
 
@@ -12,187 +13,361 @@
 
 #include <spdlog/spdlog.h>
 #include <asio/buffer.hpp>
-#include <asio/post.hpp>
-
-#include "daemon/rpc/message.hpp"
 
 namespace slsd {
 namespace {
 
-bool blank(const std::string& line) {
-  return line.find_first_not_of(" \t") == std::string::npos;
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kTurn = 1ms;
+constexpr std::size_t kSlice = 1 << 20;  // to be taken within the send timeout
+constexpr auto kGlance = 200ms;          // between two looks whether the client is gone, where it sends urgent bytes
+constexpr std::size_t kMiB = 1 << 20;
+
+bool blank(std::string_view line) {
+  return line.find_first_not_of(" \t") == std::string_view::npos;
 }
 
-// Sends the start of a text together with a descriptor. -1 with errno, as sendmsg().
-ssize_t send_descriptor(int socket, const std::string& text, int descriptor) {
-  iovec part{const_cast<char*>(text.data()), text.size()};
-  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
+bool is_event(const Outgoing& outgoing) {
+  return outgoing.kind == Outgoing::Kind::kEvent;
+}
+
+// As sendmsg(), what is left of a message; the descriptor with its first byte.
+ssize_t send_part(int socket, const Outgoing& outgoing, std::size_t sent) {
+  const std::size_t line_sent = std::min(sent, outgoing.line.size());
+  std::array<iovec, 2> parts{};
+  parts[0] = {const_cast<char*>(outgoing.line.data()) + line_sent, outgoing.line.size() - line_sent};
+  if (outgoing.bytes) {
+    const std::size_t bytes_sent = sent - line_sent;
+    parts[1] = {const_cast<char*>(outgoing.bytes->data()) + bytes_sent, outgoing.bytes->size() - bytes_sent};
+  }
   msghdr message{};
-  message.msg_iov = &part;
-  message.msg_iovlen = 1;
-  message.msg_control = control.data();
-  message.msg_controllen = control.size();
-  cmsghdr* header = CMSG_FIRSTHDR(&message);
-  header->cmsg_level = SOL_SOCKET;
-  header->cmsg_type = SCM_RIGHTS;
-  header->cmsg_len = CMSG_LEN(sizeof(int));
-  std::memcpy(CMSG_DATA(header), &descriptor, sizeof(int));
+  message.msg_iov = parts.data();
+  message.msg_iovlen = parts.size();
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
+  if (outgoing.descriptor && sent == 0) {
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    cmsghdr* header = CMSG_FIRSTHDR(&message);
+    header->cmsg_level = SOL_SOCKET;
+    header->cmsg_type = SCM_RIGHTS;
+    header->cmsg_len = CMSG_LEN(sizeof(int));
+    const int descriptor = outgoing.descriptor.number();
+    std::memcpy(CMSG_DATA(header), &descriptor, sizeof descriptor);
+  }
   return ::sendmsg(socket, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
+ucred peer_of(int socket) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  ::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &size);
+  return peer;
+}
+
+std::string megabytes(std::size_t bytes) {
+  return std::to_string((bytes + kMiB - 1) / kMiB) + " MB";
 }
 
 }  // namespace
 
-Session::Session(Socket socket, const ServerOptions& options, const Handler& handler, Ended ended)
+Session::Session(Socket socket, std::shared_ptr<SessionRoom> room)
     : socket_(std::move(socket)),
-      options_(options),
-      handler_(handler),
-      ended_(std::move(ended)),
+      shared_room_(std::move(room)),
+      room_(*shared_room_),
+      memory_(room_.memory),
       progress_(socket_.get_executor()),
-      lines_(static_cast<std::size_t>(options.request_bytes_max)) {}
+      glance_(socket_.get_executor()),
+      lines_(static_cast<std::size_t>(room_.options.request_bytes_max)) {}
+
+void Session::start() {
+  std::error_code error;
+  socket_.native_non_blocking(true, error);
+  if (error) return end();
+  await_hang_up();
+  await_input();
+}
 
 void Session::end() {
   if (std::exchange(over_, true)) return;
+  gone_.request_stop();
   std::error_code ignored;
   socket_.close(ignored);
   progress_.cancel();
-  subscription_.reset();
-  ended_(*this);
+  glance_.cancel();
+  room_.ended(*this, subscription_.has_value());
 }
 
-void Session::read() {
-  socket_.async_read_some(
-      asio::buffer(chunk_),
-      [self = shared_from_this()](const std::error_code& error, std::size_t size) { self->on_read(error, size); });
+void Session::wind_down() {
+  closing_ = true;
+  input_ = Input::kShut;
+  end_where_done();
 }
 
-void Session::on_read(const std::error_code& error, std::size_t size) {
-  if (over_ || last_reply_) return;
-  if (error) {
-    hung_up_ = true;
-    if (error != asio::error::eof) return end();
-  } else {
-    lines_.append({chunk_.data(), size});
-  }
-  next_request();
+void Session::end_where_done() {
+  const bool listens = subscription_ && !closing_ && !gone_.stop_requested();
+  if (input_ == Input::kShut && !answering_ && outgoing_.empty() && !listens) end();
 }
 
-void Session::next_request() {
-  while (!answering_ && !over_) {
-    auto line = lines_.next_line();
-    if (!line && lines_.overflown()) {
-      last_reply_ = true;
-      return refuse(nullptr, invalid_request("a request has at most " + std::to_string(options_.request_bytes_max) +
-                                             " bytes; the connection ends"));
+// ---- What the client sends ----
+
+void Session::await_input() {
+  socket_.async_wait(Socket::wait_read, [self = shared_from_this()](const std::error_code& error) {
+    if (!error && !self->over_) self->ask_turn();
+  });
+}
+
+void Session::ask_turn() {
+  if (!taker_.asked) room_.turns.ask(taker_, [self = shared_from_this()] { self->take_turn(); });
+}
+
+void Session::take_turn() {
+  const auto end = Clock::now() + kTurn;
+  in_turn_ = true;
+  bool more = true;
+  while (more && !answering_ && !over_ && input_ != Input::kShut && Clock::now() < end) {
+    const auto line = next_line();
+    if (!line) {
+      more = receive();
+    } else if (!blank(*line)) {
+      answer(*line);
     }
-    if (!line && hung_up_) {
-      line = lines_.rest();
-      last_reply_ = true;
-      if (!line) return on_answered();
-    }
-    if (!line) return read();
-    if (!blank(*line)) answer(*line);
   }
+  in_turn_ = false;
+  if (more && !answering_ && !over_ && input_ != Input::kShut) ask_turn();
 }
 
-void Session::answer(const std::string& line) {
+std::optional<std::string_view> Session::next_line() {
+  auto line = lines_.next_line();
+  if (!line && !lines_.overflown() && input_ == Input::kEnded) line = lines_.rest();
+  return line;
+}
+
+// Whether there may be a line now.
+bool Session::receive() {
+  if (lines_.overflown()) {
+    closing_ = true;
+    input_ = Input::kShut;
+    refuse(nullptr, invalid_request("a request has at most " + std::to_string(room_.options.request_bytes_max) +
+                                    " bytes; the connection ends"));
+    return false;
+  }
+  if (input_ == Input::kEnded) {
+    input_ = Input::kShut;
+    end_where_done();
+    return false;
+  }
+  (void)memory_.resize(MemoryAccount::Part::kRequest, lines_.capacity());  // it may have shrunk
+  const ssize_t size = ::recv(socket_.native_handle(), room_.chunk.data(), room_.chunk.size(), MSG_DONTWAIT);
+  if (size < 0 && errno == EINTR) return true;
+  if (size < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) return await_input(), false;
+  if (size < 0) return end(), false;
+  if (size == 0) {
+    input_ = Input::kEnded;
+    return true;
+  }
+  lines_.append({room_.chunk.data(), static_cast<std::size_t>(size)});
+  if (memory_.resize(MemoryAccount::Part::kRequest, lines_.capacity())) return true;
+  lines_.clear();
+  memory_.release(MemoryAccount::Part::kRequest);
+  closing_ = true;
+  input_ = Input::kShut;
+  refuse(nullptr, rpc_error({ErrorCode::kBusy,
+                             "other clients hold the memory that so long a request takes: send it "
+                             "again later; the connection ends",
+                             {}}));
+  return false;
+}
+
+// ---- Whether it is there ----
+
+// EPOLLHUP alone says that the client is gone; bytes that it sends as urgent wake this up, too, and would for ever.
+void Session::await_hang_up() {
+  socket_.async_wait(Socket::wait_error, [self = shared_from_this()](const std::error_code& error) {
+    if (error || self->over_) return;
+    pollfd look{self->socket_.native_handle(), 0, 0};
+    if (::poll(&look, 1, 0) == 1 && (look.revents & (POLLHUP | POLLERR)) != 0) return self->on_hang_up();
+    self->glance_.expires_after(kGlance);
+    self->glance_.async_wait([self](const std::error_code& cancelled) {
+      if (!cancelled && !self->over_) self->await_hang_up();
+    });
+  });
+}
+
+void Session::on_hang_up() {
+  gone_.request_stop();
+  if (!outgoing_.empty() || input_ == Input::kShut) return end();
+  if (!answering_ || !wanted_) return;  // what is unread still: await_input() sees the end, too
+  ++number_;                            // what comes of the request goes nowhere
+  on_answered();
+}
+
+// ---- Requests and their replies ----
+
+void Session::answer(std::string_view line) {
   answering_ = true;
-  const auto request = parse_request(line);
+  ++number_;
+  auto request = parse_request(line);
+  wanted_ = !request || request->wants_reply;
+  if (wanted_ && gone_.stop_requested()) return on_answered();
   if (!request) return refuse(request.error().id, request.error().error);
-  handler_(*request, *this,
-           [weak = weak_from_this(), id = request->id, wanted = request->wants_reply](Outcome outcome) {
-             if (const auto self = weak.lock()) self->reply(id, wanted, std::move(outcome));
-           });
+  id_ = request->id;
+  room_.handler(*request, *this, [weak = weak_from_this(), number = number_](Outcome outcome) {
+    if (const auto self = weak.lock()) self->reply(number, std::move(outcome));
+  });
+}
+
+std::optional<RpcError> Session::reserve(std::size_t bytes) {
+  const auto grant = [&] { return memory_.resize(MemoryAccount::Part::kReply, bytes); };
+  if (grant()) return std::nullopt;
+  room_.lent.sweep();
+  if (grant()) return std::nullopt;
+  const std::string limit = "[server] memory_max_mb is " + std::to_string(room_.options.memory_max_mb);
+  if (bytes > room_.memory.limit_of_one()) {
+    return rpc_error({ErrorCode::kBusy,
+                      "this takes up to " + megabytes(bytes) + ", and one client gets half of what " + "all have, as " +
+                          limit + ": raise it, or ask for less",
+                      {}});
+  }
+  return rpc_error({ErrorCode::kBusy,
+                    "this takes up to " + megabytes(bytes) + ", more than the other clients leave: " + limit +
+                        ", and " + megabytes(room_.memory.held()) +
+                        " wait for clients to read them: ask again later, or for less",
+                    {}});
 }
 
 void Session::refuse(const nlohmann::json& id, const RpcError& error) {
-  answering_ = true;
+  answering_ = wanted_ = true;
   Outgoing outgoing;
   outgoing.line = to_line(error_message(id, error));
   send(std::move(outgoing));
 }
 
-void Session::reply(const nlohmann::json& id, bool wanted, Outcome outcome) {
-  if (over_) return;
-  // By way of the event loop: a line of many notifications must not become a deep stack.
-  if (!wanted) return asio::post(socket_.get_executor(), [self = shared_from_this()] { self->on_answered(); });
-  if (!outcome) return refuse(id, outcome.error());
-  for (Outgoing& event : outcome->first) send(std::move(event));
+void Session::reply(std::uint64_t number, Outcome outcome) {
+  if (over_ || !answering_ || number != number_) return;
+  if (!wanted_) return on_answered();
+  if (!outcome) return refuse(id_, outcome.error());
   Outgoing outgoing;
-  outgoing.line = to_line(result_message(id, std::move(outcome->result)));
+  outgoing.line = to_line(result_message(id_, std::move(outcome->result)));
   outgoing.bytes = std::move(outcome->bytes);
-  outgoing.descriptor = std::move(outcome->descriptor);
+  std::size_t size = outgoing.size();
+  for (const Outgoing& event : outcome->first) size += event.size();
+  if (const auto refused = reserve(size)) return refuse(id_, *refused);
+  if (outcome->memory) {
+    if (auto lent = room_.lent.add(std::move(outcome->memory->kept), outcome->memory->bytes); !lent) {
+      return refuse(id_, rpc_error(lent.error()));
+    }
+    outgoing.descriptor = std::move(outcome->memory->given);
+  }
+  for (Outgoing& event : outcome->first) outgoing_.push_back(std::move(event));
   send(std::move(outgoing));
 }
 
 void Session::on_answered() {
   answering_ = false;
-  if (last_reply_ && outgoing_.empty()) return end();
-  if (!last_reply_) next_request();
+  memory_.release(MemoryAccount::Part::kReply);
+  if (over_ || in_turn_) return;  // the turn goes on by itself
+  if (input_ == Input::kShut) return end_where_done();
+  ask_turn();
 }
 
+// ---- What goes out ----
+
 void Session::publish(const SharedPublication& publication, std::uint64_t lost) {
-  if (!subscription_ || over_) return;
+  if (!subscription_ || closing_ || over_) return;
   subscription_->note_lost(lost);
   subscription_->offer(publication, Subscription::Clock::now());
   send_waiting_event();
 }
 
 void Session::send_waiting_event() {
-  const auto is_event = [](const Outgoing& outgoing) { return outgoing.kind == Outgoing::Kind::kEvent; };
-  if (over_ || !subscription_ || std::ranges::any_of(outgoing_, is_event)) return;
-  if (auto event = subscription_->take(Subscription::Clock::now())) send(std::move(*event));
+  if (over_ || closing_ || !subscription_ || std::ranges::any_of(outgoing_, is_event)) return;
+  auto event = subscription_->take(Subscription::Clock::now());
+  if (!event) return;
+  if (memory_.resize(MemoryAccount::Part::kEvent, event->size())) return send(std::move(*event));
+  subscription_->note_lost(1);  // the next one tells
 }
 
 void Session::send(Outgoing outgoing) {
   if (over_) return;
   outgoing_.push_back(std::move(outgoing));
-  if (outgoing_.size() == 1) write();
+  if (!writing_) write();
 }
 
+// Sends what the socket takes now, and comes back when it takes more. A message that it takes whole costs no round of
+// the event loop.
 void Session::write() {
-  watch_progress();
-  const Outgoing& front = outgoing_.front();
-  if (front.descriptor && sent_ == 0) return write_with_descriptor();
-  const std::size_t line_sent = std::min(sent_, front.line.size());
-  const std::array parts{asio::buffer(front.line) + line_sent,
-                         (front.bytes ? asio::buffer(*front.bytes) : asio::const_buffer()) + (sent_ - line_sent)};
-  socket_.async_write_some(parts, [self = shared_from_this()](const std::error_code& error, std::size_t size) {
-    self->on_written(error, size);
-  });
+  writing_ = true;
+  while (!over_ && !outgoing_.empty()) {
+    const Outgoing& front = outgoing_.front();
+    const ssize_t sent = send_part(socket_.native_handle(), front, sent_);
+    if (sent < 0 && errno == EINTR) continue;
+    if (sent < 0 && errno == ETOOMANYREFS && front.descriptor) {
+      const Error error{ErrorCode::kNoSpace, "too many descriptors are on their way to clients: ask again later", {}};
+      outgoing_.front().line = to_line(error_message(id_, rpc_error(error)));
+      outgoing_.front().descriptor = FileDescriptor();
+      continue;
+    }
+    if (sent < 0 && errno != EAGAIN) return end();
+    if (sent > 0) {
+      sent_ += static_cast<std::size_t>(sent);
+      sent_at_ = Clock::now();
+    }
+    if (sent_ == front.size()) {
+      finish_message();
+      continue;
+    }
+    if (!timing_ || sent_ >= timed_ + kSlice) watch_progress();
+    return socket_.async_wait(Socket::wait_write, [self = shared_from_this()](const std::error_code& error) {
+      if (!self->over_ && error) self->end();
+      if (!self->over_) self->write();
+    });
+  }
+  writing_ = false;
+  end_where_done();
 }
 
-void Session::write_with_descriptor() {
-  socket_.async_wait(Socket::wait_write, [self = shared_from_this()](const std::error_code& error) {
-    if (error || self->over_) return self->on_written(error, 0);
-    const Outgoing& front = self->outgoing_.front();
-    const ssize_t sent = send_descriptor(self->socket_.native_handle(), front.line, front.descriptor.number());
-    if (sent < 0 && errno != EAGAIN && errno != EINTR) return self->end();
-    self->on_written(error, sent < 0 ? 0 : static_cast<std::size_t>(sent));
-  });
-}
-
-void Session::on_written(const std::error_code& error, std::size_t size) {
-  if (over_) return;
-  if (error) return end();
-  sent_ += size;
-  if (sent_ < outgoing_.front().size()) return write();
-  const bool replied = outgoing_.front().kind == Outgoing::Kind::kReply;
+void Session::finish_message() {
+  const bool replied = !is_event(outgoing_.front());
   outgoing_.pop_front();
   sent_ = 0;
-  progress_.cancel();
-  if (!outgoing_.empty()) write();
+  if (std::exchange(timing_, false)) progress_.cancel();
+  if (std::ranges::none_of(outgoing_, is_event)) memory_.release(MemoryAccount::Part::kEvent);
+  if (replied) on_answered();
   send_waiting_event();
-  if (replied || (last_reply_ && outgoing_.empty())) on_answered();
 }
 
+// A message may take the time for each megabyte that it has, and for what is left of it. By bytes alone, one a second
+// would do.
 void Session::watch_progress() {
-  progress_.expires_after(options_.send_timeout());
+  timed_ = sent_;
+  timing_ = true;
+  progress_.expires_after(room_.options.send_timeout());
   progress_.async_wait([weak = weak_from_this()](const std::error_code& error) {
     const auto self = weak.lock();
-    if (error || !self || self->over_) return;
-    spdlog::info("a client read nothing for {} ms: dropped", self->options_.send_timeout_ms);
-    self->end();
+    if (error || !self || self->over_ || !self->timing_) return;
+    if (self->progress_.expiry() <= Clock::now()) self->drop();  // else it was set anew when this was on its way
   });
+}
+
+bool Session::is_sending_since(Clock::time_point time) const {
+  return !over_ && !outgoing_.empty() && sent_at_ >= time;
+}
+
+// In the middle of a message nothing can be told: it would be taken for the message's own bytes. That it is cut short
+// tells, and the log and the status do.
+void Session::drop() {
+  ++room_.dropped;
+  const ucred peer = peer_of(socket_.native_handle());
+  spdlog::info("a client (process {}, user {}) took {} of {} bytes in {} ms: dropped", peer.pid, peer.uid,
+               sent_ - timed_, std::min(outgoing_.front().size() - timed_, kSlice), room_.options.send_timeout_ms);
+  if (sent_ == 0) {
+    const std::string line = to_line(error_message(
+        nullptr, rpc_error({ErrorCode::kTimeout, "this client takes too slowly what is sent to it: dropped", {}})));
+    ::send(socket_.native_handle(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+  }
+  end();
 }
 
 }  // namespace slsd

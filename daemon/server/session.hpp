@@ -3,11 +3,14 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <string_view>
 
 #include <asio/local/stream_protocol.hpp>
 #include <asio/steady_timer.hpp>
@@ -15,31 +18,63 @@
 #include "daemon/configuration/server_options.hpp"
 #include "daemon/rpc/line_buffer.hpp"
 #include "daemon/rpc/request.hpp"
+#include "daemon/server/lent_memory.hpp"
+#include "daemon/server/memory_budget.hpp"
 #include "daemon/server/reply.hpp"
 #include "daemon/server/subscription.hpp"
+#include "daemon/server/turns.hpp"
 
 namespace slsd {
+
+class Session;
+
+/// What the sessions of a server have in common.
+struct SessionRoom {
+  SessionRoom(asio::io_context& events, const ServerOptions& server_options)
+      : options(server_options), memory(server_options.memory_max_bytes()), lent(memory), turns(events) {}
+
+  ServerOptions options;
+  MemoryBudget memory;
+  LentMemory lent;
+  Turns turns;
+  std::array<char, 65536> chunk{};  ///< of the session whose turn it is
+  std::uint64_t dropped = 0;        ///< clients that were too slow
+  /// Carries a request out; answers through respond, now or later.
+  std::function<void(const Request&, Session&, Respond respond)> handler = {};
+  std::function<void(Session&, bool subscribed)> ended = {};
+};
 
 /// One client. Requests are answered one after the other: the next is read when the reply to the one before is sent, so
 /// that what waits for a client is at most one reply, one event and what its subscription holds.
 ///
-///     reading --a line--> answering --reply sent--> reading
-///     any --the client hung up, read nothing for send_timeout, sent too long a line--> ended
+///     request   none --a line--> under way --respond()--> being sent --all of it sent--> none
+///     input     open --shutdown(SHUT_WR)--> ended --the last line was read--> shut
+///               open --a line too long, wind_down()-----------------------> shut
+///
+/// Events go out before, between and after, and are no reply. The connection ends when the input is shut, no request is
+/// under way and all is sent; but who shut down its writing and is subscribed still gets its events. It ends at once
+/// when the client takes what is sent to it too slowly, or is gone.
+///
+/// A client is gone when it closed its socket, or shut down both ways, which is seen while a request is under way, too:
+/// gone() is requested, and nobody waits for the reply. What it sent before without an id is carried out still.
 ///
 /// @thread thread-bound
 class Session : public std::enable_shared_from_this<Session> {  // shared with the operations under way
  public:
   using Socket = asio::local::stream_protocol::socket;
-  /// Carries a request out; answers through respond, now or later.
-  using Handler = std::function<void(const Request&, Session&, Respond respond)>;
-  using Ended = std::function<void(Session&)>;
 
-  Session(Socket socket, const ServerOptions& options, const Handler& handler, Ended ended);
+  Session(Socket socket, std::shared_ptr<SessionRoom> room);
 
-  void start() { read(); }
-  /// Reads no further request; the connection ends when all that is under way is sent.
-  void wind_down() { last_reply_ = true; }
+  void start();
+  /// Takes no further request, and ends when all that is under way is sent.
+  void wind_down();
   void end();
+
+  /// Sets memory aside for what the request under way will give, before it is made.
+  /// @return  the error to answer with where there is too little
+  [[nodiscard]] std::optional<RpcError> reserve(std::size_t bytes);
+  /// Requested when nobody waits for the outcome of the request under way any more; never for one without an id.
+  [[nodiscard]] std::stop_token gone() const { return wanted_ ? gone_.get_token() : std::stop_token(); }
 
   void subscribe(const Subscription& subscription) { subscription_ = subscription; }
   void unsubscribe() { subscription_.reset(); }
@@ -47,34 +82,53 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
   /// A free scan's outcome, for those who subscribed.
   void publish(const SharedPublication& publication, std::uint64_t lost);
 
+  /// Whether something is being sent, and bytes of it were taken since the time.
+  [[nodiscard]] bool is_sending_since(std::chrono::steady_clock::time_point time) const;
+
  private:
-  void read();
-  void on_read(const std::error_code& error, std::size_t size);
-  void next_request();
-  void answer(const std::string& line);
+  enum class Input { kOpen, kEnded, kShut };
+  void ask_turn();
+  void take_turn();
+  [[nodiscard]] std::optional<std::string_view> next_line();
+  [[nodiscard]] bool receive();
+  void await_input();
+  void await_hang_up();
+  void on_hang_up();
+  void answer(std::string_view line);
   void refuse(const nlohmann::json& id, const RpcError& error);
-  void reply(const nlohmann::json& id, bool wanted, Outcome outcome);
+  void reply(std::uint64_t number, Outcome outcome);
   void on_answered();
+  void end_where_done();
   void send(Outgoing outgoing);
   void send_waiting_event();
   void write();
-  void write_with_descriptor();
-  void on_written(const std::error_code& error, std::size_t size);
+  void finish_message();
   void watch_progress();
+  void drop();
 
   Socket socket_;
-  const ServerOptions& options_;
-  const Handler& handler_;
-  Ended ended_;
+  std::shared_ptr<SessionRoom> shared_room_;  // operations under way outlive the server
+  SessionRoom& room_;
+  Turns::Taker taker_;
+  MemoryAccount memory_;
   asio::steady_timer progress_;
-  std::array<char, 16384> chunk_{};
+  asio::steady_timer glance_;
   LineBuffer lines_;
+  Input input_ = Input::kOpen;
+  std::stop_source gone_;
+  bool answering_ = false;  ///< from a request's line to the last byte of its reply
+  bool wanted_ = false;     ///< that reply
+  nlohmann::json id_;       ///< of the request under way
+  std::uint64_t number_ = 0;
+  bool in_turn_ = false;
   std::deque<Outgoing> outgoing_;
-  std::size_t sent_ = 0;  ///< bytes of the first outgoing
+  bool writing_ = false;   ///< or waits until more can be sent
+  std::size_t sent_ = 0;   ///< bytes of the first outgoing
+  std::size_t timed_ = 0;  ///< of these, when the timer was set
+  bool timing_ = false;
+  std::chrono::steady_clock::time_point sent_at_{};
   std::optional<Subscription> subscription_;
-  bool answering_ = false;
-  bool hung_up_ = false;     ///< the client sends no more
-  bool last_reply_ = false;  ///< the connection ends when all is sent
+  bool closing_ = false;  ///< also for a subscriber, once all is sent
   bool over_ = false;
 };
 

@@ -10,7 +10,7 @@
 
 #include "daemon/scan/cloud_files.hpp"
 #include "daemon/scan/scanner.hpp"
-#include "daemon/server/outgoing.hpp"
+#include "daemon/server/reply.hpp"
 
 namespace slsd {
 

@@ -3,17 +3,22 @@
 #include "daemon/server/listening_socket.hpp"
 
 #include <fcntl.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <string>
 
 #include <gmock/gmock.h>
 
 #include "daemon/client/connection.hpp"
 #include "daemon/configuration/server_options.hpp"
-#include "daemon/server/sealed_memory.hpp"
+#include "drivers/system/file_descriptor.hpp"
 
 namespace slsd {
 namespace {
@@ -100,15 +105,23 @@ TEST_F(ListeningSocketTest, NamesAFolderThatIsMissing) {
   EXPECT_EQ(listening.error().code, ErrorCode::kNotFound);
 }
 
-TEST(SealedMemory, HoldsTheBytesForGood) {
-  const auto memory = sealed_memory("cloud");
-  ASSERT_TRUE(memory);
-  char bytes[8] = {};
-  EXPECT_EQ(::read(memory->number(), bytes, sizeof bytes), 5);
-  EXPECT_STREQ(bytes, "cloud");
-  EXPECT_LT(::write(memory->number(), "x", 1), 0);
-  EXPECT_NE(::ftruncate(memory->number(), 1), 0);
-  EXPECT_NE(::ftruncate(memory->number(), 100), 0);
+TEST_F(ListeningSocketTest, RemovesWhatADaemonThatWasKilledLeft) {
+  const pid_t dead = ::fork();
+  if (dead == 0) ::_exit(0);
+  ::waitpid(dead, nullptr, 0);
+  for (const std::string name : {".slsd-" + std::to_string(dead), ".slsd-" + std::to_string(::getppid())}) {
+    ASSERT_TRUE(ListeningSocket::open(folder_ / "other", 0600));
+    const FileDescriptor socket(::socket(AF_UNIX, SOCK_STREAM, 0));
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strncpy(address.sun_path, (folder_ / name).c_str(), sizeof address.sun_path - 1);
+    ASSERT_EQ(::bind(socket.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  }
+  std::ofstream(folder_ / (".slsd-" + std::to_string(dead) + "x")) << "a file of somebody";
+  ASSERT_TRUE(ListeningSocket::open(folder_ / "s", 0600));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / (".slsd-" + std::to_string(dead))));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / (".slsd-" + std::to_string(::getppid()))));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / (".slsd-" + std::to_string(dead) + "x")));
 }
 
 }  // namespace

@@ -4,8 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/configuration/configuration.hpp"
 #include "daemon/scan/scan_result.hpp"
-#include "daemon/scan/scan_statistics.hpp"
+#include "daemon/server/methods.hpp"
 
 namespace slsd {
 
@@ -18,7 +19,11 @@ namespace slsd {
 /// A frame's size, depth, number and times. The camera only where the image names it.
 [[nodiscard]] nlohmann::json frame_json(const FrameImage& frame);
 
-/// What `status` tells of all scans.
-[[nodiscard]] nlohmann::json totals_json(const ScanTotals& totals);
+/// What `settings` answers besides the pattern and the calibration: version, projector, cameras, and the keys that the
+/// configuration in force gives.
+[[nodiscard]] nlohmann::json settings_json(const Configuration& configuration);
+
+/// What `status` answers: the service, its devices, and what all scans came to.
+[[nodiscard]] nlohmann::json status_json(const ServiceState& state);
 
 }  // namespace slsd

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/server/lent_memory.hpp"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <string>
+#include <utility>
+
+#include "drivers/system/system_error.hpp"
+
+namespace slsd {
+namespace {
+
+FileDescriptor open_to_read(const FileDescriptor& memory) {
+  const std::string path = "/proc/self/fd/" + std::to_string(memory.number());
+  return FileDescriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+}
+
+// The kernel grants a lease for writing to the only one who has a file open, and a mapping counts as open. Where it
+// grants none at all (another error than EAGAIN) nobody is watched.
+bool is_held_by_others(const FileDescriptor& kept) {
+  if (::fcntl(kept.number(), F_SETLEASE, F_WRLCK) != 0) return errno == EAGAIN;
+  ::fcntl(kept.number(), F_SETLEASE, F_UNLCK);
+  return false;
+}
+
+}  // namespace
+
+Result<SealedMemory> sealed_memory(std::string_view bytes) {
+  const FileDescriptor memory(::memfd_create("slsd-cloud", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+  if (!memory) return fail_system(errno, "cannot make a memfd");
+  for (std::string_view rest = bytes; !rest.empty();) {
+    const ssize_t written = ::write(memory.number(), rest.data(), rest.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return fail_system(errno, "cannot fill a memfd");
+    rest.remove_prefix(static_cast<std::size_t>(written));
+  }
+  if (::fcntl(memory.number(), F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL) != 0) {
+    return fail_system(errno, "cannot seal a memfd");
+  }
+  // Two openings of their own, as the first one's writing would stand against the lease.
+  SealedMemory sealed{open_to_read(memory), open_to_read(memory), bytes.size()};
+  if (!sealed.given || !sealed.kept) return fail_system(errno, "cannot open a memfd to read");
+  return sealed;
+}
+
+LentMemory::~LentMemory() {
+  for (const Lent& lent : lent_) budget_.give_back(lent.bytes);
+}
+
+Result<> LentMemory::add(FileDescriptor kept, std::size_t bytes) {
+  sweep();
+  if (lent_.size() == kMemoriesMax || !budget_.lend(bytes)) {
+    return fail(ErrorCode::kBusy, std::to_string(lent_.size()) + " clouds that were sent as memfds, " +
+                                      std::to_string(budget_.lent() >> 20U) +
+                                      " MB, are still open or mapped by clients: close them, or ask with " +
+                                      "\"transport\": \"inline\"");
+  }
+  lent_.push_back({std::move(kept), bytes});
+  return {};
+}
+
+void LentMemory::sweep() {
+  std::erase_if(lent_, [this](const Lent& lent) {
+    if (is_held_by_others(lent.kept)) return false;
+    budget_.give_back(lent.bytes);
+    return true;
+  });
+}
+
+}  // namespace slsd

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace slsd {
+
+/// Bounds the memory of all clients together: requests that are being collected, replies and events that are being made
+/// or sent, and clouds that were lent as memfds. Bytes that several clients share count for each of them, so that what
+/// is counted is never less than what is held.
+///
+/// It is shared by one rule (dynamic thresholds: Choudhury and Hahne 1998): no client may come to hold more than is
+/// then free for all the others. One alone gets a half, two that take all they can a third each, and a hundred and one
+/// leave a hundredth free: who asks for more waits, and who asks for little is served as if nobody else were there.
+///
+/// A few bytes are always granted, as each request is to have a reply: they come on top, some 20 kB a client.
+/// @thread thread-bound
+class MemoryBudget {
+ public:
+  explicit MemoryBudget(std::size_t limit_bytes) : limit_bytes_(limit_bytes) {}
+
+  [[nodiscard]] std::size_t limit() const { return limit_bytes_; }
+  [[nodiscard]] std::size_t held() const { return held_; }
+  /// What one client may hold where no other holds anything.
+  [[nodiscard]] std::size_t limit_of_one() const { return limit_bytes_ / 2; }
+
+  /// Memory that outlives its client, as clouds that are lent: all of it together at most a half.
+  [[nodiscard]] bool lend(std::size_t bytes);
+  void give_back(std::size_t bytes);
+  [[nodiscard]] std::size_t lent() const { return lent_; }
+
+ private:
+  friend class MemoryAccount;
+  std::size_t limit_bytes_;
+  std::size_t held_ = 0;  ///< what is lent, too
+  std::size_t lent_ = 0;
+};
+
+/// What one client holds of it.
+/// @thread thread-bound
+class MemoryAccount {
+ public:
+  enum class Part { kRequest, kReply, kEvent };
+
+  explicit MemoryAccount(MemoryBudget& budget) : budget_(budget) {}
+  ~MemoryAccount();
+  MemoryAccount(const MemoryAccount&) = delete;
+  MemoryAccount& operator=(const MemoryAccount&) = delete;
+
+  /// Whether the part may be so large from now on. Where it may not, it stays as it was. To become smaller, and to
+  /// have up to 20 kB, is always granted.
+  [[nodiscard]] bool resize(Part part, std::size_t bytes);
+  void release(Part part) { set(part, 0); }
+  [[nodiscard]] std::size_t held() const;
+
+ private:
+  void set(Part part, std::size_t bytes);
+
+  MemoryBudget& budget_;
+  std::array<std::size_t, 3> parts_{};
+};
+
+}  // namespace slsd

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/server/turns.hpp"
+
+#include <algorithm>
+
+#include <asio/post.hpp>
+
+namespace slsd {
+
+void Turns::ask(Taker& taker, std::function<void()> turn) {
+  taker.asked = true;
+  waiting_.emplace(std::max(taker.used_until, now_), Waiting{&taker, std::move(turn)});
+  if (waiting_.size() == 1) asio::post(events_, [this] { take_next(); });
+}
+
+// One turn to a round of the event loop: what else it has to do comes in between.
+void Turns::take_next() {
+  if (waiting_.empty()) return;
+  auto next = waiting_.extract(waiting_.begin());
+  if (!waiting_.empty()) asio::post(events_, [this] { take_next(); });
+  now_ = next.key();
+  const auto begin = std::chrono::steady_clock::now();
+  auto& [taker, turn] = next.mapped();
+  taker->asked = false;
+  turn();
+  taker->used_until = now_ + (std::chrono::steady_clock::now() - begin);
+}
+
+}  // namespace slsd

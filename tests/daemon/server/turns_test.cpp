@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/server/turns.hpp"
+
+#include <algorithm>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+
+// Takes turns of some length, one after the other.
+struct Client {
+  Turns& turns;
+  std::string& order;
+  char name;
+  std::chrono::milliseconds length;
+  int left;
+  Turns::Taker taker{};
+
+  void ask() {
+    turns.ask(taker, [this] {
+      order += name;
+      std::this_thread::sleep_for(length);
+      if (--left > 0) ask();
+    });
+  }
+};
+
+TEST(Turns, GoToWhoUsedTheLeastTime) {
+  asio::io_context events;
+  Turns turns(events);
+  std::string order;
+  Client slow{turns, order, 'S', 20ms, 10};
+  Client quick{turns, order, 'q', 2ms, 40};
+  slow.ask();
+  quick.ask();
+  events.run();
+  const std::string first = order.substr(0, 30);
+  EXPECT_LT(std::ranges::count(first, 'S'), 12) << "of equal turns it would be half: " << order;
+  EXPECT_EQ(std::ranges::count(order, 'S'), 10);
+  EXPECT_EQ(std::ranges::count(order, 'q'), 40);
+}
+
+TEST(Turns, WhoComesAfterAWhileIsNext) {
+  asio::io_context events;
+  Turns turns(events);
+  std::string order;
+  std::vector<std::unique_ptr<Client>> floods;
+  for (int i = 0; i < 20; ++i) floods.push_back(std::make_unique<Client>(Client{turns, order, 'f', 1ms, 20}));
+  for (const auto& flood : floods) flood->ask();
+  Client modest{turns, order, 'm', 0ms, 1};
+  while (order.size() < 110) events.run_one();
+  const std::size_t asked = order.size();
+  modest.ask();
+  events.run();
+  EXPECT_LE(order.find('m') - asked, 2U) << order;
+}
+
+TEST(Turns, ForgetsWhoAsked) {
+  asio::io_context events;
+  Turns turns(events);
+  std::string order;
+  Client client{turns, order, 'c', 0ms, 1};
+  client.ask();
+  turns.clear();
+  events.run();
+  EXPECT_EQ(order, "");
+}
+
+}  // namespace
+}  // namespace slsd
