@@ -19,7 +19,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kStopTime = 700ms;
+constexpr auto kStopTime = 700ms;  // for the devices
+constexpr auto kSendTime = 2s;     // for what is being sent, as long as it is taken
+constexpr auto kSilence = 300ms;   // after which nobody seems to take it
+constexpr auto kEndGlance = 5ms;
 constexpr auto kStatusPeriod = 5s;
 constexpr auto kPrepareTime = 5min;  // half a second of computing, on a host that has none to spare
 
@@ -70,6 +73,7 @@ Service::Service(Configuration configuration, const std::filesystem::path& file,
     : signals_(events_),
       watchdog_(events_),
       status_(events_),
+      ending_(events_),
       scanner_(std::move(rig), std::move(setup)),
       state_{events_, scanner_, file, std::move(configuration)} {
   const auto handler = [this](const Request& request, Session& session, Respond respond) {
@@ -132,8 +136,21 @@ void Service::stop() {
   watchdog_.cancel();
   status_.cancel();
   scanner_.request_stop();
-  const bool stopped = scanner_.wait_stopped(kStopTime);
-  events_.poll();  // sends the answers of what was cancelled
+  await_end(std::chrono::steady_clock::now());
+}
+
+// Meanwhile the event loop sends: the answers of what was cancelled, and clouds and images to their end.
+void Service::await_end(std::chrono::steady_clock::time_point began) {
+  const auto now = std::chrono::steady_clock::now();
+  const bool stopped = scanner_.wait_stopped(0ms);
+  const bool in_time = now < began + kStopTime;
+  const bool sending = server_->is_sending_since(now - kSilence) && now < began + kSendTime;
+  if ((!stopped && in_time) || (server_->clients() > 0 && (in_time || sending))) {
+    ending_.expires_after(kEndGlance);
+    return ending_.async_wait([this, began](const std::error_code& error) {
+      if (!error) await_end(began);
+    });
+  }
   server_->end_all();
   events_.stop();
   if (stopped) return spdlog::info("stopped");

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -51,6 +52,7 @@ class Service {
   void await_signal();
   void on_signal(int number);
   void stop();
+  void await_end(std::chrono::steady_clock::time_point began);
   void reload(Respond answered);
   void on_reloaded(const Result<Configuration>& configuration, const Respond& answered);
   void watch();
@@ -61,6 +63,7 @@ class Service {
   asio::signal_set signals_;
   asio::steady_timer watchdog_;
   asio::steady_timer status_;
+  asio::steady_timer ending_;
   Scanner scanner_;
   ServiceState state_;
   std::unique_ptr<Server> server_;
