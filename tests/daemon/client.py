@@ -41,12 +41,16 @@ class Client:
             raise ConnectionError("the daemon hung up")
         self.buffer += chunk
 
-    def receive(self):
-        """One message and the bytes that follow it."""
+    def receive_line(self):
+        """One message; the bytes that follow it are not read."""
         while b"\n" not in self.buffer:
             self.more()
         line, self.buffer = self.buffer.split(b"\n", 1)
-        message = json.loads(line)
+        return json.loads(line)
+
+    def receive(self):
+        """One message and the bytes that follow it."""
+        message = self.receive_line()
         size = (message.get("result") or message.get("params") or {}).get("bytes", 0)
         while len(self.buffer) < size:
             self.more()

@@ -38,6 +38,30 @@ class Life(unittest.TestCase):
             status, _ = service.stop(signal.SIGINT)
             self.assertEqual(status, 0)
 
+    def test_sigterm_lets_what_is_being_sent_arrive(self):
+        with Service() as service, service.client() as client:
+            service.wait_ready()
+            client.request("scan", frames="raw", texture=False)
+            client.more()  # of more than the socket holds
+            service.send_signal(signal.SIGTERM)
+            wait_until(lambda: "stopping" in service.log_text(), "the signal")
+            time.sleep(0.2)  # a reader that is busy
+            result, cloud = client.reply()
+            self.assertEqual(len(cloud), result["bytes"])
+            frame, image = client.events[0]
+            self.assertEqual(len(image), frame["params"]["bytes"])
+            self.assertGreater(len(image), 500_000)
+            self.assertEqual(service.process.wait(60), 0)
+
+    def test_sigterm_while_a_client_reads_nothing(self):
+        with Service() as service, service.client() as client:
+            service.wait_ready()
+            client.request("scan", frames="raw")
+            client.more()
+            status, seconds = service.stop()
+            self.assertEqual(status, 0)
+            self.assertLess(seconds, 20)  # of the 30 of send_timeout_ms
+
     def test_sigterm_while_clients_never_stop_asking(self):
         request = b'{"jsonrpc":"2.0","id":1,"method":"status"}\n' * 16
 
@@ -194,6 +218,63 @@ class Life(unittest.TestCase):
                     client.close()
             with service.client() as client:
                 self.assertIn("version", client.call("status")[0])
+
+    def test_lack_of_descriptors_is_named_and_passes(self):
+        def few_descriptors():
+            resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+        with Service(preexec=few_descriptors) as service, service.client() as first:
+            service.wait_ready()
+            first.call_for_descriptor("scan", transport="memfd")[1].close()
+            clients = [Client(service.socket) for _ in range(80)]
+            wait_until(lambda: "cannot take another client" in service.log_text(), "the limit")
+            with self.assertRaises(RpcError) as caught:
+                first.call("scan", transport="memfd")
+            self.assertEqual(caught.exception.name, "no_space")
+            self.assertIn("version", first.call("status")[0])
+            try:
+                first.call("scan")
+            except RpcError as error:  # its camera may need one
+                self.assertEqual(error.name, "no_space")
+            for client in clients:
+                client.close()
+            wait_until(lambda: first.call("status")[0]["clients"] == 1, "the clients to be gone")
+            result, memory = first.call_for_descriptor("scan", transport="memfd")
+            with memory:
+                self.assertEqual(len(memory.read()), result["memfd_bytes"])
+
+    def test_clouds_as_memfds_count_until_they_are_closed(self):
+        with Service(server="memory_max_mb = 16") as service, service.client() as client:
+            service.wait_ready()
+            held = []
+            with self.assertRaises(RpcError) as caught:
+                while len(held) < 300:
+                    held.append(client.call_for_descriptor("scan", transport="memfd")[1])
+            self.assertEqual(caught.exception.name, "busy")
+            self.assertGreater(len(held), 10)
+            self.assertGreater(client.call("scan")[0]["points"], 0)
+            for memory in held:
+                memory.close()
+            client.call_for_descriptor("scan", transport="memfd")[1].close()
+
+    def test_memory_that_clients_hold_is_shared(self):
+        with Service(server="memory_max_mb = 16\nsend_timeout_ms = 60000") as service:
+            service.wait_ready()
+            with service.client() as modest:
+                greedy = [service.client() for _ in range(24)]
+                told = 0
+                for client in greedy:  # each holds a frame and a half that it does not read
+                    client.request("scan", frames="raw", timeout_ms=60000)
+                for client in greedy:
+                    message = client.receive_line()
+                    told += message.get("error", {}).get("data", {}).get("name") == "busy"
+                self.assertGreater(told, 0)
+                self.assertLess(told, 24)
+                memory = modest.call("status")[0]["clients_memory"]
+                self.assertLess(memory["held_bytes"], memory["limit_bytes"] * 1.05)
+                self.assertGreater(modest.call("scan", timeout_ms=60000)[0]["points"], 0)
+                for client in greedy:
+                    client.close()
+                wait_until(lambda: modest.call("status")[0]["clients_memory"]["held_bytes"] < 1e6, "the memory")
 
     def test_memory_stays_level(self):
         with Service() as service, service.client() as client:

@@ -2,11 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """The whole service against clients that send rubbish, too much, too slowly or nothing."""
+import json
 import random
+import re
+import unicodedata
 import unittest
 
 from client import RpcError
+from hostile_client import FLOODS, NASTY, line
 from service import Service, wait_until
+
+LOG_LINE = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3} (debug|info|warning|error|critical) ")
+# Every text that a client can send: the parameters of every method that takes some.
+TEXTS = {"scan": ["format", "transport", "camera", "frames"], "preview": ["camera"], "frame": ["format", "camera"],
+         "pattern": ["format"], "project": ["picture", "png"], "subscribe": ["format"], "status": [], "settings": [],
+         "reload": [], "unsubscribe": []}
 
 
 class Rubbish(unittest.TestCase):
@@ -52,6 +62,55 @@ class Rubbish(unittest.TestCase):
             self.assertEqual(client.receive()[0]["error"]["code"], -32600)
             with self.assertRaises(OSError):
                 client.receive()
+
+    def assert_printable(self, text, where):
+        odd = [character for character in text if unicodedata.category(character) in ("Cc", "Cf", "Zl", "Zp", "Cs")]
+        self.assertEqual(odd, [], where)
+
+    def test_foreign_text_is_cut_and_shown_as_what_it_is(self):
+        with self.service.client() as client:
+            for method, names in TEXTS.items():
+                requests = [{name: text} for name in names for text in NASTY]
+                requests += [{text: 1} for text in NASTY]  # a parameter of such a name
+                for params in requests:
+                    client.request(method, **params)
+                    with self.assertRaises(RpcError) as caught:
+                        client.reply()
+                    self.assert_printable(str(caught.exception), method)
+                    self.assertLess(len(str(caught.exception).encode()), 2000)
+            for text in NASTY:
+                with self.assertRaises(RpcError) as caught:
+                    client.call(text)
+                self.assert_printable(str(caught.exception), "method")
+                client.send(line("status", identity=text))
+                client.receive()
+            status = json.dumps(client.call("status")[0], ensure_ascii=False)
+            self.assertLess(len(status.encode()), 20_000)
+            self.assert_printable(status, "status")
+        log = self.service.log_text().split("\n")[:-1]
+        self.assertEqual([entry for entry in log if not LOG_LINE.match(entry)], [])
+        self.assertLess(max(len(entry.encode()) for entry in log), 2048)
+        self.assertTrue(any("kernel panic" in entry for entry in log), "it was to be logged at all")
+
+    # How quickly is hostile_soak.py's to say: a machine that runs tests side by side says nothing about it.
+    def test_floods_hold_nobody_up(self):
+        for kind, flood in FLOODS.items():
+            with self.subTest(kind):
+                clients = [self.service.client() for _ in range(16)]
+                for client in clients:
+                    client.socket.setblocking(False)
+                with self.service.client() as other:
+                    for _ in range(10):
+                        for client in clients:
+                            try:
+                                client.socket.send(flood)
+                                client.socket.recv(1 << 20)
+                            except OSError:
+                                pass
+                        self.assertIn("version", other.call("status")[0])
+                    for client in clients:
+                        client.close()
+                    wait_until(lambda: other.call("status")[0]["clients"] == 1, "the others to be gone")
 
     def test_many_notifications_are_not_answered(self):
         with self.service.client() as client:

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """Subscriptions to the clouds of the whole service."""
+import json
+import socket
 import time
 import unittest
 
@@ -29,6 +31,18 @@ class Subscription(unittest.TestCase):
                     time.sleep(0.5)
                     return other.call("status")[0]["scans"]["succeeded"] == before
                 wait_until(rests, "an end of the scans")  # some may be under way still
+
+    def test_last_request_of_a_subscriber_is_answered(self):
+        for _ in range(3):
+            with Service() as service, service.client() as client:
+                client.call("subscribe")
+                client.receive()
+                client.last_id += 1
+                client.send(json.dumps({"jsonrpc": "2.0", "id": client.last_id, "method": "scan"}).encode())
+                client.socket.shutdown(socket.SHUT_WR)
+                self.assertGreater(client.reply()[0]["points"], 0)
+                for _ in range(3):  # and it listens still
+                    self.assertIn("method", client.receive()[0])
 
     def test_slow_reader_loses_clouds_and_holds_nobody_up(self):
         with Service() as service, service.client() as slow, service.client() as quick:
