@@ -20,11 +20,11 @@ void Turns::take_next() {
   auto next = waiting_.extract(waiting_.begin());
   if (!waiting_.empty()) asio::post(events_, [this] { take_next(); });
   now_ = next.key();
-  const auto begin = std::chrono::steady_clock::now();
+  const auto begin = time_();
   auto& [taker, turn] = next.mapped();
   taker->asked = false;
   turn();
-  taker->used_until = now_ + (std::chrono::steady_clock::now() - begin);
+  taker->used_until = now_ + (time_() - begin);
 }
 
 }  // namespace slsd

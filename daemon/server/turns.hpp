@@ -30,7 +30,10 @@ class Turns {
     bool asked = false;  ///< for a turn that has not begun
   };
 
-  explicit Turns(asio::io_context& events) : events_(events) {}
+  using Now = std::chrono::steady_clock::time_point (*)();
+
+  /// @param now  the time; another one is for tests
+  explicit Turns(asio::io_context& events, Now now = std::chrono::steady_clock::now) : events_(events), time_(now) {}
   Turns(const Turns&) = delete;
   Turns& operator=(const Turns&) = delete;
 
@@ -47,6 +50,7 @@ class Turns {
     std::function<void()> turn;
   };
   asio::io_context& events_;
+  Now time_;
   std::multimap<std::chrono::nanoseconds, Waiting> waiting_;  ///< by start; equals in the order of asking
   std::chrono::nanoseconds now_{};                            ///< the start of the turn under way, or of the last one
 };

@@ -109,7 +109,7 @@ TEST_F(ListeningSocketTest, RemovesWhatADaemonThatWasKilledLeft) {
   const pid_t dead = ::fork();
   if (dead == 0) ::_exit(0);
   ::waitpid(dead, nullptr, 0);
-  for (const std::string name : {".slsd-" + std::to_string(dead), ".slsd-" + std::to_string(::getppid())}) {
+  for (const std::string& name : {".slsd-" + std::to_string(dead), ".slsd-" + std::to_string(::getppid())}) {
     ASSERT_TRUE(ListeningSocket::open(folder_ / "other", 0600));
     const FileDescriptor socket(::socket(AF_UNIX, SOCK_STREAM, 0));
     sockaddr_un address{};

@@ -3,8 +3,8 @@
 #include "daemon/server/turns.hpp"
 
 #include <algorithm>
+#include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -13,6 +13,11 @@ namespace slsd {
 namespace {
 
 using namespace std::chrono_literals;
+
+std::chrono::steady_clock::time_point g_now;
+std::chrono::steady_clock::time_point now() {
+  return g_now;
+}
 
 // Takes turns of some length, one after the other.
 struct Client {
@@ -26,7 +31,7 @@ struct Client {
   void ask() {
     turns.ask(taker, [this] {
       order += name;
-      std::this_thread::sleep_for(length);
+      g_now += length;
       if (--left > 0) ask();
     });
   }
@@ -34,7 +39,7 @@ struct Client {
 
 TEST(Turns, GoToWhoUsedTheLeastTime) {
   asio::io_context events;
-  Turns turns(events);
+  Turns turns(events, now);
   std::string order;
   Client slow{turns, order, 'S', 20ms, 10};
   Client quick{turns, order, 'q', 2ms, 40};
@@ -49,7 +54,7 @@ TEST(Turns, GoToWhoUsedTheLeastTime) {
 
 TEST(Turns, WhoComesAfterAWhileIsNext) {
   asio::io_context events;
-  Turns turns(events);
+  Turns turns(events, now);
   std::string order;
   std::vector<std::unique_ptr<Client>> floods;
   for (int i = 0; i < 20; ++i) floods.push_back(std::make_unique<Client>(Client{turns, order, 'f', 1ms, 20}));
@@ -64,7 +69,7 @@ TEST(Turns, WhoComesAfterAWhileIsNext) {
 
 TEST(Turns, ForgetsWhoAsked) {
   asio::io_context events;
-  Turns turns(events);
+  Turns turns(events, now);
   std::string order;
   Client client{turns, order, 'c', 0ms, 1};
   client.ask();
