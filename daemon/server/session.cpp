@@ -20,7 +20,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kTurn = 1ms;
+constexpr auto kTurn = 250us;            // so that a round of 64 takes 16 ms
 constexpr std::size_t kSlice = 1 << 20;  // to be taken within the send timeout
 constexpr auto kGlance = 200ms;          // between two looks whether the client is gone, where it sends urgent bytes
 constexpr std::size_t kMiB = 1 << 20;

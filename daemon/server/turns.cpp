@@ -2,11 +2,19 @@
 // Copyright the slsd authors
 #include "daemon/server/turns.hpp"
 
+#include <ctime>
+
 #include <algorithm>
 
 #include <asio/post.hpp>
 
 namespace slsd {
+
+std::chrono::nanoseconds Turns::processor_time() {
+  timespec time{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+}
 
 void Turns::ask(Taker& taker, std::function<void()> turn) {
   taker.asked = true;

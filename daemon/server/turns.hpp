@@ -14,7 +14,8 @@ namespace slsd {
 
 /// Shares the event loop's time among the clients: whoever used the least of it is served next, so that a client that
 /// asks for little does not wait for all those who flood. Start-time fair queueing (Goyal, Vin and Cheng 1997), with
-/// the time that a turn took as its cost: a long line to parse costs more than a short one, whatever is in it.
+/// the processor's time that a turn took as its cost: a long line to parse costs more than a short one, whatever is in
+/// it. By the clock, who was served when another program had its turn would pay for that.
 ///
 ///     time     a turn begins at its start: the end of the client's turn before, but not before the turn under way
 ///     floods   A |----|    |----|    |----|
@@ -30,14 +31,16 @@ class Turns {
     bool asked = false;  ///< for a turn that has not begun
   };
 
-  using Now = std::chrono::steady_clock::time_point (*)();
+  using Time = std::chrono::nanoseconds (*)();
+  /// Of the processor, that this thread had.
+  [[nodiscard]] static std::chrono::nanoseconds processor_time();
 
-  /// @param now  the time; another one is for tests
-  explicit Turns(asio::io_context& events, Now now = std::chrono::steady_clock::now) : events_(events), time_(now) {}
+  /// @param time  another one is for tests
+  explicit Turns(asio::io_context& events, Time time = processor_time) : events_(events), time_(time) {}
   Turns(const Turns&) = delete;
   Turns& operator=(const Turns&) = delete;
 
-  /// Calls later. @param turn  about a millisecond of work; one asks again for more
+  /// Calls later. @param turn  a part of a millisecond of work; one asks again for more
   void ask(Taker& taker, std::function<void()> turn);
   /// Forgets who asked.
   void clear() { waiting_.clear(); }
@@ -50,7 +53,7 @@ class Turns {
     std::function<void()> turn;
   };
   asio::io_context& events_;
-  Now time_;
+  Time time_;
   std::multimap<std::chrono::nanoseconds, Waiting> waiting_;  ///< by start; equals in the order of asking
   std::chrono::nanoseconds now_{};                            ///< the start of the turn under way, or of the last one
 };
