@@ -7,6 +7,7 @@
 
 #include <arv.h>
 
+#include "core/printable.hpp"
 #include "core/result.hpp"
 
 namespace slsd {
@@ -37,7 +38,7 @@ class GErrorSlot {
     return &error_;
   }
   [[nodiscard]] bool failed() const { return error_ != nullptr; }
-  [[nodiscard]] std::string message() const { return failed() ? error_->message : "no reason is given"; }
+  [[nodiscard]] std::string message() const { return failed() ? printable(error_->message) : "no reason is given"; }
 
   /// What the error means to who uses the camera: kDisconnected where the device does not answer, kPermissionDenied
   /// where another application controls it, else kUnsupported.

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "core/printable.hpp"
+
 namespace slsd {
 namespace {
 
@@ -42,7 +44,8 @@ Bytes data_of(Bytes answer, std::uint8_t command, std::uint16_t id, std::size_t 
 
 std::string text_at(Bytes data, std::size_t offset, std::size_t bytes) {
   const auto field = data.subspan(offset, bytes);
-  return {field.begin(), std::ranges::find(field, 0)};
+  return printable({reinterpret_cast<const char*>(field.data()),
+                    static_cast<std::size_t>(std::ranges::find(field, 0) - field.begin())});
 }
 
 }  // namespace

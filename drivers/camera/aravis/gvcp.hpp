@@ -21,7 +21,7 @@ inline constexpr std::uint16_t kGvcpPort = 3956;
 struct GigeDevice {
   std::string address;    ///< IPv4
   std::string interface;  ///< IPv4 address of this host
-  std::string vendor;
+  std::string vendor;     ///< this and the next printable, whatever the device sent
   std::string model;
   std::string serial;
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "core/printable.hpp"
 #include "drivers/camera/aravis/gige_discovery.hpp"
 #include "drivers/camera/aravis/gige_probe.hpp"
 #include "drivers/camera/aravis/host_interface.hpp"
@@ -89,13 +90,13 @@ ListedCamera usb3_camera(const UsbDevice& device, const std::vector<Usb3Device>&
   ListedCamera camera;
   camera.standard = "USB3 Vision";
   camera.driver = "aravis";
-  camera.name = device.vendor + "-" + device.serial;
-  camera.vendor = device.vendor;
-  camera.model = device.model;
-  camera.serial = device.serial;
+  camera.name = printable(device.vendor) + "-" + printable(device.serial);
+  camera.vendor = printable(device.vendor);
+  camera.model = printable(device.model);
+  camera.serial = printable(device.serial);
   camera.node = device.node;
   camera.link_mbps = device.speed_mbps;
-  const auto found = std::ranges::find(openable, device.serial, &Usb3Device::serial);
+  const auto found = std::ranges::find(openable, camera.serial, &Usb3Device::serial);
   if (::access(device.node.c_str(), R_OK | W_OK) != 0)
     camera.problem = "this user may not write to it; add a udev rule: SUBSYSTEM==\"usb\", ATTRS{idVendor}==\"" +
                      device.vendor_number + R"(", MODE="0660", GROUP="video", and this user to the group video)";

@@ -7,6 +7,8 @@
 
 #include <arv.h>
 
+#include "core/printable.hpp"
+
 namespace slsd {
 namespace {
 
@@ -24,7 +26,8 @@ std::vector<Usb3Device> list_usb3_devices() {
   std::vector<Usb3Device> devices;
   for (unsigned i = 0; i < arv_get_n_devices(); ++i) {
     if (std::string_view(text(arv_get_device_protocol(i))) != "USB3Vision") continue;
-    devices.push_back({text(arv_get_device_id(i)), text(arv_get_device_vendor(i)), text(arv_get_device_serial_nbr(i))});
+    devices.push_back({text(arv_get_device_id(i)), printable(text(arv_get_device_vendor(i))),
+                       printable(text(arv_get_device_serial_nbr(i)))});
   }
   return devices;
 }
