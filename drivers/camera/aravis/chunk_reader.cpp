@@ -5,15 +5,9 @@
 #include <span>
 
 #include "drivers/camera/aravis/chunk_layout.hpp"
-#include "drivers/camera/aravis/description_lock.hpp"
 
 namespace slsd {
 namespace {
-
-ArvChunkParser* make_parser(ArvCamera* camera) {
-  const auto lock = lock_descriptions();
-  return arv_camera_create_chunk_parser(camera);
-}
 
 bool is_float(ArvCamera* camera, const char* name) {
   return ARV_IS_GC_FLOAT(arv_device_get_feature(arv_camera_get_device(camera), name));
@@ -23,7 +17,7 @@ bool is_float(ArvCamera* camera, const char* name) {
 
 ChunkReader::ChunkReader(ArvCamera* camera, const ChunkSelection& selection, std::size_t image_bytes,
                          std::chrono::nanoseconds apart_max)
-    : parser_(make_parser(camera)),
+    : parser_(arv_camera_create_chunk_parser(camera)),
       selection_(selection),
       image_bytes_(image_bytes),
       apart_max_(apart_max),

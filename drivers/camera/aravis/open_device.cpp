@@ -2,15 +2,55 @@
 // Copyright the slsd authors
 #include "drivers/camera/aravis/open_device.hpp"
 
+#include <dlfcn.h>
+
 #include <algorithm>
 #include <chrono>
+#include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
 
-#include "drivers/camera/aravis/description_lock.hpp"
 #include "drivers/camera/aravis/gige_discovery.hpp"
 #include "drivers/camera/aravis/gige_probe.hpp"
+
+// Aravis 0.8 parses descriptions, of devices and of their chunk data, in one state for the whole process, where no lock
+// protects it; and it parses in the same call that reads them from the device, so that a lock around that would have
+// all cameras wait for one that stops answering. These two functions are all that use the state. Aravis calls them
+// through its table of symbols, in which a program's own come first: so the lock is held while bytes are parsed, and
+// never while any are waited for.
+namespace {
+
+std::mutex& parsing() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+template <class Function>
+Function* of_aravis(Function*, const char* name) {
+  return reinterpret_cast<Function*>(::dlsym(RTLD_NEXT, name));
+}
+
+}  // namespace
+
+extern "C" {
+
+[[gnu::used, gnu::visibility("default")]] ArvDomDocument* arv_dom_document_new_from_memory(const void* buffer, int size,
+                                                                                           GError** error) {
+  static auto* const parse = of_aravis(arv_dom_document_new_from_memory, __func__);
+  const std::lock_guard lock(parsing());
+  return parse(buffer, size, error);
+}
+
+[[gnu::used, gnu::visibility("default")]] void arv_dom_document_append_from_memory(ArvDomDocument* document,
+                                                                                   ArvDomNode* node, const void* buffer,
+                                                                                   int size, GError** error) {
+  static auto* const parse = of_aravis(arv_dom_document_append_from_memory, __func__);
+  const std::lock_guard lock(parsing());
+  parse(document, node, buffer, size, error);
+}
+
+}  // extern "C"
 
 namespace slsd {
 namespace {
@@ -108,7 +148,6 @@ Result<OpenedDevice> open_gige_device(const GigeDevice& found) {
   const std::string name = found.name();
   const auto interface = inet_address(found.interface);
   const auto address = inet_address(found.address);
-  const auto lock = lock_descriptions();
   GErrorSlot error;
   GObjectPtr<ArvDevice> device(arv_gv_device_new(interface.get(), address.get(), error.out()));
   if (!device || error.failed()) return fail(error.code(), "the camera cannot be opened: " + error.message(), name);
@@ -117,7 +156,6 @@ Result<OpenedDevice> open_gige_device(const GigeDevice& found) {
 
 Result<OpenedDevice> open_usb3_device(const Usb3Device& listed) {
   const std::string name = listed.vendor + "-" + listed.serial;
-  const auto lock = lock_descriptions();
   GErrorSlot error;
   GObjectPtr<ArvDevice> device(arv_open_device(listed.id.c_str(), error.out()));
   if (!device || error.failed())

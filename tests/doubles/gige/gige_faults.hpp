@@ -20,6 +20,7 @@ struct GigeFaults {
   int garbage_chunk_frames = 0;  ///< so many have noise in the place of their chunks
   bool silent = false;           ///< answers, and sends no frame
   bool gone = false;             ///< neither answers nor sends
+  int dies_after = -1;           ///< is gone after so many answers more; below 0: never
   bool resends = true;           ///< sends packets again when asked
   std::optional<std::chrono::steady_clock::time_point> stalled_until = {};  ///< exposes, and sends only then
 };

@@ -3,10 +3,12 @@
 #include <chrono>
 #include <cstdint>
 #include <future>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 
@@ -245,6 +247,36 @@ TEST_F(AravisFaultsTest, IsDisconnectedWhenAnotherTakesControl) {
   device_.occupy(false);
   ASSERT_TRUE(opens_again(camera));
   EXPECT_TRUE(next(camera));
+}
+
+// A camera that dies while its description is read keeps Aravis waiting for seconds.
+TEST_F(AravisFaultsTest, HoldsUpNoOtherCameraWhenItDiesWhileOpening) {
+  device_.set_faults({.dies_after = 30});
+  test::GigeCamera other_device;
+  AravisCamera camera(options_for(device_));
+  auto opened = std::async(std::launch::async, [&] { return camera.open(); });
+  while (!device_.is_gone()) std::this_thread::sleep_for(1ms);
+  AravisCamera other(options_for(other_device));
+  auto other_opened = std::async(std::launch::async, [&] { return other.open(); });
+  while (other_device.times_taken() == 0 && other_opened.wait_for(1ms) == std::future_status::timeout) continue;
+  EXPECT_EQ(opened.wait_for(0s), std::future_status::timeout);
+  EXPECT_TRUE(other_opened.get());
+  EXPECT_FALSE(opened.get());
+  EXPECT_TRUE(next(other));
+}
+
+TEST_F(AravisFaultsTest, OpensManyCamerasAtOnce) {
+  constexpr int kCameras = 6;
+  std::vector<std::unique_ptr<test::GigeCamera>> devices;
+  std::vector<std::future<bool>> opened;
+  for (int i = 0; i < kCameras; ++i) devices.push_back(std::make_unique<test::GigeCamera>());
+  for (const auto& device : devices)
+    opened.push_back(std::async(std::launch::async, [&device] {
+      for (int i = 0; i < 3; ++i)
+        if (AravisCamera camera(options_for(*device)); !camera.open() || !camera.capture(far_away())) return false;
+      return true;
+    }));
+  for (auto& one : opened) EXPECT_TRUE(one.get());
 }
 
 TEST_F(AravisFaultsTest, NamesAnAddressWhereNothingAnswers) {
