@@ -2,10 +2,19 @@
 // Copyright the slsd authors
 #include "drivers/camera/aravis/configure_network.hpp"
 
+#include <netinet/in.h>
+#include <sys/socket.h>
+
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <optional>
+#include <system_error>
 
+#include "drivers/camera/aravis/host_interface.hpp"
 #include "drivers/camera/aravis/packet_socket.hpp"
 
 namespace slsd {
@@ -31,6 +40,23 @@ int receive_buffer_wanted(const AravisCameraOptions& options, std::size_t frame_
   return static_cast<int>(std::clamp<std::size_t>(2 * frame_bytes, kLeastBuffer, 1u << 28));
 }
 
+/// Aravis asks for it with the first packet only, which is lost with its frame where the default is too small.
+void grow_receive_buffer(ArvGvStream* stream, int bytes) {
+  const std::uint16_t port = arv_gv_stream_get_port(stream);
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", ignored)) {
+    const int descriptor = std::atoi(entry.path().filename().c_str());
+    sockaddr_in local{};
+    socklen_t local_bytes = sizeof(local);
+    if (::getsockname(descriptor, reinterpret_cast<sockaddr*>(&local), &local_bytes) != 0) continue;
+    if (local.sin_family != AF_INET || ntohs(local.sin_port) != port) continue;
+    int type = 0;
+    socklen_t type_bytes = sizeof(type);
+    ::getsockopt(descriptor, SOL_SOCKET, SO_TYPE, &type, &type_bytes);
+    if (type == SOCK_DGRAM) ::setsockopt(descriptor, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof(bytes));
+  }
+}
+
 Result<> set_packet_size(ArvCamera* camera, const AravisCameraOptions& options) {
   GErrorSlot error;
   // The stream would otherwise try sizes again when it is made.
@@ -46,6 +72,16 @@ Result<> set_packet_size(ArvCamera* camera, const AravisCameraOptions& options) 
   return fail(ErrorCode::kMismatch, "the camera took packets of " + std::to_string(taken) + " bytes", "packet_bytes");
 }
 
+std::optional<HostInterface> interface_of(ArvCamera* camera) {
+  auto* const device = ARV_GV_DEVICE(arv_camera_get_device(camera));
+  auto* const address = G_INET_SOCKET_ADDRESS(arv_gv_device_get_interface_address(device));
+  in_addr local{};
+  std::memcpy(&local, g_inet_address_to_bytes(g_inet_socket_address_get_address(address)), sizeof(local));
+  for (const HostInterface& interface : list_host_interfaces())
+    if (interface.reaches(local)) return interface;
+  return std::nullopt;
+}
+
 }  // namespace
 
 Result<> configure_packets(ArvCamera* camera, const AravisCameraOptions& options,
@@ -59,9 +95,7 @@ Result<> configure_packets(ArvCamera* camera, const AravisCameraOptions& options
   if (error.failed() && options.packet_delay_us > 0.0) return tl::unexpected(in_words(error, "packet delay"));
   const unsigned size = arv_camera_gv_get_packet_size(camera, error.out());
   const unsigned payload = arv_camera_get_payload(camera, error.out());
-  if (size < kJumboBytes && payload > kManyBytes)
-    warnings.push_back({"packet_size", "packets have " + std::to_string(size) +
-                                           " bytes only; set the MTU of the interface, and of every switch, to 9000"});
+  if (size < kJumboBytes && payload > kManyBytes) warnings.push_back(packet_size_warning(size, interface_of(camera)));
   return {};
 }
 
@@ -73,6 +107,7 @@ void configure_stream(ArvStream* stream, const AravisCameraOptions& options, std
   g_object_set(stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size", wanted,
                "packet-request-ratio", kRequestRatio, "frame-retention",
                static_cast<guint>(options.frame_timeout_ms) * 500u, nullptr);
+  grow_receive_buffer(ARV_GV_STREAM(stream), wanted);
   ArvGvStreamPacketResend resend = ARV_GV_STREAM_PACKET_RESEND_NEVER;
   g_object_get(stream, "packet-resend", &resend, nullptr);
   if (options.packet_resend && resend == ARV_GV_STREAM_PACKET_RESEND_NEVER)

@@ -9,14 +9,9 @@
 #include "core/result.hpp"
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/camera/aravis/g_object.hpp"
+#include "drivers/camera/aravis/opening_warnings.hpp"
 
 namespace slsd {
-
-/// Something about the system that may cost frames, or that could not be made sure of, by name and with what to do.
-struct NetworkWarning {
-  std::string name;  ///< "receive_buffer", "packet_size", "packet_resend", "device_clock", "chunks" or "first_frame"
-  std::string advice;
-};
 
 /// Sets packet size and delay of a GigE Vision camera; nothing for another. To be called before the stream is made.
 /// @errors kMismatch, kUnsupported, kDisconnected

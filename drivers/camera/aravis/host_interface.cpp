@@ -19,6 +19,10 @@ in_addr ipv4_of(const sockaddr* address) {
   return reinterpret_cast<const sockaddr_in*>(address)->sin_addr;
 }
 
+std::optional<int> mtu(const std::string& name) {
+  return first_number(std::filesystem::path("/sys/class/net") / name / "mtu");
+}
+
 // The kernel says -1 where a link has no speed, as the loopback.
 std::optional<int> link_speed(const std::string& name) {
   const auto speed = first_number(std::filesystem::path("/sys/class/net") / name / "speed");
@@ -43,7 +47,7 @@ std::vector<HostInterface> list_host_interfaces() {
     const bool usable = one->ifa_addr != nullptr && one->ifa_netmask != nullptr && (one->ifa_flags & IFF_UP) != 0;
     if (!usable || one->ifa_addr->sa_family != AF_INET) continue;
     interfaces.push_back({one->ifa_name, ipv4_of(one->ifa_addr), ipv4_of(one->ifa_netmask),
-                          ::if_nametoindex(one->ifa_name), link_speed(one->ifa_name)});
+                          ::if_nametoindex(one->ifa_name), link_speed(one->ifa_name), mtu(one->ifa_name)});
   }
   ::freeifaddrs(first);
   return interfaces;

@@ -17,6 +17,7 @@ struct HostInterface {
   in_addr mask{};       ///< in network order
   unsigned number = 0;  ///< the kernel's index
   std::optional<int> link_mbps = {};
+  std::optional<int> mtu_bytes = {};
 
   /// Whether the address is in its network, so that it is reached without a router.
   [[nodiscard]] bool reaches(in_addr other) const;

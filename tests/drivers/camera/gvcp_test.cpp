@@ -8,12 +8,15 @@
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
 
+#include "core/printable.hpp"
 #include "drivers/camera/aravis/host_interface.hpp"
+#include "drivers/camera/aravis/opening_warnings.hpp"
 
 namespace slsd {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 constexpr std::uint16_t kId = 0x1234;
 
@@ -36,6 +39,32 @@ TEST(ReadGvcpDiscovery, ReadsWhoTheDeviceIs) {
   ASSERT_TRUE(device);
   EXPECT_EQ(device->name(), "Maker-S77");
   EXPECT_EQ(device->model, std::string(32, 'M'));
+}
+
+TEST(ReadGvcpDiscovery, MakesNamesPrintable) {
+  auto answer = discovery_answer();
+  for (const std::size_t offset : {0x48, 0x68, 0xd8}) {
+    answer[8 + offset] = '\n';
+    answer[9 + offset] = 0x1b;
+    answer[10 + offset] = 0xff;
+  }
+  const auto device = read_gvcp_discovery(answer, kId);
+  ASSERT_TRUE(device);
+  for (const std::string& text : {device->vendor, device->model, device->serial}) {
+    EXPECT_EQ(text, printable(text));
+    EXPECT_EQ(text.find_first_of("\n\x1b\xff"), std::string::npos);
+  }
+}
+
+TEST(PacketSizeWarning, AsksForNoMtuThatIsThere) {
+  HostInterface interface;
+  interface.name = "eth1";
+  interface.mtu_bytes = 1500;
+  EXPECT_THAT(packet_size_warning(1400, interface).advice,
+              HasSubstr("set the MTU of eth1, and of every switch, to 9000"));
+  EXPECT_THAT(packet_size_warning(1400, std::nullopt).advice, HasSubstr("set the MTU of the interface"));
+  interface.mtu_bytes = 9000;
+  EXPECT_THAT(packet_size_warning(1400, interface).advice, HasSubstr("eth1 takes 9000: let every switch"));
 }
 
 TEST(ReadGvcpDiscovery, RefusesOtherAnswers) {
