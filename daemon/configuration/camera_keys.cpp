@@ -19,6 +19,9 @@ constexpr std::array kTriggers{
     std::pair("software"sv, AravisTrigger::kSoftware), std::pair("line"sv, AravisTrigger::kLine),
     std::pair("free_run"sv, AravisTrigger::kFreeRun), std::pair("action"sv, AravisTrigger::kAction)};
 
+constexpr std::array kClocks{std::pair("auto"sv, AravisClock::kAuto), std::pair("device"sv, AravisClock::kDevice),
+                             std::pair("arrival"sv, AravisClock::kArrival)};
+
 constexpr std::array kMosaics{std::pair("none"sv, BayerPattern::kNone), std::pair("RGGB"sv, BayerPattern::kRggb),
                               std::pair("BGGR"sv, BayerPattern::kBggr), std::pair("GRBG"sv, BayerPattern::kGrbg),
                               std::pair("GBRG"sv, BayerPattern::kGbrg)};
@@ -75,6 +78,8 @@ void read_keys(TableReader& reader, AravisCameraOptions& options) {
   reader.read("action_lead_us", options.action_lead_us);
   reader.read("ptp", options.ptp);
   reader.read("rate_hz", options.rate_hz);
+  reader.choose("device_clock", options.device_clock, span_of(kClocks));
+  reader.read("readout_us", options.readout_us);
   reader.read("exposure_us", options.exposure_us);
   reader.read("gain_db", options.gain_db);
   reader.read("pixel_format", options.pixel_format);

@@ -8,7 +8,6 @@
 
 #include <spdlog/spdlog.h>
 
-#include "core/printable.hpp"
 #include "drivers/camera/aravis/aravis_session.hpp"
 #include "drivers/camera/aravis/capture_events.hpp"
 #include "drivers/camera/aravis/frame_patience.hpp"
@@ -22,7 +21,7 @@ constexpr std::size_t kClosingMax = 4;
 
 AravisCamera::AravisCamera(AravisCameraOptions options)
     : options_(std::move(options)),
-      description_{options_.name, "aravis", options_.id, 0, 0},
+      description_{options_.name, "aravis", options_.id, 0, 0, 0.0, {}},
       events_(std::make_unique<CaptureEvents>()) {}
 
 AravisCamera::~AravisCamera() {
@@ -38,7 +37,7 @@ Result<> AravisCamera::open() {
   session_ = std::move(*session);
   address_ = session_->address();
   description_.device = session_->name();
-  description_.hardware = printable(session_->name());
+  description_.hardware = session_->name();
   description_.width_px = session_->layout().width_px;
   description_.height_px = session_->layout().height_px;
   description_.rate_hz = options_.trigger == AravisTrigger::kFreeRun ? options_.rate_hz : 0.0;
@@ -82,6 +81,7 @@ Result<Frame> AravisCamera::capture_next(MonotonicTime deadline) {
 }
 
 Result<Frame> AravisCamera::note(Result<Frame> frame) {
+  if (session_->note_clock()) log_warnings();
   if (frame) last_start_ = frame->exposure_start();
   if (!frame && frame.error().code == ErrorCode::kDisconnected) end_session();
   return frame;

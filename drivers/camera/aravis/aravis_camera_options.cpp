@@ -39,6 +39,7 @@ Result<> AravisCameraOptions::validate() const {
   if (!within(action_lead_us, 0.0, 1e6)) return refuse("action_lead_us must be 0 to 1000000");
   if (action_lead_us > 0.0 && !ptp) return refuse("action_lead_us needs ptp = true, without which clocks differ");
   if (rate_hz != 0.0 && !within(rate_hz, 0.01, 10000.0)) return refuse("rate_hz must be 0, or 0.01 to 10000");
+  if (!within(readout_us, 0.0, 1e7)) return refuse("readout_us must be 0 to 10000000");
   if (!within(exposure_us, 1.0, 1e7)) return refuse("exposure_us must be 1 to 10000000");
   if (!within(gain_db, 0.0, 60.0)) return refuse("gain_db must be 0 to 60");
   if (!find_pixel_layout(pixel_format)) return refuse("pixel_format must be one of " + pixel_format_names());

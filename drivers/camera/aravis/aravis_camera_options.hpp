@@ -20,6 +20,13 @@ enum class AravisTrigger {
   kAction,    ///< GigE: one command to all cameras with the same keys
 };
 
+/// By what is told when an exposure began.
+enum class AravisClock {
+  kAuto,     ///< the device's clock, and the arrival of frames where that cannot be read or trusted
+  kDevice,   ///< the device's clock wherever it can be read
+  kArrival,  ///< the arrival of frames
+};
+
 /// The keys of a [[camera]] table whose driver is "aravis".
 struct AravisCameraOptions {
   static constexpr std::string_view kDriver = "aravis";
@@ -29,10 +36,13 @@ struct AravisCameraOptions {
   AravisTrigger trigger = AravisTrigger::kSoftware;
   std::string trigger_line = "Line1";  ///< the input, where the trigger is a line
   ActionKeys action = {};              ///< GigE, where the trigger is an action: the same for all cameras of a group
-  double action_lead_us = 0.0;   ///< GigE: so long after the command all expose, by their common clock; 0, and until
-                                 ///< they have one: at once
-  bool ptp = false;              ///< the camera's clock follows the network's (IEEE 1588)
-  double rate_hz = 0.0;          ///< where it runs freely, up to 10000; 0: as the camera has it
+  double action_lead_us = 0.0;  ///< GigE: so long after the command all expose, by their common clock; 0, and until
+                                ///< they have one: at once
+  bool ptp = false;             ///< the camera's clock follows the network's (IEEE 1588)
+  double rate_hz = 0.0;         ///< where it runs freely, up to 10000; 0: as the camera has it
+  AravisClock device_clock = AravisClock::kAuto;
+  double readout_us = 0.0;       ///< by arrival, not by command: the longest from an exposure's end to the frame being
+                                 ///< there, up to 10000000; 0: two periods
   double exposure_us = 10000.0;  ///< 1 to 10000000
   double gain_db = 0.0;          ///< 0 to 60
   std::string pixel_format = "Mono8";               ///< Mono8, Mono10, Mono12, Mono16, packed, or Bayer in 8 to 16 bits

@@ -3,6 +3,7 @@
 #include "drivers/camera/aravis/aravis_session.hpp"
 
 #include <chrono>
+#include <thread>
 #include <utility>
 
 #include "drivers/camera/aravis/frame_patience.hpp"
@@ -19,11 +20,22 @@ using std::chrono::steady_clock;
 constexpr int kFirstClockReadings = 8;
 constexpr auto kAnswerTime = 100ms;
 constexpr auto kReadoutMost = 1s;
+constexpr auto kClockPause = 3ms;
+constexpr auto kArming = 5ms;
+constexpr int kStreamsMax = 5;
+
+bool heard_others(ArvStream* stream) {
+  return ARV_IS_GV_STREAM(stream) && arv_stream_get_info_uint64_by_name(stream, "n_received_packets") > 0;
+}
 
 }  // namespace
 
 AravisSession::AravisSession(const AravisCameraOptions& options, OpenedDevice device, CaptureEvents& events)
-    : options_(options), device_(std::move(device)), events_(events), number_(events.begin_session()) {}
+    : options_(options),
+      device_(std::move(device)),
+      events_(events),
+      number_(events.begin_session()),
+      first_clock_(options.ptp || options.device_clock == AravisClock::kDevice) {}
 
 AravisSession::~AravisSession() {
   ArvDevice* device = arv_camera_get_device(device_.camera.get());
@@ -69,12 +81,11 @@ Result<> AravisSession::prepare() {
   if (auto done = configure_packets(device_.camera.get(), options_, warnings_); !done) return done;
   read_clock_first();
   control_lost_handler_ = report_loss(arv_camera_get_device(device_.camera.get()), events_, number_);
-  if (auto done = make_stream(); !done) return done;
-  if (auto done = warm_up(); !done) return done;
   if (auto done = join_group(); !done) return done;
-  if (auto done = start(options_.trigger); !done) return done;
+  if (auto done = begin(); !done) return done;
   control_ = std::make_unique<DeviceControl>(device_.camera.get(), events_, number_, first_clock_, first_ptp_);
   frame_capture_.emplace(options_, device_.name, events_, *receiver_, *control_, action_ ? &*action_ : nullptr);
+  note_clock();
   return {};
 }
 
@@ -118,31 +129,59 @@ void AravisSession::read_clock_first() {
   if (options_.ptp) first_ptp_ = read_ptp_lock(device_.camera.get());
   for (int i = 0; i < kFirstClockReadings; ++i)
     if (const auto reading = read_device_clock(device_.camera.get())) first_clock_.observe(*reading);
-  if (!first_clock_.ready()) warnings_.push_back(device_clock_warning());
 }
 
-// The size of the receive buffer is put in force with the first packet, which is lost with its frame where the buffer
-// was too small; and only a frame proves that the data's way is open. Aravis hears every packet of the interface before
-// it narrows its packet socket to this stream: after those of another camera it may discard this one's frames as late
-// ones, which a new stream mends.
-Result<> AravisSession::warm_up() {
-  const DeviceFeatures features(device_.camera.get());
-  const bool software = features.has_entry("TriggerSource", "Software");
-  if (options_.trigger != AravisTrigger::kFreeRun && !software) {
-    warnings_.push_back(first_frame_warning());
-    return {};
+// One that does not go on as it began is looked at until it is known for what it is.
+void AravisSession::read_clock_again() {
+  for (int i = 0; i < kFirstClockReadings && first_clock_.ready(); ++i) {
+    const auto reading = read_device_clock(device_.camera.get());
+    if (!reading || first_clock_.observe(*reading)) return;
+    std::this_thread::sleep_for(kClockPause);
   }
-  const AravisTrigger trigger = software ? AravisTrigger::kSoftware : AravisTrigger::kFreeRun;
+}
+
+bool AravisSession::note_clock() {
+  if (clock_told_ || options_.device_clock == AravisClock::kArrival) return false;
+  const DeviceClock clock = control_->clock();
+  if (!receiver_->goes_by_arrival(clock)) return false;
+  warnings_.push_back(device_clock_warning(!clock.was_read()                 ? "cannot be read"
+                                           : receiver_->stamps_are_foreign() ? "is not the one that stamps its frames"
+                                                                             : clock.fault()));
+  return clock_told_ = true;
+}
+
+// Software triggers and a camera that runs freely prove their way on the stream that stays. For a line or an action a
+// command proves it, and the camera must stop in between. Many then number their frames from 1 again, which Aravis
+// would discard as late ones of before: so what follows gets a stream of its own.
+Result<> AravisSession::begin() {
+  const bool own = options_.trigger == AravisTrigger::kSoftware || options_.trigger == AravisTrigger::kFreeRun;
+  const bool commanded = DeviceFeatures(device_.camera.get()).has_entry("TriggerSource", "Software");
+  if (auto done = make_stream(); !done) return done;
+  if (own || commanded)
+    if (auto done = warm_up(own ? options_.trigger : AravisTrigger::kSoftware); !done) return done;
+  if (own) return receiver_->restart(), Result<>();
+  if (!commanded) {
+    warnings_.push_back(first_frame_warning());
+    return start(options_.trigger);
+  }
+  if (auto done = stop(); !done) return done;
+  if (auto done = make_stream(); !done) return done;
+  return start(options_.trigger);
+}
+
+// Only a frame proves that the data's way is open, on each new stream anew.
+Result<> AravisSession::warm_up(AravisTrigger trigger) {
   bool unreadable = false;
   for (int i = 0; i < kFirstFrameTries; ++i) {
     if (auto done = i > 0 ? make_stream() : Result<>(); !done) return done;
     if (auto done = start(trigger); !done) return done;
     const auto first = wait_for_first_frame(trigger, first_frame_patience(options_, trigger, i));
     if (!first) return tl::unexpected(first.error());
-    if (auto done = stop(); !done || *first == FirstFrame::kCame) return done;
+    if (*first == FirstFrame::kCame) return {};
+    if (auto done = stop(); !done) return done;
     unreadable = unreadable || *first == FirstFrame::kUnreadable;
   }
-  if (unreadable) return go_without_chunks();
+  if (unreadable) return go_without_chunks(trigger);
   return fail_here(ErrorCode::kDisconnected,
                    "the camera answers, and sends no frame; check that it is reached through the right interface, and "
                    "that no firewall holds back UDP from its address");
@@ -163,23 +202,31 @@ Result<AravisSession::FirstFrame> AravisSession::wait_for_first_frame(AravisTrig
     case CaptureEvents::Wake::kBuffer:
       break;
   }
-  return receiver_->discard_readable() ? FirstFrame::kCame : FirstFrame::kUnreadable;
+  read_clock_again();
+  return receiver_->discard_readable(first_clock_) ? FirstFrame::kCame : FirstFrame::kUnreadable;
 }
 
-Result<> AravisSession::go_without_chunks() {
+Result<> AravisSession::go_without_chunks(AravisTrigger trigger) {
   chunks_ = {};
   warnings_.push_back(chunks_warning());
   if (auto done = turn_chunks_off(DeviceFeatures(device_.camera.get())); !done) return done;
   if (auto done = make_stream(); !done) return done;
-  return warm_up();
+  return warm_up(trigger);
 }
 
+// A packet socket hears every packet of the interface before it is narrowed to this stream, and by the number of
+// another camera's frame Aravis would discard this one's as late ones. Some cameras hear no trigger until a moment
+// after they have begun.
 Result<> AravisSession::start(AravisTrigger trigger) {
   const DeviceFeatures features(device_.camera.get());
   if (auto done = configure_trigger(features, options_, trigger); !done) return done;
+  for (int i = 0; i < kStreamsMax && heard_others(stream_.get()); ++i)
+    if (auto done = make_stream(); !done) return done;
   while (events_.take_buffer()) receiver_->discard();
-  receiver_->restart();
-  return features.execute("AcquisitionStart");
+  receiver_->begin();
+  if (auto done = features.execute("AcquisitionStart"); !done) return done;
+  if (trigger != AravisTrigger::kFreeRun) std::this_thread::sleep_for(kArming);
+  return {};
 }
 
 Result<> AravisSession::stop() {

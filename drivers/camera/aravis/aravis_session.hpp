@@ -50,6 +50,8 @@ class AravisSession {
   [[nodiscard]] const std::vector<NetworkWarning>& warnings() const { return warnings_; }
   [[nodiscard]] AravisStatistics statistics() const { return receiver_->statistics(); }
   [[nodiscard]] DeviceClock clock() const { return control_->clock(); }
+  /// Looks whether the device's clock can still be trusted. @return whether there is a new warning
+  bool note_clock();
   /// Whether the device still answers; waits a little for a trigger under way.
   [[nodiscard]] bool answers();
   /// @errors kDisconnected: it was lost while nobody asked for a frame
@@ -70,15 +72,17 @@ class AravisSession {
   AravisSession(const AravisCameraOptions& options, OpenedDevice device, CaptureEvents& events);
 
   [[nodiscard]] Result<> prepare();
+  [[nodiscard]] Result<> begin();
   [[nodiscard]] Result<> join_group();
   [[nodiscard]] Result<> make_stream();
   [[nodiscard]] std::unique_ptr<ChunkReader> make_chunk_reader() const;
-  [[nodiscard]] Result<> warm_up();
-  [[nodiscard]] Result<> go_without_chunks();
+  [[nodiscard]] Result<> warm_up(AravisTrigger trigger);
+  [[nodiscard]] Result<> go_without_chunks(AravisTrigger trigger);
   [[nodiscard]] Result<> start(AravisTrigger trigger);
   [[nodiscard]] Result<> stop();
   [[nodiscard]] Result<FirstFrame> wait_for_first_frame(AravisTrigger trigger, std::chrono::nanoseconds time);
   void read_clock_first();
+  void read_clock_again();
   [[nodiscard]] tl::unexpected<Error> fail_here(ErrorCode code, std::string message) const;
 
   AravisCameraOptions options_;
@@ -97,6 +101,7 @@ class AravisSession {
   std::optional<FrameCapture> frame_capture_;  ///< once it is prepared, until it is abandoned
   unsigned long control_lost_handler_ = 0;
   bool abandoned_ = false;
+  bool clock_told_ = false;  ///< the warning of it
 };
 
 }  // namespace slsd

@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "drivers/camera/aravis/frame_patience.hpp"
+
 namespace slsd {
 namespace {
 
@@ -14,6 +16,7 @@ constexpr double kExposureToleranceShare = 0.01;
 constexpr double kExposureToleranceUs = 20.0;  // sensors expose in whole lines
 constexpr double kGainToleranceDb = 0.1;
 constexpr double kRateToleranceShare = 0.01;
+constexpr double kRateUnknownHz = 10.0;
 
 /// What a camera changes by itself would make frames of one scene differ, and decoding with them.
 Result<> turn_automatics_off(const DeviceFeatures& features) {
@@ -91,6 +94,11 @@ Result<> set_rate(const DeviceFeatures& features, const AravisCameraOptions& opt
   return features.set(name, options.rate_hz, options.rate_hz * kRateToleranceShare);
 }
 
+std::chrono::nanoseconds period_of(const DeviceFeatures& features, const AravisCameraOptions& options) {
+  const double rate_hz = options.rate_hz > 0.0 ? options.rate_hz : features.rate_hz().value_or(kRateUnknownHz);
+  return from_us(1e6 / rate_hz);
+}
+
 }  // namespace
 
 Result<DeviceLayout> configure_image(const DeviceFeatures& features, const AravisCameraOptions& options) {
@@ -108,7 +116,7 @@ Result<DeviceLayout> configure_image(const DeviceFeatures& features, const Aravi
   const auto height = features.integer("Height");
   if (!width) return tl::unexpected(width.error());
   if (!height) return tl::unexpected(height.error());
-  return DeviceLayout{*width, *height, *pixels};
+  return DeviceLayout{*width, *height, *pixels, period_of(features, options)};
 }
 
 Result<> configure_clock(const DeviceFeatures& features, const AravisCameraOptions& options) {

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 
 #include "core/result.hpp"
@@ -16,6 +17,7 @@ struct DeviceLayout {
   int width_px = 0;
   int height_px = 0;
   PixelLayout pixels;
+  std::chrono::nanoseconds period{0};  ///< of frames, where the camera runs freely
 
   [[nodiscard]] std::size_t bytes() const {
     return packed_bytes(static_cast<std::size_t>(width_px) * height_px, pixels.bits_per_pixel());

@@ -14,6 +14,9 @@ constexpr double kCrystalError = 100e-6;  // what a clock may be off before its 
 constexpr double kWander = 2e-6;          // by which a drift changes as the device warms up
 constexpr std::uint64_t kSecond = 1'000'000'000;
 constexpr nanoseconds kSlack = std::chrono::milliseconds(1);  // beyond what readings tell of each other
+constexpr int kStepsMax = 3;                                  // one may be an administrator's doing
+constexpr int kFitsToForget = 60;
+constexpr nanoseconds kFarthest = std::chrono::hours(24 * 365 * 50);
 
 nanoseconds half_width(const ClockReading& reading) {
   return (reading.after - reading.before) / 2;
@@ -21,6 +24,13 @@ nanoseconds half_width(const ClockReading& reading) {
 
 MonotonicTime middle(const ClockReading& reading) {
   return reading.before + half_width(reading);
+}
+
+// A device may show any number, whose distance from another need not be one.
+nanoseconds between(nanoseconds from, nanoseconds to) {
+  std::int64_t since = 0;
+  if (__builtin_sub_overflow(to.count(), from.count(), &since)) return to > from ? kFarthest : -kFarthest;
+  return std::clamp(nanoseconds(since), -kFarthest, kFarthest);
 }
 
 double seconds(nanoseconds duration) {
@@ -38,8 +48,12 @@ std::size_t DeviceClock::size() const {
 }
 
 // Readings of both sides of a step would be fitted by a drift that no clock has.
-void DeviceClock::observe(const ClockReading& reading) {
-  if (!ready() || has_stepped(reading)) {
+bool DeviceClock::observe(const ClockReading& reading) {
+  const bool first = !was_read();
+  const bool stepped = !first && has_stepped(reading);
+  if (stepped) note_step(reading);
+  if (!first && !stepped && ++fits_ >= kFitsToForget) steps_ = 0;
+  if (first || stepped) {
     count_ = 0;
     steady_since_ = reading.after;
   }
@@ -47,6 +61,18 @@ void DeviceClock::observe(const ClockReading& reading) {
   ++count_;
   fit_drift();
   choose_reference();
+  return !stepped;
+}
+
+void DeviceClock::note_step(const ClockReading& reading) {
+  fits_ = 0;
+  if (may_be_set_ || ++steps_ < kStepsMax || !fault_.empty()) return;
+  if (reading.device == newest().device)
+    fault_ = "stands still";
+  else if (reading.device < newest().device)
+    fault_ = "goes back again and again";
+  else
+    fault_ = "does not go at the rate that it says";
 }
 
 bool DeviceClock::has_stepped(const ClockReading& reading) const {
@@ -58,9 +84,13 @@ bool DeviceClock::may_have_shown(nanoseconds device, MonotonicTime before) const
   return host_time(device) <= before + uncertainty(device) + kSlack;
 }
 
+bool DeviceClock::may_have_shown(nanoseconds device, MonotonicTime after, MonotonicTime before) const {
+  return may_have_shown(device, before) && host_time(device) >= after - uncertainty(device) - kSlack;
+}
+
 // Least squares, each reading weighed by how well it is known.
 void DeviceClock::fit_drift() {
-  const ClockReading& origin = readings_[(count_ - 1) % readings_.size()];
+  const ClockReading& origin = newest();
   double weights = 0, x_sum = 0, y_sum = 0, xx_sum = 0, xy_sum = 0;
   for (std::size_t i = 0; i < size(); ++i) {
     const double x = seconds(readings_[i].device - origin.device);
@@ -78,18 +108,17 @@ void DeviceClock::fit_drift() {
 }
 
 void DeviceClock::choose_reference() {
-  const ClockReading& newest = readings_[(count_ - 1) % readings_.size()];
-  reference_ = newest;
+  reference_ = newest();
   for (std::size_t i = 0; i < size(); ++i) {
     const auto aged = [&](const ClockReading& reading) {
-      return seconds(half_width(reading)) + drift_error_ * seconds(newest.device - reading.device);
+      return seconds(half_width(reading)) + drift_error_ * seconds(newest().device - reading.device);
     };
     if (aged(readings_[i]) < aged(reference_)) reference_ = readings_[i];
   }
 }
 
 MonotonicTime DeviceClock::host_time(nanoseconds device) const {
-  const auto since = static_cast<double>((device - reference_.device).count());
+  const auto since = static_cast<double>(between(reference_.device, device).count());
   return middle(reference_) + nanoseconds(std::llround(since * host_per_device_));
 }
 
@@ -99,7 +128,7 @@ nanoseconds DeviceClock::device_time(MonotonicTime host) const {
 }
 
 nanoseconds DeviceClock::uncertainty(nanoseconds device) const {
-  const double since = std::abs(static_cast<double>((device - reference_.device).count()));
+  const double since = std::abs(static_cast<double>(between(reference_.device, device).count()));
   return half_width(reference_) + nanoseconds(std::llround(since * drift_error_));
 }
 

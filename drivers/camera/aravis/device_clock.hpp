@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "drivers/camera/frame.hpp"
 
@@ -26,18 +27,29 @@ struct ClockReading {
 /// Maps a device's clock to CLOCK_MONOTONIC by the readings that it is given: the offset by the one that is known best,
 /// the drift by the line through all of them. Without drift a crystal's 100 ppm would put a frame 0.1 ms off after a
 /// second. A device's clock may be set, as one is that begins to follow the network's: from the first reading after it
-/// on, what was read before is forgotten.
+/// on, what was read before is forgotten. One that does not fit the readings before again and again, because it stands
+/// still, goes at another rate than it says or is set back, is not ready any more.
 /// @thread thread-bound
 class DeviceClock {
  public:
-  void observe(const ClockReading& reading);
+  /// @param may_be_set  what does not fit is no fault, however often
+  explicit DeviceClock(bool may_be_set = false) : may_be_set_(may_be_set) {}
 
-  [[nodiscard]] bool ready() const { return count_ > 0; }
+  /// @return whether it fits the readings before
+  bool observe(const ClockReading& reading);
+
+  [[nodiscard]] bool was_read() const { return count_ > 0; }
+  /// Why it is not to be trusted; empty while it is.
+  [[nodiscard]] std::string_view fault() const { return fault_; }
+  /// Whether it can be read, and trusted.
+  [[nodiscard]] bool ready() const { return was_read() && fault_.empty(); }
   /// Since when all readings were of one course of the clock. Precondition: ready().
   [[nodiscard]] MonotonicTime steady_since() const { return steady_since_; }
   /// Whether the device's clock can have shown so much before a time. What it shows only later was shown before it was
   /// set back. Precondition: ready().
   [[nodiscard]] bool may_have_shown(std::chrono::nanoseconds device, MonotonicTime before) const;
+  /// Whether it can have shown so much between two times. Precondition: ready().
+  [[nodiscard]] bool may_have_shown(std::chrono::nanoseconds device, MonotonicTime after, MonotonicTime before) const;
   /// When the device's clock showed so much. Precondition: ready().
   [[nodiscard]] MonotonicTime host_time(std::chrono::nanoseconds device) const;
   /// What the device's clock shows at a time. Precondition: ready().
@@ -49,10 +61,16 @@ class DeviceClock {
 
  private:
   [[nodiscard]] std::size_t size() const;
+  [[nodiscard]] const ClockReading& newest() const { return readings_[(count_ - 1) % readings_.size()]; }
   [[nodiscard]] bool has_stepped(const ClockReading& reading) const;
+  void note_step(const ClockReading& reading);
   void fit_drift();
   void choose_reference();
 
+  bool may_be_set_;
+  std::string_view fault_;
+  int steps_ = 0;                          ///< of late
+  int fits_ = 0;                           ///< since the last of them
   std::array<ClockReading, 32> readings_;  ///< a ring
   std::size_t count_ = 0;
   MonotonicTime steady_since_;

@@ -65,7 +65,7 @@ DeviceControl::DeviceControl(ArvCamera* camera, CaptureEvents& events, std::uint
       session_(session),
       clock_(clock),
       ptp_(ptp),
-      has_clock_(clock.ready()),
+      readable_(clock.was_read()),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 void DeviceControl::trigger() {
@@ -115,7 +115,7 @@ void DeviceControl::send_trigger() {
 
 // The clock first, by which a device that is gone is known soonest; and once more, as it is set before it is locked.
 void DeviceControl::read_clock() {
-  if (!has_clock_ || !observe_clock() || !ptp_) return;
+  if (!readable_ || !observe_clock() || !ptp_) return;
   const PtpLock ptp = read_ptp_lock(camera_);
   if (!observe_clock()) return;
   const std::lock_guard lock(mutex_);

@@ -25,6 +25,7 @@ namespace slsd {
 class DeviceControl {
  public:
   /// @param camera  outlives this, and is used by nobody else meanwhile
+  /// @param clock   as read so far; never, where the device has none that can be read
   /// @param ptp     as it is now, where the device's clock is to follow the network's; else nothing
   DeviceControl(ArvCamera* camera, CaptureEvents& events, std::uint64_t session, const DeviceClock& clock,
                 std::optional<PtpLock> ptp);
@@ -34,8 +35,6 @@ class DeviceControl {
   DeviceControl& operator=(const DeviceControl&) = delete;
 
   void trigger();
-  /// Whether the device has a clock that can be read.
-  [[nodiscard]] bool has_clock() const { return has_clock_; }
   [[nodiscard]] DeviceClock clock() const;
   /// Whether the device's clock is the network's: as it says itself, or because it was not set for a while.
   [[nodiscard]] bool follows_network() const;
@@ -54,7 +53,7 @@ class DeviceControl {
   bool trigger_ = false;
   DeviceClock clock_;
   std::optional<PtpLock> ptp_;
-  const bool has_clock_;
+  const bool readable_;
   std::jthread thread_;
 };
 

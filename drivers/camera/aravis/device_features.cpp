@@ -46,7 +46,7 @@ Result<> DeviceFeatures::choose(const char* name, const std::string& entry) cons
   }
   const char* taken = arv_camera_get_string(camera_, name, error.out());
   if (auto done = check(error, name); !done) return done;
-  return taken == entry ? Result<>() : fail_taken(name, entry, taken == nullptr ? "nothing" : taken);
+  return taken == entry ? Result<>() : fail_taken(name, entry, taken == nullptr ? "nothing" : printable(taken));
 }
 
 Result<> DeviceFeatures::set(const char* name, double value, double tolerance) const {
@@ -87,6 +87,12 @@ Result<int> DeviceFeatures::integer(const char* name) const {
   const gint64 value = arv_camera_get_integer(camera_, name, error.out());
   if (auto done = check(error, name); !done) return tl::unexpected(done.error());
   return static_cast<int>(value);
+}
+
+std::optional<double> DeviceFeatures::rate_hz() const {
+  GErrorSlot error;
+  const double rate = arv_camera_get_frame_rate(camera_, error.out());
+  return !error.failed() && std::isfinite(rate) && rate >= 0.01 ? std::optional(rate) : std::nullopt;
 }
 
 Result<> DeviceFeatures::choose_if_there(const char* name, const std::string& entry) const {

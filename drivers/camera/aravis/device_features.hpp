@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "core/result.hpp"
@@ -28,6 +29,8 @@ class DeviceFeatures {
   [[nodiscard]] Result<> turn(const char* name, bool on) const;
   [[nodiscard]] Result<> execute(const char* name) const;
   [[nodiscard]] Result<int> integer(const char* name) const;
+  /// Frames a second where it runs freely; nothing where it does not say.
+  [[nodiscard]] std::optional<double> rate_hz() const;
 
   /// The same where the camera has the feature, and nothing where it has not.
   [[nodiscard]] Result<> choose_if_there(const char* name, const std::string& entry) const;

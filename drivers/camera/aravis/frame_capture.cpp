@@ -14,6 +14,7 @@ using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
 constexpr auto kQuietLeast = 50ms;
+constexpr int kStaleMax = 5;
 
 }  // namespace
 
@@ -31,14 +32,28 @@ Result<> FrameCapture::check() const {
   return {};
 }
 
-Result<Frame> FrameCapture::capture(MonotonicTime deadline) {
+Result<> FrameCapture::may_capture(MonotonicTime deadline) {
+  passed_over_ = 0;
   if (events_.take_cancel()) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
   if (deadline <= steady_clock::now()) return fail_here(ErrorCode::kFrameLate, "the deadline is past");
   if (receiver_.all_held()) return fail_here(ErrorCode::kBusy, "all frames are held; give some back first");
+  return {};
+}
+
+// Without a clock a frame that comes sooner than its exposure takes may be of an earlier command, or of a camera that
+// does not expose as long as it says. After it was quiet the second command tells.
+Result<Frame> FrameCapture::capture(MonotonicTime deadline) {
+  if (auto may = may_capture(deadline); !may) return tl::unexpected(may.error());
+  auto frame = expose(deadline, false);
+  const bool too_soon = !frame && frame.error().code == ErrorCode::kFrameStale;
+  return too_soon && goes_by_arrival() ? expose(deadline, true) : std::move(frame);
+}
+
+Result<Frame> FrameCapture::expose(MonotonicTime deadline, bool was_quiet) {
   if (auto settled = settle(deadline); !settled) return tl::unexpected(settled.error());
   const MonotonicTime asked = steady_clock::now();
   trigger(asked);
-  return await_frame(asked, deadline);
+  return await_frame(asked, deadline, was_quiet);
 }
 
 void FrameCapture::trigger(MonotonicTime now) {
@@ -60,9 +75,7 @@ std::optional<std::uint64_t> FrameCapture::action_time() const {
 Result<Frame> FrameCapture::capture_since(MonotonicTime since, MonotonicTime deadline) {
   const auto age_max = std::min(next_frame_age_max(options_), frame_patience(options_) / 2);
   if (steady_clock::now() - since > age_max) return capture(deadline);
-  if (events_.take_cancel()) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
-  if (deadline <= steady_clock::now()) return fail_here(ErrorCode::kFrameLate, "the deadline is past");
-  if (receiver_.all_held()) return fail_here(ErrorCode::kBusy, "all frames are held; give some back first");
+  if (auto may = may_capture(deadline); !may) return tl::unexpected(may.error());
   return await_frame(since, deadline);
 }
 
@@ -96,7 +109,8 @@ Result<> FrameCapture::settle(MonotonicTime deadline) {
 
 // After a frame of an earlier trigger each capture would else get the frame of the one before it, for ever.
 Result<> FrameCapture::wait_until_quiet(MonotonicTime deadline) {
-  const auto quiet = std::min<std::chrono::nanoseconds>(2 * longest_wait_ + kQuietLeast, frame_patience(options_));
+  const auto quiet = std::min<std::chrono::nanoseconds>(from_us(options_.exposure_us) + 2 * longest_wait_ + kQuietLeast,
+                                                        frame_patience(options_));
   for (;;) {
     const auto wake = events_.wait_buffer(std::min(deadline, steady_clock::now() + quiet));
     if (wake == CaptureEvents::Wake::kLost) return lost(events_.lost_reason());
@@ -110,7 +124,7 @@ Result<> FrameCapture::wait_until_quiet(MonotonicTime deadline) {
   return {};
 }
 
-Result<Frame> FrameCapture::await_frame(MonotonicTime asked, MonotonicTime deadline) {
+Result<Frame> FrameCapture::await_frame(MonotonicTime asked, MonotonicTime deadline, bool was_quiet) {
   const bool paced = options_.trigger != AravisTrigger::kLine;
   const MonotonicTime limit = paced ? std::min(deadline, asked + frame_patience(options_)) : deadline;
   for (;;) {
@@ -120,23 +134,27 @@ Result<Frame> FrameCapture::await_frame(MonotonicTime asked, MonotonicTime deadl
       case CaptureEvents::Wake::kLost:
         return lost(events_.lost_reason());
       case CaptureEvents::Wake::kTimeout:
-        if (deadline <= limit && steady_clock::now() - asked < frame_patience(options_))
-          return fail_here(ErrorCode::kFrameLate, "no frame came before the deadline");
+        if (deadline <= limit && steady_clock::now() - asked < frame_patience(options_)) return late();
         return missed(deadline);
       case CaptureEvents::Wake::kBuffer:
-        if (auto judged = judge(asked)) return std::move(*judged);
+        if (auto judged = judge(asked, was_quiet)) return std::move(*judged);
     }
   }
 }
 
 // Passed over is a stale frame of a line or clock that runs on, and what still comes of a trigger given up before.
-std::optional<Result<Frame>> FrameCapture::judge(MonotonicTime asked) {
-  auto taken = receiver_.take(asked, control_.clock());
+std::optional<Result<Frame>> FrameCapture::judge(MonotonicTime asked, bool was_quiet) {
+  const DeviceClock clock = control_.clock();
+  auto taken = receiver_.take({asked, clock, was_quiet});
   const bool software = options_.trigger == AravisTrigger::kSoftware;
-  if (!taken && !software && taken.error().code == ErrorCode::kFrameStale) return std::nullopt;
+  const bool stale = !taken && taken.error().code == ErrorCode::kFrameStale;
+  if (stale && !software) return ++passed_over_, std::nullopt;
   if (!taken && software && frames_missed_ > 0) return --frames_missed_, std::nullopt;
   if (frames_due_ > 0) --frames_due_;
-  out_of_step_ = !taken && taken.error().code == ErrorCode::kFrameStale;
+  out_of_step_ = stale;
+  stale_in_a_row_ = stale ? stale_in_a_row_ + 1 : 0;
+  // Getting in step did not help: the next session looks at the clock anew.
+  if (stale_in_a_row_ >= kStaleMax) return Result<Frame>(lost("the camera answers with frames of before"));
   if (!taken) return Result<Frame>(tl::unexpected(taken.error()));
   if (!*taken) return std::nullopt;
   longest_wait_ = std::max(longest_wait_, steady_clock::now() - asked);
@@ -150,11 +168,19 @@ tl::unexpected<Error> FrameCapture::missed(MonotonicTime deadline) {
   frames_due_ = 0;
   ++frames_missed_;
   // Without the device's clock a frame that comes after all would be taken for the next.
-  const bool enough = frames_missed_ >= options_.missed_frames_max || !control_.has_clock();
+  const bool enough = frames_missed_ >= options_.missed_frames_max || goes_by_arrival();
   if (options_.trigger != AravisTrigger::kLine && enough) return lost("the camera answers, and sends no frames");
-  if (steady_clock::now() >= deadline) return fail_here(ErrorCode::kFrameLate, "no frame came before the deadline");
+  if (steady_clock::now() >= deadline) return late();
   return fail_here(ErrorCode::kFrameDropped, "no frame came within " + std::to_string(options_.frame_timeout_ms) +
                                                  " ms; it is lost, or frame_timeout_ms is too short");
+}
+
+tl::unexpected<Error> FrameCapture::late() const {
+  if (passed_over_ == 0) return fail_here(ErrorCode::kFrameLate, "no frame came before the deadline");
+  if (!goes_by_arrival()) return fail_here(ErrorCode::kFrameLate, "only frames of before came until the deadline");
+  return fail_here(ErrorCode::kFrameLate,
+                   "only frames came that may have been exposed before; set readout_us to the longest that the camera "
+                   "takes from the end of an exposure until its frame is there");
 }
 
 tl::unexpected<Error> FrameCapture::lost(const std::string& reason) const {

@@ -40,8 +40,12 @@ class FrameCapture {
   [[nodiscard]] std::optional<std::uint64_t> action_time() const;
   [[nodiscard]] Result<> settle(MonotonicTime deadline);
   [[nodiscard]] Result<> wait_until_quiet(MonotonicTime deadline);
-  [[nodiscard]] Result<Frame> await_frame(MonotonicTime asked, MonotonicTime deadline);
-  [[nodiscard]] std::optional<Result<Frame>> judge(MonotonicTime asked);
+  [[nodiscard]] Result<> may_capture(MonotonicTime deadline);
+  [[nodiscard]] Result<Frame> expose(MonotonicTime deadline, bool was_quiet);
+  [[nodiscard]] Result<Frame> await_frame(MonotonicTime asked, MonotonicTime deadline, bool was_quiet = false);
+  [[nodiscard]] std::optional<Result<Frame>> judge(MonotonicTime asked, bool was_quiet);
+  [[nodiscard]] bool goes_by_arrival() const { return receiver_.goes_by_arrival(control_.clock()); }
+  [[nodiscard]] tl::unexpected<Error> late() const;
   [[nodiscard]] tl::unexpected<Error> missed(MonotonicTime deadline);
   [[nodiscard]] tl::unexpected<Error> lost(const std::string& reason) const;
   [[nodiscard]] tl::unexpected<Error> fail_here(ErrorCode code, std::string message) const;
@@ -55,6 +59,8 @@ class FrameCapture {
   int frames_due_ = 0;     ///< triggers whose frame has not come
   int frames_missed_ = 0;  ///< frames in a row that did not come; they may still come late
   MonotonicTime triggered_;
+  int stale_in_a_row_ = 0;
+  int passed_over_ = 0;                       ///< stale frames of this capture
   bool out_of_step_ = false;                  ///< the last frame was of an earlier trigger
   std::chrono::nanoseconds longest_wait_{0};  ///< for a frame
 };

@@ -16,11 +16,18 @@ namespace {
 using std::chrono::nanoseconds;
 
 constexpr std::uint64_t kHandOverUs = 100'000;
-constexpr int kSpareBuffers = 4;  // being filled, or done and not yet taken
+constexpr int kSpareBuffers = 4;           // being filled, or done and not yet taken
+constexpr std::uint64_t kNear = 3;         // frames, of which some may be lost
+constexpr double kLeastOfExposure = 0.95;  // sensors take it a little shorter than they say
 
 /// When its last byte came; noted by the stream's callback.
 MonotonicTime received(ArvBuffer* buffer) {
   return MonotonicTime(nanoseconds(arv_buffer_get_system_timestamp(buffer)));
+}
+
+/// When its exposure began, by the camera's clock.
+nanoseconds stamp_of(ArvBuffer* buffer, const FrameChunks& chunks) {
+  return chunks.exposure_start.value_or(nanoseconds(arv_buffer_get_timestamp(buffer)));
 }
 
 std::string status_text(ArvBufferStatus status) {
@@ -45,7 +52,8 @@ FrameReceiver::FrameReceiver(ArvStream* stream, const DeviceLayout& layout, cons
       layout_(layout),
       options_(options),
       buffers_(stream, payload_bytes, options.frames_held_max + kSpareBuffers),
-      chunks_(std::move(chunks)) {
+      chunks_(std::move(chunks)),
+      period_(layout.period) {
   if (layout.pixels.is_zero_copy()) return;
   greys_.emplace(FrameFormat{layout.width_px, layout.height_px, layout.pixels.bytes_per_pixel},
                  options.frames_held_max);
@@ -54,6 +62,11 @@ FrameReceiver::FrameReceiver(ArvStream* stream, const DeviceLayout& layout, cons
     grey8_ = Grey8(layout.width_px, layout.height_px);
   else
     grey16_ = Grey16(layout.width_px, layout.height_px);
+}
+
+void FrameReceiver::begin() {
+  restart();
+  began_ = std::chrono::steady_clock::now();
 }
 
 void FrameReceiver::restart() {
@@ -69,7 +82,10 @@ ArvBuffer* FrameReceiver::pop() {
 }
 
 void FrameReceiver::return_unread(ArvBuffer* buffer) {
-  if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS) note_identifier(buffer);
+  if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS) {
+    note_identifier(buffer);
+    note_pace(buffer);
+  }
   buffers_.return_unread(buffer);
 }
 
@@ -78,20 +94,22 @@ void FrameReceiver::discard() {
 }
 
 // A frame with chunks that are more than the camera told is too large for its buffer.
-bool FrameReceiver::discard_readable() {
+bool FrameReceiver::discard_readable(const DeviceClock& clock) {
   ArvBuffer* buffer = pop();
   if (buffer == nullptr) return true;
   const bool too_large = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SIZE_MISMATCH;
-  const bool readable = !chunks_ || (wrong_with(buffer).empty() ? read_chunks(buffer).has_value() : !too_large);
+  const bool whole = wrong_with(buffer).empty();
+  const auto chunks = whole ? read_chunks(buffer) : std::nullopt;
+  if (chunks) judge_stamps(buffer, *chunks, clock);
   return_unread(buffer);
-  return readable;
+  return !chunks_ || (whole ? chunks.has_value() : !too_large);
 }
 
 void FrameReceiver::discard_all() {
   while (ArvBuffer* buffer = arv_stream_try_pop_buffer(stream_)) return_unread(buffer);
 }
 
-Result<std::optional<Frame>> FrameReceiver::take(MonotonicTime asked, const DeviceClock& clock) {
+Result<std::optional<Frame>> FrameReceiver::take(const Proof& proof) {
   ArvBuffer* buffer = pop();
   if (buffer == nullptr) return std::nullopt;
   if (const std::string wrong = wrong_with(buffer); !wrong.empty())
@@ -102,11 +120,13 @@ Result<std::optional<Frame>> FrameReceiver::take(MonotonicTime asked, const Devi
                   "the frame is not whole: its chunks are not as the camera describes them; where that happens with "
                   "every frame, set chunks = false");
   note_identifier(buffer);
+  note_pace(buffer);
+  judge_stamps(buffer, *chunks, proof.clock);
   if (const std::string unlike = unlike_configured(*chunks, options_); !unlike.empty())
     return refuse(buffer, counted_.misexposed, ErrorCode::kMismatch,
                   "the frame was exposed with other settings: " + unlike +
                       "; scan again, and if it stays so see that nothing else sets the camera, or set chunks = false");
-  const auto start = exposure_start(buffer, *chunks, asked, clock);
+  const auto start = exposure_start(buffer, *chunks, proof);
   if (start) return deliver(buffer, *start);
   return refuse(buffer, counted_.stale, ErrorCode::kFrameStale, "the frame was exposed before it was asked for");
 }
@@ -153,18 +173,55 @@ void FrameReceiver::note_identifier(ArvBuffer* buffer) {
   if (missing > 0 && !std::exchange(ran_out_, false)) counted_.lost += missing;
 }
 
-std::optional<MonotonicTime> FrameReceiver::exposure_start(ArvBuffer* buffer, const FrameChunks& chunks,
-                                                           MonotonicTime asked, const DeviceClock& clock) const {
+// No frame can have been exposed before the camera began to acquire, nor after it was there: one that says so is
+// stamped by another clock than the one that is read. The first tells, before anything hangs on it.
+void FrameReceiver::judge_stamps(ArvBuffer* buffer, const FrameChunks& chunks, const DeviceClock& clock) {
+  if (stamps_judged_ || options_.device_clock != AravisClock::kAuto || options_.ptp || !clock.ready()) return;
+  stamps_judged_ = true;
+  foreign_stamps_ = !clock.may_have_shown(stamp_of(buffer, chunks), began_, received(buffer));
+}
+
+// The longest of late: a link that is slower than the sensor makes it longer than the camera says, and what is held up
+// on its way comes in a burst. Where frames in between found no buffer nothing is known of their pace.
+void FrameReceiver::note_pace(ArvBuffer* buffer) {
+  const std::uint64_t id = arv_buffer_get_frame_id(buffer);
   const MonotonicTime there = received(buffer);
-  if (!clock.ready()) {
-    const MonotonicTime start = there - from_us(options_.exposure_us);
-    if (options_.trigger == AravisTrigger::kSoftware) return asked;
-    return start < asked ? std::nullopt : std::optional(start);
+  const auto before = std::exchange(last_, std::pair(id, there));
+  paced_ = before && id > before->first && id - before->first <= kNear;
+  if (paced_) period_ = std::max({layout_.period, there - before->second, period_ * 9 / 10});
+}
+
+bool FrameReceiver::goes_by_arrival(const DeviceClock& clock) const {
+  return options_.device_clock == AravisClock::kArrival || foreign_stamps_ || !clock.ready();
+}
+
+std::optional<MonotonicTime> FrameReceiver::exposure_start(ArvBuffer* buffer, const FrameChunks& chunks,
+                                                           const Proof& proof) const {
+  const MonotonicTime there = received(buffer);
+  if (goes_by_arrival(proof.clock)) return start_by_arrival(there, proof);
+  const nanoseconds device = stamp_of(buffer, chunks);
+  const MonotonicTime start = proof.clock.host_time(device);
+  if (start + proof.clock.uncertainty(device) < proof.asked) return std::nullopt;
+  if (!proof.clock.may_have_shown(device, there)) return std::nullopt;
+  return std::clamp(start, std::min(proof.asked, there), there);
+}
+
+// At a command exactly one frame is due, all earlier ones have come, and what comes sooner than an exposure takes is
+// none that the command began: unless the camera was silent before for longer than a frame ever took. Without a command
+// frames follow each other all the time: the one that is there was exposed, then read out within a period, then sent
+// within another, or else they would pile up. The start that is reported is thus the earliest possible, and a frame
+// whose exposure began before it was asked for is passed over even where it came as late as it can.
+std::optional<MonotonicTime> FrameReceiver::start_by_arrival(MonotonicTime there, const Proof& proof) const {
+  if (options_.trigger == AravisTrigger::kSoftware) {
+    const bool took_its_time = there - proof.asked >= from_us(options_.exposure_us * kLeastOfExposure);
+    return took_its_time || proof.was_quiet ? std::optional(proof.asked) : std::nullopt;
   }
-  const nanoseconds device = chunks.exposure_start.value_or(nanoseconds(arv_buffer_get_timestamp(buffer)));
-  const MonotonicTime start = clock.host_time(device);
-  if (start + clock.uncertainty(device) < asked || !clock.may_have_shown(device, there)) return std::nullopt;
-  return std::clamp(start, std::min(asked, there), there);
+  const bool runs = options_.trigger == AravisTrigger::kFreeRun;
+  if (runs && !paced_) return std::nullopt;
+  const nanoseconds period = runs ? period_ : layout_.period;
+  const nanoseconds readout = options_.readout_us > 0.0 ? from_us(options_.readout_us) : 2 * period;
+  const MonotonicTime start = there - from_us(options_.exposure_us) - readout;
+  return start < proof.asked ? std::nullopt : std::optional(start);
 }
 
 Result<std::optional<Frame>> FrameReceiver::deliver(ArvBuffer* buffer, MonotonicTime start) {

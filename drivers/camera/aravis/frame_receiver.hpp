@@ -2,11 +2,13 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/image.hpp"
@@ -34,21 +36,33 @@ class FrameReceiver {
   FrameReceiver(ArvStream* stream, const DeviceLayout& layout, const AravisCameraOptions& options,
                 std::size_t payload_bytes, std::unique_ptr<ChunkReader> chunks);
 
+  /// To be called before the camera begins to acquire.
+  void begin();
   /// Begins to count anew.
   void restart();
 
   [[nodiscard]] bool all_held() const { return buffers_.lent() >= options_.frames_held_max; }
 
+  /// What proves that a frame was exposed after it was asked for.
+  struct Proof {
+    MonotonicTime asked;  ///< frames exposed before are stale
+    const DeviceClock& clock;
+    bool was_quiet = false;  ///< the camera was silent for so long that what comes now answers the command
+  };
+
   /// Takes the next buffer of the stream, which is done.
-  /// @param asked  frames exposed before are stale
-  /// @param clock  of the device; where it is not ready the exposure is taken to end when the frame is there
   /// @return nothing if the stream gave a buffer up without a frame
   /// @errors kFrameTorn, kFrameStale, kBusy; kMismatch: exposed with other settings than configured
-  [[nodiscard]] Result<std::optional<Frame>> take(MonotonicTime asked, const DeviceClock& clock);
+  [[nodiscard]] Result<std::optional<Frame>> take(const Proof& proof);
   /// Takes the next buffer and gives it back.
   void discard();
   /// As discard(). @return false if it is a frame whose chunks cannot be read
-  [[nodiscard]] bool discard_readable();
+  [[nodiscard]] bool discard_readable(const DeviceClock& clock);
+
+  /// Whether exposures are told by the arrival of frames.
+  [[nodiscard]] bool goes_by_arrival(const DeviceClock& clock) const;
+  /// The first frame was stamped by another clock than the one that can be read.
+  [[nodiscard]] bool stamps_are_foreign() const { return foreign_stamps_; }
   /// Gives back all that are done.
   void discard_all();
 
@@ -62,8 +76,11 @@ class FrameReceiver {
   [[nodiscard]] tl::unexpected<Error> refuse(ArvBuffer* buffer, std::uint64_t& count, ErrorCode code,
                                              std::string message);
   void note_identifier(ArvBuffer* buffer);
+  void judge_stamps(ArvBuffer* buffer, const FrameChunks& chunks, const DeviceClock& clock);
+  void note_pace(ArvBuffer* buffer);
   [[nodiscard]] std::optional<MonotonicTime> exposure_start(ArvBuffer* buffer, const FrameChunks& chunks,
-                                                            MonotonicTime asked, const DeviceClock& clock) const;
+                                                            const Proof& proof) const;
+  [[nodiscard]] std::optional<MonotonicTime> start_by_arrival(MonotonicTime there, const Proof& proof) const;
   [[nodiscard]] Result<std::optional<Frame>> deliver(ArvBuffer* buffer, MonotonicTime exposure_start);
   [[nodiscard]] GreyView view(ArvBuffer* buffer) const;
   [[nodiscard]] std::optional<Frame> as_grey(ArvBuffer* buffer, MonotonicTime exposure_start);
@@ -76,6 +93,12 @@ class FrameReceiver {
   FrameIds ids_;
   std::uint64_t underruns_ = 0;
   bool ran_out_ = false;  ///< of buffers, before a gap in the identifiers that has not come yet
+  MonotonicTime began_;
+  bool stamps_judged_ = false;
+  bool foreign_stamps_ = false;
+  std::optional<std::pair<std::uint64_t, MonotonicTime>> last_;  ///< identifier and arrival of the frame before
+  bool paced_ = false;                                           ///< the frame before came before
+  std::chrono::nanoseconds period_;                              ///< of frames, as long as any of late
   AravisStatistics counted_;
   std::optional<FramePool> greys_;  ///< of mosaics turned into grey, and of packed pixels unpacked
   Grey8 grey8_;

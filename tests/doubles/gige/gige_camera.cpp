@@ -50,9 +50,9 @@ void GigeCamera::power_up() {
   registers_->write(kHasChunks, options_.chunks ? 1 : 0);
   registers_->write(kHasSoftwareTrigger, options_.software_trigger ? 1 : 0);
   registers_->write(kPtpStatus, options_.ptp_status);
-  clock_.emplace(*registers_, options_.tick_frequency_hz, options_.drift_ppm);
+  clock_.emplace(*registers_, options_.tick_frequency_hz, options_.drift_ppm, options_.clock_fault);
   port_ = std::make_unique<ControlPort>(*registers_, control_events());
-  sensor_.power_up(*registers_, options_.first_frame_id);
+  sensor_.power_up(*registers_, options_.first_frame_id, options_.readout);
   sender_->stop();
 }
 
@@ -107,8 +107,9 @@ void GigeCamera::wait_for_work() {
 }
 
 GigeCamera::Time GigeCamera::next_work(Time now) const {
-  if (sender_->sending() || (sensor_.has_exposures() && !trouble_.stalled(now))) return now;
-  return std::min({now + 100ms, sensor_.next_due(), trouble_.next_end(now)});
+  if (sender_->sending() || (sensor_.has_exposures(now) && !trouble_.stalled(now))) return now;
+  const Time due = trouble_.stalled(now) ? now + 100ms : sensor_.next_due();
+  return std::min({now + 100ms, due, trouble_.next_end(now)});
 }
 
 void GigeCamera::read_commands(int socket) {
@@ -119,6 +120,8 @@ void GigeCamera::read_commands(int socket) {
         ::recvfrom(socket, command_.data(), command_.size(), 0, reinterpret_cast<sockaddr*>(&from), &from_bytes);
     if (bytes < 0) return;
     if (trouble_.off()) continue;
+    if (trouble_.faults.dies_after == 0) trouble_.faults.gone = true;
+    if (trouble_.faults.dies_after >= 0 && trouble_.faults.dies_after-- == 0) continue;
     const auto& answer = port_->answer({command_.data(), static_cast<std::size_t>(bytes)}, from);
     if (answer.empty()) continue;
     ::sendto(control_socket_, answer.data(), answer.size(), 0, reinterpret_cast<const sockaddr*>(&from), from_bytes);
@@ -128,6 +131,10 @@ void GigeCamera::read_commands(int socket) {
 void GigeCamera::note_write(std::uint32_t address, std::uint32_t value) {
   if (address == kTriggerSoftware) return sensor_.trigger(Sensor::Source::kSoftware);
   if (address == kAcquisition && value == 0) sensor_.discard_exposures();
+  if (address == kAcquisition && value == 1) {
+    if (options_.restarts_ids) sensor_.restart_ids(), sender_->forget();
+    sensor_.arm_at(steady_clock::now() + options_.arming);
+  }
   if (address == kPtpEnable) clock_->show_frequency();
   if (address == kTimestampControl && (value & kLatch) != 0) clock_->latch();
   if (address == kStreamPacketSize && (value & kFireTestPacket) != 0) {
@@ -138,7 +145,7 @@ void GigeCamera::note_write(std::uint32_t address, std::uint32_t value) {
 
 void GigeCamera::send_frames(Time now) {
   if (trouble_.off() || trouble_.stalled(now)) return;
-  if (!sender_->sending() && sensor_.has_exposures()) {
+  if (!sender_->sending() && sensor_.has_exposures(now)) {
     compose_frame(sensor_.take_exposure(), *registers_, *clock_, options_, trouble_.faults, sender_->next_frame());
     sender_->begin(target());
   }
@@ -164,6 +171,12 @@ void GigeCamera::set_faults(const GigeFaults& faults) {
   const std::lock_guard lock(mutex_);
   trouble_.faults = faults;
   wake();
+}
+
+void GigeCamera::set_clock_fault(ClockFault fault) {
+  const std::lock_guard lock(mutex_);
+  options_.clock_fault = fault;
+  clock_->set_fault(fault);
 }
 
 void GigeCamera::stall(std::chrono::milliseconds duration) {
@@ -209,6 +222,11 @@ std::uint32_t GigeCamera::frames_exposed() const {
   return sensor_.counter();
 }
 
+GigeCamera::Time GigeCamera::exposure_of(std::uint32_t counter) const {
+  const std::lock_guard lock(mutex_);
+  return sensor_.begin_of(counter);
+}
+
 GigeCamera::Time GigeCamera::last_exposure() const {
   const std::lock_guard lock(mutex_);
   return sensor_.last_exposure();
@@ -222,6 +240,11 @@ std::uint64_t GigeCamera::packets_lost() const {
 std::uint64_t GigeCamera::packets_sent_again() const {
   const std::lock_guard lock(mutex_);
   return sender_->packets_sent_again();
+}
+
+bool GigeCamera::is_gone() const {
+  const std::lock_guard lock(mutex_);
+  return trouble_.faults.gone;
 }
 
 int GigeCamera::times_taken() const {

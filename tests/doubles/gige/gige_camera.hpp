@@ -37,6 +37,7 @@ class GigeCamera {
 
   void lose_packets(double share, std::uint32_t seed = 1);
   void set_faults(const GigeFaults& faults);
+  void set_clock_fault(ClockFault fault);
   void stall(std::chrono::milliseconds duration);
   /// Off for so long, and on again with nothing of what was set.
   void blip(std::chrono::milliseconds off);
@@ -50,11 +51,15 @@ class GigeCamera {
   [[nodiscard]] std::uint32_t read(std::uint32_t address) const;
   [[nodiscard]] double read_double(std::uint32_t address) const;
   [[nodiscard]] std::uint32_t frames_exposed() const;
+  /// When the exposure of the frame of this counter began, of the last 1024.
+  [[nodiscard]] std::chrono::steady_clock::time_point exposure_of(std::uint32_t counter) const;
   /// When the last frame's exposure began.
   [[nodiscard]] std::chrono::steady_clock::time_point last_exposure() const;
   [[nodiscard]] std::uint64_t packets_lost() const;
   [[nodiscard]] std::uint64_t packets_sent_again() const;
   [[nodiscard]] int times_taken() const;
+  /// Neither answers nor sends, as told or because it died.
+  [[nodiscard]] bool is_gone() const;
   [[nodiscard]] ActionCounts actions() const;
 
  private:

@@ -3,10 +3,13 @@
 //
 // A GigE Vision camera on this host:
 //   gige-camera [--address A] [--serial S] [--size WxH] [--images PATH] [--chunks 0|1]
+//               [--restarts-ids 0|1] [--arming-us N] [--clock good|still|epoch|rate|back]
 // Serves counted frames, or one image or those of a folder. Prints its address, and then obeys the commands that it
 // reads, a line each, and answers "ok" or "?", until "quit" or the end of the input.
 #include <algorithm>
+#include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <iostream>
@@ -25,6 +28,7 @@ namespace {
 
 constexpr const char* kUsage =
     "usage: gige-camera [--address A] [--serial S] [--size WxH] [--images PATH] [--chunks 0|1]\n"
+    "                   [--restarts-ids 0|1] [--arming-us N] [--clock good|still|epoch|rate|back]\n"
     "commands: lose SHARE | drop N | truncate N | stale N | silent 0|1 | gone 0|1 | resends 0|1 | stall MS |\n"
     "          misexpose N | misgain N | cut N | garble N |\n"
     "          blip MS | occupy 0|1 | pulse | status | quit\n";
@@ -43,11 +47,22 @@ std::vector<Grey8> images_of(const std::filesystem::path& folder) {
   return images;
 }
 
+bool set_clock(const std::string& value, GigeCameraOptions& options) {
+  const std::array<std::string, 5> names{"good", "still", "epoch", "rate", "back"};  // as ClockFault
+  const auto* const found = std::ranges::find(names, value);
+  if (found == names.end()) return false;
+  options.clock_fault = static_cast<ClockFault>(found - names.begin());
+  return true;
+}
+
 bool set_option(const std::string& name, const std::string& value, GigeCameraOptions& options) {
   if (name == "--address") return options.address = value, true;
   if (name == "--serial") return options.serial = value, true;
   if (name == "--size") return std::sscanf(value.c_str(), "%dx%d", &options.width_px, &options.height_px) == 2;
   if (name == "--chunks") return options.chunks = value != "0", true;
+  if (name == "--restarts-ids") return options.restarts_ids = value != "0", true;
+  if (name == "--arming-us") return options.arming = std::chrono::microseconds(std::atoi(value.c_str())), true;
+  if (name == "--clock") return set_clock(value, options);
   if (name != "--images") return false;
   std::vector<Grey8> images = images_of(value);
   if (images.empty()) return false;

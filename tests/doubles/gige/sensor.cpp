@@ -3,6 +3,7 @@
 #include "tests/doubles/gige/sensor.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace slsd::test {
 namespace {
@@ -20,8 +21,10 @@ Sensor::Sensor(GigeTrouble& trouble) : trouble_(trouble) {
   exposures_.reserve(1024);
 }
 
-void Sensor::power_up(const RegisterFile& registers, std::uint16_t first_id) {
+void Sensor::power_up(const RegisterFile& registers, std::uint16_t first_id,
+                      std::optional<std::chrono::microseconds> readout) {
   registers_ = &registers;
+  readout_ = readout;
   exposures_.clear();
   next_id_ = first_id;
   next_free_.reset();
@@ -29,6 +32,7 @@ void Sensor::power_up(const RegisterFile& registers, std::uint16_t first_id) {
 }
 
 void Sensor::trigger(Source source) {
+  if (steady_clock::now() < armed_at_) return;
   const bool waits =
       registers_->read(kTriggerMode) == 1 && registers_->read(kTriggerSource) == static_cast<std::uint32_t>(source);
   if (waits && registers_->read(kAcquisition) == 1) expose(steady_clock::now());
@@ -57,7 +61,8 @@ void Sensor::run_freely(Time now) {
 }
 
 Sensor::Time Sensor::next_due() const {
-  return std::min(next_free_.value_or(Time::max()), act_at_.value_or(Time::max()));
+  const Time ready = exposures_.empty() ? Time::max() : exposures_.front().ready;
+  return std::min({next_free_.value_or(Time::max()), act_at_.value_or(Time::max()), ready});
 }
 
 void Sensor::expose(Time begin) {
@@ -77,7 +82,10 @@ void Sensor::expose(Time begin) {
 }
 
 void Sensor::add_exposure(Time begin) {
-  exposures_.push_back({next_id_, counter_++, begin});
+  begins_[counter_ % begins_.size()] = begin;
+  Time ready = begin;
+  if (readout_) ready += std::chrono::microseconds(std::lround(registers_->read_double(kExposureTime))) + *readout_;
+  exposures_.push_back({next_id_, counter_++, begin, ready});
   next_id_ = id_after(next_id_);
 }
 

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -26,6 +27,7 @@ class Sensor {
     std::uint16_t id;
     std::uint32_t counter;
     Time begin;
+    Time ready;  ///< to be sent
   };
 
   /// @param trouble  outlives this; its counts of exposures are used up here
@@ -33,7 +35,16 @@ class Sensor {
 
   /// Forgets everything but its counter.
   /// @param registers  outlive this, or are followed by others at the next call
-  void power_up(const RegisterFile& registers, std::uint16_t first_id);
+  /// @param readout    from an exposure's end to its sending; without it, it is sent as it begins
+  void power_up(const RegisterFile& registers, std::uint16_t first_id,
+                std::optional<std::chrono::microseconds> readout);
+
+  /// Hears no trigger until then.
+  void arm_at(Time time) { armed_at_ = time; }
+  /// The next frame has the number 1.
+  void restart_ids() { next_id_ = 1; }
+  /// When the exposure of this counter began. Precondition: it is one of the last 1024.
+  [[nodiscard]] Time begin_of(std::uint32_t counter) const { return begins_[counter % begins_.size()]; }
 
   /// Exposes, if this is the source that is waited for.
   void trigger(Source source);
@@ -43,8 +54,9 @@ class Sensor {
   /// When it will be time to, as far as is known; Time::max() where it is not.
   [[nodiscard]] Time next_due() const;
 
-  [[nodiscard]] bool has_exposures() const { return !exposures_.empty(); }
-  /// The oldest that is not sent. Precondition: has_exposures().
+  /// Whether one is to be sent.
+  [[nodiscard]] bool has_exposures(Time now) const { return !exposures_.empty() && exposures_.front().ready <= now; }
+  /// The oldest that is not sent. Precondition: has_exposures(now).
   [[nodiscard]] Exposure take_exposure();
   void discard_exposures() { exposures_.clear(); }
 
@@ -59,10 +71,13 @@ class Sensor {
 
   GigeTrouble& trouble_;
   const RegisterFile* registers_ = nullptr;
+  std::optional<std::chrono::microseconds> readout_;
   std::vector<Exposure> exposures_;  ///< not yet sent
   std::uint16_t next_id_ = 1;
   std::uint32_t counter_ = 0;
   Time last_exposure_;
+  Time armed_at_;
+  std::array<Time, 1024> begins_{};  ///< by the counter
   std::optional<Time> next_free_;
   std::optional<Time> act_at_;
 };

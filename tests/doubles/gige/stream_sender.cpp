@@ -75,6 +75,11 @@ void StreamSender::send_some() {
   if (target_.packet_delay.count() > 0) std::this_thread::sleep_for(target_.packet_delay * kPacketsAtOnce);
 }
 
+void StreamSender::forget() {
+  stop();
+  for (WireFrame& frame : frames_) frame.id = 0;
+}
+
 void StreamSender::send_again(std::uint16_t id, std::uint32_t first, std::uint32_t last, const StreamTarget& target) {
   const auto found = std::ranges::find(frames_, id, &WireFrame::id);
   if (found == frames_.end() || found->pixels.empty()) return;

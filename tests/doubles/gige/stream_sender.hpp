@@ -50,6 +50,8 @@ class StreamSender {
   /// Sends some packets of the frame that begin() began.
   void send_some();
   void stop() { packets_ = next_packet_ = 0; }
+  /// Forgets the frames that were sent, whose numbers come again.
+  void forget();
 
   /// Sends packets again, if their frame is still kept.
   void send_again(std::uint16_t id, std::uint32_t first, std::uint32_t last, const StreamTarget& target);

@@ -9,8 +9,8 @@ constexpr std::uint64_t kNetworkTicksHz = 1'000'000'000;  // of a clock that fol
 
 }  // namespace
 
-TickClock::TickClock(RegisterFile& registers, std::uint64_t frequency_hz, double drift_ppm)
-    : registers_(registers), own_frequency_hz_(frequency_hz), drift_ppm_(drift_ppm) {
+TickClock::TickClock(RegisterFile& registers, std::uint64_t frequency_hz, double drift_ppm, ClockFault fault)
+    : registers_(registers), own_frequency_hz_(frequency_hz), drift_ppm_(drift_ppm), fault_(fault) {
   show_frequency();
 }
 
@@ -20,9 +20,26 @@ void TickClock::show_frequency() {
 }
 
 void TickClock::latch() {
-  const std::uint64_t ticks = ticks_at(std::chrono::steady_clock::now());
+  const std::uint64_t ticks = shown(ticks_at(std::chrono::steady_clock::now()));
   registers_.write(kTimestampHigh, static_cast<std::uint32_t>(ticks >> 32));
   registers_.write(kTimestampLow, static_cast<std::uint32_t>(ticks));
+}
+
+std::uint64_t TickClock::shown(std::uint64_t ticks) {
+  ++latches_;
+  switch (fault_) {
+    case ClockFault::kNone:
+      return ticks;
+    case ClockFault::kStandsStill:
+      return 0;
+    case ClockFault::kOtherEpoch:
+      return ticks + 3600 * frequency_hz();
+    case ClockFault::kOtherRate:
+      return 2 * ticks;
+    case ClockFault::kGoesBack:
+      return (1000 - latches_) * frequency_hz();
+  }
+  return ticks;
 }
 
 bool TickClock::follows_network() const {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 
+#include "tests/doubles/gige/gige_camera_options.hpp"
 #include "tests/doubles/gige/register_file.hpp"
 
 namespace slsd::test {
@@ -19,10 +20,12 @@ class TickClock {
   /// @param registers     where it is shown; they outlive this
   /// @param frequency_hz  of its own
   /// @param drift_ppm     how much faster than the host's its own goes
-  TickClock(RegisterFile& registers, std::uint64_t frequency_hz, double drift_ppm);
+  /// @param fault         of what latch() shows
+  TickClock(RegisterFile& registers, std::uint64_t frequency_hz, double drift_ppm, ClockFault fault);
 
   /// Shows how often it ticks: after PTP was turned on or off.
   void show_frequency();
+  void set_fault(ClockFault fault) { fault_ = fault; }
   /// Shows what it is now.
   void latch();
 
@@ -35,10 +38,13 @@ class TickClock {
 
  private:
   [[nodiscard]] bool follows_network() const;
+  [[nodiscard]] std::uint64_t shown(std::uint64_t ticks);
 
   RegisterFile& registers_;
   std::uint64_t own_frequency_hz_;
   double drift_ppm_;
+  ClockFault fault_;
+  std::uint64_t latches_ = 0;
   Time begin_ = std::chrono::steady_clock::now();
 };
 

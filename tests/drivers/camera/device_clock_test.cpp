@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -114,6 +115,33 @@ TEST(DeviceClock, KnowsWhatWasShownBeforeItWasSetBack) {
     const MonotonicTime received = kHostStart + 19s + 900ms;
     EXPECT_FALSE(stepped.clock.may_have_shown(stepped.crystal.at(received) - step, received));
     EXPECT_TRUE(stepped.clock.may_have_shown(stepped.crystal.at(received), received));
+  }
+}
+
+/// What a clock is found to be by readings once a second, by what it shows each time.
+std::string_view fault_of(const std::function<nanoseconds(int)>& shown, bool may_be_set = false) {
+  DeviceClock clock(may_be_set);
+  for (int i = 0; i < 5; ++i) clock.observe({shown(i), kHostStart + i * 1s, kHostStart + i * 1s + 100us});
+  EXPECT_EQ(clock.ready(), clock.fault().empty());
+  return clock.fault();
+}
+
+TEST(DeviceClock, FindsOutWhatCannotBeTrusted) {
+  EXPECT_EQ(fault_of([](int i) { return i * 1s; }), "");
+  EXPECT_EQ(fault_of([](int) { return 7s; }), "stands still");
+  EXPECT_EQ(fault_of([](int i) { return i * 2s; }), "does not go at the rate that it says");
+  EXPECT_EQ(fault_of([](int i) { return i * 1010ms; }), "does not go at the rate that it says");
+  EXPECT_EQ(fault_of([](int i) { return 100s - i * 1s; }), "goes back again and again");
+  EXPECT_EQ(fault_of([](int i) { return i * 1s + (i > 1 ? 40s : 0s) - (i > 2 ? 90s : 0s); }), "");
+  EXPECT_EQ(fault_of([](int) { return 7s; }, true), "");
+}
+
+TEST(DeviceClock, TakesAnyNumber) {
+  DeviceClock clock;
+  clock.observe({nanoseconds::min(), kHostStart, kHostStart + 100us});
+  for (const nanoseconds shown : {nanoseconds::max(), nanoseconds(0), nanoseconds::min()}) {
+    EXPECT_LE(off(clock.host_time(shown), kHostStart), 24h * 366 * 50);
+    EXPECT_EQ(clock.may_have_shown(shown, kHostStart, kHostStart + 1s), shown == nanoseconds::min());
   }
 }
 
