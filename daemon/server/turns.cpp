@@ -18,7 +18,8 @@ std::chrono::nanoseconds Turns::processor_time() {
 
 void Turns::ask(Taker& taker, std::function<void()> turn) {
   taker.asked = true;
-  waiting_.emplace(std::max(taker.used_until, now_), Waiting{&taker, std::move(turn)});
+  const bool was_away = taker.used_until < now_;
+  waiting_.emplace(Start{std::max(taker.used_until, now_), !was_away}, Waiting{&taker, std::move(turn)});
   if (waiting_.size() == 1) asio::post(events_, [this] { take_next(); });
 }
 
@@ -27,7 +28,7 @@ void Turns::take_next() {
   if (waiting_.empty()) return;
   auto next = waiting_.extract(waiting_.begin());
   if (!waiting_.empty()) asio::post(events_, [this] { take_next(); });
-  now_ = next.key();
+  now_ = next.key().first;
   const auto begin = time_();
   auto& [taker, turn] = next.mapped();
   taker->asked = false;

@@ -52,10 +52,11 @@ class Turns {
     Taker* taker;
     std::function<void()> turn;
   };
+  using Start = std::pair<std::chrono::nanoseconds, bool>;  ///< who used nothing since goes before who did
   asio::io_context& events_;
   Time time_;
-  std::multimap<std::chrono::nanoseconds, Waiting> waiting_;  ///< by start; equals in the order of asking
-  std::chrono::nanoseconds now_{};                            ///< the start of the turn under way, or of the last one
+  std::multimap<Start, Waiting> waiting_;  ///< equals in the order of asking
+  std::chrono::nanoseconds now_{};         ///< the start of the turn under way, or of the last one
 };
 
 }  // namespace slsd
