@@ -7,7 +7,7 @@
 #include <tuple>
 #include <utility>
 
-#include "drivers/camera/aravis/gige_probe.hpp"
+#include "drivers/camera/aravis/gige_discovery.hpp"
 
 namespace slsd {
 namespace {

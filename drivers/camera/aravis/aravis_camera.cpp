@@ -8,9 +8,9 @@
 
 #include <spdlog/spdlog.h>
 
+#include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/camera/aravis/aravis_session.hpp"
 #include "drivers/camera/aravis/capture_events.hpp"
-#include "drivers/camera/aravis/frame_patience.hpp"
 
 namespace slsd {
 namespace {

@@ -6,10 +6,10 @@
 #include <thread>
 #include <utility>
 
-#include "drivers/camera/aravis/frame_patience.hpp"
-#include "drivers/camera/aravis/frame_payload.hpp"
-#include "drivers/camera/aravis/opening_warnings.hpp"
-#include "drivers/camera/aravis/session_reports.hpp"
+#include "drivers/camera/aravis/aravis_camera_options.hpp"
+#include "drivers/camera/aravis/capture_events.hpp"
+#include "drivers/camera/aravis/configure_device.hpp"
+#include "drivers/camera/aravis/configure_network.hpp"
 
 namespace slsd {
 namespace {

@@ -14,14 +14,13 @@
 #include "drivers/camera/aravis/action_group.hpp"
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/camera/aravis/capture_events.hpp"
-#include "drivers/camera/aravis/configure_chunks.hpp"
+#include "drivers/camera/aravis/configure_device.hpp"
 #include "drivers/camera/aravis/configure_network.hpp"
 #include "drivers/camera/aravis/device_control.hpp"
 #include "drivers/camera/aravis/frame_capture.hpp"
 #include "drivers/camera/aravis/frame_receiver.hpp"
 #include "drivers/camera/aravis/g_object.hpp"
 #include "drivers/camera/aravis/open_device.hpp"
-#include "drivers/camera/aravis/ptp_lock.hpp"
 #include "drivers/camera/frame.hpp"
 
 namespace slsd {

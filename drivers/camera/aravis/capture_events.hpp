@@ -7,6 +7,7 @@
 #include <mutex>
 #include <string>
 
+#include "drivers/camera/aravis/g_object.hpp"
 #include "drivers/camera/frame.hpp"
 
 namespace slsd {
@@ -52,5 +53,14 @@ class CaptureEvents {
   bool cancelled_ = false;
   std::string lost_;
 };
+
+/// Makes the camera's stream, which reports each buffer that is done, and stamps it with the time.
+/// @param events  outlive the stream
+[[nodiscard]] GObjectPtr<ArvStream> make_reporting_stream(ArvCamera* camera, CaptureEvents& events,
+                                                          std::uint64_t session, GErrorSlot& error);
+
+/// Has the device report when it does not answer any more, or another application took control.
+/// @return the handler, to be disconnected before the events end
+[[nodiscard]] unsigned long report_loss(ArvDevice* device, CaptureEvents& events, std::uint64_t session);
 
 }  // namespace slsd

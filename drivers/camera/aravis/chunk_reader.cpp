@@ -4,7 +4,7 @@
 
 #include <span>
 
-#include "drivers/camera/aravis/chunk_layout.hpp"
+#include "drivers/camera/aravis/frame_chunks.hpp"
 
 namespace slsd {
 namespace {

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "drivers/camera/aravis/configure_chunks.hpp"
+#include "drivers/camera/aravis/configure_device.hpp"
 #include "drivers/camera/aravis/frame_chunks.hpp"
 #include "drivers/camera/aravis/g_object.hpp"
 

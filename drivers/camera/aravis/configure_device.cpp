@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "drivers/camera/aravis/frame_patience.hpp"
+#include "drivers/camera/aravis/aravis_camera_options.hpp"
 
 namespace slsd {
 namespace {
@@ -99,6 +99,29 @@ std::chrono::nanoseconds period_of(const DeviceFeatures& features, const AravisC
   return from_us(1e6 / rate_hz);
 }
 
+/// Whether the chunk is on now, and can be read.
+Result<bool> turn_on(const DeviceFeatures& features, const char* chunk, const char* value) {
+  if (!features.has_entry("ChunkSelector", chunk)) return false;
+  Result<> done = features.choose("ChunkSelector", chunk);
+  if (done) done = features.turn("ChunkEnable", true);
+  if (done) return features.has(value);
+  if (done.error().code == ErrorCode::kDisconnected) return tl::unexpected(done.error());
+  return false;
+}
+
+Result<ChunkSelection> turn_on_all(const DeviceFeatures& features) {
+  const auto timestamp = turn_on(features, "Timestamp", "ChunkTimestamp");
+  if (!timestamp) return tl::unexpected(timestamp.error());
+  const auto exposure_time = turn_on(features, "ExposureTime", "ChunkExposureTime");
+  if (!exposure_time) return tl::unexpected(exposure_time.error());
+  // A camera without a gain in decibels tells it in steps.
+  const auto gain = features.has("Gain") ? turn_on(features, "Gain", "ChunkGain") : Result<bool>(false);
+  if (!gain) return tl::unexpected(gain.error());
+  return ChunkSelection{*timestamp, *exposure_time, *gain};
+}
+
+constexpr std::size_t kChunkBytesMax = 1 << 16;  // of all that a camera may append by itself
+
 }  // namespace
 
 Result<DeviceLayout> configure_image(const DeviceFeatures& features, const AravisCameraOptions& options) {
@@ -137,6 +160,34 @@ Result<> configure_trigger(const DeviceFeatures& features, const AravisCameraOpt
   if (trigger == AravisTrigger::kAction) return set_action(features, options.action);
   if (auto done = features.choose_if_there("TriggerActivation", "RisingEdge"); !done) return done;
   return features.choose("TriggerSource", options.trigger_line);
+}
+
+Result<ChunkSelection> configure_chunks(const DeviceFeatures& features, const AravisCameraOptions& options) {
+  if (!options.chunks || !features.has("ChunkModeActive")) return ChunkSelection{};
+  if (auto active = features.turn("ChunkModeActive", true); !active) {
+    if (active.error().code == ErrorCode::kDisconnected) return tl::unexpected(active.error());
+    return ChunkSelection{};
+  }
+  auto selection = turn_on_all(features);
+  if (!selection || selection->any()) return selection;
+  if (auto off = turn_chunks_off(features); !off) return tl::unexpected(off.error());
+  return selection;
+}
+
+Result<> turn_chunks_off(const DeviceFeatures& features) {
+  return features.turn_if_there("ChunkModeActive", false);
+}
+
+Result<std::size_t> read_payload_bytes(ArvCamera* camera, const DeviceLayout& layout, const ChunkSelection& chunks) {
+  GErrorSlot error;
+  const std::size_t payload = arv_camera_get_payload(camera, error.out());
+  if (error.failed()) return fail(error.code(), "the camera tells no frame size: " + error.message(), "PayloadSize");
+  const std::size_t most = layout.bytes() + (chunks.any() ? kChunkBytesMax : 0);
+  if (payload >= layout.bytes() && payload <= most) return payload;
+  return fail(ErrorCode::kMismatch,
+              "the camera sends " + std::to_string(payload) + " bytes a frame, where its size and pixel format make " +
+                  std::to_string(layout.bytes()) + "; turn off what it adds",
+              "PayloadSize");
 }
 
 }  // namespace slsd

@@ -4,10 +4,12 @@
 
 #include <chrono>
 #include <cstddef>
+#include <string>
 
 #include "core/result.hpp"
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
-#include "drivers/camera/aravis/device_features.hpp"
+#include "drivers/camera/aravis/device_control.hpp"
+#include "drivers/camera/aravis/g_object.hpp"
 #include "drivers/camera/aravis/pixel_layout.hpp"
 
 namespace slsd {
@@ -36,5 +38,31 @@ struct DeviceLayout {
 /// @errors as configure_image()
 [[nodiscard]] Result<> configure_trigger(const DeviceFeatures& features, const AravisCameraOptions& options,
                                          AravisTrigger trigger);
+
+/// The chunks that are on.
+struct ChunkSelection {
+  bool timestamp = false;
+  bool exposure_time = false;
+  bool gain = false;
+
+  [[nodiscard]] bool any() const { return timestamp || exposure_time || gain; }
+  friend bool operator==(const ChunkSelection&, const ChunkSelection&) = default;
+};
+
+/// Has the camera append to each frame when its exposure began, how long it was, and its gain: those of these chunks
+/// that it has, where the options say so. What the camera refuses stays off.
+/// @errors as turn_chunks_off()
+[[nodiscard]] Result<ChunkSelection> configure_chunks(const DeviceFeatures& features,
+                                                      const AravisCameraOptions& options);
+
+/// Frames are images and nothing else from now on.
+/// @errors kUnsupported, kMismatch, kDisconnected
+[[nodiscard]] Result<> turn_chunks_off(const DeviceFeatures& features);
+
+/// How many bytes the camera sends for a frame: those of the image, and of the chunks if some are on. To be asked after
+/// everything else is set, which might change it.
+/// @errors kMismatch: it is not what the configuration makes; kUnsupported, kDisconnected
+[[nodiscard]] Result<std::size_t> read_payload_bytes(ArvCamera* camera, const DeviceLayout& layout,
+                                                     const ChunkSelection& chunks);
 
 }  // namespace slsd

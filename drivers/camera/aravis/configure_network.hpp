@@ -3,15 +3,36 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/result.hpp"
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
-#include "drivers/camera/aravis/g_object.hpp"
-#include "drivers/camera/aravis/opening_warnings.hpp"
+#include "drivers/camera/aravis/host_interface.hpp"
+
+using ArvCamera = struct _ArvCamera;
+using ArvStream = struct _ArvStream;
 
 namespace slsd {
+
+/// Something about the system that may cost frames, or that could not be made sure of, by name and with what to do.
+struct NetworkWarning {
+  std::string name;  ///< "receive_buffer", "packet_size", "packet_resend", "device_clock", "chunks" or "first_frame"
+  std::string advice;
+};
+
+/// The camera's clock is of no use. @param fault  "cannot be read"
+[[nodiscard]] NetworkWarning device_clock_warning(std::string_view fault);
+/// The chunks of the first frames could not be read.
+[[nodiscard]] NetworkWarning chunks_warning();
+/// The camera can be made to expose by no means that this host has.
+[[nodiscard]] NetworkWarning first_frame_warning();
+
+/// What to do about packets that are small for large frames.
+/// @param interface  of this host to the camera, as far as it is known
+[[nodiscard]] NetworkWarning packet_size_warning(unsigned packet_bytes, const std::optional<HostInterface>& interface);
 
 /// Sets packet size and delay of a GigE Vision camera; nothing for another. To be called before the stream is made.
 /// @errors kMismatch, kUnsupported, kDisconnected

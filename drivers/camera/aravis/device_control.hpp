@@ -3,17 +3,61 @@
 #pragma once
 
 #include <condition_variable>
+#include <cstdint>
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <thread>
 
+#include "core/result.hpp"
 #include "drivers/camera/aravis/capture_events.hpp"
 #include "drivers/camera/aravis/device_clock.hpp"
 #include "drivers/camera/aravis/g_object.hpp"
-#include "drivers/camera/aravis/ptp_lock.hpp"
 
 namespace slsd {
+
+/// The settings of a camera by their names in the Standard Features Naming Convention. What is set is read back: many a
+/// camera rounds or refuses in silence.
+/// @thread thread-bound
+class DeviceFeatures {
+ public:
+  /// @param camera  outlives this
+  explicit DeviceFeatures(ArvCamera* camera) : camera_(camera) {}
+
+  [[nodiscard]] bool has(const char* name) const;
+  [[nodiscard]] bool has_entry(const char* name, const char* entry) const;
+
+  /// @errors for all of these: kUnsupported (lacking or refused), kMismatch (it took another value), kDisconnected
+  [[nodiscard]] Result<> choose(const char* name, const std::string& entry) const;
+  [[nodiscard]] Result<> set(const char* name, double value, double tolerance) const;
+  [[nodiscard]] Result<> set(const char* name, std::int64_t value) const;
+  [[nodiscard]] Result<> turn(const char* name, bool on) const;
+  [[nodiscard]] Result<> execute(const char* name) const;
+  [[nodiscard]] Result<int> integer(const char* name) const;
+  /// Frames a second where it runs freely; nothing where it does not say.
+  [[nodiscard]] std::optional<double> rate_hz() const;
+
+  /// The same where the camera has the feature, and nothing where it has not.
+  [[nodiscard]] Result<> choose_if_there(const char* name, const std::string& entry) const;
+  [[nodiscard]] Result<> turn_if_there(const char* name, bool on) const;
+
+ private:
+  [[nodiscard]] Result<> check(const GErrorSlot& error, const char* name) const;
+
+  ArvCamera* camera_;
+};
+
+/// Whether a device's clock is the network's (IEEE 1588). It takes seconds from opening until it is.
+enum class PtpLock {
+  kUnknown,  ///< the device does not tell
+  kOpen,     ///< it has a clock of its own, or is about to set it
+  kLocked    ///< it follows a master's clock, or is the master
+};
+
+/// Asks the device.
+/// @thread thread-safe for GigE Vision, else thread-bound to the camera
+[[nodiscard]] PtpLock read_ptp_lock(ArvCamera* camera);
 
 /// Reads the device's clock, if it has one that can be read.
 /// @thread thread-safe for GigE Vision, else thread-bound to the camera

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "drivers/camera/aravis/frame_patience.hpp"
+#include "drivers/camera/aravis/aravis_camera_options.hpp"
 
 namespace slsd {
 namespace {

@@ -13,6 +13,19 @@ namespace {
 
 using std::chrono::nanoseconds;
 
+constexpr std::size_t kLengthBytes = 4;
+constexpr std::size_t kTagBytes = 4 + kLengthBytes;
+constexpr std::size_t kWordBytes = 4;
+
+std::size_t length_before(std::span<const std::uint8_t> bytes, std::size_t end, std::endian order) {
+  std::size_t length = 0;
+  for (std::size_t i = 0; i < kLengthBytes; ++i) {
+    const std::size_t at = order == std::endian::big ? end - kLengthBytes + i : end - 1 - i;
+    length = length << 8 | bytes[at];
+  }
+  return length;
+}
+
 // Twice what configuring allows: sensors add a constant to what they were set to.
 constexpr double kExposureToleranceShare = 0.02;
 constexpr double kExposureToleranceUs = 40.0;
@@ -30,6 +43,16 @@ bool is_nearer(nanoseconds a, nanoseconds b, nanoseconds to) {
 }
 
 }  // namespace
+
+bool is_image_with_chunks(std::span<const std::uint8_t> frame, std::size_t image_bytes, std::endian order) {
+  for (std::size_t end = frame.size(); end >= image_bytes + kTagBytes;) {
+    const std::size_t length = length_before(frame, end, order);
+    if (length > end - kTagBytes) return false;
+    end -= kTagBytes + length;
+    if (end == 0) return length >= image_bytes && length < image_bytes + kWordBytes;
+  }
+  return false;
+}
 
 std::string unlike_configured(const FrameChunks& chunks, const AravisCameraOptions& options) {
   const double share = options.exposure_us * kExposureToleranceShare;

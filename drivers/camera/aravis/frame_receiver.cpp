@@ -7,7 +7,7 @@
 #include <utility>
 #include <variant>
 
-#include "drivers/camera/aravis/frame_patience.hpp"
+#include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/files/bayer.hpp"
 
 namespace slsd {

@@ -2,28 +2,112 @@
 // Copyright the slsd authors
 #include "drivers/camera/aravis/gige_discovery.hpp"
 
+#include <arpa/inet.h>
 #include <poll.h>
+#include <sys/socket.h>
+#include <sys/types.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdint>
 #include <cstring>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "drivers/camera/aravis/host_interface.hpp"
-#include "drivers/camera/aravis/udp_socket.hpp"
+#include "drivers/system/file_descriptor.hpp"
+#include "drivers/system/system_error.hpp"
 
 namespace slsd {
 namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
+using Bytes = std::span<const std::uint8_t>;
+using ControlBuffer = std::array<char, CMSG_SPACE(sizeof(in_pktinfo))>;
+
+constexpr int kTries = 3;
+constexpr std::uint32_t kControlPrivilege = 0xa00;
+constexpr std::uint32_t kControlled = 3;  // exclusively or not
+constexpr std::uint32_t kControllerPort = 0xa04;
+constexpr std::uint32_t kControllerAddress = 0xa14;
+
+std::optional<sockaddr_in> socket_address(const std::string& text, std::uint16_t port) {
+  sockaddr_in made{};
+  made.sin_family = AF_INET;
+  made.sin_port = htons(port);
+  if (::inet_pton(AF_INET, text.c_str(), &made.sin_addr) != 1) return std::nullopt;
+  return made;
+}
+
+const sockaddr* generic(const sockaddr_in& address) {
+  return reinterpret_cast<const sockaddr*>(&address);
+}
+
+std::string local_address(int socket) {
+  sockaddr_in local{};
+  socklen_t bytes = sizeof(local);
+  ::getsockname(socket, reinterpret_cast<sockaddr*>(&local), &bytes);
+  return address_text(local.sin_addr);
+}
+
+FileDescriptor udp_socket() {
+  return FileDescriptor(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+}
+
+/// One device's port, connected, so that only the device is heard.
+class ControlChannel {
+ public:
+  /// @errors as probe_gige_device()
+  [[nodiscard]] Result<> connect(const std::string& address, const std::string& interface) {
+    const auto to = socket_address(address, kGvcpPort);
+    const auto from = socket_address(interface.empty() ? "0.0.0.0" : interface, 0);
+    if (!to || !from) return fail(ErrorCode::kInvalidArgument, "is no IPv4 address", !to ? address : interface);
+    socket_ = udp_socket();
+    if (!socket_) return fail_system(errno, "cannot open a socket", address);
+    if (::bind(socket_.number(), generic(*from), sizeof(*from)) != 0)
+      return fail(ErrorCode::kInvalidArgument, "no interface of this host has this address; see ip address", interface);
+    (void)::connect(socket_.number(), generic(*to), sizeof(*to));  // where it cannot, nothing will answer
+    return {};
+  }
+
+  /// What the reader makes of the answer to the question, if it comes in time; that to an earlier one may come late.
+  template <class Question, class Reader>
+  [[nodiscard]] auto ask(Question question, Reader read, milliseconds timeout) -> decltype(read(Bytes(), 0)) {
+    const std::uint16_t id = ++id_ == 0 ? ++id_ : id_;
+    const auto asked = question(id);
+    for (int i = 0; i < kTries; ++i) {
+      if (::send(socket_.number(), asked.data(), asked.size(), MSG_NOSIGNAL) < 0) continue;
+      const auto end = steady_clock::now() + timeout / kTries;
+      for (Bytes answer = receive(end); !answer.empty(); answer = receive(end))
+        if (auto value = read(answer, id)) return value;
+    }
+    return std::nullopt;
+  }
+
+  void tell(Bytes command) const { (void)::send(socket_.number(), command.data(), command.size(), MSG_NOSIGNAL); }
+
+  [[nodiscard]] std::string interface() const { return local_address(socket_.number()); }
+
+ private:
+  /// What comes next; empty if nothing does before the end.
+  [[nodiscard]] Bytes receive(steady_clock::time_point end) {
+    const auto left = std::chrono::ceil<milliseconds>(end - steady_clock::now());
+    pollfd waited{socket_.number(), POLLIN, 0};
+    if (left.count() <= 0 || ::poll(&waited, 1, static_cast<int>(left.count())) <= 0) return {};
+    const auto bytes = ::recv(socket_.number(), answer_.data(), answer_.size(), 0);
+    return Bytes(answer_).first(static_cast<std::size_t>(std::max<ssize_t>(bytes, 0)));
+  }
+
+  FileDescriptor socket_;
+  std::uint16_t id_ = 0;
+  std::vector<std::uint8_t> answer_ = std::vector<std::uint8_t>(1024);
+};
 
 constexpr int kQuestions = 2;             // one may be lost
 constexpr std::uint16_t kQuestionId = 1;  // of both: either answer will do
-
-using ControlBuffer = std::array<char, CMSG_SPACE(sizeof(in_pktinfo))>;
 
 /// Sends to everyone on the interface's network, whatever the routes say.
 void ask_everyone(int socket, const HostInterface& interface) {
@@ -112,16 +196,50 @@ bool gather(int socket, const std::vector<HostInterface>& interfaces, steady_clo
 
 }  // namespace
 
+Result<GigeDevice> probe_gige_device(const std::string& address, const std::string& interface, milliseconds timeout) {
+  ControlChannel channel;
+  if (auto connected = channel.connect(address, interface); !connected) return tl::unexpected(connected.error());
+  auto device = channel.ask(gvcp_discovery, read_gvcp_discovery, timeout);
+  if (!device)
+    return fail(ErrorCode::kNotFound,
+                "no camera answers at this address; check its power and cable, that it is in the network of this "
+                "host's interface, and that no firewall holds back UDP from port 3956",
+                address);
+  device->address = address;
+  device->interface = channel.interface();
+  return std::move(*device);
+}
+
+std::optional<std::string> gige_controller(const GigeDevice& device, milliseconds timeout) {
+  ControlChannel channel;
+  if (!channel.connect(device.address, device.interface)) return std::nullopt;
+  const auto read = [&](std::uint32_t address) {
+    return channel.ask([&](std::uint16_t id) { return gvcp_read(address, id); }, read_gvcp_value, timeout);
+  };
+  const auto privilege = read(kControlPrivilege);
+  if (!privilege) return std::nullopt;
+  if ((*privilege & kControlled) == 0) return "";
+  const in_addr address{htonl(read(kControllerAddress).value_or(0))};
+  if (address.s_addr == 0) return "another application";
+  return address_text(address) + ":" + std::to_string(read(kControllerPort).value_or(0) & 0xffff);
+}
+
+void send_gige_action(const std::string& address, const std::string& interface, const ActionKeys& keys,
+                      std::optional<std::uint64_t> ticks) {
+  ControlChannel channel;
+  if (channel.connect(address, interface)) channel.tell(gvcp_action(keys, ticks));
+}
+
 std::vector<GigeDevice> discover_gige_devices(milliseconds wait, const std::function<bool(const GigeDevice&)>& enough) {
   const std::vector<HostInterface> interfaces = list_host_interfaces();
-  const UdpSocket socket;
+  const FileDescriptor socket = udp_socket();
   const int on = 1;
-  ::setsockopt(socket.get(), SOL_SOCKET, SO_BROADCAST, &on, sizeof(on));
-  ::setsockopt(socket.get(), IPPROTO_IP, IP_PKTINFO, &on, sizeof(on));
+  ::setsockopt(socket.number(), SOL_SOCKET, SO_BROADCAST, &on, sizeof(on));
+  ::setsockopt(socket.number(), IPPROTO_IP, IP_PKTINFO, &on, sizeof(on));
   std::vector<GigeDevice> devices;
   for (int i = 0; i < kQuestions; ++i) {
-    for (const HostInterface& interface : interfaces) ask_everyone(socket.get(), interface);
-    if (gather(socket.get(), interfaces, steady_clock::now() + wait / kQuestions, enough, devices)) break;
+    for (const HostInterface& interface : interfaces) ask_everyone(socket.number(), interface);
+    if (gather(socket.number(), interfaces, steady_clock::now() + wait / kQuestions, enough, devices)) break;
   }
   return devices;
 }

@@ -4,11 +4,32 @@
 
 #include <chrono>
 #include <functional>
+#include <optional>
+#include <string>
 #include <vector>
 
+#include "core/result.hpp"
 #include "drivers/camera/aravis/gvcp.hpp"
 
 namespace slsd {
+
+/// Asks the device at the address who it is (GVCP discovery). Aravis itself would wait for seconds for one that is not
+/// there, and may ask through the wrong interface.
+/// @param interface  IPv4 address of this host to ask from; empty: the one that the route goes through
+/// @errors kNotFound: nothing answers; kInvalidArgument: no address, or the interface is not one of this host's
+/// @thread reentrant
+[[nodiscard]] Result<GigeDevice> probe_gige_device(const std::string& address, const std::string& interface,
+                                                   std::chrono::milliseconds timeout);
+
+/// Who controls the device, "10.0.0.5:4711", or "another application" where it does not tell; empty if nobody does.
+/// @return nothing if it does not answer
+/// @thread reentrant
+[[nodiscard]] std::optional<std::string> gige_controller(const GigeDevice& device, std::chrono::milliseconds timeout);
+
+/// Sends the device an action command. One that is lost is noticed by the frame that does not come.
+/// @thread reentrant
+void send_gige_action(const std::string& address, const std::string& interface, const ActionKeys& keys,
+                      std::optional<std::uint64_t> ticks);
 
 /// Asks all networks of this host which GigE Vision devices there are, also those with an address of another network.
 /// @param wait    how long to wait for answers

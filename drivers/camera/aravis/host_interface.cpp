@@ -4,13 +4,16 @@
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>
+#include <net/ethernet.h>
 #include <net/if.h>
+#include <sys/socket.h>
 
 #include <array>
 #include <bit>
 #include <filesystem>
 
 #include "drivers/camera/listing/sysfs.hpp"
+#include "drivers/system/file_descriptor.hpp"
 
 namespace slsd {
 namespace {
@@ -57,6 +60,10 @@ std::string address_text(in_addr address) {
   std::array<char, INET_ADDRSTRLEN> text{};
   ::inet_ntop(AF_INET, &address, text.data(), text.size());
   return text.data();
+}
+
+bool packet_socket_allowed() {
+  return static_cast<bool>(FileDescriptor(::socket(PF_PACKET, SOCK_RAW | SOCK_CLOEXEC, htons(ETH_P_ALL))));
 }
 
 }  // namespace slsd

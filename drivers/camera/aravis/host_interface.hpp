@@ -31,4 +31,8 @@ struct HostInterface {
 /// "10.0.0.1"
 [[nodiscard]] std::string address_text(in_addr address);
 
+/// Whether this process may take packets before the UDP socket (CAP_NET_RAW).
+/// @thread reentrant
+[[nodiscard]] bool packet_socket_allowed();
+
 }  // namespace slsd

@@ -9,7 +9,6 @@
 
 #include "core/printable.hpp"
 #include "drivers/camera/aravis/gige_discovery.hpp"
-#include "drivers/camera/aravis/gige_probe.hpp"
 #include "drivers/camera/aravis/host_interface.hpp"
 #include "drivers/camera/aravis/open_device.hpp"
 #include "drivers/camera/aravis/pixel_layout.hpp"

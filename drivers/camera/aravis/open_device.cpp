@@ -8,11 +8,14 @@
 #include <chrono>
 #include <mutex>
 #include <optional>
+#include <string_view>
 #include <thread>
 #include <utility>
 
+#include <arv.h>
+
+#include "core/printable.hpp"
 #include "drivers/camera/aravis/gige_discovery.hpp"
-#include "drivers/camera/aravis/gige_probe.hpp"
 
 // Aravis 0.8 parses descriptions, of devices and of their chunk data, in one state for the whole process, where no lock
 // protects it; and it parses in the same call that reads them from the device, so that a lock around that would have
@@ -58,6 +61,10 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
+
+std::string text(const char* from) {
+  return from == nullptr ? "" : from;
+}
 
 constexpr milliseconds kProbe{600};
 constexpr milliseconds kRelease{700};  // below a second, in which the service is to stop
@@ -122,6 +129,20 @@ std::optional<GigeDevice> found_before(const AravisCameraOptions& options, const
 }
 
 }  // namespace
+
+std::vector<Usb3Device> list_usb3_devices() {
+  static std::mutex mutex;  // Aravis keeps one list, whose entries a second call takes away
+  const std::lock_guard lock(mutex);
+  arv_disable_interface("GigEVision");  // asks each network for a second; discover_gige_devices() knows already
+  arv_update_device_list();
+  std::vector<Usb3Device> devices;
+  for (unsigned i = 0; i < arv_get_n_devices(); ++i) {
+    if (std::string_view(text(arv_get_device_protocol(i))) != "USB3Vision") continue;
+    devices.push_back({text(arv_get_device_id(i)), printable(text(arv_get_device_vendor(i))),
+                       printable(text(arv_get_device_serial_nbr(i)))});
+  }
+  return devices;
+}
 
 Result<OpenedDevice> open_device(const AravisCameraOptions& options, const std::string& address) {
   if (options.names_address()) {

@@ -3,14 +3,24 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/result.hpp"
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/camera/aravis/g_object.hpp"
 #include "drivers/camera/aravis/gvcp.hpp"
-#include "drivers/camera/aravis/usb3_devices.hpp"
 
 namespace slsd {
+
+/// A USB3 Vision camera that Aravis can open.
+struct Usb3Device {
+  std::string id;  ///< as Aravis names it
+  std::string vendor;
+  std::string serial;
+};
+
+/// @thread thread-safe
+[[nodiscard]] std::vector<Usb3Device> list_usb3_devices();
 
 /// A device that this host controls.
 struct OpenedDevice {

@@ -12,8 +12,6 @@
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
 
-#include "drivers/camera/aravis/chunk_layout.hpp"
-
 namespace slsd {
 namespace {
 

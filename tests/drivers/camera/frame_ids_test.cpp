@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "drivers/camera/aravis/frame_ids.hpp"
+#include "drivers/camera/aravis/frame_counts.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "drivers/camera/aravis/frame_patience.hpp"
+#include "drivers/camera/aravis/aravis_camera_options.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "drivers/camera/aravis/gige_probe.hpp"
+#include "drivers/camera/aravis/gige_discovery.hpp"
 
 #include <sys/socket.h>
 #include <unistd.h>

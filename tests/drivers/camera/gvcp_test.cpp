@@ -9,8 +9,8 @@
 #include <rapidcheck/gtest.h>
 
 #include "core/printable.hpp"
+#include "drivers/camera/aravis/configure_network.hpp"
 #include "drivers/camera/aravis/host_interface.hpp"
-#include "drivers/camera/aravis/opening_warnings.hpp"
 
 namespace slsd {
 namespace {

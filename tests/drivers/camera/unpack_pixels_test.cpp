@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "drivers/camera/aravis/unpack_pixels.hpp"
 
 #include <array>
 #include <cstring>
