@@ -51,6 +51,10 @@ std::chrono::nanoseconds AravisCamera::open_time_max() const {
   return Camera::open_time_max() + first_frame_time_max(options_);
 }
 
+std::chrono::nanoseconds AravisCamera::frame_time_max() const {
+  return Camera::frame_time_max() + from_us(options_.exposure_us + options_.readout_us);
+}
+
 void AravisCamera::log_warnings() {
   for (const NetworkWarning& warning : session_->warnings()) {
     if (std::ranges::find(logged_, warning.name) != logged_.end()) continue;

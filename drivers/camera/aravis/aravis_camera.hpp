@@ -46,6 +46,7 @@ class AravisCamera final : public Camera {
   ///         (it took another value than the one configured), kUnsupported, kDisconnected; kCancelled
   [[nodiscard]] Result<> open() override;
   [[nodiscard]] std::chrono::nanoseconds open_time_max() const override;
+  [[nodiscard]] std::chrono::nanoseconds frame_time_max() const override;
   /// kDisconnected also after missed_frames_max frames in a row did not come.
   /// @errors kMismatch: the frame was exposed with other settings than configured, and is lost; as Camera::capture()
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;

@@ -126,7 +126,8 @@ Result<> FrameCapture::wait_until_quiet(MonotonicTime deadline) {
 
 Result<Frame> FrameCapture::await_frame(MonotonicTime asked, MonotonicTime deadline, bool was_quiet) {
   const bool paced = options_.trigger != AravisTrigger::kLine;
-  const MonotonicTime limit = paced ? std::min(deadline, asked + frame_patience(options_)) : deadline;
+  MonotonicTime heard = asked;
+  MonotonicTime limit = paced ? std::min(deadline, heard + frame_patience(options_)) : deadline;
   for (;;) {
     switch (events_.wait_buffer(limit)) {
       case CaptureEvents::Wake::kCancelled:
@@ -134,10 +135,14 @@ Result<Frame> FrameCapture::await_frame(MonotonicTime asked, MonotonicTime deadl
       case CaptureEvents::Wake::kLost:
         return lost(events_.lost_reason());
       case CaptureEvents::Wake::kTimeout:
-        if (deadline <= limit && steady_clock::now() - asked < frame_patience(options_)) return late();
+        if (deadline <= limit && steady_clock::now() - heard < frame_patience(options_)) return late();
         return missed(deadline);
       case CaptureEvents::Wake::kBuffer:
         if (auto judged = judge(asked, was_quiet)) return std::move(*judged);
+        // By arrival frames are passed over on a slow link, where the camera is there nevertheless.
+        if (!paced || !goes_by_arrival()) continue;
+        heard = steady_clock::now();
+        limit = std::min(deadline, heard + frame_patience(options_));
     }
   }
 }

@@ -120,6 +120,19 @@ TEST_F(AravisClockTest, TakesNoFrameThatWasHeldUpForAFreshOne) {
   for (int i = 0; i < 5; ++i) EXPECT_TRUE(takes_fresh(camera, device));
 }
 
+// The next one may be seconds away, and is not missing.
+TEST_F(AravisClockTest, WaitsForAFrameThatIsFreshForCertain) {
+  test::GigeCamera device(with_clock(ClockFault::kStandsStill));
+  AravisCameraOptions options = free_run(device);
+  options.frame_timeout_ms = 500;
+  options.readout_us = 1.5e6;
+  AravisCamera camera(options);
+  ASSERT_TRUE(opens(camera));
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(takes_fresh(camera, device));
+  EXPECT_EQ(error_of(camera, steady_clock::now() + 700ms), ErrorCode::kFrameLate);
+  EXPECT_GE(camera.frame_time_max(), 1500ms + 5s);
+}
+
 // The double without a readout sends a frame as soon as its exposure begins, as simulated cameras do.
 TEST_F(AravisClockTest, TakesFramesOfACameraThatDoesNotExposeAsLongAsItSays) {
   test::GigeCameraOptions simulated;
