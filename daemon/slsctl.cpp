@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include <algorithm>
-#include <array>
-#include <string_view>
+#include <string>
 
 #include <CLI/CLI.hpp>
 
+#include "core/picture/picture.hpp"
 #include "daemon/client/client_commands.hpp"
 #include "daemon/client/client_options.hpp"
 
@@ -63,8 +62,7 @@ void add_record(CLI::App& app, ClientOptions& options) {
 
 const CLI::Validator kPicture(
     [](const std::string& picture) {
-      constexpr std::array<std::string_view, 6> kNames{"pattern", "idle", "white", "black", "focus", "grid"};
-      const bool named = std::ranges::find(kNames, picture) != kNames.end();
+      const bool named = picture != "image" && picture != "held" && slsd::picture_named(picture);
       return named || std::filesystem::path(picture).extension() == ".png" ? ""
                                                                            : "no such picture; a file ends in .png";
     },

@@ -21,9 +21,7 @@ constexpr std::size_t kMaxFileBytes = 1 << 20;
 
 constexpr std::array kProjectorDrivers{std::pair("headless"sv, ProjectorDriver::kHeadless),
                                        std::pair("glfw"sv, ProjectorDriver::kGlfw)};
-constexpr std::array kIdlePictures{std::pair("pattern"sv, IdlePicture::kPattern),
-                                   std::pair("black"sv, IdlePicture::kBlack),
-                                   std::pair("white"sv, IdlePicture::kWhite)};
+constexpr auto kIdlePictures = std::span(kPictureNames).first(3);  // pattern, white and black
 constexpr std::array kArrayMethods{std::pair("constructive"sv, ArrayMethod::kConstructive),
                                    std::pair("paper"sv, ArrayMethod::kPaper)};
 constexpr std::array kMethods{std::pair("default"sv, Method::kDefault), std::pair("paper"sv, Method::kPaper)};
@@ -45,7 +43,7 @@ Result<> read_projector(const toml::table* table, const path& file, ProjectorOpt
   reader.read("gamma", options.light.gamma);
   reader.read("black_level", options.light.black_level);
   reader.read("refresh_hz", options.refresh_hz);
-  reader.choose("idle", options.idle, span_of(kIdlePictures));
+  reader.choose("idle", options.idle, kIdlePictures);
   reader.read("idle_after_ms", options.idle_after_ms);
   return reader.finish(options.validate());
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/picture/picture.hpp"
 #include "core/result.hpp"
 #include "drivers/projector/light_curve.hpp"
 
@@ -12,9 +13,6 @@ namespace slsd {
 
 enum class ProjectorDriver { kHeadless, kGlfw };
 [[nodiscard]] std::string_view to_string(ProjectorDriver driver);
-
-/// What a projector shows when nobody has scanned for a while.
-enum class IdlePicture { kPattern, kBlack, kWhite };
 
 /// The [projector] table.
 struct ProjectorOptions {
@@ -24,8 +22,8 @@ struct ProjectorOptions {
   int height_px = 800;       ///< 360 to 2160
   LightOptions light;        ///< how grey becomes light
   double refresh_hz = 60.0;  ///< 10 to 1000; 0: it lights steadily, so that every exposure suits it
-  IdlePicture idle = IdlePicture::kPattern;
-  int idle_after_ms = 2000;  ///< 0 to 3600000; how long after a scan that takes the pattern's place
+  Picture idle = Picture::kPattern;  ///< when nobody has scanned for a while: that, kBlack or kWhite
+  int idle_after_ms = 2000;          ///< 0 to 3600000; how long after a scan that takes the pattern's place
 
   [[nodiscard]] Result<> validate() const;
   friend bool operator==(const ProjectorOptions&, const ProjectorOptions&) = default;

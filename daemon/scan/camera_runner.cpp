@@ -74,7 +74,7 @@ tl::unexpected<Error> CameraRunner::fail_not_ready() const {
   return fail(ErrorCode::kTimeout, "the camera did not become ready in time: " + reason, "camera " + name_);
 }
 
-void CameraRunner::begin_capture(MonotonicTime deadline, Exposure exposure, FrameLight light) {
+void CameraRunner::begin_capture(MonotonicTime deadline, Exposure exposure, Picture light) {
   {
     const std::lock_guard lock(mutex_);
     answer_.reset();

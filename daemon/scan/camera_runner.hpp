@@ -57,8 +57,7 @@ class CameraRunner {
   [[nodiscard]] Result<> wait_ready(const Patience& patience);
 
   /// Lets the camera expose one frame, now; wait_captured() and end_capture() belong to it.
-  void begin_capture(MonotonicTime deadline, Exposure exposure = Exposure::kFresh,
-                     FrameLight light = FrameLight::kPattern);
+  void begin_capture(MonotonicTime deadline, Exposure exposure = Exposure::kFresh, Picture light = Picture::kPattern);
   /// Waits for the driver's answer. @return whether it is there, or never will be
   [[nodiscard]] bool wait_captured(const Patience& patience, MonotonicTime until);
   /// Tells a driver that has not answered yet to do so, now.
@@ -71,7 +70,7 @@ class CameraRunner {
   struct Order {
     MonotonicTime deadline;
     Exposure exposure = Exposure::kFresh;
-    FrameLight light = FrameLight::kPattern;
+    Picture light = Picture::kPattern;
     bool cancelled = false;
   };
   void run(const std::stop_token& stop);

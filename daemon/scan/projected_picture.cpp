@@ -34,30 +34,31 @@ Result<std::optional<Grey8>> draw_grid(const ScanSetup& setup) {
 
 }  // namespace
 
-Result<std::optional<Grey8>> draw_projected(ProjectedPicture picture, std::string_view png, const ScanSetup& setup) {
+Result<std::optional<Grey8>> draw_projected(Picture picture, std::string_view png, const ScanSetup& setup) {
   const int width_px = setup.image.width();
   const int height_px = setup.image.height();
   switch (picture) {
-    case ProjectedPicture::kIdle:
-    case ProjectedPicture::kPattern:
+    case Picture::kIdle:
+    case Picture::kHeld:
+    case Picture::kPattern:
       return std::nullopt;
-    case ProjectedPicture::kBlack:
+    case Picture::kBlack:
       return Grey8(width_px, height_px, 0);
-    case ProjectedPicture::kWhite:
+    case Picture::kWhite:
       return Grey8(width_px, height_px, 255);
-    case ProjectedPicture::kFocus:
+    case Picture::kFocus:
       return draw_focus_chart(width_px, height_px);
-    case ProjectedPicture::kGrid:
+    case Picture::kGrid:
       return draw_grid(setup);
-    case ProjectedPicture::kImage:
+    case Picture::kImage:
       return read_picture(png, width_px, height_px);
   }
   return std::nullopt;
 }
 
 std::optional<Grey8> draw_idle(const ProjectorOptions& options) {
-  if (options.idle == IdlePicture::kPattern) return std::nullopt;
-  const std::uint8_t level = options.idle == IdlePicture::kWhite ? 255 : 0;
+  if (options.idle == Picture::kPattern) return std::nullopt;
+  const std::uint8_t level = options.idle == Picture::kWhite ? 255 : 0;
   return Grey8(options.width_px, options.height_px, level);
 }
 

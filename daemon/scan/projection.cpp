@@ -5,7 +5,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -18,7 +17,6 @@ using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
 constexpr auto kLook = 10ms;
-constexpr std::string_view kNames[] = {"pattern", "white", "black", "idle", "held", ""};
 
 }  // namespace
 
@@ -42,42 +40,42 @@ DeviceStatus Projection::status() const {
 
 void Projection::set_pattern(Grey8 pattern) {
   pattern_ = std::move(pattern);
-  if (shown_ == Shown::kPattern || held_) shown_ = Shown::kNothing;
+  if (shown_ == Picture::kPattern || held_) shown_.reset();
 }
 
 void Projection::set_idle(std::optional<Grey8> picture, std::chrono::milliseconds after) {
   idle_ = std::move(picture);
   idle_after_ = after;
-  if (shown_ == Shown::kIdle) shown_ = Shown::kNothing;
+  if (shown_ == Picture::kIdle) shown_.reset();
 }
 
 void Projection::set_held(std::optional<Held> held) {
   if (!held) last_scan_ = {};
   held_ = std::move(held);
-  if (shown_ == Shown::kHeld) shown_ = Shown::kNothing;
+  if (shown_ == Picture::kHeld) shown_.reset();
 }
 
-Projection::Shown Projection::due() const {
-  if (held_) return Shown::kHeld;
-  return idle_ && steady_clock::now() - last_scan_ >= idle_after_ ? Shown::kIdle : Shown::kPattern;
+Picture Projection::due() const {
+  if (held_) return Picture::kHeld;
+  return idle_ && steady_clock::now() - last_scan_ >= idle_after_ ? Picture::kIdle : Picture::kPattern;
 }
 
 MonotonicTime Projection::next_change() const {
-  if (shown_ == Shown::kNothing) return next_attempt_;
-  const bool idle_comes = idle_ && !held_ && shown_ != Shown::kIdle;
+  if (!shown_) return next_attempt_;
+  const bool idle_comes = idle_ && !held_ && shown_ != Picture::kIdle;
   return idle_comes ? last_scan_ + idle_after_ : MonotonicTime::max();
 }
 
-const Grey8& Projection::image(Shown which) {
-  if (which == Shown::kIdle) return *idle_;
-  if (which == Shown::kHeld && held_->picture) return *held_->picture;
-  if (which != Shown::kWhite && which != Shown::kBlack) return pattern_;
+const Grey8& Projection::image(Picture which) {
+  if (which == Picture::kIdle) return *idle_;
+  if (which == Picture::kHeld && held_->picture) return *held_->picture;
+  if (which != Picture::kWhite && which != Picture::kBlack) return pattern_;
   if (plain_.empty()) plain_ = Grey8(pattern_.width(), pattern_.height());
-  std::fill_n(plain_.data(), plain_.size(), which == Shown::kWhite ? 255 : 0);
+  std::fill_n(plain_.data(), plain_.size(), which == Picture::kWhite ? 255 : 0);
   return plain_;
 }
 
-Result<> Projection::open_and_show(Shown which) {
+Result<> Projection::open_and_show(Picture which) {
   if (!is_open(status().state)) {
     if (auto opened = projector_->open(); !opened) return opened;
   }
@@ -88,10 +86,10 @@ Result<> Projection::open_and_show(Shown which) {
   return {};
 }
 
-void Projection::attempt(Shown which) {
+void Projection::attempt(Picture which) {
   if (shown_ == which || steady_clock::now() < next_attempt_) return;
   const Result<> outcome = open_and_show(which);
-  shown_ = outcome ? which : Shown::kNothing;
+  shown_ = outcome ? std::optional(which) : std::nullopt;
   note(outcome);
   if (outcome) {
     backoff_.reset();
@@ -101,8 +99,8 @@ void Projection::attempt(Shown which) {
 }
 
 void Projection::look() {
-  if (const auto there = shown_ != Shown::kNothing ? projector_->check() : Result<>(); !there) {
-    shown_ = Shown::kNothing;
+  if (const auto there = shown_ ? projector_->check() : Result<>(); !there) {
+    shown_.reset();
     note(there);
   }
 }
@@ -114,7 +112,7 @@ void Projection::supervise() {
 
 void Projection::note(const Result<>& outcome) {
   const std::lock_guard lock(mutex_);
-  status_.shows = kNames[static_cast<int>(shown_)];
+  status_.shows = shown_ ? to_string(*shown_) : "";
   if (!outcome) {
     if (status_.problem.empty()) spdlog::warn("projector: {}; trying again until it opens", to_string(outcome.error()));
     status_.state = state_after(outcome.error().code);
@@ -133,7 +131,7 @@ void Projection::note(const Result<>& outcome) {
   status_.problem.clear();
 }
 
-Result<> Projection::await(Shown which, MonotonicTime deadline, const std::stop_token& stop) {
+Result<> Projection::await(Picture which, MonotonicTime deadline, const std::stop_token& stop) {
   look();
   attempt(which);
   while (shown_ != which) {
@@ -151,7 +149,7 @@ Result<> Projection::await(Shown which, MonotonicTime deadline, const std::stop_
 
 Result<> Projection::show(Picture picture, MonotonicTime deadline, const std::stop_token& stop) {
   set_held(std::nullopt);
-  auto shown = await(static_cast<Shown>(picture), deadline, stop);
+  auto shown = await(picture, deadline, stop);
   last_scan_ = steady_clock::now();
   return shown;
 }

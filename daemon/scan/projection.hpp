@@ -10,6 +10,7 @@
 #include <stop_token>
 
 #include "core/image.hpp"
+#include "core/picture/picture.hpp"
 #include "core/result.hpp"
 #include "daemon/scan/backoff.hpp"
 #include "daemon/scan/device_status.hpp"
@@ -28,9 +29,6 @@ namespace slsd {
 /// @thread thread-bound, but for status()
 class Projection {
  public:
-  /// What a scan shows: the pattern, and for the light of each point all white and all black.
-  enum class Picture { kPattern, kWhite, kBlack };
-
   /// @param pattern  of the projector's size
   Projection(std::unique_ptr<Projector> projector, Grey8 pattern, const ScanOptions& options);
 
@@ -51,7 +49,9 @@ class Projection {
   /// When supervise() will have another picture to show; the end of time where it will not.
   [[nodiscard]] MonotonicTime next_change() const;
 
-  /// Returns when the picture is visible, whatever was shown before. @errors kTimeout, with the reason; kCancelled
+  /// Returns when the picture is visible, whatever was shown before.
+  /// @param picture  the pattern, and for the light of each point all white and all black
+  /// @errors kTimeout, with the reason; kCancelled
   [[nodiscard]] Result<> show(Picture picture, MonotonicTime deadline, const std::stop_token& stop);
   /// Returns when what is due is visible. @errors as show()
   [[nodiscard]] Result<> show_due(MonotonicTime deadline, const std::stop_token& stop);
@@ -67,18 +67,17 @@ class Projection {
   [[nodiscard]] DeviceStatus status() const;
 
  private:
-  enum class Shown { kPattern, kWhite, kBlack, kIdle, kHeld, kNothing };
   struct Held {
     std::optional<Grey8> picture;  ///< nothing: the pattern
   };
-  [[nodiscard]] Shown due() const;
-  [[nodiscard]] const Grey8& image(Shown which);
-  [[nodiscard]] Result<> open_and_show(Shown which);
-  [[nodiscard]] Result<> await(Shown which, MonotonicTime deadline, const std::stop_token& stop);
+  [[nodiscard]] Picture due() const;
+  [[nodiscard]] const Grey8& image(Picture which);
+  [[nodiscard]] Result<> open_and_show(Picture which);
+  [[nodiscard]] Result<> await(Picture which, MonotonicTime deadline, const std::stop_token& stop);
   [[nodiscard]] Result<> show_held(std::optional<Held> held, MonotonicTime deadline, const std::stop_token& stop);
   void set_held(std::optional<Held> held);
   void look();
-  void attempt(Shown which);
+  void attempt(Picture which);
   void note(const Result<>& outcome);
 
   std::unique_ptr<Projector> projector_;
@@ -92,7 +91,7 @@ class Projection {
   MonotonicTime next_attempt_{};
   MonotonicTime last_scan_{};
   MonotonicTime visible_{};
-  Shown shown_ = Shown::kNothing;
+  std::optional<Picture> shown_;
   std::uint64_t changes_ = 0;
   mutable std::mutex mutex_;  ///< guards status_
   DeviceStatus status_;

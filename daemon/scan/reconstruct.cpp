@@ -40,7 +40,7 @@ ScanResult describe(const FrameSet& set, const ScanSetup& setup, const std::stri
   return result;
 }
 
-Result<> keep_frames(const std::vector<Frame>& frames, FrameLight light, const ScanSetup& setup, FrameCoding coding,
+Result<> keep_frames(const std::vector<Frame>& frames, Picture light, const ScanSetup& setup, FrameCoding coding,
                      ScanResult& result) {
   for (std::size_t i = 0; coding != FrameCoding::kNone && i < frames.size(); ++i) {
     auto image = image_of(frames[i], coding, setup.camera_names[i]);
@@ -52,9 +52,9 @@ Result<> keep_frames(const std::vector<Frame>& frames, FrameLight light, const S
 }
 
 Result<> keep_frames(const FrameSet& set, const ScanSetup& setup, FrameCoding coding, ScanResult& result) {
-  auto kept = keep_frames(set.frames, FrameLight::kPattern, setup, coding, result);
-  if (kept) kept = keep_frames(set.white, FrameLight::kWhite, setup, coding, result);
-  if (kept) kept = keep_frames(set.dark, FrameLight::kDark, setup, coding, result);
+  auto kept = keep_frames(set.frames, Picture::kPattern, setup, coding, result);
+  if (kept) kept = keep_frames(set.white, Picture::kWhite, setup, coding, result);
+  if (kept) kept = keep_frames(set.dark, Picture::kBlack, setup, coding, result);
   return kept;
 }
 

@@ -33,11 +33,6 @@ std::chrono::nanoseconds skew_of(const std::vector<Frame>& frames) {
   return last->exposure_start() - first->exposure_start();
 }
 
-Projection::Picture picture_for(FrameLight light) {
-  if (light == FrameLight::kPattern) return Projection::Picture::kPattern;
-  return light == FrameLight::kWhite ? Projection::Picture::kWhite : Projection::Picture::kBlack;
-}
-
 // One camera's error is the set's.
 Error incomplete(Error error, std::size_t cameras) {
   if (cameras > 1 && error.code != ErrorCode::kCancelled) {
@@ -143,9 +138,8 @@ Result<std::vector<Frame>> Rig::expose(Cameras cameras, const Shot& shot) {
 }
 
 Result<std::vector<Frame>> Rig::take_set(const Shot& shot) {
-  const auto shown = show(shot.patience, [&](MonotonicTime end) {
-    return projection_.show(picture_for(shot.light), end, shot.patience.over);
-  });
+  const auto shown =
+      show(shot.patience, [&](MonotonicTime end) { return projection_.show(shot.light, end, shot.patience.over); });
   if (!shown) return tl::unexpected(shown.error());
   const bool going_on = std::exchange(changes_before_, projection_.changes()) == projection_.changes();
   auto frames = expose(cameras_, {shot.patience, going_on ? shot.exposure : Exposure::kFresh, shot.light});
@@ -158,15 +152,15 @@ Result<std::vector<Frame>> Rig::take_set(const Shot& shot) {
 Result<FrameSet> Rig::capture(const Patience& patience, Exposure exposure, LightFrames light) {
   const auto begin = steady_clock::now();
   FrameSet set;
-  for (const FrameLight now : {FrameLight::kPattern, FrameLight::kWhite, FrameLight::kDark}) {
-    if (now == FrameLight::kWhite && !light.white) continue;
-    if (now == FrameLight::kDark && !light.dark) continue;
+  for (const Picture now : {Picture::kPattern, Picture::kWhite, Picture::kBlack}) {
+    if (now == Picture::kWhite && !light.white) continue;
+    if (now == Picture::kBlack && !light.dark) continue;
     auto frames = take_set({patience, exposure, now});
     while (!frames && patience.again && patience.again(frames.error())) {
       frames = take_set({patience, Exposure::kFresh, now});
     }
     if (!frames) return tl::unexpected(frames.error());
-    (now == FrameLight::kPattern ? set.frames : now == FrameLight::kWhite ? set.white : set.dark) = std::move(*frames);
+    (now == Picture::kPattern ? set.frames : now == Picture::kWhite ? set.white : set.dark) = std::move(*frames);
   }
   set.capture_time = steady_clock::now() - begin;
   set.skew = skew_of(set.frames);
@@ -177,7 +171,7 @@ Result<Frame> Rig::capture_one(std::size_t camera, const Patience& patience, boo
   for (;;) {
     const auto shown = show(patience, [&](MonotonicTime end) {
       return as_shown ? projection_.show_due(end, patience.over)
-                      : projection_.show(Projection::Picture::kPattern, end, patience.over);
+                      : projection_.show(Picture::kPattern, end, patience.over);
     });
     if (!shown) return tl::unexpected(shown.error());
     auto frames = expose(Cameras(cameras_).subspan(camera, 1), {patience});

@@ -87,7 +87,7 @@ class Rig {
   struct Shot {
     const Patience& patience;
     Exposure exposure = Exposure::kFresh;
-    FrameLight light = FrameLight::kPattern;
+    Picture light = Picture::kPattern;
   };
   template <class Show>
   [[nodiscard]] Result<> show(const Patience& patience, Show show);

@@ -58,7 +58,7 @@ struct FrameImage {
   int bits = 8;
   std::uint64_t sequence = 0;
   std::string camera = {};  ///< its name; the times are those of the Frame
-  FrameLight light = FrameLight::kPattern;
+  Picture light = Picture::kPattern;
   MonotonicTime exposure_start = {};
   MonotonicTime received = {};
 };

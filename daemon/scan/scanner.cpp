@@ -281,7 +281,7 @@ void Scanner::project(ProjectRequest request, Answer<void> answer) {
   submit({task,
           [this, task, request = std::move(request)] {
             const Patience patience = patience_of(*task);
-            if (request.picture == ProjectedPicture::kIdle) return task->end(rig_->release(patience));
+            if (request.picture == Picture::kIdle) return task->end(rig_->release(patience));
             heartbeat_.promise(kWorkPromise);
             auto drawn = draw_projected(request.picture, request.png, *adopted_);
             task->end(drawn ? rig_->hold(std::move(*drawn), patience) : tl::unexpected(drawn.error()));

@@ -104,7 +104,7 @@ Outgoing frame_event(const std::string& scan_id, const FrameImage& frame, FrameC
   event.bytes = share(frame.bytes);
   json params = frame_json(frame);
   params["scan"] = scan_id;
-  params["light"] = to_string(frame.light);
+  params["light"] = light_name(frame.light);
   params["format"] = coding == FrameCoding::kPng ? "png" : "raw";
   params["bytes"] = event.bytes->size();
   event.line = to_line(event_message("frame", std::move(params)));
@@ -207,11 +207,6 @@ void run_pattern(ServiceState& state, const json& params, Session&, Respond resp
   }));
 }
 
-ProjectedPicture picture_named(const std::string& name) {
-  const auto found = std::ranges::find(kProjectedPictures, name);
-  return static_cast<ProjectedPicture>(found - kProjectedPictures.begin());
-}
-
 void run_project(ServiceState& state, const json& params, Session& session, Respond respond) {
   ParamReader reader(params);
   const std::string name = reader.choice("picture", {"pattern", "idle", "black", "white", "focus", "grid", "image"});
@@ -222,7 +217,7 @@ void run_project(ServiceState& state, const json& params, Session& session, Resp
   if (!png || (name == "image") == png->empty()) {
     return respond(tl::unexpected(invalid_params("\"png\" must be an image as base64, and only with \"image\"")));
   }
-  state.scanner.project({picture_named(name), std::move(*png), deadline_in(timeout_ms), session.gone()},
+  state.scanner.project({*picture_named(name), std::move(*png), deadline_in(timeout_ms), session.gone()},
                         [&events = state.events, respond = std::move(respond), name](const Result<>& shown) {
                           auto outcome = std::make_shared<Outcome>(Reply{{{"picture", name}}});
                           if (!shown) *outcome = tl::unexpected(rpc_error(shown.error()));

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <functional>
 #include <string>
-#include <string_view>
 
+#include "core/picture/picture.hpp"
 #include "core/result.hpp"
 #include "drivers/camera/frame.hpp"
 
@@ -25,14 +25,6 @@ struct CameraDescription {
                               ///< in; printable, at most 200 bytes; empty where nothing does
   bool external_trigger = false;  ///< exposes when a line outside of this host says so: it may be silent for long
 };
-
-/// What the projector shows when a frame is exposed.
-enum class FrameLight { kPattern, kWhite, kDark };
-
-[[nodiscard]] constexpr std::string_view to_string(FrameLight light) {
-  constexpr std::string_view kNames[] = {"pattern", "white", "dark"};
-  return kNames[static_cast<int>(light)];
-}
 
 /// A camera that takes one frame to a trigger. Backends: file, v4l2, aravis. Every backend passes the suite in
 /// tests/drivers. Frames may outlive the camera.
@@ -83,7 +75,7 @@ class Camera {
 
   /// What lights the captures that follow; the pattern, where nobody says. A camera sees it, a replay chooses its
   /// images by it.
-  virtual void expect(FrameLight) {}
+  virtual void expect(Picture) {}
 
   /// Whether the open device is still there, as far as can be told without a frame and without waiting.
   /// @errors kDisconnected: it needs open()

@@ -30,7 +30,7 @@ class FaultyCamera final : public Camera {
   [[nodiscard]] Result<> open() override;
   [[nodiscard]] std::chrono::nanoseconds open_time_max() const override { return camera_->open_time_max(); }
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
-  void expect(FrameLight light) override { camera_->expect(light); }
+  void expect(Picture light) override { camera_->expect(light); }
   [[nodiscard]] Result<> check() override;
   void cancel() override;
 

@@ -116,7 +116,7 @@ Result<MonotonicTime> FileCamera::wait_for_exposure(MonotonicTime deadline) {
 
 Result<Frame> FileCamera::deliver(MonotonicTime exposure_start) {
   if (pool_->all_lent()) return fail_busy();  // first, so that no image is passed over
-  const auto image = light_ == FrameLight::kPattern ? next_image() : image_in_light();
+  const auto image = light_ == Picture::kPattern ? next_image() : image_in_light();
   if (!image) return tl::unexpected(image.error());
   const GreyView pixels = view(**image);
   if (format_of(pixels) != pool_->format()) return fail_format(format_of(pixels));
@@ -135,11 +135,10 @@ Result<const GreyImage*> FileCamera::next_image() {
 
 // That which belongs to the frame of the pattern that was shown last.
 Result<const GreyImage*> FileCamera::image_in_light() {
-  const bool white = light_ == FrameLight::kWhite;
-  ImageFolder& folder = white ? white_ : dark_;
+  ImageFolder& folder = light_ == Picture::kWhite ? white_ : dark_;
   if (folder.size() == 0)
     return fail(ErrorCode::kNotFound,
-                std::string("a replay has such frames only from a folder \"") + (white ? "white" : "dark") +
+                "a replay has such frames only from a folder \"" + std::string(light_name(light_)) +
                     "\" beside its images: make one, or scan without",
                 options_.path.string());
   ++next_sequence_;
@@ -159,9 +158,9 @@ tl::unexpected<Error> FileCamera::fail_busy() const {
 
 tl::unexpected<Error> FileCamera::fail_format(const FrameFormat& format) const {
   const std::string which =
-      light_ == FrameLight::kPattern
+      light_ == Picture::kPattern
           ? "image " + std::to_string((patterns_ - 1) % folder_.size() + 1) + " of " + std::to_string(folder_.size())
-          : std::string("an image in the folder \"") + (light_ == FrameLight::kWhite ? "white\"" : "dark\"");
+          : "an image in the folder \"" + std::string(light_name(light_)) + "\"";
   return fail(ErrorCode::kMismatch,
               which + " is " + format_text(format) + ", the first is " + format_text(pool_->format()) +
                   "; keep images of one kind to a folder",

@@ -55,7 +55,7 @@ class FileCamera final : public Camera {
   /// @errors kInvalidArgument (an option), kNotFound (path, or no image in it), kMismatch, and as read_image()
   [[nodiscard]] Result<> open() override;
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
-  void expect(FrameLight light) override { light_ = light; }
+  void expect(Picture light) override { light_ = light; }
   [[nodiscard]] Result<> check() override;
   void cancel() override { wake_.wake(); }
 
@@ -76,7 +76,7 @@ class FileCamera final : public Camera {
   ImageFolder folder_;
   ImageFolder white_;  ///< empty where there is none
   ImageFolder dark_;
-  FrameLight light_ = FrameLight::kPattern;
+  Picture light_ = Picture::kPattern;
   std::uint64_t patterns_ = 0;  ///< frames of the pattern so far
   std::optional<FramePool> pool_;
   MonotonicTime opened_;

@@ -85,10 +85,10 @@ class LateLightTest : public ::testing::Test {
     request.deadline = steady_clock::now() + 60s;
     switch (random_() % 4) {
       case 0:
-        request.picture = ProjectedPicture::kWhite;
+        request.picture = Picture::kWhite;
         break;
       case 1:
-        request.picture = ProjectedPicture::kImage;
+        request.picture = Picture::kImage;
         request.png = *other_png_;
         break;
       default:
@@ -195,9 +195,9 @@ TEST_F(LateLightTest, EveryFrameSeesItsOwnLightAlone) {
       ASSERT_TRUE(result) << to_string(result.error());
       ASSERT_EQ(result->frames.size(), 1U + (request.texture ? 1 : 0) + (request.ambient ? 1 : 0));
       for (const FrameImage& frame : result->frames) {
-        const std::size_t expected = frame.light == FrameLight::kPattern ? kPattern
-                                     : frame.light == FrameLight::kWhite ? kWhite
-                                                                         : kBlack;
+        const std::size_t expected = frame.light == Picture::kPattern ? kPattern
+                                     : frame.light == Picture::kWhite ? kWhite
+                                                                      : kBlack;
         EXPECT_EQ(light_->sight_of(frame.sequence).picture, expected);
         EXPECT_FALSE(light_->sight_of(frame.sequence).other);
       }

@@ -19,17 +19,17 @@ ScanSetup setup() {
 
 TEST(DrawProjected, DrawsEach) {
   const ScanSetup setup = slsd::setup();
-  const auto draw = [&](ProjectedPicture picture) { return *draw_projected(picture, {}, setup); };
-  EXPECT_EQ(draw(ProjectedPicture::kPattern), std::nullopt);
-  EXPECT_EQ(draw(ProjectedPicture::kBlack), Grey8(1280, 800, 0));
-  EXPECT_EQ(draw(ProjectedPicture::kWhite), Grey8(1280, 800, 255));
-  EXPECT_EQ(draw(ProjectedPicture::kFocus)->at(0, 0), 255);
-  EXPECT_EQ(draw(ProjectedPicture::kGrid)->at(0, 0), 255);
+  const auto draw = [&](Picture picture) { return *draw_projected(picture, {}, setup); };
+  EXPECT_EQ(draw(Picture::kPattern), std::nullopt);
+  EXPECT_EQ(draw(Picture::kBlack), Grey8(1280, 800, 0));
+  EXPECT_EQ(draw(Picture::kWhite), Grey8(1280, 800, 255));
+  EXPECT_EQ(draw(Picture::kFocus)->at(0, 0), 255);
+  EXPECT_EQ(draw(Picture::kGrid)->at(0, 0), 255);
 }
 
 TEST(DrawProjected, TakesAnImageOfTheProjectorsSize) {
   const ScanSetup setup = slsd::setup();
-  const auto draw = [&](const std::string& png) { return draw_projected(ProjectedPicture::kImage, png, setup); };
+  const auto draw = [&](const std::string& png) { return draw_projected(Picture::kImage, png, setup); };
   EXPECT_EQ(*draw(*encode_png(Grey8(1280, 800, 42))), Grey8(1280, 800, 42));
   const auto other = draw(*encode_png(Grey8(1280, 720)));
   ASSERT_FALSE(other);
@@ -40,7 +40,7 @@ TEST(DrawProjected, TakesAnImageOfTheProjectorsSize) {
 }
 
 TEST(DrawProjected, RefusesAnImageThatWouldFillTheMemory) {
-  const auto huge = draw_projected(ProjectedPicture::kImage, "P5 20000 20000 255\n", setup());
+  const auto huge = draw_projected(Picture::kImage, "P5 20000 20000 255\n", setup());
   ASSERT_FALSE(huge);
   EXPECT_THAT(huge.error().message, HasSubstr("20000"));
 }
@@ -48,15 +48,15 @@ TEST(DrawProjected, RefusesAnImageThatWouldFillTheMemory) {
 TEST(DrawProjected, NeedsACalibrationForTheGrid) {
   ScanSetup setup = slsd::setup();
   setup.calibration.reset();
-  EXPECT_EQ(draw_projected(ProjectedPicture::kGrid, {}, setup).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(draw_projected(Picture::kGrid, {}, setup).error().code, ErrorCode::kNotFound);
 }
 
 TEST(DrawIdle, FollowsTheConfiguration) {
   EXPECT_EQ(draw_idle({}), std::nullopt);
   ProjectorOptions options;
-  options.idle = IdlePicture::kWhite;
+  options.idle = Picture::kWhite;
   EXPECT_EQ(draw_idle(options), Grey8(1280, 800, 255));
-  options.idle = IdlePicture::kBlack;
+  options.idle = Picture::kBlack;
   EXPECT_EQ(draw_idle(options), Grey8(1280, 800, 0));
 }
 

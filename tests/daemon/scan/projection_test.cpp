@@ -16,7 +16,6 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 using ::testing::HasSubstr;
-using Picture = Projection::Picture;
 
 constexpr int kWidthPx = 96;
 constexpr int kHeightPx = 64;

@@ -23,7 +23,7 @@ class FileCameraInLightTest : public FileCameraTest {
   void put(const std::string& name, int number) {
     folder_.write(name, test::pnm_bytes(samples_of(ramp8(12, 8, 10 * number))));
   }
-  static int next_in(Camera& camera, FrameLight light) {
+  static int next_in(Camera& camera, Picture light) {
     camera.expect(light);
     return next(camera);
   }
@@ -36,11 +36,11 @@ TEST_F(FileCameraInLightTest, ReplaysWhatBelongsToTheFrameOfThePattern) {
   FileCamera camera(options());
   ASSERT_TRUE(camera.open());
   for (const int frame : {0, 1, 2, 0, 1}) {
-    EXPECT_EQ(next_in(camera, FrameLight::kPattern), frame);
-    EXPECT_EQ(next_in(camera, FrameLight::kDark), 6);
+    EXPECT_EQ(next_in(camera, Picture::kPattern), frame);
+    EXPECT_EQ(next_in(camera, Picture::kBlack), 6);
     if (frame == 1) continue;
-    EXPECT_EQ(next_in(camera, FrameLight::kWhite), frame + 3);
-    EXPECT_EQ(next_in(camera, FrameLight::kWhite), frame + 3);
+    EXPECT_EQ(next_in(camera, Picture::kWhite), frame + 3);
+    EXPECT_EQ(next_in(camera, Picture::kWhite), frame + 3);
   }
 }
 
@@ -52,11 +52,11 @@ TEST_F(FileCameraInLightTest, CountsEveryFrame) {
   FileCamera camera(once);
   ASSERT_TRUE(camera.open());
   const auto pattern = camera.capture(far_away());
-  camera.expect(FrameLight::kWhite);
+  camera.expect(Picture::kWhite);
   const auto white = camera.capture(far_away());
   ASSERT_TRUE(pattern && white);
   EXPECT_EQ(white->sequence(), pattern->sequence() + 1);
-  camera.expect(FrameLight::kPattern);
+  camera.expect(Picture::kPattern);
   EXPECT_EQ(next_error(camera), ErrorCode::kNotFound);
 }
 
@@ -67,8 +67,8 @@ TEST_F(FileCameraInLightTest, TakesTheFoldersBesideOneImage) {
   one.path = folder_.path() / "a.pgm";
   FileCamera camera(one);
   ASSERT_TRUE(camera.open());
-  EXPECT_EQ(next_in(camera, FrameLight::kWhite), 1);
-  EXPECT_EQ(next_in(camera, FrameLight::kPattern), 0);
+  EXPECT_EQ(next_in(camera, Picture::kWhite), 1);
+  EXPECT_EQ(next_in(camera, Picture::kPattern), 0);
 }
 
 TEST_F(FileCameraInLightTest, SaysWhichFolderIsMissingOrOfAnotherSize) {
@@ -76,17 +76,17 @@ TEST_F(FileCameraInLightTest, SaysWhichFolderIsMissingOrOfAnotherSize) {
   folder_.write("white/0.pgm", test::pnm_bytes(samples_of(ramp8(10, 8, 0))));
   FileCamera camera(options());
   ASSERT_TRUE(camera.open());
-  camera.expect(FrameLight::kDark);
+  camera.expect(Picture::kBlack);
   const auto dark = camera.capture(far_away());
   ASSERT_FALSE(dark);
   EXPECT_EQ(dark.error().code, ErrorCode::kNotFound);
   EXPECT_THAT(dark.error().message, HasSubstr("\"dark\""));
-  camera.expect(FrameLight::kWhite);
+  camera.expect(Picture::kWhite);
   const auto white = camera.capture(far_away());
   ASSERT_FALSE(white);
   EXPECT_EQ(white.error().code, ErrorCode::kMismatch);
   EXPECT_THAT(white.error().message, HasSubstr("folder \"white\" is 10x8"));
-  EXPECT_EQ(next_in(camera, FrameLight::kPattern), 0);
+  EXPECT_EQ(next_in(camera, Picture::kPattern), 0);
 }
 
 }  // namespace

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+namespace slsd {
+
+/// What a projector shows.
+enum class Picture {
+  kPattern,
+  kWhite,
+  kBlack,
+  kFocus,  ///< a chart to focus by
+  kGrid,   ///< each camera's view
+  kImage,  ///< a client's own
+  kIdle,   ///< what the configuration says for when nobody scans: one of the first three
+  kHeld,   ///< what a client has it show until the next scan: any of the above
+};
+
+inline constexpr std::array kPictureNames{
+    std::pair<std::string_view, Picture>("pattern", Picture::kPattern),
+    std::pair<std::string_view, Picture>("white", Picture::kWhite),
+    std::pair<std::string_view, Picture>("black", Picture::kBlack),
+    std::pair<std::string_view, Picture>("focus", Picture::kFocus),
+    std::pair<std::string_view, Picture>("grid", Picture::kGrid),
+    std::pair<std::string_view, Picture>("image", Picture::kImage),
+    std::pair<std::string_view, Picture>("idle", Picture::kIdle),
+    std::pair<std::string_view, Picture>("held", Picture::kHeld),
+};
+
+[[nodiscard]] constexpr std::string_view to_string(Picture picture) {
+  return std::ranges::find(kPictureNames, picture, &std::pair<std::string_view, Picture>::second)->first;
+}
+
+[[nodiscard]] constexpr std::optional<Picture> picture_named(std::string_view name) {
+  const auto* found = std::ranges::find(kPictureNames, name, &std::pair<std::string_view, Picture>::first);
+  return found == kPictureNames.end() ? std::nullopt : std::optional(found->second);
+}
+
+/// What a frame that was exposed under the picture is called: in black there is only the light of the room.
+[[nodiscard]] constexpr std::string_view light_name(Picture picture) {
+  return picture == Picture::kBlack ? "dark" : to_string(picture);
+}
+
+}  // namespace slsd
