@@ -38,9 +38,10 @@ std::string drift_line(const json& camera) {
 }
 
 std::string device_line(const json& device) {
-  std::string line = fmt::format("{:<12}{}, {} {}, {}x{} px", text_of(device, "name"), text_of(device, "state"),
-                                 text_of(device, "driver"), text_of(device, "device"), device.value("width_px", 0),
-                                 device.value("height_px", 0));
+  std::string what = text_of(device, "driver");
+  if (const std::string name = text_of(device, "device"); name != what) what += " " + name;
+  std::string line = fmt::format("{:<12}{}, {}, {}x{} px", text_of(device, "name"), text_of(device, "state"), what,
+                                 device.value("width_px", 0), device.value("height_px", 0));
   if (const std::string shows = text_of(device, "shows"); !shows.empty()) line += ", shows " + shows;
   if (device.contains("frames")) {
     line += fmt::format(", {} frames, {} lost", device.value("frames", std::uint64_t{0}),
