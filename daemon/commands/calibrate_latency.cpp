@@ -18,6 +18,8 @@ namespace {
 
 using std::filesystem::path;
 
+constexpr auto kOpenTime = std::chrono::seconds(30);
+
 double milliseconds(std::chrono::microseconds time) {
   return std::chrono::duration<double, std::milli>(time).count();
 }
@@ -35,7 +37,8 @@ void print(const CameraLatency& camera) {
 Result<LatencyReport> measure(const Configuration& configuration, const LatencyOptions& options) {
   auto projector = make_projector(configuration.projector);
   if (!projector) return tl::unexpected(projector.error());
-  if (auto opened = (*projector)->open(); !opened) return tl::unexpected(opened.error());
+  if (auto opened = (*projector)->open(std::chrono::steady_clock::now() + kOpenTime); !opened)
+    return tl::unexpected(opened.error());
   const ProjectorDescription& description = (*projector)->description();
   LatencyReport report{
       utc_text(std::chrono::system_clock::now()), projector_name(description.driver, description.monitor), {}};

@@ -22,7 +22,7 @@
 #include "daemon/server/listening_socket.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/projector/x11/choose_output.hpp"
-#include "drivers/projector/x11/monitor_report.hpp"
+#include "drivers/projector/x11/x_display.hpp"
 
 namespace slsd {
 namespace {
@@ -32,6 +32,7 @@ using std::filesystem::path;
 
 constexpr std::size_t kMaxLatencyBytes = 1 << 20;
 constexpr std::size_t kLongestProblem = 1000;
+constexpr auto kOpenTime = std::chrono::seconds(30);
 
 /// Prints findings, and keeps whether one of them forbids a scan.
 class Findings {
@@ -205,14 +206,15 @@ class Check {
     if (options.driver == ProjectorDriver::kGlfw) return check_monitor(open);
     if (live_ || held_) return;
     const auto projector = make_projector(options);
-    findings_.note((*projector)->open(),
+    findings_.note((*projector)->open(std::chrono::steady_clock::now() + kOpenTime),
                    "projector headless, " + size_text(options.width_px, options.height_px) + " px");
   }
 
   // Only looks: the service that runs may be showing its pattern there, on a display that is not this user's.
   void check_monitor(bool open) {
     const ProjectorOptions& options = configuration_.projector;
-    const auto report = report_monitor(options.monitor, options.width_px, options.height_px);
+    const auto report = report_monitor(options.monitor, options.width_px, options.height_px,
+                                       options.enable_output.value_or(owns_display()));
     if (!report && open) return;
     if (!report) return findings_.bad(to_string(report.error()));
     monitor_ = report->output.name;

@@ -20,6 +20,7 @@ using std::chrono::nanoseconds;
 
 constexpr double kWhole = 0.9;  // lamps and a DLP's flashes let whole ones differ by some percent
 constexpr int kLostMax = 5;
+constexpr auto kShowTime = std::chrono::seconds(10);
 
 constexpr int kSamplesAcross = 200;
 constexpr double kBrightest = 0.99;
@@ -146,7 +147,7 @@ class LatencyMeter {
 
  private:
   Result<MonotonicTime> show_and_settle(const Grey8& image, nanoseconds more = {}) {
-    auto shown = projector_.show(image);
+    auto shown = projector_.show(image, time_.now() + kShowTime);
     if (shown) time_.sleep(options_.settle + more);
     return shown;
   }
@@ -185,7 +186,7 @@ class LatencyMeter {
   Result<Flash> flash(const FlashPixels& pixels) {
     const nanoseconds pause(std::uniform_int_distribution<std::int64_t>(0, 100'000'000)(random_));
     if (auto shown = show_and_settle(black_, pause); !shown) return tl::unexpected(shown.error());
-    const auto shown = projector_.show(white_);
+    const auto shown = projector_.show(white_, time_.now() + kShowTime);
     if (!shown) return tl::unexpected(shown.error());
     Flash flash;
     while (time_.now() < *shown + options_.patience) {

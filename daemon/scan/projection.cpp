@@ -5,7 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <thread>
+#include <condition_variable>
 #include <utility>
 
 #include "daemon/scan/hardware.hpp"
@@ -16,7 +16,15 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr auto kLook = 10ms;
+constexpr auto kSlice = 100ms;  // after which a wait for the projector looks whether it still makes sense
+constexpr auto kGrace = 500ms;  // beyond the deadline of a scan
+
+void sleep_until(MonotonicTime time, const std::stop_token& stop) {
+  std::mutex mutex;
+  std::condition_variable_any never;
+  std::unique_lock lock(mutex);
+  never.wait_until(lock, stop, time, [] { return false; });
+}
 
 }  // namespace
 
@@ -61,7 +69,7 @@ Picture Projection::due() const {
 }
 
 MonotonicTime Projection::next_change() const {
-  if (!shown_) return next_attempt_;
+  if (!shown_ || looking_) return next_attempt_;
   const bool idle_comes = idle_ && !held_ && shown_ != Picture::kIdle;
   return idle_comes ? last_scan_ + idle_after_ : MonotonicTime::max();
 }
@@ -75,21 +83,25 @@ const Grey8& Projection::image(Picture which) {
   return plain_;
 }
 
-Result<> Projection::open_and_show(Picture which) {
-  if (!is_open(status().state)) {
-    if (auto opened = projector_->open(); !opened) return opened;
+Result<> Projection::open_and_show(Picture which, MonotonicTime until) {
+  if (!open_) {
+    if (auto opened = projector_->open(until); !opened) return opened;
+    open_ = true;
   }
-  const auto complete = projector_->show(image(which));
+  const auto complete = projector_->show(image(which), until);
   if (!complete) return tl::unexpected(complete.error());
   visible_ = *complete + latency_;
   ++changes_;
   return {};
 }
 
-void Projection::attempt(Picture which) {
+void Projection::attempt(Picture which, MonotonicTime until) {
   if (shown_ == which || steady_clock::now() < next_attempt_) return;
-  const Result<> outcome = open_and_show(which);
-  shown_ = outcome ? std::optional(which) : std::nullopt;
+  const Result<> outcome = open_and_show(which, until);
+  shown_.reset();
+  if (!outcome && outcome.error().code == ErrorCode::kTimeout) return;  // it goes on
+  if (outcome) shown_ = which;
+  open_ = outcome.has_value();
   note(outcome);
   if (outcome) {
     backoff_.reset();
@@ -98,16 +110,33 @@ void Projection::attempt(Picture which) {
   }
 }
 
-void Projection::look() {
-  if (const auto there = shown_ ? projector_->check() : Result<>(); !there) {
-    shown_.reset();
-    note(there);
-  }
+// Whether it is known by then that what was shown still is, or why not.
+bool Projection::look(MonotonicTime until) {
+  const auto there = shown_ ? projector_->check(until) : Result<>();
+  looking_ = !there && there.error().code == ErrorCode::kTimeout;
+  if (!there && !looking_) lose(there);
+  return !looking_;
+}
+
+void Projection::lose(const Result<>& reason) {
+  shown_.reset();
+  open_ = false;
+  note(reason);
 }
 
 void Projection::supervise() {
-  look();
-  attempt(due());
+  const MonotonicTime until = steady_clock::now() + kSlice;
+  if (look(until)) attempt(due(), until);
+}
+
+Result<> Projection::check() {
+  auto there = projector_->check(std::max<MonotonicTime>(deadline_, steady_clock::now()) + kGrace);
+  if (there) return there;
+  if (there.error().code != ErrorCode::kTimeout) lose(there);
+  Error error = std::move(there.error());
+  error.code = ErrorCode::kDisconnected;
+  if (error.where != "projector") error.where = "projector, " + error.where;
+  return tl::unexpected(std::move(error));
 }
 
 void Projection::note(const Result<>& outcome) {
@@ -132,19 +161,27 @@ void Projection::note(const Result<>& outcome) {
 }
 
 Result<> Projection::await(Picture which, MonotonicTime deadline, const std::stop_token& stop) {
-  look();
-  attempt(which);
-  while (shown_ != which) {
+  deadline_ = deadline;
+  for (bool looked = false; !looked || shown_ != which;) {
+    const MonotonicTime until = std::min<MonotonicTime>(deadline, steady_clock::now() + kSlice);
+    looked = looked || look(until);
+    if (looked) attempt(which, until);
     if (stop.stop_requested()) return fail(ErrorCode::kCancelled, "the service is stopping");
-    if (steady_clock::now() >= deadline) {
-      return fail(ErrorCode::kTimeout, "the projector did not become ready in time: " + status().problem, "projector");
-    }
-    std::this_thread::sleep_until(std::min<MonotonicTime>(deadline, steady_clock::now() + kLook));
-    attempt(which);
+    if (looked && shown_ == which) break;
+    if (steady_clock::now() >= deadline) return fail_not_ready();
+    sleep_until(std::min(deadline, next_attempt_), stop);
   }
   if (visible_ > deadline) return fail(ErrorCode::kTimeout, "the picture is not visible in time", "projector");
-  std::this_thread::sleep_until(visible_);
+  sleep_until(visible_, stop);
+  if (stop.stop_requested()) return fail(ErrorCode::kCancelled, "the service is stopping");
   return {};
+}
+
+tl::unexpected<Error> Projection::fail_not_ready() const {
+  const std::string problem = status().problem;
+  return fail(ErrorCode::kTimeout,
+              "the projector did not become ready in time: " + (problem.empty() ? "it takes longer" : problem),
+              "projector");
 }
 
 Result<> Projection::show(Picture picture, MonotonicTime deadline, const std::stop_token& stop) {

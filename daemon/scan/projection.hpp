@@ -19,7 +19,7 @@
 namespace slsd {
 
 /// The projector and what it shows. Opens it, opens it again after it was lost, with growing pauses; the first failure
-/// and the recovery are logged, not each attempt.
+/// and the recovery are logged, not each attempt. Comes back from every call in time, whatever the projector does.
 ///
 ///             a scan                    idle_after without a scan
 ///     any ------------> pattern (white, black) ------------> idle picture
@@ -44,7 +44,8 @@ class Projection {
   /// Goes on to the idle picture, at once. @errors as hold()
   [[nodiscard]] Result<> release(MonotonicTime deadline, const std::stop_token& stop);
 
-  /// Opens the projector and shows what is due; notices that it is gone.
+  /// Opens the projector and shows what is due; notices that it is gone, or hangs. Takes a tenth of a second at most:
+  /// what takes longer goes on, and the next call looks after it.
   void supervise();
   /// When supervise() will have another picture to show; the end of time where it will not.
   [[nodiscard]] MonotonicTime next_change() const;
@@ -56,8 +57,9 @@ class Projection {
   /// Returns when what is due is visible. @errors as show()
   [[nodiscard]] Result<> show_due(MonotonicTime deadline, const std::stop_token& stop);
 
-  /// Whether what was shown still is. Asked after each capture. @errors kDisconnected
-  [[nodiscard]] Result<> check() { return projector_->check(); }
+  /// Whether what was shown still is. Asked after each capture; comes back half a second after the deadline of what was
+  /// shown at the latest. @errors kDisconnected
+  [[nodiscard]] Result<> check();
   /// From when on every exposure sees what is shown, and nothing of what was shown before.
   [[nodiscard]] MonotonicTime visible() const { return visible_; }
   /// How often another picture was shown; frames of different counts do not belong together.
@@ -72,12 +74,14 @@ class Projection {
   };
   [[nodiscard]] Picture due() const;
   [[nodiscard]] const Grey8& image(Picture which);
-  [[nodiscard]] Result<> open_and_show(Picture which);
+  [[nodiscard]] Result<> open_and_show(Picture which, MonotonicTime until);
   [[nodiscard]] Result<> await(Picture which, MonotonicTime deadline, const std::stop_token& stop);
   [[nodiscard]] Result<> show_held(std::optional<Held> held, MonotonicTime deadline, const std::stop_token& stop);
   void set_held(std::optional<Held> held);
-  void look();
-  void attempt(Picture which);
+  [[nodiscard]] tl::unexpected<Error> fail_not_ready() const;
+  [[nodiscard]] bool look(MonotonicTime until);
+  void attempt(Picture which, MonotonicTime until);
+  void lose(const Result<>& reason);
   void note(const Result<>& outcome);
 
   std::unique_ptr<Projector> projector_;
@@ -91,7 +95,10 @@ class Projection {
   MonotonicTime next_attempt_{};
   MonotonicTime last_scan_{};
   MonotonicTime visible_{};
-  std::optional<Picture> shown_;
+  MonotonicTime deadline_{};      ///< of what was shown last
+  std::optional<Picture> shown_;  ///< nothing: unknown
+  bool open_ = false;
+  bool looking_ = false;  ///< whether it is still shown, it has not answered yet
   std::uint64_t changes_ = 0;
   mutable std::mutex mutex_;  ///< guards status_
   DeviceStatus status_;

@@ -10,11 +10,12 @@
 #include <vector>
 
 #include "drivers/projector/light_curve.hpp"
-#include "drivers/projector/offscreen_target.hpp"
 #include "drivers/projector/projector.hpp"
 #include "drivers/projector/texel_painter.hpp"
 
 namespace slsd {
+
+class OffscreenTarget;
 
 /// The keys of the [projector] table that a headless projector reads.
 struct HeadlessProjectorOptions {
@@ -22,7 +23,7 @@ struct HeadlessProjectorOptions {
   int height_px = 800;  ///< 1 to 16384
   LightOptions light = {};
   double refresh_hz = 60.0;                       ///< 1 to 1000
-  std::vector<std::uint64_t> disconnect_at = {};  ///< at which calls of show(), counted from 1, it is found unplugged
+  std::vector<std::uint64_t> disconnect_at = {};  ///< at which image shown, counted from 1, it is found unplugged
 
   [[nodiscard]] Result<> validate() const;
 };
@@ -32,11 +33,12 @@ struct HeadlessProjectorOptions {
 class HeadlessProjector final : public Projector {
  public:
   explicit HeadlessProjector(HeadlessProjectorOptions options);
+  ~HeadlessProjector() override;
 
   [[nodiscard]] const ProjectorDescription& description() const override { return description_; }
-  [[nodiscard]] Result<> open() override;
-  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image) override;
-  [[nodiscard]] Result<> check() override;
+  [[nodiscard]] Result<> open(MonotonicTime deadline) override;
+  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image, MonotonicTime deadline) override;
+  [[nodiscard]] Result<> check(MonotonicTime deadline) override;
   [[nodiscard]] std::vector<std::string> warnings() const override { return {}; }
   [[nodiscard]] Result<Grey8> read_back() override;
 
@@ -45,6 +47,7 @@ class HeadlessProjector final : public Projector {
 
  private:
   [[nodiscard]] Result<> make_target();
+  [[nodiscard]] Result<> begin(const Grey8& image);
   void draw(const Grey8& image);
   [[nodiscard]] std::chrono::nanoseconds period() const;
   [[nodiscard]] MonotonicTime next_refresh(MonotonicTime after) const;
@@ -55,6 +58,8 @@ class HeadlessProjector final : public Projector {
   std::optional<TexelPainter> painter_;
   bool connected_ = false;
   MonotonicTime first_refresh_;
+  Grey8 showing_;
+  std::optional<MonotonicTime> complete_;  ///< of what is shown, until show() has said so
   std::uint64_t shows_ = 0;
 };
 

@@ -22,30 +22,33 @@ struct ProjectorDescription {
 
 /// A projector that shows one image, pixel for pixel. Backends: headless, glfw. Every backend passes the suite
 /// in tests/drivers.
-/// After kDisconnected it needs open(), and then shows black until show().
+///
+/// No call waits for longer than its deadline, whatever the device and its driver do. What is not done by then goes on:
+/// that is kTimeout, and the same call, made again, waits for it. A driver that has not answered for seconds hangs:
+/// that is kIo, which every call says at once until the driver answers. After kDisconnected and kIo it needs open().
 /// @thread thread-bound
 class Projector {
  public:
   virtual ~Projector() = default;
   [[nodiscard]] virtual const ProjectorDescription& description() const = 0;
 
-  /// Opens the projector, again after a fault, and shows black.
-  /// @errors kNotFound, kPermissionDenied, kMismatch, kUnsupported, kDisconnected
-  [[nodiscard]] virtual Result<> open() = 0;
+  /// Opens the projector, again after a fault, and shows black; after a driver only was slow or hung, what it was told.
+  /// @errors kNotFound, kPermissionDenied, kMismatch, kUnsupported, kDisconnected, kTimeout, kIo
+  [[nodiscard]] virtual Result<> open(MonotonicTime deadline) = 0;
 
   /// Shows the image from now on; waits for its first whole refresh to be complete, from the first row to the last, and
   /// returns when that was. How long the device itself takes from there to its light, no driver knows.
-  /// @errors kMismatch: not of the projector's size; kDisconnected
-  [[nodiscard]] virtual Result<MonotonicTime> show(const Grey8& image) = 0;
+  /// @errors kMismatch: not of the projector's size; kDisconnected, kTimeout, kIo
+  [[nodiscard]] virtual Result<MonotonicTime> show(const Grey8& image, MonotonicTime deadline) = 0;
 
   /// Whether it still shows what it was told to, now; waits for no refresh. Asked before and after each frame of a
-  /// scan, and while nobody scans. @errors kDisconnected
-  [[nodiscard]] virtual Result<> check() = 0;
+  /// scan, and while nobody scans. @errors kDisconnected, kTimeout, kIo
+  [[nodiscard]] virtual Result<> check(MonotonicTime deadline) = 0;
 
   /// What disturbs the light that it gives, as found by open(): a sentence each, with the remedy.
   [[nodiscard]] virtual std::vector<std::string> warnings() const = 0;
 
-  /// What is shown, as read back from where it is shown. @errors kDisconnected
+  /// What is shown, as read back from where it is shown; for tests. @errors kDisconnected, kIo
   [[nodiscard]] virtual Result<Grey8> read_back() = 0;
 };
 

@@ -168,8 +168,12 @@ class Projector(unittest.TestCase):
         self.assertEqual(checked.returncode, 0)
         self.server.unplug()
         checked = slsd("--check", "--config", self.service.file, env=environment)
-        self.assertIn("the monitor \"DUMMY1\" is not there", checked.stdout)
+        self.assertIn("the monitor \"DUMMY1\" is plugged in, but off", checked.stdout)
         self.assertEqual(checked.returncode, 1)
+        self.service.configure(configuration=CONFIGURATION.replace('"glfw"', '"glfw"\nenable_output = true'))
+        checked = slsd("--check", "--config", self.service.file, env=environment)
+        self.assertIn("it is off: slsd turns it on", checked.stdout)
+        self.assertEqual(checked.returncode, 0)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@
 import ctypes
 import pathlib
 import shutil
+import signal
 import subprocess
 import tempfile
 
@@ -87,6 +88,13 @@ class XServer:
         self.x11.XDestroyImage(image)
         self.x11.XCloseDisplay(display)
         return rows[1::4]
+
+    def freeze(self):
+        """Lets it hang: it takes connections and answers nothing."""
+        self.process.send_signal(signal.SIGSTOP)
+
+    def thaw(self):
+        self.process.send_signal(signal.SIGCONT)
 
     def close(self):
         self.process.kill()

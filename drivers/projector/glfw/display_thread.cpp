@@ -3,69 +3,114 @@
 #include "drivers/projector/glfw/display_thread.hpp"
 
 #include <array>
-#include <cstdint>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <system_error>
+#include <thread>
+#include <utility>
 
 #include <poll.h>
 #include <pthread.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
+
+#include "drivers/system/wake_event.hpp"
 
 namespace slsd {
+namespace {
 
-DisplayThread::DisplayThread(std::function<int()> handle_events) : handle_events_(std::move(handle_events)) {}
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+
+constexpr auto kEndMax = 3s;  // for the window to be taken away
+
+}  // namespace
+
+struct DisplayThread::Shared {
+  explicit Shared(const GlfwProjectorOptions& options) : screen(options) {}
+
+  ProjectorScreen screen;  ///< used on the thread alone
+  std::atomic<bool> open{false};
+  WakeEvent woken;
+  std::mutex mutex;  ///< guards what follows
+  std::condition_variable changed;
+  Work work;  ///< empty: none is under way
+  MonotonicTime since{};
+  bool running = false;
+  bool stop = false;
+};
+
+DisplayThread::DisplayThread(const GlfwProjectorOptions& options) : shared_(std::make_shared<Shared>(options)) {}
 
 DisplayThread::~DisplayThread() {
-  if (thread_.joinable()) {
-    thread_.request_stop();
-    wake();
-    thread_.join();
-  }
-  if (wake_descriptor_ >= 0) ::close(wake_descriptor_);
+  std::unique_lock lock(shared_->mutex);
+  shared_->stop = true;
+  shared_->woken.wake();
+  const bool stuck = shared_->work != nullptr;
+  shared_->changed.wait_for(lock, stuck ? 0s : kEndMax, [this] { return !shared_->running; });
 }
 
 Result<> DisplayThread::start() {
-  if (thread_.joinable()) return {};
-  if (wake_descriptor_ < 0) wake_descriptor_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  if (wake_descriptor_ < 0) return fail(ErrorCode::kNoSpace, "no descriptor is left for the display's thread");
+  const std::lock_guard lock(shared_->mutex);
+  if (shared_->running) return {};
+  if (auto opened = shared_->woken.open(); !opened) return opened;
   try {
-    thread_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
+    std::thread([shared = shared_] { serve(shared); }).detach();
   } catch (const std::system_error&) {
-    return fail(ErrorCode::kNoSpace, "no thread is left for the display");
+    return fail(ErrorCode::kNoSpace, "no thread is left for the display", "projector");
   }
+  shared_->running = true;
   return {};
 }
 
-void DisplayThread::wake() const {
-  const std::uint64_t one = 1;
-  [[maybe_unused]] const auto written = ::write(wake_descriptor_, &one, sizeof one);
+void DisplayThread::begin(Work work) {
+  const std::lock_guard lock(shared_->mutex);
+  shared_->work = std::move(work);
+  shared_->since = steady_clock::now();
+  shared_->woken.wake();
 }
 
-void DisplayThread::run(const std::function<void()>& job) {
-  std::unique_lock lock(mutex_);
-  job_ = &job;
-  wake();
-  done_.wait(lock, [&] { return job_ == nullptr; });
+bool DisplayThread::wait(MonotonicTime until) const {
+  std::unique_lock lock(shared_->mutex);
+  return shared_->changed.wait_until(lock, until, [this] { return !shared_->work; });
 }
 
-void DisplayThread::take_job() {
-  std::uint64_t count = 0;
-  [[maybe_unused]] const auto got = ::read(wake_descriptor_, &count, sizeof count);
-  const std::lock_guard lock(mutex_);
-  if (job_ == nullptr) return;
-  (*job_)();
-  job_ = nullptr;
-  done_.notify_one();
+MonotonicTime DisplayThread::begun() const {
+  const std::lock_guard lock(shared_->mutex);
+  return shared_->since;
 }
 
-void DisplayThread::serve(const std::stop_token& stop) {
+bool DisplayThread::screen_open() const {
+  return shared_->open;
+}
+
+void DisplayThread::serve(const std::shared_ptr<Shared>& shared) {
   pthread_setname_np(pthread_self(), "display");
-  while (!stop.stop_requested()) {
-    const int events = handle_events_();
-    std::array descriptors{pollfd{wake_descriptor_, POLLIN, 0}, pollfd{events, POLLIN, 0}};
+  ProjectorScreen& screen = shared->screen;
+  std::unique_lock lock(shared->mutex);
+  while (!shared->stop) {
+    if (const Work work = shared->work) {
+      lock.unlock();
+      work(screen);
+      shared->open = screen.is_open();
+      lock.lock();
+      shared->work = nullptr;
+      shared->changed.notify_all();
+      continue;
+    }
+    lock.unlock();
+    const int events = screen.handle_events();
+    shared->open = screen.is_open();
+    std::array descriptors{pollfd{shared->woken.descriptor(), POLLIN, 0}, pollfd{events, POLLIN, 0}};
     ::poll(descriptors.data(), descriptors.size(), -1);
-    take_job();
+    shared->woken.reset();
+    lock.lock();
   }
+  lock.unlock();
+  screen.end();
+  lock.lock();
+  shared->running = false;
+  shared->changed.notify_all();
 }
 
 }  // namespace slsd

@@ -2,46 +2,50 @@
 // Copyright the slsd authors
 #pragma once
 
-#include <condition_variable>
 #include <functional>
-#include <mutex>
-#include <thread>
+#include <memory>
 
 #include "core/result.hpp"
+#include "drivers/camera/frame.hpp"
+#include "drivers/projector/glfw/projector_screen.hpp"
 
 namespace slsd {
 
-/// A thread that does one job at a time, and in between waits for events, at no cost.
-/// @thread thread-safe
+/// The thread that a projector's screen lives on, "display". It does one piece of work at a time, and in between sleeps
+/// until the X server tells something: so an unplugged monitor is known at once, also while nobody scans.
+///
+/// Xlib and graphics drivers wait for a server that hangs without bound. So nobody waits for this thread without bound:
+/// work that is not done in time goes on, until the server answers or is gone. The thread owns all that it works with;
+/// where it is stuck when its owner ends, it is left to itself and nothing is freed under it.
+/// @thread one at a time
 class DisplayThread {
  public:
-  /// @param handle_events  called on the thread after each job and when there are events; returns the descriptor that
-  /// is
-  ///                       readable when there are more, -1: none
-  explicit DisplayThread(std::function<int()> handle_events);
+  using Work = std::function<void(ProjectorScreen&)>;
+
+  explicit DisplayThread(const GlfwProjectorOptions& options);
+  /// Takes the window away and ends the thread; one that is stuck does so itself, as soon as it can.
   ~DisplayThread();
   DisplayThread(const DisplayThread&) = delete;
   DisplayThread& operator=(const DisplayThread&) = delete;
 
-  /// @errors kNoSpace: no descriptor or no thread is left
+  /// Nothing to do where it runs already. @errors kNoSpace: no descriptor or no thread is left
   [[nodiscard]] Result<> start();
 
-  [[nodiscard]] bool started() const { return thread_.joinable(); }
+  /// Begins the work; what came before has ended. @param work  keeps alive what it uses
+  void begin(Work work);
+  /// Waits for the end of the work. @return whether it has ended, by the time
+  [[nodiscard]] bool wait(MonotonicTime until) const;
+  /// When the work under way, or the last, began.
+  [[nodiscard]] MonotonicTime begun() const;
 
-  /// Runs the job on the thread and waits for its end. Started before.
-  void run(const std::function<void()>& job);
+  /// Whether the screen was open when the thread last looked.
+  [[nodiscard]] bool screen_open() const;
 
  private:
-  void serve(const std::stop_token& stop);
-  void take_job();
-  void wake() const;
+  struct Shared;
+  static void serve(const std::shared_ptr<Shared>& shared);
 
-  std::function<int()> handle_events_;
-  int wake_descriptor_ = -1;
-  std::mutex mutex_;  ///< guards job_
-  std::condition_variable done_;
-  const std::function<void()>* job_ = nullptr;
-  std::jthread thread_;
+  std::shared_ptr<Shared> shared_;  // shared: a thread that is stuck outlives its owner
 };
 
 }  // namespace slsd

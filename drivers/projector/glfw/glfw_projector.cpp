@@ -2,76 +2,120 @@
 // Copyright the slsd authors
 #include "drivers/projector/glfw/glfw_projector.hpp"
 
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
 #include <utility>
 
 #include "core/image_size.hpp"
+#include "drivers/projector/x11/x_display.hpp"
 
 namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+
+// An X server that has not answered for so long hangs, as far as can be told; one that is only slow goes on all the
+// same.
+constexpr std::chrono::nanoseconds kHangs = 2s;
+constexpr std::chrono::nanoseconds kOpeningHangs = 5s;
+constexpr auto kScreenshotMax = 10s;
+
+}  // namespace
 
 GlfwProjector::GlfwProjector(GlfwProjectorOptions options)
     : options_(std::move(options)),
       description_{"glfw", options_.monitor, options_.width_px, options_.height_px},
-      screen_(options_),
-      thread_([this] {
-        const int events = screen_.handle_events();
-        connected_ = screen_.is_open();
-        return events;
-      }) {}
-
-GlfwProjector::~GlfwProjector() {
-  if (thread_.started()) thread_.run([this] { screen_.end(); });
+      thread_(options_) {
+  // Where there is no DRI3 Mesa tries its predecessor, which is refused on any server of today, and says so on stderr
+  // at each start, before it draws on the processor. Set here, while the process has one thread.
+  ::setenv("LIBGL_DRI2_DISABLE", "true", 0);
 }
 
-Result<> GlfwProjector::open() {
+std::string GlfwProjector::where() const {
+  return description_.monitor.empty() ? "projector" : "monitor " + description_.monitor;
+}
+
+tl::unexpected<Error> GlfwProjector::fail_gone() const {
+  return fail(ErrorCode::kDisconnected, "the projector is not there; check its cable and its power", where());
+}
+
+// For the end of what the thread was told last.
+Result<> GlfwProjector::wait(MonotonicTime deadline) const {
+  const MonotonicTime hangs = thread_.begun() + (is_under_way(Task::kOpen) ? kOpeningHangs : kHangs);
+  if (thread_.wait(std::min(deadline, hangs))) return {};
+  if (steady_clock::now() < hangs) return fail(ErrorCode::kTimeout, "it takes longer", where());
+  Error error = no_answer().value();
+  error.where = where();
+  return tl::unexpected(std::move(error));
+}
+
+Result<> GlfwProjector::begin(Order order, MonotonicTime deadline, void (*work)(ProjectorScreen&, Order&)) {
+  if (auto done = wait(deadline); !done) return done;
+  order_.reset();
+  if (order.task != Task::kOpen && !thread_.screen_open()) return fail_gone();
+  order_ = std::make_shared<Order>(std::move(order));
+  thread_.begin([order = order_, work](ProjectorScreen& screen) { work(screen, *order); });
+  return {};
+}
+
+Result<> GlfwProjector::open(MonotonicTime deadline) {
   if (auto valid = options_.validate(); !valid) return valid;
   if (auto started = thread_.start(); !started) return started;
-  Result<> opened;
-  thread_.run([&] {
-    opened = screen_.open();
-    connected_ = screen_.is_open();
-    if (!opened) return;
-    description_.monitor = screen_.output().name;
-    description_.model = screen_.output().model;
-    description_.serial = screen_.output().serial;
-    warnings_ = screen_.warnings();
-  });
-  return opened;
+  if (!is_under_way(Task::kOpen)) {
+    if (auto done = wait(deadline); !done) return done;
+    if (order_ && thread_.screen_open()) return {};  // it hung or was slow, and still shows what it was told
+    const auto open_screen = [](ProjectorScreen& screen, Order& order) {
+      order.opened = screen.open();
+      order.output = screen.output();
+      order.warnings = screen.warnings();
+    };
+    if (auto begun = begin({Task::kOpen}, deadline, open_screen); !begun) return begun;
+  }
+  if (auto done = wait(deadline); !done) return done;
+  const auto order = std::exchange(order_, nullptr);
+  if (!order->opened) return order->opened;
+  description_.monitor = order->output.name;
+  description_.model = order->output.model;
+  description_.serial = order->output.serial;
+  warnings_ = order->warnings;
+  return {};
 }
 
-Result<MonotonicTime> GlfwProjector::show(const Grey8& image) {
-  if (auto there = check(); !there) return tl::unexpected(there.error());
+Result<MonotonicTime> GlfwProjector::show(const Grey8& image, MonotonicTime deadline) {
   if (image.width() != options_.width_px || image.height() != options_.height_px) {
+    if (!thread_.screen_open()) return fail_gone();
     return fail(ErrorCode::kMismatch,
                 "the image is " + size_text(image.width(), image.height()) + " pixels, the projector " +
                     size_text(options_.width_px, options_.height_px) + "; make the pattern for this projector",
-                "monitor " + description_.monitor);
+                where());
   }
-  Result<MonotonicTime> shown;
-  thread_.run([&] {
-    shown = screen_.show(image);
-    connected_ = screen_.is_open();
-  });
-  return shown;
+  if (!is_under_way(Task::kShow) || !(order_->image == image)) {
+    const auto show_image = [](ProjectorScreen& screen, Order& order) { order.shown = screen.show(order.image); };
+    if (auto begun = begin({Task::kShow, image}, deadline, show_image); !begun) return tl::unexpected(begun.error());
+  }
+  if (auto done = wait(deadline); !done) return tl::unexpected(done.error());
+  return std::exchange(order_, nullptr)->shown;
 }
 
 // What is asked of the server here it answers as it is now: an event that tells of the loss may still be under way.
-Result<> GlfwProjector::check() {
-  if (connected_) {
-    thread_.run([this] {
-      screen_.handle_events();
-      connected_ = screen_.is_open();
-    });
+Result<> GlfwProjector::check(MonotonicTime deadline) {
+  if (!is_under_way(Task::kCheck)) {
+    const auto look = [](ProjectorScreen& screen, Order&) { screen.handle_events(); };
+    if (auto begun = begin({Task::kCheck}, deadline, look); !begun) return begun;
   }
-  if (connected_) return {};
-  return fail(ErrorCode::kDisconnected, "the projector is not there; check its cable and its power",
-              description_.monitor.empty() ? "projector" : "monitor " + description_.monitor);
+  if (auto done = wait(deadline); !done) return done;
+  order_.reset();
+  return thread_.screen_open() ? Result<>() : fail_gone();
 }
 
 Result<Grey8> GlfwProjector::read_back() {
-  if (auto there = check(); !there) return tl::unexpected(there.error());
-  Result<Grey8> screen;
-  thread_.run([&] { screen = screen_.read_back(); });
-  return screen;
+  const MonotonicTime deadline = steady_clock::now() + kScreenshotMax;
+  const auto take = [](ProjectorScreen& screen, Order& order) { order.screenshot = screen.read_back(); };
+  if (auto begun = begin({Task::kReadBack}, deadline, take); !begun) return tl::unexpected(begun.error());
+  if (auto done = wait(deadline); !done) return tl::unexpected(done.error());
+  return std::exchange(order_, nullptr)->screenshot;
 }
 
 }  // namespace slsd

@@ -2,7 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
-#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
 
 #include "drivers/projector/glfw/display_thread.hpp"
 #include "drivers/projector/glfw/projector_screen.hpp"
@@ -13,38 +15,52 @@ namespace slsd {
 /// A projector that is a monitor of an X server: a full-screen window on it, drawn once for each image and not again
 /// while that stands still.
 ///
-/// All of GLFW, Xlib and OpenGL runs on one thread, "display", which this class owns. GLFW's documentation asks for the
-/// main thread, for the sake of macOS; its X11 code asks only that it is always the same one. Main serves the socket,
-/// and a graphics driver may block for long. The thread sleeps until the X server tells something: so an unplugged
-/// monitor is known at once, also while nobody scans.
+/// All of GLFW, Xlib and OpenGL runs on one thread, which this class owns. GLFW's documentation asks for the main
+/// thread, for the sake of macOS; its X11 code asks only that it is always the same one. Main serves the socket, and a
+/// graphics driver may block for long.
 ///
 /// When the monitor or the X server is gone, open() tries to get it back: the same monitor, never another one unless
-/// the options name none and none was found before.
+/// the options name none and none was found before. An X server that hangs keeps the thread until it goes on, and then
+/// the projector does, or until it ends; until then every call says so at once.
 /// @thread thread-bound; one at a time in a process
 class GlfwProjector final : public Projector {
  public:
   explicit GlfwProjector(GlfwProjectorOptions options);
-  ~GlfwProjector() override;
 
   /// The monitor is known after open().
   [[nodiscard]] const ProjectorDescription& description() const override { return description_; }
   /// @errors kNotFound: no X server, or no such monitor; kInvalidArgument: several monitors could be meant; kMismatch:
-  /// it
-  ///         does not show the projector's size pixel for pixel; kUnsupported: no OpenGL ES 3; kBusy: the process has
-  ///         another; kDisconnected
-  [[nodiscard]] Result<> open() override;
-  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image) override;
-  [[nodiscard]] Result<> check() override;
+  ///         it does not show the projector's size pixel for pixel; kUnsupported: no OpenGL ES 3; kBusy: the process
+  ///         has another; kDisconnected; kIo: the X server hangs; kTimeout
+  [[nodiscard]] Result<> open(MonotonicTime deadline) override;
+  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image, MonotonicTime deadline) override;
+  [[nodiscard]] Result<> check(MonotonicTime deadline) override;
   [[nodiscard]] std::vector<std::string> warnings() const override { return warnings_; }
   /// A screenshot of the monitor: what other programs draw over the pattern is in it.
   [[nodiscard]] Result<Grey8> read_back() override;
 
  private:
+  /// What the thread was told to do last and its outcome, until somebody fetched that.
+  struct Order {
+    enum class Task { kOpen, kShow, kCheck, kReadBack } task;
+    Grey8 image = {};  ///< to show
+    Result<> opened = {};
+    RandrOutput output = {};
+    std::vector<std::string> warnings = {};
+    Result<MonotonicTime> shown = {};
+    Result<Grey8> screenshot = {};
+  };
+  using Task = Order::Task;
+  [[nodiscard]] bool is_under_way(Task task) const { return order_ && order_->task == task; }
+  [[nodiscard]] Result<> begin(Order order, MonotonicTime deadline, void (*work)(ProjectorScreen&, Order&));
+  [[nodiscard]] Result<> wait(MonotonicTime deadline) const;
+  [[nodiscard]] tl::unexpected<Error> fail_gone() const;
+  [[nodiscard]] std::string where() const;
+
   GlfwProjectorOptions options_;
   ProjectorDescription description_;
   std::vector<std::string> warnings_;
-  ProjectorScreen screen_;  ///< used on the thread alone
-  std::atomic<bool> connected_{false};
+  std::shared_ptr<Order> order_;  // shared: with the thread, which may outlive this
   DisplayThread thread_;
 };
 

@@ -2,17 +2,21 @@
 // Copyright the slsd authors
 #include "drivers/projector/glfw/projector_screen.hpp"
 
+#include <chrono>
 #include <utility>
 
 #include <X11/Xlib.h>
 #include <X11/Xutil.h>
+#include <spdlog/spdlog.h>
 
+#include "core/image_size.hpp"
 #include "drivers/projector/x11/choose_output.hpp"
 
 namespace slsd {
 namespace {
 
 constexpr int kSideMaxPx = 16384;
+constexpr auto kProbePeriod = std::chrono::seconds(2);  // it may disturb what other monitors show
 
 struct DestroyImage {
   void operator()(XImage* image) const { XDestroyImage(image); }
@@ -56,7 +60,6 @@ void ProjectorScreen::close() {
 
 void ProjectorScreen::end() {
   close();
-  awake_.reset();
   session_.reset();
 }
 
@@ -66,15 +69,15 @@ Result<> ProjectorScreen::open_session() {
   auto session = GlfwSession::open();
   if (!session) return tl::unexpected(session.error());
   session_ = std::move(*session);
-  awake_ = StayAwake::begin(session_->display());
   return {};
 }
 
 Result<> ProjectorScreen::find_output() {
   XSync(session_->display(), False);
   session_->handle_events();
-  const auto outputs = read_outputs(session_->display());
-  auto output = choose_output(outputs, options_.monitor, output_.name);
+  auto output = options_.enable_output
+                    ? enabled_output()
+                    : choose_output(read_outputs(session_->display()), options_.monitor, output_.name);
   if (!output) return tl::unexpected(output.error());
   const bool can_switch =
       output->native_width_px == options_.width_px && output->native_height_px == options_.height_px;
@@ -82,6 +85,31 @@ Result<> ProjectorScreen::find_output() {
   if (!fits && !can_switch) return fits;
   output_ = std::move(*output);
   return {};
+}
+
+// Under an X server without a desktop nobody else turns a monitor on, or looks which ones there are.
+Result<RandrOutput> ProjectorScreen::enabled_output() {
+  _XDisplay* display = session_->display();
+  const auto fits = [this](const Result<RandrOutput>& output) {
+    return output && output->on && check_fit(*output, options_.width_px, options_.height_px);
+  };
+  auto outputs = read_outputs(display);
+  auto output = choose_output(outputs, options_.monitor, output_.name, true);
+  if (fits(output)) return output;
+  if (const auto now = std::chrono::steady_clock::now(); now - probed_ >= kProbePeriod) {
+    probed_ = now;
+    outputs = read_outputs(display, Probe::kHardware);
+    output = choose_output(outputs, options_.monitor, output_.name, true);
+  }
+  if (!output || output->transformed || fits(output)) return output;
+  if (auto set = set_output(display, *output, outputs, options_.width_px, options_.height_px, options_.refresh_hz);
+      !set) {
+    return tl::unexpected(set.error());
+  }
+  spdlog::info("projector: monitor {} set to {}", output->name, size_text(options_.width_px, options_.height_px));
+  XSync(display, False);
+  session_->handle_events();
+  return choose_output(read_outputs(display), output->name, {}, true);
 }
 
 Result<> ProjectorScreen::open_window() {
@@ -98,7 +126,6 @@ Result<> ProjectorScreen::open_window() {
   output_ = std::move(*output);
   warnings_ = output_warnings(output_, outputs);
   clock_ = RefreshClock::open(DisplayString(session_->display()), window_->id(), output_.refresh_hz);
-  window_->set_redraw([this] { redraw(); });
   return {};
 }
 
@@ -164,6 +191,7 @@ int ProjectorScreen::handle_events() {
   if (!session_) return -1;
   do {  // what is asked of the server may read further events, which then no descriptor tells of
     session_->handle_events();
+    if (clock_ && window_->take_damage() && !session_->lost()) redraw();
     if (window_ && !session_->lost() && !is_in_place()) close();
   } while (!session_->lost() && XEventsQueued(session_->display(), QueuedAlready) > 0);
   if (!session_->lost()) return session_->descriptor();

@@ -9,13 +9,11 @@
 
 #include "core/image.hpp"
 #include "core/result.hpp"
-#include "drivers/projector/glfw/fullscreen_window.hpp"
-#include "drivers/projector/glfw/glfw_session.hpp"
+#include "drivers/projector/glfw/glfw_window.hpp"
 #include "drivers/projector/light_curve.hpp"
 #include "drivers/projector/projector.hpp"
 #include "drivers/projector/texel_painter.hpp"
 #include "drivers/projector/x11/refresh_clock.hpp"
-#include "drivers/projector/x11/stay_awake.hpp"
 
 namespace slsd {
 
@@ -25,6 +23,8 @@ struct GlfwProjectorOptions {
   int width_px = 1280;       ///< 1 to 16384; the monitor's
   int height_px = 800;       ///< 1 to 16384; the monitor's
   LightOptions light = {};
+  bool enable_output = false;  ///< turn the monitor on and set it to that size: the display is the scanner's alone
+  double refresh_hz = 60.0;    ///< then at the nearest refresh that it has
 
   [[nodiscard]] Result<> validate() const;
 };
@@ -58,6 +58,7 @@ class ProjectorScreen {
  private:
   [[nodiscard]] Result<> open_session();
   [[nodiscard]] Result<> find_output();
+  [[nodiscard]] Result<RandrOutput> enabled_output();
   [[nodiscard]] Result<> open_window();
   [[nodiscard]] Result<> check_open() const;
   [[nodiscard]] bool is_in_place() const;
@@ -68,7 +69,7 @@ class ProjectorScreen {
   RandrOutput output_;
   std::vector<std::string> warnings_;
   std::unique_ptr<GlfwSession> session_;
-  std::unique_ptr<StayAwake> awake_;
+  MonotonicTime probed_{};  ///< when the X server last looked for monitors at our wish
   std::unique_ptr<FullscreenWindow> window_;
   std::optional<TexelPainter> painter_;
   std::unique_ptr<RefreshClock> clock_;

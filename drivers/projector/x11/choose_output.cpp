@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
 
 #include "core/image_size.hpp"
 
@@ -16,15 +17,14 @@ std::string place_text(const DesktopArea& area) {
   return text;
 }
 
-bool overlap(const DesktopArea& a, const DesktopArea& b) {
-  return a.x_px < b.x_px + b.width_px && b.x_px < a.x_px + a.width_px && a.y_px < b.y_px + b.height_px &&
-         b.y_px < a.y_px + a.height_px;
-}
-
 std::string names_of(std::span<const RandrOutput> outputs) {
   std::string names;
   for (const RandrOutput& output : outputs) (names += names.empty() ? "" : "; ") += describe_output(output);
-  return names.empty() ? "no monitor is plugged in and lit" : "there are: " + names;
+  return names.empty() ? "no monitor is plugged in" : "there are: " + names;
+}
+
+std::string turn_on(const RandrOutput& output) {
+  return "run xrandr --output " + output.name + " --auto, or let slsd do it by [projector] enable_output = true";
 }
 
 tl::unexpected<Error> not_there(const std::string& which, std::span<const RandrOutput> outputs) {
@@ -44,12 +44,17 @@ std::vector<RandrOutput> others_than_primary(std::span<const RandrOutput> output
   return others;
 }
 
+bool is_meant(const RandrOutput& output, const std::string& name) {
+  return output.name == name || output.serial == name || (output.on && place_text(output.area) == name);
+}
+
 }  // namespace
 
 std::string describe_output(const RandrOutput& output) {
   std::string text = output.name;
   if (!output.model.empty()) text += ", " + output.model;
   if (!output.serial.empty()) text += ", serial " + output.serial;
+  if (!output.on) return text + ", off";
   char refresh[32];
   std::snprintf(refresh, sizeof refresh, " at %.2f Hz, ", output.refresh_hz);
   text += ", " + size_text(output.area.width_px, output.area.height_px) + refresh + place_text(output.area);
@@ -57,17 +62,22 @@ std::string describe_output(const RandrOutput& output) {
 }
 
 Result<RandrOutput> choose_output(std::span<const RandrOutput> outputs, const std::string& wanted,
-                                  const std::string& last) {
+                                  const std::string& last, bool enable) {
   const std::string& name = wanted.empty() ? last : wanted;
   if (!name.empty()) {
-    for (const RandrOutput& output : outputs) {
-      if (output.name == name || output.serial == name || place_text(output.area) == name) return output;
-    }
-    return not_there("the monitor \"" + name + "\" is not there", outputs);
+    const auto found = std::ranges::find_if(outputs, [&](const RandrOutput& output) { return is_meant(output, name); });
+    if (found == outputs.end()) return not_there("the monitor \"" + name + "\" is not there", outputs);
+    if (found->on || enable) return *found;
+    return fail(ErrorCode::kNotFound, "the monitor \"" + name + "\" is plugged in, but off: " + turn_on(*found),
+                "projector");
   }
-  if (outputs.empty()) return not_there("the projector is not there", outputs);
-  if (outputs.size() == 1) return outputs.front();
-  const auto others = others_than_primary(outputs);
+  std::vector<RandrOutput> usable;
+  std::ranges::copy_if(outputs, std::back_inserter(usable),
+                       [&](const RandrOutput& output) { return output.on || enable; });
+  if (usable.empty() && !outputs.empty()) return not_there("no monitor is on: " + turn_on(outputs.front()), outputs);
+  if (usable.empty()) return not_there("the projector is not there", outputs);
+  if (usable.size() == 1) return usable.front();
+  const auto others = others_than_primary(usable);
   if (others.size() == 1) return others.front();
   return fail(ErrorCode::kInvalidArgument,
               "name the monitor that is the projector as [projector] monitor; " + names_of(outputs), "projector");
@@ -77,6 +87,7 @@ Result<> check_fit(const RandrOutput& output, int width_px, int height_px) {
   const std::string where = "monitor " + output.name;
   const std::string size = size_text(width_px, height_px);
   const std::string xrandr = "xrandr --output " + output.name;
+  if (!output.on) return fail(ErrorCode::kMismatch, "it is off: " + turn_on(output), where);
   if (output.transformed) {
     return fail(ErrorCode::kMismatch, "its picture is scaled: run " + xrandr + " --scale 1x1 --transform none", where);
   }
@@ -124,6 +135,22 @@ std::vector<std::string> output_warnings(const RandrOutput& output, std::span<co
     warnings.push_back("a Wayland session stands between: it may scale, delay and cover the pattern; use an X server");
   }
   return warnings;
+}
+
+Result<MonitorReport> report_monitor(const std::string& wanted, int width_px, int height_px, bool enable) {
+  const auto outputs = list_outputs();
+  if (!outputs) return tl::unexpected(outputs.error());
+  auto output = choose_output(*outputs, wanted, {}, enable);
+  if (!output) return tl::unexpected(output.error());
+  const auto fits = check_fit(*output, width_px, height_px);
+  const bool will_fit = enable && !output->transformed && find_mode(*output, width_px, height_px, 0) != nullptr;
+  if (!fits && !will_fit) return tl::unexpected(fits.error());
+  if (!fits) {
+    const std::string now = output->on ? "it has another size" : "it is off";
+    return MonitorReport{std::move(*output), {now + ": slsd turns it on with the right one"}};
+  }
+  auto warnings = output_warnings(*output, *outputs);
+  return MonitorReport{std::move(*output), std::move(warnings)};
 }
 
 }  // namespace slsd

@@ -17,10 +17,11 @@ namespace slsd {
 ///                primary, and where there is only one, that
 /// @param last    name of the monitor that was chosen before, empty where none was: without a wish only that will do,
 ///                lest the pattern moves to the operator's monitor when the projector is unplugged
+/// @param enable  take one that is off, too, to turn it on
 /// @errors kNotFound: no such monitor; kInvalidArgument: several could be meant. The message lists those that are there
 /// @thread reentrant
 [[nodiscard]] Result<RandrOutput> choose_output(std::span<const RandrOutput> outputs, const std::string& wanted,
-                                                const std::string& last);
+                                                const std::string& last, bool enable = false);
 
 /// Whether the monitor shows an image of that size pixel for pixel.
 /// @errors kMismatch, with the remedy
@@ -30,6 +31,18 @@ namespace slsd {
 /// What disturbs the light of that monitor: a sentence each, with the remedy.
 /// @thread reentrant
 [[nodiscard]] std::vector<std::string> output_warnings(const RandrOutput& output, std::span<const RandrOutput> outputs);
+
+/// The monitor that is the projector, and what disturbs its light.
+struct MonitorReport {
+  RandrOutput output;
+  std::vector<std::string> warnings;  ///< as output_warnings() says
+};
+
+/// Looks at the monitor that a projector with these options takes; shows nothing on it, and leaves one that is off.
+/// @param enable  slsd would turn it on, and set it to that size
+/// @errors as list_outputs(), choose_output() and check_fit()
+/// @thread thread-safe
+[[nodiscard]] Result<MonitorReport> report_monitor(const std::string& wanted, int width_px, int height_px, bool enable);
 
 /// "HDMI-1, Maker Model, serial 123, 1280x800 at 60.00 Hz, +1920+0, primary".
 [[nodiscard]] std::string describe_output(const RandrOutput& output);

@@ -3,19 +3,27 @@
 #include "drivers/projector/x11/randr_output.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <future>
 #include <memory>
+#include <thread>
 
 #include <X11/Xatom.h>
 #include <X11/Xlib.h>
 #include <X11/extensions/Xrandr.h>
 
+#include "core/image_size.hpp"
+#include "core/printable.hpp"
 #include "drivers/projector/x11/edid.hpp"
-#include "drivers/projector/x11/x_errors.hpp"
+#include "drivers/projector/x11/x_display.hpp"
 
 namespace slsd {
 namespace {
+
+constexpr auto kAnswerMax = std::chrono::seconds(5);
+constexpr double kMillimetresPerPixel = 25.4 / 96;  // what X takes where nobody knows
 
 template <auto Free>
 struct Freeing {
@@ -58,10 +66,10 @@ std::string read_word(Display* display, RROutput output, const char* name) {
   if (property.type != XA_ATOM || property.bytes.size() < sizeof(Atom)) return {};
   const Atom atom = *reinterpret_cast<const Atom*>(property.bytes.data());
   const XMemory<char> word(XGetAtomName(display, atom));
-  return word ? word.get() : "";
+  return word ? printable(word.get()) : "";
 }
 
-const XRRModeInfo* find_mode(const XRRScreenResources& resources, RRMode mode) {
+const XRRModeInfo* mode_info(const XRRScreenResources& resources, RRMode mode) {
   for (int i = 0; i < resources.nmode; ++i) {
     if (resources.modes[i].id == mode) return &resources.modes[i];
   }
@@ -102,12 +110,18 @@ DesktopArea area_of(const XRRCrtcInfo& crtc) {
 }
 
 void read_modes(const XRRScreenResources& resources, const XRROutputInfo& info, RRMode now, RandrOutput& output) {
-  if (const XRRModeInfo* mode = find_mode(resources, now)) {
+  for (int i = 0; i < info.nmode; ++i) {
+    const XRRModeInfo* mode = mode_info(resources, info.modes[i]);
+    if (mode == nullptr || (mode->modeFlags & RR_Interlace) != 0) continue;
+    output.modes.push_back(
+        {mode->id, static_cast<int>(mode->width), static_cast<int>(mode->height), refresh_of(*mode)});
+  }
+  if (const XRRModeInfo* mode = mode_info(resources, now)) {
     output.mode_width_px = static_cast<int>(mode->width);
     output.mode_height_px = static_cast<int>(mode->height);
     output.refresh_hz = refresh_of(*mode);
   }
-  const XRRModeInfo* native = info.npreferred > 0 ? find_mode(resources, info.modes[0]) : nullptr;
+  const XRRModeInfo* native = info.npreferred > 0 ? mode_info(resources, info.modes[0]) : nullptr;
   if (native == nullptr) return;
   output.native_width_px = static_cast<int>(native->width);
   output.native_height_px = static_cast<int>(native->height);
@@ -127,29 +141,66 @@ void read_light_path(Display* display, RRCrtc crtc, RandrOutput& output) {
 
 std::optional<RandrOutput> read_output(Display* display, XRRScreenResources* resources, RROutput id) {
   const OutputInfo info(XRRGetOutputInfo(display, resources, id));
-  if (!info || info->connection == RR_Disconnected || info->crtc == None) return std::nullopt;
-  const CrtcInfo crtc(XRRGetCrtcInfo(display, resources, info->crtc));
-  if (!crtc || crtc->mode == None) return std::nullopt;
+  if (!info || info->connection == RR_Disconnected) return std::nullopt;
   RandrOutput output;
   output.id = id;
-  output.name.assign(info->name, static_cast<std::size_t>(info->nameLen));
+  output.name = printable({info->name, static_cast<std::size_t>(info->nameLen)});
   const EdidIdentity identity = read_edid(read_property(display, id, "EDID").bytes);
-  output.model = identity.model;
-  output.serial = identity.serial;
+  output.model = printable(identity.model);
+  output.serial = printable(identity.serial);
   output.primary = XRRGetOutputPrimary(display, DefaultRootWindow(display)) == id;
+  const CrtcInfo crtc(info->crtc != None ? XRRGetCrtcInfo(display, resources, info->crtc) : nullptr);
+  output.on = crtc && crtc->mode != None;
+  read_modes(*resources, *info, output.on ? crtc->mode : None, output);
+  if (!output.on) return output;
   output.area = area_of(*crtc);
   output.rotation_deg = rotation_of(crtc->rotation);
   output.reflected = (crtc->rotation & (RR_Reflect_X | RR_Reflect_Y)) != 0;
-  read_modes(*resources, *info, crtc->mode, output);
   read_light_path(display, info->crtc, output);
   return output;
 }
 
+RRCrtc free_crtc(Display* display, XRRScreenResources* resources, const XRROutputInfo& info) {
+  if (info.crtc != None) return info.crtc;
+  for (int i = 0; i < info.ncrtc; ++i) {
+    const CrtcInfo crtc(XRRGetCrtcInfo(display, resources, info.crtcs[i]));
+    if (crtc && crtc->noutput == 0) return info.crtcs[i];
+  }
+  return None;
+}
+
+void grow_desktop(Display* display, int width_px, int height_px) {
+  const Window root = DefaultRootWindow(display);
+  XWindowAttributes now{};
+  if (XGetWindowAttributes(display, root, &now) == 0) return;
+  width_px = std::max(width_px, now.width);
+  height_px = std::max(height_px, now.height);
+  if (width_px == now.width && height_px == now.height) return;
+  XRRSetScreenSize(display, root, width_px, height_px, static_cast<int>(std::lround(width_px * kMillimetresPerPixel)),
+                   static_cast<int>(std::lround(height_px * kMillimetresPerPixel)));
+}
+
+Result<std::vector<RandrOutput>> ask_for_outputs() {
+  survive_x_errors();
+  const std::unique_ptr<Display, Freeing<XCloseDisplay>> display(XOpenDisplay(nullptr));
+  if (!display) return no_display();
+  std::atomic<bool> lost = false;
+  survive_loss(display.get(), lost);
+  int major = 0;
+  int minor = 0;
+  if (XRRQueryVersion(display.get(), &major, &minor) == 0 || major < 1 || (major == 1 && minor < 3)) {
+    return fail(ErrorCode::kUnsupported, "the X server lacks RandR 1.3: use a newer one", DisplayString(display.get()));
+  }
+  return read_outputs(display.get());
+}
+
 }  // namespace
 
-std::vector<RandrOutput> read_outputs(_XDisplay* display) {
+std::vector<RandrOutput> read_outputs(_XDisplay* display, Probe probe) {
   std::vector<RandrOutput> outputs;
-  const Resources resources(XRRGetScreenResourcesCurrent(display, DefaultRootWindow(display)));
+  const Window root = DefaultRootWindow(display);
+  const Resources resources(probe == Probe::kHardware ? XRRGetScreenResources(display, root)
+                                                      : XRRGetScreenResourcesCurrent(display, root));
   for (int i = 0; resources && i < resources->noutput; ++i) {
     if (auto output = read_output(display, resources.get(), resources->outputs[i])) outputs.push_back(*output);
   }
@@ -166,18 +217,66 @@ std::optional<DesktopArea> lit_area(_XDisplay* display, unsigned long output) {
   return area_of(*crtc);
 }
 
-Result<std::vector<RandrOutput>> list_outputs() {
-  survive_x_errors();
-  const std::unique_ptr<Display, Freeing<XCloseDisplay>> display(XOpenDisplay(nullptr));
-  if (!display) return no_display();
-  std::atomic<bool> lost = false;
-  survive_loss(display.get(), lost);
-  int major = 0;
-  int minor = 0;
-  if (XRRQueryVersion(display.get(), &major, &minor) == 0 || major < 1 || (major == 1 && minor < 3)) {
-    return fail(ErrorCode::kUnsupported, "the X server lacks RandR 1.3: use a newer one", DisplayString(display.get()));
+const RandrMode* find_mode(const RandrOutput& output, int width_px, int height_px, double refresh_hz) {
+  const RandrMode* best = nullptr;
+  for (const RandrMode& mode : output.modes) {
+    if (mode.width_px != width_px || mode.height_px != height_px) continue;
+    if (best == nullptr || std::abs(mode.refresh_hz - refresh_hz) < std::abs(best->refresh_hz - refresh_hz)) {
+      best = &mode;
+    }
   }
-  return read_outputs(display.get());
+  return best;
+}
+
+DesktopArea place_of(const RandrOutput& output, const std::vector<RandrOutput>& outputs, int width_px, int height_px) {
+  const DesktopArea here{output.area.x_px, output.area.y_px, width_px, height_px};
+  bool free = true;
+  int right_px = 0;
+  for (const RandrOutput& other : outputs) {
+    if (other.id == output.id || !other.on) continue;
+    free = free && !overlap(other.area, here);
+    right_px = std::max(right_px, other.area.x_px + other.area.width_px);
+  }
+  return free ? here : DesktopArea{right_px, 0, width_px, height_px};
+}
+
+Result<> set_output(_XDisplay* display, const RandrOutput& output, const std::vector<RandrOutput>& outputs,
+                    int width_px, int height_px, double refresh_hz) {
+  const std::string where = "monitor " + output.name;
+  const RandrMode* mode = find_mode(output, width_px, height_px, refresh_hz);
+  if (mode == nullptr) {
+    return fail(ErrorCode::kMismatch,
+                "it has no mode of " + size_text(width_px, height_px) +
+                    " pixels: set [projector] width_px and height_px to its native size" +
+                    (output.native_width_px > 0 ? ", " + size_text(output.native_width_px, output.native_height_px)
+                                                : std::string()),
+                where);
+  }
+  const Resources resources(XRRGetScreenResourcesCurrent(display, DefaultRootWindow(display)));
+  const OutputInfo info(resources ? XRRGetOutputInfo(display, resources.get(), output.id) : nullptr);
+  const RRCrtc crtc = info ? free_crtc(display, resources.get(), *info) : None;
+  if (crtc == None) return fail(ErrorCode::kUnsupported, "the graphics card drives no further monitor", where);
+  const DesktopArea place = place_of(output, outputs, width_px, height_px);
+  grow_desktop(display, place.x_px + width_px, place.y_px + height_px);
+  RROutput id = output.id;
+  const Status set = XRRSetCrtcConfig(display, resources.get(), crtc, CurrentTime, place.x_px, place.y_px, mode->id,
+                                      RR_Rotate_0, &id, 1);
+  if (set == RRSetConfigSuccess) return {};
+  return fail(ErrorCode::kUnsupported, "the X server does not set it to " + size_text(width_px, height_px) + " pixels",
+              where);
+}
+
+// Xlib waits for a server that hangs without bound: then its thread is left to wait.
+Result<std::vector<RandrOutput>> list_outputs() {
+  std::packaged_task<Result<std::vector<RandrOutput>>()> ask(ask_for_outputs);
+  auto outputs = ask.get_future();
+  try {
+    std::thread(std::move(ask)).detach();
+  } catch (const std::system_error&) {
+    return fail(ErrorCode::kNoSpace, "no thread is left for the display");
+  }
+  if (outputs.wait_for(kAnswerMax) == std::future_status::ready) return outputs.get();
+  return no_answer();
 }
 
 }  // namespace slsd

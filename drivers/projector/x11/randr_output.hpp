@@ -21,18 +21,33 @@ struct DesktopArea {
   friend bool operator==(const DesktopArea&, const DesktopArea&) = default;
 };
 
-/// A monitor that shows a part of the desktop, as RandR tells of it.
+[[nodiscard]] constexpr bool overlap(const DesktopArea& a, const DesktopArea& b) {
+  return a.x_px < b.x_px + b.width_px && b.x_px < a.x_px + a.width_px && a.y_px < b.y_px + b.height_px &&
+         b.y_px < a.y_px + a.height_px;
+}
+
+/// What a monitor can be set to.
+struct RandrMode {
+  unsigned long id = 0;
+  int width_px = 0;
+  int height_px = 0;
+  double refresh_hz = 0.0;
+};
+
+/// A monitor that is plugged in, as RandR tells of it.
 struct RandrOutput {
   unsigned long id = 0;
   std::string name;    ///< of the socket: "HDMI-1"
   std::string model;   ///< as the monitor's EDID says; empty: unknown
   std::string serial;  ///< as the monitor's EDID says; empty: none
   bool primary = false;
-  DesktopArea area;
+  bool on = true;         ///< shows a part of the desktop
+  DesktopArea area = {};  ///< that part
   int mode_width_px = 0;  ///< of the signal
   int mode_height_px = 0;
   int native_width_px = 0;  ///< of the mode that the monitor prefers; 0: it does not say
   int native_height_px = 0;
+  std::vector<RandrMode> modes = {};  ///< that it can be set to
   double refresh_hz = 0.0;
   int rotation_deg = 0;  ///< 0, 90, 180 or 270
   bool reflected = false;
@@ -42,14 +57,34 @@ struct RandrOutput {
   bool underscan = false;
 };
 
-/// The monitors that are plugged in and lit, in RandR's order.
-[[nodiscard]] std::vector<RandrOutput> read_outputs(_XDisplay* display);
+enum class Probe {
+  kKnown,     ///< what the X server knows
+  kHardware,  ///< it looks at its sockets anew, which takes it up to a second
+};
+
+/// The monitors that are plugged in, on or off, in RandR's order.
+[[nodiscard]] std::vector<RandrOutput> read_outputs(_XDisplay* display, Probe probe = Probe::kKnown);
 
 /// Where that output is lit now; nothing where it is unplugged or off.
 [[nodiscard]] std::optional<DesktopArea> lit_area(_XDisplay* display, unsigned long output);
 
+/// Turns a monitor on, or sets it to another size: to its mode of that size whose refresh is nearest. It stays where it
+/// is, unless it would be over another one: then it goes to the right of them all. The desktop grows as needed.
+/// @param outputs  all that are plugged in
+/// @errors kMismatch: it has no mode of that size; kUnsupported: the X server refuses
+[[nodiscard]] Result<> set_output(_XDisplay* display, const RandrOutput& output,
+                                  const std::vector<RandrOutput>& outputs, int width_px, int height_px,
+                                  double refresh_hz);
+
+/// The mode of that size whose refresh is nearest; null where it has none.
+[[nodiscard]] const RandrMode* find_mode(const RandrOutput& output, int width_px, int height_px, double refresh_hz);
+
+/// Where that monitor has room for such a size: where it is, or to the right of all others.
+[[nodiscard]] DesktopArea place_of(const RandrOutput& output, const std::vector<RandrOutput>& outputs, int width_px,
+                                   int height_px);
+
 /// The monitors of the X server that DISPLAY names, over a connection of its own.
-/// @errors kNotFound: no X server answers; kUnsupported: it lacks RandR 1.3
+/// @errors kNotFound: no X server is there; kIo: it does not answer; kUnsupported: it lacks RandR 1.3
 /// @thread thread-safe
 [[nodiscard]] Result<std::vector<RandrOutput>> list_outputs();
 

@@ -68,9 +68,11 @@ class LateProjector final : public Projector {
  public:
   explicit LateProjector(DarkRoom& room) : room_(room) {}
   [[nodiscard]] const ProjectorDescription& description() const override { return description_; }
-  [[nodiscard]] Result<> open() override { return {}; }
-  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image) override { return room_.show(image.at(0, 0) > 0); }
-  [[nodiscard]] Result<> check() override { return {}; }
+  [[nodiscard]] Result<> open(MonotonicTime) override { return {}; }
+  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image, MonotonicTime) override {
+    return room_.show(image.at(0, 0) > 0);
+  }
+  [[nodiscard]] Result<> check(MonotonicTime) override { return {}; }
   [[nodiscard]] std::vector<std::string> warnings() const override { return {}; }
   [[nodiscard]] Result<Grey8> read_back() override { return Grey8(); }
 

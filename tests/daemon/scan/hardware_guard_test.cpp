@@ -28,9 +28,11 @@ class ReplacedProjector final : public Projector {
     description_.serial = std::move(serial);
   }
   [[nodiscard]] const ProjectorDescription& description() const override { return description_; }
-  [[nodiscard]] Result<> open() override { return memory_.open(); }
-  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image) override { return memory_.show(image); }
-  [[nodiscard]] Result<> check() override { return memory_.check(); }
+  [[nodiscard]] Result<> open(MonotonicTime deadline) override { return memory_.open(deadline); }
+  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image, MonotonicTime deadline) override {
+    return memory_.show(image, deadline);
+  }
+  [[nodiscard]] Result<> check(MonotonicTime deadline) override { return memory_.check(deadline); }
   [[nodiscard]] std::vector<std::string> warnings() const override { return {}; }
   [[nodiscard]] Result<Grey8> read_back() override { return memory_.read_back(); }
 

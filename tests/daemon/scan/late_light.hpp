@@ -93,18 +93,18 @@ class LateHeadless final : public Projector {
  public:
   LateHeadless(LateLight& light, HeadlessProjectorOptions options) : light_(light), projector_(std::move(options)) {}
   [[nodiscard]] const ProjectorDescription& description() const override { return projector_.description(); }
-  [[nodiscard]] Result<> open() override {
-    auto opened = projector_.open();
+  [[nodiscard]] Result<> open(MonotonicTime deadline) override {
+    auto opened = projector_.open(deadline);
     const auto& description = projector_.description();
     if (opened) light_.change(Grey8(description.width_px, description.height_px), std::chrono::steady_clock::now());
     return opened;
   }
-  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image) override {
-    const auto complete = projector_.show(image);
+  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image, MonotonicTime deadline) override {
+    const auto complete = projector_.show(image, deadline);
     if (complete) light_.change(*projector_.read_back(), *complete);
     return complete;
   }
-  [[nodiscard]] Result<> check() override { return projector_.check(); }
+  [[nodiscard]] Result<> check(MonotonicTime deadline) override { return projector_.check(deadline); }
   [[nodiscard]] std::vector<std::string> warnings() const override { return {}; }
   [[nodiscard]] Result<Grey8> read_back() override { return projector_.read_back(); }
 

@@ -168,6 +168,102 @@ TEST_F(ProjectionTest, TellsWhyThePatternIsNotShown) {
   EXPECT_EQ(projection_->status().shows, "");
 }
 
+/// A projector whose driver takes its time, or hangs.
+class SlowProjector final : public Projector {
+ public:
+  [[nodiscard]] const ProjectorDescription& description() const override { return description_; }
+  [[nodiscard]] Result<> open(MonotonicTime deadline) override {
+    ++opened;
+    return wait(deadline);
+  }
+  [[nodiscard]] Result<MonotonicTime> show(const Grey8&, MonotonicTime deadline) override {
+    if (auto done = wait(deadline); !done) return tl::unexpected(done.error());
+    return steady_clock::now();
+  }
+  [[nodiscard]] Result<> check(MonotonicTime deadline) override { return wait(deadline); }
+  [[nodiscard]] std::vector<std::string> warnings() const override { return {}; }
+  [[nodiscard]] Result<Grey8> read_back() override { return Grey8(); }
+
+  MonotonicTime ready;  ///< answers nothing before
+  bool hangs = false;
+  int opened = 0;
+
+ private:
+  [[nodiscard]] Result<> wait(MonotonicTime deadline) const {
+    if (hangs) return fail(ErrorCode::kIo, "it does not answer", "monitor A");
+    std::this_thread::sleep_until(std::min(ready, deadline));
+    return ready > deadline ? Result<>(fail(ErrorCode::kTimeout, "it takes longer")) : Result<>();
+  }
+  ProjectorDescription description_{"slow", "", kWidthPx, kHeightPx};
+};
+
+class SlowProjectionTest : public ::testing::Test {
+ protected:
+  SlowProjectionTest() {
+    ScanOptions options;
+    options.reopen_first_ms = options.reopen_longest_ms = 1;
+    auto projector = std::make_unique<SlowProjector>();
+    projector_ = projector.get();
+    projection_ = std::make_unique<Projection>(std::move(projector), plain(100), options);
+  }
+
+  static MonotonicTime in(std::chrono::nanoseconds time) { return steady_clock::now() + time; }
+
+  SlowProjector* projector_ = nullptr;
+  std::unique_ptr<Projection> projection_;
+};
+
+TEST_F(SlowProjectionTest, GoesOnWhereOnePictureTookTooLongForAScan) {
+  ASSERT_TRUE(projection_->show(Picture::kPattern, in(30s), {}));
+  projector_->ready = in(400ms);
+  const auto shown = projection_->show(Picture::kWhite, in(10ms), {});
+  EXPECT_EQ(shown.error().code, ErrorCode::kTimeout);
+  EXPECT_EQ(projection_->status().state, DeviceState::kReady) << "it is only slow";
+  EXPECT_TRUE(projection_->show(Picture::kWhite, in(30s), {}));
+  EXPECT_EQ(projector_->opened, 1);
+}
+
+TEST_F(SlowProjectionTest, IsFaultedWhileItsDriverHangs) {
+  ASSERT_TRUE(projection_->show(Picture::kPattern, in(30s), {}));
+  projector_->hangs = true;
+  const auto there = projection_->check();
+  EXPECT_EQ(there.error().code, ErrorCode::kDisconnected);
+  EXPECT_EQ(there.error().where, "projector, monitor A");
+  const auto shown = projection_->show(Picture::kPattern, in(50ms), {});
+  EXPECT_EQ(shown.error().code, ErrorCode::kTimeout);
+  EXPECT_THAT(to_string(shown.error()), HasSubstr("projector: the projector did not become ready"));
+  EXPECT_THAT(shown.error().message, HasSubstr("it does not answer"));
+  EXPECT_EQ(projection_->status().state, DeviceState::kFaulted);
+  EXPECT_THAT(projection_->status().problem, HasSubstr("it does not answer"));
+  projector_->hangs = false;
+  EXPECT_TRUE(projection_->show(Picture::kPattern, in(30s), {}));
+  EXPECT_EQ(projection_->status().problem, "");
+}
+
+TEST_F(SlowProjectionTest, LooksAfterASlowOneInSmallSteps) {
+  projector_->ready = in(500ms);
+  int steps = 0;
+  for (; !is_open(projection_->status().state); ++steps) {
+    EXPECT_LE(projection_->next_change(), steady_clock::now());
+    projection_->supervise();
+  }
+  EXPECT_GE(steps, 3);
+  projector_->ready = in(300ms);
+  projection_->supervise();
+  EXPECT_LE(projection_->next_change(), steady_clock::now()) << "it has not answered yet";
+  EXPECT_EQ(projection_->status().state, DeviceState::kReady);
+}
+
+TEST_F(SlowProjectionTest, EndsItsWaitWhenNobodyWaitsForTheOutcome) {
+  projector_->ready = in(600s);
+  std::stop_source stop;
+  std::jthread hand([&stop] {
+    std::this_thread::sleep_for(50ms);
+    stop.request_stop();
+  });
+  EXPECT_EQ(projection_->show(Picture::kPattern, in(600s), stop.get_token()).error().code, ErrorCode::kCancelled);
+}
+
 TEST_F(ProjectionTest, EndsWhenTheServiceStops) {
   projection_->set_pattern(Grey8(1, 1));
   std::stop_source stop;

@@ -112,6 +112,7 @@ std::unique_ptr<XServer> XServer::started(std::unique_ptr<XServer> server) {
 
 XServer::~XServer() {
   if (process_ > 0) ::kill(process_, SIGTERM);
+  thaw();
   if (process_ > 0) ::waitpid(process_, nullptr, 0);
   std::error_code ignored;
   if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
@@ -140,6 +141,14 @@ void XServer::kill() {
   ::kill(process_, SIGKILL);
   ::waitpid(process_, nullptr, 0);
   process_ = -1;
+}
+
+void XServer::freeze() {
+  if (process_ > 0) ::kill(process_, SIGSTOP);
+}
+
+void XServer::thaw() {
+  if (process_ > 0) ::kill(process_, SIGCONT);
 }
 
 bool XServer::restart() {

@@ -28,6 +28,9 @@ class XServer {
 
   /// The server's end, as by a crash.
   void kill();
+  /// Lets it hang: it takes connections and answers nothing, until thaw().
+  void freeze();
+  void thaw();
   /// Starts it again with the same display number. @return whether it came
   [[nodiscard]] bool restart();
 

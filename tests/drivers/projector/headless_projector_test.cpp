@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include "drivers/projector/headless_projector.hpp"
+#include "tests/drivers/projector/soon.hpp"
 
 #include <chrono>
 #include <cmath>
@@ -10,6 +11,8 @@
 namespace slsd {
 namespace {
 
+using test::soon;
+
 using namespace std::chrono_literals;
 
 HeadlessProjectorOptions small() {
@@ -18,37 +21,37 @@ HeadlessProjectorOptions small() {
 
 TEST(HeadlessProjector, ShowsOnlyAtItsRefreshes) {
   HeadlessProjector projector(small());
-  ASSERT_TRUE(projector.open());
-  const MonotonicTime first = *projector.show(Grey8(16, 9));
-  for (int i = 0; i < 5; ++i) EXPECT_EQ((*projector.show(Grey8(16, 9)) - first) % 5ms, 0ns);
+  ASSERT_TRUE(projector.open(soon()));
+  const MonotonicTime first = *projector.show(Grey8(16, 9), soon());
+  for (int i = 0; i < 5; ++i) EXPECT_EQ((*projector.show(Grey8(16, 9), soon()) - first) % 5ms, 0ns);
 }
 
 TEST(HeadlessProjector, IsGoneFromWhenItIsUnpluggedUntilItIsOpened) {
   HeadlessProjector projector(small());
-  ASSERT_TRUE(projector.open());
+  ASSERT_TRUE(projector.open(soon()));
   projector.disconnect();
-  EXPECT_EQ(projector.show(Grey8(16, 9)).error().code, ErrorCode::kDisconnected);
+  EXPECT_EQ(projector.show(Grey8(16, 9), soon()).error().code, ErrorCode::kDisconnected);
   EXPECT_EQ(projector.read_back().error().code, ErrorCode::kDisconnected);
-  EXPECT_EQ(projector.check().error().code, ErrorCode::kDisconnected);
-  ASSERT_TRUE(projector.open());
-  EXPECT_TRUE(projector.show(Grey8(16, 9)));
+  EXPECT_EQ(projector.check(soon()).error().code, ErrorCode::kDisconnected);
+  ASSERT_TRUE(projector.open(soon()));
+  EXPECT_TRUE(projector.show(Grey8(16, 9), soon()));
 }
 
 TEST(HeadlessProjector, IsUnpluggedAtTheCallsThatItIsToldTo) {
   HeadlessProjectorOptions options = small();
   options.disconnect_at = {2};
   HeadlessProjector projector(options);
-  ASSERT_TRUE(projector.open());
-  EXPECT_TRUE(projector.show(Grey8(16, 9, 7)));
-  EXPECT_EQ(projector.show(Grey8(16, 9)).error().code, ErrorCode::kDisconnected);
-  ASSERT_TRUE(projector.open());
+  ASSERT_TRUE(projector.open(soon()));
+  EXPECT_TRUE(projector.show(Grey8(16, 9, 7), soon()));
+  EXPECT_EQ(projector.show(Grey8(16, 9), soon()).error().code, ErrorCode::kDisconnected);
+  ASSERT_TRUE(projector.open(soon()));
   EXPECT_EQ(projector.read_back(), Grey8(16, 9, 0));
-  EXPECT_TRUE(projector.show(Grey8(16, 9)));
+  EXPECT_TRUE(projector.show(Grey8(16, 9), soon()));
 }
 
 TEST(HeadlessProjector, NamesTheKeyThatIsOutOfRange) {
   const auto where = [](HeadlessProjectorOptions options) {
-    const auto opened = HeadlessProjector(options).open();
+    const auto opened = HeadlessProjector(options).open(soon());
     return opened ? "valid" : opened.error().where;
   };
   EXPECT_EQ(where(small()), "valid");

@@ -9,9 +9,12 @@
 
 #include "drivers/projector/headless_projector.hpp"
 #include "tests/drivers/plain_images.hpp"
+#include "tests/drivers/projector/soon.hpp"
 
 namespace slsd {
 namespace {
+
+using test::soon;
 
 using ::testing::HasSubstr;
 
@@ -75,9 +78,9 @@ TEST(LightOptions, NamesTheKeyThatIsWrong) {
 TEST(HeadlessProjector, SendsWhatTheCurveMakesOfAnImage) {
   const LightOptions light{.brightness = 0.9, .gamma = {1.8}, .black_level = 5};
   HeadlessProjector projector({.width_px = 64, .height_px = 48, .light = light, .refresh_hz = 1000});
-  ASSERT_TRUE(projector.open());
+  ASSERT_TRUE(projector.open(soon()));
   const Grey8 image = test::ramp8(64, 48);
-  ASSERT_TRUE(projector.show(image));
+  ASSERT_TRUE(projector.show(image, soon()));
   EXPECT_EQ(projector.read_back(), LightCurve(light).apply(image));
 }
 

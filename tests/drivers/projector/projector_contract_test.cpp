@@ -12,6 +12,7 @@
 #include "drivers/projector/projector.hpp"
 #include "tests/doubles/x11/x_server.hpp"
 #include "tests/drivers/plain_images.hpp"
+#include "tests/drivers/projector/soon.hpp"
 
 namespace slsd {
 namespace {
@@ -19,6 +20,7 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 using test::ramp8;
+using test::soon;
 
 /// A backend, and how to make one; null where this machine has none.
 struct Backend {
@@ -37,9 +39,11 @@ class OnServer final : public Projector {
   OnServer(std::unique_ptr<test::XServer> server, GlfwProjectorOptions options)
       : server_(std::move(server)), projector_(std::move(options)) {}
   [[nodiscard]] const ProjectorDescription& description() const override { return projector_.description(); }
-  [[nodiscard]] Result<> open() override { return projector_.open(); }
-  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image) override { return projector_.show(image); }
-  [[nodiscard]] Result<> check() override { return projector_.check(); }
+  [[nodiscard]] Result<> open(MonotonicTime deadline) override { return projector_.open(deadline); }
+  [[nodiscard]] Result<MonotonicTime> show(const Grey8& image, MonotonicTime deadline) override {
+    return projector_.show(image, deadline);
+  }
+  [[nodiscard]] Result<> check(MonotonicTime deadline) override { return projector_.check(deadline); }
   [[nodiscard]] std::vector<std::string> warnings() const override { return projector_.warnings(); }
   [[nodiscard]] Result<Grey8> read_back() override { return projector_.read_back(); }
 
@@ -69,48 +73,48 @@ class ProjectorContract : public ::testing::TestWithParam<Backend> {
 };
 
 TEST_P(ProjectorContract, SaysWhatItIs) {
-  ASSERT_TRUE(projector_->open());
+  ASSERT_TRUE(projector_->open(soon()));
   EXPECT_FALSE(projector_->description().driver.empty() || projector_->description().monitor.empty());
   EXPECT_GT(width(), 0);
   EXPECT_GT(height(), 0);
 }
 
 TEST_P(ProjectorContract, IsDisconnectedBeforeItIsOpened) {
-  EXPECT_EQ(projector_->show(Grey8(width(), height())).error().code, ErrorCode::kDisconnected);
+  EXPECT_EQ(projector_->show(Grey8(width(), height()), soon()).error().code, ErrorCode::kDisconnected);
   EXPECT_EQ(projector_->read_back().error().code, ErrorCode::kDisconnected);
-  EXPECT_EQ(projector_->check().error().code, ErrorCode::kDisconnected);
+  EXPECT_EQ(projector_->check(soon()).error().code, ErrorCode::kDisconnected);
 }
 
 TEST_P(ProjectorContract, IsThereFromWhenItIsOpened) {
-  ASSERT_TRUE(projector_->open());
-  EXPECT_TRUE(projector_->check());
-  ASSERT_TRUE(projector_->show(Grey8(width(), height())));
-  EXPECT_TRUE(projector_->check());
+  ASSERT_TRUE(projector_->open(soon()));
+  EXPECT_TRUE(projector_->check(soon()));
+  ASSERT_TRUE(projector_->show(Grey8(width(), height()), soon()));
+  EXPECT_TRUE(projector_->check(soon()));
 }
 
 TEST_P(ProjectorContract, IsBlackWheneverItIsOpened) {
   for (int i = 0; i < 2; ++i) {
-    ASSERT_TRUE(projector_->open());
+    ASSERT_TRUE(projector_->open(soon()));
     EXPECT_EQ(projector_->read_back(), Grey8(width(), height(), 0));
-    ASSERT_TRUE(projector_->show(Grey8(width(), height(), 255)));
+    ASSERT_TRUE(projector_->show(Grey8(width(), height(), 255), soon()));
   }
 }
 
 TEST_P(ProjectorContract, ShowsEveryPixelAsItIs) {
-  ASSERT_TRUE(projector_->open());
+  ASSERT_TRUE(projector_->open(soon()));
   for (int i = 0; i < 3; ++i) {
     const Grey8 image = ramp8(width(), height(), 50 * i);
-    ASSERT_TRUE(projector_->show(image));
+    ASSERT_TRUE(projector_->show(image, soon()));
     EXPECT_EQ(projector_->read_back(), image);
   }
 }
 
 TEST_P(ProjectorContract, WaitsForARefreshThatBeganAfterTheCall) {
-  ASSERT_TRUE(projector_->open());
+  ASSERT_TRUE(projector_->open(soon()));
   const Grey8 image(width(), height(), 9);
   for (int i = 0; i < 3; ++i) {
     const MonotonicTime before = steady_clock::now();
-    const auto visible = projector_->show(image);
+    const auto visible = projector_->show(image, soon());
     ASSERT_TRUE(visible);
     EXPECT_GE(*visible - GetParam().period, before);
     EXPECT_LE(*visible, steady_clock::now());
@@ -118,11 +122,11 @@ TEST_P(ProjectorContract, WaitsForARefreshThatBeganAfterTheCall) {
 }
 
 TEST_P(ProjectorContract, RefusesAnImageOfAnotherSizeAndKeepsTheLast) {
-  ASSERT_TRUE(projector_->open());
+  ASSERT_TRUE(projector_->open(soon()));
   const Grey8 image = ramp8(width(), height());
-  ASSERT_TRUE(projector_->show(image));
+  ASSERT_TRUE(projector_->show(image, soon()));
   for (const Grey8& other : {Grey8(width() + 1, height()), Grey8(width(), height() - 1), Grey8()})
-    EXPECT_EQ(projector_->show(other).error().code, ErrorCode::kMismatch);
+    EXPECT_EQ(projector_->show(other, soon()).error().code, ErrorCode::kMismatch);
   EXPECT_EQ(projector_->read_back(), image);
 }
 

@@ -2,17 +2,46 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <atomic>
 #include <cstdint>
-#include <functional>
 #include <memory>
+#include <utility>
 
 #include "core/result.hpp"
-#include "drivers/projector/glfw/glfw_session.hpp"
 #include "drivers/projector/x11/randr_output.hpp"
+#include "drivers/projector/x11/x_display.hpp"
 
 struct GLFWwindow;
+struct _XDisplay;
 
 namespace slsd {
+
+/// GLFW from its start to its end, with its connection to the X server, whose loss the process survives and whose
+/// monitors stay awake.
+/// @thread thread-bound; one at a time in a process
+class GlfwSession {
+ public:
+  /// @errors kNotFound: no display; kBusy: the process has a session already
+  [[nodiscard]] static Result<std::unique_ptr<GlfwSession>> open();
+  ~GlfwSession();
+  GlfwSession(const GlfwSession&) = delete;
+  GlfwSession& operator=(const GlfwSession&) = delete;
+
+  [[nodiscard]] _XDisplay* display() const { return display_; }
+  /// Readable when there are events.
+  [[nodiscard]] int descriptor() const;
+  /// Whether the X server is gone; then the session can only be ended.
+  [[nodiscard]] bool lost() const { return lost_; }
+  /// Lets GLFW handle what has come; does not wait.
+  void handle_events();
+
+ private:
+  GlfwSession() = default;
+
+  _XDisplay* display_ = nullptr;
+  std::atomic<bool> lost_{false};
+  std::unique_ptr<StayAwake> awake_;
+};
 
 /// A window over one whole monitor, with a context of OpenGL ES 3 that is current on this thread while it lives; no
 /// pointer on it, no screen saver.
@@ -32,8 +61,8 @@ class FullscreenWindow {
   [[nodiscard]] std::uint32_t id() const;
   /// Whether it is on the screen, exactly there; asks the X server.
   [[nodiscard]] bool covers(const DesktopArea& area) const;
-  /// Called when what was shown is damaged and has to be drawn anew.
-  void set_redraw(std::function<void()> redraw) { redraw_ = std::move(redraw); }
+  /// Whether what was shown was damaged since this was asked last, and has to be drawn anew.
+  [[nodiscard]] bool take_damage() { return std::exchange(damaged_, false); }
   /// Shows what was drawn; returns when the X server has it.
   void swap();
 
@@ -43,7 +72,7 @@ class FullscreenWindow {
 
   GlfwSession& session_;
   GLFWwindow* window_ = nullptr;
-  std::function<void()> redraw_;
+  bool damaged_ = false;
 };
 
 }  // namespace slsd

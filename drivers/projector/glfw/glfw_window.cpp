@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "drivers/projector/glfw/fullscreen_window.hpp"
+#include "drivers/projector/glfw/glfw_window.hpp"
 
 #include <chrono>
 #include <string>
@@ -11,8 +11,6 @@
 #include <GLFW/glfw3.h>
 #include <GLFW/glfw3native.h>
 
-#include "drivers/projector/x11/x_errors.hpp"
-
 namespace slsd {
 namespace {
 
@@ -20,6 +18,8 @@ using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
 constexpr auto kPatience = 5s;  // for a window manager
+
+std::atomic_flag in_use;  // GLFW is the process's
 
 GLFWmonitor* find_monitor(unsigned long output) {
   int count = 0;
@@ -63,6 +63,36 @@ std::string last_error() {
 
 }  // namespace
 
+Result<std::unique_ptr<GlfwSession>> GlfwSession::open() {
+  if (in_use.test_and_set()) return fail(ErrorCode::kBusy, "the process has a GLFW projector already", "projector");
+  survive_x_errors();
+  int begun = GLFW_FALSE;
+  if (!survive_call([&begun] { begun = glfwInit(); }) || begun != GLFW_TRUE) {
+    in_use.clear();
+    return no_display();
+  }
+  std::unique_ptr<GlfwSession> session(new GlfwSession);
+  session->display_ = glfwGetX11Display();
+  survive_x_errors();
+  survive_loss(session->display_, session->lost_);
+  session->awake_ = StayAwake::begin(session->display_);
+  return session;
+}
+
+GlfwSession::~GlfwSession() {
+  awake_.reset();
+  glfwTerminate();
+  in_use.clear();
+}
+
+int GlfwSession::descriptor() const {
+  return ConnectionNumber(display_);
+}
+
+void GlfwSession::handle_events() {
+  if (!lost_) static_cast<void>(survive_call(glfwPollEvents));
+}
+
 Result<std::unique_ptr<FullscreenWindow>> FullscreenWindow::open(GlfwSession& session, const RandrOutput& output,
                                                                  int width_px, int height_px) {
   const std::string where = "monitor " + output.name;
@@ -70,8 +100,12 @@ Result<std::unique_ptr<FullscreenWindow>> FullscreenWindow::open(GlfwSession& se
   if (monitor == nullptr) return fail(ErrorCode::kNotFound, "it went away while it was opened", where);
   set_hints(refresh_to_ask_for(monitor, width_px, height_px));
   std::unique_ptr<FullscreenWindow> window(new FullscreenWindow(session));
-  window->window_ = glfwCreateWindow(width_px, height_px, "slsd projector", monitor, nullptr);
+  GLFWwindow* created = nullptr;
+  const auto create = [&] { created = glfwCreateWindow(width_px, height_px, "slsd projector", monitor, nullptr); };
+  const bool survived = survive_call(create);
   survive_x_errors();
+  if (!survived) return fail(ErrorCode::kDisconnected, "the X server ended while it was opened", where);
+  window->window_ = created;
   if (window->window_ == nullptr) {
     return fail(ErrorCode::kUnsupported, "cannot draw there: " + last_error() + "; install libgl1-mesa-dri and libegl1",
                 where);
@@ -81,8 +115,7 @@ Result<std::unique_ptr<FullscreenWindow>> FullscreenWindow::open(GlfwSession& se
   glfwSetInputMode(window->window_, GLFW_CURSOR, GLFW_CURSOR_HIDDEN);
   glfwSetWindowUserPointer(window->window_, window.get());
   glfwSetWindowRefreshCallback(window->window_, [](GLFWwindow* damaged) {
-    const auto* self = static_cast<const FullscreenWindow*>(glfwGetWindowUserPointer(damaged));
-    if (self->redraw_) self->redraw_();
+    static_cast<FullscreenWindow*>(glfwGetWindowUserPointer(damaged))->damaged_ = true;
   });
   if (window->wait_until_it_covers(output.id, width_px, height_px)) return window;
   return fail(ErrorCode::kMismatch,
