@@ -39,6 +39,7 @@ Result<> read_projector(const toml::table* table, const path& file, ProjectorOpt
   reader.read("monitor", options.monitor);
   reader.read("width_px", options.width_px);
   reader.read("height_px", options.height_px);
+  reader.read("enable_output", options.enable_output);
   reader.read("brightness", options.light.brightness);
   reader.read("gamma", options.light.gamma);
   reader.read("black_level", options.light.black_level);

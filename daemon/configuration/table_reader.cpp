@@ -64,6 +64,12 @@ void TableReader::read(std::string_view key, bool& value) {
   }
 }
 
+void TableReader::read(std::string_view key, std::optional<bool>& value) {
+  bool given = false;
+  read(key, given);
+  if (has(key)) value = given;
+}
+
 void TableReader::read(std::string_view key, int& value) {
   using Limits = std::numeric_limits<int>;
   if (const auto number = integer(key, Limits::min(), Limits::max())) value = static_cast<int>(*number);

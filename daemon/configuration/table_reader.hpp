@@ -32,6 +32,7 @@ class TableReader {
 
   [[nodiscard]] bool has(std::string_view key) const;
   void read(std::string_view key, bool& value);
+  void read(std::string_view key, std::optional<bool>& value);
   void read(std::string_view key, int& value);
   void read(std::string_view key, std::uint32_t& value);
   void read(std::string_view key, std::optional<int>& value);

@@ -8,6 +8,7 @@
 #include "drivers/camera/v4l2/v4l2_camera.hpp"
 #include "drivers/projector/glfw/glfw_projector.hpp"
 #include "drivers/projector/headless_projector.hpp"
+#include "drivers/projector/x11/x_display.hpp"
 
 namespace slsd {
 
@@ -24,8 +25,14 @@ Result<std::unique_ptr<Camera>> make_camera(const CameraOptions& options) {
 
 Result<std::unique_ptr<Projector>> make_projector(const ProjectorOptions& options) {
   if (options.driver == ProjectorDriver::kGlfw) {
-    return std::make_unique<GlfwProjector>(
-        GlfwProjectorOptions{options.monitor, options.width_px, options.height_px, options.light});
+    return std::make_unique<GlfwProjector>(GlfwProjectorOptions{
+        .monitor = options.monitor,
+        .width_px = options.width_px,
+        .height_px = options.height_px,
+        .light = options.light,
+        .enable_output = options.enable_output.value_or(owns_display()),
+        .refresh_hz = options.refresh_hz,
+    });
   }
   HeadlessProjectorOptions headless;
   headless.width_px = options.width_px;

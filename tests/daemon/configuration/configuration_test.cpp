@@ -36,6 +36,7 @@ gamma = [0, 0.25, 1]
 black_level = 16
 refresh_hz = 120
 idle = "black"
+enable_output = true
 idle_after_ms = 0
 [[camera]]
 name = "left"
@@ -73,6 +74,7 @@ socket_mode = 0o600
   EXPECT_EQ(configuration->projector.light.black_level, 16);
   EXPECT_EQ(configuration->projector.refresh_hz, 120.0);
   EXPECT_EQ(configuration->projector.idle, Picture::kBlack);
+  EXPECT_EQ(configuration->projector.enable_output, true);
   EXPECT_EQ(configuration->projector.idle_after_ms, 0);
   EXPECT_EQ(configuration->scan.projector_latency_ms, 34.5);
   EXPECT_EQ(configuration->scan.power_line_hz, 60);
