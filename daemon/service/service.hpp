@@ -25,6 +25,7 @@ namespace slsd {
 ///
 ///   main     the event loop: socket, signals, watchdog. Never waits for a device, never computes for long.
 ///   scanner  the projector, and each scan's frames: waits for devices.
+///   display  the projector's window: an X server that hangs holds whatever talks to it.
 ///   cam NAME one to a camera: cameras expose at the same time, and opening one may take seconds.
 ///   log      writes the log: whoever reads that may stand still.
 ///   decode N one or two, from frames to clouds and pictures: each uses a processor fully while the next frames come.
