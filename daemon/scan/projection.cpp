@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
 constexpr auto kSlice = 100ms;  // after which a wait for the projector looks whether it still makes sense
-constexpr auto kGrace = 500ms;  // beyond the deadline of a scan
+constexpr auto kGrace = 300ms;  // beyond the deadline of a scan
 
 void sleep_until(MonotonicTime time, const std::stop_token& stop) {
   std::mutex mutex;
@@ -129,8 +129,8 @@ void Projection::supervise() {
   if (look(until)) attempt(due(), until);
 }
 
-Result<> Projection::check() {
-  auto there = projector_->check(std::max<MonotonicTime>(deadline_, steady_clock::now()) + kGrace);
+Result<> Projection::check(MonotonicTime deadline) {
+  auto there = projector_->check(std::max<MonotonicTime>(deadline, steady_clock::now()) + kGrace);
   if (there) return there;
   if (there.error().code != ErrorCode::kTimeout) lose(there);
   Error error = std::move(there.error());
@@ -161,7 +161,6 @@ void Projection::note(const Result<>& outcome) {
 }
 
 Result<> Projection::await(Picture which, MonotonicTime deadline, const std::stop_token& stop) {
-  deadline_ = deadline;
   for (bool looked = false; !looked || shown_ != which;) {
     const MonotonicTime until = std::min<MonotonicTime>(deadline, steady_clock::now() + kSlice);
     looked = looked || look(until);

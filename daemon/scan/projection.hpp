@@ -57,9 +57,9 @@ class Projection {
   /// Returns when what is due is visible. @errors as show()
   [[nodiscard]] Result<> show_due(MonotonicTime deadline, const std::stop_token& stop);
 
-  /// Whether what was shown still is. Asked after each capture; comes back half a second after the deadline of what was
-  /// shown at the latest. @errors kDisconnected
-  [[nodiscard]] Result<> check();
+  /// Whether what was shown still is. Asked after each capture; comes back 0.3 s after the deadline, or after now, at
+  /// the latest. @errors kDisconnected
+  [[nodiscard]] Result<> check(MonotonicTime deadline);
   /// From when on every exposure sees what is shown, and nothing of what was shown before.
   [[nodiscard]] MonotonicTime visible() const { return visible_; }
   /// How often another picture was shown; frames of different counts do not belong together.
@@ -95,7 +95,6 @@ class Projection {
   MonotonicTime next_attempt_{};
   MonotonicTime last_scan_{};
   MonotonicTime visible_{};
-  MonotonicTime deadline_{};      ///< of what was shown last
   std::optional<Picture> shown_;  ///< nothing: unknown
   bool open_ = false;
   bool looking_ = false;  ///< whether it is still shown, it has not answered yet

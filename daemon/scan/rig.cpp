@@ -132,7 +132,7 @@ Result<std::vector<Frame>> Rig::expose(Cameras cameras, const Shot& shot) {
   auto frames = collect(cameras, shot.patience);
   if (!frames) return frames;
   Result<> outcome = check_times(cameras, *frames, since, shot.patience.deadline);
-  if (outcome) outcome = projection_.check();
+  if (outcome) outcome = projection_.check(shot.patience.deadline);
   if (!outcome) return tl::unexpected(outcome.error());
   return frames;
 }

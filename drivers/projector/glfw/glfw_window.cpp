@@ -144,7 +144,8 @@ bool FullscreenWindow::wait_until_it_covers(unsigned long output, int width_px, 
   while (steady_clock::now() < deadline && !session_.lost()) {
     session_.handle_events();
     const auto area = lit_area(session_.display(), output);
-    if (area && area->width_px == width_px && area->height_px == height_px && covers(*area)) return true;
+    if (!area) return false;  // turned off meanwhile: nothing to be patient for
+    if (area->width_px == width_px && area->height_px == height_px && covers(*area)) return true;
     std::this_thread::sleep_for(5ms);
   }
   return false;

@@ -152,7 +152,7 @@ TEST_F(ProjectionTest, WaitsAsLongAsTheDeviceIsLate) {
 TEST_F(ProjectionTest, ShowsWhatItShowedWhenItIsBack) {
   ASSERT_TRUE(hold(plain(3)));
   projector_->disconnect();
-  EXPECT_EQ(projection_->check().error().code, ErrorCode::kDisconnected);
+  EXPECT_EQ(projection_->check(in(30s)).error().code, ErrorCode::kDisconnected);
   ASSERT_TRUE(show_due());
   EXPECT_EQ(shown(), plain(3));
   EXPECT_EQ(projection_->status().opened, 2U);
@@ -226,7 +226,7 @@ TEST_F(SlowProjectionTest, GoesOnWhereOnePictureTookTooLongForAScan) {
 TEST_F(SlowProjectionTest, IsFaultedWhileItsDriverHangs) {
   ASSERT_TRUE(projection_->show(Picture::kPattern, in(30s), {}));
   projector_->hangs = true;
-  const auto there = projection_->check();
+  const auto there = projection_->check(in(30s));
   EXPECT_EQ(there.error().code, ErrorCode::kDisconnected);
   EXPECT_EQ(there.error().where, "projector, monitor A");
   const auto shown = projection_->show(Picture::kPattern, in(50ms), {});
