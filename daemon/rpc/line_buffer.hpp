@@ -28,6 +28,8 @@ class LineBuffer {
 
   /// Whether the line that has begun is longer than the limit.
   [[nodiscard]] bool overflown() const { return bytes_.size() - begin_ > limit_bytes_ && searched_ == bytes_.size(); }
+  /// How many bytes wait to be read as lines.
+  [[nodiscard]] std::size_t size() const { return bytes_.size() - begin_; }
   /// What it holds of memory.
   [[nodiscard]] std::size_t capacity() const { return bytes_.capacity(); }
   /// Gives back what it holds, lines that are not read yet with it.

@@ -63,6 +63,7 @@ JsonShape shape_of(std::string_view text) {
       ++shape.values;
     }
   }
+  shape.closed = depth == 0 && !in_text;
   return shape;
 }
 
@@ -74,7 +75,8 @@ tl::expected<Request, BadRequest> parse_request(std::string_view line) {
   if (shape.values > kMaxValues) {
     return refuse(nullptr, parse_error("more than " + std::to_string(kMaxValues) + " values: a request has a few"));
   }
-  json message = json::parse(line, nullptr, /*allow_exceptions=*/false);
+  // What is cut short is not parsed: the parser's error, which nobody reads, would quote all of it.
+  json message = shape.closed ? json::parse(line, nullptr, /*allow_exceptions=*/false) : json(json::value_t::discarded);
   if (message.is_discarded()) {
     return refuse(nullptr, parse_error("no JSON: send one JSON-RPC 2.0 object to a line, in UTF-8"));
   }

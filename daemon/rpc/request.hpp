@@ -39,6 +39,7 @@ struct BadRequest {
 struct JsonShape {
   int depth = 0;
   int values = 1;
+  bool closed = true;  ///< each text and bracket that is opened
 };
 [[nodiscard]] JsonShape shape_of(std::string_view json);
 

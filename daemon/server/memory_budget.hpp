@@ -15,7 +15,8 @@ namespace slsd {
 /// then free for all the others. One alone gets a half, two that take all they can a third each, and a hundred and one
 /// leave a hundredth free: who asks for more waits, and who asks for little is served as if nobody else were there.
 ///
-/// A few bytes are always granted, as each request is to have a reply: they come on top, at most 20 kB for each part of a client's.
+/// A few bytes are always granted, as each request is to have a reply: they come on top, at most 20 kB for each part of
+/// a client's.
 /// @thread thread-bound
 class MemoryBudget {
  public:

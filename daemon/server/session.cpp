@@ -21,6 +21,7 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
 constexpr auto kTurn = 250us;            // so that a round of 64 takes 16 ms
+constexpr auto kByteCost = 10ns;         // to parse, of a long line
 constexpr std::size_t kSlice = 1 << 20;  // to be taken within the send timeout
 constexpr auto kGlance = 200ms;          // between two looks whether the client is gone, where it sends urgent bytes
 constexpr std::size_t kMiB = 1 << 20;
@@ -119,7 +120,9 @@ void Session::await_input() {
 }
 
 void Session::ask_turn() {
-  if (!taker_.asked) room_.turns.ask(taker_, [self = shared_from_this()] { self->take_turn(); });
+  if (taker_.asked) return;
+  const auto cost = kByteCost * lines_.size();  // where a long line is about to be whole
+  room_.turns.ask(taker_, cost, [self = shared_from_this()] { self->take_turn(); });
 }
 
 void Session::take_turn() {

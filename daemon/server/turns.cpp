@@ -16,24 +16,43 @@ std::chrono::nanoseconds Turns::processor_time() {
   return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
 }
 
-void Turns::ask(Taker& taker, std::function<void()> turn) {
+void Turns::ask(Taker& taker, std::chrono::nanoseconds cost, std::function<void()> turn) {
   taker.asked = true;
-  const bool was_away = taker.used_until < now_;
-  waiting_.emplace(Start{std::max(taker.used_until, now_), !was_away}, Waiting{&taker, std::move(turn)});
-  if (waiting_.size() == 1) asio::post(events_, [this] { take_next(); });
+  if (&taker == running_) {
+    again_cost_ = cost;
+    again_ = std::move(turn);
+    return;
+  }
+  const auto start = std::max(taker.used_until, now_);
+  waiting_.emplace(start + std::max(cost, taker.last_cost), Waiting{&taker, start, std::move(turn)});
+  if (waiting_.size() == 1) post_next();
+}
+
+// By way of another round of the event loop: who asks while a turn is under way is heard before the next is given.
+void Turns::post_next() {
+  asio::post(events_, [this] { asio::post(events_, [this] { take_next(); }); });
 }
 
 // One turn to a round of the event loop: what else it has to do comes in between.
 void Turns::take_next() {
   if (waiting_.empty()) return;
   auto next = waiting_.extract(waiting_.begin());
-  if (!waiting_.empty()) asio::post(events_, [this] { take_next(); });
-  now_ = next.key().first;
+  if (!waiting_.empty()) post_next();
+  auto& [taker, start, turn] = next.mapped();
+  now_ = std::max(now_, start);
   const auto begin = time_();
-  auto& [taker, turn] = next.mapped();
   taker->asked = false;
+  running_ = taker;
   turn();
-  taker->used_until = now_ + (time_() - begin);
+  running_ = nullptr;
+  taker->last_cost = time_() - begin;
+  taker->used_until = start + taker->last_cost;
+  if (again_) ask(*taker, again_cost_, std::exchange(again_, nullptr));
+}
+
+void Turns::clear() {
+  waiting_.clear();
+  again_ = nullptr;
 }
 
 }  // namespace slsd

@@ -12,15 +12,16 @@
 
 namespace slsd {
 
-/// Shares the event loop's time among the clients: whoever used the least of it is served next, so that a client that
-/// asks for little does not wait for all those who flood. Start-time fair queueing (Goyal, Vin and Cheng 1997), with
-/// the processor's time that a turn took as its cost: a long line to parse costs more than a short one, whatever is in
-/// it. By the clock, who was served when another program had its turn would pay for that.
+/// Shares the event loop's time among the clients: next is whoever would have used the least of it after the turn, so
+/// that a client that asks for little does not wait for all those who flood. Self-clocked fair queueing (Golestani
+/// 1994), with the processor's time that a turn took as its cost: a long line to parse costs more than a short one,
+/// whatever is in it. By the clock, who was served when another program had its turn would pay for that. By the start
+/// of the turns in the place of their end, two quick ones of a client would wait for a long one of each other.
 ///
-///     time     a turn begins at its start: the end of the client's turn before, but not before the turn under way
-///     floods   A |----|    |----|    |----|
-///              B      |----|    |----|    |----|
-///     status   C               x|-|                 is next, however many flood
+///     time     a turn begins where the client's turn before ended, but not before the turn under way
+///     floods   A |--------|
+///              B |--------|
+///     status   C |-|-|                  ends first, and is next, twice
 ///
 /// @thread thread-bound
 class Turns {
@@ -28,6 +29,7 @@ class Turns {
   /// One who takes turns. Outlives those that it asked for.
   struct Taker {
     std::chrono::nanoseconds used_until{};
+    std::chrono::nanoseconds last_cost{};
     bool asked = false;  ///< for a turn that has not begun
   };
 
@@ -41,22 +43,28 @@ class Turns {
   Turns& operator=(const Turns&) = delete;
 
   /// Calls later. @param turn  a part of a millisecond of work; one asks again for more
-  void ask(Taker& taker, std::function<void()> turn);
+  /// @param cost  what it will take at least, as far as that is known; as much as the last one, too, is expected
+  void ask(Taker& taker, std::chrono::nanoseconds cost, std::function<void()> turn);
   /// Forgets who asked.
-  void clear() { waiting_.clear(); }
+  void clear();
 
  private:
+  void post_next();
   void take_next();
 
   struct Waiting {
     Taker* taker;
+    std::chrono::nanoseconds start;
     std::function<void()> turn;
   };
-  using Start = std::pair<std::chrono::nanoseconds, bool>;  ///< who used nothing since goes before who did
+  /// Whose turn is under way, and what it asks for meanwhile: that waits until the turn's cost is known.
+  Taker* running_ = nullptr;
+  std::chrono::nanoseconds again_cost_{};
+  std::function<void()> again_;
   asio::io_context& events_;
   Time time_;
-  std::multimap<Start, Waiting> waiting_;  ///< equals in the order of asking
-  std::chrono::nanoseconds now_{};         ///< the start of the turn under way, or of the last one
+  std::multimap<std::chrono::nanoseconds, Waiting> waiting_;  ///< by expected end; equals in the order of asking
+  std::chrono::nanoseconds now_{};                            ///< the latest start of a turn
 };
 
 }  // namespace slsd

@@ -82,6 +82,8 @@ TEST(ShapeOf, PassesOverTexts) {
   EXPECT_EQ(shape_of("[[],[[]]]").depth, 3);
   EXPECT_EQ(shape_of("[1,[2,3]]").values, 5) << "an upper bound, as an empty array is counted with an element";
   EXPECT_EQ(shape_of("").depth, 0);
+  EXPECT_TRUE(shape_of(R"({"a\"{":[1]})").closed);
+  for (const char* open : {"{", "[[]", "\"", "{\"a\":\"}", "]"}) EXPECT_FALSE(shape_of(open).closed) << open;
 }
 
 RC_GTEST_PROP(ParseRequest, SurvivesAnyBytes, (const std::string& line)) {

@@ -29,7 +29,7 @@ struct Client {
   Turns::Taker taker{};
 
   void ask() {
-    turns.ask(taker, [this] {
+    turns.ask(taker, 0ns, [this] {
       order += name;
       g_now += length;
       if (--left > 0) ask();
@@ -65,6 +65,34 @@ TEST(Turns, WhoComesAfterAWhileIsNext) {
   modest.ask();
   events.run();
   EXPECT_LE(order.find('m') - asked, 2U) << order;
+}
+
+// The floods' turns are long, and all begin at about the same time: quick ones in a row do not wait for them.
+TEST(Turns, QuickOnesDoNotWaitForLongOnesOfAllOthers) {
+  asio::io_context events;
+  Turns turns(events, now);
+  std::string order;
+  std::vector<std::unique_ptr<Client>> floods;
+  for (int i = 0; i < 20; ++i) floods.push_back(std::make_unique<Client>(Client{turns, order, 'f', 20ms, 5}));
+  for (const auto& flood : floods) flood->ask();
+  while (order.size() < 25) events.run_one();
+  Client quick{turns, order, 'q', 1ms, 4};
+  quick.ask();
+  events.run();
+  EXPECT_LE(order.rfind('q'), 25U + 8U) << order;
+}
+
+// One that is always there again for a quick turn does not keep the long ones out for ever.
+TEST(Turns, LongOnesHaveTheirShare) {
+  asio::io_context events;
+  Turns turns(events, now);
+  std::string order;
+  Client slow{turns, order, 'S', 20ms, 3};
+  Client quick{turns, order, 'q', 1ms, 200};
+  quick.ask();
+  slow.ask();
+  events.run();
+  EXPECT_LT(order.rfind('S'), 90U) << order;
 }
 
 TEST(Turns, ForgetsWhoAsked) {
