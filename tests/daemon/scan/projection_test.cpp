@@ -39,6 +39,11 @@ class ProjectionTest : public ::testing::Test {
 
   Result<> show(Picture picture = Picture::kPattern) { return projection_->show(picture, in(30s), {}); }
   Result<> hold(std::optional<Grey8> picture) { return projection_->hold(std::move(picture), in(30s), {}); }
+  /// Until there is nothing left to do: on a busy machine a picture takes more than one step.
+  void supervise() {
+    do projection_->supervise();
+    while (projection_->next_change() <= steady_clock::now());
+  }
   Result<> show_due() { return projection_->show_due(in(30s), {}); }
   Grey8 shown() { return *projector_->read_back(); }
   static MonotonicTime in(std::chrono::nanoseconds time) { return steady_clock::now() + time; }
@@ -48,12 +53,12 @@ class ProjectionTest : public ::testing::Test {
 };
 
 TEST_F(ProjectionTest, ShowsThePatternWhileNobodyScans) {
-  projection_->supervise();
+  supervise();
   EXPECT_EQ(shown(), plain(100));
   EXPECT_EQ(projection_->status().state, DeviceState::kReady);
   EXPECT_EQ(projection_->status().shows, "pattern");
   const auto changes = projection_->changes();
-  projection_->supervise();
+  supervise();
   ASSERT_TRUE(show());
   EXPECT_EQ(projection_->changes(), changes);
   EXPECT_EQ(projection_->next_change(), MonotonicTime::max());
@@ -61,13 +66,13 @@ TEST_F(ProjectionTest, ShowsThePatternWhileNobodyScans) {
 
 TEST_F(ProjectionTest, ShowsTheIdlePictureBetweenScans) {
   projection_->set_idle(plain(7), 0ms);
-  projection_->supervise();
+  supervise();
   EXPECT_EQ(shown(), plain(7));
   for (int i = 0; i < 3; ++i) {
     ASSERT_TRUE(show());
     EXPECT_EQ(shown(), plain(100));
     EXPECT_LE(projection_->next_change(), steady_clock::now());
-    projection_->supervise();
+    supervise();
     EXPECT_EQ(shown(), plain(7));
     EXPECT_EQ(projection_->status().shows, "idle");
     EXPECT_EQ(projection_->next_change(), MonotonicTime::max());
@@ -77,7 +82,7 @@ TEST_F(ProjectionTest, ShowsTheIdlePictureBetweenScans) {
 TEST_F(ProjectionTest, WaitsAfterAScanWithTheIdlePicture) {
   projection_->set_idle(plain(7), 600s);
   ASSERT_TRUE(show());
-  projection_->supervise();
+  supervise();
   EXPECT_EQ(shown(), plain(100));
   EXPECT_GT(projection_->next_change(), in(500s));
 }
@@ -86,13 +91,13 @@ TEST_F(ProjectionTest, HoldsAPictureUntilAScan) {
   projection_->set_idle(plain(7), 0ms);
   for (const auto value : {std::uint8_t{1}, std::uint8_t{2}}) {
     ASSERT_TRUE(hold(plain(value)));
-    projection_->supervise();
+    supervise();
     EXPECT_EQ(shown(), plain(value));
     EXPECT_EQ(projection_->status().shows, "held");
   }
   ASSERT_TRUE(show());
   EXPECT_EQ(shown(), plain(100));
-  projection_->supervise();
+  supervise();
   EXPECT_EQ(shown(), plain(7));
 }
 
@@ -101,7 +106,7 @@ TEST_F(ProjectionTest, HoldsThePatternAsItIs) {
   ASSERT_TRUE(hold(std::nullopt));
   EXPECT_EQ(shown(), plain(100));
   projection_->set_pattern(plain(200));
-  projection_->supervise();
+  supervise();
   EXPECT_EQ(shown(), plain(200));
   ASSERT_TRUE(projection_->release(in(30s), {}));
   EXPECT_EQ(shown(), plain(7));
@@ -114,11 +119,11 @@ TEST_F(ProjectionTest, GoesBackToWhatWasHeldWhereAnotherPictureIsNotShownInTime)
       ASSERT_TRUE(hold(plain(1)));
     }
     EXPECT_EQ(projection_->hold(plain(2), in(-1s), {}).error().code, ErrorCode::kTimeout);
-    projection_->supervise();
+    supervise();
     EXPECT_EQ(shown(), plain(held ? 1 : 7));
   }
   EXPECT_EQ(projection_->release(in(-1s), {}).error().code, ErrorCode::kTimeout);
-  projection_->supervise();
+  supervise();
   EXPECT_EQ(shown(), plain(1));
 }
 
@@ -127,7 +132,7 @@ TEST_F(ProjectionTest, ShowsWhiteAndBlack) {
   EXPECT_EQ(shown(), plain(255));
   ASSERT_TRUE(show(Picture::kBlack));
   EXPECT_EQ(shown(), plain(0));
-  projection_->supervise();
+  supervise();
   EXPECT_EQ(shown(), plain(100));
 }
 
@@ -215,10 +220,11 @@ class SlowProjectionTest : public ::testing::Test {
 
 TEST_F(SlowProjectionTest, GoesOnWhereOnePictureTookTooLongForAScan) {
   ASSERT_TRUE(projection_->show(Picture::kPattern, in(30s), {}));
-  projector_->ready = in(400ms);
+  projector_->ready = in(600s);
   const auto shown = projection_->show(Picture::kWhite, in(10ms), {});
   EXPECT_EQ(shown.error().code, ErrorCode::kTimeout);
   EXPECT_EQ(projection_->status().state, DeviceState::kReady) << "it is only slow";
+  projector_->ready = in(0s);
   EXPECT_TRUE(projection_->show(Picture::kWhite, in(30s), {}));
   EXPECT_EQ(projector_->opened, 1);
 }
@@ -241,14 +247,16 @@ TEST_F(SlowProjectionTest, IsFaultedWhileItsDriverHangs) {
 }
 
 TEST_F(SlowProjectionTest, LooksAfterASlowOneInSmallSteps) {
-  projector_->ready = in(500ms);
-  int steps = 0;
-  for (; !is_open(projection_->status().state); ++steps) {
+  projector_->ready = in(600s);
+  for (int steps = 0; steps < 3; ++steps) {
     EXPECT_LE(projection_->next_change(), steady_clock::now());
     projection_->supervise();
+    EXPECT_EQ(projection_->status().state, DeviceState::kOpening);
   }
-  EXPECT_GE(steps, 3);
-  projector_->ready = in(300ms);
+  projector_->ready = in(0s);
+  projection_->supervise();
+  EXPECT_EQ(projection_->status().state, DeviceState::kReady);
+  projector_->ready = in(600s);
   projection_->supervise();
   EXPECT_LE(projection_->next_change(), steady_clock::now()) << "it has not answered yet";
   EXPECT_EQ(projection_->status().state, DeviceState::kReady);
