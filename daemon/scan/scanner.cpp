@@ -241,7 +241,9 @@ std::shared_ptr<Scan> Scanner::make_scan(ScanRequest request, bool listened, Ans
         conclude(scan, result);
         if (answer) answer(result);
         const bool for_all = listened && (result || result.error().code != ErrorCode::kCancelled);
-        if (for_all && listener_) listener_(std::make_shared<Result<ScanResult>>(std::move(result)));
+        if (!for_all || !listener_) return;
+        if (result) result->frames = {}, result->picture_png = {};  // one client's alone, and large
+        listener_(std::make_shared<Result<ScanResult>>(std::move(result)));
       });
 }
 
