@@ -2,10 +2,11 @@
 // Copyright the slsd authors
 #include "daemon/scan/scan.hpp"
 
-#include <atomic>
 #include <future>
+#include <memory>
 #include <optional>
 #include <stop_token>
+#include <utility>
 
 #include <gmock/gmock.h>
 
@@ -135,13 +136,12 @@ TEST_F(ScanTest, OneThatLosesEveryFrameEndsAtItsDeadline) {
 
 TEST_F(ScanTest, FreeRunTellsOfEachLostFrame) {
   make(std::deque<Step>(10'000, fails(ErrorCode::kFrameDropped)));
-  std::promise<std::optional<ErrorCode>> first;
-  std::atomic<bool> told{false};
-  scanner_->set_listener([&](const FreeScan& scan) {
-    if (!told.exchange(true)) first.set_value(*scan ? std::nullopt : std::optional(scan->error().code));
+  const auto first = std::make_shared<std::promise<std::optional<ErrorCode>>>();  // the scanner outlives this test
+  scanner_->set_listener([first, told = false](const FreeScan& scan) mutable {
+    if (!std::exchange(told, true)) first->set_value(*scan ? std::nullopt : std::optional(scan->error().code));
   });
   scanner_->run_freely(FreeRun{1000, {}});
-  EXPECT_EQ(first.get_future().get(), ErrorCode::kFrameDropped);
+  EXPECT_EQ(first->get_future().get(), ErrorCode::kFrameDropped);
   scanner_->run_freely(std::nullopt);
 }
 
