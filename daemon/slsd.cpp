@@ -55,7 +55,7 @@ int serve(const std::filesystem::path& configuration_file) {
   // by 20 % in 240 losses of one.
   ::mallopt(M_MMAP_THRESHOLD, kOwnPagesBytes);
   std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGIO, SIG_IGN);  // of the leases by which lent memfds are watched, should anybody else open one
+  std::signal(SIGIO, SIG_IGN);   // of the leases by which lent memfds are watched, should anybody else open one
   std::signal(SIGHUP, SIG_IGN);  // what a reload would read is about to be read
   spdlog::info("slsd {} starts with {}", SLSD_VERSION, configuration_file.string());
   slsd::queue_log();

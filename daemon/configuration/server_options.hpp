@@ -18,10 +18,10 @@ struct ServerOptions {
   int socket_mode = 0660;               ///< 0 to 0777
   int clients_max = 256;                ///< 1 to 10000; one more is told so and closed
   int request_bytes_max = 1024 * 1024;  ///< 1024 to 16777216; a longer line is an error and ends the connection
-  int memory_max_mb = 512;              ///< 16 to 65536; all that waits for clients together, and at most half of it for
-                                        ///< one
-  int send_timeout_ms = 30'000;         ///< 100 to 600000; a client that takes neither a megabyte nor all of a message
-                                        ///< in so long is dropped
+  int memory_max_mb = 512;       ///< 16 to 65536; all that waits for clients together, and at most half of it for
+                                 ///< one
+  int send_timeout_ms = 30'000;  ///< 100 to 600000; a client that takes neither a megabyte nor all of a message
+                                 ///< in so long is dropped
 
   [[nodiscard]] std::chrono::milliseconds send_timeout() const { return std::chrono::milliseconds(send_timeout_ms); }
   [[nodiscard]] std::size_t memory_max_bytes() const { return static_cast<std::size_t>(memory_max_mb) << 20U; }
