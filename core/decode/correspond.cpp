@@ -24,7 +24,7 @@ void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellCl
   }
 }
 
-void Correspondence::correspond(const CellRays& cells, const std::vector<EpipolarSegment>& segments,
+void Correspondence::correspond(const CellRays& cells, std::span<const EpipolarSegment> segments,
                                 std::vector<CellClaim>& claims) {
   for (std::size_t node = 0; node < claims.size(); ++node) {
     CellClaim& claim = claims[node];

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "core/decode/decode_windows.hpp"
@@ -22,7 +23,7 @@ class Correspondence {
  public:
   explicit Correspondence(CorrespondOptions options) : options_(options) {}
 
-  void correspond(const CellRays& cells, const std::vector<EpipolarSegment>& segments, std::vector<CellClaim>& claims);
+  void correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, std::vector<CellClaim>& claims);
 
   /// The duplicates alone, where there is no calibration.
   void settle_duplicates(const CellRays& cells, std::vector<CellClaim>& claims);

@@ -8,11 +8,24 @@
 
 #include <Eigen/LU>
 
+#include "core/decode/centre_sigma.hpp"
+
 namespace slsd {
 namespace {
 
 /// Bend over a symbol's size that moves its centre by a tenth of that, below what noise does.
 constexpr float kNegligiblePx = 0.12F;
+
+/// How far the centroid of a symbol's image lies from the point that its centroid lights.
+/// @param m  second moments of the symbol, projector px squared
+Eigen::Vector2f pull_of(const Bend& bend, const LatticeFrame& frame, const Eigen::Matrix2f& m) {
+  const Eigen::Matrix2f inverse = frame.inverse();
+  Eigen::Matrix2f along_u, along_v;
+  along_u << bend.uu, bend.uv;
+  along_v << bend.uv, bend.vv;
+  const Eigen::Vector2f log_area_gradient((inverse * along_u).trace(), (inverse * along_v).trace());
+  return 0.5F * (bend.uu * m(0, 0) + 2 * bend.uv * m(0, 1) + bend.vv * m(1, 1)) + frame * (m * log_area_gradient);
+}
 
 }  // namespace
 
@@ -108,29 +121,38 @@ std::optional<Bend> CentreCorrection::bend_of(const std::vector<GridNode>& nodes
 }
 
 void CentreCorrection::correct(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
-                               const std::vector<CellClaim>& claims, const std::vector<std::int8_t>& letters,
-                               std::vector<Eigen::Vector2f>& corrected) {
-  corrected.resize(nodes.size());
+                               const std::vector<CellClaim>& claims, const CodeArray& array, Lattice& lattice) {
   centres_.resize(nodes.size());
+  symbol_of_.assign(nodes.size(), -1);
+  std::int32_t symbols = 0;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    corrected[i] = {moments[i].x, moments[i].y};
-    centres_[i] = corrected[i];
-    if (letters[i] >= 0) centres_[i] -= nodes[i].frame * centroids_px_[letters[i]];
+    centres_[i] = {moments[i].x, moments[i].y};
+    if (claims[i].named()) centres_[i] -= nodes[i].frame * centroids_px_[array.at(claims[i].row, claims[i].column)];
+    if (claims[i].status == RegionStatus::kDecoded) symbol_of_[i] = symbols++;
   }
   measure_bends(nodes, claims);
+  lattice.symbols.clear();
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    if (claims[i].status != RegionStatus::kDecoded || letters[i] < 0) continue;
-    const std::optional<Bend> found = bend_of(nodes, static_cast<std::int32_t>(i));
-    if (!found) continue;
-    const Bend& bend = *found;
-    const Eigen::Matrix2f& m = second_moments_px2_[letters[i]];
-    const Eigen::Matrix2f inverse = nodes[i].frame.inverse();
-    Eigen::Matrix2f along_u, along_v;
-    along_u << bend.uu, bend.uv;
-    along_v << bend.uv, bend.vv;
-    const Eigen::Vector2f log_area_gradient((inverse * along_u).trace(), (inverse * along_v).trace());
-    corrected[i] -= 0.5F * (bend.uu * m(0, 0) + 2 * bend.uv * m(0, 1) + bend.vv * m(1, 1)) +
-                    nodes[i].frame * (m * log_area_gradient);
+    if (symbol_of_[i] < 0) continue;
+    const GreyMoments& seen = moments[i];
+    LatticeSymbol symbol{.sighting = static_cast<std::int32_t>(i),
+                         .row = claims[i].row,
+                         .column = claims[i].column,
+                         .centre_px = {seen.x, seen.y},
+                         .frame = nodes[i].frame,
+                         .bend = {},
+                         .background = seen.background,
+                         .gain = seen.peak - seen.background,
+                         .sigma_px = static_cast<float>(centre_sigma_px(seen)),
+                         .neighbours = {-1, -1, -1, -1}};
+    for (const Direction d : {kRight, kDown, kLeft, kUp}) {
+      if (named_[i][d] >= 0) symbol.neighbours[d] = symbol_of_[named_[i][d]];
+    }
+    if (const std::optional<Bend> bend = bend_of(nodes, symbol.sighting)) {
+      symbol.bend = *bend;
+      symbol.centre_px -= pull_of(*bend, symbol.frame, second_moments_px2_[array.at(symbol.row, symbol.column)]);
+    }
+    lattice.symbols.push_back(symbol);
   }
 }
 

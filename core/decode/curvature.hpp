@@ -9,16 +9,11 @@
 
 #include "core/decode/decode_windows.hpp"
 #include "core/decode/grey_moments.hpp"
+#include "core/decode/lattice.hpp"
 #include "core/decode/link_grid.hpp"
 #include "core/decode/prototypes.hpp"
 
 namespace slsd {
-
-/// How the map from the pattern to the camera bends around a symbol: its second derivatives, camera px per projector px
-/// squared.
-struct Bend {
-  Eigen::Vector2f uu{0, 0}, uv{0, 0}, vv{0, 0};
-};
 
 /// Where the camera sees the point of the surface that a symbol's centroid in the projector lights. The centroid of the
 /// symbol's image is not that point: perspective and curvature show more of one half than of the other, by some
@@ -34,11 +29,11 @@ class CentreCorrection {
  public:
   CentreCorrection(const std::vector<Prototype>& prototypes, float pitch_px, float symbol_size_px);
 
-  /// @param letters    of the nodes' cells, -1 where they have none
-  /// @param corrected  camera pixels, one to a node
+  /// @param array    of the pattern: tells the letters of the cells
+  /// @param lattice  becomes one symbol to each node that is decoded, in their order, with its place, map and
+  /// neighbours
   void correct(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
-               const std::vector<CellClaim>& claims, const std::vector<std::int8_t>& letters,
-               std::vector<Eigen::Vector2f>& corrected);
+               const std::vector<CellClaim>& claims, const CodeArray& array, Lattice& lattice);
 
  private:
   struct Derivatives {
@@ -60,6 +55,7 @@ class CentreCorrection {
   std::vector<Eigen::Vector2f> centroids_px_;
   std::vector<Eigen::Matrix2f> second_moments_px2_;
   std::vector<Eigen::Vector2f> centres_;            // of the squares
+  std::vector<std::int32_t> symbol_of_;             // in the lattice
   std::vector<std::array<std::int32_t, 4>> named_;  // by Direction: neighbours that are decoded, and as such agree
   std::vector<Derivatives> derivatives_;
 };

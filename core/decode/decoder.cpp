@@ -2,12 +2,31 @@
 // Copyright the slsd authors
 #include "core/decode/decoder.hpp"
 
-#include "core/decode/pipeline.hpp"
+#include <algorithm>
+#include <cmath>
+
+#include "core/decode/symbol_reader.hpp"
 #include "core/exposure/light_levels.hpp"
+#include "core/geometry/triangulator.hpp"
 #include "core/image_size.hpp"
 
 namespace slsd {
-Decoder::Decoder(std::unique_ptr<Pipeline> pipeline) : pipeline_(std::move(pipeline)) {}
+
+/// A copy is for another thread.
+struct Decoder::Parts {
+  CalibratedCamera camera;
+  std::uint8_t camera_index;
+  DecodeOptions options;
+  SymbolReader reader;
+  EpipolarView view;
+  Triangulator triangulator;
+  Decoding decoding{};
+
+  void triangulate(const Lattice& lattice, double full);
+  void add_point(const LatticeSymbol& symbol, const TriangulatedPoint& solved, double full);
+};
+
+Decoder::Decoder(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 Decoder::Decoder(Decoder&&) noexcept = default;
 Decoder& Decoder::operator=(Decoder&&) noexcept = default;
 Decoder::~Decoder() = default;
@@ -37,20 +56,27 @@ Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calib
     if (!created) return tl::unexpected(created.error());
     paper = std::move(*created);
   }
-  return Decoder(std::make_unique<Pipeline>(pattern, calibration, camera_index, options, std::move(paper)));
+  ExpectedFrames expected(camera, projector, std::sqrt(options.depth_min_mm * options.depth_max_mm));
+  return Decoder(std::make_unique<Parts>(
+      Parts{.camera = camera,
+            .camera_index = static_cast<std::uint8_t>(camera_index),
+            .options = options,
+            .reader = SymbolReader(pattern, projector, std::move(expected), options, std::move(paper)),
+            .view = EpipolarView(camera, projector, options.depth_min_mm, options.depth_max_mm),
+            .triangulator = Triangulator(camera, projector)}));
 }
 
 Decoder Decoder::another() const {
-  return Decoder(std::make_unique<Pipeline>(*pipeline_));
+  return Decoder(std::make_unique<Parts>(*parts_));
 }
 
 std::uint8_t Decoder::camera_index() const {
-  return pipeline_->camera_index();
+  return parts_->camera_index;
 }
 
 Result<> Decoder::check_size(const GreyView& frame) const {
   const auto [width, height] = std::visit([](const auto& view) { return std::pair(view.width, view.height); }, frame);
-  const Lens& lens = pipeline_->camera_lens();
+  const Lens& lens = parts_->camera.lens;
   if (width == lens.width_px && height == lens.height_px) return {};
   return fail(ErrorCode::kMismatch, "the frame has " + size_text(width, height) +
                                         " pixels, the camera was calibrated with " +
@@ -60,12 +86,50 @@ Result<> Decoder::check_size(const GreyView& frame) const {
 
 Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<double> full, StageObserver* observer) {
   if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
-  return &pipeline_->decode(frame, full ? *full : guess_full_level(frame), observer);
+  const double level = full ? *full : guess_full_level(frame);
+  const Lattice& lattice = parts_->reader.read(frame, level, &parts_->view, observer);
+  parts_->triangulate(lattice, level);
+  parts_->reader.report(parts_->decoding);
+  if (observer != nullptr) observer->stage_done(Stage::kTriangulate);
+  return &parts_->decoding;
+}
+
+void Decoder::Parts::triangulate(const Lattice& lattice, double full) {
+  const bool gated = options.correspond == Method::kDefault;
+  decoding.points.clear();
+  for (const LatticeSymbol& symbol : lattice.symbols) {
+    const TriangulatedPoint solved =
+        triangulator.triangulate(view.ray_near(symbol.sighting, symbol.centre_px),
+                                 reader.cells().ray(symbol.row, symbol.column), symbol.sigma_px);
+    const double depth = solved.point_in_camera.z();
+    const bool in_range = gated ? depth >= options.depth_min_mm && depth <= options.depth_max_mm : depth > 0;
+    if (in_range && solved.point_in_camera.allFinite()) {
+      add_point(symbol, solved, full);
+    } else {
+      reader.reject(symbol, RegionStatus::kOutOfDepthRange);
+    }
+  }
+}
+
+void Decoder::Parts::add_point(const LatticeSymbol& symbol, const TriangulatedPoint& solved, double full) {
+  const Eigen::Vector3f point = (camera.rig_from_camera * solved.point_in_camera).cast<float>();
+  const Eigen::Vector2f projector = reader.cells().pixel(symbol.row, symbol.column).cast<float>();
+  const float level_of_255 = static_cast<float>(full / 255);
+  CloudPoint& out = decoding.points.emplace_back();
+  out.x = point.x(), out.y = point.y(), out.z = point.z();
+  out.camera_u = symbol.centre_px.x(), out.camera_v = symbol.centre_px.y();
+  out.projector_u = projector.x(), out.projector_v = projector.y();
+  out.sigma_mm = static_cast<float>(solved.sigma_mm);
+  out.column = static_cast<std::uint16_t>(symbol.column), out.row = static_cast<std::uint16_t>(symbol.row);
+  out.intensity = static_cast<std::uint8_t>(std::clamp((symbol.background + symbol.gain) / level_of_255, 0.F, 255.F));
+  out.camera = camera_index;
+  const Pattern& pattern = reader.pattern();
+  out.symbol = static_cast<std::uint8_t>(pattern.options.symbols[pattern.array.at(symbol.row, symbol.column)]);
 }
 
 Result<std::vector<SymbolMatch>> Decoder::read_anywhere(const GreyView& frame, std::optional<double> full) {
   if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
-  return pipeline_->read_anywhere(frame, full ? *full : guess_full_level(frame));
+  return parts_->reader.read_anywhere(frame, full ? *full : guess_full_level(frame));
 }
 
 }  // namespace slsd

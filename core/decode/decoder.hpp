@@ -50,10 +50,10 @@ class Decoder {
                                                                std::optional<double> full = std::nullopt);
 
  private:
-  class Pipeline;
+  struct Parts;
   [[nodiscard]] Result<> check_size(const GreyView& frame) const;
-  explicit Decoder(std::unique_ptr<Pipeline> pipeline);
-  std::unique_ptr<Pipeline> pipeline_;
+  explicit Decoder(std::unique_ptr<Parts> parts);
+  std::unique_ptr<Parts> parts_;
 };
 
 }  // namespace slsd

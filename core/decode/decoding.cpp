@@ -54,6 +54,8 @@ std::string_view to_string(Stage stage) {
       return "link_grid";
     case Stage::kDecodeWindows:
       return "decode_windows";
+    case Stage::kReview:
+      return "review";
     case Stage::kCorrespond:
       return "correspond";
     case Stage::kTriangulate:

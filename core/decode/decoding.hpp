@@ -43,10 +43,11 @@ enum class Stage : std::uint8_t {
   kClassify,
   kLinkGrid,
   kDecodeWindows,
+  kReview,
   kCorrespond,
   kTriangulate
 };
-inline constexpr int kStageCount = 8;
+inline constexpr int kStageCount = 9;
 [[nodiscard]] std::string_view to_string(Stage stage);
 
 /// Directions of the grid's links, along the pattern's axes: u to the right, v down.

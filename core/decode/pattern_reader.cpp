@@ -76,12 +76,10 @@ bool lie_on_one_plane(const std::vector<SymbolMatch>& matches, double pitch_px) 
 
 struct PatternReader::Trial {
   SymbolReader reader;
-  CellRays cells;
   double scale;
 
   Trial(const Pattern& pattern, ExpectedFrames frames)
-      : reader(pattern, std::move(frames), {}, std::nullopt),
-        cells(reader.cell_rays(any_lens(pattern.options))),
+      : reader(pattern, any_lens(pattern.options), std::move(frames), {}, std::nullopt),
         scale(reader.expected_scale()) {}
 };
 
@@ -103,8 +101,8 @@ std::vector<SymbolMatch> PatternReader::attempt(const Homography& camera_from_pr
   } else {
     (*at)->reader.expect(std::move(frames));
   }
-  std::vector<SymbolMatch> matches = (*at)->reader.read_anywhere(frame, full_, (*at)->cells);
-  shapes_ = std::max(shapes_, (*at)->reader.seen().size());
+  std::vector<SymbolMatch> matches = (*at)->reader.read_anywhere(frame, full_);
+  shapes_ = std::max(shapes_, (*at)->reader.shapes());
   return matches;
 }
 

@@ -4,9 +4,6 @@
 
 #include <Eigen/LU>
 
-#include "core/decode/centre_sigma.hpp"
-#include "core/decode/correspond.hpp"
-
 namespace slsd {
 namespace {
 
@@ -40,135 +37,137 @@ int radius_of(const CodeArray& array) {
 
 }  // namespace
 
-SymbolReader::Prototypes SymbolReader::prototypes_for(const Pattern& pattern, float scale) {
+SymbolReader::Prototypes SymbolReader::Prototypes::of(const Pattern& pattern, float scale) {
   constexpr float kFrameErrors[] = {kExpectedFrameError, kMeasuredFrameError};
   auto made = make_prototypes(
       {pattern.options.symbols, pattern.options.symbol_size_px, pattern.options.spacing_px, scale}, kFrameErrors);
   return {std::move(made[0]), std::move(made[1])};
 }
 
-SymbolReader::SymbolReader(const Pattern& pattern, ExpectedFrames expected, const DecodeOptions& options,
-                           std::optional<PaperWay> paper)
-    : SymbolReader(prototypes_for(pattern, expected.in_the_middle().scale), pattern, std::move(expected), options,
-                   std::move(paper)) {}
+SymbolReader::Fixed::Fixed(const Pattern& shown, const Lens& projector, Method centre, Prototypes&& made)
+    : pattern(shown),
+      prototypes(std::move(made)),
+      as_expected(prototypes.as_expected, kExpectedDistanceMax),
+      as_measured(prototypes.as_measured, kMeasuredDistanceMax),
+      cells(pattern, with_centroids_of(centre, pattern, prototypes.as_measured), projector) {}
 
-SymbolReader::SymbolReader(Prototypes prototypes, const Pattern& pattern, ExpectedFrames&& expected,
-                           const DecodeOptions& options, std::optional<PaperWay>&& paper)
-    : pattern_(pattern),
-      options_(options),
+SymbolReader::SymbolReader(const Pattern& pattern, const Lens& projector, ExpectedFrames expected,
+                           const DecodeOptions& options, std::optional<PaperWay> paper)
+    : options_(options),
+      fixed_(std::make_shared<const Fixed>(pattern, projector, options.centre,
+                                           Prototypes::of(pattern, expected.in_the_middle().scale))),
       paper_(std::move(paper)),
-      shapes_(pattern.options, std::move(expected), options.binarize, options.find_regions),
-      prototypes_(std::move(prototypes)),
-      classifier_as_expected_(prototypes_.as_expected, kExpectedDistanceMax),
-      classifier_as_measured_(prototypes_.as_measured, kMeasuredDistanceMax),
+      finder_(pattern.options, std::move(expected), options.binarize, options.find_regions),
       linker_({.pitch_px = static_cast<float>(pattern.pitch_px())}),
       window_decoder_(pattern, {.rows = pattern.whole_rows(), .columns = pattern.whole_columns()},
                       radius_of(pattern.array)),
-      review_(pattern, prototypes_.as_measured, {}),
-      centre_correction_(prototypes_.as_measured, static_cast<float>(pattern.pitch_px()),
+      review_(pattern, fixed_->prototypes.as_measured, {}),
+      correspondence_({}),
+      centre_correction_(fixed_->prototypes.as_measured, static_cast<float>(pattern.pitch_px()),
                          static_cast<float>(pattern.options.symbol_size_px)) {}
 
-CellRays SymbolReader::cell_rays(const Lens& projector) const {
-  return {pattern_, with_centroids_of(options_.centre, pattern_, prototypes_.as_measured), projector};
-}
-
-void SymbolReader::describe(const GreyView& frame) {
-  shapes_.describe(frame, seen_);
-  if (paper_) paper_->describe(shapes_.regions(), seen_);
-  if (options_.centre == Method::kPaper) paper_->centre(seen_);
+const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarView* view, StageObserver* observer) {
+  const auto done = [&](Stage stage) {
+    if (observer != nullptr) observer->stage_done(stage);
+  };
+  finder_.binarize(frame, full), done(Stage::kBinarize);
+  finder_.find_regions(frame), done(Stage::kFindRegions);
+  finder_.describe(frame, seen_);
+  if (paper_) paper_->describe(finder_.regions(), seen_, options_.centre);
+  done(Stage::kDescribe);
+  classify(), done(Stage::kClassify);
+  link_grid(), done(Stage::kLinkGrid);
+  if (view != nullptr) view->look_at(seen_);
+  decode_windows(view), done(Stage::kDecodeWindows);
+  review(frame), done(Stage::kReview);
+  correspond(view);
+  fit_lattice(), done(Stage::kCorrespond);
+  return lattice_;
 }
 
 void SymbolReader::classify() {
-  const float size = static_cast<float>(pattern_.options.symbol_size_px);
+  const float size = static_cast<float>(pattern().options.symbol_size_px);
   seen_.shapes.resize(seen_.size());
   seen_.nodes.assign(seen_.size(), {});
   if (options_.classify == Method::kPaper) paper_->classify(size * expected_scale(), seen_);
   for (std::size_t i = 0; i < seen_.size(); ++i) {
     const GreyMoments& moments = seen_.moments[i];
     GridNode& node = seen_.nodes[i];
-    const ExpectedFrame& expected = shapes_.expected().at(moments.x, moments.y);
+    const ExpectedFrame& expected = finder_.expected().at(moments.x, moments.y);
     node.frame = expected.frame;
     node.centre_px = {moments.x, moments.y};
     if (options_.classify == Method::kDefault) {
-      seen_.shapes[i] = classifier_as_expected_.classify(shape_features(moments, expected.inverse, size));
+      seen_.shapes[i] = fixed_->as_expected.classify(shape_features(moments, expected.inverse, size));
     }
     if (seen_.shapes[i].letter >= 0)
-      node.centre_px -= node.frame * prototypes_.as_expected[seen_.shapes[i].letter].centroid_px;
+      node.centre_px -= node.frame * fixed_->prototypes.as_expected[seen_.shapes[i].letter].centroid_px;
   }
 }
 
 void SymbolReader::link_grid() {
   if (options_.link_grid == Method::kPaper)
-    return paper_->link_grid(shapes_.regions(), shapes_.mask().width(), shapes_.mask().height(), seen_);
+    return paper_->link_grid(finder_.regions(), finder_.mask().width(), finder_.mask().height(), seen_);
   linker_.link(seen_.nodes);
   if (options_.classify == Method::kDefault) classify_in_measured_frames();
 }
 
 void SymbolReader::classify_in_measured_frames() {
-  const float size = static_cast<float>(pattern_.options.symbol_size_px);
+  const float size = static_cast<float>(pattern().options.symbol_size_px);
   for (std::size_t i = 0; i < seen_.size(); ++i) {
     const GridNode& node = seen_.nodes[i];
     const Classification& before = seen_.shapes[i];
     const bool decided = before.letter >= 0 && before.distance < kDecidedDistance &&
                          before.log_probability[before.letter] > kDecidedLogProbability;
     if (decided || !node.measured_u || !node.measured_v) continue;
-    seen_.shapes[i] = classifier_as_measured_.classify(shape_features(seen_.moments[i], node.frame.inverse(), size));
+    seen_.shapes[i] = fixed_->as_measured.classify(shape_features(seen_.moments[i], node.frame.inverse(), size));
   }
 }
 
-bool SymbolReader::reviews() const {
-  return options_.classify == Method::kDefault && options_.centre == Method::kDefault &&
-         options_.decode_windows == Method::kDefault;
-}
-
-void SymbolReader::decode_windows(const GreyView& frame, const CellGate& gate) {
-  if (options_.decode_windows == Method::kPaper) {
-    return paper_->decode_windows(pattern_.whole_rows(), pattern_.whole_columns(), seen_);
-  }
+void SymbolReader::decode_windows(const EpipolarView* view) {
+  if (options_.decode_windows == Method::kPaper)
+    return paper_->decode_windows(pattern().whole_rows(), pattern().whole_columns(), seen_);
+  const bool gated = view != nullptr && options_.correspond == Method::kDefault;
+  const CellGate gate(cells(), gated ? view->segments() : std::span<const EpipolarSegment>(),
+                      CorrespondOptions{}.epipolar_max_px);
   window_decoder_.decode(seen_.nodes, seen_.shapes, gate, seen_.claims);
-  if (reviews()) review_.review(frame, shapes_.regions(), linker_, shapes_.meter(), seen_);
 }
 
-const std::vector<Eigen::Vector2f>& SymbolReader::find_centres() {
-  letters_.resize(seen_.size());
-  for (std::size_t i = 0; i < seen_.size(); ++i) {
-    const CellClaim& claim = seen_.claims[i];
-    letters_[i] = static_cast<std::int8_t>(claim.named() ? pattern_.array.at(claim.row, claim.column) : -1);
-  }
-  if (options_.centre == Method::kPaper) {
-    centres_.resize(seen_.size());
-    for (std::size_t i = 0; i < seen_.size(); ++i) centres_[i] = {seen_.moments[i].x, seen_.moments[i].y};
-  } else {
-    centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, letters_, centres_);
-  }
-  return centres_;
+void SymbolReader::review(const GreyView& frame) {
+  const bool paper_before = options_.classify == Method::kPaper || options_.centre == Method::kPaper ||
+                            options_.decode_windows == Method::kPaper;
+  if (!paper_before) review_.review(frame, finder_.regions(), linker_, finder_.meter(), seen_);
 }
 
-std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, double full, const CellRays& cells) {
-  binarize(frame, full);
-  find_regions(frame);
-  describe(frame);
+void SymbolReader::correspond(const EpipolarView* view) {
+  if (view == nullptr) {
+    correspondence_.settle_duplicates(cells(), seen_.claims);
+  } else if (options_.correspond == Method::kDefault) {
+    correspondence_.correspond(cells(), view->segments(), seen_.claims);
+  }
+}
+
+void SymbolReader::fit_lattice() {
+  centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, pattern().array, lattice_);
+  if (options_.centre == Method::kDefault) return;
+  for (LatticeSymbol& symbol : lattice_.symbols) {
+    const GreyMoments& moments = seen_.moments[symbol.sighting];
+    symbol.centre_px = {moments.x, moments.y};
+  }
+}
+
+std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, double full) {
   std::vector<SymbolMatch> matches;
-  if (seen_.size() == 0) return matches;
-  classify();
-  link_grid();
-  decode_windows(frame, CellGate(cells, {}, 0));
-  Correspondence({}).settle_duplicates(cells, seen_.claims);
-  const std::vector<Eigen::Vector2f>& centres = find_centres();
-  for (std::size_t i = 0; i < seen_.size(); ++i) {
-    const CellClaim& claim = seen_.claims[i];
-    if (claim.status != RegionStatus::kDecoded) continue;
-    matches.push_back(
-        {centres[i].cast<double>(), cells.pixel(claim.row, claim.column), centre_sigma_px(seen_.moments[i])});
+  for (const LatticeSymbol& symbol : read(frame, full, nullptr).symbols) {
+    matches.push_back({symbol.centre_px.cast<double>(), cells().pixel(symbol.row, symbol.column), symbol.sigma_px});
   }
   return matches;
 }
 
 void SymbolReader::report(Decoding& decoding) const {
-  const std::vector<Region>& regions = shapes_.regions().regions;
+  const std::vector<Region>& regions = finder_.regions().regions;
   decoding.regions.resize(regions.size());
   for (std::size_t i = 0; i < regions.size(); ++i) {
-    decoding.regions[i] = {regions[i].middle_px(), shapes_.status(i), -1, {-1, -1, -1, -1}, {}, -1, -1};
+    decoding.regions[i] = {regions[i].middle_px(), finder_.status(i), -1, {-1, -1, -1, -1}, {}, -1, -1};
   }
   for (std::size_t i = 0; i < seen_.size(); ++i) {
     RegionSeen& out = decoding.regions[seen_.region[i]];

@@ -38,25 +38,22 @@ Result<PaperWay> PaperWay::create(const Pattern& pattern) {
   return PaperWay(pattern, std::move(*thresholds));
 }
 
-void PaperWay::describe(const Regions& regions, const Sightings& seen) {
+void PaperWay::describe(const Regions& regions, Sightings& seen, Method centre) {
   described_.resize(seen.size());
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const Region& region = regions.regions[seen.region[i]];
     described_[i].shape = describe_shape(mask_of(region, regions.runs_of(region)));
-    described_[i].shape.centroid_px += Eigen::Vector2d(region.left, region.top);
+    Eigen::Vector2d& centroid_px = described_[i].shape.centroid_px;
+    centroid_px += Eigen::Vector2d(region.left, region.top);
+    if (centre == Method::kDefault) continue;
+    seen.moments[i].x = static_cast<float>(centroid_px.x());
+    seen.moments[i].y = static_cast<float>(centroid_px.y());
   }
 }
 
 void PaperWay::classify(float side_px, Sightings& seen) const {
   for (std::size_t i = 0; i < seen.size(); ++i) {
     seen.shapes[i] = certain(classify_paper(described_[i].shape, thresholds_, side_px), pattern_.letters());
-  }
-}
-
-void PaperWay::centre(Sightings& seen) const {
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    seen.moments[i].x = static_cast<float>(described_[i].shape.centroid_px.x());
-    seen.moments[i].y = static_cast<float>(described_[i].shape.centroid_px.y());
   }
 }
 

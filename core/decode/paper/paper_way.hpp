@@ -6,6 +6,7 @@
 
 #include "core/code/pattern.hpp"
 #include "core/decode/find_regions.hpp"
+#include "core/decode/options.hpp"
 #include "core/decode/paper/classify.hpp"
 #include "core/decode/paper/link_grid.hpp"
 #include "core/decode/sightings.hpp"
@@ -21,12 +22,11 @@ class PaperWay {
   [[nodiscard]] static Result<PaperWay> create(const Pattern& pattern);
 
   /// The ten descriptors of every sighting.
-  void describe(const Regions& regions, const Sightings& seen);
+  /// @param centre  kPaper: centroids of the masks too, equations (7) and (8)
+  void describe(const Regions& regions, Sightings& seen, Method centre);
   /// Letters by thresholds.
   /// @param side_px  of a symbol's square in the camera
   void classify(float side_px, Sightings& seen) const;
-  /// Centroids of the masks, equations (7) and (8).
-  void centre(Sightings& seen) const;
   /// Links by equations (9) to (22).
   void link_grid(const Regions& regions, int width_px, int height_px, Sightings& seen);
   /// Exact codewords.

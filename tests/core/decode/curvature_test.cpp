@@ -63,15 +63,15 @@ class Block {
       }
     }
     grid_.link_truly();
-    std::vector<Eigen::Vector2f> corrected;
-    CentreCorrection({prototype}, 18, kSizePx)
-        .correct(grid_.nodes, moments_, claims_, std::vector<std::int8_t>(claims_.size(), 0), corrected);
+    const CodeArray one_letter{kSide, kSide, 1, std::vector<std::uint8_t>(kSide * kSide, 0)};
+    Lattice lattice;
+    CentreCorrection({prototype}, 18, kSizePx).correct(grid_.nodes, moments_, claims_, one_letter, lattice);
     Errors sum;
-    for (std::size_t i = 0; i < corrected.size(); ++i) {
+    for (std::size_t i = 0; i < moments_.size(); ++i) {
       sum.before += (Eigen::Vector2d(moments_[i].x, moments_[i].y) - truth_[i]).squaredNorm();
-      sum.after += (corrected[i].cast<double>() - truth_[i]).squaredNorm();
+      sum.after += (lattice.symbols.at(i).centre_px.cast<double>() - truth_[i]).squaredNorm();
     }
-    const auto count = static_cast<double>(corrected.size());
+    const auto count = static_cast<double>(moments_.size());
     return {std::sqrt(sum.before / count), std::sqrt(sum.after / count)};
   }
 
@@ -148,14 +148,12 @@ TEST(CentreCorrection, LeavesAFlatGridAlone) {
   EXPECT_LT(errors.after, 0.01);
 }
 
-TEST(CentreCorrection, LeavesWhatHasNoCellWhereItIs) {
-  std::vector<GridNode> nodes(1, GridNode{{10, 20}, LatticeFrame::Identity()});
-  std::vector<GreyMoments> moments(1);
-  moments[0].x = 10.5F, moments[0].y = 20.25F;
-  std::vector<Eigen::Vector2f> corrected;
-  CentreCorrection({exact_prototype(lit_places(7))}, 18, kSizePx)
-      .correct(nodes, moments, {CellClaim{}}, {-1}, corrected);
-  EXPECT_EQ(corrected, std::vector{Eigen::Vector2f(10.5F, 20.25F)});
+TEST(CentreCorrection, LeavesOutWhatHasNoCell) {
+  const std::vector<GridNode> nodes(1, GridNode{{10, 20}, LatticeFrame::Identity()});
+  const std::vector<GreyMoments> moments(1);
+  Lattice lattice{{LatticeSymbol{}}};
+  CentreCorrection({exact_prototype(lit_places(7))}, 18, kSizePx).correct(nodes, moments, {CellClaim{}}, {}, lattice);
+  EXPECT_TRUE(lattice.symbols.empty());
 }
 
 }  // namespace

@@ -208,9 +208,9 @@ TEST(Decode, TellsOfEachStageOnceInOrder) {
   const Grey8 frame(1600, 1200, 30);
   Stages stages;
   ASSERT_TRUE(decoder.decode(frame.view(), 255, &stages));
-  EXPECT_THAT(stages.seen,
-              testing::ElementsAre(Stage::kBinarize, Stage::kFindRegions, Stage::kDescribe, Stage::kClassify,
-                                   Stage::kLinkGrid, Stage::kDecodeWindows, Stage::kCorrespond, Stage::kTriangulate));
+  EXPECT_THAT(stages.seen, testing::ElementsAre(Stage::kBinarize, Stage::kFindRegions, Stage::kDescribe,
+                                                Stage::kClassify, Stage::kLinkGrid, Stage::kDecodeWindows,
+                                                Stage::kReview, Stage::kCorrespond, Stage::kTriangulate));
 }
 
 TEST(Decode, RefusesAFrameOfAnotherSize) {

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/decode/cell_rays.hpp"
+#include "core/decode/sightings.hpp"
+#include "core/geometry/epipolar_gate.hpp"
+#include "core/geometry/ray_table.hpp"
+
+namespace slsd {
+
+/// What the calibration knows of the sightings of a frame: the ray on which each lies, and the part of the projector's
+/// epipolar line that the working depth leaves.
+/// @thread thread-bound: keeps its buffers
+class EpipolarView {
+ public:
+  EpipolarView(const CalibratedCamera& camera, const Lens& projector, double depth_min_mm, double depth_max_mm)
+      : camera_rays_(camera.lens), gate_(camera, projector, depth_min_mm, depth_max_mm) {}
+
+  void look_at(const Sightings& seen) {
+    rays_.resize(seen.size());
+    pixels_.resize(seen.size());
+    segments_.resize(seen.size());
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      pixels_[i] = {seen.moments[i].x, seen.moments[i].y};
+      rays_[i] = camera_rays_.ray(pixels_[i].cast<double>());
+      segments_[i] = gate_.prepare(rays_[i].direction);
+    }
+  }
+  /// One to a sighting.
+  [[nodiscard]] std::span<const EpipolarSegment> segments() const { return segments_; }
+  /// The ray of a pixel that lies some tenths beside a sighting's: so far it turns evenly.
+  [[nodiscard]] PixelRay ray_near(std::int32_t sighting, const Eigen::Vector2f& camera_px) const {
+    PixelRay ray = rays_[sighting];
+    ray.direction += ray.turn * (camera_px - pixels_[sighting]).cast<double>();
+    return ray;
+  }
+
+ private:
+  RayTable camera_rays_;
+  EpipolarGate gate_;
+  std::vector<PixelRay> rays_;
+  std::vector<Eigen::Vector2f> pixels_;
+  std::vector<EpipolarSegment> segments_;
+};
+
+}  // namespace slsd
