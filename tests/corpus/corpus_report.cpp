@@ -1,8 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <algorithm>
 #include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "core/decode/decoder.hpp"
 #include "tests/corpus/expectations.hpp"
 #include "tests/corpus/score.hpp"
 
@@ -50,11 +57,49 @@ Result<> print_report() {
   return {};
 }
 
+/// What became of the regions that gave no point, the commonest first.
+std::string reasons(const Decoding& decoding) {
+  std::vector<std::pair<std::uint32_t, std::string>> counts;
+  for (int i = 1; i < kRegionStatusCount; ++i)
+    counts.emplace_back(decoding.counts[i], to_string(static_cast<RegionStatus>(i)));
+  std::ranges::sort(counts, std::greater<>());
+  std::string text;
+  for (const auto& [count, reason] : counts)
+    if (count > 0) text += " " + std::to_string(count) + " " + reason;
+  return text;
+}
+
+/// Scenes that are not in the corpus, and their mean.
+Result<> print_folders(std::span<char*> folders) {
+  std::puts(
+      "| scene | resolvable | decoded % | inliers % | wrong | depth RMS mm | bias mm | worst mm | regions rejected |\n"
+      "|---|---|---|---|---|---|---|---|---|");
+  double decoded = 0;
+  std::size_t wrong = 0;
+  for (const char* folder : folders) {
+    const auto scene = read_scene(std::filesystem::absolute(folder).native());
+    if (!scene) return tl::unexpected(scene.error());
+    auto decoder = Decoder::create(scene->pattern, scene->calibration, 0, {});
+    if (!decoder) return tl::unexpected(decoder.error());
+    const auto decoding = decoder->decode(view(scene->frame));
+    if (!decoding) return tl::unexpected(decoding.error());
+    const Score scored = score(*scene, (*decoding)->points);
+    std::printf("| %s | %d |", std::filesystem::path(folder).filename().c_str(), scored.resolvable);
+    print_score(scored);
+    std::printf("%s |\n", reasons(**decoding).c_str());
+    decoded += scored.decoded_percent() / static_cast<double>(folders.size());
+    wrong += scored.wrong.size();
+  }
+  std::printf("| mean of %zu | | %.2f | | %zu | | | | |\n", folders.size(), decoded, wrong);
+  return {};
+}
+
 }  // namespace
 }  // namespace slsd
 
-int main() {
-  const auto done = slsd::print_report();
+/// Without arguments the corpus; else folders with the files of a scene of it.
+int main(int argc, char** argv) {
+  const auto done = argc > 1 ? slsd::print_folders(std::span(argv + 1, argv + argc)) : slsd::print_report();
   if (!done) std::fprintf(stderr, "corpus-report: %s\n", slsd::to_string(done.error()).c_str());
   return done ? 0 : 1;
 }
