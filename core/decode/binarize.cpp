@@ -166,7 +166,7 @@ void Binarizer::find_extremes(const ImageView<T>& frame) {
   }
 }
 
-void Binarizer::set_thresholds(float contrast_min, float greatest) {
+void Binarizer::set_thresholds(float greatest) {
   const auto least_of = [](float a, float b) { return a < b ? a : b; };
   const auto greatest_of = [](float a, float b) { return a > b ? a : b; };
   const auto sum_of = [](float a, float b) { return a + b; };
@@ -176,8 +176,8 @@ void Binarizer::set_thresholds(float contrast_min, float greatest) {
   for (int row = 1; row <= rows_; ++row) {
     for (int i = row * stride_ + 1; i <= row * stride_ + columns_; ++i) {
       const float contrast = high_[i] - low_[i];
-      const float nothing_lit = high_[i] + contrast_min;
-      midway_[i] = contrast < contrast_min ? nothing_lit : low_[i] + options_.level * contrast;
+      const float nothing_lit = high_[i] + contrast_min_;
+      midway_[i] = contrast < contrast_min_ ? nothing_lit : low_[i] + options_.level * contrast;
     }
   }
   combine_3x3(midway_, stride_, sum_of, across_, threshold_);
@@ -197,9 +197,10 @@ template <class T>
 void Binarizer::binarize_as(const ImageView<T>& frame, double full, Mask& mask) {
   if (mask.width() != frame.width || mask.height() != frame.height) mask = Mask(frame.width, frame.height);
   const auto floor = static_cast<int>(options_.contrast_min * full / 255);
-  const int contrast_min = std::max(floor, static_cast<int>(options_.contrast_min_sigma * noise_sigma(frame, full)));
+  contrast_min_ =
+      static_cast<float>(std::max(floor, static_cast<int>(options_.contrast_min_sigma * noise_sigma(frame, full))));
   find_extremes(frame);
-  set_thresholds(static_cast<float>(contrast_min), static_cast<float>(full));
+  set_thresholds(static_cast<float>(full));
   auto& threshold = std::get<RowBuffers<T>>(row_buffers_).threshold;
   threshold.resize(static_cast<std::size_t>(columns_) * options_.tile_px + kLanes);
   for (int y = 0; y < frame.height; ++y) {

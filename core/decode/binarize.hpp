@@ -35,6 +35,10 @@ class Binarizer {
   /// @param mask  becomes of the frame's size
   void binarize(const GreyView& frame, double full, Mask& mask);
 
+  [[nodiscard]] const BinarizeOptions& options() const { return options_; }
+  /// Between light and dark of what was taken for the pattern in the last frame, in its levels.
+  [[nodiscard]] float contrast_min() const { return contrast_min_; }
+
  private:
   template <class T>
   void binarize_as(const ImageView<T>& frame, double full, Mask& mask);
@@ -42,9 +46,10 @@ class Binarizer {
   void find_extremes(const ImageView<T>& frame);
   template <class T>
   void interpolate_row(int y, int width, T* threshold);
-  void set_thresholds(float contrast_min, float greatest);
+  void set_thresholds(float greatest);
 
   BinarizeOptions options_;
+  float contrast_min_ = 0;
   int columns_ = 0, rows_ = 0;  // of tiles
   int stride_ = 0;              // of the tiles with a border of one all round
   std::vector<float> least_, greatest_, across_, low_, high_, midway_, threshold_;

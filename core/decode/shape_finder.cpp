@@ -16,10 +16,6 @@ constexpr float kAreaMin = 0.08F;
 constexpr float kAreaMax = 1.1F;
 constexpr int kAreaMinPx = 6;
 constexpr float kExtentMax = 1.5F;  // of a cell's side
-/// Levels between a merged region's dark and light at which it is taken apart.
-constexpr float kSplitLevels[] = {0.35F, 0.6F};
-/// What is larger than this is not a few symbols that ran together.
-constexpr int kSplitAreaMaxPx = 20000;
 /// Between a region's peak and its background, of 255 levels.
 constexpr float kContrastMin = 8;
 
@@ -38,6 +34,7 @@ ShapeFinder::ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected,
       find_regions_(find_regions),
       expected_(std::move(expected)),
       binarizer_(binarize_options(pattern, expected_.in_the_middle().scale)),
+      splitter_({.tile_px = binarizer_.options().tile_px}),
       meter_(margin_px(pattern.spacing_px, expected_.in_the_middle().scale)) {}
 
 void ShapeFinder::binarize(const GreyView& frame, double full) {
@@ -52,9 +49,15 @@ void ShapeFinder::binarize(const GreyView& frame, double full) {
 void ShapeFinder::find_regions(const GreyView& frame) {
   region_finder_.find(mask_, regions_);
   if (find_regions_ == Method::kPaper) return;
-  splitter_.split_all(frame, kSplitLevels, regions_, [this](const Region& region) {
-    return region.area_px <= kSplitAreaMaxPx && judge_size(region) == RegionStatus::kTooLarge;
-  });
+  splitter_.split_all(frame, std::max(binarizer_.contrast_min(), kContrastMin * frame_levels_), regions_,
+                      [this](const Region& region) { return is_too_large(region); });
+}
+
+bool ShapeFinder::is_too_large(const Region& region) const {
+  const Eigen::Vector2f middle = region.middle_px();
+  const float pitch_px = pitch_px_ * expected_.at(middle.x(), middle.y()).scale;
+  const float extent = static_cast<float>(std::max(region.width_px(), region.height_px()));
+  return static_cast<float>(region.area_px) > kAreaMax * pitch_px * pitch_px || extent > kExtentMax * pitch_px;
 }
 
 RegionStatus ShapeFinder::judge_size(const Region& region) const {
@@ -62,14 +65,11 @@ RegionStatus ShapeFinder::judge_size(const Region& region) const {
     return RegionStatus::kTouchesBorder;
   }
   const Eigen::Vector2f middle = region.middle_px();
-  const float scale = expected_.at(middle.x(), middle.y()).scale, square_px = scale * scale;
-  const float area = static_cast<float>(region.area_px);
-  if (region.area_px < kAreaMinPx || area < kAreaMin * symbol_size_px_ * symbol_size_px_ * square_px) {
+  const float symbol_px = symbol_size_px_ * expected_.at(middle.x(), middle.y()).scale;
+  if (region.area_px < kAreaMinPx || static_cast<float>(region.area_px) < kAreaMin * symbol_px * symbol_px) {
     return RegionStatus::kTooSmall;
   }
-  const float extent = static_cast<float>(std::max(region.width_px(), region.height_px()));
-  const bool too_large = area > kAreaMax * pitch_px_ * pitch_px_ * square_px || extent > kExtentMax * pitch_px_ * scale;
-  return too_large ? RegionStatus::kTooLarge : RegionStatus::kNoNeighbour;
+  return is_too_large(region) ? RegionStatus::kTooLarge : RegionStatus::kNoNeighbour;
 }
 
 void ShapeFinder::describe(const GreyView& frame, Sightings& seen) {

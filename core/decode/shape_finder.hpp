@@ -44,6 +44,7 @@ class ShapeFinder {
   [[nodiscard]] float frame_levels() const { return frame_levels_; }
 
  private:
+  [[nodiscard]] bool is_too_large(const Region& region) const;
   [[nodiscard]] RegionStatus judge_size(const Region& region) const;
 
   float symbol_size_px_, pitch_px_;

@@ -9,7 +9,8 @@
 namespace slsd {
 namespace {
 
-constexpr float kLevel[] = {0.6F};
+constexpr SplitOptions kOptions{.tile_px = 6};
+constexpr float kContrastMin = 8;
 const auto kEvery = [](const Region&) { return true; };
 const auto kNone = [](const Region&) { return false; };
 
@@ -56,21 +57,21 @@ TEST(SplitRegions, TakesApartWhatRanTogether) {
   const Grey8 frame = two_run_together();
   Regions regions = regions_of(frame);
   ASSERT_THAT(regions.regions, testing::SizeIs(2));
-  RegionSplitter().split_all(frame.view(), kLevel, regions, kEvery);
+  RegionSplitter(kOptions).split_all(frame.view(), kContrastMin, regions, kEvery);
   expect_split(regions);
 }
 
 TEST(SplitRegions, TakesApartSixteenBitsAlike) {
   const Grey8 frame = two_run_together();
   Regions regions = regions_of(frame);
-  RegionSplitter().split_all(sixteen_bits(frame).view(), kLevel, regions, kEvery);
+  RegionSplitter(kOptions).split_all(sixteen_bits(frame).view(), kContrastMin, regions, kEvery);
   expect_split(regions);
 }
 
 TEST(SplitRegions, LeavesWhatIsNotMerged) {
   const Grey8 frame = two_run_together();
   Regions regions = regions_of(frame);
-  RegionSplitter().split_all(frame.view(), kLevel, regions, kNone);
+  RegionSplitter(kOptions).split_all(frame.view(), kContrastMin, regions, kNone);
   ASSERT_THAT(regions.regions, testing::SizeIs(2));
   EXPECT_EQ(regions.regions[0].area_px, 84);
 }
@@ -81,7 +82,7 @@ TEST(SplitRegions, LeavesWholeWhatTheLevelDoesNotSplit) {
   regions.regions.erase(regions.regions.begin() + 1);
   Grey8 even = frame;
   for (std::size_t i = 0; i < even.size(); ++i) even.data()[i] = even.data()[i] > 50 ? 200 : 10;
-  RegionSplitter().split_all(even.view(), kLevel, regions, kEvery);
+  RegionSplitter(kOptions).split_all(even.view(), kContrastMin, regions, kEvery);
   ASSERT_THAT(regions.regions, testing::SizeIs(1));
   EXPECT_EQ(regions.regions[0].area_px, 84);
 }
