@@ -3,7 +3,6 @@
 #include "core/decode/decoder.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/decode/symbol_reader.hpp"
 #include "core/exposure/light_levels.hpp"
@@ -56,7 +55,7 @@ Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calib
     if (!created) return tl::unexpected(created.error());
     paper = std::move(*created);
   }
-  ExpectedFrames expected(camera, projector, std::sqrt(options.depth_min_mm * options.depth_max_mm));
+  ExpectedFrames expected(camera, projector, options.middle_depth_mm());
   return Decoder(std::make_unique<Parts>(
       Parts{.camera = camera,
             .camera_index = static_cast<std::uint8_t>(camera_index),

@@ -3,6 +3,7 @@
 #include "core/decode/options.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 namespace slsd {
@@ -14,6 +15,10 @@ Result<> DecodeOptions::validate() const {
     return fail(ErrorCode::kInvalidArgument, "depth_max_mm has to be greater than depth_min_mm", "decode.depth_max_mm");
   }
   return {};
+}
+
+double DecodeOptions::middle_depth_mm() const {
+  return std::sqrt(depth_min_mm * depth_max_mm);
 }
 
 bool DecodeOptions::any_paper() const {

@@ -22,6 +22,8 @@ struct DecodeOptions {
   Method correspond = Method::kDefault;
 
   [[nodiscard]] Result<> validate() const;
+  /// Of the working range, by ratio: 1000 of 500 and 2000.
+  [[nodiscard]] double middle_depth_mm() const;
   /// Whether any stage goes the paper's way.
   [[nodiscard]] bool any_paper() const;
   friend bool operator==(const DecodeOptions&, const DecodeOptions&) = default;

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -35,7 +36,24 @@ struct PrototypeOptions {
   /// is off by the tilt of the surface, a frame measured from neighbours by a few hundredths.
   float frame_error = 0.05F;
   int samples = 120;  ///< looks at each symbol
+  /// Standard deviation of the blur of projector and camera, camera px, to a fifth; without it all that occurs.
+  std::optional<float> blur_px{};
+  /// Standard deviation of the noise as a share of the contrast; without it all that occurs.
+  std::optional<float> noise{};
 };
+
+using FeatureCovariance = Eigen::Matrix<double, kFeatureCount, kFeatureCount>;
+
+/// How one symbol's features are distributed, and how often there are none.
+struct SymbolSpread {
+  Eigen::Matrix<double, kFeatureCount, 1> mean;
+  FeatureCovariance covariance;  ///< with what the model leaves out
+  double lost;                   ///< share of the looks in which it broke into pieces or grew together with a neighbour
+};
+
+/// One to each symbol, from the looks that show it whole and by itself.
+/// @thread reentrant
+[[nodiscard]] std::vector<SymbolSpread> spread_of_symbols(const PrototypeOptions& options);
 
 /// Draws each symbol among random neighbours as a camera would see it, many times, reads it with the decoder's own
 /// stages, and keeps mean, covariance and centre. The same options give the same prototypes.
@@ -52,6 +70,9 @@ struct PrototypeOptions {
 
 /// Largest margin that a region's edge can be followed by without reaching its neighbour.
 [[nodiscard]] int margin_px(int spacing_px, float camera_px_per_projector_px);
+
+/// Side of the tiles that thresholds are taken from, three by three: half the pitch as the camera sees it.
+[[nodiscard]] int threshold_tile_px(int pitch_px, float camera_px_per_projector_px);
 
 /// Where between dark and light the threshold lies: below the middle where the gaps are wide enough for it, so that a
 /// symbol whose parts touch at a corner stays in one piece.

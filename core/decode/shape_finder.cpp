@@ -20,8 +20,7 @@ constexpr float kExtentMax = 1.5F;  // of a cell's side
 constexpr float kContrastMin = 8;
 
 BinarizeOptions binarize_options(const PatternOptions& pattern, float scale) {
-  const float pitch = static_cast<float>(pattern.symbol_size_px + pattern.spacing_px) * scale;
-  return {.tile_px = std::clamp(static_cast<int>(std::lround(0.5F * pitch)), 4, 64),
+  return {.tile_px = threshold_tile_px(pattern.symbol_size_px + pattern.spacing_px, scale),
           .level = threshold_level(pattern.spacing_px, scale)};
 }
 

@@ -158,9 +158,8 @@ const SymbolView& SymbolViewer::view(int letter, float tilt) {
   view_.image = Grey8(side, side);
   view_.mask = Grey8(side, side);
   expose(side);
-  blur(uniform(0.5F, std::max(1.1F, 0.07F * size_px)));
-
-  add_noise(uniform(0.F, 6.F));
+  blur(options_.blur_px ? *options_.blur_px * uniform(0.8F, 1.2F) : uniform(0.5F, std::max(1.1F, 0.07F * size_px)));
+  add_noise(options_.noise ? *options_.noise * (kLight - kDark) : uniform(0.F, 6.F));
   return view_;
 }
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -19,7 +20,9 @@ struct SymbolViewOptions {
   int symbol_size_px;
   int spacing_px;
   float camera_px_per_projector_px;
-  float threshold_level;  ///< between dark and light
+  float threshold_level;           ///< between dark and light
+  std::optional<float> blur_px{};  ///< standard deviation, to a fifth; without it all that occurs
+  std::optional<float> noise{};    ///< standard deviation, as a share of the contrast; without it all that occurs
 };
 
 /// One symbol among its neighbours, as a camera might see it.

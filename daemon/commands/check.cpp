@@ -139,7 +139,9 @@ class Check {
     const auto pattern = configured_pattern(configuration_);
     findings_.note(pattern, "pattern");
     if (pattern) {
-      for (const std::string& warning : symbol_warnings(pattern->options)) findings_.warn(warning);
+      for (const std::string& warning :
+           symbol_warnings(pattern->options, pattern_scale(calibration_, configuration_.decode)))
+        findings_.warn(warning);
     }
     if (findings_.note(calibration, "calibration") && !calibration_) {
       findings_.bad("no calibration: name its file as [calibration] file");

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <future>
+#include <limits>
 
-#include "core/code/separability.hpp"
+#include "core/decode/lattice_frame.hpp"
+#include "core/decode/separability.hpp"
 #include "core/image_size.hpp"
 #include "core/printable.hpp"
 #include "drivers/files/file.hpp"
@@ -104,8 +106,19 @@ Result<Pattern> configured_pattern(const Configuration& configuration) {
   return pattern;
 }
 
-std::vector<std::string> symbol_warnings(const PatternOptions& pattern) {
+double pattern_scale(const std::optional<Calibration>& calibration, const DecodeOptions& options) {
+  if (!calibration) return LookOptions{}.camera_px_per_projector_px;
+  double smallest = std::numeric_limits<double>::max();
+  for (const CalibratedCamera& camera : calibration->cameras) {
+    const ExpectedFrames frames(camera, calibration->projector, options.middle_depth_mm());
+    smallest = std::min<double>(smallest, frames.in_the_middle().scale);
+  }
+  return smallest;
+}
+
+std::vector<std::string> symbol_warnings(const PatternOptions& pattern, double scale) {
   LookOptions look;
+  look.camera_px_per_projector_px = scale;
   look.symbol_size_px = pattern.symbol_size_px;
   look.spacing_px = pattern.spacing_px;
   const auto separability = assess_separability(pattern.symbols, look);

@@ -21,9 +21,13 @@ namespace slsd {
 /// @errors of make_pattern(), read_file() and read_pattern(); kMismatch: not of the projector's size
 [[nodiscard]] Result<Pattern> configured_pattern(const Configuration& configuration);
 
-/// What is risky about the pattern's choice of symbols, a sentence each; nothing where nothing is. Takes a part of a
-/// second of computing.
-[[nodiscard]] std::vector<std::string> symbol_warnings(const PatternOptions& pattern);
+/// Camera px for one projector px, of the calibrated camera that sees the pattern smallest; of the paper's rig without a
+/// calibration.
+[[nodiscard]] double pattern_scale(const std::optional<Calibration>& calibration, const DecodeOptions& options);
+
+/// What is risky about the pattern's choice of symbols at a scale, a sentence each; nothing where nothing is. Takes a
+/// part of a second of computing.
+[[nodiscard]] std::vector<std::string> symbol_warnings(const PatternOptions& pattern, double scale);
 
 /// The calibration that the configuration names; empty where it names none.
 /// @errors of read_file() and read_calibration(); kMismatch: not of this projector's size, or without one of the

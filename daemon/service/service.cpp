@@ -26,10 +26,11 @@ constexpr auto kEndGlance = 5ms;
 constexpr auto kStatusPeriod = 5s;
 constexpr auto kPrepareTime = 5min;  // half a second of computing, on a host that has none to spare
 
-// The default sets are known to be good, and looking takes a while.
-void warn_of_symbols(const PatternOptions& pattern) {
-  if (pattern.symbols == default_symbols(pattern.symbol_size_px)) return;
-  for (const std::string& warning : symbol_warnings(pattern)) spdlog::warn("pattern: {}", warning);
+// The default sets are known to be good where they are seen large enough, and looking takes a while.
+void warn_of_symbols(const PatternOptions& pattern, double scale) {
+  constexpr double kKnownScale = 1.3;
+  if (pattern.symbols == default_symbols(pattern.symbol_size_px) && scale >= kKnownScale) return;
+  for (const std::string& warning : symbol_warnings(pattern, scale)) spdlog::warn("pattern: {}", warning);
 }
 
 // Tables that a reload cannot put into force.
@@ -58,7 +59,7 @@ Result<std::unique_ptr<Service>> Service::create(Configuration configuration, co
   Notifier().starting("starting: prepares the decoder", kPrepareTime);
   auto setup = ScanSetup::create(configuration, DecodeLanes::lanes_here());
   if (!setup) return tl::unexpected(setup.error());
-  warn_of_symbols(setup->pattern.options);
+  warn_of_symbols(setup->pattern.options, pattern_scale(setup->calibration, configuration.decode));
   for (const std::string& warning : exposure_warnings(configuration)) spdlog::warn("{}", warning);
   auto rig = std::make_unique<Rig>(std::move(*projector), std::move(cameras), setup->image, configuration.scan);
   rig->set_idle(draw_idle(configuration.projector), std::chrono::milliseconds(configuration.projector.idle_after_ms));

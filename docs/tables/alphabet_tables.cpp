@@ -6,10 +6,10 @@
 #include <numeric>
 
 #include "core/code/pattern.hpp"
-#include "core/code/separability.hpp"
 #include "core/code/symbol.hpp"
 #include "core/decode/descriptors.hpp"
 #include "core/decode/prototypes.hpp"
+#include "core/decode/separability.hpp"
 #include "docs/tables/best_symbols.hpp"
 #include "docs/tables/table.hpp"
 
@@ -43,16 +43,18 @@ constexpr const char* kSeparabilityText = R"(
 ## Which symbols stay apart
 
 A simulated camera looks at each symbol among random neighbours (spacing 2 px, 1.4 camera pixels to a projector pixel; blur with a
-standard deviation of 0.8, 1.1 and 1.4 camera pixels, each varied by a fifth; tilt that shortens to three quarters, roll of up to 6
-degrees, any position on the pixels, noise of 2 % of the contrast, a threshold at 40 to 50 %) and measures area, second and third moments as
-the decoder does, by grid vectors that are off by up to 7 % (`core/code/separability.hpp`). Two figures come of it:
+standard deviation of 0.8, 1.1 and 1.4 camera pixels, each varied by a fifth; tilt that shortens to 0.6 and lengthens to 1.15, roll of up to 6
+degrees, any position on the pixels, noise of 2 % of the contrast). It is the one by which the decoder's prototypes are made
+(`core/decode/prototypes.hpp`): the decoder's threshold, its way of taking apart what ran together, its moments, in a frame that is off by up to 7 %. Two
+figures come of it (`core/decode/separability.hpp`):
 
 - **distance** of a pair: standard deviations from each symbol's mean to the boundary between the two along the direction that parts them best.
   Below 4 a pair is risky: at 4 the Gaussian error is 1 in 30,000, so that even tails ten times as heavy stay far below the 2 % of
   symbols misread that a pattern of minimum distance 3 survives.
-- **lost**: share of views in which the symbol breaks into pieces or grows together with a neighbour. Above 5 % a symbol is risky.
+- **lost**: share of views in which the symbol breaks into pieces or grows together with a neighbour and cannot be taken apart. Above 15 % a
+  symbol is risky.
 
-The designs and the default sets are chosen by these two: a set's merit is the distance of its closest pair less one for each
+The default sets are among the best by these two: a set's merit is the distance of its closest pair less one for each
 per cent that its members are lost on average. Merits that differ by less than
 0.1 are the same within what 400 looks at each symbol can tell.
 

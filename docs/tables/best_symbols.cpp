@@ -6,7 +6,7 @@
 #include <iterator>
 #include <numeric>
 
-#include "core/code/separability.hpp"
+#include "core/decode/separability.hpp"
 #include "core/code/symbol.hpp"
 
 namespace slsd {

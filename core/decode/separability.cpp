@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/separability.hpp"
+#include "core/decode/separability.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,40 +10,16 @@
 #include <Eigen/Cholesky>
 
 #include "core/code/symbol.hpp"
+#include "core/decode/prototypes.hpp"
 
 namespace slsd {
 namespace {
 
-constexpr std::uint32_t kSeed = 1;
+using Features = Eigen::Matrix<double, kFeatureCount, 1>;
 
-/// What the simulation leaves out (uneven light, curvature, texture), as a standard deviation of each feature.
-const LookFeatures kFeatureFloor =
-    (LookFeatures() << 0.02, 0.003, 0.003, 0.003, 0.0008, 0.0006, 0.0006, 0.0008).finished();
-
-using Covariance = Eigen::Matrix<double, kLookFeatures, kLookFeatures>;
-
-struct Cluster {
-  LookFeatures mean = LookFeatures::Zero();
-  Covariance covariance = Covariance::Zero();
-  double lost = 0;
-};
-
-Cluster cluster_of(SymbolObserver& observer, int number, int count) {
-  std::vector<LookFeatures> looks;
-  for (int i = 0; i < count; ++i)
-    if (const auto look = observer.look_at(number)) looks.push_back(*look);
-  Cluster cluster;
-  cluster.covariance.diagonal() = kFeatureFloor.cwiseAbs2();
-  cluster.lost = 1.0 - static_cast<double>(looks.size()) / count;
-  for (const LookFeatures& look : looks) cluster.mean += look / static_cast<double>(looks.size());
-  for (const LookFeatures& look : looks)
-    cluster.covariance += (look - cluster.mean) * (look - cluster.mean).transpose() / static_cast<double>(looks.size());
-  return cluster;
-}
-
-double distance_between(const Cluster& a, const Cluster& b) {
-  const LookFeatures apart = b.mean - a.mean;
-  const LookFeatures along = Covariance(a.covariance + b.covariance).llt().solve(apart);
+double distance_between(const SymbolSpread& a, const SymbolSpread& b) {
+  const Features apart = b.mean - a.mean;
+  const Features along = FeatureCovariance(a.covariance + b.covariance).llt().solve(apart);
   const double sigmas = std::sqrt(along.dot(a.covariance * along)) + std::sqrt(along.dot(b.covariance * along));
   return sigmas > 0 ? along.dot(apart) / sigmas : 0.0;
 }
@@ -92,14 +68,20 @@ std::vector<SymbolLoss> Separability::risky_symbols() const {
 
 Result<Separability> assess_separability(const std::vector<int>& symbols, const LookOptions& options) {
   if (auto valid = check(symbols, options); !valid) return tl::unexpected(valid.error());
-  SymbolObserver observer(options, symbols, kSeed);
-  std::vector<Cluster> clusters;
-  for (const int number : symbols) clusters.push_back(cluster_of(observer, number, options.looks));
+  const std::vector<SymbolSpread> spreads =
+      spread_of_symbols({.symbols = symbols,
+                         .symbol_size_px = options.symbol_size_px,
+                         .spacing_px = options.spacing_px,
+                         .camera_px_per_projector_px = static_cast<float>(options.camera_px_per_projector_px),
+                         .frame_error = static_cast<float>(options.frame_error),
+                         .samples = options.looks,
+                         .blur_px = static_cast<float>(options.blur_px),
+                         .noise = static_cast<float>(options.noise)});
   Separability result;
   for (std::size_t i = 0; i < symbols.size(); ++i) {
-    result.losses.push_back({symbols[i], clusters[i].lost});
+    result.losses.push_back({symbols[i], spreads[i].lost});
     for (std::size_t j = i + 1; j < symbols.size(); ++j)
-      result.pairs.push_back({symbols[i], symbols[j], distance_between(clusters[i], clusters[j])});
+      result.pairs.push_back({symbols[i], symbols[j], distance_between(spreads[i], spreads[j])});
   }
   std::ranges::sort(result.pairs, {}, &SymbolPair::distance);
   return result;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/separability.hpp"
+#include "core/decode/separability.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "core/code/pattern.hpp"
+#include "core/decode/prototypes.hpp"
 
 namespace slsd {
 namespace {
@@ -77,25 +78,28 @@ TEST(AssessSeparability, RefusesWhatIsOutOfRange) {
   EXPECT_FALSE(assess_separability({7, 22}, {.blur_px = std::numeric_limits<double>::quiet_NaN()}));
 }
 
-TEST(SymbolObserver, MeasuresASymbolThatItSeesWell) {
+TEST(SpreadOfSymbols, MeasuresASquareAsItIs) {
   // A square of side 1 has area 1 and second moments 1/12 and no others.
-  SymbolObserver observer({.spacing_px = 8, .camera_px_per_projector_px = 3, .blur_px = 0.3, .frame_error = 0}, {7}, 1);
-  const auto look = observer.look_at(7);
-  ASSERT_TRUE(look);
-  EXPECT_NEAR((*look)(0), 1, 0.02);
-  EXPECT_NEAR((*look)(1), 1.0 / 12, 0.002);
-  EXPECT_NEAR((*look)(2), 0, 0.001);
-  EXPECT_NEAR((*look)(3), 1.0 / 12, 0.002);
-  EXPECT_NEAR(look->tail<4>().cwiseAbs().maxCoeff(), 0, 0.001);
+  const auto spread = spread_of_symbols({.symbols = {7},
+                                         .spacing_px = 8,
+                                         .camera_px_per_projector_px = 3,
+                                         .frame_error = 0,
+                                         .blur_px = 0.3F,
+                                         .noise = 0.F});
+  const auto& mean = spread.at(0).mean;
+  EXPECT_EQ(spread[0].lost, 0);
+  EXPECT_NEAR(mean(0), 1, 0.05);
+  EXPECT_NEAR(mean(1), 1.0 / 12, 0.004);
+  EXPECT_NEAR(mean(2), 0, 0.001);
+  EXPECT_NEAR(mean(3), 1.0 / 12, 0.004);
+  EXPECT_NEAR(mean.tail<4>().cwiseAbs().maxCoeff(), 0, 0.001);
 }
 
-TEST(SymbolObserver, TellsWhichWayATrianglePoints) {
+TEST(SpreadOfSymbols, TellsWhichWayATrianglePoints) {
   // Mass left and below: x - mean is skewed to the right, y - mean upwards (y is down).
-  SymbolObserver observer({}, {25}, 1);
-  const auto look = observer.look_at(25);
-  ASSERT_TRUE(look);
-  EXPECT_GT((*look)(4), 0.001);
-  EXPECT_LT((*look)(7), -0.001);
+  const auto spread = spread_of_symbols({.symbols = {25}});
+  EXPECT_GT(spread.at(0).mean(4), 0.001);
+  EXPECT_LT(spread.at(0).mean(7), -0.001);
 }
 
 }  // namespace
