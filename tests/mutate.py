@@ -1,0 +1,216 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""Breaks a folder's sources on purpose, one place at a time, and lists what the folder's tests do not notice.
+
+Gates, limits and formulas are loosened, left out, doubled or turned round in a copy of the checkout, which is built and
+tested; the checkout itself stays as it is. Exit status 1 where a change passed that tests/mutate_passes.txt does not
+name with its reason.
+"""
+import argparse
+import hashlib
+import os
+import pathlib
+import random
+import re
+import shutil
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PASSES = ROOT / "tests" / "mutate_passes.txt"
+
+NUMBER = r"(?<![\w.])(\d+\.\d+(?:[eE][-+]?\d+)?|\d+[eE][-+]?\d+|\d+)(F?)(?![\w.])"
+
+
+def scaled(match, factor):
+    text = match.group(1)
+    if re.fullmatch(r"\d+", text):
+        value = str(round(int(text) * factor))
+    else:
+        value = repr(float(text) * factor)
+    return value + match.group(2)
+
+
+def numbers(line):
+    """A named limit, or a default of an option, doubled and halved."""
+    if not re.search(r"\bconstexpr\b.*=|^\s+[\w:<>]+ \w+ = [\d.]+F?;", line):
+        return
+    head, equals, tail = line.partition("=")
+    for match in re.finditer(NUMBER, tail):
+        if float(match.group(1)) == 0:
+            return
+        for factor, name in ((2, "doubled"), (0.5, "halved")):
+            changed = scaled(match, factor)
+            if changed != match.group(0):
+                yield f"{match.group(0)} {name}", head + equals + tail[:match.start()] + changed + tail[match.end():]
+        return
+
+
+def conditions(line):
+    """A rejection or an early end left out, or taken always."""
+    match = re.match(r"(\s*(?:\} else )?if )\((.+)\)( (?:return|continue|break|\{).*)$", line)
+    if match and not re.search(r"constexpr", line) and match.group(2).count("(") == match.group(2).count(")") \
+            and ";" not in match.group(2) and "= " not in re.sub(r"[<>=!]= ", "", match.group(2)):
+        yield "condition left out", f"{match.group(1)}(false && ({match.group(2)})){match.group(3)}"
+
+
+def comparisons(line):
+    for match in re.finditer(r" (<=|>=|<|>|==|!=) ", line):
+        if re.search(r"template|#include|<[\w:]+>|for \(", line):
+            continue
+        turned = {"<": ">=", ">": "<=", "<=": ">", ">=": "<", "==": "!=", "!=": "=="}[match.group(1)]
+        yield f"{match.group(1)} became {turned}", line[:match.start(1)] + turned + line[match.end(1):]
+        return
+
+
+def signs(line):
+    """A term of a formula with the other sign, or with a factor of two."""
+    if not re.search(r"[=(].*[a-z_\])] [-+*/] [a-z_(\d]", line) or re.search(r"std::string|template|\"|&&|\|\|", line):
+        return
+    match = re.search(r"(?<=[\w)\]]) ([-+]) (?=[\w(])", line)
+    if match:
+        other = "-" if match.group(1) == "+" else "+"
+        yield f"{match.group(1)} became {other}", line[:match.start(1)] + other + line[match.end(1):]
+    match = re.search(r"(?<=[\w)\]]) (\*) (?=[\w(])", line)
+    if match:
+        yield "product doubled", line[:match.start(1)] + "* 2 *" + line[match.end(1):]
+
+
+KINDS = (numbers, conditions, comparisons, signs)
+
+
+def places(folder):
+    """All changes that can be made: file, line number, what, the changed line."""
+    for path in sorted((ROOT / folder).rglob("*.[ch]pp")):
+        for number, line in enumerate(path.read_text().split("\n")):
+            code = line.split("//")[0].rstrip()
+            if not code.strip() or code.lstrip().startswith(("#", "*", "static_assert", "assert")):
+                continue
+            for kind in KINDS:
+                for what, changed in kind(code):
+                    yield path.relative_to(ROOT), number, kind.__name__, what, changed
+
+
+def chosen(folder, count, seed):
+    """As many of each kind and file as there are places to choose."""
+    generator = random.Random(seed)
+    groups = {}
+    for place in places(folder):
+        groups.setdefault((place[0], place[2]), []).append(place)
+    for group in groups.values():
+        generator.shuffle(group)
+    order = sorted(groups)
+    generator.shuffle(order)
+    taken = []
+    while len(taken) < count and any(groups.values()):
+        for key in order:
+            if groups[key] and len(taken) < count:
+                taken.append(groups[key].pop())
+    return taken
+
+
+def test_targets(folder):
+    """The programs that test a room: those of its folder under tests/, and the corpus for the decoder."""
+    targets = []
+    for part in [pathlib.Path(folder), *pathlib.Path(folder).parents]:
+        lists = ROOT / "tests" / part / "CMakeLists.txt"
+        if lists.exists():
+            targets += [name + "_tests" for name in re.findall(r"slsd_add_tests\((\w+)", lists.read_text())]
+            break
+    if "decode" in folder:
+        targets.append("corpus_tests")
+    return targets
+
+
+def run(command, folder, seconds=None):
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=seconds)
+        return done.returncode, done.stdout + done.stderr
+    except subprocess.TimeoutExpired:
+        return 124, ""
+
+
+def copy_checkout(copy):
+    copy.mkdir(parents=True, exist_ok=True)
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\n")
+    for name in filter(None, listed):
+        source, target = ROOT / name, copy / name
+        if not source.exists():
+            continue
+        text = source.read_bytes()
+        if target.exists() and target.read_bytes() == text:
+            continue
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(source, target)
+        shutil.copymode(source, target)
+
+
+def verdict(copy, targets, seconds):
+    """None where every test passed, else what noticed."""
+    status, text = run(["cmake", "--build", "--preset", "release", "--target", *targets], copy)
+    if status != 0:
+        return "the compiler" if "error:" in text else "the build"
+    for target in targets:
+        program = copy / "build" / "release" / "bin" / target
+        status, text = run([str(program), "--gtest_brief=1", "--gtest_fail_fast"], copy, seconds)
+        if status == 124:
+            return f"{target}: no end in {seconds} s"
+        if status != 0:
+            failed = re.search(r"\[  FAILED  \] ([\w/.]+)", text)
+            return failed.group(1) if failed else f"{target}: ended by status {status}"
+    return None
+
+
+def known_passes():
+    lines = PASSES.read_text().split("\n") if PASSES.exists() else []
+    return {line.split("  #")[0].strip() for line in lines if line and not line.startswith("#")}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", help="core/decode, for one")
+    parser.add_argument("--places", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--list", action="store_true", help="the places alone")
+    options = parser.parse_args()
+    folder = options.folder.rstrip("/")
+    if not (ROOT / folder).is_dir():
+        parser.error(f"{folder} is no folder of the checkout")
+    taken = chosen(folder, options.places, options.seed)
+    if options.list:
+        for path, number, _, what, changed in taken:
+            print(f"{path}:{number + 1}: {what}: {changed.strip()}")
+        return 0
+    targets = test_targets(folder)
+    if not targets:
+        parser.error(f"tests/{folder} has no tests")
+    copy = ROOT / "build" / "mutate" / hashlib.sha1(folder.encode()).hexdigest()[:8]
+    copy_checkout(copy)
+    print(f"building {' '.join(targets)} unchanged", flush=True)
+    status, text = run(["cmake", "--preset", "release"], copy)
+    begun = verdict(copy, targets, 900) if status == 0 else text
+    if begun is not None:
+        sys.exit(f"the unchanged sources do not pass: {begun}")
+    passes, unnoticed = known_passes(), []
+    for index, (path, number, _, what, changed) in enumerate(taken):
+        target = copy / path
+        original = target.read_text()
+        lines = original.split("\n")
+        name = f"{path}: {what}: {lines[number].strip()}"
+        lines[number] = changed
+        target.write_text("\n".join(lines))
+        noticed = verdict(copy, targets, 900)
+        target.write_text(original)
+        if noticed is None and name not in passes:
+            unnoticed.append(name)
+        tail = f"noticed by {noticed}" if noticed else "passes" + ("" if name in unnoticed else ", as listed")
+        print(f"{index + 1:3} {path}:{number + 1} {what}: {tail}", flush=True)
+    print(f"{len(taken)} places, {len(unnoticed)} passed unnoticed")
+    for name in unnoticed:
+        print(name)
+    return 1 if unnoticed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
