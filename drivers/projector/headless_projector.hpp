@@ -4,18 +4,14 @@
 
 #include <chrono>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "drivers/projector/light_curve.hpp"
 #include "drivers/projector/projector.hpp"
-#include "drivers/projector/texel_painter.hpp"
 
 namespace slsd {
-
-class OffscreenTarget;
 
 /// The keys of the [projector] table that a headless projector reads.
 struct HeadlessProjectorOptions {
@@ -28,12 +24,11 @@ struct HeadlessProjectorOptions {
   [[nodiscard]] Result<> validate() const;
 };
 
-/// A projector that nobody sees: draws the image off screen as a monitor would get it, keeps the time of its refreshes.
+/// A projector that nobody sees: keeps the image in memory as a monitor would get it, keeps the time of its refreshes.
 /// @thread one at a time
 class HeadlessProjector final : public Projector {
  public:
   explicit HeadlessProjector(HeadlessProjectorOptions options);
-  ~HeadlessProjector() override;
 
   [[nodiscard]] const ProjectorDescription& description() const override { return description_; }
   [[nodiscard]] Result<> open(MonotonicTime deadline) override;
@@ -46,19 +41,15 @@ class HeadlessProjector final : public Projector {
   void disconnect() { connected_ = false; }
 
  private:
-  [[nodiscard]] Result<> make_target();
   [[nodiscard]] Result<> begin(const Grey8& image);
-  void draw(const Grey8& image);
   [[nodiscard]] std::chrono::nanoseconds period() const;
   [[nodiscard]] MonotonicTime next_refresh(MonotonicTime after) const;
 
   HeadlessProjectorOptions options_;
   ProjectorDescription description_;
-  std::unique_ptr<OffscreenTarget> target_;  ///< empty until it was opened
-  std::optional<TexelPainter> painter_;
   bool connected_ = false;
   MonotonicTime first_refresh_;
-  Grey8 showing_;
+  Grey8 showing_, light_;  // what was asked for, and the values that a monitor would get for it
   std::optional<MonotonicTime> complete_;  ///< of what is shown, until show() has said so
   std::uint64_t shows_ = 0;
 };

@@ -9,7 +9,7 @@
 namespace slsd {
 
 /// Draws a grey image with OpenGL ES 3 so that texel (x, y) becomes pixel (x, y), the first row on top: no filter, no
-/// dithering, no sRGB, no scaling. What the headless projector keeps and what a monitor shows is drawn by this alone.
+/// dithering, no sRGB, no scaling.
 /// Its objects belong to the context that was current when it was made, and end with it.
 /// @thread thread-bound: the context is current in every call
 class TexelPainter {
