@@ -9,6 +9,11 @@
 #include <asio/post.hpp>
 
 namespace slsd {
+namespace {
+
+constexpr int kForgiven = 16;  // of the time that a client left to others, this part
+
+}  // namespace
 
 std::chrono::nanoseconds Turns::processor_time() {
   timespec time{};
@@ -23,8 +28,10 @@ void Turns::ask(Taker& taker, std::chrono::nanoseconds cost, std::function<void(
     again_ = std::move(turn);
     return;
   }
+  const auto forgiven = taker.left_at ? (time_() - *taker.left_at) / kForgiven : std::chrono::nanoseconds(0);
   const auto start = std::max(taker.used_until, now_);
-  waiting_.emplace(start + std::max(cost, taker.last_cost), Waiting{&taker, start, std::move(turn)});
+  const auto end = start + std::max(cost, taker.last_cost);
+  waiting_.emplace(std::max(end - forgiven, now_), Waiting{&taker, std::max(start - forgiven, now_), std::move(turn)});
   if (waiting_.size() == 1) post_next();
 }
 
@@ -45,8 +52,10 @@ void Turns::take_next() {
   running_ = taker;
   turn();
   running_ = nullptr;
-  taker->last_cost = time_() - begin;
+  taker->left_at = time_();
+  taker->last_cost = *taker->left_at - begin;
   taker->used_until = start + taker->last_cost;
+  now_ += taker->last_cost / static_cast<std::int64_t>(waiting_.size() + 1);
   if (again_) ask(*taker, again_cost_, std::exchange(again_, nullptr));
 }
 

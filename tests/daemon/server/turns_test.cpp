@@ -67,6 +67,42 @@ TEST(Turns, WhoComesAfterAWhileIsNext) {
   EXPECT_LE(order.find('m') - asked, 2U) << order;
 }
 
+// A share of one in 64 would be used up by then.
+TEST(Turns, WhoComesBackNowAndThenIsNext) {
+  asio::io_context events;
+  Turns turns(events, now);
+  std::string order;
+  std::vector<std::unique_ptr<Client>> floods;
+  for (int i = 0; i < 64; ++i) floods.push_back(std::make_unique<Client>(Client{turns, order, 'f', 1ms, 20}));
+  for (const auto& flood : floods) flood->ask();
+  Client modest{turns, order, 'm', 1ms, 1};
+  for (int i = 1; i <= 10; ++i) {
+    while (order.size() < 64U + 30 * i) events.run_one();
+    const std::size_t asked = order.size();
+    modest.ask();
+    while (order.find('m', asked) == std::string::npos) events.run_one();
+    EXPECT_LE(order.find('m', asked) - asked, 3U) << "time " << i;
+  }
+}
+
+// Nor do many who each come back now and then, and leave no time between them.
+TEST(Turns, LongOnesHaveTheirShareBesideManyWhoComeBack) {
+  asio::io_context events;
+  Turns turns(events, now);
+  std::string order;
+  std::vector<std::unique_ptr<Client>> many;
+  for (int i = 0; i < 40; ++i) many.push_back(std::make_unique<Client>(Client{turns, order, 'q', 1ms, 1}));
+  Client slow{turns, order, 'S', 20ms, 1};
+  many.front()->ask();
+  slow.ask();
+  for (int i = 1; order.find('S') == std::string::npos && i < 2000; ++i) {
+    many[i % 40]->ask();
+    const std::size_t before = order.size();
+    while (order.size() == before) events.run_one();
+  }
+  EXPECT_LT(order.find('S'), 1000U);
+}
+
 // The floods' turns are long, and all begin at about the same time: quick ones in a row do not wait for them.
 TEST(Turns, QuickOnesDoNotWaitForLongOnesOfAllOthers) {
   asio::io_context events;
