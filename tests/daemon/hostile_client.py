@@ -45,6 +45,7 @@ FLOODS = {
     "unknown": line("stattus") * 500,
     "texts": b"".join(line("scan", camera=text) for text in NASTY) + b"".join(line(text) for text in NASTY),
 }
+BLANK = {"feeds", "blanks", "spaces"}  # lines that no reply is owed to, and that cost a flood nothing
 ENDLESS = {"no_end": b"x" * 65536, "no_end_of_braces": b"{" * 65536}
 
 
@@ -105,7 +106,7 @@ class Hostile:
         lines = self.payload.count(b"\n", self.at, self.at + sent)
         self.lines += lines
         self.at = (self.at + sent) % len(self.payload)
-        return lines
+        return 0 if self.kind in BLANK else lines
 
     def close(self):
         self.socket.close()
@@ -117,8 +118,14 @@ STRIKES = ["stall", "raw", "subscribe", "vanish", "half", "memfd", "urgent"]
 SCANNING = {"raw", "vanish", "half", "memfd", "urgent"}
 
 
-def flood(path, kinds, clients, life_s, stop, counts, total):
-    """Keeps so many hostile clients until told to stop. counts: the lines by kind of those that are gone; total: of all."""
+def flooding(share):
+    """Whether it floods now, that does so for a share of each minute."""
+    return time.monotonic() % 60 < 60 * share
+
+
+def flood(path, kinds, clients, life_s, share, stop, counts, total):
+    """Keeps so many hostile clients until told to stop. counts: the lines by kind of those that are gone.
+    total: the lines of all that flood, but the blank ones."""
     chooser = random.Random(2)
     selector = selectors.DefaultSelector()
     alive = []
@@ -142,7 +149,9 @@ def flood(path, kinds, clients, life_s, stop, counts, total):
                 selector.register(hostile.socket, events, hostile)
         now = time.monotonic()
         gone = {hostile for hostile in alive if now > hostile.end}
-        for key, events in selector.select(0.05):
+        if not flooding(share):
+            time.sleep(0.01)
+        for key, events in selector.select(0.05) if flooding(share) else []:
             hostile = key.data
             try:
                 if events & selectors.EVENT_READ and not hostile.read():

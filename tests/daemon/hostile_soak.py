@@ -5,7 +5,9 @@
 
 Prints the hostile lines by kind, what the honest clients got, the service's memory and the time that `status` took.
 Exit status 1 where a scan was lost or came damaged, a log line was forged or long, or memory grew; with --p99-ms also
-where `status` took longer. For an hour: hostile_soak.py --lines 10000000 --seconds 3600
+where `status` took longer beside floods, with --lines where fewer were sent. For an hour:
+hostile_soak.py --seconds 3600 --lines 10000000 --p99-ms 50
+--flooded 0.2 --rate-hz 4 leave a machine to others meanwhile.
 
 It needs SLSD_BIN, the folder of slsd, and SLSD_SCENE, what make_scene wrote.
 """
@@ -17,7 +19,7 @@ import sys
 import time
 
 from client import RpcError
-from hostile_client import ENDLESS, FLOODS, STRIKES, flood
+from hostile_client import ENDLESS, FLOODS, STRIKES, flood, flooding
 from point_cloud import vertices
 from recovery import resident_kib
 from service import Service, wait_until
@@ -47,19 +49,21 @@ def scan(path, stop, result):
     result.put(("scans", done, wrong, longest))
 
 
-def ask_status(path, pause_s, stop, result):
+def ask_status(path, pause_s, share, stop, result):
+    """The times of those that were asked beside floods."""
     from client import Client
     times, wrong, longest = [], [], 0
     with Client(path) as client:
         while not stop.is_set():
-            begin = time.monotonic()
+            begin, flooded = time.monotonic(), flooding(share)
             try:
                 reply, _ = client.call("status")
                 longest = max(longest, len(json.dumps(reply)))
             except (RpcError, OSError) as error:
                 wrong.append(str(error))
                 break
-            times.append(time.monotonic() - begin)
+            if flooded:
+                times.append(time.monotonic() - begin)
             time.sleep(pause_s)
     result.put(("status", sorted(times), wrong, longest))
 
@@ -73,11 +77,13 @@ def log_faults(text):
 def options():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=20)
-    parser.add_argument("--lines", type=int, default=0, help="go on until so many hostile lines, within the seconds")
+    parser.add_argument("--lines", type=int, default=0, help="that are not blank, owed at the end")
     parser.add_argument("--clients", type=int, default=64)
     parser.add_argument("--life", type=float, default=2, help="of a hostile client, seconds")
     parser.add_argument("--kinds", default="", help=f"of {', '.join([*FLOODS, *ENDLESS, *STRIKES])}; default: all")
     parser.add_argument("--p99-ms", type=float, default=0)
+    parser.add_argument("--flooded", type=float, default=1, metavar="SHARE", help="of each minute, that floods last")
+    parser.add_argument("--rate-hz", type=float, default=0, help="of the camera; 0: as fast as frames are asked for")
     parser.add_argument("--no-scans", action="store_true", help="the honest client does not scan")
     return parser.parse_args()
 
@@ -86,7 +92,8 @@ def main():
     arguments = options()
     kinds = arguments.kinds.split(",") if arguments.kinds else [*FLOODS, *ENDLESS, *STRIKES]
     wrong = []
-    with Service(server="send_timeout_ms = 2000") as service, multiprocessing.Manager() as manager:
+    with (Service(camera=f"rate_hz = {arguments.rate_hz}", server="send_timeout_ms = 2000") as service,
+          multiprocessing.Manager() as manager):
         service.wait_ready()
         with service.client() as client:
             for _ in range(10):
@@ -96,21 +103,19 @@ def main():
         counts = manager.dict()
         total = multiprocessing.Value("q", 0)
         path = str(service.socket)
-        processes = [multiprocessing.Process(target=ask_status, args=(path, 0.02, stop, results))]
+        processes = [multiprocessing.Process(target=ask_status, args=(path, 0.02, arguments.flooded, stop, results))]
         if not arguments.no_scans:
             processes.append(multiprocessing.Process(target=scan, args=(path, stop, results)))
-        flooding = multiprocessing.Process(target=flood, args=(path, kinds, arguments.clients, arguments.life, stop,
-                                                               counts, total))
+        hostile = multiprocessing.Process(target=flood, args=(path, kinds, arguments.clients, arguments.life,
+                                                              arguments.flooded, stop, counts, total))
         begin = time.monotonic()
-        for process in [*processes, flooding]:
+        for process in [*processes, hostile]:
             process.start()
         memory = []
         while time.monotonic() < begin + arguments.seconds and service.process.poll() is None:
-            time.sleep(min(arguments.seconds / 10, 60))
+            time.sleep(min(arguments.seconds / 10, 57))
             memory.append(resident_kib(service.process))
             print(f"{time.monotonic() - begin:7.0f} s {total.value:11} hostile lines {memory[-1]:8} KiB", flush=True)
-            if arguments.lines and total.value >= arguments.lines:
-                break
         stop.set()
         for name, done, faults, longest in [results.get(timeout=120) for _ in processes]:
             wrong += [f"{name}: {fault}" for fault in faults]
@@ -118,15 +123,18 @@ def main():
                 print(f"scans: {done} whole, {len(faults)} wrong, the longest {longest:.2f} s")
             elif done:
                 p50, p99 = done[len(done) // 2], done[int(len(done) * 0.99)]
-                print(f"status: {len(done)} in p50 {p50 * 1e3:.1f}, p99 {p99 * 1e3:.1f}, longest {done[-1] * 1e3:.1f} ms; "
-                      f"the longest reply {longest} bytes")
+                print(f"status: {len(done)} beside floods, p50 {p50 * 1e3:.1f}, p99 {p99 * 1e3:.1f}, "
+                      f"longest {done[-1] * 1e3:.1f} ms; the longest reply {longest} bytes")
                 if arguments.p99_ms and p99 * 1e3 > arguments.p99_ms:
                     wrong.append(f"status took {p99 * 1e3:.1f} ms at the 99th percentile")
                 if longest > 20_000:
                     wrong.append(f"a status of {longest} bytes")
-        for process in [*processes, flooding]:
+        for process in [*processes, hostile]:
             process.join()
-        print("hostile lines:", ", ".join(f"{kind} {count}" for kind, count in sorted(counts.items())))
+        print(f"hostile lines that are not blank: {total.value}; all by kind:",
+              ", ".join(f"{kind} {count}" for kind, count in sorted(counts.items())))
+        if total.value < arguments.lines:
+            wrong.append(f"{total.value} hostile lines of {arguments.lines}")
         if service.process.poll() is not None:
             wrong.append(f"the service ended: {service.process.returncode}")
         else:
