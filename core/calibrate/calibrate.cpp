@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <ranges>
 
 #include <fmt/format.h>
 
@@ -45,8 +44,8 @@ Result<> settle(Adjustment& adjustment, Observations& observations, PoseList& po
 Result<Adjustment> solve(Observations& observations, PoseList& poses) {
   auto initial = estimate_cameras(observations);
   if (!initial) return tl::unexpected(initial.error());
-  for (const FaultyPose& faulty : std::views::reverse(initial->faulty)) {
-    poses.leave_out(faulty, observations, &initial->rig);
+  for (auto faulty = initial->faulty.rbegin(); faulty != initial->faulty.rend(); ++faulty) {
+    poses.leave_out(*faulty, observations, &initial->rig);
   }
   if (auto enough = check_count(observations, poses); !enough) return tl::unexpected(enough.error());
   auto adjustment = Adjustment::begin(observations, std::move(initial->rig));
