@@ -54,6 +54,8 @@ class CloudFiles {
     return bytes;
   }
 
+  [[nodiscard]] std::size_t bytes() const { return (ply_ ? ply_->size() : 0) + (pcd_ ? pcd_->size() : 0); }
+
  private:
   SharedBytes ply_;
   SharedBytes pcd_;

@@ -8,8 +8,8 @@
 namespace slsd {
 
 /// Bounds the memory of all clients together: requests that are being collected, replies and events that are being made
-/// or sent, and clouds that were lent as memfds. Bytes that several clients share count for each of them, so that what
-/// is counted is never less than what is held.
+/// or sent, clouds that wait for their subscribers, and those that were lent as memfds. Bytes that several clients
+/// share count for each of them, so that what is counted is never less than what is held.
 ///
 /// It is shared by one rule (dynamic thresholds: Choudhury and Hahne 1998): no client may come to hold more than is
 /// then free for all the others. One alone gets a half, two that take all they can a third each, and a hundred and one
@@ -43,7 +43,7 @@ class MemoryBudget {
 /// @thread thread-bound
 class MemoryAccount {
  public:
-  enum class Part { kRequest, kReply, kEvent };
+  enum class Part { kRequest, kReply, kEvent, kWaiting };
 
   explicit MemoryAccount(MemoryBudget& budget) : budget_(budget) {}
   ~MemoryAccount();
@@ -60,7 +60,7 @@ class MemoryAccount {
   void set(Part part, std::size_t bytes);
 
   MemoryBudget& budget_;
-  std::array<std::size_t, 3> parts_{};
+  std::array<std::size_t, 4> parts_{};
 };
 
 }  // namespace slsd

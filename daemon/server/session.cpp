@@ -281,12 +281,19 @@ void Session::publish(const SharedPublication& publication, std::uint64_t lost) 
   if (!subscription_ || closing_ || over_) return;
   subscription_->note_lost(lost);
   subscription_->offer(publication, Subscription::Clock::now());
+  weigh_waiting();
   send_waiting_event();
+}
+
+// What does not fit is lost, the oldest first: the next event tells.
+void Session::weigh_waiting() {
+  while (!memory_.resize(MemoryAccount::Part::kWaiting, subscription_->waiting_bytes())) subscription_->lose_oldest();
 }
 
 void Session::send_waiting_event() {
   if (over_ || closing_ || !subscription_ || std::ranges::any_of(outgoing_, is_event)) return;
   auto event = subscription_->take(Subscription::Clock::now());
+  weigh_waiting();
   if (!event) return;
   if (memory_.resize(MemoryAccount::Part::kEvent, event->size())) return send(std::move(*event));
   subscription_->note_lost(1);  // the next one tells

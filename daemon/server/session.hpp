@@ -77,7 +77,10 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
   [[nodiscard]] std::stop_token gone() const { return wanted_ ? gone_.get_token() : std::stop_token(); }
 
   void subscribe(const Subscription& subscription) { subscription_ = subscription; }
-  void unsubscribe() { subscription_.reset(); }
+  void unsubscribe() {
+    subscription_.reset();
+    memory_.release(MemoryAccount::Part::kWaiting);
+  }
   [[nodiscard]] const std::optional<Subscription>& subscription() const { return subscription_; }
   /// A free scan's outcome, for those who subscribed.
   void publish(const SharedPublication& publication, std::uint64_t lost);
@@ -100,6 +103,7 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
   void on_answered();
   void end_where_done();
   void send(Outgoing outgoing);
+  void weigh_waiting();
   void send_waiting_event();
   void write();
   void finish_message();

@@ -22,9 +22,19 @@ void Subscription::offer(SharedPublication publication, Clock::time_point now) {
 
 void Subscription::drop_old(Clock::time_point now) {
   while (waiting_.size() > 1 && (waiting_.size() > kWaitingMax || now - waiting_.front().since > kTurn)) {
-    if (waiting_.front().publication->scan()) ++lost_;
-    waiting_.pop_front();
+    lose_oldest();
   }
+}
+
+void Subscription::lose_oldest() {
+  if (waiting_.front().publication->scan()) ++lost_;
+  waiting_.pop_front();
+}
+
+std::size_t Subscription::waiting_bytes() const {
+  std::size_t bytes = 0;
+  for (const Waiting& each : waiting_) bytes += each.publication->bytes();
+  return bytes;
 }
 
 std::optional<Outgoing> Subscription::take(Clock::time_point now) {

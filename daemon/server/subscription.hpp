@@ -25,6 +25,10 @@ class Publication {
 
   [[nodiscard]] const Result<ScanResult>& scan() const { return *scan_; }
   [[nodiscard]] SharedBytes cloud(CloudFormat format) { return files_.file((*scan_)->cloud, format); }
+  /// What it holds of memory: the cloud, and its files so far.
+  [[nodiscard]] std::size_t bytes() const {
+    return *scan_ ? (*scan_)->cloud.points.size() * sizeof(CloudPoint) + files_.bytes() : 0;
+  }
 
  private:
   FreeScan scan_;
@@ -54,6 +58,10 @@ class Subscription {
   void note_lost(std::uint64_t count) {
     if (!rate_hz_) lost_ += count;  // else the next cloud is as good
   }
+  /// What those that wait hold of memory.
+  [[nodiscard]] std::size_t waiting_bytes() const;
+  /// Loses the one that has waited longest.
+  void lose_oldest();
   /// The event to send next, with the number of clouds lost since the one before; nothing where none waits.
   [[nodiscard]] std::optional<Outgoing> take(Clock::time_point now);
 

@@ -311,6 +311,24 @@ TEST_F(SessionTest, CountsARequestThatIsCollected) {
   run_until([&] { return room_->memory.held() < 100'000; });
 }
 
+// Clouds of 3 MB for one who reads none: of 16 MB one client gets half.
+TEST_F(SessionTest, CountsCloudsThatWait) {
+  ServerOptions options;
+  options.memory_max_mb = 16;
+  connect(options);
+  session_->subscribe(Subscription(CloudFormat::kPly, std::nullopt));
+  ScanResult scan;
+  scan.cloud.points.resize((3 << 20) / sizeof(CloudPoint));
+  for (int i = 0; i < 4; ++i) {
+    session_->publish(std::make_shared<Publication>(std::make_shared<const Result<ScanResult>>(scan)), 0);
+    EXPECT_GT(room_->memory.held(), 2U << 20U);
+    EXPECT_LE(room_->memory.held(), 8U << 20U);
+  }
+  EXPECT_GT(room_->memory.held(), 5U << 20U) << "one is being sent, and one waits";
+  session_->unsubscribe();
+  EXPECT_LT(room_->memory.held(), 5U << 20U) << "what is being sent";
+}
+
 TEST_F(SessionTest, ManyLinesDoNotHoldUpTheLoop) {
   connect();
   std::string lines;

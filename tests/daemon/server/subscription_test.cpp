@@ -51,6 +51,25 @@ TEST(Subscription, LosesTheOldestOfTooManyAndCountsThem) {
   EXPECT_EQ(take(subscription)["params"]["lost"], 5);
 }
 
+TEST(Subscription, SaysWhatWaits) {
+  Subscription subscription(CloudFormat::kPly, std::nullopt);
+  EXPECT_EQ(subscription.waiting_bytes(), 0U);
+  for (const std::uint64_t frame : {1, 2}) {
+    ScanResult scan;
+    scan.cloud.frame = frame;
+    scan.cloud.points.resize(1000);
+    subscription.offer(std::make_shared<Publication>(std::make_shared<const Result<ScanResult>>(std::move(scan))),
+                       Time());
+  }
+  EXPECT_EQ(subscription.waiting_bytes(), 2000 * sizeof(CloudPoint));
+  subscription.lose_oldest();
+  EXPECT_EQ(subscription.waiting_bytes(), 1000 * sizeof(CloudPoint));
+  const auto event = take(subscription);
+  EXPECT_EQ(event["params"]["frame"], 2);
+  EXPECT_EQ(event["params"]["lost"], 1);
+  EXPECT_EQ(subscription.waiting_bytes(), 0U);
+}
+
 TEST(Subscription, GivesWhoReadsLateTheNewestOnly) {
   Subscription subscription(CloudFormat::kPly, std::nullopt);
   for (const std::uint64_t frame : {1, 2, 3}) subscription.offer(scan_number(frame), Time() + frame * 10ms);
