@@ -11,8 +11,9 @@ namespace slsd {
 Result<> DecodeOptions::validate() const {
   if (!(depth_min_mm > 0))
     return fail(ErrorCode::kInvalidArgument, "depth_min_mm has to be greater than 0", "decode.depth_min_mm");
-  if (!(depth_max_mm > depth_min_mm)) {
-    return fail(ErrorCode::kInvalidArgument, "depth_max_mm has to be greater than depth_min_mm", "decode.depth_max_mm");
+  if (!(depth_max_mm > depth_min_mm) || !std::isfinite(depth_max_mm)) {
+    return fail(ErrorCode::kInvalidArgument, "depth_max_mm has to be greater than depth_min_mm, and finite",
+                "decode.depth_max_mm");
   }
   return {};
 }
