@@ -19,6 +19,7 @@ struct Decoder::Parts {
   SymbolReader reader;
   EpipolarView view;
   Triangulator triangulator;
+  HeldFullLevel full_level{};
   Decoding decoding{};
 
   void triangulate(const Lattice& lattice, double full);
@@ -85,7 +86,7 @@ Result<> Decoder::check_size(const GreyView& frame) const {
 
 Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<double> full, StageObserver* observer) {
   if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
-  const double level = full ? *full : guess_full_level(frame);
+  const double level = full ? *full : parts_->full_level.of(frame);
   const Lattice& lattice = parts_->reader.read(frame, level, &parts_->view, observer);
   parts_->triangulate(lattice, level);
   parts_->reader.report(parts_->decoding);
@@ -128,7 +129,7 @@ void Decoder::Parts::add_point(const LatticeSymbol& symbol, const TriangulatedPo
 
 Result<std::vector<SymbolMatch>> Decoder::read_anywhere(const GreyView& frame, std::optional<double> full) {
   if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
-  return parts_->reader.read_anywhere(frame, full ? *full : guess_full_level(frame));
+  return parts_->reader.read_anywhere(frame, full ? *full : parts_->full_level.of(frame));
 }
 
 }  // namespace slsd

@@ -38,7 +38,7 @@ class Decoder {
   [[nodiscard]] std::uint8_t camera_index() const;  ///< in the calibration
 
   /// Image to points. The result stands until the next call. Nothing found is an empty result with its counters.
-  /// @param full  the level of a saturated pixel: 255, 1023, 65535...; without it guess_full_level() of the frame
+  /// @param full  the level of a saturated pixel: 255, 1023, 65535...; without it as HeldFullLevel has it
   /// @errors kMismatch: the frame is not of the calibration's size
   [[nodiscard]] Result<const Decoding*> decode(const GreyView& frame, std::optional<double> full = std::nullopt,
                                                StageObserver* observer = nullptr);

@@ -115,9 +115,9 @@ std::vector<double> PatternReader::likely_scales(const GreyView& frame) {
   for (const double scale : scales) {
     ShapeFinder finder(pattern_.options, ExpectedFrames(turned_and_scaled(0, scale).matrix, width, height),
                        Method::kDefault, Method::kDefault);
-    finder.binarize(frame, full_);
-    finder.find_regions(frame);
-    finder.describe(frame, seen);
+    const GreyView sharp = finder.binarize(frame, full_);
+    finder.find_regions(sharp);
+    finder.describe(sharp, seen);
     shapes.push_back(seen.size());
   }
   shapes_ = std::max(shapes_, std::ranges::max(shapes));
@@ -166,7 +166,7 @@ Result<std::vector<SymbolMatch>> PatternReader::read(const GreyView& frame) {
   if (auto fits = check_image_size(width, height); !fits) return tl::unexpected(fits.error());
   std::vector<SymbolMatch> found;
   shapes_ = 0;
-  full_ = guess_full_level(frame);
+  full_ = full_level_.of(frame);
   if (last_) found = attempt(*last_, frame);
   if (found.size() < kCertain || !lie_on_one_plane(found, pattern_.pitch_px())) found = search(frame);
   return refine(std::move(found), frame);

@@ -10,6 +10,7 @@
 
 #include "core/code/pattern.hpp"
 #include "core/decode/symbol_match.hpp"
+#include "core/exposure/light_levels.hpp"
 #include "core/geometry/homography.hpp"
 #include "core/image.hpp"
 #include "core/result.hpp"
@@ -45,7 +46,8 @@ class PatternReader {
   Pattern pattern_;
   std::vector<std::unique_ptr<Trial>> trials_;  // one to a scale
   std::optional<Homography> last_;              // camera from projector
-  double full_ = 255;                           // of the frame that is read
+  HeldFullLevel full_level_;
+  double full_ = 255;  // of the frame that is read
   std::size_t shapes_ = 0;
 };
 

@@ -87,6 +87,12 @@ double guess_full_level(const GreyView& frame) {
   return 65535;
 }
 
+double HeldFullLevel::of(const GreyView& frame) {
+  const double guessed = guess_full_level(frame);
+  if (frame.index() == 0) return guessed;
+  return greatest_ = std::max(greatest_, guessed);
+}
+
 double full_level(std::string_view format, const GreyView& frame) {
   if (frame.index() == 0) return 255;
   const double guessed = guess_full_level(frame);

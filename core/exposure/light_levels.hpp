@@ -43,6 +43,18 @@ struct LightLevels {
 /// @thread reentrant
 [[nodiscard]] double guess_full_level(const GreyView& frame);
 
+/// The level of a saturated pixel of one camera, frame after frame: a faint frame after a bright one is not of fewer
+/// bits. It may rise, once one of its pixels shows it, and does not fall.
+/// @thread thread-bound
+class HeldFullLevel {
+ public:
+  /// 255, or what was guessed of this frame of 16 bits or one before, whichever is more.
+  [[nodiscard]] double of(const GreyView& frame);
+
+ private:
+  double greatest_ = 0;
+};
+
 /// The level of a saturated pixel. Formats that leave the upper bits of 16 empty say so by the first number in their
 /// names: "Y10", "Mono12", "Mono10p", "BayerRG12Packed". Those of 16 say nothing: what fills them may be less.
 /// @param format  the camera's name for it; where it says nothing, or a pixel is above what it says, guess_full_level()

@@ -140,6 +140,12 @@ Result<std::optional<Calibration>> configured_calibration(const Configuration& c
   return std::optional(std::move(*calibration));
 }
 
+double FullLevels::raise(std::size_t camera, double level) {
+  const std::lock_guard lock(mutex_);
+  if (greatest_.size() <= camera) greatest_.resize(camera + 1, 0);
+  return greatest_[camera] = std::max(greatest_[camera], level);
+}
+
 Result<ScanSetup> ScanSetup::create(const Configuration& configuration, std::size_t lanes) {
   auto pattern = configured_pattern(configuration);
   if (!pattern) return tl::unexpected(pattern.error());

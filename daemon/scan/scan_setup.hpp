@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,8 +41,21 @@ struct ScanFiles {
   std::string calibration;  ///< a calibration file; empty: none
 };
 
+/// The levels of saturated pixels that the cameras' frames have shown: where no format says, a faint frame after a
+/// bright one is not of fewer bits.
+/// @thread thread-safe: lanes share it
+class FullLevels {
+ public:
+  /// The greatest level that was told of this camera.
+  [[nodiscard]] double raise(std::size_t camera, double level);
+
+ private:
+  std::mutex mutex_;
+  std::vector<double> greatest_;
+};
+
 /// Everything about a scan that a reload replaces at once.
-/// @thread a lane belongs to one thread at a time; the rest does not change
+/// @thread a lane belongs to one thread at a time; the rest does not change, but for the full levels
 struct ScanSetup {
   Pattern pattern;
   Grey8 image;  ///< what the projector shows
@@ -50,7 +64,8 @@ struct ScanSetup {
   std::vector<std::vector<Decoder>> lanes;  ///< for each thread that decodes, one to a configured camera; empty without
                                             ///< a calibration
   OtherHardware other_hardware = OtherHardware::kError;
-  std::vector<std::string> camera_formats = {};        ///< as configured, "Mono12"; empty where it is left open
+  std::vector<std::string> camera_formats = {};  ///< as configured, "Mono12"; empty where it is left open
+  std::unique_ptr<FullLevels> full_levels = std::make_unique<FullLevels>();
   double depth_min_mm = DecodeOptions{}.depth_min_mm;  ///< where along the cameras' axes there may be something
   double depth_max_mm = DecodeOptions{}.depth_max_mm;
 

@@ -82,6 +82,15 @@ TEST(GuessFullLevel, IsOfTheBitsInUse) {
   EXPECT_EQ(guess_full_level(Grey16(4, 4, 65535).view()), 65535);
 }
 
+TEST(HeldFullLevel, DoesNotFallWithAFaintFrame) {
+  HeldFullLevel held;
+  EXPECT_EQ(held.of(Grey16(4, 4, 1000).view()), 1023);
+  EXPECT_EQ(held.of(Grey16(4, 4, 1024).view()), 4095);
+  EXPECT_EQ(held.of(Grey16(4, 4, 1000).view()), 4095);
+  EXPECT_EQ(held.of(Grey8(4, 4, 100).view()), 255);
+  EXPECT_EQ(held.of(Grey16(4, 4, 10).view()), 4095);
+}
+
 TEST(FullLevel, IsWhatTheFormatSays) {
   const Grey16 faint(4, 4, 20);
   for (const char* format : {"Y10", "Mono10", "Mono10p", "Mono10Packed", "BayerRG10", "BayerRG10p", "RG10", "Y10P"})
