@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 #include "core/calibrate/observe_plane.hpp"
 
-#include "core/calibrate/divide_light.hpp"
+#include "core/exposure/divide_light.hpp"
 
 namespace slsd {
 namespace {

@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 
 #include "core/calibrate/board_region.hpp"
-#include "core/calibrate/divide_light.hpp"
 #include "core/calibrate/gray_code.hpp"
+#include "core/exposure/divide_light.hpp"
 
 namespace slsd {
 namespace {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/cloud/shade_points.hpp"
+#include "core/decode/decode_in_light.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "core/utc_text.hpp"
 #include "daemon/scan/frame_image.hpp"
@@ -58,24 +59,28 @@ Result<> keep_frames(const FrameSet& set, const ScanSetup& setup, FrameCoding co
   return kept;
 }
 
-// The level of a saturated pixel of a camera, one for all its frames of a scan: what is guessed of a dark one alone
-// would be lower.
+// The level of a saturated pixel of a camera, one for all its frames: what is guessed of a dark one alone would be
+// lower.
 double full_level_of(const FrameSet& set, const ScanSetup& setup, std::size_t camera) {
   const std::string format = camera < setup.camera_formats.size() ? setup.camera_formats[camera] : "";
   double full = 0;
   for (const auto* frames : {&set.frames, &set.white, &set.dark}) {
     if (!frames->empty()) full = std::max(full, full_level(format, (*frames)[camera].image()));
   }
-  return full;
+  return setup.full_levels->raise(camera, full);
 }
 
-// The light of the points of one camera.
-void shade(std::span<CloudPoint> points, const FrameSet& set, std::size_t camera, double full, ScanResult& result) {
-  if (set.white.empty() && set.dark.empty()) return;
+SceneLight light_of(const FrameSet& set, std::size_t camera, double full) {
   SceneLight light;
   if (!set.white.empty()) light.white = set.white[camera].image();
   if (!set.dark.empty()) light.dark = set.dark[camera].image();
   light.full = full;
+  return light;
+}
+
+// The light of the points of one camera.
+void shade(std::span<CloudPoint> points, const SceneLight& light, ScanResult& result) {
+  if (!light.white && !light.dark) return;
   const std::size_t saturated = shade_points(points, light);
   if (light.white) result.saturated = result.saturated.value_or(0) + saturated;
 }
@@ -91,17 +96,17 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     clock.start();
     const auto begin = steady_clock::now();
     Decoder& decoder = setup.lanes[lane][i];
-    const double full = full_level_of(set, setup, i);
-    const auto decoding = decoder.decode(set.frames[i].image(), full, &clock);
+    const SceneLight light = light_of(set, i, full_level_of(set, setup, i));
+    const auto decoding = decode_in_light(decoder, set.frames[i].image(), light, &clock);
     result.decode_time += steady_clock::now() - begin;
     if (!decoding) {
       return fail(decoding.error().code, decoding.error().message, "camera " + setup.camera_names[i]);
     }
     const std::size_t before = result.cloud.points.size();
     append(**decoding, result);
-    const std::vector<CloudPoint> strays = stray_symbols(decoder, **decoding, set.frames[i].image(), full);
+    const std::vector<CloudPoint> strays = stray_symbols(decoder, **decoding, set.frames[i].image(), light.full);
     result.strays.insert(result.strays.end(), strays.begin(), strays.end());
-    shade(std::span(result.cloud.points).subspan(before), set, i, full, result);
+    shade(std::span(result.cloud.points).subspan(before), light, result);
     if (!request.picture || i != pictured) continue;
     auto picture = picture_of(set.frames[i].image(), **decoding, setup.pattern);
     if (!picture) return tl::unexpected(picture.error());

@@ -6,10 +6,13 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
-#include "core/decode/decoder.hpp"
+#include "core/decode/decode_in_light.hpp"
+#include "core/exposure/light_levels.hpp"
+#include "drivers/files/read_image.hpp"
 #include "tests/corpus/expectations.hpp"
 #include "tests/corpus/score.hpp"
 
@@ -70,7 +73,8 @@ std::string reasons(const Decoding& decoding) {
 }
 
 /// Scenes that are not in the corpus, and their mean.
-Result<> print_folders(std::span<char*> folders) {
+/// @param texture  their images white/frame.png are divided out, where they have any
+Result<> print_folders(std::span<char*> folders, bool texture) {
   std::puts(
       "| scene | resolvable | decoded % | inliers % | wrong | depth RMS mm | bias mm | worst mm | regions rejected |\n"
       "|---|---|---|---|---|---|---|---|---|");
@@ -81,7 +85,11 @@ Result<> print_folders(std::span<char*> folders) {
     if (!scene) return tl::unexpected(scene.error());
     auto decoder = Decoder::create(scene->pattern, scene->calibration, 0, {});
     if (!decoder) return tl::unexpected(decoder.error());
-    const auto decoding = decoder->decode(view(scene->frame));
+    SceneLight light;
+    light.full = guess_full_level(view(scene->frame));
+    const auto white = read_image(std::filesystem::path(folder) / "white" / "frame.png");
+    if (texture && white) light.white = view(*white);
+    const auto decoding = decode_in_light(*decoder, view(scene->frame), light);
     if (!decoding) return tl::unexpected(decoding.error());
     const Score scored = score(*scene, (*decoding)->points);
     std::printf("| %s | %d |", std::filesystem::path(folder).filename().c_str(), scored.resolvable);
@@ -97,9 +105,12 @@ Result<> print_folders(std::span<char*> folders) {
 }  // namespace
 }  // namespace slsd
 
-/// Without arguments the corpus; else folders with the files of a scene of it.
+/// Without arguments the corpus; else folders with the files of a scene of it, after --texture in white light too.
 int main(int argc, char** argv) {
-  const auto done = argc > 1 ? slsd::print_folders(std::span(argv + 1, argv + argc)) : slsd::print_report();
+  std::span<char*> folders(argv + 1, argv + argc);
+  const bool texture = !folders.empty() && std::string_view(folders.front()) == "--texture";
+  if (texture) folders = folders.subspan(1);
+  const auto done = folders.empty() ? slsd::print_report() : slsd::print_folders(folders, texture);
   if (!done) std::fprintf(stderr, "corpus-report: %s\n", slsd::to_string(done.error()).c_str());
   return done ? 0 : 1;
 }

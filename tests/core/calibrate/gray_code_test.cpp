@@ -11,7 +11,6 @@
 
 #include <gmock/gmock.h>
 
-#include "core/calibrate/divide_light.hpp"
 
 namespace slsd {
 namespace {
@@ -150,26 +149,6 @@ TEST(ReadGrayCode, RefusesTheCodeOfAnotherProjector) {
   EXPECT_EQ(points.error().code, ErrorCode::kMismatch);
   EXPECT_THAT(points.error().message,
               testing::HasSubstr("there are 2 images of the Gray code, 40 belong to a projector of 1024x768"));
-}
-
-TEST(DivideLight, TakesThePrintOut) {
-  Grey8 white(4, 1), lit(4, 1);
-  const int print[] = {200, 100, 40, 1};
-  for (int x = 0; x < 4; ++x) {
-    white.at(x, 0) = static_cast<std::uint8_t>(print[x]);
-    lit.at(x, 0) = static_cast<std::uint8_t>(print[x] / 2);
-  }
-  const auto quotient = divide_light(lit.view(), white.view());
-  ASSERT_TRUE(quotient);
-  EXPECT_EQ(quotient->at(0, 0), 25000);
-  EXPECT_EQ(quotient->at(1, 0), 25000);
-  EXPECT_EQ(quotient->at(2, 0), 25000);
-  EXPECT_EQ(quotient->at(3, 0), 0);
-}
-
-TEST(DivideLight, RefusesPicturesOfTwoSizes) {
-  const Grey8 white(4, 4), lit(4, 5);
-  EXPECT_EQ(divide_light(lit.view(), white.view()).error().code, ErrorCode::kMismatch);
 }
 
 }  // namespace
