@@ -3,8 +3,6 @@
 #include "core/decode/binarize.hpp"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +11,7 @@
 #include "core/decode/clones.hpp"
 #include "core/decode/lanes.hpp"
 #include "core/decode/slide.hpp"
+#include "core/exposure/pixel_noise.hpp"
 
 namespace slsd {
 namespace {
@@ -64,6 +63,34 @@ SLSD_CLONES void slide_extremes(std::uint16_t* least, std::uint16_t* greatest, i
   slide_greatest(greatest, count, length);
 }
 
+template <class T>
+inline __attribute__((always_inline)) T difference(T a, T b) {
+  return static_cast<T>((a > b ? a : b) - (a > b ? b : a));
+}
+
+/// The greatest difference between the pixels two apart, across or down, of as many pixels from each on; the first and
+/// the last of the row have none.
+/// @param count  of those that are asked for; beyond the row there are none either
+template <class T>
+inline __attribute__((always_inline)) void find_steepest_of(const T* above, const T* row, const T* below, int width,
+                                                            int length, int count, T* steepest) {
+  for (int x = 1; x < width - 1; ++x) {
+    const T across = difference(row[x + 1], row[x - 1]), down = difference(below[x], above[x]);
+    steepest[x] = across > down ? across : down;
+  }
+  steepest[0] = 0;
+  for (int x = width > 1 ? width - 1 : 1; x < count; ++x) steepest[x] = 0;
+  slide_greatest(steepest, count, length);
+}
+SLSD_CLONES void find_steepest(const std::uint8_t* above, const std::uint8_t* row, const std::uint8_t* below, int width,
+                               int length, int count, std::uint8_t* steepest) {
+  find_steepest_of(above, row, below, width, length, count, steepest);
+}
+SLSD_CLONES void find_steepest(const std::uint16_t* above, const std::uint16_t* row, const std::uint16_t* below,
+                               int width, int length, int count, std::uint16_t* steepest) {
+  find_steepest_of(above, row, below, width, length, count, steepest);
+}
+
 /// Binary places of a threshold; a line may run on for kLanes pixels beyond a tile without leaving 31 bits.
 template <class T>
 constexpr int kFractionBits = sizeof(T) == 1 ? 20 : 12;
@@ -103,28 +130,6 @@ SLSD_CLONES void draw(const ThresholdLine& line, std::uint8_t* threshold) {
 }
 SLSD_CLONES void draw(const ThresholdLine& line, std::uint16_t* threshold) {
   draw_line(line, threshold);
-}
-
-/// Standard deviation of the noise, from the median second difference along the rows of a sample of pixels: edges are
-/// too few to move the median.
-template <class T>
-float noise_sigma(const ImageView<T>& frame, double full) {
-  constexpr int kStep = 7, kBinBits = 10, kBins = 1 << kBinBits;
-  // A bin to a level up to 10 bits; of more, as many bins.
-  const int shift = std::max(0, static_cast<int>(std::bit_width(static_cast<unsigned>(full))) - kBinBits);
-  std::array<int, kBins> histogram{};
-  int count = 0;
-  for (int y = kStep; y < frame.height; y += kStep) {
-    const T* row = frame.row(y);
-    for (int x = 1; x + 1 < frame.width; x += kStep, ++count) {
-      ++histogram[std::min(std::abs(row[x - 1] - 2 * row[x] + row[x + 1]) >> shift, kBins - 1)];
-    }
-  }
-  int bin = 0;
-  for (int below = histogram[0]; 2 * below < count; below += histogram[++bin]) {
-  }
-  constexpr float kMedianOfDifference = 0.6745F * 2.4495F;  // of |a - 2b + c|, sigma 1
-  return static_cast<float>(bin << shift) / kMedianOfDifference;
 }
 
 /// Combines each tile with its eight neighbours. The tiles have a border of one all round, whose values do not count.
@@ -198,7 +203,7 @@ void Binarizer::binarize_as(const ImageView<T>& frame, double full, Mask& mask) 
   if (mask.width() != frame.width || mask.height() != frame.height) mask = Mask(frame.width, frame.height);
   const auto floor = static_cast<int>(options_.contrast_min * full / 255);
   contrast_min_ =
-      static_cast<float>(std::max(floor, static_cast<int>(options_.contrast_min_sigma * noise_sigma(frame, full))));
+      static_cast<float>(std::max(floor, static_cast<int>(options_.contrast_min_sigma * pixel_noise(frame, full))));
   find_extremes(frame);
   set_thresholds(static_cast<float>(full));
   auto& threshold = std::get<RowBuffers<T>>(row_buffers_).threshold;
@@ -208,6 +213,36 @@ void Binarizer::binarize_as(const ImageView<T>& frame, double full, Mask& mask) 
     if (y % kRowsAlike == 0) interpolate_row(y + kRowsAlike / 2, frame.width, threshold.data());
     compare_row(frame.row(y), threshold.data(), frame.width, mask.row(y));
   }
+}
+
+template <class T>
+float Binarizer::edge_blur_of(const ImageView<T>& frame) {
+  constexpr int kStepRows = 37;
+  constexpr float kSharpShare = 0.9F;
+  const int tile = options_.tile_px;
+  steepness_.clear();
+  std::vector<T>& steepest = std::get<RowBuffers<T>>(row_buffers_).greatest;
+  steepest.assign(static_cast<std::size_t>(columns_) * tile, 0);
+  for (int y = kStepRows / 2; y + 1 < frame.height; y += kStepRows) {
+    find_steepest(frame.row(y - 1), frame.row(y), frame.row(y + 1), frame.width, tile, columns_ * tile,
+                  steepest.data());
+    const int first = (y / tile + 1) * stride_ + 1;
+    for (int column = 0; column < columns_; ++column) {
+      const float contrast = high_[first + column] - low_[first + column];
+      if (contrast >= 2 * contrast_min_ && contrast > 0)
+        steepness_.push_back(0.5F * static_cast<float>(steepest[column * tile]) / contrast);
+    }
+  }
+  if (steepness_.empty()) return 0;
+  const auto sharp =
+      steepness_.begin() + static_cast<std::ptrdiff_t>(kSharpShare * static_cast<float>(steepness_.size() - 1));
+  std::ranges::nth_element(steepness_, sharp);
+  // A step blurred by a Gaussian is steepest with 1 / (sqrt(2 pi) sigma) of its height to a pixel.
+  return *sharp > 0 ? 0.399F / *sharp : 0;
+}
+
+float Binarizer::edge_blur_px(const GreyView& frame) {
+  return std::visit([&](const auto& view) { return edge_blur_of(view); }, frame);
 }
 
 /// Tile centres carry the thresholds; between them they are interpolated in both directions, and rounded down: what is
@@ -227,8 +262,10 @@ void Binarizer::interpolate_row(int y, int width, T* threshold) {
   for (int column = 0; column < columns_; ++column) {
     at_centre_[column] = static_cast<int>((upper[column] + fraction * (lower[column] - upper[column])) * kUnit);
   }
+  // Not divided by the tile in whole numbers, which takes longer than all the rest.
+  const float per_px = 1 / static_cast<float>(tile);
   for (int column = 0; column + 1 < columns_; ++column) {
-    step_[column] = (at_centre_[column + 1] - at_centre_[column]) / tile;
+    step_[column] = static_cast<int>(static_cast<float>(at_centre_[column + 1] - at_centre_[column]) * per_px);
   }
   // Flat before the first centre and after the last.
   const int first = tile / 2, last = first + (columns_ - 1) * tile;

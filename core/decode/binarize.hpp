@@ -38,8 +38,14 @@ class Binarizer {
   [[nodiscard]] const BinarizeOptions& options() const { return options_; }
   /// Between light and dark of what was taken for the pattern in the last frame, in its levels.
   [[nodiscard]] float contrast_min() const { return contrast_min_; }
+  /// One standard deviation of the blur at the sharpest edges of the last frame, from how steep they are between its
+  /// tiles' least and greatest values; 0 where there are none.
+  /// @param frame  the last
+  [[nodiscard]] float edge_blur_px(const GreyView& frame);
 
  private:
+  template <class T>
+  [[nodiscard]] float edge_blur_of(const ImageView<T>& frame);
   template <class T>
   void binarize_as(const ImageView<T>& frame, double full, Mask& mask);
   template <class T>
@@ -53,6 +59,7 @@ class Binarizer {
   int columns_ = 0, rows_ = 0;  // of tiles
   int stride_ = 0;              // of the tiles with a border of one all round
   std::vector<float> least_, greatest_, across_, low_, high_, midway_, threshold_;
+  std::vector<float> steepness_;
   std::vector<int> at_centre_, step_;  // of a row of thresholds, binary fractions
   template <class T>
   struct RowBuffers {

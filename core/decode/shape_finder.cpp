@@ -16,6 +16,11 @@ constexpr float kAreaMin = 0.08F;
 constexpr float kAreaMax = 1.1F;
 constexpr int kAreaMinPx = 6;
 constexpr float kExtentMax = 1.5F;  // of a cell's side
+/// Blur up to which the prototypes know how symbols look; what of more is undone, rather less than too much, as
+/// sharpening by too much makes ripples; and how much at the most, of a symbol's side.
+constexpr float kBlurMinPx = 1.9F;
+constexpr float kBlurUndone = 0.85F;
+constexpr float kBlurMax = 0.2F;
 /// Between a region's peak and its background, of 255 levels.
 constexpr float kContrastMin = 8;
 
@@ -36,13 +41,20 @@ ShapeFinder::ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected,
       splitter_({.tile_px = binarizer_.options().tile_px}),
       meter_(margin_px(pattern.spacing_px, expected_.in_the_middle().scale)) {}
 
-void ShapeFinder::binarize(const GreyView& frame, double full) {
+GreyView ShapeFinder::binarize(const GreyView& frame, double full) {
   frame_levels_ = static_cast<float>(full / 255);
   if (binarize_ == Method::kPaper) {
     mask_ = binarize_paper(frame);
-  } else {
-    binarizer_.binarize(frame, full, mask_);
+    return frame;
   }
+  binarizer_.binarize(frame, full, mask_);
+  const float blur_px = binarizer_.edge_blur_px(frame);
+  if (blur_px < kBlurMinPx) return frame;
+  const float symbol_px = symbol_size_px_ * expected_.in_the_middle().scale;
+  const GreyView sharp = sharpener_.sharpen(frame, std::min(kBlurUndone * blur_px, kBlurMax * symbol_px), full).view();
+  frame_levels_ = kSharpenedFull / 255;
+  binarizer_.binarize(sharp, kSharpenedFull, mask_);
+  return sharp;
 }
 
 void ShapeFinder::find_regions(const GreyView& frame) {

@@ -12,6 +12,7 @@
 #include "core/decode/lattice_frame.hpp"
 #include "core/decode/mask.hpp"
 #include "core/decode/options.hpp"
+#include "core/decode/sharpen.hpp"
 #include "core/decode/sightings.hpp"
 #include "core/decode/split_regions.hpp"
 
@@ -29,8 +30,11 @@ class ShapeFinder {
   void expect(ExpectedFrames expected) { expected_ = std::move(expected); }
   [[nodiscard]] const ExpectedFrames& expected() const { return expected_; }
 
-  /// @param full  the level of a saturated pixel of the frame; the stages that follow go by it too
-  void binarize(const GreyView& frame, double full);
+  /// A frame that is out of focus is sharpened before.
+  /// @param full  the level of a saturated pixel of the frame
+  /// @return      what the stages that follow have to look at, the frame itself or as it was sharpened; stands until
+  ///              the next call
+  GreyView binarize(const GreyView& frame, double full);
   void find_regions(const GreyView& frame);
   /// Puts the shapes that may be symbols into the sightings, in place of what was there.
   void describe(const GreyView& frame, Sightings& seen);
@@ -51,6 +55,7 @@ class ShapeFinder {
   Method binarize_, find_regions_;
   ExpectedFrames expected_;
   Binarizer binarizer_;
+  Sharpener sharpener_;
   RegionFinder region_finder_;
   RegionSplitter splitter_;
   GreyMomentMeter meter_;

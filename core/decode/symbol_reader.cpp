@@ -70,18 +70,19 @@ const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarVi
   const auto done = [&](Stage stage) {
     if (observer != nullptr) observer->stage_done(stage);
   };
-  finder_.binarize(frame, full), done(Stage::kBinarize);
-  finder_.find_regions(frame), done(Stage::kFindRegions);
-  finder_.describe(frame, seen_);
+  const GreyView sharp = finder_.binarize(frame, full);
+  done(Stage::kBinarize);
+  finder_.find_regions(sharp), done(Stage::kFindRegions);
+  finder_.describe(sharp, seen_);
   if (paper_) paper_->describe(finder_.regions(), seen_, options_.centre);
   done(Stage::kDescribe);
   classify(), done(Stage::kClassify);
   link_grid(), done(Stage::kLinkGrid);
   if (view != nullptr) view->look_at(seen_);
   decode_windows(view), done(Stage::kDecodeWindows);
-  review(frame), done(Stage::kReview);
+  review(sharp), done(Stage::kReview);
   correspond(view);
-  fit_lattice(), done(Stage::kCorrespond);
+  fit_lattice(static_cast<float>(full / 255)), done(Stage::kCorrespond);
   return lattice_;
 }
 
@@ -146,8 +147,12 @@ void SymbolReader::correspond(const EpipolarView* view) {
   }
 }
 
-void SymbolReader::fit_lattice() {
+/// @param levels  of the frame for one of 255
+void SymbolReader::fit_lattice(float levels) {
   centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, pattern().array, lattice_);
+  // Of the frame that was given, not of one that was sharpened.
+  const float scale = levels / finder_.frame_levels();
+  for (LatticeSymbol& symbol : lattice_.symbols) symbol.background *= scale, symbol.gain *= scale;
   if (options_.centre == Method::kDefault) return;
   for (LatticeSymbol& symbol : lattice_.symbols) {
     const GreyMoments& moments = seen_.moments[symbol.sighting];

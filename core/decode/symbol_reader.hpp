@@ -77,7 +77,7 @@ class SymbolReader {
   void decode_windows(const EpipolarView* view);
   void review(const GreyView& frame);
   void correspond(const EpipolarView* view);
-  void fit_lattice();
+  void fit_lattice(float levels);
 
   DecodeOptions options_;
   std::shared_ptr<const Fixed> fixed_;

@@ -4,11 +4,16 @@
 // Frames in which symbols run together or there are none.
 #include <algorithm>
 #include <cmath>
+#include <random>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "core/decode/decode_in_light.hpp"
 #include "tests/core/decode/decoded_scene.hpp"
+#include "tests/core/decode/images.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
 
 namespace slsd {
@@ -16,6 +21,7 @@ namespace {
 
 using test::decode;
 using test::decoder_of;
+using test::frame_of;
 using test::wrong_points;
 
 /// A board of 600 x 460 mm that faces the camera, nothing behind it.
@@ -93,6 +99,117 @@ TEST(HardFrames, ReadsALitObjectThatTheFrameCuts) {
   EXPECT_GE(static_cast<double>(decode(decoder, frame.view()).points.size()),
             0.985 * static_cast<double>(whole_on_board(pattern)));
 }
+
+// As far out of focus as three pixels of the camera: the gaps between symbols are nearly as bright as they are.
+TEST(HardFrames, ReadsAPlaneOutOfFocus) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  Decoder decoder = decoder_of(pattern);
+  const std::size_t in_focus = decode(decoder, frame_of(pattern, test::kTilted).view()).points.size();
+  for (const double blur_px : {2., 2.5, 3.}) {
+    const Grey8 frame = simulate(draw_pattern(pattern), paper_rig(), test::kTilted, {.blur_sigma_px = blur_px});
+    const Decoding decoding = decode(decoder, frame.view());
+    EXPECT_GE(static_cast<double>(decoding.points.size()), 0.97 * static_cast<double>(in_focus)) << blur_px;
+    EXPECT_EQ(wrong_points(decoding, test::kTilted, 3), 0) << blur_px;
+    const auto deep_frame = deep(frame, 1023);
+    EXPECT_GE(static_cast<double>((*decoder.decode(deep_frame.view(), 1023))->points.size()),
+              0.97 * static_cast<double>(in_focus));
+  }
+}
+
+// Levels are told as those of the frame, not of what was made of it.
+TEST(HardFrames, IntensitiesOutOfFocusAreTheFrames) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  Decoder decoder = decoder_of(pattern);
+  const auto middle = [&](double blur_px) {
+    const Grey8 frame = simulate(draw_pattern(pattern), paper_rig(), test::kPlane, {.blur_sigma_px = blur_px});
+    std::vector<int> intensities;
+    for (const CloudPoint& point : decode(decoder, frame.view()).points) intensities.push_back(point.intensity);
+    std::ranges::nth_element(intensities, intensities.begin() + static_cast<std::ptrdiff_t>(intensities.size() / 2));
+    return intensities.empty() ? 0 : intensities[intensities.size() / 2];
+  };
+  EXPECT_NEAR(middle(3), middle(1), 20);
+}
+
+/// What is printed on a surface: dark and bright checks about as large as symbols, with a pitch of their own.
+double print_at(int x, int y) {
+  return (x / 17 + y / 13) % 2 == 0 ? 1 : 0.25;
+}
+
+Grey8 printed(Grey8 frame) {
+  for (int y = 0; y < frame.height(); ++y) {
+    for (int x = 0; x < frame.width(); ++x)
+      frame.at(x, y) = static_cast<std::uint8_t>(std::lround(print_at(x, y) * frame.at(x, y)));
+  }
+  return frame;
+}
+
+TEST(DecodeInLight, ReadsWhatIsPrintedOver) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  const Grey8 plain = frame_of(pattern, test::kTilted);
+  const Grey8 frame = printed(plain);
+  const Grey8 white = printed(simulate(Grey8(1280, 800, 255), paper_rig(), test::kTilted, {.seed = 2}));
+  Decoder decoder = decoder_of(pattern);
+  const std::size_t unprinted = decode(decoder, plain.view()).points.size();
+  SceneLight light;
+  EXPECT_LT((*decode_in_light(decoder, frame.view(), light))->points.size(), unprinted / 2);
+  light.white = white.view();
+  const auto decoding = decode_in_light(decoder, frame.view(), light);
+  ASSERT_TRUE(decoding);
+  EXPECT_GE(static_cast<double>((*decoding)->points.size()), 0.95 * static_cast<double>(unprinted));
+  EXPECT_EQ(wrong_points(**decoding, test::kTilted, 3), 0);
+}
+
+// A white frame of another scene: what the pattern's frame gives by itself.
+TEST(DecodeInLight, LosesNoPointByALateWhiteFrame) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  const Grey8 frame = frame_of(pattern, test::kTilted);
+  const Grey8 other = frame_of(pattern, test::kCylinder);
+  Decoder decoder = decoder_of(pattern);
+  const auto plain = decode(decoder, frame.view()).points;
+  SceneLight light;
+  light.white = other.view();
+  EXPECT_GE((*decode_in_light(decoder, frame.view(), light))->points.size(), plain.size());
+  const Grey8 small(4, 4);
+  light.white = small.view();
+  EXPECT_EQ(decode_in_light(decoder, frame.view(), light).error().code, ErrorCode::kMismatch);
+}
+
+class FrameOfNothing : public testing::TestWithParam<std::pair<int, int>> {};
+
+// Of every size that a camera may have: no point, no error, each region with its reason.
+TEST_P(FrameOfNothing, GivesAnEmptyCloudWithItsReasons) {
+  const auto [width, height] = GetParam();
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  Calibration rig = paper_rig();
+  Lens& lens = rig.cameras[0].lens;
+  lens.width_px = width, lens.height_px = height;
+  lens.cx = 0.5 * (width - 1), lens.cy = 0.5 * (height - 1);
+  auto decoder = Decoder::create(pattern, rig, 0, {});
+  ASSERT_TRUE(decoder) << to_string(decoder.error());
+  std::mt19937 random(7);
+  for (const bool noisy : {false, true}) {
+    for (const int grey : {0, 1, 90, 254, 255}) {
+      Grey8 eight(width, height, static_cast<std::uint8_t>(grey));
+      if (noisy)
+        std::generate_n(eight.data(), eight.size(), [&] { return static_cast<std::uint8_t>(random() % (grey + 1)); });
+      const Grey16 wide = sixteen_bits(eight);
+      for (const GreyView& frame : {GreyView(eight.view()), GreyView(wide.view())}) {
+        const auto decoding = decoder->decode(frame);
+        ASSERT_TRUE(decoding) << to_string(decoding.error());
+        EXPECT_TRUE((*decoding)->points.empty());
+        EXPECT_EQ((*decoding)->count(RegionStatus::kDecoded), 0U);
+        std::size_t counted = 0;
+        for (const auto count : (*decoding)->counts) counted += count;
+        EXPECT_EQ(counted, (*decoding)->regions.size());
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, FrameOfNothing,
+                         testing::Values(std::pair(1, 1), std::pair(2, 1), std::pair(1, 3), std::pair(5, 7),
+                                         std::pair(32767, 1), std::pair(1, 32767), std::pair(64, 64),
+                                         std::pair(1600, 1200)));
 
 }  // namespace
 }  // namespace slsd

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// Levels of a sharpened frame where the frame was saturated; above it is room for what its edges overshoot.
+inline constexpr float kSharpenedFull = 50000;
+
+/// Undoes blur of a known size as far as noise lets it: gaps between symbols are dark again, and shapes as they are in
+/// a frame in focus. Symmetric in all directions, so that what is symmetric stays where it is.
+///
+/// By Wiener's filter along the rows and along the columns, W = T H / (H^2 + k^2): H the blur's spectrum, T that of the
+/// blur which is left, k what noise may be of the light.
+/// @thread thread-bound: keeps its buffers
+class Sharpener {
+ public:
+  /// @param blur_px  one standard deviation
+  /// @param full     the level of a saturated pixel of the frame
+  /// @return         of the frame's size; stands until the next call
+  const Grey16& sharpen(const GreyView& frame, float blur_px, double full);
+
+ private:
+  template <class T>
+  void sharpen_as(const ImageView<T>& frame, float scale);
+
+  std::vector<float> weights_;  // from the middle outwards
+  std::vector<float> padded_, rows_, sum_;
+  Grey16 sharpened_;
+};
+
+}  // namespace slsd
