@@ -4,75 +4,74 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
+
+#include "core/decode/clones.hpp"
 
 namespace slsd {
 namespace {
 
-/// Writes the runs of a row and returns their end; the caller has room for every second pixel.
-Run* find_runs_of_row(const Mask& mask, int y, Run* runs) {
-  const auto row = static_cast<std::int16_t>(y);
-  bool inside = false;
+/// Ends of runs that are written at once, whether there are as many or not: what lies beyond is written over.
+constexpr int kEndsAtOnce = 8;
+
+/// Writes where the runs of a row begin and end, in turn; the caller has room for an end at every pixel and some more.
+/// @return the number of runs
+SLSD_CLONES int find_ends(const std::uint64_t* words, int width, std::uint16_t* ends) {
+  constexpr std::uint64_t kLast = std::uint64_t{1} << (Mask::kWordPx - 1);  // so that there is always one to count to
+  std::uint16_t* const first = ends;
   std::uint64_t last = 0;
-  const std::uint64_t* words = mask.row(y);
-  for (int x = 0; x < mask.width(); x += Mask::kWordPx) {
+  for (int x = 0; x < width; x += Mask::kWordPx) {
     const std::uint64_t bits = *words++;
     std::uint64_t changes = bits ^ (bits << 1U | last);
     last = bits >> 63U;
-    for (; changes != 0; changes &= changes - 1) {
-      const auto at = static_cast<std::int16_t>(x + std::countr_zero(changes));
-      (inside ? runs->right : runs->left) = at;
-      if (inside) runs++->row = row;
-      inside = !inside;
+    const int count = std::popcount(changes);
+    for (int done = 0; done < count; done += kEndsAtOnce) {
+      for (int i = 0; i < kEndsAtOnce; ++i, changes &= changes - 1)
+        ends[done + i] = static_cast<std::uint16_t>(x + std::countr_zero(changes | kLast));
     }
+    ends += count;
   }
-  if (!inside) return runs;
-  runs->right = static_cast<std::int16_t>(mask.width());
-  runs->row = row;
-  return runs + 1;
+  if ((ends - first) % 2 != 0) *ends++ = static_cast<std::uint16_t>(width);
+  return static_cast<int>(ends - first) / 2;
 }
 
 }  // namespace
 
-int RegionFinder::root(int label) {
+std::int32_t RegionFinder::root(std::int32_t label) {
   while (labels_[label].parent != label) label = labels_[label].parent = labels_[labels_[label].parent].parent;
   return label;
 }
 
-/// The label of the runs that a run touches in the row above, all made one; a new label where it touches none.
-/// @param above  the first run there that does not end before it; moves on from run to run
-int RegionFinder::label_of(const Run& run, int& above, int above_end) {
-  while (above < above_end && runs_[above].right < run.left) ++above;
-  int label = -1;
-  for (int i = above; i < above_end && runs_[i].left <= run.right; ++i) {
-    if (label < 0) label = label_of_run_[i];
-    if (label == label_of_run_[i]) continue;
-    const int a = root(label), b = root(label_of_run_[i]);
-    labels_[std::max(a, b)].parent = std::min(a, b);
-  }
-  if (label >= 0) return label;
-  labels_.push_back({static_cast<int>(labels_.size()), {run.left, run.row, run.right - 1, run.row, 0, 0, 0}});
-  return labels_.back().parent;
+std::int32_t RegionFinder::join(std::int32_t a, std::int32_t b) {
+  const std::int32_t first = root(a), second = root(b);
+  return labels_[std::max(first, second)].parent = std::min(first, second);
 }
 
-/// Finds the runs of a row and labels them, with those of the row above, from first_above to run_count_, still at hand.
-void RegionFinder::label_row(const Mask& mask, int y, std::size_t first_above) {
-  const std::size_t first = run_count_, row_max = static_cast<std::size_t>(mask.width()) / 2 + 1;
-  if (runs_.size() < first + row_max) {
-    runs_.resize(2 * (first + row_max));
-    label_of_run_.resize(runs_.size());
+/// Gives each run the label of the runs that it touches in the row above, all made one; a new label where it touches
+/// none.
+void RegionFinder::label_row(int y, int runs, const Row& above, Row& row) {
+  const std::uint16_t *ends = row.ends.data(), *above_ends = above.ends.data();
+  const std::int32_t* above_label = above.labels.data();
+  Run* out = runs_.data() + run_count_;
+  std::int32_t* out_label = label_of_run_.data() + run_count_;
+  for (int i = 0; i < runs; ++i, ends += 2) {
+    const std::uint16_t left = ends[0], right = ends[1];
+    while (above_ends[1] < left) above_ends += 2, ++above_label;
+    std::int32_t label = *above_label;
+    if (above_ends[0] > right) {
+      label = static_cast<std::int32_t>(labels_.size());
+      labels_.push_back({label, 0});
+    } else {
+      const std::int32_t* other = above_label + 1;
+      for (const std::uint16_t* next = above_ends + 2; *next <= right; next += 2, ++other)
+        if (*other != label) (void)join(label, *other);
+    }
+    ++labels_[label].runs;
+    row.labels[i] = label;
+    *out++ = {static_cast<std::int16_t>(y), static_cast<std::int16_t>(left), static_cast<std::int16_t>(right)};
+    *out_label++ = label;
   }
-  run_count_ = static_cast<std::size_t>(find_runs_of_row(mask, y, runs_.data() + first) - runs_.data());
-  auto above = static_cast<int>(first_above);
-  for (std::size_t i = first; i < run_count_; ++i) {
-    const Run& run = runs_[i];
-    label_of_run_[i] = label_of(run, above, static_cast<int>(first));
-    Region& region = labels_[label_of_run_[i]].region;
-    region.left = std::min<int>(region.left, run.left);
-    region.right = std::max(region.right, run.right - 1);
-    region.bottom = run.row;
-    region.area_px += run.right - run.left;
-    ++region.run_count;
-  }
+  run_count_ += runs;
 }
 
 /// One region to each label that is its own parent, in the order of the labels: that of their first pixels. From here
@@ -81,24 +80,19 @@ void RegionFinder::number_regions(Regions& found) {
   found.regions.clear();
   for (std::size_t i = 0; i < labels_.size(); ++i) {
     Label& label = labels_[i];
-    if (label.parent == static_cast<int>(i)) {
-      label.parent = static_cast<int>(found.regions.size());
-      found.regions.push_back(label.region);
-      continue;
+    if (label.parent == static_cast<std::int32_t>(i)) {
+      label.parent = static_cast<std::int32_t>(found.regions.size());
+      found.regions.emplace_back().run_count = label.runs;
+    } else {
+      label.parent = labels_[label.parent].parent;
+      found.regions[label.parent].run_count += label.runs;
     }
-    label.parent = labels_[label.parent].parent;
-    Region& whole = found.regions[label.parent];
-    whole.left = std::min(whole.left, label.region.left);
-    whole.right = std::max(whole.right, label.region.right);
-    whole.bottom = std::max(whole.bottom, label.region.bottom);
-    whole.area_px += label.region.area_px;
-    whole.run_count += label.region.run_count;
   }
 }
 
 void RegionFinder::gather(Regions& found) {
-  int next = 0;
   next_run_.clear();
+  std::int32_t next = 0;
   for (Region& region : found.regions) {
     region.first_run = next;
     next_run_.push_back(next);
@@ -106,15 +100,39 @@ void RegionFinder::gather(Regions& found) {
   }
   found.runs.resize(run_count_);
   for (std::size_t i = 0; i < run_count_; ++i) found.runs[next_run_[labels_[label_of_run_[i]].parent]++] = runs_[i];
+  for (Region& region : found.regions) {
+    const std::span<const Run> runs = found.runs_of(region);
+    region.top = runs.front().row, region.bottom = runs.back().row;
+    int left = runs.front().left, right = 0, area_px = 0;
+    for (const Run& run : runs) {
+      left = std::min<int>(left, run.left);
+      right = std::max<int>(right, run.right);
+      area_px += run.right - run.left;
+    }
+    region.left = left, region.right = right - 1, region.area_px = area_px;
+  }
 }
 
 void RegionFinder::find(const Mask& mask, Regions& found) {
+  constexpr std::uint16_t kBeyond = std::numeric_limits<std::uint16_t>::max();
+  const std::size_t row_max = static_cast<std::size_t>(mask.width()) / 2 + 1;
+  for (Row& row : rows_) {
+    row.ends.resize(2 * row_max + kEndsAtOnce + 2);
+    row.labels.resize(row_max + 1);
+  }
   labels_.clear();
   run_count_ = 0;
-  for (std::size_t y = 0, above = 0; y < static_cast<std::size_t>(mask.height()); ++y) {
-    const std::size_t first = run_count_;
-    label_row(mask, static_cast<int>(y), above);
-    above = first;
+  Row *above = &rows_[0], *row = &rows_[1];
+  above->ends[0] = above->ends[1] = kBeyond;
+  for (int y = 0; y < mask.height(); ++y) {
+    const int runs = find_ends(mask.row(y), mask.width(), row->ends.data());
+    row->ends[2 * runs] = row->ends[2 * runs + 1] = kBeyond;
+    if (runs_.size() < run_count_ + row_max) {
+      runs_.resize(2 * (run_count_ + row_max));
+      label_of_run_.resize(runs_.size());
+    }
+    label_row(y, runs, *above, *row);
+    std::swap(above, row);
   }
   number_regions(found);
   gather(found);

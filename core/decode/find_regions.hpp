@@ -55,22 +55,27 @@ class RegionFinder {
   void find(const Mask& mask, Regions& found);
 
  private:
-  void label_row(const Mask& mask, int y, std::size_t first_above);
-  [[nodiscard]] int label_of(const Run& run, int& above, int above_end);
+  /// The runs of a row, left and right in turn, then a run beyond every other, and a label to each run.
+  struct Row {
+    std::vector<std::uint16_t> ends;
+    std::vector<std::int32_t> labels;
+  };
+  void label_row(int y, int runs, const Row& above, Row& row);
+  [[nodiscard]] std::int32_t join(std::int32_t a, std::int32_t b);
+  [[nodiscard]] std::int32_t root(std::int32_t label);
   void number_regions(Regions& found);
   void gather(Regions& found);
-  [[nodiscard]] int root(int label);
 
+  Row rows_[2];
   std::vector<Run> runs_;  // run_count_ of them, then room for more
+  std::vector<std::int32_t> label_of_run_;
   std::size_t run_count_ = 0;
-  std::vector<int> label_of_run_;
   /// A part of a region, found row by row; its parent is not above it: labels of one region have one root.
   struct Label {
-    int parent;
-    Region region;
+    std::int32_t parent, runs;
   };
   std::vector<Label> labels_;
-  std::vector<int> next_run_;  // of each region, where its next run goes
+  std::vector<std::int32_t> next_run_;  // of each region, where its next run goes
 };
 
 }  // namespace slsd
