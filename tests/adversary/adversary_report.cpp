@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/decode/decoder.hpp"
+#include "tests/adversary/frames.hpp"
+
+namespace slsd::adversary {
+namespace {
+
+constexpr std::pair<double, double> kRangesMm[] = {{350, 3200}, {400, 2500}, {1500, 2500}};
+constexpr double kTolerancePx = 1.5;
+
+struct Row {
+  int frames = 0, frames_wrong = 0, wrong = 0, undecidable = 0, right = 0, visible = 0;
+};
+
+struct Reader {
+  std::unique_ptr<FrameMaker> maker;
+  std::vector<Decoder> decoders;  // one to a range
+};
+
+Result<Reader> reader_of(PatternOptions options) {
+  auto pattern = make_pattern(options);
+  if (!pattern) return tl::unexpected(pattern.error());
+  options.seed += 1;
+  auto foreign = make_pattern(options);
+  if (!foreign) return tl::unexpected(foreign.error());
+  Reader reader{std::make_unique<FrameMaker>(*pattern, foreign->array), {}};
+  for (const auto& [nearest, farthest] : kRangesMm) {
+    auto decoder =
+        Decoder::create(*pattern, reader.maker->calibration(), 0, {.depth_min_mm = nearest, .depth_max_mm = farthest});
+    if (!decoder) return tl::unexpected(decoder.error());
+    reader.decoders.push_back(std::move(*decoder));
+  }
+  return reader;
+}
+
+void write_pgm(const Grey8& image, const std::string& path) {
+  std::FILE* const file = std::fopen(path.c_str(), "wb");
+  if (file == nullptr) return;
+  std::fprintf(file, "P5\n%d %d\n255\n", image.width(), image.height());
+  std::fwrite(image.data(), 1, image.size(), file);
+  std::fclose(file);
+}
+
+void print(const char* name, const Row& row) {
+  std::printf("| %s | %d | %d | %d | %d | %d | %.1f |\n", name, row.frames, row.wrong, row.frames_wrong,
+              row.undecidable, row.right, row.visible == 0 ? 0. : 100. * row.right / row.visible);
+}
+
+Result<int> report(int frames, int only_kind, int only_number, bool verbose) {
+  std::vector<Reader> readers;
+  for (const PatternOptions& options :
+       {PatternOptions{.symbol_size_px = 16, .spacing_px = 2}, PatternOptions{.symbol_size_px = 8, .spacing_px = 2}}) {
+    auto reader = reader_of(options);
+    if (!reader) return tl::unexpected(reader.error());
+    readers.push_back(std::move(*reader));
+  }
+  Row all, slats;
+  std::puts(
+      "| frames of | number | wrong points | frames with one | undecidable | right points | of the visible % "
+      "|\n|---|---|---|---|---|---|---|");
+  for (int k = 0; k < kKinds; ++k) {
+    if (only_kind >= 0 && k != only_kind) continue;
+    const Kind kind = static_cast<Kind>(k);
+    Row row;
+    for (int n = 0; n < (frames + kKinds - 1) / kKinds; ++n) {
+      if (only_number >= 0 && n != only_number) continue;
+      Reader& reader = readers[n % 2];
+      const Frame frame = reader.maker->make(kind, static_cast<std::uint32_t>(n));
+      const auto decoding = reader.decoders[n / 2 % 3].decode(frame.image.view(), 255);
+      if (!decoding) return tl::unexpected(decoding.error());
+      const Verdict verdict = reader.maker->judge(frame, (*decoding)->points, kTolerancePx);
+      ++row.frames, row.frames_wrong += verdict.wrong > 0;
+      row.wrong += verdict.wrong, row.undecidable += verdict.undecidable;
+      row.right += verdict.right, row.visible += verdict.visible;
+      for (const CloudPoint& point : verdict.wrong_points) {
+        std::fprintf(stderr, "wrong: --kind %d --frame %d: row %d, column %d at (%.1f, %.1f) px\n", k, n, point.row,
+                     point.column, point.camera_u, point.camera_v);
+      }
+      if (verbose) {
+        write_pgm(frame.image, "adversary.pgm");
+        for (int i = 0; i < kRegionStatusCount; ++i)
+          std::fprintf(stderr, "%s %u\n", std::string(to_string(static_cast<RegionStatus>(i))).c_str(),
+                       (*decoding)->counts[i]);
+      }
+    }
+    print(std::string(to_string(kind)).c_str(), row);
+    for (Row* sum : {&all, k <= static_cast<int>(Kind::kPickets) ? &slats : nullptr}) {
+      if (sum == nullptr) continue;
+      sum->frames += row.frames, sum->frames_wrong += row.frames_wrong, sum->wrong += row.wrong;
+      sum->undecidable += row.undecidable, sum->right += row.right, sum->visible += row.visible;
+    }
+  }
+  if (only_kind < 0) print("slats, shelves and pickets", slats), print("all", all);
+  return all.wrong;
+}
+
+}  // namespace
+}  // namespace slsd::adversary
+
+// adversary-report [FRAMES] [--kind K] [--frame N]
+int main(int count, char** arguments) {
+  int frames = 1000, kind = -1, number = -1;
+  for (int i = 1; i < count; ++i) {
+    const bool more = i + 1 < count;
+    if (std::strcmp(arguments[i], "--kind") == 0 && more) {
+      kind = std::atoi(arguments[++i]);
+    } else if (std::strcmp(arguments[i], "--frame") == 0 && more) {
+      number = std::atoi(arguments[++i]);
+    } else {
+      frames = std::atoi(arguments[i]);
+    }
+  }
+  if (number >= 0) frames = std::max(frames, (number + 1) * slsd::adversary::kKinds);
+  const auto wrong = slsd::adversary::report(frames, kind, number, number >= 0);
+  if (!wrong) std::fprintf(stderr, "adversary-report: %s\n", slsd::to_string(wrong.error()).c_str());
+  return wrong && *wrong == 0 ? 0 : 1;
+}

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <cstdlib>
+#include <ostream>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/decode/decoder.hpp"
+#include "tests/adversary/frames.hpp"
+
+namespace slsd::adversary {
+
+void PrintTo(Kind kind, std::ostream* out) {
+  *out << to_string(kind);
+}
+
+namespace {
+
+/// Frames of each kind: 4, or as many as SLSD_ADVERSARY_FRAMES says.
+int frames_of_a_kind() {
+  const char* const asked = std::getenv("SLSD_ADVERSARY_FRAMES");
+  return asked == nullptr ? 4 : std::atoi(asked);
+}
+
+class Adversary : public testing::TestWithParam<Kind> {};
+
+TEST_P(Adversary, GetsNoWrongCell) {
+  for (const int size_px : {16, 8}) {
+    PatternOptions options{.symbol_size_px = size_px, .spacing_px = 2};
+    const auto pattern = make_pattern(options);
+    options.seed = 2;
+    const auto foreign = make_pattern(options);
+    ASSERT_TRUE(pattern && foreign);
+    FrameMaker maker(*pattern, foreign->array);
+    auto decoder = Decoder::create(*pattern, maker.calibration(), 0, {.depth_min_mm = 350, .depth_max_mm = 3200});
+    ASSERT_TRUE(decoder);
+    for (int number = 0; number < frames_of_a_kind(); ++number) {
+      const Frame frame = maker.make(GetParam(), static_cast<std::uint32_t>(number));
+      const auto decoding = decoder->decode(frame.image.view(), 255);
+      ASSERT_TRUE(decoding);
+      const Verdict verdict = maker.judge(frame, (*decoding)->points, 1.5);
+      EXPECT_EQ(verdict.wrong, 0) << size_px << " px, frame " << number;
+    }
+  }
+}
+
+std::vector<Kind> all_kinds() {
+  std::vector<Kind> kinds;
+  for (int i = 0; i < kKinds; ++i) kinds.push_back(static_cast<Kind>(i));
+  return kinds;
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, Adversary, testing::ValuesIn(all_kinds()));
+
+// The frames are drawn as they are judged, and are no riddles: nearly all of broad slats and of plain parts is read.
+TEST(AdversaryFrames, AreReadWhereNothingMisleads) {
+  const auto pattern = make_pattern({});
+  ASSERT_TRUE(pattern);
+  FrameMaker maker(*pattern, pattern->array);
+  auto decoder = Decoder::create(*pattern, maker.calibration(), 0, {});
+  int right = 0, visible = 0;
+  for (std::uint32_t number = 0; number < 6; ++number) {
+    const Frame frame = maker.make(Kind::kForeign, number);  // of the same array: a plane that shows the pattern
+    const Verdict verdict = maker.judge(frame, (*decoder->decode(frame.image.view(), 255))->points, 1.5);
+    right += verdict.right + verdict.undecidable, visible += 600;
+  }
+  EXPECT_GT(right, visible * 8 / 10);
+}
+
+}  // namespace
+}  // namespace slsd::adversary
