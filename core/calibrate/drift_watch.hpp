@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include "core/calibrate/epipolar_limit.hpp"
+#include "core/geometry/epipolar_limit.hpp"
 #include "core/cloud/cloud.hpp"
 #include "core/geometry/calibration.hpp"
 

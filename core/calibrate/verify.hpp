@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/calibrate/epipolar_limit.hpp"
+#include "core/geometry/epipolar_limit.hpp"
 #include "core/calibrate/observations.hpp"
 #include "core/calibrate/trueness.hpp"
 #include "core/geometry/calibration.hpp"

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 
@@ -21,6 +22,19 @@ class CellGate {
 
   [[nodiscard]] bool admits(std::int32_t node, int row, int column) const {
     return segments_.empty() || segments_[node].passes(cells_.ray(row, column).direction, tolerance_px_);
+  }
+  /// Whether the cell lies on the node's epipolar line, at whatever depth.
+  [[nodiscard]] bool on_line(std::int32_t node, int row, int column) const {
+    return segments_.empty() ||
+           std::abs(segments_[node].residual_px(cells_.ray(row, column).direction)) <= tolerance_px_;
+  }
+  /// Calls visit(row, column) for every cell that a node can be; with `anywhere` for every cell.
+  template <class Visit>
+  void visit(std::int32_t node, bool anywhere, Visit&& visit) const {
+    for (int row = 0; row < cells_.rows(); ++row) {
+      for (int column = 0; column < cells_.columns(); ++column)
+        if (anywhere || admits(node, row, column)) visit(row, column);
+    }
   }
 
  private:

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include "core/decode/classify.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -15,7 +16,12 @@ static_assert(kMaxLetters == kLanes && kFeatureCount == 8);
 constexpr float kDegreesOfFreedom = 4;
 constexpr float kFarthestSquared = 1e5F;  // farther than that all are equally unlikely, and a float's range ends
 constexpr float kAbsent = 1e12F;
-constexpr float kLeastProbability = 1e-6F;
+
+/// How often a shape is another letter than the likeliest for what the prototypes do not know: cut at an edge, torn,
+/// run together, printed on. It grows with the distance from the nearest prototype. Measured on drawn and rendered
+/// frames: docs/decoder.md has the table.
+constexpr float kDoubtMin = 0.01F, kDoubtMax = 0.5F;
+constexpr float kDoubtFrom = 2, kDoubtSlope = 0.12F;
 
 struct Verdict {
   Lanes squared_distance, likelihood, log_probability;
@@ -60,8 +66,11 @@ SLSD_CLONES void judge(const Classifier::Table& table, const float* features, Ve
   const Lanes squared = squared_distance < farthest ? squared_distance : farthest;
   const Lanes t = 1 + squared / kDegreesOfFreedom, cubed = t * t * t;
   const Lanes likelihood = density / (cubed * cubed);
-  const Lanes probability = likelihood / sum_of(likelihood), least = zero + kLeastProbability;
-  take_logarithms(probability > least ? probability : least, verdict.log_probability);
+  float nearest = squared_distance[0];
+  for (int i = 1; i < kMaxLetters; ++i) nearest = squared_distance[i] < nearest ? squared_distance[i] : nearest;
+  const float doubt = std::clamp(kDoubtMin + kDoubtSlope * (std::sqrt(nearest) - kDoubtFrom), kDoubtMin, kDoubtMax);
+  const Lanes probability = likelihood * ((1 - doubt) / sum_of(likelihood)) + doubt * table.share;
+  take_logarithms(probability, verdict.log_probability);
   verdict.squared_distance = squared_distance;
   verdict.likelihood = likelihood;
 }
@@ -70,6 +79,7 @@ SLSD_CLONES void judge(const Classifier::Table& table, const float* features, Ve
 
 Classifier::Classifier(const std::vector<Prototype>& prototypes, float distance_max)
     : table_{}, distance_max_(distance_max) {
+  table_.share = 1 / static_cast<float>(prototypes.size());
   for (float& absent : table_.absent) absent = kAbsent;
   for (std::size_t letter = 0; letter < prototypes.size(); ++letter) {
     const Prototype& prototype = prototypes[letter];

@@ -38,6 +38,7 @@ class Classifier {
     alignas(32) float whitening[kFeatureCount * (kFeatureCount + 1) / 2][kMaxLetters];  ///< lower triangle, by rows
     alignas(32) float density[kMaxLetters];
     alignas(32) float absent[kMaxLetters];  ///< squared distance that a place without a letter has more
+    float share;                            ///< of one letter among all
   };
 
  private:

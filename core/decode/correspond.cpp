@@ -17,22 +17,46 @@ void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellCl
       continue;
     }
     CellClaim& other = claims[holder];
-    const float lead = claim.evidence - other.evidence;
+    // Of two islands nothing says which is right; within one a symbol may have been taken apart.
+    const float lead = claim.island == other.island ? claim.evidence - other.evidence : 0;
     if (lead > -options_.evidence_margin) other.status = RegionStatus::kDuplicateCell;
     if (lead < options_.evidence_margin) claim.status = RegionStatus::kDuplicateCell;
     if (lead > 0) holder = static_cast<std::int32_t>(node);
   }
 }
 
-void Correspondence::correspond(const CellRays& cells, std::span<const EpipolarSegment> segments,
+void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, std::vector<CellClaim>& claims) {
+  constexpr int kReach = 2;
+  const auto is_lone = [&](std::int32_t node, Direction forth) {
+    bool has_any = false;
+    for (const Direction d : {forth, opposite(forth)}) {
+      std::int32_t other = node;
+      for (int i = 0; i < kReach; ++i) {
+        other = neighbour(nodes, other, d);
+        if (other < 0) break;
+        has_any = true;
+        if (claims[other].status == RegionStatus::kDecoded && claims[other].island == claims[node].island) return false;
+      }
+    }
+    return has_any;
+  };
+  lone_.clear();
+  for (std::int32_t node = 0; node < static_cast<std::int32_t>(nodes.size()); ++node) {
+    if (claims[node].status != RegionStatus::kDecoded) continue;
+    if (is_lone(node, kRight) || is_lone(node, kDown)) lone_.push_back(node);
+  }
+  for (const std::int32_t node : lone_) claims[node].status = RegionStatus::kNeighboursDisagree;
+}
+
+void Correspondence::correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,
                                 std::vector<CellClaim>& claims) {
   for (std::size_t node = 0; node < claims.size(); ++node) {
     CellClaim& claim = claims[node];
     if (claim.status != RegionStatus::kDecoded) continue;
     const Eigen::Vector2d& direction = cells.ray(claim.row, claim.column).direction;
-    if (std::abs(segments[node].residual_px(direction)) > options_.epipolar_max_px) {
+    if (std::abs(segments[node].residual_px(direction)) > tolerance_px) {
       claim.status = RegionStatus::kOffEpipolarLine;
-    } else if (!segments[node].passes(direction, options_.epipolar_max_px)) {
+    } else if (!segments[node].passes(direction, tolerance_px)) {
       claim.status = RegionStatus::kOutOfDepthRange;
     }
   }

@@ -10,20 +10,25 @@
 namespace slsd {
 
 struct CorrespondOptions {
-  double epipolar_max_px = 1.5;  ///< projector px
-  float evidence_margin = 2;     ///< by how much the better of two claims on one cell has to be better to stand
+  float evidence_margin = 2;  ///< by how much the better of two claims on one cell has to be better to stand
 };
 
 /// Makes correspondences of claims: each cell belongs to one node at most, on its epipolar line and within the working
 /// depth. Of two claims on one cell the better stands, if it is clearly better; otherwise neither.
-/// @param segments  one to a node
-/// @param claims    in and out: rejected ones change their status
+/// @param segments      one to a node
+/// @param tolerance_px  distance from the epipolar line, projector px: epipolar_gate_px()
+/// @param claims        in and out: rejected ones change their status
 /// @thread thread-bound: keeps its buffers
 class Correspondence {
  public:
   explicit Correspondence(CorrespondOptions options) : options_(options) {}
 
-  void correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, std::vector<CellClaim>& claims);
+  void correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,
+                  std::vector<CellClaim>& claims);
+
+  /// Refuses symbols that stand alone in their row, or in their column, with neighbours on it that were all refused:
+  /// the edge that cut those runs through them as well, and what is left of two symbols looks like a whole one.
+  void refuse_lone(const std::vector<GridNode>& nodes, std::vector<CellClaim>& claims);
 
   /// The duplicates alone, where there is no calibration.
   void settle_duplicates(const CellRays& cells, std::vector<CellClaim>& claims);
@@ -31,6 +36,7 @@ class Correspondence {
  private:
   CorrespondOptions options_;
   std::vector<std::int32_t> holder_;  // of each cell
+  std::vector<std::int32_t> lone_;
 };
 
 }  // namespace slsd

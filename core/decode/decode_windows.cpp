@@ -10,8 +10,6 @@ namespace {
 
 constexpr int kExactWeight = 2;
 constexpr int kCorrectedWeight = 1;
-constexpr int kSpreadRounds = 3;
-constexpr float kCornerSymbols = 3.6F;  // of four, as none is certain
 
 }  // namespace
 
@@ -22,7 +20,8 @@ WindowDecoder::WindowDecoder(const Pattern& pattern, DecodeWindowsOptions option
           std::make_shared<const Codebooks>(Codebooks{Codebook(pattern.array, options.rows, options.columns, 0),
                                                       Codebook(pattern.array, options.rows, options.columns, radius)})),
       unique_(pattern.array.minimum_distance > 0),
-      log_letters_(std::log(static_cast<float>(pattern.letters()))) {}
+      log_letters_(std::log(static_cast<float>(pattern.letters()))),
+      judge_(pattern, {.rows = options.rows, .columns = options.columns}) {}
 
 std::optional<std::uint32_t> WindowDecoder::key_of(const Neighbourhood& around,
                                                    const std::vector<Classification>& shapes) const {
@@ -57,6 +56,14 @@ WindowDecoder::Hit WindowDecoder::look_up(std::int32_t node, std::uint32_t key, 
     ++hits;
   };
   codebooks_->exact.find(key, take);
+  if (hits == 1) return found;
+  // Light of the pattern that comes from elsewhere than the calibration says: of a knocked rig, of another projector.
+  if (hits == 0 && unique_) {
+    codebooks_->exact.find(key, [&](const Codebook::Entry& entry) {
+      found = {entry.row, entry.column, kExactWeight, true};
+      ++hits;
+    });
+  }
   if (hits == 0) codebooks_->correcting.find(key, take);
   return hits == 1 ? found : Hit{};
 }
@@ -68,17 +75,22 @@ void WindowDecoder::look_up_windows(const std::vector<Classification>& shapes, c
     if (!key) continue;
     const auto node = static_cast<std::int32_t>(i);
     hits_[i] = continued(node, *key);
-    if (hits_[i].weight == 0 || !gate.admits(node, hits_[i].row, hits_[i].column)) hits_[i] = look_up(node, *key, gate);
+    if (hits_[i].weight == 0) {
+      hits_[i] = look_up(node, *key, gate);
+    } else {
+      hits_[i].strays = !gate.admits(node, hits_[i].row, hits_[i].column);
+    }
   }
 }
 
-void WindowDecoder::vote(std::int32_t node, const Vote& vote, const CellGate& gate, Ballot& ballot) const {
+void WindowDecoder::vote(std::int32_t node, const Vote& vote, bool strays, const CellGate& gate, Ballot& ballot) const {
   for (int i = 1; i < ballot.count; ++i) {
     if (ballot.votes[i].row != vote.row || ballot.votes[i].column != vote.column) continue;
     ballot.votes[i].weight += vote.weight;
     return;
   }
-  if (ballot.count == kVotes || !shown(vote.row, vote.column) || !gate.admits(node, vote.row, vote.column)) return;
+  if (ballot.count == kVotes || !shown(vote.row, vote.column)) return;
+  if (!strays && !gate.admits(node, vote.row, vote.column)) return;
   ballot.votes[ballot.count++] = vote;
 }
 
@@ -96,7 +108,7 @@ WindowDecoder::Ballot WindowDecoder::collect_votes(std::int32_t node, const Cell
     if (ballot.count > 0 && first.row == next.row && first.column == next.column) {
       first.weight += next.weight;
     } else {
-      vote(node, next, gate, ballot);
+      vote(node, next, hit.strays, gate, ballot);
     }
   }
   return ballot;
@@ -127,56 +139,15 @@ void WindowDecoder::elect(const CellGate& gate, std::vector<CellClaim>& claims) 
   }
 }
 
-void WindowDecoder::spread(const std::vector<GridNode>& nodes, const CellGate& gate, std::vector<CellClaim>& claims) {
-  for (int round = 0; round < kSpreadRounds; ++round) {
-    bool changed = false;
-    for (std::size_t node = 0; node < claims.size(); ++node) {
-      if (claims[node].status != RegionStatus::kNoCodeword) continue;
-      CellClaim named;
-      for (const Direction d : {kRight, kDown, kLeft, kUp}) {
-        const std::int32_t other = neighbour(nodes, static_cast<std::int32_t>(node), d);
-        if (other < 0 || !claims[other].named()) continue;
-        const Eigen::Vector2f back = step(opposite(d));
-        const int row = claims[other].row + static_cast<int>(back.y()),
-                  column = claims[other].column + static_cast<int>(back.x());
-        if (!shown(row, column) || !gate.admits(static_cast<std::int32_t>(node), row, column)) continue;
-        if (named.named() && !named.same_cell(row, column)) {
-          named = {-1, -1, 0, RegionStatus::kAmbiguousCodeword};
-          break;
-        }
-        named = {static_cast<std::int16_t>(row), static_cast<std::int16_t>(column), 0, RegionStatus::kDecoded};
-      }
-      if (!named.named()) continue;
-      claims[node] = named;
-      changed = true;
-    }
-    if (!changed) return;
-  }
-}
-
-void WindowDecoder::verify(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims) const {
-  // A corner of the pattern has four symbols to speak for it, each worth the logarithm of the letters.
-  const float evidence_min = std::min(options_.evidence_min, kCornerSymbols * log_letters_);
+void WindowDecoder::weigh_windows(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims) const {
   for (std::size_t node = 0; node < claims.size(); ++node) {
     CellClaim& claim = claims[node];
-    if (!claim.named()) continue;
-    const Neighbourhood& around = around_[node];
-    int for_it = 0, against_it = 0;
+    if (claim.status != RegionStatus::kDecoded) continue;
     for (int i = 0; i < kWindowCells; ++i) {
+      const std::int32_t other = around_[node][i];
       const int row = claim.row - 1 + i / kWindowSide, column = claim.column - 1 + i % kWindowSide;
-      if (around[i] < 0 || !shown(row, column)) continue;
-      claim.evidence += shape_evidence(shapes[around[i]], row, column);
-      if (i == kWindowCells / 2 || !claims[around[i]].named()) continue;
-      ++(claims[around[i]].same_cell(row, column) ? for_it : against_it);
-    }
-    const float own = shapes[node].log_probability[array_.at(claim.row, claim.column)];
-    if (shapes[node].letter < 0) {
-      claim.status = RegionStatus::kUnknownShape;
-    } else if (own < options_.own_class_min) {
-      claim.status = RegionStatus::kClassDisagrees;
-    } else if (claim.evidence < evidence_min ||
-               options_.dissent_max * static_cast<float>(for_it) <= static_cast<float>(against_it)) {
-      claim.status = RegionStatus::kNeighboursDisagree;
+      if (other < 0 || shapes[other].letter < 0 || !shown(row, column)) continue;
+      claim.evidence += shapes[other].log_probability[array_.at(row, column)] + log_letters_;
     }
   }
 }
@@ -188,8 +159,8 @@ void WindowDecoder::decode(const std::vector<GridNode>& nodes, const std::vector
   claims.assign(nodes.size(), {});
   look_up_windows(shapes, gate);
   elect(gate, claims);
-  spread(nodes, gate, claims);
-  verify(shapes, claims);
+  judge_.judge(nodes, shapes, gate, claims);
+  weigh_windows(shapes, claims);
 }
 
 }  // namespace slsd

@@ -10,45 +10,25 @@
 
 #include "core/code/codebook.hpp"
 #include "core/code/pattern.hpp"
+#include "core/decode/cell_claim.hpp"
 #include "core/decode/cell_gate.hpp"
 #include "core/decode/classify.hpp"
-#include "core/decode/decoding.hpp"
+#include "core/decode/islands.hpp"
 #include "core/decode/neighbourhood.hpp"
 
 namespace slsd {
 
-/// A cell of the pattern that a node was found to be, and how well its surroundings speak for it.
-struct CellClaim {
-  std::int16_t row = -1, column = -1;
-  float evidence = 0;  ///< log-likelihood of the window's shapes at this cell against chance, natural logarithm
-  RegionStatus status = RegionStatus::kNoNeighbour;  ///< kDecoded, or why not
-
-  [[nodiscard]] bool named() const { return row >= 0; }
-  [[nodiscard]] bool same_cell(int other_row, int other_column) const {
-    return row == other_row && column == other_column;
-  }
-};
-
 struct DecodeWindowsOptions {
-  int rows = 0, columns = 0;    ///< of the part of the array that is shown
-  float evidence_min = 5;       ///< e^5: odds of 150 to 1 against chance
-  float own_class_min = -2.5F;  ///< log-probability of the node's own letter at its cell
-  float mismatch = -3;          ///< what one neighbour may count against a cell at the most
-  /// Named neighbours that contradict a cell, for one that agrees, at which it is rejected: beside an edge in depth a
-  /// symbol of the one surface can fit the grid of the other, and be of the right letter by chance.
-  float dissent_max = 0.2F;
+  int rows = 0, columns = 0;  ///< of the part of the array that is shown
 };
 
 /// Names the cell of each node.
 ///
-/// 1. Every full 3x3 window is looked up, correcting as many errors as the array's distance allows; what the epipolar
-/// gate
-///    excludes does not count.
+/// 1. Every full 3x3 window is looked up: exactly wherever it lies, and with as many errors as the array's distance
+///    corrects on its epipolar line.
 /// 2. Each window found votes for the cells of all its nine nodes, so a node at an edge, or misread, is named by its
-/// neighbours; what the gate excludes for that node is no vote.
-/// 3. What no window reaches is named by neighbours that are named already.
-/// 4. Every name is verified: the node's own shape, and the shapes around it, have to be those of the cells around that
-/// cell.
+///    neighbours; what the gate excludes for that node is no vote.
+/// 3. What is thus proposed is judged as islands: see IslandJudge.
 /// @thread thread-bound: keeps its buffers
 class WindowDecoder {
  public:
@@ -62,6 +42,7 @@ class WindowDecoder {
   struct Hit {
     std::int16_t row = -1, column = -1;
     int weight = 0;
+    bool strays = false;  // it lies where the gate does not admit its middle
   };
   struct Vote {
     int row, column;
@@ -79,14 +60,10 @@ class WindowDecoder {
   [[nodiscard]] Hit continued(std::int32_t node, std::uint32_t key) const;
   [[nodiscard]] Hit look_up(std::int32_t node, std::uint32_t key, const CellGate& gate) const;
   [[nodiscard]] Ballot collect_votes(std::int32_t node, const CellGate& gate) const;
-  void vote(std::int32_t node, const Vote& vote, const CellGate& gate, Ballot& ballot) const;
+  void vote(std::int32_t node, const Vote& vote, bool strays, const CellGate& gate, Ballot& ballot) const;
   void elect(const CellGate& gate, std::vector<CellClaim>& claims) const;
-  void spread(const std::vector<GridNode>& nodes, const CellGate& gate, std::vector<CellClaim>& claims);
-  void verify(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims) const;
-  [[nodiscard]] float shape_evidence(const Classification& shape, int row, int column) const {
-    if (shape.letter < 0) return 0;
-    return std::max(shape.log_probability[array_.at(row, column)] + log_letters_, options_.mismatch);
-  }
+  /// Log-likelihood of each window's shapes against chance.
+  void weigh_windows(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims) const;
   [[nodiscard]] bool shown(int row, int column) const {
     return row >= 0 && column >= 0 && row < options_.rows && column < options_.columns;
   }
@@ -102,6 +79,7 @@ class WindowDecoder {
   float log_letters_;
   std::vector<Neighbourhood> around_;
   std::vector<Hit> hits_;
+  IslandJudge judge_;
 };
 
 }  // namespace slsd

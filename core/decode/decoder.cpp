@@ -6,6 +6,7 @@
 
 #include "core/decode/symbol_reader.hpp"
 #include "core/exposure/light_levels.hpp"
+#include "core/geometry/epipolar_limit.hpp"
 #include "core/geometry/triangulator.hpp"
 #include "core/image_size.hpp"
 
@@ -62,7 +63,8 @@ Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calib
             .camera_index = static_cast<std::uint8_t>(camera_index),
             .options = options,
             .reader = SymbolReader(pattern, projector, std::move(expected), options, std::move(paper)),
-            .view = EpipolarView(camera, projector, options.depth_min_mm, options.depth_max_mm),
+            .view = EpipolarView(camera, projector, options.depth_min_mm, options.depth_max_mm,
+                                 epipolar_gate_px(calibration.report.epipolar_error_px)),
             .triangulator = Triangulator(camera, projector)}));
 }
 
@@ -89,6 +91,7 @@ Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<dou
   const double level = full ? *full : parts_->full_level.of(frame);
   const Lattice& lattice = parts_->reader.read(frame, level, &parts_->view, observer);
   parts_->triangulate(lattice, level);
+  parts_->decoding.off_line = parts_->reader.off_line();
   parts_->reader.report(parts_->decoding);
   if (observer != nullptr) observer->stage_done(Stage::kTriangulate);
   return &parts_->decoding;
@@ -125,11 +128,6 @@ void Decoder::Parts::add_point(const LatticeSymbol& symbol, const TriangulatedPo
   out.camera = camera_index;
   const Pattern& pattern = reader.pattern();
   out.symbol = static_cast<std::uint8_t>(pattern.options.symbols[pattern.array.at(symbol.row, symbol.column)]);
-}
-
-Result<std::vector<SymbolMatch>> Decoder::read_anywhere(const GreyView& frame, std::optional<double> full) {
-  if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
-  return parts_->reader.read_anywhere(frame, full ? *full : parts_->full_level.of(frame));
 }
 
 }  // namespace slsd

@@ -10,7 +10,6 @@
 #include "core/code/pattern.hpp"
 #include "core/decode/decoding.hpp"
 #include "core/decode/options.hpp"
-#include "core/decode/symbol_match.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/image.hpp"
 #include "core/result.hpp"
@@ -42,12 +41,6 @@ class Decoder {
   /// @errors kMismatch: the frame is not of the calibration's size
   [[nodiscard]] Result<const Decoding*> decode(const GreyView& frame, std::optional<double> full = std::nullopt,
                                                StageObserver* observer = nullptr);
-
-  /// Symbols wherever they lie, in the image of a rig that is not as the calibration says: without their epipolar lines
-  /// to check them by, some in a thousand are wrong.
-  /// @errors kMismatch: the frame is not of the calibration's size
-  [[nodiscard]] Result<std::vector<SymbolMatch>> read_anywhere(const GreyView& frame,
-                                                               std::optional<double> full = std::nullopt);
 
  private:
   struct Parts;

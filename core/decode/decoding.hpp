@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "core/cloud/cloud.hpp"
+#include "core/decode/symbol_match.hpp"
 
 namespace slsd {
 
@@ -67,6 +68,9 @@ struct RegionSeen {
 struct Decoding {
   std::vector<CloudPoint> points;
   std::vector<RegionSeen> regions;
+  /// Symbols whose cells are certain, and that lie off their epipolar lines: of a rig that was knocked out of its
+  /// calibration, or of another projector's light.
+  std::vector<SymbolMatch> off_line;
   std::array<std::uint32_t, kRegionStatusCount> counts{};  ///< regions by status
 
   [[nodiscard]] std::uint32_t count(RegionStatus status) const { return counts[static_cast<std::size_t>(status)]; }

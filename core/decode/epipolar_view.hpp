@@ -18,8 +18,10 @@ namespace slsd {
 /// @thread thread-bound: keeps its buffers
 class EpipolarView {
  public:
-  EpipolarView(const CalibratedCamera& camera, const Lens& projector, double depth_min_mm, double depth_max_mm)
-      : camera_rays_(camera.lens), gate_(camera, projector, depth_min_mm, depth_max_mm) {}
+  /// @param tolerance_px  distance from the epipolar line, projector px: epipolar_gate_px()
+  EpipolarView(const CalibratedCamera& camera, const Lens& projector, double depth_min_mm, double depth_max_mm,
+               double tolerance_px)
+      : camera_rays_(camera.lens), gate_(camera, projector, depth_min_mm, depth_max_mm), tolerance_px_(tolerance_px) {}
 
   void look_at(const Sightings& seen) {
     rays_.resize(seen.size());
@@ -33,6 +35,7 @@ class EpipolarView {
   }
   /// One to a sighting.
   [[nodiscard]] std::span<const EpipolarSegment> segments() const { return segments_; }
+  [[nodiscard]] double tolerance_px() const { return tolerance_px_; }
   /// The ray of a pixel that lies some tenths beside a sighting's: so far it turns evenly.
   [[nodiscard]] PixelRay ray_near(std::int32_t sighting, const Eigen::Vector2f& camera_px) const {
     PixelRay ray = rays_[sighting];
@@ -43,6 +46,7 @@ class EpipolarView {
  private:
   RayTable camera_rays_;
   EpipolarGate gate_;
+  double tolerance_px_;
   std::vector<PixelRay> rays_;
   std::vector<Eigen::Vector2f> pixels_;
   std::vector<EpipolarSegment> segments_;

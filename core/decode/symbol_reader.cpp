@@ -4,6 +4,8 @@
 
 #include <Eigen/LU>
 
+#include "core/decode/centre_sigma.hpp"
+
 namespace slsd {
 namespace {
 
@@ -129,7 +131,7 @@ void SymbolReader::decode_windows(const EpipolarView* view) {
     return paper_->decode_windows(pattern().whole_rows(), pattern().whole_columns(), seen_);
   const bool gated = view != nullptr && options_.correspond == Method::kDefault;
   const CellGate gate(cells(), gated ? view->segments() : std::span<const EpipolarSegment>(),
-                      CorrespondOptions{}.epipolar_max_px);
+                      gated ? view->tolerance_px() : 0);
   window_decoder_.decode(seen_.nodes, seen_.shapes, gate, seen_.claims);
 }
 
@@ -140,10 +142,11 @@ void SymbolReader::review(const GreyView& frame) {
 }
 
 void SymbolReader::correspond(const EpipolarView* view) {
+  if (options_.decode_windows == Method::kDefault) correspondence_.refuse_lone(seen_.nodes, seen_.claims);
   if (view == nullptr) {
     correspondence_.settle_duplicates(cells(), seen_.claims);
   } else if (options_.correspond == Method::kDefault) {
-    correspondence_.correspond(cells(), view->segments(), seen_.claims);
+    correspondence_.correspond(cells(), view->segments(), view->tolerance_px(), seen_.claims);
   }
 }
 
@@ -164,6 +167,17 @@ std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, doub
   std::vector<SymbolMatch> matches;
   for (const LatticeSymbol& symbol : read(frame, full, nullptr).symbols) {
     matches.push_back({symbol.centre_px.cast<double>(), cells().pixel(symbol.row, symbol.column), symbol.sigma_px});
+  }
+  return matches;
+}
+
+std::vector<SymbolMatch> SymbolReader::off_line() const {
+  std::vector<SymbolMatch> matches;
+  for (std::size_t i = 0; i < seen_.size(); ++i) {
+    const CellClaim& claim = seen_.claims[i];
+    if (claim.status != RegionStatus::kOffEpipolarLine || !claim.named()) continue;
+    const Eigen::Vector2d centre(seen_.moments[i].x, seen_.moments[i].y);
+    matches.push_back({centre, cells().pixel(claim.row, claim.column), centre_sigma_px(seen_.moments[i])});
   }
   return matches;
 }

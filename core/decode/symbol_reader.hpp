@@ -48,6 +48,8 @@ class SymbolReader {
   /// The same as pairs of pixels, wherever the symbols lie.
   [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, double full);
 
+  /// The symbols of the last frame whose cells are certain and not on their epipolar lines, where they are seen.
+  [[nodiscard]] std::vector<SymbolMatch> off_line() const;
   /// The symbol turned out to be no point.
   void reject(const LatticeSymbol& symbol, RegionStatus status) { seen_.claims[symbol.sighting].status = status; }
   /// What became of every region, with the counters.

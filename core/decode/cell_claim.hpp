@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+
+#include "core/decode/decoding.hpp"
+
+namespace slsd {
+
+/// A cell of the pattern that a node was found to be, and how well its surroundings speak for it.
+struct CellClaim {
+  std::int16_t row = -1, column = -1;
+  float evidence = 0;  ///< log-likelihood of the window's shapes at this cell against chance, natural logarithm
+  RegionStatus status = RegionStatus::kNoNeighbour;  ///< kDecoded, or why not
+  std::int32_t island = -1;                          ///< that it is part of: see IslandJudge
+
+  [[nodiscard]] bool named() const { return row >= 0; }
+  [[nodiscard]] bool same_cell(int other_row, int other_column) const {
+    return row == other_row && column == other_column;
+  }
+};
+
+}  // namespace slsd

@@ -1,0 +1,387 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/islands.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/decode/neighbourhood.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr Direction kDirections[] = {kRight, kDown, kLeft, kUp};
+
+/// A shape speaks against a cell where it is so much likelier to be chance; a damaged one says nothing.
+constexpr float kSpeaksAgainst = -1.5F;
+
+/// The cell beside a cell, one step on.
+struct Beside {
+  int row, column;
+  Beside(const CellClaim& claim, Direction d)
+      : row(claim.row + (d == kDown) - (d == kUp)), column(claim.column + (d == kRight) - (d == kLeft)) {}
+};
+
+Direction across(Direction d, int side) {
+  return static_cast<Direction>((d + (side == 0 ? 1 : 3)) % 4);
+}
+
+}  // namespace
+
+IslandJudge::IslandJudge(const Pattern& pattern, IslandOptions options)
+    : array_(pattern.array),
+      options_(options),
+      log_letters_(std::log(static_cast<float>(pattern.letters()))),
+      link_weight_(static_cast<float>(-std::log(options.link_crosses))) {}
+
+float IslandJudge::ratio(const Frame& frame, std::int32_t node, int row, int column) const {
+  const Classification& shape = frame.shapes[node];
+  return shape.letter < 0 ? 0 : shape.log_probability[array_.at(row, column)] + log_letters_;
+}
+
+/// The best of the cells that a node's neighbours put it on, if it is better than the next.
+bool IslandJudge::adopt(const Frame& frame, std::int32_t node, CellClaim& adopted) const {
+  struct Candidate {
+    int row, column, links;
+    float ratio;
+  };
+  std::array<Candidate, 4> candidates;
+  int count = 0;
+  for (const Direction d : kDirections) {
+    const std::int32_t other = neighbour(frame.nodes, node, d);
+    if (other < 0 || !frame.claims[other].named()) continue;
+    const Beside cell(frame.claims[other], opposite(d));
+    if (!shown(cell.row, cell.column)) continue;
+    const auto end = candidates.begin() + count;
+    const auto known = std::find_if(candidates.begin(), end, [&](const Candidate& candidate) {
+      return candidate.row == cell.row && candidate.column == cell.column;
+    });
+    if (known != end) {
+      ++known->links;
+      continue;
+    }
+    const bool strays = !frame.gate.admits(other, frame.claims[other].row, frame.claims[other].column);
+    if (!strays && !frame.gate.admits(node, cell.row, cell.column)) continue;
+    candidates[count++] = {cell.row, cell.column, 1, ratio(frame, node, cell.row, cell.column)};
+  }
+  const Candidate* best = nullptr;
+  float best_score = 0, second_score = 0;
+  for (int i = 0; i < count; ++i) {
+    const Candidate& candidate = candidates[i];
+    const float score = candidate.ratio + link_weight_ * static_cast<float>(candidate.links);
+    if (best == nullptr || score > best_score) {
+      second_score = best == nullptr ? 0 : best_score;
+      best = &candidate, best_score = score;
+    } else {
+      second_score = std::max(second_score, score);
+    }
+  }
+  if (best == nullptr || (best->ratio <= 0 && best->links < 3) || best_score - second_score < 1) return false;
+  adopted = {static_cast<std::int16_t>(best->row), static_cast<std::int16_t>(best->column), 0, RegionStatus::kDecoded};
+  return true;
+}
+
+/// In rounds, each by what the round before knew, so that it does not matter in which order nodes stand.
+void IslandJudge::grow(const Frame& frame) {
+  queue_.clear();
+  for (std::size_t i = 0; i < frame.nodes.size(); ++i) {
+    if (frame.claims[i].named() || frame.claims[i].status == RegionStatus::kNoNeighbour) continue;
+    queue_.push_back(static_cast<std::int32_t>(i));
+  }
+  cut_.assign(frame.nodes.size(), 0);  // here: whether a node is in the next round's queue
+  while (!queue_.empty()) {
+    next_queue_.clear(), adopted_.clear();
+    for (const std::int32_t node : queue_) {
+      if (CellClaim claim; !frame.claims[node].named() && adopt(frame, node, claim)) {
+        adopted_.push_back(claim);
+        next_queue_.push_back(node);
+      }
+    }
+    queue_.clear();
+    for (std::size_t i = 0; i < adopted_.size(); ++i) frame.claims[next_queue_[i]] = adopted_[i];
+    for (const std::int32_t node : next_queue_) {
+      for (const Direction d : kDirections) {
+        const std::int32_t other = neighbour(frame.nodes, node, d);
+        if (other >= 0 && !frame.claims[other].named()) queue_.push_back(other);
+      }
+    }
+    std::ranges::sort(queue_);
+    queue_.erase(std::ranges::unique(queue_).begin(), queue_.end());
+  }
+}
+
+void IslandJudge::find_islands(const Frame& frame) {
+  island_of_.assign(frame.nodes.size(), -1);
+  islands_.clear(), members_.clear();
+  for (std::size_t i = 0; i < frame.nodes.size(); ++i) {
+    const bool asked = frame.claims[i].named() && frame.claims[i].status == RegionStatus::kDecoded;
+    if (!asked || island_of_[i] >= 0) continue;
+    const auto id = static_cast<std::int32_t>(islands_.size());
+    Island island{.first = static_cast<std::int32_t>(members_.size())};
+    members_.push_back(static_cast<std::int32_t>(i));
+    island_of_[i] = id;
+    for (std::size_t at = island.first; at < members_.size(); ++at) {
+      const std::int32_t node = members_[at];
+      for (const Direction d : kDirections) {
+        const std::int32_t other = neighbour(frame.nodes, node, d);
+        if (other < 0 || island_of_[other] >= 0 || frame.claims[other].status != RegionStatus::kDecoded) continue;
+        const Beside cell(frame.claims[node], d);
+        if (!frame.claims[other].same_cell(cell.row, cell.column)) continue;
+        island_of_[other] = id;
+        members_.push_back(other);
+      }
+    }
+    island.size = static_cast<std::int32_t>(members_.size()) - island.first;
+    islands_.push_back(island);
+  }
+}
+
+IslandJudge::Link IslandJudge::read_link(const Frame& frame, std::int32_t node, Direction direction) const {
+  const std::int32_t other = neighbour(frame.nodes, node, direction);
+  if (other < 0) return Link::kNone;
+  const Beside cell(frame.claims[node], direction);
+  if (!shown(cell.row, cell.column)) return Link::kAgainst;
+  const float speaks = ratio(frame, other, cell.row, cell.column);
+  // A node of another island has a surface of its own, though its letter may fit here too.
+  const bool apart = island_of_[other] >= 0 && island_of_[other] != island_of_[node];
+  if (speaks < kSpeaksAgainst || (apart && speaks > 0)) return Link::kAgainst;
+  const bool together = island_of_[other] == island_of_[node] && frame.claims[other].same_cell(cell.row, cell.column);
+  return speaks > 0 && together ? Link::kAgrees : Link::kNeutral;
+}
+
+void IslandJudge::read_links(const Frame& frame) {
+  links_.resize(frame.nodes.size());
+  for (const std::int32_t node : members_)
+    for (const Direction d : kDirections) links_[node][d] = read_link(frame, node, d);
+}
+
+/// Whether a contradiction is one of several side by side: the edge of a surface, which says nothing against the node.
+/// Where the links beside agree, it stands alone.
+bool IslandJudge::runs_along_edge(const Frame& frame, std::int32_t node, Direction direction) const {
+  int against = 0;
+  for (const int side : {0, 1}) {
+    const Direction aside = across(direction, side);
+    if (links_[node][aside] != Link::kAgrees) continue;
+    const std::int32_t beside = neighbour(frame.nodes, node, aside);
+    if (links_[beside][direction] == Link::kAgrees) return false;
+    against += links_[beside][direction] == Link::kAgainst;
+  }
+  return against > 0;
+}
+
+double IslandJudge::cost_of_rim(const Frame& frame, const Island& island) const {
+  constexpr double kPiece = 3, kLink = 0.1;
+  double cost = 0;
+  for (std::int32_t i = island.first; i < island.first + island.size; ++i) {
+    const std::int32_t node = members_[i];
+    for (const Direction d : kDirections) {
+      if (links_[node][d] != Link::kAgainst) continue;
+      const std::int32_t beside = neighbour(frame.nodes, node, across(d, 0));
+      const bool goes_on = beside >= 0 && island_of_[beside] == island_of_[node] && links_[beside][d] == Link::kAgainst;
+      cost += goes_on ? kLink : kPiece;
+    }
+  }
+  return cost;
+}
+
+void IslandJudge::weigh(const Frame& frame, Island& island) const {
+  // Larger islands differ from every other place, by three letters and more in each window of theirs.
+  constexpr std::int32_t kComparedMax = 150;
+  const bool compares = island.size <= kComparedMax || array_.minimum_distance < 3;
+  const auto members = std::span(members_).subspan(island.first, island.size);
+  double evidence = 0;
+  int off_line = 0;
+  for (const std::int32_t node : members) {
+    evidence += own_ratio(frame, node);
+    off_line += !frame.gate.on_line(node, frame.claims[node].row, frame.claims[node].column);
+  }
+  const bool strays = 2 * off_line > island.size;
+  const double needed = std::log(static_cast<double>(frame.nodes.size())) + cost_of_rim(frame, island) +
+                        std::log(static_cast<double>(island.size) / options_.wrong_cells_max);
+  island.status = RegionStatus::kNoCodeword;
+  if (evidence < needed) return;
+  // Every other place where the epipolar line of one of its nodes lets it be, or anywhere for an island that strays.
+  const std::int32_t probe = members[members.size() / 2];
+  double places = 0, likelihood_elsewhere = 0;
+  frame.gate.visit(probe, strays, [&](int row, int column) {
+    ++places;
+    const int down = row - frame.claims[probe].row, right = column - frame.claims[probe].column;
+    if ((down == 0 && right == 0) || !compares) return;
+    double there = 0;
+    for (const std::int32_t node : members) {
+      const int at_row = frame.claims[node].row + down, at_column = frame.claims[node].column + right;
+      there += shown(at_row, at_column) ? ratio(frame, node, at_row, at_column) : -log_letters_;
+      if (there < evidence - 60) break;
+    }
+    likelihood_elsewhere += std::exp(there - evidence);
+  });
+  if (evidence < needed + std::log(std::max(1., places))) return;
+  if (likelihood_elsewhere * static_cast<double>(island.size) > options_.wrong_cells_max) {
+    island.status = RegionStatus::kAmbiguousCodeword;
+  } else {
+    island.status = strays ? RegionStatus::kOffEpipolarLine : RegionStatus::kDecoded;
+  }
+}
+
+/// One place of the projector lights one place of the scene. Two islands that both show the same part of the pattern,
+/// as much of it as makes an island, cannot both be it, and nothing says which is.
+void IslandJudge::refuse_doubles(const Frame& frame) {
+  holder_.assign(static_cast<std::size_t>(options_.rows) * options_.columns, -1);
+  for (std::size_t id = 0; id < islands_.size(); ++id) {
+    Island& island = islands_[id];
+    if (island.status != RegionStatus::kDecoded) continue;
+    const auto members = std::span(members_).subspan(island.first, island.size);
+    for (const std::int32_t node : members) {
+      std::int32_t& holder =
+          holder_[static_cast<std::size_t>(frame.claims[node].row) * options_.columns + frame.claims[node].column];
+      if (holder < 0) holder = node;
+    }
+  }
+  const double needed = std::log(static_cast<double>(frame.nodes.size()) / options_.wrong_cells_max);
+  std::vector<std::pair<std::int32_t, double>> shared;  // with which island, and how much evidence
+  for (std::size_t id = 0; id < islands_.size(); ++id) {
+    Island& island = islands_[id];
+    if (island.status != RegionStatus::kDecoded && island.status != RegionStatus::kDuplicateCell) continue;
+    shared.clear();
+    for (std::int32_t i = island.first; i < island.first + island.size; ++i) {
+      const std::int32_t node = members_[i];
+      const std::int32_t holder =
+          holder_[static_cast<std::size_t>(frame.claims[node].row) * options_.columns + frame.claims[node].column];
+      if (holder < 0 || island_of_[holder] == static_cast<std::int32_t>(id)) continue;
+      const auto known = std::ranges::find(shared, island_of_[holder], &std::pair<std::int32_t, double>::first);
+      (known == shared.end() ? shared.emplace_back(island_of_[holder], 0.) : *known).second += own_ratio(frame, node);
+    }
+    for (const auto& [other, evidence] : shared) {
+      if (evidence < needed) continue;
+      island.status = islands_[other].status = RegionStatus::kDuplicateCell;
+    }
+  }
+}
+
+/// Nodes that too little holds, in so many rounds as a row of symbols is long that chance could not add.
+void IslandJudge::cut_back(const Frame& frame) {
+  const int rounds = static_cast<int>(std::ceil(-std::log(options_.wrong_cells_max) / log_letters_ / 1.5));
+  constexpr int kHeldBy = 2;
+  for (int round = 0; round < rounds; ++round) {
+    queue_.clear();
+    for (const std::int32_t node : members_) {
+      if (cut_[node] != 0) continue;
+      int held = 0;
+      for (const Direction d : kDirections) {
+        const Link link = links_[node][d];
+        if (link == Link::kAgrees) {
+          held += cut_[neighbour(frame.nodes, node, d)] == 0;
+        } else if (link == Link::kAgainst) {
+          held -= !runs_along_edge(frame, node, d);
+        }
+      }
+      if (held < kHeldBy) queue_.push_back(node);
+    }
+    if (queue_.empty()) return;
+    for (const std::int32_t node : queue_) cut_[node] = 1;
+  }
+}
+
+/// The evidence of the line of nodes through a node, as far as it agrees; nothing where nothing contradicts it.
+std::optional<float> IslandJudge::contradicted_line(const Frame& frame, std::int32_t node, Direction forth) const {
+  constexpr int kReach = 10, kBeyond = 3;
+  constexpr float kUsualShare = 0.5F;
+  float evidence = own_ratio(frame, node), length = 1;
+  bool contradicted = evidence < kSpeaksAgainst;
+  for (const Direction d : {forth, opposite(forth)}) {
+    std::int32_t at = node;
+    for (int i = 0; i < kReach; ++i) {
+      // A misread symbol of the island is weighed with the others; what is none of it ends the line.
+      const std::int32_t next = neighbour(frame.nodes, at, d);
+      const Beside cell(frame.claims[at], d);
+      const bool own =
+          next >= 0 && island_of_[next] == island_of_[node] && frame.claims[next].same_cell(cell.row, cell.column);
+      if (!own) {
+        if (links_[at][d] == Link::kAgainst) contradicted |= !runs_along_edge(frame, at, d);
+        if (links_[at][d] == Link::kNeutral) length += count_doubtful(frame, at, d, kBeyond);
+        break;
+      }
+      at = next;
+      evidence += own_ratio(frame, at), ++length;
+    }
+  }
+  contradicted |= evidence < kUsualShare * log_letters_ * length;
+  return contradicted ? std::optional(evidence) : std::nullopt;
+}
+
+/// How many nodes on from the end of a line, of so many, may be its own and say nothing for it.
+float IslandJudge::count_doubtful(const Frame& frame, std::int32_t node, Direction d, int most) const {
+  const Beside first(frame.claims[node], d);
+  const int down = first.row - frame.claims[node].row, right = first.column - frame.claims[node].column;
+  int row = first.row, column = first.column, count = 0;
+  for (std::int32_t at = neighbour(frame.nodes, node, d); at >= 0 && count < most; at = neighbour(frame.nodes, at, d)) {
+    if (!shown(row, column) || ratio(frame, at, row, column) < kSpeaksAgainst) break;
+    row += down, column += right, ++count;
+  }
+  return static_cast<float>(count);
+}
+
+void IslandJudge::cut_contradicted_lines(const Frame& frame) {
+  lines_.clear();
+  std::size_t rim = 1;  // links across which chance could have led on
+  for (const std::int32_t node : members_) {
+    rim += static_cast<std::size_t>(std::ranges::count(links_[node], Link::kAgainst));
+    const auto along = contradicted_line(frame, node, kRight), down = contradicted_line(frame, node, kDown);
+    if (along) lines_.push_back({node, *along});
+    if (down) lines_.push_back({node, *down});
+  }
+  const double evidence_min = std::log(static_cast<double>(rim) / options_.wrong_cells_max);
+  for (const auto& [node, evidence] : lines_)
+    if (evidence < evidence_min) cut_[node] = 1;
+}
+
+void IslandJudge::judge(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes,
+                        const CellGate& gate, std::vector<CellClaim>& claims) {
+  const Frame frame{nodes, shapes, gate, claims};
+  grow(frame);
+  find_islands(frame);
+  read_links(frame);
+  for (Island& island : islands_) weigh(frame, island);
+  const auto take_over = [&](RegionStatus unless) {
+    for (const std::int32_t node : members_) {
+      const RegionStatus status = islands_[island_of_[node]].status;
+      claims[node].island = island_of_[node];
+      if (status != unless) claims[node].status = status;
+      if (status == RegionStatus::kNoCodeword || status == RegionStatus::kAmbiguousCodeword)
+        claims[node].row = claims[node].column = -1;
+    }
+  };
+  take_over(RegionStatus::kDecoded);
+  // Again without those that were no islands: what is left of a contradiction is an edge, or stands alone.
+  find_islands(frame);
+  read_links(frame);
+  cut_.assign(nodes.size(), 0);
+  cut_contradicted_lines(frame);
+  cut_back(frame);
+  for (const std::int32_t node : members_)
+    if (cut_[node] != 0) {
+      claims[node].status =
+          own_ratio(frame, node) < 0 ? RegionStatus::kClassDisagrees : RegionStatus::kNeighboursDisagree;
+    }
+  // What the cuts have parted has to stand by itself.
+  find_islands(frame);
+  read_links(frame);
+  for (Island& island : islands_) weigh(frame, island);
+  refuse_doubles(frame);
+  take_over(RegionStatus::kDecoded);
+  for (const std::int32_t node : members_) {
+    CellClaim& claim = claims[node];
+    if (claim.status != RegionStatus::kDecoded) continue;
+    if (shapes[node].letter < 0) {
+      claim.status = RegionStatus::kUnknownShape;
+    } else if (own_ratio(frame, node) < 0) {
+      claim.status = RegionStatus::kClassDisagrees;
+    } else if (!gate.on_line(node, claim.row, claim.column)) {
+      claim.status = RegionStatus::kOffEpipolarLine;
+    } else if (!gate.admits(node, claim.row, claim.column)) {
+      claim.status = RegionStatus::kOutOfDepthRange;
+    }
+  }
+}
+
+}  // namespace slsd

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/code/pattern.hpp"
+#include "core/decode/cell_claim.hpp"
+#include "core/decode/cell_gate.hpp"
+#include "core/decode/classify.hpp"
+#include "core/decode/link_grid.hpp"
+
+namespace slsd {
+
+/// What may go wrong, and what it is weighed by. docs/decoder.md derives each.
+struct IslandOptions {
+  int rows = 0, columns = 0;        ///< of the part of the array that is shown
+  double wrong_cells_max = 0.001;   ///< in expectation, in a frame
+  double link_crosses = 1.0 / 150;  ///< share of links that lead across an edge in depth without being broken for it
+};
+
+/// Says which of the cells that were proposed for a frame's nodes are certain.
+///
+/// An island is a set of linked nodes whose cells lie beside each other as the nodes do. Its symbols speak for it once
+/// each: the sum of their log-likelihood ratios against chance. That has to outweigh
+///
+/// - every other place on the epipolar lines where the island fits, letter by letter;
+/// - what choosing it has cost: which nodes of the frame it is made of, and where along its rim it ends although links
+///   lead on:     cost = log nodes + log places + 3 a straight piece of the rim + 0.1 a link of it
+/// - the budget: log (its nodes / wrong cells in a frame).
+///
+/// Within an island a node has to be held by two links more than contradict it, and where the line of nodes through it
+/// is contradicted, the part of the line that agrees has to reach the budget by itself: so chance adds no node of
+/// another surface to a rim, and two rows at one depth name no row between them at another.
+/// @thread thread-bound: keeps its buffers
+class IslandJudge {
+ public:
+  IslandJudge(const Pattern& pattern, IslandOptions options);
+
+  /// @param claims  in: cells as proposed, or none; out: with the reason where it is rejected
+  void judge(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes, const CellGate& gate,
+             std::vector<CellClaim>& claims);
+
+ private:
+  /// What a link says of the cell of the node that it leads from.
+  enum class Link : std::uint8_t { kNone, kAgrees, kNeutral, kAgainst };
+  struct Island {
+    std::int32_t first = 0, size = 0;  // of members_
+    RegionStatus status = RegionStatus::kDecoded;
+  };
+
+  struct Frame {
+    const std::vector<GridNode>& nodes;
+    const std::vector<Classification>& shapes;
+    const CellGate& gate;
+    std::vector<CellClaim>& claims;
+  };
+
+  /// Log-likelihood ratio of a node's shape against chance, were it that cell's.
+  [[nodiscard]] float ratio(const Frame& frame, std::int32_t node, int row, int column) const;
+  [[nodiscard]] float own_ratio(const Frame& frame, std::int32_t node) const {
+    return ratio(frame, node, frame.claims[node].row, frame.claims[node].column);
+  }
+  [[nodiscard]] bool shown(int row, int column) const {
+    return row >= 0 && column >= 0 && row < options_.rows && column < options_.columns;
+  }
+  void grow(const Frame& frame);
+  bool adopt(const Frame& frame, std::int32_t node, CellClaim& adopted) const;
+  void find_islands(const Frame& frame);
+  void read_links(const Frame& frame);
+  [[nodiscard]] Link read_link(const Frame& frame, std::int32_t node, Direction direction) const;
+  [[nodiscard]] bool runs_along_edge(const Frame& frame, std::int32_t node, Direction direction) const;
+  void weigh(const Frame& frame, Island& island) const;
+  [[nodiscard]] double cost_of_rim(const Frame& frame, const Island& island) const;
+  void refuse_doubles(const Frame& frame);
+  void cut_back(const Frame& frame);
+  void cut_contradicted_lines(const Frame& frame);
+  [[nodiscard]] float count_doubtful(const Frame& frame, std::int32_t node, Direction direction, int most) const;
+  [[nodiscard]] std::optional<float> contradicted_line(const Frame& frame, std::int32_t node, Direction forth) const;
+
+  CodeArray array_;
+  IslandOptions options_;
+  float log_letters_, link_weight_;
+  std::vector<std::int32_t> island_of_;  // -1: none
+  std::vector<Island> islands_;
+  std::vector<std::int32_t> members_, queue_, next_queue_;
+  std::vector<std::array<Link, 4>> links_;
+  std::vector<CellClaim> adopted_;
+  std::vector<std::uint8_t> cut_;
+  std::vector<std::pair<std::int32_t, float>> lines_;  // contradicted ones: through which node, with what evidence
+  std::vector<std::int32_t> holder_;
+};
+
+}  // namespace slsd

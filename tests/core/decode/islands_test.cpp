@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/islands.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <random>
+
+#include <gmock/gmock.h>
+
+#include "core/decode/decode_windows.hpp"
+#include "tests/core/decode/shipped_pattern.hpp"
+#include "tests/core/decode/simulated_grid.hpp"
+#include "tests/simulator/simulator.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr int kRows = 44, kColumns = 71;
+constexpr auto kDecoded = RegionStatus::kDecoded;
+
+Classification read_as(int letter, int letters) {
+  Classification shape;
+  for (int i = 0; i < letters; ++i)
+    shape.log_probability[i] = static_cast<float>(std::log(i == letter ? 0.992 : 0.008 / (letters - 1)));
+  shape.letter = static_cast<std::int8_t>(letter);
+  return shape;
+}
+
+/// Nodes at places of a grid, linked wherever there are two side by side, that show what they are told to.
+class Islands : public testing::Test {
+ protected:
+  Islands()
+      : pattern_(shipped_pattern("16px-5.toml")),
+        cells_(pattern_, std::vector<Prototype>(5, flat_prototype()), paper_rig().projector) {}
+
+  static Prototype flat_prototype() {
+    Prototype prototype;
+    prototype.centroid_px = {0, 0};
+    return prototype;
+  }
+
+  void show(int row, int column, int letter) {
+    grid_.add(row, column, {18.F * static_cast<float>(column), 18.F * static_cast<float>(row)},
+              LatticeFrame::Identity());
+    shapes_.push_back(read_as(letter, 5));
+  }
+  void show_pattern(int top, int left, int bottom, int right, int slid = 0) {
+    for (int row = top; row < bottom; ++row)
+      for (int column = left; column < right; ++column) show(row, column, pattern_.array.at(row, column + slid));
+  }
+
+  std::vector<CellClaim> decode(std::span<const EpipolarSegment> segments = {}) {
+    grid_.link_truly();
+    WindowDecoder decoder(pattern_, {.rows = kRows, .columns = kColumns}, 1);
+    std::vector<CellClaim> claims;
+    decoder.decode(grid_.nodes, shapes_, CellGate(cells_, segments, 1.5), claims);
+    return claims;
+  }
+  int decoded(const std::vector<CellClaim>& claims) const {
+    return static_cast<int>(std::ranges::count(claims, kDecoded, &CellClaim::status));
+  }
+  bool is_decoded(const std::vector<CellClaim>& claims, int row, int column) const {
+    return claims[grid_.node_at(row, column)].status == kDecoded;
+  }
+
+  Pattern pattern_;
+  CellRays cells_;
+  SimulatedGrid grid_;
+  std::vector<Classification> shapes_;
+};
+
+TEST_F(Islands, NeedEvidenceForTheBudgetWhereTheyMayLieAnywhere) {
+  show_pattern(10, 10, 13, 13);  // nine letters are e^14 to 1, and there are 3124 places
+  EXPECT_EQ(decoded(decode()), 0);
+  show_pattern(20, 30, 24, 35);
+  EXPECT_EQ(decoded(decode()), 20);
+}
+
+TEST_F(Islands, AreNoLargerForNodesThatChanceAddsAtTheirRim) {
+  show_pattern(10, 10, 20, 30);
+  std::mt19937 random(4);
+  for (int row = 20; row < 30; ++row)
+    for (int column = 10; column < 30; ++column) show(row, column, static_cast<int>(random() % 5));
+  const auto claims = decode();
+  int alike = 0;
+  for (std::size_t i = 200; i < claims.size(); ++i) {
+    const auto [row, column] = grid_.cells[i];
+    alike += shapes_[i].letter == pattern_.array.at(row, column);
+    EXPECT_NE(claims[i].status, kDecoded) << row << ", " << column;
+  }
+  EXPECT_GT(alike, 20);  // so many letters are the pattern's by chance
+  EXPECT_GE(decoded(claims), 195);
+}
+
+// Two rows at one depth named the row between them, wherever its letters agreed.
+TEST_F(Islands, NameNoRowBetweenThemThatIsAtAnotherDepth) {
+  for (int slid = 1; slid <= 6; ++slid) {
+    grid_ = {}, shapes_.clear();
+    show_pattern(10, 10, 20, 50);
+    show_pattern(20, 10, 21, 50, slid);
+    show_pattern(21, 10, 30, 50);
+    const auto claims = decode();
+    for (int column = 10; column < 50; ++column) {
+      const CellClaim& claim = claims[grid_.node_at(20, column)];
+      EXPECT_FALSE(claim.status == kDecoded && claim.same_cell(20, column)) << slid << ": " << column;
+    }
+    EXPECT_GT(decoded(claims), 700);
+  }
+}
+
+TEST_F(Islands, LoseNothingAtAStraightEdgeInDepth) {
+  show_pattern(10, 10, 20, 40);
+  show_pattern(20, 10, 30, 40, 7);
+  const auto claims = decode();
+  EXPECT_GE(decoded(claims), 560);  // of 600
+  for (std::size_t i = 0; i < claims.size(); ++i) {
+    const auto [row, column] = grid_.cells[i];
+    if (claims[i].status == kDecoded) EXPECT_TRUE(claims[i].same_cell(row, row < 20 ? column : column + 7));
+  }
+}
+
+TEST_F(Islands, AreBothRefusedWhereTheyShowOnePartOfThePattern) {
+  for (int row = 0; row < 8; ++row) {
+    for (int column = 0; column < 8; ++column) {
+      show(row, column, pattern_.array.at(20 + row, 30 + column));
+      show(row, column + 20, pattern_.array.at(20 + row, 30 + column));
+    }
+  }
+  for (const CellClaim& claim : decode()) EXPECT_EQ(claim.status, RegionStatus::kDuplicateCell);
+}
+
+TEST_F(Islands, AreNotOneMistakeAwayFromNothing) {
+  show_pattern(10, 10, 18, 18);
+  shapes_[grid_.node_at(14, 14)] = read_as((pattern_.array.at(14, 14) + 1) % 5, 5);
+  const auto claims = decode();
+  EXPECT_EQ(claims[grid_.node_at(14, 14)].status, RegionStatus::kClassDisagrees);
+  EXPECT_GE(decoded(claims), 48);
+}
+
+TEST_F(Islands, SayThatTheyLieOffTheirEpipolarLines) {
+  show_pattern(10, 10, 20, 30);
+  const std::vector<EpipolarSegment> nowhere(grid_.nodes.size());
+  for (const CellClaim& claim : decode(nowhere)) EXPECT_EQ(claim.status, RegionStatus::kOffEpipolarLine);
+}
+
+TEST_F(Islands, LoseTheNodesThatOneLinkAloneHolds) {
+  show_pattern(10, 10, 18, 18);
+  show(12, 18, pattern_.array.at(12, 18));
+  show(12, 19, pattern_.array.at(12, 19));
+  const auto claims = decode();
+  EXPECT_EQ(decoded(claims), 64);
+  EXPECT_EQ(claims[grid_.node_at(12, 19)].status, RegionStatus::kNeighboursDisagree);
+}
+
+TEST_F(Islands, AreTheSameInWhateverOrderNodesStand) {
+  std::mt19937 random(6);
+  show_pattern(10, 10, 25, 40);
+  show_pattern(25, 10, 26, 40, 3);
+  show_pattern(26, 10, 35, 40);
+  for (Classification& shape : shapes_)
+    if (random() % 12 == 0) shape = read_as(static_cast<int>(random() % 5), 5);
+  const auto claims = decode();
+  std::vector<std::size_t> order(shapes_.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  for (int round = 0; round < 3; ++round) {
+    std::shuffle(order.begin(), order.end(), random);
+    SimulatedGrid grid;
+    std::vector<Classification> shapes;
+    for (const std::size_t i : order) {
+      const auto [row, column] = grid_.cells[i];
+      grid.add(row, column, grid_.nodes[i].centre_px, LatticeFrame::Identity());
+      shapes.push_back(shapes_[i]);
+    }
+    std::swap(grid, grid_), std::swap(shapes, shapes_);
+    const auto shuffled = decode();
+    std::swap(grid, grid_), std::swap(shapes, shapes_);
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      EXPECT_EQ(shuffled[k].status, claims[order[k]].status) << k;
+      EXPECT_EQ(shuffled[k].row, claims[order[k]].row);
+      EXPECT_EQ(shuffled[k].column, claims[order[k]].column);
+    }
+  }
+}
+
+// Every window of an array whose right half is its left one again answers to two cells.
+TEST_F(Islands, AreNoneWhereEveryWindowAnswersToTwoCells) {
+  for (int row = 0; row < kRows; ++row)
+    for (int column = 0; column < 35; ++column)
+      pattern_.array.cells[row * pattern_.array.columns + column + 35] =
+          pattern_.array.cells[row * pattern_.array.columns + column];
+  pattern_.array.minimum_distance = 0;
+  show_pattern(0, 0, 40, 34);
+  EXPECT_EQ(decoded(decode()), 0);
+}
+
+}  // namespace
+}  // namespace slsd
