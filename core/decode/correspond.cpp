@@ -26,19 +26,27 @@ void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellCl
 }
 
 void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, std::vector<CellClaim>& claims) {
-  constexpr int kReach = 2;
+  constexpr int kReach = 3;
+  const auto stands = [&](std::int32_t node, std::int32_t other) {
+    return other >= 0 && claims[other].status == RegionStatus::kDecoded && claims[other].island == claims[node].island;
+  };
+  // Whether the island goes on there, refused or not, or no node is there that could be of another surface.
+  const auto continues = [&](std::int32_t node, Direction d) {
+    const std::int32_t other = neighbour(nodes, node, d);
+    const Eigen::Vector2f to = step(d);
+    return other < 0 || claims[other].same_cell(claims[node].row + static_cast<int>(to.y()),
+                                                claims[node].column + static_cast<int>(to.x()));
+  };
   const auto is_lone = [&](std::int32_t node, Direction forth) {
-    bool has_any = false;
+    int standing = 0, refused = 0;
     for (const Direction d : {forth, opposite(forth)}) {
-      std::int32_t other = node;
-      for (int i = 0; i < kReach; ++i) {
-        other = neighbour(nodes, other, d);
-        if (other < 0) break;
-        has_any = true;
-        if (claims[other].status == RegionStatus::kDecoded && claims[other].island == claims[node].island) return false;
-      }
+      std::int32_t other = neighbour(nodes, node, d);
+      for (int i = 0; i < kReach && other >= 0; ++i, other = neighbour(nodes, other, d))
+        ++(stands(node, other) ? standing : refused);
     }
-    return has_any;
+    const auto aside = static_cast<Direction>((forth + 1) % 4);
+    const bool inside = continues(node, aside) && continues(node, opposite(aside));
+    return refused > (inside ? 2 * kReach - 1 : standing);
   };
   lone_.clear();
   for (std::int32_t node = 0; node < static_cast<std::int32_t>(nodes.size()); ++node) {

@@ -26,8 +26,9 @@ class Correspondence {
   void correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,
                   std::vector<CellClaim>& claims);
 
-  /// Refuses symbols that stand alone in their row, or in their column, with neighbours on it that were all refused:
-  /// the edge that cut those runs through them as well, and what is left of two symbols looks like a whole one.
+  /// Refuses symbols at a rim most of whose neighbours along their row, or their column, were refused: the edge that
+  /// cut those runs through them as well, and what is left of two symbols can look like a whole one. Between decoded
+  /// ones on both sides it takes that all of them were.
   void refuse_lone(const std::vector<GridNode>& nodes, std::vector<CellClaim>& claims);
 
   /// The duplicates alone, where there is no calibration.

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "tests/core/decode/shipped_pattern.hpp"
+#include "tests/core/decode/simulated_grid.hpp"
 #include "tests/simulator/simulator.hpp"
 
 namespace slsd {
@@ -106,6 +107,42 @@ TEST_F(Correspond, LeavesEarlierReasonsAlone) {
   add(20, 30, 20, 30);
   claims_[0].status = RegionStatus::kClassDisagrees;
   EXPECT_THAT(statuses(), testing::ElementsAre(RegionStatus::kClassDisagrees));
+}
+
+/// A sheet of 6 rows of 9 nodes, all decoded; below it a row of another surface.
+struct RimSheet {
+  SimulatedGrid grid;
+  std::vector<CellClaim> claims;
+
+  RimSheet() {
+    for (int row = 0; row < 7; ++row) {
+      for (int column = 0; column < 9; ++column) {
+        grid.add(row, column, {0, 0}, LatticeFrame::Identity());
+        claims.push_back({static_cast<std::int16_t>(row), static_cast<std::int16_t>(row < 6 ? column : column + 20), 0,
+                          kDecoded, row < 6 ? 0 : 1});
+      }
+    }
+    grid.link_truly();
+  }
+  CellClaim& at(int row, int column) { return claims[grid.node_at(row, column)]; }
+};
+
+TEST(RefuseLone, RefusesWhatStandsBetweenRefusedOnesAtARim) {
+  RimSheet sheet;
+  for (const int column : {0, 1, 2, 3, 5, 6, 8}) sheet.at(5, column).status = RegionStatus::kDamagedShape;
+  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  EXPECT_EQ(sheet.at(5, 4).status, RegionStatus::kNeighboursDisagree);
+  EXPECT_EQ(sheet.at(5, 7).status, RegionStatus::kNeighboursDisagree);
+  for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(4, column).status, kDecoded);
+}
+
+TEST(RefuseLone, KeepsWhatIsWholeAtARimAndInside) {
+  RimSheet sheet;
+  for (const int column : {2, 6}) sheet.at(5, column).status = RegionStatus::kDamagedShape;
+  for (const int column : {0, 1, 2, 3, 5, 6}) sheet.at(2, column).status = RegionStatus::kDamagedShape;
+  const std::vector<CellClaim> before = sheet.claims;
+  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(sheet.claims[i].status, before[i].status) << i;
 }
 
 }  // namespace
