@@ -5,10 +5,10 @@
 #include <optional>
 #include <vector>
 
-#include "core/geometry/epipolar_limit.hpp"
 #include "core/calibrate/observations.hpp"
 #include "core/calibrate/trueness.hpp"
 #include "core/geometry/calibration.hpp"
+#include "core/geometry/epipolar_limit.hpp"
 #include "core/result.hpp"
 
 namespace slsd {

@@ -71,7 +71,8 @@ Result<> PatternOptions::validate() const {
   return array_options(with_symbols).validate();
 }
 
-// Among the best that ./run tables finds: see docs/alphabet.md. Five letters where they reach minimum distance 3, else six.
+// Among the best that ./run tables finds: see docs/alphabet.md. Five letters where they reach minimum distance 3, else
+// six.
 std::vector<int> default_symbols(int symbol_size_px) {
   switch (symbol_size_px) {
     case 16:

@@ -38,8 +38,8 @@ struct SymbolLoss {
 /// far below the 2 % of symbols misread that a pattern of minimum distance 3 survives.
 inline constexpr double kRiskyDistance = 4.0;
 
-/// Above this a symbol is risky: what is lost is missing in the nine windows around it. The looks are of every tilt that
-/// occurs; a pattern of which each symbol is lost in one of ten still decodes to nine tenths on a sculpture.
+/// Above this a symbol is risky: what is lost is missing in the nine windows around it. The looks are of every tilt
+/// that occurs; a pattern of which each symbol is lost in one of ten still decodes to nine tenths on a sculpture.
 inline constexpr double kRiskyLoss = 0.15;
 
 /// How far apart the members of a set of symbols are.

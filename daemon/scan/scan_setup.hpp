@@ -22,8 +22,8 @@ namespace slsd {
 /// @errors of make_pattern(), read_file() and read_pattern(); kMismatch: not of the projector's size
 [[nodiscard]] Result<Pattern> configured_pattern(const Configuration& configuration);
 
-/// Camera px for one projector px, of the calibrated camera that sees the pattern smallest; of the paper's rig without a
-/// calibration.
+/// Camera px for one projector px, of the calibrated camera that sees the pattern smallest; of the paper's rig without
+/// a calibration.
 [[nodiscard]] double pattern_scale(const std::optional<Calibration>& calibration, const DecodeOptions& options);
 
 /// What is risky about the pattern's choice of symbols at a scale, a sentence each; nothing where nothing is. Takes a

@@ -6,8 +6,8 @@
 #include <iterator>
 #include <numeric>
 
-#include "core/decode/separability.hpp"
 #include "core/code/symbol.hpp"
+#include "core/decode/separability.hpp"
 
 namespace slsd {
 namespace {

@@ -49,7 +49,7 @@ class HeadlessProjector final : public Projector {
   ProjectorDescription description_;
   bool connected_ = false;
   MonotonicTime first_refresh_;
-  Grey8 showing_, light_;  // what was asked for, and the values that a monitor would get for it
+  Grey8 showing_, light_;                  // what was asked for, and the values that a monitor would get for it
   std::optional<MonotonicTime> complete_;  ///< of what is shown, until show() has said so
   std::uint64_t shows_ = 0;
 };

@@ -90,7 +90,7 @@ class Slsd(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stdout)
 
     def test_warns_of_symbols_that_look_alike(self):
-        self.file.write_text("[pattern]\nsymbol_size_px = 8\nsymbols = [3, 7, 22, 25]\n", encoding="utf-8")
+        self.file.write_text("[pattern]\nsymbol_size_px = 8\nsymbols = [1, 7, 22, 25]\n", encoding="utf-8")
         self.assertIn("warning  symbol", slsd("--check", "--config", self.file).stdout)
 
     def test_latency_refuses_what_sees_no_flash(self):

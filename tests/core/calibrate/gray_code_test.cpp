@@ -11,7 +11,6 @@
 
 #include <gmock/gmock.h>
 
-
 namespace slsd {
 namespace {
 
