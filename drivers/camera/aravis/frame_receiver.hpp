@@ -19,11 +19,33 @@
 #include "drivers/camera/aravis/device_clock.hpp"
 #include "drivers/camera/aravis/frame_counts.hpp"
 #include "drivers/camera/aravis/g_object.hpp"
-#include "drivers/camera/aravis/stream_buffers.hpp"
 #include "drivers/camera/frame.hpp"
 #include "drivers/camera/frame_pool.hpp"
 
 namespace slsd {
+
+/// The buffers of one stream, each with the stream or lent to a frame. Frames may outlive the stream: a buffer that is
+/// given back after its end is freed.
+/// @thread thread-bound; the frames that it lends may end on any thread
+class StreamBuffers {
+ public:
+  /// Allocates the buffers and hands them to the stream.
+  StreamBuffers(ArvStream* stream, std::size_t bytes_each, int buffers);
+  /// The stream is not used from then on.
+  ~StreamBuffers();
+  StreamBuffers(const StreamBuffers&) = delete;
+  StreamBuffers& operator=(const StreamBuffers&) = delete;
+
+  [[nodiscard]] int lent() const;
+  /// A lease on a buffer that was taken from the stream.
+  [[nodiscard]] FrameLease lend(ArvBuffer* buffer);
+  /// For a buffer that was not lent.
+  void return_unread(ArvBuffer* buffer);
+
+ private:
+  struct Shared;
+  std::shared_ptr<Shared> shared_;  ///< with the frames
+};
 
 /// Turns the buffers of a stream into frames, and refuses those that are not what was asked for.
 /// @thread thread-bound

@@ -16,7 +16,7 @@
 #include <span>
 #include <vector>
 
-#include "drivers/camera/aravis/host_interface.hpp"
+#include "drivers/camera/aravis/configure_network.hpp"
 #include "drivers/system/file_descriptor.hpp"
 #include "drivers/system/system_error.hpp"
 

@@ -8,8 +8,8 @@
 #include <chrono>
 
 #include "core/printable.hpp"
+#include "drivers/camera/aravis/configure_network.hpp"
 #include "drivers/camera/aravis/gige_discovery.hpp"
-#include "drivers/camera/aravis/host_interface.hpp"
 #include "drivers/camera/aravis/open_device.hpp"
 #include "drivers/camera/aravis/pixel_layout.hpp"
 #include "drivers/camera/listing/sysfs.hpp"

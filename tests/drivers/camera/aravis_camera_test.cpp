@@ -12,8 +12,8 @@
 
 #include <gmock/gmock.h>
 
+#include "drivers/camera/aravis/configure_network.hpp"
 #include "drivers/camera/aravis/gige_discovery.hpp"
-#include "drivers/camera/aravis/host_interface.hpp"
 #include "tests/drivers/allocations.hpp"
 #include "tests/drivers/camera/aravis_test.hpp"
 

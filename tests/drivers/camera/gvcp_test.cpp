@@ -10,7 +10,6 @@
 
 #include "core/printable.hpp"
 #include "drivers/camera/aravis/configure_network.hpp"
-#include "drivers/camera/aravis/host_interface.hpp"
 
 namespace slsd {
 namespace {
