@@ -6,8 +6,7 @@
 
 #include <utility>
 
-#include "daemon/scan/hardware.hpp"
-#include "daemon/scan/thread_name.hpp"
+#include "drivers/system/thread_name.hpp"
 
 namespace slsd {
 namespace {

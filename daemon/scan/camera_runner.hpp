@@ -2,8 +2,10 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -12,11 +14,9 @@
 #include <thread>
 
 #include "core/result.hpp"
-#include "daemon/scan/backoff.hpp"
 #include "daemon/scan/device_status.hpp"
 #include "daemon/scan/heartbeat.hpp"
 #include "daemon/scan/patience.hpp"
-#include "daemon/scan/sequence_gaps.hpp"
 #include "drivers/camera/camera.hpp"
 
 namespace slsd {
@@ -25,6 +25,28 @@ namespace slsd {
 enum class Exposure {
   kFresh,  ///< the first whose exposure begins after the capture
   kNext,   ///< the one after the last, where the camera runs freely
+};
+
+/// Counts frames that are missing between those delivered and that no error has told of.
+/// @thread thread-bound
+class SequenceGaps {
+ public:
+  /// The device counts anew.
+  void restart() { *this = {}; }
+  /// A frame was told to be lost.
+  void note_failure() { ++failures_; }
+  /// @return how many frames before this one were lost without an error
+  [[nodiscard]] std::uint64_t note_frame(std::uint64_t sequence) {
+    const std::uint64_t missing = last_ && sequence > *last_ ? sequence - *last_ - 1 : 0;
+    const std::uint64_t told = std::min(missing, failures_);
+    last_ = sequence;
+    failures_ = 0;
+    return missing - told;
+  }
+
+ private:
+  std::optional<std::uint64_t> last_;
+  std::uint64_t failures_ = 0;
 };
 
 /// A camera and the thread that it lives on, its supervisor: opens it, opens it again after it was lost, with growing

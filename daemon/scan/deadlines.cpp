@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "daemon/scan/thread_name.hpp"
+#include "drivers/system/thread_name.hpp"
 
 namespace slsd {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "daemon/scan/thread_name.hpp"
+#include "drivers/system/thread_name.hpp"
 
 namespace slsd {
 namespace {

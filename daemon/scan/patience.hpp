@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/result.hpp"
+#include "daemon/configuration/scan_options.hpp"
 #include "drivers/camera/frame.hpp"
 
 namespace slsd {
@@ -51,6 +52,27 @@ struct Patience {
     }
     return true;
   }
+};
+
+/// The pauses between attempts to open a device: each twice as long as the one before, up to the longest.
+/// @thread thread-bound
+class Backoff {
+ public:
+  explicit Backoff(const ScanOptions& options)
+      : first_(options.reopen_first_ms), longest_(options.reopen_longest_ms), next_(first_) {}
+
+  /// The pause before the next attempt.
+  [[nodiscard]] std::chrono::milliseconds next() {
+    const auto pause = next_;
+    next_ = std::min(2 * next_, longest_);
+    return pause;
+  }
+  void reset() { next_ = first_; }
+
+ private:
+  std::chrono::milliseconds first_;
+  std::chrono::milliseconds longest_;
+  std::chrono::milliseconds next_;
 };
 
 }  // namespace slsd

@@ -12,8 +12,8 @@
 #include "core/image.hpp"
 #include "core/picture/picture.hpp"
 #include "core/result.hpp"
-#include "daemon/scan/backoff.hpp"
 #include "daemon/scan/device_status.hpp"
+#include "daemon/scan/patience.hpp"
 #include "drivers/projector/projector.hpp"
 
 namespace slsd {

@@ -11,12 +11,13 @@
 #include "core/exposure/light_levels.hpp"
 #include "core/utc_text.hpp"
 #include "daemon/scan/frame_image.hpp"
-#include "daemon/scan/stray_symbols.hpp"
 
 namespace slsd {
 namespace {
 
 using std::chrono::steady_clock;
+
+constexpr std::size_t kStraysMin = 100;
 
 std::string utc_time(MonotonicTime time) {
   return utc_text_ms(std::chrono::system_clock::now() - (steady_clock::now() - time));
@@ -86,6 +87,19 @@ void shade(std::span<CloudPoint> points, const SceneLight& light, ScanResult& re
 }
 
 }  // namespace
+
+std::vector<CloudPoint> stray_symbols(const Decoding& decoding, std::uint8_t camera) {
+  if (decoding.off_line.size() < kStraysMin || decoding.off_line.size() < decoding.points.size()) return {};
+  std::vector<CloudPoint> strays;
+  for (const SymbolMatch& match : decoding.off_line) {
+    CloudPoint& stray = strays.emplace_back();
+    const Eigen::Vector2f seen = match.camera_px.cast<float>(), lit = match.projector_px.cast<float>();
+    stray.camera_u = seen.x(), stray.camera_v = seen.y();
+    stray.projector_u = lit.x(), stray.projector_v = lit.y();
+    stray.camera = camera;
+  }
+  return strays;
+}
 
 Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_t lane, const ScanRequest& request,
                                const std::string& scan_id) {

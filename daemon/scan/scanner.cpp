@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <random>
 
-#include "daemon/scan/thread_name.hpp"
 #include "drivers/files/encode_png.hpp"
+#include "drivers/system/thread_name.hpp"
 
 namespace slsd {
 namespace {

@@ -20,7 +20,7 @@
 #include <spdlog/spdlog.h>
 
 #include "core/printable.hpp"
-#include "daemon/scan/thread_name.hpp"
+#include "drivers/system/thread_name.hpp"
 
 namespace slsd {
 namespace {

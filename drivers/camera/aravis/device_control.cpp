@@ -2,14 +2,14 @@
 // Copyright the slsd authors
 #include "drivers/camera/aravis/device_control.hpp"
 
-#include <pthread.h>
-
 #include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
+
+#include "drivers/system/thread_name.hpp"
 
 namespace slsd {
 namespace {
@@ -200,7 +200,7 @@ bool DeviceControl::follows_network() const {
 }
 
 void DeviceControl::run(const std::stop_token& stop) {
-  ::pthread_setname_np(::pthread_self(), "aravis control");
+  name_this_thread("aravis control");
   auto next_reading = steady_clock::now() + kClockPeriod;
   while (!stop.stop_requested()) {
     bool asked = false;

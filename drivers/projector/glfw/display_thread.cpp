@@ -12,8 +12,8 @@
 #include <utility>
 
 #include <poll.h>
-#include <pthread.h>
 
+#include "drivers/system/thread_name.hpp"
 #include "drivers/system/wake_event.hpp"
 
 namespace slsd {
@@ -85,7 +85,7 @@ bool DisplayThread::screen_open() const {
 }
 
 void DisplayThread::serve(const std::shared_ptr<Shared>& shared) {
-  pthread_setname_np(pthread_self(), "display");
+  name_this_thread("display");
   ProjectorScreen& screen = shared->screen;
   std::unique_lock lock(shared->mutex);
   while (!shared->stop) {

@@ -6,8 +6,8 @@
 
 #include <gmock/gmock.h>
 
-#include "daemon/scan/backoff.hpp"
 #include "daemon/scan/heartbeat.hpp"
+#include "daemon/scan/patience.hpp"
 
 namespace slsd {
 namespace {

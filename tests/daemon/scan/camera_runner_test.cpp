@@ -183,5 +183,19 @@ TEST(CameraRunner, StopEndsItSoonAndClosesTheCamera) {
   EXPECT_EQ(run.runner->wait_ready(steady_clock::now() + 30s).error().code, ErrorCode::kCancelled);
 }
 
+TEST(SequenceGaps, CountsWhatNoErrorToldOf) {
+  SequenceGaps gaps;
+  EXPECT_EQ(gaps.note_frame(5), 0U);
+  EXPECT_EQ(gaps.note_frame(6), 0U);
+  EXPECT_EQ(gaps.note_frame(9), 2U);
+  gaps.note_failure();
+  EXPECT_EQ(gaps.note_frame(11), 0U);
+  gaps.note_failure();  // of a frame that the device does not number
+  EXPECT_EQ(gaps.note_frame(12), 0U);
+  EXPECT_EQ(gaps.note_frame(14), 1U);
+  gaps.restart();
+  EXPECT_EQ(gaps.note_frame(0), 0U);
+}
+
 }  // namespace
 }  // namespace slsd

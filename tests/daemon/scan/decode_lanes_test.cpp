@@ -9,8 +9,6 @@
 
 #include <gmock/gmock.h>
 
-#include "daemon/scan/sequence_gaps.hpp"
-
 namespace slsd {
 namespace {
 
@@ -147,20 +145,6 @@ TEST(DecodeLanes, WaitDoneEndsWithAJobTheTimeOrNothingUnderWay) {
   EXPECT_FALSE(lanes.wait_done(0, steady_clock::now()));
   gate.opened.set_value();
   EXPECT_TRUE(lanes.wait_done(0, steady_clock::now() + 600s));
-}
-
-TEST(SequenceGaps, CountsWhatNoErrorToldOf) {
-  SequenceGaps gaps;
-  EXPECT_EQ(gaps.note_frame(5), 0U);
-  EXPECT_EQ(gaps.note_frame(6), 0U);
-  EXPECT_EQ(gaps.note_frame(9), 2U);
-  gaps.note_failure();
-  EXPECT_EQ(gaps.note_frame(11), 0U);
-  gaps.note_failure();  // of a frame that the device does not number
-  EXPECT_EQ(gaps.note_frame(12), 0U);
-  EXPECT_EQ(gaps.note_frame(14), 1U);
-  gaps.restart();
-  EXPECT_EQ(gaps.note_frame(0), 0U);
 }
 
 }  // namespace
