@@ -106,7 +106,7 @@ void IslandJudge::grow(const Frame& frame) {
       }
     }
     std::ranges::sort(queue_);
-    queue_.erase(std::ranges::unique(queue_).begin(), queue_.end());
+    queue_.erase(std::unique(queue_.begin(), queue_.end()), queue_.end());  // clang 14 cannot read its ranges form
   }
 }
 
