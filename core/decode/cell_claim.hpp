@@ -11,7 +11,8 @@ namespace slsd {
 /// A cell of the pattern that a node was found to be, and how well its surroundings speak for it.
 struct CellClaim {
   std::int16_t row = -1, column = -1;
-  float evidence = 0;  ///< log-likelihood of the window's shapes at this cell against chance, natural logarithm
+  float evidence = 0;  ///< log-likelihood of the window's shapes at this cell against chance, natural logarithm;
+                       ///< weighed where another claims the cell too
   RegionStatus status = RegionStatus::kNoNeighbour;  ///< kDecoded, or why not
   std::int32_t island = -1;                          ///< that it is part of: see IslandJudge
 

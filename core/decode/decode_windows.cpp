@@ -114,8 +114,26 @@ WindowDecoder::Ballot WindowDecoder::collect_votes(std::int32_t node, const Cell
   return ballot;
 }
 
+/// Whether the windows around a node name the cell that its own does: there is nothing to count then.
+bool WindowDecoder::is_unanimous(std::int32_t node) const {
+  const Hit& own = hits_[node];
+  if (own.weight == 0 || !shown(own.row, own.column)) return false;
+  bool unanimous = true;
+  for (int i = 0; i < kWindowCells; ++i) {
+    const std::int32_t other = around_[node][i];
+    const Hit& hit = hits_[other < 0 ? node : other];
+    const int row = own.row - 1 + i / kWindowSide, column = own.column - 1 + i % kWindowSide;
+    unanimous &= other < 0 || hit.weight == 0 || (hit.row == row && hit.column == column);
+  }
+  return unanimous;
+}
+
 void WindowDecoder::elect(const CellGate& gate, std::vector<CellClaim>& claims) const {
   for (std::size_t node = 0; node < claims.size(); ++node) {
+    if (is_unanimous(static_cast<std::int32_t>(node))) {
+      claims[node] = {hits_[node].row, hits_[node].column, 0, RegionStatus::kDecoded};
+      continue;
+    }
     const Ballot ballot = collect_votes(static_cast<std::int32_t>(node), gate);
     CellClaim& claim = claims[node];
     claim = {};
@@ -139,10 +157,23 @@ void WindowDecoder::elect(const CellGate& gate, std::vector<CellClaim>& claims) 
   }
 }
 
-void WindowDecoder::weigh_windows(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims) const {
+/// Weighs the claims on cells that are claimed more than once: the log-likelihood of each window's shapes against
+/// chance.
+void WindowDecoder::weigh_rivals(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims) {
+  claimed_.assign(static_cast<std::size_t>(options_.rows) * options_.columns, 0);
+  const auto claimed = [&](const CellClaim& claim) -> std::uint8_t& {
+    return claimed_[static_cast<std::size_t>(claim.row) * options_.columns + claim.column];
+  };
+  bool rivals = false;
+  for (const CellClaim& claim : claims) {
+    if (claim.status != RegionStatus::kDecoded) continue;
+    rivals |= claimed(claim) != 0;
+    claimed(claim) = claimed(claim) == 0 ? 1 : 2;
+  }
+  if (!rivals) return;
   for (std::size_t node = 0; node < claims.size(); ++node) {
     CellClaim& claim = claims[node];
-    if (claim.status != RegionStatus::kDecoded) continue;
+    if (claim.status != RegionStatus::kDecoded || claimed(claim) < 2) continue;
     for (int i = 0; i < kWindowCells; ++i) {
       const std::int32_t other = around_[node][i];
       const int row = claim.row - 1 + i / kWindowSide, column = claim.column - 1 + i % kWindowSide;
@@ -155,12 +186,13 @@ void WindowDecoder::weigh_windows(const std::vector<Classification>& shapes, std
 void WindowDecoder::decode(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes,
                            const CellGate& gate, std::vector<CellClaim>& claims) {
   around_.resize(nodes.size());
-  for (std::size_t i = 0; i < nodes.size(); ++i) around_[i] = neighbourhood(nodes, static_cast<std::int32_t>(i));
+  find_beside(nodes, beside_);
+  for (std::size_t i = 0; i < nodes.size(); ++i) around_[i] = neighbourhood(beside_, static_cast<std::int32_t>(i));
   claims.assign(nodes.size(), {});
   look_up_windows(shapes, gate);
   elect(gate, claims);
-  judge_.judge(nodes, shapes, gate, claims);
-  weigh_windows(shapes, claims);
+  judge_.judge(nodes, beside_, shapes, gate, claims);
+  weigh_rivals(shapes, claims);
 }
 
 }  // namespace slsd

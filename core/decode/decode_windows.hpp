@@ -62,8 +62,8 @@ class WindowDecoder {
   [[nodiscard]] Ballot collect_votes(std::int32_t node, const CellGate& gate) const;
   void vote(std::int32_t node, const Vote& vote, bool strays, const CellGate& gate, Ballot& ballot) const;
   void elect(const CellGate& gate, std::vector<CellClaim>& claims) const;
-  /// Log-likelihood of each window's shapes against chance.
-  void weigh_windows(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims) const;
+  [[nodiscard]] bool is_unanimous(std::int32_t node) const;
+  void weigh_rivals(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims);
   [[nodiscard]] bool shown(int row, int column) const {
     return row >= 0 && column >= 0 && row < options_.rows && column < options_.columns;
   }
@@ -77,8 +77,10 @@ class WindowDecoder {
   std::shared_ptr<const Codebooks> codebooks_;  // shared with copies: the larger part of a decoder, and never changes
   bool unique_;                                 // no two windows alike
   float log_letters_;
+  std::vector<Beside> beside_;
   std::vector<Neighbourhood> around_;
   std::vector<Hit> hits_;
+  std::vector<std::uint8_t> claimed_;  // of each cell: whether once, or more often
   IslandJudge judge_;
 };
 

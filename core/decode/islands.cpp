@@ -3,9 +3,8 @@
 #include "core/decode/islands.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-
-#include "core/decode/neighbourhood.hpp"
 
 namespace slsd {
 namespace {
@@ -16,9 +15,9 @@ constexpr Direction kDirections[] = {kRight, kDown, kLeft, kUp};
 constexpr float kSpeaksAgainst = -1.5F;
 
 /// The cell beside a cell, one step on.
-struct Beside {
+struct Beyond {
   int row, column;
-  Beside(const CellClaim& claim, Direction d)
+  Beyond(const CellClaim& claim, Direction d)
       : row(claim.row + (d == kDown) - (d == kUp)), column(claim.column + (d == kRight) - (d == kLeft)) {}
 };
 
@@ -27,6 +26,13 @@ Direction across(Direction d, int side) {
 }
 
 }  // namespace
+
+/// No branch for each of the four: most nodes have none.
+bool IslandJudge::any_against(const Links& links) {
+  static_assert(static_cast<int>(Link::kAgainst) == 3);
+  const auto bits = std::bit_cast<std::uint32_t>(links);
+  return (bits & bits >> 1U & 0x01010101U) != 0;
+}
 
 IslandJudge::IslandJudge(const Pattern& pattern, IslandOptions options)
     : array_(pattern.array),
@@ -48,9 +54,9 @@ bool IslandJudge::adopt(const Frame& frame, std::int32_t node, CellClaim& adopte
   std::array<Candidate, 4> candidates;
   int count = 0;
   for (const Direction d : kDirections) {
-    const std::int32_t other = neighbour(frame.nodes, node, d);
+    const std::int32_t other = frame.beside[node][d];
     if (other < 0 || !frame.claims[other].named()) continue;
-    const Beside cell(frame.claims[other], opposite(d));
+    const Beyond cell(frame.claims[other], opposite(d));
     if (!shown(cell.row, cell.column)) continue;
     const auto end = candidates.begin() + count;
     const auto known = std::find_if(candidates.begin(), end, [&](const Candidate& candidate) {
@@ -101,12 +107,33 @@ void IslandJudge::grow(const Frame& frame) {
     for (std::size_t i = 0; i < adopted_.size(); ++i) frame.claims[next_queue_[i]] = adopted_[i];
     for (const std::int32_t node : next_queue_) {
       for (const Direction d : kDirections) {
-        const std::int32_t other = neighbour(frame.nodes, node, d);
+        const std::int32_t other = frame.beside[node][d];
         if (other >= 0 && !frame.claims[other].named()) queue_.push_back(other);
       }
     }
     std::ranges::sort(queue_);
     queue_.erase(std::unique(queue_.begin(), queue_.end()), queue_.end());  // clang 14 cannot read its ranges form
+  }
+}
+
+void IslandJudge::look_at_own_cells(const Frame& frame) {
+  own_.resize(frame.nodes.size());
+  for (std::size_t i = 0; i < own_.size(); ++i) {
+    const auto node = static_cast<std::int32_t>(i);
+    const CellClaim& claim = frame.claims[i];
+    if (!claim.named()) {
+      own_[i] = {};
+      continue;
+    }
+    own_[i] = {ratio(frame, node, claim.row, claim.column),
+               frame.gate.on_line(node, claim.row, claim.column),
+               frame.gate.admits(node, claim.row, claim.column),
+               {}};
+    for (const Direction d : kDirections) {
+      const std::int32_t other = frame.beside[i][d];
+      const Beyond cell(claim, d);
+      own_[i].fits[d] = other >= 0 && frame.claims[other].same_cell(cell.row, cell.column);
+    }
   }
 }
 
@@ -123,10 +150,9 @@ void IslandJudge::find_islands(const Frame& frame) {
     for (std::size_t at = island.first; at < members_.size(); ++at) {
       const std::int32_t node = members_[at];
       for (const Direction d : kDirections) {
-        const std::int32_t other = neighbour(frame.nodes, node, d);
-        if (other < 0 || island_of_[other] >= 0 || frame.claims[other].status != RegionStatus::kDecoded) continue;
-        const Beside cell(frame.claims[node], d);
-        if (!frame.claims[other].same_cell(cell.row, cell.column)) continue;
+        const std::int32_t other = frame.beside[node][d];
+        if (!own_[node].fits[d] || island_of_[other] >= 0) continue;
+        if (frame.claims[other].status != RegionStatus::kDecoded) continue;
         island_of_[other] = id;
         members_.push_back(other);
       }
@@ -137,22 +163,31 @@ void IslandJudge::find_islands(const Frame& frame) {
 }
 
 IslandJudge::Link IslandJudge::read_link(const Frame& frame, std::int32_t node, Direction direction) const {
-  const std::int32_t other = neighbour(frame.nodes, node, direction);
+  const std::int32_t other = frame.beside[node][direction];
   if (other < 0) return Link::kNone;
-  const Beside cell(frame.claims[node], direction);
+  if (continues(frame, node, direction)) {
+    const float speaks = own_ratio(other);
+    return speaks > 0 ? Link::kAgrees : speaks < kSpeaksAgainst ? Link::kAgainst : Link::kNeutral;
+  }
+  const Beyond cell(frame.claims[node], direction);
   if (!shown(cell.row, cell.column)) return Link::kAgainst;
   const float speaks = ratio(frame, other, cell.row, cell.column);
   // A node of another island has a surface of its own, though its letter may fit here too.
   const bool apart = island_of_[other] >= 0 && island_of_[other] != island_of_[node];
-  if (speaks < kSpeaksAgainst || (apart && speaks > 0)) return Link::kAgainst;
-  const bool together = island_of_[other] == island_of_[node] && frame.claims[other].same_cell(cell.row, cell.column);
-  return speaks > 0 && together ? Link::kAgrees : Link::kNeutral;
+  return speaks < kSpeaksAgainst || (apart && speaks > 0) ? Link::kAgainst : Link::kNeutral;
 }
 
 void IslandJudge::read_links(const Frame& frame) {
   links_.resize(frame.nodes.size());
-  for (const std::int32_t node : members_)
-    for (const Direction d : kDirections) links_[node][d] = read_link(frame, node, d);
+  for (const std::int32_t node : members_) read_links_of(frame, node);
+}
+
+/// Only links to nodes that are of an island no longer say something else than before.
+void IslandJudge::read_links_around(const Frame& frame, const std::vector<std::int32_t>& gone) {
+  for (const std::int32_t node : gone) {
+    for (const std::int32_t other : frame.beside[node])
+      if (other >= 0 && island_of_[other] >= 0) read_links_of(frame, other);
+  }
 }
 
 /// Whether a contradiction is one of several side by side: the edge of a surface, which says nothing against the node.
@@ -162,7 +197,7 @@ bool IslandJudge::runs_along_edge(const Frame& frame, std::int32_t node, Directi
   for (const int side : {0, 1}) {
     const Direction aside = across(direction, side);
     if (links_[node][aside] != Link::kAgrees) continue;
-    const std::int32_t beside = neighbour(frame.nodes, node, aside);
+    const std::int32_t beside = frame.beside[node][aside];
     if (links_[beside][direction] == Link::kAgrees) return false;
     against += links_[beside][direction] == Link::kAgainst;
   }
@@ -174,9 +209,10 @@ double IslandJudge::cost_of_rim(const Frame& frame, const Island& island) const 
   double cost = 0;
   for (std::int32_t i = island.first; i < island.first + island.size; ++i) {
     const std::int32_t node = members_[i];
+    if (!any_against(links_[node])) continue;
     for (const Direction d : kDirections) {
       if (links_[node][d] != Link::kAgainst) continue;
-      const std::int32_t beside = neighbour(frame.nodes, node, across(d, 0));
+      const std::int32_t beside = frame.beside[node][across(d, 0)];
       const bool goes_on = beside >= 0 && island_of_[beside] == island_of_[node] && links_[beside][d] == Link::kAgainst;
       cost += goes_on ? kLink : kPiece;
     }
@@ -192,8 +228,8 @@ void IslandJudge::weigh(const Frame& frame, Island& island) const {
   double evidence = 0;
   int off_line = 0;
   for (const std::int32_t node : members) {
-    evidence += own_ratio(frame, node);
-    off_line += !frame.gate.on_line(node, frame.claims[node].row, frame.claims[node].column);
+    evidence += own_ratio(node);
+    off_line += !own_[node].on_line;
   }
   const bool strays = 2 * off_line > island.size;
   const double needed = std::log(static_cast<double>(frame.nodes.size())) + cost_of_rim(frame, island) +
@@ -226,6 +262,7 @@ void IslandJudge::weigh(const Frame& frame, Island& island) const {
 /// One place of the projector lights one place of the scene. Two islands that both show the same part of the pattern,
 /// as much of it as makes an island, cannot both be it, and nothing says which is.
 void IslandJudge::refuse_doubles(const Frame& frame) {
+  if (islands_.size() < 2) return;
   holder_.assign(static_cast<std::size_t>(options_.rows) * options_.columns, -1);
   for (std::size_t id = 0; id < islands_.size(); ++id) {
     Island& island = islands_[id];
@@ -249,7 +286,7 @@ void IslandJudge::refuse_doubles(const Frame& frame) {
           holder_[static_cast<std::size_t>(frame.claims[node].row) * options_.columns + frame.claims[node].column];
       if (holder < 0 || island_of_[holder] == static_cast<std::int32_t>(id)) continue;
       const auto known = std::ranges::find(shared, island_of_[holder], &std::pair<std::int32_t, double>::first);
-      (known == shared.end() ? shared.emplace_back(island_of_[holder], 0.) : *known).second += own_ratio(frame, node);
+      (known == shared.end() ? shared.emplace_back(island_of_[holder], 0.) : *known).second += own_ratio(node);
     }
     for (const auto& [other, evidence] : shared) {
       if (evidence < needed) continue;
@@ -262,59 +299,86 @@ void IslandJudge::refuse_doubles(const Frame& frame) {
 void IslandJudge::cut_back(const Frame& frame) {
   const int rounds = static_cast<int>(std::ceil(-std::log(options_.wrong_cells_max) / log_letters_ / 1.5));
   constexpr int kHeldBy = 2;
-  for (int round = 0; round < rounds; ++round) {
-    queue_.clear();
-    for (const std::int32_t node : members_) {
-      if (cut_[node] != 0) continue;
-      int held = 0;
+  held_.resize(frame.nodes.size());
+  queue_.clear();
+  for (const std::int32_t node : members_) {
+    held_[node] = 4;
+    if (links_[node] != kAllAgree) {
+      held_[node] = 0;
       for (const Direction d : kDirections) {
         const Link link = links_[node][d];
-        if (link == Link::kAgrees) {
-          held += cut_[neighbour(frame.nodes, node, d)] == 0;
-        } else if (link == Link::kAgainst) {
-          held -= !runs_along_edge(frame, node, d);
-        }
+        if (link == Link::kAgrees) ++held_[node];
+        if (link == Link::kAgainst && !runs_along_edge(frame, node, d)) --held_[node];
       }
-      if (held < kHeldBy) queue_.push_back(node);
     }
+    if (cut_[node] != 0) queue_.push_back(node);
+  }
+  // A node that is cut holds its neighbours no longer.
+  const auto let_go = [&](std::int32_t node) {
+    for (const Direction d : kDirections) {
+      const std::int32_t other = frame.beside[node][d];
+      if (other < 0 || island_of_[other] < 0 || frame.beside[other][opposite(d)] != node) continue;
+      held_[other] = static_cast<std::int8_t>(held_[other] - (links_[other][opposite(d)] == Link::kAgrees));
+    }
+  };
+  for (int round = 0; round < rounds; ++round) {
+    for (const std::int32_t node : queue_) let_go(node);
+    queue_.clear();
+    for (const std::int32_t node : members_)
+      if (held_[node] < kHeldBy && cut_[node] == 0) queue_.push_back(node);
     if (queue_.empty()) return;
     for (const std::int32_t node : queue_) cut_[node] = 1;
   }
 }
 
-/// The evidence of the line of nodes through a node, as far as it agrees; nothing where nothing contradicts it.
-std::optional<float> IslandJudge::contradicted_line(const Frame& frame, std::int32_t node, Direction forth) const {
+/// Keeps for every node the evidence of the line of nodes through it, as far as it agrees and so far around it, where
+/// something contradicts it.
+void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth) {
   constexpr int kReach = 10, kBeyond = 3;
   constexpr float kUsualShare = 0.5F;
-  float evidence = own_ratio(frame, node), length = 1;
-  bool contradicted = evidence < kSpeaksAgainst;
-  for (const Direction d : {forth, opposite(forth)}) {
-    std::int32_t at = node;
-    for (int i = 0; i < kReach; ++i) {
-      // A misread symbol of the island is weighed with the others; what is none of it ends the line.
-      const std::int32_t next = neighbour(frame.nodes, at, d);
-      const Beside cell(frame.claims[at], d);
-      const bool own =
-          next >= 0 && island_of_[next] == island_of_[node] && frame.claims[next].same_cell(cell.row, cell.column);
-      if (!own) {
-        if (links_[at][d] == Link::kAgainst) contradicted |= !runs_along_edge(frame, at, d);
-        if (links_[at][d] == Link::kNeutral) length += count_doubtful(frame, at, d, kBeyond);
-        break;
-      }
-      at = next;
-      evidence += own_ratio(frame, at), ++length;
+  const Direction back = opposite(forth);
+  const auto leads = [&](std::int32_t node, Direction d) {
+    return continues(frame, node, d) && frame.beside[frame.beside[node][d]][opposite(d)] == node;
+  };
+  struct End {
+    bool contradicts;
+    float doubtful;
+  };
+  const auto look_beyond = [&](std::int32_t node, Direction d) {
+    const Link link = links_[node][d];
+    return End{link == Link::kAgainst && !runs_along_edge(frame, node, d),
+               link == Link::kNeutral ? count_doubtful(frame, node, d, kBeyond) : 0};
+  };
+  for (const std::int32_t first : members_) {
+    if (leads(first, back)) continue;
+    // A misread symbol of the island is weighed with the others; what is none of it ends the line.
+    line_.assign(1, first);
+    line_ratios_.assign({0, own_ratio(first)});
+    while (leads(line_.back(), forth)) {
+      line_.push_back(frame.beside[line_.back()][forth]);
+      line_ratios_.push_back(line_ratios_.back() + own_ratio(line_.back()));
+    }
+    const End begin = look_beyond(first, back), end = look_beyond(line_.back(), forth);
+    const int count = static_cast<int>(line_.size());
+    for (int i = 0; i < count; ++i) {
+      const int from = std::max(i - kReach, 0), to = std::min(i + kReach, count - 1);
+      const bool begins = i - kReach<0, ends = i + kReach> count - 1;
+      const auto evidence = static_cast<float>(line_ratios_[to + 1] - line_ratios_[from]);
+      const float length =
+          static_cast<float>(to - from + 1) + (begins ? begin.doubtful : 0) + (ends ? end.doubtful : 0);
+      const bool contradicted = own_ratio(line_[i]) < kSpeaksAgainst || (begins && begin.contradicts) ||
+                                (ends && end.contradicts) || evidence < kUsualShare * log_letters_ * length;
+      if (contradicted) lines_.emplace_back(line_[i], evidence);
     }
   }
-  contradicted |= evidence < kUsualShare * log_letters_ * length;
-  return contradicted ? std::optional(evidence) : std::nullopt;
 }
 
 /// How many nodes on from the end of a line, of so many, may be its own and say nothing for it.
 float IslandJudge::count_doubtful(const Frame& frame, std::int32_t node, Direction d, int most) const {
-  const Beside first(frame.claims[node], d);
+  const Beyond first(frame.claims[node], d);
   const int down = first.row - frame.claims[node].row, right = first.column - frame.claims[node].column;
   int row = first.row, column = first.column, count = 0;
-  for (std::int32_t at = neighbour(frame.nodes, node, d); at >= 0 && count < most; at = neighbour(frame.nodes, at, d)) {
+  for (std::int32_t at = frame.beside[node][d]; at >= 0 && count < most; at = frame.beside[at][d]) {
     if (!shown(row, column) || ratio(frame, at, row, column) < kSpeaksAgainst) break;
     row += down, column += right, ++count;
   }
@@ -324,61 +388,93 @@ float IslandJudge::count_doubtful(const Frame& frame, std::int32_t node, Directi
 void IslandJudge::cut_contradicted_lines(const Frame& frame) {
   lines_.clear();
   std::size_t rim = 1;  // links across which chance could have led on
-  for (const std::int32_t node : members_) {
-    rim += static_cast<std::size_t>(std::ranges::count(links_[node], Link::kAgainst));
-    const auto along = contradicted_line(frame, node, kRight), down = contradicted_line(frame, node, kDown);
-    if (along) lines_.push_back({node, *along});
-    if (down) lines_.push_back({node, *down});
-  }
+  for (const std::int32_t node : members_)
+    if (any_against(links_[node])) rim += static_cast<std::size_t>(std::ranges::count(links_[node], Link::kAgainst));
+  find_contradicted_lines(frame, kRight);
+  find_contradicted_lines(frame, kDown);
   const double evidence_min = std::log(static_cast<double>(rim) / options_.wrong_cells_max);
   for (const auto& [node, evidence] : lines_)
     if (evidence < evidence_min) cut_[node] = 1;
 }
 
-void IslandJudge::judge(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes,
-                        const CellGate& gate, std::vector<CellClaim>& claims) {
-  const Frame frame{nodes, shapes, gate, claims};
+/// Without those that were no islands: what is left of a contradiction is an edge, or stands alone.
+void IslandJudge::drop_rejected(const Frame& frame) {
+  queue_.clear();
+  std::size_t islands = 0;
+  std::int32_t kept = 0;
+  for (const Island& island : islands_) {
+    const auto members = std::span(members_).subspan(island.first, island.size);
+    if (island.status != RegionStatus::kDecoded) {
+      for (const std::int32_t node : members) island_of_[node] = -1;
+      queue_.insert(queue_.end(), members.begin(), members.end());
+      continue;
+    }
+    for (const std::int32_t node : members) island_of_[node] = static_cast<std::int32_t>(islands);
+    std::ranges::copy(members, members_.begin() + kept);
+    islands_[islands++] = {.first = kept, .size = island.size};
+    kept += island.size;
+  }
+  islands_.resize(islands);
+  members_.resize(static_cast<std::size_t>(kept));
+  read_links_around(frame, queue_);
+}
+
+/// Without the nodes that were cut. What they have parted has to stand by itself.
+void IslandJudge::part_islands(const Frame& frame) {
+  queue_.clear();
+  for (const std::int32_t node : members_) {
+    if (cut_[node] == 0) continue;
+    frame.claims[node].status = own_ratio(node) < 0 ? RegionStatus::kClassDisagrees : RegionStatus::kNeighboursDisagree;
+    queue_.push_back(node);
+    --islands_[island_of_[node]].size;
+  }
+  if (queue_.empty()) return;
+  const auto left = std::ranges::count_if(islands_, [](const Island& island) { return island.size > 0; });
+  find_islands(frame);
+  if (static_cast<std::ptrdiff_t>(islands_.size()) == left) {
+    read_links_around(frame, queue_);
+  } else {
+    read_links(frame);
+  }
+  for (Island& island : islands_) weigh(frame, island);
+}
+
+void IslandJudge::judge(const std::vector<GridNode>& nodes, const std::vector<Beside>& beside,
+                        const std::vector<Classification>& shapes, const CellGate& gate,
+                        std::vector<CellClaim>& claims) {
+  const Frame frame{nodes, beside, shapes, gate, claims};
   grow(frame);
+  look_at_own_cells(frame);
   find_islands(frame);
   read_links(frame);
   for (Island& island : islands_) weigh(frame, island);
-  const auto take_over = [&](RegionStatus unless) {
+  const auto take_over = [&] {
     for (const std::int32_t node : members_) {
       const RegionStatus status = islands_[island_of_[node]].status;
       claims[node].island = island_of_[node];
-      if (status != unless) claims[node].status = status;
+      claims[node].status = status;
       if (status == RegionStatus::kNoCodeword || status == RegionStatus::kAmbiguousCodeword)
         claims[node].row = claims[node].column = -1;
     }
   };
-  take_over(RegionStatus::kDecoded);
-  // Again without those that were no islands: what is left of a contradiction is an edge, or stands alone.
-  find_islands(frame);
-  read_links(frame);
+  take_over();
+  drop_rejected(frame);
   cut_.assign(nodes.size(), 0);
   cut_contradicted_lines(frame);
   cut_back(frame);
-  for (const std::int32_t node : members_)
-    if (cut_[node] != 0) {
-      claims[node].status =
-          own_ratio(frame, node) < 0 ? RegionStatus::kClassDisagrees : RegionStatus::kNeighboursDisagree;
-    }
-  // What the cuts have parted has to stand by itself.
-  find_islands(frame);
-  read_links(frame);
-  for (Island& island : islands_) weigh(frame, island);
+  part_islands(frame);
   refuse_doubles(frame);
-  take_over(RegionStatus::kDecoded);
+  take_over();
   for (const std::int32_t node : members_) {
     CellClaim& claim = claims[node];
     if (claim.status != RegionStatus::kDecoded) continue;
     if (shapes[node].letter < 0) {
       claim.status = RegionStatus::kUnknownShape;
-    } else if (own_ratio(frame, node) < 0) {
+    } else if (own_ratio(node) < 0) {
       claim.status = RegionStatus::kClassDisagrees;
-    } else if (!gate.on_line(node, claim.row, claim.column)) {
+    } else if (!own_[node].on_line) {
       claim.status = RegionStatus::kOffEpipolarLine;
-    } else if (!gate.admits(node, claim.row, claim.column)) {
+    } else if (!own_[node].admitted) {
       claim.status = RegionStatus::kOutOfDepthRange;
     }
   }

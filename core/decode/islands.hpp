@@ -13,6 +13,7 @@
 #include "core/decode/cell_gate.hpp"
 #include "core/decode/classify.hpp"
 #include "core/decode/link_grid.hpp"
+#include "core/decode/neighbourhood.hpp"
 
 namespace slsd {
 
@@ -42,12 +43,15 @@ class IslandJudge {
   IslandJudge(const Pattern& pattern, IslandOptions options);
 
   /// @param claims  in: cells as proposed, or none; out: with the reason where it is rejected
-  void judge(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes, const CellGate& gate,
-             std::vector<CellClaim>& claims);
+  void judge(const std::vector<GridNode>& nodes, const std::vector<Beside>& beside,
+             const std::vector<Classification>& shapes, const CellGate& gate, std::vector<CellClaim>& claims);
 
  private:
   /// What a link says of the cell of the node that it leads from.
   enum class Link : std::uint8_t { kNone, kAgrees, kNeutral, kAgainst };
+  using Links = std::array<Link, 4>;
+  static constexpr Links kAllAgree{Link::kAgrees, Link::kAgrees, Link::kAgrees, Link::kAgrees};
+  [[nodiscard]] static bool any_against(const Links& links);
   struct Island {
     std::int32_t first = 0, size = 0;  // of members_
     RegionStatus status = RegionStatus::kDecoded;
@@ -55,6 +59,7 @@ class IslandJudge {
 
   struct Frame {
     const std::vector<GridNode>& nodes;
+    const std::vector<Beside>& beside;
     const std::vector<Classification>& shapes;
     const CellGate& gate;
     std::vector<CellClaim>& claims;
@@ -62,16 +67,26 @@ class IslandJudge {
 
   /// Log-likelihood ratio of a node's shape against chance, were it that cell's.
   [[nodiscard]] float ratio(const Frame& frame, std::int32_t node, int row, int column) const;
-  [[nodiscard]] float own_ratio(const Frame& frame, std::int32_t node) const {
-    return ratio(frame, node, frame.claims[node].row, frame.claims[node].column);
-  }
+  /// The same were it its own, which it is asked for most.
+  [[nodiscard]] float own_ratio(std::int32_t node) const { return own_[node].ratio; }
   [[nodiscard]] bool shown(int row, int column) const {
     return row >= 0 && column >= 0 && row < options_.rows && column < options_.columns;
   }
   void grow(const Frame& frame);
   bool adopt(const Frame& frame, std::int32_t node, CellClaim& adopted) const;
+  void look_at_own_cells(const Frame& frame);
   void find_islands(const Frame& frame);
   void read_links(const Frame& frame);
+  void read_links_of(const Frame& frame, std::int32_t node) {
+    for (const Direction d : {kRight, kDown, kLeft, kUp}) links_[node][d] = read_link(frame, node, d);
+  }
+  void read_links_around(const Frame& frame, const std::vector<std::int32_t>& gone);
+  /// Whether a link leads to the node of the same island whose cell lies there.
+  [[nodiscard]] bool continues(const Frame& frame, std::int32_t node, Direction direction) const {
+    return own_[node].fits[direction] && island_of_[frame.beside[node][direction]] == island_of_[node];
+  }
+  void drop_rejected(const Frame& frame);
+  void part_islands(const Frame& frame);
   [[nodiscard]] Link read_link(const Frame& frame, std::int32_t node, Direction direction) const;
   [[nodiscard]] bool runs_along_edge(const Frame& frame, std::int32_t node, Direction direction) const;
   void weigh(const Frame& frame, Island& island) const;
@@ -79,18 +94,28 @@ class IslandJudge {
   void refuse_doubles(const Frame& frame);
   void cut_back(const Frame& frame);
   void cut_contradicted_lines(const Frame& frame);
+  void find_contradicted_lines(const Frame& frame, Direction forth);
   [[nodiscard]] float count_doubtful(const Frame& frame, std::int32_t node, Direction direction, int most) const;
-  [[nodiscard]] std::optional<float> contradicted_line(const Frame& frame, std::int32_t node, Direction forth) const;
 
   CodeArray array_;
   IslandOptions options_;
   float log_letters_, link_weight_;
+  /// What a node's own cell is to it, once all have one.
+  struct Own {
+    float ratio;  // as above; 0 without a cell
+    bool on_line, admitted;
+    std::array<bool, 4> fits;  // whether the neighbour's cell lies beside it as the neighbour does
+  };
+  std::vector<Own> own_;
   std::vector<std::int32_t> island_of_;  // -1: none
   std::vector<Island> islands_;
   std::vector<std::int32_t> members_, queue_, next_queue_;
-  std::vector<std::array<Link, 4>> links_;
+  std::vector<Links> links_;
   std::vector<CellClaim> adopted_;
   std::vector<std::uint8_t> cut_;
+  std::vector<std::int8_t> held_;                      // by so many links more than contradict
+  std::vector<std::int32_t> line_;                     // of nodes
+  std::vector<double> line_ratios_;                    // their sums before each of them
   std::vector<std::pair<std::int32_t, float>> lines_;  // contradicted ones: through which node, with what evidence
   std::vector<std::int32_t> holder_;
 };

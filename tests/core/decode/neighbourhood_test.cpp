@@ -19,38 +19,44 @@ SimulatedGrid nine() {
   return grid;
 }
 
+Neighbourhood around(const SimulatedGrid& grid, std::int32_t node) {
+  std::vector<Beside> beside;
+  find_beside(grid.nodes, beside);
+  return neighbourhood(beside, node);
+}
+
 void unlink(std::vector<GridNode>& nodes, std::int32_t node, Direction direction) {
   nodes[nodes[node].links[direction]].links[opposite(direction)] = -1;
   nodes[node].links[direction] = -1;
 }
 
 TEST(Neighbourhood, IsTheWindowRowByRow) {
-  EXPECT_THAT(neighbourhood(nine().nodes, 4), testing::ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8));
+  EXPECT_THAT(around(nine(), 4), testing::ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8));
 }
 
 TEST(Neighbourhood, LeavesOutWhatIsBeyondTheGrid) {
-  EXPECT_THAT(neighbourhood(nine().nodes, 0), testing::ElementsAre(-1, -1, -1, -1, 0, 1, -1, 3, 4));
+  EXPECT_THAT(around(nine(), 0), testing::ElementsAre(-1, -1, -1, -1, 0, 1, -1, 3, 4));
 }
 
 TEST(Neighbourhood, ReachesACornerByTheOtherWay) {
   SimulatedGrid grid = nine();
   unlink(grid.nodes, 1, kRight);
-  EXPECT_EQ(neighbourhood(grid.nodes, 4)[2], 2);
+  EXPECT_EQ(around(grid, 4)[2], 2);
   unlink(grid.nodes, 5, kUp);
-  EXPECT_EQ(neighbourhood(grid.nodes, 4)[2], -1);
+  EXPECT_EQ(around(grid, 4)[2], -1);
 }
 
 TEST(Neighbourhood, LeavesOutACornerThatTwoWaysDisagreeAbout) {
   SimulatedGrid grid = nine();
   grid.nodes[1].links[kRight] = 8;
-  EXPECT_EQ(neighbourhood(grid.nodes, 4)[2], -1);
+  EXPECT_EQ(around(grid, 4)[2], -1);
 }
 
 TEST(Neighbourhood, DoesNotFollowBrokenLinks) {
   SimulatedGrid grid = nine();
   grid.nodes[4].broken[kRight] = true;
   grid.nodes[1].broken[kRight] = true;
-  EXPECT_THAT(neighbourhood(grid.nodes, 4), testing::ElementsAre(0, 1, -1, 3, 4, -1, 6, 7, 8));
+  EXPECT_THAT(around(grid, 4), testing::ElementsAre(0, 1, -1, 3, 4, -1, 6, 7, 8));
 }
 
 }  // namespace
