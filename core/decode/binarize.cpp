@@ -19,13 +19,8 @@ namespace {
 constexpr int kRowsAlike = 4;
 
 /// Least and greatest of each column of a band of rows, one row more.
-SLSD_CLONES void extend_columns(const std::uint8_t* pixels, int width, std::uint8_t* least, std::uint8_t* greatest) {
-  for (int x = 0; x < width; ++x) {
-    least[x] = pixels[x] < least[x] ? pixels[x] : least[x];
-    greatest[x] = pixels[x] > greatest[x] ? pixels[x] : greatest[x];
-  }
-}
-SLSD_CLONES void extend_columns(const std::uint16_t* pixels, int width, std::uint16_t* least, std::uint16_t* greatest) {
+template <class T>
+inline __attribute__((always_inline)) void extend_columns(const T* pixels, int width, T* least, T* greatest) {
   for (int x = 0; x < width; ++x) {
     least[x] = pixels[x] < least[x] ? pixels[x] : least[x];
     greatest[x] = pixels[x] > greatest[x] ? pixels[x] : greatest[x];
@@ -33,8 +28,8 @@ SLSD_CLONES void extend_columns(const std::uint16_t* pixels, int width, std::uin
 }
 
 template <class T>
-inline __attribute__((always_inline)) void compare_row_of(const T* pixels, const T* threshold, int width,
-                                                          std::uint64_t* lit) {
+inline __attribute__((always_inline)) void compare_row(const T* pixels, const T* threshold, int width,
+                                                       std::uint64_t* lit) {
   alignas(Lanes) std::uint8_t bytes[Mask::kWordPx];
   int x = 0;
   for (; x + Mask::kWordPx <= width; x += Mask::kWordPx) {
@@ -46,19 +41,9 @@ inline __attribute__((always_inline)) void compare_row_of(const T* pixels, const
   for (int i = 0; x + i < width; ++i) bytes[i] = pixels[x + i] > threshold[x + i] ? 255 : 0;
   *lit = top_bits(bytes);
 }
-SLSD_CLONES void compare_row(const std::uint8_t* pixels, const std::uint8_t* threshold, int width, std::uint64_t* lit) {
-  compare_row_of(pixels, threshold, width, lit);
-}
-SLSD_CLONES void compare_row(const std::uint16_t* pixels, const std::uint16_t* threshold, int width,
-                             std::uint64_t* lit) {
-  compare_row_of(pixels, threshold, width, lit);
-}
 
-SLSD_CLONES void slide_extremes(std::uint8_t* least, std::uint8_t* greatest, int count, int length) {
-  slide_least(least, count, length);
-  slide_greatest(greatest, count, length);
-}
-SLSD_CLONES void slide_extremes(std::uint16_t* least, std::uint16_t* greatest, int count, int length) {
+template <class T>
+inline __attribute__((always_inline)) void slide_extremes(T* least, T* greatest, int count, int length) {
   slide_least(least, count, length);
   slide_greatest(greatest, count, length);
 }
@@ -72,8 +57,8 @@ inline __attribute__((always_inline)) T difference(T a, T b) {
 /// the last of the row have none.
 /// @param count  of those that are asked for; beyond the row there are none either
 template <class T>
-inline __attribute__((always_inline)) void find_steepest_of(const T* above, const T* row, const T* below, int width,
-                                                            int length, int count, T* steepest) {
+inline __attribute__((always_inline)) void find_steepest(const T* above, const T* row, const T* below, int width,
+                                                         int length, int count, T* steepest) {
   for (int x = 1; x < width - 1; ++x) {
     const T across = difference(row[x + 1], row[x - 1]), down = difference(below[x], above[x]);
     steepest[x] = across > down ? across : down;
@@ -81,14 +66,6 @@ inline __attribute__((always_inline)) void find_steepest_of(const T* above, cons
   steepest[0] = 0;
   for (int x = width > 1 ? width - 1 : 1; x < count; ++x) steepest[x] = 0;
   slide_greatest(steepest, count, length);
-}
-SLSD_CLONES void find_steepest(const std::uint8_t* above, const std::uint8_t* row, const std::uint8_t* below, int width,
-                               int length, int count, std::uint8_t* steepest) {
-  find_steepest_of(above, row, below, width, length, count, steepest);
-}
-SLSD_CLONES void find_steepest(const std::uint16_t* above, const std::uint16_t* row, const std::uint16_t* below,
-                               int width, int length, int count, std::uint16_t* steepest) {
-  find_steepest_of(above, row, below, width, length, count, steepest);
 }
 
 /// Binary places of a threshold; a line may run on for kLanes pixels beyond a tile without leaving 31 bits.
@@ -125,12 +102,6 @@ inline __attribute__((always_inline)) void draw_line(const ThresholdLine& line, 
       store_pixels(value >> kFractionBits<T>, threshold + tile * line.tile_px + x);
   }
 }
-SLSD_CLONES void draw(const ThresholdLine& line, std::uint8_t* threshold) {
-  draw_line(line, threshold);
-}
-SLSD_CLONES void draw(const ThresholdLine& line, std::uint16_t* threshold) {
-  draw_line(line, threshold);
-}
 
 /// Combines each tile with its eight neighbours. The tiles have a border of one all round, whose values do not count.
 template <class Operation>
@@ -159,11 +130,12 @@ void Binarizer::find_extremes(const ImageView<T>& frame) {
     const int top = row * tile, bottom = std::min(top + tile, frame.height);
     least.assign(frame.row(top), frame.row(top) + frame.width);
     greatest = least;
-    for (int y = top + 1; y < bottom; ++y) extend_columns(frame.row(y), frame.width, least.data(), greatest.data());
+    for (int y = top + 1; y < bottom; ++y)
+      Cloned<extend_columns<T>>::call(frame.row(y), frame.width, least.data(), greatest.data());
     // The last tile may reach beyond the frame.
     least.resize(static_cast<std::size_t>(columns_) * tile, std::numeric_limits<T>::max());
     greatest.resize(least.size(), 0);
-    slide_extremes(least.data(), greatest.data(), static_cast<int>(least.size()), tile);
+    Cloned<slide_extremes<T>>::call(least.data(), greatest.data(), static_cast<int>(least.size()), tile);
     for (int column = 0; column < columns_; ++column) {
       least_[(row + 1) * stride_ + 1 + column] = least[column * tile];
       greatest_[(row + 1) * stride_ + 1 + column] = greatest[column * tile];
@@ -211,7 +183,7 @@ void Binarizer::binarize_as(const ImageView<T>& frame, double full, Mask& mask) 
   for (int y = 0; y < frame.height; ++y) {
     // Thresholds change little from row to row.
     if (y % kRowsAlike == 0) interpolate_row(y + kRowsAlike / 2, frame.width, threshold.data());
-    compare_row(frame.row(y), threshold.data(), frame.width, mask.row(y));
+    Cloned<compare_row<T>>::call(frame.row(y), threshold.data(), frame.width, mask.row(y));
   }
 }
 
@@ -224,8 +196,8 @@ float Binarizer::edge_blur_of(const ImageView<T>& frame) {
   std::vector<T>& steepest = std::get<RowBuffers<T>>(row_buffers_).greatest;
   steepest.assign(static_cast<std::size_t>(columns_) * tile, 0);
   for (int y = kStepRows / 2; y + 1 < frame.height; y += kStepRows) {
-    find_steepest(frame.row(y - 1), frame.row(y), frame.row(y + 1), frame.width, tile, columns_ * tile,
-                  steepest.data());
+    Cloned<find_steepest<T>>::call(frame.row(y - 1), frame.row(y), frame.row(y + 1), frame.width, tile, columns_ * tile,
+                                   steepest.data());
     const int first = (y / tile + 1) * stride_ + 1;
     for (int column = 0; column < columns_; ++column) {
       const float contrast = high_[first + column] - low_[first + column];
@@ -270,7 +242,7 @@ void Binarizer::interpolate_row(int y, int width, T* threshold) {
   // Flat before the first centre and after the last.
   const int first = tile / 2, last = first + (columns_ - 1) * tile;
   std::fill_n(threshold, std::min(first, width), static_cast<T>(at_centre_.front() >> kFractionBits<T>));
-  draw({at_centre_.data(), step_.data(), columns_, tile}, threshold + first);
+  Cloned<draw_line<T>>::call({at_centre_.data(), step_.data(), columns_, tile}, threshold + first);
   if (last < width)
     std::fill(threshold + last, threshold + width, static_cast<T>(at_centre_.back() >> kFractionBits<T>));
 }

@@ -40,7 +40,8 @@ inline __attribute__((always_inline)) void take_logarithms(const Lanes& of, Lane
                2 * s * (1 + ss * (1 / 3.F + ss * (1 / 5.F + ss * (1 / 7.F + ss * (1 / 9.F)))));
 }
 
-SLSD_CLONES void judge(const Classifier::Table& table, const float* features, Verdict& verdict) {
+inline __attribute__((always_inline)) void judge(const Classifier::Table& table, const float* features,
+                                                 Verdict& verdict) {
   const Lanes zero{};
   Lanes deviation[kFeatureCount];
   for (int i = 0; i < kFeatureCount; ++i) {
@@ -95,7 +96,7 @@ Classifier::Classifier(const std::vector<Prototype>& prototypes, float distance_
 
 Classification Classifier::classify(const ShapeFeatures& features) const {
   Verdict verdict;
-  judge(table_, features.data(), verdict);
+  Cloned<judge>::call(table_, features.data(), verdict);
   Classification result;
   std::memcpy(result.log_probability.data(), &verdict.log_probability, sizeof verdict.log_probability);
   float nearest = std::numeric_limits<float>::max(), best = 0;

@@ -2,11 +2,62 @@
 // Copyright the slsd authors
 #pragma once
 
-/// Compiles a function for the baseline and for AVX2 and picks one when the program starts, so that one package serves
-/// every x86-64 machine. Sanitizers cannot follow the picking (an ifunc runs before they are set up).
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define SLSD_CLONES __attribute__((target_clones("avx2", "default")))
-#else
-#define SLSD_CLONES
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+namespace slsd {
+
+/// What the decoder's inner loops are compiled for. One package serves every machine of an architecture: each loop is
+/// there several times, and the machine that it runs on chooses. On arm64 the plain code is NEON, which all of these
+/// have.
+enum class Clone : std::uint8_t {
+  kPlain,    ///< the least that the architecture has: SSE2, NEON
+  kAvx2,     ///< the same numbers
+  kAvx2Fma,  ///< the same but for rounding, as products are not rounded before they are added to
+};
+
+/// Those that this machine can run, the plain one first and the fastest last.
+[[nodiscard]] std::vector<Clone> clones_here();
+
+/// Which one runs: the fastest, but where a test asks for another. Core's only variable.
+extern std::atomic<Clone> clone_in_use;
+
+/// A loop that is there once for each clone: Cloned<body>::call(...) calls that in use.
+/// @param kBody  an always_inline function, which each clone takes into itself. Its parameters are numbers, pointers
+/// and
+///               references: vectors are passed differently from clone to clone
+template <auto kBody>
+struct Cloned;
+
+template <class Result, class... Parameters, Result (*kBody)(Parameters...)>
+struct Cloned<kBody> {
+  static Result call(Parameters... parameters) {
+#if defined(__x86_64__)
+    switch (clone_in_use.load(std::memory_order_relaxed)) {
+      case Clone::kAvx2Fma:
+        return avx2_fma(parameters...);
+      case Clone::kAvx2:
+        return avx2(parameters...);
+      case Clone::kPlain:
+        break;
+    }
 #endif
+    return plain(parameters...);
+  }
+
+ private:
+  [[gnu::noinline]] static Result plain(Parameters... parameters) {
+    return kBody(parameters...);
+  }
+#if defined(__x86_64__)
+  __attribute__((noinline, target("avx2,bmi,bmi2,popcnt"))) static Result avx2(Parameters... parameters) {
+    return kBody(parameters...);
+  }
+  __attribute__((noinline, target("avx2,bmi,bmi2,popcnt,fma"))) static Result avx2_fma(Parameters... parameters) {
+    return kBody(parameters...);
+  }
+#endif
+};
+
+}  // namespace slsd

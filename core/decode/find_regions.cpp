@@ -16,7 +16,7 @@ constexpr int kEndsAtOnce = 8;
 
 /// Writes where the runs of a row begin and end, in turn; the caller has room for an end at every pixel and some more.
 /// @return the number of runs
-SLSD_CLONES int find_ends(const std::uint64_t* words, int width, std::uint16_t* ends) {
+inline __attribute__((always_inline)) int find_ends(const std::uint64_t* words, int width, std::uint16_t* ends) {
   constexpr std::uint64_t kLast = std::uint64_t{1} << (Mask::kWordPx - 1);  // so that there is always one to count to
   std::uint16_t* const first = ends;
   std::uint64_t last = 0;
@@ -125,7 +125,7 @@ void RegionFinder::find(const Mask& mask, Regions& found) {
   Row *above = &rows_[0], *row = &rows_[1];
   above->ends[0] = above->ends[1] = kBeyond;
   for (int y = 0; y < mask.height(); ++y) {
-    const int runs = find_ends(mask.row(y), mask.width(), row->ends.data());
+    const int runs = Cloned<find_ends>::call(mask.row(y), mask.width(), row->ends.data());
     row->ends[2 * runs] = row->ends[2 * runs + 1] = kBeyond;
     if (runs_.size() < run_count_ + row_max) {
       runs_.resize(2 * (run_count_ + row_max));

@@ -43,8 +43,8 @@ inline __attribute__((always_inline)) Words load_pixels(const std::uint8_t* pixe
 /// Grey values between before[y] and after[y] of each row, kOutside elsewhere; the patch lies in the frame, padding and
 /// all.
 template <class T>
-inline __attribute__((always_inline)) void copy_rows_of(const ImageView<T>& frame, const PatchPlace& place,
-                                                        const PatchEdges& edges, float* patch, PatchRange& range) {
+inline __attribute__((always_inline)) void copy_rows(const ImageView<T>& frame, const PatchPlace& place,
+                                                     const PatchEdges& edges, float* patch, PatchRange& range) {
   constexpr IntLanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
   Lanes least = Lanes{} + range.least, greatest = Lanes{} + range.greatest;
   for (int y = 0; y < place.height; ++y) {
@@ -63,14 +63,6 @@ inline __attribute__((always_inline)) void copy_rows_of(const ImageView<T>& fram
     range.least = std::min(range.least, least[lane]);
     range.greatest = std::max(range.greatest, greatest[lane]);
   }
-}
-SLSD_CLONES void copy_rows(const ImageView<std::uint8_t>& frame, const PatchPlace& place, const PatchEdges& edges,
-                           float* patch, PatchRange& range) {
-  copy_rows_of(frame, place, edges, patch, range);
-}
-SLSD_CLONES void copy_rows(const ImageView<std::uint16_t>& frame, const PatchPlace& place, const PatchEdges& edges,
-                           float* patch, PatchRange& range) {
-  copy_rows_of(frame, place, edges, patch, range);
 }
 
 int padded(int width) {
@@ -131,7 +123,7 @@ void GreyMomentMeter::copy_patch(const ImageView<T>& frame, const Region& region
   range_ = {};
   if (left_ >= 0 && top_ >= 0 && left_ + stride_ <= frame.width && top_ + height_ <= frame.height) {
     patch_.resize(static_cast<std::size_t>(stride_) * height_);
-    return copy_rows(frame, {left_, top_, stride_, height_}, edges, patch_.data(), range_);
+    return Cloned<copy_rows<T>>::call(frame, {left_, top_, stride_, height_}, edges, patch_.data(), range_);
   }
   patch_.assign(static_cast<std::size_t>(stride_) * height_, kOutside);
   for (int y = 0; y < height_; ++y) {

@@ -37,7 +37,8 @@ std::vector<float> wiener_weights(float blur_px) {
 }
 
 /// @param padded  as many pixels before the first of the row and after the last as the filter reaches
-SLSD_CLONES void filter_row(const float* padded, const float* weights, int reach, int width, float* filtered) {
+inline __attribute__((always_inline)) void filter_row(const float* padded, const float* weights, int reach, int width,
+                                                      float* filtered) {
   const float* middle = padded + reach;
   for (int x = 0; x < width; ++x) filtered[x] = weights[0] * middle[x];
   for (int i = 1; i <= reach; ++i) {
@@ -45,7 +46,8 @@ SLSD_CLONES void filter_row(const float* padded, const float* weights, int reach
   }
 }
 
-SLSD_CLONES void add_rows(const float* above, const float* below, float weight, int width, float* sum) {
+inline __attribute__((always_inline)) void add_rows(const float* above, const float* below, float weight, int width,
+                                                    float* sum) {
   for (int x = 0; x < width; ++x) sum[x] += weight * (above[x] + below[x]);
 }
 
@@ -70,10 +72,11 @@ void Sharpener::sharpen_as(const ImageView<T>& frame, float scale) {
       for (int x = 0; x < width; ++x) padded_[x + reach] = scale * static_cast<float>(row[x]);
       std::fill_n(padded_.begin(), reach, padded_[reach]);
       std::fill_n(padded_.end() - reach, reach, padded_[reach + width - 1]);
-      filter_row(padded_.data(), weights_.data(), reach, width, kept_row(next));
+      Cloned<filter_row>::call(padded_.data(), weights_.data(), reach, width, kept_row(next));
     }
     std::transform(kept_row(y), kept_row(y) + width, sum_.begin(), [&](float value) { return weights_[0] * value; });
-    for (int i = 1; i <= reach; ++i) add_rows(kept_row(y - i), kept_row(y + i), weights_[i], width, sum_.data());
+    for (int i = 1; i <= reach; ++i)
+      Cloned<add_rows>::call(kept_row(y - i), kept_row(y + i), weights_[i], width, sum_.data());
     std::uint16_t* out = sharpened_.row(y);
     for (int x = 0; x < width; ++x) out[x] = static_cast<std::uint16_t>(std::clamp(sum_[x], 0.F, kHighest));
   }

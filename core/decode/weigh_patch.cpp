@@ -13,18 +13,8 @@ namespace {
 
 constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
 
-}  // namespace
-
-PatchRange range_of(const float* patch, int count) {
-  PatchRange range;
-  for (int i = 0; i < count; ++i) {
-    if (patch[i] < range.least) range.least = patch[i];
-    if (patch[i] > range.greatest) range.greatest = patch[i];
-  }
-  return range;
-}
-
-SLSD_CLONES void find_levels(const float* patch, int count, const PatchRange& range, PatchLevels& levels) {
+inline __attribute__((always_inline)) void find_levels_of(const float* patch, int count, const PatchRange& range,
+                                                          PatchLevels& levels) {
   const float quarter = 0.25F * (range.greatest - range.least);
   const Lanes low_limit = Lanes{} + (range.least + quarter), high_limit = Lanes{} + (range.greatest - quarter);
   const Lanes zero{};
@@ -51,8 +41,9 @@ SLSD_CLONES void find_levels(const float* patch, int count, const PatchRange& ra
   levels.noise = std::sqrt(std::max(0.F, sum_of(high_squares) / highs - mean * mean));
 }
 
-SLSD_CLONES void sum_moments(const float* patch, int stride, int height, float middle_x, float middle_y,
-                             const PatchLevels& levels, RawMoments& moments) {
+inline __attribute__((always_inline)) void sum_moments_of(const float* patch, int stride, int height, float middle_x,
+                                                          float middle_y, const PatchLevels& levels,
+                                                          RawMoments& moments) {
   const float range = levels.peak - levels.background;
   const Lanes zero{}, one = zero + 1;
   const Lanes offset = zero + (levels.background + kRampStart * range);
@@ -86,6 +77,26 @@ SLSD_CLONES void sum_moments(const float* patch, int stride, int height, float m
   m[1][0] = sum_of(m10), m[1][1] = sum_of(m11), m[1][2] = sum_of(m12);
   m[2][0] = sum_of(m20), m[2][1] = sum_of(m21);
   m[3][0] = sum_of(m30);
+}
+
+}  // namespace
+
+PatchRange range_of(const float* patch, int count) {
+  PatchRange range;
+  for (int i = 0; i < count; ++i) {
+    if (patch[i] < range.least) range.least = patch[i];
+    if (patch[i] > range.greatest) range.greatest = patch[i];
+  }
+  return range;
+}
+
+void find_levels(const float* patch, int count, const PatchRange& range, PatchLevels& levels) {
+  Cloned<find_levels_of>::call(patch, count, range, levels);
+}
+
+void sum_moments(const float* patch, int stride, int height, float middle_x, float middle_y, const PatchLevels& levels,
+                 RawMoments& moments) {
+  Cloned<sum_moments_of>::call(patch, stride, height, middle_x, middle_y, levels, moments);
 }
 
 }  // namespace slsd

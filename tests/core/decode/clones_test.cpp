@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/clones.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "core/decode/binarize.hpp"
+#include "core/decode/classify.hpp"
+#include "core/decode/find_regions.hpp"
+#include "core/decode/sharpen.hpp"
+#include "core/decode/weigh_patch.hpp"
+#include "tests/core/decode/decoded_scene.hpp"
+#include "tests/core/decode/images.hpp"
+#include "tests/core/decode/shipped_pattern.hpp"
+
+namespace slsd {
+namespace {
+
+std::string name_of(Clone clone) {
+  switch (clone) {
+    case Clone::kPlain:
+      return "Plain";
+    case Clone::kAvx2:
+      return "Avx2";
+    case Clone::kAvx2Fma:
+      break;
+  }
+  return "Avx2Fma";
+}
+
+/// What a function gives when a clone is in use.
+template <class Function>
+auto with(Clone clone, Function&& function) {
+  const Clone usual = clone_in_use.exchange(clone);
+  auto result = function();
+  clone_in_use = usual;
+  return result;
+}
+
+/// Every clone that this machine can run, against the plain code: numbers that are whole are the same; others are where
+/// products are rounded before they are added to, and nearly so where they are not.
+class Clones : public testing::TestWithParam<Clone> {
+ protected:
+  template <class Function>
+  void expect_same(Function&& function) const {
+    EXPECT_TRUE(with(GetParam(), function) == with(Clone::kPlain, function));
+  }
+  [[nodiscard]] float tolerance() const { return GetParam() == Clone::kAvx2Fma ? 1e-5F : 0; }
+  void expect_near(float a, float b, float scale = 1) const {
+    EXPECT_LE(std::abs(a - b), tolerance() * std::max({std::abs(a), std::abs(b), scale})) << a << ' ' << b;
+  }
+};
+
+/// Grey values over the whole range, and places where little changes; of a width that fills no register.
+template <class T>
+Image<T> some_frame(int width, int height, double full) {
+  Image<T> frame(width, height);
+  std::mt19937 random(7);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double wave = std::sin(0.31 * x + 0.0007 * x * y) * std::cos(0.27 * y);
+      const double noise = static_cast<double>(random() % 1000) / 1000;
+      frame.at(x, y) = static_cast<T>(full * std::clamp(0.5 + 0.45 * wave + 0.1 * noise, 0., 1.));
+    }
+  }
+  return frame;
+}
+
+template <class T>
+Mask binarized(const Image<T>& frame, double full, int tile_px) {
+  Mask mask;
+  Binarizer({.tile_px = tile_px}).binarize(frame.view(), full, mask);
+  return mask;
+}
+
+TEST_P(Clones, BinarizeAlike) {
+  for (const int width : {1, 7, 64, 333}) {
+    for (const int tile_px : {4, 5, 12, 30}) {
+      expect_same([&] { return binarized(some_frame<std::uint8_t>(width, 101, 255), 255, tile_px); });
+      expect_same([&] { return binarized(some_frame<std::uint16_t>(width, 101, 65535), 65535, tile_px); });
+    }
+  }
+}
+
+TEST_P(Clones, MeasureTheSameBlur) {
+  expect_same([] {
+    const Grey8 frame = some_frame<std::uint8_t>(333, 101, 255);
+    Binarizer binarizer({.tile_px = 8});
+    Mask mask;
+    binarizer.binarize(frame.view(), 255, mask);
+    return binarizer.edge_blur_px(frame.view());
+  });
+}
+
+TEST_P(Clones, FindTheSameRegions) {
+  const Mask mask = binarized(some_frame<std::uint8_t>(700, 90, 255), 255, 6);
+  expect_same([&] {
+    Regions found;
+    RegionFinder().find(mask, found);
+    std::vector<int> all;
+    for (const slsd::Run& run : found.runs) all.insert(all.end(), {run.row, run.left, run.right});
+    for (const Region& region : found.regions) all.insert(all.end(), {region.left, region.top, region.area_px});
+    return all;
+  });
+}
+
+TEST_P(Clones, SharpenAlike) {
+  const Grey8 frame = some_frame<std::uint8_t>(333, 41, 255);
+  const auto sharpened = [&] { return Sharpener().sharpen(frame.view(), 2.5F, 255); };
+  const Grey16 here = with(GetParam(), sharpened), plain = with(Clone::kPlain, sharpened);
+  int farthest = 0;
+  for (std::size_t i = 0; i < plain.size(); ++i)
+    farthest = std::max(farthest, std::abs(here.data()[i] - plain.data()[i]));
+  EXPECT_LE(farthest, GetParam() == Clone::kAvx2Fma ? 1 : 0);
+}
+
+TEST_P(Clones, WeighPatchesAlike) {
+  constexpr int kHeight = 19;
+  std::mt19937 random(5);
+  for (const int stride : {8, 16, 40}) {
+    std::vector<float> patch;
+    for (int i = 0; i < stride * kHeight; ++i)
+      patch.push_back(random() % 5 == 0 ? kOutside : static_cast<float>(random() % 256));
+    const PatchRange range = range_of(patch.data(), static_cast<int>(patch.size()));
+    const auto levels = [&] {
+      PatchLevels found;
+      find_levels(patch.data(), static_cast<int>(patch.size()), range, found);
+      return found;
+    };
+    const PatchLevels here = with(GetParam(), levels), plain = with(Clone::kPlain, levels);
+    expect_near(here.background, plain.background);
+    expect_near(here.peak, plain.peak);
+    const auto moments = [&] {
+      RawMoments sums;
+      sum_moments(patch.data(), stride, kHeight, 0.5F * static_cast<float>(stride - 1), 9, plain, sums);
+      return sums;
+    };
+    const RawMoments sums = with(GetParam(), moments), plain_sums = with(Clone::kPlain, moments);
+    for (int p = 0; p <= 3; ++p)
+      for (int q = 0; p + q <= 3; ++q) expect_near(sums.m[p][q], plain_sums.m[p][q], plain_sums.m[0][0] * 400);
+  }
+}
+
+TEST_P(Clones, ClassifyAlike) {
+  std::mt19937 random(3);
+  std::normal_distribution<float> normal;
+  std::vector<Prototype> prototypes(5);
+  for (Prototype& prototype : prototypes) {
+    prototype.density = 1;
+    for (int i = 0; i < kFeatureCount; ++i) {
+      prototype.mean[i] = normal(random);
+      for (int j = 0; j < kFeatureCount; ++j) prototype.whitening(i, j) = j <= i ? normal(random) : 0;
+    }
+  }
+  const Classifier classifier(prototypes, 20);
+  for (int n = 0; n < 50; ++n) {
+    ShapeFeatures features;
+    for (int i = 0; i < kFeatureCount; ++i) features[i] = normal(random);
+    const auto classified = [&] { return classifier.classify(features); };
+    const Classification here = with(GetParam(), classified), plain = with(Clone::kPlain, classified);
+    EXPECT_EQ(here.letter, plain.letter);
+    expect_near(here.distance, plain.distance);
+    for (std::size_t i = 0; i < prototypes.size(); ++i) expect_near(here.log_probability[i], plain.log_probability[i]);
+  }
+}
+
+/// @return points of a frame, those of the same cells side by side
+std::vector<CloudPoint> points_of(const Pattern& pattern, const GreyView& frame) {
+  Decoder decoder = test::decoder_of(pattern);
+  return test::decode(decoder, frame).points;
+}
+
+TEST_P(Clones, DecodeAlike) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  const Grey8 sharp = test::frame_of(pattern, test::kCylinder);
+  SimulationOptions out_of_focus;
+  out_of_focus.blur_sigma_px = 2.5;
+  const Grey8 blurred = simulate(draw_pattern(pattern), paper_rig(), test::kTilted, out_of_focus);
+  const Grey16 wide = sixteen_bits(sharp);
+  for (const GreyView& frame : {GreyView(sharp.view()), GreyView(blurred.view()), GreyView(wide.view())}) {
+    const auto decoded = [&] { return points_of(pattern, frame); };
+    const auto here = with(GetParam(), decoded), plain = with(Clone::kPlain, decoded);
+    ASSERT_GT(plain.size(), 500U);
+    ASSERT_EQ(here.size(), plain.size());
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+      ASSERT_EQ(std::pair(here[i].row, here[i].column), std::pair(plain[i].row, plain[i].column));
+      expect_near(here[i].camera_u, plain[i].camera_u);
+      expect_near(here[i].camera_v, plain[i].camera_v);
+      EXPECT_NEAR(here[i].z, plain[i].z, GetParam() == Clone::kAvx2Fma ? 0.02 : 0);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(OfThisMachine, Clones, testing::ValuesIn(clones_here()),
+                         [](const auto& clone) { return name_of(clone.param); });
+
+TEST(ClonesHere, BeginWithThePlainCodeAndEndWithTheOneInUse) {
+  EXPECT_EQ(clones_here().front(), Clone::kPlain);
+  EXPECT_EQ(clones_here().back(), clone_in_use.load());
+}
+
+}  // namespace
+}  // namespace slsd
