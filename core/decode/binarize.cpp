@@ -8,7 +8,7 @@
 #include <cstring>
 #include <limits>
 
-#include "core/decode/clones.hpp"
+#include "core/clones.hpp"
 #include "core/decode/lanes.hpp"
 #include "core/decode/slide.hpp"
 #include "core/exposure/pixel_noise.hpp"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/decode/clones.hpp"
+#include "core/clones.hpp"
 #include "core/decode/lanes.hpp"
 
 namespace slsd {

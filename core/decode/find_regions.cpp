@@ -6,7 +6,7 @@
 #include <bit>
 #include <limits>
 
-#include "core/decode/clones.hpp"
+#include "core/clones.hpp"
 
 namespace slsd {
 namespace {

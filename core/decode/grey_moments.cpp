@@ -9,7 +9,7 @@
 
 #include <Eigen/LU>
 
-#include "core/decode/clones.hpp"
+#include "core/clones.hpp"
 #include "core/decode/slide.hpp"
 
 namespace slsd {

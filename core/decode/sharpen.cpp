@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/decode/clones.hpp"
+#include "core/clones.hpp"
 
 namespace slsd {
 namespace {

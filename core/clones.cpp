@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/clones.hpp"
+#include "core/clones.hpp"
 
 namespace slsd {
 

@@ -8,9 +8,8 @@
 
 namespace slsd {
 
-/// What the decoder's inner loops are compiled for. One package serves every machine of an architecture: each loop is
-/// there several times, and the machine that it runs on chooses. On arm64 the plain code is NEON, which all of these
-/// have.
+/// What core's inner loops are compiled for. One package serves every machine of an architecture: each loop is there
+/// several times, and the machine that it runs on chooses. On arm64 the plain code is NEON, which all of these have.
 enum class Clone : std::uint8_t {
   kPlain,    ///< the least that the architecture has: SSE2, NEON
   kAvx2,     ///< the same numbers
@@ -24,9 +23,8 @@ enum class Clone : std::uint8_t {
 extern std::atomic<Clone> clone_in_use;
 
 /// A loop that is there once for each clone: Cloned<body>::call(...) calls that in use.
-/// @param kBody  an always_inline function, which each clone takes into itself. Its parameters are numbers, pointers
-/// and
-///               references: vectors are passed differently from clone to clone
+/// @param kBody  an always_inline function, which each clone takes into itself. Its parameters are numbers, pointers and
+///               references: how vectors are passed differs from clone to clone
 template <auto kBody>
 struct Cloned;
 
