@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/align/pattern_field.hpp"
+#include "core/geometry/calibration.hpp"
+#include "core/geometry/pixel_ray.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// How the pattern falls on what a small window of the camera sees, for any plane there. With (x, y) camera px from the
+/// window's middle, the ray there is (r + T (x, y), 1), the inverse of its depth rho, and the projector sees the point
+/// in the direction R (r + T (x, y), 1) + rho t: linear in x and y on a plane, whose inverse depth is so too. With the
+/// projector's lens made linear around the middle, its pixel is
+///
+///     p = (q0 / q2, q1 / q2),  q = (base + shift (disparity, its slopes)) (1, x, y)
+///
+/// disparity being the inverse depth in units that move p by one projector px in the middle, from the reference.
+struct PatchMap {
+  Eigen::Matrix3f base;                                  ///< columns: of x, of y, of 1; at the reference depth
+  Eigen::Vector3f shift;                                 ///< what a disparity of 1 adds to q
+  Eigen::Vector2f middle_px;                             ///< in the camera
+  Eigen::Vector2i origin_px;                             ///< p is taken from there: floats are exact enough near it
+  Eigen::Vector2f along;                                 ///< unit vector in which p moves with the disparity
+  double reference_inverse_depth, inverse_depth_per_px;  ///< 1/mm
+};
+
+/// @param ray                 of the window's middle
+/// @param reference_depth_mm  along the camera's z axis
+[[nodiscard]] PatchMap make_patch_map(const PixelRay& ray, const Eigen::Vector2d& middle_px,
+                                      const RigidTransform& projector_from_camera, const Lens& projector,
+                                      double reference_depth_mm);
+
+/// Where a patch of the surface lies, and how the light falls on it.
+struct PatchState {
+  float disparity = 0;                          ///< projector px from the reference
+  float slope_x = 0, slope_y = 0;               ///< its change for one camera px
+  float across = 0;                             ///< how far off the epipolar line the pattern lies, projector px
+  float bend_xx = 0, bend_xy = 0, bend_yy = 0;  ///< second derivatives of the disparity: given, not fitted
+  float gain = 0, gain_x = 0, gain_y = 0;  ///< grey levels for light 1 in the middle, and its change for one camera px
+  float offset = 0;                        ///< grey level where it is dark
+};
+
+/// Pixels of the camera to align.
+struct PatchWindow {
+  int left, top, width, height;
+  /// Only what lies this near to the square's middle counts, in projector px along both axes.
+  Eigen::Vector2f square_middle_px = Eigen::Vector2f::Zero();
+  float square_half_px = 1e6F;
+};
+
+struct AlignOptions {
+  float across_sigma_px = 0.15F;  ///< how far off the epipolar lines the pattern may lie; 0: not at all
+  int steps = 4;
+  /// What the model leaves out where it fits, as a share of the gain.
+  float misfit_share = 0.02F;
+  /// Standard deviations of noise and misfit at which a pixel counts half: the surface ends there, or bears print.
+  float outlier_sigmas = 4;
+};
+
+/// The parameters that are fitted, in this order: disparity, its slopes, across; gain, its slopes, offset.
+inline constexpr int kFitted = 8;
+
+struct PatchFit {
+  PatchState state;
+  float residual = 0;  ///< root mean square, grey levels
+  float pixels = 0;    ///< how many there were
+  float support = 0;   ///< the share of them that agrees with the pattern
+  float scatter = 0;   ///< of the disparities of the patch's ninths about the plane, px, beyond what noise does
+  /// Of disparity, its slopes and across, for a noise of one grey level in each pixel.
+  Eigen::Matrix4f covariance = Eigen::Matrix4f::Zero();
+  bool solved = false;  ///< the pattern is there, and its place follows from it
+};
+
+/// Aligns a window of the frame with the pattern: least squares of
+///
+///     I(x, y) = (gain + gain_x x + gain_y y) P(p(x, y)) + offset
+///
+/// by Gauss and Newton (Lucas and Kanade 1981; Baker and Matthews 2004), P the pattern blurred. Gain, its slopes and
+/// offset are linear, so each step solves for them anew and needs no estimate of theirs.
+/// @thread thread-bound: keeps its buffers
+class PatchAligner {
+ public:
+  explicit PatchAligner(AlignOptions options) : options_(options) {}
+
+  /// @param full   the level of a saturated pixel, which does not count
+  /// @param noise  one standard deviation of a pixel, grey levels: weighs the pixels against what is known of `across`
+  /// @param start  within a pixel or so of the truth
+  template <class T>
+  [[nodiscard]] PatchFit align(const ImageView<T>& frame, double full, float noise, const PatternField& field,
+                               const PatchMap& map, const PatchWindow& window, const PatchState& start);
+
+ private:
+  AlignOptions options_;
+  std::vector<float> patch_;
+};
+
+/// Sums over a patch that the normal equations are made of.
+struct PatchSums {
+  Eigen::Matrix<double, kFitted, kFitted> normal;
+  Eigen::Matrix<double, kFitted, 1> right;
+  double squares, pixels;
+};
+
+/// The camera pixel, from the window's middle, that sees a projector pixel (from the map's origin) on the patch.
+[[nodiscard]] Eigen::Vector2f camera_offset(const PatchMap& map, const PatchState& state, const Eigen::Vector2f& pixel);
+
+}  // namespace slsd

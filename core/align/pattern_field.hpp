@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// The pattern as it falls on a surface: its pixels as squares, blurred, with its slopes, two samples to a projector
+/// pixel. From the nearest sample and its slopes the value anywhere follows to 1 % of the contrast, half of it as if
+/// the blur were wider by 0.02 px^2, from a single load.
+///
+/// Made once for a pattern and a blur, 16 bytes to a projector pixel, and shared by all that align with it.
+/// @thread reentrant
+class PatternField {
+ public:
+  static constexpr int kSamplesPerPx = 2;
+  static constexpr int kBorderPx = 6;  ///< dark, all round the pattern
+
+  /// @param pattern        what the projector shows; 255 is light 1
+  /// @param blur_sigma_px  of a Gaussian, projector px, 0.3 to 2
+  PatternField(const ImageView<std::uint8_t>& pattern, float blur_sigma_px);
+
+  /// Light at a sample, 0 to 1, and its slopes, per projector px.
+  struct Sample {
+    float value, slope_u, slope_v;
+  };
+  /// @param u, v  projector px; what lies outside the pattern is dark
+  [[nodiscard]] Sample at(float u, float v) const;
+
+  /// A sample: 10 bits of the value, 11 of each slope.
+  [[nodiscard]] const std::uint32_t* samples() const { return samples_.data(); }
+  [[nodiscard]] int width() const { return width_; }  ///< in samples
+  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] float slope_unit() const { return slope_unit_; }  ///< per projector px, of one step of a slope's bits
+  [[nodiscard]] float blur_sigma_px() const { return blur_sigma_px_; }
+
+  static constexpr float kValueUnit = 1.F / 1023;
+  static constexpr int kSlopeBits = 11;
+
+ private:
+  int width_, height_;
+  float blur_sigma_px_, slope_unit_;
+  std::vector<std::uint32_t> samples_;
+};
+
+}  // namespace slsd
