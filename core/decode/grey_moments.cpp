@@ -78,8 +78,12 @@ GreyMoments central(const RawMoments& raw, double middle_x, double middle_y) {
   const double x = m[1][0] * n, y = m[0][1] * n;
   const double xx = m[2][0] * n, xy = m[1][1] * n, yy = m[0][2] * n;
   g.weight = m[0][0];
-  g.x = static_cast<float>(middle_x + x);
-  g.y = static_cast<float>(middle_y + y);
+  g.shape_x = static_cast<float>(middle_x + x);
+  g.shape_y = static_cast<float>(middle_y + y);
+  // Where there is a shape there is a centre: its ramp begins as low.
+  const double per_centre = 1 / static_cast<double>(raw.centre);
+  g.x = static_cast<float>(middle_x + raw.centre_x * per_centre);
+  g.y = static_cast<float>(middle_y + raw.centre_y * per_centre);
   g.m20 = static_cast<float>(xx - x * x);
   g.m11 = static_cast<float>(xy - x * y);
   g.m02 = static_cast<float>(yy - y * y);

@@ -14,12 +14,14 @@
 namespace slsd {
 
 /// What a region weighs: moments of its grey values through a soft threshold, a ramp from 20 to 65 % of the way from
-/// the region's own background to its own peak. A pixel on the edge counts by how much of it is lit, so the centre is
-/// good to some hundredths of a pixel, where the binary mask's is eight times worse.
+/// the region's own background to its own peak; its centre through one from 20 to 80 %. A pixel on the edge counts by
+/// how much of it is lit, so the centre is good to some hundredths of a pixel, where the binary mask's is eight times
+/// worse.
 struct GreyMoments {
-  float x = 0, y = 0;                        ///< centroid, camera px
+  float x = 0, y = 0;                        ///< centre, camera px
+  float shape_x = 0, shape_y = 0;            ///< centroid of the shape, which uneven light pulls less than the centre
   float weight = 0;                          ///< lit area, camera px squared
-  float m20 = 0, m11 = 0, m02 = 0;           ///< central, over the weight: px^2
+  float m20 = 0, m11 = 0, m02 = 0;           ///< about the centroid, over the weight: px^2
   float m30 = 0, m21 = 0, m12 = 0, m03 = 0;  ///< px^3
   float noise = 0;                           ///< one standard deviation of a pixel where it is lit
   float background = 0, peak = 0;            ///< grey levels of the frame

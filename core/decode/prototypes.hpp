@@ -16,9 +16,10 @@ namespace slsd {
 struct Prototype {
   ShapeFeatures mean;
   Eigen::Matrix<float, kFeatureCount, kFeatureCount>
-      whitening;                ///< features minus mean, times this, have unit covariance
-  float density;                ///< at the mean, up to a factor common to all: 1 / volume of the covariance
-  Eigen::Vector2f centroid_px;  ///< of its grey moments, from the middle of its square, projector px
+      whitening;                      ///< features minus mean, times this, have unit covariance
+  float density;                      ///< at the mean, up to a factor common to all: 1 / volume of the covariance
+  Eigen::Vector2f centroid_px;        ///< centre of its grey moments, from the middle of its square, projector px
+  Eigen::Vector2f shape_centroid_px;  ///< centroid of its shape, likewise
 
   /// In standard deviations.
   [[nodiscard]] float squared_distance(const ShapeFeatures& features) const {

@@ -152,6 +152,11 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
     const float half_px = 0.25F * (size_px_ + pitch_px_);
     adopt_if_better(meter.measure_cell(frame, centre, lattice_frame, half_px, shading), 0);
   }
+  if (per_cell.cwiseAbs().maxCoeff() > options_.uneven_light) {
+    const Prototype& prototype = prototype_of(seen.claims[node]);
+    const Eigen::Vector2f from_shape = lattice_frame * (prototype.centroid_px - prototype.shape_centroid_px);
+    moments.x = moments.shape_x + from_shape.x(), moments.y = moments.shape_y + from_shape.y();
+  }
   const float distance_max = is_inside(seen, node) ? options_.damaged_distance_inside : options_.damaged_distance;
   if (distance > distance_max) seen.claims[node].status = RegionStatus::kDamagedShape;
 }

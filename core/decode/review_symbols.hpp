@@ -11,6 +11,8 @@ namespace slsd {
 struct ReviewOptions {
   /// Change of the light from cell to cell from which on a symbol is measured again with the light levelled.
   float shading_min = 0.04F;
+  /// The same from which on the centre is that of the shape, which uneven light pulls less.
+  float uneven_light = 0.1F;
   /// Standard deviations from its letter's prototype from which on a symbol is measured again where its neighbours put
   /// it.
   float doubtful_distance = 1.5F;

@@ -48,14 +48,22 @@ inline __attribute__((always_inline)) void sum_moments_of(const float* patch, in
   const Lanes zero{}, one = zero + 1;
   const Lanes offset = zero + (levels.background + kRampStart * range);
   const Lanes scale = zero + 1 / ((kRampEnd - kRampStart) * range);
+  const Lanes centre_offset = zero + (levels.background + kCentreRampStart * range);
+  const Lanes centre_scale = zero + 1 / ((kCentreRampEnd - kCentreRampStart) * range);
+  Lanes centre{}, centre_x{}, centre_y{};
   // Sums over y stay in their columns, and are then taken over x; lanes are summed once at the end.
   Lanes m00{}, m01{}, m02{}, m03{}, m10{}, m11{}, m12{}, m20{}, m21{}, m30{};
   for (int left = 0; left < stride; left += kLanes) {
-    Lanes s0{}, s1{}, s2{}, s3{}, y = zero - middle_y;
+    Lanes s0{}, s1{}, s2{}, s3{}, c0{}, y = zero - middle_y;
     for (int row = 0; row < height; ++row) {
-      Lanes w;
-      load(patch + row * stride + left, w);
-      w = (w - offset) * scale;
+      Lanes grey;
+      load(patch + row * stride + left, grey);
+      Lanes c = (grey - centre_offset) * centre_scale;
+      c = c > zero ? c : zero;
+      c = c < one ? c : one;
+      c0 += c;
+      centre_y += c * y;
+      Lanes w = (grey - offset) * scale;
       w = w > zero ? w : zero;
       w = w < one ? w : one;
       const Lanes wy = w * y, wyy = wy * y;
@@ -66,12 +74,14 @@ inline __attribute__((always_inline)) void sum_moments_of(const float* patch, in
       y += one;
     }
     const Lanes x = kLane + (static_cast<float>(left) - middle_x);
+    centre += c0, centre_x += c0 * x;
     const Lanes x0 = s0 * x, x1 = s1 * x, xx0 = x0 * x;
     m00 += s0, m01 += s1, m02 += s2, m03 += s3;
     m10 += x0, m11 += x1, m12 += s2 * x;
     m20 += xx0, m21 += x1 * x;
     m30 += xx0 * x;
   }
+  moments.centre = sum_of(centre), moments.centre_x = sum_of(centre_x), moments.centre_y = sum_of(centre_y);
   auto& m = moments.m;
   m[0][0] = sum_of(m00), m[0][1] = sum_of(m01), m[0][2] = sum_of(m02), m[0][3] = sum_of(m03);
   m[1][0] = sum_of(m10), m[1][1] = sum_of(m11), m[1][2] = sum_of(m12);

@@ -8,9 +8,14 @@
 
 namespace slsd {
 
-/// Where the soft threshold begins and ends, between a region's background and its peak.
+/// Where the soft threshold begins and ends, between a region's background and its peak: for a shape, whose bright part
+/// may bear print or shading,
 inline constexpr float kRampStart = 0.2F;
 inline constexpr float kRampEnd = 0.65F;
+/// and for its centre. Even about the middle and as wide as background and peak allow, so that blur does not move it:
+/// on planes at 2 m 0.09 mm are left of the 0.16 mm of the other.
+inline constexpr float kCentreRampStart = 0.2F;
+inline constexpr float kCentreRampEnd = 0.8F;
 
 /// Pixels of a patch that belong to others: every comparison with them is false.
 inline constexpr float kOutside = std::numeric_limits<float>::quiet_NaN();
@@ -36,6 +41,7 @@ void find_levels(const float* patch, int count, const PatchRange& range, PatchLe
 /// Raw moments of a patch, the sum of w x^p y^q in [p][q], w the soft threshold's weight of a pixel, 0 to 1.
 struct RawMoments {
   float m[4][4] = {};
+  float centre = 0, centre_x = 0, centre_y = 0;  ///< the sums of w, w x and w y through the centre's ramp
 };
 
 /// @param stride              columns of the patch, a multiple of kLanes
