@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "core/decode/clones.hpp"
+#include "core/clones.hpp"
 #include "core/decode/lanes.hpp"
 
 namespace slsd {
@@ -79,7 +79,7 @@ enum RowSum {
   kRowSums
 };
 
-SLSD_CLONES void sum_patch(const Pass& pass, Sums& sums) {
+inline __attribute__((always_inline)) void sum_patch(const Pass& pass, Sums& sums) {
   constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
   const Warp& warp = pass.warp;
   const Lanes zero{}, one = zero + 1;
@@ -326,7 +326,7 @@ PatchFit PatchAligner::align(const ImageView<T>& frame, double full, float noise
   for (int step = 0; step < options_.steps; ++step) {
     pass.warp = warp_of(map, fit.state);
     Sums sums;
-    sum_patch(pass, sums);
+    Cloned<sum_patch>::call(pass, sums);
     fit.pixels = sums.pixels;
     fit.support = sums.w / std::max(1.F, sums.pixels);
     if (!(sums.w > 2 * kFitted)) return fit;

@@ -2,14 +2,65 @@
 // Copyright the slsd authors
 #include "core/decode/centre_sigma.hpp"
 
+#include <algorithm>
 #include <cmath>
 
-namespace slsd {
+#include <Eigen/LU>
 
-double centre_sigma_px(const GreyMoments& moments) {
-  constexpr double kUnexplainedPx = 0.015, kRamp = kRampEnd - kRampStart;
-  const double relative_noise = moments.noise / (kRamp * (moments.peak - moments.background));
-  return std::sqrt(relative_noise * relative_noise / std::sqrt(moments.weight) + kUnexplainedPx * kUnexplainedPx);
+#include "core/decode/weigh_patch.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr float kLeastPx = 0.01F;  // what is left of sampling and blur
+constexpr float kOfAcross = 0.5F, kOfAcrossAround = 0.6F;
+constexpr float kOfMisfitSquared = 0.034F;  // px
+constexpr float kUnknownBendPx = 0.02F;
+/// Beyond this a neighbour's residual is a fault of its own.
+constexpr float kAcrossAroundMaxPx = 0.3F;
+
+bool has_bend(const LatticeSymbol& symbol) {
+  const auto& beside = symbol.neighbours;
+  return (beside[kRight] >= 0 && beside[kLeft] >= 0) || (beside[kUp] >= 0 && beside[kDown] >= 0);
+}
+
+}  // namespace
+
+float noise_of_centre_px(const LatticeSymbol& symbol, const FrameNoise& noise) {
+  constexpr float kRamp = kCentreRampEnd - kCentreRampStart;
+  const float relative = noise.at(symbol.background + 0.5F * symbol.gain) / (kRamp * symbol.gain);
+  return relative / std::sqrt(std::sqrt(symbol.weight));
+}
+
+void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const CellRays& cells, Lattice& lattice) {
+  std::vector<LatticeSymbol>& symbols = lattice.symbols;
+  across_px_.assign(symbols.size(), 0);
+  if (view != nullptr && !symbols.empty()) {
+    for (std::size_t i = 0; i < symbols.size(); ++i) {
+      const LatticeSymbol& symbol = symbols[i];
+      across_px_[i] = static_cast<float>(
+          view->residual_px(symbol.sighting, symbol.centre_px, cells.ray(symbol.row, symbol.column)));
+    }
+    sorted_ = across_px_;
+    const auto middle = sorted_.begin() + static_cast<std::ptrdiff_t>(sorted_.size() / 2);
+    std::nth_element(sorted_.begin(), middle, sorted_.end());
+    for (std::size_t i = 0; i < symbols.size(); ++i)
+      across_px_[i] = std::abs(across_px_[i] - *middle) * std::sqrt(std::abs(symbols[i].frame.determinant()));
+  }
+  const auto square = [](float x) { return x * x; };
+  for (std::size_t i = 0; i < symbols.size(); ++i) {
+    LatticeSymbol& symbol = symbols[i];
+    float around = square(across_px_[i]), count = 1;
+    for (const std::int32_t other : symbol.neighbours) {
+      if (other < 0) continue;
+      around += square(std::min(across_px_[static_cast<std::size_t>(other)], kAcrossAroundMaxPx));
+      ++count;
+    }
+    symbol.sigma_px =
+        std::sqrt(square(noise_of_centre_px(symbol, noise)) + square(kLeastPx) + square(kOfAcross * across_px_[i]) +
+                  square(kOfAcrossAround) * around / count + square(kOfMisfitSquared * square(symbol.misfit)) +
+                  (has_bend(symbol) ? 0 : square(kUnknownBendPx)));
+  }
 }
 
 }  // namespace slsd

@@ -2,16 +2,41 @@
 // Copyright the slsd authors
 #pragma once
 
-#include "core/decode/grey_moments.hpp"
+#include <vector>
+
+#include "core/decode/cell_rays.hpp"
+#include "core/decode/epipolar_view.hpp"
+#include "core/decode/frame_noise.hpp"
+#include "core/decode/lattice.hpp"
 
 namespace slsd {
 
-/// One standard deviation of a symbol's centre in x and in y, camera px.
+/// One standard deviation of a symbol's centre from the noise of the pixels alone, camera px.
 ///
 /// The soft threshold lets noise in along the edge alone, a band about a pixel and a half wide: with w the area, n the
-/// noise and c the contrast, var = (n / r c)^2 / sqrt(w), r the ramp, for a compact symbol. Below that stays what noise
-/// does not explain: what is left of curvature and shading, 0.015 px on rendered planes and cylinders.
+/// noise and c the contrast, var = (n / r c)^2 / sqrt(w), r the ramp, for a compact symbol.
 /// @thread reentrant
-[[nodiscard]] double centre_sigma_px(const GreyMoments& moments);
+[[nodiscard]] float noise_of_centre_px(const LatticeSymbol& symbol, const FrameNoise& noise);
+
+/// Tells how exact each centre of a lattice is, along the epipolar line and across it.
+///
+/// What disturbs a centre besides noise is relief, print, shadow or an edge under the symbol. It shows in two ways:
+/// across the epipolar line, where no depth moves a symbol and what is left over is error alone; and in the symbol's
+/// shape. So, all in camera px and added in squares,
+///
+///     noise, 0.01,  0.5 across,  0.6 across around,  0.034 misfit^2,  0.02 where no neighbours tell of its bend
+///
+/// across: the residual less the frame's median (that is the calibration's); around: root mean square of the symbol's
+/// and its neighbours'; misfit: of the shape, in standard deviations. The factors are fitted to rendered frames
+/// (docs/decoder.md).
+/// @thread thread-bound: keeps its buffers
+class CentreJudge {
+ public:
+  /// @param view  null where there is no calibration: nothing is known then of what lies across
+  void judge(const FrameNoise& noise, const EpipolarView* view, const CellRays& cells, Lattice& lattice);
+
+ private:
+  std::vector<float> across_px_, sorted_;
+};
 
 }  // namespace slsd

@@ -4,11 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
 #include <Eigen/LU>
-
-#include "core/decode/centre_sigma.hpp"
 
 namespace slsd {
 namespace {
@@ -30,7 +29,10 @@ Eigen::Vector2f pull_of(const Bend& bend, const LatticeFrame& frame, const Eigen
 }  // namespace
 
 CentreCorrection::CentreCorrection(const std::vector<Prototype>& prototypes, float pitch_px, float symbol_size_px)
-    : pitch_px_(pitch_px), negligible_bend_(kNegligiblePx / (symbol_size_px * symbol_size_px)) {
+    : prototypes_(prototypes),
+      size_px_(symbol_size_px),
+      pitch_px_(pitch_px),
+      negligible_bend_(kNegligiblePx / (symbol_size_px * symbol_size_px)) {
   for (const Prototype& prototype : prototypes) {
     const ShapeFeatures& mean = prototype.mean;
     Eigen::Matrix2f moments;
@@ -143,14 +145,19 @@ void CentreCorrection::correct(const std::vector<GridNode>& nodes, const std::ve
                          .bend = {},
                          .background = seen.background,
                          .gain = seen.peak - seen.background,
-                         .sigma_px = static_cast<float>(centre_sigma_px(seen)),
+                         .misfit = 0,
+                         .weight = seen.weight,
+                         .sigma_px = 0,
                          .neighbours = {-1, -1, -1, -1}};
+    const std::size_t letter = array.at(symbol.row, symbol.column);
+    symbol.misfit =
+        std::sqrt(prototypes_[letter].squared_distance(shape_features(seen, symbol.frame.inverse(), size_px_)));
     for (const Direction d : {kRight, kDown, kLeft, kUp}) {
       if (named_[i][d] >= 0) symbol.neighbours[d] = symbol_of_[named_[i][d]];
     }
     if (const std::optional<Bend> bend = bend_of(nodes, symbol.sighting)) {
       symbol.bend = *bend;
-      symbol.centre_px -= pull_of(*bend, symbol.frame, second_moments_px2_[array.at(symbol.row, symbol.column)]);
+      symbol.centre_px -= pull_of(*bend, symbol.frame, second_moments_px2_[letter]);
     }
     lattice.symbols.push_back(symbol);
   }

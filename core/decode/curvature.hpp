@@ -31,7 +31,7 @@ class CentreCorrection {
 
   /// @param array    of the pattern: tells the letters of the cells
   /// @param lattice  becomes one symbol to each node that is decoded, in their order, with its place, map and
-  /// neighbours
+  /// neighbours; what its centre's sigma is remains to be told
   void correct(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
                const std::vector<CellClaim>& claims, const CodeArray& array, Lattice& lattice);
 
@@ -50,6 +50,8 @@ class CentreCorrection {
   [[nodiscard]] std::int32_t named_neighbour(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims,
                                              std::int32_t node, Direction direction) const;
 
+  std::vector<Prototype> prototypes_;
+  float size_px_;
   float pitch_px_;
   float negligible_bend_;
   std::vector<Eigen::Vector2f> centroids_px_;

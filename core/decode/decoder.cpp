@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/decode/align_symbols.hpp"
 #include "core/decode/symbol_reader.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "core/geometry/epipolar_limit.hpp"
@@ -20,11 +21,18 @@ struct Decoder::Parts {
   SymbolReader reader;
   EpipolarView view;
   Triangulator triangulator;
+  std::optional<SymbolAligner> aligner;  // for precision "fine"
   HeldFullLevel full_level{};
   Decoding decoding{};
+  std::vector<PixelRay> rays{};  // of the symbols to align, and their depths
+  std::vector<double> depths_mm{};
+  const std::vector<AlignedSymbol>* aligned = nullptr;  // of this frame
 
+  [[nodiscard]] TriangulatedPoint solve(const LatticeSymbol& symbol) const;
+  void align(const GreyView& frame, double full, const Lattice& lattice);
   void triangulate(const Lattice& lattice, double full);
-  void add_point(const LatticeSymbol& symbol, const TriangulatedPoint& solved, double full);
+  void add_point(const LatticeSymbol& symbol, const Eigen::Vector2f& centre_px, const TriangulatedPoint& solved,
+                 double full);
 };
 
 Decoder::Decoder(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
@@ -65,7 +73,10 @@ Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calib
             .reader = SymbolReader(pattern, projector, std::move(expected), options, std::move(paper)),
             .view = EpipolarView(camera, projector, options.depth_min_mm, options.depth_max_mm,
                                  epipolar_gate_px(calibration.report.epipolar_error_px)),
-            .triangulator = Triangulator(camera, projector)}));
+            .triangulator = Triangulator(camera, projector),
+            .aligner = options.precision == Precision::kFine
+                           ? std::optional<SymbolAligner>(std::in_place, pattern, camera, projector)
+                           : std::nullopt}));
 }
 
 Decoder Decoder::another() const {
@@ -90,6 +101,10 @@ Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<dou
   if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
   const double level = full ? *full : parts_->full_level.of(frame);
   const Lattice& lattice = parts_->reader.read(frame, level, &parts_->view, observer);
+  if (parts_->aligner) {
+    parts_->align(frame, level, lattice);
+    if (observer != nullptr) observer->stage_done(Stage::kAlign);
+  }
   parts_->triangulate(lattice, level);
   parts_->decoding.off_line = parts_->reader.off_line();
   parts_->reader.report(parts_->decoding);
@@ -97,30 +112,50 @@ Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<dou
   return &parts_->decoding;
 }
 
+TriangulatedPoint Decoder::Parts::solve(const LatticeSymbol& symbol) const {
+  return triangulator.triangulate(view.ray_near(symbol.sighting, symbol.centre_px),
+                                  reader.cells().ray(symbol.row, symbol.column), symbol.sigma_px);
+}
+
+void Decoder::Parts::align(const GreyView& frame, double full, const Lattice& lattice) {
+  rays.clear(), depths_mm.clear();
+  for (const LatticeSymbol& symbol : lattice.symbols) {
+    rays.push_back(view.ray_near(symbol.sighting, symbol.centre_px));
+    const double depth = solve(symbol).point_in_camera.z();
+    depths_mm.push_back(depth > 0 ? depth : options.depth_max_mm);
+  }
+  aligned = &aligner->align(frame, full, reader.noise(), lattice, rays, depths_mm, reader.cells());
+}
+
 void Decoder::Parts::triangulate(const Lattice& lattice, double full) {
   const bool gated = options.correspond == Method::kDefault;
   decoding.points.clear();
-  for (const LatticeSymbol& symbol : lattice.symbols) {
+  for (std::size_t i = 0; i < lattice.symbols.size(); ++i) {
+    const LatticeSymbol& symbol = lattice.symbols[i];
+    if (aligner && !(*aligned)[i].whole) {
+      reader.reject(symbol, RegionStatus::kDamagedShape);
+      continue;
+    }
     const TriangulatedPoint solved =
-        triangulator.triangulate(view.ray_near(symbol.sighting, symbol.centre_px),
-                                 reader.cells().ray(symbol.row, symbol.column), symbol.sigma_px);
+        aligner ? TriangulatedPoint{(*aligned)[i].point_in_camera, (*aligned)[i].sigma_mm} : solve(symbol);
     const double depth = solved.point_in_camera.z();
     const bool in_range = gated ? depth >= options.depth_min_mm && depth <= options.depth_max_mm : depth > 0;
     if (in_range && solved.point_in_camera.allFinite()) {
-      add_point(symbol, solved, full);
+      add_point(symbol, aligner ? (*aligned)[i].centre_px : symbol.centre_px, solved, full);
     } else {
       reader.reject(symbol, RegionStatus::kOutOfDepthRange);
     }
   }
 }
 
-void Decoder::Parts::add_point(const LatticeSymbol& symbol, const TriangulatedPoint& solved, double full) {
+void Decoder::Parts::add_point(const LatticeSymbol& symbol, const Eigen::Vector2f& centre_px,
+                               const TriangulatedPoint& solved, double full) {
   const Eigen::Vector3f point = (camera.rig_from_camera * solved.point_in_camera).cast<float>();
   const Eigen::Vector2f projector = reader.cells().pixel(symbol.row, symbol.column).cast<float>();
   const float level_of_255 = static_cast<float>(full / 255);
   CloudPoint& out = decoding.points.emplace_back();
   out.x = point.x(), out.y = point.y(), out.z = point.z();
-  out.camera_u = symbol.centre_px.x(), out.camera_v = symbol.centre_px.y();
+  out.camera_u = centre_px.x(), out.camera_v = centre_px.y();
   out.projector_u = projector.x(), out.projector_v = projector.y();
   out.sigma_mm = static_cast<float>(solved.sigma_mm);
   out.column = static_cast<std::uint16_t>(symbol.column), out.row = static_cast<std::uint16_t>(symbol.row);

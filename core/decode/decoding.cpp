@@ -58,6 +58,8 @@ std::string_view to_string(Stage stage) {
       return "review";
     case Stage::kCorrespond:
       return "correspond";
+    case Stage::kAlign:
+      return "align";
     case Stage::kTriangulate:
       return "triangulate";
   }

@@ -46,9 +46,10 @@ enum class Stage : std::uint8_t {
   kDecodeWindows,
   kReview,
   kCorrespond,
+  kAlign,  ///< with precision "fine" alone
   kTriangulate
 };
-inline constexpr int kStageCount = 9;
+inline constexpr int kStageCount = 10;
 [[nodiscard]] std::string_view to_string(Stage stage);
 
 /// Directions of the grid's links, along the pattern's axes: u to the right, v down.

@@ -42,6 +42,13 @@ class EpipolarView {
     ray.direction += ray.turn * (camera_px - pixels_[sighting]).cast<double>();
     return ray;
   }
+  /// How far a cell lies off the epipolar line of a pixel near a sighting's, projector px, signed.
+  [[nodiscard]] double residual_px(std::int32_t sighting, const Eigen::Vector2f& camera_px,
+                                   const PixelRay& cell) const {
+    const bool moved = camera_px != pixels_[sighting];
+    return moved ? gate_.prepare(ray_near(sighting, camera_px).direction).residual_px(cell.direction)
+                 : segments_[sighting].residual_px(cell.direction);
+  }
 
  private:
   RayTable camera_rays_;

@@ -27,6 +27,8 @@ struct LatticeSymbol {
   LatticeFrame frame;                      ///< camera px for one projector px
   Bend bend;                               ///< zero where it is negligible
   float background, gain;                  ///< grey levels of the frame: the dark, and what light adds to it
+  float misfit;                            ///< of its shape, standard deviations from its letter's
+  float weight;                            ///< its lit area, camera px squared
   float sigma_px;                          ///< one standard deviation of the centre, in x and in y
   std::array<std::int32_t, 4> neighbours;  ///< by Direction: symbols of the cells beside, linked to it, or -1
 };

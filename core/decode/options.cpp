@@ -15,6 +15,11 @@ Result<> DecodeOptions::validate() const {
     return fail(ErrorCode::kInvalidArgument, "depth_max_mm has to be greater than depth_min_mm, and finite",
                 "decode.depth_max_mm");
   }
+  if (precision == Precision::kFine && centre == Method::kPaper) {
+    return fail(ErrorCode::kInvalidArgument,
+                "precision = \"fine\" aligns symbols and takes no centroids; leave centre at \"default\"",
+                "decode.precision");
+  }
   return {};
 }
 

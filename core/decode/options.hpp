@@ -7,12 +7,15 @@
 namespace slsd {
 
 enum class Method { kDefault, kPaper };
+enum class Precision { kStandard, kFine };
 
 /// The [decode] table of the configuration. Every stage can be run the paper's way, so that both can be measured side
 /// by side.
 struct DecodeOptions {
   double depth_min_mm = 400.0;  ///< working range along the camera's z axis; cuts the candidates of a codeword
   double depth_max_mm = 2500.0;
+  /// kFine: each decoded symbol's patch is aligned with the pattern, which takes several times as long.
+  Precision precision = Precision::kStandard;
   Method binarize = Method::kDefault;
   Method find_regions = Method::kDefault;  ///< the paper's way leaves regions merged that ran together
   Method classify = Method::kDefault;

@@ -84,7 +84,7 @@ const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarVi
   decode_windows(view), done(Stage::kDecodeWindows);
   review(sharp), done(Stage::kReview);
   correspond(view);
-  fit_lattice(static_cast<float>(full / 255)), done(Stage::kCorrespond);
+  fit_lattice(frame, full, sharp, view), done(Stage::kCorrespond);
   return lattice_;
 }
 
@@ -150,17 +150,22 @@ void SymbolReader::correspond(const EpipolarView* view) {
   }
 }
 
-/// @param levels  of the frame for one of 255
-void SymbolReader::fit_lattice(float levels) {
+/// @param sharp  what the symbols were measured in
+void SymbolReader::fit_lattice(const GreyView& frame, double full, const GreyView& sharp, const EpipolarView* view) {
   centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, pattern().array, lattice_);
-  // Of the frame that was given, not of one that was sharpened.
-  const float scale = levels / finder_.frame_levels();
-  for (LatticeSymbol& symbol : lattice_.symbols) symbol.background *= scale, symbol.gain *= scale;
-  if (options_.centre == Method::kDefault) return;
-  for (LatticeSymbol& symbol : lattice_.symbols) {
-    const GreyMoments& moments = seen_.moments[symbol.sighting];
-    symbol.centre_px = {moments.x, moments.y};
+  if (options_.centre == Method::kPaper) {
+    for (LatticeSymbol& symbol : lattice_.symbols) {
+      const GreyMoments& moments = seen_.moments[symbol.sighting];
+      symbol.centre_px = {moments.x, moments.y};
+    }
   }
+  noise_ = measure_noise(sharp, 255.0 * finder_.frame_levels());
+  centre_judge_.judge(noise_, view, cells(), lattice_);
+  const float scale = static_cast<float>(full / 255) / finder_.frame_levels();
+  if (scale == 1) return;
+  // Sharpening makes noise; from here on it is the frame that counts.
+  for (LatticeSymbol& symbol : lattice_.symbols) symbol.background *= scale, symbol.gain *= scale;
+  noise_ = measure_noise(frame, full);
 }
 
 std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, double full) {

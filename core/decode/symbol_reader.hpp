@@ -7,11 +7,13 @@
 #include <vector>
 
 #include "core/code/pattern.hpp"
+#include "core/decode/centre_sigma.hpp"
 #include "core/decode/correspond.hpp"
 #include "core/decode/curvature.hpp"
 #include "core/decode/decode_windows.hpp"
 #include "core/decode/decoding.hpp"
 #include "core/decode/epipolar_view.hpp"
+#include "core/decode/frame_noise.hpp"
 #include "core/decode/lattice.hpp"
 #include "core/decode/lattice_frame.hpp"
 #include "core/decode/link_grid.hpp"
@@ -56,6 +58,8 @@ class SymbolReader {
   void report(Decoding& decoding) const;
 
   [[nodiscard]] const Pattern& pattern() const { return fixed_->pattern; }
+  /// Of the last frame.
+  [[nodiscard]] const FrameNoise& noise() const { return noise_; }
   [[nodiscard]] const CellRays& cells() const { return fixed_->cells; }
   /// How many shapes of a symbol's size the last frame had.
   [[nodiscard]] std::size_t shapes() const { return seen_.size(); }
@@ -79,7 +83,7 @@ class SymbolReader {
   void decode_windows(const EpipolarView* view);
   void review(const GreyView& frame);
   void correspond(const EpipolarView* view);
-  void fit_lattice(float levels);
+  void fit_lattice(const GreyView& frame, double full, const GreyView& sharp, const EpipolarView* view);
 
   DecodeOptions options_;
   std::shared_ptr<const Fixed> fixed_;
@@ -90,9 +94,11 @@ class SymbolReader {
   SymbolReview review_;
   Correspondence correspondence_;
   CentreCorrection centre_correction_;
+  CentreJudge centre_judge_;
 
   Sightings seen_;
   Lattice lattice_;
+  FrameNoise noise_;
 };
 
 }  // namespace slsd

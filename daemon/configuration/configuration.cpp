@@ -24,6 +24,7 @@ constexpr std::array kProjectorDrivers{std::pair("headless"sv, ProjectorDriver::
 constexpr auto kIdlePictures = std::span(kPictureNames).first(3);  // pattern, white and black
 constexpr std::array kArrayMethods{std::pair("constructive"sv, ArrayMethod::kConstructive),
                                    std::pair("paper"sv, ArrayMethod::kPaper)};
+constexpr std::array kPrecisions{std::pair("standard"sv, Precision::kStandard), std::pair("fine"sv, Precision::kFine)};
 constexpr std::array kMethods{std::pair("default"sv, Method::kDefault), std::pair("paper"sv, Method::kPaper)};
 constexpr std::array kOtherHardware{std::pair("error"sv, OtherHardware::kError),
                                     std::pair("warn"sv, OtherHardware::kWarn)};
@@ -80,6 +81,7 @@ Result<> read_decode(const toml::table* table, const path& file, DecodeOptions& 
   TableReader reader(table, "[decode]", file);
   reader.read("depth_min_mm", options.depth_min_mm);
   reader.read("depth_max_mm", options.depth_max_mm);
+  reader.choose("precision", options.precision, span_of(kPrecisions));
   reader.choose("binarize", options.binarize, span_of(kMethods));
   reader.choose("find_regions", options.find_regions, span_of(kMethods));
   reader.choose("classify", options.classify, span_of(kMethods));

@@ -4,30 +4,110 @@
 
 #include <cmath>
 
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
+
+#include "tests/core/decode/decoded_scene.hpp"
+#include "tests/core/decode/shipped_pattern.hpp"
 
 namespace slsd {
 namespace {
 
-GreyMoments moments_of(float weight, float noise, float contrast) {
-  GreyMoments moments;
-  moments.weight = weight, moments.noise = noise;
-  moments.background = 20, moments.peak = 20 + contrast;
-  return moments;
+LatticeSymbol symbol_of(float weight, float gain) {
+  LatticeSymbol symbol{};
+  symbol.weight = weight, symbol.background = 20, symbol.gain = gain;
+  symbol.frame.setIdentity();
+  symbol.neighbours = {0, 0, 0, 0};
+  return symbol;
 }
 
-TEST(CentreSigma, WithoutNoiseIsWhatNoiseDoesNotExplain) {
-  EXPECT_NEAR(centre_sigma_px(moments_of(150, 0, 100)), 0.015, 1e-9);
+TEST(NoiseOfCentre, FollowsNoiseOverContrast) {
+  const FrameNoise six{.dark_variance = 36}, twelve{.dark_variance = 144};
+  EXPECT_NEAR(noise_of_centre_px(symbol_of(144, 100), six), 6 / 60. / std::sqrt(12), 1e-6);
+  EXPECT_NEAR(noise_of_centre_px(symbol_of(144, 200), twelve), 6 / 60. / std::sqrt(12), 1e-6);
+  EXPECT_LT(noise_of_centre_px(symbol_of(600, 100), six), noise_of_centre_px(symbol_of(144, 100), six));
 }
 
-TEST(CentreSigma, FollowsNoiseOverContrast) {
-  const double expected = std::hypot(6 / 45. / std::sqrt(12), 0.015);
-  EXPECT_NEAR(centre_sigma_px(moments_of(144, 6, 100)), expected, 1e-6);
-  EXPECT_NEAR(centre_sigma_px(moments_of(144, 12, 200)), expected, 1e-6);
+float judged(const LatticeSymbol& symbol) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  const CellRays cells(pattern, std::vector<Prototype>(5), paper_rig().projector);
+  Lattice lattice{{symbol}};
+  CentreJudge().judge({}, nullptr, cells, lattice);
+  return lattice.symbols[0].sigma_px;
 }
 
-TEST(CentreSigma, IsSmallerForLargerSymbols) {
-  EXPECT_LT(centre_sigma_px(moments_of(600, 5, 100)), centre_sigma_px(moments_of(100, 5, 100)));
+TEST(CentreJudge, GrowsWithTheMisfitOfTheShapeAndWhereNothingTellsOfItsBend) {
+  LatticeSymbol symbol = symbol_of(144, 100);
+  const float good = judged(symbol);
+  EXPECT_NEAR(good, 0.01, 1e-6);
+  symbol.misfit = 2;
+  EXPECT_NEAR(judged(symbol), std::hypot(0.01, 0.034 * 4), 1e-6);
+  symbol.misfit = 0;
+  symbol.neighbours = {0, 0, -1, -1};
+  EXPECT_NEAR(judged(symbol), std::hypot(0.01, 0.02), 1e-6);
+}
+
+/// Standard deviation of errors over sigma, and the root mean square of the errors, on a plane whose place is known.
+struct Truth {
+  double over_sigma, rms_mm;
+};
+
+Truth truth_of(Precision precision, double noise, const Surface& surface) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  DecodeOptions options;
+  options.precision = precision;
+  Decoder decoder = test::decoder_of(pattern, options);
+  SimulationOptions simulation;
+  simulation.noise_sigma = noise;
+  const Grey8 frame = simulate(draw_pattern(pattern), paper_rig(), surface, simulation);
+  const Decoding decoding = test::decode(decoder, frame.view());
+  EXPECT_GT(decoding.points.size(), 2000U);
+  double squares = 0, in_sigma = 0;
+  const Lens lens = paper_rig().cameras[0].lens;
+  for (const CloudPoint& point : decoding.points) {
+    const Eigen::Vector3d at(point.x, point.y, point.z);
+    const Eigen::Vector3d direction = lens.undistort(lens.project(at)).homogeneous();
+    const auto true_depth = surface({Eigen::Vector3d::Zero(), direction});
+    if (!true_depth) continue;
+    const double error = (at.z() - *true_depth) * direction.norm();
+    squares += error * error;
+    in_sigma += std::pow(error / point.sigma_mm, 2);
+  }
+  const auto count = static_cast<double>(decoding.points.size());
+  return {std::sqrt(in_sigma / count), std::sqrt(squares / count)};
+}
+
+// The truth is known: sigma tripled, or a third of it, is out of bounds.
+TEST(Sigma, IsTrueAtEveryNoise) {
+  for (const double noise : {2.0, 6.0}) {
+    for (const Precision precision : {Precision::kStandard, Precision::kFine}) {
+      const Truth truth = truth_of(precision, noise, test::kTilted);
+      EXPECT_GT(truth.over_sigma, 0.55) << noise << " " << static_cast<int>(precision);
+      EXPECT_LT(truth.over_sigma, 1.5) << noise << " " << static_cast<int>(precision);
+    }
+  }
+}
+
+TEST(Sigma, WithoutNoiseIsNotTooSmall) {
+  for (const Precision precision : {Precision::kStandard, Precision::kFine})
+    EXPECT_LT(truth_of(precision, 0, test::kTilted).over_sigma, 1.5);
+}
+
+TEST(Precision, FineIsSeveralTimesAsExact) {
+  const Truth standard = truth_of(Precision::kStandard, 2, test::kTilted),
+              fine = truth_of(Precision::kFine, 2, test::kTilted);
+  EXPECT_LT(fine.rms_mm, 0.6 * standard.rms_mm);
+  EXPECT_LT(fine.rms_mm, 0.1);
+}
+
+TEST(Precision, FineTakesNoCentroidsThePapersWay) {
+  DecodeOptions options;
+  options.precision = Precision::kFine;
+  EXPECT_TRUE(options.validate());
+  options.centre = Method::kPaper;
+  const auto refused = options.validate();
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(to_string(refused.error()), testing::HasSubstr("leave centre at"));
 }
 
 }  // namespace

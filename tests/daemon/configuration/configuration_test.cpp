@@ -53,6 +53,7 @@ other_hardware = "warn"
 [decode]
 depth_min_mm = 100
 depth_max_mm = 200.5
+precision = "fine"
 find_regions = "paper"
 classify = "paper"
 [scan]
@@ -85,6 +86,7 @@ socket_mode = 0o600
   EXPECT_EQ(configuration->calibration_file, "etc/calibration.yml");
   EXPECT_EQ(configuration->other_hardware, OtherHardware::kWarn);
   EXPECT_EQ(configuration->decode.binarize, Method::kDefault);
+  EXPECT_EQ(configuration->decode.precision, Precision::kFine);
   EXPECT_EQ(configuration->decode.find_regions, Method::kPaper);
   EXPECT_EQ(configuration->decode.classify, Method::kPaper);
   EXPECT_EQ(configuration->decode.depth_min_mm, 100.0);

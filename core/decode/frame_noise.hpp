@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cmath>
+
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// The noise of a frame's pixels: the sensor's own, and that of light, whose variance grows with the light.
+struct FrameNoise {
+  float dark_variance = 0;       ///< grey levels squared
+  float variance_per_level = 0;  ///< grey levels
+
+  /// One standard deviation of a pixel, grey levels.
+  [[nodiscard]] float at(float level) const {
+    return std::sqrt(dark_variance + variance_per_level * (level > 0 ? level : 0));
+  }
+};
+
+/// Measures the noise of a frame from second differences along the rows of a sample of its pixels: what is straight
+/// drops out, and edges are a minority that the lower quartile passes over. Where a level is seen at edges alone, the
+/// levels that tell less noise stand.
+/// @param full  the level of a saturated pixel, which has no noise
+/// @thread reentrant
+[[nodiscard]] FrameNoise measure_noise(const GreyView& frame, double full);
+
+}  // namespace slsd
