@@ -13,8 +13,10 @@ namespace slsd {
 namespace {
 
 constexpr float kLeastPx = 0.01F;  // what is left of sampling and blur
-constexpr float kOfAcross = 0.5F, kOfAcrossAround = 0.6F;
-constexpr float kOfMisfitSquared = 0.034F;  // px
+constexpr float kOfAcross = 0.4F, kOfRoughness = 1;
+constexpr float kOfMisfitSquared = 0.03F;  // px
+/// What lies across on the smoothest of surfaces, besides noise.
+constexpr float kSmoothAcrossPx = 0.022F;
 constexpr float kUnknownBendPx = 0.02F;
 /// Beyond this a neighbour's residual is a fault of its own.
 constexpr float kAcrossAroundMaxPx = 0.3F;
@@ -56,10 +58,11 @@ void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const
       around += square(std::min(across_px_[static_cast<std::size_t>(other)], kAcrossAroundMaxPx));
       ++count;
     }
-    symbol.sigma_px =
-        std::sqrt(square(noise_of_centre_px(symbol, noise)) + square(kLeastPx) + square(kOfAcross * across_px_[i]) +
-                  square(kOfAcrossAround) * around / count + square(kOfMisfitSquared * square(symbol.misfit)) +
-                  (has_bend(symbol) ? 0 : square(kUnknownBendPx)));
+    const float noise_px = noise_of_centre_px(symbol, noise);
+    const float roughness = std::max(0.F, around / count - square(noise_px) - square(kSmoothAcrossPx));
+    symbol.sigma_px = std::sqrt(square(noise_px) + square(kLeastPx) + square(kOfAcross * across_px_[i]) +
+                                square(kOfRoughness) * roughness + square(kOfMisfitSquared * square(symbol.misfit)) +
+                                (has_bend(symbol) ? 0 : square(kUnknownBendPx)));
   }
 }
 

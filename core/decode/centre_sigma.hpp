@@ -24,11 +24,11 @@ namespace slsd {
 /// across the epipolar line, where no depth moves a symbol and what is left over is error alone; and in the symbol's
 /// shape. So, all in camera px and added in squares,
 ///
-///     noise, 0.01,  0.5 across,  0.6 across around,  0.034 misfit^2,  0.02 where no neighbours tell of its bend
+///     noise,  0.01,  0.4 across,  roughness,  0.03 misfit^2,  0.02 where no neighbours tell of its bend
 ///
-/// across: the residual less the frame's median (that is the calibration's); around: root mean square of the symbol's
-/// and its neighbours'; misfit: of the shape, in standard deviations. The factors are fitted to rendered frames
-/// (docs/decoder.md).
+/// across: the residual less the frame's median (that is the calibration's); roughness: the root mean square of the
+/// symbol's and its neighbours', beyond noise and the 0.022 px of smooth surfaces; misfit: of the shape, in standard
+/// deviations. The factors are fitted to rendered frames (docs/decoder.md).
 /// @thread thread-bound: keeps its buffers
 class CentreJudge {
  public:
