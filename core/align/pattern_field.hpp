@@ -18,10 +18,10 @@ namespace slsd {
 class PatternField {
  public:
   static constexpr int kSamplesPerPx = 2;
-  static constexpr int kBorderPx = 6;  ///< dark, all round the pattern
+  static constexpr int kBorderPx = 8;  ///< dark, all round the pattern
 
   /// @param pattern        what the projector shows; 255 is light 1
-  /// @param blur_sigma_px  of a Gaussian, projector px, 0.3 to 2
+  /// @param blur_sigma_px  of a Gaussian, projector px, 0.3 to 2.2
   PatternField(const ImageView<std::uint8_t>& pattern, float blur_sigma_px);
 
   /// Light at a sample, 0 to 1, and its slopes, per projector px.

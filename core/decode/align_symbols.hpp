@@ -23,7 +23,7 @@ namespace slsd {
 /// @thread thread-safe
 class PatternFields {
  public:
-  static constexpr std::array<float, 6> kBlursPx{0.42F, 0.55F, 0.72F, 0.95F, 1.25F, 1.65F};
+  static constexpr std::array<float, 7> kBlursPx{0.42F, 0.55F, 0.72F, 0.95F, 1.25F, 1.65F, 2.15F};
   explicit PatternFields(Grey8 pattern) : pattern_(std::move(pattern)) {}
   [[nodiscard]] const PatternField& at(std::size_t blur) const;
 
