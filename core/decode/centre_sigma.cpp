@@ -28,10 +28,10 @@ bool has_bend(const LatticeSymbol& symbol) {
 
 }  // namespace
 
-float noise_of_centre_px(const LatticeSymbol& symbol, const FrameNoise& noise) {
+float noise_of_centre_px(float weight, float background, float gain, const FrameNoise& noise) {
   constexpr float kRamp = kCentreRampEnd - kCentreRampStart;
-  const float relative = noise.at(symbol.background + 0.5F * symbol.gain) / (kRamp * symbol.gain);
-  return relative / std::sqrt(std::sqrt(symbol.weight));
+  const float relative = noise.at(background + 0.5F * gain) / (kRamp * gain);
+  return relative / std::sqrt(std::sqrt(weight));
 }
 
 void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const CellRays& cells, Lattice& lattice) {
@@ -58,7 +58,7 @@ void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const
       around += square(std::min(across_px_[static_cast<std::size_t>(other)], kAcrossAroundMaxPx));
       ++count;
     }
-    const float noise_px = noise_of_centre_px(symbol, noise);
+    const float noise_px = noise_of_centre_px(symbol.weight, symbol.background, symbol.gain, noise);
     const float roughness = std::max(0.F, around / count - square(noise_px) - square(kSmoothAcrossPx));
     symbol.sigma_px = std::sqrt(square(noise_px) + square(kLeastPx) + square(kOfAcross * across_px_[i]) +
                                 square(kOfRoughness) * roughness + square(kOfMisfitSquared * square(symbol.misfit)) +

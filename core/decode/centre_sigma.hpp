@@ -15,8 +15,10 @@ namespace slsd {
 ///
 /// The soft threshold lets noise in along the edge alone, a band about a pixel and a half wide: with w the area, n the
 /// noise and c the contrast, var = (n / r c)^2 / sqrt(w), r the ramp, for a compact symbol.
+/// @param weight            lit area, camera px squared
+/// @param background, gain  grey levels: the dark, and what light adds to it
 /// @thread reentrant
-[[nodiscard]] float noise_of_centre_px(const LatticeSymbol& symbol, const FrameNoise& noise);
+[[nodiscard]] float noise_of_centre_px(float weight, float background, float gain, const FrameNoise& noise);
 
 /// Tells how exact each centre of a lattice is, along the epipolar line and across it.
 ///

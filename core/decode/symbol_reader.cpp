@@ -159,7 +159,7 @@ void SymbolReader::fit_lattice(const GreyView& frame, double full, const GreyVie
       symbol.centre_px = {moments.x, moments.y};
     }
   }
-  noise_ = measure_noise(sharp, 255.0 * finder_.frame_levels());
+  noise_ = measured_noise_ = measure_noise(sharp, 255.0 * finder_.frame_levels());
   centre_judge_.judge(noise_, view, cells(), lattice_);
   const float scale = static_cast<float>(full / 255) / finder_.frame_levels();
   if (scale == 1) return;
@@ -181,8 +181,10 @@ std::vector<SymbolMatch> SymbolReader::off_line() const {
   for (std::size_t i = 0; i < seen_.size(); ++i) {
     const CellClaim& claim = seen_.claims[i];
     if (claim.status != RegionStatus::kOffEpipolarLine || !claim.named()) continue;
-    const Eigen::Vector2d centre(seen_.moments[i].x, seen_.moments[i].y);
-    matches.push_back({centre, cells().pixel(claim.row, claim.column), centre_sigma_px(seen_.moments[i])});
+    const GreyMoments& m = seen_.moments[i];
+    matches.push_back({{m.x, m.y},
+                       cells().pixel(claim.row, claim.column),
+                       noise_of_centre_px(m.weight, m.background, m.peak - m.background, measured_noise_)});
   }
   return matches;
 }

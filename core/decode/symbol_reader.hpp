@@ -98,7 +98,7 @@ class SymbolReader {
 
   Sightings seen_;
   Lattice lattice_;
-  FrameNoise noise_;
+  FrameNoise noise_, measured_noise_;  // of the frame, and of what the symbols were measured in
 };
 
 }  // namespace slsd

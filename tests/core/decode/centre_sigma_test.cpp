@@ -23,9 +23,9 @@ LatticeSymbol symbol_of(float weight, float gain) {
 
 TEST(NoiseOfCentre, FollowsNoiseOverContrast) {
   const FrameNoise six{.dark_variance = 36}, twelve{.dark_variance = 144};
-  EXPECT_NEAR(noise_of_centre_px(symbol_of(144, 100), six), 6 / 60. / std::sqrt(12), 1e-6);
-  EXPECT_NEAR(noise_of_centre_px(symbol_of(144, 200), twelve), 6 / 60. / std::sqrt(12), 1e-6);
-  EXPECT_LT(noise_of_centre_px(symbol_of(600, 100), six), noise_of_centre_px(symbol_of(144, 100), six));
+  EXPECT_NEAR(noise_of_centre_px(144, 20, 100, six), 6 / 60. / std::sqrt(12), 1e-6);
+  EXPECT_NEAR(noise_of_centre_px(144, 20, 200, twelve), 6 / 60. / std::sqrt(12), 1e-6);
+  EXPECT_LT(noise_of_centre_px(600, 20, 100, six), noise_of_centre_px(144, 20, 100, six));
 }
 
 float judged(const LatticeSymbol& symbol) {
