@@ -36,7 +36,8 @@ struct IslandOptions {
 ///
 /// Within an island a node has to be held by two links more than contradict it, and where the line of nodes through it
 /// is contradicted, the part of the line that agrees has to reach the budget by itself: so chance adds no node of
-/// another surface to a rim, and two rows at one depth name no row between them at another.
+/// another surface to a rim, and two rows at one depth name no row between them at another. The same is asked of each
+/// piece at a rim that another surface may have taken from the island: see docs/decoder.md.
 /// @thread thread-bound: keeps its buffers
 class IslandJudge {
  public:
@@ -55,6 +56,19 @@ class IslandJudge {
   struct Island {
     std::int32_t first = 0, size = 0;  // of members_
     RegionStatus status = RegionStatus::kDecoded;
+  };
+
+  /// Cells of an island.
+  struct Piece {
+    int row, column, rows, columns;
+    [[nodiscard]] bool contains(int r, int c) const {
+      return r >= row && r < row + rows && c >= column && c < column + columns;
+    }
+  };
+  struct Side {
+    int held_by = 0;  // links of the island's
+    float bend = 0;   // their sum
+    bool contradicted = false, broken = false;
   };
 
   struct Frame {
@@ -93,6 +107,18 @@ class IslandJudge {
   [[nodiscard]] double cost_of_rim(const Frame& frame, const Island& island) const;
   void refuse_doubles(const Frame& frame);
   void cut_back(const Frame& frame);
+  void cut_pieces(const Frame& frame);
+  void cut_pieces_through(const Frame& frame, std::int32_t node, float evidence_min);
+  void cut_piece(const Frame& frame, const Piece& piece, float missing);
+  [[nodiscard]] bool may_be_apart(const Frame& frame, const Piece& piece) const;
+  [[nodiscard]] Side side_of(const Frame& frame, const Piece& piece, Direction d) const;
+  [[nodiscard]] float bend_of(const Frame& frame, std::int32_t node, Direction d) const;
+  [[nodiscard]] int turns_without(const Piece& piece) const;
+  [[nodiscard]] int turns_at(int row, int column, const Piece* without) const;
+  [[nodiscard]] std::optional<float> evidence_of(const Piece& piece) const;
+  [[nodiscard]] std::size_t index_of(int row, int column) const {
+    return static_cast<std::size_t>(row) * options_.columns + column;
+  }
   void cut_contradicted_lines(const Frame& frame);
   void find_contradicted_lines(const Frame& frame, Direction forth);
   [[nodiscard]] float count_doubtful(const Frame& frame, std::int32_t node, Direction direction, int most) const;

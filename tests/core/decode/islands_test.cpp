@@ -91,8 +91,8 @@ TEST_F(Islands, AreNoLargerForNodesThatChanceAddsAtTheirRim) {
     alike += shapes_[i].letter == pattern_.array.at(row, column);
     EXPECT_NE(claims[i].status, kDecoded) << row << ", " << column;
   }
-  EXPECT_GT(alike, 20);  // so many letters are the pattern's by chance
-  EXPECT_GE(decoded(claims), 195);
+  EXPECT_GT(alike, 20);             // so many letters are the pattern's by chance
+  EXPECT_GE(decoded(claims), 185);  // corners that lie beside them may be theirs
 }
 
 // Two rows at one depth named the row between them, wherever its letters agreed.
@@ -118,7 +118,9 @@ TEST_F(Islands, LoseNothingAtAStraightEdgeInDepth) {
   EXPECT_GE(decoded(claims), 560);  // of 600
   for (std::size_t i = 0; i < claims.size(); ++i) {
     const auto [row, column] = grid_.cells[i];
-    if (claims[i].status == kDecoded) EXPECT_TRUE(claims[i].same_cell(row, row < 20 ? column : column + 7));
+    if (claims[i].status == kDecoded) {
+      EXPECT_TRUE(claims[i].same_cell(row, row < 20 ? column : column + 7));
+    }
   }
 }
 
