@@ -30,23 +30,26 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, std::vector
   const auto stands = [&](std::int32_t node, std::int32_t other) {
     return other >= 0 && claims[other].status == RegionStatus::kDecoded && claims[other].island == claims[node].island;
   };
-  // Whether the island goes on there, refused or not, or no node is there that could be of another surface.
+  // Whether the island goes on there, refused or not, or no node is there that could be of another surface. What was
+  // refused by its surroundings could.
   const auto continues = [&](std::int32_t node, Direction d) {
     const std::int32_t other = neighbour(nodes, node, d);
     const Eigen::Vector2f to = step(d);
-    return other < 0 || claims[other].same_cell(claims[node].row + static_cast<int>(to.y()),
-                                                claims[node].column + static_cast<int>(to.x()));
+    return other < 0 || (claims[other].status != RegionStatus::kNeighboursDisagree &&
+                         claims[other].same_cell(claims[node].row + static_cast<int>(to.y()),
+                                                 claims[node].column + static_cast<int>(to.x())));
   };
   const auto is_lone = [&](std::int32_t node, Direction forth) {
-    int standing = 0, refused = 0;
+    int standing = 0, refused = 0, next_refused = 0;
     for (const Direction d : {forth, opposite(forth)}) {
       std::int32_t other = neighbour(nodes, node, d);
+      next_refused += other >= 0 && !stands(node, other);
       for (int i = 0; i < kReach && other >= 0; ++i, other = neighbour(nodes, other, d))
         ++(stands(node, other) ? standing : refused);
     }
     const auto aside = static_cast<Direction>((forth + 1) % 4);
     const bool inside = continues(node, aside) && continues(node, opposite(aside));
-    return refused > (inside ? 2 * kReach - 1 : standing);
+    return inside ? refused == 2 * kReach : refused > standing || next_refused == 2;
   };
   lone_.clear();
   for (std::int32_t node = 0; node < static_cast<std::int32_t>(nodes.size()); ++node) {

@@ -67,6 +67,8 @@ TEST(AdversaryFrames, NameNoPieceOfAnotherSurfaceAtARim) {
                                      {Kind::kSwappedPatch, 55}})
     fine.expect_none_wrong(kind, number);
   for (const int number : {68, 82}) coarse.expect_none_wrong(Kind::kSwappedPatch, number);
+  // Two halves, of a symbol of a shelf and of one beyond it, that look like one.
+  for (const int number : {166, 332, 334, 390}) coarse.expect_none_wrong(Kind::kShelves, number);
 }
 
 std::vector<Kind> all_kinds() {
