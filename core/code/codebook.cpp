@@ -14,28 +14,18 @@ Codeword codeword_at(const CodeArray& array, int row, int column) {
   return codeword;
 }
 
-Codebook::Codebook(const CodeArray& array, int rows, int columns, int radius)
+Codebook::Codebook(const CodeArray& array, int rows, int columns)
     : letters_(static_cast<std::uint32_t>(array.letters)),
       rows_(rows),
       columns_(columns),
-      keys_(static_cast<std::size_t>(rows) * columns, kNoKey) {
-  const std::size_t per_window = radius > 0 ? 1 + kWindowCells * (letters_ - 1) : 1;
-  const std::size_t entries = static_cast<std::size_t>(rows) * columns * per_window;
-  mask_ = std::bit_ceil(2 * entries + 1) - 1;
-  table_.assign(mask_ + 1, Entry{0, 0, 0, -1});
+      keys_(static_cast<std::size_t>(rows) * columns, kNoKey),
+      mask_(std::bit_ceil(2 * keys_.size() + 1) - 1),
+      table_(mask_ + 1, Entry{0, -1, -1}) {
   for (int row = 1; row + 1 < rows; ++row) {
     for (int column = 1; column + 1 < columns; ++column) {
-      Codeword codeword = codeword_at(array, row, column);
-      keys_[static_cast<std::size_t>(row) * columns + column] = key_of(codeword);
-      insert(codeword, row, column, 0);
-      if (radius == 0) continue;
-      for (std::uint8_t& letter : codeword) {
-        const std::uint8_t right = letter;
-        for (letter = 0; letter < letters_; ++letter) {
-          if (letter != right) insert(codeword, row, column, 1);
-        }
-        letter = right;
-      }
+      const std::uint32_t key = key_of(codeword_at(array, row, column));
+      keys_[static_cast<std::size_t>(row) * columns + column] = key;
+      insert(key, row, column);
     }
   }
 }
@@ -46,12 +36,10 @@ std::uint32_t Codebook::key_of(const Codeword& codeword) const {
   return key;
 }
 
-void Codebook::insert(const Codeword& codeword, int row, int column, int errors) {
-  const std::uint32_t key = key_of(codeword);
+void Codebook::insert(std::uint32_t key, int row, int column) {
   std::size_t slot = slot_of(key);
-  while (table_[slot].errors >= 0) slot = (slot + 1) & mask_;
-  table_[slot] = {key, static_cast<std::int16_t>(row), static_cast<std::int16_t>(column),
-                  static_cast<std::int8_t>(errors)};
+  while (table_[slot].row >= 0) slot = (slot + 1) & mask_;
+  table_[slot] = {key, static_cast<std::int16_t>(row), static_cast<std::int16_t>(column)};
 }
 
 }  // namespace slsd

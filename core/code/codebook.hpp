@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "core/code/code_array.hpp"
@@ -14,21 +13,20 @@ namespace slsd {
 /// The nine letters of a 3x3 window, row by row.
 using Codeword = std::array<std::uint8_t, kWindowCells>;
 
-/// Finds windows of the array by their codewords, with up to the number of errors that its minimum distance can
-/// correct.
+/// Finds windows of the array by their codewords, or by such as differ in one letter.
+///
+/// Only the windows themselves are kept, 12 bytes each and as much room again: a codeword that is misread is looked for
+/// by all words that differ from it in one letter, which are 9 (letters - 1) questions to a table in the cache.
 /// @thread reentrant
 class Codebook {
  public:
   struct Entry {
     std::uint32_t key;
-    std::int16_t row, column;  ///< of the window's middle cell
-    std::int8_t errors;        ///< letters of the key that differ from the array's
+    std::int16_t row, column;  ///< of the window's middle cell; row -1: an empty slot
   };
 
   /// @param rows, columns  the part of the array that is shown
-  /// @param radius         errors to correct, 0 or 1; at most (minimum distance - 1) / 2 where the answers are to be
-  /// unique
-  Codebook(const CodeArray& array, int rows, int columns, int radius);
+  Codebook(const CodeArray& array, int rows, int columns);
 
   /// The key of a codeword, letter by letter: append(append(0, first), second) and so on to the ninth.
   [[nodiscard]] std::uint32_t append(std::uint32_t key, std::uint8_t letter) const { return key * letters_ + letter; }
@@ -41,21 +39,27 @@ class Codebook {
     return keys_[static_cast<std::size_t>(row) * columns_ + column];
   }
 
-  /// Calls found(const Entry&) for every window within the radius of the codeword.
-  template <class Found>
-  void find(const Codeword& codeword, Found&& found) const {
-    find(key_of(codeword), std::forward<Found>(found));
-  }
+  /// Calls found(const Entry&) for every window of the codeword.
   template <class Found>
   void find(std::uint32_t key, Found&& found) const {
-    for (std::size_t slot = slot_of(key); table_[slot].errors >= 0; slot = (slot + 1) & mask_) {
+    for (std::size_t slot = slot_of(key); table_[slot].row >= 0; slot = (slot + 1) & mask_) {
       if (table_[slot].key == key) found(table_[slot]);
+    }
+  }
+  /// The same for every window that differs from the codeword in one letter.
+  template <class Found>
+  void find_one_off(std::uint32_t key, Found&& found) const {
+    std::uint32_t worth = 1;  // of the letter in the key
+    for (int i = 0; i < kWindowCells; ++i, worth *= letters_) {
+      const std::uint32_t read = key / worth % letters_, without = key - read * worth;
+      for (std::uint32_t letter = 0; letter < letters_; ++letter)
+        if (letter != read) find(without + letter * worth, found);
     }
   }
 
  private:
   [[nodiscard]] std::size_t slot_of(std::uint32_t key) const { return (key * 2654435769U >> 7U) & mask_; }
-  void insert(const Codeword& codeword, int row, int column, int errors);
+  void insert(std::uint32_t key, int row, int column);
 
   std::uint32_t letters_;
   int rows_, columns_;

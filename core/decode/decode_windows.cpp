@@ -13,13 +13,12 @@ constexpr int kCorrectedWeight = 1;
 
 }  // namespace
 
-WindowDecoder::WindowDecoder(const Pattern& pattern, DecodeWindowsOptions options, int radius)
+WindowDecoder::WindowDecoder(const Pattern& pattern, DecodeWindowsOptions options)
     : array_(pattern.array),
       options_(options),
-      codebooks_(
-          std::make_shared<const Codebooks>(Codebooks{Codebook(pattern.array, options.rows, options.columns, 0),
-                                                      Codebook(pattern.array, options.rows, options.columns, radius)})),
+      codebook_(std::make_shared<const Codebook>(pattern.array, options.rows, options.columns)),
       unique_(pattern.array.minimum_distance > 0),
+      corrects_(pattern.array.minimum_distance >= 3),
       log_letters_(std::log(static_cast<float>(pattern.letters()))),
       judge_(pattern, {.rows = options.rows, .columns = options.columns}) {}
 
@@ -28,7 +27,7 @@ std::optional<std::uint32_t> WindowDecoder::key_of(const Neighbourhood& around,
   std::uint32_t key = 0;
   for (const std::int32_t node : around) {
     if (node < 0 || shapes[node].letter < 0) return std::nullopt;
-    key = codebooks_->exact.append(key, static_cast<std::uint8_t>(shapes[node].letter));
+    key = codebook_->append(key, static_cast<std::uint8_t>(shapes[node].letter));
   }
   return key;
 }
@@ -41,7 +40,7 @@ WindowDecoder::Hit WindowDecoder::continued(std::int32_t node, std::uint32_t key
   for (const int beside : {kAbove, kLeftOf}) {
     const Hit& hit = hits_[around_[node][beside]];
     const int row = hit.row + (beside == kAbove), column = hit.column + (beside == kLeftOf);
-    if (hit.weight == 0 || codebooks_->exact.key_at(row, column) != key) continue;
+    if (hit.weight == 0 || codebook_->key_at(row, column) != key) continue;
     return {static_cast<std::int16_t>(row), static_cast<std::int16_t>(column), kExactWeight};
   }
   return {};
@@ -50,21 +49,21 @@ WindowDecoder::Hit WindowDecoder::continued(std::int32_t node, std::uint32_t key
 WindowDecoder::Hit WindowDecoder::look_up(std::int32_t node, std::uint32_t key, const CellGate& gate) const {
   Hit found;
   int hits = 0;
-  const auto take = [&](const Codebook::Entry& entry) {
-    if (!gate.admits(node, entry.row, entry.column)) return;
-    found = {entry.row, entry.column, entry.errors == 0 ? kExactWeight : kCorrectedWeight};
+  const auto take = [&](const Codebook::Entry& entry, int weight, bool strays) {
+    found = {entry.row, entry.column, weight, strays};
     ++hits;
   };
-  codebooks_->exact.find(key, take);
+  const auto take_admitted = [&](const Codebook::Entry& entry, int weight) {
+    if (gate.admits(node, entry.row, entry.column)) take(entry, weight, false);
+  };
+  codebook_->find(key, [&](const Codebook::Entry& entry) { take_admitted(entry, kExactWeight); });
   if (hits == 1) return found;
   // Light of the pattern that comes from elsewhere than the calibration says: of a knocked rig, of another projector.
   if (hits == 0 && unique_) {
-    codebooks_->exact.find(key, [&](const Codebook::Entry& entry) {
-      found = {entry.row, entry.column, kExactWeight, true};
-      ++hits;
-    });
+    codebook_->find(key, [&](const Codebook::Entry& entry) { take(entry, kExactWeight, true); });
   }
-  if (hits == 0) codebooks_->correcting.find(key, take);
+  if (hits == 0 && corrects_)
+    codebook_->find_one_off(key, [&](const Codebook::Entry& entry) { take_admitted(entry, kCorrectedWeight); });
   return hits == 1 ? found : Hit{};
 }
 

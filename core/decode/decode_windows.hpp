@@ -32,7 +32,7 @@ struct DecodeWindowsOptions {
 /// @thread thread-bound: keeps its buffers
 class WindowDecoder {
  public:
-  WindowDecoder(const Pattern& pattern, DecodeWindowsOptions options, int radius);
+  WindowDecoder(const Pattern& pattern, DecodeWindowsOptions options);
 
   void decode(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes, const CellGate& gate,
               std::vector<CellClaim>& claims);
@@ -68,14 +68,10 @@ class WindowDecoder {
     return row >= 0 && column >= 0 && row < options_.rows && column < options_.columns;
   }
 
-  struct Codebooks {
-    Codebook exact, correcting;  // the first is small enough to stay in the cache
-  };
-
   CodeArray array_;
   DecodeWindowsOptions options_;
-  std::shared_ptr<const Codebooks> codebooks_;  // shared with copies: the larger part of a decoder, and never changes
-  bool unique_;                                 // no two windows alike
+  std::shared_ptr<const Codebook> codebook_;  // shared with copies: it never changes
+  bool unique_, corrects_;                    // no two windows alike; none alike but for two letters
   float log_letters_;
   std::vector<Beside> beside_;
   std::vector<Neighbourhood> around_;

@@ -32,11 +32,6 @@ std::vector<Prototype> with_centroids_of(Method centre, const Pattern& pattern, 
   return prototypes;
 }
 
-/// Errors that the array's distance corrects; more than one costs more memory than it gains.
-int radius_of(const CodeArray& array) {
-  return array.minimum_distance >= 3 ? 1 : 0;
-}
-
 }  // namespace
 
 SymbolReader::Prototypes SymbolReader::Prototypes::of(const Pattern& pattern, float scale) {
@@ -61,8 +56,7 @@ SymbolReader::SymbolReader(const Pattern& pattern, const Lens& projector, Expect
       paper_(std::move(paper)),
       finder_(pattern.options, std::move(expected), options.binarize, options.find_regions),
       linker_({.pitch_px = static_cast<float>(pattern.pitch_px())}),
-      window_decoder_(pattern, {.rows = pattern.whole_rows(), .columns = pattern.whole_columns()},
-                      radius_of(pattern.array)),
+      window_decoder_(pattern, {.rows = pattern.whole_rows(), .columns = pattern.whole_columns()}),
       review_(pattern, fixed_->prototypes.as_measured, {}),
       correspondence_({}),
       centre_correction_(fixed_->prototypes.as_measured, static_cast<float>(pattern.pitch_px()),

@@ -69,7 +69,7 @@ class DecodeWindows : public testing::Test {
   }
 
   std::vector<CellClaim> decode(const Sheet& sheet, std::span<const EpipolarSegment> segments = {}) {
-    WindowDecoder decoder(pattern_, {.rows = kRows, .columns = kColumns}, 1);
+    WindowDecoder decoder(pattern_, {.rows = kRows, .columns = kColumns});
     std::vector<CellClaim> claims;
     decoder.decode(sheet.grid.nodes, sheet.shapes, CellGate(cells_, segments, 1.5), claims);
     return claims;
@@ -178,7 +178,7 @@ TEST_F(DecodeWindows, TakesNoCellThatTheGateExcludes) {
 
 TEST_F(DecodeWindows, NamesAPartThatIsAskedForAlone) {
   const Sheet sheet = sheet_of(pattern_.array, {});
-  WindowDecoder decoder(pattern_, {.rows = 20, .columns = 30}, 1);
+  WindowDecoder decoder(pattern_, {.rows = 20, .columns = 30});
   std::vector<CellClaim> claims;
   decoder.decode(sheet.grid.nodes, sheet.shapes, CellGate(cells_, {}, 1.5), claims);
   EXPECT_EQ(score(sheet, claims).decoded, 20 * 30);

@@ -54,7 +54,7 @@ class Islands : public testing::Test {
 
   std::vector<CellClaim> decode(std::span<const EpipolarSegment> segments = {}) {
     grid_.link_truly();
-    WindowDecoder decoder(pattern_, {.rows = kRows, .columns = kColumns}, 1);
+    WindowDecoder decoder(pattern_, {.rows = kRows, .columns = kColumns});
     std::vector<CellClaim> claims;
     decoder.decode(grid_.nodes, shapes_, CellGate(cells_, segments, 1.5), claims);
     return claims;
