@@ -336,6 +336,11 @@ PatchFit PatchAligner::align(const ImageView<T>& frame, double full, float noise
     const double weight = options_.across_sigma_px > 0 ? std::pow(noise / (gain * options_.across_sigma_px), 2) : 1e12;
     normal(3, 3) += weight;
     right[3] -= weight * gain * fit.state.across;
+    if (options_.gain_slope_sigma > 0) {
+      const double misfit = std::hypot(static_cast<double>(noise), options_.misfit_share * gain);
+      const double of_slopes = std::pow(misfit / (gain * options_.gain_slope_sigma), 2);
+      normal(5, 5) += of_slopes, normal(6, 6) += of_slopes;
+    }
     const Eigen::LDLT<Normal> solver(normal);
     if (solver.info() != Eigen::Success || !solver.isPositive()) return fit;
     const Unknowns solution = solver.solve(right);

@@ -28,8 +28,10 @@ struct Decoder::Parts {
   std::vector<double> depths_mm{};
   const std::vector<AlignedSymbol>* aligned = nullptr;  // of this frame
 
+  const Lattice* lattice_read = nullptr;  // of this frame
+
   [[nodiscard]] TriangulatedPoint solve(const LatticeSymbol& symbol) const;
-  void align(const GreyView& frame, double full, const Lattice& lattice);
+  void place_symbols();
   void triangulate(const Lattice& lattice, double full);
   void add_point(const LatticeSymbol& symbol, const Eigen::Vector2f& centre_px, const TriangulatedPoint& solved,
                  double full);
@@ -80,7 +82,9 @@ Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calib
 }
 
 Decoder Decoder::another() const {
-  return Decoder(std::make_unique<Parts>(*parts_));
+  auto parts = std::make_unique<Parts>(*parts_);
+  parts->lattice_read = nullptr;
+  return Decoder(std::move(parts));
 }
 
 std::uint8_t Decoder::camera_index() const {
@@ -101,8 +105,11 @@ Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<dou
   if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
   const double level = full ? *full : parts_->full_level.of(frame);
   const Lattice& lattice = parts_->reader.read(frame, level, &parts_->view, observer);
+  parts_->lattice_read = &lattice;
   if (parts_->aligner) {
-    parts_->align(frame, level, lattice);
+    parts_->place_symbols();
+    parts_->aligned = &parts_->aligner->align(frame, level, parts_->reader.noise(), lattice, parts_->rays,
+                                              parts_->depths_mm, parts_->reader.cells());
     if (observer != nullptr) observer->stage_done(Stage::kAlign);
   }
   parts_->triangulate(lattice, level);
@@ -117,14 +124,20 @@ TriangulatedPoint Decoder::Parts::solve(const LatticeSymbol& symbol) const {
                                   reader.cells().ray(symbol.row, symbol.column), symbol.sigma_px);
 }
 
-void Decoder::Parts::align(const GreyView& frame, double full, const Lattice& lattice) {
+DecodedSymbols Decoder::symbols() {
+  static const Lattice kNone;
+  if (parts_->lattice_read == nullptr) return {&kNone, {}, {}, {}};
+  parts_->place_symbols();
+  return {parts_->lattice_read, parts_->rays, parts_->depths_mm, parts_->reader.noise()};
+}
+
+void Decoder::Parts::place_symbols() {
   rays.clear(), depths_mm.clear();
-  for (const LatticeSymbol& symbol : lattice.symbols) {
+  for (const LatticeSymbol& symbol : lattice_read->symbols) {
     rays.push_back(view.ray_near(symbol.sighting, symbol.centre_px));
     const double depth = solve(symbol).point_in_camera.z();
     depths_mm.push_back(depth > 0 ? depth : options.depth_max_mm);
   }
-  aligned = &aligner->align(frame, full, reader.noise(), lattice, rays, depths_mm, reader.cells());
 }
 
 void Decoder::Parts::triangulate(const Lattice& lattice, double full) {

@@ -5,16 +5,28 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/code/pattern.hpp"
 #include "core/decode/decoding.hpp"
+#include "core/decode/frame_noise.hpp"
+#include "core/decode/lattice.hpp"
 #include "core/decode/options.hpp"
 #include "core/geometry/calibration.hpp"
+#include "core/geometry/pixel_ray.hpp"
 #include "core/image.hpp"
 #include "core/result.hpp"
 
 namespace slsd {
+
+/// The symbols of a frame in space: where a dense cloud begins. Stands as long as the decoding.
+struct DecodedSymbols {
+  const Lattice* lattice;
+  std::span<const PixelRay> rays;     ///< one to a symbol: that of its centre
+  std::span<const double> depths_mm;  ///< one to a symbol, along the camera's z axis, as triangulated from its centre
+  FrameNoise noise;                   ///< of the frame
+};
 
 /// Reads frames of one camera that see one pattern. Keeps its buffers from frame to frame: nothing is allocated once
 /// they have grown to a frame's size.
@@ -41,6 +53,8 @@ class Decoder {
   /// @errors kMismatch: the frame is not of the calibration's size
   [[nodiscard]] Result<const Decoding*> decode(const GreyView& frame, std::optional<double> full = std::nullopt,
                                                StageObserver* observer = nullptr);
+  /// Of the last frame that was decoded.
+  [[nodiscard]] DecodedSymbols symbols();
 
  private:
   struct Parts;

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/dense/dense_map.hpp"
+#include "core/dense/executor.hpp"
+#include "core/dense/ray_grid.hpp"
+#include "core/geometry/calibration.hpp"
+
+namespace slsd {
+
+/// Takes out of a map what cannot be, by what all its pixels say together.
+/// @thread thread-bound: keeps its buffers
+class MapCleaner {
+ public:
+  MapCleaner(const CalibratedCamera& camera, const Lens& projector);
+
+  /// A projector pixel lights one point: what lies behind another surface on its ray goes.
+  void drop_occluded(DenseMap& map, Executor& executor);
+  /// Where the pattern is dark, a surface looks like a shadow: such a pixel stays where firm ones enclose it, which is
+  /// within their closing (dilated, then eroded as much), and goes at a rim.
+  void drop_unlit_rims(DenseMap& map, int reach_px);
+  /// What hangs together without a jump, and has fewer pixels than a patch, goes: so little can be anything.
+  void drop_islands(DenseMap& map, std::size_t least);
+  /// What is nearer than that to a hole or to a jump goes.
+  void prune(DenseMap& map, double reach_px);
+
+ private:
+  CalibratedCamera camera_;
+  Lens projector_;
+  RayGrid rays_;
+  std::vector<std::int32_t> label_, members_;
+  std::vector<std::uint64_t> bits_, rows_;
+  std::vector<float> distance_, nearest_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <string_view>
+#include <vector>
+
+namespace slsd {
+
+/// What became of a camera pixel. Everything but kMeasured is a reason why it has no point.
+enum class DensePixel : std::uint8_t {
+  kMeasured,
+  kNotReached,  ///< no patch near it fits the pattern: shadow, background, or a surface that no symbol is decoded on
+  kNoSupport,   ///< what is around it speaks against every surface beside it
+  kSaturated,   ///< it is as bright as the camera can tell
+  kOutOfDepthRange,
+  kOccluded,  ///< another surface, nearer to the projector, takes the light of its projector pixel
+  kUnlit,     ///< dark where it should be dark, at a rim: nothing tells that the surface is there
+  kIsland,    ///< too few around it
+  kAtAnEdge,  ///< as near to a hole or a jump as dense_prune_px says
+};
+inline constexpr int kDensePixelCount = 9;
+
+/// "no_support", as in the counters of a reply.
+[[nodiscard]] std::string_view to_string(DensePixel pixel);
+
+/// What a camera measured: a value for each of its pixels, row by row; NaN depth and sigma, and intensity 0, where
+/// there is none.
+struct DenseMap {
+  int width = 0, height = 0;
+  std::vector<float> depth_mm;          ///< along the camera's z axis
+  std::vector<float> sigma_mm;          ///< one standard deviation along the pixel's ray
+  std::vector<std::uint8_t> intensity;  ///< what the surface sends back where the projector shows white
+  std::vector<DensePixel> pixels;
+  std::vector<std::uint8_t> firm;  ///< 1 where a pixel itself shows the light that falls there, or all around it does
+  std::array<std::uint32_t, kDensePixelCount> counts{};  ///< of pixels
+
+  void reset(int to_width, int to_height) {
+    width = to_width, height = to_height;
+    const std::size_t count = static_cast<std::size_t>(width) * height;
+    depth_mm.assign(count, std::numeric_limits<float>::quiet_NaN());
+    sigma_mm.assign(count, std::numeric_limits<float>::quiet_NaN());
+    intensity.assign(count, 0);
+    pixels.assign(count, DensePixel::kNotReached);
+    firm.assign(count, 0);
+  }
+  void drop(std::size_t pixel, DensePixel why) {
+    depth_mm[pixel] = sigma_mm[pixel] = std::numeric_limits<float>::quiet_NaN();
+    intensity[pixel] = 0;
+    pixels[pixel] = why;
+  }
+  [[nodiscard]] bool measured(std::size_t pixel) const { return pixels[pixel] == DensePixel::kMeasured; }
+  [[nodiscard]] std::uint32_t count(DensePixel pixel) const { return counts[static_cast<std::size_t>(pixel)]; }
+};
+
+}  // namespace slsd

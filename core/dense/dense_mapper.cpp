@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/dense/dense_mapper.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/LU>
+
+#include "core/decode/lattice_frame.hpp"
+
+namespace slsd {
+namespace {
+
+/// The window of a node covers this share of a cell, within limits: less has too few edges, more bends.
+constexpr double kWindowOfPitch = 0.72;
+constexpr int kWindowLeastPx = 11, kWindowMostPx = 21;
+
+int window_px(double pitch_in_camera_px) {
+  const int px = static_cast<int>(std::lround(kWindowOfPitch * pitch_in_camera_px));
+  return std::clamp(px, kWindowLeastPx, kWindowMostPx) | 1;
+}
+
+int judge_reach_px(double pitch_in_camera_px) {
+  return std::clamp(static_cast<int>(std::lround(0.17 * pitch_in_camera_px)), 3, 5);
+}
+
+/// Twice that bridges what is dark within a symbol and between two.
+int close_px(double pitch_in_camera_px) {
+  return std::max(2, static_cast<int>(std::lround(0.3 * pitch_in_camera_px)));
+}
+
+}  // namespace
+
+std::string_view to_string(DenseStage stage) {
+  constexpr std::array<std::string_view, kDenseStageCount> kNames{"find_blur", "grow", "fuse", "judge", "clean"};
+  return kNames[static_cast<std::size_t>(stage)];
+}
+
+std::string_view to_string(DensePixel pixel) {
+  constexpr std::array<std::string_view, kDensePixelCount> kNames{
+      "measured", "not_reached", "no_support", "saturated", "out_of_depth_range",
+      "occluded", "unlit",       "island",     "at_an_edge"};
+  return kNames[static_cast<std::size_t>(pixel)];
+}
+
+struct DenseMapper::Fixed {
+  PatchGeometry geometry;
+  DecodeOptions decode;
+  DenseOptions options;
+  int window_px, reach_px, close_px;
+  PatternFields fields;
+};
+
+DenseMapper::DenseMapper(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
+                         const DecodeOptions& decode, const DenseOptions& options)
+    : DenseMapper([&] {
+        const CalibratedCamera& camera = calibration.cameras[camera_index];
+        const ExpectedFrames expected(camera, calibration.projector, decode.middle_depth_mm());
+        const double pitch = pattern.pitch_px() * static_cast<double>(expected.in_the_middle().scale);
+        return std::shared_ptr<const Fixed>(new Fixed{PatchGeometry(camera, calibration.projector), decode, options,
+                                                      slsd::window_px(pitch), judge_reach_px(pitch),
+                                                      slsd::close_px(pitch), PatternFields(draw_pattern(pattern))});
+      }()) {}
+
+DenseMapper::DenseMapper(std::shared_ptr<const Fixed> fixed)
+    : fixed_(std::move(fixed)),
+      grid_(fixed_->geometry,
+            {fixed_->options.stride_px, fixed_->window_px, fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
+      judge_({fixed_->reach_px, fixed_->window_px, fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
+      cleaner_(fixed_->geometry.camera, fixed_->geometry.projector) {}
+
+DenseMapper DenseMapper::another() const {
+  return DenseMapper(fixed_);
+}
+
+/// The plane of a symbol: its depth, and the slopes that make the map turn as the grid of symbols does.
+void DenseMapper::find_seeds(const DecodedSymbols& symbols) {
+  seeds_.clear();
+  for (std::size_t i = 0; i < symbols.lattice->symbols.size(); ++i) {
+    const LatticeSymbol& symbol = symbols.lattice->symbols[i];
+    const double depth_mm = symbols.depths_mm[i];
+    if (!(depth_mm >= fixed_->decode.depth_min_mm && depth_mm <= fixed_->decode.depth_max_mm)) continue;
+    const PatchGeometry& geometry = fixed_->geometry;
+    const PatchMap map = make_patch_map(symbols.rays[i], symbol.centre_px.cast<double>(),
+                                        geometry.camera.projector_from_camera, geometry.projector, depth_mm);
+    const Eigen::Vector2f at = map.base.topRightCorner<2, 1>();
+    const Eigen::Matrix2f flat = map.base.topLeftCorner<2, 2>() - at * map.base.bottomLeftCorner<1, 2>();
+    const Eigen::RowVector2f slopes = map.along.transpose() * (symbol.frame.inverse() - flat);
+    const auto per_px = static_cast<float>(map.inverse_depth_per_px);
+    seeds_.push_back({symbol.centre_px, {static_cast<float>(1 / depth_mm), slopes.x() * per_px, slopes.y() * per_px}});
+  }
+}
+
+/// The blur that fits best, from that of the frame before downhill.
+void DenseMapper::find_blur(const DenseFrame& frame) {
+  std::array<float, PatternFields::kBlursPx.size()> misfits;
+  misfits.fill(-1);
+  const auto misfit = [&](std::size_t blur) {
+    if (misfits[blur] < 0) misfits[blur] = grid_.misfit(frame, fixed_->fields.at(blur), seeds_);
+    return misfits[blur];
+  };
+  for (std::size_t from = misfits.size(); from != blur_;) {
+    from = blur_;
+    if (from + 1 < misfits.size() && misfit(from + 1) < misfit(blur_)) blur_ = from + 1;
+    if (from > 0 && misfit(from - 1) < misfit(blur_)) blur_ = from - 1;
+  }
+}
+
+const DenseMap& DenseMapper::measure(const GreyView& frame, double full, const DecodedSymbols& symbols,
+                                     Executor& executor, DenseObserver* observer) {
+  const auto done = [&](DenseStage stage) {
+    if (observer != nullptr) observer->stage_done(stage);
+  };
+  const DenseFrame seen{frame, full, symbols.noise};
+  map_.reset(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
+  find_seeds(symbols);
+  blur_ = 1;
+  if (!seeds_.empty()) find_blur(seen);
+  done(DenseStage::kFindBlur);
+  const PatternField& field = fixed_->fields.at(blur_);
+  grid_.grow(seen, field, seeds_, executor);
+  done(DenseStage::kGrow);
+  grid_.fuse(executor);
+  done(DenseStage::kFuse);
+  judge_.judge(seen, field, fixed_->geometry, grid_, map_, executor);
+  done(DenseStage::kJudge);
+  cleaner_.drop_occluded(map_, executor);
+  cleaner_.drop_unlit_rims(map_, fixed_->close_px);
+  cleaner_.drop_islands(map_, static_cast<std::size_t>(fixed_->window_px) * fixed_->window_px);
+  cleaner_.prune(map_, fixed_->options.prune_px);
+  map_.counts.fill(0);
+  for (const DensePixel pixel : map_.pixels) ++map_.counts[static_cast<std::size_t>(pixel)];
+  done(DenseStage::kClean);
+  return map_;
+}
+
+}  // namespace slsd

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/code/pattern.hpp"
+#include "core/decode/align_symbols.hpp"
+#include "core/decode/decoder.hpp"
+#include "core/dense/clean_map.hpp"
+#include "core/dense/dense_map.hpp"
+#include "core/dense/dense_options.hpp"
+#include "core/dense/executor.hpp"
+#include "core/dense/pixel_judge.hpp"
+#include "core/dense/surface_grid.hpp"
+
+namespace slsd {
+
+enum class DenseStage : std::uint8_t { kFindBlur, kGrow, kFuse, kJudge, kClean };
+inline constexpr int kDenseStageCount = 5;
+[[nodiscard]] std::string_view to_string(DenseStage stage);
+
+/// Is told of each stage as it ends.
+class DenseObserver {
+ public:
+  virtual ~DenseObserver() = default;
+  virtual void stage_done(DenseStage stage) = 0;
+};
+
+/// Measures the surface between decoded symbols, a point to a camera pixel: docs/dense.md.
+/// @thread thread-bound: keeps its buffers; what never changes is shared with those that another() makes
+class DenseMapper {
+ public:
+  /// @param camera_index  in the calibration; the calibration's projector is of the pattern's size
+  DenseMapper(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
+              const DecodeOptions& decode, const DenseOptions& options);
+  /// Of the same, for another thread.
+  [[nodiscard]] DenseMapper another() const;
+
+  /// @param symbols  those that the decoder has found in this frame
+  /// @return         stands until the next call
+  const DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
+                          DenseObserver* observer = nullptr);
+
+  /// Of the last frame: the blur of the pattern, projector px.
+  [[nodiscard]] float blur_sigma_px() const { return PatternFields::kBlursPx[blur_]; }
+
+ private:
+  struct Fixed;
+  explicit DenseMapper(std::shared_ptr<const Fixed> fixed);
+  void find_seeds(const DecodedSymbols& symbols);
+  void find_blur(const DenseFrame& frame);
+
+  std::shared_ptr<const Fixed> fixed_;  // shared: mappers of several threads use one
+  SurfaceGrid grid_;
+  PixelJudge judge_;
+  MapCleaner cleaner_;
+  std::vector<SurfaceSeed> seeds_;
+  std::size_t blur_ = 1;
+  DenseMap map_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/geometry/lens.hpp"
+
+namespace slsd {
+
+/// The rays of a camera's pixels, between those of every eighth pixel: 1 MB for 8 Mpx, and off by less than 0.001 px
+/// with any lens that a calibration accepts.
+/// @thread reentrant
+class RayGrid {
+ public:
+  static constexpr int kPitchPx = 8;
+  explicit RayGrid(const Lens& lens);
+
+  /// (x/z, y/z) of a pixel inside the image.
+  [[nodiscard]] Eigen::Vector2f at(int x, int y) const {
+    const int column = x / kPitchPx, row = y / kPitchPx;
+    const float right = static_cast<float>(x - column * kPitchPx) / kPitchPx,
+                below = static_cast<float>(y - row * kPitchPx) / kPitchPx;
+    const Eigen::Vector2f* node = &nodes_[static_cast<std::size_t>(row) * columns_ + column];
+    return (1 - below) * ((1 - right) * node[0] + right * node[1]) +
+           below * ((1 - right) * node[columns_] + right * node[columns_ + 1]);
+  }
+
+ private:
+  int columns_;
+  std::vector<Eigen::Vector2f> nodes_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/align/align_patch.hpp"
+#include "core/decode/frame_noise.hpp"
+#include "core/dense/executor.hpp"
+#include "core/geometry/calibration.hpp"
+#include "core/geometry/ray_table.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// A piece of the surface around a camera pixel: on a plane the inverse of the depth is linear in the pixels.
+struct SurfacePlane {
+  float inverse_depth = 0;         ///< 1/mm, along the camera's z axis
+  float slope_x = 0, slope_y = 0;  ///< its change for one camera px
+
+  [[nodiscard]] float at(float dx, float dy) const { return inverse_depth + slope_x * dx + slope_y * dy; }
+};
+
+/// A place on the surface that is known: growth begins there.
+struct SurfaceSeed {
+  Eigen::Vector2f camera_px;
+  SurfacePlane plane;
+};
+
+/// The plane that was fitted around one pixel of the grid.
+struct SurfaceNode {
+  SurfacePlane plane;
+  float per_px = 0;                                    ///< 1/mm: what moves the pattern by one projector px there
+  float across = 0;                                    ///< how far off the epipolar line the pattern lies, projector px
+  float gain = 0, gain_x = 0, gain_y = 0, offset = 0;  ///< grey levels, for one camera px
+  float support = 0;                                   ///< the share of its window that agrees with the pattern
+  float noise_px = 0, slope_noise = 0;                 ///< one standard deviation that the frame's noise leaves
+  float sigma_px = 0;                                  ///< of everything, projector px
+  float residual = 0;                                  ///< root mean square, of the gain
+  bool good = false;
+};
+
+/// One frame as the dense stages see it.
+struct DenseFrame {
+  GreyView pixels;
+  double full;  ///< the level of a saturated pixel
+  FrameNoise noise;
+};
+
+/// How a camera and its projector lie, for patches anywhere in the frame.
+/// @thread reentrant
+struct PatchGeometry {
+  CalibratedCamera camera;
+  Lens projector;
+  RayTable rays;
+
+  PatchGeometry(const CalibratedCamera& of_camera, const Lens& of_projector)
+      : camera(of_camera), projector(of_projector), rays(of_camera.lens) {}
+  [[nodiscard]] PatchMap map_at(const Eigen::Vector2f& camera_px, double inverse_depth) const {
+    const Eigen::Vector2d pixel = camera_px.cast<double>();
+    return make_patch_map(rays.ray(pixel), pixel, camera.projector_from_camera, projector, 1 / inverse_depth);
+  }
+};
+
+struct GridOptions {
+  int stride_px;
+  int window_px;  ///< odd: the side of the patch that a node is fitted to
+  double depth_min_mm, depth_max_mm;
+};
+
+/// The surface on a grid of camera pixels, grown from seeds: each node is aligned with the pattern from the plane of a
+/// neighbour that is known, front by front, so that which of them run beside each other changes nothing.
+///
+///     o   o   o   o   o      o  not reached yet
+///     o  (+)-(+)  o   o     (+) the front: from their best neighbours' planes, continued
+///    (+)-[#]-[#]-(+)  o     [#] fitted, and good
+///
+/// @thread thread-bound: keeps its buffers
+class SurfaceGrid {
+ public:
+  SurfaceGrid(const PatchGeometry& geometry, const GridOptions& options);
+
+  [[nodiscard]] int columns() const { return columns_; }
+  [[nodiscard]] int rows() const { return rows_; }
+  [[nodiscard]] int stride_px() const { return options_.stride_px; }
+  [[nodiscard]] int x_of(int column) const { return first_ + column * options_.stride_px; }
+  [[nodiscard]] int y_of(int row) const { return first_ + row * options_.stride_px; }
+  /// Null outside the grid, and where nothing was fitted.
+  [[nodiscard]] const SurfaceNode* good(int column, int row) const {
+    if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return nullptr;
+    const SurfaceNode& node = nodes_[static_cast<std::size_t>(row) * columns_ + column];
+    return node.good ? &node : nullptr;
+  }
+
+  /// How badly the pattern at a blur fits the seeds: the median of residual over gain; 1 where nothing fits.
+  [[nodiscard]] float misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
+
+  void grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds, Executor& executor);
+  /// Where a node and those around it agree to within their noise they are one smooth surface, and their mean is more
+  /// exact than each: wide windows where it is flat. Where they differ by more, that is what sigma is made of.
+  void fuse(Executor& executor);
+
+ private:
+  struct Attempt {
+    std::int32_t node;
+    float cost;
+    SurfacePlane start;
+    float across, gain, gain_x, gain_y, offset;  // gain 0: not known
+  };
+  [[nodiscard]] bool fit(const DenseFrame& frame, const PatternField& field, const Attempt& attempt,
+                         PatchAligner& aligner, SurfaceNode& node) const;
+  void offer(const Attempt& attempt);
+  void offer_neighbours(std::int32_t index);
+  [[nodiscard]] std::int32_t node_at(const Eigen::Vector2f& camera_px) const;
+  void fuse_node(int column, int row);
+
+  const PatchGeometry* geometry_;
+  GridOptions options_;
+  int first_, columns_, rows_;
+  std::vector<SurfaceNode> nodes_, own_;
+  std::vector<Attempt> front_, next_;
+  std::vector<char> accepted_;                  // of the front
+  std::vector<std::int32_t> pending_;           // of a node: its place in the next front, or -1
+  std::vector<std::uint8_t> attempts_;          // of a node
+  std::vector<PatchAligner> begin_, continue_;  // one to a worker
+  std::vector<float> misfits_;
+};
+
+}  // namespace slsd

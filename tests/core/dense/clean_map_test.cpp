@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/dense/clean_map.hpp"
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include "tests/simulator/simulator.hpp"
+
+namespace slsd {
+namespace {
+
+using Drawing = std::vector<std::string_view>;
+
+/// '#' a pixel at 1 m that is firm, 'o' one that is not, '2' one at 2 m, '.' none.
+DenseMap map_of(const Drawing& rows) {
+  DenseMap map;
+  map.reset(static_cast<int>(rows[0].size()), static_cast<int>(rows.size()));
+  for (std::size_t y = 0; y < rows.size(); ++y) {
+    for (std::size_t x = 0; x < rows[y].size(); ++x) {
+      const std::size_t pixel = y * rows[0].size() + x;
+      if (rows[y][x] == '.') continue;
+      map.depth_mm[pixel] = rows[y][x] == '2' ? 2000 : 1000, map.sigma_mm[pixel] = 1, map.intensity[pixel] = 100;
+      map.pixels[pixel] = DensePixel::kMeasured;
+      map.firm[pixel] = rows[y][x] != 'o';
+    }
+  }
+  return map;
+}
+
+std::string left_of(const DenseMap& map) {
+  std::string drawing;
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const std::size_t pixel = static_cast<std::size_t>(y) * map.width + x;
+      const bool there = map.measured(pixel);
+      EXPECT_EQ(there, map.depth_mm[pixel] > 0);
+      EXPECT_EQ(there, map.sigma_mm[pixel] > 0);
+      EXPECT_EQ(there, map.intensity[pixel] > 0);
+      drawing += there ? '#' : '.';
+    }
+    drawing += '\n';
+  }
+  return drawing;
+}
+
+MapCleaner cleaner() {
+  const Calibration rig = paper_rig();
+  return {rig.cameras[0], rig.projector};
+}
+
+TEST(DropIslands, KeepsWhatIsLargeEnough) {
+  DenseMap map = map_of({"##...#", "##...#", "......", "###..."});
+  cleaner().drop_islands(map, 3);
+  EXPECT_EQ(left_of(map), "##....\n##....\n......\n###...\n");
+  EXPECT_EQ(map.pixels[5], DensePixel::kIsland);
+}
+
+TEST(DropIslands, AJumpInDepthParts) {
+  DenseMap map = map_of({"####22", "####22"});
+  cleaner().drop_islands(map, 5);
+  EXPECT_EQ(left_of(map), "####..\n####..\n");
+}
+
+TEST(Prune, TakesWhatIsNearerToAHoleThanAsked) {
+  const Drawing rows = {"......", ".#####", ".#####", ".#####", ".#####"};
+  DenseMap map = map_of(rows);
+  cleaner().prune(map, 0);
+  EXPECT_EQ(left_of(map), "......\n.#####\n.#####\n.#####\n.#####\n");
+  cleaner().prune(map, 1);
+  EXPECT_EQ(left_of(map), "......\n......\n..####\n..####\n..####\n");
+  EXPECT_EQ(map.pixels[7], DensePixel::kAtAnEdge);
+  map = map_of(rows);
+  cleaner().prune(map, 2);
+  EXPECT_EQ(left_of(map), "......\n......\n......\n...###\n...###\n");
+}
+
+TEST(Prune, TakesBothSidesOfAJump) {
+  DenseMap map = map_of({"###222", "###222", "###222"});
+  cleaner().prune(map, 1);
+  EXPECT_EQ(left_of(map), "##..##\n##..##\n##..##\n");
+}
+
+TEST(DropUnlitRims, KeepsWhatFirmPixelsEnclose) {
+  DenseMap map = map_of({"##o##ooo", "##o##ooo", "##o##ooo", "##o##ooo"});
+  cleaner().drop_unlit_rims(map, 1);
+  EXPECT_EQ(left_of(map), "#####...\n#####...\n#####...\n#####...\n");
+  EXPECT_EQ(map.pixels[5], DensePixel::kUnlit);
+}
+
+TEST(DropUnlitRims, BridgesTwiceItsReachAcrossWords) {
+  const std::string row = std::string(60, '#') + "oooooo" + std::string(60, '#');
+  DenseMap map = map_of({row, row});
+  cleaner().drop_unlit_rims(map, 3);
+  EXPECT_EQ(left_of(map), std::string(126, '#') + "\n" + std::string(126, '#') + "\n");
+  map = map_of({row, row});
+  cleaner().drop_unlit_rims(map, 2);
+  EXPECT_EQ(left_of(map).find('.'), 60U);
+}
+
+/// The middle row of the camera: one pixel sees a point at 1.5 m, another one behind it on the same ray of the
+/// projector.
+TEST(DropOccluded, ARayOfTheProjectorEndsAtItsFirstSurface) {
+  const Calibration rig = paper_rig();
+  const CalibratedCamera& camera = rig.cameras[0];
+  const RigidTransform camera_from_projector = camera.projector_from_camera.inverse();
+  const Eigen::Vector3d from = camera_from_projector.translation,
+                        ray = camera_from_projector.rotation * rig.projector.undistort({640, 400}).homogeneous();
+  DenseMap map;
+  map.reset(camera.lens.width_px, camera.lens.height_px);
+  std::vector<std::size_t> pixels;
+  for (const double distance : {1500.0, 1900.0}) {
+    const Eigen::Vector3d point = from + distance * ray;
+    const Eigen::Vector2d seen = camera.lens.project(point);
+    const std::size_t pixel =
+        static_cast<std::size_t>(std::lround(seen.y())) * map.width + static_cast<std::size_t>(std::lround(seen.x()));
+    map.depth_mm[pixel] = static_cast<float>(point.z()), map.sigma_mm[pixel] = 1, map.intensity[pixel] = 1;
+    map.pixels[pixel] = DensePixel::kMeasured;
+    pixels.push_back(pixel);
+  }
+  SerialExecutor executor;
+  cleaner().drop_occluded(map, executor);
+  EXPECT_EQ(map.pixels[pixels[0]], DensePixel::kMeasured);
+  EXPECT_EQ(map.pixels[pixels[1]], DensePixel::kOccluded);
+}
+
+}  // namespace
+}  // namespace slsd

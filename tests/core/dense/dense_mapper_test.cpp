@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/dense/dense_mapper.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include "tests/drivers/allocations.hpp"
+#include "tests/simulator/simulator.hpp"
+
+namespace slsd {
+namespace {
+
+/// The paper's rig with the middle of its camera alone.
+Calibration small_rig() {
+  Calibration rig = paper_rig();
+  Lens& lens = rig.cameras[0].lens;
+  lens.width_px = 360, lens.height_px = 280;
+  lens.cx -= 620, lens.cy -= 460;
+  return rig;
+}
+
+Pattern pattern_of(std::uint32_t seed = 1) {
+  PatternOptions options;
+  options.symbol_size_px = 8, options.spacing_px = 1;
+  options.symbols = {9, 10, 11, 12, 18, 19};
+  options.seed = seed;
+  return make_pattern(options).value();
+}
+
+const Pattern& pattern() {
+  static const Pattern made = pattern_of();
+  return made;
+}
+
+const Surface kTilted = plane({0, 0, 2000}, {0.3, 0.15, -1});
+
+/// A column in front of a wall.
+std::optional<double> column_and_wall(const Ray& ray) {
+  const auto wall = plane({0, 0, 2150}, {0, 0, 1})(ray), column = cylinder({0, 0, 2030}, {0, 1, 0}, 40)(ray);
+  return column ? column : wall;
+}
+
+struct Seen {
+  Calibration rig;
+  Surface surface;
+  Grey8 frame;
+};
+
+Seen see(const Surface& surface, const Grey8& image, const SimulationOptions& options = {}) {
+  const Calibration rig = small_rig();
+  return {rig, surface, simulate(image, rig, surface, options)};
+}
+
+const Seen& tilted() {
+  static const Seen seen = see(kTilted, draw_pattern(pattern()));
+  return seen;
+}
+const Seen& column() {
+  static const Seen seen = see(column_and_wall, draw_pattern(pattern()));
+  return seen;
+}
+
+struct Measured {
+  std::size_t symbols;
+  DenseMap map;
+};
+
+Measured measure(const GreyView& frame, double full = 255, const DenseOptions& options = {},
+                 Executor* executor = nullptr) {
+  SerialExecutor serial;
+  const Calibration rig = small_rig();
+  Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
+  const auto decoding = decoder.decode(frame, full);
+  EXPECT_TRUE(decoding);
+  DenseMapper mapper(pattern(), rig, 0, {}, options);
+  const DecodedSymbols symbols = decoder.symbols();
+  return {symbols.lattice->symbols.size(),
+          mapper.measure(frame, full, symbols, executor != nullptr ? *executor : serial)};
+}
+
+struct Score {
+  std::size_t lit = 0, measured = 0, unlit = 0, gross = 0, beyond_three = 0;
+  double median_px = 0, rms_mm = 0, over_sigma = 0;
+};
+
+Score score(const DenseMap& map, const Seen& seen) {
+  const Lens& lens = seen.rig.cameras[0].lens;
+  Score score;
+  std::vector<double> px;
+  double squares = 0, squares_sigma = 0;
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const std::size_t pixel = static_cast<std::size_t>(y) * map.width + x;
+      const Eigen::Vector3d ray = lens.undistort({x, y}).homogeneous();
+      const bool lit = projector_from_camera({x, y}, seen.rig, seen.surface).has_value();
+      score.lit += lit;
+      if (!map.measured(pixel)) continue;
+      if (!lit) {
+        ++score.unlit;
+        continue;
+      }
+      ++score.measured;
+      const double off = static_cast<double>(map.depth_mm[pixel]) - *seen.surface({Eigen::Vector3d::Zero(), ray});
+      if (std::abs(off) > 5) {
+        ++score.gross;
+        continue;
+      }
+      px.push_back(std::abs(off) / 6.3);
+      squares += off * off;
+      const double over = off / static_cast<double>(map.sigma_mm[pixel]);
+      squares_sigma += over * over;
+      score.beyond_three += std::abs(over) > 3;
+    }
+  }
+  if (px.empty()) return score;
+  std::nth_element(px.begin(), px.begin() + static_cast<std::ptrdiff_t>(px.size() / 2), px.end());
+  score.median_px = px[px.size() / 2];
+  score.rms_mm = std::sqrt(squares / static_cast<double>(px.size()));
+  score.over_sigma = std::sqrt(squares_sigma / static_cast<double>(px.size()));
+  return score;
+}
+
+double share(std::size_t part, std::size_t all) {
+  return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, all));
+}
+
+TEST(DenseMapper, MeasuresAPlane) {
+  const Score got = score(measure(tilted().frame.view()).map, tilted());
+  EXPECT_GT(share(got.measured, got.lit), 0.97);
+  EXPECT_LT(got.median_px, 0.03);
+  EXPECT_LT(got.rms_mm, 0.35);
+  EXPECT_EQ(got.gross, 0U);
+  EXPECT_GT(got.over_sigma, 0.6);
+  EXPECT_LT(got.over_sigma, 1.4);
+  EXPECT_LT(share(got.beyond_three, got.measured), 0.02);
+}
+
+TEST(DenseMapper, DrawsNoSurfaceOverAShadow) {
+  const Score got = score(measure(column().frame.view()).map, column());
+  EXPECT_GT(share(got.measured, got.lit), 0.75);
+  EXPECT_LT(share(got.gross, got.measured), 0.002);
+  EXPECT_LT(share(got.unlit, got.measured), 0.001);
+}
+
+TEST(DenseMapper, WithoutPruningItReachesFartherAndNearerToWrong) {
+  DenseOptions all;
+  all.prune_px = 0;
+  DenseOptions few;
+  few.prune_px = 4;
+  const auto count = [](const DenseOptions& options) {
+    return measure(column().frame.view(), 255, options).map.count(DensePixel::kMeasured);
+  };
+  const std::uint32_t whole = count(all), usual = count({}), pruned = count(few);
+  EXPECT_GT(whole, usual + 500);
+  EXPECT_GT(usual, pruned + 500);
+}
+
+TEST(DenseMapper, NothingInNoise) {
+  Grey8 frame(360, 280);
+  std::mt19937 random(3);
+  std::uniform_int_distribution<int> level(0, 255);
+  for (int y = 0; y < frame.height(); ++y)
+    for (int x = 0; x < frame.width(); ++x) frame.at(x, y) = static_cast<std::uint8_t>(level(random));
+  EXPECT_EQ(measure(frame.view()).map.count(DensePixel::kMeasured), 0U);
+}
+
+TEST(DenseMapper, NothingInTheLightOfAnotherPattern) {
+  const Seen seen = see(kTilted, draw_pattern(pattern_of(2)));
+  EXPECT_EQ(measure(seen.frame.view()).map.count(DensePixel::kMeasured), 0U);
+}
+
+TEST(DenseMapper, NothingWhereThePatternIsCutOff) {
+  Grey8 half = draw_pattern(pattern());
+  for (int y = 0; y < half.height(); ++y)
+    for (int x = half.width() / 2; x < half.width(); ++x) half.at(x, y) = 0;
+  const Seen seen = see(kTilted, half);
+  const DenseMap map = measure(seen.frame.view()).map;
+  std::size_t lit = 0, beyond = 0;
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      if (!map.measured(static_cast<std::size_t>(y) * map.width + x)) continue;
+      const auto lit_by = projector_from_camera({x, y}, seen.rig, seen.surface);
+      (lit_by && lit_by->x() < half.width() / 2 ? lit : beyond) += 1;
+    }
+  }
+  EXPECT_GT(lit, 20'000U);
+  EXPECT_EQ(beyond, 0U);
+}
+
+TEST(DenseMapper, NothingOnASaturatedPatch) {
+  Grey8 frame = tilted().frame;
+  for (int y = 100; y < 160; ++y)
+    for (int x = 100; x < 180; ++x) frame.at(x, y) = 255;
+  const DenseMap map = measure(frame.view()).map;
+  for (int y = 104; y < 156; ++y)
+    for (int x = 104; x < 176; ++x)
+      ASSERT_FALSE(map.measured(static_cast<std::size_t>(y) * map.width + x)) << x << " " << y;
+  EXPECT_GT(score(map, tilted()).measured, 70'000U);
+}
+
+TEST(DenseMapper, CountsEveryPixelOnce) {
+  const DenseMap map = measure(column().frame.view()).map;
+  EXPECT_EQ(std::accumulate(map.counts.begin(), map.counts.end(), 0U), map.pixels.size());
+  for (const DensePixel reason : {DensePixel::kMeasured, DensePixel::kNotReached, DensePixel::kNoSupport,
+                                  DensePixel::kUnlit, DensePixel::kAtAnEdge}) {
+    EXPECT_GT(map.count(reason), 0U) << to_string(reason);
+  }
+}
+
+TEST(DenseMapper, IntensityIsThatOfTheSurfaceInWhiteLight) {
+  const DenseMap map = measure(tilted().frame.view()).map;
+  std::vector<std::uint8_t> levels;
+  for (std::size_t pixel = 0; pixel < map.pixels.size(); ++pixel)
+    if (map.measured(pixel)) levels.push_back(map.intensity[pixel]);
+  std::sort(levels.begin(), levels.end());
+  EXPECT_NEAR(levels[levels.size() / 2], SimulationOptions{}.lit, 5);
+  EXPECT_NEAR(levels[levels.size() / 20], SimulationOptions{}.lit, 15);
+}
+
+TEST(DenseMapper, DepthBeyondTheWorkingRangeIsNone) {
+  const Calibration rig = small_rig();
+  DecodeOptions decode;
+  Decoder decoder = Decoder::create(pattern(), rig, 0, decode).value();
+  ASSERT_TRUE(decoder.decode(tilted().frame.view(), 255));
+  decode.depth_min_mm = 2000;  // a half of the plane is nearer
+  DenseMapper mapper(pattern(), rig, 0, decode, {});
+  SerialExecutor executor;
+  const DenseMap& map = mapper.measure(tilted().frame.view(), 255, decoder.symbols(), executor);
+  EXPECT_GT(map.count(DensePixel::kMeasured), 20'000U);
+  EXPECT_GT(map.count(DensePixel::kOutOfDepthRange), 500U);
+  EXPECT_FALSE(std::ranges::any_of(map.depth_mm, [](float depth) { return depth < 2000; }));
+}
+
+TEST(DenseMapper, SixteenBitsAreAsGood) {
+  Grey16 frame(360, 280);
+  for (int y = 0; y < frame.height(); ++y)
+    for (int x = 0; x < frame.width(); ++x) frame.at(x, y) = static_cast<std::uint16_t>(257 * tilted().frame.at(x, y));
+  const Score got = score(measure(frame.view(), 65535).map, tilted());
+  EXPECT_GT(share(got.measured, got.lit), 0.97);
+  EXPECT_LT(got.rms_mm, 0.35);
+}
+
+/// Two threads that share the parts as they come.
+class TwoThreads final : public Executor {
+ public:
+  [[nodiscard]] int workers() const override { return 2; }
+
+ protected:
+  void run_parts(int parts, Part part, const void* work) override {
+    const auto run = [&](int worker) {
+      for (int i = worker; i < parts; i += 2) part(work, i, worker);
+    };
+    std::thread other(run, 1);
+    run(0);
+    other.join();
+  }
+};
+
+bool same(const DenseMap& a, const DenseMap& b) {
+  const auto equal = [](const auto& one, const auto& other) {
+    return one.size() == other.size() && std::memcmp(one.data(), other.data(), one.size() * sizeof one[0]) == 0;
+  };
+  return equal(a.depth_mm, b.depth_mm) && equal(a.sigma_mm, b.sigma_mm) && equal(a.intensity, b.intensity) &&
+         equal(a.pixels, b.pixels);
+}
+
+TEST(DenseMapper, ThreadsChangeNothing) {
+  TwoThreads threads;
+  EXPECT_TRUE(same(measure(column().frame.view()).map, measure(column().frame.view(), 255, {}, &threads).map));
+}
+
+TEST(DenseMapper, AFrameDoesNotDependOnTheOneBefore) {
+  const Calibration rig = small_rig();
+  Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
+  DenseMapper mapper(pattern(), rig, 0, {}, {});
+  SerialExecutor executor;
+  for (const Seen* seen : {&tilted(), &column()}) {
+    ASSERT_TRUE(decoder.decode(seen->frame.view(), 255));
+    const DenseMap& map = mapper.measure(seen->frame.view(), 255, decoder.symbols(), executor);
+    EXPECT_TRUE(same(map, measure(seen->frame.view()).map));
+  }
+}
+
+TEST(DenseMapper, AllocatesNothingAfterTheFirstFrame) {
+  const Calibration rig = small_rig();
+  Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
+  DenseMapper mapper(pattern(), rig, 0, {}, {});
+  SerialExecutor executor;
+  ASSERT_TRUE(decoder.decode(tilted().frame.view(), 255));
+  const DecodedSymbols symbols = decoder.symbols();
+  (void)mapper.measure(tilted().frame.view(), 255, symbols, executor);
+  const auto before = test::allocations();
+  (void)mapper.measure(tilted().frame.view(), 255, symbols, executor);
+  EXPECT_EQ(test::allocations(), before);
+}
+
+TEST(DenseOptions, AreChecked) {
+  EXPECT_TRUE(DenseOptions{}.validate());
+  for (const int stride : {0, 17}) EXPECT_FALSE((DenseOptions{stride, 1.5}.validate())) << stride;
+  for (const double prune : {-0.1, 16.1, std::nan("")}) EXPECT_FALSE((DenseOptions{4, prune}.validate())) << prune;
+  for (const int stride : {1, 16}) EXPECT_TRUE((DenseOptions{stride, 0}.validate()));
+}
+
+TEST(DenseMapper, EveryStrideMeasures) {
+  for (const int stride : {2, 7, 16}) {
+    DenseOptions options;
+    options.stride_px = stride;
+    const Score got = score(measure(tilted().frame.view(), 255, options).map, tilted());
+    EXPECT_GT(share(got.measured, got.lit), stride < 10 ? 0.93 : 0.7) << stride;
+    EXPECT_EQ(got.gross, 0U) << stride;
+  }
+}
+
+}  // namespace
+}  // namespace slsd

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "core/dense/dense_mapper.hpp"
+#include "core/exposure/light_levels.hpp"
+#include "drivers/files/file.hpp"
+#include "drivers/files/read_image.hpp"
+#include "tests/corpus/dense_score.hpp"
+
+namespace slsd {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr std::size_t kLargestFileBytes = 1 << 22;
+
+double ms_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
+class StageTimes final : public DenseObserver {
+ public:
+  void stage_done(DenseStage stage) override {
+    ms[static_cast<std::size_t>(stage)] = ms_since(last_);
+    last_ = Clock::now();
+  }
+  void start() { last_ = Clock::now(); }
+  std::array<double, kDenseStageCount> ms{};
+
+ private:
+  Clock::time_point last_;
+};
+
+Result<> report(const Pattern& pattern, const std::string& folder, const DenseOptions& options) {
+  const auto text = read_file(folder + "/calibration.yml", kLargestFileBytes);
+  if (!text) return tl::unexpected(text.error());
+  const auto calibration = read_calibration(*text, folder + "/calibration.yml");
+  if (!calibration) return tl::unexpected(calibration.error());
+  const auto frame = read_image(folder + "/frame.png");
+  if (!frame) return tl::unexpected(frame.error());
+  const auto truth = read_dense_truth(folder);
+  if (!truth) return tl::unexpected(truth.error());
+  const DecodeOptions decode;
+  auto decoder = Decoder::create(pattern, *calibration, 0, decode);
+  if (!decoder) return tl::unexpected(decoder.error());
+  const double full = guess_full_level(view(*frame));
+  const auto decoding = decoder->decode(view(*frame), full);
+  if (!decoding) return tl::unexpected(decoding.error());
+  DenseMapper mapper(pattern, *calibration, 0, decode, options);
+  SerialExecutor executor;
+  StageTimes times;
+  (void)mapper.measure(view(*frame), full, decoder->symbols(), executor);
+  times.start();
+  const auto begin = Clock::now();
+  const DenseMap& map = mapper.measure(view(*frame), full, decoder->symbols(), executor, &times);
+  const double total_ms = ms_since(begin);
+  const DenseScore s = score_dense(*truth, *calibration, map.depth_mm, map.sigma_mm);
+  const auto slash = folder.find_last_of('/');
+  std::printf("%-24s %5zu %5.1f  %.3f %.3f  %.2f %.2f  %5.2f %5.2f %5.2f  %4.2f %5.2f ",
+              folder.substr(slash + 1).c_str(), (*decoding)->points.size(), 100 * s.complete, s.median_px, s.rms_px,
+              s.median_mm, s.rms_mm, 100 * s.gross, 100 * s.unlit, 100 * s.unlit_far, s.error_over_sigma,
+              100 * s.beyond_three);
+  for (const auto& edge : s.edges) std::printf(" %2.0f/%.1f", 100 * edge.complete, 100 * edge.gross);
+  std::printf("  %4.0f:", total_ms);
+  for (const double ms : times.ms) std::printf(" %.0f", ms);
+  std::printf("  %.2f", static_cast<double>(mapper.blur_sigma_px()));
+  for (int i = 1; i < kDensePixelCount; ++i) std::printf(" %.1f", 100.0 * map.counts[i] / static_cast<double>(s.lit));
+  std::printf("\n");
+  return {};
+}
+
+}  // namespace
+}  // namespace slsd
+
+int main(int argc, char** argv) {
+  using namespace slsd;
+  DenseOptions options;
+  std::string pattern_file;
+  std::vector<std::string> folders;
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--stride") == 0 && i + 1 < argc)
+      options.stride_px = std::atoi(argv[++i]);
+    else if (std::strcmp(argv[i], "--prune") == 0 && i + 1 < argc)
+      options.prune_px = std::atof(argv[++i]);
+    else if (pattern_file.empty())
+      pattern_file = argv[i];
+    else
+      folders.emplace_back(argv[i]);
+  }
+  if (folders.empty()) {
+    std::fputs("usage: dense-report PATTERN.toml FOLDER... [--stride PX] [--prune PX]\n", stderr);
+    return 2;
+  }
+  const auto text = read_file(pattern_file, kLargestFileBytes);
+  const auto pattern = text ? read_pattern(*text, pattern_file) : Result<Pattern>(tl::unexpected(text.error()));
+  if (!pattern) return std::fprintf(stderr, "dense-report: %s\n", to_string(pattern.error()).c_str()), 1;
+  std::printf(
+      "scene                    seeds compl med px rms px  mm med rms  gross unlit   far  err/s  >3   edges 0-2 2-4 "
+      "4-6 6- (complete/gross %%)  ms: blur grow fuse judge clean  blur  reasons %%\n");
+  for (const std::string& folder : folders) {
+    const auto done = report(*pattern, folder, options);
+    if (!done) std::fprintf(stderr, "dense-report: %s: %s\n", folder.c_str(), to_string(done.error()).c_str());
+  }
+  return 0;
+}
