@@ -168,6 +168,9 @@ CalibrationReport file_report(const CalibrationOutcome& outcome, const Adjustmen
   report.epipolar_error_px = outcome.epipolar_rms_px;
   report.held_out_error_px = outcome.held_out_symbol_px;
   report.verdict = to_string(outcome.verdict.grade);
+  if (outcome.depth.size() == 3)
+    for (const DepthUncertainty& depth : outcome.depth)
+      report.depth_sigma.push_back({depth.depth_mm, depth.calibration_mm});
   report.projector_sigma.assign(9, 0);
   report.camera_sigma.assign(outcome.calibration.cameras.size(), std::vector<double>(9, 0));
   const auto& shared = adjustment.equations().shared;

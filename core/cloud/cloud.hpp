@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,9 @@ struct Cloud {
   std::string scan_id;
   std::string time;         ///< ISO 8601, UTC; when the exposure began
   std::uint64_t frame = 0;  ///< sequence number of the first camera's frame
+  /// One standard deviation of the depth, from the calibration's own uncertainty, where the calibration tells: it moves
+  /// the cloud as a whole, and no point against another.
+  std::optional<float> sigma_calibration_mm;
   friend bool operator==(const Cloud&, const Cloud&) = default;
 };
 

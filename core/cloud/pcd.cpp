@@ -23,6 +23,7 @@ std::string header(const Cloud& cloud) {
   const std::string points = std::to_string(cloud.lattice_columns * cloud.lattice_rows * cloud.cameras);
   return "# .PCD v0.7 - Point Cloud Data file format\n# scan_id " + header_text(cloud.scan_id) + "\n# time " +
          header_text(cloud.time) + "\n# frame " + std::to_string(cloud.frame) +
+         (cloud.sigma_calibration_mm ? "\n# sigma_calibration_mm " + sigma_calibration_text(cloud) : "") +
          "\n# units mm, px\n# coordinate_frame rig: the first camera's, x right, y down, z forward\nVERSION 0.7\n" +
          line_of_fields("FIELDS", [](const PointField& field) { return std::string(field.name); }) +
          line_of_fields("SIZE", [](const PointField& field) { return std::to_string(field.bytes); }) +

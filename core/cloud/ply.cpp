@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -47,6 +48,14 @@ class HeaderReader {
     if (error != std::errc() || end != digits.data() + digits.size() || value > high) refuse(key);
     return value;
   }
+  [[nodiscard]] bool has(std::string_view key) const { return rest_.starts_with(key); }
+  float length(std::string_view key) {
+    const std::string digits = text(key);
+    float value = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error != std::errc() || end != digits.data() + digits.size() || !std::isfinite(value) || value < 0) refuse(key);
+    return value;
+  }
   [[nodiscard]] const std::string& problem() const { return problem_; }
   [[nodiscard]] std::string_view rest() const { return rest_; }
 
@@ -66,6 +75,7 @@ std::string write_ply(const Cloud& cloud) {
   bytes += "comment time " + header_text(cloud.time) + "\n";
   bytes += "comment frame " + std::to_string(cloud.frame) + "\n";
   bytes += kUnits;
+  if (cloud.sigma_calibration_mm) bytes += "comment sigma_calibration_mm " + sigma_calibration_text(cloud) + "\n";
   bytes += "comment lattice_columns " + std::to_string(cloud.lattice_columns) + "\n";
   bytes += "comment lattice_rows " + std::to_string(cloud.lattice_rows) + "\n";
   bytes += "comment cameras " + std::to_string(cloud.cameras) + "\n";
@@ -85,6 +95,8 @@ Result<Cloud> read_ply(std::string_view bytes, std::string_view name) {
   cloud.time = header.text("comment time ");
   cloud.frame = header.number("comment frame ", std::numeric_limits<std::uint64_t>::max());
   header.expect(kUnits);
+  if (header.has("comment sigma_calibration_mm "))
+    cloud.sigma_calibration_mm = header.length("comment sigma_calibration_mm ");
   cloud.lattice_columns = static_cast<int>(header.number("comment lattice_columns ", kMaxLattice));
   cloud.lattice_rows = static_cast<int>(header.number("comment lattice_rows ", kMaxLattice));
   cloud.cameras = static_cast<int>(header.number("comment cameras ", 256));

@@ -3,7 +3,9 @@
 #include "core/cloud/point_record.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <charconv>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -59,6 +61,13 @@ std::optional<CloudPoint> read_point(const char* bytes) {
   point.column = static_cast<std::uint16_t>(cell.column);
   point.row = static_cast<std::uint16_t>(cell.row);
   return point;
+}
+
+std::string sigma_calibration_text(const Cloud& cloud) {
+  if (!cloud.sigma_calibration_mm) return {};
+  std::array<char, 32> digits{};
+  const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), *cloud.sigma_calibration_mm);
+  return {digits.data(), end};
 }
 
 std::string header_text(std::string_view text) {

@@ -44,6 +44,9 @@ void append_point(const CloudPoint& point, std::string& bytes);
 /// @param bytes  at least kPointBytes
 [[nodiscard]] std::optional<CloudPoint> read_point(const char* bytes);
 
+/// sigma_calibration_mm as a header names it: "0.213", or empty.
+[[nodiscard]] std::string sigma_calibration_text(const Cloud& cloud);
+
 /// A text fit for a line of a header: control characters become spaces.
 [[nodiscard]] std::string header_text(std::string_view text);
 

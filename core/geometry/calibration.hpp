@@ -48,6 +48,15 @@ struct CalibrationReport {
   std::optional<std::string> projector_serial;
   std::vector<std::string> camera_serials;  ///< one to a camera, or empty
   std::optional<double> epipolar_error_px;  ///< root mean square, in the projector
+  /// One standard deviation of a depth in the middle of the field, from the calibration's own uncertainty, near to far.
+  struct DepthSigma {
+    double depth_mm = 0, sigma_mm = 0;
+    friend bool operator==(const DepthSigma&, const DepthSigma&) = default;
+  };
+  std::vector<DepthSigma> depth_sigma;  ///< 3, or empty
+
+  /// The same at any depth, between and beyond those that are known by the square of the depth; nothing where none is.
+  [[nodiscard]] std::optional<double> depth_sigma_mm(double depth_mm) const;
 };
 
 struct Calibration {

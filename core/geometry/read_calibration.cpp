@@ -102,6 +102,18 @@ std::vector<double> read_sigma(FileSection& section, const char* key) {
   return {sigma.begin(), sigma.end()};
 }
 
+std::vector<CalibrationReport::DepthSigma> read_depth_sigma(FileSection& section) {
+  if (!section.has("depth_mm")) return {};
+  const Eigen::VectorXd depths = section.vector("depth_mm", 3), sigmas = section.vector("depth_sigma_mm", 3);
+  std::vector<CalibrationReport::DepthSigma> out;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    if (depths(i) <= (i == 0 ? 0 : depths(i - 1))) section.refuse("depth_mm", "must grow, from above 0");
+    if (sigmas(i) < 0) section.refuse("depth_sigma_mm", "must not be negative");
+    out.push_back({depths(i), sigmas(i)});
+  }
+  return out;
+}
+
 CalibrationReport read_report(FileSection& section) {
   CalibrationReport report;
   if (section.has("reprojection_error_camera_px")) {
@@ -112,6 +124,7 @@ CalibrationReport read_report(FileSection& section) {
   }
   if (section.has("epipolar_error_px")) report.epipolar_error_px = section.number("epipolar_error_px");
   if (section.has("held_out_error_px")) report.held_out_error_px = section.number("held_out_error_px");
+  report.depth_sigma = read_depth_sigma(section);
   if (section.has("verdict")) report.verdict = section.text("verdict");
   report.projector_sigma = read_sigma(section, "projector_sigma");
   if (section.has("board")) report.board = section.text("board");

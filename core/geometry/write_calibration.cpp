@@ -60,6 +60,15 @@ void write_report(cv::FileStorage& storage, const CalibrationReport& report) {
   write_optional(storage, "reprojection_error_projector_px", report.reprojection_error_projector_px);
   write_optional(storage, "epipolar_error_px", report.epipolar_error_px);
   write_optional(storage, "held_out_error_px", report.held_out_error_px);
+  if (!report.depth_sigma.empty()) {
+    Eigen::RowVector3d depths, sigmas;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      const auto& [depth_mm, sigma_mm] = report.depth_sigma.at(static_cast<std::size_t>(i));
+      depths(i) = depth_mm, sigmas(i) = sigma_mm;
+    }
+    write_matrix(storage, "depth_mm", depths);
+    write_matrix(storage, "depth_sigma_mm", sigmas);
+  }
   write_optional(storage, "verdict", report.verdict);
   write_sigma(storage, "projector_sigma", report.projector_sigma);
   write_optional(storage, "board", report.board);

@@ -9,6 +9,7 @@
 #include "core/cloud/shade_points.hpp"
 #include "core/decode/decode_in_light.hpp"
 #include "core/exposure/light_levels.hpp"
+#include "core/geometry/median.hpp"
 #include "core/utc_text.hpp"
 #include "daemon/scan/frame_image.hpp"
 
@@ -127,6 +128,12 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     result.picture_png = std::move(*picture);
   }
   result.stage_times = clock.times();
+  if (!result.cloud.points.empty()) {
+    std::vector<double> depths_mm;
+    for (const CloudPoint& point : result.cloud.points) depths_mm.push_back(point.z);
+    const auto sigma_mm = setup.calibration->report.depth_sigma_mm(median_of(std::move(depths_mm)));
+    if (sigma_mm) result.cloud.sigma_calibration_mm = static_cast<float>(*sigma_mm);
+  }
   if (auto kept = keep_frames(set, setup, request.frames, result); !kept) return tl::unexpected(kept.error());
   return result;
 }

@@ -146,6 +146,7 @@ json scan_json(const ScanResult& scan) {
               {"capture_ms", milliseconds(scan.capture_time)},
               {"decode_ms", milliseconds(scan.decode_time)},
               {"stages_ms", std::move(stages)}};
+  if (scan.cloud.sigma_calibration_mm) result["sigma_calibration_mm"] = *scan.cloud.sigma_calibration_mm;
   if (scan.saturated) result["saturated"] = *scan.saturated;
   result["tries"] = scan.lost.count + 1;
   if (scan.lost.count > 0) {

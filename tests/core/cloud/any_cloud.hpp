@@ -21,6 +21,7 @@ inline Cloud any_cloud(std::uint32_t seed, int columns, int rows) {
   cloud.scan_id = "scan-" + std::to_string(seed);
   cloud.time = "2026-03-01T12:00:00.000Z";
   cloud.frame = random();
+  if (seed % 2 == 1) cloud.sigma_calibration_mm = draw(0, 2);
   for (int cell = 0; cell < columns * rows * 2; ++cell) {
     if (random() % 2 == 0) continue;
     CloudPoint point{draw(-500, 500),

@@ -26,6 +26,7 @@ Calibration two_cameras() {
   CalibrationReport& report = rig.report;
   report.reprojection_error_camera_px = 0.11, report.reprojection_error_projector_px = 0.09;
   report.epipolar_error_px = 0.12, report.held_out_error_px = 0.13;
+  report.depth_sigma = {{500, 0.1}, {1000, 0.25}, {2000, 1.1}};
   report.verdict = "good";
   report.projector_sigma.assign(9, 0.25), report.camera_sigma = {std::vector<double>(9, 0.5), {}};
   report.board = "charuco 12x9", report.date = "2026-03-01";
@@ -75,6 +76,7 @@ TEST(ReadCalibration, ReturnsWhatWasWritten) {
   EXPECT_EQ(read->report.reprojection_error_projector_px, 0.09);
   EXPECT_EQ(read->report.epipolar_error_px, 0.12);
   EXPECT_EQ(read->report.held_out_error_px, 0.13);
+  EXPECT_EQ(read->report.depth_sigma, written.report.depth_sigma);
   EXPECT_EQ(read->report.verdict, "good");
   EXPECT_EQ(read->report.projector_sigma, written.report.projector_sigma);
   EXPECT_EQ(read->report.camera_sigma, written.report.camera_sigma);
@@ -240,6 +242,26 @@ RC_GTEST_PROP(ReadCalibration, RefusesEveryTruncation, ()) {
   const std::size_t end = text.rfind(']');
   const std::size_t size = *rc::gen::resize(rc::kNominalSize, rc::gen::inRange<std::size_t>(0, end));
   RC_ASSERT(message_of(text.substr(0, size)) != "accepted");
+}
+
+TEST(DepthSigma, GrowsWithTheSquareOfTheDepthWhereNothingElseIsKnown) {
+  CalibrationReport report;
+  EXPECT_EQ(report.depth_sigma_mm(1000), std::nullopt);
+  report.depth_sigma = {{500, 0.1}, {1000, 0.8}, {2000, 3.2}};
+  EXPECT_DOUBLE_EQ(*report.depth_sigma_mm(250), 0.025);
+  EXPECT_DOUBLE_EQ(*report.depth_sigma_mm(500), 0.1);
+  EXPECT_DOUBLE_EQ(*report.depth_sigma_mm(1000), 0.8);
+  EXPECT_DOUBLE_EQ(*report.depth_sigma_mm(1500), 1.8);
+  EXPECT_DOUBLE_EQ(*report.depth_sigma_mm(4000), 12.8);
+  EXPECT_DOUBLE_EQ(*report.depth_sigma_mm(750), 750 * 750 * 0.6e-6);
+}
+
+TEST(ReadCalibration, RefusesDepthsThatDoNotGrowAndDeviationsBelowNone) {
+  Calibration rig = paper_rig();
+  rig.report.depth_sigma = {{500, 0.1}, {500, 0.8}, {2000, 3.2}};
+  EXPECT_THAT(message_of(write_calibration(rig)), HasSubstr("depth_mm must grow"));
+  rig.report.depth_sigma = {{500, 0.1}, {1000, -0.8}, {2000, 3.2}};
+  EXPECT_THAT(message_of(write_calibration(rig)), HasSubstr("depth_sigma_mm must not be negative"));
 }
 
 TEST(Camera, IsFoundByName) {
