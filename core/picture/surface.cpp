@@ -3,6 +3,8 @@
 #include "core/picture/surface.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -12,47 +14,47 @@ namespace {
 // An edge longer than this many typical ones spans a gap in depth.
 constexpr double kMaxEdge = 3.0;
 
-// Index of the point in each cell of each camera's lattice, or -1; one ring of empty cells around it.
+using Corners = std::array<std::int32_t, 4>;  // clockwise from the top left; -1: no point
+
+// The points by their cells. As large as there are points, wherever in the lattice a file says that they lie.
 class Lattice {
  public:
   explicit Lattice(const Cloud& cloud) {
-    for (const CloudPoint& point : cloud.points) {
-      columns_ = std::max(columns_, point.column + 2);
-      rows_ = std::max(rows_, point.row + 2);
-      cameras_ = std::max(cameras_, point.camera + 1);
-    }
-    cells_.assign(static_cast<std::size_t>(columns_) * rows_ * cameras_, -1);
     for (std::size_t i = 0; i < cloud.points.size(); ++i) {
       const CloudPoint& point = cloud.points[i];
-      cells_[index(point.camera, point.row, point.column)] = static_cast<std::int32_t>(i);
+      cells_.emplace_back(key(point.camera, point.row, point.column), static_cast<std::int32_t>(i));
+      for (const int row : {point.row - 1, int{point.row}})
+        for (const int column : {point.column - 1, int{point.column}})
+          if (row >= 0 && column >= 0) quads_.push_back(key(point.camera, row, column));
     }
+    std::ranges::sort(cells_);
+    std::ranges::sort(quads_);
+    quads_.erase(std::ranges::unique(quads_).begin(), quads_.end());
   }
-  [[nodiscard]] std::int32_t at(int camera, int row, int column) const { return cells_[index(camera, row, column)]; }
-  [[nodiscard]] int columns() const { return columns_; }
-  [[nodiscard]] int rows() const { return rows_; }
-  [[nodiscard]] int cameras() const { return cameras_; }
+
+  // Visits each square of four neighbouring cells that holds a point, camera by camera, row by row.
+  template <class Visit>
+  void for_each_quad(Visit visit) const {
+    constexpr std::uint64_t kRow = 1U << 17U;
+    for (const std::uint64_t quad : quads_)
+      visit(Corners{at(quad), at(quad + 1), at(quad + kRow + 1), at(quad + kRow)});
+  }
 
  private:
-  [[nodiscard]] std::size_t index(int camera, int row, int column) const {
-    return (static_cast<std::size_t>(camera) * rows_ + row) * columns_ + column;
+  // Cells are of 16 bits; the one beyond the last is no cell of the next row.
+  static std::uint64_t key(int camera, int row, int column) {
+    return (static_cast<std::uint64_t>(camera) << 34U) + (static_cast<std::uint64_t>(row) << 17U) +
+           static_cast<std::uint64_t>(column);
   }
-  int columns_ = 0, rows_ = 0, cameras_ = 0;
-  std::vector<std::int32_t> cells_;
+  // Of points that share a cell the last one counts.
+  [[nodiscard]] std::int32_t at(std::uint64_t key) const {
+    const auto after = std::ranges::upper_bound(cells_, key, {}, &std::pair<std::uint64_t, std::int32_t>::first);
+    return after != cells_.begin() && std::prev(after)->first == key ? std::prev(after)->second : -1;
+  }
+
+  std::vector<std::pair<std::uint64_t, std::int32_t>> cells_;
+  std::vector<std::uint64_t> quads_;
 };
-
-using Corners = std::array<std::int32_t, 4>;  // clockwise from the top left
-
-template <class Visit>
-void for_each_quad(const Lattice& lattice, Visit visit) {
-  for (int camera = 0; camera < lattice.cameras(); ++camera) {
-    for (int row = 0; row + 1 < lattice.rows(); ++row) {
-      for (int column = 0; column + 1 < lattice.columns(); ++column) {
-        visit(Corners{lattice.at(camera, row, column), lattice.at(camera, row, column + 1),
-                      lattice.at(camera, row + 1, column + 1), lattice.at(camera, row + 1, column)});
-      }
-    }
-  }
-}
 
 // Length of an edge in lattice pitches at its depth, where a pitch grows with the distance.
 double edge(const std::vector<Eigen::Vector3d>& points, std::int32_t a, std::int32_t b) {
@@ -61,7 +63,7 @@ double edge(const std::vector<Eigen::Vector3d>& points, std::int32_t a, std::int
 
 double typical_edge(const std::vector<Eigen::Vector3d>& points, const Lattice& lattice) {
   std::vector<double> edges;
-  for_each_quad(lattice, [&](const Corners& quad) {
+  lattice.for_each_quad([&](const Corners& quad) {
     if (quad[0] >= 0 && quad[1] >= 0) edges.push_back(edge(points, quad[0], quad[1]));
     if (quad[0] >= 0 && quad[3] >= 0) edges.push_back(edge(points, quad[0], quad[3]));
   });
@@ -111,7 +113,7 @@ Surface join_surface(const Cloud& cloud) {
   surface.normals.assign(surface.points.size(), Eigen::Vector3d::Zero());
   const Lattice lattice(cloud);
   Joiner joiner(surface, kMaxEdge * typical_edge(surface.points, lattice));
-  for_each_quad(lattice, [&](const Corners& quad) { joiner.join(quad); });
+  lattice.for_each_quad([&](const Corners& quad) { joiner.join(quad); });
   for (Eigen::Vector3d& normal : surface.normals) {
     if (normal.norm() > 0) normal.normalize();
   }

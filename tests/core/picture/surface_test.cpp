@@ -44,5 +44,16 @@ TEST(JoinSurface, LeavesALonePointWithoutANormal) {
   EXPECT_EQ(surface.normals[0].norm(), 0);
 }
 
+// A file can say so: of a table of the whole lattice that would be terabytes.
+TEST(JoinSurface, NeedsNoMoreMemoryForPointsFarApart) {
+  Cloud cloud = lattice_cloud(2, 2, [](int, int) { return 1000; });
+  CloudPoint far = cloud.points.front();
+  far.row = far.column = 65535, far.camera = 255;
+  cloud.points.push_back(far);
+  far.row = 0;
+  cloud.points.push_back(far);
+  EXPECT_EQ(join_surface(cloud).triangles.size(), 2U);
+}
+
 }  // namespace
 }  // namespace slsd
