@@ -55,7 +55,7 @@ void print(const char* name, const Row& row) {
               row.undecidable, row.right, row.visible == 0 ? 0. : 100. * row.right / row.visible);
 }
 
-Result<int> report(int frames, int only_kind, int only_number, bool verbose) {
+Result<int> report(int frames, int only_kind, int only_number, const char* picture) {
   std::vector<Reader> readers;
   for (const PatternOptions& options :
        {PatternOptions{.symbol_size_px = 16, .spacing_px = 2}, PatternOptions{.symbol_size_px = 8, .spacing_px = 2}}) {
@@ -85,8 +85,8 @@ Result<int> report(int frames, int only_kind, int only_number, bool verbose) {
         std::fprintf(stderr, "wrong: --kind %d --frame %d: row %d, column %d at (%.1f, %.1f) px\n", k, n, point.row,
                      point.column, point.camera_u, point.camera_v);
       }
-      if (verbose) {
-        write_pgm(frame.image, "adversary.pgm");
+      if (picture != nullptr) write_pgm(frame.image, picture);
+      if (only_number >= 0) {
         for (int i = 0; i < kRegionStatusCount; ++i)
           std::fprintf(stderr, "%s %u\n", std::string(to_string(static_cast<RegionStatus>(i))).c_str(),
                        (*decoding)->counts[i]);
@@ -106,21 +106,24 @@ Result<int> report(int frames, int only_kind, int only_number, bool verbose) {
 }  // namespace
 }  // namespace slsd::adversary
 
-// adversary-report [FRAMES] [--kind K] [--frame N]
+// adversary-report [FRAMES] [--kind K] [--frame N [--picture FILE.pgm]]
 int main(int count, char** arguments) {
   int frames = 1000, kind = -1, number = -1;
+  const char* picture = nullptr;
   for (int i = 1; i < count; ++i) {
     const bool more = i + 1 < count;
     if (std::strcmp(arguments[i], "--kind") == 0 && more) {
       kind = std::atoi(arguments[++i]);
     } else if (std::strcmp(arguments[i], "--frame") == 0 && more) {
       number = std::atoi(arguments[++i]);
+    } else if (std::strcmp(arguments[i], "--picture") == 0 && more) {
+      picture = arguments[++i];
     } else {
       frames = std::atoi(arguments[i]);
     }
   }
   if (number >= 0) frames = std::max(frames, (number + 1) * slsd::adversary::kKinds);
-  const auto wrong = slsd::adversary::report(frames, kind, number, number >= 0);
+  const auto wrong = slsd::adversary::report(frames, kind, number, picture);
   if (!wrong) std::fprintf(stderr, "adversary-report: %s\n", slsd::to_string(wrong.error()).c_str());
   return wrong && *wrong == 0 ? 0 : 1;
 }
