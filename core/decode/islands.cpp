@@ -407,6 +407,14 @@ float IslandJudge::bend_of(const Frame& frame, std::int32_t node, Direction d) c
   return (own - behind).norm() / behind.norm();
 }
 
+/// Whether a link leads to what is none of the island: its letter contradicts, or is well seen and has been refused.
+bool IslandJudge::is_of_another(const Frame& frame, std::int32_t node, Direction d) const {
+  constexpr float kWellSeen = 3;
+  if (links_[node][d] != Link::kNeutral) return links_[node][d] == Link::kAgainst;
+  const Classification& shape = frame.shapes[frame.beside[node][d]];
+  return !continues(frame, node, d) && shape.letter >= 0 && shape.distance < kWellSeen;
+}
+
 IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, Direction d) const {
   const bool along_row = d == kUp || d == kDown;
   Side side;
@@ -416,7 +424,7 @@ IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, D
     const std::int32_t node = holder_[index_of(row, column)];
     if (links_[node][d] == Link::kAgrees) side.bend += bend_of(frame, node, d), ++side.held_by;
     const Beyond cell(frame.claims[node], d);
-    side.contradicted |= links_[node][d] == Link::kAgainst && shown(cell.row, cell.column);
+    side.contradicted |= shown(cell.row, cell.column) && is_of_another(frame, node, d);
     side.broken |= frame.nodes[node].broken[d];
   }
   return side;
@@ -517,7 +525,8 @@ void IslandJudge::cut_pieces_through(const Frame& frame, std::int32_t node, floa
 void IslandJudge::cut_pieces(const Frame& frame) {
   holder_.assign(static_cast<std::size_t>(options_.rows) * options_.columns, -1);
   const auto ends_at = [&](std::int32_t node) {
-    return std::ranges::count(links_[node], Link::kAgainst) + std::ranges::count(frame.nodes[node].broken, true);
+    return std::ranges::count_if(kDirections, [&](Direction d) { return is_of_another(frame, node, d); }) +
+           std::ranges::count(frame.nodes[node].broken, true);
   };
   std::ptrdiff_t rim = 1;  // links across which chance could have led on
   for (const std::int32_t node : members_) rim += ends_at(node);

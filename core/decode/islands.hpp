@@ -111,6 +111,7 @@ class IslandJudge {
   void cut_pieces_through(const Frame& frame, std::int32_t node, float evidence_min);
   void cut_piece(const Frame& frame, const Piece& piece, float missing);
   [[nodiscard]] bool may_be_apart(const Frame& frame, const Piece& piece) const;
+  [[nodiscard]] bool is_of_another(const Frame& frame, std::int32_t node, Direction d) const;
   [[nodiscard]] Side side_of(const Frame& frame, const Piece& piece, Direction d) const;
   [[nodiscard]] float bend_of(const Frame& frame, std::int32_t node, Direction d) const;
   [[nodiscard]] int turns_without(const Piece& piece) const;
