@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""Clouds: the points of a scan as a structured array."""
+from __future__ import annotations
+
+from typing import Any, Mapping, Union
+
+import numpy as np
+
+from .errors import ProtocolError
+
+_TYPES = {"char": "<i1", "uchar": "<u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "uint": "<u4", "float": "<f4",
+          "double": "<f8"}
+_HEADER_MAX = 1 << 16
+
+Buffer = Union[bytes, bytearray, memoryview]
+
+
+class Cloud:
+    """One scan.
+
+    points       structured array, a record to a point: x y z (mm, rig frame), sigma_mm, intensity, camera, and with
+                 symbols also camera_u camera_v projector_u projector_v (px), symbol, column, row
+    description  what the reply says of the scan: its id, times, counts of regions, ...
+    comments     of the file's header
+    lost         clouds that a subscriber lost since the one before, because it read too slowly
+    pictures, frames   what was asked for with it
+    """
+
+    def __init__(self, points: np.ndarray, comments: Mapping[str, str], description: Mapping[str, Any]):
+        self.points = points
+        self.comments = dict(comments)
+        self.description = dict(description)
+        self.lost = int(self.description.get("lost", 0))
+        self.picture: bytes | None = None
+        self.frames: list[Any] = []
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __repr__(self) -> str:
+        return f"<slsd.Cloud {self.description.get('scan', '')}: {len(self)} points>"
+
+    @property
+    def xyz(self) -> np.ndarray:
+        """The coordinates, mm, as an array of N x 3 float32: a copy."""
+        return np.stack([self.points[axis] for axis in "xyz"], axis=1)
+
+    @property
+    def normals(self) -> np.ndarray | None:
+        """The unit normals towards the camera, N x 3, where they were asked for."""
+        names = self.points.dtype.names or ()
+        if "nx" not in names:
+            return None
+        return np.stack([self.points[name] for name in ("nx", "ny", "nz")], axis=1)
+
+    @property
+    def sigma_calibration_mm(self) -> float | None:
+        """One standard deviation of the depth from the calibration alone: it moves all points together."""
+        value = self.description.get("sigma_calibration_mm", self.comments.get("sigma_calibration_mm"))
+        return None if value is None else float(value)
+
+
+def read_ply(data: Buffer, description: Mapping[str, Any] | None = None) -> Cloud:
+    """The cloud in the bytes of a binary PLY file. The points are a view of them: nothing is copied.
+
+    Raises ProtocolError where the header promises what is not there.
+    """
+    view = memoryview(data)
+    head = bytes(view[:_HEADER_MAX])
+    end = head.find(b"end_header\n")
+    if not head.startswith(b"ply\nformat binary_little_endian 1.0\n") or end < 0:
+        raise ProtocolError("the cloud is no binary little-endian PLY")
+    comments: dict[str, str] = {}
+    fields: list[tuple[str, str]] = []
+    count = None
+    for line in head[:end].decode("utf-8", "replace").split("\n"):
+        words = line.split(" ")
+        if words[0] == "comment" and len(words) > 1:
+            comments[words[1]] = " ".join(words[2:])
+        elif words[:2] == ["element", "vertex"] and len(words) == 3 and words[2].isdecimal():
+            count = int(words[2])
+        elif words[0] == "property" and len(words) == 3 and words[1] in _TYPES:
+            fields.append((words[2], _TYPES[words[1]]))
+        elif words[0] in ("element", "property"):
+            raise ProtocolError(f"the cloud's header has a line that is none of slsd's: {line[:80]!r}")
+    if count is None or not fields or len({name for name, _ in fields}) != len(fields):
+        raise ProtocolError("the cloud's header names no points")
+    body = view[end + len(b"end_header\n"):]
+    record = np.dtype(fields)
+    if count * record.itemsize != len(body):
+        raise ProtocolError(f"the cloud has {len(body)} bytes where its header says {count} points of "
+                            f"{record.itemsize}")
+    return Cloud(np.frombuffer(body, record, count), comments, description or {})

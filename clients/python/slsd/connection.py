@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""One connection to the service: JSON-RPC lines, the bytes behind them, and descriptors."""
+from __future__ import annotations
+
+import array
+import json
+import mmap
+import os
+import socket
+import time
+from typing import Any
+
+from .errors import ConnectionLost, PermissionDenied, ProtocolError, TimedOut
+
+_LINE_MAX = 1 << 20
+_BYTES_MAX = 1 << 32
+
+
+class Connection:
+    def __init__(self, path: str | os.PathLike[str]):
+        self.path = os.fspath(path)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._buffer = bytearray()
+        self._descriptors: list[int] = []
+        self._last_id = 0
+        try:
+            self._socket.connect(self.path)
+        except PermissionError as error:
+            self.close()
+            raise PermissionDenied(f"{self.path}: you may not use this scanner; join the group that owns the socket",
+                                   "permission_denied", self.path) from error
+        except OSError as error:
+            self.close()
+            raise ConnectionLost(f"{self.path}: {error.strerror}; is slsd running? systemctl status slsd",
+                                 where=self.path) from error
+
+    def close(self) -> None:
+        self._socket.close()
+        while self._descriptors:
+            os.close(self._descriptors.pop())
+
+    def send(self, method: str, params: dict[str, Any]) -> int:
+        """Sends a request. Returns its id."""
+        self._last_id += 1
+        line = json.dumps({"jsonrpc": "2.0", "id": self._last_id, "method": method, "params": params})
+        try:
+            self._socket.settimeout(10)
+            self._socket.sendall(line.encode() + b"\n")
+        except OSError as error:
+            raise self._lost(error) from error
+        return self._last_id
+
+    def receive(self, deadline: float | None) -> tuple[dict[str, Any], bytearray | mmap.mmap | None]:
+        """The next message, and what comes with it: bytes, or a memfd mapped for reading.
+
+        deadline: of time.monotonic(); None waits for ever.
+        """
+        while (end := self._buffer.find(b"\n")) < 0:
+            if len(self._buffer) > _LINE_MAX:
+                raise ProtocolError("what came is no message of slsd: a line of more than 1 MiB")
+            self._more(deadline)
+        line = bytes(self._buffer[:end])
+        del self._buffer[:end + 1]
+        try:
+            message = json.loads(line)
+        except ValueError as error:
+            raise ProtocolError(f"what came is no JSON: {line[:80]!r}") from error
+        if not isinstance(message, dict) or message.get("jsonrpc") != "2.0":
+            raise ProtocolError("what came is no JSON-RPC 2.0")
+        body = message.get("params" if "method" in message else "result")
+        if not isinstance(body, dict):
+            return message, None
+        if "memfd_bytes" in body:
+            return message, self._map(_size(body["memfd_bytes"]))
+        if "bytes" in body:
+            return message, self._bytes(_size(body["bytes"]), deadline)
+        return message, None
+
+    def _lost(self, error: OSError) -> Exception:
+        if isinstance(error, TimeoutError):
+            return TimedOut(f"{self.path}: the service does not answer", "timeout", self.path)
+        return ConnectionLost(f"{self.path}: the service hung up: {error.strerror or error}", where=self.path)
+
+    def _wait(self, deadline: float | None) -> None:
+        if deadline is None:
+            self._socket.settimeout(None)
+            return
+        left = deadline - time.monotonic()
+        if left <= 0:
+            raise TimedOut(f"{self.path}: the service does not answer", "timeout", self.path)
+        self._socket.settimeout(left)
+
+    def _more(self, deadline: float | None) -> None:
+        self._wait(deadline)
+        space = socket.CMSG_SPACE(4 * array.array("i").itemsize)
+        try:
+            chunk, control, _, _ = self._socket.recvmsg(1 << 16, space, socket.MSG_CMSG_CLOEXEC)
+        except OSError as error:
+            raise self._lost(error) from error
+        for level, kind, data in control:
+            if level == socket.SOL_SOCKET and kind == socket.SCM_RIGHTS:
+                received = array.array("i")
+                received.frombytes(data[:len(data) - len(data) % received.itemsize])
+                self._descriptors.extend(received)
+        if not chunk:
+            raise ConnectionLost(f"{self.path}: the service hung up", where=self.path)
+        self._buffer += chunk
+
+    def _bytes(self, size: int, deadline: float | None) -> bytearray:
+        data = bytearray(size)
+        have = min(size, len(self._buffer))
+        data[:have] = self._buffer[:have]
+        del self._buffer[:have]
+        rest = memoryview(data)[have:]
+        while rest:
+            self._wait(deadline)
+            try:
+                count = self._socket.recv_into(rest)
+            except OSError as error:
+                raise self._lost(error) from error
+            if count == 0:
+                raise ConnectionLost(f"{self.path}: the service hung up in the middle of a cloud", where=self.path)
+            rest = rest[count:]
+        return data
+
+    def _map(self, size: int) -> mmap.mmap:
+        if not self._descriptors:
+            raise ProtocolError("a cloud was to come as a memfd, and no descriptor came")
+        descriptor = self._descriptors.pop(0)
+        try:
+            if os.fstat(descriptor).st_size != size or size == 0:
+                raise ProtocolError("the memfd is not of the size that the service said")
+            return mmap.mmap(descriptor, size, prot=mmap.PROT_READ)
+        finally:
+            os.close(descriptor)
+
+
+def _size(value: Any) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= _BYTES_MAX:
+        raise ProtocolError(f"a message says that {value!r} bytes follow it")
+    return value

@@ -1,0 +1,258 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""The Python client against the whole service, and against services that lie, stall and vanish."""
+import array
+import inspect
+import json
+import os
+import pathlib
+import random
+import signal
+import socket
+import sys
+import tempfile
+import threading
+import unittest
+import unittest.mock
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daemon")]
+
+import numpy as np  # noqa: E402
+
+import slsd  # noqa: E402
+from point_cloud import vertices  # noqa: E402
+from service import SCENE, Service, wait_until  # noqa: E402
+
+
+def ply(count, said=None, lines=("property float x", "property float y", "property float z")):
+    head = ["ply", "format binary_little_endian 1.0", f"element vertex {count if said is None else said}", *lines]
+    return "\n".join([*head, "end_header\n"]).encode() + bytes(12 * count)
+
+
+class Impostor:
+    """Listens where slsd would, and answers each request by a function of it that gives bytes."""
+
+    def __init__(self, answer, descriptor=None, hangs_up=False):
+        self.hangs_up = hangs_up
+        self.folder = tempfile.TemporaryDirectory()
+        self.path = pathlib.Path(self.folder.name) / "slsd.sock"
+        self.answer, self.descriptor = answer, descriptor
+        self.listener = socket.socket(socket.AF_UNIX)
+        self.listener.bind(str(self.path))
+        self.listener.listen()
+        self.thread = threading.Thread(target=self.serve, daemon=True)
+        self.thread.start()
+
+    def serve(self):
+        try:
+            while True:
+                peer, _ = self.listener.accept()
+                threading.Thread(target=self.talk, args=(peer,), daemon=True).start()
+        except OSError:
+            pass
+
+    def talk(self, peer):
+        with peer, peer.makefile("rb") as lines:
+            for line in lines:
+                data = self.answer(json.loads(line))
+                passed = [] if self.descriptor is None else [
+                    (socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [self.descriptor]))]
+                peer.sendmsg([data], passed)
+                if self.hangs_up:
+                    return
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.listener.close()
+        self.folder.cleanup()
+
+
+def result(request, body=b"", **values):
+    return json.dumps({"jsonrpc": "2.0", "id": request["id"], "result": values}).encode() + b"\n" + body
+
+
+class Scans(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.service = Service().start()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.service.__exit__()
+
+    def test_are_the_arrays_that_another_reader_reads(self):
+        with slsd.Scanner(self.service.socket) as scanner, self.service.client() as other:
+            cloud = scanner.scan()
+            description, data = other.call("scan", format="ply")
+            self.assertEqual(len(cloud), description["points"])
+            self.assertEqual(cloud.description["points"], len(cloud))
+            np.testing.assert_array_equal(cloud.xyz, np.array(vertices(data), np.float32))
+            self.assertEqual(cloud.comments["scan_id"], cloud.description["scan"])
+            for name in ("sigma_mm", "intensity", "camera", "symbol", "column", "row", "camera_u", "projector_v"):
+                self.assertIn(name, cloud.points.dtype.names)
+            self.assertTrue((cloud.points["sigma_mm"] > 0).all())
+
+    def test_are_not_copied(self):
+        with slsd.Scanner(self.service.socket) as scanner:
+            points = scanner.scan().points
+            self.assertFalse(points.flags.owndata)
+            self.assertFalse(points.flags.writeable)
+            before = points["z"].copy()
+            for _ in range(3):
+                scanner.scan()
+        np.testing.assert_array_equal(points["z"], before)  # it outlives scans and scanner
+
+    def test_leave_no_descriptor_and_no_memory_behind(self):
+        with slsd.Scanner(self.service.socket) as scanner:
+            scanner.scan()
+            before = len(os.listdir("/proc/self/fd"))
+            for _ in range(100):
+                scanner.scan()
+            self.assertEqual(len(os.listdir("/proc/self/fd")), before)
+            wait_until(lambda: scanner.status()["clients_memory"]["lent_bytes"] < 2_000_000, "memory given back")
+
+    def test_take_two_lines(self):
+        example = [line.strip() for line in inspect.getdoc(slsd).splitlines()[1:] if line]
+        self.assertEqual(len(example), 2)
+        names = {}
+        with unittest.mock.patch.dict(os.environ, {"SLSD_SOCKET": str(self.service.socket)}):
+            exec("\n".join(example), names)
+        self.assertGreater(len(names["points"]), 100)
+
+    def test_bring_picture_and_frames_where_asked(self):
+        with slsd.Scanner(self.service.socket) as scanner:
+            cloud = scanner.scan(picture=True, frames=True)
+            self.assertTrue(cloud.picture.startswith(b"\x89PNG"))
+            self.assertEqual([frame.description["light"] for frame in cloud.frames], ["pattern"])
+            frame = scanner.frame()
+            np.testing.assert_array_equal(frame.image, cloud.frames[0].image)
+            self.assertEqual(frame.image.shape, (frame.description["height_px"], frame.description["width_px"]))
+            self.assertTrue(scanner.pattern().startswith(b"\x89PNG"))
+            self.assertTrue(scanner.preview().startswith(b"\x89PNG"))
+
+    def test_stream_and_tell_what_was_lost(self):
+        with slsd.Scanner(self.service.socket) as scanner:
+            stream = scanner.stream()
+            frames = [next(stream).description["frame"] for _ in range(5)]
+            self.assertEqual(frames, sorted(set(frames)))
+            # The socket holds some clouds; the service counts those that then come in vain.
+            first = next(stream)
+            before = scanner.status()["scans"]["succeeded"]
+            wait_until(lambda: scanner.status()["scans"]["succeeded"] > before + 60, "clouds in vain")
+            self.assertGreater(sum(next(stream).lost for _ in range(30)), 0)
+            self.assertEqual(first.lost, 0)
+            stream.close()
+            wait_until(lambda: scanner.status()["subscribers"] == 0, "no subscriber")
+
+    def test_errors_have_their_names(self):
+        with slsd.Scanner(self.service.socket) as scanner:
+            with self.assertRaises(slsd.InvalidRequest) as caught:
+                scanner.scan(colour=True)
+            self.assertEqual(caught.exception.name, "invalid_params")
+            with self.assertRaises(slsd.NotFound):
+                scanner.frame("another camera")
+            with self.assertRaises(slsd.InvalidRequest):
+                next(scanner.stream(rate_hz=-1))
+            scanner.project("pattern")
+            self.assertEqual(scanner.reload(), [])
+            self.assertIn("pattern", scanner.settings())
+            self.assertGreater(len(scanner.scan()), 0)  # none of them broke the connection
+
+    def test_threads_may_share_a_scanner(self):
+        counts = []
+        with slsd.Scanner(self.service.socket) as scanner:
+            threads = [threading.Thread(target=lambda: counts.append(len(scanner.scan()))) for _ in range(8)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+        self.assertEqual(len(set(counts)), 1)
+        self.assertEqual(len(counts), 8)
+
+
+class Vanishing(unittest.TestCase):
+    def test_is_told_and_the_next_request_connects_anew(self):
+        with Service() as service, slsd.Scanner(service.socket) as scanner:
+            self.assertGreater(len(scanner.scan()), 0)
+            service.stop(signal.SIGKILL)
+            with self.assertRaises(slsd.ConnectionLost):
+                scanner.scan()
+            with self.assertRaises(slsd.ConnectionLost):
+                scanner.scan()
+            service.socket.unlink(missing_ok=True)
+            service.start()
+            self.assertGreater(len(scanner.scan()), 0)
+
+    def test_nobody_listening_is_told_with_what_to_do(self):
+        with self.assertRaisesRegex(slsd.ConnectionLost, "is slsd running"):
+            slsd.Scanner("/nonexistent/slsd.sock")
+
+    def test_stalling_ends_in_time(self):
+        with Impostor(lambda request: b"") as silent:
+            with slsd.Scanner(silent.path) as scanner, self.assertRaises(slsd.TimedOut):
+                scanner.scan(timeout_s=0.1)
+
+    def test_in_the_middle_of_a_cloud_is_told(self):
+        with Impostor(lambda request: result(request, b"ply", bytes=100), hangs_up=True) as cut:
+            with slsd.Scanner(cut.path) as scanner, self.assertRaisesRegex(slsd.ConnectionLost, "middle"):
+                scanner.scan()
+
+
+class Lies(unittest.TestCase):
+    def refused(self, answer, descriptor=None):
+        with Impostor(answer, descriptor) as impostor:
+            with slsd.Scanner(impostor.path) as scanner, self.assertRaises(slsd.ProtocolError) as caught:
+                scanner.scan()
+            return str(caught.exception)
+
+    def test_about_json_and_version_are_refused(self):
+        self.assertIn("no JSON", self.refused(lambda request: b"220 mail ready\n"))
+        self.assertIn("JSON-RPC 2.0", self.refused(lambda request: b'{"id": 1, "result": {}}\n'))
+        self.assertIn("JSON-RPC 2.0", self.refused(lambda request: b"[]\n"))
+        self.assertIn("1 MiB", self.refused(lambda request: b"x" * (1 << 21)))
+
+    def test_about_sizes_are_refused(self):
+        for size in (-1, True, "12", 1 << 60, None, 1.5):
+            self.assertIn("bytes follow", self.refused(lambda request: result(request, bytes=size)))
+        self.assertIn("did not come", self.refused(lambda request: result(request)))
+
+    def test_about_memory_are_refused(self):
+        self.assertIn("no descriptor", self.refused(lambda request: result(request, memfd_bytes=100)))
+        descriptor = os.memfd_create("cloud")
+        os.write(descriptor, ply(3))
+        try:
+            self.assertIn("size", self.refused(lambda request: result(request, memfd_bytes=4096), descriptor))
+        finally:
+            os.close(descriptor)
+
+    def test_of_a_header_are_refused(self):
+        for data, reason in ((ply(3, said=4), "where its header says"), (ply(3, said=10**30), "where its header says"),
+                             (ply(3)[:-1], "where its header says"), (b"ply\n", "no binary"), (b"", "no binary"),
+                             (ply(1, lines=["property list uchar int x"]), "none of slsd's"),
+                             (ply(1, lines=["property float x", "property float x", "property float y"]), "names no"),
+                             (ply(3, said=-1), "none of slsd's")):
+            with self.assertRaisesRegex(slsd.ProtocolError, reason):
+                slsd.read_ply(data)
+        self.assertEqual(len(slsd.read_ply(ply(3))), 3)
+        self.assertEqual(len(slsd.read_ply(ply(0))), 0)
+
+    def test_of_any_kind_raise_nothing_else(self):
+        draw = random.Random(5)
+        whole = ply(20)
+        for _ in range(5000):
+            data = bytearray(whole[:draw.randrange(len(whole) + 1)])
+            for _ in range(draw.randrange(6)):
+                if data:
+                    data[draw.randrange(min(len(data), 140))] = draw.randrange(256)
+            try:
+                slsd.read_ply(data)
+            except slsd.ProtocolError:
+                pass
+
+
+if __name__ == "__main__":
+    unittest.main()
