@@ -21,16 +21,17 @@ socket = "slsd.sock"
 
 
 class Double:
-    """A camera that shows the scene; without an address, on one that is free."""
+    """A camera that shows the scene; without an address, on one that is free. Options are those of gige-camera."""
 
-    def __init__(self):
+    def __init__(self, *options):
+        self.options = options
         self.address = None
         self.process = None
         self.plug_in()
 
     def plug_in(self):
         where = ["--address", self.address] if self.address else []
-        self.process = subprocess.Popen([BIN / "gige-camera", "--images", SCENE / "frame.png", *where],
+        self.process = subprocess.Popen([BIN / "gige-camera", "--images", SCENE / "frame.png", *self.options, *where],
                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.address = self.process.stdout.readline().strip()
         assert self.address, "the double does not start"
@@ -44,6 +45,14 @@ class Double:
         self.process.stdin.write(command + "\n")
         self.process.stdin.flush()
         assert self.process.stdout.readline() == "ok\n", command
+
+    def status(self):
+        """What became of its frames and packets, in words."""
+        self.process.stdin.write("status\n")
+        self.process.stdin.flush()
+        words = self.process.stdout.readline().strip()
+        assert self.process.stdout.readline() == "ok\n"
+        return words
 
     def mend(self):
         """Ends every fault that lasts."""

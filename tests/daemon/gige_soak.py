@@ -5,7 +5,11 @@
 another, and measures how long it takes from its end to a cloud. Needs SLSD_BIN and SLSD_SCENE, as the tests of the
 service. Kinds that are named with commas run beside one another, each on a camera and a service of its own.
 
-Exit status 1 where a life did not end in a scan, or a service's descriptors, threads or memory grew.
+With --openings it strikes nothing, but opens that often, each time with a new service, a camera that loses packets and
+numbers its frames from 1 at each AcquisitionStart, scans once after each opening, and then --scans times more.
+
+Exit status 1 where a life did not end in a scan, a service's descriptors, threads or memory grew, or a scan of the
+openings failed.
 """
 import argparse
 import concurrent.futures
@@ -25,6 +29,7 @@ QUICK = "frame_timeout_ms = 500"
 WARM_UP_LIVES = 50  # sessions that overlap while they close leave the allocator with more than one needs
 SETTLE_S = 8  # sessions with a camera that is gone take seconds to close
 GROWTH_MAX = 1.1
+POINTS_MIN = 2000
 
 
 def strike(double, kind):
@@ -83,12 +88,53 @@ def soak(kind, lives, seconds):
     return after[0] <= before[0] and after[1] <= before[1] and after[2] <= before[2] * GROWTH_MAX
 
 
+def scan_once(client):
+    """Whether there is a cloud, how many tries of the scan lost their frame before, and the seconds."""
+    begin = time.monotonic()
+    try:
+        result, _ = client.call("scan")
+    except RpcError as error:
+        print(f"scan: {error}", flush=True)
+        return False, 0, time.monotonic() - begin
+    return result["points"] > POINTS_MIN, result.get("tries", 1) - 1, time.monotonic() - begin
+
+
+def tell(what, scans):
+    """The line of the report, and whether all is well."""
+    well = sum(cloud for cloud, _, _ in scans)
+    times = sorted(seconds for _, _, seconds in scans)
+    print(f"{what}: {well} of {len(scans)} scans gave a cloud, {sum(lost > 0 for _, lost, _ in scans)} of them at a later "
+          f"try; median {times[len(times) // 2] * 1e3:.0f} ms, longest {times[-1] * 1e3:.0f} ms", flush=True)
+    return well == len(scans)
+
+
+def open_again_and_again(openings, scans, loss):
+    double = Double("--restarts-ids", "1")
+    double.tell(f"lose {loss}")
+    first, more = [], []
+    for opening in range(openings):
+        with service_on(double) as service, service.client() as client:
+            service.wait_ready()
+            first.append(scan_once(client))
+            for _ in range(scans if opening + 1 == openings else 0):
+                more.append(scan_once(client))
+    print(f"the camera: {double.status()}")
+    double.close()
+    well = tell("first after opening", first)
+    return (not more or tell("more", more)) and well
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--lives", type=int, default=1000, help="of each kind")
     arguments.add_argument("--kinds", default=",".join(KINDS))
     arguments.add_argument("--seconds", type=float, default=36000, help="an end to it, for each kind")
+    arguments.add_argument("--openings", type=int, default=0, help="open so often instead")
+    arguments.add_argument("--scans", type=int, default=1000, help="after the last of the openings")
+    arguments.add_argument("--loss", type=float, default=0.01, help="share of packets lost, with --openings")
     arguments = arguments.parse_args()
+    if arguments.openings:
+        return 0 if open_again_and_again(arguments.openings, arguments.scans, arguments.loss) else 1
     kinds = arguments.kinds.split(",")
     with concurrent.futures.ThreadPoolExecutor(len(kinds)) as pool:
         well = list(pool.map(lambda kind: soak(kind, arguments.lives, arguments.seconds), kinds))
