@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "daemon/scan/log_field.hpp"
+
 namespace slsd {
 namespace {
 
@@ -42,6 +44,7 @@ void CalibrationWatch::note(const SharedSetup& setup, const ScanResult& result, 
   for (Watched& camera : cameras_) {
     const bool stray = std::ranges::find(result.strays, camera.index, &CloudPoint::camera) != result.strays.end();
     const std::vector<CloudPoint>& points = stray ? result.strays : result.cloud.points;
+    const LogField about("SLSD_CAMERA", camera.name);
     log_change(camera.watch.note(points, camera.index, scan), camera.name, camera.watch.state());
   }
 }

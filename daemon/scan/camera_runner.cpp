@@ -6,6 +6,7 @@
 
 #include <utility>
 
+#include "daemon/scan/log_field.hpp"
 #include "drivers/system/thread_name.hpp"
 
 namespace slsd {
@@ -108,6 +109,7 @@ Result<Frame> CameraRunner::end_capture() {
   if (stopped_) return fail(ErrorCode::kCancelled, "the service is stopping", "camera " + name_);
   if (status_.state != DeviceState::kCapturing) return fail_not_ready();
   given_up_ = true;
+  const LogField about("SLSD_CAMERA", name_);  // another's thread
   const Error error{ErrorCode::kDisconnected, "the camera's driver does not answer; it is opened again when it does",
                     "camera " + name_};
   note_lost(error, std::move(lock));
@@ -116,6 +118,7 @@ Result<Frame> CameraRunner::end_capture() {
 
 void CameraRunner::run(const std::stop_token& stop) {
   name_this_thread("cam " + name_);
+  const LogField about("SLSD_CAMERA", name_);
   while (!stop.stop_requested()) {
     if (!is_open(status().state)) {
       open_or_pause(stop);
@@ -169,6 +172,7 @@ void CameraRunner::note_opened(const Result<>& opened) {
     status_.state = state_after(opened.error().code);
     status_.problem = problem;
     lock.unlock();
+    const LogField code("SLSD_ERROR", std::string(to_string(opened.error().code)));
     if (!had_problem) spdlog::warn("camera {}: {}; trying again until it opens", name_, problem);
     return;
   }
@@ -205,6 +209,7 @@ void CameraRunner::note_lost(const Error& error, std::unique_lock<std::mutex> lo
   status_.state = DeviceState::kFaulted;
   status_.problem = error.message;
   lock.unlock();
+  const LogField code("SLSD_ERROR", std::string(to_string(error.code)));
   spdlog::warn("camera {}: {}; trying again until it opens", name_, error.message);
 }
 

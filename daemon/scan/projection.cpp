@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "daemon/scan/hardware.hpp"
+#include "daemon/scan/log_field.hpp"
 
 namespace slsd {
 namespace {
@@ -141,8 +142,10 @@ Result<> Projection::check(MonotonicTime deadline) {
 
 void Projection::note(const Result<>& outcome) {
   const std::lock_guard lock(mutex_);
+  const LogField about("SLSD_PROJECTOR", status_.device.empty() ? status_.driver : status_.device);
   status_.shows = shown_ ? to_string(*shown_) : "";
   if (!outcome) {
+    const LogField code("SLSD_ERROR", std::string(to_string(outcome.error().code)));
     if (status_.problem.empty()) spdlog::warn("projector: {}; trying again until it opens", to_string(outcome.error()));
     status_.state = state_after(outcome.error().code);
     status_.problem = to_string(outcome.error());

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <random>
 
+#include "daemon/scan/log_field.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/system/thread_name.hpp"
 
@@ -186,7 +187,7 @@ std::function<bool(const Error&)> Scanner::wait_for_frames(Task& task) {
 // Frames that were lost are taken again. The pauses keep a camera that loses everything at once from using a whole
 // processor.
 std::function<bool(const Error&)> Scanner::try_again(Task& task, std::function<void(const Error&)> note) {
-  return [this, &task, lent = wait_for_frames(task), note = std::move(note),
+  return [&task, lent = wait_for_frames(task), note = std::move(note),
           pause = std::chrono::milliseconds::zero()](const Error& error) mutable {
     if (lent(error)) return true;
     if (!may_be_taken_again(error) || steady_clock::now() + pause >= task.deadline()) return false;
@@ -356,6 +357,7 @@ void Scanner::run_freely(std::optional<FreeRun> demand) {
 
 void Scanner::conclude(const Scan& scan, Result<ScanResult>& result) {
   const std::lock_guard lock(concluding_);
+  const LogField about("SLSD_SCAN", scan.id());
   const std::uint64_t skipped = lanes_.skipped();
   const std::uint64_t skipped_now = skipped - std::exchange(skipped_told_, skipped);
   if (result) result->skipped = skipped_now;
@@ -375,6 +377,7 @@ void Scanner::log_outcome(const std::string& scan_id, const Result<ScanResult>& 
   }
   const bool of_the_client = result.error().code == ErrorCode::kCancelled;
   const auto level = of_the_client || failures_in_a_row_ > 0 ? spdlog::level::debug : spdlog::level::info;
+  const LogField code("SLSD_ERROR", std::string(to_string(result.error().code)));
   spdlog::log(level, "scan {} failed ({}): {}", scan_id, to_string(result.error().code), to_string(result.error()));
   if (!of_the_client) ++failures_in_a_row_;
 }

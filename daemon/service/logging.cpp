@@ -4,6 +4,7 @@
 
 #include <poll.h>
 #include <sys/stat.h>
+#include <sys/uio.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -16,10 +17,12 @@
 #include <utility>
 
 #include <fmt/chrono.h>
-#include <spdlog/sinks/systemd_sink.h>
 #include <spdlog/spdlog.h>
+#define SD_JOURNAL_SUPPRESS_LOCATION
+#include <systemd/sd-journal.h>
 
 #include "core/printable.hpp"
+#include "daemon/scan/log_field.hpp"
 #include "drivers/system/thread_name.hpp"
 
 namespace slsd {
@@ -29,6 +32,7 @@ using spdlog::details::log_msg;
 using spdlog::level::level_enum;
 
 constexpr const char* kJournalSocket = "/run/systemd/journal/socket";
+constexpr std::size_t kFieldBytesMax = 256;
 
 std::shared_ptr<LogSink> log_sink;  // of this program
 
@@ -72,28 +76,37 @@ void write_stderr(std::string_view bytes) {
 }
 
 LogSink::Output standard_error(std::function<std::string(const log_msg&)> prefix) {
-  return {std::move(prefix), [](level_enum, std::string_view line) { write_stderr(std::string(line) + "\n"); }};
+  return {std::move(prefix), [](const LogSink::Line& line) { write_stderr(line.text + "\n"); }};
+}
+
+// Itself, as spdlog's sink for the journal sends no fields but its own.
+bool send_to_journal(const LogSink::Line& line) {
+  std::vector<std::string> entries{"MESSAGE=" + line.text, fmt::format("PRIORITY={}", journal_prefix(line.level)[1]),
+                                   "SYSLOG_IDENTIFIER=slsd"};
+  entries.insert(entries.end(), line.fields.begin(), line.fields.end());
+  std::vector<iovec> parts;
+  for (std::string& entry : entries) parts.push_back({entry.data(), entry.size()});
+  return (::sd_journal_sendv)(parts.data(), static_cast<int>(parts.size())) == 0;
 }
 
 LogSink::Output journal() {
-  const auto sink = std::make_shared<spdlog::sinks::systemd_sink_mt>("slsd");
   return {[](const log_msg&) { return std::string(); },
-          [sink](level_enum level, std::string_view line) {
-            try {
-              sink->log(log_msg("slsd", level, spdlog::string_view_t(line.data(), line.size())));
-            } catch (const spdlog::spdlog_ex&) {
-              write_stderr(fmt::format("{}{}\n", journal_prefix(level), line));  // which the journal reads, too
-            }
+          [](const LogSink::Line& line) {
+            // The journal reads that, too.
+            if (!send_to_journal(line)) write_stderr(fmt::format("{}{}\n", journal_prefix(line.level), line.text));
           }};
+}
+
+std::vector<std::string> fields_here() {
+  std::vector<std::string> fields;
+  for (const LogField* field : LogField::here())
+    fields.push_back(fmt::format("{}={}", field->name(), printable(field->value(), kFieldBytesMax)));
+  return fields;
 }
 
 }  // namespace
 
 struct LogSink::Queue {
-  struct Line {
-    level_enum level;
-    std::string text;
-  };
   mutable std::mutex mutex;
   mutable std::condition_variable changed;
   std::deque<Line> lines;
@@ -108,8 +121,9 @@ struct LogSink::Queue {
   void take_up_again() {
     const auto missing = std::exchange(told, dropped);
     dropping = false;
-    lines.push_back({spdlog::level::warn, fmt::format("{} lines of the log were dropped here: nobody read them in time",
-                                                      dropped - missing)});
+    lines.push_back({spdlog::level::warn,
+                     fmt::format("{} lines of the log were dropped here: nobody read them in time", dropped - missing),
+                     {}});
   }
 
   void write_lines(const Output& output) {
@@ -122,7 +136,7 @@ struct LogSink::Queue {
       if (dropping && lines.size() <= kLogLinesMax / 2) take_up_again();
       writing = true;
       lock.unlock();
-      output.write(line.level, line.text);
+      output.write(line);
       lock.lock();
       writing = false;
       changed.notify_all();
@@ -139,16 +153,16 @@ LogSink::~LogSink() {
 }
 
 void LogSink::log(const log_msg& message) {
-  std::string line = output_.prefix(message);
-  line += printable({message.payload.data(), message.payload.size()}, kLogLineBytesMax - line.size() - 1);
+  Line line{message.level, output_.prefix(message), fields_here()};
+  line.text += printable({message.payload.data(), message.payload.size()}, kLogLineBytesMax - line.text.size() - 1);
   const std::lock_guard lock(queue_->mutex);
-  if (!queue_->queued) return output_.write(message.level, line);
+  if (!queue_->queued) return output_.write(line);
   if (queue_->lines.size() >= kLogLinesMax) queue_->dropping = true;
   if (queue_->dropping) {
     ++queue_->dropped;
     return;
   }
-  queue_->lines.push_back({message.level, std::move(line)});
+  queue_->lines.push_back(std::move(line));
   queue_->changed.notify_all();
 }
 

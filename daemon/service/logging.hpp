@@ -6,7 +6,8 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <string_view>
+#include <string>
+#include <vector>
 
 #include <spdlog/common.h>
 #include <spdlog/sinks/sink.h>
@@ -27,10 +28,16 @@ inline constexpr std::size_t kLogLinesMax = 1024;
 /// @thread thread-safe
 class LogSink final : public spdlog::sinks::sink {
  public:
+  /// One line as it is written.
+  struct Line {
+    spdlog::level::level_enum level;
+    std::string text;
+    std::vector<std::string> fields;  ///< "SLSD_CAMERA=left": each LogField of the thread that logged it
+  };
   /// How a line begins and where it goes.
   struct Output {
     std::function<std::string(const spdlog::details::log_msg&)> prefix;
-    std::function<void(spdlog::level::level_enum, std::string_view line)> write;  ///< may wait for its reader
+    std::function<void(const Line&)> write;  ///< may wait for its reader
   };
   explicit LogSink(Output output);
   ~LogSink() override;

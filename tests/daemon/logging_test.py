@@ -6,16 +6,19 @@ import argparse
 import fcntl
 import os
 import re
+import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import unittest
 
 from client import RpcError
-from service import BIN, Service, wait_until
+from service import BIN, PATIENCE_S, Service, wait_until
 
 F_SETPIPE_SZ = 1031
+PRIVATE_RUN = ["unshare", "--mount", "--map-root-user", "sh", "-c", 'mount --bind "$0" /run && exec "$@"']
 QUEUE = 1024
 LONGEST = 2048
 SECONDS = 0.0
@@ -44,6 +47,29 @@ class FullPipe(Service):
                 text.extend(chunk)
         threading.Thread(target=read, daemon=True).start()
         return text
+
+
+class Journaled(Service):
+    """A service in whose view of /run the journal is ours."""
+
+    def launch(self):
+        run = self.folder / "run"
+        (run / "systemd/journal").mkdir(parents=True)
+        self.journal = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.journal.bind(str(run / "systemd/journal/socket"))
+        self.journal.settimeout(PATIENCE_S)
+        with open(self.log, "ab") as log:
+            about = os.fstat(log.fileno())
+            self.process = subprocess.Popen(
+                [*PRIVATE_RUN, run, BIN / "slsd", "--config", self.file], stderr=log,
+                env={**self.environment, "JOURNAL_STREAM": f"{about.st_dev}:{about.st_ino}"})
+
+    def entry(self, text):
+        """The fields of the next line that has the text in it."""
+        while True:
+            fields = dict(line.split("=", 1) for line in self.journal.recv(65536).decode().splitlines())
+            if text in fields["MESSAGE"]:
+                return fields
 
 
 def refuse_reloads(client, count):
@@ -116,6 +142,22 @@ class Log(unittest.TestCase):
         with service:
             wait_until(lambda: "ready at" in service.log_text(), "the line")
             self.assertRegex(service.log_text(), r"(?m)^<6>slsd .* starts with ")
+
+    def test_the_journal_has_fields_of_what_a_line_is_about(self):
+        with tempfile.TemporaryDirectory() as empty:
+            if subprocess.run([*PRIVATE_RUN, empty, "true"], stderr=subprocess.DEVNULL, check=False).returncode:
+                self.skipTest("this machine gives no mount namespace")
+        with Journaled(camera='faults = ["disconnect@2"]') as service, service.client() as client, service.journal:
+            self.assertEqual(service.entry("starts with")["SYSLOG_IDENTIFIER"], "slsd")
+            self.assertEqual(service.entry("ready at")["PRIORITY"], "6")
+            client.call("scan")
+            with self.assertRaises(RpcError):
+                client.call("scan")
+            lost = service.entry("camera camera: ")
+            self.assertEqual((lost["SLSD_CAMERA"], lost["SLSD_ERROR"], lost["PRIORITY"]), ("camera", "disconnected", "4"))
+            failed = service.entry("failed (disconnected)")
+            self.assertEqual(failed["SLSD_ERROR"], "disconnected")
+            self.assertTrue(failed["MESSAGE"].startswith(f"scan {failed['SLSD_SCAN']} failed"))
 
 
 if __name__ == "__main__":

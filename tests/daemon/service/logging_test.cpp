@@ -5,9 +5,12 @@
 #include <condition_variable>
 #include <mutex>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
+
+#include "daemon/scan/log_field.hpp"
 
 namespace slsd {
 namespace {
@@ -15,7 +18,9 @@ namespace {
 using namespace std::chrono_literals;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::SizeIs;
+using ::testing::StartsWith;
 
 constexpr auto kPatience = 120s;
 
@@ -23,8 +28,7 @@ constexpr auto kPatience = 120s;
 class Reader {
  public:
   [[nodiscard]] LogSink::Output output() {
-    return {[](const auto&) { return std::string("> "); },
-            [this](spdlog::level::level_enum, std::string_view line) { take(line); }};
+    return {[](const auto&) { return std::string("> "); }, [this](const LogSink::Line& line) { take(line); }};
   }
   void set_reading(bool reading) {
     const std::lock_guard lock(mutex_);
@@ -35,18 +39,25 @@ class Reader {
     const std::lock_guard lock(mutex_);
     return lines_;
   }
+  /// Of the line that came last.
+  [[nodiscard]] std::vector<std::string> fields() {
+    const std::lock_guard lock(mutex_);
+    return fields_.back();
+  }
 
  private:
-  void take(std::string_view line) {
+  void take(const LogSink::Line& line) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return reading_; });
-    lines_.emplace_back(line);
+    lines_.push_back(line.text);
+    fields_.push_back(line.fields);
   }
 
   std::mutex mutex_;
   std::condition_variable changed_;
   bool reading_ = true;
   std::vector<std::string> lines_;
+  std::vector<std::vector<std::string>> fields_;
 };
 
 void log_line(LogSink& sink, const std::string& text) {
@@ -73,6 +84,26 @@ TEST(LogSink, CutsLongLines) {
   log_line(sink, std::string(900'000, 'x'));
   log_line(sink, std::string(900'000, '\n'));
   for (const std::string& line : reader.lines()) EXPECT_LT(line.size(), kLogLineBytesMax);
+}
+
+TEST(LogSink, TellsWhatTheThreadsLinesAreAbout) {
+  Reader reader;
+  LogSink sink(reader.output());
+  {
+    const LogField camera("SLSD_CAMERA", "left\nPRIORITY=2");
+    {
+      const LogField error("SLSD_ERROR", std::string(900'000, 'x'));
+      log_line(sink, "one");
+      EXPECT_THAT(reader.fields(), ElementsAre(StartsWith("SLSD_ERROR=x"), R"(SLSD_CAMERA=left\nPRIORITY=2)"));
+      EXPECT_LT(reader.fields().front().size(), 300U);
+    }
+    log_line(sink, "two");
+    EXPECT_THAT(reader.fields(), SizeIs(1));
+    std::jthread([&] { log_line(sink, "three"); }).join();
+    EXPECT_THAT(reader.fields(), IsEmpty());
+  }
+  log_line(sink, "four");
+  EXPECT_THAT(reader.fields(), IsEmpty());
 }
 
 TEST(LogSink, HoldsNobodyUpAndTellsOnceWhatWasDropped) {
