@@ -15,6 +15,7 @@ from client import Client
 BIN = pathlib.Path(os.environ["SLSD_BIN"])
 SCENE = pathlib.Path(os.environ["SLSD_SCENE"])
 PATIENCE_S = 120
+REPORTS = ("ThreadSanitizer", "AddressSanitizer", "LeakSanitizer", "runtime error:")
 
 CONFIGURATION = """
 [pattern]
@@ -80,6 +81,13 @@ class Service:
     def log_text(self):
         return self.log.read_text(encoding="utf-8")
 
+    def check_sanitizers(self):
+        """Their reports are lines of the log, and may be all that tells of what they found."""
+        if os.environ.get("SLSD_SANITIZE") and self.log.exists():
+            text = self.log.read_text(encoding="utf-8", errors="replace")
+            at = min((text.find(sign) for sign in REPORTS if sign in text), default=None)
+            assert at is None, text[max(0, at - 200):at + 8000]
+
     def client(self, **options):
         return Client(self.socket, **options)
 
@@ -90,7 +98,9 @@ class Service:
         """The exit status and the seconds that it took."""
         begin = time.monotonic()
         self.send_signal(number)
-        return self.process.wait(PATIENCE_S), time.monotonic() - begin
+        status = self.process.wait(PATIENCE_S)
+        self.check_sanitizers()
+        return status, time.monotonic() - begin
 
     def __enter__(self):
         return self.start()
@@ -99,6 +109,7 @@ class Service:
         if self.process.poll() is None:
             self.process.kill()
             self.process.wait()
+        self.check_sanitizers()
 
 
 def slsd(*arguments, **options):
