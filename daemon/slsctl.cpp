@@ -4,7 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "core/picture/picture.hpp"
+#include "core/shown_picture.hpp"
 #include "daemon/client/client_commands.hpp"
 #include "daemon/client/client_options.hpp"
 

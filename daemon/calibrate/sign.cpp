@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "core/picture/canvas.hpp"
+#include "picture/canvas.hpp"
 
 namespace slsd {
 namespace {

@@ -6,7 +6,6 @@
 
 #include "core/cloud/pcd.hpp"
 #include "core/cloud/ply.hpp"
-#include "core/picture/render_cloud.hpp"
 #include "core/printable.hpp"
 #include "daemon/client/connection.hpp"
 #include "daemon/client/report.hpp"
@@ -14,6 +13,7 @@
 #include "daemon/rpc/message.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/files/file.hpp"
+#include "picture/render_cloud.hpp"
 
 namespace slsd {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "core/picture/picture.hpp"
 #include "core/result.hpp"
+#include "core/shown_picture.hpp"
 #include "drivers/projector/light_curve.hpp"
 
 namespace slsd {

@@ -4,8 +4,8 @@
 
 #include <variant>
 
-#include "core/picture/draw_decoding.hpp"
 #include "drivers/files/encode_png.hpp"
+#include "picture/draw_decoding.hpp"
 
 namespace slsd {
 namespace {

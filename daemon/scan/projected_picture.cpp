@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "core/image_size.hpp"
-#include "core/picture/focus_chart.hpp"
-#include "core/picture/view_grid.hpp"
 #include "drivers/files/read_image.hpp"
+#include "picture/focus_chart.hpp"
+#include "picture/view_grid.hpp"
 
 namespace slsd {
 namespace {

@@ -8,8 +8,8 @@
 #include <string_view>
 
 #include "core/image.hpp"
-#include "core/picture/picture.hpp"
 #include "core/result.hpp"
+#include "core/shown_picture.hpp"
 #include "daemon/configuration/projector_options.hpp"
 #include "daemon/scan/scan_setup.hpp"
 #include "drivers/camera/frame.hpp"

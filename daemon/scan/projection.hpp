@@ -10,8 +10,8 @@
 #include <stop_token>
 
 #include "core/image.hpp"
-#include "core/picture/picture.hpp"
 #include "core/result.hpp"
+#include "core/shown_picture.hpp"
 #include "daemon/scan/device_status.hpp"
 #include "daemon/scan/patience.hpp"
 #include "drivers/projector/projector.hpp"

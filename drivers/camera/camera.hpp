@@ -8,8 +8,8 @@
 #include <functional>
 #include <string>
 
-#include "core/picture/picture.hpp"
 #include "core/result.hpp"
+#include "core/shown_picture.hpp"
 #include "drivers/camera/frame.hpp"
 
 namespace slsd {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/view.hpp"
+#include "picture/view.hpp"
 
 #include <Eigen/Geometry>
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "tests/core/picture/lattice_cloud.hpp"
+#include "tests/picture/lattice_cloud.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/ticks.hpp"
+#include "picture/ticks.hpp"
 
 #include <cmath>
 #include <cstdio>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/dimmed_frame.hpp"
+#include "picture/dimmed_frame.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "core/picture/canvas.hpp"
+#include "picture/canvas.hpp"
 
 namespace slsd {
 namespace {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/relief.hpp"
+#include "picture/relief.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/picture/canvas.hpp"
-#include "core/picture/depth_colour.hpp"
+#include "picture/canvas.hpp"
+#include "picture/depth_colour.hpp"
 
 namespace slsd {
 namespace {

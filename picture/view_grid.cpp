@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/view_grid.hpp"
+#include "picture/view_grid.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 
 #include <Eigen/Geometry>
 
-#include "core/picture/canvas.hpp"
+#include "picture/canvas.hpp"
 
 namespace slsd {
 namespace {

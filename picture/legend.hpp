@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "core/picture/canvas.hpp"
+#include "picture/canvas.hpp"
 
 namespace slsd {
 

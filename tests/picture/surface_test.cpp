@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/surface.hpp"
+#include "picture/surface.hpp"
 
 #include <gtest/gtest.h>
 
-#include "tests/core/picture/lattice_cloud.hpp"
+#include "tests/picture/lattice_cloud.hpp"
 
 namespace slsd {
 namespace {

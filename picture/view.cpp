@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/view.hpp"
+#include "picture/view.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/depth_colour.hpp"
+#include "picture/depth_colour.hpp"
 
 #include <algorithm>
 #include <array>
 
-#include "core/picture/canvas.hpp"
+#include "picture/canvas.hpp"
 
 namespace slsd {
 namespace {

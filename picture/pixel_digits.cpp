@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/pixel_digits.hpp"
+#include "picture/pixel_digits.hpp"
 
 #include <array>
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/room.hpp"
+#include "picture/room.hpp"
 
 #include <array>
 #include <vector>
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/picture/relief.hpp"
-#include "core/picture/ticks.hpp"
+#include "picture/relief.hpp"
+#include "picture/ticks.hpp"
 
 namespace slsd {
 namespace {

@@ -2,9 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
-#include "core/picture/canvas.hpp"
-#include "core/picture/surface.hpp"
-#include "core/picture/view.hpp"
+#include "picture/canvas.hpp"
+#include "picture/surface.hpp"
+#include "picture/view.hpp"
 
 namespace slsd {
 

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/render_cloud.hpp"
+#include "picture/render_cloud.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "core/picture/canvas.hpp"
-#include "core/picture/depth_colour.hpp"
-#include "core/picture/relief.hpp"
-#include "core/picture/room.hpp"
-#include "core/picture/surface.hpp"
-#include "core/picture/ticks.hpp"
-#include "core/picture/view.hpp"
+#include "picture/canvas.hpp"
+#include "picture/depth_colour.hpp"
+#include "picture/relief.hpp"
+#include "picture/room.hpp"
+#include "picture/surface.hpp"
+#include "picture/ticks.hpp"
+#include "picture/view.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/draw_decoding.hpp"
+#include "picture/draw_decoding.hpp"
 
 #include <string>
 #include <vector>

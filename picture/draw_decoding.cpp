@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/draw_decoding.hpp"
+#include "picture/draw_decoding.hpp"
 
 #include <algorithm>
 #include <array>
 #include <string>
 #include <vector>
 
-#include "core/picture/canvas.hpp"
-#include "core/picture/dimmed_frame.hpp"
-#include "core/picture/legend.hpp"
+#include "picture/canvas.hpp"
+#include "picture/dimmed_frame.hpp"
+#include "picture/legend.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/canvas.hpp"
+#include "picture/canvas.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/relief.hpp"
+#include "picture/relief.hpp"
 
 #include <string>
 
 #include <gtest/gtest.h>
 
-#include "core/picture/canvas.hpp"
+#include "picture/canvas.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/focus_chart.hpp"
+#include "picture/focus_chart.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "core/picture/pixel_digits.hpp"
+#include "picture/pixel_digits.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/surface.hpp"
+#include "picture/surface.hpp"
 
 #include <algorithm>
 #include <iterator>

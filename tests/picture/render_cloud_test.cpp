@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/picture/render_cloud.hpp"
+#include "picture/render_cloud.hpp"
 
 #include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 
-#include "core/picture/depth_colour.hpp"
-#include "tests/core/picture/lattice_cloud.hpp"
+#include "picture/depth_colour.hpp"
+#include "tests/picture/lattice_cloud.hpp"
 
 namespace slsd {
 namespace {
