@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include <Eigen/LU>
 
@@ -53,7 +54,7 @@ inline __attribute__((always_inline)) void copy_rows(const ImageView<T>& frame, 
     for (int x = 0; x < place.stride; x += kLanes, patch += kLanes) {
       const IntLanes at = kLane + x;
       const Lanes grey = __builtin_convertvector(__builtin_convertvector(load_pixels(row + x), IntLanes), Lanes);
-      const Lanes value = (at > before) & (at < after) ? grey : Lanes{} + kOutside;
+      const Lanes value = ((at > before) & (at < after)) ? grey : Lanes{} + kOutside;
       std::memcpy(patch, &value, sizeof value);
       least = value < least ? value : least;
       greatest = value > greatest ? value : greatest;
@@ -70,10 +71,11 @@ int padded(int width) {
 }
 
 /// Raw moments about the patch's middle, to central ones over the weight.
-GreyMoments central(const RawMoments& raw, double middle_x, double middle_y) {
+GreyMoments central(const RawMoments& raw, const PatchLevels& levels, double middle_x, double middle_y) {
   const auto& m = raw.m;
   GreyMoments g;
   if (m[0][0] <= 0) return g;
+  g.background = levels.background, g.peak = levels.peak;
   const double n = 1 / static_cast<double>(m[0][0]);
   const double x = m[1][0] * n, y = m[0][1] * n;
   const double xx = m[2][0] * n, xy = m[1][1] * n, yy = m[0][2] * n;
@@ -185,16 +187,20 @@ GreyMoments GreyMomentMeter::moments_of_patch() const {
   const float middle_x = 0.5F * static_cast<float>(width_ - 1), middle_y = 0.5F * static_cast<float>(height_ - 1);
   RawMoments raw;
   sum_moments(patch_.data(), stride_, height_, middle_x, middle_y, levels, raw);
-  GreyMoments moments = central(raw, static_cast<float>(left_) + middle_x, static_cast<float>(top_) + middle_y);
-  moments.noise = levels.noise;
-  moments.background = levels.background;
-  moments.peak = levels.peak;
-  return moments;
+  return central(raw, levels, static_cast<float>(left_) + middle_x, static_cast<float>(top_) + middle_y);
 }
 
 template <class T>
 GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
                                      const Eigen::Vector2f& shading) {
+  if constexpr (std::is_same_v<T, std::uint8_t>) {
+    PatchLevels levels;
+    RawMoments raw;
+    if (shading.isZero() && weigh_region(frame, region, runs, margin_px_, levels, raw)) {
+      const Eigen::Vector2f middle = region.middle_px();
+      return central(raw, levels, middle.x(), middle.y());
+    }
+  }
   copy_patch(frame, region, runs);
   if (!shading.isZero()) {
     const Eigen::Vector2f middle(0.5F * static_cast<float>(region.left + region.right),

@@ -23,7 +23,6 @@ struct GreyMoments {
   float weight = 0;                          ///< lit area, camera px squared
   float m20 = 0, m11 = 0, m02 = 0;           ///< about the centroid, over the weight: px^2
   float m30 = 0, m21 = 0, m12 = 0, m03 = 0;  ///< px^3
-  float noise = 0;                           ///< one standard deviation of a pixel where it is lit
   float background = 0, peak = 0;            ///< grey levels of the frame
 };
 

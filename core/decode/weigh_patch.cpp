@@ -13,12 +13,22 @@ namespace {
 
 constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
 
+inline __attribute__((always_inline)) void load_grey(const float* from, Lanes& grey) {
+  load(from, grey);
+}
+inline __attribute__((always_inline)) void load_grey(const std::int16_t* from, Lanes& grey) {
+  using Half [[gnu::vector_size(2 * kLanes)]] = std::int16_t;
+  Half shorts;
+  std::memcpy(&shorts, from, sizeof shorts);
+  grey = __builtin_convertvector(__builtin_convertvector(shorts, IntLanes), Lanes);
+}
+
 inline __attribute__((always_inline)) void find_levels_of(const float* patch, int count, const PatchRange& range,
                                                           PatchLevels& levels) {
   const float quarter = 0.25F * (range.greatest - range.least);
   const Lanes low_limit = Lanes{} + (range.least + quarter), high_limit = Lanes{} + (range.greatest - quarter);
   const Lanes zero{};
-  Lanes low_sum{}, high_sum{}, high_squares{};
+  Lanes low_sum{}, high_sum{};
   IntLanes low_count{}, high_count{};  // negative: a comparison that holds is -1
   for (int i = 0; i < count; i += kLanes) {
     Lanes value;
@@ -28,7 +38,6 @@ inline __attribute__((always_inline)) void find_levels_of(const float* patch, in
     low_sum += is_low ? value : zero;
     low_count += is_low;
     high_sum += above;
-    high_squares += above * above;
     high_count += is_high;
   }
   levels = {};
@@ -38,34 +47,34 @@ inline __attribute__((always_inline)) void find_levels_of(const float* patch, in
   const float mean = sum_of(high_sum) / highs;
   levels.background = sum_of(low_sum) / lows;
   levels.peak = high_limit[0] + mean;
-  levels.noise = std::sqrt(std::max(0.F, sum_of(high_squares) / highs - mean * mean));
 }
 
-inline __attribute__((always_inline)) void sum_moments_of(const float* patch, int stride, int height, float middle_x,
-                                                          float middle_y, const PatchLevels& levels,
+template <class Pixel>
+inline __attribute__((always_inline)) void sum_moments_of(const Pixel* patch, int stride, int width, int height,
+                                                          float middle_x, float middle_y, const PatchLevels& levels,
                                                           RawMoments& moments) {
   const float range = levels.peak - levels.background;
   const Lanes zero{}, one = zero + 1;
   const Lanes offset = zero + (levels.background + kRampStart * range);
   const Lanes scale = zero + 1 / ((kRampEnd - kRampStart) * range);
-  const Lanes centre_offset = zero + (levels.background + kCentreRampStart * range);
+  static_assert(kCentreRampStart == kRampStart);
   const Lanes centre_scale = zero + 1 / ((kCentreRampEnd - kCentreRampStart) * range);
   Lanes centre{}, centre_x{}, centre_y{};
   // Sums over y stay in their columns, and are then taken over x; lanes are summed once at the end.
   Lanes m00{}, m01{}, m02{}, m03{}, m10{}, m11{}, m12{}, m20{}, m21{}, m30{};
-  for (int left = 0; left < stride; left += kLanes) {
+  for (int left = 0; left < width; left += kLanes) {
     Lanes s0{}, s1{}, s2{}, s3{}, c0{}, y = zero - middle_y;
     for (int row = 0; row < height; ++row) {
       Lanes grey;
-      load(patch + row * stride + left, grey);
-      Lanes c = (grey - centre_offset) * centre_scale;
-      c = c > zero ? c : zero;
+      load_grey(patch + row * stride + left, grey);
+      // Both ramps begin at one place.
+      grey -= offset;
+      grey = grey > zero ? grey : zero;
+      Lanes c = grey * centre_scale, w = grey * scale;
       c = c < one ? c : one;
+      w = w < one ? w : one;
       c0 += c;
       centre_y += c * y;
-      Lanes w = (grey - offset) * scale;
-      w = w > zero ? w : zero;
-      w = w < one ? w : one;
       const Lanes wy = w * y, wyy = wy * y;
       s0 += w;
       s1 += wy;
@@ -89,6 +98,141 @@ inline __attribute__((always_inline)) void sum_moments_of(const float* patch, in
   m[3][0] = sum_of(m30);
 }
 
+constexpr int kShortLanes = 16;
+using Shorts [[gnu::vector_size(2 * kShortLanes)]] = std::int16_t;
+using UnsignedShorts [[gnu::vector_size(2 * kShortLanes)]] = std::uint16_t;
+using WideShorts [[gnu::vector_size(4 * kShortLanes)]] = int;
+/// Registers of a patch, which holds a symbol of 40 px: sums of as many grey values stay within 15 bits.
+constexpr int kShortsMax = 128;
+constexpr int kPatchRowsMax = kShortsMax, kEdgeRows = kPatchRowsMax + 2 * kShortLanes;
+
+inline __attribute__((always_inline)) void load(const std::int16_t* from, Shorts& to) {
+  std::memcpy(&to, from, sizeof to);
+}
+inline __attribute__((always_inline)) void load(const std::uint8_t* from, Shorts& to) {
+  using Bytes [[gnu::vector_size(kShortLanes)]] = std::uint8_t;
+  Bytes bytes;
+  std::memcpy(&bytes, from, sizeof bytes);
+  to = reinterpret_cast<Shorts>(__builtin_convertvector(bytes, UnsignedShorts));
+}
+inline __attribute__((always_inline)) std::int16_t least_of(const Shorts& lanes) {
+  Shorts a = lanes, b = __builtin_shufflevector(a, a, 8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 7);
+  a = a < b ? a : b;
+  b = __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3, 12, 13, 14, 15, 8, 9, 10, 11);
+  a = a < b ? a : b;
+  b = __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5, 10, 11, 8, 9, 14, 15, 12, 13);
+  a = a < b ? a : b;
+  return a[0] < a[1] ? a[0] : a[1];
+}
+inline __attribute__((always_inline)) int total_of(const Shorts& lanes) {
+  const auto wide = __builtin_convertvector(lanes, WideShorts);
+  const IntLanes halves = __builtin_shufflevector(wide, wide, 0, 1, 2, 3, 4, 5, 6, 7) +
+                          __builtin_shufflevector(wide, wide, 8, 9, 10, 11, 12, 13, 14, 15);
+  const IntLanes quarters = halves + __builtin_shufflevector(halves, halves, 4, 5, 6, 7, 0, 1, 2, 3);
+  const IntLanes eighths = quarters + __builtin_shufflevector(quarters, quarters, 2, 3, 0, 1, 6, 7, 4, 5);
+  return eighths[0] + eighths[1];
+}
+
+struct ShortPatch {
+  int left, top, width, height, margin;
+  [[nodiscard]] int blocks() const { return (width + kShortLanes - 1) / kShortLanes; }
+};
+
+/// Where a region's rows begin and end, and those within the margin above and below: as follow_edge does it.
+inline __attribute__((always_inline)) void find_edges(const ShortPatch& place, const Region& region, const Run* runs,
+                                                      std::int16_t* before, std::int16_t* after) {
+  const int reach = 2 * place.margin;
+  const Shorts none_before = Shorts{} + std::numeric_limits<std::int16_t>::max(),
+               none_after = Shorts{} + std::numeric_limits<std::int16_t>::min();
+  for (int y = 0; y < place.height + reach; y += kShortLanes) {
+    std::memcpy(before + y, &none_before, sizeof none_before);
+    std::memcpy(after + y, &none_after, sizeof none_after);
+  }
+  int row = -1;
+  for (const Run* run = runs; run < runs + region.run_count; ++run) {
+    const int y = run->row - region.top + reach;
+    if (run->row != row) before[y] = static_cast<std::int16_t>(run->left - region.left - 1);
+    after[y] = static_cast<std::int16_t>(run->right - region.left + reach);
+    row = run->row;
+  }
+  for (int y = 0; y < place.height; y += kShortLanes) {
+    Shorts least, greatest;
+    load(before + y, least), load(after + y, greatest);
+    for (int i = 1; i <= reach; ++i) {
+      Shorts b, a;
+      load(before + y + i, b), load(after + y + i, a);
+      least = b < least ? b : least;
+      greatest = a > greatest ? a : greatest;
+    }
+    std::memcpy(before + y, &least, sizeof least);
+    std::memcpy(after + y, &greatest, sizeof greatest);
+  }
+}
+
+/// As copy_rows; what is outside becomes -1.
+inline __attribute__((always_inline)) void copy_shorts(const ImageView<std::uint8_t>& frame, const ShortPatch& place,
+                                                       const std::int16_t* before, const std::int16_t* after,
+                                                       std::int16_t* patch, std::int16_t& least_of_all,
+                                                       std::int16_t& greatest_of_all) {
+  constexpr Shorts kAt = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  constexpr std::int16_t kAllBits = -1;
+  const int blocks = place.blocks();
+  Shorts least = Shorts{} + std::numeric_limits<std::int16_t>::max(), greatest{};
+  const std::uint8_t* row = frame.row(place.top) + place.left;
+  for (int y = 0; y < place.height; ++y, row += frame.stride) {
+    const Shorts after_first = Shorts{} + before[y], before_last = Shorts{} + after[y];
+    for (int block = 0; block < blocks; ++block, patch += kShortLanes) {
+      const Shorts at = kAt + static_cast<std::int16_t>(block * kShortLanes);
+      const Shorts outside = ~((at > after_first) & (at < before_last));
+      Shorts value;
+      load(row + static_cast<std::ptrdiff_t>(block) * kShortLanes, value);
+      value |= outside;
+      std::memcpy(patch, &value, sizeof value);
+      const Shorts inside_value = value & static_cast<std::int16_t>(~(kAllBits << 15));
+      least = inside_value < least ? inside_value : least;
+      greatest = value > greatest ? value : greatest;
+    }
+  }
+  least_of_all = least_of(least);
+  greatest_of_all = static_cast<std::int16_t>(-least_of(-greatest));
+}
+
+/// As find_levels_of, in whole numbers: what is outside is below zero.
+inline __attribute__((always_inline)) void find_short_levels(const std::int16_t* patch, int count, std::int16_t least,
+                                                             std::int16_t greatest, PatchLevels& levels) {
+  const float quarter = 0.25F * static_cast<float>(greatest - least);
+  const Shorts low_limit = Shorts{} + static_cast<std::int16_t>(static_cast<float>(least) + quarter),
+               below_high = Shorts{} + static_cast<std::int16_t>(std::ceil(static_cast<float>(greatest) - quarter) - 1);
+  Shorts low_sum{}, high_sum{}, low_count{}, high_count{};  // counts: negative
+  for (int i = 0; i < count; i += kShortLanes) {
+    Shorts value;
+    load(patch + i, value);
+    const Shorts is_low = (value <= low_limit) & (value > -1), is_high = value > below_high;
+    low_sum += value & is_low;
+    high_sum += value & is_high;
+    low_count += is_low;
+    high_count += is_high;
+  }
+  levels = {};
+  const int lows = -total_of(low_count), highs = -total_of(high_count);
+  if (lows == 0 || highs == 0) return;
+  levels.background = static_cast<float>(total_of(low_sum)) / static_cast<float>(lows);
+  levels.peak = static_cast<float>(total_of(high_sum)) / static_cast<float>(highs);
+}
+
+inline __attribute__((always_inline)) void weigh_region_of(const ImageView<std::uint8_t>& frame,
+                                                           const ShortPatch& place, const Region& region,
+                                                           const Run* runs, float middle_x, float middle_y,
+                                                           PatchLevels& levels, RawMoments& moments) {
+  std::int16_t before[kEdgeRows], after[kEdgeRows], patch[kShortsMax * kShortLanes];
+  std::int16_t least = 0, greatest = 0;
+  find_edges(place, region, runs, before, after);
+  copy_shorts(frame, place, before, after, patch, least, greatest);
+  find_short_levels(patch, place.blocks() * place.height * kShortLanes, least, greatest, levels);
+  if (levels.peak > levels.background)
+    sum_moments_of(patch, place.blocks() * kShortLanes, place.width, place.height, middle_x, middle_y, levels, moments);
+}
+
 }  // namespace
 
 PatchRange range_of(const float* patch, int count) {
@@ -106,7 +250,19 @@ void find_levels(const float* patch, int count, const PatchRange& range, PatchLe
 
 void sum_moments(const float* patch, int stride, int height, float middle_x, float middle_y, const PatchLevels& levels,
                  RawMoments& moments) {
-  Cloned<sum_moments_of>::call(patch, stride, height, middle_x, middle_y, levels, moments);
+  Cloned<sum_moments_of<float>>::call(patch, stride, stride, height, middle_x, middle_y, levels, moments);
+}
+
+bool weigh_region(const ImageView<std::uint8_t>& frame, const Region& region, std::span<const Run> runs, int margin_px,
+                  PatchLevels& levels, RawMoments& moments) {
+  const ShortPatch place{region.left - margin_px, region.top - margin_px, region.width_px() + 2 * margin_px,
+                         region.height_px() + 2 * margin_px, margin_px};
+  const int right = place.left + place.blocks() * kShortLanes, bottom = place.top + place.height;
+  if (place.left < 0 || place.top < 0 || right > frame.width || bottom > frame.height) return false;
+  if (place.blocks() * place.height > kShortsMax || 2 * margin_px > kShortLanes) return false;
+  Cloned<weigh_region_of>::call(frame, place, region, runs.data(), 0.5F * static_cast<float>(place.width - 1),
+                                0.5F * static_cast<float>(place.height - 1), levels, moments);
+  return true;
 }
 
 }  // namespace slsd

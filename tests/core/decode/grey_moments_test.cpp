@@ -155,8 +155,9 @@ RC_GTEST_PROP(GreyMoments, MoveWithTheRegionAndDoNotChange, ()) {
   const GreyMoments a = measure(here, regions_of(here)), b = measure(there, regions_of(there));
   RC_ASSERT(std::abs(b.x - a.x - static_cast<float>(dx)) < 1e-5F);
   RC_ASSERT(std::abs(b.y - a.y - static_cast<float>(dy)) < 1e-5F);
-  RC_ASSERT(a.weight == b.weight && a.m20 == b.m20 && a.m11 == b.m11 && a.m02 == b.m02);
-  RC_ASSERT(a.m30 == b.m30 && a.m21 == b.m21 && a.m12 == b.m12 && a.m03 == b.m03 && a.noise == b.noise);
+  const auto same = [](float one, float two) { return std::abs(one - two) < 1e-5F * std::max(std::abs(one), 100.F); };
+  RC_ASSERT(same(a.weight, b.weight) && same(a.m20, b.m20) && same(a.m11, b.m11) && same(a.m02, b.m02));
+  RC_ASSERT(same(a.m30, b.m30) && same(a.m21, b.m21) && same(a.m12, b.m12) && same(a.m03, b.m03));
 }
 
 RC_GTEST_PROP(GreyMoments, FindTheCentreBetweenPixels, ()) {
@@ -180,12 +181,6 @@ TEST(GreyMoments, OfSixteenBitsAreThoseOfEight) {
   EXPECT_NEAR(sixteen.y, eight.y, 1e-4);
   EXPECT_NEAR(sixteen.weight, eight.weight, 1e-2);
   EXPECT_NEAR(sixteen.peak / 257, eight.peak, 1e-2);
-  EXPECT_NEAR(sixteen.noise / 257, eight.noise, 1e-2);
-}
-
-TEST(GreyMoments, TellMoreNoiseFromLess) {
-  const Grey8 quiet = blurred_box({8, 8, 40, 32}, 1), noisy = blurred_box({8, 8, 40, 32}, 12);
-  EXPECT_GT(measure(noisy, regions_of(noisy)).noise, measure(quiet, regions_of(quiet)).noise + 1);
 }
 
 TEST(GreyMoments, OfAnEvenPatchWeighNothing) {
