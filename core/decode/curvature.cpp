@@ -123,7 +123,8 @@ std::optional<Bend> CentreCorrection::bend_of(const std::vector<GridNode>& nodes
 }
 
 void CentreCorrection::correct(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
-                               const std::vector<CellClaim>& claims, const CodeArray& array, Lattice& lattice) {
+                               const std::vector<CellClaim>& claims, const CodeArray& array, Lattice& lattice,
+                               std::span<const float> misfits) {
   centres_.resize(nodes.size());
   symbol_of_.assign(nodes.size(), -1);
   std::int32_t symbols = 0;
@@ -151,7 +152,9 @@ void CentreCorrection::correct(const std::vector<GridNode>& nodes, const std::ve
                          .neighbours = {-1, -1, -1, -1}};
     const std::size_t letter = array.at(symbol.row, symbol.column);
     symbol.misfit =
-        std::sqrt(prototypes_[letter].squared_distance(shape_features(seen, symbol.frame.inverse(), size_px_)));
+        !misfits.empty()
+            ? misfits[i]
+            : std::sqrt(prototypes_[letter].squared_distance(shape_features(seen, symbol.frame.inverse(), size_px_)));
     for (const Direction d : {kRight, kDown, kLeft, kUp}) {
       if (named_[i][d] >= 0) symbol.neighbours[d] = symbol_of_[named_[i][d]];
     }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/decode/decode_windows.hpp"
@@ -29,11 +30,13 @@ class CentreCorrection {
  public:
   CentreCorrection(const std::vector<Prototype>& prototypes, float pitch_px, float symbol_size_px);
 
+  /// @param misfits  of the nodes, where they are known
   /// @param array    of the pattern: tells the letters of the cells
   /// @param lattice  becomes one symbol to each node that is decoded, in their order, with its place, map and
   /// neighbours; what its centre's sigma is remains to be told
   void correct(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
-               const std::vector<CellClaim>& claims, const CodeArray& array, Lattice& lattice);
+               const std::vector<CellClaim>& claims, const CodeArray& array, Lattice& lattice,
+               std::span<const float> misfits = {});
 
  private:
   struct Derivatives {

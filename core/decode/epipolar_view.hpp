@@ -46,7 +46,7 @@ class EpipolarView {
   [[nodiscard]] double residual_px(std::int32_t sighting, const Eigen::Vector2f& camera_px,
                                    const PixelRay& cell) const {
     const bool moved = camera_px != pixels_[sighting];
-    return moved ? gate_.prepare(ray_near(sighting, camera_px).direction).residual_px(cell.direction)
+    return moved ? gate_.residual_px(ray_near(sighting, camera_px).direction, cell.direction)
                  : segments_[sighting].residual_px(cell.direction);
   }
 

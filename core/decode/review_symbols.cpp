@@ -79,19 +79,19 @@ void SymbolReview::measure_around_distrusted(const GridLinker& linker, Sightings
       const auto i = static_cast<std::size_t>(other);
       linker.measure_frame(seen.nodes, trusted_, i);
       if (seen.claims[i].status == RegionStatus::kDecoded)
-        distances_[i] = distance_from_letter(seen, i, seen.moments[i]);
+        seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
     });
   }
 }
 
 void SymbolReview::trust_whole_symbols(const GridLinker& linker, Sightings& seen) {
   trusted_.resize(seen.size());
-  distances_.resize(seen.size());
+  seen.misfits.resize(seen.size());
   distrusted_.clear();
   for (std::size_t i = 0; i < seen.size(); ++i) {
     trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
     if (trusted_[i] != 0) {
-      distances_[i] = distance_from_letter(seen, i, seen.moments[i]);
+      seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
     } else {
       distrusted_.push_back(static_cast<std::int32_t>(i));
     }
@@ -99,7 +99,7 @@ void SymbolReview::trust_whole_symbols(const GridLinker& linker, Sightings& seen
   measure_around_distrusted(linker, seen);
   distrusted_.clear();
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (trusted_[i] == 0 || distances_[i] <= options_.damaged_distance) continue;
+    if (trusted_[i] == 0 || seen.misfits[i] <= options_.damaged_distance) continue;
     trusted_[i] = 0;
     distrusted_.push_back(static_cast<std::int32_t>(i));
   }
@@ -133,7 +133,7 @@ template <class T>
 void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions, GreyMomentMeter& meter,
                                Sightings& seen, std::size_t node) const {
   GreyMoments& moments = seen.moments[node];
-  float distance = distances_[node];
+  float& distance = seen.misfits[node];
   const auto adopt_if_better = [&](const GreyMoments& again, float tolerance) {
     const float distance_again = distance_from_letter(seen, node, again);
     if (again.weight > 0 && distance_again < distance + tolerance) moments = again, distance = distance_again;

@@ -56,7 +56,6 @@ class SymbolReview {
   ReviewOptions options_;
   std::vector<std::uint8_t> trusted_;
   std::vector<std::int32_t> distrusted_;
-  std::vector<float> distances_;                // of each symbol from its letter, standard deviations
   std::vector<Eigen::Vector2f> light_changes_;  // from cell to cell along u and v, relative
 };
 

@@ -19,9 +19,10 @@ struct Sightings {
   std::vector<Classification> shapes;
   std::vector<GridNode> nodes;
   std::vector<CellClaim> claims;
+  std::vector<float> misfits;  ///< of each from its cell's letter, standard deviations, where review measured it
 
   [[nodiscard]] std::size_t size() const { return region.size(); }
-  void clear() { region.clear(), moments.clear(), shapes.clear(), nodes.clear(), claims.clear(); }
+  void clear() { region.clear(), moments.clear(), shapes.clear(), nodes.clear(), claims.clear(), misfits.clear(); }
 };
 
 }  // namespace slsd

@@ -146,7 +146,7 @@ void SymbolReader::correspond(const EpipolarView* view) {
 
 /// @param sharp  what the symbols were measured in
 void SymbolReader::fit_lattice(const GreyView& frame, double full, const GreyView& sharp, const EpipolarView* view) {
-  centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, pattern().array, lattice_);
+  centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, pattern().array, lattice_, seen_.misfits);
   if (options_.centre == Method::kPaper) {
     for (LatticeSymbol& symbol : lattice_.symbols) {
       const GreyMoments& moments = seen_.moments[symbol.sighting];

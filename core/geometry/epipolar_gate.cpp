@@ -54,4 +54,13 @@ EpipolarSegment EpipolarGate::prepare(const Eigen::Vector2d& camera_direction) c
   return segment;
 }
 
+double EpipolarGate::residual_px(const Eigen::Vector2d& camera_direction,
+                                 const Eigen::Vector2d& projector_direction) const {
+  const Eigen::Vector3d line =
+      projector_from_camera_.translation.cross(projector_from_camera_.rotation * camera_direction.homogeneous());
+  const double length = (line.head<2>().array() * per_focal_px_).matrix().norm();
+  if (!(length > 0)) return std::numeric_limits<double>::infinity();
+  return (line.head<2>().dot(projector_direction) + line.z()) / length;
+}
+
 }  // namespace slsd

@@ -53,6 +53,9 @@ class EpipolarGate {
 
   /// @param camera_direction  undistorted, normalised
   [[nodiscard]] EpipolarSegment prepare(const Eigen::Vector2d& camera_direction) const;
+  /// prepare(camera_direction).residual_px(projector_direction), in less than half the time.
+  [[nodiscard]] double residual_px(const Eigen::Vector2d& camera_direction,
+                                   const Eigen::Vector2d& projector_direction) const;
 
  private:
   RigidTransform projector_from_camera_;
