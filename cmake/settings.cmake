@@ -15,12 +15,17 @@ option(SLSD_BENCHMARKS "Build the benchmarks" ON)
 option(SLSD_FUZZERS "Build the libFuzzer targets (needs clang)" OFF)
 set(SLSD_SANITIZE "" CACHE STRING "Sanitizers to build with, as for -fsanitize=")
 
-include(CheckIPOSupported)
-check_ipo_supported(RESULT SLSD_HAS_IPO LANGUAGES CXX OUTPUT ignored)
+# Clang's needs a linker of its own, which Debian's check for it does not.
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  include(CheckIPOSupported)
+  check_ipo_supported(RESULT SLSD_HAS_IPO LANGUAGES CXX OUTPUT ignored)
+endif()
 
 # Lets a release's compiler inline from one file of the target into another.
 function(slsd_inline_across_files target)
-  set_target_properties(${target} PROPERTIES INTERPROCEDURAL_OPTIMIZATION_RELEASE ${SLSD_HAS_IPO})
+  if(SLSD_HAS_IPO)
+    set_target_properties(${target} PROPERTIES INTERPROCEDURAL_OPTIMIZATION_RELEASE ON)
+  endif()
 endfunction()
 
 add_library(slsd_settings INTERFACE)
