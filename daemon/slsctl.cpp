@@ -15,9 +15,16 @@ using slsd::ClientOptions;
 const CLI::Validator kCloudFile(
     [](const std::string& file) {
       const auto extension = std::filesystem::path(file).extension();
-      return extension == ".ply" || extension == ".pcd" ? "" : "a cloud's file ends in .ply or .pcd";
+      for (const char* known : {".ply", ".pcd", ".tiff", ".tif"})
+        if (extension == known) return "";
+      return "a cloud's file ends in .ply or .pcd, a depth map's in .tiff";
     },
-    "CLOUD.ply|CLOUD.pcd");
+    "CLOUD.ply|CLOUD.pcd|DEPTH.tiff");
+
+void add_density(CLI::App* command, ClientOptions& options) {
+  command->add_option("--density", options.density, "a point for each symbol, or for each camera pixel")
+      ->check(CLI::IsMember({"symbols", "pixels"}));
+}
 
 void add_timeout(CLI::App* command, ClientOptions& options) {
   command->add_option("--timeout-ms", options.timeout_ms, "how long to wait for devices and frames")
@@ -26,9 +33,12 @@ void add_timeout(CLI::App* command, ClientOptions& options) {
 
 void add_scan(CLI::App& app, ClientOptions& options) {
   CLI::App* scan = app.add_subcommand("scan", "trigger one scan, wait, write the cloud");
-  scan->add_option("-o,--output,CLOUD", options.output, "write the cloud, as PLY or PCD")->check(kCloudFile);
+  scan->add_option("-o,--output,CLOUD", options.output, "write the cloud, as PLY or PCD, or as a depth map")
+      ->check(kCloudFile);
   scan->add_option("--picture", options.picture, "write the frame with what was decoded, as a PNG");
   scan->add_option("--cloud-picture", options.cloud_picture, "write a picture of the cloud, as a PNG");
+  add_density(scan, options);
+  scan->add_flag("--normals", options.normals, "with --density pixels: the surface's normals too");
   scan->add_flag("--texture", options.texture, "also light the scene in white: intensities are those of the points");
   scan->add_flag("--ambient", options.ambient, "also take a frame without light, and subtract the light of the room");
   add_timeout(scan, options);
@@ -37,6 +47,7 @@ void add_scan(CLI::App& app, ClientOptions& options) {
 void add_watch(CLI::App& app, ClientOptions& options) {
   CLI::App* watch = app.add_subcommand("watch", "a line for each cloud as it comes");
   watch->add_option("--count", options.count, "end after so many clouds")->check(CLI::Range(1, 1'000'000'000));
+  add_density(watch, options);
   watch->add_option("--rate", options.rate_hz, "at most so many a second")->check(CLI::Range(0.001, 1000.0));
 }
 

@@ -8,6 +8,17 @@
 
 namespace slsd {
 
+Result<> DenseOptions::validate() const {
+  if (stride_px < 1 || stride_px > 16) {
+    return fail(ErrorCode::kInvalidArgument, "dense_stride_px must be 1 to 16, not " + std::to_string(stride_px),
+                "decode.dense_stride_px");
+  }
+  if (!(prune_px >= 0 && prune_px <= 16)) {
+    return fail(ErrorCode::kInvalidArgument, "dense_prune_px must be 0 to 16", "decode.dense_prune_px");
+  }
+  return {};
+}
+
 Result<> DecodeOptions::validate() const {
   if (!(depth_min_mm > 0))
     return fail(ErrorCode::kInvalidArgument, "depth_min_mm has to be greater than 0", "decode.depth_min_mm");
@@ -20,7 +31,7 @@ Result<> DecodeOptions::validate() const {
                 "precision = \"fine\" aligns symbols and takes no centroids; leave centre at \"default\"",
                 "decode.precision");
   }
-  return {};
+  return dense.validate();
 }
 
 double DecodeOptions::middle_depth_mm() const {

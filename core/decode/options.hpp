@@ -8,6 +8,17 @@ namespace slsd {
 
 enum class Method { kDefault, kPaper };
 enum class Precision { kStandard, kFine };
+/// What a cloud has a point for.
+enum class Density { kSymbols, kPixels };
+
+/// What the keys of [decode] say of clouds with a point for each pixel.
+struct DenseOptions {
+  int stride_px = 4;      ///< dense_stride_px, 1 to 16; the surface is fitted every so many camera pixels
+  double prune_px = 1.5;  ///< dense_prune_px, 0 to 16; points this close to a hole or a jump in depth are dropped
+
+  [[nodiscard]] Result<> validate() const;
+  friend bool operator==(const DenseOptions&, const DenseOptions&) = default;
+};
 
 /// The [decode] table of the configuration. Every stage can be run the paper's way, so that both can be measured side
 /// by side.
@@ -16,6 +27,8 @@ struct DecodeOptions {
   double depth_max_mm = 2500.0;
   /// kFine: each decoded symbol's patch is aligned with the pattern, which takes several times as long.
   Precision precision = Precision::kStandard;
+  Density density = Density::kSymbols;  ///< unless a request says
+  DenseOptions dense = {};
   Method binarize = Method::kDefault;
   Method find_regions = Method::kDefault;  ///< the paper's way leaves regions merged that ran together
   Method classify = Method::kDefault;

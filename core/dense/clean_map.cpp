@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -23,8 +24,8 @@ bool is_jump(float a, float b) {
 
 }  // namespace
 
-MapCleaner::MapCleaner(const CalibratedCamera& camera, const Lens& projector)
-    : camera_(camera), projector_(projector), rays_(camera.lens) {}
+MapCleaner::MapCleaner(const CalibratedCamera& camera, const Lens& projector, std::shared_ptr<const RayGrid> rays)
+    : camera_(camera), projector_(projector), rays_(std::move(rays)) {}
 
 void MapCleaner::drop_occluded(DenseMap& map, Executor& executor) {
   const int width = projector_.width_px, height = projector_.height_px;
@@ -35,7 +36,7 @@ void MapCleaner::drop_occluded(DenseMap& map, Executor& executor) {
     for (int x = 0; x < map.width; ++x) {
       const std::size_t pixel = static_cast<std::size_t>(y) * map.width + x;
       if (!map.measured(pixel)) continue;
-      const Eigen::Vector3d direction = rays_.at(x, y).cast<double>().homogeneous();
+      const Eigen::Vector3d direction = rays_->at(x, y).cast<double>().homogeneous();
       const Eigen::Vector3d point = camera_.projector_from_camera * (direction * map.depth_mm[pixel]);
       const Eigen::Vector2d lit_by = projector_.project(point);
       const int u = static_cast<int>(std::lround(lit_by.x())), v = static_cast<int>(std::lround(lit_by.y()));

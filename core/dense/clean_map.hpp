@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/dense/dense_map.hpp"
@@ -16,7 +17,7 @@ namespace slsd {
 /// @thread thread-bound: keeps its buffers
 class MapCleaner {
  public:
-  MapCleaner(const CalibratedCamera& camera, const Lens& projector);
+  MapCleaner(const CalibratedCamera& camera, const Lens& projector, std::shared_ptr<const RayGrid> rays);
 
   /// A projector pixel lights one point: what lies behind another surface on its ray goes.
   void drop_occluded(DenseMap& map, Executor& executor);
@@ -31,7 +32,7 @@ class MapCleaner {
  private:
   CalibratedCamera camera_;
   Lens projector_;
-  RayGrid rays_;
+  std::shared_ptr<const RayGrid> rays_;  // shared: the same for all
   std::vector<std::int32_t> label_, members_;
   std::vector<std::uint64_t> bits_, rows_;
   std::vector<float> distance_, nearest_;

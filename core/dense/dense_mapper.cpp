@@ -48,31 +48,35 @@ std::string_view to_string(DensePixel pixel) {
 struct DenseMapper::Fixed {
   PatchGeometry geometry;
   DecodeOptions decode;
-  DenseOptions options;
   int window_px, reach_px, close_px;
   PatternFields fields;
+  std::shared_ptr<const RayGrid> rays;
 };
 
 DenseMapper::DenseMapper(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
-                         const DecodeOptions& decode, const DenseOptions& options)
+                         const DecodeOptions& decode)
     : DenseMapper([&] {
         const CalibratedCamera& camera = calibration.cameras[camera_index];
         const ExpectedFrames expected(camera, calibration.projector, decode.middle_depth_mm());
         const double pitch = pattern.pitch_px() * static_cast<double>(expected.in_the_middle().scale);
-        return std::shared_ptr<const Fixed>(new Fixed{PatchGeometry(camera, calibration.projector), decode, options,
-                                                      slsd::window_px(pitch), judge_reach_px(pitch),
-                                                      slsd::close_px(pitch), PatternFields(draw_pattern(pattern))});
+        return std::shared_ptr<const Fixed>(new Fixed{
+            PatchGeometry(camera, calibration.projector), decode, slsd::window_px(pitch), judge_reach_px(pitch),
+            slsd::close_px(pitch), PatternFields(draw_pattern(pattern)), std::make_shared<const RayGrid>(camera.lens)});
       }()) {}
 
 DenseMapper::DenseMapper(std::shared_ptr<const Fixed> fixed)
     : fixed_(std::move(fixed)),
-      grid_(fixed_->geometry,
-            {fixed_->options.stride_px, fixed_->window_px, fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
+      grid_(fixed_->geometry, {fixed_->decode.dense.stride_px, fixed_->window_px, fixed_->decode.depth_min_mm,
+                               fixed_->decode.depth_max_mm}),
       judge_({fixed_->reach_px, fixed_->window_px, fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
-      cleaner_(fixed_->geometry.camera, fixed_->geometry.projector) {}
+      cleaner_(fixed_->geometry.camera, fixed_->geometry.projector, fixed_->rays) {}
 
 DenseMapper DenseMapper::another() const {
   return DenseMapper(fixed_);
+}
+
+const std::shared_ptr<const RayGrid>& DenseMapper::rays() const {
+  return fixed_->rays;
 }
 
 /// The plane of a symbol: its depth, and the slopes that make the map turn as the grid of symbols does.
@@ -129,7 +133,7 @@ const DenseMap& DenseMapper::measure(const GreyView& frame, double full, const D
   cleaner_.drop_occluded(map_, executor);
   cleaner_.drop_unlit_rims(map_, fixed_->close_px);
   cleaner_.drop_islands(map_, static_cast<std::size_t>(fixed_->window_px) * fixed_->window_px);
-  cleaner_.prune(map_, fixed_->options.prune_px);
+  cleaner_.prune(map_, fixed_->decode.dense.prune_px);
   map_.counts.fill(0);
   for (const DensePixel pixel : map_.pixels) ++map_.counts[static_cast<std::size_t>(pixel)];
   done(DenseStage::kClean);

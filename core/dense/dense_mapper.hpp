@@ -10,7 +10,6 @@
 #include "core/decode/decoder.hpp"
 #include "core/dense/clean_map.hpp"
 #include "core/dense/dense_map.hpp"
-#include "core/dense/dense_options.hpp"
 #include "core/dense/executor.hpp"
 #include "core/dense/pixel_judge.hpp"
 #include "core/dense/surface_grid.hpp"
@@ -34,7 +33,7 @@ class DenseMapper {
  public:
   /// @param camera_index  in the calibration; the calibration's projector is of the pattern's size
   DenseMapper(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
-              const DecodeOptions& decode, const DenseOptions& options);
+              const DecodeOptions& decode);
   /// Of the same, for another thread.
   [[nodiscard]] DenseMapper another() const;
 
@@ -43,6 +42,8 @@ class DenseMapper {
   const DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
                           DenseObserver* observer = nullptr);
 
+  /// Of the camera's pixels.
+  [[nodiscard]] const std::shared_ptr<const RayGrid>& rays() const;
   /// Of the last frame: the blur of the pattern, projector px.
   [[nodiscard]] float blur_sigma_px() const { return PatternFields::kBlursPx[blur_]; }
 

@@ -21,6 +21,8 @@ struct ClientOptions {
   std::filesystem::path picture;          ///< scan: the frame with what was decoded; project: what to show
   std::filesystem::path cloud_picture;    ///< scan: the cloud, drawn
   std::filesystem::path image;            ///< preview, frame, pattern: the PNG to write
+  std::string density;                    ///< scan, watch: "symbols" or "pixels"; empty: as configured
+  bool normals = false;                   ///< scan: normals of pixels
   bool texture = false;                   ///< scan: intensities from a frame in white light
   bool ambient = false;                   ///< scan: less the light of the room
   bool as_shown = false;                  ///< frame: whatever the projector shows

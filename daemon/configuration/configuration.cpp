@@ -25,6 +25,7 @@ constexpr auto kIdlePictures = std::span(kPictureNames).first(3);  // pattern, w
 constexpr std::array kArrayMethods{std::pair("constructive"sv, ArrayMethod::kConstructive),
                                    std::pair("paper"sv, ArrayMethod::kPaper)};
 constexpr std::array kPrecisions{std::pair("standard"sv, Precision::kStandard), std::pair("fine"sv, Precision::kFine)};
+constexpr std::array kDensities{std::pair("symbols"sv, Density::kSymbols), std::pair("pixels"sv, Density::kPixels)};
 constexpr std::array kMethods{std::pair("default"sv, Method::kDefault), std::pair("paper"sv, Method::kPaper)};
 constexpr std::array kOtherHardware{std::pair("error"sv, OtherHardware::kError),
                                     std::pair("warn"sv, OtherHardware::kWarn)};
@@ -82,6 +83,9 @@ Result<> read_decode(const toml::table* table, const path& file, DecodeOptions& 
   reader.read("depth_min_mm", options.depth_min_mm);
   reader.read("depth_max_mm", options.depth_max_mm);
   reader.choose("precision", options.precision, span_of(kPrecisions));
+  reader.choose("density", options.density, span_of(kDensities));
+  reader.read("dense_stride_px", options.dense.stride_px);
+  reader.read("dense_prune_px", options.dense.prune_px);
   reader.choose("binarize", options.binarize, span_of(kMethods));
   reader.choose("find_regions", options.find_regions, span_of(kMethods));
   reader.choose("classify", options.classify, span_of(kMethods));

@@ -2,34 +2,67 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
 
 #include "core/cloud/pcd.hpp"
 #include "core/cloud/ply.hpp"
+#include "core/decode/options.hpp"
+#include "core/dense/dense_cloud.hpp"
 
 namespace slsd {
 
-enum class CloudFormat { kPly, kPcd };
+enum class CloudFormat : std::uint8_t { kPly, kPcd, kTiff };
 
 [[nodiscard]] inline std::string_view to_string(CloudFormat format) {
-  return format == CloudFormat::kPly ? "ply" : "pcd";
+  return format == CloudFormat::kPly ? "ply" : format == CloudFormat::kPcd ? "pcd" : "tiff";
 }
 [[nodiscard]] inline CloudFormat cloud_format(std::string_view name) {
-  return name == "pcd" ? CloudFormat::kPcd : CloudFormat::kPly;
+  return name == "pcd" ? CloudFormat::kPcd : name == "tiff" ? CloudFormat::kTiff : CloudFormat::kPly;
+}
+[[nodiscard]] inline std::string_view to_string(Density density) {
+  return density == Density::kPixels ? "pixels" : "symbols";
 }
 
-/// The formats that somebody wants a cloud in.
-struct CloudFormats {
-  bool ply = false;
-  bool pcd = false;
+/// What somebody wants a cloud as. Depth maps and normals are of dense clouds alone.
+struct CloudForm {
+  CloudFormat format = CloudFormat::kPly;
+  Density density = Density::kSymbols;
+  bool normals = false;
 
-  [[nodiscard]] static CloudFormats only(CloudFormat format) {
-    return {format == CloudFormat::kPly, format == CloudFormat::kPcd};
+  CloudForm() = default;
+  CloudForm(CloudFormat of_format, Density of_density = Density::kSymbols, bool with_normals = false)
+      : format(of_format), density(of_density), normals(with_normals) {}
+  [[nodiscard]] bool dense() const { return density == Density::kPixels; }
+
+  static constexpr unsigned kCount = 12;
+  [[nodiscard]] unsigned index() const {
+    return static_cast<unsigned>(format) + (dense() ? 3U : 0U) + (normals ? 6U : 0U);
   }
-  friend CloudFormats operator|(CloudFormats a, CloudFormats b) { return {a.ply || b.ply, a.pcd || b.pcd}; }
+};
+
+/// The forms that somebody wants a cloud in.
+class CloudFormats {
+ public:
+  [[nodiscard]] static CloudFormats only(CloudForm form) {
+    CloudFormats formats;
+    formats.bits_ = static_cast<std::uint16_t>(1U << form.index());
+    return formats;
+  }
+  [[nodiscard]] bool has(CloudForm form) const { return (bits_ >> form.index() & 1U) != 0; }
+  /// Whether a point for each pixel is wanted.
+  [[nodiscard]] bool dense() const { return (bits_ & 0b111000'111000U) != 0; }
+  friend CloudFormats operator|(CloudFormats a, CloudFormats b) {
+    a.bits_ = static_cast<std::uint16_t>(a.bits_ | b.bits_);
+    return a;
+  }
   friend bool operator==(CloudFormats, CloudFormats) = default;
+
+ private:
+  std::uint16_t bits_ = 0;  // by CloudForm::index()
 };
 
 /// Bytes that may go to several clients, which send them at their own pace: hence shared.
@@ -40,25 +73,38 @@ using SharedBytes = std::shared_ptr<const std::string>;
 class CloudFiles {
  public:
   CloudFiles() = default;
-  CloudFiles(const Cloud& cloud, CloudFormats formats) {
-    if (formats.ply) (void)file(cloud, CloudFormat::kPly);
-    if (formats.pcd) (void)file(cloud, CloudFormat::kPcd);
+  /// @param dense  null where no form wants it
+  CloudFiles(const Cloud& cloud, const DenseCloud* dense, CloudFormats formats) {
+    for (const CloudFormat format : {CloudFormat::kPly, CloudFormat::kPcd, CloudFormat::kTiff}) {
+      for (const CloudForm form :
+           {CloudForm(format), CloudForm(format, Density::kPixels), CloudForm(format, Density::kPixels, true)}) {
+        if (formats.has(form)) (void)file(cloud, dense, form);
+      }
+    }
   }
 
-  /// Writes it where it is not there yet. @param cloud  the same as before
-  [[nodiscard]] const SharedBytes& file(const Cloud& cloud, CloudFormat format) {
-    SharedBytes& bytes = format == CloudFormat::kPly ? ply_ : pcd_;
-    if (!bytes) {
-      bytes = std::make_shared<const std::string>(format == CloudFormat::kPly ? write_ply(cloud) : write_pcd(cloud));
-    }
+  /// Writes it where it is not there yet. @param cloud, dense  the same as before
+  [[nodiscard]] const SharedBytes& file(const Cloud& cloud, const DenseCloud* dense, CloudForm form) {
+    SharedBytes& bytes = files_[form.index()];
+    if (!bytes) bytes = std::make_shared<const std::string>(write(cloud, dense, form));
     return bytes;
   }
 
-  [[nodiscard]] std::size_t bytes() const { return (ply_ ? ply_->size() : 0) + (pcd_ ? pcd_->size() : 0); }
+  [[nodiscard]] std::size_t bytes() const {
+    std::size_t sum = 0;
+    for (const SharedBytes& file : files_) sum += file ? file->size() : 0;
+    return sum;
+  }
 
  private:
-  SharedBytes ply_;
-  SharedBytes pcd_;
+  [[nodiscard]] static std::string write(const Cloud& cloud, const DenseCloud* dense, CloudForm form) {
+    const bool ply = form.format == CloudFormat::kPly;
+    if (!form.dense() || dense == nullptr) return ply ? write_ply(cloud) : write_pcd(cloud);
+    if (form.format == CloudFormat::kTiff) return write_dense_tiff(*dense);
+    return ply ? write_dense_ply(*dense, form.normals) : write_dense_pcd(*dense, form.normals);
+  }
+
+  std::array<SharedBytes, CloudForm::kCount> files_;
 };
 
 }  // namespace slsd

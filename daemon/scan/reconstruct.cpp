@@ -8,6 +8,7 @@
 
 #include "core/cloud/shade_points.hpp"
 #include "core/decode/decode_in_light.hpp"
+#include "core/decode/frame_noise.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "core/geometry/median.hpp"
 #include "core/utc_text.hpp"
@@ -87,6 +88,23 @@ void shade(std::span<CloudPoint> points, const SceneLight& light, ScanResult& re
   if (light.white) result.saturated = result.saturated.value_or(0) + saturated;
 }
 
+/// A point for each pixel of a camera, from the symbols of its frame.
+DenseView measure_pixels(const GreyView& frame, Decoder& decoder, ScanSetup& setup, std::size_t lane,
+                         std::size_t camera, const SceneLight& light, ScanResult& result) {
+  DenseMapper& mapper = setup.dense->of(lane, camera, decoder, setup.pattern, *setup.calibration, setup.decode);
+  DecodedSymbols symbols = decoder.symbols();
+  if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may be those of the quotient
+  SerialExecutor executor;
+  const CalibratedCamera& calibrated = setup.calibration->cameras[decoder.camera_index()];
+  DenseView view{mapper.measure(frame, light.full, symbols, executor), mapper.rays(), calibrated.rig_from_camera,
+                 decoder.camera_index(), setup.camera_names[camera]};
+  if (light.white || light.dark) {
+    const std::size_t saturated = shade_view(view, light);
+    if (light.white) result.dense_saturated = result.dense_saturated.value_or(0) + saturated;
+  }
+  return view;
+}
+
 }  // namespace
 
 std::vector<CloudPoint> stray_symbols(const Decoding& decoding, std::uint8_t camera) {
@@ -107,6 +125,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
   ScanResult result = describe(set, setup, scan_id);
   const std::size_t pictured = setup.camera_index(request.camera);
   StageClock clock;
+  auto dense = request.formats.dense() ? std::make_shared<DenseCloud>() : nullptr;
   for (std::size_t i = 0; i < set.frames.size(); ++i) {
     clock.start();
     const auto begin = steady_clock::now();
@@ -122,10 +141,20 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     const std::vector<CloudPoint> strays = stray_symbols(**decoding, decoder.camera_index());
     result.strays.insert(result.strays.end(), strays.begin(), strays.end());
     shade(std::span(result.cloud.points).subspan(before), light, result);
+    if (dense) {
+      const auto dense_begin = steady_clock::now();
+      dense->views.push_back(measure_pixels(set.frames[i].image(), decoder, setup, lane, i, light, result));
+      const auto took = steady_clock::now() - dense_begin;
+      result.dense_time += took, result.decode_time += took;
+    }
     if (!request.picture || i != pictured) continue;
     auto picture = picture_of(set.frames[i].image(), **decoding, setup.pattern);
     if (!picture) return tl::unexpected(picture.error());
     result.picture_png = std::move(*picture);
+  }
+  if (dense) {
+    dense->scan_id = result.cloud.scan_id, dense->time = result.cloud.time, dense->frame = result.cloud.frame;
+    result.dense = std::move(dense);
   }
   result.stage_times = clock.times();
   if (!result.cloud.points.empty()) {

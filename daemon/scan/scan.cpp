@@ -58,7 +58,7 @@ void Scan::note_lost(const Error& error) {
 void Scan::expose(Rig& rig, HardwareGuard& hardware, SharedSetup setup, const Patience& patience, Exposure exposure,
                   CloudFormats formats) {
   setup_ = std::move(setup);
-  formats_ = request_.formats | formats;
+  request_.formats = request_.formats | formats;
   if (auto possible = setup_->check(request_); !possible) {
     set_ = tl::unexpected(possible.error());
     return;
@@ -75,7 +75,7 @@ void Scan::compute(std::size_t lane) {
   if (set_) set_->give_back();  // back to the driver before others have had their turn
   if (!result_) return;
   result_->lost = std::move(lost_);
-  result_->files = CloudFiles(result_->cloud, formats_);
+  result_->files = CloudFiles(result_->cloud, result_->dense.get(), request_.formats);
 }
 
 FrameTask::FrameTask(FrameRequest request, Answer answer)

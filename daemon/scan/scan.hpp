@@ -55,7 +55,6 @@ class Scan final : public TaskOf<ScanResult>, public FrameJob {
   std::uint64_t number_;
   std::string id_;
   SharedSetup setup_;
-  CloudFormats formats_;
   LostTries lost_;
   Result<FrameSet> set_;
   Result<ScanResult> result_;

@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -86,17 +87,21 @@ struct FrameImage {
 /// What a scan gave.
 struct ScanResult {
   Cloud cloud;
+  std::shared_ptr<const DenseCloud> dense = {};  ///< a point for each pixel, where it was asked for; shared: as large
+                                                 ///< as the frames
   CloudFiles files = {};  ///< the cloud's, in the formats that were asked for
   LostTries lost = {};
   std::vector<CloudPoint> strays;          ///< symbols that a knocked rig has elsewhere: see stray_symbols()
   RegionCounts regions{};                  ///< of all cameras, by status
   std::optional<std::uint64_t> saturated;  ///< points without an intensity, as white was too bright; where it was asked
                                            ///< for
-  MonotonicTime received;                  ///< when the last byte of its frames was there
-  std::chrono::nanoseconds skew{};         ///< from the first camera's exposure to the last one's
+  std::optional<std::uint64_t> dense_saturated = {};  ///< the same, of the points of pixels
+  MonotonicTime received;                             ///< when the last byte of its frames was there
+  std::chrono::nanoseconds skew{};                    ///< from the first camera's exposure to the last one's
   std::uint64_t skipped = 0;  ///< sets of frames since the scan before that were not decoded: newer ones came
   std::chrono::nanoseconds capture_time{};
   std::chrono::nanoseconds decode_time{};
+  std::chrono::nanoseconds dense_time{};  ///< of that, for the points of pixels
   StageTimes stage_times{};
   std::string picture_png;         ///< empty unless asked for
   std::vector<FrameImage> frames;  ///< one to a camera, in the configuration's order, those of the pattern, of

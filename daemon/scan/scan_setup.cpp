@@ -146,6 +146,17 @@ double FullLevels::raise(std::size_t camera, double level) {
   return greatest_[camera] = std::max(greatest_[camera], level);
 }
 
+DenseMapper& DenseMappers::of(std::size_t lane, std::size_t camera, const Decoder& decoder, const Pattern& pattern,
+                              const Calibration& calibration, const DecodeOptions& options) {
+  const std::lock_guard lock(mutex_);
+  auto& mapper = mappers_[{camera, lane}];
+  if (mapper) return *mapper;
+  const auto other = mappers_.lower_bound({camera, 0});  // of another lane, or this one
+  mapper = other->second ? std::make_unique<DenseMapper>(other->second->another())
+                         : std::make_unique<DenseMapper>(pattern, calibration, decoder.camera_index(), options);
+  return *mapper;
+}
+
 Result<ScanSetup> ScanSetup::create(const Configuration& configuration, std::size_t lanes) {
   auto pattern = configured_pattern(configuration);
   if (!pattern) return tl::unexpected(pattern.error());
@@ -157,6 +168,7 @@ Result<ScanSetup> ScanSetup::create(const Configuration& configuration, std::siz
     setup.camera_formats.push_back(camera.format());
   }
   setup.image = draw_pattern(setup.pattern);
+  setup.decode = configuration.decode;
   setup.depth_min_mm = configuration.decode.depth_min_mm;
   setup.depth_max_mm = configuration.decode.depth_max_mm;
   if (!setup.calibration) return setup;

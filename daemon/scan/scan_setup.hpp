@@ -2,14 +2,17 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/code/pattern.hpp"
 #include "core/decode/decoder.hpp"
+#include "core/dense/dense_mapper.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/image.hpp"
 #include "core/result.hpp"
@@ -54,6 +57,19 @@ class FullLevels {
   std::vector<double> greatest_;
 };
 
+/// What measures a point for each pixel: made when it is first asked for, as it takes more memory than all else.
+/// @thread thread-safe; what it lends belongs to the lane's thread
+class DenseMappers {
+ public:
+  /// The mapper of a lane for the camera of a decoder.
+  [[nodiscard]] DenseMapper& of(std::size_t lane, std::size_t camera, const Decoder& decoder, const Pattern& pattern,
+                                const Calibration& calibration, const DecodeOptions& options);
+
+ private:
+  std::mutex mutex_;
+  std::map<std::pair<std::size_t, std::size_t>, std::unique_ptr<DenseMapper>> mappers_;  // by camera, lane
+};
+
 /// Everything about a scan that a reload replaces at once.
 /// @thread a lane belongs to one thread at a time; the rest does not change, but for the full levels
 struct ScanSetup {
@@ -66,6 +82,8 @@ struct ScanSetup {
   OtherHardware other_hardware = OtherHardware::kError;
   std::vector<std::string> camera_formats = {};  ///< as configured, "Mono12"; empty where it is left open
   std::unique_ptr<FullLevels> full_levels = std::make_unique<FullLevels>();
+  DecodeOptions decode = {};
+  std::unique_ptr<DenseMappers> dense = std::make_unique<DenseMappers>();
   double depth_min_mm = DecodeOptions{}.depth_min_mm;  ///< where along the cameras' axes there may be something
   double depth_max_mm = DecodeOptions{}.depth_max_mm;
 

@@ -72,9 +72,14 @@ std::size_t picture_bytes(const ServiceState& state, const std::string& camera, 
 constexpr std::size_t kFrameBytes = 2;    // a pixel's: grey, as deep as it comes
 constexpr std::size_t kPictureBytes = 3;  // a pixel's: what was decoded is drawn in colours
 
-// What a scan gives besides its cloud, of which nobody knows how large it will be.
-std::size_t expected_bytes(const ServiceState& state, const ScanRequest& request) {
+// What a scan gives at most, but for a cloud of symbols, of which nobody knows how large it will be.
+std::size_t expected_bytes(const ServiceState& state, const ScanRequest& request, CloudForm form = {}) {
   std::size_t bytes = request.picture ? picture_bytes(state, request.camera, kPictureBytes) : 0;
+  if (form.dense()) {
+    const std::size_t a_pixel = form.format == CloudFormat::kTiff ? 8U : form.normals ? 30U : 18U;
+    for (const DeviceStatus& camera : state.scanner.rig().camera_statuses())
+      bytes += static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px) * a_pixel;
+  }
   if (request.frames == FrameCoding::kNone) return bytes;
   const std::size_t lights = 1 + (request.texture ? 1U : 0U) + (request.ambient ? 1U : 0U);
   for (const DeviceStatus& camera : state.scanner.rig().camera_statuses()) {
@@ -111,11 +116,32 @@ Outgoing frame_event(const std::string& scan_id, const FrameImage& frame, FrameC
   return event;
 }
 
-Outcome scan_reply(const ScanResult& scan, CloudFormat format, bool as_memfd, FrameCoding frames) {
-  Reply reply{scan_json(scan)};
-  reply.result["format"] = to_string(format);
+// A cloud as a request has it; where no density is named the configuration's.
+CloudForm read_form(ParamReader& reader, const ServiceState& state) {
+  CloudForm form(cloud_format(reader.choice("format", {"ply", "pcd", "tiff"})));
+  const bool pixels = state.configuration.decode.density == Density::kPixels;
+  const std::string density =
+      pixels ? reader.choice("density", {"pixels", "symbols"}) : reader.choice("density", {"symbols", "pixels"});
+  form.density = density == "pixels" ? Density::kPixels : Density::kSymbols;
+  form.normals = reader.boolean("normals", false);
+  return form;
+}
+
+// What does not go together.
+std::optional<RpcError> refused_form(CloudForm form) {
+  const bool tiff = form.format == CloudFormat::kTiff;
+  if (tiff && !form.dense()) return invalid_params("\"tiff\" is a depth map: ask for \"density\": \"pixels\" with it");
+  if (form.normals && !form.dense())
+    return invalid_params("\"normals\" are those of pixels: ask for \"density\": \"pixels\" with them");
+  if (form.normals && tiff) return invalid_params("a depth map (\"tiff\") has no normals: ask for \"ply\" or \"pcd\"");
+  return std::nullopt;
+}
+
+Outcome scan_reply(const ScanResult& scan, CloudForm form, bool as_memfd, FrameCoding frames) {
+  Reply reply{scan_json(scan, form.density)};
+  reply.result["format"] = to_string(form.format);
   CloudFiles files = scan.files;
-  const SharedBytes cloud = files.file(scan.cloud, format);
+  const SharedBytes cloud = files.file(scan.cloud, scan.dense.get(), form);
   if (as_memfd) {
     auto memory = sealed_memory(*cloud);
     if (!memory) return tl::unexpected(rpc_error(memory.error()));
@@ -139,7 +165,7 @@ Outcome image_reply(std::string bytes, json result) {
 
 void run_scan(ServiceState& state, const json& params, Session& session, Respond respond) {
   ParamReader reader(params);
-  const CloudFormat format = cloud_format(reader.choice("format", {"ply", "pcd"}));
+  const CloudForm form = read_form(reader, state);
   const bool as_memfd = reader.choice("transport", {"inline", "memfd"}) == "memfd";
   const int timeout_ms = read_timeout(reader, state);
   const bool picture = reader.boolean("picture", false);
@@ -148,11 +174,12 @@ void run_scan(ServiceState& state, const json& params, Session& session, Respond
   const bool texture = reader.boolean("texture", false);
   const bool ambient = reader.boolean("ambient", false);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
-  const ScanRequest request{deadline_in(timeout_ms),    picture,       camera, frames, texture, ambient,
-                            CloudFormats::only(format), session.gone()};
-  if (auto refused = session.reserve(expected_bytes(state, request))) return respond(tl::unexpected(*refused));
-  state.scanner.scan(request, carry_scan(state, std::move(respond), [format, as_memfd, frames](const ScanResult& scan) {
-                       return scan_reply(scan, format, as_memfd, frames);
+  if (auto refused = refused_form(form)) return respond(tl::unexpected(*refused));
+  const ScanRequest request{deadline_in(timeout_ms),  picture,       camera, frames, texture, ambient,
+                            CloudFormats::only(form), session.gone()};
+  if (auto refused = session.reserve(expected_bytes(state, request, form))) return respond(tl::unexpected(*refused));
+  state.scanner.scan(request, carry_scan(state, std::move(respond), [form, as_memfd, frames](const ScanResult& scan) {
+                       return scan_reply(scan, form, as_memfd, frames);
                      }));
 }
 
@@ -233,13 +260,15 @@ void run_status(ServiceState& state, const json& params, Session&, Respond respo
 
 void run_subscribe(ServiceState& state, const json& params, Session& session, Respond respond) {
   ParamReader reader(params);
-  const CloudFormat format = cloud_format(reader.choice("format", {"ply", "pcd"}));
+  const CloudForm form = read_form(reader, state);
   const std::optional<double> rate_hz = reader.number("rate_hz", kRateMinHz, kRateMaxHz);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
-  json result{{"format", to_string(format)}};
+  if (auto refused = refused_form(form)) return respond(tl::unexpected(*refused));
+  json result{{"format", to_string(form.format)}};
+  if (form.dense()) result["density"] = to_string(form.density);
   result["rate_hz"] = rate_hz ? json(*rate_hz) : json();
   respond(Reply{std::move(result)});
-  session.subscribe(Subscription(format, rate_hz));
+  session.subscribe(Subscription(form, rate_hz));
   state.server->update_demand();
 }
 

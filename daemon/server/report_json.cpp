@@ -131,7 +131,27 @@ double latency_ms(MonotonicTime received) {
   return milliseconds(std::chrono::steady_clock::now() - received);
 }
 
-json scan_json(const ScanResult& scan) {
+namespace {
+
+void add_pixels(const DenseCloud& dense, const ScanResult& scan, json& result) {
+  result["density"] = to_string(Density::kPixels);
+  result["width_px"] = dense.views.front().map.width;
+  result["height_px"] = dense.views.front().map.height;
+  result["points"] = dense.points();
+  result["dense_ms"] = milliseconds(scan.dense_time);
+  if (scan.dense_saturated) result["saturated"] = *scan.dense_saturated;
+  json pixels = json::object();
+  for (int i = 0; i < kDensePixelCount; ++i) {
+    std::uint64_t count = 0;
+    for (const DenseView& view : dense.views) count += view.map.counts[static_cast<std::size_t>(i)];
+    pixels[std::string(to_string(static_cast<DensePixel>(i)))] = count;
+  }
+  result["pixels"] = std::move(pixels);
+}
+
+}  // namespace
+
+json scan_json(const ScanResult& scan, Density density) {
   json stages = json::object();
   for (std::size_t i = 0; i < scan.stage_times.size(); ++i) stages[stage_name(i)] = milliseconds(scan.stage_times[i]);
   json result{{"scan", scan.cloud.scan_id},
@@ -148,6 +168,7 @@ json scan_json(const ScanResult& scan) {
               {"stages_ms", std::move(stages)}};
   if (scan.cloud.sigma_calibration_mm) result["sigma_calibration_mm"] = *scan.cloud.sigma_calibration_mm;
   if (scan.saturated) result["saturated"] = *scan.saturated;
+  if (density == Density::kPixels && scan.dense) add_pixels(*scan.dense, scan, result);
   result["tries"] = scan.lost.count + 1;
   if (scan.lost.count > 0) {
     json lost = json::array();

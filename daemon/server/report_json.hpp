@@ -11,7 +11,7 @@
 namespace slsd {
 
 /// What a client is told of a scan besides its cloud: id, time, number of points, regions by status, times.
-[[nodiscard]] nlohmann::json scan_json(const ScanResult& scan);
+[[nodiscard]] nlohmann::json scan_json(const ScanResult& scan, Density density = Density::kSymbols);
 
 /// The time since the last byte of a scan's frames, in milliseconds, for its `latency_ms`.
 [[nodiscard]] double latency_ms(MonotonicTime received);

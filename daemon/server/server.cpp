@@ -83,7 +83,7 @@ void Server::update_demand() {
     if (!demand) demand.emplace();
     const double rate_hz = session->subscription()->rate_hz().value_or(std::numeric_limits<double>::infinity());
     demand->rate_hz = std::max(demand->rate_hz, rate_hz);
-    demand->formats = demand->formats | CloudFormats::only(session->subscription()->format());
+    demand->formats = demand->formats | CloudFormats::only(session->subscription()->form());
   }
   demand_changed_(demand);
 }

@@ -10,6 +10,7 @@
 namespace slsd {
 
 void Subscription::offer(SharedPublication publication, Clock::time_point now) {
+  if (!publication->fits(form_)) return;
   if (rate_hz_) {
     const auto period = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / *rate_hz_));
     // Scans made at this very rate come a little early as often as late.
@@ -48,9 +49,9 @@ std::optional<Outgoing> Subscription::take(Clock::time_point now) {
     event.line = to_line(event_message("scan_failed", {{"error", rpc_error(publication->scan().error()).to_json()}}));
     return event;
   }
-  event.bytes = publication->cloud(format_);
-  nlohmann::json params = scan_json(*publication->scan());
-  params["format"] = to_string(format_);
+  event.bytes = publication->cloud(form_);
+  nlohmann::json params = scan_json(*publication->scan(), form_.density);
+  params["format"] = to_string(form_.format);
   params["bytes"] = event.bytes->size();
   params["latency_ms"] = latency_ms(publication->scan()->received);
   params["lost"] = std::exchange(lost_, 0);

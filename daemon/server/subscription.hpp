@@ -24,10 +24,14 @@ class Publication {
   }
 
   [[nodiscard]] const Result<ScanResult>& scan() const { return *scan_; }
-  [[nodiscard]] SharedBytes cloud(CloudFormat format) { return files_.file((*scan_)->cloud, format); }
+  [[nodiscard]] SharedBytes cloud(CloudForm form) { return files_.file((*scan_)->cloud, (*scan_)->dense.get(), form); }
+  /// Whether it is a cloud of that density: a scan that was taken before somebody asked for pixels has none.
+  [[nodiscard]] bool fits(CloudForm form) const { return !*scan_ || !form.dense() || (*scan_)->dense; }
   /// What it holds of memory: the cloud, and its files so far.
   [[nodiscard]] std::size_t bytes() const {
-    return *scan_ ? (*scan_)->cloud.points.size() * sizeof(CloudPoint) + files_.bytes() : 0;
+    if (!*scan_) return 0;
+    return (*scan_)->cloud.points.size() * sizeof(CloudPoint) + files_.bytes() +
+           ((*scan_)->dense ? (*scan_)->dense->bytes() : 0);
   }
 
  private:
@@ -47,10 +51,10 @@ class Subscription {
   static constexpr std::size_t kWaitingMax = 4;
   static constexpr std::chrono::milliseconds kTurn{100};  ///< after which a newer one takes its place
 
-  Subscription(CloudFormat format, std::optional<double> rate_hz) : format_(format), rate_hz_(rate_hz) {}
+  Subscription(CloudForm form, std::optional<double> rate_hz) : form_(form), rate_hz_(rate_hz) {}
 
   [[nodiscard]] std::optional<double> rate_hz() const { return rate_hz_; }
-  [[nodiscard]] CloudFormat format() const { return format_; }
+  [[nodiscard]] CloudForm form() const { return form_; }
 
   /// Takes a scan in, unless it comes sooner than the client wants one.
   void offer(SharedPublication publication, Clock::time_point now);
@@ -72,7 +76,7 @@ class Subscription {
   };
   void drop_old(Clock::time_point now);
 
-  CloudFormat format_;
+  CloudForm form_;
   std::optional<double> rate_hz_;
   Clock::time_point next_{};
   std::deque<Waiting> waiting_;

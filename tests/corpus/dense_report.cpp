@@ -46,13 +46,14 @@ Result<> report(const Pattern& pattern, const std::string& folder, const DenseOp
   if (!frame) return tl::unexpected(frame.error());
   const auto truth = read_dense_truth(folder);
   if (!truth) return tl::unexpected(truth.error());
-  const DecodeOptions decode;
+  DecodeOptions decode;
+  decode.dense = options;
   auto decoder = Decoder::create(pattern, *calibration, 0, decode);
   if (!decoder) return tl::unexpected(decoder.error());
   const double full = guess_full_level(view(*frame));
   const auto decoding = decoder->decode(view(*frame), full);
   if (!decoding) return tl::unexpected(decoding.error());
-  DenseMapper mapper(pattern, *calibration, 0, decode, options);
+  DenseMapper mapper(pattern, *calibration, 0, decode);
   SerialExecutor executor;
   StageTimes times;
   (void)mapper.measure(view(*frame), full, decoder->symbols(), executor);

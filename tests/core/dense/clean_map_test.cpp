@@ -50,7 +50,7 @@ std::string left_of(const DenseMap& map) {
 
 MapCleaner cleaner() {
   const Calibration rig = paper_rig();
-  return {rig.cameras[0], rig.projector};
+  return {rig.cameras[0], rig.projector, std::make_shared<const RayGrid>(rig.cameras[0].lens)};
 }
 
 TEST(DropIslands, KeepsWhatIsLargeEnough) {

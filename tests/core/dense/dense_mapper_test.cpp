@@ -81,7 +81,9 @@ Measured measure(const GreyView& frame, double full = 255, const DenseOptions& o
   Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
   const auto decoding = decoder.decode(frame, full);
   EXPECT_TRUE(decoding);
-  DenseMapper mapper(pattern(), rig, 0, {}, options);
+  DecodeOptions decode;
+  decode.dense = options;
+  DenseMapper mapper(pattern(), rig, 0, decode);
   const DecodedSymbols symbols = decoder.symbols();
   return {symbols.lattice->symbols.size(),
           mapper.measure(frame, full, symbols, executor != nullptr ? *executor : serial)};
@@ -232,7 +234,7 @@ TEST(DenseMapper, DepthBeyondTheWorkingRangeIsNone) {
   Decoder decoder = Decoder::create(pattern(), rig, 0, decode).value();
   ASSERT_TRUE(decoder.decode(tilted().frame.view(), 255));
   decode.depth_min_mm = 2000;  // a half of the plane is nearer
-  DenseMapper mapper(pattern(), rig, 0, decode, {});
+  DenseMapper mapper(pattern(), rig, 0, decode);
   SerialExecutor executor;
   const DenseMap& map = mapper.measure(tilted().frame.view(), 255, decoder.symbols(), executor);
   EXPECT_GT(map.count(DensePixel::kMeasured), 20'000U);
@@ -281,7 +283,7 @@ TEST(DenseMapper, ThreadsChangeNothing) {
 TEST(DenseMapper, AFrameDoesNotDependOnTheOneBefore) {
   const Calibration rig = small_rig();
   Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
-  DenseMapper mapper(pattern(), rig, 0, {}, {});
+  DenseMapper mapper(pattern(), rig, 0, {});
   SerialExecutor executor;
   for (const Seen* seen : {&tilted(), &column()}) {
     ASSERT_TRUE(decoder.decode(seen->frame.view(), 255));
@@ -293,7 +295,7 @@ TEST(DenseMapper, AFrameDoesNotDependOnTheOneBefore) {
 TEST(DenseMapper, AllocatesNothingAfterTheFirstFrame) {
   const Calibration rig = small_rig();
   Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
-  DenseMapper mapper(pattern(), rig, 0, {}, {});
+  DenseMapper mapper(pattern(), rig, 0, {});
   SerialExecutor executor;
   ASSERT_TRUE(decoder.decode(tilted().frame.view(), 255));
   const DecodedSymbols symbols = decoder.symbols();

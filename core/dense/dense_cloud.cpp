@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/dense/dense_cloud.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <Eigen/Geometry>
+
+#include "core/cloud/point_record.hpp"
+
+namespace slsd {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the records are copied as they lie in memory");
+
+constexpr std::size_t kPointBytes = 18, kNormalBytes = 12;
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+/// Of the depth, to a neighbour that still belongs to the same surface.
+constexpr float kJump = 0.004F;
+/// Of full: noise and the sensor's own unevenness keep some pixels below.
+constexpr double kSaturated = 0.985;
+
+/// The points of a view in the rig frame, pixel by pixel.
+class ViewPoints {
+ public:
+  explicit ViewPoints(const DenseView& view)
+      : view_(view),
+        rotation_(view.rig_from_camera.rotation.cast<float>()),
+        translation_(view.rig_from_camera.translation.cast<float>()) {}
+
+  [[nodiscard]] Eigen::Vector3f at(int x, int y) const {
+    const float depth = view_.map.depth_mm[index(x, y)];
+    const Eigen::Vector2f ray = view_.rays->at(x, y);
+    return rotation_ * Eigen::Vector3f(ray.x() * depth, ray.y() * depth, depth) + translation_;
+  }
+  /// The unit normal towards the camera, from the neighbours on the same surface; the ray, reversed, where there are
+  /// none.
+  [[nodiscard]] Eigen::Vector3f normal(int x, int y) const {
+    const Eigen::Vector3f here = at(x, y), to_camera = translation_ - here;
+    const Eigen::Vector3f along = slope(x, y, 1, 0), down = slope(x, y, 0, 1);
+    Eigen::Vector3f normal = along.cross(down);
+    if (!(normal.squaredNorm() > 0)) return to_camera.normalized();
+    normal.normalize();
+    return normal.dot(to_camera) < 0 ? Eigen::Vector3f(-normal) : normal;
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(int x, int y) const { return static_cast<std::size_t>(y) * view_.map.width + x; }
+  [[nodiscard]] bool joined(int x, int y, int to_x, int to_y) const {
+    if (to_x < 0 || to_y < 0 || to_x >= view_.map.width || to_y >= view_.map.height) return false;
+    const float depth = view_.map.depth_mm[index(x, y)], other = view_.map.depth_mm[index(to_x, to_y)];
+    return std::abs(other - depth) < kJump * depth;
+  }
+  [[nodiscard]] Eigen::Vector3f slope(int x, int y, int dx, int dy) const {
+    const bool before = joined(x, y, x - dx, y - dy), behind = joined(x, y, x + dx, y + dy);
+    const Eigen::Vector3f from = before ? at(x - dx, y - dy) : at(x, y), to = behind ? at(x + dx, y + dy) : at(x, y);
+    return to - from;
+  }
+
+  const DenseView& view_;
+  Eigen::Matrix3f rotation_;
+  Eigen::Vector3f translation_;
+};
+
+void put(char*& to, const Eigen::Vector3f& vector) {
+  std::memcpy(to, vector.data(), 12);
+  to += 12;
+}
+
+void put_point(char*& to, const DenseView& view, const ViewPoints& points, int x, int y, bool normals) {
+  const std::size_t pixel = static_cast<std::size_t>(y) * view.map.width + x;
+  put(to, points.at(x, y));
+  std::memcpy(to, &view.map.sigma_mm[pixel], 4);
+  to[4] = static_cast<char>(view.map.intensity[pixel]);
+  to[5] = static_cast<char>(view.camera);
+  to += 6;
+  if (normals) put(to, points.normal(x, y));
+}
+
+std::size_t bytes_of_point(bool normals) {
+  return kPointBytes + (normals ? kNormalBytes : 0);
+}
+
+}  // namespace
+
+std::size_t DenseCloud::points() const {
+  std::size_t count = 0;
+  for (const DenseView& view : views) count += view.map.count(DensePixel::kMeasured);
+  return count;
+}
+
+std::size_t DenseCloud::bytes() const {
+  std::size_t bytes = 0;
+  for (const DenseView& view : views) bytes += view.map.pixels.size() * (2 * sizeof(float) + 2);
+  return bytes;
+}
+
+std::size_t shade_view(DenseView& view, const SceneLight& light) {
+  std::size_t saturated = 0;
+  const auto level = [](const GreyView& frame, int x, int y) {
+    return std::visit([&](const auto& pixels) { return static_cast<double>(pixels.at(x, y)); }, frame);
+  };
+  for (int y = 0; y < view.map.height; ++y) {
+    for (int x = 0; x < view.map.width; ++x) {
+      const std::size_t pixel = static_cast<std::size_t>(y) * view.map.width + x;
+      if (!view.map.measured(pixel)) continue;
+      const double dark = light.dark ? level(*light.dark, x, y) : 0;
+      const double white = light.white ? level(*light.white, x, y) : view.map.intensity[pixel] / 255.0 * light.full;
+      const bool clipped = light.white && white >= kSaturated * light.full;
+      saturated += clipped;
+      const double share = clipped ? 1 : (white - dark) / light.full;
+      view.map.intensity[pixel] = static_cast<std::uint8_t>(std::lround(std::clamp(255 * share, 0.0, 255.0)));
+    }
+  }
+  return saturated;
+}
+
+std::string write_dense_ply(const DenseCloud& cloud, bool normals) {
+  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment scan_id " + header_text(cloud.scan_id) +
+                      "\ncomment time " + header_text(cloud.time) + "\ncomment frame " + std::to_string(cloud.frame) +
+                      "\ncomment units mm\ncomment coordinate_frame rig: the first camera's, x right, y down, z "
+                      "forward\ncomment cameras " +
+                      std::to_string(cloud.views.size()) + "\nelement vertex " + std::to_string(cloud.points()) +
+                      "\nproperty float x\nproperty float y\nproperty float z\nproperty float sigma_mm\nproperty uchar "
+                      "intensity\nproperty uchar camera\n";
+  if (normals) bytes += "property float nx\nproperty float ny\nproperty float nz\n";
+  bytes += "end_header\n";
+  const std::size_t begin = bytes.size();
+  bytes.resize(begin + cloud.points() * bytes_of_point(normals));
+  char* to = bytes.data() + begin;
+  for (const DenseView& view : cloud.views) {
+    const ViewPoints points(view);
+    for (int y = 0; y < view.map.height; ++y) {
+      for (int x = 0; x < view.map.width; ++x) {
+        if (view.map.measured(static_cast<std::size_t>(y) * view.map.width + x))
+          put_point(to, view, points, x, y, normals);
+      }
+    }
+  }
+  return bytes;
+}
+
+std::string write_dense_pcd(const DenseCloud& cloud, bool normals) {
+  int width = 0, height = 0;
+  for (const DenseView& view : cloud.views) width = std::max(width, view.map.width), height += view.map.height;
+  const std::string size = std::to_string(width), rows = std::to_string(height),
+                    count = std::to_string(static_cast<std::size_t>(width) * height);
+  std::string bytes =
+      "# .PCD v0.7 - Point Cloud Data file format\n# scan_id " + header_text(cloud.scan_id) + "\n# time " +
+      header_text(cloud.time) + "\n# frame " + std::to_string(cloud.frame) +
+      "\n# units mm\n# coordinate_frame rig: the first camera's, x right, y down, z forward\nVERSION 0.7\n";
+  bytes += normals ? "FIELDS x y z sigma_mm intensity camera normal_x normal_y normal_z\nSIZE 4 4 4 4 1 1 4 4 4\n"
+                     "TYPE F F F F U U F F F\nCOUNT 1 1 1 1 1 1 1 1 1\n"
+                   : "FIELDS x y z sigma_mm intensity camera\nSIZE 4 4 4 4 1 1\nTYPE F F F F U U\nCOUNT 1 1 1 1 1 1\n";
+  bytes += "WIDTH " + size + "\nHEIGHT " + rows + "\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + count + "\nDATA binary\n";
+  const std::size_t begin = bytes.size();
+  bytes.resize(begin + static_cast<std::size_t>(width) * height * bytes_of_point(normals));
+  char* to = bytes.data() + begin;
+  const Eigen::Vector3f none = Eigen::Vector3f::Constant(kNone);
+  for (const DenseView& view : cloud.views) {
+    const ViewPoints points(view);
+    for (int y = 0; y < view.map.height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        if (x < view.map.width && view.map.measured(static_cast<std::size_t>(y) * view.map.width + x)) {
+          put_point(to, view, points, x, y, normals);
+          continue;
+        }
+        put(to, none);
+        std::memcpy(to, none.data(), 4);
+        to[4] = 0, to[5] = static_cast<char>(view.camera);
+        to += 6;
+        if (normals) put(to, none);
+      }
+    }
+  }
+  return bytes;
+}
+
+namespace {
+
+/// A baseline TIFF of pages of floats: TIFF 6.0, sections 2 and 19.
+class FloatPages {
+ public:
+  void add(const std::vector<float>& pixels, int width, int height, const std::string& description) {
+    const std::size_t data = bytes_.size();
+    bytes_.append(reinterpret_cast<const char*>(pixels.data()), pixels.size() * sizeof(float));
+    const std::size_t text = bytes_.size();
+    bytes_ += description + std::string(2 - description.size() % 2, '\0');  // ends in a zero, and on a word
+    const auto at = static_cast<std::uint32_t>(bytes_.size());
+    std::memcpy(bytes_.data() + link_, &at, 4);
+    constexpr std::uint16_t kShort = 3, kLong = 4, kAscii = 2;
+    word(11);
+    entry(256, kLong, 1, static_cast<std::uint32_t>(width));
+    entry(257, kLong, 1, static_cast<std::uint32_t>(height));
+    entry(258, kShort, 1, 32);  // bits
+    entry(259, kShort, 1, 1);   // not compressed
+    entry(262, kShort, 1, 1);   // black is zero
+    entry(270, kAscii, static_cast<std::uint32_t>(description.size() + 1), static_cast<std::uint32_t>(text));
+    entry(273, kLong, 1, static_cast<std::uint32_t>(data));
+    entry(277, kShort, 1, 1);
+    entry(278, kLong, 1, static_cast<std::uint32_t>(height));
+    entry(279, kLong, 1, static_cast<std::uint32_t>(pixels.size() * sizeof(float)));
+    entry(339, kShort, 1, 3);  // IEEE floats
+    link_ = bytes_.size();
+    number(0);
+  }
+  [[nodiscard]] std::string take() { return std::move(bytes_); }
+
+ private:
+  void word(std::uint16_t value) { bytes_.append(reinterpret_cast<const char*>(&value), sizeof value); }
+  void number(std::uint32_t value) { bytes_.append(reinterpret_cast<const char*>(&value), sizeof value); }
+  void entry(std::uint16_t tag, std::uint16_t type, std::uint32_t count, std::uint32_t value) {
+    word(tag), word(type), number(count), number(value);
+  }
+
+  std::string bytes_ = std::string("II*\0\0\0\0\0", 8);
+  std::size_t link_ = 4;  // where the offset of the next page goes
+};
+
+}  // namespace
+
+std::string write_dense_tiff(const DenseCloud& cloud) {
+  FloatPages pages;
+  for (const DenseView& view : cloud.views) {
+    const std::string of = "scan " + header_text(cloud.scan_id) + ", " + header_text(cloud.time) + ", frame " +
+                           std::to_string(cloud.frame) + ", camera " + header_text(view.camera_name) + ": ";
+    pages.add(view.map.depth_mm, view.map.width, view.map.height, of + "Z in mm, in the frame of this camera");
+    pages.add(view.map.sigma_mm, view.map.width, view.map.height, of + "sigma_mm");
+  }
+  return pages.take();
+}
+
+}  // namespace slsd
