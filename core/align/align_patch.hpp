@@ -56,8 +56,8 @@ struct PatchWindow {
 
 struct AlignOptions {
   float across_sigma_px = 0.15F;  ///< how far off the epipolar lines the pattern may lie; 0: not at all
-  /// How much of the gain it may change by for one camera px; 0: by any. Small windows need it: a light that fades within
-  /// them can stand for many a displacement.
+  /// How much of the gain it may change by for one camera px; 0: by any. Small windows need it: a light that fades
+  /// within them can stand for many a displacement.
   float gain_slope_sigma = 0;
   int steps = 4;
   /// What the model leaves out where it fits, as a share of the gain.

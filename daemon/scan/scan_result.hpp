@@ -89,7 +89,7 @@ struct ScanResult {
   Cloud cloud;
   std::shared_ptr<const DenseCloud> dense = {};  ///< a point for each pixel, where it was asked for; shared: as large
                                                  ///< as the frames
-  CloudFiles files = {};  ///< the cloud's, in the formats that were asked for
+  CloudFiles files = {};                         ///< the cloud's, in the formats that were asked for
   LostTries lost = {};
   std::vector<CloudPoint> strays;          ///< symbols that a knocked rig has elsewhere: see stray_symbols()
   RegionCounts regions{};                  ///< of all cameras, by status
