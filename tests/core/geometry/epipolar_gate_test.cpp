@@ -52,6 +52,15 @@ RC_GTEST_PROP(EpipolarGate, ResidualIsThatOfTriangulateToAFewPercent, ()) {
   RC_ASSERT(std::abs(quick - exact) < 0.05 * exact + 1e-9);
 }
 
+RC_GTEST_PROP(EpipolarGate, MeasuresAResidualWithoutASegmentToo, ()) {
+  const Calibration rig = paper_rig();
+  const EpipolarGate gate(rig.cameras[0], rig.projector, kMinMm, kMaxMm);
+  const Eigen::Vector2d seen = rig.cameras[0].lens.undistort(any_pixel(rig.cameras[0].lens)),
+                        lit = rig.projector.undistort(any_pixel(rig.projector));
+  const double by_segment = gate.prepare(seen).residual_px(lit);
+  RC_ASSERT(std::abs(gate.residual_px(seen, lit) - by_segment) < 1e-9 * std::abs(by_segment) + 1e-9);
+}
+
 TEST(EpipolarGate, CutsWhatLiesBehindTheProjector) {
   Calibration rig = paper_rig();
   rig.cameras[0].projector_from_camera = {Eigen::Matrix3d::Identity(), {-180, 0, -1000}};
