@@ -129,15 +129,15 @@ void draw_scale_bar(Canvas& canvas, const CloudPictureSize& size, const View& vi
               kInk, Align::kCentre);
 }
 
-void draw_title(Canvas& canvas, const Cloud& cloud, double text_px) {
-  canvas.text({2.5 * text_px, 3.6 * text_px}, std::to_string(cloud.points.size()) + " points", 1.7 * text_px, kInk);
+void draw_title(Canvas& canvas, const Cloud& cloud, std::size_t points, double text_px) {
+  canvas.text({2.5 * text_px, 3.6 * text_px}, std::to_string(points) + " points", 1.7 * text_px, kInk);
   const std::string scan = cloud.scan_id.empty() ? std::string() : "scan " + cloud.scan_id;
   canvas.text({2.5 * text_px, 5.8 * text_px}, scan + (scan.empty() ? "" : "   ") + cloud.time, text_px, kSoftInk);
 }
 
 }  // namespace
 
-ColourImage render_cloud(const Cloud& whole, CloudPictureSize size) {
+ColourImage render_cloud(const Cloud& whole, CloudPictureSize size, std::optional<std::size_t> measured) {
   const Cloud cloud = drawable(whole);
   const double text_px = std::max(6.0, size.height_px / 85.0);
   const View::Frame frame{9.5 * text_px, 7.5 * text_px, size.width_px - 21.5 * text_px, size.height_px - 15 * text_px};
@@ -152,7 +152,7 @@ ColourImage render_cloud(const Cloud& whole, CloudPictureSize size) {
   draw_axes(canvas, view, box, text_px);
   draw_colour_bar(canvas, size, depths, text_px);
   draw_scale_bar(canvas, size, view, text_px);
-  draw_title(canvas, cloud, text_px);
+  draw_title(canvas, cloud, measured.value_or(cloud.points.size()), text_px);
   return picture;
 }
 

@@ -2,6 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstddef>
+#include <optional>
+
 #include "core/cloud/cloud.hpp"
 #include "core/image.hpp"
 
@@ -14,8 +17,10 @@ struct CloudPictureSize {
 
 /// Draws a cloud for people: seen from beside and above the scanner, neighbours of the lattice joined where depth runs
 /// on, shaded, coloured by depth; axes in millimetres (rig frame), a scale bar and a colour bar.
-/// @return  a picture with its axes alone where the cloud is empty
-/// @thread  reentrant
-[[nodiscard]] ColourImage render_cloud(const Cloud& cloud, CloudPictureSize size = {});
+/// @param measured  points that the title names; those of the cloud, unless it is a part of a larger one
+/// @return          a picture with its axes alone where the cloud is empty
+/// @thread          reentrant
+[[nodiscard]] ColourImage render_cloud(const Cloud& cloud, CloudPictureSize size = {},
+                                       std::optional<std::size_t> measured = {});
 
 }  // namespace slsd

@@ -86,9 +86,9 @@ std::string dense_ply_of(const json& result, std::string_view pcd, bool normals)
   return ply + "end_header\n" + points;
 }
 
-tl::expected<void, Failure> write_cloud_picture(const path& file, const Result<Cloud>& cloud) {
+tl::expected<void, Failure> write_cloud_picture(const path& file, const Result<Cloud>& cloud, std::size_t measured) {
   if (!cloud) return tl::unexpected(failure(cloud.error()));
-  const auto png = encode_png(render_cloud(*cloud));
+  const auto png = encode_png(render_cloud(*cloud, {}, measured));
   if (!png) return tl::unexpected(failure(png.error()));
   return write(file, *png);
 }
@@ -115,8 +115,10 @@ tl::expected<void, Failure> write_files(const ClientOptions& options, const Answ
     written = write(options.output, make_ply ? dense_ply_of(result, bytes, options.normals) : bytes);
   }
   if (written && !options.cloud_picture.empty()) {
-    written = write_cloud_picture(options.cloud_picture, dense ? lattice_of_pixels(result, bytes, options.normals)
-                                                               : read_ply(bytes, "the daemon's cloud"));
+    written = write_cloud_picture(
+        options.cloud_picture,
+        dense ? lattice_of_pixels(result, bytes, options.normals) : read_ply(bytes, "the daemon's cloud"),
+        result.value("points", std::size_t{0}));
   }
   for (const Received& event : answered.events) {
     const bool picture = event.message.value("method", "") == "picture";

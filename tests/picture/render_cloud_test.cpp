@@ -55,6 +55,12 @@ TEST(RenderCloud, DrawsTheRoomOfAnEmptyCloud) {
   EXPECT_EQ(coloured(picture), 0);
 }
 
+TEST(RenderCloud, NamesThePointsThatWereMeasured) {
+  const Cloud cloud = lattice_cloud(6, 5, [](int, int) { return 1000; });
+  EXPECT_EQ(render_cloud(cloud, kSmall, 30), render_cloud(cloud, kSmall));
+  EXPECT_FALSE(render_cloud(cloud, kSmall, 1739383) == render_cloud(cloud, kSmall));
+}
+
 TEST(RenderCloud, LeavesOutWhatIsNotFinite) {
   Cloud cloud = lattice_cloud(40, 30, [](int, int) { return 1000; });
   const ColourImage clean = render_cloud(cloud, kSmall);
