@@ -29,7 +29,7 @@ class Lattice {
     }
     std::ranges::sort(cells_);
     std::ranges::sort(quads_);
-    quads_.erase(std::ranges::unique(quads_).begin(), quads_.end());
+    quads_.erase(std::unique(quads_.begin(), quads_.end()), quads_.end());  // clang 14 cannot read its ranges form
   }
 
   // Visits each square of four neighbouring cells that holds a point, camera by camera, row by row.
