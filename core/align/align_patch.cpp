@@ -114,7 +114,7 @@ inline __attribute__((always_inline)) void sum_patch(const Pass& pass, Sums& sum
       const Lanes far_u = off_u > zero ? off_u : -off_u, far_v = off_v > zero ? off_v : -off_v;
       Lanes inside = pass.half - (far_u > far_v ? far_u : far_v);
       inside = inside < one ? inside : one;
-      const Lanes counted = (inside > zero) & (i >= zero) ? inside : zero;
+      const Lanes counted = ((inside > zero) & (i >= zero)) ? inside : zero;
       i -= pass.level;
       // The nearest sample.
       constexpr float kScale = PatternField::kSamplesPerPx;

@@ -6,9 +6,11 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
-#include <iterator>
+#include <string>
+#include <system_error>
 #include <thread>
 #include <variant>
+#include <vector>
 
 #include <gmock/gmock.h>
 
@@ -232,15 +234,23 @@ TEST_F(AravisCameraTest, AllocatesNothingPerFrame) {
   EXPECT_EQ(test::allocations(), before);
 }
 
-std::ptrdiff_t open_descriptors() {
-  const std::filesystem::directory_iterator descriptors("/proc/self/fd");
-  return std::distance(begin(descriptors), end(descriptors));
+/// Without pipes: Aravis opens none, and a sanitizer's lead to what names functions for it.
+std::vector<std::string> open_descriptors() {
+  std::vector<std::string> open;
+  for (const auto& descriptor : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code gone;  // the iterator's own
+    const std::string target = std::filesystem::read_symlink(descriptor, gone).string();
+    // Of a socket or an event descriptor the kind alone: each opening makes new ones.
+    if (!target.starts_with("pipe:")) open.push_back(target.substr(0, target.find(":[")));
+  }
+  std::ranges::sort(open);
+  return open;
 }
 
 TEST_F(AravisCameraTest, LeavesNoDescriptorBehind) {
   AravisCamera camera(options_for(device_));
   ASSERT_TRUE(opens(camera));
-  const std::ptrdiff_t before = open_descriptors();
+  const std::vector<std::string> before = open_descriptors();
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(opens(camera));
   EXPECT_EQ(open_descriptors(), before);
   EXPECT_EQ(device_.times_taken(), 11);
