@@ -2,9 +2,91 @@
 // Copyright the slsd authors
 #include "core/decode/correspond.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace slsd {
+namespace {
+
+/// What became of the nodes along a node's row and column.
+class Surroundings {
+ public:
+  Surroundings(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims)
+      : nodes_(nodes), claims_(claims) {}
+
+  [[nodiscard]] bool leave_alone(std::int32_t node) const {
+    return is_lone(node, kRight) || is_lone(node, kDown) ||
+           std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp},
+                               [&](Direction d) { return is_lone_at_rim(node, d); });
+  }
+
+ private:
+  static constexpr int kReach = 3;
+
+  [[nodiscard]] bool stands(std::int32_t node, std::int32_t other) const {
+    return other >= 0 && claims_[other].status == RegionStatus::kDecoded &&
+           claims_[other].island == claims_[node].island;
+  }
+  [[nodiscard]] std::int32_t beside(std::int32_t node, Direction d) const { return neighbour(nodes_, node, d); }
+
+  /// Whether a node's cell lies beside another's as the nodes do.
+  [[nodiscard]] bool fits(std::int32_t node, std::int32_t other, Direction d) const {
+    const Eigen::Vector2f to = step(d);
+    return claims_[other].same_cell(claims_[node].row + static_cast<int>(to.y()),
+                                    claims_[node].column + static_cast<int>(to.x()));
+  }
+
+  /// Whether the island goes on there, refused or not, or no node is there that could be of another surface. What was
+  /// refused by its surroundings could.
+  [[nodiscard]] bool continues(std::int32_t node, Direction d) const {
+    const std::int32_t other = beside(node, d);
+    return other < 0 || (claims_[other].status != RegionStatus::kNeighboursDisagree && fits(node, other, d));
+  }
+
+  [[nodiscard]] bool is_lone(std::int32_t node, Direction forth) const {
+    int standing = 0, refused = 0, next_refused = 0;
+    for (const Direction d : {forth, opposite(forth)}) {
+      std::int32_t other = beside(node, d);
+      next_refused += other >= 0 && !stands(node, other);
+      for (int i = 0; i < kReach && other >= 0; ++i, other = beside(other, d))
+        ++(stands(node, other) ? standing : refused);
+    }
+    const auto aside = static_cast<Direction>((forth + 1) % 4);
+    const bool inside = continues(node, aside) && continues(node, opposite(aside));
+    return inside ? refused == 2 * kReach : refused > standing || next_refused == 2;
+  }
+
+  /// The same, seen from the row within: its links lead on where those of a row that an edge runs through are broken.
+  /// What is damaged counts half: the symbols at a limb are, too.
+  [[nodiscard]] bool is_lone_at_rim(std::int32_t node, Direction outwards) const {
+    const std::int32_t within = beside(node, opposite(outwards));
+    if (!stands(node, within) || stands(node, beside(node, outwards))) return false;
+    int standing = 0, refused = 0;
+    for (const int turn : {1, 3}) {
+      const auto along = static_cast<Direction>((outwards + turn) % 4);
+      std::int32_t before = within;
+      for (int i = 0; i < kReach; ++i) {
+        const std::int32_t at = beside(before, along);
+        if (at < 0 || !fits(before, at, along)) break;
+        before = at;
+        const std::int32_t other = nodes_[at].links[outwards];
+        if (other < 0) continue;
+        if (stands(node, other) && !nodes_[at].broken[outwards]) {
+          standing += 2;
+        } else {
+          refused += claims_[other].status == RegionStatus::kDamagedShape ? 1 : 2;
+        }
+      }
+    }
+    return refused > standing;
+  }
+
+  const std::vector<GridNode>& nodes_;
+  const std::vector<CellClaim>& claims_;
+};
+
+}  // namespace
 
 void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellClaim>& claims) {
   holder_.assign(static_cast<std::size_t>(cells.rows()) * cells.columns(), -1);
@@ -26,36 +108,10 @@ void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellCl
 }
 
 void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, std::vector<CellClaim>& claims) {
-  constexpr int kReach = 3;
-  const auto stands = [&](std::int32_t node, std::int32_t other) {
-    return other >= 0 && claims[other].status == RegionStatus::kDecoded && claims[other].island == claims[node].island;
-  };
-  // Whether the island goes on there, refused or not, or no node is there that could be of another surface. What was
-  // refused by its surroundings could.
-  const auto continues = [&](std::int32_t node, Direction d) {
-    const std::int32_t other = neighbour(nodes, node, d);
-    const Eigen::Vector2f to = step(d);
-    return other < 0 || (claims[other].status != RegionStatus::kNeighboursDisagree &&
-                         claims[other].same_cell(claims[node].row + static_cast<int>(to.y()),
-                                                 claims[node].column + static_cast<int>(to.x())));
-  };
-  const auto is_lone = [&](std::int32_t node, Direction forth) {
-    int standing = 0, refused = 0, next_refused = 0;
-    for (const Direction d : {forth, opposite(forth)}) {
-      std::int32_t other = neighbour(nodes, node, d);
-      next_refused += other >= 0 && !stands(node, other);
-      for (int i = 0; i < kReach && other >= 0; ++i, other = neighbour(nodes, other, d))
-        ++(stands(node, other) ? standing : refused);
-    }
-    const auto aside = static_cast<Direction>((forth + 1) % 4);
-    const bool inside = continues(node, aside) && continues(node, opposite(aside));
-    return inside ? refused == 2 * kReach : refused > standing || next_refused == 2;
-  };
   lone_.clear();
-  for (std::int32_t node = 0; node < static_cast<std::int32_t>(nodes.size()); ++node) {
-    if (claims[node].status != RegionStatus::kDecoded) continue;
-    if (is_lone(node, kRight) || is_lone(node, kDown)) lone_.push_back(node);
-  }
+  const Surroundings around(nodes, claims);
+  for (std::int32_t node = 0; node < static_cast<std::int32_t>(nodes.size()); ++node)
+    if (claims[node].status == RegionStatus::kDecoded && around.leave_alone(node)) lone_.push_back(node);
   for (const std::int32_t node : lone_) claims[node].status = RegionStatus::kNeighboursDisagree;
 }
 

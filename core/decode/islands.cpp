@@ -9,9 +9,6 @@
 namespace slsd {
 namespace {
 
-/// A shape speaks against a cell where it is so much likelier to be chance; a damaged one says nothing.
-constexpr float kSpeaksAgainst = -1.5F;
-
 Direction across(Direction d, int side) {
   return static_cast<Direction>((d + (side == 0 ? 1 : 3)) % 4);
 }
@@ -286,108 +283,6 @@ void IslandJudge::refuse_doubles(const Frame& frame) {
   }
 }
 
-/// Nodes that too little holds, in so many rounds as a row of symbols is long that chance could not add.
-void IslandJudge::cut_back(const Frame& frame) {
-  const int rounds = static_cast<int>(std::ceil(-std::log(options_.wrong_cells_max) / log_letters_ / 1.5));
-  constexpr int kHeldBy = 2;
-  held_.resize(frame.nodes.size());
-  queue_.clear();
-  for (const std::int32_t node : members_) {
-    held_[node] = 4;
-    if (links_[node] != kAllAgree) {
-      held_[node] = 0;
-      for (const Direction d : kAllDirections) {
-        const Link link = links_[node][d];
-        if (link == Link::kAgrees) ++held_[node];
-        if (link == Link::kAgainst && !runs_along_edge(frame, node, d)) --held_[node];
-      }
-    }
-    if (cut_[node] != 0) queue_.push_back(node);
-  }
-  // A node that is cut holds its neighbours no longer.
-  const auto let_go = [&](std::int32_t node) {
-    for (const Direction d : kAllDirections) {
-      const std::int32_t other = frame.beside[node][d];
-      if (other < 0 || island_of_[other] < 0 || frame.beside[other][opposite(d)] != node) continue;
-      held_[other] = static_cast<std::int8_t>(held_[other] - (links_[other][opposite(d)] == Link::kAgrees));
-    }
-  };
-  for (int round = 0; round < rounds; ++round) {
-    for (const std::int32_t node : queue_) let_go(node);
-    queue_.clear();
-    for (const std::int32_t node : members_)
-      if (held_[node] < kHeldBy && cut_[node] == 0) queue_.push_back(node);
-    if (queue_.empty()) return;
-    for (const std::int32_t node : queue_) cut_[node] = 1;
-  }
-}
-
-/// Keeps for every node the evidence of the line of nodes through it, as far as it agrees and so far around it, where
-/// something contradicts it.
-void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth) {
-  constexpr int kReach = 10, kBeyond = 3;
-  constexpr float kUsualShare = 0.5F;
-  const Direction back = opposite(forth);
-  const auto leads = [&](std::int32_t node, Direction d) {
-    return continues(frame, node, d) && frame.beside[frame.beside[node][d]][opposite(d)] == node;
-  };
-  struct End {
-    bool contradicts;
-    float doubtful;
-  };
-  const auto look_beyond = [&](std::int32_t node, Direction d) {
-    const Link link = links_[node][d];
-    return End{link == Link::kAgainst && !runs_along_edge(frame, node, d),
-               link == Link::kNeutral ? count_doubtful(frame, node, d, kBeyond) : 0};
-  };
-  for (const std::int32_t first : members_) {
-    if (leads(first, back)) continue;
-    // A misread symbol of the island is weighed with the others; what is none of it ends the line.
-    line_.assign(1, first);
-    line_ratios_.assign({0, own_ratio(first)});
-    while (leads(line_.back(), forth)) {
-      line_.push_back(frame.beside[line_.back()][forth]);
-      line_ratios_.push_back(line_ratios_.back() + own_ratio(line_.back()));
-    }
-    const End begin = look_beyond(first, back), end = look_beyond(line_.back(), forth);
-    const int count = static_cast<int>(line_.size());
-    for (int i = 0; i < count; ++i) {
-      const int from = std::max(i - kReach, 0), to = std::min(i + kReach, count - 1);
-      const bool begins = i - kReach<0, ends = i + kReach> count - 1;
-      const auto evidence = static_cast<float>(line_ratios_[to + 1] - line_ratios_[from]);
-      const float length =
-          static_cast<float>(to - from + 1) + (begins ? begin.doubtful : 0) + (ends ? end.doubtful : 0);
-      const bool contradicted = own_ratio(line_[i]) < kSpeaksAgainst || (begins && begin.contradicts) ||
-                                (ends && end.contradicts) || evidence < kUsualShare * log_letters_ * length;
-      if (contradicted) lines_.emplace_back(line_[i], evidence);
-    }
-  }
-}
-
-/// How many nodes on from the end of a line, of so many, may be its own and say nothing for it.
-float IslandJudge::count_doubtful(const Frame& frame, std::int32_t node, Direction d, int most) const {
-  const Beyond first(frame.claims[node], d);
-  const int down = first.row - frame.claims[node].row, right = first.column - frame.claims[node].column;
-  int row = first.row, column = first.column, count = 0;
-  for (std::int32_t at = frame.beside[node][d]; at >= 0 && count < most; at = frame.beside[at][d]) {
-    if (!shown(row, column) || ratio(frame, at, row, column) < kSpeaksAgainst) break;
-    row += down, column += right, ++count;
-  }
-  return static_cast<float>(count);
-}
-
-void IslandJudge::cut_contradicted_lines(const Frame& frame) {
-  lines_.clear();
-  std::size_t rim = 1;  // links across which chance could have led on
-  for (const std::int32_t node : members_)
-    if (any_against(links_[node])) rim += static_cast<std::size_t>(std::ranges::count(links_[node], Link::kAgainst));
-  find_contradicted_lines(frame, kRight);
-  find_contradicted_lines(frame, kDown);
-  const double evidence_min = std::log(static_cast<double>(rim) / options_.wrong_cells_max);
-  for (const auto& [node, evidence] : lines_)
-    if (evidence < evidence_min) cut_[node] = 1;
-}
-
 /// Without those that were no islands: what is left of a contradiction is an edge, or stands alone.
 void IslandJudge::drop_rejected(const Frame& frame) {
   queue_.clear();
@@ -450,10 +345,7 @@ void IslandJudge::judge(const std::vector<GridNode>& nodes, const std::vector<Be
   };
   take_over();
   drop_rejected(frame);
-  cut_.assign(nodes.size(), 0);
-  cut_contradicted_lines(frame);
-  cut_back(frame);
-  cut_pieces(frame);
+  cut_rims(frame);
   part_islands(frame);
   refuse_doubles(frame);
   take_over();

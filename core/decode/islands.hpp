@@ -60,6 +60,8 @@ class IslandJudge {
   /// What a link says of the cell of the node that it leads from.
   enum class Link : std::uint8_t { kNone, kAgrees, kNeutral, kAgainst };
   using Links = std::array<Link, 4>;
+  /// A shape speaks against a cell where it is so much likelier to be chance; a damaged one says nothing.
+  static constexpr float kSpeaksAgainst = -1.5F;
   static constexpr Links kAllAgree{Link::kAgrees, Link::kAgrees, Link::kAgrees, Link::kAgrees};
   [[nodiscard]] static bool any_against(const Links& links);
   struct Island {
@@ -74,9 +76,15 @@ class IslandJudge {
       return r >= row && r < row + rows && c >= column && c < column + columns;
     }
   };
+  /// The line of nodes through one of them: its evidence, and from where to where all agree with what evidence.
+  struct Line {
+    std::int32_t node, first, last;
+    float evidence, agreeing;
+  };
   struct Side {
-    int held_by = 0;  // links of the island's
-    float bend = 0;   // their sum
+    int held_by = 0;   // links of the island's
+    float bend = 0;    // their sum
+    float beyond = 0;  // what doubtful shapes there say for being the island's
     bool contradicted = false, broken = false;
   };
 
@@ -115,11 +123,18 @@ class IslandJudge {
   void weigh(const Frame& frame, Island& island) const;
   [[nodiscard]] double cost_of_rim(const Frame& frame, const Island& island) const;
   void refuse_doubles(const Frame& frame);
+  void cut_rims(const Frame& frame);
   void cut_back(const Frame& frame);
   void cut_pieces(const Frame& frame);
+  void cut_notches(const Frame& frame, std::int32_t island);
+  void cut_steps(const Frame& frame);
   void cut_pieces_through(const Frame& frame, std::int32_t node, float evidence_min);
   void cut_piece(const Frame& frame, const Piece& piece, float missing);
   [[nodiscard]] bool may_be_apart(const Frame& frame, const Piece& piece) const;
+  [[nodiscard]] static bool is_well_seen(const Frame& frame, std::int32_t node) {
+    constexpr float kWellSeen = 3;  // standard deviations
+    return frame.shapes[node].letter >= 0 && frame.shapes[node].distance < kWellSeen;
+  }
   [[nodiscard]] bool is_of_another(const Frame& frame, std::int32_t node, Direction d) const;
   [[nodiscard]] Side side_of(const Frame& frame, const Piece& piece, Direction d) const;
   [[nodiscard]] float bend_of(const Frame& frame, std::int32_t node, Direction d) const;
@@ -129,8 +144,17 @@ class IslandJudge {
   [[nodiscard]] std::size_t index_of(int row, int column) const {
     return static_cast<std::size_t>(row) * options_.columns + column;
   }
+  void look_at_cells(const Frame& frame, std::int32_t island);
+  [[nodiscard]] std::int32_t& holder_of(const Frame& frame, std::int32_t node) {
+    return holder_[index_of(frame.claims[node].row, frame.claims[node].column)];
+  }
+  /// Whether the island that is looked at has a node there.
+  [[nodiscard]] bool is_left(int row, int column) const {
+    return shown(row, column) && holder_[index_of(row, column)] >= 0;
+  }
   void cut_contradicted_lines(const Frame& frame);
   void find_contradicted_lines(const Frame& frame, Direction forth);
+  [[nodiscard]] bool fits_between(const Frame& frame, const Line& line, float evidence_min);
   [[nodiscard]] float count_doubtful(const Frame& frame, std::int32_t node, Direction direction, int most) const;
 
   CodeArray array_;
@@ -149,11 +173,13 @@ class IslandJudge {
   std::vector<Links> links_;
   std::vector<CellClaim> adopted_;
   std::vector<std::uint8_t> cut_;
-  std::vector<std::int8_t> held_;                      // by so many links more than contradict
-  std::vector<std::int32_t> line_;                     // of nodes
-  std::vector<double> line_ratios_;                    // their sums before each of them
-  std::vector<std::pair<std::int32_t, float>> lines_;  // contradicted ones: through which node, with what evidence
-  std::vector<std::int32_t> holder_;
+  std::vector<std::int8_t> held_;    // by so many links more than contradict
+  std::vector<std::int32_t> line_;   // of nodes
+  std::vector<double> line_ratios_;  // their sums before each of them
+  std::vector<Line> lines_;          // contradicted ones
+  float weight_across_columns_ = 0, weight_across_rows_ = 0;
+  std::vector<std::int32_t> holder_;  // of each cell: of the island that is looked at, or of all
+  std::int32_t looked_at_ = -1;
 };
 
 }  // namespace slsd

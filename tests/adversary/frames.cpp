@@ -293,10 +293,11 @@ void FrameMaker::add_second_projector(Kind kind, Random& random, Frame& frame) c
     for (int x = 0; x < options.projector_width_px; ++x)
       if (x < left || y < top) second.image.at(x, y) = 0;
   }
-  const double angle = whole(random, 0, 1) == 0 ? 0 : uniform(random, -0.15, 0.15), scale = uniform(random, 0.85, 1.15);
+  const auto angle = static_cast<float>(whole(random, 0, 1) == 0 ? 0 : uniform(random, -0.15, 0.15)),
+             scale = static_cast<float>(uniform(random, 0.85, 1.15));
   Eigen::Matrix3f pose = Eigen::Matrix3f::Identity();
   pose.topLeftCorner<2, 2>() << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
-  pose.topLeftCorner<2, 2>() *= static_cast<float>(scale);
+  pose.topLeftCorner<2, 2>() *= scale;
   pose(0, 2) = static_cast<float>(uniform(random, -300, 300));
   pose(1, 2) = static_cast<float>(uniform(random, -200, 200));
   for (const Eigen::Matrix3f& seen : frame.lights[0].projector_from_camera)
@@ -358,7 +359,7 @@ void FrameMaker::expose(Random& random, Frame& frame) {
   frame.image = Grey8(kWidth, kHeight);
   for (int y = 0; y < kHeight; ++y) {
     const auto mask = static_cast<std::uint32_t>(kNoiseTable) - 1;
-    std::uint32_t at = random();
+    auto at = static_cast<std::uint32_t>(random());
     for (int x = 0; x < kWidth; ++x, ++at) {
       const float grey = dark + contrast * light(y, x) + sigma * noise_[at & mask];
       frame.image.at(x, y) = static_cast<std::uint8_t>(std::clamp(grey + 0.5F, 0.F, 255.F));
@@ -404,9 +405,18 @@ bool FrameMaker::undecidable(const Frame&, const Light& light, int surface, int 
 }
 
 /// Whether a whole side of what was put in the pattern's place, from edge to edge along its row or its column, happens
-/// to show the letters that the pattern has there: as if it had been put in with a row or a column less.
-bool FrameMaker::is_side_alike(const Shown& shown, int row, int column, const CloudPoint& point) const {
+/// to show the letters that the pattern has there: as if it had been put in with a row or a column less. Edges beyond
+/// the camera's image count for nothing.
+bool FrameMaker::is_side_alike(const Light& light, int surface, int row, int column, const CloudPoint& point) const {
   if (point.row != row || point.column != column) return false;
+  const Shown& shown = light.shown;
+  const Eigen::Matrix3f camera_from_projector = light.projector_from_camera[surface].inverse();
+  const auto seen = [&](int at_row, int at_column) {
+    const Eigen::Vector2f at =
+        through(camera_from_projector, static_cast<float>(pattern_.symbol_centre_u_px(at_column)),
+                static_cast<float>(pattern_.symbol_centre_v_px(at_row)));
+    return at.x() >= 0 && at.y() >= 0 && at.x() < kWidth && at.y() < kHeight;
+  };
   const auto moved_as = [&](int other_row, int other_column) {
     const auto& own = shown.source[shown.index(row, column)];
     const auto& other = shown.source[shown.index(other_row, other_column)];
@@ -416,7 +426,7 @@ bool FrameMaker::is_side_alike(const Shown& shown, int row, int column, const Cl
     for (const int sign : {1, -1}) {
       for (int i = 0;; i += sign) {
         const int at_row = row + i * down, at_column = column + i * right;
-        if (!shown.contains(at_row, at_column) || !moved_as(at_row, at_column)) break;
+        if (!shown.contains(at_row, at_column) || !moved_as(at_row, at_column) || !seen(at_row, at_column)) break;
         if (shown.letters[shown.index(at_row, at_column)] != pattern_.array.at(at_row, at_column)) return false;
       }
     }
@@ -448,7 +458,7 @@ Verdict FrameMaker::judge(const Frame& frame, const std::vector<CloudPoint>& poi
           const auto& source = light.shown.source[light.shown.index(row, column)];
           right = i == 0 && source[0] == point.row && source[1] == point.column;
           undecidable_here |= undecidable(frame, light, id, row, column, point, tolerance_px) ||
-                              is_side_alike(light.shown, row, column, point);
+                              is_side_alike(light, id, row, column, point);
         }
       }
     }

@@ -106,7 +106,7 @@ class FrameMaker {
   [[nodiscard]] Grey8 draw(const Shown& shown, bool mirrored) const;
   void expose(Random& random, Frame& frame);
   [[nodiscard]] Eigen::Matrix3f seen_on_plane(const Eigen::Vector3d& normal, double distance_mm) const;
-  [[nodiscard]] bool is_side_alike(const Shown& shown, int row, int column, const CloudPoint& point) const;
+  [[nodiscard]] bool is_side_alike(const Light& light, int surface, int row, int column, const CloudPoint& point) const;
   [[nodiscard]] bool undecidable(const Frame& frame, const Light& light, int surface, int row, int column,
                                  const CloudPoint& point, double tolerance_px) const;
 

@@ -136,6 +136,22 @@ TEST(RefuseLone, RefusesWhatStandsBetweenRefusedOnesAtARim) {
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(4, column).status, kDecoded);
 }
 
+// An edge that runs through a row breaks its links: what is beside a symbol then shows from the row within alone.
+TEST(RefuseLone, LooksAlongTheRowWithinWhereTheRowIsBroken) {
+  RimSheet sheet;
+  for (int column = 0; column < 9; ++column) {
+    const int node = sheet.grid.node_at(5, column);
+    sheet.grid.nodes[node].broken[kRight] = sheet.grid.nodes[node].broken[kLeft] = true;
+    if (column != 4) sheet.claims[node].status = RegionStatus::kClassDisagrees;
+  }
+  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  EXPECT_EQ(sheet.at(5, 4).status, RegionStatus::kNeighboursDisagree);
+  for (const int column : {1, 2}) sheet.at(5, column).status = kDecoded;
+  sheet.at(5, 5).status = sheet.at(5, 6).status = sheet.at(5, 4).status = kDecoded;
+  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  EXPECT_EQ(sheet.at(5, 4).status, kDecoded);
+}
+
 TEST(RefuseLone, KeepsWhatIsWholeAtARimAndInside) {
   RimSheet sheet;
   for (const int column : {2, 6}) sheet.at(5, column).status = RegionStatus::kDamagedShape;

@@ -92,7 +92,7 @@ TEST_F(Islands, AreNoLargerForNodesThatChanceAddsAtTheirRim) {
     EXPECT_NE(claims[i].status, kDecoded) << row << ", " << column;
   }
   EXPECT_GT(alike, 20);             // so many letters are the pattern's by chance
-  EXPECT_GE(decoded(claims), 185);  // corners that lie beside them may be theirs
+  EXPECT_GE(decoded(claims), 175);  // corners that lie beside them may be theirs
 }
 
 // Two rows at one depth named the row between them, wherever its letters agreed.
@@ -107,7 +107,7 @@ TEST_F(Islands, NameNoRowBetweenThemThatIsAtAnotherDepth) {
       const CellClaim& claim = claims[grid_.node_at(20, column)];
       EXPECT_FALSE(claim.status == kDecoded && claim.same_cell(20, column)) << slid << ": " << column;
     }
-    EXPECT_GT(decoded(claims), 700);
+    EXPECT_GT(decoded(claims), 690);
   }
 }
 
@@ -122,6 +122,47 @@ TEST_F(Islands, LoseNothingAtAStraightEdgeInDepth) {
       EXPECT_TRUE(claims[i].same_cell(row, row < 20 ? column : column + 7));
     }
   }
+}
+
+// No column of so few rows reaches the budget by itself.
+TEST_F(Islands, KeepThinBandsWhoseLettersAllAgree) {
+  std::mt19937 random(3);
+  show_pattern(15, 10, 21, 50);
+  for (const int row : {13, 14, 21, 22})
+    for (int column = 10; column < 50; ++column) show(row, column, static_cast<int>(random() % 5));
+  const auto claims = decode();
+  int right = 0;
+  for (int row = 15; row < 21; ++row)
+    for (int column = 10; column < 50; ++column) right += is_decoded(claims, row, column);
+  EXPECT_GE(right, 90);  // of 240
+}
+
+/// Another part of the pattern in the place of rows 16 to 18 and columns 20 to 24.
+class PatchedIslands : public Islands {
+ protected:
+  PatchedIslands() {
+    show_pattern(10, 10, 30, 40);
+    for (int row = 16; row < 19; ++row)
+      for (int column = 20; column < 25; ++column) put(row, column, 1);
+  }
+  /// Its letter, or one that is so many on from it.
+  void put(int row, int column, int on) {
+    shapes_[grid_.node_at(row, column)] = read_as((pattern_.array.at(row, column) + on) % 5, 5);
+  }
+};
+
+TEST_F(PatchedIslands, GiveUpTheCornerOfThePatchThatAgreesByChance) {
+  for (const auto& [row, column] : {std::pair(18, 24), {18, 23}, {18, 22}, {17, 24}}) put(row, column, 0);
+  EXPECT_FALSE(is_decoded(decode(), 18, 24));
+}
+
+TEST_F(PatchedIslands, GiveUpWhatIsBesideAWellSeenContradiction) {
+  put(25, 30, 1);
+  const auto claims = decode();
+  for (const auto& [row, column] : {std::pair(24, 30), {26, 30}, {25, 29}, {25, 31}})
+    EXPECT_FALSE(is_decoded(claims, row, column)) << row << ", " << column;
+  EXPECT_TRUE(is_decoded(claims, 23, 30));
+  EXPECT_TRUE(is_decoded(claims, 25, 28));
 }
 
 TEST_F(Islands, AreBothRefusedWhereTheyShowOnePartOfThePattern) {

@@ -1,0 +1,363 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+// What another surface may have lent an island at its rim: docs/decoder.md.
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "core/decode/islands.hpp"
+
+namespace slsd {
+
+/// The cells of one island, which is_left() and all that follows from it tell of.
+void IslandJudge::look_at_cells(const Frame& frame, std::int32_t island) {
+  if (looked_at_ == island) return;
+  const auto members_of = [&](std::int32_t id) {
+    return id < 0 ? std::span<const std::int32_t>()
+                  : std::span<const std::int32_t>(members_).subspan(islands_[id].first, islands_[id].size);
+  };
+  for (const std::int32_t node : members_of(looked_at_)) holder_of(frame, node) = -1;
+  for (const std::int32_t node : members_of(island)) holder_of(frame, node) = node;
+  looked_at_ = island;
+}
+
+/// Nodes that too little holds, in so many rounds as a row of symbols is long that chance could not add.
+void IslandJudge::cut_back(const Frame& frame) {
+  const int rounds = static_cast<int>(std::ceil(-std::log(options_.wrong_cells_max) / log_letters_ / 1.5));
+  constexpr int kHeldBy = 2;
+  held_.resize(frame.nodes.size());
+  queue_.clear();
+  for (const std::int32_t node : members_) {
+    held_[node] = 4;
+    if (links_[node] != kAllAgree) {
+      held_[node] = 0;
+      for (const Direction d : kAllDirections) {
+        const Link link = links_[node][d];
+        if (link == Link::kAgrees) ++held_[node];
+        // What is well seen and contradicts is other light, which seldom is a symbol wide.
+        if (link == Link::kAgainst && !runs_along_edge(frame, node, d))
+          held_[node] = static_cast<std::int8_t>(held_[node] - (is_well_seen(frame, frame.beside[node][d]) ? 2 : 1));
+      }
+    }
+    if (cut_[node] != 0) queue_.push_back(node);
+  }
+  // A node that is cut holds its neighbours no longer.
+  const auto let_go = [&](std::int32_t node) {
+    for (const Direction d : kAllDirections) {
+      const std::int32_t other = frame.beside[node][d];
+      if (other < 0 || island_of_[other] < 0 || frame.beside[other][opposite(d)] != node) continue;
+      held_[other] = static_cast<std::int8_t>(held_[other] - (links_[other][opposite(d)] == Link::kAgrees));
+    }
+  };
+  for (int round = 0; round < rounds; ++round) {
+    for (const std::int32_t node : queue_) let_go(node);
+    queue_.clear();
+    for (const std::int32_t node : members_)
+      if (held_[node] < kHeldBy && cut_[node] == 0) queue_.push_back(node);
+    if (queue_.empty()) return;
+    for (const std::int32_t node : queue_) cut_[node] = 1;
+  }
+}
+
+/// Keeps for every node the evidence of the line of nodes through it, as far as it agrees and so far around it, where
+/// something contradicts it.
+void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth) {
+  constexpr int kReach = 10, kBeyond = 3;
+  constexpr float kUsualShare = 0.5F;
+  const Direction back = opposite(forth);
+  const auto leads = [&](std::int32_t node, Direction d) {
+    return continues(frame, node, d) && frame.beside[frame.beside[node][d]][opposite(d)] == node;
+  };
+  struct End {
+    bool contradicts;
+    float doubtful;
+  };
+  const auto look_beyond = [&](std::int32_t node, Direction d) {
+    const Link link = links_[node][d];
+    return End{link == Link::kAgainst && !runs_along_edge(frame, node, d),
+               link == Link::kNeutral ? count_doubtful(frame, node, d, kBeyond) : 0};
+  };
+  for (const std::int32_t first : members_) {
+    if (leads(first, back)) continue;
+    // A misread symbol of the island is weighed with the others; what is none of it ends the line.
+    line_.assign(1, first);
+    line_ratios_.assign({0, own_ratio(first)});
+    while (leads(line_.back(), forth)) {
+      line_.push_back(frame.beside[line_.back()][forth]);
+      line_ratios_.push_back(line_ratios_.back() + own_ratio(line_.back()));
+    }
+    const End begin = look_beyond(first, back), end = look_beyond(line_.back(), forth);
+    const int count = static_cast<int>(line_.size());
+    for (int i = 0; i < count; ++i) {
+      const int from = std::max(i - kReach, 0), to = std::min(i + kReach, count - 1);
+      const bool begins = i - kReach<0, ends = i + kReach> count - 1;
+      const auto evidence = static_cast<float>(line_ratios_[to + 1] - line_ratios_[from]);
+      const float length =
+          static_cast<float>(to - from + 1) + (begins ? begin.doubtful : 0) + (ends ? end.doubtful : 0);
+      const bool contradicted = own_ratio(line_[i]) < kSpeaksAgainst || (begins && begin.contradicts) ||
+                                (ends && end.contradicts) || evidence < kUsualShare * log_letters_ * length;
+      if (!contradicted) continue;
+      // As far as it agrees: what ends it may have been read as one of the island.
+      int begun = i, last = i;
+      while (begun > from && own_ratio(line_[begun - 1]) > 0) --begun;
+      while (last < to && own_ratio(line_[last + 1]) > 0) ++last;
+      lines_.push_back({line_[i], line_[begun], line_[last], evidence,
+                        static_cast<float>(line_ratios_[last + 1] - line_ratios_[begun])});
+    }
+  }
+}
+
+/// How many nodes on from the end of a line, of so many, may be its own and say nothing for it.
+float IslandJudge::count_doubtful(const Frame& frame, std::int32_t node, Direction d, int most) const {
+  const Beyond first(frame.claims[node], d);
+  const int down = first.row - frame.claims[node].row, right = first.column - frame.claims[node].column;
+  int row = first.row, column = first.column, count = 0;
+  for (std::int32_t at = frame.beside[node][d]; at >= 0 && count < most; at = frame.beside[at][d]) {
+    if (!shown(row, column) || ratio(frame, at, row, column) < kSpeaksAgainst) break;
+    row += down, column += right, ++count;
+  }
+  return static_cast<float>(count);
+}
+
+/// Whether a line agrees from end to end, ends where the rim turns oftener without it, and lacks no more than the links
+/// on both of its sides make up for: in this frame so few of them lead to something else.
+bool IslandJudge::fits_between(const Frame& frame, const Line& line, float evidence_min) {
+  constexpr float kClean = 0.8F;
+  const CellClaim &first = frame.claims[line.first], &last = frame.claims[line.last];
+  const Piece piece{first.row, first.column, last.row - first.row + 1, last.column - first.column + 1};
+  if (line.agreeing < kClean * log_letters_ * static_cast<float>(piece.rows * piece.columns)) return false;
+  const float missing = evidence_min - line.agreeing;
+  if (missing > std::min(link_weight_, piece.rows > 1 ? weight_across_columns_ : weight_across_rows_)) return false;
+  look_at_cells(frame, island_of_[line.node]);
+  return turns_without(piece) > 0;
+}
+
+void IslandJudge::cut_contradicted_lines(const Frame& frame) {
+  lines_.clear();
+  std::array<std::ptrdiff_t, 2> links{1, 1}, against{1, 1};  // right and left, down and up
+  for (const std::int32_t node : members_) {
+    for (const Direction d : kAllDirections) {
+      links[d % 2] += links_[node][d] != Link::kNone;
+      against[d % 2] += links_[node][d] == Link::kAgainst;
+    }
+  }
+  const auto weight = [&](int axis) {
+    return static_cast<float>(std::log(static_cast<double>(links[axis]) / static_cast<double>(against[axis])));
+  };
+  weight_across_columns_ = weight(0), weight_across_rows_ = weight(1);
+  find_contradicted_lines(frame, kRight);
+  find_contradicted_lines(frame, kDown);
+  // Links across which chance could have led on.
+  const std::ptrdiff_t rim = against[0] + against[1] - 1;
+  const auto evidence_min = static_cast<float>(std::log(static_cast<double>(rim) / options_.wrong_cells_max));
+  for (const Line& line : lines_)
+    if (line.evidence < evidence_min && !fits_between(frame, line, evidence_min)) cut_[line.node] = 1;
+}
+
+/// How far a link's step is from the one behind it, in cells.
+float IslandJudge::bend_of(const Frame& frame, std::int32_t node, Direction d) const {
+  const std::int32_t other = frame.beside[node][d];
+  const std::int32_t next = frame.beside[other][d];
+  if (next < 0 || links_[other][d] != Link::kAgrees) return 0;
+  const Eigen::Vector2f own = frame.nodes[other].centre_px - frame.nodes[node].centre_px,
+                        behind = frame.nodes[next].centre_px - frame.nodes[other].centre_px;
+  return (own - behind).norm() / behind.norm();
+}
+
+/// Whether a link leads to what is none of the island: its letter contradicts, or is well seen and has been refused.
+bool IslandJudge::is_of_another(const Frame& frame, std::int32_t node, Direction d) const {
+  if (links_[node][d] != Link::kNeutral) return links_[node][d] == Link::kAgainst;
+  return !continues(frame, node, d) && is_well_seen(frame, frame.beside[node][d]);
+}
+
+IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, Direction d) const {
+  const bool along_row = d == kUp || d == kDown;
+  Side side;
+  for (int i = 0; i < (along_row ? piece.columns : piece.rows); ++i) {
+    const int row = along_row ? piece.row + (d == kDown ? piece.rows - 1 : 0) : piece.row + i,
+              column = along_row ? piece.column + i : piece.column + (d == kRight ? piece.columns - 1 : 0);
+    const std::int32_t node = holder_[index_of(row, column)];
+    if (links_[node][d] == Link::kAgrees) side.bend += bend_of(frame, node, d), ++side.held_by;
+    const Beyond cell(frame.claims[node], d);
+    if (shown(cell.row, cell.column)) {
+      side.contradicted |= is_of_another(frame, node, d);
+      if (links_[node][d] == Link::kNeutral) side.beyond += ratio(frame, frame.beside[node][d], cell.row, cell.column);
+    }
+    side.broken |= frame.nodes[node].broken[d];
+  }
+  return side;
+}
+
+/// Whether a piece of an island may be of another surface: one whose rim is straight, or turns once, so that the island
+/// holds the piece on one side or on two that meet. Something else lies beside it, or breaks off beside it while what
+/// holds the piece is bent.
+bool IslandJudge::may_be_apart(const Frame& frame, const Piece& piece) const {
+  constexpr float kBent = 0.06F;  // surfaces bend by a third of it and less
+  std::array<Side, 4> sides;
+  for (const Direction d : kAllDirections) sides[d] = side_of(frame, piece, d);
+  const auto held = [&](Direction d) { return sides[d].held_by > 0; };
+  if ((held(kLeft) && held(kRight)) || (held(kUp) && held(kDown))) return false;
+  float bend = 0, links = 0, beyond = 0;
+  bool contradicted = false, broken = false;
+  for (const Side& side : sides) {
+    bend += side.bend, links += static_cast<float>(side.held_by);
+    contradicted |= side.contradicted && side.held_by == 0;
+    broken |= side.broken && side.held_by == 0;
+    if (side.held_by == 0) beyond += side.beyond;
+  }
+  return contradicted || beyond < kSpeaksAgainst || (broken && bend > kBent * links);
+}
+
+/// How often the edge of an island turns at the corner above and to the left of a cell.
+int IslandJudge::turns_at(int row, int column, const Piece* without) const {
+  const auto member = [&](int r, int c) { return is_left(r, c) && (without == nullptr || !without->contains(r, c)); };
+  const bool above_left = member(row - 1, column - 1), above_right = member(row - 1, column),
+             below_left = member(row, column - 1), below_right = member(row, column);
+  const int count = above_left + above_right + below_left + below_right;
+  if (count == 2) return above_left == below_right ? 2 : 0;
+  return count % 2;
+}
+
+/// How much oftener the edge of the island turns without a piece.
+int IslandJudge::turns_without(const Piece& piece) const {
+  int turns = 0;
+  for (int row = piece.row; row <= piece.row + piece.rows; ++row)
+    for (int column = piece.column; column <= piece.column + piece.columns; ++column)
+      turns += turns_at(row, column, &piece) - turns_at(row, column, nullptr);
+  return turns;
+}
+
+/// The evidence of cells for their island; nothing where one of them is none of it.
+std::optional<float> IslandJudge::evidence_of(const Piece& piece) const {
+  float sum = 0;
+  for (int row = piece.row; row < piece.row + piece.rows; ++row) {
+    for (int column = piece.column; column < piece.column + piece.columns; ++column) {
+      if (!is_left(row, column)) return std::nullopt;
+      sum += own_ratio(holder_[index_of(row, column)]);
+    }
+  }
+  return sum;
+}
+
+/// Refuses a piece that may be of another surface and says too little for being of this one.
+void IslandJudge::cut_piece(const Frame& frame, const Piece& piece, float missing) {
+  if (!may_be_apart(frame, piece)) return;
+  // Where the surface has a corner, another that had it would have to turn as often as an edge is overlooked.
+  if (missing <= link_weight_ && turns_without(piece) > 0) return;
+  for (int row = piece.row; row < piece.row + piece.rows; ++row)
+    for (int column = piece.column; column < piece.column + piece.columns; ++column)
+      cut_[holder_[index_of(row, column)]] = 1;
+}
+
+/// Looks at every piece along a row or a column, so many cells wide, that holds a node and might lack evidence.
+void IslandJudge::cut_pieces_through(const Frame& frame, std::int32_t node, float evidence_min) {
+  constexpr int kWidest = 3;
+  const int row = frame.claims[node].row, column = frame.claims[node].column;
+  for (const bool along_row : {true, false}) {
+    const int along = along_row ? column : row, across = along_row ? row : column;
+    const auto slice = [&](int first_across, int width, int at) {
+      return along_row ? Piece{first_across, at, width, 1} : Piece{at, first_across, 1, width};
+    };
+    for (int width = 1; width <= kWidest; ++width) {
+      for (int side = across - width + 1; side <= across; ++side) {
+        float before = 0;
+        for (int first = along;; --first) {
+          const auto added = evidence_of(slice(side, width, first));
+          if (!added || (before += *added) >= evidence_min) break;
+          float evidence = before;
+          for (int last = along;;) {
+            const int length = last - first + 1;
+            cut_piece(frame, along_row ? Piece{side, first, width, length} : Piece{first, side, length, width},
+                      evidence_min - evidence);
+            const auto next = evidence_of(slice(side, width, ++last));
+            if (!next || (evidence += *next) >= evidence_min) break;
+          }
+        }
+      }
+    }
+  }
+}
+
+void IslandJudge::cut_pieces(const Frame& frame) {
+  queue_.clear();
+  std::ptrdiff_t rim = 1;  // links across which chance could have led on
+  for (const std::int32_t node : members_) {
+    if (links_[node] == kAllAgree) continue;
+    const auto ends = std::ranges::count_if(
+        kAllDirections, [&](Direction d) { return frame.nodes[node].broken[d] || is_of_another(frame, node, d); });
+    if (ends > 0 || std::ranges::count(links_[node], Link::kNeutral) > 0) queue_.push_back(node);
+    rim += ends;
+  }
+  const auto evidence_min = static_cast<float>(std::log(static_cast<double>(rim) / options_.wrong_cells_max));
+  for (const std::int32_t node : queue_) {
+    look_at_cells(frame, island_of_[node]);
+    cut_pieces_through(frame, node, evidence_min);
+  }
+}
+
+/// Single symbols that are left beside what was cut, where the rim turns less often without them: the corner of
+/// something put there agrees by chance.
+void IslandJudge::cut_notches(const Frame& frame, std::int32_t island) {
+  queue_.clear();
+  const auto cut = [&](std::int32_t node) {
+    cut_[node] = 1;
+    holder_of(frame, node) = -1;
+    for (const std::int32_t other : frame.beside[node])
+      if (other >= 0 && island_of_[other] == island && cut_[other] == 0) queue_.push_back(other);
+  };
+  const auto members = std::span(members_).subspan(islands_[island].first, islands_[island].size);
+  if (std::ranges::none_of(members, [&](std::int32_t node) { return cut_[node] != 0; })) return;
+  look_at_cells(frame, island);
+  for (const std::int32_t node : members)
+    if (cut_[node] != 0) cut(node);
+  // One after the other, as each changes the rim, in the order of their cells.
+  for (std::size_t asked = 0; asked < queue_.size();) {
+    next_queue_.assign(queue_.begin() + static_cast<std::ptrdiff_t>(asked), queue_.end());
+    asked = queue_.size();
+    std::ranges::sort(next_queue_, {},
+                      [&](std::int32_t node) { return index_of(frame.claims[node].row, frame.claims[node].column); });
+    for (const std::int32_t node : next_queue_) {
+      const CellClaim& claim = frame.claims[node];
+      if (cut_[node] == 0 && turns_without({claim.row, claim.column, 1, 1}) < 0) cut(node);
+    }
+  }
+  cut_steps(frame);
+}
+
+/// Symbols of queue_ that the island holds on two sides that meet, from which too few that agree, and were cut, lead on
+/// to a contradiction: any of them may be the first of something else.
+void IslandJudge::cut_steps(const Frame& frame) {
+  constexpr float kFewAgree = 3.5F;
+  const auto is_cut = [&](std::int32_t node, Direction d) {
+    return links_[node][d] == Link::kAgrees && cut_[frame.beside[node][d]] != 0;
+  };
+  const auto held = [&](std::int32_t node, Direction d) {
+    return links_[node][d] == Link::kAgrees && cut_[frame.beside[node][d]] == 0;
+  };
+  next_queue_.clear();
+  for (const std::int32_t node : queue_) {
+    if (cut_[node] != 0) continue;
+    if ((held(node, kLeft) && held(node, kRight)) || (held(node, kUp) && held(node, kDown))) continue;
+    for (const Direction d : kAllDirections) {
+      if (!is_cut(node, d)) continue;
+      float evidence = own_ratio(node);
+      std::int32_t last = node;
+      while (is_cut(last, d)) last = frame.beside[last][d], evidence += own_ratio(last);
+      const bool ends = links_[last][d] != Link::kAgrees && is_of_another(frame, last, d);
+      if (ends && evidence < kFewAgree * log_letters_) next_queue_.push_back(node);
+    }
+  }
+  for (const std::int32_t node : next_queue_) cut_[node] = 1;
+}
+
+void IslandJudge::cut_rims(const Frame& frame) {
+  cut_.assign(frame.nodes.size(), 0);
+  holder_.assign(static_cast<std::size_t>(options_.rows) * options_.columns, -1);
+  looked_at_ = -1;
+  cut_contradicted_lines(frame);
+  cut_back(frame);
+  cut_pieces(frame);
+  for (std::size_t id = 0; id < islands_.size(); ++id) cut_notches(frame, static_cast<std::int32_t>(id));
+}
+
+}  // namespace slsd
