@@ -118,6 +118,9 @@ Result<> read_server(const toml::table* table, const path& file, ServerOptions& 
   TableReader reader(table, "[server]", file);
   reader.read("socket", options.socket);
   reader.read("socket_mode", options.socket_mode);
+  reader.read("observe", options.observe);
+  reader.read("scan", options.scan);
+  reader.read("administer", options.administer);
   reader.read("clients_max", options.clients_max);
   reader.read("request_bytes_max", options.request_bytes_max);
   reader.read("memory_max_mb", options.memory_max_mb);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/printable.hpp"
+#include "daemon/configuration/access.hpp"
 #include "daemon/configuration/camera_options.hpp"
 #include "daemon/configuration/projector_options.hpp"
 #include "daemon/configuration/scan_options.hpp"
@@ -93,7 +94,9 @@ Result<> ServerOptions::validate() const {
   if (auto valid = in_range("clients_max", clients_max, 1, 10'000); !valid) return valid;
   if (auto valid = in_range("request_bytes_max", request_bytes_max, 1024, 16 * 1024 * 1024); !valid) return valid;
   if (auto valid = in_range("memory_max_mb", memory_max_mb, 16, 65'536); !valid) return valid;
-  return in_range("send_timeout_ms", send_timeout_ms, 100, 600'000);
+  if (auto valid = in_range("send_timeout_ms", send_timeout_ms, 100, 600'000); !valid) return valid;
+  if (auto rules = AccessRules::of(*this); !rules) return tl::unexpected(rules.error());
+  return {};
 }
 
 }  // namespace slsd

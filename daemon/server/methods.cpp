@@ -6,6 +6,7 @@
 #include <array>
 #include <vector>
 
+#include <spdlog/spdlog.h>
 #include <asio/post.hpp>
 
 #include "core/nearest_name.hpp"
@@ -252,10 +253,12 @@ void run_project(ServiceState& state, const json& params, Session& session, Resp
                         });
 }
 
-void run_status(ServiceState& state, const json& params, Session&, Respond respond) {
+void run_status(ServiceState& state, const json& params, Session& session, Respond respond) {
   const ParamReader reader(params);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
-  respond(Reply{status_json(state)});
+  json status = status_json(state);
+  status["role"] = to_string(session.role());
+  respond(Reply{std::move(status)});
 }
 
 void run_subscribe(ServiceState& state, const json& params, Session& session, Respond respond) {
@@ -287,12 +290,25 @@ void run_reload(ServiceState& state, const json& params, Session&, Respond respo
 }
 
 constexpr std::array kMethods{
-    RpcMethod{"frame", run_frame},         RpcMethod{"pattern", run_pattern},
-    RpcMethod{"preview", run_preview},     RpcMethod{"project", run_project},
-    RpcMethod{"reload", run_reload},       RpcMethod{"scan", run_scan},
-    RpcMethod{"settings", run_settings},   RpcMethod{"status", run_status},
-    RpcMethod{"subscribe", run_subscribe}, RpcMethod{"unsubscribe", run_unsubscribe},
+    RpcMethod{"frame", Role::kScan, run_frame},          RpcMethod{"pattern", Role::kObserve, run_pattern},
+    RpcMethod{"preview", Role::kScan, run_preview},      RpcMethod{"project", Role::kAdminister, run_project},
+    RpcMethod{"reload", Role::kAdminister, run_reload},  RpcMethod{"scan", Role::kScan, run_scan},
+    RpcMethod{"settings", Role::kObserve, run_settings}, RpcMethod{"status", Role::kObserve, run_status},
+    RpcMethod{"subscribe", Role::kScan, run_subscribe},  RpcMethod{"unsubscribe", Role::kObserve, run_unsubscribe},
 };
+
+RpcError not_for(Session& session, const RpcMethod& method) {
+  const Peer& peer = session.peer();
+  if (session.is_first_refusal())
+    spdlog::warn("a client (process {}, user {}) asked for {}, which takes the role \"{}\": refused", peer.process,
+                 peer.user, method.name, to_string(method.role));
+  return rpc_error({ErrorCode::kPermissionDenied,
+                    "\"" + std::string(method.name) + "\" takes the role \"" + std::string(to_string(method.role)) +
+                        "\", and user " + std::to_string(peer.user) + " has \"" +
+                        std::string(to_string(session.role())) + "\": " + session.way_to(method.role) +
+                        ", and connect again",
+                    {}});
+}
 
 }  // namespace
 
@@ -303,6 +319,9 @@ std::span<const RpcMethod> methods() {
 void dispatch(ServiceState& state, const Request& request, Session& session, Respond respond) {
   const auto found = std::ranges::lower_bound(kMethods, request.method, {}, &RpcMethod::name);
   if (found != kMethods.end() && found->name == request.method) {
+    if (session.role() < found->role) return respond(tl::unexpected(not_for(session, *found)));
+    if (found->role == Role::kAdminister)
+      spdlog::info("{}: by user {} (process {})", found->name, session.peer().user, session.peer().process);
     return found->run(state, request.params, session, std::move(respond));
   }
   std::vector<std::string> names;

@@ -33,6 +33,7 @@ struct ServiceState {
 /// One method of the socket's protocol.
 struct RpcMethod {
   std::string_view name;
+  Role role;  ///< that it takes
   void (*run)(ServiceState& state, const nlohmann::json& params, Session& session, Respond respond);
 };
 

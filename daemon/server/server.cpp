@@ -97,8 +97,9 @@ void Server::on_accepted(const std::error_code& error, Session::Socket socket) {
   if (!acceptor_.is_open() || error == asio::error::operation_aborted) return;
   if (error) return retry_later(error);
   retrying_ = false;
-  if (sessions_.size() >= static_cast<std::size_t>(room_->options.clients_max)) {
-    turn_away(std::move(socket));
+  const Peer peer = peer_of(socket.native_handle());
+  if (const auto refused = refuses(peer)) {
+    turn_away(std::move(socket), *refused);
   } else {
     const auto session = std::make_shared<Session>(std::move(socket), room_);
     sessions_.insert(session);
@@ -107,10 +108,30 @@ void Server::on_accepted(const std::error_code& error, Session::Socket socket) {
   accept();
 }
 
-void Server::turn_away(Session::Socket socket) const {
-  const Error busy{
-      ErrorCode::kBusy, std::to_string(room_->options.clients_max) + " clients are connected: try again later", {}};
-  const std::string line = to_line(error_message(nullptr, rpc_error(busy)));
+// Why somebody is not taken in. One user who does not administer the scanner gets no more places than are then left for
+// all the others, which is half of them.
+std::optional<Error> Server::refuses(const Peer& peer) const {
+  const auto places = static_cast<std::size_t>(room_->options.clients_max);
+  if (sessions_.size() >= places)
+    return Error{ErrorCode::kBusy, std::to_string(places) + " clients are connected: try again later", {}};
+  const Role role = room_->access.role_of(peer);
+  if (role == Role::kNone) {
+    return Error{ErrorCode::kPermissionDenied,
+                 "user " + std::to_string(peer.user) +
+                     " may not use this scanner: " + room_->access.way_to(Role::kObserve) + ", and connect again",
+                 {}};
+  }
+  const auto own = static_cast<std::size_t>(
+      std::ranges::count_if(sessions_, [&](const auto& session) { return session->peer().user == peer.user; }));
+  if (role == Role::kAdminister || own < places - sessions_.size()) return std::nullopt;
+  return Error{ErrorCode::kBusy,
+               "user " + std::to_string(peer.user) + " has " + std::to_string(own) + " of " + std::to_string(places) +
+                   " places already, and the rest is for others: end some of these connections",
+               {}};
+}
+
+void Server::turn_away(Session::Socket socket, const Error& error) {
+  const std::string line = to_line(error_message(nullptr, rpc_error(error)));
   ::send(socket.native_handle(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 

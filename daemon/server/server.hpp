@@ -62,7 +62,8 @@ class Server {
  private:
   void accept();
   void on_accepted(const std::error_code& error, Session::Socket socket);
-  void turn_away(Session::Socket socket) const;
+  static void turn_away(Session::Socket socket, const Error& error);
+  [[nodiscard]] std::optional<Error> refuses(const Peer& peer) const;
   void retry_later(const std::error_code& error);
   void deliver();
 

@@ -60,13 +60,6 @@ ssize_t send_part(int socket, const Outgoing& outgoing, std::size_t sent) {
   return ::sendmsg(socket, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
-ucred peer_of(int socket) {
-  ucred peer{};
-  socklen_t size = sizeof peer;
-  ::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &size);
-  return peer;
-}
-
 std::string megabytes(std::size_t bytes) {
   return std::to_string((bytes + kMiB - 1) / kMiB) + " MB";
 }
@@ -77,6 +70,8 @@ Session::Session(Socket socket, std::shared_ptr<SessionRoom> room)
     : socket_(std::move(socket)),
       shared_room_(std::move(room)),
       room_(*shared_room_),
+      peer_(peer_of(socket_.native_handle())),
+      role_(room_.access.role_of(peer_)),
       memory_(room_.memory),
       progress_(socket_.get_executor()),
       glance_(socket_.get_executor()),
@@ -369,8 +364,7 @@ bool Session::is_sending_since(Clock::time_point time) const {
 // tells, and the log and the status do.
 void Session::drop() {
   ++room_.dropped;
-  const ucred peer = peer_of(socket_.native_handle());
-  spdlog::info("a client (process {}, user {}) took {} of {} bytes in {} ms: dropped", peer.pid, peer.uid,
+  spdlog::info("a client (process {}, user {}) took {} of {} bytes in {} ms: dropped", peer_.process, peer_.user,
                sent_ - timed_, std::min(outgoing_.front().size() - timed_, kSlice), room_.options.send_timeout_ms);
   if (sent_ == 0) {
     const std::string line = to_line(error_message(

@@ -11,10 +11,12 @@
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <asio/local/stream_protocol.hpp>
 #include <asio/steady_timer.hpp>
 
+#include "daemon/configuration/access.hpp"
 #include "daemon/configuration/server_options.hpp"
 #include "daemon/rpc/line_buffer.hpp"
 #include "daemon/rpc/request.hpp"
@@ -31,9 +33,14 @@ class Session;
 /// What the sessions of a server have in common.
 struct SessionRoom {
   SessionRoom(asio::io_context& events, const ServerOptions& server_options)
-      : options(server_options), memory(server_options.memory_max_bytes()), lent(memory), turns(events) {}
+      : options(server_options),
+        access(AccessRules::of(options).value_or(AccessRules())),
+        memory(server_options.memory_max_bytes()),
+        lent(memory),
+        turns(events) {}
 
   ServerOptions options;
+  AccessRules access;
   MemoryBudget memory;
   LentMemory lent;
   Turns turns;
@@ -64,6 +71,12 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
   using Socket = asio::local::stream_protocol::socket;
 
   Session(Socket socket, std::shared_ptr<SessionRoom> room);
+
+  [[nodiscard]] const Peer& peer() const { return peer_; }
+  [[nodiscard]] Role role() const { return role_; }
+  /// Whether nothing was refused to it before: the log tells once.
+  [[nodiscard]] bool is_first_refusal() { return !std::exchange(refused_, true); }
+  [[nodiscard]] const std::string& way_to(Role role) const { return room_.access.way_to(role); }
 
   void start();
   /// Takes no further request, and ends when all that is under way is sent.
@@ -113,6 +126,9 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
   Socket socket_;
   std::shared_ptr<SessionRoom> shared_room_;  // operations under way outlive the server
   SessionRoom& room_;
+  Peer peer_;
+  Role role_;
+  bool refused_ = false;
   Turns::Taker taker_;
   MemoryAccount memory_;
   asio::steady_timer progress_;

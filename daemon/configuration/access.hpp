@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <sys/types.h>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+struct ServerOptions;
+
+/// What a client may do. Each may what those before it may.
+enum class Role : std::uint8_t { kNone, kObserve, kScan, kAdminister };
+[[nodiscard]] std::string_view to_string(Role role);
+
+/// Who is at the other end of a Unix socket, as the kernel says.
+struct Peer {
+  uid_t user;
+  gid_t group;
+  pid_t process;
+  std::vector<gid_t> groups;  ///< the others that the user belongs to
+};
+/// @return  of a socket that is gone, a user who may nothing
+[[nodiscard]] Peer peer_of(int socket);
+
+/// Who may what: [server] observe, scan and administer with the numbers behind the names.
+class AccessRules {
+ public:
+  /// Names of users, of groups as "@name", or "*" for whoever can open the socket.
+  /// @errors kNotFound: a user or group that this host does not know, but for those of the defaults;
+  ///         kInvalidArgument: an empty name
+  [[nodiscard]] static Result<AccessRules> of(const ServerOptions& options);
+
+  /// Root, and who runs the service, may everything.
+  [[nodiscard]] Role role_of(const Peer& peer) const;
+  /// "be in the group slsd-admin": what gives somebody the role.
+  [[nodiscard]] const std::string& way_to(Role role) const { return ways_[static_cast<std::size_t>(role)]; }
+
+ private:
+  struct Names {
+    bool all = false;
+    std::vector<uid_t> users;
+    std::vector<gid_t> groups;
+  };
+  static constexpr std::size_t kRoles = 4;
+  std::array<Names, kRoles> names_;
+  std::array<std::string, kRoles> ways_;
+};
+
+}  // namespace slsd
