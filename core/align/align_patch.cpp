@@ -248,27 +248,42 @@ void fill(const Sums& s, Normal& normal, Unknowns& right) {
 
 PatchMap make_patch_map(const PixelRay& ray, const Eigen::Vector2d& middle_px,
                         const RigidTransform& projector_from_camera, const Lens& projector, double reference_depth_mm) {
-  const auto& [rotation, translation] = projector_from_camera;
+  return make_patch_map(turned_by(ray, projector_from_camera), middle_px, projector_from_camera.translation, projector,
+                        1 / reference_depth_mm);
+}
+
+Eigen::Matrix3d turned_by(const PixelRay& ray, const RigidTransform& projector_from_camera) {
+  Eigen::Matrix3d turned;
+  turned.leftCols<2>() = projector_from_camera.rotation.leftCols<2>() * ray.turn;
+  turned.col(2) = projector_from_camera.rotation * ray.direction.homogeneous();
+  return turned;
+}
+
+PatchMap make_patch_map(const Eigen::Matrix3d& turned, const Eigen::Vector2d& middle_px,
+                        const Eigen::Vector3d& translation, const Lens& projector, double reference_inverse_depth) {
   PatchMap map;
-  map.reference_inverse_depth = 1 / reference_depth_mm;
-  Eigen::Matrix3d q;
-  q.leftCols<2>() = rotation.leftCols<2>() * ray.turn;
-  q.col(2) = rotation * ray.direction.homogeneous() + map.reference_inverse_depth * translation;
-  const Eigen::Vector2d direction = q.col(2).hnormalized();
+  map.reference_inverse_depth = reference_inverse_depth;
+  const Eigen::Vector3d middle = turned.col(2) + reference_inverse_depth * translation;
+  const double scale = 1 / middle.z();
+  const Eigen::Vector2d direction = scale * middle.head<2>();
   const Eigen::Vector2d pixel = projector.distort(direction);
-  map.origin_px = pixel.array().round().cast<int>();
-  // The lens made linear around the direction, from the origin; then scaled so that q2 is 1 in the middle.
+  map.origin_px = {static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))};
+  // The lens made linear around the direction, from the origin; all scaled so that q2 is 1 in the middle.
   const Eigen::Matrix2d bend = projector.distort_jacobian(direction);
-  Eigen::Matrix3d lens = Eigen::Matrix3d::Identity();
-  lens.topLeftCorner<2, 2>() = bend;
-  lens.topRightCorner<2, 1>() = pixel - map.origin_px.cast<double>() - bend * direction;
-  const double scale = 1 / q(2, 2);
-  q = scale * lens * q;
-  const Eigen::Vector3d t = scale * lens * translation;
-  const Eigen::Vector2d per_inverse_depth = t.head<2>() - q.col(2).head<2>() * t.z();
+  const Eigen::Vector2d from_origin = pixel - map.origin_px.cast<double>();
+  const auto through_lens = [&](const Eigen::Vector3d& q) {
+    const Eigen::Vector2d flat = q.head<2>() - q.z() * direction;
+    return Eigen::Vector3d(scale * (bend(0, 0) * flat.x() + bend(0, 1) * flat.y() + from_origin.x() * q.z()),
+                           scale * (bend(1, 0) * flat.x() + bend(1, 1) * flat.y() + from_origin.y() * q.z()),
+                           scale * q.z());
+  };
+  const Eigen::Vector3d t = through_lens(translation);
+  const Eigen::Vector2d per_inverse_depth = t.head<2>() - from_origin * t.z();
   map.inverse_depth_per_px = 1 / per_inverse_depth.norm();
   map.along = (per_inverse_depth * map.inverse_depth_per_px).cast<float>();
-  map.base = q.cast<float>();
+  map.base.col(0) = through_lens(turned.col(0)).cast<float>();
+  map.base.col(1) = through_lens(turned.col(1)).cast<float>();
+  map.base.col(2) = Eigen::Vector3d(from_origin.x(), from_origin.y(), 1).cast<float>();
   map.shift = (t * map.inverse_depth_per_px).cast<float>();
   map.middle_px = middle_px.cast<float>();
   return map;

@@ -36,6 +36,13 @@ struct PatchMap {
                                       const RigidTransform& projector_from_camera, const Lens& projector,
                                       double reference_depth_mm);
 
+/// What of it depends on the pixel alone, for many depths: R (T, r), T and r as columns.
+[[nodiscard]] Eigen::Matrix3d turned_by(const PixelRay& ray, const RigidTransform& projector_from_camera);
+/// @param translation  of projector_from_camera
+[[nodiscard]] PatchMap make_patch_map(const Eigen::Matrix3d& turned, const Eigen::Vector2d& middle_px,
+                                      const Eigen::Vector3d& translation, const Lens& projector,
+                                      double reference_inverse_depth);
+
 /// Where a patch of the surface lies, and how the light falls on it.
 struct PatchState {
   float disparity = 0;                          ///< projector px from the reference

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <span>
+
+#include "core/align/align_patch.hpp"
+
+namespace slsd {
+
+/// How many patches are aligned beside each other.
+inline constexpr int kEight = 8;
+
+/// A square window of the frame, to be aligned around its middle pixel.
+struct PatchTask {
+  int x = 0, y = 0;          ///< the middle; the window lies within the frame
+  PatchMap map;              ///< around the same pixel
+  float noise = 0;           ///< one standard deviation of a pixel, grey levels
+  PatchState state;          ///< the start, and then what was found; gain 0: not known. Bends are not looked at
+  bool settled = false;      ///< the caller's: whether a step that moves little is the last
+  bool failed = false;       ///< nothing follows from what is seen there; the rest is then as it was
+  float moved = 0;           ///< by the last step: the disparity, projector px
+  float residual = 0;        ///< root mean square, grey levels, as the last step leaves it
+  float pixels = 0;          ///< how many there were
+  float support = 0;         ///< the share of them that agreed with the pattern at the last step's start
+  float scatter = 0;         ///< of the ninths about the plane, px, beyond what noise does
+  float variance = 0;        ///< of the disparity, for a noise of one grey level in each pixel
+  float slope_variance = 0;  ///< of its slopes, the mean of both
+};
+
+/// One step of PatchAligner for up to eight windows of the same size: the same equations, a patch to each lane. Eight
+/// are some four times as fast as one after the other, as none of it goes across lanes, and the eight systems of
+/// equations are solved at once.
+/// @param full       the level of a saturated pixel, which does not count
+/// @param window_px  odd: the windows' side
+/// @thread reentrant
+void align_eight(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
+                 int window_px, std::span<PatchTask* const> tasks);
+
+}  // namespace slsd
