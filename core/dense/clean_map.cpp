@@ -3,12 +3,17 @@
 #include "core/dense/clean_map.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <limits>
 #include <utility>
 
 #include <Eigen/Geometry>
+
+#include "core/clones.hpp"
+#include "core/decode/lanes.hpp"
 
 namespace slsd {
 namespace {
@@ -17,45 +22,76 @@ namespace {
 constexpr float kJump = 0.004F;
 /// Of the distance from the projector: what lies farther behind is another surface.
 constexpr float kBehind = 1.01F;
+constexpr auto kMeasuredByte = static_cast<std::uint8_t>(DensePixel::kMeasured);
 
-bool is_jump(float a, float b) {
-  return std::isnan(a) != std::isnan(b) || std::abs(a - b) > kJump * a;
+/// Eight pixels of a row, and where the projector lights them.
+struct Rays {
+  float turned[3], per_px[3];  // R r of the first pixel, and its change for one px
+  float translation[3];
+  float fx, fy, cx, cy, distortion[5];
+  int width, height;  // of the projector
+};
+
+/// @param to  the projector's pixel, -1 where there is none; and the distance from the projector along its z axis
+inline __attribute__((always_inline)) void find_rays(const Rays& in, const float* depth_mm, std::int32_t* to,
+                                                     float* distance_mm) {
+  constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
+  const Lanes zero{};
+  Lanes depth, q[3];
+  load(depth_mm, depth);
+  for (int k = 0; k < 3; ++k) q[k] = depth * (in.turned[k] + in.per_px[k] * kLane) + in.translation[k];
+  const Lanes x = q[0] / q[2], y = q[1] / q[2], r2 = x * x + y * y;
+  const float k1 = in.distortion[0], k2 = in.distortion[1], p1 = in.distortion[2], p2 = in.distortion[3],
+              k3 = in.distortion[4];
+  const Lanes radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  const Lanes u = in.fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + (in.cx + 0.5F),
+              v = in.fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + (in.cy + 0.5F);
+  // What is no number is in no range.
+  const IntLanes inside = (u >= zero) & (v >= zero) & (u < zero + static_cast<float>(in.width)) &
+                          (v < zero + static_cast<float>(in.height)) & (q[2] > zero);
+  const Lanes safe_u = inside ? u : zero, safe_v = inside ? v : zero;
+  const IntLanes at = __builtin_convertvector(safe_v, IntLanes) * in.width + __builtin_convertvector(safe_u, IntLanes);
+  const IntLanes found = inside ? at : IntLanes{} - 1;
+  std::memcpy(to, &found, sizeof found), std::memcpy(distance_mm, &q[2], sizeof q[2]);
 }
 
-}  // namespace
+/// A bit for each of eight pixels that are on one surface with those beside them.
+inline __attribute__((always_inline)) void find_joined(const float* depth_mm, const float* beside_mm,
+                                                       std::uint64_t& joined) {
+  const Lanes none{};
+  Lanes here, beside;
+  load(depth_mm, here), load(beside_mm, beside);
+  const Lanes off = beside - here, far = off > none ? off : -off;
+  const IntLanes near = far <= kJump * here;
+  std::uint64_t bits = 0;
+  for (int lane = 0; lane < kLanes; ++lane) bits |= static_cast<std::uint64_t>(near[lane] & 1) << lane;
+  joined = bits;
+}
 
-MapCleaner::MapCleaner(const CalibratedCamera& camera, const Lens& projector, std::shared_ptr<const RayGrid> rays)
-    : camera_(camera), projector_(projector), rays_(std::move(rays)) {}
-
-void MapCleaner::drop_occluded(DenseMap& map, Executor& executor) {
-  const int width = projector_.width_px, height = projector_.height_px;
-  label_.assign(map.depth_mm.size(), -1);
-  distance_.resize(map.depth_mm.size());
-  nearest_.assign(static_cast<std::size_t>(width) * height, std::numeric_limits<float>::max());
-  executor.run(map.height, [&](int y, int) {
-    for (int x = 0; x < map.width; ++x) {
-      const std::size_t pixel = static_cast<std::size_t>(y) * map.width + x;
-      if (!map.measured(pixel)) continue;
-      const Eigen::Vector3d direction = rays_->at(x, y).cast<double>().homogeneous();
-      const Eigen::Vector3d point = camera_.projector_from_camera * (direction * map.depth_mm[pixel]);
-      const Eigen::Vector2d lit_by = projector_.project(point);
-      const int u = static_cast<int>(std::lround(lit_by.x())), v = static_cast<int>(std::lround(lit_by.y()));
-      if (u < 0 || v < 0 || u >= width || v >= height) continue;
-      label_[pixel] = v * width + u, distance_[pixel] = static_cast<float>(point.z());
-    }
-  });
-  for (std::size_t pixel = 0; pixel < label_.size(); ++pixel) {
-    if (label_[pixel] < 0) continue;
-    float& nearest = nearest_[label_[pixel]];
-    nearest = std::min(nearest, distance_[pixel]);
+/// A row of them.
+inline __attribute__((always_inline)) void join_row(const float* depth_mm, const float* beside_mm, int count,
+                                                    std::uint64_t* bits) {
+  for (int x = 0; x + kLanes <= count; x += kLanes) {
+    std::uint64_t joined;
+    find_joined(depth_mm + x, beside_mm + x, joined);
+    bits[x / 64] |= joined << (x % 64);
   }
-  for (std::size_t pixel = 0; pixel < label_.size(); ++pixel) {
-    if (label_[pixel] >= 0 && distance_[pixel] > kBehind * nearest_[label_[pixel]])
-      map.drop(pixel, DensePixel::kOccluded);
+  for (int x = count / kLanes * kLanes; x < count; ++x) {
+    const bool near = std::abs(beside_mm[x] - depth_mm[x]) <= kJump * depth_mm[x];
+    bits[x / 64] |= static_cast<std::uint64_t>(near) << (x % 64);
   }
 }
 
-namespace {
+/// A bit to each byte that is not 0, or is, of bytes of 0 and other small numbers.
+inline __attribute__((always_inline)) void pack_row(const std::uint8_t* bytes, int count, std::uint8_t wanted,
+                                                    std::uint64_t* bits) {
+  for (int first = 0; first < count; first += 64) {
+    std::uint64_t word = 0;
+    const int end = std::min(64, count - first);
+    for (int x = 0; x < end; ++x) word |= static_cast<std::uint64_t>(bytes[first + x] == wanted) << x;
+    bits[first / 64] = word;
+  }
+}
 
 /// Rows of bits, each as wide as the image.
 struct BitRows {
@@ -66,15 +102,16 @@ struct BitRows {
   template <class Combine>
   void along(std::uint64_t* rows, int reach, std::uint64_t beyond, Combine combine) const {
     for (int y = 0; y < height; ++y) {
-      std::uint64_t* row = rows + words * static_cast<std::size_t>(y);
-      for (int step = 0; step < reach; ++step) {
-        std::uint64_t before = beyond;
-        for (std::size_t w = 0; w < words; ++w) {
-          const std::uint64_t here = row[w], behind = w + 1 < words ? row[w + 1] : beyond;
-          row[w] = combine(here, combine(here << 1 | before >> 63, here >> 1 | behind << 63));
-          before = here;
-        }
-      }
+      for (int step = 0; step < reach; ++step) one_along(rows + words * static_cast<std::size_t>(y), beyond, combine);
+    }
+  }
+  template <class Combine>
+  void one_along(std::uint64_t* row, std::uint64_t beyond, Combine combine) const {
+    std::uint64_t before = beyond;
+    for (std::size_t w = 0; w < words; ++w) {
+      const std::uint64_t here = row[w], behind = w + 1 < words ? row[w + 1] : beyond;
+      row[w] = combine(here, combine(here << 1 | before >> 63, here >> 1 | behind << 63));
+      before = here;
     }
   }
   template <class Combine>
@@ -90,7 +127,72 @@ struct BitRows {
   }
 };
 
+/// The first bit from there on that is as wanted; the end where there is none.
+int next_bit(const std::uint64_t* row, int from, int end, bool wanted) {
+  if (from >= end) return end;
+  const std::uint64_t turn = wanted ? 0 : ~std::uint64_t{0};
+  int word = from / 64;
+  std::uint64_t left = (row[word] ^ turn) & ~std::uint64_t{0} << (from % 64);
+  while (left == 0 && (word + 1) * 64 < end) left = row[++word] ^ turn;
+  return left == 0 ? end : std::min(end, word * 64 + std::countr_zero(left));
+}
+
+/// Calls with each bit's place in its row.
+template <class Take>
+void for_each_bit(const std::uint64_t* row, std::size_t words, const Take& take) {
+  for (std::size_t w = 0; w < words; ++w)
+    for (std::uint64_t left = row[w]; left != 0; left &= left - 1)
+      take(w * 64 + static_cast<std::size_t>(std::countr_zero(left)));
+}
+
 }  // namespace
+
+MapCleaner::MapCleaner(const CalibratedCamera& camera, const Lens& projector, std::shared_ptr<const RayGrid> rays)
+    : camera_(camera), projector_(projector), rays_(std::move(rays)) {}
+
+void MapCleaner::drop_occluded(DenseMap& map, Executor& executor) {
+  label_.resize(map.depth_mm.size());
+  distance_.resize(map.depth_mm.size());
+  nearest_.assign(static_cast<std::size_t>(projector_.width_px) * projector_.height_px,
+                  std::numeric_limits<float>::max());
+  const auto& [rotation, translation] = camera_.projector_from_camera;
+  const Eigen::Matrix3f turn = rotation.cast<float>();
+  Rays rays{};
+  Eigen::Map<Eigen::Vector3f>(rays.translation) = translation.cast<float>();
+  rays.fx = static_cast<float>(projector_.fx), rays.fy = static_cast<float>(projector_.fy);
+  rays.cx = static_cast<float>(projector_.cx), rays.cy = static_cast<float>(projector_.cy);
+  for (int k = 0; k < 5; ++k) rays.distortion[k] = static_cast<float>(projector_.distortion[k]);
+  rays.width = projector_.width_px, rays.height = projector_.height_px;
+  executor.run(map.height, [&](int y, int) {
+    Rays here = rays;
+    for (int x = 0; x < map.width; x += kLanes) {
+      const Eigen::Vector2f first = rays_->at(x, y), last = rays_->before_next(x, y);
+      Eigen::Map<Eigen::Vector3f>(here.turned) = turn * first.homogeneous();
+      Eigen::Map<Eigen::Vector3f>(here.per_px) = turn.leftCols<2>() * (last - first) / (RayGrid::kPitchPx - 1);
+      const std::size_t pixel = static_cast<std::size_t>(y) * map.width + x;
+      if (x + kLanes <= map.width) {
+        Cloned<find_rays>::call(here, map.depth_mm.data() + pixel, label_.data() + pixel, distance_.data() + pixel);
+        continue;
+      }
+      float depth[kLanes], distance[kLanes];
+      std::int32_t at[kLanes];
+      const int count = map.width - x;
+      std::fill(depth, depth + kLanes, std::numeric_limits<float>::quiet_NaN());
+      std::copy_n(map.depth_mm.data() + pixel, count, depth);
+      Cloned<find_rays>::call(here, depth, at, distance);
+      std::copy_n(at, count, label_.data() + pixel), std::copy_n(distance, count, distance_.data() + pixel);
+    }
+  });
+  for (std::size_t pixel = 0; pixel < label_.size(); ++pixel) {
+    if (label_[pixel] < 0) continue;
+    float& nearest = nearest_[label_[pixel]];
+    nearest = std::min(nearest, distance_[pixel]);
+  }
+  for (std::size_t pixel = 0; pixel < label_.size(); ++pixel) {
+    if (label_[pixel] >= 0 && distance_[pixel] > kBehind * nearest_[label_[pixel]])
+      map.drop(pixel, DensePixel::kOccluded);
+  }
+}
 
 void MapCleaner::drop_unlit_rims(DenseMap& map, int reach_px) {
   const BitRows rows{static_cast<std::size_t>(map.width + 63) / 64, map.height};
@@ -98,8 +200,7 @@ void MapCleaner::drop_unlit_rims(DenseMap& map, int reach_px) {
   rows_.resize(bits_.size());
   for (int y = 0; y < map.height; ++y) {
     const std::uint8_t* firm = map.firm.data() + static_cast<std::size_t>(y) * map.width;
-    std::uint64_t* row = bits_.data() + rows.words * static_cast<std::size_t>(y);
-    for (int x = 0; x < map.width; ++x) row[x / 64] |= static_cast<std::uint64_t>(firm[x]) << (x % 64);
+    Cloned<pack_row>::call(firm, map.width, std::uint8_t{1}, bits_.data() + rows.words * static_cast<std::size_t>(y));
   }
   const auto either = [](std::uint64_t a, std::uint64_t b) { return a | b; };
   const auto both = [](std::uint64_t a, std::uint64_t b) { return a & b; };
@@ -107,60 +208,118 @@ void MapCleaner::drop_unlit_rims(DenseMap& map, int reach_px) {
   rows.across(bits_.data(), rows_.data(), reach_px, either);
   rows.along(rows_.data(), reach_px, ~std::uint64_t{0}, both);
   rows.across(rows_.data(), bits_.data(), reach_px, both);
+  measured_.resize(rows.words);
   for (int y = 0; y < map.height; ++y) {
-    const std::uint64_t* row = bits_.data() + rows.words * static_cast<std::size_t>(y);
-    for (int x = 0; x < map.width; ++x) {
-      const std::size_t pixel = static_cast<std::size_t>(y) * map.width + x;
-      if (map.measured(pixel) && (row[x / 64] >> (x % 64) & 1) == 0) map.drop(pixel, DensePixel::kUnlit);
-    }
+    const std::size_t first = static_cast<std::size_t>(y) * map.width;
+    const std::uint64_t* enclosed = bits_.data() + rows.words * static_cast<std::size_t>(y);
+    Cloned<pack_row>::call(reinterpret_cast<const std::uint8_t*>(map.pixels.data()) + first, map.width, kMeasuredByte,
+                           measured_.data());
+    for (std::size_t w = 0; w < rows.words; ++w) measured_[w] &= ~enclosed[w];
+    for_each_bit(measured_.data(), rows.words, [&](std::size_t x) { map.drop(first + x, DensePixel::kUnlit); });
   }
 }
 
+/// Which pixels are measured, and which are on one surface with the next to the right, and below.
+void MapCleaner::find_joined(const DenseMap& map) {
+  const std::size_t words = static_cast<std::size_t>(map.width + 63) / 64, all = words * map.height;
+  measured_.assign(all, 0), right_.assign(all, 0), below_.assign(all, 0);
+  for (int y = 0; y < map.height; ++y) {
+    const std::size_t first = static_cast<std::size_t>(y) * map.width, row = words * static_cast<std::size_t>(y);
+    const float* depth = map.depth_mm.data() + first;
+    Cloned<pack_row>::call(reinterpret_cast<const std::uint8_t*>(map.pixels.data()) + first, map.width, kMeasuredByte,
+                           measured_.data() + row);
+    Cloned<join_row>::call(depth, depth + 1, map.width - 1, right_.data() + row);
+    if (y + 1 < map.height) Cloned<join_row>::call(depth, depth + map.width, map.width, below_.data() + row);
+  }
+}
+
+// Runs of pixels that hang together in a row, joined with those of the row before that they touch.
 void MapCleaner::drop_islands(DenseMap& map, std::size_t least) {
-  const auto count = static_cast<std::int32_t>(map.depth_mm.size());
-  label_.assign(map.depth_mm.size(), -1);
-  for (std::int32_t first = 0; first < count; ++first) {
-    if (label_[first] >= 0 || !map.measured(first)) continue;
-    members_.assign(1, first);
-    label_[first] = first;
-    for (std::size_t next = 0; next < members_.size(); ++next) {
-      const std::int32_t pixel = members_[next];
-      const int x = pixel % map.width;
-      const auto take = [&](std::int32_t other) {
-        if (label_[other] >= 0 || is_jump(map.depth_mm[pixel], map.depth_mm[other])) return;
-        label_[other] = first;
-        members_.push_back(other);
-      };
-      if (x > 0) take(pixel - 1);
-      if (x + 1 < map.width) take(pixel + 1);
-      if (pixel >= map.width) take(pixel - map.width);
-      if (pixel + map.width < count) take(pixel + map.width);
+  find_joined(map);
+  runs_.clear();
+  const std::size_t words = static_cast<std::size_t>(map.width + 63) / 64;
+  const auto root = [&](std::int32_t run) {
+    while (runs_[run].parent != run) run = runs_[run].parent = runs_[runs_[run].parent].parent;
+    return run;
+  };
+  std::size_t before = 0;  // the first run of the row before
+  for (int y = 0; y < map.height; ++y) {
+    const std::size_t begin = runs_.size();
+    const std::uint64_t *const measured = measured_.data() + words * static_cast<std::size_t>(y),
+                               *const right = right_.data() + words * static_cast<std::size_t>(y);
+    for (int x = next_bit(measured, 0, map.width, true); x < map.width;) {
+      const int last = next_bit(right, x, map.width - 1, false);
+      runs_.push_back(
+          {y, x, last + 1, static_cast<std::int32_t>(runs_.size()), static_cast<std::uint32_t>(last + 1 - x)});
+      x = next_bit(measured, last + 1, map.width, true);
     }
-    if (members_.size() >= least) continue;
-    for (const std::int32_t pixel : members_) map.drop(pixel, DensePixel::kIsland);
+    if (y > 0) {
+      const std::uint64_t* const joined = below_.data() + words * static_cast<std::size_t>(y - 1);
+      std::size_t above = before;
+      for (std::size_t run = begin; run < runs_.size(); ++run) {
+        while (above < begin && runs_[above].end <= runs_[run].first) ++above;
+        for (std::size_t other = above; other < begin && runs_[other].first < runs_[run].end; ++other) {
+          const int from = std::max(runs_[other].first, runs_[run].first),
+                    to = std::min(runs_[other].end, runs_[run].end);
+          if (next_bit(joined, from, to, true) == to) continue;
+          const std::int32_t a = root(static_cast<std::int32_t>(other)), b = root(static_cast<std::int32_t>(run));
+          if (a == b) continue;
+          runs_[std::max(a, b)].parent = std::min(a, b);
+          runs_[std::min(a, b)].pixels += runs_[std::max(a, b)].pixels;
+        }
+      }
+    }
+    before = begin;
+  }
+  for (std::size_t run = 0; run < runs_.size(); ++run) {
+    if (runs_[root(static_cast<std::int32_t>(run))].pixels >= least) continue;
+    for (int x = runs_[run].first; x < runs_[run].end; ++x)
+      map.drop(static_cast<std::size_t>(runs_[run].y) * map.width + x, DensePixel::kIsland);
   }
 }
 
 void MapCleaner::prune(DenseMap& map, double reach_px) {
   if (!(reach_px > 0)) return;
-  const int width = map.width, height = map.height, reach = static_cast<int>(std::ceil(reach_px)) - 1;
-  label_.assign(map.depth_mm.size(), 0);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const std::size_t pixel = static_cast<std::size_t>(y) * width + x;
-      const auto differs = [&](std::size_t other) { return is_jump(map.depth_mm[pixel], map.depth_mm[other]); };
-      const bool edge = (x > 0 && differs(pixel - 1)) || (x + 1 < width && differs(pixel + 1)) ||
-                        (y > 0 && differs(pixel - width)) || (y + 1 < height && differs(pixel + width));
-      if (!edge) continue;
-      for (int j = std::max(-reach, -y); j <= std::min(reach, height - 1 - y); ++j) {
-        for (int i = std::max(-reach, -x); i <= std::min(reach, width - 1 - x); ++i) {
-          if (i * i + j * j < reach_px * reach_px) label_[pixel + static_cast<std::ptrdiff_t>(j) * width + i] = 1;
-        }
+  find_joined(map);
+  const BitRows rows{static_cast<std::size_t>(map.width + 63) / 64, map.height};
+  const std::size_t words = rows.words;
+  const auto either = [](std::uint64_t a, std::uint64_t b) { return a | b; };
+  // Both sides of whatever is not joined.
+  bits_.assign(measured_.size(), 0), rows_.assign(measured_.size(), 0);
+  const std::uint64_t beyond = map.width % 64 == 0 ? 0 : ~std::uint64_t{0} << (map.width % 64);
+  for (int y = 0; y < map.height; ++y) {
+    const std::size_t row = words * static_cast<std::size_t>(y);
+    for (std::size_t w = 0; w < words; ++w) {
+      const std::uint64_t here = measured_[row + w];
+      const std::uint64_t next = here >> 1 | (w + 1 < words ? measured_[row + w + 1] << 63 : 0);
+      std::uint64_t parted = (here | next) & ~right_[row + w];
+      if (w + 1 == words) parted &= ~(beyond | std::uint64_t{1} << ((map.width - 1) % 64));
+      bits_[row + w] |= parted | parted << 1;
+      if (w + 1 < words) bits_[row + w + 1] |= parted >> 63;
+      if (y + 1 == map.height) continue;
+      const std::uint64_t down = (here | measured_[row + words + w]) & ~below_[row + w];
+      bits_[row + w] |= down, bits_[row + words + w] |= down;
+    }
+  }
+  // A disc around each: to every row the part of it that is as wide there.
+  const int reach = static_cast<int>(std::ceil(reach_px)) - 1;
+  for (int y = 0; y < map.height; ++y) {
+    std::uint64_t* const edge = bits_.data() + words * static_cast<std::size_t>(y);
+    if (std::all_of(edge, edge + words, [](std::uint64_t word) { return word == 0; })) continue;
+    int width = 0;
+    for (int away = reach; away >= 0; --away) {
+      for (; (width + 1) * (width + 1) + away * away < reach_px * reach_px; ++width) rows.one_along(edge, 0, either);
+      for (const int other : {y - away, y + away}) {
+        if (other < 0 || other >= map.height) continue;
+        std::uint64_t* const to = rows_.data() + words * static_cast<std::size_t>(other);
+        for (std::size_t w = 0; w < words; ++w) to[w] |= edge[w];
       }
     }
   }
-  for (std::size_t pixel = 0; pixel < label_.size(); ++pixel) {
-    if (label_[pixel] != 0 && map.measured(pixel)) map.drop(pixel, DensePixel::kAtAnEdge);
+  for (int y = 0; y < map.height; ++y) {
+    const std::size_t row = words * static_cast<std::size_t>(y), first = static_cast<std::size_t>(y) * map.width;
+    for (std::size_t w = 0; w < words; ++w) rows_[row + w] &= measured_[row + w];
+    for_each_bit(rows_.data() + row, words, [&](std::size_t x) { map.drop(first + x, DensePixel::kAtAnEdge); });
   }
 }
 

@@ -33,8 +33,17 @@ class MapCleaner {
   CalibratedCamera camera_;
   Lens projector_;
   std::shared_ptr<const RayGrid> rays_;  // shared: the same for all
-  std::vector<std::int32_t> label_, members_;
-  std::vector<std::uint64_t> bits_, rows_;
+  /// Pixels of a row that hang together.
+  struct Run {
+    int y, first, end;
+    std::int32_t parent;
+    std::uint32_t pixels;  ///< of all that hang together, in the root
+  };
+  void find_joined(const DenseMap& map);
+
+  std::vector<std::int32_t> label_;
+  std::vector<Run> runs_;
+  std::vector<std::uint64_t> bits_, rows_, measured_, right_, below_;
   std::vector<float> distance_, nearest_;
 };
 

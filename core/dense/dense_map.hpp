@@ -47,6 +47,14 @@ struct DenseMap {
     pixels.assign(count, DensePixel::kNotReached);
     firm.assign(count, 0);
   }
+  void count_pixels() {
+    counts.fill(0);
+    // Four tallies: most pixels are as the one before, and would wait for its count.
+    std::array<std::array<std::uint32_t, kDensePixelCount>, 4> tallies{};
+    for (std::size_t i = 0; i < pixels.size(); ++i) ++tallies[i % 4][static_cast<std::size_t>(pixels[i])];
+    for (const auto& tally : tallies)
+      for (int i = 0; i < kDensePixelCount; ++i) counts[i] += tally[i];
+  }
   void drop(std::size_t pixel, DensePixel why) {
     depth_mm[pixel] = sigma_mm[pixel] = std::numeric_limits<float>::quiet_NaN();
     intensity[pixel] = 0;

@@ -17,6 +17,9 @@ namespace {
 constexpr double kWindowOfPitch = 0.72;
 constexpr int kWindowLeastPx = 11, kWindowMostPx = 21;
 
+/// Of the blurs, from the sharpest on: what a projector and a camera in focus come to.
+constexpr int kUsualBlurs = 4;
+
 int window_px(double pitch_in_camera_px) {
   const int px = static_cast<int>(std::lround(kWindowOfPitch * pitch_in_camera_px));
   return std::clamp(px, kWindowLeastPx, kWindowMostPx) | 1;
@@ -79,6 +82,11 @@ const std::shared_ptr<const RayGrid>& DenseMapper::rays() const {
   return fixed_->rays;
 }
 
+void DenseMapper::warm_up(Executor& executor) {
+  executor.run(kUsualBlurs, [&](int blur, int) { (void)fixed_->fields.at(static_cast<std::size_t>(blur)); });
+  map_.reset(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
+}
+
 /// The plane of a symbol: its depth, and the slopes that make the map turn as the grid of symbols does.
 void DenseMapper::find_seeds(const DecodedSymbols& symbols) {
   seeds_.clear();
@@ -128,14 +136,13 @@ const DenseMap& DenseMapper::measure(const GreyView& frame, double full, const D
   done(DenseStage::kGrow);
   grid_.fuse(executor);
   done(DenseStage::kFuse);
-  judge_.judge(seen, field, fixed_->geometry, grid_, map_, executor);
+  judge_.judge(seen, field, grid_, map_, executor);
   done(DenseStage::kJudge);
   cleaner_.drop_occluded(map_, executor);
   cleaner_.drop_unlit_rims(map_, fixed_->close_px);
   cleaner_.drop_islands(map_, static_cast<std::size_t>(fixed_->window_px) * fixed_->window_px);
   cleaner_.prune(map_, fixed_->decode.dense.prune_px);
-  map_.counts.fill(0);
-  for (const DensePixel pixel : map_.pixels) ++map_.counts[static_cast<std::size_t>(pixel)];
+  map_.count_pixels();
   done(DenseStage::kClean);
   return map_;
 }

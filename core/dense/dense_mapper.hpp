@@ -42,6 +42,9 @@ class DenseMapper {
   const DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
                           DenseObserver* observer = nullptr);
 
+  /// Makes beforehand what the first frame would wait for.
+  void warm_up(Executor& executor);
+
   /// Of the camera's pixels.
   [[nodiscard]] const std::shared_ptr<const RayGrid>& rays() const;
   /// Of the last frame: the blur of the pattern, projector px.

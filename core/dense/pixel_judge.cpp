@@ -4,8 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 #include <utility>
+
+#include "core/clones.hpp"
+#include "core/decode/lanes.hpp"
 
 namespace slsd {
 namespace {
@@ -26,10 +30,6 @@ constexpr float kEdgePx = 0.03F;
 /// Planes that differ by less at a cell are one candidate, px.
 constexpr float kSamePx = 0.08F;
 
-// The axes of the table.
-constexpr int kExpected = 17, kSeen = 48, kSlopes = 4, kNoises = 6;
-constexpr float kSeenFirst = -0.5F, kSeenStep = 0.05F, kSlopeStep = 0.1F, kNoiseFirst = 0.01F;
-
 // What is known of a pixel's level where a surface is, in units of its gain.
 constexpr float kMisfit = 0.04F;                               // of the dark: light that the scene scatters
 constexpr float kGainSpread = 0.12F;                           // of the light: print, relief
@@ -40,6 +40,19 @@ constexpr float kDark = 0.4F, kLit = 0.35F, kBetween = 0.25F;  // of the pixels 
 
 float normal(float off, float sigma) {
   return std::exp(-0.5F * off * off / (sigma * sigma)) / (sigma * std::sqrt(2 * std::numbers::pi_v<float>));
+}
+
+std::uint32_t packed(const Evidence& evidence) {
+  const auto half = [](float log) {
+    const long steps = std::clamp(std::lround(log / EvidenceTable::kUnit), -32'767L, 32'767L);
+    return static_cast<std::uint32_t>(steps) & 0xffffU;
+  };
+  return half(evidence.against_another) << 16U | half(evidence.against_unlit);
+}
+
+Evidence unpacked(std::uint32_t entry) {
+  return {static_cast<float>(static_cast<std::int32_t>(entry) >> 16) * EvidenceTable::kUnit,
+          static_cast<float>(static_cast<std::int32_t>(entry << 16U) >> 16) * EvidenceTable::kUnit};
 }
 
 }  // namespace
@@ -63,37 +76,203 @@ EvidenceTable::EvidenceTable() {
     for (int slope = 0; slope < kSlopes; ++slope)
       for (int expected = 0; expected < kExpected; ++expected)
         for (int seen = 0; seen < kSeen; ++seen)
-          table_.push_back(
+          table_.push_back(packed(
               reckon(static_cast<float>(expected) / (kExpected - 1), kSeenFirst + kSeenStep * static_cast<float>(seen),
-                     kSlopeStep * static_cast<float>(slope), kNoiseFirst * static_cast<float>(1 << noise)));
+                     kSlopeStep * static_cast<float>(slope), kNoiseFirst * static_cast<float>(1 << noise))));
+}
+
+const std::uint32_t* EvidenceTable::entries(float noise) const {
+  int loud = 0;
+  for (float limit = 1.41F * kNoiseFirst; loud + 1 < kNoises && noise > limit; limit *= 2) ++loud;
+  return table_.data() + static_cast<std::ptrdiff_t>(loud) * kSlopes * kExpected * kSeen;
 }
 
 Evidence EvidenceTable::at(float expected, float seen, float slope, float noise) const {
   const auto step = [](float value, int count) {
     return static_cast<int>(std::clamp(value + 0.5F, 0.F, static_cast<float>(count - 1)));
   };
-  int loud = 0;
-  for (float limit = 1.41F * kNoiseFirst; loud + 1 < kNoises && noise > limit; limit *= 2) ++loud;
-  const int row =
-      (loud * kSlopes + step(slope / kSlopeStep, kSlopes)) * kExpected + step(expected * (kExpected - 1), kExpected);
-  return table_[static_cast<std::size_t>(row) * kSeen + step((seen - kSeenFirst) / kSeenStep, kSeen)];
+  const int row = step(slope / kSlopeStep, kSlopes) * kExpected + step(expected * (kExpected - 1), kExpected);
+  return unpacked(entries(noise)[row * kSeen + step((seen - kSeenFirst) / kSeenStep, kSeen)]);
 }
 
-/// What lies between four nodes that are one surface.
-struct Blend {
-  float inverse_depth, sigma_px, light;
+namespace {
+
+using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
+
+/// A plane's patch, in plain numbers: what weigh_lanes() needs.
+struct Weighing {
+  const float *seen, *x, *y;  // of each pixel, from the map's middle as first_x and first_y say
+  int count;                  // a multiple of the lanes
+  float first_x, first_y;
+  float warp[9];  // by rows
+  float origin_u, origin_v;
+  const std::uint32_t* samples;
+  int field_width, field_height;
+  float slope_unit, px_per_px;
+  float gain, gain_x, gain_y, offset;
+  const std::uint32_t* entries;
 };
+
+/// What each pixel says for the plane: two numbers to a pixel, see Evidence.
+inline __attribute__((always_inline)) void weigh_lanes(const Weighing& in, float* to) {
+  constexpr float kScale = PatternField::kSamplesPerPx;
+  constexpr int kBits = PatternField::kSlopeBits;
+  using Table = EvidenceTable;
+  const Lanes zero{}, one = zero + 1;
+  const auto clamp = [](const Lanes& from, float last, Lanes& to_lanes) __attribute__((always_inline)) {
+    const Lanes none{}, most = none + last;
+    to_lanes = from < most ? from : most;
+    to_lanes = to_lanes > none ? to_lanes : none;
+  };
+  for (int first = 0; first < in.count; first += kLanes) {
+    Lanes seen, dx, dy;
+    load(in.seen + first, seen), load(in.x + first, dx), load(in.y + first, dy);
+    dx += in.first_x, dy += in.first_y;
+    const Lanes per_q2 = one / (in.warp[6] * dx + in.warp[7] * dy + in.warp[8]);
+    Lanes u, v;
+    clamp(((in.warp[0] * dx + in.warp[1] * dy + in.warp[2]) * per_q2 + in.origin_u) * kScale,
+          static_cast<float>(in.field_width - 1), u);
+    clamp(((in.warp[3] * dx + in.warp[4] * dy + in.warp[5]) * per_q2 + in.origin_v) * kScale,
+          static_cast<float>(in.field_height - 1), v);
+    const IntLanes at_u = __builtin_convertvector(u + 0.5F, IntLanes),
+                   at_v = __builtin_convertvector(v + 0.5F, IntLanes);
+    const IntLanes at = at_v * in.field_width + at_u;
+    BitLanes bits;
+    for (int lane = 0; lane < kLanes; ++lane) bits[lane] = in.samples[at[lane]];
+    const Lanes slope_u =
+        __builtin_convertvector(reinterpret_cast<IntLanes>(bits << (32 - 2 * kBits)) >> (32 - kBits), Lanes) *
+        in.slope_unit;
+    const Lanes slope_v =
+        __builtin_convertvector(reinterpret_cast<IntLanes>(bits << (32 - kBits)) >> (32 - kBits), Lanes) *
+        in.slope_unit;
+    const Lanes from_u = u - __builtin_convertvector(at_u, Lanes), from_v = v - __builtin_convertvector(at_v, Lanes);
+    const Lanes light =
+        __builtin_convertvector(reinterpret_cast<IntLanes>(bits >> (2 * kBits)), Lanes) * PatternField::kValueUnit +
+        (slope_u * from_u + slope_v * from_v) * (1 / kScale);
+    const Lanes steep_u = slope_u > zero ? slope_u : -slope_u, steep_v = slope_v > zero ? slope_v : -slope_v;
+    const Lanes gain = in.gain + in.gain_x * dx + in.gain_y * dy;
+    const Lanes least = zero + 0.3F * in.gain;
+    const Lanes level = (seen - in.offset) / (gain > least ? gain : least);
+    Lanes slope, expected, step;
+    clamp((steep_u > steep_v ? steep_u : steep_v) * (in.px_per_px / Table::kSlopeStep) + 0.5F, Table::kSlopes - 1,
+          slope);
+    clamp(light * (Table::kExpected - 1) + 0.5F, Table::kExpected - 1, expected);
+    clamp((level - Table::kSeenFirst) * (1 / Table::kSeenStep) + 0.5F, Table::kSeen - 1, step);
+    const IntLanes entry =
+        (__builtin_convertvector(slope, IntLanes) * Table::kExpected + __builtin_convertvector(expected, IntLanes)) *
+            Table::kSeen +
+        __builtin_convertvector(step, IntLanes);
+    BitLanes found;
+    for (int lane = 0; lane < kLanes; ++lane) found[lane] = in.entries[entry[lane]];
+    const Lanes counted = seen > zero ? zero + Table::kUnit : zero;  // below: outside, or saturated
+    const Lanes another = __builtin_convertvector(reinterpret_cast<IntLanes>(found) >> 16, Lanes) * counted;
+    const Lanes unlit = __builtin_convertvector(reinterpret_cast<IntLanes>(found << 16) >> 16, Lanes) * counted;
+    const Lanes low = __builtin_shufflevector(another, unlit, 0, 8, 1, 9, 2, 10, 3, 11),
+                high = __builtin_shufflevector(another, unlit, 4, 12, 5, 13, 6, 14, 7, 15);
+    std::memcpy(to + 2 * first, &low, sizeof low);
+    std::memcpy(to + 2 * first + kLanes, &high, sizeof high);
+  }
+}
+
+struct Summing {
+  int side, reach, cell;  // of the whole, around a pixel, of the cell
+  float of_half;          // is added to what a half has
+};
+
+/// For each pixel of a cell the least that its surroundings say: the whole, and the halves to each side, the pixel's
+/// own line in both. What goes on on one side alone ends here, or before.
+/// @param evidence  two numbers for each of side x side pixels
+/// @param columns   room for 8 (side + 1) numbers
+inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const float* evidence, float* columns,
+                                                     float* least, float* own) {
+  const int side = in.side, reach = in.reach;
+  for (int y = 0; y < in.cell; ++y) {
+    // Sums of columns, all of it and its upper and lower half, then added up along the row.
+    Lanes total{};
+    std::memcpy(columns, &total, sizeof total);
+    for (int x = 0; x < side; ++x) {
+      const float* at = evidence + 2 * (y * side + x);
+      float above[2] = {0, 0}, below[2] = {0, 0};
+      for (int j = 0; j < reach; ++j) above[0] += at[2 * j * side], above[1] += at[2 * j * side + 1];
+      at += 2 * reach * side;
+      for (int j = 1; j <= reach; ++j) below[0] += at[2 * j * side], below[1] += at[2 * j * side + 1];
+      const Lanes column = {above[0] + at[0] + below[0],
+                            above[1] + at[1] + below[1],
+                            above[0] + at[0],
+                            above[1] + at[1],
+                            at[0] + below[0],
+                            at[1] + below[1],
+                            0,
+                            0};
+      total += column;
+      std::memcpy(columns + 8 * (x + 1), &total, sizeof total);
+    }
+    for (int x = 0; x < in.cell; ++x) {
+      Lanes from, before, behind, to;
+      load(columns + 8 * x, from), load(columns + 8 * (x + reach), before);
+      load(columns + 8 * (x + reach + 1), behind), load(columns + 8 * (x + 2 * reach + 1), to);
+      const Lanes all = to - from, left = behind - from, right = to - before;
+      const float whole = std::min(all[0], all[1]);
+      const float halves = std::min(std::min(std::min(all[2], all[3]), std::min(all[4], all[5])),
+                                    std::min(std::min(left[0], left[1]), std::min(right[0], right[1])));
+      least[y * in.cell + x] = std::min(whole, halves + in.of_half);
+      own[y * in.cell + x] = evidence[2 * ((y + reach) * side + x + reach) + 1];
+    }
+  }
+}
+
+/// What lies between four nodes that are one surface: the blend of their planes.
+struct Blending {
+  float value[4], slope_x[4], slope_y[4];  // inverse depth at the cell's first pixel
+  float sigma_px[4], light[4];
+  float per_px, per_stride, of_full;
+  int first_x, first_y;  // of the cell, from the pixel of its first node
+};
+
+/// A row of them.
+inline __attribute__((always_inline)) void blend_lanes(const Blending& in, int row, int first, float* depth,
+                                                       float* sigma, std::int32_t* light) {
+  constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
+  const Lanes x = kLane + static_cast<float>(in.first_x + first);
+  const auto y = static_cast<float>(in.first_y + row);
+  const Lanes fx = x * in.per_stride;
+  const float fy = y * in.per_stride;
+  Lanes sums[3];
+  for (int side = 0; side < 2; ++side) {
+    const int a = side, b = side + 2;
+    const auto mix = [&](float above, float below) { return above + fy * (below - above); };
+    const Lanes value =
+        mix(in.value[a] + y * in.slope_y[a], in.value[b] + y * in.slope_y[b]) + x * mix(in.slope_x[a], in.slope_x[b]);
+    const float sigma_px = mix(in.sigma_px[a], in.sigma_px[b]), grey = mix(in.light[a], in.light[b]);
+    if (side == 0) {
+      sums[0] = (1 - fx) * value, sums[1] = (1 - fx) * sigma_px, sums[2] = (1 - fx) * grey;
+    } else {
+      sums[0] += fx * value, sums[1] += fx * sigma_px, sums[2] += fx * grey;
+    }
+  }
+  const Lanes mm = 1 / sums[0];
+  const Lanes sigma_mm = in.per_px * mm * mm * sums[1];
+  const Lanes least = Lanes{} + 1, most = Lanes{} + 255;
+  Lanes of_light = sums[2] * in.of_full;
+  of_light = of_light > least ? of_light : least;
+  of_light = of_light < most ? of_light : most;
+  const IntLanes level = __builtin_convertvector(of_light, IntLanes);
+  std::memcpy(depth, &mm, sizeof mm), std::memcpy(sigma, &sigma_mm, sizeof sigma_mm);
+  std::memcpy(light, &level, sizeof level);
+}
+
+}  // namespace
 
 /// The pixels between four nodes.
 struct PixelJudge::Cell {
   const DenseFrame& frame;
   const PatternField& field;
-  const PatchGeometry& geometry;
   const SurfaceGrid& grid;
   DenseMap& map;
   int column, row;               // of the node at its top left
   int left, top, right, bottom;  // its pixels, right and bottom beyond the last
   std::array<const SurfaceNode*, kCandidates> candidates{};
+  std::array<Eigen::Vector2i, kCandidates> nodes{};  // column, row
   std::array<Eigen::Vector2f, kCandidates> places{};
   int count = 0;
 
@@ -104,6 +283,7 @@ struct PixelJudge::Cell {
     const SurfaceNode* node = grid.good(at_column, at_row);
     if (node == nullptr || count == kCandidates) return;
     candidates[count] = node;
+    nodes[count] = {at_column, at_row};
     places[count] = {static_cast<float>(grid.x_of(at_column)), static_cast<float>(grid.y_of(at_row))};
     ++count;
   }
@@ -141,154 +321,211 @@ struct PixelJudge::Cell {
     return std::all_of(candidates.begin(), candidates.begin() + 4,
                        [](const SurfaceNode* node) { return node->support >= kCleanSupport; });
   }
-  [[nodiscard]] Blend blended(int x, int y) const {
-    const float per_stride = 1 / static_cast<float>(grid.stride_px());
-    const float fx = static_cast<float>(x - left) * per_stride, fy = static_cast<float>(y - top) * per_stride;
-    const float weights[4] = {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy};
-    Blend sum{0, 0, 0};
+  /// The mean of the corners, as a node at the place of the first.
+  [[nodiscard]] SurfaceNode merged() const {
+    SurfaceNode node = *candidates[0];
+    node.plane = {0, 0, 0};
+    node.gain = node.gain_x = node.gain_y = node.offset = node.across = 0;
     for (int k = 0; k < 4; ++k) {
-      const SurfaceNode& node = *candidates[k];
-      sum.inverse_depth += weights[k] * value(k, static_cast<float>(x), static_cast<float>(y));
-      sum.sigma_px += weights[k] * node.sigma_px;
-      sum.light += weights[k] * (node.gain + node.offset);
+      const SurfaceNode& corner = *candidates[k];
+      const Eigen::Vector2f off = places[0] - places[k];
+      node.plane.inverse_depth += 0.25F * corner.plane.at(off.x(), off.y());
+      node.plane.slope_x += 0.25F * corner.plane.slope_x, node.plane.slope_y += 0.25F * corner.plane.slope_y;
+      node.gain += 0.25F * (corner.gain + corner.gain_x * off.x() + corner.gain_y * off.y());
+      node.gain_x += 0.25F * corner.gain_x, node.gain_y += 0.25F * corner.gain_y;
+      node.offset += 0.25F * corner.offset, node.across += 0.25F * corner.across;
     }
-    return sum;
+    return node;
   }
+  [[nodiscard]] std::size_t pixel(int x, int y) const { return static_cast<std::size_t>(y) * map.width + x; }
 };
 
-void PixelJudge::write(const Cell& cell, int x, int y, float inverse_depth, float sigma_px, float per_px, float light,
-                       bool firm) const {
-  const std::size_t pixel = static_cast<std::size_t>(y) * cell.map.width + x;
-  const float depth = 1 / inverse_depth;
-  if (!(depth >= static_cast<float>(options_.depth_min_mm) && depth <= static_cast<float>(options_.depth_max_mm))) {
-    cell.map.pixels[pixel] = DensePixel::kOutOfDepthRange;
-    return;
+void PixelJudge::blend(const Cell& cell, const float* least, const float* own) const {
+  Blending blending;
+  const int node_x = static_cast<int>(cell.places[0].x()), node_y = static_cast<int>(cell.places[0].y());
+  for (int k = 0; k < 4; ++k) {
+    const SurfaceNode& node = *cell.candidates[k];
+    blending.value[k] = cell.value(k, cell.places[0].x(), cell.places[0].y());
+    blending.slope_x[k] = node.plane.slope_x, blending.slope_y[k] = node.plane.slope_y;
+    blending.sigma_px[k] = node.sigma_px, blending.light[k] = node.gain + node.offset;
   }
-  cell.map.depth_mm[pixel] = depth;
-  cell.map.sigma_mm[pixel] = per_px * depth * depth * sigma_px;
-  const auto of_full = static_cast<float>(255 / cell.frame.full);
-  cell.map.intensity[pixel] = static_cast<std::uint8_t>(std::clamp(light * of_full, 1.F, 255.F));
-  cell.map.pixels[pixel] = DensePixel::kMeasured;
-  cell.map.firm[pixel] = firm;
-}
-
-void PixelJudge::blend(const Cell& cell) const {
+  const int stride = cell.grid.stride_px();
+  blending.per_px = cell.candidates[0]->per_px, blending.per_stride = 1 / static_cast<float>(stride);
+  blending.of_full = static_cast<float>(255 / cell.frame.full);
+  blending.first_x = cell.left - node_x, blending.first_y = cell.top - node_y;
+  const auto depth_min = static_cast<float>(options_.depth_min_mm),
+             depth_max = static_cast<float>(options_.depth_max_mm);
   for (int y = cell.top; y < cell.bottom; ++y) {
-    for (int x = cell.left; x < cell.right; ++x) {
-      const Blend here = cell.blended(x, y);
-      write(cell, x, y, here.inverse_depth, here.sigma_px, cell.candidates[0]->per_px, here.light, true);
-    }
-  }
-}
-
-/// What each pixel of the cell and around it says for a candidate's plane.
-template <class T>
-void PixelJudge::weigh(const ImageView<T>& pixels, const Cell& cell, int candidate,
-                       std::vector<Evidence>& evidence) const {
-  const SurfaceNode& node = *cell.candidates[candidate];
-  const PatchMap map = cell.geometry.map_at(cell.places[candidate], static_cast<double>(node.plane.inverse_depth));
-  PatchState state;
-  state.slope_x = node.plane.slope_x / node.per_px, state.slope_y = node.plane.slope_y / node.per_px;
-  const Eigen::Matrix3f warp = map.base + map.shift * Eigen::RowVector3f(state.slope_x, state.slope_y, 0);
-  const Eigen::Vector2f origin =
-      map.origin_px.cast<float>() + node.across * Eigen::Vector2f(-map.along.y(), map.along.x());
-  const float noise = cell.frame.noise.at(node.offset + 0.5F * node.gain) / node.gain;
-  const float px_per_px = std::sqrt(std::abs(warp.topLeftCorner<2, 2>().determinant()));
-  std::size_t at = 0;
-  for (int y = cell.top - options_.reach_px; y < cell.bottom + options_.reach_px; ++y) {
-    for (int x = cell.left - options_.reach_px; x < cell.right + options_.reach_px; ++x, ++at) {
-      evidence[at] = {0, 0};
-      if (!pixels.contains(x, y) || pixels.at(x, y) >= cell.frame.full) continue;
-      const float dx = static_cast<float>(x) - map.middle_px.x(), dy = static_cast<float>(y) - map.middle_px.y();
-      const Eigen::Vector3f q = warp * Eigen::Vector3f(dx, dy, 1);
-      const Eigen::Vector2f p = q.head<2>() / q.z() + origin;
-      const PatternField::Sample light = cell.field.at(p.x(), p.y());
-      const float gain = std::max(0.3F * node.gain, node.gain + node.gain_x * dx + node.gain_y * dy);
-      const float slope = px_per_px * std::max(std::abs(light.slope_u), std::abs(light.slope_v));
-      evidence[at] = table_.at(light.value, (static_cast<float>(pixels.at(x, y)) - node.offset) / gain, slope, noise);
-    }
-  }
-}
-
-void PixelJudge::judge_pixels(const Cell& cell, bool one_surface, Scratch& scratch) const {
-  const float least_evidence = one_surface ? kEnclosedMin : kEvidenceMin;
-  const int reach = options_.reach_px, width = cell.right - cell.left + 2 * reach,
-            height = cell.bottom - cell.top + 2 * reach;
-  const std::size_t area = static_cast<std::size_t>(width) * height;
-  for (int k = 0; k < cell.count; ++k) {
-    scratch.evidence[k].resize(area);
-    std::visit([&](const auto& pixels) { weigh(pixels, cell, k, scratch.evidence[k]); }, cell.frame.pixels);
-  }
-  for (int y = cell.top; y < cell.bottom; ++y) {
-    for (int x = cell.left; x < cell.right; ++x) {
-      int best = -1;
-      float most = 0;
-      for (int k = 0; k < cell.count; ++k) {
-        // Of the whole, and of its halves to each side, the pixel's own line in both: what goes on on one side alone
-        // ends here, or before.
-        Evidence sum{0, 0}, halves[4] = {};
-        for (int j = 0; j <= 2 * reach; ++j) {
-          const Evidence* line =
-              &scratch.evidence[k][static_cast<std::size_t>(y - cell.top + j) * width + x - cell.left];
-          Evidence before{0, 0}, all{0, 0};
-          for (int i = 0; i <= 2 * reach; ++i) {
-            all += line[i];
-            if (i <= reach) before += line[i];
-            if (i == reach) halves[1] += line[i];
+    for (int x = cell.left; x < cell.right; x += kLanes) {
+      float depth[kLanes], sigma[kLanes];
+      std::int32_t light[kLanes];
+      Cloned<blend_lanes>::call(blending, y - cell.top, x - cell.left, depth, sigma, light);
+      const int count = std::min(kLanes, cell.right - x);
+      for (int i = 0; i < count; ++i) {
+        const std::size_t pixel = cell.pixel(x + i, y);
+        bool firm = true;
+        if (least != nullptr) {
+          const int at = (y - cell.top) * stride + x + i - cell.left;
+          if (least[at] < kEnclosedMin) {
+            cell.map.pixels[pixel] = DensePixel::kNoSupport;
+            continue;
           }
-          sum += all, halves[0] += before;
-          halves[1] += all, halves[1] -= before;
-          if (j <= reach) halves[2] += all;
-          if (j >= reach) halves[3] += all;
+          firm = own[at] > kFirmMin;
         }
-        float least = sum.least();
-        for (const Evidence& half : halves) least = std::min(least, half.least() + least_evidence - kHalfMin);
-        if (best < 0 || least > most) best = k, most = least;
+        if (!(depth[i] >= depth_min && depth[i] <= depth_max)) {
+          cell.map.pixels[pixel] = DensePixel::kOutOfDepthRange;
+          continue;
+        }
+        cell.map.depth_mm[pixel] = depth[i], cell.map.sigma_mm[pixel] = sigma[i];
+        cell.map.intensity[pixel] = static_cast<std::uint8_t>(light[i]);
+        cell.map.pixels[pixel] = DensePixel::kMeasured;
+        cell.map.firm[pixel] = firm;
       }
-      const std::size_t pixel = static_cast<std::size_t>(y) * cell.map.width + x;
-      if (best < 0 || most < least_evidence) {
+    }
+  }
+}
+
+/// The pixels of the cell and around it; -1 where none counts.
+void PixelJudge::see(const Cell& cell, Scratch& scratch) const {
+  std::visit(
+      [&](const auto& pixels) {
+        const int from_x = cell.left - options_.reach_px, from_y = cell.top - options_.reach_px;
+        for (int j = 0; j < side_; ++j) {
+          float* to = scratch.seen.data() + static_cast<std::ptrdiff_t>(j) * side_;
+          if (from_y + j < 0 || from_y + j >= pixels.height) {
+            std::fill(to, to + side_, -1.F);
+            continue;
+          }
+          const auto* row = pixels.row(from_y + j);
+          const int first = std::clamp(-from_x, 0, side_), end = std::clamp(pixels.width - from_x, 0, side_);
+          std::fill(to, to + first, -1.F), std::fill(to + end, to + side_, -1.F);
+          // A tenth of a level: zero is seen, and is not -1.
+          const auto full = static_cast<float>(cell.frame.full);
+          for (int i = first; i < end; ++i) {
+            const auto level = static_cast<float>(row[from_x + i]);
+            to[i] = level < full ? level + 0.01F : -1.F;
+          }
+        }
+      },
+      cell.frame.pixels);
+}
+
+/// What each pixel's surroundings say for a node's plane.
+void PixelJudge::weigh(const Cell& cell, const SurfaceNode& node, int candidate, int as, Scratch& scratch) const {
+  const PatchMap map = cell.grid.map_at(cell.nodes[candidate].x(), cell.nodes[candidate].y(),
+                                        static_cast<double>(node.plane.inverse_depth));
+  const float slope_x = node.plane.slope_x / node.per_px, slope_y = node.plane.slope_y / node.per_px;
+  Weighing in;
+  for (int k = 0; k < 3; ++k) {
+    in.warp[3 * k] = map.base(k, 0) + map.shift[k] * slope_x;
+    in.warp[3 * k + 1] = map.base(k, 1) + map.shift[k] * slope_y;
+    in.warp[3 * k + 2] = map.base(k, 2);
+  }
+  in.px_per_px = std::sqrt(std::abs(in.warp[0] * in.warp[4] - in.warp[1] * in.warp[3]));
+  in.origin_u = static_cast<float>(map.origin_px.x() + PatternField::kBorderPx) - node.across * map.along.y();
+  in.origin_v = static_cast<float>(map.origin_px.y() + PatternField::kBorderPx) + node.across * map.along.x();
+  in.seen = scratch.seen.data(), in.x = xs_.data(), in.y = ys_.data();
+  in.count = static_cast<int>(xs_.size());
+  in.first_x = static_cast<float>(cell.left - options_.reach_px) - map.middle_px.x();
+  in.first_y = static_cast<float>(cell.top - options_.reach_px) - map.middle_px.y();
+  in.samples = cell.field.samples(), in.field_width = cell.field.width(), in.field_height = cell.field.height();
+  in.slope_unit = cell.field.slope_unit();
+  in.gain = node.gain, in.gain_x = node.gain_x, in.gain_y = node.gain_y, in.offset = node.offset;
+  in.entries = table_.entries(cell.frame.noise.at(node.offset + 0.5F * node.gain) / node.gain);
+  Cloned<weigh_lanes>::call(in, scratch.evidence.data());
+  const int stride = cell.grid.stride_px();
+  const bool enclosed = as < 0;
+  const Summing summing{side_, options_.reach_px, stride, (enclosed ? kEnclosedMin : kEvidenceMin) - kHalfMin};
+  const int at = std::max(as, 0);
+  Cloned<sum_lanes>::call(summing, scratch.evidence.data(), scratch.sums.data(), scratch.least[at].data(),
+                          scratch.own[at].data());
+}
+
+/// For each pixel the plane that most speaks for.
+void PixelJudge::choose(const Cell& cell, const Scratch& scratch) const {
+  const int stride = cell.grid.stride_px();
+  const auto depth_min = static_cast<float>(options_.depth_min_mm),
+             depth_max = static_cast<float>(options_.depth_max_mm);
+  const auto of_full = static_cast<float>(255 / cell.frame.full);
+  for (int y = cell.top; y < cell.bottom; ++y) {
+    for (int x = cell.left; x < cell.right; ++x) {
+      const int at = (y - cell.top) * stride + x - cell.left;
+      int best = 0;
+      for (int k = 1; k < cell.count; ++k)
+        if (scratch.least[k][at] > scratch.least[best][at]) best = k;
+      const std::size_t pixel = cell.pixel(x, y);
+      if (scratch.least[best][at] < kEvidenceMin) {
         cell.map.pixels[pixel] = DensePixel::kNoSupport;
         continue;
       }
-      const Evidence& own =
-          scratch.evidence[best][static_cast<std::size_t>(y - cell.top + reach) * width + x - cell.left + reach];
-      const bool firm = own.against_unlit > kFirmMin;
       const SurfaceNode& node = *cell.candidates[best];
-      if (one_surface) {
-        const Blend here = cell.blended(x, y);
-        write(cell, x, y, here.inverse_depth, here.sigma_px, node.per_px, here.light, firm);
-        continue;
-      }
       const float dx = static_cast<float>(x) - cell.places[best].x(),
                   dy = static_cast<float>(y) - cell.places[best].y();
+      const float depth = 1 / node.plane.at(dx, dy);
+      if (!(depth >= depth_min && depth <= depth_max)) {
+        cell.map.pixels[pixel] = DensePixel::kOutOfDepthRange;
+        continue;
+      }
       const float sigma = std::sqrt(node.sigma_px * node.sigma_px + kEdgePx * kEdgePx +
                                     node.slope_noise * node.slope_noise * (dx * dx + dy * dy));
-      write(cell, x, y, node.plane.at(dx, dy), sigma, node.per_px, node.gain + node.offset, firm);
+      cell.map.depth_mm[pixel] = depth;
+      cell.map.sigma_mm[pixel] = node.per_px * depth * depth * sigma;
+      cell.map.intensity[pixel] =
+          static_cast<std::uint8_t>(std::clamp((node.gain + node.offset) * of_full, 1.F, 255.F));
+      cell.map.pixels[pixel] = DensePixel::kMeasured;
+      cell.map.firm[pixel] = scratch.own[best][at] > kFirmMin;
     }
   }
 }
 
-void PixelJudge::judge_cell(const Cell& from, Scratch& scratch) const {
-  Cell cell = from;
+void PixelJudge::judge_cell(Cell& cell, Scratch& scratch) const {
   const int c = cell.column, r = cell.row;
   cell.add(c, r), cell.add(c + 1, r), cell.add(c, r + 1), cell.add(c + 1, r + 1);
-  if (cell.one_surface()) return cell.clean() ? blend(cell) : judge_pixels(cell, true, scratch);
+  if (cell.one_surface()) {
+    if (cell.clean()) return blend(cell, nullptr, nullptr);
+    see(cell, scratch);
+    weigh(cell, cell.merged(), 0, -1, scratch);
+    return blend(cell, scratch.least[0].data(), scratch.own[0].data());
+  }
   cell.count = 0;
   for (const auto& [dx, dy] :
        {std::pair(0, 0), {1, 0}, {0, 1}, {1, 1}, {-1, 0}, {2, 0}, {0, -1}, {0, 2}, {-1, 1}, {2, 1}, {1, -1}, {1, 2}}) {
     cell.add_other(c + dx, r + dy, options_.window_px);
   }
-  if (cell.count > 0) judge_pixels(cell, false, scratch);
+  if (cell.count == 0) return;
+  see(cell, scratch);
+  for (int k = 0; k < cell.count; ++k) weigh(cell, *cell.candidates[k], k, k, scratch);
+  choose(cell, scratch);
 }
 
-void PixelJudge::judge(const DenseFrame& frame, const PatternField& field, const PatchGeometry& geometry,
-                       const SurfaceGrid& grid, DenseMap& map, Executor& executor) {
-  if (scratch_.size() < static_cast<std::size_t>(executor.workers())) scratch_.resize(executor.workers());
+void PixelJudge::resize(int stride_px, int workers) {
+  const int side = stride_px + 2 * options_.reach_px;
+  const auto area = static_cast<std::size_t>((side * side + kLanes - 1) / kLanes * kLanes);
+  if (side != side_) {
+    side_ = side;
+    xs_.assign(area, 0), ys_.assign(area, 0);
+    for (int i = 0; i < side * side; ++i) xs_[i] = static_cast<float>(i % side), ys_[i] = static_cast<float>(i / side);
+    scratch_.clear();
+  }
+  while (scratch_.size() < static_cast<std::size_t>(workers)) {
+    Scratch& scratch = scratch_.emplace_back();
+    scratch.seen.assign(area, -1), scratch.evidence.assign(2 * area, 0);
+    scratch.sums.assign(8 * static_cast<std::size_t>(side + 1), 0);
+    for (int k = 0; k < kCandidates; ++k) {
+      scratch.least[k].assign(static_cast<std::size_t>(stride_px) * stride_px, 0);
+      scratch.own[k] = scratch.least[k];
+    }
+  }
+}
+
+void PixelJudge::judge(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid, DenseMap& map,
+                       Executor& executor) {
   const int stride = grid.stride_px();
+  resize(stride, executor.workers());
   executor.run(grid.rows() + 1, [&](int part, int worker) {
     const int row = part - 1;
     for (int column = -1; column < grid.columns(); ++column) {
-      Cell cell{frame, field, geometry, grid, map, column, row, 0, 0, 0, 0};
+      Cell cell{frame, field, grid, map, column, row, 0, 0, 0, 0};
       cell.left = std::max(0, grid.x_of(column)), cell.top = std::max(0, grid.y_of(row));
       cell.right = std::min(map.width, grid.x_of(column) + stride);
       cell.bottom = std::min(map.height, grid.y_of(row) + stride);

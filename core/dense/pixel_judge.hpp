@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "core/align/pattern_field.hpp"
@@ -40,11 +41,19 @@ class EvidenceTable {
   /// @param noise     one standard deviation of a pixel
   [[nodiscard]] Evidence at(float expected, float seen, float slope, float noise) const;
 
+  /// For a noise: the entries at kSeen to a row, kExpected rows to a slope; the upper half of each against another, the
+  /// lower against none, both signed and in steps of kUnit.
+  [[nodiscard]] const std::uint32_t* entries(float noise) const;
+
+  static constexpr float kUnit = 1.F / 1024;
+  static constexpr int kExpected = 17, kSeen = 48, kSlopes = 4, kNoises = 6;
+  static constexpr float kSeenFirst = -0.5F, kSeenStep = 0.05F, kSlopeStep = 0.1F, kNoiseFirst = 0.01F;
+
   /// The same, not from the table.
   [[nodiscard]] static Evidence reckon(float expected, float seen, float slope, float noise);
 
  private:
-  std::vector<Evidence> table_;
+  std::vector<std::uint32_t> table_;
 };
 
 /// Gives each camera pixel the surface between the grid's nodes: blended where they are one surface and all that is
@@ -60,25 +69,26 @@ class PixelJudge {
   };
   explicit PixelJudge(const Options& options) : options_(options) {}
 
-  void judge(const DenseFrame& frame, const PatternField& field, const PatchGeometry& geometry, const SurfaceGrid& grid,
-             DenseMap& map, Executor& executor);
+  void judge(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid, DenseMap& map,
+             Executor& executor);
 
  private:
   static constexpr int kCandidates = 6;
   struct Scratch {
-    std::vector<Evidence> evidence[kCandidates], columns;
+    std::vector<float> seen, evidence, sums, least[kCandidates], own[kCandidates];
   };
   struct Cell;
-  void judge_cell(const Cell& cell, Scratch& scratch) const;
-  void blend(const Cell& cell) const;
-  void judge_pixels(const Cell& cell, bool one_surface, Scratch& scratch) const;
-  template <class T>
-  void weigh(const ImageView<T>& pixels, const Cell& cell, int candidate, std::vector<Evidence>& evidence) const;
-  void write(const Cell& cell, int x, int y, float inverse_depth, float sigma_px, float per_px, float light,
-             bool firm) const;
+  void resize(int stride_px, int workers);
+  void judge_cell(Cell& cell, Scratch& scratch) const;
+  void blend(const Cell& cell, const float* least, const float* own) const;
+  void see(const Cell& cell, Scratch& scratch) const;
+  void weigh(const Cell& cell, const SurfaceNode& node, int candidate, int as, Scratch& scratch) const;
+  void choose(const Cell& cell, const Scratch& scratch) const;
 
   Options options_;
   EvidenceTable table_;
+  int side_ = 0;                // of a cell and what is around it
+  std::vector<float> xs_, ys_;  // of its pixels, from the cell's first
   std::vector<Scratch> scratch_;
 };
 

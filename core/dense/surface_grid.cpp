@@ -5,15 +5,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/clones.hpp"
+#include "core/decode/lanes.hpp"
+
 namespace slsd {
 namespace {
 
-constexpr int kStepsFromSeed = 4, kStepsFromNeighbour = 2;
+/// A start that the last step has moved by less stands: what is left is less than a hundredth of that.
+constexpr float kSettledPx = 0.1F;
+constexpr int kStepsMost = 4;
 /// Of the gain, for one camera px: how fast light and colour change on most of what is scanned.
 constexpr float kGainSlopeSigma = 0.02F;
-constexpr int kPartNodes = 64;
 constexpr int kAttemptsMax = 4;
-constexpr std::size_t kMisfitSamples = 60;
 
 /// What makes a fit one: docs/dense.md has what each is for.
 constexpr float kSupportMin = 0.5F;   // of the window's pixels agree
@@ -28,12 +31,7 @@ constexpr float kContrastMin = 4;       // of the gain over the noise of a pixel
 /// Parts of sigma, as for symbols (docs/decoder.md).
 constexpr float kLeastPx = 0.003F, kOfScatter = 1.2F;
 
-AlignOptions steps(int count) {
-  AlignOptions options;
-  options.steps = count;
-  options.gain_slope_sigma = kGainSlopeSigma;
-  return options;
-}
+constexpr AlignOptions kAlign{.gain_slope_sigma = kGainSlopeSigma};
 
 }  // namespace
 
@@ -42,6 +40,12 @@ SurfaceGrid::SurfaceGrid(const PatchGeometry& geometry, const GridOptions& optio
   const Lens& lens = geometry.camera.lens;
   columns_ = std::max(0, (lens.width_px - first_ + options.stride_px - 1) / options.stride_px);
   rows_ = std::max(0, (lens.height_px - first_ + options.stride_px - 1) / options.stride_px);
+  turned_.reserve(static_cast<std::size_t>(columns_) * rows_);
+  for (int row = 0; row < rows_; ++row)
+    for (int column = 0; column < columns_; ++column)
+      turned_.push_back(
+          turned_by(geometry.rays.ray(Eigen::Vector2d(x_of(column), y_of(row))), geometry.camera.projector_from_camera)
+              .cast<float>());
 }
 
 std::int32_t SurfaceGrid::node_at(const Eigen::Vector2f& camera_px) const {
@@ -51,66 +55,94 @@ std::int32_t SurfaceGrid::node_at(const Eigen::Vector2f& camera_px) const {
   return column < 0 || row < 0 || column >= columns_ || row >= rows_ ? -1 : row * columns_ + column;
 }
 
-bool SurfaceGrid::fit(const DenseFrame& frame, const PatternField& field, const Attempt& attempt, PatchAligner& aligner,
-                      SurfaceNode& node) const {
+/// Sets the task up; false where nothing can be fitted.
+bool SurfaceGrid::begin(const DenseFrame& frame, const Attempt& attempt, PatchTask& task) const {
   const SurfacePlane& start = attempt.start;
-  const double depth_mm = 1 / static_cast<double>(start.inverse_depth);
-  if (!(depth_mm > 0.9 * options_.depth_min_mm && depth_mm < 1.1 * options_.depth_max_mm)) return false;
-  const int x = x_of(attempt.node % columns_), y = y_of(attempt.node / columns_), half = options_.window_px / 2;
+  const double inverse_depth = static_cast<double>(start.inverse_depth);
+  if (!(0.9 * options_.depth_min_mm * inverse_depth < 1 && 1.1 * options_.depth_max_mm * inverse_depth > 1))
+    return false;
+  task.x = x_of(attempt.node % columns_), task.y = y_of(attempt.node / columns_);
+  const int half = options_.window_px / 2;
   // Half a window tells little of a slope: the frame's rim takes its planes from farther in.
   const Lens& lens = geometry_->camera.lens;
-  if (x < half || y < half || x + half >= lens.width_px || y + half >= lens.height_px) return false;
-  const PatchMap map =
-      geometry_->map_at({static_cast<float>(x), static_cast<float>(y)}, static_cast<double>(start.inverse_depth));
-  const auto per_px = static_cast<float>(map.inverse_depth_per_px);
-  PatchState state;
-  state.slope_x = start.slope_x / per_px, state.slope_y = start.slope_y / per_px;
-  state.across = attempt.across, state.gain = attempt.gain, state.gain_x = attempt.gain_x,
-  state.gain_y = attempt.gain_y, state.offset = attempt.offset;
-  const PatchWindow window{x - half, y - half, options_.window_px, options_.window_px};
-  const PatchFit fit = std::visit(
-      [&](const auto& pixels) {
-        const float noise = frame.noise.at(static_cast<float>(pixels.at(x, y)));
-        return aligner.align(pixels, frame.full, noise, field, map, window, state);
-      },
-      frame.pixels);
-  if (!fit.solved || fit.support < kSupportMin) return false;
-  if (fit.pixels < kSeenMin * static_cast<float>(options_.window_px * options_.window_px)) return false;
-  const PatchState& found = fit.state;
+  if (task.x < half || task.y < half || task.x + half >= lens.width_px || task.y + half >= lens.height_px) return false;
+  task.map = make_patch_map(turned_[attempt.node].cast<double>(), {task.x, task.y},
+                            geometry_->camera.projector_from_camera.translation, geometry_->projector, inverse_depth);
+  const float px = static_cast<float>(1 / task.map.inverse_depth_per_px);
+  task.state = {};
+  task.state.slope_x = start.slope_x * px, task.state.slope_y = start.slope_y * px;
+  task.state.across = attempt.across, task.state.gain = attempt.gain, task.state.gain_x = attempt.gain_x,
+  task.state.gain_y = attempt.gain_y, task.state.offset = attempt.offset;
+  task.noise = std::visit(
+      [&](const auto& pixels) { return frame.noise.at(static_cast<float>(pixels.at(task.x, task.y))); }, frame.pixels);
+  return true;
+}
+
+/// Steps until each has come to rest: from a neighbour's plane the first does for most.
+void SurfaceGrid::align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t count) const {
+  for (int step = 0; step < kStepsMost && count > 0; ++step) {
+    for (std::size_t i = 0; i < count; i += kEight) {
+      align_eight(frame.pixels, frame.full, field, kAlign, options_.window_px,
+                  std::span(batch.active).subspan(i, std::min<std::size_t>(kEight, count - i)));
+    }
+    const auto end = std::remove_if(
+        batch.active.begin(), batch.active.begin() + static_cast<std::ptrdiff_t>(count),
+        [&](const PatchTask* task) { return task->failed || (task->settled && std::abs(task->moved) < kSettledPx); });
+    count = static_cast<std::size_t>(end - batch.active.begin());
+    for (std::size_t i = 0; i < count; ++i) batch.active[i]->settled = true;
+  }
+}
+
+bool SurfaceGrid::accept(const DenseFrame& frame, const PatchTask& task, SurfaceNode& node) const {
+  if (task.failed || task.support < kSupportMin) return false;
+  if (task.pixels < kSeenMin * static_cast<float>(options_.window_px * options_.window_px)) return false;
+  const PatchState& found = task.state;
   const float noise = frame.noise.at(found.offset + 0.5F * found.gain);
-  if (fit.residual > kResidualMax * found.gain || found.gain < kContrastMin * noise) return false;
+  if (task.residual > kResidualMax * found.gain || found.gain < kContrastMin * noise) return false;
   if (std::abs(found.disparity) > kStepMaxPx) return false;
-  if (std::hypot(found.gain_x, found.gain_y) > kGainSlopeMax * found.gain) return false;
+  const auto squares = [](float x, float y) { return x * x + y * y; };
+  if (squares(found.gain_x, found.gain_y) > kGainSlopeMax * kGainSlopeMax * found.gain * found.gain) return false;
   if (std::abs(found.slope_x) > kSlopeMax || std::abs(found.slope_y) > kSlopeMax) return false;
-  node.noise_px = std::sqrt(fit.covariance(0, 0)) * fit.residual;
-  node.slope_noise = std::sqrt(0.5F * (fit.covariance(1, 1) + fit.covariance(2, 2))) * fit.residual;
+  node.noise_px = std::sqrt(task.variance) * task.residual;
+  node.slope_noise = std::sqrt(task.slope_variance) * task.residual;
   node.sigma_px = std::sqrt(kLeastPx * kLeastPx + node.noise_px * node.noise_px +
-                            kOfScatter * kOfScatter * fit.scatter * fit.scatter);
+                            kOfScatter * kOfScatter * task.scatter * task.scatter);
   if (!(node.sigma_px < kSigmaMaxPx)) return false;
-  node.plane = {static_cast<float>(map.reference_inverse_depth + found.disparity * map.inverse_depth_per_px),
+  const auto per_px = static_cast<float>(task.map.inverse_depth_per_px);
+  node.plane = {static_cast<float>(task.map.reference_inverse_depth +
+                                   static_cast<double>(found.disparity) * task.map.inverse_depth_per_px),
                 found.slope_x * per_px, found.slope_y * per_px};
   node.per_px = per_px;
   node.across = found.across;
   node.gain = found.gain, node.gain_x = found.gain_x, node.gain_y = found.gain_y, node.offset = found.offset;
-  node.support = fit.support;
-  node.residual = fit.residual / found.gain;
+  node.support = task.support;
+  node.residual = task.residual / found.gain;
   node.good = true;
   return true;
 }
 
 float SurfaceGrid::misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds) {
-  const std::size_t step = std::max<std::size_t>(1, seeds.size() / kMisfitSamples);
-  if (begin_.empty()) begin_.emplace_back(steps(kStepsFromSeed));
-  misfits_.clear();
+  const std::size_t step = (seeds.size() + kBatchNodes - 1) / kBatchNodes;
+  if (batches_.empty()) batches_.resize(1);
+  Batch& batch = batches_[0];
+  std::size_t count = 0, all = 0;
   for (std::size_t i = step / 2; i < seeds.size(); i += step) {
     const std::int32_t index = node_at(seeds[i].camera_px);
     if (index < 0) continue;
     const float dx = static_cast<float>(x_of(index % columns_)) - seeds[i].camera_px.x(),
                 dy = static_cast<float>(y_of(index / columns_)) - seeds[i].camera_px.y();
-    SurfaceNode node;
     const SurfacePlane& plane = seeds[i].plane;
     const Attempt attempt{index, 0, {plane.at(dx, dy), plane.slope_x, plane.slope_y}, 0, 0, 0, 0, 0};
-    misfits_.push_back(fit(frame, field, attempt, begin_[0], node) ? node.residual : 1);
+    ++all;
+    batch.tasks[count].settled = false;
+    if (begin(frame, attempt, batch.tasks[count])) ++count;
+  }
+  for (std::size_t i = 0; i < count; ++i) batch.active[i] = &batch.tasks[i];
+  align(frame, field, batch, count);
+  misfits_.assign(all - count, 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    SurfaceNode node;
+    misfits_.push_back(accept(frame, batch.tasks[i], node) ? node.residual : 1);
   }
   if (misfits_.empty()) return 1;
   const auto middle = misfits_.begin() + static_cast<std::ptrdiff_t>(misfits_.size() / 2);
@@ -156,9 +188,7 @@ void SurfaceGrid::grow(const DenseFrame& frame, const PatternField& field, std::
   nodes_.assign(count, SurfaceNode{});
   pending_.assign(count, -1);
   attempts_.assign(count, 0);
-  while (begin_.size() < static_cast<std::size_t>(executor.workers())) begin_.emplace_back(steps(kStepsFromSeed));
-  while (continue_.size() < static_cast<std::size_t>(executor.workers()))
-    continue_.emplace_back(steps(kStepsFromNeighbour));
+  if (batches_.size() < static_cast<std::size_t>(executor.workers())) batches_.resize(executor.workers());
   next_.clear();
   for (const SurfaceSeed& seed : seeds) {
     const std::int32_t index = node_at(seed.camera_px);
@@ -171,14 +201,21 @@ void SurfaceGrid::grow(const DenseFrame& frame, const PatternField& field, std::
     front_.swap(next_);
     next_.clear();
     accepted_.assign(front_.size(), 0);
-    const int parts = static_cast<int>((front_.size() + kPartNodes - 1) / kPartNodes);
+    const auto parts = static_cast<int>((front_.size() + kBatchNodes - 1) / kBatchNodes);
     executor.run(parts, [&](int part, int worker) {
-      const std::size_t end = std::min(front_.size(), static_cast<std::size_t>(part + 1) * kPartNodes);
-      for (std::size_t i = static_cast<std::size_t>(part) * kPartNodes; i < end; ++i) {
-        const Attempt& attempt = front_[i];
-        PatchAligner& aligner = attempt.gain > 0 ? continue_[worker] : begin_[worker];
-        accepted_[i] = fit(frame, field, attempt, aligner, nodes_[attempt.node]);
+      const std::size_t first = static_cast<std::size_t>(part) * kBatchNodes,
+                        in_part = std::min(kBatchNodes, front_.size() - first);
+      Batch& batch = batches_[worker];
+      std::size_t active = 0;
+      for (std::size_t i = 0; i < in_part; ++i) {
+        PatchTask& task = batch.tasks[i];
+        task.settled = front_[first + i].gain > 0;
+        task.failed = !begin(frame, front_[first + i], task);
+        if (!task.failed) batch.active[active++] = &task;
       }
+      align(frame, field, batch, active);
+      for (std::size_t i = 0; i < in_part; ++i)
+        accepted_[first + i] = accept(frame, batch.tasks[i], nodes_[front_[first + i].node]);
     });
     for (const Attempt& attempt : front_) pending_[attempt.node] = -1;
     for (std::size_t i = 0; i < front_.size(); ++i) {
@@ -196,112 +233,151 @@ constexpr float kFuseSigmas = 3;
 /// Of the scatter of the nodes around over what noise does: beyond it there is relief, and the mean is of fewer.
 constexpr float kFuseExcess[kFuseReach] = {1.6F, 0.8F};
 /// Parts of sigma: of what the nodes beside, continued, are off, and of what the bend moved.
-constexpr float kOfDisagreement = 0.35F, kOfLift = 0.5F;
+constexpr float kOfLift = 0.5F;
+/// Over a bend the neighbours' planes, continued by a stride, are off by half its square, and the window's plane by a
+/// 24th of its own: so much of the one stands for the other.
+constexpr float kOfBendLeft = 1.0F, kOfDisagreementMost = 1;
 
-/// The nodes around a node, continued to it, and what their mean is.
-struct NodeMean {
-  double weights = 0, values = 0, slopes_x = 0, slopes_y = 0;
-  float squares = 0, expected = 0;
-  int count = 0;
+/// How much slopes beside each other are wrong together, as their windows overlap.
+constexpr float kOverlap = 3;
 
-  void add(double weight, float value, const SurfacePlane& plane, float off, float variance) {
-    weights += weight, values += weight * static_cast<double>(value);
-    slopes_x += weight * static_cast<double>(plane.slope_x), slopes_y += weight * static_cast<double>(plane.slope_y);
-    squares += off * off, expected += variance, ++count;
-  }
-  /// Whether they are one surface, as far as noise tells.
-  [[nodiscard]] bool holds(int reach) const {
-    const int all = (2 * reach + 1) * (2 * reach + 1);
-    const float excess = kFuseExcess[reach - 1];
-    return 2 * count > all && squares < excess * excess * expected;
-  }
-  [[nodiscard]] SurfacePlane plane() const {
-    return {static_cast<float>(values / weights), static_cast<float>(slopes_x / weights),
-            static_cast<float>(slopes_y / weights)};
-  }
+/// What fuse_lanes() knows of eight nodes of a row, and of all around them, in the order of Around.
+struct Fusing {
+  const float* around[7];
+  std::ptrdiff_t row;  // from a row to the next
+  float stride, of_bend, of_disagreement;
+};
+enum Around { kInverseDepth, kSlopeX, kSlopeY, kPxPer, kNoisePx, kSlopeNoise, kGood };
+
+/// What comes of them: their planes, in projector px, from their own; and what adds to sigma's square.
+struct Fused {
+  Lanes off, slope_x, slope_y, more;
 };
 
-/// How a slope changes along an axis around a node, by regression: projector px for one camera px squared; less where
-/// noise could be the cause.
+/// The sums of a regression of slopes by place along an axis.
 struct BendSums {
-  float w = 0, x = 0, xx = 0, s = 0, xs = 0;
-
-  void add(float weight, float at, float slope) {
-    w += weight, x += weight * at, xx += weight * at * at, s += weight * slope, xs += weight * at * slope;
-  }
-  [[nodiscard]] float bend() const {
-    const float spread = xx - x * x / w;
-    if (!(spread > 0)) return 0;
-    // Windows overlap: the slopes beside each other are wrong together.
-    const float found = (xs - x * s / w) / spread, variance = kOverlap / spread;
-    return found * std::max(0.F, 1 - variance / (found * found));
-  }
-  static constexpr float kOverlap = 3;
+  Lanes w, x, xx, s, xs;
 };
-
-}  // namespace
 
 // With a node's own slopes and its neighbour's, each by half, the neighbour's value is continued exactly over any
 // surface of the second order.
-void SurfaceGrid::fuse_node(int column, int row) {
-  const std::size_t index = static_cast<std::size_t>(row) * columns_ + column;
-  const SurfaceNode& own = own_[index];
-  if (!own.good) return;
-  SurfaceNode& node = nodes_[index];
-  const auto stride = static_cast<float>(options_.stride_px);
-  float beside = 0;
-  int beside_count = 0;
-  NodeMean means[kFuseReach];
-  BendSums along_x, along_y;
+inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& fused) {
+  const Lanes zero{}, one = zero + 1;
+  Lanes own[7], beside = zero, beside_count = zero;
+  for (int k = 0; k < 7; ++k) load(in.around[k], own[k]);
+  struct Mean {
+    Lanes weights, values, slopes_x, slopes_y, squares, expected, count;
+  };
+  Mean means[kFuseReach];
+  for (Mean& mean : means) mean = {zero, zero, zero, zero, zero, zero, zero};
+  BendSums along_x{zero, zero, zero, zero, zero}, along_y = along_x;
+  const Lanes& px_per = own[kPxPer];
+  const Lanes own_noise = own[kNoisePx] * own[kNoisePx] + kFusePx * kFusePx;
   for (int dy = -kFuseReach; dy <= kFuseReach; ++dy) {
     for (int dx = -kFuseReach; dx <= kFuseReach; ++dx) {
-      if (column + dx < 0 || row + dy < 0 || column + dx >= columns_ || row + dy >= rows_) continue;
-      const SurfaceNode& other = own_[index + static_cast<std::ptrdiff_t>(dy) * columns_ + dx];
-      if (!other.good) continue;
-      const float x = stride * static_cast<float>(dx), y = stride * static_cast<float>(dy);
-      const float there = other.plane.inverse_depth - 0.5F * ((other.plane.slope_x + own.plane.slope_x) * x +
-                                                              (other.plane.slope_y + own.plane.slope_y) * y);
-      const float off = (there - own.plane.inverse_depth) / own.per_px;
-      const float of_slopes = 0.5F * (other.slope_noise + own.slope_noise);
-      const float variance = other.noise_px * other.noise_px + of_slopes * of_slopes * (x * x + y * y);
-      if (std::abs(dx) + std::abs(dy) == 1 && std::abs(off) < 1) {
-        const float continued =
-            (other.plane.inverse_depth - other.plane.slope_x * x - other.plane.slope_y * y - own.plane.inverse_depth) /
-            own.per_px;
-        beside += continued * continued, ++beside_count;
+      Lanes other[7];
+      for (int k = 0; k < 7; ++k) load(in.around[k] + dy * in.row + dx, other[k]);
+      const float x = in.stride * static_cast<float>(dx), y = in.stride * static_cast<float>(dy);
+      const Lanes apart = other[kInverseDepth] - own[kInverseDepth];
+      const Lanes off =
+          px_per * (apart - 0.5F * ((other[kSlopeX] + own[kSlopeX]) * x + (other[kSlopeY] + own[kSlopeY]) * y));
+      const Lanes of_slopes = 0.5F * (other[kSlopeNoise] + own[kSlopeNoise]);
+      const Lanes variance = other[kNoisePx] * other[kNoisePx] + of_slopes * of_slopes * (x * x + y * y);
+      const Lanes near = off * off < one ? other[kGood] : zero;
+      if (std::abs(dx) + std::abs(dy) == 1) {
+        const Lanes continued = px_per * (apart - other[kSlopeX] * x - other[kSlopeY] * y);
+        beside += near * continued * continued, beside_count += near;
       }
-      if (std::abs(off) < 1) {
-        const float w = 1 / (other.slope_noise * other.slope_noise + 1e-8F);
-        along_x.add(w, x, other.plane.slope_x / own.per_px);
-        along_y.add(w, y, other.plane.slope_y / own.per_px);
+      const Lanes w = near / (other[kSlopeNoise] * other[kSlopeNoise] + 1e-8F);
+      const auto regress = [&](BendSums & sums, float at, const Lanes& slope) __attribute__((always_inline)) {
+        sums.w += w, sums.x += w * at, sums.xx += w * (at * at), sums.s += w * slope, sums.xs += w * at * slope;
+      };
+      regress(along_x, x, px_per * other[kSlopeX]), regress(along_y, y, px_per * other[kSlopeY]);
+      const Lanes expected = variance + own_noise;
+      const Lanes taken = off * off <= kFuseSigmas * kFuseSigmas * expected ? other[kGood] : zero;
+      const Lanes weight = taken / (variance + kFusePx * kFusePx);
+      for (int reach = std::max({1, std::abs(dx), std::abs(dy)}); reach <= kFuseReach; ++reach) {
+        Mean& mean = means[reach - 1];
+        mean.weights += weight, mean.values += weight * off;
+        mean.slopes_x += weight * other[kSlopeX], mean.slopes_y += weight * other[kSlopeY];
+        mean.squares += taken * off * off, mean.expected += taken * expected, mean.count += taken;
       }
-      const float expected = variance + own.noise_px * own.noise_px + kFusePx * kFusePx;
-      if (off * off > kFuseSigmas * kFuseSigmas * expected) continue;
-      const double weight = 1 / static_cast<double>(variance + kFusePx * kFusePx);
-      for (int reach = std::max({1, std::abs(dx), std::abs(dy)}); reach <= kFuseReach; ++reach)
-        means[reach - 1].add(weight, there, other.plane, off, expected);
     }
   }
   // A plane over a window lies beside what bends there by the bend times the mean of the squared distance from the
-  // middle, by half.
-  const auto side = static_cast<float>(options_.window_px);
-  const float of_bend = side * side / 24, lift = of_bend * (along_x.bend() + along_y.bend());
-  if (beside_count > 0) {
-    node.sigma_px = std::sqrt(own.sigma_px * own.sigma_px + kOfLift * kOfLift * lift * lift +
-                              kOfDisagreement * kOfDisagreement * beside / static_cast<float>(beside_count));
+  // middle, by half; less where noise could be the cause.
+  Lanes lift = zero;
+  for (const BendSums* sums : {&along_x, &along_y}) {
+    const Lanes spread = sums->xx - sums->x * sums->x / sums->w;
+    const Lanes found = (sums->xs - sums->x * sums->s / sums->w) / spread;
+    const Lanes sure = one - kOverlap / (spread * found * found);
+    lift += (spread > zero) & (sure > zero) ? found * sure : zero;
   }
-  for (int reach = kFuseReach; reach > 0; --reach) {
-    if (!means[reach - 1].holds(reach)) continue;
-    node.plane = means[reach - 1].plane();
-    break;
+  lift *= in.of_bend;
+  const Lanes any = beside_count > zero ? one : zero;
+  fused.more = any * (kOfLift * kOfLift * lift * lift +
+                      in.of_disagreement * in.of_disagreement * beside / (beside_count + (one - any)));
+  fused.off = zero, fused.slope_x = own[kSlopeX], fused.slope_y = own[kSlopeY];
+  for (int reach = 1; reach <= kFuseReach; ++reach) {
+    const Mean& mean = means[reach - 1];
+    const auto all = static_cast<float>((2 * reach + 1) * (2 * reach + 1));
+    const float excess = kFuseExcess[reach - 1];
+    const IntLanes holds = (2 * mean.count > zero + all) & (mean.squares < excess * excess * mean.expected);
+    const Lanes per_weight = one / (mean.weights + 1e-20F);
+    fused.off = holds ? mean.values * per_weight : fused.off;
+    fused.slope_x = holds ? mean.slopes_x * per_weight : fused.slope_x;
+    fused.slope_y = holds ? mean.slopes_y * per_weight : fused.slope_y;
   }
-  node.plane.inverse_depth -= lift * own.per_px;
+  fused.off -= lift;
 }
 
+}  // namespace
+
 void SurfaceGrid::fuse(Executor& executor) {
-  own_ = nodes_;
-  executor.run(rows_, [&](int row, int) {
-    for (int column = 0; column < columns_; ++column) fuse_node(column, row);
+  // All that is asked of the nodes around, a number of all nodes after the other, with a rim where none is good.
+  const std::size_t row = static_cast<std::size_t>(columns_) + 2 * kFuseReach + kLanes,
+                    plane = row * (static_cast<std::size_t>(rows_) + 2 * kFuseReach);
+  if (around_.size() != 7 * plane) around_.assign(7 * plane, 0);
+  const auto place = [&](int at_row, int column, int what) {
+    return around_.data() + what * plane + (static_cast<std::size_t>(at_row) + kFuseReach) * row + column + kFuseReach;
+  };
+  executor.run(rows_, [&](int at_row, int) {
+    const SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
+    for (int column = 0; column < columns_; ++column) {
+      const SurfaceNode& node = nodes[column];
+      const float values[7] = {node.plane.inverse_depth,
+                               node.plane.slope_x,
+                               node.plane.slope_y,
+                               1 / node.per_px,
+                               node.noise_px,
+                               node.slope_noise,
+                               1};
+      for (int k = 0; k < 7; ++k) *place(at_row, column, k) = node.good ? values[k] : 0;
+    }
+  });
+  const auto side = static_cast<float>(options_.window_px), stride = static_cast<float>(options_.stride_px);
+  executor.run(rows_, [&](int at_row, int) {
+    Fusing fusing{{},
+                  static_cast<std::ptrdiff_t>(row),
+                  static_cast<float>(options_.stride_px),
+                  side * side / 24,
+                  std::min(kOfDisagreementMost, kOfBendLeft * side * side / (12 * stride * stride))};
+    SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
+    for (int column = 0; column < columns_; column += kLanes) {
+      const int count = std::min(kLanes, columns_ - column);
+      if (std::none_of(nodes + column, nodes + column + count, [](const SurfaceNode& node) { return node.good; }))
+        continue;
+      for (int k = 0; k < 7; ++k) fusing.around[k] = place(at_row, column, k);
+      Fused fused;
+      Cloned<fuse_lanes>::call(fusing, fused);
+      for (int lane = 0; lane < count; ++lane) {
+        SurfaceNode& node = nodes[column + lane];
+        if (!node.good) continue;
+        node.plane.inverse_depth += fused.off[lane] * node.per_px;
+        node.plane.slope_x = fused.slope_x[lane], node.plane.slope_y = fused.slope_y[lane];
+        node.sigma_px = std::sqrt(node.sigma_px * node.sigma_px + fused.more[lane]);
+      }
+    }
   });
 }
 

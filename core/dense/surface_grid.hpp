@@ -2,13 +2,14 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "core/align/align_patch.hpp"
+#include "core/align/align_eight.hpp"
 #include "core/decode/frame_noise.hpp"
 #include "core/dense/executor.hpp"
 #include "core/geometry/calibration.hpp"
@@ -60,10 +61,6 @@ struct PatchGeometry {
 
   PatchGeometry(const CalibratedCamera& of_camera, const Lens& of_projector)
       : camera(of_camera), projector(of_projector), rays(of_camera.lens) {}
-  [[nodiscard]] PatchMap map_at(const Eigen::Vector2f& camera_px, double inverse_depth) const {
-    const Eigen::Vector2d pixel = camera_px.cast<double>();
-    return make_patch_map(rays.ray(pixel), pixel, camera.projector_from_camera, projector, 1 / inverse_depth);
-  }
 };
 
 struct GridOptions {
@@ -96,6 +93,13 @@ class SurfaceGrid {
     return node.good ? &node : nullptr;
   }
 
+  /// How the pattern falls around a node.
+  [[nodiscard]] PatchMap map_at(int column, int row, double inverse_depth) const {
+    return make_patch_map(turned_[static_cast<std::size_t>(row) * columns_ + column].cast<double>(),
+                          Eigen::Vector2d(x_of(column), y_of(row)), geometry_->camera.projector_from_camera.translation,
+                          geometry_->projector, inverse_depth);
+  }
+
   /// How badly the pattern at a blur fits the seeds: the median of residual over gain; 1 where nothing fits.
   [[nodiscard]] float misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
 
@@ -105,28 +109,36 @@ class SurfaceGrid {
   void fuse(Executor& executor);
 
  private:
+  static constexpr std::size_t kBatchNodes = 64;
   struct Attempt {
     std::int32_t node;
     float cost;
     SurfacePlane start;
     float across, gain, gain_x, gain_y, offset;  // gain 0: not known
   };
-  [[nodiscard]] bool fit(const DenseFrame& frame, const PatternField& field, const Attempt& attempt,
-                         PatchAligner& aligner, SurfaceNode& node) const;
+  /// Attempts that are aligned together, on one worker.
+  struct Batch {
+    std::array<PatchTask, kBatchNodes> tasks;
+    std::array<PatchTask*, kBatchNodes> active;
+  };
+  [[nodiscard]] bool begin(const DenseFrame& frame, const Attempt& attempt, PatchTask& task) const;
+  void align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t count) const;
+  [[nodiscard]] bool accept(const DenseFrame& frame, const PatchTask& task, SurfaceNode& node) const;
   void offer(const Attempt& attempt);
   void offer_neighbours(std::int32_t index);
   [[nodiscard]] std::int32_t node_at(const Eigen::Vector2f& camera_px) const;
-  void fuse_node(int column, int row);
 
   const PatchGeometry* geometry_;
   GridOptions options_;
   int first_, columns_, rows_;
-  std::vector<SurfaceNode> nodes_, own_;
+  std::vector<Eigen::Matrix3f> turned_;  // of the nodes' pixels, see turned_by()
+  std::vector<SurfaceNode> nodes_;
+  std::vector<float> around_;  // of the nodes, as fuse() reads them
   std::vector<Attempt> front_, next_;
-  std::vector<char> accepted_;                  // of the front
-  std::vector<std::int32_t> pending_;           // of a node: its place in the next front, or -1
-  std::vector<std::uint8_t> attempts_;          // of a node
-  std::vector<PatchAligner> begin_, continue_;  // one to a worker
+  std::vector<char> accepted_;          // of the front
+  std::vector<std::int32_t> pending_;   // of a node: its place in the next front, or -1
+  std::vector<std::uint8_t> attempts_;  // of a node
+  std::vector<Batch> batches_;          // one to a worker
   std::vector<float> misfits_;
 };
 

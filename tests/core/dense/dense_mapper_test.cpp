@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "core/clones.hpp"
 #include "tests/drivers/allocations.hpp"
 #include "tests/simulator/simulator.hpp"
 
@@ -278,6 +279,27 @@ bool same(const DenseMap& a, const DenseMap& b) {
 TEST(DenseMapper, ThreadsChangeNothing) {
   TwoThreads threads;
   EXPECT_TRUE(same(measure(column().frame.view()).map, measure(column().frame.view(), 255, {}, &threads).map));
+}
+
+TEST(DenseMapper, ClonesMeasureTheSame) {
+  const Clone usual = clone_in_use.exchange(Clone::kPlain);
+  const DenseMap plain = measure(column().frame.view()).map;
+  for (const Clone clone : clones_here()) {
+    clone_in_use = clone;
+    const DenseMap map = measure(column().frame.view()).map;
+    if (clone == Clone::kAvx2) {
+      EXPECT_TRUE(same(plain, map));
+    }
+    // A sum beside a gate may be rounded to its other side.
+    std::size_t other = 0;
+    for (std::size_t pixel = 0; pixel < map.pixels.size(); ++pixel) {
+      const bool both = map.measured(pixel) && plain.measured(pixel);
+      other += map.pixels[pixel] != plain.pixels[pixel] ||
+               (both && std::abs(map.depth_mm[pixel] - plain.depth_mm[pixel]) > 0.1F * plain.sigma_mm[pixel]);
+    }
+    EXPECT_LT(share(other, map.pixels.size()), 0.002);
+  }
+  clone_in_use = usual;
 }
 
 TEST(DenseMapper, AFrameDoesNotDependOnTheOneBefore) {
