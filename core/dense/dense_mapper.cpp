@@ -13,16 +13,18 @@
 namespace slsd {
 namespace {
 
-/// The window of a node covers this share of a cell, within limits: less has too few edges, more bends.
-constexpr double kWindowOfPitch = 0.72;
-constexpr int kWindowLeastPx = 11, kWindowMostPx = 21;
+/// The window of a node covers this share of a cell, less some pixels, within limits: less has too few edges, more
+/// bends. Small symbols have more edges to a cell.
+constexpr double kWindowOfPitch = 0.86, kWindowLessPx = 3;
+constexpr int kWindowLeastPx = 9, kWindowMostPx = 21;
 
 /// Of the blurs, from the sharpest on: what a projector and a camera in focus come to.
 constexpr int kUsualBlurs = 4;
 
-int window_px(double pitch_in_camera_px) {
-  const int px = static_cast<int>(std::lround(kWindowOfPitch * pitch_in_camera_px));
-  return std::clamp(px, kWindowLeastPx, kWindowMostPx) | 1;
+/// No smaller than the stride: every pixel is seen by some node.
+int window_px(double pitch_in_camera_px, int stride_px) {
+  const int px = static_cast<int>(std::lround(kWindowOfPitch * pitch_in_camera_px - kWindowLessPx));
+  return std::clamp(px, std::max(kWindowLeastPx, stride_px), kWindowMostPx) | 1;
 }
 
 int judge_reach_px(double pitch_in_camera_px) {
@@ -62,9 +64,10 @@ DenseMapper::DenseMapper(const Pattern& pattern, const Calibration& calibration,
         const CalibratedCamera& camera = calibration.cameras[camera_index];
         const ExpectedFrames expected(camera, calibration.projector, decode.middle_depth_mm());
         const double pitch = pattern.pitch_px() * static_cast<double>(expected.in_the_middle().scale);
-        return std::shared_ptr<const Fixed>(new Fixed{
-            PatchGeometry(camera, calibration.projector), decode, slsd::window_px(pitch), judge_reach_px(pitch),
-            slsd::close_px(pitch), PatternFields(draw_pattern(pattern)), std::make_shared<const RayGrid>(camera.lens)});
+        return std::shared_ptr<const Fixed>(
+            new Fixed{PatchGeometry(camera, calibration.projector), decode,
+                      slsd::window_px(pitch, decode.dense.stride_px), judge_reach_px(pitch), slsd::close_px(pitch),
+                      PatternFields(draw_pattern(pattern)), std::make_shared<const RayGrid>(camera.lens)});
       }()) {}
 
 DenseMapper::DenseMapper(std::shared_ptr<const Fixed> fixed)

@@ -20,7 +20,7 @@ constexpr float kAgreePx = 0.12F, kAgreeSigmas = 4;
 constexpr float kCleanSupport = 0.9F;
 /// Logarithms: how much likelier the surface has to be than another, or none, by what is around a pixel. Blur makes
 /// neighbours alike, some three pixels to one that is independent; so this is a chance of one in a thousand.
-constexpr float kEvidenceMin = 20, kHalfMin = -3;
+constexpr float kEvidenceMin = 20, kHalfMin = -3, kEnclosedHalfMin = -5;
 /// The same between nodes that are one surface: nothing may speak against it.
 constexpr float kEnclosedMin = -2;
 /// Of a pixel by itself: that it is lit, and as it should be.
@@ -435,7 +435,8 @@ void PixelJudge::weigh(const Cell& cell, const SurfaceNode& node, int candidate,
   Cloned<weigh_lanes>::call(in, scratch.evidence.data());
   const int stride = cell.grid.stride_px();
   const bool enclosed = as < 0;
-  const Summing summing{side_, options_.reach_px, stride, (enclosed ? kEnclosedMin : kEvidenceMin) - kHalfMin};
+  const Summing summing{side_, options_.reach_px, stride,
+                        enclosed ? kEnclosedMin - kEnclosedHalfMin : kEvidenceMin - kHalfMin};
   const int at = std::max(as, 0);
   Cloned<sum_lanes>::call(summing, scratch.evidence.data(), scratch.sums.data(), scratch.least[at].data(),
                           scratch.own[at].data());

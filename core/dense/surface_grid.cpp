@@ -19,7 +19,7 @@ constexpr float kGainSlopeSigma = 0.02F;
 constexpr int kAttemptsMax = 4;
 
 /// What makes a fit one: docs/dense.md has what each is for.
-constexpr float kSupportMin = 0.5F;   // of the window's pixels agree
+constexpr float kSupportMin = 0.6F;   // of the window's pixels agree
 constexpr float kSeenMin = 0.7F;      // of them are in the frame and not saturated
 constexpr float kResidualMax = 0.3F;  // of the gain
 constexpr float kStepMaxPx = 0.8F;    // from the neighbour's plane: within the pull of the fit
@@ -29,7 +29,9 @@ constexpr float kGainSlopeMax = 0.08F;  // of the gain, for one camera px
 constexpr float kContrastMin = 4;       // of the gain over the noise of a pixel
 
 /// Parts of sigma, as for symbols (docs/decoder.md).
-constexpr float kLeastPx = 0.003F, kOfScatter = 1.2F;
+constexpr float kLeastPx = 0.003F, kOfScatter = 0.7F;
+/// Of the share of the window that is saturated: its rims are wrong too.
+constexpr float kOfUnseen = 4;
 
 constexpr AlignOptions kAlign{.gain_slope_sigma = kGainSlopeSigma};
 
@@ -107,6 +109,7 @@ bool SurfaceGrid::accept(const DenseFrame& frame, const PatchTask& task, Surface
   node.slope_noise = std::sqrt(task.slope_variance) * task.residual;
   node.sigma_px = std::sqrt(kLeastPx * kLeastPx + node.noise_px * node.noise_px +
                             kOfScatter * kOfScatter * task.scatter * task.scatter);
+  node.sigma_px *= 1 + kOfUnseen * (1 - task.pixels / static_cast<float>(options_.window_px * options_.window_px));
   if (!(node.sigma_px < kSigmaMaxPx)) return false;
   const auto per_px = static_cast<float>(task.map.inverse_depth_per_px);
   node.plane = {static_cast<float>(task.map.reference_inverse_depth +
@@ -236,7 +239,11 @@ constexpr float kFuseExcess[kFuseReach] = {1.6F, 0.8F};
 constexpr float kOfLift = 0.5F;
 /// Over a bend the neighbours' planes, continued by a stride, are off by half its square, and the window's plane by a
 /// 24th of its own: so much of the one stands for the other.
-constexpr float kOfBendLeft = 1.0F, kOfDisagreementMost = 1;
+constexpr float kOfBendLeft = 1.6F, kOfDisagreementLeast = 0.3F, kOfDisagreementMost = 4;
+/// Of that disagreement's square this much of what noise does is no relief.
+constexpr float kOfNoise = 0.5F;
+/// Of the variance, where the mean is of this reach and those smaller.
+constexpr float kLeftOfVariance[kFuseReach] = {1, 0.85F};
 
 /// How much slopes beside each other are wrong together, as their windows overlap.
 constexpr float kOverlap = 3;
@@ -249,9 +256,10 @@ struct Fusing {
 };
 enum Around { kInverseDepth, kSlopeX, kSlopeY, kPxPer, kNoisePx, kSlopeNoise, kGood };
 
-/// What comes of them: their planes, in projector px, from their own; and what adds to sigma's square.
+/// What comes of them: their planes, in projector px, from their own; what is added to sigma's
+/// square, and the share of it that stays.
 struct Fused {
-  Lanes off, slope_x, slope_y, more;
+  Lanes off, slope_x, slope_y, left, more;
 };
 
 /// The sums of a regression of slopes by place along an axis.
@@ -286,7 +294,9 @@ inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& f
       const Lanes near = off * off < one ? other[kGood] : zero;
       if (std::abs(dx) + std::abs(dy) == 1) {
         const Lanes continued = px_per * (apart - other[kSlopeX] * x - other[kSlopeY] * y);
-        beside += near * continued * continued, beside_count += near;
+        const Lanes by_noise = other[kNoisePx] * other[kNoisePx] + own[kNoisePx] * own[kNoisePx] +
+                               other[kSlopeNoise] * other[kSlopeNoise] * (x * x + y * y);
+        beside += near * (continued * continued - kOfNoise * by_noise), beside_count += near;
       }
       const Lanes w = near / (other[kSlopeNoise] * other[kSlopeNoise] + 1e-8F);
       const auto regress = [&](BendSums & sums, float at, const Lanes& slope) __attribute__((always_inline)) {
@@ -315,15 +325,17 @@ inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& f
   }
   lift *= in.of_bend;
   const Lanes any = beside_count > zero ? one : zero;
+  beside = beside > zero ? beside : zero;
   fused.more = any * (kOfLift * kOfLift * lift * lift +
                       in.of_disagreement * in.of_disagreement * beside / (beside_count + (one - any)));
-  fused.off = zero, fused.slope_x = own[kSlopeX], fused.slope_y = own[kSlopeY];
+  fused.left = one, fused.off = zero, fused.slope_x = own[kSlopeX], fused.slope_y = own[kSlopeY];
   for (int reach = 1; reach <= kFuseReach; ++reach) {
     const Mean& mean = means[reach - 1];
     const auto all = static_cast<float>((2 * reach + 1) * (2 * reach + 1));
     const float excess = kFuseExcess[reach - 1];
     const IntLanes holds = (2 * mean.count > zero + all) & (mean.squares < excess * excess * mean.expected);
     const Lanes per_weight = one / (mean.weights + 1e-20F);
+    fused.left = holds ? zero + kLeftOfVariance[reach - 1] : fused.left;
     fused.off = holds ? mean.values * per_weight : fused.off;
     fused.slope_x = holds ? mean.slopes_x * per_weight : fused.slope_x;
     fused.slope_y = holds ? mean.slopes_y * per_weight : fused.slope_y;
@@ -357,11 +369,12 @@ void SurfaceGrid::fuse(Executor& executor) {
   });
   const auto side = static_cast<float>(options_.window_px), stride = static_cast<float>(options_.stride_px);
   executor.run(rows_, [&](int at_row, int) {
-    Fusing fusing{{},
-                  static_cast<std::ptrdiff_t>(row),
-                  static_cast<float>(options_.stride_px),
-                  side * side / 24,
-                  std::min(kOfDisagreementMost, kOfBendLeft * side * side / (12 * stride * stride))};
+    Fusing fusing{
+        {},
+        static_cast<std::ptrdiff_t>(row),
+        static_cast<float>(options_.stride_px),
+        side * side / 24,
+        std::clamp(kOfBendLeft * side * side / (12 * stride * stride), kOfDisagreementLeast, kOfDisagreementMost)};
     SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
     for (int column = 0; column < columns_; column += kLanes) {
       const int count = std::min(kLanes, columns_ - column);
@@ -375,7 +388,7 @@ void SurfaceGrid::fuse(Executor& executor) {
         if (!node.good) continue;
         node.plane.inverse_depth += fused.off[lane] * node.per_px;
         node.plane.slope_x = fused.slope_x[lane], node.plane.slope_y = fused.slope_y[lane];
-        node.sigma_px = std::sqrt(node.sigma_px * node.sigma_px + fused.more[lane]);
+        node.sigma_px = std::sqrt(fused.left[lane] * (node.sigma_px * node.sigma_px + fused.more[lane]));
       }
     }
   });
