@@ -59,12 +59,15 @@ class ScanTest : public ::testing::Test {
                                      std::move(cameras), setup.image, options);
     scanner_ = std::make_unique<Scanner>(std::move(rig), std::move(setup));
   }
+  /// A scan that is waited for no longer is not decoded: there are no decoders here.
   void TearDown() override {
+    gone_.request_stop();
     let_go_.set_value();
     scanner_.reset();
   }
 
-  Outcome scan(std::chrono::milliseconds time, const std::stop_token& gone = {}) {
+  Outcome scan(std::chrono::milliseconds time) { return scan(time, gone_.get_token()); }
+  Outcome scan(std::chrono::milliseconds time, const std::stop_token& gone) {
     auto answer = std::make_shared<std::promise<Result<ScanResult>>>();
     ScanRequest request;
     request.deadline = steady_clock::now() + time;
@@ -87,6 +90,7 @@ class ScanTest : public ::testing::Test {
     while (scanner_->rig().camera_statuses().at(0).state != DeviceState::kCapturing) std::this_thread::sleep_for(1ms);
   }
 
+  std::stop_source gone_;
   std::promise<void> let_go_;
   const std::shared_future<void> let_go_of_ = let_go_.get_future().share();
   const Grey8 black_{64, 48};
