@@ -94,7 +94,7 @@ DenseView measure_pixels(const GreyView& frame, Decoder& decoder, ScanSetup& set
   DenseMapper& mapper = setup.dense->of(lane, camera, decoder, setup.pattern, *setup.calibration, setup.decode);
   DecodedSymbols symbols = decoder.symbols();
   if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may be those of the quotient
-  SerialExecutor executor;
+  Executor& executor = setup.dense->crew();
   const CalibratedCamera& calibrated = setup.calibration->cameras[decoder.camera_index()];
   DenseView view{mapper.measure(frame, light.full, symbols, executor), mapper.rays(), calibrated.rig_from_camera,
                  decoder.camera_index(), setup.camera_names[camera]};

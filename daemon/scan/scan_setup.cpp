@@ -146,6 +146,12 @@ double FullLevels::raise(std::size_t camera, double level) {
   return greatest_[camera] = std::max(greatest_[camera], level);
 }
 
+Executor& DenseMappers::crew() {
+  const std::lock_guard lock(mutex_);
+  if (!crew_) crew_.emplace(Crew::helpers_here());
+  return *crew_;
+}
+
 DenseMapper& DenseMappers::of(std::size_t lane, std::size_t camera, const Decoder& decoder, const Pattern& pattern,
                               const Calibration& calibration, const DecodeOptions& options) {
   const std::lock_guard lock(mutex_);
@@ -178,6 +184,14 @@ Result<ScanSetup> ScanSetup::create(const Configuration& configuration, std::siz
   if (!first) return tl::unexpected(first.error());
   for (std::size_t lane = 1; lane < lanes; ++lane) setup.lanes.push_back(another_lane(*first));
   if (lanes > 0) setup.lanes.push_back(std::move(*first));
+  if (setup.decode.density != Density::kPixels) return setup;
+  // The first scan is to be as quick as the others.
+  for (std::size_t lane = 0; lane < setup.lanes.size(); ++lane) {
+    for (std::size_t camera = 0; camera < cameras->size(); ++camera) {
+      setup.dense->of(lane, camera, setup.lanes[lane][camera], setup.pattern, *setup.calibration, setup.decode)
+          .warm_up(setup.dense->crew());
+    }
+  }
   return setup;
 }
 

@@ -17,6 +17,7 @@
 #include "core/image.hpp"
 #include "core/result.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/scan/crew.hpp"
 #include "daemon/scan/scan_result.hpp"
 
 namespace slsd {
@@ -61,12 +62,15 @@ class FullLevels {
 /// @thread thread-safe; what it lends belongs to the lane's thread
 class DenseMappers {
  public:
+  /// The threads that help the lanes, which sleep meanwhile.
+  [[nodiscard]] Executor& crew();
   /// The mapper of a lane for the camera of a decoder.
   [[nodiscard]] DenseMapper& of(std::size_t lane, std::size_t camera, const Decoder& decoder, const Pattern& pattern,
                                 const Calibration& calibration, const DecodeOptions& options);
 
  private:
   std::mutex mutex_;
+  std::optional<Crew> crew_;
   std::map<std::pair<std::size_t, std::size_t>, std::unique_ptr<DenseMapper>> mappers_;  // by camera, lane
 };
 

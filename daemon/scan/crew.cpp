@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/crew.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "drivers/system/thread_name.hpp"
+
+namespace slsd {
+
+int Crew::helpers_here() {
+  constexpr int kMost = 15;
+  return std::clamp(static_cast<int>(std::thread::hardware_concurrency()) - 1, 0, kMost);
+}
+
+Crew::Crew(int helpers) {
+  for (int worker = 1; worker <= helpers; ++worker)
+    threads_.emplace_back([this, worker](const std::stop_token& stop) { help(worker, stop); });
+}
+
+Crew::~Crew() {
+  for (std::jthread& thread : threads_) thread.request_stop();
+}
+
+void Crew::run_parts(int parts, Part part, const void* work) {
+  const std::unique_lock alone(in_use_, std::try_to_lock);
+  if (parts < 2 || threads_.empty() || !alone) {
+    for (int i = 0; i < parts; ++i) part(work, i, 0);
+    return;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    part_ = part, work_ = work, parts_ = parts, next_ = 0;
+    ++call_;
+  }
+  changed_.notify_all();
+  for (int i = next_++; i < parts; i = next_++) part(work, i, 0);
+  std::unique_lock lock(mutex_);
+  parts_ = 0;
+  changed_.wait(lock, [this] { return helping_ == 0; });
+}
+
+void Crew::help(int worker, const std::stop_token& stop) {
+  name_this_thread("dense " + std::to_string(worker));
+  std::uint64_t done = 0;
+  std::unique_lock lock(mutex_);
+  while (changed_.wait(lock, stop, [&] { return parts_ > 0 && call_ != done; })) {
+    done = call_;
+    ++helping_;
+    const Part part = part_;
+    const void* const work = work_;
+    const int parts = parts_;
+    lock.unlock();
+    for (int i = next_++; i < parts; i = next_++) part(work, i, worker);
+    lock.lock();
+    if (--helping_ == 0) changed_.notify_all();
+  }
+}
+
+}  // namespace slsd
