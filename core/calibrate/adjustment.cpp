@@ -17,9 +17,6 @@ namespace {
 constexpr double kOutlyingSigmas = 5;
 /// No estimator is better than this, whatever little noise a few points show.
 constexpr double kSigmaMinPx = 0.005;
-/// A term of distortion counts from so many standard deviations, and so many pixels at the outermost point.
-constexpr double kTermSigmas = 2, kTermPx = 0.02;
-constexpr double kAddedTermSigmas = 4;
 /// A print longer one way than the other by this share, beyond doubt.
 constexpr double kStretchMin = 0.001, kStretchSigmas = 5;
 /// Two prints whose scales differ by this share, beyond doubt. Of one look nobody can tell whether it or the print is
@@ -36,47 +33,12 @@ void visit_views(Observations& observations, Visit visit) {
   }
 }
 
-double outermost_radius(const DeviceModel& device, int index, const Observations& observations) {
-  const Lens lens = to_lens(device.lens, device.size);
-  double radius = 0;
-  const auto take = [&](const Eigen::Vector2d& pixel) { radius = std::max(radius, lens.undistort(pixel).norm()); };
-  for (const PoseObservation& pose : observations.poses) {
-    for (const PoseView& view : pose.views) {
-      if (index >= 0 && view.camera != static_cast<std::size_t>(index)) continue;
-      for (const ProjectedPoint& symbol : view.symbols) {
-        if (!symbol.outlying) take(index < 0 ? symbol.projector_px : symbol.camera_px);
-      }
-      if (index < 0) continue;
-      for (const BoardPoint& corner : view.corners) take(corner.camera_px);
-    }
-  }
-  return radius;
-}
-
-/// Change of the outermost pixel by a term of distortion.
-double effect_px(const LensVector& lens, int index, double radius) {
-  const double value = std::abs(lens[static_cast<std::size_t>(index)]) * lens[0];
-  switch (index) {
-    case 4:
-      return value * std::pow(radius, 3);
-    case 5:
-      return value * std::pow(radius, 5);
-    case 8:
-      return value * std::pow(radius, 7);
-    default:
-      return 3 * value * radius * radius;
-  }
-}
-
-LensTerms without_highest(LensTerms terms) {
-  if (terms.k3) {
-    terms.k3 = false;
-  } else if (terms.k2) {
-    terms.k2 = false;
-  } else {
-    terms.k1 = terms.tangential = false;
-  }
-  return terms;
+/// The highest term less likely, where a lens turns back on itself within its picture.
+bool tighten(const DeviceModel& device, DistortionPrior& prior) {
+  constexpr double kLess = 0.2;
+  if (device.lens[0] <= 0 || to_lens(device.lens, device.size).invertible()) return false;
+  prior[4] *= kLess, prior[1] *= std::sqrt(kLess);
+  return true;
 }
 
 }  // namespace
@@ -155,13 +117,16 @@ Result<> Adjustment::find_influence_of(const Observations& observations) {
 Result<Adjustment> Adjustment::begin(Observations& observations, RigModel rig) {
   Adjustment adjustment(std::move(rig));
   BundleOptions& options = adjustment.options_;
-  options.cameras.assign(adjustment.rig_.cameras.size(), {});
+  for (const DeviceModel& camera : adjustment.rig_.cameras) {
+    options.cameras.push_back(plausible_distortion(camera.size, camera.lens[0]));
+  }
   options.with_symbols = false;
   if (auto solved = adjust(observations, options, adjustment.rig_); !solved) return tl::unexpected(solved.error());
   if (auto tilted = check_tilts(adjustment.rig_); !tilted) return tl::unexpected(tilted.error());
   adjustment.measure_noise(observations);
   if (auto estimated = estimate_projector(observations, adjustment.rig_); !estimated)
     return tl::unexpected(estimated.error());
+  options.projector = plausible_distortion(adjustment.rig_.projector.size, adjustment.rig_.projector.lens[0]);
   options.with_symbols = true;
   if (auto solved = adjust(observations, options, adjustment.rig_); !solved) return tl::unexpected(solved.error());
   if (auto solved = adjustment.adjust_again(observations); !solved) return tl::unexpected(solved.error());
@@ -170,65 +135,30 @@ Result<Adjustment> Adjustment::begin(Observations& observations, RigModel rig) {
   return adjustment;
 }
 
+/// Everything at once, with distortions that can be undone over the whole of each picture.
+Result<> Adjustment::adjust_to_lenses(const Observations& observations) {
+  constexpr int kRounds = 8;
+  for (int round = 0; round < kRounds; ++round) {
+    const auto settled = adjust(observations, options_, rig_);
+    if (!settled) return tl::unexpected(settled.error());
+    settled_ = *settled;
+    bool tightened = tighten(rig_.projector, options_.projector);
+    for (std::size_t i = 0; i < rig_.cameras.size(); ++i) {
+      tightened = tighten(rig_.cameras[i], options_.cameras[i]) || tightened;
+    }
+    if (!tightened) break;
+  }
+  return {};
+}
+
 Result<> Adjustment::adjust_again(Observations& observations) {
   options_.scale = options_.scale && observations.count(PoseSubject::kPlane) >= kLooksForScale;
   if (!options_.scale) rig_.board_scale = 0;
   measure_noise(observations);
   mark_outlying(observations);
-  const auto settled = adjust(observations, options_, rig_);
-  if (!settled) return tl::unexpected(settled.error());
-  settled_ = *settled;
+  if (auto adjusted = adjust_to_lenses(observations); !adjusted) return adjusted;
   measure_noise(observations);
   return find_influence_of(observations);
-}
-
-/// The terms less those that are not determined, the highest order first; or k3 more where the others are.
-LensTerms Adjustment::fitting_terms(const DeviceModel& device, int index, LensTerms terms) const {
-  const auto& shared = equations_.shared;
-  const auto counts = [&](int term, double radius, double sigmas) {
-    for (std::size_t i = 0; i < shared.size(); ++i) {
-      if (shared[i].kind != SharedParameter::Kind::kLens || shared[i].device != index || shared[i].index != term)
-        continue;
-      const double value = std::abs(device.lens[static_cast<std::size_t>(term)]);
-      return value > sigmas * influence_.sigma(i) && effect_px(device.lens, term, radius) > kTermPx;
-    }
-    return false;
-  };
-  const double radius = radii_[static_cast<std::size_t>(index + 1)];
-  if (terms.tangential && !counts(6, radius, kTermSigmas) && !counts(7, radius, kTermSigmas)) terms.tangential = false;
-  if (!to_lens(device.lens, device.size).invertible()) return without_highest(terms);
-  if (terms.k3) {
-    terms.k3 = counts(8, radius, kAddedTermSigmas);
-  } else if (terms.k2) {
-    terms.k2 = counts(5, radius, kTermSigmas);
-  } else if (terms.k1) {
-    terms.k1 = counts(4, radius, kTermSigmas);
-  }
-  return terms;
-}
-
-Result<> Adjustment::choose_terms(Observations& observations) {
-  radii_.assign(1, outermost_radius(rig_.projector, -1, observations));
-  for (std::size_t i = 0; i < rig_.cameras.size(); ++i) {
-    radii_.push_back(outermost_radius(rig_.cameras[i], static_cast<int>(i), observations));
-  }
-  constexpr LensTerms kAllTerms{.k3 = true};
-  options_.cameras.assign(rig_.cameras.size(), kAllTerms);
-  options_.projector = kAllTerms;
-  constexpr int kRounds = 4;
-  for (int round = 0; round < kRounds; ++round) {
-    if (auto solved = adjust_again(observations); !solved) return solved;
-    const BundleOptions before = options_;
-    options_.projector = fitting_terms(rig_.projector, -1, before.projector);
-    bool same = options_.projector == before.projector;
-    for (std::size_t i = 0; i < rig_.cameras.size(); ++i) {
-      options_.cameras[i] = fitting_terms(rig_.cameras[i], static_cast<int>(i), before.cameras[i]);
-      same = same && options_.cameras[i] == before.cameras[i];
-    }
-    if (same) break;
-  }
-  if (auto solved = adjust_again(observations); !solved) return solved;
-  return look_for_stretch(observations);
 }
 
 Result<> Adjustment::begin_with_planes(Observations& observations) {

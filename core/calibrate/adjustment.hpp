@@ -7,6 +7,7 @@
 
 #include "core/calibrate/bundle.hpp"
 #include "core/calibrate/pose_influence.hpp"
+#include "core/calibrate/rig_change.hpp"
 #include "core/result.hpp"
 
 namespace slsd {
@@ -24,9 +25,8 @@ class Adjustment {
   /// Everything together, from where it stands.
   [[nodiscard]] Result<> adjust_again(Observations& observations);
 
-  /// Drops terms of distortion that the poses do not determine or that change nothing, and adds k3 where it does; says
-  /// whether the board is stretched.
-  [[nodiscard]] Result<> choose_terms(Observations& observations);
+  /// Says whether the board is stretched, and adjusts once more.
+  [[nodiscard]] Result<> look_for_stretch(Observations& observations);
 
   /// Goes on with looks at the reference plane among the poses. With two or more of them the board's scale is open, so
   /// that prints of different scales contradict nothing.
@@ -35,6 +35,11 @@ class Adjustment {
   /// Holds the board's scale again where the prints agree as far as can be told; otherwise says by how much they do
   /// not.
   [[nodiscard]] Result<> compare_prints(Observations& observations);
+
+  /// Whether the session is one rig.
+  [[nodiscard]] std::optional<RigChange> find_change(const Observations& observations) const {
+    return find_rig_change(observations, options_, rig_);
+  }
 
   [[nodiscard]] RigModel& rig() { return rig_; }
   [[nodiscard]] const RigModel& rig() const { return rig_; }
@@ -48,16 +53,14 @@ class Adjustment {
   [[nodiscard]] std::string unplaced_text(const Observations& observations) const;
   void measure_noise(const Observations& observations);
   void mark_outlying(Observations& observations) const;
-  [[nodiscard]] LensTerms fitting_terms(const DeviceModel& device, int index, LensTerms terms) const;
+  [[nodiscard]] Result<> adjust_to_lenses(const Observations& observations);
   [[nodiscard]] bool is_stretched() const;
-  [[nodiscard]] Result<> look_for_stretch(Observations& observations);
 
   RigModel rig_;
   BundleOptions options_;
   BundleEquations equations_;
   PoseInfluence influence_;
-  bool settled_ = true;        // the last time that all was adjusted
-  std::vector<double> radii_;  // outermost, of the projector and of each camera
+  bool settled_ = true;  // the last time that all was adjusted
   std::vector<std::string> warnings_;
 };
 

@@ -20,6 +20,8 @@ class Problem {
   Problem(const Observations& observations, const BundleOptions& options, RigModel& rig)
       : observations_(observations), options_(options), rig_(rig) {
     for (std::size_t i = 0; i < observations.poses.size(); ++i) add_pose(i);
+    for (std::size_t i = 0; i < rig.cameras.size(); ++i) add_prior(rig.cameras[i], options.cameras[i]);
+    add_prior(rig.projector, options.projector);
     hold_constant();
   }
 
@@ -30,6 +32,17 @@ class Problem {
   [[nodiscard]] std::size_t corners_of(std::size_t pose) const { return corners_[pose]; }
   [[nodiscard]] const std::vector<double>& sigmas_of(std::size_t pose) const { return sigmas_px_[pose]; }
   double* pose_block(std::size_t pose) { return rig_.rig_from_board[pose].data(); }
+  /// Of a camera, by its index, or of the projector: -1.
+  double* place_block(int device, std::size_t pose) {
+    const bool moved = rig_.moved && pose >= rig_.moved->first_pose && device != 0;
+    if (device < 0) return moved ? rig_.moved->projector.data() : rig_.projector.device_from_rig.data();
+    const auto camera = static_cast<std::size_t>(device);
+    return moved ? rig_.moved->cameras[camera].data() : rig_.cameras[camera].device_from_rig.data();
+  }
+  double* lit_block(std::size_t pose) {
+    const auto own = rig_.rig_from_lit.find(pose);
+    return own == rig_.rig_from_lit.end() ? pose_block(pose) : own->second.data();
+  }
 
   /// The poses are eliminated first. Each other block has a group of its own: within one Ceres goes by the addresses,
   /// and sums in another order give other last digits.
@@ -39,33 +52,45 @@ class Problem {
       if (problem_.HasParameterBlock(block)) ordering->AddElementToGroup(block, group);
     };
     for (std::size_t i = 0; i < rig_.rig_from_board.size(); ++i) add(pose_block(i), 0);
+    for (auto& [pose, lit] : rig_.rig_from_lit) add(lit.data(), 0);
     int group = 0;
     const auto add_device = [&](DeviceModel& device) {
       add(device.lens.data(), ++group), add(device.device_from_rig.data(), ++group);
     };
     for (DeviceModel& camera : rig_.cameras) add_device(camera);
     add_device(rig_.projector);
+    if (rig_.moved) {
+      for (MotionVector& camera : rig_.moved->cameras) add(camera.data(), ++group);
+      add(rig_.moved->projector.data(), ++group);
+    }
     for (double* print : {&rig_.board_scale, &rig_.board_stretch, &true_scale_, &true_stretch_}) add(print, ++group);
     return ordering;
   }
 
   /// Blocks that all poses share and that are adjusted, with their parameters in the order of the columns.
   void list_shared(std::vector<double*>& blocks, std::vector<SharedParameter>& parameters) {
-    const auto add_device = [&](DeviceModel& device, int index, const LensTerms& terms) {
+    const auto add_device = [&](DeviceModel& device, int index) {
       if (active(device.lens.data())) {
         blocks.push_back(device.lens.data());
-        for (int i = 0; i < 9; ++i) {
-          if (adjusts(terms, i)) parameters.push_back({SharedParameter::Kind::kLens, index, i});
-        }
+        for (int i = 0; i < 9; ++i) parameters.push_back({SharedParameter::Kind::kLens, index, i});
       }
       if (!active(device.device_from_rig.data())) return;
       blocks.push_back(device.device_from_rig.data());
       for (int i = 0; i < 6; ++i) parameters.push_back({SharedParameter::Kind::kMotion, index, i});
     };
     for (std::size_t i = 0; i < rig_.cameras.size(); ++i) {
-      add_device(rig_.cameras[i], static_cast<int>(i), options_.cameras[i]);
+      add_device(rig_.cameras[i], static_cast<int>(i));
     }
-    add_device(rig_.projector, -1, options_.projector);
+    add_device(rig_.projector, -1);
+    const auto add_moved = [&](MotionVector& place, int index) {
+      if (!active(place.data())) return;
+      blocks.push_back(place.data());
+      for (int i = 0; i < 6; ++i) parameters.push_back({SharedParameter::Kind::kMovedTo, index, i});
+    };
+    if (rig_.moved) {
+      for (std::size_t i = 0; i < rig_.cameras.size(); ++i) add_moved(rig_.moved->cameras[i], static_cast<int>(i));
+      add_moved(rig_.moved->projector, -1);
+    }
     const auto add_print = [&](double* block, SharedParameter::Kind kind) {
       if (!active(block)) return;
       blocks.push_back(block);
@@ -100,8 +125,9 @@ class Problem {
       if (point.outlying) continue;
       auto* cost = new ceres::AutoDiffCostFunction<CornerResidual, 2, 9, 6, 6, 1, 1>(
           new CornerResidual{point.camera_px, point.board_mm, sigma_px});
-      blocks.push_back(problem_.AddResidualBlock(cost, &loss_, camera.lens.data(), camera.device_from_rig.data(),
-                                                 pose_block(pose), scale, stretch));
+      blocks.push_back(problem_.AddResidualBlock(cost, &loss_, camera.lens.data(),
+                                                 place_block(static_cast<int>(view.camera), pose), pose_block(pose),
+                                                 scale, stretch));
       sigmas_px_[pose].push_back(sigma_px);
     }
   }
@@ -113,29 +139,28 @@ class Problem {
       const double sigma_px = point.sigma_px * options_.symbol_sigma_factor;
       auto* cost = new ceres::AutoDiffCostFunction<SymbolResidual, 2, 9, 6, 9, 6, 6>(
           new SymbolResidual{point.camera_px, point.projector_px, sigma_px});
-      blocks.push_back(problem_.AddResidualBlock(cost, &loss_, camera.lens.data(), camera.device_from_rig.data(),
-                                                 projector.lens.data(), projector.device_from_rig.data(),
-                                                 pose_block(pose)));
+      blocks.push_back(problem_.AddResidualBlock(cost, &loss_, camera.lens.data(),
+                                                 place_block(static_cast<int>(view.camera), pose),
+                                                 projector.lens.data(), place_block(-1, pose), lit_block(pose)));
       sigmas_px_[pose].push_back(sigma_px);
     }
   }
 
-  void hold(DeviceModel& device, const LensTerms& terms) {
-    std::vector<int> fixed;
-    for (int i = 0; i < 9; ++i) {
-      if (adjusts(terms, i)) continue;
-      fixed.push_back(i);
-      device.lens[static_cast<std::size_t>(i)] = 0;
-    }
-    if (!fixed.empty() && problem_.HasParameterBlock(device.lens.data())) {
-      problem_.SetManifold(device.lens.data(), new ceres::SubsetManifold(9, fixed));
-    }
+  // Of a lens that nothing was seen by there is none: its block is not part of the problem.
+  void add_prior(DeviceModel& device, const DistortionPrior& prior) {
+    if (!problem_.HasParameterBlock(device.lens.data())) return;
+    problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<DistortionResidual, 5, 9>(new DistortionResidual{prior}),
+                              nullptr, device.lens.data());
   }
 
   void hold_constant() {
-    for (std::size_t i = 0; i < rig_.cameras.size(); ++i) hold(rig_.cameras[i], options_.cameras[i]);
-    hold(rig_.projector, options_.projector);
     keep(rig_.cameras[0].device_from_rig.data());
+    // Of symbols alone a board may lie anywhere on its plane.
+    for (auto& [pose, lit] : rig_.rig_from_lit) {
+      if (problem_.HasParameterBlock(lit.data())) {
+        problem_.SetManifold(lit.data(), new ceres::SubsetManifold(6, {2, 3, 4}));
+      }
+    }
     if (!options_.scale) keep(&rig_.board_scale);
     if (!options_.stretch) keep(&rig_.board_stretch);
     keep(&true_scale_);
@@ -190,12 +215,30 @@ Result<bool> adjust(const Observations& observations, const BundleOptions& optio
   return summary.termination_type == ceres::CONVERGENCE;
 }
 
+double cost_of(const Observations& observations, const BundleOptions& options, RigModel rig) {
+  Problem problem(observations, options, rig);
+  double cost = 0;
+  problem.ceres().Evaluate({}, &cost, nullptr, nullptr, nullptr);
+  return cost;
+}
+
 BundleEquations linearise(const Observations& observations, const BundleOptions& options, RigModel rig) {
   Problem problem(observations, options, rig);
   BundleEquations equations;
   std::vector<double*> shared;
   problem.list_shared(shared, equations.shared);
   const auto columns = static_cast<Eigen::Index>(equations.shared.size());
+  equations.prior_weight = equations.prior_pull = Eigen::VectorXd::Zero(columns);
+  for (Eigen::Index i = 0; i < columns; ++i) {
+    const SharedParameter& parameter = equations.shared[static_cast<std::size_t>(i)];
+    const auto index = static_cast<std::size_t>(parameter.index);
+    if (parameter.kind != SharedParameter::Kind::kLens || index < kFirstTerm) continue;
+    const auto device = static_cast<std::size_t>(parameter.device);
+    const double sigma = (parameter.device < 0 ? options.projector : options.cameras[device])[index - kFirstTerm];
+    equations.prior_weight(i) = 1 / (sigma * sigma);
+    equations.prior_pull(i) =
+        (parameter.device < 0 ? rig.projector : rig.cameras[device]).lens[index] * equations.prior_weight(i);
+  }
   for (std::size_t pose = 0; pose < rig.rig_from_board.size(); ++pose) {
     PoseEquations& out = equations.poses.emplace_back();
     if (problem.residuals_of(pose).empty()) continue;

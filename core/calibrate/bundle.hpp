@@ -13,8 +13,8 @@
 namespace slsd {
 
 struct BundleOptions {
-  std::vector<LensTerms> cameras;  ///< one to a camera
-  LensTerms projector;
+  std::vector<DistortionPrior> cameras;  ///< one to a camera
+  DistortionPrior projector = kUsualDistortion;
   bool with_symbols = true;  ///< otherwise the cameras and poses alone are adjusted
   bool scale = false;        ///< whether the board's scale is adjusted too, against that of the reference plane
   bool stretch = false;      ///< whether the board's aspect is adjusted too
@@ -36,6 +36,9 @@ struct BundleOptions {
 /// @thread reentrant
 [[nodiscard]] Result<bool> adjust(const Observations& observations, const BundleOptions& options, RigModel& rig);
 
+/// Half of the sum of all squared residuals, lessened by the loss.
+[[nodiscard]] double cost_of(const Observations& observations, const BundleOptions& options, RigModel rig);
+
 /// The equations of the adjustment at its solution, linear: residuals of each pose and their derivatives. Empty where
 /// all points of a pose are outlying.
 struct PoseEquations {
@@ -48,7 +51,7 @@ struct PoseEquations {
 
 /// One adjusted parameter that all poses share.
 struct SharedParameter {
-  enum class Kind { kLens, kMotion, kScale, kStretch };
+  enum class Kind { kLens, kMotion, kMovedTo, kScale, kStretch };
   Kind kind;
   int device;  ///< index of the camera, or -1: the projector
   int index;   ///< in LensVector or MotionVector
@@ -56,6 +59,8 @@ struct SharedParameter {
 
 struct BundleEquations {
   std::vector<SharedParameter> shared;
+  Eigen::VectorXd prior_weight;  ///< one to a shared parameter: of what was plausible before; 0: anything was
+  Eigen::VectorXd prior_pull;    ///< its part in the gradient
   std::vector<PoseEquations> poses;
 };
 

@@ -28,7 +28,19 @@ Result<> check_count(const Observations& observations, const PoseList& poses) {
                                           (faults.empty() ? "" : ". Left out: " + faults));
 }
 
-/// Leaves out what contradicts the rest, one after the other, and chooses the terms of distortion.
+Result<> check_one_rig(const Adjustment& adjustment, const Observations& observations) {
+  const auto change = adjustment.find_change(observations);
+  if (!change) return {};
+  const auto& poses = observations.poses;
+  return fail(
+      ErrorCode::kImpossible,
+      fmt::format("the session is not one rig: {}. Fasten the devices and take the poses again, or calibrate by "
+                  "those of one part: --use {}:{} is the rig as it stands now, --use {}:{} as it was before",
+                  change->text, poses[change->first_pose].name, poses.back().name, poses.front().name,
+                  poses[change->first_pose - 1].name));
+}
+
+/// Leaves out what contradicts the rest, one after the other.
 Result<> settle(Adjustment& adjustment, Observations& observations, PoseList& poses) {
   do {
     while (const auto contradiction = find_contradiction(observations, adjustment.rig(), adjustment.influence())) {
@@ -36,7 +48,8 @@ Result<> settle(Adjustment& adjustment, Observations& observations, PoseList& po
       if (auto enough = check_count(observations, poses); !enough) return enough;
       if (auto again = adjustment.adjust_again(observations); !again) return again;
     }
-    if (auto chosen = adjustment.choose_terms(observations); !chosen) return chosen;
+    if (auto adjusted = adjustment.adjust_again(observations); !adjusted) return adjusted;
+    if (auto looked = adjustment.look_for_stretch(observations); !looked) return looked;
   } while (find_unplaced(observations, adjustment.rig(), adjustment.influence()));
   return {};
 }
@@ -50,7 +63,12 @@ Result<Adjustment> solve(Observations& observations, PoseList& poses) {
   if (auto enough = check_count(observations, poses); !enough) return tl::unexpected(enough.error());
   auto adjustment = Adjustment::begin(observations, std::move(initial->rig));
   if (!adjustment) return adjustment;
+  if (auto one = check_one_rig(*adjustment, observations); !one) return tl::unexpected(one.error());
+  const std::size_t count = observations.poses.size();
   if (auto settled = settle(*adjustment, observations, poses); !settled) return tl::unexpected(settled.error());
+  if (observations.poses.size() == count) return adjustment;
+  // Once more without the poses that contradict the others: a smaller change shows then.
+  if (auto one = check_one_rig(*adjustment, observations); !one) return tl::unexpected(one.error());
   return adjustment;
 }
 

@@ -21,6 +21,7 @@ double* value_in(RigModel& rig, const SharedParameter& parameter) {
     case SharedParameter::Kind::kLens:
       return &device.lens[index];
     case SharedParameter::Kind::kMotion:
+    case SharedParameter::Kind::kMovedTo:
       return &device.device_from_rig[index];
     case SharedParameter::Kind::kScale:
       return &rig.board_scale;
@@ -82,8 +83,7 @@ std::vector<DepthUncertainty> depth_uncertainty(const RigModel& rig, const std::
         const double moved = depth_of(match, changed, symbol_sigma_px).point_in_camera.z();
         slope(static_cast<Eigen::Index>(i)) = (moved - point.point_in_camera.z()) / step_of(shared[i]);
       }
-      calibration +=
-          std::max(slope.dot(influence.noise_covariance * slope), slope.dot(influence.jackknife_covariance * slope));
+      calibration += slope.dot(influence.covariance * slope);
       noise += point.sigma_mm * point.sigma_mm;
     }
     const auto count = static_cast<double>(matches.size());

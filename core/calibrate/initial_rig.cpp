@@ -244,7 +244,9 @@ Result<> judge_doubtful(const std::vector<std::size_t>& doubtful, const Observat
     rig.rig_from_board.erase(rig.rig_from_board.begin() + static_cast<std::ptrdiff_t>(*i));
   }
   BundleOptions cameras_alone;
-  cameras_alone.cameras.assign(rig.cameras.size(), {});
+  for (const DeviceModel& camera : rig.cameras) {
+    cameras_alone.cameras.push_back(plausible_distortion(camera.size, camera.lens[0]));
+  }
   cameras_alone.with_symbols = false;
   if (auto solved = adjust(others, cameras_alone, rig); !solved) return tl::unexpected(solved.error());
   const auto error_of = [&](const PoseObservation& pose, const MotionVector& place) {

@@ -58,11 +58,11 @@ HeldOut hold_out(const PoseEquations& pose, const Eigen::VectorXd& change) {
 /// What a pose asks to be changed, against what the others leave open. In coordinates in which all poses together have
 /// the unit matrix for their normal equations and this one diag(share), the difference of its own solution to that of
 /// the others is gradient / (share (1 - share)), its variance 1 / share + 1 / (1 - share).
-double disagreement_of(const Reduced& pose, const Eigen::MatrixXd& normal) {
+void compare(const Reduced& pose, const Eigen::MatrixXd& normal, HeldOut& held_out) {
   const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(
       scale.asDiagonal() * pose.normal * scale.asDiagonal(), scale.asDiagonal() * normal * scale.asDiagonal());
-  if (solver.info() != Eigen::Success) return 0;
+  if (solver.info() != Eigen::Success) return;
   const Eigen::VectorXd gradient = solver.eigenvectors().transpose() * (scale.asDiagonal() * pose.gradient);
   double sum = 0, count = 0;
   for (Eigen::Index i = 0; i < gradient.size(); ++i) {
@@ -70,7 +70,8 @@ double disagreement_of(const Reduced& pose, const Eigen::MatrixXd& normal) {
     if (share < kShareMin || share > 1 - kShareMin) continue;
     sum += gradient(i) * gradient(i) / (share * (1 - share)), count += 1;
   }
-  return count > 0 ? std::sqrt(sum / count) : 0;
+  held_out.directions = count;
+  held_out.disagreement = count > 0 ? std::sqrt(sum / count) : 0;
 }
 
 /// Inverts a normal matrix after scaling its diagonal to one.
@@ -104,7 +105,7 @@ std::string name_of(const SharedParameter& parameter) {
 
 double PoseInfluence::sigma(std::size_t parameter) const {
   const auto i = static_cast<Eigen::Index>(parameter);
-  return std::sqrt(std::max({noise_covariance(i, i), jackknife_covariance(i, i), 0.0}));
+  return std::sqrt(std::max(covariance(i, i), 0.0));
 }
 
 bool is_placed(const PoseEquations& pose) {
@@ -118,18 +119,16 @@ bool is_placed(const PoseEquations& pose) {
 Result<PoseInfluence> find_influence(const BundleEquations& equations) {
   const auto size = static_cast<Eigen::Index>(equations.shared.size());
   std::vector<Reduced> reduced;
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
-  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(size);
+  Eigen::MatrixXd said = Eigen::MatrixXd::Zero(size, size);
+  Eigen::VectorXd gradient = equations.prior_pull;
   for (const PoseEquations& pose : equations.poses) {
     reduced.push_back(reduce(pose, size));
-    normal += reduced.back().normal, gradient += reduced.back().gradient;
+    said += reduced.back().normal, gradient += reduced.back().gradient;
   }
-  auto covariance = invert(normal, equations.shared);
-  if (!covariance) return tl::unexpected(covariance.error());
-  PoseInfluence influence{*covariance, Eigen::MatrixXd::Zero(size, size), {}};
-  std::vector<Eigen::VectorXd> changes;
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(size);
-  const auto count = static_cast<double>(std::ranges::count_if(equations.poses, is_placed));
+  Eigen::MatrixXd normal = said;
+  normal.diagonal() += equations.prior_weight;
+  PoseInfluence influence;
+  double squares = 0, directions = 0;
   for (std::size_t i = 0; i < reduced.size(); ++i) {
     if (!is_placed(equations.poses[i])) {
       influence.held_out.push_back({.placed = false});
@@ -137,14 +136,19 @@ Result<PoseInfluence> find_influence(const BundleEquations& equations) {
     }
     const auto without = invert(normal - reduced[i].normal, equations.shared);
     if (!without) return tl::unexpected(without.error());
-    changes.emplace_back(-*without * (gradient - reduced[i].gradient));
-    mean += changes.back() / count;
-    influence.held_out.push_back(hold_out(equations.poses[i], changes.back()));
-    influence.held_out.back().disagreement = disagreement_of(reduced[i], normal);
+    HeldOut& held_out = influence.held_out.emplace_back(
+        hold_out(equations.poses[i], Eigen::VectorXd(-*without * (gradient - reduced[i].gradient))));
+    compare(reduced[i], normal, held_out);
+    squares += held_out.directions * held_out.disagreement * held_out.disagreement;
+    directions += held_out.directions;
   }
-  for (const Eigen::VectorXd& change : changes) {
-    influence.jackknife_covariance += (count - 1) / count * (change - mean) * (change - mean).transpose();
-  }
+  // Over all poses and directions at once: of each parameter by itself a dozen poses would tell little.
+  influence.scatter = directions > 0 ? std::max(1.0, std::sqrt(squares / directions)) : 1;
+  Eigen::MatrixXd scattered = said / (influence.scatter * influence.scatter);
+  scattered.diagonal() += equations.prior_weight;
+  auto covariance = invert(scattered, equations.shared);
+  if (!covariance) return tl::unexpected(covariance.error());
+  influence.covariance = std::move(*covariance);
   return influence;
 }
 

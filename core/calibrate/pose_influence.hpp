@@ -17,18 +17,19 @@ struct HeldOut {
   double symbol_rms_px = 0;  ///< the same of its symbols
   double disagreement = 0;   ///< between what it says of the shared parameters and what the others say: root mean
                              ///< square, standard deviations of the noise
+  double directions = 0;     ///< in how many directions it and the others both say something
   bool placed = true;        ///< whether its own points say where it is; if not, it says nothing, and the rest is 0
 };
 
 /// How well the poses determine the shared parameters, from the linear equations at the solution: each pose is left out
 /// in turn, without solving anew.
 struct PoseInfluence {
-  Eigen::MatrixXd noise_covariance;      ///< of the shared parameters, from the residuals' noise alone
-  Eigen::MatrixXd jackknife_covariance;  ///< of the same, from how they change as each pose is left out: it has a part
-                                         ///< for what is common to all points of a pose, as when the board is not flat
-  std::vector<HeldOut> held_out;         ///< one to a pose
+  Eigen::MatrixXd covariance;  ///< of the shared parameters: of what the points and what was plausible before say
+  double scatter = 1;          ///< by how much more the poses differ in what they say of them than their points' noise
+                               ///< lets expect, as where the board is not quite flat; the covariance contains it
+  std::vector<HeldOut> held_out;  ///< one to a pose
 
-  /// One standard deviation of a shared parameter: the larger of both.
+  /// One standard deviation of a shared parameter.
   [[nodiscard]] double sigma(std::size_t parameter) const;
 };
 

@@ -7,6 +7,7 @@
 
 #include <ceres/rotation.h>
 
+#include "core/calibrate/lens_terms.hpp"
 #include "core/calibrate/rig_model.hpp"
 
 namespace slsd {
@@ -47,6 +48,17 @@ void camera_residual(const T* lens, const T* camera_from_rig, const Eigen::Matri
   residual[0] = (pixel.x() - seen_px.x()) / sigma_px;
   residual[1] = (pixel.y() - seen_px.y()) / sigma_px;
 }
+
+/// What is plausible of a distortion, in standard deviations.
+struct DistortionResidual {
+  DistortionPrior prior;
+
+  template <class T>
+  bool operator()(const T* lens, T* residual) const {
+    for (std::size_t i = 0; i < prior.size(); ++i) residual[i] = lens[kFirstTerm + i] / prior[i];
+    return true;
+  }
+};
 
 /// A point of the board in the camera. The print is larger than it should be by `scale`, and by `stretch` along y.
 struct CornerResidual {

@@ -37,6 +37,15 @@ Eigen::Vector3d RigModel::printed_mm(const Eigen::Vector2d& nominal_mm, PoseSubj
   return {scale * nominal_mm.x(), scale * (1 + board_stretch) * nominal_mm.y(), 0};
 }
 
+RigModel RigModel::as_of(std::size_t pose) const {
+  RigModel then = *this;
+  then.moved.reset();
+  if (!moved || pose < moved->first_pose) return then;
+  then.projector.device_from_rig = moved->projector;
+  for (std::size_t i = 1; i < cameras.size(); ++i) then.cameras[i].device_from_rig = moved->cameras[i];
+  return then;
+}
+
 Calibration RigModel::calibration(const std::vector<NamedCamera>& names) const {
   Calibration result;
   result.projector = to_lens(projector.lens, projector.size);

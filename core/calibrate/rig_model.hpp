@@ -3,6 +3,8 @@
 #pragma once
 
 #include <array>
+#include <map>
+#include <optional>
 #include <vector>
 
 #include "core/calibrate/observations.hpp"
@@ -27,6 +29,13 @@ struct DeviceModel {
   MotionVector device_from_rig{};
 };
 
+/// Where the devices are from a pose on, for the question whether a session is one rig.
+struct MovedDevices {
+  std::size_t first_pose = 0;
+  std::vector<MotionVector> cameras;  ///< the first one's, which is the rig's frame, has no part
+  MotionVector projector{};
+};
+
 /// Everything that is adjusted: the devices and the poses of the board and the reference plane. The rig's frame is that
 /// of the first camera.
 struct RigModel {
@@ -36,10 +45,15 @@ struct RigModel {
   double board_stretch = 0;                  ///< by how much the print is longer along y than it should be against x
   double board_scale = 0;                    ///< by how much the board's print is larger than it should be, by the
                                              ///< reference plane's measure
+  std::optional<MovedDevices> moved;         ///< nothing: the session is one rig
+  std::map<std::size_t, MotionVector>
+      rig_from_lit;  ///< of poses whose symbols lie on a plane of their own, where it is
 
   /// Where a point is on the print: on that of the board with its scale and stretch.
   /// @param nominal_mm  where it should be
   [[nodiscard]] Eigen::Vector3d printed_mm(const Eigen::Vector2d& nominal_mm, PoseSubject subject) const;
+  /// The rig as it was at a pose.
+  [[nodiscard]] RigModel as_of(std::size_t pose) const;
   [[nodiscard]] Calibration calibration(const std::vector<NamedCamera>& names) const;
 };
 

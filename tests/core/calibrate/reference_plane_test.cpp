@@ -101,7 +101,7 @@ TEST(ReferencePlane, ImprovesTheRigWhereThePosesAreFewAndNoisy) {
   double logarithms = 0;
   for (const auto& [name, square] : with) {
     const double share = std::sqrt(square / without[name]);
-    EXPECT_LT(share, 1.05) << name;
+    EXPECT_LT(share, 1.1) << name;  // of six trials it is known to a tenth
     logarithms += std::log(share) / static_cast<double>(with.size());
   }
   EXPECT_LT(std::exp(logarithms), 0.8);

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/board/find_board.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// Where the board's print is in the pattern's picture, against the white one. The edges of the print show there too,
+/// wherever the pattern lights them.
+struct PrintShift {
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  double significance = 0;  ///< how far it stands out of all other shifts, in their deviations: about 10 of pictures of
+                            ///< one pose, below 4 of those of two
+
+  [[nodiscard]] bool certain() const { return significance > 6; }
+};
+
+/// Compares the gradients of both pictures' logarithms at the print's edges, over all shifts of up to 24 px.
+/// @return a significance of 0 where the board has no edges that could tell
+/// @thread reentrant
+[[nodiscard]] PrintShift find_print_shift(const GreyView& white, const GreyView& pattern, const Board& board,
+                                          const BoardSighting& sighting);
+
+}  // namespace slsd

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+
+// Reported standard deviations against true errors, over many rigs: of lenses that have terms of distortion that the
+// poses do not tell.
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <random>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include "core/calibrate/calibrate.hpp"
+#include "core/geometry/triangulate.hpp"
+#include "tests/core/calibrate/synthetic_rig.hpp"
+
+namespace slsd {
+namespace {
+
+/// Errors in reported deviations.
+struct Ratios {
+  double squares = 0, worst = 0;
+  int count = 0;
+
+  void add(double ratio) { squares += ratio * ratio, worst = std::max(worst, std::abs(ratio)), ++count; }
+  [[nodiscard]] double rms() const { return std::sqrt(squares / count); }
+};
+
+/// A rig unlike others: focal lengths, distortions and baseline of its own.
+RigModel some_rig(std::mt19937& random) {
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  const auto lens = [&](double focal, double cx, double cy) {
+    const double k1 = uniform(-0.32, 0.08);
+    return LensVector{focal * uniform(0.8, 1.2),
+                      0,
+                      cx + uniform(-15, 15),
+                      cy + uniform(-15, 15),
+                      k1,
+                      -0.7 * k1 * uniform(0, 1.3),
+                      uniform(-0.0015, 0.0015),
+                      uniform(-0.0015, 0.0015),
+                      0.3 * k1 * uniform(0, 1)};
+  };
+  RigModel rig = true_rig();
+  rig.cameras[0].lens = lens(3300, 800, 600), rig.projector.lens = lens(2500, 640, 436);
+  rig.cameras[0].lens[1] = rig.cameras[0].lens[0] * uniform(0.999, 1.001);
+  rig.projector.lens[1] = rig.projector.lens[0] * uniform(0.999, 1.001);
+  const double share = uniform(0.6, 1.8);
+  rig.projector.device_from_rig[1] *= share, rig.projector.device_from_rig[3] *= share;
+  return rig;
+}
+
+void thin(Observations& observations, std::size_t corner_step, std::size_t symbol_step) {
+  const auto keep = [](auto& points, std::size_t step) {
+    std::size_t i = 0;
+    std::erase_if(points, [&](const auto&) { return i++ % step != 0; });
+  };
+  for (PoseObservation& pose : observations.poses) {
+    keep(pose.views[0].corners, corner_step), keep(pose.views[0].symbols, symbol_step);
+  }
+}
+
+double truth_of(const ParameterReport& parameter, const RigModel& truth) {
+  const DeviceModel& device = parameter.device == "projector" ? truth.projector : truth.cameras[0];
+  for (std::size_t i = 0; i < device.lens.size(); ++i) {
+    if (kLensParameterNames[i] == parameter.name) return device.lens[i];
+  }
+  const std::map<std::string, std::size_t> motion{{"turn_x", 0},  {"turn_y", 1},  {"turn_z", 2},
+                                                  {"place_x", 3}, {"place_y", 4}, {"place_z", 5}};
+  return device.device_from_rig[motion.at(parameter.name)];
+}
+
+/// Where the calibration puts a point of the truth in the middle of the picture, in depths too much, mm.
+double depth_error_mm(double depth_mm, const RigModel& found, const RigModel& truth) {
+  const auto device = [](const RigModel& rig) {
+    return CalibratedCamera{
+        "", to_lens(rig.cameras[0].lens, rig.cameras[0].size), to_motion(rig.projector.device_from_rig), {}};
+  };
+  const auto projector = [](const RigModel& rig) { return to_lens(rig.projector.lens, rig.projector.size); };
+  const CalibratedCamera is = device(truth);
+  const Eigen::Vector3d point = depth_mm * is.lens.undistort({800, 600}).homogeneous();
+  const Match match{is.lens.project(point), projector(truth).project(is.projector_from_camera * point)};
+  return triangulate(match, device(found), projector(found), 1).point_in_camera.z() - depth_mm;
+}
+
+TEST(Calibrate, ReportsDeviationsThatHold) {
+  constexpr unsigned kTrials = 30;
+  std::map<std::string, Ratios> of;
+  for (unsigned trial = 0; trial < kTrials; ++trial) {
+    std::mt19937 random(trial + 100);
+    const RigModel truth = some_rig(random);
+    SightOptions options;
+    options.seed = static_cast<std::uint32_t>(random());
+    options.corner_sigma_px = 0.01 + 0.01 * (trial % 5), options.symbol_sigma_px = 0.05 + 0.03 * (trial % 3);
+    Observations seen =
+        see(truth, true_poses(8 + static_cast<int>(trial % 7), static_cast<std::uint32_t>(random())), options);
+    thin(seen, 1 + (trial % 2), 2 + (trial % 4));
+    const auto outcome = calibrate(seen, {.depth_min_mm = 1000, .depth_max_mm = 2500});
+    ASSERT_TRUE(outcome) << outcome.error().message;
+    for (const ParameterReport& parameter : outcome->parameters) {
+      const double ratio = (parameter.value - truth_of(parameter, truth)) / parameter.sigma;
+      of[(parameter.device == "projector" ? "projector " : "camera ") + parameter.name].add(ratio);
+      EXPECT_LT(std::abs(ratio), 4) << "trial " << trial << ": " << parameter.device << " " << parameter.name;
+    }
+    for (const DepthUncertainty& depth : outcome->depth) {
+      of["depth"].add(depth_error_mm(depth.depth_mm, outcome->rig, truth) / depth.calibration_mm);
+    }
+  }
+  for (const auto& [name, ratios] : of) {
+    std::printf("%-20s error over deviation: RMS %.2f, worst %.2f of %d\n", name.c_str(), ratios.rms(), ratios.worst,
+                ratios.count);
+    EXPECT_LT(ratios.rms(), 1.4) << name;
+    EXPECT_LT(ratios.worst, 4) << name;
+    // What is hardly seen stays where it was thought to be, at no error where lenses have none of it.
+    if (name.find(" k") == name.npos && name.find(" p1") == name.npos && name.find(" p2") == name.npos) {
+      EXPECT_GT(ratios.rms(), 0.7) << name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace slsd
