@@ -25,6 +25,7 @@ struct BoardSighting {
   double edge_px = 0;                ///< one standard deviation of the blur at the board's edges; sharp: 0.3 to 0.8
   double pitch_px = 0;               ///< Board::pitch_mm in the image, along the shorter direction
   double clipped_share = 0;          ///< of the pixels where the board is, those at the full level or at 0; 0 to 1
+  double full_share = 0;             ///< of the same pixels, those at the full level: 0 to 1. Ink may well be at 0
   bool half_turn_ambiguous = false;  ///< the board looks the same upside down (chessboard of 9x7 inner corners, circles
                                      ///< of even rows), so that its upper end was taken to be up in the image
 };

@@ -38,18 +38,18 @@ double shorter_pitch(const std::vector<MeasuredPoint>& points, const Homography&
          });
 }
 
-bool is_clipped(float level, double full) {
-  return level >= full || level <= 0;
-}
+struct Clipped {
+  double share = 0, full_share = 0;
+};
 
 // Looked at once to about a pixel, within the points seen.
-double clipped_share(const std::vector<MeasuredPoint>& points, const Homography& homography, const Board& board,
-                     const BoardPhoto& photo, double pitch_px) {
+Clipped clipped_shares(const std::vector<MeasuredPoint>& points, const Homography& homography, const Board& board,
+                       const BoardPhoto& photo, double pitch_px) {
   Eigen::AlignedBox2d area;
   for (const auto& measured : points) area.extend(board.point(measured.point.id).head<2>());
   const double step = board.pitch_mm / std::max(2.0, pitch_px);
   int looked = 0;
-  int clipped = 0;
+  int full = 0, dark = 0;
   for (double y = area.min().y(); y <= area.max().y(); y += step) {
     for (double x = area.min().x(); x <= area.max().x(); x += step) {
       const Eigen::Vector2d pixel = homography.map({x, y});
@@ -57,10 +57,12 @@ double clipped_share(const std::vector<MeasuredPoint>& points, const Homography&
       const int row = static_cast<int>(std::lround(pixel.y()));
       if (!photo.light.view().contains(column, row)) continue;
       ++looked;
-      clipped += is_clipped(photo.light.at(column, row), photo.full) ? 1 : 0;
+      full += photo.light.at(column, row) >= photo.full ? 1 : 0;
+      dark += photo.light.at(column, row) <= 0 ? 1 : 0;
     }
   }
-  return looked == 0 ? 0 : static_cast<double>(clipped) / looked;
+  if (looked == 0) return {};
+  return {static_cast<double>(full + dark) / looked, static_cast<double>(full) / looked};
 }
 
 }  // namespace
@@ -73,7 +75,8 @@ BoardSighting summarise(std::vector<MeasuredPoint> points, const BoardPhoto& pho
   sighting.edge_px = median_of(points, [](const auto& measured) { return measured.blur_px; });
   if (const auto homography = fit_homography(ties_of_points(points, board))) {
     sighting.pitch_px = shorter_pitch(points, *homography, board);
-    sighting.clipped_share = clipped_share(points, *homography, board, photo, sighting.pitch_px);
+    const Clipped clipped = clipped_shares(points, *homography, board, photo, sighting.pitch_px);
+    sighting.clipped_share = clipped.share, sighting.full_share = clipped.full_share;
   }
   return sighting;
 }

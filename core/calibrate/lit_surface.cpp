@@ -34,6 +34,9 @@ std::vector<Eigen::Vector3d> points_on_board(const PoseObservation& pose, const 
   return points;
 }
 
+/// Of half the board's size: what is nearer than this may be the board.
+constexpr double kBeforeShare = 0.03;
+
 /// z over terms in x and y, both of about one; misread symbols, which lie anywhere, have no part.
 struct SurfaceFit {
   Eigen::VectorXd coefficients;
@@ -91,6 +94,17 @@ LitSurface measure_lit_surface(const PoseObservation& pose, const RigModel& rig,
   surface.bow_mm = bowed.maxCoeff() - bowed.minCoeff();
   surface.bow_share = off > 0 ? 1 - mean_square(z - smooth, bend.weights) / off : 0;
   surface.flatness_mm = std::sqrt(off);
+  const double before = kBeforeShare * scale;
+  std::vector<double> in_front;
+  std::size_t behind = 0;
+  for (const double height : z) {
+    if (height < -before) in_front.push_back(-height);
+    behind += height > before ? 1 : 0;
+  }
+  if (in_front.size() > behind) {
+    surface.before_share = static_cast<double>(in_front.size() - behind) / static_cast<double>(rows);
+    surface.before_mm = median_of(std::move(in_front));
+  }
   return surface;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,7 +29,10 @@ struct PoseView {
   std::size_t camera = 0;
   std::vector<BoardPoint> corners;
   std::vector<ProjectedPoint> symbols;
-  double blur_px = 0;  ///< one standard deviation of the blur at the board's edges; 0: not known
+  double blur_px = 0;        ///< one standard deviation of the blur at the board's edges; 0: not known
+  double clipped_share = 0;  ///< of the board's pixels, those at full level
+  std::optional<Eigen::Vector2d>
+      shift_px;  ///< of the print from the white picture to the pattern's, where both show it
 };
 
 /// What is shown to the cameras.

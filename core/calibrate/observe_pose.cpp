@@ -6,6 +6,7 @@
 
 #include "core/calibrate/board_region.hpp"
 #include "core/calibrate/gray_code.hpp"
+#include "core/calibrate/print_shift.hpp"
 #include "core/exposure/divide_light.hpp"
 
 namespace slsd {
@@ -33,7 +34,7 @@ Result<PoseView> observe_board(const PosePictures& pictures, const Board& board,
   if (!found) return tl::unexpected(found.error());
   sighting = std::move(*found);
   PoseView view;
-  view.blur_px = sighting.edge_px;
+  view.blur_px = sighting.edge_px, view.clipped_share = sighting.full_share;
   for (const SeenPoint& point : sighting.points) {
     view.corners.push_back({point.pixel, board.point(point.id).head<2>()});
   }
@@ -42,6 +43,8 @@ Result<PoseView> observe_board(const PosePictures& pictures, const Board& board,
 
 Result<> observe_pattern(const PosePictures& pictures, const Board& board, const BoardSighting& sighting,
                          PatternReader& reader, PoseView& view) {
+  const PrintShift shift = find_print_shift(pictures.white, pictures.coded.at(0), board, sighting);
+  if (shift.certain()) view.shift_px = shift.px;
   const auto levelled = divide_light(pictures.coded.at(0), pictures.white);
   if (!levelled) return tl::unexpected(levelled.error());
   const auto matches = reader.read(levelled->view());

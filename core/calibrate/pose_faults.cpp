@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -31,6 +32,14 @@ constexpr double kBowShareMin = 0.4;
 constexpr double kBowOfShiftMin = 0.3;
 /// Of half the board's size: root mean square off a plane beyond which it is no board.
 constexpr double kUnevenShareMax = 0.1;
+/// Of the board's pixels: from here on what is left of its edges and of the symbols is not where it was.
+constexpr double kClippedMax = 0.25;
+/// The print lies this much elsewhere under the pattern: the picture of the board tells nothing of it.
+constexpr double kShiftMaxPx = 1;
+/// Corners that are this near those of an earlier pose, as a share of the picture's width, say what those said.
+constexpr double kSamePlaceShare = 0.005;
+/// Of a pose's symbols, those that something stands before; of more it is the board that moved.
+constexpr double kCoveredShare = 0.08, kUncoveredShare = 0.5;
 /// Times the usual error from which on the figure tells nothing more.
 constexpr double kTimesTelling = 100;
 
@@ -68,6 +77,48 @@ std::string least_lack_of_symbols(const PoseObservation& pose) {
     if (lack_of_corners(view).empty()) most = std::max(most, view.symbols.size());
   }
   return lack_of_symbols(most);
+}
+
+double clipped_share_of(const PoseObservation& pose) {
+  double share = 0;
+  for (const PoseView& view : pose.views) share = std::max(share, view.clipped_share);
+  return share;
+}
+
+double shift_of(const PoseObservation& pose) {
+  double shift = 0;
+  for (const PoseView& view : pose.views) shift = std::max(shift, view.shift_px ? view.shift_px->norm() : 0);
+  return shift;
+}
+
+/// How far the corners that both views have are apart, root mean square; nothing where hardly any are.
+std::optional<double> apart_px(const PoseView& one, const PoseView& other) {
+  constexpr std::size_t kCommonMin = 4;
+  std::map<std::pair<double, double>, Eigen::Vector2d> places;
+  for (const BoardPoint& corner : one.corners) places[{corner.board_mm.x(), corner.board_mm.y()}] = corner.camera_px;
+  double sum = 0;
+  std::size_t count = 0;
+  for (const BoardPoint& corner : other.corners) {
+    const auto place = places.find({corner.board_mm.x(), corner.board_mm.y()});
+    if (place != places.end()) sum += (place->second - corner.camera_px).squaredNorm(), ++count;
+  }
+  if (count < kCommonMin) return std::nullopt;
+  return std::sqrt(sum / static_cast<double>(count));
+}
+
+/// Whether all views of the later pose show the board where the earlier one's do.
+bool repeats(const PoseObservation& earlier, const PoseObservation& later, const Observations& observations) {
+  if (earlier.subject != later.subject) return false;
+  bool any = false;
+  for (const PoseView& view : later.views) {
+    const auto before = std::ranges::find(earlier.views, view.camera, &PoseView::camera);
+    if (before == earlier.views.end()) return false;
+    const auto apart = apart_px(*before, view);
+    const double width_px = observations.cameras[view.camera].size.width_px;
+    if (!apart || *apart > kSamePlaceShare * width_px) return false;
+    any = true;
+  }
+  return any;
 }
 
 /// Of the corners or of the symbols of a pose, whichever is more.
@@ -138,6 +189,13 @@ Explanation compare(std::size_t pose, const Observations& observations, const Ri
 FaultyPose explain(std::size_t pose, const std::string& error, const Observations& observations, const RigModel& rig) {
   const Explanation shown = compare(pose, observations, rig);
   const char* const subject = observations.poses[pose].subject == PoseSubject::kBoard ? "board" : "plane";
+  const auto& surface = shown.surface;
+  if (surface.before_share > kCoveredShare && surface.before_share < kUncoveredShare) {
+    return {pose, PoseFault::kCovered,
+            fmt::format("something stood before the {}: {:.0f} % of the symbols lie about {:.0f} mm before it; keep "
+                        "hands and cables out of its light",
+                        subject, 100 * surface.before_share, surface.before_mm)};
+  }
   if (shown.is_bowed()) {
     return {pose, PoseFault::kBent,
             fmt::format("the {} is not flat: it is bent by {:.1f} mm, {:.0f} times as much as in the other poses; "
@@ -172,6 +230,14 @@ std::string_view to_string(PoseFault fault) {
       return "too_few_symbols";
     case PoseFault::kBlurred:
       return "blurred";
+    case PoseFault::kClipped:
+      return "clipped";
+    case PoseFault::kRepeated:
+      return "repeated";
+    case PoseFault::kSwapped:
+      return "swapped";
+    case PoseFault::kCovered:
+      return "covered";
     case PoseFault::kBent:
       return "bent";
     case PoseFault::kMoved:
@@ -187,6 +253,11 @@ std::vector<FaultyPose> find_unusable(const Observations& observations) {
   for (std::size_t i = 0; i < observations.poses.size(); ++i) {
     const PoseObservation& pose = observations.poses[i];
     std::string corners = least_lack_of_corners(pose), symbols = least_lack_of_symbols(pose);
+    const auto is_fine = [&](std::size_t other) {
+      return std::ranges::none_of(faulty, [&](const FaultyPose& one) { return one.pose == other; });
+    };
+    std::size_t same = 0;
+    while (same < i && !(is_fine(same) && repeats(observations.poses[same], pose, observations))) ++same;
     const double blur = blur_of(pose), usual_blur = usual_blur_of(pose.subject, observations);
     if (!corners.empty()) {
       faulty.push_back({i, PoseFault::kTooFewCorners, std::move(corners)});
@@ -197,6 +268,22 @@ std::vector<FaultyPose> find_unusable(const Observations& observations) {
                         fmt::format("blurred: the board's edges are {:.1f} px wide, {:.1f} px in the other poses; hold "
                                     "it still, and within the depth of focus",
                                     blur, usual_blur)});
+    } else if (clipped_share_of(pose) > kClippedMax) {
+      faulty.push_back({i, PoseFault::kClipped,
+                        fmt::format("clipped: {:.0f} % of the board's pixels are at full level; expose less, or turn a "
+                                    "reflection away",
+                                    100 * clipped_share_of(pose))});
+    } else if (shift_of(pose) > kShiftMaxPx) {
+      faulty.push_back(
+          {i, PoseFault::kMoved,
+           fmt::format("the board moved between the white picture and the pattern: its print by {:.0f} px; "
+                       "hold it still, or lean it against something",
+                       shift_of(pose))});
+    } else if (same < i) {
+      faulty.push_back({i, PoseFault::kRepeated,
+                        fmt::format("it shows the board where {} does, so that both count once; move, tilt or turn it "
+                                    "between the poses",
+                                    observations.poses[same].name)});
     }
   }
   return faulty;

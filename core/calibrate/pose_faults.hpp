@@ -19,9 +19,13 @@ enum class PoseFault {
   kTooFewCorners,
   kTooFewSymbols,
   kBlurred,
-  kBent,    ///< the board is not flat
-  kMoved,   ///< between the picture of the board and that of the pattern
-  kUnlike,  ///< it contradicts the others, for another reason
+  kClipped,   ///< too much of the board is at full level
+  kRepeated,  ///< it shows the board where an earlier one does
+  kBent,      ///< the board is not flat
+  kMoved,     ///< between the picture of the board and that of the pattern
+  kSwapped,   ///< the pattern's picture is another pose's
+  kCovered,   ///< something stood before the board
+  kUnlike,    ///< it contradicts the others, for another reason
 };
 [[nodiscard]] std::string_view to_string(PoseFault fault);
 

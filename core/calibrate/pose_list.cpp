@@ -4,9 +4,16 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
 #include "core/calibrate/view_demands.hpp"
 
 namespace slsd {
+namespace {
+
+constexpr double kClippedToSay = 0.02;  // as a session on hardware does not take it
+
+}  // namespace
 
 PoseList::PoseList(const Observations& observations) {
   for (const PoseObservation& pose : observations.poses) {
@@ -15,6 +22,9 @@ PoseList::PoseList(const Observations& observations) {
     used_.push_back(used_.size());
     for (const PoseView& view : pose.views) {
       report.corners += view.corners.size(), report.symbols += view.symbols.size();
+      if (view.clipped_share <= kClippedToSay) continue;
+      report.remarks.push_back(
+          fmt::format("{:.0f} % of the board's pixels are at full level: expose less", 100 * view.clipped_share));
     }
   }
 }

@@ -19,6 +19,7 @@ struct PoseReport {
   std::optional<PoseFault> fault;    ///< why it was left out
   std::string reason;                ///< the same for a person, with the figure; empty where it was used
   std::vector<std::string> without;  ///< of a pose that was used: cameras whose view was left out, and why
+  std::vector<std::string> remarks;  ///< of a pose that was used: what is not as it should be
   std::size_t corners = 0, symbols = 0;
   std::size_t outlying_corners = 0, outlying_symbols = 0;
   double corner_rms_px = 0, symbol_rms_px = 0;  ///< in the camera

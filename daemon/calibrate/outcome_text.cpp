@@ -22,6 +22,7 @@ void add_poses(const CalibrationOutcome& outcome, std::string& text) {
           fmt::format("  {} corners and {} symbols left out as outlying", pose.outlying_corners, pose.outlying_symbols);
     }
     text += "\n";
+    for (const std::string& remark : pose.remarks) text += "               " + remark + "\n";
     for (const std::string& view : pose.without) text += "               without " + view + "\n";
   }
 }

@@ -165,6 +165,65 @@ TEST(Calibrate, NamesAPoseOfWhichNothingFits) {
   }
 }
 
+// Three poses that were copied are three poses still.
+TEST(Calibrate, CountsRepeatedPosesOnce) {
+  Observations observations = see(true_rig(), true_poses(4));
+  for (int copy = 0; copy < 3; ++copy) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      PoseObservation again = observations.poses[i];
+      again.name = "pose_" + std::to_string(observations.poses.size());
+      for (BoardPoint& corner : again.views[0].corners) corner.camera_px.x() += copy;  // held in the hand
+      observations.poses.push_back(std::move(again));
+    }
+  }
+  const auto outcome = calibrate(observations, {});
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(left_out(*outcome), 12U);
+  EXPECT_EQ(report_of(*outcome, "pose_9").fault, PoseFault::kRepeated);
+  EXPECT_THAT(report_of(*outcome, "pose_9").reason, HasSubstr("where pose_1 does"));
+  EXPECT_NE(outcome->verdict.grade, Grade::kGood);
+}
+
+TEST(Calibrate, NamesClippedPoses) {
+  Observations observations = see(true_rig(), true_poses(12));
+  observations.poses[2].views[0].clipped_share = 0.82;
+  observations.poses[5].views[0].clipped_share = 0.1;
+  const auto outcome = calibrate(observations, {});
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(left_out(*outcome), 1U);
+  EXPECT_EQ(report_of(*outcome, "pose_2").fault, PoseFault::kClipped);
+  EXPECT_THAT(report_of(*outcome, "pose_2").reason, HasSubstr("clipped: 82 %"));
+  EXPECT_THAT(report_of(*outcome, "pose_5").remarks, testing::ElementsAre(HasSubstr("10 % of the board's pixels")));
+}
+
+TEST(Calibrate, NamesPicturesOfWhichOneIsShifted) {
+  Observations observations = see(true_rig(), true_poses(12));
+  for (PoseObservation& pose : observations.poses) pose.views[0].shift_px = Eigen::Vector2d(0, 0);
+  observations.poses[6].views[0].shift_px = Eigen::Vector2d(9, 0);
+  const auto outcome = calibrate(observations, {});
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(left_out(*outcome), 1U);
+  EXPECT_EQ(report_of(*outcome, "pose_6").fault, PoseFault::kMoved);
+  EXPECT_THAT(report_of(*outcome, "pose_6").reason, HasSubstr("its print by 9 px"));
+}
+
+TEST(Calibrate, NamesAPoseThatSomethingStoodBefore) {
+  const RigModel truth = true_rig();
+  Observations observations = see(truth, true_poses(12));
+  SightOptions options;
+  options.relief = [](int, const Eigen::Vector2d&) { return -60; };
+  const Observations before = see(truth, true_poses(12), options);
+  for (std::size_t i = 0; i < 60; ++i) {
+    observations.poses[4].views[0].symbols[i] = before.poses[4].views[0].symbols[i];
+  }
+  const auto outcome = calibrate(observations, {});
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(left_out(*outcome), 1U);
+  EXPECT_EQ(report_of(*outcome, "pose_4").fault, PoseFault::kCovered) << report_of(*outcome, "pose_4").reason;
+  EXPECT_THAT(report_of(*outcome, "pose_4").reason, HasSubstr("60 mm before it"));
+  expect_near_truth(*outcome, truth);
+}
+
 TEST(Calibrate, NamesBlurredPoses) {
   const RigModel truth = true_rig();
   Observations observations = see(truth, true_poses(12));
