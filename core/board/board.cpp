@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #include "core/board/board.hpp"
 
+#include <utility>
+
 namespace slsd {
 namespace {
 
@@ -22,6 +24,14 @@ Eigen::Vector3d lattice_point(int i, int j, double step) {
 }
 
 }  // namespace
+
+std::optional<Board> rows_by_columns(const Board& board) {
+  const bool has_ends = board.kind == BoardKind::kCharuco || board.kind == BoardKind::kPlane;
+  if (!has_ends || board.columns == board.rows) return std::nullopt;
+  Board other = board;
+  std::swap(other.columns, other.rows);
+  return other;
+}
 
 Board Board::scaled(double factor) const {
   Board board = *this;

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -64,6 +65,10 @@ struct Board {
 /// @errors kMalformed (not of that form), kInvalidArgument (of numbers that no board has)
 /// @thread reentrant
 [[nodiscard]] Result<Board> parse_board(std::string_view text);
+
+/// The same print as others name it: rows by columns. Nothing of kinds that look the same by either name.
+/// @thread reentrant
+[[nodiscard]] std::optional<Board> rows_by_columns(const Board& board);
 
 /// What parse_board() reads.
 /// @thread reentrant

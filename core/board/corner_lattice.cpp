@@ -37,7 +37,8 @@ double reach(const Board& board, double square_px) {
 
 }  // namespace
 
-CornerLattice::CornerLattice(const Image<float>& light, const Board& board) : light_(&light), board_(&board) {}
+CornerLattice::CornerLattice(const Image<float>& light, const Board& board, bool white_first)
+    : light_(&light), board_(&board), white_first_(white_first) {}
 
 int CornerLattice::columns() const {
   return board_->kind == BoardKind::kCharuco ? board_->columns - 1 : board_->columns;
@@ -55,7 +56,7 @@ bool CornerLattice::look_for(int id, const Homography& local) {
   const auto saddle = fit_saddle(*light_, guess, reach(*board_, guess.square_px()));
   if (!saddle) return false;
   const bool first_is_black = (id % columns() + id / columns()) % 2 == 0;
-  if ((saddle->step > 0) != first_is_black) return false;
+  if ((saddle->step > 0) != (first_is_black != white_first_)) return false;
   if ((saddle->pixel - guess.pixel).norm() > std::max(1.5, kMaxStrayOfSquare * guess.square_px())) return false;
   corners_[id] = {{id, saddle->pixel}, saddle->step, saddle->blur_px};
   return true;

@@ -17,7 +17,8 @@ namespace slsd {
 class CornerLattice {
  public:
   /// Borrows both.
-  CornerLattice(const Image<float>& light, const Board& board);
+  /// @param white_first  whether the square at the board's top left is white
+  CornerLattice(const Image<float>& light, const Board& board, bool white_first = false);
 
   /// Fits a corner where a homography of its surroundings has it; keeps it where it is of the right colours.
   bool look_for(int id, const Homography& local);
@@ -36,6 +37,7 @@ class CornerLattice {
 
   const Image<float>* light_;
   const Board* board_;
+  bool white_first_;
   std::map<int, MeasuredPoint> corners_;
 };
 

@@ -104,9 +104,10 @@ tl::unexpected<Error> refuse(const Grey8& image, const Board& board) {
   return fail(ErrorCode::kNotFound, name + " is hidden in part, unevenly lit, or another one: " + size + " are seen");
 }
 
-// Finds none where the order would have the top left square white.
-std::vector<MeasuredPoint> fitted(const BoardPhoto& photo, const Board& board, const GridOrder& order) {
-  CornerLattice lattice(photo.light, board);
+// Finds none where the order would have the top left square of the other colour.
+std::vector<MeasuredPoint> fitted(const BoardPhoto& photo, const Board& board, const GridOrder& order,
+                                  bool white_first) {
+  CornerLattice lattice(photo.light, board, white_first);
   for (int id = 0; id < board.point_count(); ++id) {
     if (const auto local = fit_homography(ties_around(order, board, id, 1))) lattice.look_for(id, *local);
   }
@@ -120,9 +121,15 @@ Result<BoardSighting> find_chessboard(const BoardPhoto& photo, const Board& boar
   const auto found = search(photo.grey, board);
   if (found.size() != static_cast<std::size_t>(board.point_count())) return refuse(photo.grey, board);
   std::vector<MeasuredPoint> most;
-  for (const auto& order : grid_orders(found, board)) {
-    auto corners = fitted(photo, board, order);
-    if (corners.size() > most.size()) most = std::move(corners);
+  // By the black corner, where a board has one: that tells which end is up. One of 9x7 has four of the same colour,
+  // black or white; as 7x9 it is the same board.
+  const bool corners_alike = (board.columns + board.rows) % 2 == 0 && board.columns != board.rows;
+  for (const bool white_first : {false, true}) {
+    if (white_first && !(corners_alike && most.empty())) break;
+    for (const auto& order : grid_orders(found, board)) {
+      auto corners = fitted(photo, board, order, white_first);
+      if (corners.size() > most.size()) most = std::move(corners);
+    }
   }
   if (100 * most.size() < kLeastPerCent * found.size()) {
     return fail(ErrorCode::kNotFound, "only " + std::to_string(most.size()) + " of " + std::to_string(found.size()) +
