@@ -12,8 +12,12 @@ namespace {
 
 constexpr std::size_t kPointsMin = 10;     // of a quarter, for its median to say something
 constexpr std::size_t kLookedAtMax = 256;  // points of a scan
-constexpr std::uint64_t kAveragedScans = 20;
-constexpr std::uint64_t kScansMin = 5;     // before anything is said
+constexpr std::uint64_t kLearntScans = 20;
+constexpr std::uint64_t kAveragedScans = 5;  // medians of many points: a knock is told within ten scans
+constexpr std::uint64_t kScansMin = 5;       // before anything is said
+constexpr std::uint64_t kSpeaksFor = 20;     // scans that a quarter's average is good for without new points
+// Symbols that are misread lie anywhere: what they say is not one shift. The spread is half of the points' distance.
+constexpr double kSpreadMaxPx = 2, kSpreadMaxShare = 0.5;
 constexpr double kFineAgainShare = 0.8;    // of the limit: no to and fro at it
 constexpr double kLearntLimitMaxPx = 1.0;  // a rig may be out already as the service starts
 
@@ -27,7 +31,7 @@ double median(std::span<float> values) {
 
 DriftWatch::DriftWatch(const CalibratedCamera& camera, const Lens& projector, std::optional<double> expected_px)
     : camera_(camera), projector_(projector), learns_(!expected_px) {
-  state_.limit_px = epipolar_limit_px(expected_px);
+  state_.limit_px = watch_limit_px(expected_px);
 }
 
 void DriftWatch::sample(std::span<const CloudPoint> points, std::uint8_t camera) {
@@ -53,13 +57,16 @@ std::optional<double> DriftWatch::average_quarters() {
   state_.epipolar_px = 0;
   for (Quarter& quarter : quarters_) {
     if (quarter.count >= kPointsMin) {
-      const double off_px = median(std::span(quarter.residuals_px).first(quarter.count));
+      const std::span<float> residuals = std::span(quarter.residuals_px).first(quarter.count);
+      const double off_px = median(residuals);
+      for (float& residual : residuals) residual = std::abs(residual - static_cast<float>(off_px));
+      if (median(residuals) > std::max(kSpreadMaxPx, kSpreadMaxShare * std::abs(off_px))) continue;
       quarter.last = state_.scans;
       quarter.scans = std::min(quarter.scans + 1, kAveragedScans);
       quarter.running_px += (off_px - quarter.running_px) / static_cast<double>(quarter.scans);
       own_px = std::max(own_px.value_or(0), std::abs(off_px));
     }
-    const bool speaks = quarter.scans >= kScansMin && state_.scans - quarter.last < kAveragedScans;
+    const bool speaks = quarter.scans >= kScansMin && state_.scans - quarter.last < kSpeaksFor;
     if (speaks) state_.epipolar_px = std::max(state_.epipolar_px, std::abs(quarter.running_px));
   }
   return own_px;
@@ -67,7 +74,7 @@ std::optional<double> DriftWatch::average_quarters() {
 
 void DriftWatch::learn() {
   learns_ = false;
-  state_.limit_px = std::min(kLearntLimitMaxPx, epipolar_limit_px(state_.epipolar_px));
+  state_.limit_px = std::min(kLearntLimitMaxPx, watch_limit_px(state_.epipolar_px));
 }
 
 DriftWatch::Change DriftWatch::judge(double own_px, std::uint64_t scan) {
@@ -89,7 +96,7 @@ DriftWatch::Change DriftWatch::note(std::span<const CloudPoint> points, std::uin
   const auto own_px = average_quarters();
   if (!own_px) return Change::kNone;
   ++state_.scans;
-  if (learns_ && state_.scans == kAveragedScans) learn();
+  if (learns_ && state_.scans == kLearntScans) learn();
   return learns_ ? Change::kNone : judge(*own_px, scan);
 }
 

@@ -27,7 +27,7 @@ struct DriftState {
 ///
 ///     shifted           rolled            noise alone
 ///     + + | + +         + + | - -         + - | - +
-///     ----+----         ----+----         ----+----      the median of each quarter, averaged over about 20 scans,
+///     ----+----         ----+----         ----+----      the median of each quarter, averaged over about 5 scans,
 ///     + + | + +         + + | - -         - + | + -      tells them apart
 ///
 /// A knock by more than the decoder's tolerance leaves no points: their symbols, read without it, do as well.

@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include <fmt/format.h>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <Eigen/QR>
 
 #include "core/calibrate/plane_fit.hpp"
 #include "core/calibrate/point_residuals.hpp"
@@ -18,12 +22,14 @@ namespace {
 constexpr std::size_t kSymbolsMin = 30;
 constexpr double kMisreadSigmas = 6, kMisreadMinPx = 1;  // off where the other symbols lie
 constexpr double kOnPlaneMin = 0.7;                      // of the symbols
+constexpr double kTurnSigmas = 5;                        // from which on a turn is no chance
 constexpr double kScaleOnly = 0.5;  // of the long distances' error, what may be left beside the common factor
 
 struct MeasuredSymbol {
   Eigen::Vector3d point_mm;
   double sigma_mm;  // along the camera's ray
   double epipolar_px;
+  Match match;
 };
 
 /// Without a calibration to check them by, some symbols are misread: they lie far from the others, wherever those are.
@@ -46,9 +52,29 @@ std::vector<MeasuredSymbol> measure(const PoseView& view, const CalibratedCamera
     const Match match{symbol.camera_px, symbol.projector_px};
     const TriangulatedPoint point = triangulate(match, camera, projector, symbol.sigma_px);
     if (!point.point_in_camera.allFinite() || !(point.point_in_camera.z() > 0)) continue;
-    out.push_back({point.point_in_camera, point.sigma_mm, signed_epipolar_residual_px(match, camera, projector)});
+    out.push_back(
+        {point.point_in_camera, point.sigma_mm, signed_epipolar_residual_px(match, camera, projector), match});
   }
   return out.empty() ? out : without_misread(std::move(out));
+}
+
+/// How much noisier the symbols of this look are than they were taken to be, as those on a printed board are: what is
+/// left off the plane when a smooth bend is taken out, over what was expected.
+double noise_factor(const std::vector<MeasuredSymbol>& symbols, const PlaneFit& plane) {
+  const auto rows = static_cast<Eigen::Index>(plane.on_plane.size());
+  const Eigen::Vector3d right = plane.normal.unitOrthogonal(), down = plane.normal.cross(right);
+  Eigen::MatrixXd terms(rows, 6);
+  Eigen::VectorXd off(rows), expected(rows);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const MeasuredSymbol& symbol = symbols[plane.on_plane[static_cast<std::size_t>(i)]];
+    const Eigen::Vector3d from_middle = symbol.point_mm - plane.middle;
+    const double x = from_middle.dot(right) / 100, y = from_middle.dot(down) / 100;
+    terms.row(i) << 1, x, y, x * x, x * y, y * y;
+    off(i) = plane.off_mm(symbol.point_mm);
+    expected(i) = symbol.sigma_mm * std::abs(plane.normal.dot(symbol.point_mm.normalized()));
+  }
+  const Eigen::VectorXd rough = off - terms * terms.colPivHouseholderQr().solve(off);
+  return std::max(1.0, std::sqrt(rough.squaredNorm() / std::max(expected.squaredNorm(), 1e-12)));
 }
 
 /// What the symbols' noise lets expect off the plane.
@@ -58,7 +84,49 @@ double expected_rms_mm(const std::vector<MeasuredSymbol>& symbols, const PlaneFi
     const double across = symbols[i].sigma_mm * plane.normal.dot(symbols[i].point_mm.normalized());
     sum += across * across / static_cast<double>(plane.on_plane.size());
   }
-  return std::sqrt(sum);
+  return noise_factor(symbols, plane) * std::sqrt(sum);
+}
+
+/// The turn of the projector that explains best how the symbols lie off their epipolar lines. A look that does not show
+/// a turn about some axis, as none shows that along the lines, says so.
+void find_turn(const std::vector<MeasuredSymbol>& symbols, const CalibratedCamera& camera, const Lens& projector,
+               ViewCheck& check) {
+  constexpr double kStep = 1e-5, kDegrees = 180 / std::numbers::pi, kShownDeg = 0.01;
+  // What moves the symbols by less than this as it turns by the limit is no better known than the lenses.
+  constexpr double kShownPx = 0.05, kTurnRad = 0.03 / kDegrees;
+  const auto rows = static_cast<Eigen::Index>(symbols.size());
+  Eigen::MatrixX3d slope(rows, 3);
+  Eigen::VectorXd off(rows);
+  for (Eigen::Index i = 0; i < rows; ++i) off(i) = symbols[static_cast<std::size_t>(i)].epipolar_px;
+  for (int axis = 0; axis < 3; ++axis) {
+    CalibratedCamera turned = camera;
+    const RigidTransform turn{Eigen::AngleAxisd(kStep, Eigen::Vector3d::Unit(axis)).toRotationMatrix(),
+                              Eigen::Vector3d::Zero()};
+    turned.projector_from_camera = turn.after(camera.projector_from_camera);
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const double then = signed_epipolar_residual_px(symbols[static_cast<std::size_t>(i)].match, turned, projector);
+      slope(i, axis) = (then - off(i)) / kStep;
+    }
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(Eigen::Matrix3d(slope.transpose() * slope));
+  const Eigen::Vector3d towards = axes.eigenvectors().transpose() * (slope.transpose() * off);
+  Eigen::VectorXd left = off;
+  for (int i = 0; i < 3; ++i) {
+    if (axes.eigenvalues()(i) > 0) left -= slope * axes.eigenvectors().col(i) * (towards(i) / axes.eigenvalues()(i));
+  }
+  const double noise_px = std::sqrt(left.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(rows - 3, 1)));
+  double square = 0, variance = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double sigma_deg = noise_px / std::sqrt(std::max(axes.eigenvalues()(i), 1e-12)) * kDegrees;
+    const double shown_px = std::sqrt(std::max(axes.eigenvalues()(i), 0.0) / static_cast<double>(rows)) * kTurnRad;
+    if (sigma_deg > kShownDeg || shown_px < kShownPx) {
+      check.blind_axis = axes.eigenvectors().col(i);
+      continue;
+    }
+    const double by_deg = towards(i) / axes.eigenvalues()(i) * kDegrees;
+    square += by_deg * by_deg, variance += sigma_deg * sigma_deg;
+  }
+  check.turn_deg = std::sqrt(square), check.turn_sigma_deg = std::sqrt(variance);
 }
 
 double epipolar_rms_px(const std::vector<MeasuredSymbol>& symbols) {
@@ -112,6 +180,7 @@ Result<ViewCheck> check_view(const PoseView& view, const CalibratedCamera& camer
   check.left_out = view.symbols.size() - check.symbols;
   check.distance_mm = plane->middle.norm();
   check.epipolar_rms_px = epipolar_rms_px(symbols);
+  find_turn(symbols, camera, projector, check);
   check.plane_rms_mm = plane->rms_mm;
   check.plane_sigma_mm = expected_rms_mm(symbols, *plane);
   check.trueness = measure_trueness(view.corners, camera.lens, *plane);
@@ -120,7 +189,8 @@ Result<ViewCheck> check_view(const PoseView& view, const CalibratedCamera& camer
 
 std::vector<VerifyFault> find_faults(const ViewCheck& check, const VerifyLimits& limits) {
   std::vector<VerifyFault> faults;
-  if (!(check.epipolar_rms_px <= limits.epipolar_px)) faults.push_back(VerifyFault::kEpipolar);
+  const bool turned = check.turn_deg > std::max(limits.turn_deg, kTurnSigmas * check.turn_sigma_deg);
+  if (!(check.epipolar_rms_px <= limits.epipolar_px) || turned) faults.push_back(VerifyFault::kEpipolar);
   if (!(check.plane_rms_mm <= check.plane_limit_mm(limits))) faults.push_back(VerifyFault::kPlane);
   if (!check.trueness) return faults;
   const Trueness& trueness = *check.trueness;

@@ -19,17 +19,21 @@ struct VerifyLimits {
   double plane_sigmas = 3;        ///< off the plane, times what the noise of the symbols explains
   double plane_percent = 0.1;     ///< off the plane, of the distance
   double epipolar_px = epipolar_limit_px(std::nullopt);  ///< off the epipolar lines, in the projector
+  double turn_deg = 0.03;  ///< by which projector and camera seem to have turned against each other
 };
 
 /// What one camera's look at a flat thing says of the calibration. Root mean squares.
 struct ViewCheck {
-  std::size_t symbols = 0;           ///< that took part
-  std::size_t left_out = 0;          ///< misread, or beside the plane
-  double distance_mm = 0;            ///< of the plane's middle from the camera
-  double epipolar_rms_px = 0;        ///< symbols off their epipolar lines, in the projector
-  double plane_rms_mm = 0;           ///< symbols off their plane
-  double plane_sigma_mm = 0;         ///< the same, as the noise of the symbols lets expect
-  std::optional<Trueness> trueness;  ///< nothing without a board
+  std::size_t symbols = 0;                    ///< that took part
+  std::size_t left_out = 0;                   ///< misread, or beside the plane
+  double distance_mm = 0;                     ///< of the plane's middle from the camera
+  double epipolar_rms_px = 0;                 ///< symbols off their epipolar lines, in the projector
+  double turn_deg = 0;                        ///< of the projector against the camera, as the epipolar lines show it
+  double turn_sigma_deg = 0;                  ///< one standard deviation of that
+  std::optional<Eigen::Vector3d> blind_axis;  ///< of the projector: a turn about it does not show in this look
+  double plane_rms_mm = 0;                    ///< symbols off their plane
+  double plane_sigma_mm = 0;                  ///< the same, as the noise of the symbols in this look lets expect
+  std::optional<Trueness> trueness;           ///< nothing without a board
 
   [[nodiscard]] double plane_limit_mm(const VerifyLimits& limits) const;
 };

@@ -15,6 +15,13 @@ namespace slsd {
   return std::max(kLeastPx, kTimes * expected_px.value_or(0));
 }
 
+/// The same of the medians of many symbols, which are far more exact than each of them.
+/// @thread reentrant
+[[nodiscard]] constexpr double watch_limit_px(std::optional<double> expected_px) {
+  constexpr double kLeastPx = 0.25, kTimes = 3;
+  return std::max(kLeastPx, kTimes * expected_px.value_or(0));
+}
+
 /// How far off its epipolar line a symbol is still taken for what it seems: as far as a rig may be off that is as it
 /// was calibrated, and as a symbol may be off by itself. Wider than the limit, so that a rig beyond it still gives
 /// points that show it.

@@ -19,6 +19,15 @@ std::string trueness_text(const std::optional<Trueness>& trueness, const VerifyL
       trueness->worst_percent);
 }
 
+/// Which turn this look cannot show.
+std::string blind_text(const ViewCheck& check) {
+  if (!check.blind_axis) return "";
+  Eigen::Index most = 0;
+  check.blind_axis->cwiseAbs().maxCoeff(&most);
+  const std::string axis = fmt::format("; one about the projector's {} axis does not show here", "xyz"[most]);
+  return check.trueness ? axis + ", but in the distances" : axis + ": show it a board";
+}
+
 std::string advice_for(VerifyFault fault, double scale_percent) {
   switch (fault) {
     case VerifyFault::kEpipolar:
@@ -44,11 +53,11 @@ std::string advice_for(VerifyFault fault, double scale_percent) {
 
 std::string check_text(const ViewCheck& check, const VerifyLimits& limits) {
   return fmt::format(
-      "{} symbols at {:.0f} mm ({} left out); off their epipolar lines by {:.3f} px (at most {:.2f}); off the plane by "
-      "{:.3f} mm (at most {:.3f}); {}: {}",
-      check.symbols, check.distance_mm, check.left_out, check.epipolar_rms_px, limits.epipolar_px, check.plane_rms_mm,
-      check.plane_limit_mm(limits), trueness_text(check.trueness, limits),
-      verdict(!find_faults(check, limits).empty()));
+      "{} symbols at {:.0f} mm ({} left out); off their epipolar lines by {:.3f} px (at most {:.2f}), as by a turn "
+      "of {:.3f} degrees (at most {:.2f}{}); off the plane by {:.3f} mm (at most {:.3f}); {}: {}",
+      check.symbols, check.distance_mm, check.left_out, check.epipolar_rms_px, limits.epipolar_px, check.turn_deg,
+      limits.turn_deg, blind_text(check), check.plane_rms_mm, check.plane_limit_mm(limits),
+      trueness_text(check.trueness, limits), verdict(!find_faults(check, limits).empty()));
 }
 
 std::string summary_text(const VerifySummary& summary, const VerifyLimits& limits) {

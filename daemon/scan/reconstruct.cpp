@@ -19,7 +19,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr std::size_t kStraysMin = 100;
+constexpr std::size_t kStraysMin = 24;
 
 std::string utc_time(MonotonicTime time) {
   return utc_text_ms(std::chrono::system_clock::now() - (steady_clock::now() - time));

@@ -58,7 +58,7 @@ TEST_F(DriftWatchTest, SaysNothingOfARigThatStays) {
   EXPECT_TRUE(scan(100, kStill).empty());
   EXPECT_EQ(watch_.state().scans, 100U);
   EXPECT_LT(watch_.state().epipolar_px, 0.1);
-  EXPECT_EQ(watch_.state().limit_px, 0.5);
+  EXPECT_DOUBLE_EQ(watch_.state().limit_px, 0.3);
   EXPECT_FALSE(watch_.state().off_since_scan);
 }
 
@@ -76,6 +76,33 @@ TEST_F(DriftWatchTest, SeesARollThoughItsMedianIsNothing) {
   ASSERT_TRUE(scan(30, kStill).empty());
   ASSERT_EQ(scan(60, kRolled).size(), 1U);
   EXPECT_EQ(watch_.state().off_since_scan, 31U);
+}
+
+// 0.1 degrees about each axis that epipolar lines show, and the smallest knock that is one.
+TEST_F(DriftWatchTest, TellsAKnockWithinTenScans) {
+  for (const Eigen::Vector3d& turn_mrad : {Eigen::Vector3d(0, 0, 1.745), {1.745, 0, 0}, {0.16, 0, 0}, {17, 0, 0}}) {
+    watch_ = DriftWatch(calibration_.cameras.front(), calibration_.projector, 0.1);
+    ASSERT_TRUE(scan(30, kStill).empty());
+    const std::uint64_t before = number_;
+    const auto changes = scan(10, turn_mrad);
+    ASSERT_EQ(changes.size(), 1U) << turn_mrad.transpose();
+    EXPECT_EQ(changes[0].first, Change::kOff);
+    EXPECT_EQ(watch_.state().off_since_scan, before + 1);
+  }
+}
+
+TEST_F(DriftWatchTest, HasNoFalseAlarmInAThousandScans) {
+  EXPECT_TRUE(scan(1000, kStill, 300).empty());
+}
+
+// Of an empty scene all that is read is misread.
+TEST_F(DriftWatchTest, IsNotMisledByPointsThatLieAnywhere) {
+  std::uniform_real_distribution<float> anywhere(-300, 300);
+  for (int i = 0; i < 200; ++i) {
+    auto points = scan_points(kStill, 60);
+    for (CloudPoint& point : points) point.projector_v += anywhere(random_);
+    ASSERT_EQ(watch_.note(points, 0, ++number_), Change::kNone) << i;
+  }
 }
 
 TEST_F(DriftWatchTest, IsFineAgainAsTheRigIs) {

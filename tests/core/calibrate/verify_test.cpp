@@ -63,6 +63,39 @@ TEST(CheckView, ExpectsThePlaneToBeAsFlatAsTheNoiseLetsIt) {
   EXPECT_NEAR(checked->plane_rms_mm / checked->plane_sigma_mm, 1, 0.15);
 }
 
+// Symbols on a printed board are noisier than they say of themselves.
+TEST(CheckView, HasNoFalseAlarmInTwoHundredLooks) {
+  int looks = 0;
+  for (const double noise_px : {0.05, 0.1, 0.15, 0.2}) {
+    SightOptions options;
+    options.symbol_sigma_px = noise_px, options.seed = static_cast<std::uint32_t>(1000 * noise_px);
+    for (const PoseView& view : views_of(see(true_rig(), true_poses(50, options.seed), options))) {
+      EXPECT_THAT(faults(view), IsEmpty()) << "look " << ++looks << ", symbols off by " << noise_px << " px";
+    }
+  }
+}
+
+TEST(CheckView, FindsATurnByATwentiethOfADegreeAboutEachAxis) {
+  constexpr double kTurnMrad = 0.05 / 57.29578 * 1000;
+  for (const Eigen::Vector3d& axis : {Eigen::Vector3d(1, 0, 0), {0, 1, 0}, {0, 0, 1}, {0, 0, -1}, {0.6, 0, 0.8}}) {
+    SightOptions options;
+    options.symbol_sigma_px = 0.2;
+    for (const PoseView& view : views_of(see(true_rig(), true_poses(20), options))) {
+      EXPECT_THAT(faults(view, knocked(true_rig(), kTurnMrad * axis)), Not(IsEmpty())) << axis.transpose();
+    }
+  }
+}
+
+TEST(CheckView, SaysWhichTurnAPlainPlaneDoesNotShow) {
+  PoseView plain = a_view();
+  plain.corners.clear();
+  const auto checked = check(plain);
+  ASSERT_TRUE(checked) << checked.error().message;
+  ASSERT_TRUE(checked->blind_axis);
+  EXPECT_GT(std::abs(checked->blind_axis->y()), 0.95) << "along the epipolar lines, which run from left to right";
+  EXPECT_LT(checked->turn_deg, 0.01);
+}
+
 TEST(CheckView, FindsAProjectorThatWasTurnedAcrossTheEpipolarLines) {
   EXPECT_THAT(faults(a_view(), knocked(true_rig(), {1, 0, 0})), Contains(VerifyFault::kEpipolar));
 }
@@ -143,8 +176,11 @@ TEST(EpipolarLimit, FollowsWhatTheCalibrationSays) {
 }
 
 TEST(Summarise, PoolsTheViewsAndNamesEachFaultOnce) {
-  ViewCheck good{100, 0, 2000, 0.1, 0.3, 0.3, Trueness{50, 0.05, 0.06, 0.1}};
-  ViewCheck off{300, 0, 2000, 0.7, 0.3, 0.3, std::nullopt};
+  ViewCheck good{
+      .symbols = 100, .distance_mm = 2000, .epipolar_rms_px = 0.1, .plane_rms_mm = 0.3, .plane_sigma_mm = 0.3};
+  good.trueness = Trueness{50, 0.05, 0.06, 0.1};
+  const ViewCheck off{
+      .symbols = 300, .distance_mm = 2000, .epipolar_rms_px = 0.7, .plane_rms_mm = 0.3, .plane_sigma_mm = 0.3};
   const VerifySummary summary = summarise({good, off, off}, {});
   EXPECT_EQ(summary.views, 3U);
   EXPECT_EQ(summary.views_with_board, 1U);
