@@ -25,6 +25,7 @@ struct DecodedImage {
 [[nodiscard]] Result<DecodedImage> decode_png(std::string_view bytes, std::size_t limit_bytes);
 [[nodiscard]] Result<DecodedImage> decode_tiff(std::string_view bytes, std::size_t limit_bytes);
 [[nodiscard]] Result<DecodedImage> decode_pnm(std::string_view bytes, std::size_t limit_bytes);
+[[nodiscard]] Result<DecodedImage> decode_jpeg(std::string_view bytes, std::size_t limit_bytes);
 [[nodiscard]] Result<DecodedImage> decode_bmp(std::string_view bytes, std::size_t limit_bytes);
 
 /// What a header declares.
