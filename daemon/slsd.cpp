@@ -105,6 +105,12 @@ void add_calibration_options(CLI::App& app, CommandLine& line) {
   app.add_option("--planes", request.planes, "with --plane: how many looks at it a session takes")
       ->check(CLI::Range(1, 99))
       ->needs("--plane");
+  app.add_option("--use", request.use, "with --calibrate --from: FIRST:LAST, the poses of that part alone")
+      ->needs(calibrate)
+      ->needs("--from");
+  app.add_flag("--force", request.force,
+               "with --calibrate: replace the calibration in force though distances are of another scale by it")
+      ->needs(calibrate);
   const auto choose_code = [&request](const std::string& code) { request.gray_code = code == "gray"; };
   app.add_option_function<std::string>("--code", choose_code,
                                        "what is projected: the pattern, or a Gray code that takes many pictures a pose")

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include "daemon/calibrate/calibrate_from_files.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <set>
@@ -46,6 +47,23 @@ std::string refusals(const std::vector<PoseReport>& refused) {
   return text;
 }
 
+/// The poses from one name to another, and all looks at the reference plane.
+Result<> keep_part(const std::string& use, std::vector<CapturedPose>& poses) {
+  const std::size_t colon = use.find(':');
+  const std::string first = use.substr(0, colon), last = colon == use.npos ? first : use.substr(colon + 1);
+  for (const std::string& name : {first, last}) {
+    if (std::ranges::find(poses, name, &CapturedPose::name) != poses.end()) continue;
+    return fail(
+        ErrorCode::kInvalidArgument,
+        "names no pose that is there: it is FIRST:LAST, such as " + poses.front().name + ":" + poses.back().name,
+        "--use " + use);
+  }
+  std::erase_if(poses, [&](const CapturedPose& pose) {
+    return pose.subject == PoseSubject::kBoard && (pose.name < first || pose.name > last);
+  });
+  return {};
+}
+
 Result<std::vector<CapturedPose>> list_all(const std::filesystem::path& folder, bool knows_plane) {
   auto poses = list_captures_with_planes(folder, knows_plane);
   if (!poses || !knows_plane || poses->back().subject == PoseSubject::kPlane) return poses;
@@ -66,8 +84,11 @@ Result<> calibrate_from_files(const CalibrateRequest& request) {
   if (!plane) return tl::unexpected(plane.error());
   const auto file = file_to_keep(request, *configuration);
   if (!file) return tl::unexpected(file.error());
-  const auto poses = list_all(request.from, plane->has_value());
+  auto poses = list_all(request.from, plane->has_value());
   if (!poses) return tl::unexpected(poses.error());
+  if (!request.use.empty()) {
+    if (auto kept = keep_part(request.use, *poses); !kept) return kept;
+  }
   const auto pattern = captured_pattern(request.from, *configuration);
   if (!pattern) return tl::unexpected(pattern.error());
 
@@ -83,12 +104,14 @@ Result<> calibrate_from_files(const CalibrateRequest& request) {
   if (captures->observations.count(PoseSubject::kBoard) == 0) {
     return fail(ErrorCode::kNotFound, "no pose can be used:" + refusals(captures->refused), request.from.string());
   }
+  const Board& found = observers.board.board();
+  if (!(found == *board)) std::cout << fmt::format("the board is {}: it was named rows by columns\n", to_string(found));
   auto outcome = calibrate(std::move(captures->observations), calibrate_options(*configuration));
   if (!outcome) return tl::unexpected(outcome.error());
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
   std::cout << fmt::format("calibrated in {:.1f} s, {:.2f} s a pose\n", spent.count(),
                            spent.count() / static_cast<double>(poses->size()));
-  return finish_calibration(request, *file, *board, captures->refused, std::move(*outcome));
+  return finish_calibration(request, *file, found, captures->refused, std::move(*outcome));
 }
 
 }  // namespace slsd

@@ -17,6 +17,8 @@ struct CalibrateRequest {
   std::string ruler;             ///< "NOMINAL:MEASURED" in mm, as the print's ruler was measured; empty: true to scale
   std::string plane;             ///< the reference plane; empty: no second step
   std::string plane_ruler;       ///< as `ruler`, of the plane's print
+  std::string use;               ///< "FIRST:LAST", with `from`: the poses of that part; empty: all
+  bool force = false;            ///< replaces the calibration in force though distances are of another scale by it
   bool gray_code = false;        ///< instead of the pattern
   std::filesystem::path record;  ///< where a session's captures go; empty: beside the calibration file
   int poses = 12;                ///< 3 to 99; how many poses a session takes, those recorded before among them

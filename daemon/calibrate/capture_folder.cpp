@@ -3,6 +3,7 @@
 #include "daemon/calibrate/capture_folder.hpp"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 
 namespace slsd {
@@ -25,52 +26,59 @@ std::vector<path> sorted_entries(const path& folder, bool folders) {
   return entries;
 }
 
-path where_there(const path& file) {
-  std::error_code ignored;
-  return std::filesystem::exists(file, ignored) ? file : path();
+constexpr std::array kExtensions{".png", ".tif", ".tiff", ".pgm", ".ppm", ".bmp", ".jpg", ".jpeg"};
+
+bool is_picture(const path& file) {
+  return std::ranges::find(kExtensions, file.extension()) != kExtensions.end();
 }
 
-Result<CaptureFiles> list_files(const path& folder, WhitePicture white) {
-  CaptureFiles files{folder / "white.png", where_there(folder / "pattern.png"), {}, where_there(folder / "black.png")};
-  if (white == WhitePicture::kOptional && !files.pattern.empty()) files.white = where_there(files.white);
-  if (!files.white.empty() && where_there(files.white).empty()) {
-    return fail(ErrorCode::kNotFound, std::string("is missing: the board under the white projector; ") + kLayout,
-                files.white.string());
+/// The picture of a name, in any format that is read; empty where there is none.
+path where_there(const path& folder, const std::string& name) {
+  std::error_code ignored;
+  for (const char* const extension : kExtensions) {
+    path file = folder / (name + extension);
+    if (std::filesystem::exists(file, ignored)) return file;
   }
+  return {};
+}
+
+Error lacking(const std::string& message, const path& where) {
+  return {ErrorCode::kNotFound, message, where.string()};
+}
+
+CaptureFiles list_files(const path& folder, WhitePicture white) {
+  CaptureFiles files{
+      where_there(folder, "white"), where_there(folder, "pattern"), {}, where_there(folder, "black"), {}};
   for (const path& file : sorted_entries(folder, false)) {
-    if (file.filename().string().starts_with("gray_") && file.extension() == ".png") files.gray.push_back(file);
+    if (file.filename().string().starts_with("gray_") && is_picture(file)) files.gray.push_back(file);
   }
-  if (files.pattern.empty() && files.gray.empty()) {
-    return fail(ErrorCode::kNotFound,
-                std::string("has nothing projected: neither pattern.png nor gray_00.png; ") + kLayout, folder.string());
-  }
-  if (files.pattern.empty() && files.black.empty()) {
-    return fail(ErrorCode::kNotFound, "is missing: a Gray code needs the board under the black projector too",
-                (folder / "black.png").string());
+  if (files.white.empty() && !(white == WhitePicture::kOptional && !files.pattern.empty())) {
+    files.lack =
+        lacking(std::string("is missing: the board under the white projector; ") + kLayout, folder / "white.png");
+  } else if (files.pattern.empty() && files.gray.empty()) {
+    files.lack = lacking(std::string("has nothing projected: neither pattern.png nor gray_00.png; ") + kLayout, folder);
+  } else if (files.pattern.empty() && files.black.empty()) {
+    files.lack = lacking("is missing: a Gray code needs the board under the black projector too", folder / "black.png");
   }
   return files;
 }
 
-Result<CapturedPose> list_pose(const path& folder, WhitePicture white, PoseSubject subject) {
+CapturedPose list_pose(const path& folder, WhitePicture white, PoseSubject subject) {
   CapturedPose pose{folder.filename().string(), {}, subject};
   std::vector<path> cameras = sorted_entries(folder, true);
-  const bool has_pictures = !where_there(folder / "white.png").empty() || !where_there(folder / "pattern.png").empty();
+  const bool has_pictures = !where_there(folder, "white").empty() || !where_there(folder, "pattern").empty();
   if (cameras.empty() || has_pictures) cameras = {folder};
   for (const path& camera : cameras) {
-    auto files = list_files(camera, white);
-    if (!files) return tl::unexpected(files.error());
-    pose.cameras[camera == folder ? std::string() : camera.filename().string()] = std::move(*files);
+    pose.cameras[camera == folder ? std::string() : camera.filename().string()] = list_files(camera, white);
   }
   return pose;
 }
 
-Result<std::vector<CapturedPose>> list_subject(const path& folder, WhitePicture white, PoseSubject subject) {
+std::vector<CapturedPose> list_subject(const path& folder, WhitePicture white, PoseSubject subject) {
   std::vector<CapturedPose> poses;
   for (const path& entry : sorted_entries(folder, true)) {
     if (!entry.filename().string().starts_with(folder_prefix(subject))) continue;
-    auto pose = list_pose(entry, white, subject);
-    if (!pose) return tl::unexpected(pose.error());
-    poses.push_back(std::move(*pose));
+    poses.push_back(list_pose(entry, white, subject));
   }
   return poses;
 }
@@ -87,7 +95,7 @@ Result<std::vector<CapturedPose>> list_captures(const path& folder, WhitePicture
     return fail(ErrorCode::kNotFound, std::string("is no folder; ") + kLayout, folder.string());
   }
   auto poses = list_subject(folder, white, PoseSubject::kBoard);
-  if (poses && poses->empty()) {
+  if (poses.empty()) {
     return fail(ErrorCode::kNotFound, std::string("holds no pose; ") + kLayout, folder.string());
   }
   return poses;
@@ -97,13 +105,12 @@ Result<std::vector<CapturedPose>> list_captures_with_planes(const path& folder, 
   auto poses = list_captures(folder);
   if (!poses) return poses;
   auto planes = list_subject(folder, WhitePicture::kNeeded, PoseSubject::kPlane);
-  if (!planes) return planes;
-  if (!planes->empty() && !knows_plane) {
+  if (!planes.empty() && !knows_plane) {
     return fail(ErrorCode::kInvalidArgument,
                 "is a look at a reference plane: name its print by --plane, or put the folder elsewhere",
-                (folder / planes->front().name).string());
+                (folder / planes.front().name).string());
   }
-  std::ranges::move(*planes, std::back_inserter(*poses));
+  std::ranges::move(planes, std::back_inserter(*poses));
   return poses;
 }
 

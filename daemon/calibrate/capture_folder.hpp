@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,6 +20,7 @@ struct CaptureFiles {
   std::filesystem::path pattern;            ///< empty where there is none
   std::vector<std::filesystem::path> gray;  ///< in order; empty where there are none
   std::filesystem::path black;              ///< empty where there is none
+  std::optional<Error> lack;                ///< what is missing, without which this look is of no use
 };
 
 struct CapturedPose {

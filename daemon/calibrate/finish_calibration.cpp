@@ -80,6 +80,13 @@ Result<> finish_calibration(const CalibrateRequest& request, const path& file, c
   outcome.calibration.report.date = utc_text(std::chrono::system_clock::now());
   std::cout << outcome_text(outcome) << std::flush;
   if (request.output.empty()) {
+    const std::string scale = request.force ? "" : other_scale(outcome, board, file);
+    if (!scale.empty()) {
+      return fail(
+          ErrorCode::kMismatch,
+          scale + ". Where the new one is right, replace that in force by --force, or keep it elsewhere by --output",
+          file.string());
+    }
     if (auto gain = check_gain(outcome, file); !gain) return gain;
   }
   if (auto reported = write_report(file, outcome); !reported) return reported;

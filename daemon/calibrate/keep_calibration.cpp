@@ -6,6 +6,9 @@
 
 #include <fmt/format.h>
 
+#include "core/calibrate/verify.hpp"
+#include "core/geometry/epipolar_limit.hpp"
+#include "core/geometry/median.hpp"
 #include "core/geometry/triangulate.hpp"
 #include "daemon/scan/hardware.hpp"
 #include "drivers/files/file.hpp"
@@ -63,13 +66,44 @@ bool of_the_same_devices(const Calibration& one, const Calibration& other) {
   return true;
 }
 
+/// The calibration in a file, where it can be read and is of the same devices as a new one.
+std::optional<Calibration> in_force(const Calibration& calibration, const path& file) {
+  const auto text = read_file(file, kMaxFileBytes);
+  auto before = text ? read_calibration(*text, file.string()) : tl::unexpected(text.error());
+  if (!before || !of_the_same_devices(calibration, *before)) return std::nullopt;
+  return std::move(*before);
+}
+
 }  // namespace
 
 std::optional<Grade> grade_in_force(const Calibration& calibration, const path& file) {
-  const auto text = read_file(file, kMaxFileBytes);
-  const auto before = text ? read_calibration(*text, file.string()) : tl::unexpected(text.error());
-  if (!before || !before->report.verdict || !of_the_same_devices(calibration, *before)) return std::nullopt;
-  return parse_grade(*before->report.verdict);
+  const auto before = in_force(calibration, file);
+  return before && before->report.verdict ? parse_grade(*before->report.verdict) : std::nullopt;
+}
+
+std::string other_scale(const CalibrationOutcome& outcome, const Board& board, const path& file) {
+  constexpr double kNoticedPercent = 0.5;  // more than a rig drifts, and less than a printer that fits to the page
+  const auto before = in_force(outcome.calibration, file);
+  if (!before) return {};
+  std::vector<double> percents, off_lines;
+  for (const PoseObservation& pose : outcome.observations.poses) {
+    if (pose.subject != PoseSubject::kBoard) continue;
+    for (const PoseView& view : pose.views) {
+      const CalibratedCamera* const camera = before->camera(outcome.calibration.cameras[view.camera].name);
+      const auto check = check_view(view, *camera, before->projector);
+      if (!check || !check->trueness) continue;
+      percents.push_back(check->trueness->scale_percent), off_lines.push_back(check->epipolar_rms_px);
+    }
+  }
+  const double percent = median_of(percents);
+  if (percents.empty() || std::abs(percent) < kNoticedPercent) return {};
+  const bool moved = median_of(off_lines) > epipolar_limit_px(before->report.epipolar_error_px);
+  return fmt::format(
+      "the calibration in force{} measures {:.2f} mm where the board is said to have {:.2f} mm, {:.1f} % "
+      "{}: hold a rule to the print's ruler, and give what it measures by --ruler{}",
+      before->report.date ? " of " + *before->report.date : "", board.pitch_mm * (1 + percent / 100), board.pitch_mm,
+      std::abs(percent), percent > 0 ? "more" : "less",
+      moved ? ". The rig has moved since, which may have a part in it" : "");
 }
 
 Result<std::string> keep_calibration(const CalibrationOutcome& outcome, const path& file) {

@@ -10,13 +10,22 @@ PoseObserver::PoseObserver(const Board& board, const Pattern& pattern, const Ima
 Result<PoseView> PoseObserver::observe(std::size_t camera, const PosePictures& pictures) {
   BoardSighting sighting;
   auto view = observe_board(pictures, board_, sighting);
+  if (const auto other = rows_by_columns(board_); !view && !seen_ && other) {
+    if (auto turned = observe_board(pictures, *other, sighting)) view = std::move(turned), board_ = *other;
+  }
   if (!view) return view;
+  seen_ = true;
   view->camera = camera;
   const auto read = gray_code_ ? observe_gray_code(pictures, board_, sighting, projector_, *view)
                                : observe_pattern(pictures, board_, sighting,
                                                  readers_.try_emplace(camera, pattern_).first->second, *view);
   if (!read) return tl::unexpected(read.error());
   return view;
+}
+
+PrintShift PoseObserver::print_shift(const GreyView& white, const GreyView& pattern) const {
+  const auto sighting = find_board(white, board_);
+  return sighting ? find_print_shift(white, pattern, board_, *sighting) : PrintShift{};
 }
 
 PoseObservers make_observers(const Board& board, const std::optional<Board>& plane, const Pattern& pattern,

@@ -9,6 +9,7 @@
 
 #include "core/board/find_board.hpp"
 #include "core/calibrate/observe_pose.hpp"
+#include "core/calibrate/print_shift.hpp"
 #include "core/code/pattern.hpp"
 
 namespace slsd {
@@ -23,6 +24,11 @@ class PoseObserver {
   /// @errors what observe_board(), observe_pattern() and observe_gray_code() say
   [[nodiscard]] Result<PoseView> observe(std::size_t camera, const PosePictures& pictures);
 
+  /// How much of the white picture's print is in a pattern's picture, and where.
+  /// @return a significance of 0 where the board is not found
+  [[nodiscard]] PrintShift print_shift(const GreyView& white, const GreyView& pattern) const;
+
+  /// The board as it is: that which was named, or the same named rows by columns, where the first pictures show that.
   [[nodiscard]] const Board& board() const { return board_; }
 
  private:
@@ -30,6 +36,7 @@ class PoseObserver {
   Pattern pattern_;
   ImageSize projector_;
   bool gray_code_;
+  bool seen_ = false;                             // the board, so that it is known which way it was named
   std::map<std::size_t, PatternReader> readers_;  // one to a camera: each keeps where its pattern lies
 };
 

@@ -20,6 +20,7 @@ Result<> load(const path& file, GreyImage& image) {
 }
 
 Result<CapturedPictures> load(const CaptureFiles& files, bool gray_code) {
+  if (files.lack) return tl::unexpected(*files.lack);
   CapturedPictures pictures;
   const std::vector<path> coded = gray_code ? files.gray : std::vector{files.pattern};
   if (coded.empty() || coded.front().empty()) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -10,6 +11,7 @@
 #include "daemon/calibrate/calibrate_from_files.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/files/file.hpp"
+#include "drivers/files/read_image.hpp"
 #include "tests/daemon/calibrate/simulated_captures.hpp"
 
 namespace slsd {
@@ -188,18 +190,121 @@ TEST_F(FromFiles, LeavesAPoseOutThatShowsNothing) {
   EXPECT_TRUE(calibrate_from_files(request_));
 }
 
-TEST_F(FromFiles, RefusesWhatIsMissing) {
+// It costs that pose alone.
+TEST_F(FromFiles, LeavesAPoseOutOfWhichAPictureIsMissing) {
   copy_captures();
   std::filesystem::remove(request_.from / "pose_03/white.png");
-  EXPECT_THAT(refusal(), HasSubstr("pose_03/white.png: is missing"));
+  std::filesystem::remove(request_.from / "pose_05/pattern.png");
+  testing::internal::CaptureStdout();
+  const auto done = calibrate_from_files(request_);
+  const std::string said = testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_THAT(said, HasSubstr("pose_03/white.png: is missing"));
+  EXPECT_THAT(said, HasSubstr("pose_05: has nothing projected"));
+  EXPECT_THAT(said, HasSubstr("pose_04: 24 corners"));
+}
+
+TEST_F(FromFiles, RefusesAFolderThatIsNotThere) {
   request_.from = home_ / "nowhere";
   EXPECT_THAT(refusal(), HasSubstr("nowhere: is no folder"));
 }
 
-TEST_F(FromFiles, RefusesPicturesOfTwoSizes) {
+TEST_F(FromFiles, LeavesAPoseOutWhosePicturesAreOfTwoSizes) {
   copy_captures();
   ASSERT_TRUE(write_file_atomically(request_.from / "pose_03/pattern.png", *encode_png(Grey8(640, 480))));
-  EXPECT_THAT(refusal(), HasSubstr("pose_03/pattern.png: has 640x480 pixels, the pictures before it 800x600"));
+  testing::internal::CaptureStdout();
+  const auto done = calibrate_from_files(request_);
+  const std::string said = testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_THAT(said, HasSubstr("pose_03/pattern.png: has 640x480 pixels, the pictures before it 800x600"));
+}
+
+// The first pose is no measure for the others.
+TEST_F(FromFiles, LeavesThePoseOutThatIsOfAnotherSizeThanTheOthers) {
+  copy_captures();
+  for (const char* picture : {"white.png", "pattern.png"}) {
+    const auto read = read_image(request_.from / "pose_00" / picture);
+    ASSERT_TRUE(read);
+    const Grey8& whole = std::get<Grey8>(*read);
+    Grey8 cut(whole.width() - 40, whole.height());
+    for (int y = 0; y < cut.height(); ++y) std::copy_n(whole.row(y), cut.width(), cut.row(y));
+    ASSERT_TRUE(write_file_atomically(request_.from / "pose_00" / picture, *encode_png(cut)));
+  }
+  testing::internal::CaptureStdout();
+  const auto done = calibrate_from_files(request_);
+  const std::string said = testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_THAT(said, HasSubstr("pose_00: not used: its pictures have 760x600 pixels, those of the other poses 800x600"));
+  EXPECT_EQ(kept().cameras.at(0).lens.width_px, 800);
+}
+
+TEST_F(FromFiles, NamesPatternsThatWereSwapped) {
+  copy_captures();
+  const path one = request_.from / "pose_02/pattern.png", other = request_.from / "pose_04/pattern.png";
+  std::filesystem::rename(one, home_ / "kept.png");
+  std::filesystem::rename(other, one);
+  std::filesystem::rename(home_ / "kept.png", other);
+  testing::internal::CaptureStdout();
+  const auto done = calibrate_from_files(request_);
+  const std::string said = testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_THAT(said, HasSubstr("pose_02: not used: its pattern's picture is that of another pose, and its own lies with "
+                              "pose_04"));
+  EXPECT_THAT(said, HasSubstr("pose_04: not used: its pattern's picture is that of another pose"));
+}
+
+TEST_F(FromFiles, NamesAPatternThatIsShifted) {
+  copy_captures();
+  const path file = request_.from / "pose_02/pattern.png";
+  Grey8 picture = std::get<Grey8>(*read_image(file));
+  for (int y = 0; y < picture.height(); ++y) {
+    std::rotate(picture.row(y), picture.row(y) + picture.width() - 9, picture.row(y) + picture.width());
+  }
+  ASSERT_TRUE(write_file_atomically(file, *encode_png(picture)));
+  testing::internal::CaptureStdout();
+  const auto done = calibrate_from_files(request_);
+  const std::string said = testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_THAT(said,
+              HasSubstr("pose_02        left out: the board moved between the white picture and the pattern: its print "
+                        "by 9 px"));
+}
+
+TEST_F(FromFiles, TakesABoardNamedRowsByColumns) {
+  request_.board = "charuco:5x7:60:45:DICT_5X5_100";
+  testing::internal::CaptureStdout();
+  const auto done = calibrate_from_files(request_);
+  const std::string said = testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_THAT(said, HasSubstr("the board is " + std::string(kBoard) + ": it was named rows by columns"));
+  EXPECT_EQ(kept().report.board, kBoard);
+}
+
+TEST_F(FromFiles, UsesThePosesOfOnePart) {
+  request_.use = "pose_01:pose_04";
+  testing::internal::CaptureStdout();
+  const auto done = calibrate_from_files(request_);
+  const std::string said = testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_THAT(said, HasSubstr("400, 4 poses"));
+  EXPECT_THAT(said, Not(HasSubstr("pose_05")));
+  request_.use = "pose_01:pose_09";
+  EXPECT_THAT(refusal(), HasSubstr("--use pose_01:pose_09: names no pose that is there"));
+}
+
+// A print that is larger than it is said to be is seen by the calibration in force alone.
+TEST_F(FromFiles, ReplacesNoCalibrationOfAnotherScaleUnlessForced) {
+  Calibration truth = small_rig();
+  truth.cameras[0].name = "camera";
+  write_text(home_ / "calibration.yml", write_calibration(truth));
+  request_.board = "charuco:7x5:61.8:46.35:DICT_5X5_100";
+  EXPECT_THAT(refusal(),
+              testing::AllOf(HasSubstr("measures 60.0"), HasSubstr("said to have 61.80 mm"), HasSubstr("--force")));
+  request_.force = true;
+  const auto done = calibrate_from_files(request_);
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_NEAR(kept().cameras[0].projector_from_camera.translation.norm(),
+              1.03 * truth.cameras[0].projector_from_camera.translation.norm(), 1);
 }
 
 TEST_F(FromFiles, RefusesAnotherBoard) {
