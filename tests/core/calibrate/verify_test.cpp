@@ -176,11 +176,12 @@ TEST(EpipolarLimit, FollowsWhatTheCalibrationSays) {
 }
 
 TEST(Summarise, PoolsTheViewsAndNamesEachFaultOnce) {
-  ViewCheck good{
-      .symbols = 100, .distance_mm = 2000, .epipolar_rms_px = 0.1, .plane_rms_mm = 0.3, .plane_sigma_mm = 0.3};
+  ViewCheck good;
+  good.symbols = 100, good.distance_mm = 2000, good.epipolar_rms_px = 0.1;
+  good.plane_rms_mm = good.plane_sigma_mm = 0.3;
+  ViewCheck off = good;
+  off.symbols = 300, off.epipolar_rms_px = 0.7;
   good.trueness = Trueness{50, 0.05, 0.06, 0.1};
-  const ViewCheck off{
-      .symbols = 300, .distance_mm = 2000, .epipolar_rms_px = 0.7, .plane_rms_mm = 0.3, .plane_sigma_mm = 0.3};
   const VerifySummary summary = summarise({good, off, off}, {});
   EXPECT_EQ(summary.views, 3U);
   EXPECT_EQ(summary.views_with_board, 1U);

@@ -59,7 +59,9 @@ TEST(ReportHtml, HasEveryDevicePoseAndParameter) {
 TEST(ReportHtml, ShowsWhatTheReferencePlaneSays) {
   EXPECT_THAT(report_html(an_outcome()), Not(HasSubstr("Reference plane")));
   CalibrationOutcome outcome = an_outcome();
-  const ViewCheck check{300, 2, 2000, 0.1, 0.321, 0.3, Trueness{50, -0.045, 0.06, 0.1}};
+  ViewCheck check;
+  check.plane_rms_mm = 0.321, check.plane_sigma_mm = 0.3;
+  check.trueness = Trueness{50, -0.045, 0.06, 0.1};
   outcome.planes = {{"plane_00", "camera0", check, check}, {"plane_01", "camera0", check, std::nullopt}};
   const std::string html = report_html(outcome);
   expect_balanced(html);
