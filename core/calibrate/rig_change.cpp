@@ -23,10 +23,9 @@ constexpr std::size_t kPosesMin = 5, kPosesOfPart = 2;
 constexpr std::size_t kSymbolsOfView = 50;  // enough by far: a device that moved takes all of them along
 constexpr int kRoundsOfSearch = 5;          // of the adjustment at each moment tried: from one rig it is near
 constexpr std::size_t kMomentsTried = 24;   // at first; then those beside the best
-constexpr int kRoundsMax = 15;
 
-/// The difference between both parts, squared, in the deviations of the six numbers that a device has: of rigs that
-/// stay as they are 6 on the average, and the largest over all moments of a hundred sessions was 25.
+/// The difference between both parts, squared, in the deviations of the six numbers that a device has: 6 on the average
+/// of a moment that was named beforehand, more of the most likely of many. Ten times that is no chance.
 constexpr double kDifferentMin = 60;
 /// A change that moves symbols by less than this, in the projector, is none that anybody would notice.
 constexpr double kNoticedPx = 0.1;
@@ -93,7 +92,6 @@ RigModel split_at(const RigModel& rig, std::size_t first_pose) {
 Model adjusted(const Observations& seen, BundleOptions options, RigModel rig, int rounds = 2) {
   constexpr double kSigmaOfMedian = 1 / 1.1774;  // of the distance in a plane
   Model model{std::move(rig), options};
-  model.options.iterations_max = std::min(options.iterations_max, kRoundsMax);
   for (int round = 0; round < rounds; ++round) {
     if (!adjust(seen, model.options, model.rig)) return model;
     if (round + 1 < rounds) {

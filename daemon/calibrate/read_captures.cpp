@@ -95,10 +95,10 @@ class CaptureReader {
     take_usual_sizes();
     name_swapped();
     if (jpegs_ == 0) return;
-    report_(fmt::format(
-        "warning: {} of the pictures are JPEG, whose compression moves edges by some hundredths of a pixel, "
-        "more at low quality: calibrate by PNG or raw pictures where the camera gives them",
-        jpegs_));
+    report_(
+        fmt::format("warning: {} of the pictures are JPEG, whose compression moves edges a little, and "
+                    "more at low quality: calibrate by PNG or raw pictures where the camera gives them",
+                    jpegs_));
   }
 
   ReadCaptures captures;
