@@ -111,7 +111,8 @@ TEST(ReadConfiguration, ShippedFileHasEveryKey) {
       {"[decode]",
        "depth_min_mm depth_max_mm precision binarize find_regions classify centre link_grid decode_windows correspond"},
       {"[scan]", "timeout_ms exposure_skew_ms reopen_first_ms reopen_longest_ms projector_latency_ms power_line_hz"},
-      {"[server]", "socket socket_mode observe scan administer clients_max request_bytes_max memory_max_mb send_timeout_ms"}};
+      {"[server]",
+       "socket socket_mode observe scan administer clients_max request_bytes_max memory_max_mb send_timeout_ms"}};
   for (const auto& [heading, keys] : tables) {
     const std::string part = shipped_part(heading);
     std::istringstream words(keys);
