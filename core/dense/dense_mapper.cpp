@@ -16,7 +16,7 @@ namespace {
 /// The window of a node covers this share of a cell, less some pixels, within limits: less has too few edges, more
 /// bends. Small symbols have more edges to a cell.
 constexpr double kWindowOfPitch = 0.86, kWindowLessPx = 3;
-constexpr int kWindowLeastPx = 9, kWindowMostPx = 21;
+constexpr int kWindowLeastPx = 11, kWindowMostPx = 21;
 
 /// Of the blurs, from the sharpest on: what a projector and a camera in focus come to.
 constexpr int kUsualBlurs = 4;

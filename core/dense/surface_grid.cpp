@@ -19,7 +19,7 @@ constexpr float kGainSlopeSigma = 0.02F;
 constexpr int kAttemptsMax = 4;
 
 /// What makes a fit one: docs/dense.md has what each is for.
-constexpr float kSupportMin = 0.6F;   // of the window's pixels agree
+constexpr float kSupportMin = 0.5F;   // of the window's pixels agree
 constexpr float kSeenMin = 0.7F;      // of them are in the frame and not saturated
 constexpr float kResidualMax = 0.3F;  // of the gain
 constexpr float kStepMaxPx = 0.8F;    // from the neighbour's plane: within the pull of the fit
