@@ -321,7 +321,7 @@ inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& f
     const Lanes spread = sums->xx - sums->x * sums->x / sums->w;
     const Lanes found = (sums->xs - sums->x * sums->s / sums->w) / spread;
     const Lanes sure = one - kOverlap / (spread * found * found);
-    lift += (spread > zero) & (sure > zero) ? found * sure : zero;
+    lift += ((spread > zero) & (sure > zero)) ? found * sure : zero;
   }
   lift *= in.of_bend;
   const Lanes any = beside_count > zero ? one : zero;
