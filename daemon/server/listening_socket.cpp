@@ -11,6 +11,9 @@
 #include <charconv>
 #include <csignal>
 #include <cstring>
+#include <optional>
+
+#include <systemd/sd-daemon.h>
 
 #include "daemon/configuration/server_options.hpp"
 #include "drivers/system/system_error.hpp"
@@ -95,6 +98,43 @@ Result<> listen_in(const FileDescriptor& socket, const FileDescriptor& folder, c
   return failed;
 }
 
+// std::filesystem::equivalent() knows nothing of sockets.
+bool same_file(const path& one, const path& other) {
+  struct stat a {
+  }, b{};
+  return ::stat(one.c_str(), &a) == 0 && ::stat(other.c_str(), &b) == 0 && a.st_dev == b.st_dev && a.st_ino == b.st_ino;
+}
+
+path path_of(int socket) {
+  sockaddr_un address{};
+  socklen_t size = sizeof address - 1;  // a path that fills it has no end otherwise
+  if (::getsockname(socket, reinterpret_cast<sockaddr*>(&address), &size) != 0) return {};
+  return address.sun_family == AF_UNIX ? path(address.sun_path) : path();
+}
+
+// The one at the path, of those that systemd listens at and hands over; nothing where it hands over none.
+Result<std::optional<FileDescriptor>> handed_over(const path& path) {
+  const int count = ::sd_listen_fds(0);
+  if (count <= 0) return std::nullopt;
+  std::string others;
+  for (int socket = SD_LISTEN_FDS_START; socket < SD_LISTEN_FDS_START + count; ++socket) {
+    const auto bound = path_of(socket);
+    if (::sd_is_socket(socket, AF_UNIX, SOCK_STREAM, 1) > 0 && same_file(bound, path)) {
+      FileDescriptor own(::fcntl(socket, F_DUPFD_CLOEXEC, 0));
+      if (!own || ::fcntl(own.number(), F_SETFL, O_NONBLOCK) != 0) {
+        return fail_system(errno, "cannot take the socket that systemd listens at", path.string());
+      }
+      return own;
+    }
+    others += (others.empty() ? "" : ", ") + bound.string();
+  }
+  return fail(ErrorCode::kMismatch,
+              "systemd listens at " + others +
+                  " for this service: set [server] socket to that, or ListenStream= to this " +
+                  "(systemctl edit of the socket's unit)",
+              path.string());
+}
+
 }  // namespace
 
 Result<> check_socket_path(const path& path) {
@@ -110,6 +150,9 @@ Result<> check_socket_path(const path& path) {
 }
 
 Result<ListeningSocket> ListeningSocket::open(const path& path, int mode) {
+  auto inherited = handed_over(path);
+  if (!inherited) return tl::unexpected(inherited.error());
+  if (*inherited) return ListeningSocket(std::move(**inherited), {}, 0);
   if (auto usable = check_socket_path(path); !usable) return tl::unexpected(usable.error());
   remove_left_behind(folder_of(path));
   const FileDescriptor folder(::open(folder_of(path).c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));

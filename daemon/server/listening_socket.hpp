@@ -15,11 +15,13 @@ namespace slsd {
 /// @thread thread-bound
 class ListeningSocket {
  public:
-  /// Listens at the path. The socket of a daemon that is dead is replaced. The socket appears at the path with its
-  /// mode, and only once connections are taken.
+  /// Listens at the path, by the socket that systemd hands over where it does (sd_listen_fds(3)): that has its unit's
+  /// mode and owner, and stays when this object goes. Else by one of its own: the socket of a daemon that is dead is
+  /// replaced. The socket appears at the path with its mode, and only once connections are taken.
   /// @param mode  as for chmod
   /// @errors kInvalidArgument: longer than kMaxSocketPath; kBusy: a daemon answers there; kAlreadyExists: something
-  ///         that is no socket is there; kNotFound: no such folder; kPermissionDenied; kNoSpace; kIo
+  ///         that is no socket is there; kMismatch: systemd listens elsewhere; kNotFound: no such folder;
+  ///         kPermissionDenied; kNoSpace; kIo
   [[nodiscard]] static Result<ListeningSocket> open(const std::filesystem::path& path, int mode);
 
   ListeningSocket(ListeningSocket&& other) noexcept = default;
@@ -34,7 +36,7 @@ class ListeningSocket {
       : socket_(std::move(socket)), path_(std::move(path)), inode_(inode) {}
 
   FileDescriptor socket_;
-  std::filesystem::path path_;  ///< empty once moved from
+  std::filesystem::path path_;  ///< empty once moved from, and where it is systemd's
   ino_t inode_;                 ///< so that another daemon's socket at the path is left alone
 };
 
