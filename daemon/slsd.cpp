@@ -76,7 +76,7 @@ struct CommandLine {
   std::optional<std::filesystem::path> configuration;
   std::string level = "info";
   std::filesystem::path pattern_image;
-  bool check = false, list = false, as_json = false;
+  bool check = false, check_configuration = false, list = false, as_json = false;
   bool calibrate = false, latency = false, verify = false;
   slsd::CalibrateRequest request;
   slsd::PrintRequest print;
@@ -139,6 +139,8 @@ void add_options(CLI::App& app, CommandLine& line) {
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "critical"}));
   auto* pattern = app.add_option("--pattern", line.pattern_image, "write the image that the projector shows, as a PNG");
   auto* check = app.add_flag("--check", line.check, "look at everything that a scan needs, and say what to do");
+  auto* check_configuration = app.add_flag("--check-config", line.check_configuration,
+                                           "look at the configuration alone: no device, no service");
   auto* list = app.add_flag("--list", line.list, "list the cameras and projectors that are seen");
   app.add_flag("--json", line.as_json, "list as JSON")->needs(list);
   auto* calibrate = app.add_flag("--calibrate", line.calibrate, "measure the scanner itself");
@@ -148,11 +150,13 @@ void add_options(CLI::App& app, CommandLine& line) {
   verify->excludes(pattern)->excludes(check)->excludes(list);
   pattern->excludes(check)->excludes(list);
   check->excludes(list);
+  check_configuration->excludes(calibrate)->excludes(verify)->excludes(pattern)->excludes(check)->excludes(list);
   add_print_options(app, line.print)
       ->excludes(pattern)
       ->excludes(calibrate)
       ->excludes(verify)
       ->excludes(check)
+      ->excludes(check_configuration)
       ->excludes(list);
 }
 
@@ -170,6 +174,13 @@ void check_commands(const CLI::App& app, const CommandLine& line) {
   }
 }
 
+int check_configuration(const CommandLine& line) {
+  const auto checked = slsd::check_configuration(line.configuration);
+  if (checked) return kDone;
+  std::cerr << "slsd: " << to_string(checked.error()) << "\n";
+  return may_pass(checked.error().code) ? kFailed : kWrongConfiguration;
+}
+
 int calibrate(const CommandLine& line) {
   if (line.latency) return report(slsd::calibrate_latency(line.configuration, line.request.output));
   return report(line.request.from.empty() ? slsd::calibrate_by_session(line.request)
@@ -183,6 +194,7 @@ int carry_out(const CommandLine& line) {
   if (line.verify)
     return report(line.request.from.empty() ? slsd::verify_live(line.request) : slsd::verify_from_files(line.request));
   if (line.list) return report(slsd::list_devices(line.configuration, line.as_json));
+  if (line.check_configuration) return check_configuration(line);
   if (line.check) return slsd::check_everything(line.configuration) ? kDone : kFailed;
   return serve(line.configuration.value_or(slsd::kConfigurationFile));
 }

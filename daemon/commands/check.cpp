@@ -13,6 +13,7 @@
 #include "daemon/client/connection.hpp"
 #include "daemon/commands/commands.hpp"
 #include "daemon/commands/device_list.hpp"
+#include "daemon/configuration/access.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/configuration/exposure_warnings.hpp"
 #include "daemon/latency/latency_file.hpp"
@@ -312,6 +313,24 @@ class Check {
 };
 
 }  // namespace
+
+Result<> check_configuration(const std::optional<path>& configuration_file) {
+  const path file = configuration_file.value_or(kConfigurationFile);
+  const auto configuration = load_configuration(file);
+  if (!configuration) return tl::unexpected(configuration.error());
+  if (const auto access = AccessRules::of(configuration->server); !access) return tl::unexpected(access.error());
+  if (const auto projector = make_projector(configuration->projector); !projector) {
+    return tl::unexpected(projector.error());
+  }
+  for (const CameraOptions& options : configuration->cameras) {
+    if (const auto camera = make_camera(options); !camera) return tl::unexpected(camera.error());
+  }
+  if (const auto setup = ScanSetup::create(*configuration, 1); !setup) return tl::unexpected(setup.error());
+  Findings findings;
+  findings.good("configuration " + file.string());
+  for (const std::string& warning : exposure_warnings(*configuration)) findings.warn(warning);
+  return {};
+}
 
 bool check_everything(const std::optional<path>& configuration_file) {
   Findings findings;

@@ -196,7 +196,9 @@ std::optional<Error> TableReader::unknown_key() const {
   for (const auto& [key, node] : *table_) {
     if (std::ranges::find(known_, key.str()) != known_.end()) continue;
     const std::string what = name_.empty() ? "no such table or key: " : "no such key in " + name_ + ": ";
-    return Error{ErrorCode::kInvalidArgument, what + printable(key.str(), 64) + nearest_hint(key.str(), known_),
+    std::string hint = nearest_hint(key.str(), known_);
+    if (hint.empty()) hint = "; this is slsd " SLSD_VERSION ": is the configuration of another version?";
+    return Error{ErrorCode::kInvalidArgument, what + printable(key.str(), 64) + hint,
                  place_of(key.source(), file_.string())};
   }
   return std::nullopt;

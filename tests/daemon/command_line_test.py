@@ -80,6 +80,22 @@ class Slsd(unittest.TestCase):
         self.assertEqual(len(lines), 1, result.stderr)
         self.assertIn(expected, lines[0])
 
+    def test_check_config_looks_at_the_configuration_alone(self):
+        service = Service(camera_path="/nowhere")  # a camera that does not open is none of its business
+        result = slsd("--check-config", "--config", service.file)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertIn(f"ok       configuration {service.file}", result.stdout)
+        cases = {"[server]\nclients_min = 3\n": "did you mean",
+                 "[server]\nwhistle = 3\n": "is the configuration of another version?",
+                 "[server]\nscan = ['@no-such-group']\n": "no-such-group",
+                 "[calibration]\nfile = 'slsd.toml'\n": "slsd.toml:1:"}
+        for text, expected in cases.items():
+            with self.subTest(text=text):
+                self.file.write_text(text, encoding="utf-8")
+                result = slsd("--check-config", "--config", self.file)
+                self.assertIn(expected, result.stderr)
+                self.assertEqual(result.returncode, 1 if "no-such-group" in text else WRONG_CONFIGURATION)
+
     def test_check_finds_what_forbids_a_scan(self):
         service = Service(camera_path=SCENE / "small.png")
         result = slsd("--check", "--config", service.file)
