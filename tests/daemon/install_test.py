@@ -3,6 +3,7 @@
 # Copyright the slsd authors
 """What `cmake --install` puts where: install_test.py CMAKE BUILD_DIR."""
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import tempfile
 import unittest
 
 CMAKE, BUILD = sys.argv[1:3]
+UNITS = ("slsd.service", "slsd.socket", "slsd@.service", "slsd@.socket", "slsd-display.service")
 
 
 def install(prefix, destination):
@@ -25,33 +27,84 @@ class Install(unittest.TestCase):
 
     def test_puts_everything_in_its_place(self):
         install("/usr", str(self.root))
-        for file in ("usr/bin/slsd", "usr/bin/slsctl", "usr/lib/systemd/system/slsd.service",
-                     "usr/lib/systemd/system/slsd-display.service", "etc/slsd/slsd.toml",
+        for file in ("usr/bin/slsd", "usr/bin/slsctl", *(f"usr/lib/systemd/system/{unit}" for unit in UNITS),
+                     "usr/lib/sysusers.d/slsd.conf", "usr/lib/udev/rules.d/60-slsd.rules",
+                     "usr/share/bash-completion/completions/slsctl", "etc/slsd/slsd.toml",
                      "etc/slsd/patterns/16px-5.toml",
                      "usr/share/slsd/boards/charuco-11x7-23mm-a4.pdf", "usr/share/man/man1/slsctl.1", "usr/share/man/man5/slsd.toml.5",
                      "usr/share/man/man8/slsd.8"):
             self.assertTrue((self.root / file).is_file(), file)
-        unit = (self.root / "usr/lib/systemd/system/slsd.service").read_text(encoding="utf-8")
-        self.assertIn("ExecStart=/usr/bin/slsd --config /etc/slsd/slsd.toml\n", unit)
+        for name in UNITS:
+            self.assertNotRegex(self.unit(name), r"@[a-z_]+@", name)
+        self.assertIn("ExecStart=/usr/bin/slsd --config /etc/slsd/slsd.toml\n", self.unit("slsd.service"))
+        self.assertIn("ExecStart=/usr/bin/slsd --config /etc/slsd/%i.toml\n", self.unit("slsd@.service"))
+        self.assertIn("ListenStream=/run/slsd/%i.sock\n", self.unit("slsd@.socket"))
 
-    def test_units_are_sound(self):
+    def unit(self, name, prefix="usr"):
+        return (self.root / prefix / "lib/systemd/system" / name).read_text(encoding="utf-8")
+
+    def lay_out_for_systemd(self):
+        """Besides the units, all that they name, and an instance of the templates."""
         if not shutil.which("systemd-analyze"):
             self.skipTest("no systemd-analyze here (package systemd)")
         install("/usr", str(self.root))
+        units = self.root / "usr/lib/systemd/system"
+        for kind in ("service", "socket"):
+            shutil.copy(units / f"slsd@.{kind}", units / f"slsd@left.{kind}")
         for program in ("usr/lib/xorg/Xorg", "bin/kill", "bin/sh"):
             (self.root / program).parent.mkdir(parents=True, exist_ok=True)
             (self.root / program).write_text("#!/bin/sh\n", encoding="utf-8")
             (self.root / program).chmod(0o755)
-        for target in ("sysinit", "basic", "shutdown", "multi-user"):  # systemd's own, which every unit needs
-            (self.root / f"usr/lib/systemd/system/{target}.target").write_text("[Unit]\n", encoding="utf-8")
-        verified = subprocess.run(["systemd-analyze", "verify", "--man=no", f"--root={self.root}", "slsd-display.service",
-                                   "slsd.service"], capture_output=True, text=True, check=False)
-        self.assertEqual((verified.stderr, verified.returncode), ("", 0))
+        for target in ("sysinit", "basic", "shutdown", "multi-user", "sockets"):  # systemd's own, which every unit needs
+            (units / f"{target}.target").write_text("[Unit]\n", encoding="utf-8")
 
-    def test_follows_the_prefix(self):
-        install("/opt/scanner", str(self.root))
-        unit = (self.root / "opt/scanner/lib/systemd/system/slsd.service").read_text(encoding="utf-8")
-        self.assertIn("ExecStart=/opt/scanner/bin/slsd --config /opt/scanner/etc/slsd/slsd.toml\n", unit)
+    def test_units_are_sound(self):
+        self.lay_out_for_systemd()
+        names = [name.replace("@", "@left") for name in UNITS]
+        verified = subprocess.run(["systemd-analyze", "verify", "--man=no", f"--root={self.root}", *names],
+                                  capture_output=True, text=True, check=False)
+        self.assertEqual((verified.stdout + verified.stderr, verified.returncode), ("", 0))
+
+    def test_units_have_few_rights(self):
+        self.lay_out_for_systemd()
+        for name, highest in (("slsd.service", 1.8), ("slsd@left.service", 1.8), ("slsd-display.service", 3.5)):
+            weighed = subprocess.run(["systemd-analyze", "security", "--offline=yes", "--no-pager", f"--root={self.root}", name],
+                                     capture_output=True, text=True, check=True).stdout
+            exposure = float(re.search(r"Overall exposure level for .*: ([0-9.]+)", weighed).group(1))
+            print(f"{name}: exposure {exposure}, at most {highest}")
+            self.assertLessEqual(exposure, highest, weighed)
+
+    def test_users_are_as_systemd_reads_them(self):
+        if not shutil.which("systemd-sysusers"):
+            self.skipTest("no systemd-sysusers here (package systemd)")
+        install("/usr", str(self.root))
+        (self.root / "etc").mkdir(exist_ok=True)
+        subprocess.run(["systemd-sysusers", f"--root={self.root}"], check=True, capture_output=True)
+        users = (self.root / "etc/passwd").read_text(encoding="utf-8")
+        groups = (self.root / "etc/group").read_text(encoding="utf-8")
+        self.assertRegex(users, r"(?m)^slsd:[^\n]*:/var/lib/slsd:/usr/sbin/nologin$")
+        for group in ("video", "render", "plugdev"):
+            self.assertRegex(groups, rf"(?m)^{group}:.*\bslsd$")
+        self.assertRegex(groups, r"(?m)^slsd-admin:")
+
+    def test_programs_follow_the_prefix_and_the_configuration_does_not(self):
+        install("/usr/local", str(self.root))
+        self.assertIn("ExecStart=/usr/local/bin/slsd --config /etc/slsd/slsd.toml\n", self.unit("slsd.service", "usr/local"))
+        self.assertTrue((self.root / "etc/slsd/slsd.toml").is_file())
+        self.assertIn("/etc/slsd/slsd.toml", subprocess.run([self.root / "usr/local/bin/slsd", "--help"], check=True,
+                                                            capture_output=True, text=True).stdout)
+
+    def test_completes_commands_and_options(self):
+        install("/usr", str(self.root))
+        script = self.root / "usr/share/bash-completion/completions/slsctl"
+        for line, expected in (("slsctl sta", "status"), ("slsctl scan --dens", "--density"), ("slsd --check-c", "--check-config"),
+                               ("slsctl scan --density p", "pixels"), ("slsd --log-level w", "warning")):
+            words = line.split()
+            code = (f"source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; "
+                    f"_slsd {words[0]} {words[-1]} {words[-2]}; echo \"${{COMPREPLY[*]}}\"")
+            completed = subprocess.run(["bash", "-c", code], env={"PATH": f"{self.root}/usr/bin:/usr/bin:/bin"}, check=True,
+                                       capture_output=True, text=True)
+            self.assertEqual(completed.stdout.strip(), expected, line)
 
     def test_leaves_the_administrators_configuration_alone(self):
         file = self.root / "etc/slsd/slsd.toml"
