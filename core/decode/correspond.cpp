@@ -21,6 +21,19 @@ class Surroundings {
                                [&](Direction d) { return is_lone_at_rim(node, d); });
   }
 
+  /// The last of a line that has been refused, beside what is none of its island.
+  [[nodiscard]] bool is_last(std::int32_t node) const {
+    return std::ranges::any_of(std::array{kRight, kDown}, [&](Direction forth) {
+      for (const Direction d : {forth, opposite(forth)})
+        if (const std::int32_t other = beside(node, d); other < 0 || stands(node, other)) return false;
+      return std::ranges::any_of(std::array{1, 3}, [&](int turn) {
+        const auto aside = static_cast<Direction>((forth + turn) % 4);
+        const std::int32_t other = beside(node, aside);
+        return other >= 0 && !fits(node, other, aside);
+      });
+    });
+  }
+
  private:
   static constexpr int kReach = 3;
 
@@ -108,11 +121,16 @@ void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellCl
 }
 
 void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, std::vector<CellClaim>& claims) {
-  lone_.clear();
   const Surroundings around(nodes, claims);
-  for (std::int32_t node = 0; node < static_cast<std::int32_t>(nodes.size()); ++node)
-    if (claims[node].status == RegionStatus::kDecoded && around.leave_alone(node)) lone_.push_back(node);
-  for (const std::int32_t node : lone_) claims[node].status = RegionStatus::kNeighboursDisagree;
+  const auto refuse = [&](auto&& asked) {
+    lone_.clear();
+    for (std::int32_t node = 0; node < static_cast<std::int32_t>(nodes.size()); ++node)
+      if (claims[node].status == RegionStatus::kDecoded && asked(node)) lone_.push_back(node);
+    for (const std::int32_t node : lone_) claims[node].status = RegionStatus::kNeighboursDisagree;
+    return !lone_.empty();
+  };
+  if (!refuse([&](std::int32_t node) { return around.leave_alone(node); })) return;
+  while (refuse([&](std::int32_t node) { return around.is_last(node); })) continue;
 }
 
 void Correspondence::correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,

@@ -119,39 +119,38 @@ float IslandJudge::count_doubtful(const Frame& frame, std::int32_t node, Directi
   return static_cast<float>(count);
 }
 
-/// Whether a line agrees from end to end, ends where the rim turns oftener without it, and lacks no more than the links
-/// on both of its sides make up for: in this frame so few of them lead to something else.
+/// Whether a line agrees from end to end, says enough by itself, and ends where the rim turns oftener without it.
 bool IslandJudge::fits_between(const Frame& frame, const Line& line, float evidence_min) {
   constexpr float kClean = 0.8F;
   const CellClaim &first = frame.claims[line.first], &last = frame.claims[line.last];
   const Piece piece{first.row, first.column, last.row - first.row + 1, last.column - first.column + 1};
   if (line.agreeing < kClean * log_letters_ * static_cast<float>(piece.rows * piece.columns)) return false;
-  const float missing = evidence_min - line.agreeing;
-  if (missing > std::min(link_weight_, piece.rows > 1 ? weight_across_columns_ : weight_across_rows_)) return false;
+  if (line.agreeing < evidence_min) return false;
   look_at_cells(frame, island_of_[line.node]);
   return turns_without(piece) > 0;
 }
 
+/// Lines that chance may have added: of nodes that links across them hold, in places as many as such links contradict.
 void IslandJudge::cut_contradicted_lines(const Frame& frame) {
-  lines_.clear();
-  std::array<std::ptrdiff_t, 2> links{1, 1}, against{1, 1};  // right and left, down and up
+  constexpr double kUnseenPlaces = 0.3;  // in expectation, where nothing contradicts
+  constexpr double kShareOfBudget = 0.3;
+  std::array<double, 2> places{kUnseenPlaces, kUnseenPlaces};  // along rows, along columns
   for (const std::int32_t node : members_) {
-    for (const Direction d : kAllDirections) {
-      links[d % 2] += links_[node][d] != Link::kNone;
-      against[d % 2] += links_[node][d] == Link::kAgainst;
-    }
+    const Links& links = links_[node];
+    if (!any_against(links)) continue;
+    // What chance has added is contradicted all around.
+    if (std::ranges::count(links, Link::kAgrees) < std::ranges::count(links, Link::kAgainst) + 2) continue;
+    for (const Direction d : kAllDirections) places[d % 2] += links[d] == Link::kAgainst;
   }
-  const auto weight = [&](int axis) {
-    return static_cast<float>(std::log(static_cast<double>(links[axis]) / static_cast<double>(against[axis])));
+  const auto cut = [&](Direction forth, double count) {
+    lines_.clear();
+    find_contradicted_lines(frame, forth);
+    const auto evidence_min = static_cast<float>(std::log(count / (kShareOfBudget * options_.wrong_cells_max)));
+    for (const Line& line : lines_)
+      if (line.evidence < evidence_min && !fits_between(frame, line, evidence_min)) cut_[line.node] = 1;
   };
-  weight_across_columns_ = weight(0), weight_across_rows_ = weight(1);
-  find_contradicted_lines(frame, kRight);
-  find_contradicted_lines(frame, kDown);
-  // Links across which chance could have led on.
-  const std::ptrdiff_t rim = against[0] + against[1] - 1;
-  const auto evidence_min = static_cast<float>(std::log(static_cast<double>(rim) / options_.wrong_cells_max));
-  for (const Line& line : lines_)
-    if (line.evidence < evidence_min && !fits_between(frame, line, evidence_min)) cut_[line.node] = 1;
+  cut(kRight, places[1]);
+  cut(kDown, places[0]);
 }
 
 /// How far a link's step is from the one behind it, in cells.

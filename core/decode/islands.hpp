@@ -173,11 +173,10 @@ class IslandJudge {
   std::vector<Links> links_;
   std::vector<CellClaim> adopted_;
   std::vector<std::uint8_t> cut_;
-  std::vector<std::int8_t> held_;    // by so many links more than contradict
-  std::vector<std::int32_t> line_;   // of nodes
-  std::vector<double> line_ratios_;  // their sums before each of them
-  std::vector<Line> lines_;          // contradicted ones
-  float weight_across_columns_ = 0, weight_across_rows_ = 0;
+  std::vector<std::int8_t> held_;     // by so many links more than contradict
+  std::vector<std::int32_t> line_;    // of nodes
+  std::vector<double> line_ratios_;   // their sums before each of them
+  std::vector<Line> lines_;           // contradicted ones
   std::vector<std::int32_t> holder_;  // of each cell: of the island that is looked at, or of all
   std::int32_t looked_at_ = -1;
 };

@@ -136,6 +136,13 @@ TEST(RefuseLone, RefusesWhatStandsBetweenRefusedOnesAtARim) {
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(4, column).status, kDecoded);
 }
 
+TEST(RefuseLone, RefusesTheLastOfARefusedRow) {
+  RimSheet sheet;
+  for (const int column : {0, 4, 5, 6, 7, 8}) sheet.at(5, column).status = RegionStatus::kClassDisagrees;
+  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  for (const int column : {1, 2, 3}) EXPECT_EQ(sheet.at(5, column).status, RegionStatus::kNeighboursDisagree) << column;
+}
+
 // An edge that runs through a row breaks its links: what is beside a symbol then shows from the row within alone.
 TEST(RefuseLone, LooksAlongTheRowWithinWhereTheRowIsBroken) {
   RimSheet sheet;
