@@ -21,16 +21,14 @@ class Surroundings {
                                [&](Direction d) { return is_lone_at_rim(node, d); });
   }
 
-  /// The last of a line that has been refused, beside what is none of its island.
+  /// The last of a line that has been refused, beside what is none of its island or has been refused, too.
   [[nodiscard]] bool is_last(std::int32_t node) const {
     return std::ranges::any_of(std::array{kRight, kDown}, [&](Direction forth) {
       for (const Direction d : {forth, opposite(forth)})
         if (const std::int32_t other = beside(node, d); other < 0 || stands(node, other)) return false;
-      return std::ranges::any_of(std::array{1, 3}, [&](int turn) {
-        const auto aside = static_cast<Direction>((forth + turn) % 4);
-        const std::int32_t other = beside(node, aside);
-        return other >= 0 && !fits(node, other, aside);
-      });
+      const auto one = static_cast<Direction>((forth + 1) % 4), two = opposite(one);
+      return contradicts(node, one) || contradicts(node, two) ||
+             (!stands(node, beside(node, one)) && !stands(node, beside(node, two)));
     });
   }
 
@@ -48,6 +46,11 @@ class Surroundings {
     const Eigen::Vector2f to = step(d);
     return claims_[other].same_cell(claims_[node].row + static_cast<int>(to.y()),
                                     claims_[node].column + static_cast<int>(to.x()));
+  }
+
+  [[nodiscard]] bool contradicts(std::int32_t node, Direction d) const {
+    const std::int32_t other = beside(node, d);
+    return other >= 0 && !fits(node, other, d);
   }
 
   /// Whether the island goes on there, refused or not, or no node is there that could be of another surface. What was
