@@ -94,7 +94,7 @@ tl::expected<void, Failure> write_cloud_picture(const path& file, const Result<C
 }
 
 // The cloud's picture is drawn from a PLY; a PCD is then made of it here.
-tl::expected<void, Failure> write_cloud_file(const ClientOptions& options, const std::string& bytes, bool as_ply) {
+tl::expected<void, Failure> write_cloud_file(const ClientOptions& options, std::string_view bytes, bool as_ply) {
   if (options.output.empty()) return {};
   if (!as_ply || options.output.extension() == ".ply") return write(options.output, bytes);
   const auto cloud = read_ply(bytes, "the daemon's cloud");
@@ -105,14 +105,15 @@ tl::expected<void, Failure> write_cloud_file(const ClientOptions& options, const
 tl::expected<void, Failure> write_files(const ClientOptions& options, const Answered& answered, bool as_ply,
                                         bool dense) {
   const json& result = answered.reply.message["result"];
-  const std::string& bytes = answered.reply.bytes;
+  const std::string_view bytes = answered.reply.bytes;
   const bool from_pcd = dense && !options.cloud_picture.empty();  // drawn, and made a PLY of here
   tl::expected<void, Failure> written;
   if (!dense) {
     written = write_cloud_file(options, bytes, as_ply);
   } else if (!options.output.empty()) {
     const bool make_ply = from_pcd && options.output.extension() == ".ply";
-    written = write(options.output, make_ply ? dense_ply_of(result, bytes, options.normals) : bytes);
+    written =
+        make_ply ? write(options.output, dense_ply_of(result, bytes, options.normals)) : write(options.output, bytes);
   }
   if (written && !options.cloud_picture.empty()) {
     written = write_cloud_picture(

@@ -4,22 +4,24 @@
 
 #include <chrono>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include <slsd/connection.hpp>
+
 #include "core/image.hpp"
 #include "core/result.hpp"
-#include "drivers/system/file_descriptor.hpp"
 
 namespace slsd {
 
-/// A line from the daemon and the bytes that followed it.
+/// A line from the daemon and the bytes that came with it.
 struct Received {
   nlohmann::json message;
-  std::string bytes;
+  client::Bytes bytes;
 
   /// The bytes as raw pixels, 8 or 16 bits; it lives as long as they do.
   /// @param about  the message's part that describes them: `width_px`, `height_px`, `bits`
@@ -33,15 +35,16 @@ struct Answered {
   std::vector<Received> events;
 };
 
-/// A connection to the daemon's socket. Waits as long as the daemon works, unless told otherwise.
+/// The client library's connection for slsctl: JSON that is parsed, errors as values. Waits as long as the daemon
+/// works, unless told otherwise.
 /// @thread thread-bound
 class Connection {
  public:
   /// @errors kNotFound: no daemon answers at this path; kPermissionDenied; kInvalidArgument: too long a path; kIo
   [[nodiscard]] static Result<Connection> open(const std::filesystem::path& socket);
 
-  /// From now on at most so long for each part of a message, to be sent or received; then kTimeout.
-  void set_patience(std::chrono::seconds patience) const;
+  /// From now on at most so long for each message, to be sent or received; then kTimeout.
+  void set_patience(std::chrono::seconds patience) { patience_ = patience; }
 
   /// Sends a request and waits for its reply, which may be a JSON-RPC error.
   /// @errors kDisconnected: the daemon hung up; kMalformed: it is no slsd; kIo
@@ -56,15 +59,11 @@ class Connection {
   [[nodiscard]] Result<Received> receive();
 
  private:
-  explicit Connection(FileDescriptor socket) : socket_(std::move(socket)) {}
-  [[nodiscard]] Result<> send(std::string_view bytes);
-  [[nodiscard]] Result<> receive_more();
-  [[nodiscard]] Result<std::string> receive_line();
-  [[nodiscard]] Result<std::string> receive_bytes(std::size_t count);
+  explicit Connection(client::Connection socket) : socket_(std::move(socket)) {}
+  [[nodiscard]] client::Connection::Deadline deadline() const;
 
-  FileDescriptor socket_;
-  std::string buffer_;
-  std::int64_t last_id_ = 0;
+  client::Connection socket_;
+  std::optional<std::chrono::seconds> patience_;
 };
 
 }  // namespace slsd

@@ -142,7 +142,7 @@ Result<> Recording::write_summary() {
   return write("recording.json", settings_.dump(2) + "\n");
 }
 
-Result<> Recording::write(const std::string& name, const std::string& bytes) {
+Result<> Recording::write(const std::string& name, std::string_view bytes) {
   if (auto written = write_file_atomically(folder_ / name, bytes); !written) return written;
   bytes_ += bytes.size();
   return {};

@@ -64,7 +64,7 @@ class Recording {
   [[nodiscard]] Result<> write_scan(const Answered& scan, nlohmann::json& line);
   void remove_scan() const;
   [[nodiscard]] Result<> write_summary();
-  [[nodiscard]] Result<> write(const std::string& name, const std::string& bytes);
+  [[nodiscard]] Result<> write(const std::string& name, std::string_view bytes);
   [[nodiscard]] Result<> write_line(const nlohmann::json& line);
   [[nodiscard]] Result<nlohmann::json> write_frame(const RecordedCamera& camera, const Answered& scan);
 

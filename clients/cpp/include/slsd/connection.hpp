@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace slsd::client {
+
+/// Bytes that came: memory that is shared with the service, or this process's own. Copies share them; nobody changes
+/// them.
+/// @thread reentrant
+class Bytes {
+ public:
+  Bytes() = default;
+  explicit Bytes(std::string own);
+  /// @param memory  keeps `view` alive
+  Bytes(std::shared_ptr<const void> memory, std::string_view view) : memory_(std::move(memory)), view_(view) {}
+
+  [[nodiscard]] const char* data() const { return view_.data(); }
+  [[nodiscard]] std::size_t size() const { return view_.size(); }
+  [[nodiscard]] bool empty() const { return view_.empty(); }
+  [[nodiscard]] std::string_view view() const { return view_; }
+  operator std::string_view() const { return view_; }  // NOLINT(google-explicit-constructor): they are read as a text
+
+ private:
+  std::shared_ptr<const void> memory_;
+  std::string_view view_;
+};
+
+/// One line of the protocol, and what came with it.
+struct Message {
+  std::string json;
+  Bytes bytes;  ///< behind the line, or in a memfd
+};
+
+/// The protocol without its meaning, for what Scanner has no method for: lines of JSON, the bytes behind them, memfds.
+/// Any error leaves it unusable: what comes later would be taken for the answer to the next request.
+/// @thread thread-bound
+class Connection {
+ public:
+  using Deadline = std::optional<std::chrono::steady_clock::time_point>;
+
+  /// @throws NoService, PermissionDenied, ConnectionLost
+  explicit Connection(const std::string& socket);
+  ~Connection();
+  Connection(Connection&&) noexcept;
+  Connection& operator=(Connection&&) noexcept;
+
+  /// Sends a request; returns its id.
+  /// @param params    a JSON object
+  /// @param deadline  until when the service must have taken it; nothing: wait as long as it is there
+  /// @throws ConnectionLost, TimedOut
+  std::int64_t send(std::string_view method, std::string_view params, Deadline deadline = {});
+
+  /// Waits for the next message: a reply, which may be an error, or an event.
+  /// @throws ConnectionLost, TimedOut, ProtocolError
+  [[nodiscard]] Message receive(Deadline deadline = {});
+
+ private:
+  void wait(short events, const Deadline& deadline) const;
+  void receive_more(const Deadline& deadline);
+  [[nodiscard]] std::string receive_line(const Deadline& deadline);
+  [[nodiscard]] Bytes receive_bytes(std::size_t count, const Deadline& deadline);
+  [[nodiscard]] Bytes map_descriptor(std::size_t size);
+  void close() noexcept;
+
+  std::string path_;
+  int socket_ = -1;
+  std::string buffer_;
+  std::vector<int> descriptors_;  ///< that came and are not mapped yet
+  std::int64_t last_id_ = 0;
+};
+
+}  // namespace slsd::client

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <thread>
+
+#include <slsd/scanner.hpp>
+
+namespace slsd::client {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+std::string ply(std::size_t count, const std::string& said = {}, const std::string& fields = {}) {
+  return "ply\nformat binary_little_endian 1.0\ncomment units mm\nelement vertex " +
+         (said.empty() ? std::to_string(count) : said) + "\n" +
+         (fields.empty() ? "property float x\nproperty float y\nproperty float z\n" : fields) + "end_header\n" +
+         std::string(12 * count, '\0');
+}
+
+std::string result(const std::string& values, const std::string& body = {}) {
+  return R"({"jsonrpc":"2.0","id":1,"result":{)" + values + "}}\n" + body;
+}
+
+// Listens where slsd would, and answers the first line of each of its peers.
+class Impostor {
+ public:
+  explicit Impostor(std::string answer, int descriptor = -1, bool hangs_up = true) {
+    char folder[] = "/tmp/slsd-test-XXXXXX";
+    folder_ = ::mkdtemp(folder);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path().copy(address.sun_path, sizeof address.sun_path - 1);
+    listener_ = ::socket(AF_UNIX, SOCK_STREAM, 0);
+    EXPECT_EQ(::bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    EXPECT_EQ(::listen(listener_, 8), 0);
+    thread_ = std::thread([this, answer = std::move(answer), descriptor, hangs_up] {
+      std::vector<int> peers;
+      for (int peer; (peer = ::accept(listener_, nullptr, nullptr)) >= 0;) {
+        char line[4096];
+        (void)!::read(peer, line, sizeof line);
+        send(peer, answer, descriptor);
+        if (hangs_up) {
+          ::close(peer);
+        } else {
+          peers.push_back(peer);
+        }
+      }
+      for (const int peer : peers) ::close(peer);
+    });
+  }
+  ~Impostor() {
+    ::shutdown(listener_, SHUT_RDWR);
+    thread_.join();
+    ::close(listener_);
+    std::filesystem::remove_all(folder_);
+  }
+  [[nodiscard]] std::string path() const { return folder_ + "/slsd.sock"; }
+
+ private:
+  static void send(int peer, const std::string& bytes, int descriptor) {
+    iovec part{const_cast<char*>(bytes.data()), bytes.size()};
+    alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
+    msghdr header{};
+    header.msg_iov = &part;
+    header.msg_iovlen = 1;
+    if (descriptor >= 0) {
+      header.msg_control = control;
+      header.msg_controllen = sizeof control;
+      cmsghdr* passed = CMSG_FIRSTHDR(&header);
+      passed->cmsg_level = SOL_SOCKET;
+      passed->cmsg_type = SCM_RIGHTS;
+      passed->cmsg_len = CMSG_LEN(sizeof(int));
+      std::memcpy(CMSG_DATA(passed), &descriptor, sizeof descriptor);
+    }
+    (void)!::sendmsg(peer, &header, MSG_NOSIGNAL);
+  }
+
+  std::string folder_;
+  int listener_;
+  std::thread thread_;
+};
+
+template <class Error>
+std::string refused(const std::string& answer, int descriptor = -1) {
+  const Impostor impostor(answer, descriptor);
+  Scanner scanner(impostor.path());
+  try {
+    (void)scanner.scan();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "not refused as it should be";
+}
+
+int memfd(const std::string& bytes, int seals) {
+  const int descriptor = ::memfd_create("cloud", MFD_ALLOW_SEALING | MFD_CLOEXEC);
+  EXPECT_EQ(::write(descriptor, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
+  EXPECT_EQ(::fcntl(descriptor, F_ADD_SEALS, seals), 0);
+  return descriptor;
+}
+
+constexpr int kSealed = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL;
+
+TEST(ReadPly, GivesTheFieldsByName) {
+  std::string file = ply(0, "2", "property uchar intensity\nproperty float x\nproperty float y\nproperty float z\n");
+  for (const float x : {1.5F, -2.0F}) {
+    const float xyz[] = {x, 2, 3};
+    file.push_back('\x07');
+    file.append(reinterpret_cast<const char*>(xyz), sizeof xyz);
+  }
+  const Cloud cloud = Cloud::read_ply(Bytes(file), R"({"scan":"a-1","lost":3,"sigma_calibration_mm":0.25})");
+  ASSERT_EQ(cloud.size(), 2U);
+  EXPECT_EQ(cloud[1].x, -2);
+  EXPECT_EQ(cloud[1].z, 3);
+  EXPECT_EQ(cloud[1].intensity, 7);
+  EXPECT_EQ(cloud.column<float>("x")[0], 1.5F);
+  EXPECT_THROW((void)cloud.column<double>("x"), std::invalid_argument);
+  EXPECT_THROW((void)cloud.column<float>("nx"), std::invalid_argument);
+  EXPECT_EQ(cloud.comments().at("units"), "mm");
+  EXPECT_EQ(cloud.scan, "a-1");
+  EXPECT_EQ(cloud.lost, 3U);
+  EXPECT_EQ(cloud.sigma_calibration_mm, 0.25);
+}
+
+TEST(ReadPly, RefusesHeadersThatLie) {
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {ply(3, "4"), "where its header says"},
+      {ply(3).substr(0, ply(3).size() - 1), "where its header says"},
+      {ply(3, "99999999999999999999999"), "none of slsd's"},
+      {ply(3, "1537228672809129302"), "where its header says"},  // times 12 it is 8
+      {ply(3, "-1"), "none of slsd's"},
+      {"ply\n", "no binary"},
+      {"", "no binary"},
+      {ply(1, "1", "property list uchar int x\n"), "none of slsd's"},
+      {ply(1, "1", "property float x\nproperty float x\nproperty float z\n"), "none of slsd's"},
+      {ply(1, "1", "property float x\nproperty int y\nproperty float z\n"), "names no points"}};
+  for (const auto& [file, reason] : cases) {
+    try {
+      (void)Cloud::read_ply(Bytes(file));
+      ADD_FAILURE() << file.substr(0, 80);
+    } catch (const ProtocolError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(reason));
+    }
+  }
+  EXPECT_EQ(Cloud::read_ply(Bytes(ply(3))).size(), 3U);
+  EXPECT_TRUE(Cloud::read_ply(Bytes(ply(0))).empty());
+}
+
+TEST(ReadPly, RefusesRubbishByNothingElse) {
+  const std::string whole = ply(20);
+  std::srand(5);
+  for (int i = 0; i < 5000; ++i) {
+    std::string file = whole.substr(0, static_cast<std::size_t>(std::rand()) % (whole.size() + 1));
+    for (int n = std::rand() % 6; n > 0 && !file.empty(); --n) {
+      file[static_cast<std::size_t>(std::rand()) % std::min<std::size_t>(file.size(), 140)] =
+          static_cast<char>(std::rand());
+    }
+    try {
+      for (const Point point : Cloud::read_ply(Bytes(file))) EXPECT_EQ(point.sigma_mm, 0);
+    } catch (const ProtocolError&) {  // as it should be
+    }
+  }
+}
+
+TEST(Scan, RefusesWhatIsNotSlsd) {
+  EXPECT_THAT(refused<ProtocolError>("220 mail ready\n"), HasSubstr("JSON-RPC 2.0"));
+  EXPECT_THAT(refused<ProtocolError>("[]\n"), HasSubstr("JSON-RPC 2.0"));
+  EXPECT_THAT(refused<ProtocolError>("{\"id\":1,\"result\":{}}\n"), HasSubstr("JSON-RPC 2.0"));
+  EXPECT_THAT(refused<ProtocolError>(result("\"a\":" + std::string(100'000, '[') + std::string(100'000, ']'))),
+              HasSubstr("JSON-RPC 2.0"));
+  EXPECT_THAT(refused<ProtocolError>(std::string((1 << 24) + 70'000, 'x')), HasSubstr("no end"));
+  for (const char* size : {"-1", "true", "\"12\"", "1152921504606846976", "null", "1.5"}) {
+    EXPECT_THAT(refused<ProtocolError>(result("\"bytes\":" + std::string(size))), HasSubstr("bytes follow"));
+  }
+  EXPECT_THAT(refused<ProtocolError>(result("")), HasSubstr("did not come"));
+  EXPECT_THAT(refused<ConnectionLost>(result("\"bytes\":4294967296", "ply")), HasSubstr("hung up"));
+}
+
+TEST(Scan, MapsASealedMemfdAndRefusesAnyOther) {
+  const std::string file = ply(3), said = "\"memfd_bytes\":" + std::to_string(file.size());
+  EXPECT_THAT(refused<ProtocolError>(result(said)), HasSubstr("no descriptor"));
+  const int sealed = memfd(file, kSealed), open = memfd(file, F_SEAL_GROW);
+  EXPECT_THAT(refused<ProtocolError>(result(said), open), HasSubstr("not sealed"));
+  EXPECT_THAT(refused<ProtocolError>(result("\"memfd_bytes\":4096"), sealed), HasSubstr("size"));
+  const Impostor impostor(result(said), sealed);
+  Cloud cloud = Scanner(impostor.path()).scan();
+  EXPECT_EQ(cloud.size(), 3U);  // after its scanner
+  ::close(sealed);
+  ::close(open);
+}
+
+TEST(Scan, EndsInTimeWhereNobodyAnswers) {
+  const Impostor silent("", -1, /*hangs_up=*/false);
+  Scanner scanner(silent.path());
+  ScanOptions options;
+  options.timeout = 1ms;
+  EXPECT_THROW((void)scanner.scan(options), TimedOut);
+}
+
+TEST(Scan, ThrowsTheProtocolsErrorsByName) {
+  const auto answered = [](const std::string& name) {
+    return R"({"jsonrpc":"2.0","id":1,"error":{"code":-32018,"message":"why","data":{"name":")" + name + "\"}}}\n";
+  };
+  EXPECT_EQ(refused<FrameError>(answered("frame_late")), "why");
+  EXPECT_EQ(refused<Busy>(answered("busy")), "why");
+  EXPECT_EQ(refused<PermissionDenied>(answered("permission_denied")), "why");
+  EXPECT_EQ(refused<InvalidRequest>(answered("invalid_params")), "why");
+  EXPECT_EQ(refused<ScannerError>(answered("of_another_version")), "why");
+}
+
+TEST(AScanner, TellsThatNobodyListens) {
+  EXPECT_THROW(Scanner("/nonexistent/slsd.sock"), NoService);
+  EXPECT_THROW(Scanner("/" + std::string(200, 'a')), ConnectionLost);
+}
+
+TEST(AScanner, ConnectsAnewAfterItWasHungUpOn) {
+  const Impostor impostor(result("\"role\":\"scan\""));
+  Scanner scanner(impostor.path());
+  EXPECT_EQ(scanner.role(), "scan");
+  EXPECT_THROW((void)scanner.role(), ConnectionLost);
+  EXPECT_EQ(scanner.role(), "scan");
+}
+
+}  // namespace
+}  // namespace slsd::client
