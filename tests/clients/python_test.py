@@ -3,6 +3,7 @@
 # Copyright the slsd authors
 """The Python client against the whole service, and against services that lie, stall and vanish."""
 import array
+import fcntl
 import inspect
 import json
 import os
@@ -222,10 +223,15 @@ class Lies(unittest.TestCase):
 
     def test_about_memory_are_refused(self):
         self.assertIn("no descriptor", self.refused(lambda request: result(request, memfd_bytes=100)))
-        descriptor = os.memfd_create("cloud")
-        os.write(descriptor, ply(3))
+        descriptor = os.memfd_create("cloud", os.MFD_ALLOW_SEALING)
+        size = os.write(descriptor, ply(3))
         try:
             self.assertIn("size", self.refused(lambda request: result(request, memfd_bytes=4096), descriptor))
+            self.assertIn("sealed", self.refused(lambda request: result(request, memfd_bytes=size), descriptor))
+            fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_WRITE)
+            with Impostor(lambda request: result(request, memfd_bytes=size), descriptor) as honest:
+                with slsd.Scanner(honest.path) as scanner:
+                    self.assertEqual(len(scanner.scan()), 3)
         finally:
             os.close(descriptor)
 

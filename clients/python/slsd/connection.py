@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import array
+import fcntl
 import json
 import mmap
 import os
@@ -15,6 +16,7 @@ from .errors import ConnectionLost, PermissionDenied, ProtocolError, TimedOut
 
 _LINE_MAX = 1 << 20
 _BYTES_MAX = 1 << 32
+_SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_WRITE  # one that may still shrink would end this process later
 
 
 class Connection:
@@ -131,9 +133,18 @@ class Connection:
         try:
             if os.fstat(descriptor).st_size != size or size == 0:
                 raise ProtocolError("the memfd is not of the size that the service said")
+            if not _sealed(descriptor):
+                raise ProtocolError("the memfd is not sealed")
             return mmap.mmap(descriptor, size, prot=mmap.PROT_READ)
         finally:
             os.close(descriptor)
+
+
+def _sealed(descriptor: int) -> bool:
+    try:
+        return fcntl.fcntl(descriptor, fcntl.F_GET_SEALS) & _SEALS == _SEALS
+    except OSError:  # no memfd
+        return False
 
 
 def _size(value: Any) -> int:
