@@ -94,11 +94,21 @@ void add_image(CLI::App& app, ClientOptions& options, const std::string& name, c
   if (name == "frame") command->add_flag("--as-shown", options.as_shown, "leave what the projector shows");
 }
 
+void add_view(CLI::App& app, ClientOptions& options) {
+  CLI::App* metrics = app.add_subcommand("metrics", "what the service counts and measures, as OpenMetrics text");
+  metrics->add_option("-o,--output,FILE", options.output, "write it there, whole or not at all: for node_exporter");
+  CLI::App* top = app.add_subcommand("top", "rates, latencies and states, live in a terminal");
+  top->add_option("--interval", options.interval_s, "seconds between two looks (1)")->check(CLI::Range(0.1, 3600.0));
+  top->add_option("--count", options.count, "end after so many looks")->check(CLI::Range(1, 1'000'000'000));
+}
+
 int run(const CLI::App& app, const ClientOptions& options) {
   const std::string command = app.get_subcommands().front()->get_name();
   if (command == "scan") return slsd::scan_command(options);
   if (command == "status") return slsd::status_command(options);
   if (command == "watch") return slsd::watch_command(options);
+  if (command == "metrics") return slsd::metrics_command(options);
+  if (command == "top") return slsd::top_command(options);
   if (command == "exposure") return slsd::exposure_command(options);
   if (command == "project") return slsd::project_command(options);
   if (command == "record") return slsd::record_command(options);
@@ -126,6 +136,7 @@ int main(int argc, char** argv) {
   add_scan(app, options);
   app.add_subcommand("status", "the state of the service, and what its scans came to");
   add_watch(app, options);
+  add_view(app, options);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -21,6 +21,7 @@
 #include "daemon/calibrate/verify_live.hpp"
 #include "daemon/commands/commands.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/scan/message_ids.hpp"
 #include "daemon/service/logging.hpp"
 #include "daemon/service/notifier.hpp"
 #include "daemon/service/service.hpp"
@@ -45,6 +46,7 @@ bool may_pass(slsd::ErrorCode code) {
 
 int not_served(const slsd::Error& error, bool passes) {
   const std::string why = to_string(error);
+  const slsd::MessageId id(slsd::MessageId::kDoesNotStart);
   spdlog::critical("{}", why);
   slsd::Notifier().status("does not start: " + slsd::printable(why, 1000));  // as `systemctl status` shows it
   return passes ? kFailed : kWrongConfiguration;

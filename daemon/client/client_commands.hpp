@@ -20,6 +20,10 @@ namespace slsd {
 [[nodiscard]] int project_command(const ClientOptions& options);
 /// Looks at two frames of a camera while the pattern is shown, and proposes exposure and gain.
 [[nodiscard]] int exposure_command(const ClientOptions& options);
+/// Prints the service's metrics, or writes them to a file, whole or not at all.
+[[nodiscard]] int metrics_command(const ClientOptions& options);
+/// Shows rates, latencies and states, again and again.
+[[nodiscard]] int top_command(const ClientOptions& options);
 /// Scans on and on, each while the frames of the one before are written, until as many as asked for are
 /// there, the time is over, or an interrupt comes.
 [[nodiscard]] int record_command(const ClientOptions& options);

@@ -7,16 +7,19 @@
 #include <algorithm>
 
 #include "daemon/scan/log_field.hpp"
+#include "daemon/scan/message_ids.hpp"
 
 namespace slsd {
 namespace {
 
 void log_change(DriftWatch::Change change, const std::string& camera, const DriftState& state) {
   if (change == DriftWatch::Change::kFineAgain) {
+    const MessageId id(MessageId::kCalibratedAgain);
     return spdlog::info("camera {}: points lie on their epipolar lines again, {:.2f} px off", camera,
                         state.epipolar_px);
   }
   if (change == DriftWatch::Change::kNone) return;
+  const MessageId id(MessageId::kKnocked);
   spdlog::warn(
       "camera {}: knocked out of its calibration since scan {}: points lie {:.2f} px off their epipolar lines, {:.2f} "
       "px are fine; fasten projector and camera, look by slsd --verify, and calibrate again",

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "daemon/scan/log_field.hpp"
+#include "daemon/scan/message_ids.hpp"
 #include "drivers/system/thread_name.hpp"
 
 namespace slsd {
@@ -173,6 +174,7 @@ void CameraRunner::note_opened(const Result<>& opened) {
     status_.problem = problem;
     lock.unlock();
     const LogField code("SLSD_ERROR", std::string(to_string(opened.error().code)));
+    const MessageId id(MessageId::kDeviceLost);
     if (!had_problem) spdlog::warn("camera {}: {}; trying again until it opens", name_, problem);
     return;
   }
@@ -188,7 +190,9 @@ void CameraRunner::note_opened(const Result<>& opened) {
   ++status_.opened;
   lock.unlock();
   changed_.notify_all();
-  if (had_problem) spdlog::info("camera {}: open again", name_);
+  if (!had_problem) return;
+  const MessageId id(MessageId::kDeviceBack);
+  spdlog::info("camera {}: open again", name_);
 }
 
 std::optional<CameraRunner::Order> CameraRunner::next_order(const std::stop_token& stop) {
@@ -202,7 +206,13 @@ std::optional<CameraRunner::Order> CameraRunner::next_order(const std::stop_toke
 
 void CameraRunner::look_after() {
   const Result<> there = camera_->check();
+  note_figures(std::unique_lock(mutex_));
   if (!there) note_lost(there.error(), std::unique_lock(mutex_));
+}
+
+void CameraRunner::note_figures(const std::unique_lock<std::mutex>&) {
+  status_.figures.clear();
+  camera_->tell_figures(status_.figures);
 }
 
 void CameraRunner::note_lost(const Error& error, std::unique_lock<std::mutex> lock) {
@@ -210,6 +220,7 @@ void CameraRunner::note_lost(const Error& error, std::unique_lock<std::mutex> lo
   status_.problem = error.message;
   lock.unlock();
   const LogField code("SLSD_ERROR", std::string(to_string(error.code)));
+  const MessageId id(MessageId::kDeviceLost);
   spdlog::warn("camera {}: {}; trying again until it opens", name_, error.message);
 }
 
@@ -239,11 +250,13 @@ void CameraRunner::note_frame(Result<Frame> frame) {
   std::unique_lock lock(mutex_);
   if (std::exchange(given_up_, false)) return;
   status_.state = DeviceState::kReady;
+  note_figures(lock);
   if (frame) {
     ++status_.frames;
     status_.frames_lost += gaps_.note_frame(frame->sequence());
   } else if (frame.error().code != ErrorCode::kBusy && frame.error().code != ErrorCode::kCancelled) {
     ++status_.frames_lost;
+    ++status_.frames_failed[frame.error().code];
     gaps_.note_failure();
   }
   const bool lost = !frame && frame.error().code == ErrorCode::kDisconnected;

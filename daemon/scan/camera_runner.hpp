@@ -102,6 +102,7 @@ class CameraRunner {
   void note_found();
   void note_opened(const Result<>& opened);
   void look_after();
+  void note_figures(const std::unique_lock<std::mutex>& lock);
   void note_lost(const Error& error, std::unique_lock<std::mutex> lock);
   [[nodiscard]] std::optional<Order> next_order(const std::stop_token& stop);
   void take_frame(const Order& order);

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/result.hpp"
+#include "drivers/camera/camera.hpp"
 
 namespace slsd {
 
@@ -49,6 +51,8 @@ struct DeviceStatus {
   std::uint64_t opened = 0;       ///< times
   std::uint64_t frames = 0;       ///< delivered
   std::uint64_t frames_lost = 0;  ///< asked for and not delivered, or missing between two that were
+  std::map<ErrorCode, std::uint64_t> frames_failed;  ///< of the lost those that an error told of
+  std::vector<DriverFigure> figures;                 ///< the driver's own
 };
 
 /// All of a rig's.

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "core/printable.hpp"
+#include "daemon/scan/message_ids.hpp"
 
 namespace slsd {
 
@@ -53,6 +54,7 @@ Result<> HardwareGuard::check(const std::shared_ptr<ScanSetup>& setup, const Rig
   setup_ = setup, openings_ = openings;
   verdict_ = setup->calibration ? check_hardware(*setup->calibration, rig.status()) : Result<>();
   if (!verdict_ && setup->other_hardware == OtherHardware::kWarn) {
+    const MessageId id(MessageId::kOtherHardware);
     spdlog::warn("{}", to_string(verdict_.error()));
     verdict_ = {};
   }

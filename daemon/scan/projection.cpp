@@ -10,6 +10,7 @@
 
 #include "daemon/scan/hardware.hpp"
 #include "daemon/scan/log_field.hpp"
+#include "daemon/scan/message_ids.hpp"
 
 namespace slsd {
 namespace {
@@ -146,12 +147,16 @@ void Projection::note(const Result<>& outcome) {
   status_.shows = shown_ ? to_string(*shown_) : "";
   if (!outcome) {
     const LogField code("SLSD_ERROR", std::string(to_string(outcome.error().code)));
+    const MessageId id(MessageId::kDeviceLost);
     if (status_.problem.empty()) spdlog::warn("projector: {}; trying again until it opens", to_string(outcome.error()));
     status_.state = state_after(outcome.error().code);
     status_.problem = to_string(outcome.error());
     return;
   }
-  if (!status_.problem.empty()) spdlog::info("projector: open again");
+  if (!status_.problem.empty()) {
+    const MessageId id(MessageId::kDeviceBack);
+    spdlog::info("projector: open again");
+  }
   if (!is_open(status_.state)) {
     ++status_.opened;
     const ProjectorDescription& description = projector_->description();

@@ -7,6 +7,8 @@
 namespace slsd {
 
 void Duration::add(std::chrono::nanoseconds time) {
+  const double seconds = std::chrono::duration<double>(time).count();
+  ++buckets[static_cast<std::size_t>(std::ranges::lower_bound(kDurationBounds, seconds) - kDurationBounds.begin())];
   last = time;
   total += time;
   longest = std::max(longest, time);
@@ -28,11 +30,18 @@ void ScanStatistics::note(const Result<ScanResult>& scan, std::uint64_t skipped)
   }
   ++totals_.succeeded;
   totals_.points = scan->cloud.points.size();
+  totals_.all_points += totals_.points;
+  totals_.lost_tries += scan->lost.count;
   totals_.regions_of_last = scan->regions;
   for (std::size_t i = 0; i < scan->regions.size(); ++i) totals_.regions[i] += scan->regions[i];
   totals_.capture.add(scan->capture_time);
   totals_.decode.add(scan->decode_time);
   for (std::size_t i = 0; i < scan->stage_times.size(); ++i) totals_.stages[i].add(scan->stage_times[i]);
+  if (!scan->dense) return;
+  totals_.dense.add(scan->dense_time);
+  for (const DenseView& view : scan->dense->views) {
+    for (std::size_t i = 0; i < totals_.pixels.size(); ++i) totals_.pixels[i] += view.map.counts[i];
+  }
 }
 
 ScanTotals ScanStatistics::totals() const {

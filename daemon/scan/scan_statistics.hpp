@@ -14,12 +14,17 @@
 
 namespace slsd {
 
-/// How long something took: the last time, on average, and at most.
+/// The upper bounds of a Duration's histogram, in seconds; beyond the last there is one bucket more.
+inline constexpr std::array kDurationBounds{0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05,
+                                            0.1,    0.2,   0.5,   1.0,   2.0,  5.0};
+
+/// How long something took: the last time, on average, at most, and how often how long.
 struct Duration {
   std::chrono::nanoseconds last{};
   std::chrono::nanoseconds total{};
   std::chrono::nanoseconds longest{};
   std::uint64_t count = 0;
+  std::array<std::uint64_t, kDurationBounds.size() + 1> buckets{};
 
   void add(std::chrono::nanoseconds time);
   [[nodiscard]] std::chrono::nanoseconds mean() const {
@@ -32,7 +37,9 @@ struct ScanTotals {
   std::uint64_t succeeded = 0;
   std::map<ErrorCode, std::uint64_t> failed;
   std::optional<Error> last_error;
-  std::uint64_t points = 0;  ///< of the last scan
+  std::uint64_t points = 0;      ///< of the last scan
+  std::uint64_t all_points = 0;  ///< of symbols
+  std::uint64_t lost_tries = 0;  ///< of the scans that succeeded
   std::array<std::uint64_t, kRegionStatusCount> regions{};
   RegionCounts regions_of_last{};
   std::uint64_t skipped = 0;  ///< sets of frames taken in free run and not decoded: newer ones came
@@ -40,6 +47,8 @@ struct ScanTotals {
   Duration decode;
   Duration latency;  ///< from the last byte of a scan's frames to its cloud at a client's socket
   std::array<Duration, kStageCount> stages{};
+  Duration dense;  ///< of the scans with a point for each pixel, what those took
+  std::array<std::uint64_t, kDensePixelCount> pixels{};
 };
 
 /// Counts scans. @thread thread-safe

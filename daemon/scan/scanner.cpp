@@ -8,6 +8,7 @@
 #include <random>
 
 #include "daemon/scan/log_field.hpp"
+#include "daemon/scan/message_ids.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/system/thread_name.hpp"
 
@@ -371,13 +372,14 @@ void Scanner::log_outcome(const std::string& scan_id, const Result<ScanResult>& 
     spdlog::debug("scan {}: {} points, capture {:.1f} ms, decode {:.1f} ms, {} lost tries", scan_id,
                   result->cloud.points.size(), milliseconds(result->capture_time), milliseconds(result->decode_time),
                   result->lost.count);
-    if (failures_in_a_row_ > 0) spdlog::info("scan {}: scans succeed again", scan_id);
-    failures_in_a_row_ = 0;
-    return;
+    if (failures_in_a_row_.exchange(0) == 0) return;
+    const MessageId id(MessageId::kScansSucceedAgain);
+    return spdlog::info("scan {}: scans succeed again", scan_id);
   }
   const bool of_the_client = result.error().code == ErrorCode::kCancelled;
   const auto level = of_the_client || failures_in_a_row_ > 0 ? spdlog::level::debug : spdlog::level::info;
   const LogField code("SLSD_ERROR", std::string(to_string(result.error().code)));
+  const MessageId id(MessageId::kScanFailed);
   spdlog::log(level, "scan {} failed ({}): {}", scan_id, to_string(result.error().code), to_string(result.error()));
   if (!of_the_client) ++failures_in_a_row_;
 }

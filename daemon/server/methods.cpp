@@ -14,6 +14,8 @@
 #include "daemon/rpc/base64.hpp"
 #include "daemon/rpc/message.hpp"
 #include "daemon/rpc/param_reader.hpp"
+#include "daemon/scan/message_ids.hpp"
+#include "daemon/server/metrics.hpp"
 #include "daemon/server/report_json.hpp"
 
 namespace slsd {
@@ -157,7 +159,7 @@ Outcome scan_reply(const ScanResult& scan, CloudForm form, bool as_memfd, FrameC
   return reply;
 }
 
-Outcome image_reply(std::string bytes, json result) {
+Outcome bytes_reply(std::string bytes, json result) {
   Reply reply{std::move(result)};
   reply.result["bytes"] = bytes.size();
   reply.bytes = share(std::move(bytes));
@@ -205,7 +207,7 @@ void run_preview(ServiceState& state, const json& params, Session& session, Resp
   state.scanner.scan(request, carry_scan(state, std::move(respond), [](const ScanResult& scan) -> Outcome {
                        json result = scan_json(scan);
                        result["format"] = "png";
-                       return image_reply(scan.picture_png, std::move(result));
+                       return bytes_reply(scan.picture_png, std::move(result));
                      }));
 }
 
@@ -222,8 +224,14 @@ void run_frame(ServiceState& state, const json& params, Session& session, Respon
                       carry<FrameImage>(state, std::move(respond), [format](const FrameImage& image) {
                         json result = frame_json(image);
                         result["format"] = format;
-                        return image_reply(image.bytes, std::move(result));
+                        return bytes_reply(image.bytes, std::move(result));
                       }));
+}
+
+void run_metrics(ServiceState& state, const json& params, Session&, Respond respond) {
+  const ParamReader reader(params);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  respond(bytes_reply(metrics_text(state), {{"format", "openmetrics"}}));
 }
 
 void run_pattern(ServiceState& state, const json& params, Session&, Respond respond) {
@@ -231,7 +239,7 @@ void run_pattern(ServiceState& state, const json& params, Session&, Respond resp
   (void)reader.choice("format", {"png"});
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
   state.scanner.pattern(carry<std::string>(state, std::move(respond), [](const std::string& png) {
-    return image_reply(png, {{"format", "png"}});
+    return bytes_reply(png, {{"format", "png"}});
   }));
 }
 
@@ -290,15 +298,22 @@ void run_reload(ServiceState& state, const json& params, Session&, Respond respo
 }
 
 constexpr std::array kMethods{
-    RpcMethod{"frame", Role::kScan, run_frame},          RpcMethod{"pattern", Role::kObserve, run_pattern},
-    RpcMethod{"preview", Role::kScan, run_preview},      RpcMethod{"project", Role::kAdminister, run_project},
-    RpcMethod{"reload", Role::kAdminister, run_reload},  RpcMethod{"scan", Role::kScan, run_scan},
-    RpcMethod{"settings", Role::kObserve, run_settings}, RpcMethod{"status", Role::kObserve, run_status},
-    RpcMethod{"subscribe", Role::kScan, run_subscribe},  RpcMethod{"unsubscribe", Role::kObserve, run_unsubscribe},
+    RpcMethod{"frame", Role::kScan, run_frame},
+    RpcMethod{"metrics", Role::kObserve, run_metrics},
+    RpcMethod{"pattern", Role::kObserve, run_pattern},
+    RpcMethod{"preview", Role::kScan, run_preview},
+    RpcMethod{"project", Role::kAdminister, run_project},
+    RpcMethod{"reload", Role::kAdminister, run_reload},
+    RpcMethod{"scan", Role::kScan, run_scan},
+    RpcMethod{"settings", Role::kObserve, run_settings},
+    RpcMethod{"status", Role::kObserve, run_status},
+    RpcMethod{"subscribe", Role::kScan, run_subscribe},
+    RpcMethod{"unsubscribe", Role::kObserve, run_unsubscribe},
 };
 
 RpcError not_for(Session& session, const RpcMethod& method) {
   const Peer& peer = session.peer();
+  const MessageId id(MessageId::kClientRefused);
   if (session.is_first_refusal())
     spdlog::warn("a client (process {}, user {}) asked for {}, which takes the role \"{}\": refused", peer.process,
                  peer.user, method.name, to_string(method.role));
@@ -317,11 +332,16 @@ std::span<const RpcMethod> methods() {
 }
 
 void dispatch(ServiceState& state, const Request& request, Session& session, Respond respond) {
+  respond = [&state, answer = std::move(respond)](Outcome outcome) {
+    if (!outcome) ++state.requests.failed[outcome.error().name];
+    answer(std::move(outcome));
+  };
   const auto found = std::ranges::lower_bound(kMethods, request.method, {}, &RpcMethod::name);
   if (found != kMethods.end() && found->name == request.method) {
     if (session.role() < found->role) return respond(tl::unexpected(not_for(session, *found)));
     if (found->role == Role::kAdminister)
       spdlog::info("{}: by user {} (process {})", found->name, session.peer().user, session.peer().process);
+    ++state.requests.by_method[found->name];
     return found->run(state, request.params, session, std::move(respond));
   }
   std::vector<std::string> names;

@@ -5,7 +5,9 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include <asio/io_context.hpp>
@@ -18,6 +20,12 @@
 
 namespace slsd {
 
+/// What was asked for so far.
+struct RequestCounts {
+  std::map<std::string_view, std::uint64_t> by_method;
+  std::map<std::string, std::uint64_t> failed;  ///< by the error's name
+};
+
 /// What the methods act on. Everything outlives the server's sessions.
 struct ServiceState {
   asio::io_context& events;
@@ -28,6 +36,7 @@ struct ServiceState {
   Server* server = nullptr;
   std::function<std::uint64_t()> log_lines_dropped = {};
   std::function<void(Respond)> reload = {};  ///< reads the configuration anew, then answers
+  RequestCounts requests = {};
 };
 
 /// One method of the socket's protocol.

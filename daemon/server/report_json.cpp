@@ -4,6 +4,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "core/printable.hpp"
@@ -117,6 +118,8 @@ json memory_json(const MemoryBudget& memory) {
   return {{"held_bytes", memory.held()}, {"lent_bytes", memory.lent()}, {"limit_bytes", memory.limit()}};
 }
 
+}  // namespace
+
 std::uint64_t resident_bytes() {
   std::ifstream statm("/proc/self/statm");
   std::uint64_t total_pages = 0;
@@ -125,7 +128,12 @@ std::uint64_t resident_bytes() {
   return resident_pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
-}  // namespace
+bool is_ready(const ServiceState& state) {
+  const RigStatus rig = state.scanner.rig().status();
+  const bool open = is_open(rig.projector.state) &&
+                    std::ranges::all_of(rig.cameras, [](const DeviceStatus& camera) { return is_open(camera.state); });
+  return open && !rig.cameras.empty() && !state.configuration.calibration_file.empty();
+}
 
 double latency_ms(MonotonicTime received) {
   return milliseconds(std::chrono::steady_clock::now() - received);
@@ -207,17 +215,15 @@ json settings_json(const Configuration& configuration) {
 json status_json(const ServiceState& state) {
   const Rig& rig = state.scanner.rig();
   json cameras = json::array();
-  bool ready = is_open(rig.projector_status().state) && !state.configuration.calibration_file.empty();
   const std::vector<DriftState> drifts = state.scanner.drifts();
   for (const DeviceStatus& camera : rig.camera_statuses()) {
     cameras.push_back(camera_status_json(camera, cameras.size() < drifts.size() ? &drifts[cameras.size()] : nullptr));
-    ready = ready && is_open(camera.state);
   }
   const auto uptime = std::chrono::duration<double>(std::chrono::steady_clock::now() - state.started);
   return {{"version", SLSD_VERSION},
           {"process", ::getpid()},
           {"uptime_s", uptime.count()},
-          {"ready", ready && !cameras.empty()},
+          {"ready", is_ready(state)},
           {"resident_bytes", resident_bytes()},
           {"log_lines_dropped", state.log_lines_dropped()},
           {"clients", state.server->clients()},

@@ -26,4 +26,10 @@ namespace slsd {
 /// What `status` answers: the service, its devices, and what all scans came to.
 [[nodiscard]] nlohmann::json status_json(const ServiceState& state);
 
+/// Whether all devices are open, and there is a calibration.
+[[nodiscard]] bool is_ready(const ServiceState& state);
+
+/// Memory of this process.
+[[nodiscard]] std::uint64_t resident_bytes();
+
 }  // namespace slsd

@@ -99,9 +99,11 @@ void Server::on_accepted(const std::error_code& error, Session::Socket socket) {
   retrying_ = false;
   const Peer peer = peer_of(socket.native_handle());
   if (const auto refused = refuses(peer)) {
+    ++room_->traffic.refused;
     turn_away(std::move(socket), *refused);
   } else {
     const auto session = std::make_shared<Session>(std::move(socket), room_);
+    ++room_->traffic.accepted;
     sessions_.insert(session);
     session->start();
   }

@@ -48,7 +48,8 @@ class Server {
   [[nodiscard]] std::size_t clients() const { return sessions_.size(); }
   [[nodiscard]] std::size_t subscribers() const;
   /// How many were too slow to take what was sent to them.
-  [[nodiscard]] std::uint64_t dropped() const { return room_->dropped; }
+  [[nodiscard]] std::uint64_t dropped() const { return room_->traffic.dropped; }
+  [[nodiscard]] const Traffic& traffic() const { return room_->traffic; }
   [[nodiscard]] const MemoryBudget& memory() const { return room_->memory; }
   /// To be called when a session's subscription changed.
   void update_demand();

@@ -14,6 +14,8 @@
 #include <spdlog/spdlog.h>
 #include <asio/buffer.hpp>
 
+#include "daemon/scan/message_ids.hpp"
+
 namespace slsd {
 namespace {
 
@@ -165,6 +167,7 @@ bool Session::receive() {
     input_ = Input::kEnded;
     return true;
   }
+  room_.traffic.bytes_received += static_cast<std::uint64_t>(size);
   lines_.append({room_.chunk.data(), static_cast<std::size_t>(size)});
   if (memory_.resize(MemoryAccount::Part::kRequest, lines_.capacity())) return true;
   lines_.clear();
@@ -278,6 +281,7 @@ void Session::publish(const SharedPublication& publication, std::uint64_t lost) 
   subscription_->offer(publication, Subscription::Clock::now());
   weigh_waiting();
   send_waiting_event();
+  if (subscription_) room_.traffic.clouds_lost += subscription_->take_uncounted();
 }
 
 // What does not fit is lost, the oldest first: the next event tells.
@@ -317,6 +321,7 @@ void Session::write() {
     if (sent < 0 && errno != EAGAIN) return end();
     if (sent > 0) {
       sent_ += static_cast<std::size_t>(sent);
+      room_.traffic.bytes_sent += static_cast<std::uint64_t>(sent);
       sent_at_ = Clock::now();
     }
     if (sent_ == front.size()) {
@@ -363,7 +368,8 @@ bool Session::is_sending_since(Clock::time_point time) const {
 // In the middle of a message nothing can be told: it would be taken for the message's own bytes. That it is cut short
 // tells, and the log and the status do.
 void Session::drop() {
-  ++room_.dropped;
+  ++room_.traffic.dropped;
+  const MessageId id(MessageId::kClientDropped);
   spdlog::info("a client (process {}, user {}) took {} of {} bytes in {} ms: dropped", peer_.process, peer_.user,
                sent_ - timed_, std::min(outgoing_.front().size() - timed_, kSlice), room_.options.send_timeout_ms);
   if (sent_ == 0) {

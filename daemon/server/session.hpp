@@ -30,6 +30,16 @@ namespace slsd {
 
 class Session;
 
+/// What went between a server and all its clients so far.
+struct Traffic {
+  std::uint64_t accepted = 0;     ///< clients
+  std::uint64_t refused = 0;      ///< for want of places or of a role
+  std::uint64_t dropped = 0;      ///< as they were too slow
+  std::uint64_t clouds_lost = 0;  ///< by subscribers that read too slowly
+  std::uint64_t bytes_received = 0;
+  std::uint64_t bytes_sent = 0;
+};
+
 /// What the sessions of a server have in common.
 struct SessionRoom {
   SessionRoom(asio::io_context& events, const ServerOptions& server_options)
@@ -45,7 +55,7 @@ struct SessionRoom {
   LentMemory lent;
   Turns turns;
   std::array<char, 65536> chunk{};  ///< of the session whose turn it is
-  std::uint64_t dropped = 0;        ///< clients that were too slow
+  Traffic traffic;
   /// Carries a request out; answers through respond, now or later.
   std::function<void(const Request&, Session&, Respond respond)> handler = {};
   std::function<void(Session&, bool subscribed)> ended = {};

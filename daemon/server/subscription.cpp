@@ -28,7 +28,7 @@ void Subscription::drop_old(Clock::time_point now) {
 }
 
 void Subscription::lose_oldest() {
-  if (waiting_.front().publication->scan()) ++lost_;
+  if (waiting_.front().publication->scan()) ++lost_, ++uncounted_;
   waiting_.pop_front();
 }
 

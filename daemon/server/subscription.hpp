@@ -7,6 +7,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "daemon/scan/cloud_files.hpp"
 #include "daemon/scan/scanner.hpp"
@@ -60,8 +61,10 @@ class Subscription {
   void offer(SharedPublication publication, Clock::time_point now);
   /// Clouds that were replaced before this client's session saw them.
   void note_lost(std::uint64_t count) {
-    if (!rate_hz_) lost_ += count;  // else the next cloud is as good
+    if (!rate_hz_) lost_ += count, uncounted_ += count;  // else the next cloud is as good
   }
+  /// Clouds lost since this was asked before.
+  [[nodiscard]] std::uint64_t take_uncounted() { return std::exchange(uncounted_, 0); }
   /// What those that wait hold of memory.
   [[nodiscard]] std::size_t waiting_bytes() const;
   /// Loses the one that has waited longest.
@@ -81,6 +84,7 @@ class Subscription {
   Clock::time_point next_{};
   std::deque<Waiting> waiting_;
   std::uint64_t lost_ = 0;
+  std::uint64_t uncounted_ = 0;
 };
 
 }  // namespace slsd

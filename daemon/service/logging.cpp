@@ -23,6 +23,7 @@
 
 #include "core/printable.hpp"
 #include "daemon/scan/log_field.hpp"
+#include "daemon/scan/message_ids.hpp"
 #include "drivers/system/thread_name.hpp"
 
 namespace slsd {
@@ -123,7 +124,7 @@ struct LogSink::Queue {
     dropping = false;
     lines.push_back({spdlog::level::warn,
                      fmt::format("{} lines of the log were dropped here: nobody read them in time", dropped - missing),
-                     {}});
+                     {fmt::format("MESSAGE_ID={}", MessageId::kLogDropped)}});
   }
 
   void write_lines(const Output& output) {

@@ -11,6 +11,7 @@
 
 #include "daemon/configuration/exposure_warnings.hpp"
 #include "daemon/scan/devices.hpp"
+#include "daemon/scan/message_ids.hpp"
 #include "daemon/scan/projected_picture.hpp"
 #include "daemon/service/logging.hpp"
 
@@ -108,6 +109,7 @@ Result<> Service::run() {
 
 void Service::announce() const {
   const Configuration& configuration = state_.configuration;
+  const MessageId id(MessageId::kReady);
   spdlog::info("ready at {}: {} camera(s), projector {} {}x{}, {}", configuration.server.socket.string(),
                configuration.cameras.size(), to_string(configuration.projector.driver),
                configuration.projector.width_px, configuration.projector.height_px,
@@ -172,6 +174,7 @@ void Service::reload(Respond answered) {
 void Service::on_reloaded(const Result<Configuration>& configuration, const Respond& answered) {
   notifier_.ready("ready");
   if (!configuration) {
+    const MessageId id(MessageId::kReloadRefused);
     spdlog::error("reload refused, everything stays as it was: {}", to_string(configuration.error()));
     return answered(tl::unexpected(rpc_error(configuration.error())));
   }

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "core/result.hpp"
 #include "core/shown_picture.hpp"
@@ -24,6 +26,13 @@ struct CameraDescription {
   std::string hardware = {};  ///< after open(): what tells the device from others of its kind, wherever it is plugged
                               ///< in; printable, at most 200 bytes; empty where nothing does
   bool external_trigger = false;  ///< exposes when a line outside of this host says so: it may be silent for long
+};
+
+/// A number that a driver keeps of its own: "packets_sent_again", "clock_drift_ppm".
+struct DriverFigure {
+  std::string_view name;  ///< lives as long as the program
+  double value = 0.0;
+  bool counts = true;  ///< only grows, until the device is opened anew; else it is what it is now
 };
 
 /// A camera that takes one frame to a trigger. Backends: file, v4l2, aravis. Every backend passes the suite in
@@ -80,6 +89,9 @@ class Camera {
   /// Whether the open device is still there, as far as can be told without a frame and without waiting.
   /// @errors kDisconnected: it needs open()
   [[nodiscard]] virtual Result<> check() { return {}; }
+
+  /// Appends what the driver counts besides frames delivered and lost.
+  virtual void tell_figures(std::vector<DriverFigure>& /*figures*/) const {}
 
   /// Ends the capture() that waits on another thread, soon, with kCancelled; where none waits, ends the next one, so
   /// that a cancel() that comes just before it is not lost. open() forgets it; one that comes while a backend waits

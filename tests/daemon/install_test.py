@@ -28,7 +28,7 @@ class Install(unittest.TestCase):
     def test_puts_everything_in_its_place(self):
         install("/usr", str(self.root))
         for file in ("usr/bin/slsd", "usr/bin/slsctl", *(f"usr/lib/systemd/system/{unit}" for unit in UNITS),
-                     "usr/lib/sysusers.d/slsd.conf", "usr/lib/udev/rules.d/60-slsd.rules",
+                     "usr/lib/sysusers.d/slsd.conf", "usr/lib/systemd/catalog/slsd.catalog", "usr/lib/udev/rules.d/60-slsd.rules",
                      "usr/share/bash-completion/completions/slsctl", "etc/slsd/slsd.toml",
                      "etc/slsd/patterns/16px-5.toml",
                      "usr/share/slsd/boards/charuco-11x7-23mm-a4.pdf", "usr/share/man/man1/slsctl.1", "usr/share/man/man5/slsd.toml.5",

@@ -22,6 +22,8 @@ PRIVATE_RUN = ["unshare", "--mount", "--map-root-user", "sh", "-c", 'mount --bin
 QUEUE = 1024
 LONGEST = 2048
 SECONDS = 0.0
+DEVICE_LOST = "4d5bfa985efe404790a7f9fc62e585d8"  # as systemd/slsd.catalog has them, for good
+SCAN_FAILED = "aa8fd2b94774407b8c04099fd35bb9fd"
 
 
 class FullPipe(Service):
@@ -157,6 +159,7 @@ class Log(unittest.TestCase):
             self.assertEqual((lost["SLSD_CAMERA"], lost["SLSD_ERROR"], lost["PRIORITY"]), ("camera", "disconnected", "4"))
             failed = service.entry("failed (disconnected)")
             self.assertEqual(failed["SLSD_ERROR"], "disconnected")
+            self.assertEqual((lost["MESSAGE_ID"], failed["MESSAGE_ID"]), (DEVICE_LOST, SCAN_FAILED))
             self.assertTrue(failed["MESSAGE"].startswith(f"scan {failed['SLSD_SCAN']} failed"))
 
 

@@ -102,6 +102,21 @@ void AravisCamera::cancel() {
   events_->cancel();
 }
 
+void AravisCamera::tell_figures(std::vector<DriverFigure>& figures) const {
+  const AravisStatistics counted = statistics();
+  const auto tell = [&](std::string_view name, std::uint64_t count) {
+    figures.push_back({name, static_cast<double>(count)});
+  };
+  tell("frames_missing", counted.lost);
+  tell("frames_torn", counted.torn);
+  tell("frames_stale", counted.stale);
+  tell("frames_misexposed", counted.misexposed);
+  tell("packets_sent_again", counted.packets_sent_again);
+  tell("packets_missing", counted.packets_missing);
+  tell("underruns", counted.underruns);
+  figures.push_back({"clock_drift_ppm", clock_drift_ppm(), false});
+}
+
 AravisStatistics AravisCamera::statistics() const {
   return session_ ? session_->statistics() : ended_;
 }

@@ -53,6 +53,7 @@ class AravisCamera final : public Camera {
   [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override;
   /// Tells what the camera's own clock, which is read every second, or its heartbeat found out.
   [[nodiscard]] Result<> check() override;
+  void tell_figures(std::vector<DriverFigure>& figures) const override;
   void cancel() override;
 
   /// Of the session that is open, or the one before.

@@ -41,6 +41,7 @@ struct AravisStatistics {
   std::uint64_t misexposed = 0;  ///< of another exposure or gain than configured, by their chunks
   std::uint64_t packets_sent_again = 0;
   std::uint64_t packets_missing = 0;
+  std::uint64_t underruns = 0;  ///< frames that came while no buffer was free
 };
 
 }  // namespace slsd

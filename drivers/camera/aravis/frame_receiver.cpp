@@ -313,6 +313,7 @@ AravisStatistics FrameReceiver::statistics() const {
   AravisStatistics statistics = counted_;
   if (ARV_IS_GV_STREAM(stream_))
     arv_gv_stream_get_statistics(ARV_GV_STREAM(stream_), &statistics.packets_sent_again, &statistics.packets_missing);
+  arv_stream_get_statistics(stream_, nullptr, nullptr, &statistics.underruns);
   return statistics;
 }
 

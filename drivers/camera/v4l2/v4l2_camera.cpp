@@ -312,6 +312,12 @@ Result<Frame> V4l2Camera::convert(const v4l2_buffer& buffer, MonotonicTime expos
   return std::move(*frame).restamped(exposure_start, received);
 }
 
+void V4l2Camera::tell_figures(std::vector<DriverFigure>& figures) const {
+  figures.push_back({"frames_before_trigger", static_cast<double>(counts_.before_trigger)});
+  figures.push_back({"frames_dropped", static_cast<double>(counts_.dropped)});
+  figures.push_back({"frames_torn", static_cast<double>(counts_.torn)});
+}
+
 tl::unexpected<Error> V4l2Camera::lose(ErrorCode code, std::uint64_t frames, std::string message) {
   next_sequence_ += frames;
   return fail_here(code, std::move(message));

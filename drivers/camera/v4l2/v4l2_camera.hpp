@@ -51,6 +51,7 @@ class V4l2Camera final : public Camera {
   /// is older than a few periods, as capture().
   [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override;
   [[nodiscard]] Result<> check() override;
+  void tell_figures(std::vector<DriverFigure>& figures) const override;
   void cancel() override { wake_.wake(); }
 
   [[nodiscard]] const V4l2FrameCounts& counts() const { return counts_; }

@@ -265,7 +265,7 @@ TEST_F(SessionTest, WhoReadsByBytesIsDropped) {
     char byte = 0;
     return ::recv(client_.number(), &byte, 1, MSG_DONTWAIT), ended_;
   });
-  EXPECT_EQ(room_->dropped, 1U);
+  EXPECT_EQ(room_->traffic.dropped, 1U);
 }
 
 TEST_F(SessionTest, WhoTakesAMegabyteInTimeIsNotDropped) {
@@ -285,7 +285,7 @@ TEST_F(SessionTest, WhoTakesAMegabyteInTimeIsNotDropped) {
     return size > kSize || ended_;
   });
   EXPECT_FALSE(ended_);
-  EXPECT_EQ(room_->dropped, 0U);
+  EXPECT_EQ(room_->traffic.dropped, 0U);
 }
 
 TEST_F(SessionTest, TellsWhoAsksForMoreThanThereIs) {

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/server/metrics.hpp"
+
+#include <initializer_list>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "daemon/scan/scan_statistics.hpp"
+#include "daemon/server/report_json.hpp"
+
+namespace slsd {
+namespace {
+
+using Labels = std::initializer_list<std::pair<std::string_view, std::string_view>>;
+
+std::string escaped(std::string_view value) {
+  std::string text;
+  for (const char letter : value) {
+    if (letter == '\\' || letter == '"') text += '\\';
+    text += letter == '\n' ? std::string("\\n") : std::string(1, letter);
+  }
+  return text;
+}
+
+/// Writes metric families, each in one piece.
+class Exposition {
+ public:
+  /// @param name  where it has a unit, that comes last, after "_"
+  void family(std::string_view name, std::string_view type, std::string_view help, std::string_view unit = {}) {
+    name_ = name;
+    counter_ = type == "counter";
+    text_ += fmt::format("# TYPE {} {}\n", name, type);
+    if (!unit.empty()) text_ += fmt::format("# UNIT {} {}\n", name, unit);
+    text_ += fmt::format("# HELP {} {}\n", name, help);
+  }
+
+  void sample(double value, Labels labels = {}) { line(counter_ ? "_total" : "", labels, value); }
+
+  void one(std::string_view name, std::string_view type, std::string_view help, double value,
+           std::string_view unit = {}) {
+    family(name, type, help, unit);
+    sample(value);
+  }
+
+  void histogram(const Duration& duration, std::string_view label = {}, std::string_view value = {}) {
+    std::uint64_t below = 0;
+    const bool labelled = !label.empty();
+    for (std::size_t i = 0; i < duration.buckets.size(); ++i) {
+      below += duration.buckets[i];
+      std::string bound = i < kDurationBounds.size() ? fmt::format("{}", kDurationBounds[i]) : "+Inf";
+      if (bound.find('.') == std::string::npos && bound != "+Inf") bound += ".0";  // as OpenMetrics writes a bound
+      labelled ? line("_bucket", {{label, value}, {"le", bound}}, static_cast<double>(below))
+               : line("_bucket", {{"le", bound}}, static_cast<double>(below));
+    }
+    const double seconds = std::chrono::duration<double>(duration.total).count();
+    labelled ? line("_count", {{label, value}}, static_cast<double>(duration.count))
+             : line("_count", {}, static_cast<double>(duration.count));
+    labelled ? line("_sum", {{label, value}}, seconds) : line("_sum", {}, seconds);
+  }
+
+  [[nodiscard]] std::string finish() && { return std::move(text_) + "# EOF\n"; }
+
+ private:
+  void line(std::string_view suffix, Labels labels, double value) {
+    text_ += name_, text_ += suffix;
+    char before = '{';
+    for (const auto& [label, of] : labels) {
+      text_ += fmt::format("{}{}=\"{}\"", before, label, escaped(of));
+      before = ',';
+    }
+    text_ += fmt::format("{} {}\n", before == ',' ? "}" : "", value);
+  }
+
+  std::string text_;
+  std::string name_;
+  bool counter_ = false;
+};
+
+void tell_service(const ServiceState& state, Exposition& out) {
+  const auto uptime = std::chrono::duration<double>(std::chrono::steady_clock::now() - state.started);
+  out.family("slsd_build", "gauge", "1, with the version of the service.");
+  out.sample(1, {{"version", SLSD_VERSION}});
+  out.one("slsd_uptime_seconds", "gauge", "How long the service has been running.", uptime.count(), "seconds");
+  out.one("slsd_ready", "gauge", "1 where all devices are open and there is a calibration.", is_ready(state) ? 1 : 0);
+  out.one("slsd_resident_bytes", "gauge", "Memory of the service.", static_cast<double>(resident_bytes()), "bytes");
+  out.one("slsd_log_lines_dropped", "counter", "Lines of the log that nobody read in time.",
+          static_cast<double>(state.log_lines_dropped()));
+}
+
+void tell_clients(const ServiceState& state, Exposition& out) {
+  const Server& server = *state.server;
+  const Traffic& traffic = server.traffic();
+  const auto count = [&](std::string_view name, std::string_view help, std::uint64_t value,
+                         std::string_view unit = {}) {
+    out.one(name, "counter", help, static_cast<double>(value), unit);
+  };
+  out.one("slsd_clients", "gauge", "Clients that are connected.", static_cast<double>(server.clients()));
+  out.one("slsd_subscribers", "gauge", "Of these, those that are sent clouds.",
+          static_cast<double>(server.subscribers()));
+  count("slsd_clients_accepted", "Clients that connected.", traffic.accepted);
+  count("slsd_clients_refused", "Clients that were turned away, for want of places or of a role.", traffic.refused);
+  count("slsd_clients_dropped", "Clients that took what was sent to them too slowly.", traffic.dropped);
+  count("slsd_received_bytes", "Bytes of requests.", traffic.bytes_received, "bytes");
+  count("slsd_sent_bytes", "Bytes of replies and events; memfds are not among them.", traffic.bytes_sent, "bytes");
+  count("slsd_clouds_lost", "Clouds that subscribers lost, as they read too slowly.", traffic.clouds_lost);
+  const MemoryBudget& memory = server.memory();
+  out.family("slsd_clients_memory_bytes", "gauge", "Memory that waits for clients: held, lent of that, the limit.",
+             "bytes");
+  out.sample(static_cast<double>(memory.held()), {{"part", "held"}});
+  out.sample(static_cast<double>(memory.lent()), {{"part", "lent"}});
+  out.sample(static_cast<double>(memory.limit()), {{"part", "limit"}});
+  out.family("slsd_requests", "counter", "Requests, by method.");
+  for (const RpcMethod& method : methods()) {
+    const auto asked = state.requests.by_method.find(method.name);
+    const bool ever = asked != state.requests.by_method.end();
+    out.sample(ever ? static_cast<double>(asked->second) : 0, {{"method", method.name}});
+  }
+  out.family("slsd_requests_failed", "counter", "Requests that were answered with an error, by its name.");
+  for (const auto& [name, failed] : state.requests.failed) out.sample(static_cast<double>(failed), {{"error", name}});
+}
+
+constexpr DeviceState kStates[] = {DeviceState::kAbsent, DeviceState::kOpening, DeviceState::kReady,
+                                   DeviceState::kCapturing, DeviceState::kFaulted};
+
+void tell_cameras(const ServiceState& state, Exposition& out) {
+  const std::vector<DeviceStatus> cameras = state.scanner.rig().camera_statuses();
+  out.family("slsd_camera_state", "gauge", "1 for the state that the camera is in.");
+  for (const DeviceStatus& camera : cameras) {
+    for (const DeviceState each : kStates)
+      out.sample(camera.state == each ? 1 : 0, {{"camera", camera.name}, {"state", to_string(each)}});
+  }
+  const auto count = [&](std::string_view name, std::string_view help, auto value_of) {
+    out.family(name, "counter", help);
+    for (const DeviceStatus& camera : cameras)
+      out.sample(static_cast<double>(value_of(camera)), {{"camera", camera.name}});
+  };
+  count("slsd_camera_frames", "Frames delivered.", [](const DeviceStatus& camera) { return camera.frames; });
+  count("slsd_camera_reconnects", "Times the camera was opened again after it was lost.",
+        [](const DeviceStatus& camera) { return camera.opened > 0 ? camera.opened - 1 : 0; });
+  out.family("slsd_camera_frames_lost", "counter",
+             "Frames asked for and not delivered, by the error; \"missing\": between two that were delivered.");
+  for (const DeviceStatus& camera : cameras) {
+    std::uint64_t missing = camera.frames_lost;
+    for (const auto& [code, failed] : camera.frames_failed) {
+      out.sample(static_cast<double>(failed), {{"camera", camera.name}, {"cause", to_string(code)}});
+      missing -= failed;
+    }
+    out.sample(static_cast<double>(missing), {{"camera", camera.name}, {"cause", "missing"}});
+  }
+  for (const bool counts : {true, false}) {
+    counts ? out.family("slsd_camera_driver", "counter", "What the camera's driver counts itself, since it opened it.")
+           : out.family("slsd_camera_driver_now", "gauge", "What the camera's driver tells of itself.");
+    for (const DeviceStatus& camera : cameras) {
+      for (const DriverFigure& figure : camera.figures) {
+        if (figure.counts == counts)
+          out.sample(figure.value, {{"camera", camera.name}, {"driver", camera.driver}, {"figure", figure.name}});
+      }
+    }
+  }
+  const std::vector<DriftState> drifts = state.scanner.drifts();
+  const auto drift = [&](std::string_view name, std::string_view help, auto value_of, std::string_view unit) {
+    out.family(name, "gauge", help, unit);
+    for (std::size_t i = 0; i < std::min(drifts.size(), cameras.size()); ++i)
+      out.sample(value_of(drifts[i]), {{"camera", cameras[i].name}});
+  };
+  drift(
+      "slsd_camera_epipolar_px", "How far the points of recent scans lie off their epipolar lines.",
+      [](const DriftState& of) { return of.epipolar_px; }, "px");
+  drift(
+      "slsd_camera_epipolar_limit_px", "Up to there the camera is as it was calibrated.",
+      [](const DriftState& of) { return of.limit_px; }, "px");
+  drift("slsd_camera_knocked", "1 since the camera was knocked out of its calibration.",
+        [](const DriftState& of) { return of.off_since_scan ? 1.0 : 0.0; }, {});
+}
+
+void tell_projector(const ServiceState& state, Exposition& out) {
+  const DeviceStatus projector = state.scanner.rig().projector_status();
+  out.family("slsd_projector_state", "gauge", "1 for the state that the projector is in.");
+  for (const DeviceState each : kStates) out.sample(projector.state == each ? 1 : 0, {{"state", to_string(each)}});
+  out.one("slsd_projector_reconnects", "counter", "Times the projector was opened again after it was lost.",
+          static_cast<double>(projector.opened > 0 ? projector.opened - 1 : 0));
+}
+
+void tell_scans(const ServiceState& state, Exposition& out) {
+  const ScanTotals totals = state.scanner.totals();
+  const auto count = [&](std::string_view name, std::string_view help, std::uint64_t value) {
+    out.one(name, "counter", help, static_cast<double>(value));
+  };
+  count("slsd_scans_succeeded", "Scans that gave a cloud.", totals.succeeded);
+  out.family("slsd_scans_failed", "counter", "Scans that gave an error, by its name.");
+  for (const auto& [code, failed] : totals.failed)
+    out.sample(static_cast<double>(failed), {{"error", to_string(code)}});
+  count("slsd_scans_skipped", "Sets of frames taken and not decoded, as newer ones came.", totals.skipped);
+  count("slsd_scan_tries_lost", "Tries that lost their frames, of scans that then gave a cloud.", totals.lost_tries);
+  count("slsd_points", "Points of symbols, of all clouds.", totals.all_points);
+  out.one("slsd_points_of_last_scan", "gauge", "Points of symbols of the last cloud.",
+          static_cast<double>(totals.points));
+  out.family("slsd_regions", "counter", "Regions of all frames, decoded or by the reason why not.");
+  for (std::size_t i = 0; i < totals.regions.size(); ++i)
+    out.sample(static_cast<double>(totals.regions[i]), {{"status", to_string(static_cast<RegionStatus>(i))}});
+  out.family("slsd_pixels", "counter", "Pixels of all dense clouds, measured or by the reason why not.");
+  for (std::size_t i = 0; i < totals.pixels.size(); ++i)
+    out.sample(static_cast<double>(totals.pixels[i]), {{"status", to_string(static_cast<DensePixel>(i))}});
+  const auto times = [&](std::string_view name, std::string_view help, const Duration& duration) {
+    out.family(name, "histogram", help, "seconds");
+    out.histogram(duration);
+  };
+  times("slsd_capture_seconds", "From a scan's turn to its last frame.", totals.capture);
+  times("slsd_decode_seconds", "From its frames to its cloud.", totals.decode);
+  times("slsd_dense_seconds", "Of that, what the points of pixels took.", totals.dense);
+  times("slsd_latency_seconds", "From the last byte of its frames to its cloud at a client's socket.", totals.latency);
+  out.family("slsd_stage_seconds", "histogram", "What each stage of decoding took.", "seconds");
+  for (std::size_t i = 0; i < totals.stages.size(); ++i)
+    out.histogram(totals.stages[i], "stage", to_string(static_cast<Stage>(i)));
+}
+
+}  // namespace
+
+std::string metrics_text(const ServiceState& state) {
+  Exposition out;
+  tell_service(state, out);
+  tell_scans(state, out);
+  tell_projector(state, out);
+  tell_cameras(state, out);
+  tell_clients(state, out);
+  return std::move(out).finish();
+}
+
+}  // namespace slsd
