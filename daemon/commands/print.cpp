@@ -2,10 +2,8 @@
 // Copyright the slsd authors
 #include <iostream>
 
-#include "core/code/pattern.hpp"
 #include "core/print/draw_sheet.hpp"
 #include "daemon/commands/commands.hpp"
-#include "daemon/scan/scan_setup.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/files/file.hpp"
 
@@ -39,17 +37,6 @@ Result<Sheet> sheet_for(const PrintRequest& request) {
 }
 
 }  // namespace
-
-Result<> write_pattern_image(const std::optional<std::filesystem::path>& configuration_file,
-                             const std::filesystem::path& image) {
-  const auto configuration = load_configuration_or_defaults(configuration_file);
-  if (!configuration) return tl::unexpected(configuration.error());
-  const auto pattern = configured_pattern(*configuration);
-  if (!pattern) return tl::unexpected(pattern.error());
-  const auto png = encode_png(draw_pattern(*pattern));
-  if (!png) return tl::unexpected(png.error());
-  return write_file_atomically(image, *png);
-}
 
 Result<> print_board(const PrintRequest& request) {
   const auto sheet = sheet_for(request);

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/calibrate/drift_watch.hpp"
+#include "core/calibrate/watch/drift_watch.hpp"
 #include "daemon/scan/scan_setup.hpp"
 
 namespace slsd {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/drift_watch.hpp"
+#include "core/calibrate/watch/drift_watch.hpp"
 
 #include <random>
 

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <iostream>
+
+#include <glog/logging.h>
+
+#include "daemon/calibrate/calibrate_from_files.hpp"
+#include "daemon/calibrate/session.hpp"
+#include "daemon/calibrate/verify_from_files.hpp"
+#include "daemon/calibrate/verify_live.hpp"
+#include "daemon/command_line.hpp"
+#include "daemon/service/logging.hpp"
+
+namespace {
+
+slsd::Result<> calibrate(const slsd::CommandLine& line) {
+  if (line.latency) return slsd::calibrate_latency(line.configuration, line.request.output);
+  return line.request.from.empty() ? slsd::calibrate_by_session(line.request)
+                                   : slsd::calibrate_from_files(line.request);
+}
+
+slsd::Result<> carry_out(const slsd::CommandLine& line) {
+  if (!line.print.file.empty()) return slsd::print_board(line.print);
+  if (line.calibrate) return calibrate(line);
+  return line.request.from.empty() ? slsd::verify_live(line.request) : slsd::verify_from_files(line.request);
+}
+
+}  // namespace
+
+// What slsd becomes for --calibrate, --verify and --print-board.
+int main(int argc, char** argv) {
+  const auto line = slsd::parse_command_line(argc, argv);
+  if (!line) return line.error();
+  if (!line->calibrates()) {
+    std::cerr << "slsd-calibrate: needs --calibrate, --verify or --print-board; slsd is the service\n";
+    return slsd::kWrongUsage;
+  }
+  FLAGS_minloglevel = google::GLOG_FATAL;  // what Ceres warns of is judged by the result
+  slsd::start_logging(spdlog::level::from_str(line->level));
+  const int status = slsd::exit_status(carry_out(*line));
+  slsd::flush_log(slsd::kLogPatience);
+  return status;
+}
