@@ -200,11 +200,11 @@ def at_rest(container):
 
 
 def removed(container):
-    container.run("dpkg", "--remove", "slsd-display", "slsd-calibrate", "slsd-client", "slsd")
+    container.run("dpkg", "--remove", *lifecycle.NAMES)
     require(container.show("slsd.service", "ActiveState") == "inactive", "removed, and still active")
     require((container.root / "var/lib/slsd/calibration.yml").exists(), "a removal takes the calibration away")
     container.run("systemctl", "stop", "slsd@example.socket", "slsd@example.service", check=False)
-    container.run("dpkg", "--purge", "slsd-display", "slsd-calibrate", "slsd-client", "slsd")
+    container.run("dpkg", "--purge", *lifecycle.NAMES)
     for user in ("alice", "bob", "carol"):
         container.run("userdel", user)
     left = [path for path in ("etc/slsd", "var/lib/slsd", "run/slsd", "usr/bin/slsd") if (container.root / path).exists()]
