@@ -27,14 +27,10 @@ class Install(unittest.TestCase):
 
     def test_puts_everything_in_its_place(self):
         install("/usr", str(self.root))
-<<<<<<< HEAD
-        for file in ("usr/bin/slsd", "usr/bin/slsctl", *(f"usr/lib/systemd/system/{unit}" for unit in UNITS),
+        for file in ("usr/bin/slsd", "usr/bin/slsctl", "usr/libexec/slsd/slsd-calibrate",
+                     *(f"usr/lib/systemd/system/{unit}" for unit in UNITS),
                      "usr/lib/sysusers.d/slsd.conf", "usr/lib/systemd/catalog/slsd.catalog", "usr/lib/udev/rules.d/60-slsd.rules",
                      "usr/share/bash-completion/completions/slsctl", "etc/slsd/slsd.toml",
-=======
-        for file in ("usr/bin/slsd", "usr/bin/slsctl", "usr/libexec/slsd/slsd-calibrate", "usr/lib/systemd/system/slsd.service",
-                     "usr/lib/systemd/system/slsd-display.service", "etc/slsd/slsd.toml",
->>>>>>> 4e005a7 (daemon: calibrating, verifying and printing boards are a program of their own)
                      "etc/slsd/patterns/16px-5.toml",
                      "usr/share/slsd/boards/charuco-11x7-23mm-a4.pdf", "usr/share/man/man1/slsctl.1", "usr/share/man/man5/slsd.toml.5",
                      "usr/share/man/man8/slsd.8"):
