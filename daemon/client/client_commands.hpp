@@ -4,9 +4,14 @@
 
 #include <string>
 
+#include <nlohmann/json_fwd.hpp>
+#include <tl/expected.hpp>
+
 #include "daemon/client/client_options.hpp"
 
 namespace slsd {
+
+struct Failure;
 
 // slsctl's commands: each prints what it did and gives the exit status.
 
@@ -20,6 +25,8 @@ namespace slsd {
 [[nodiscard]] int project_command(const ClientOptions& options);
 /// Looks at two frames of a camera while the pattern is shown, and proposes exposure and gain.
 [[nodiscard]] int exposure_command(const ClientOptions& options);
+/// The same as JSON, for others than slsctl.
+[[nodiscard]] tl::expected<nlohmann::json, Failure> look_at_exposure(const ClientOptions& options);
 /// Prints the service's metrics, or writes them to a file, whole or not at all.
 [[nodiscard]] int metrics_command(const ClientOptions& options);
 /// Shows rates, latencies and states, again and again.

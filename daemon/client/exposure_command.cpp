@@ -135,6 +135,12 @@ std::string text_of(const Look& look) {
 
 }  // namespace
 
+tl::expected<json, Failure> look_at_exposure(const ClientOptions& options) {
+  const auto seen = look(options);
+  if (!seen) return tl::unexpected(seen.error());
+  return to_json(*seen);
+}
+
 int exposure_command(const ClientOptions& options) {
   const auto seen = look(options);
   if (!seen) return report(options, seen.error());

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "clients/web/cloud_feed.hpp"
+
+#include <utility>
+
+#include "daemon/client/connection.hpp"
+
+namespace slsd::web {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kStaysWanted = 5s;  // after the last watcher asked
+constexpr auto kPatience = 20s;
+constexpr auto kPause = 500ms;  // after a failure
+
+}  // namespace
+
+CloudFeed::CloudFeed(std::filesystem::path socket, std::string density, double rate_hz)
+    : socket_(std::move(socket)), density_(std::move(density)), rate_hz_(rate_hz) {
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+}
+
+bool CloudFeed::wanted() const {
+  return Clock::now() < wanted_until_;
+}
+
+tl::expected<SharedCloud, Failure> CloudFeed::next(std::uint64_t after, std::chrono::milliseconds time) {
+  std::unique_lock lock(mutex_);
+  wanted_until_ = Clock::now() + time + kStaysWanted;
+  changed_.notify_all();
+  const std::uint64_t failures = failures_;
+  const auto there = [&] { return (newest_ && newest_->number != after) || failures_ != failures; };
+  if (!changed_.wait_for(lock, time, there)) return nullptr;
+  if (newest_ && newest_->number != after) return newest_;
+  return tl::unexpected(*failure_);
+}
+
+void CloudFeed::run(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    {
+      std::unique_lock lock(mutex_);
+      newest_.reset();  // of long ago by the time that somebody asks again
+      if (!changed_.wait(lock, stop, [this] { return wanted(); })) return;
+    }
+    Failure failed = follow(stop);
+    std::unique_lock lock(mutex_);
+    if (!wanted()) continue;
+    failure_ = std::move(failed);
+    ++failures_;
+    changed_.notify_all();
+    changed_.wait_for(lock, stop, kPause, [] { return false; });
+  }
+}
+
+// Until nobody wants it any more, or something is wrong.
+Failure CloudFeed::follow(const std::stop_token& stop) {
+  auto connection = Connection::open(socket_);
+  if (!connection) return failure(connection.error());
+  connection->set_patience(kPatience);
+  const auto subscribed =
+      ask(*connection, "subscribe", {{"format", "ply"}, {"density", density_}, {"rate_hz", rate_hz_}});
+  if (!subscribed) return subscribed.error();
+  for (;;) {
+    auto event = connection->receive();
+    if (!event) return failure(event.error());
+    const std::lock_guard lock(mutex_);
+    if (stop.stop_requested() || !wanted()) return failure({ErrorCode::kCancelled, "nobody watches", {}});
+    nlohmann::json params = event->message.value("params", nlohmann::json::object());
+    if (event->message.value("method", "") == "cloud") {
+      newest_ =
+          std::make_shared<const WatchedCloud>(WatchedCloud{++clouds_, std::move(params), std::move(event->bytes)});
+    } else if (params.contains("error")) {
+      failure_ = judge(Answered{{{{"error", params["error"]}}, {}}, {}}).error();
+      ++failures_;
+    }
+    changed_.notify_all();
+  }
+}
+
+}  // namespace slsd::web

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include <nlohmann/json.hpp>
+
+#include "core/result.hpp"
+#include "daemon/client/report.hpp"
+
+namespace slsd::web {
+
+/// A cloud as the service sent it: a PLY, and its description.
+struct WatchedCloud {
+  std::uint64_t number = 0;
+  nlohmann::json about;
+  client::Bytes ply;
+};
+using SharedCloud = std::shared_ptr<const WatchedCloud>;  // shared: watchers send it at their own pace
+
+/// The newest cloud of one density, for any number of watchers: one subscription, while somebody asks.
+/// @thread thread-safe
+class CloudFeed {
+ public:
+  CloudFeed(std::filesystem::path socket, std::string density, double rate_hz);
+  CloudFeed(const CloudFeed&) = delete;
+  CloudFeed& operator=(const CloudFeed&) = delete;
+
+  /// Waits for a cloud after that number, or for a failure. @return null where neither came in time
+  [[nodiscard]] tl::expected<SharedCloud, Failure> next(std::uint64_t after, std::chrono::milliseconds time);
+
+ private:
+  void run(const std::stop_token& stop);
+  [[nodiscard]] Failure follow(const std::stop_token& stop);
+  [[nodiscard]] bool wanted() const;
+
+  std::filesystem::path socket_;
+  std::string density_;
+  double rate_hz_;
+  mutable std::mutex mutex_;
+  std::condition_variable_any changed_;
+  std::chrono::steady_clock::time_point wanted_until_{};
+  SharedCloud newest_;
+  std::optional<Failure> failure_;
+  std::uint64_t failures_ = 0;
+  std::uint64_t clouds_ = 0;
+  std::jthread thread_;
+};
+
+}  // namespace slsd::web

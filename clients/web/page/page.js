@@ -1,0 +1,361 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+"use strict";
+
+const $ = (id) => document.getElementById(id);
+const kStatusPause = 1000, kRetryPause = 1500;
+
+// ---- what is asked for ----
+
+class Refused extends Error {
+  constructor(status, error) {
+    super(error.message);
+    this.status = status;
+    this.name = error.name;
+  }
+}
+
+async function ask(path, body) {
+  let response;
+  try {
+    response = await fetch(path, {
+      method: body === undefined ? "GET" : "POST", headers: {"X-Slsd-Page": "1"}, credentials: "same-origin",
+      cache: "no-store", body: body === undefined ? undefined : JSON.stringify(body)});
+  } catch (error) {
+    throw new Refused(0, {name: "no_page_service", message: "slsd-web does not answer: look whether it is running"});
+  }
+  if (response.ok) return response;
+  const told = await response.json().catch(() => ({}));
+  const refused = new Refused(response.status, told.error || {name: "error", message: "HTTP " + response.status});
+  if (refused.status === 401 && refused.name === "no_token") $("login").open || $("login").showModal();
+  throw refused;
+}
+
+const aboutOf = (response) => JSON.parse(response.headers.get("X-Slsd-About") || "{}");
+const pause = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
+
+function say(error) {
+  $("message").hidden = !error;
+  if (error) $("message").textContent = error.message;
+}
+
+// Runs what a button asks for; its error is shown, and the button waits meanwhile.
+function onClick(button, action) {
+  button.addEventListener("click", async () => {
+    button.disabled = true;
+    try {
+      await action();
+      say(null);
+    } catch (error) {
+      say(error);
+    }
+    button.disabled = false;
+  });
+}
+
+// ---- devices ----
+
+const kStates = {
+  ready: ["good", "ready"],
+  capturing: ["good", "takes a frame"],
+  opening: ["wait", "is being opened"],
+  absent: ["bad", "not found", "Look at its cable and its power. It is looked for again and again."],
+  faulted: ["bad", "does not work", "Look at its cable. It is opened again by itself."]};
+
+function element(tag, text, kind) {
+  const made = document.createElement(tag);
+  made.textContent = text;
+  if (kind) made.className = kind;
+  return made;
+}
+
+function deviceItem(device, what) {
+  const [kind, words, remedy] = kStates[device.state] || ["wait", device.state];
+  const item = document.createElement("li");
+  item.append(element("strong", what + " "), element("span", words, kind));
+  item.append(element("span", ` · ${device.device || device.driver}, ${device.width_px} × ${device.height_px} px`));
+  if (device.shows) item.append(element("span", ` · shows ${device.shows}`));
+  if (device.frames !== undefined) item.append(element("span", ` · ${device.frames} frames, ${device.frames_lost} lost`));
+  if (device.problem) item.append(element("span", device.problem, "remedy bad"));
+  if (remedy) item.append(element("span", remedy, "remedy"));
+  const drift = device.calibration;
+  if (drift && drift.off_since_scan !== null) {
+    item.append(element("span", `Knocked out of its calibration since scan ${drift.off_since_scan}: points lie ` +
+      `${drift.epipolar_px.toFixed(2)} px off, ${drift.limit_px.toFixed(2)} are fine. Fasten projector and camera, look ` +
+      "with slsd --verify, and calibrate again.", "remedy bad"));
+  }
+  return item;
+}
+
+function stateInWords({status}) {
+  const devices = [["the projector", status.projector], ...status.cameras.map((camera) => [`camera ${camera.name}`, camera])];
+  const bad = devices.find(([, device]) => !["ready", "capturing"].includes(device.state));
+  if (status.cameras.length === 0) return ["bad", "No camera is configured: name one in slsd.toml."];
+  if (bad) return [kStates[bad[1].state][0], `Not ready: ${bad[0]} ${kStates[bad[1].state][1]}.`];
+  if (!status.calibration) return ["bad", "Not calibrated: run slsd --calibrate."];
+  if (status.cameras.some((camera) => camera.calibration && camera.calibration.off_since_scan !== null))
+    return ["bad", "Scans, but was knocked out of its calibration."];
+  return ["good", "Ready to scan."];
+}
+
+function showStatus(told) {
+  const {status} = told;
+  const [kind, words] = stateInWords(told);
+  $("state").className = kind;
+  $("state").textContent = words;
+  $("device-list").replaceChildren(
+    deviceItem(status.projector, "Projector"),
+    ...status.cameras.map((camera) => deviceItem(camera, `Camera ${camera.name}`)));
+  const scans = status.scans;
+  const failed = Object.values(scans.failed).reduce((sum, count) => sum + count, 0);
+  $("figures").textContent = `slsd ${status.version}, up ${Math.round(status.uptime_s)} s: ${scans.succeeded} scans, ` +
+    `${failed} failed; decoding takes ${scans.decode_ms.mean.toFixed(1)} ms, ${scans.latency_ms.mean.toFixed(1)} ms to the ` +
+    `client; ${status.clients} clients; ${(status.resident_bytes / 1048576).toFixed(0)} MiB.` +
+    (scans.last_error ? ` Last error: ${scans.last_error.message}` : "");
+  showCameras(status.cameras.map((camera) => camera.name));
+  showPast(told.past);
+}
+
+function showCameras(names) {
+  const choice = $("which-camera");
+  if ([...choice.options].map((option) => option.value).join("\n") === names.join("\n")) return;
+  choice.replaceChildren(...names.map((name) => Object.assign(element("option", name), {value: name})));
+}
+
+async function followStatus() {
+  for (;; await pause(kStatusPause)) {
+    if (document.hidden) continue;
+    try {
+      showStatus(await (await ask("/api/status")).json());
+    } catch (error) {
+      $("state").className = "bad";
+      $("state").textContent = error.message;
+    }
+  }
+}
+
+// ---- camera ----
+
+async function takePicture() {
+  const camera = encodeURIComponent($("which-camera").value);
+  const response = await ask(`/api/frame?as_shown=1&camera=${camera}`);
+  const figures = await drawFrame($("picture"), await response.blob(),
+                                  {clipping: $("show-clipping").checked, sharpness: $("show-sharpness").checked});
+  $("picture-figures").textContent = `${figures.width} × ${figures.height} px, ${(100 * figures.clipped).toFixed(2)} % clipped` +
+    (figures.sharpness === null ? "; too little contrast to judge how sharp it is"
+                                : `; sharpness ${figures.sharpness.toFixed(2)} (1: edges within two pixels)`);
+}
+
+async function followCamera() {
+  for (;; await pause(50)) {
+    if (!$("camera-live").checked || document.hidden) continue;
+    try {
+      await takePicture();
+      say(null);
+    } catch (error) {
+      say(error);
+      await pause(kRetryPause);
+    }
+  }
+}
+
+async function proposeExposure() {
+  $("exposure").replaceChildren(element("p", "looks at two frames…"));
+  try {
+    const told = await (await ask("/api/exposure?camera=" + encodeURIComponent($("which-camera").value))).json();
+    const lines = [];
+    lines.push(element("p", told.patterned_share === 0 ? "No pattern is seen in the frame." :
+      `Symbols reach ${Math.round(told.lit)} of ${told.full}; the pattern covers ${Math.round(100 * told.patterned_share)} % ` +
+      `of the frame, ${Math.round(100 * told.clipped_share)} % of that is clipped.`));
+    if (told.proposed && told.present)
+      lines.push(element("p", `Set exposure_us = ${Math.round(told.proposed.exposure_us)} and a gain of ` +
+        `${told.proposed.gain_db.toFixed(1)} dB; now they are ${Math.round(told.present.exposure_us)} and ` +
+        `${told.present.gain_db.toFixed(1)} dB.`));
+    else if (told.patterned_share > 0)
+      lines.push(element("p", told.brighter === 1 ? "The brightness is good as it is." :
+        `${told.brighter.toPrecision(2)} times as much light would be best.`));
+    for (const trouble of told.troubles) lines.push(element("p", trouble.remedy, "wait"));
+    $("exposure").replaceChildren(...lines);
+  } catch (error) {
+    $("exposure").replaceChildren();
+    throw error;
+  }
+}
+
+// ---- cloud ----
+
+let view = null;
+let shownScan = null;
+
+function showCloud(buffer, about) {
+  const changed = shownScan && shownScan.density !== about.density;
+  shownScan = about;
+  if (changed || (view.ply && view.ply.count === 0)) view.framed = false;
+  view.show(buffer);
+  showScale();
+  $("distance").textContent = "";
+  $("cloud-figures").textContent = `${about.points.toLocaleString("en")} points of scan ${about.scan}, ${about.time}` +
+    (about.decode_ms !== undefined ? `; decoded in ${about.decode_ms.toFixed(0)} ms` : "") +
+    (about.sigma_calibration_mm !== undefined ?
+      `; the calibration may put all of it off by ${about.sigma_calibration_mm.toFixed(2)} mm (one standard deviation)` : "");
+  $("save-ply").disabled = $("save-pcd").disabled = false;
+}
+
+const kColours = {z: "mm of depth", intensity: "of 255", sigma_mm: "mm of sigma", symbol: "number of the symbol"};
+
+function showScale() {
+  const [low, high] = view.range;
+  const digits = Math.max(0, Math.min(4, 2 - Math.floor(Math.log10(high - low))));
+  const [lowest, highest] = view.colour === "intensity" ? ["black", "white"] : ["blue", "red"];
+  $("scale").replaceChildren(element("span", `${lowest} ${low.toFixed(digits)}`), element("span", kColours[view.colour]),
+                             element("span", `${highest} ${high.toFixed(digits)}`));
+}
+
+async function scan() {
+  const response = await ask("/api/scan", {density: $("density").value});
+  showCloud(await response.arrayBuffer(), aboutOf(response));
+}
+
+async function followCloud() {
+  let after = 0, density = null;
+  for (;;) {
+    if (!$("cloud-live").checked || document.hidden) {
+      await pause(50);
+      continue;
+    }
+    if (density !== $("density").value) [density, after] = [$("density").value, 0];
+    try {
+      const response = await ask(`/api/cloud?density=${density}&after=${after}`);
+      if (response.status === 204) continue;
+      const buffer = await response.arrayBuffer();
+      const about = aboutOf(response);
+      after = about.number;
+      if ($("cloud-live").checked && $("density").value === density) showCloud(buffer, about);
+      say(null);
+      await new Promise((done) => requestAnimationFrame(done));
+    } catch (error) {
+      say(error);
+      await pause(kRetryPause);
+    }
+  }
+}
+
+function save(blob, extension) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = `${shownScan.scan}.${extension}`;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+}
+
+function measureAt(event) {
+  const place = $("space").getBoundingClientRect();
+  const marked = view.mark(event.clientX - place.left, event.clientY - place.top);
+  $("distance").textContent = !marked ? "No point there." :
+    marked.points === 1 ? "Now the second point." :
+    `${marked.distance.toFixed(2)} mm ± ${marked.sigma.toFixed(2)} mm (one standard deviation)`;
+}
+
+// ---- history ----
+
+let pastShown = "";
+
+function showPast(past) {
+  const told = JSON.stringify(past);
+  if (told === pastShown) return;
+  pastShown = told;
+  $("past").replaceChildren(...past.map((scan) => {
+    const item = document.createElement("li");
+    if (scan.error) {
+      item.append(element("span", scan.time), element("span", scan.error, "bad"));
+      return item;
+    }
+    item.append(element("span", scan.time), element("span", `${scan.points.toLocaleString("en")} points, ${scan.scan}`));
+    if (scan.kept) {
+      const button = element("button", "Show");
+      onClick(button, async () => {
+        const response = await ask("/api/past?scan=" + encodeURIComponent(scan.scan));
+        $("cloud-live").checked = false;
+        showCloud(await response.arrayBuffer(), scan);
+        choose("cloud");
+      });
+      item.append(button);
+    }
+    return item;
+  }));
+  if (past.length === 0) $("past").append(element("li", "No scan was asked for here yet."));
+}
+
+// ---- the whole ----
+
+function choose(name) {
+  for (const button of document.querySelectorAll("nav button")) button.classList.toggle("chosen", button.dataset.view === name);
+  for (const section of document.querySelectorAll("main section")) section.classList.toggle("chosen", section.id === name);
+}
+
+function begin() {
+  for (const button of document.querySelectorAll("nav button"))
+    button.addEventListener("click", () => choose(button.dataset.view));
+  choose("devices");
+  for (const button of document.querySelectorAll("[data-project]")) {
+    onClick(button, async () => {
+      await ask("/api/project", {picture: button.dataset.project});
+      await takePicture();
+    });
+  }
+  onClick($("propose"), proposeExposure);
+  onClick($("scan"), scan);
+  onClick($("whole"), async () => view && view.frameAll());
+  onClick($("save-ply"), async () => save(new Blob([view.ply.buffer]), "ply"));
+  onClick($("save-pcd"), async () => save(pcdOf(view.ply), "pcd"));
+  $("save-ply").disabled = $("save-pcd").disabled = true;
+  for (const id of ["show-clipping", "show-sharpness"]) $(id).addEventListener("change", () => takePicture().catch(say));
+  $("colour").addEventListener("change", () => {
+    if (view) view.colour = $("colour").value;
+    if (view && view.paint()) showScale();
+  });
+  let pressed = null;
+  $("space").addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
+  $("space").addEventListener("pointerup", (event) => {
+    const moved = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]);
+    if (view && $("measure").checked && moved !== null && moved < 5) measureAt(event);
+  });
+  $("login-form").addEventListener("submit", async (event) => {
+    event.preventDefault();
+    try {
+      await ask("/api/login", {token: $("token").value});
+      $("login").close();
+      $("token").value = $("login-message").textContent = "";
+    } catch (error) {
+      $("login-message").textContent = error.message;
+    }
+  });
+  $("scan").disabled = $("cloud-live").disabled = true;  // until there is something to draw clouds with
+  followStatus();
+  takePicture().catch(say);
+  followCamera();
+  prepareCloud();
+}
+
+function load(script) {
+  return new Promise((done, failed) => {
+    const element = Object.assign(document.createElement("script"), {src: script, onload: done});
+    element.onerror = () => failed(new Error("three.js was not found on the scanner: install its package libjs-three."));
+    document.head.append(element);
+  });
+}
+
+// After the rest, as it is large: the picture and the states do not wait for it.
+async function prepareCloud() {
+  try {
+    await load("/three.js");
+    await load("/orbit_controls.js");
+    view = new CloudView($("space"));
+    $("scan").disabled = $("cloud-live").disabled = false;
+    followCloud();
+  } catch (error) {
+    $("cloud-figures").textContent = "Clouds cannot be drawn: " + error.message;
+  }
+}
+
+begin();

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""Headless Chromium by its driver, over the WebDriver protocol, with the standard library alone."""
+import base64
+import json
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+import urllib.error
+import urllib.request
+
+PATIENCE_S = 120
+ARGUMENTS = ["--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
+             "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage", "--hide-scrollbars",
+             "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+
+def is_there():
+    return all(map(shutil.which, ("chromium", "chromedriver")))
+
+
+def free_port():
+    with socket.socket() as listening:
+        listening.bind(("127.0.0.1", 0))
+        return listening.getsockname()[1]
+
+
+class Browser:
+    def __init__(self, downloads=None):
+        self.port = free_port()
+        self.profile = tempfile.mkdtemp(prefix="slsd-test-chromium-")
+        self.driver = subprocess.Popen(["chromedriver", f"--port={self.port}"], stdout=subprocess.DEVNULL,
+                                       stderr=subprocess.DEVNULL)
+        options = {"binary": shutil.which("chromium"), "args": [*ARGUMENTS, f"--user-data-dir={self.profile}"],
+                   "prefs": {"download.default_directory": str(downloads or self.profile)}}
+        end = time.monotonic() + PATIENCE_S
+        while True:
+            try:
+                made = self.ask("POST", "/session", {"capabilities": {"alwaysMatch": {
+                    "goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL"}}}})
+                break
+            except (urllib.error.URLError, ConnectionError):
+                if time.monotonic() > end:
+                    raise
+                time.sleep(0.1)
+        self.session = "/session/" + made["sessionId"]
+
+    def ask(self, method, path, body=None):
+        request = urllib.request.Request(f"http://127.0.0.1:{self.port}{path}", method=method,
+                                         data=None if body is None else json.dumps(body).encode(),
+                                         headers={"Content-Type": "application/json"})
+        try:
+            with urllib.request.urlopen(request, timeout=PATIENCE_S) as response:
+                return json.load(response)["value"]
+        except urllib.error.HTTPError as error:
+            raise AssertionError(error.read().decode()) from error
+
+    def open(self, url):
+        self.ask("POST", self.session + "/url", {"url": url})
+
+    def run(self, script, *arguments):
+        return self.ask("POST", self.session + "/execute/sync", {"script": script, "args": list(arguments)})
+
+    def wait(self, condition, what, seconds=PATIENCE_S):
+        """Until an expression of the page's is true; its value."""
+        end = time.monotonic() + seconds
+        while True:
+            value = self.run(f"return {condition};")
+            if value:
+                return value
+            if time.monotonic() > end:
+                raise AssertionError(f"{what}; the page says: " + self.run("return document.body.innerText;"))
+            time.sleep(0.02)
+
+    def click(self, selector):
+        element = self.ask("POST", self.session + "/element", {"using": "css selector", "value": selector})
+        self.ask("POST", f"{self.session}/element/{next(iter(element.values()))}/click", {})
+
+    def resize(self, width, height):
+        # A headless window is never narrower than 500 px; what a narrow one shows is asked of the engine itself.
+        self.ask("POST", self.session + "/goog/cdp/execute", {
+            "cmd": "Emulation.setDeviceMetricsOverride",
+            "params": {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}})
+
+    def picture(self, file):
+        shot = self.ask("POST", self.session + "/goog/cdp/execute", {
+            "cmd": "Page.captureScreenshot", "params": {"format": "png", "captureBeyondViewport": True}})
+        file.write_bytes(base64.b64decode(shot["data"]))
+
+    def complaints(self):
+        """What the browser wrote to its console as an error: refused by the policy, or thrown."""
+        log = self.ask("POST", self.session + "/se/log", {"type": "browser"})
+        return [entry["message"] for entry in log if entry["level"] == "SEVERE"]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        try:
+            self.ask("DELETE", self.session)
+        finally:
+            self.driver.terminate()
+            self.driver.wait()
+            shutil.rmtree(self.profile, ignore_errors=True)
