@@ -11,7 +11,7 @@ import tempfile
 import unittest
 
 CMAKE, BUILD = sys.argv[1:3]
-UNITS = ("slsd.service", "slsd.socket", "slsd@.service", "slsd@.socket", "slsd-display.service")
+UNITS = ("slsd.service", "slsd.socket", "slsd@.service", "slsd@.socket", "slsd-display.service", "slsd-web.service")
 
 
 def install(prefix, destination):
@@ -68,7 +68,8 @@ class Install(unittest.TestCase):
 
     def test_units_have_few_rights(self):
         self.lay_out_for_systemd()
-        for name, highest in (("slsd.service", 1.8), ("slsd@left.service", 1.8), ("slsd-display.service", 3.5)):
+        for name, highest in (("slsd.service", 1.8), ("slsd@left.service", 1.8), ("slsd-display.service", 3.5),
+                              ("slsd-web.service", 1.5)):
             weighed = subprocess.run(["systemd-analyze", "security", "--offline=yes", "--no-pager", f"--root={self.root}", name],
                                      capture_output=True, text=True, check=True).stdout
             exposure = float(re.search(r"Overall exposure level for .*: ([0-9.]+)", weighed).group(1))
