@@ -30,7 +30,8 @@ endfunction()
 
 add_library(slsd_settings INTERFACE)
 target_include_directories(slsd_settings INTERFACE ${PROJECT_SOURCE_DIR})
-target_compile_options(slsd_settings INTERFACE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor)
+target_compile_options(slsd_settings INTERFACE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion
+  $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor>)
 # GCC 12 sees memory overlap in std::string where none does (its bug 105651).
 target_compile_options(slsd_settings INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)
 target_compile_definitions(slsd_settings INTERFACE SLSD_VERSION="${PROJECT_VERSION}")

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "network.hpp"
+
+namespace slsd::dds {
+
+struct BridgeOptions {
+  std::string name = "scanner";      ///< of the scanner in the network: its topics begin with it
+  std::string socket;                ///< of its service; empty: the usual place
+  std::optional<double> rate_hz;     ///< clouds; 0: only those that are triggered; nothing: every frame
+  std::string density;               ///< "symbols" or "pixels"; empty: as configured
+  double image_rate_hz = 0;          ///< images of every camera; 0: none
+  std::filesystem::path extrinsics;  ///< where the scanner stands; empty: told by nobody
+};
+
+/// One scanner in a ROS 2 network. Ends with the process.
+/// Threads: one waits for clouds, one for triggers, one asks for the state each second and for images.
+class Bridge {
+ public:
+  /// @errors kInvalidArgument: no name of ROS; kAlreadyExists: another scanner of this name is there;
+  ///         kNotFound, kMalformed: extrinsics
+  [[nodiscard]] static Result<std::unique_ptr<Bridge>> start(const BridgeOptions& options, Network network);
+  virtual ~Bridge() = default;
+};
+
+}  // namespace slsd::dds

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "core/geometry/calibration.hpp"
+
+namespace slsd::dds {
+
+/// Where a scanner stands in a cell of several.
+struct Extrinsics {
+  std::string parent;                  ///< the frame of all
+  RigidTransform parent_from_scanner;  ///< millimetres
+  std::string calibration_date;        ///< of the calibration that it was measured with; empty: not known
+};
+
+/// A scanner's place in a file of several:
+///     parent = "cell"
+///     [scanner.left]
+///     rotation = [1, 0, 0, 0, 1, 0, 0, 0, 1]     # parent_from_scanner, row by row
+///     translation_mm = [0, 0, 0]
+///     calibration_date = "2026-01-31T12:00:00Z"  # optional
+/// @errors kMalformed: no such file, or no rotation; kNotFound: it does not name the scanner
+[[nodiscard]] Result<Extrinsics> read_extrinsics(std::string_view text, const std::string& scanner,
+                                                 const std::string& file);
+
+}  // namespace slsd::dds

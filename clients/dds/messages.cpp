@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "messages.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <iterator>
+
+#include <Eigen/Geometry>
+
+namespace slsd::dds {
+namespace {
+
+// idlc's C strings are not const; nobody writes to them.
+char* text(const std::string& text) {
+  return const_cast<char*>(text.c_str());
+}
+
+constexpr std::uint32_t kPointStep = 20;
+constexpr std::uint8_t kUint8 = 2, kFloat32 = 7;  // of sensor_msgs/PointField
+
+sensor_msgs_msg_dds__PointField_ field(const char* name, std::uint32_t offset, std::uint8_t type) {
+  return {const_cast<char*>(name), offset, type, 1};
+}
+
+}  // namespace
+
+builtin_interfaces_msg_dds__Time_ stamp_now() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(now);
+  return {static_cast<std::int32_t>(seconds.count()),
+          static_cast<std::uint32_t>(std::chrono::nanoseconds(now - seconds).count())};
+}
+
+builtin_interfaces_msg_dds__Time_ stamp_of(std::string_view utc) {
+  std::tm parts{};
+  double second = 0;
+  if (std::sscanf(std::string(utc).c_str(), "%d-%d-%dT%d:%d:%lfZ", &parts.tm_year, &parts.tm_mon, &parts.tm_mday,
+                  &parts.tm_hour, &parts.tm_min, &second) != 6 ||
+      !(second >= 0 && second < 61)) {
+    return stamp_now();
+  }
+  parts.tm_year -= 1900;
+  parts.tm_mon -= 1;
+  const double whole = std::floor(second);
+  const double nanoseconds = std::min(std::round((second - whole) * 1e9), 999'999'999.0);
+  return {static_cast<std::int32_t>(::timegm(&parts) + static_cast<std::time_t>(whole)),
+          static_cast<std::uint32_t>(nanoseconds)};
+}
+
+const sensor_msgs_msg_dds__PointCloud2_& CloudMessage::of(const client::Cloud& cloud, const std::string& frame_id,
+                                                          builtin_interfaces_msg_dds__Time_ stamp) {
+  static sensor_msgs_msg_dds__PointField_ fields[] = {field("x", 0, kFloat32),        field("y", 4, kFloat32),
+                                                      field("z", 8, kFloat32),        field("sigma", 12, kFloat32),
+                                                      field("intensity", 16, kUint8), field("camera", 17, kUint8)};
+  data_.resize(kPointStep * cloud.size());
+  std::uint8_t* to = data_.data();
+  for (const client::Point point : cloud) {
+    const float metres[] = {point.x / 1000, point.y / 1000, point.z / 1000, point.sigma_mm / 1000};
+    std::memcpy(to, metres, sizeof metres);
+    to[16] = point.intensity;
+    to[17] = point.camera;
+    to[18] = to[19] = 0;
+    to += kPointStep;
+  }
+  message_.header = {stamp, text(frame_id)};
+  message_.height = 1;
+  message_.width = static_cast<std::uint32_t>(cloud.size());
+  message_.fields = {std::size(fields), std::size(fields), fields, false};
+  message_.is_bigendian = false;
+  message_.point_step = kPointStep;
+  message_.row_step = static_cast<std::uint32_t>(data_.size());
+  message_.data = {message_.row_step, message_.row_step, data_.data(), false};
+  message_.is_dense = true;
+  return message_;
+}
+
+sensor_msgs_msg_dds__CameraInfo_ camera_info(const CalibratedCamera& camera, const std::string& frame_id,
+                                             builtin_interfaces_msg_dds__Time_ stamp) {
+  static std::string model = "plumb_bob";
+  const Lens& lens = camera.lens;
+  sensor_msgs_msg_dds__CameraInfo_ info{};
+  info.header = {stamp, text(frame_id)};
+  info.height = static_cast<std::uint32_t>(lens.height_px);
+  info.width = static_cast<std::uint32_t>(lens.width_px);
+  info.distortion_model = model.data();
+  info.d = {5, 5, const_cast<double*>(lens.distortion.data()), false};
+  const double k[] = {lens.fx, 0, lens.cx, 0, lens.fy, lens.cy, 0, 0, 1};
+  const double r[] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const double p[] = {lens.fx, 0, lens.cx, 0, 0, lens.fy, lens.cy, 0, 0, 0, 1, 0};
+  std::copy(std::begin(k), std::end(k), info.k);
+  std::copy(std::begin(r), std::end(r), info.r);
+  std::copy(std::begin(p), std::end(p), info.p);
+  return info;
+}
+
+sensor_msgs_msg_dds__Image_ image(const client::Frame& frame, const std::string& frame_id,
+                                  builtin_interfaces_msg_dds__Time_ stamp) {
+  static std::string mono8 = "mono8", mono16 = "mono16";
+  const auto size = static_cast<std::uint32_t>(frame.pixels.size());
+  sensor_msgs_msg_dds__Image_ image{};
+  image.header = {stamp, text(frame_id)};
+  image.height = static_cast<std::uint32_t>(frame.height_px);
+  image.width = static_cast<std::uint32_t>(frame.width_px);
+  image.encoding = frame.bits > 8 ? mono16.data() : mono8.data();
+  image.step = image.width * (frame.bits > 8 ? 2U : 1U);
+  image.data = {size, size, reinterpret_cast<std::uint8_t*>(const_cast<char*>(frame.pixels.data())), false};
+  return image;
+}
+
+geometry_msgs_msg_dds__TransformStamped_ transform(const std::string& parent, const std::string& child,
+                                                   const RigidTransform& parent_from_child,
+                                                   builtin_interfaces_msg_dds__Time_ stamp) {
+  const Eigen::Quaterniond turn(parent_from_child.rotation);
+  const Eigen::Vector3d& at = parent_from_child.translation;
+  return {{stamp, text(parent)},
+          text(child),
+          {{at.x() / 1000, at.y() / 1000, at.z() / 1000}, {turn.x(), turn.y(), turn.z(), turn.w()}}};
+}
+
+}  // namespace slsd::dds

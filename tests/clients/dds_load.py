@@ -1,0 +1,141 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""Simulated scanners, each with its slsd-dds, and a reader of all: how many clouds are lost on the way, and the delay from
+the service's socket to the reader.
+
+    SLSD_BIN=build/release/bin tests/clients/dds_load.py --scanners 16 --rate 10 --points 2600
+    SLSD_BIN=build/release/bin tests/clients/dds_load.py --scanners 1 --rate 5 --points 500000
+"""
+import argparse
+import contextlib
+import datetime
+import json
+import os
+import pathlib
+import resource
+import signal
+import socket
+import subprocess
+import tempfile
+import threading
+import time
+
+BIN = pathlib.Path(os.environ["SLSD_BIN"])
+FIELDS = "float x,float y,float z,float sigma_mm,uchar intensity,uchar camera".split(",")
+
+
+class Replay:
+    """What slsd is to its subscribers, without the work of scanning: the same cloud again and again."""
+
+    def __init__(self, folder, name, points, rate_hz):
+        self.path, self.rate_hz, self.sent, self.stop = folder / f"{name}.sock", rate_hz, [], threading.Event()
+        head = ["ply", "format binary_little_endian 1.0", f"element vertex {points}", *(f"property {f}" for f in FIELDS)]
+        self.cloud = "\n".join([*head, "end_header\n"]).encode() + bytes(18 * points)
+        self.listener = socket.socket(socket.AF_UNIX)
+        self.listener.bind(str(self.path))
+        self.listener.listen()
+        threading.Thread(target=self.serve, daemon=True).start()
+
+    def serve(self):
+        while True:
+            peer, _ = self.listener.accept()
+            threading.Thread(target=self.talk, args=(peer,), daemon=True).start()
+
+    def talk(self, peer):
+        with contextlib.suppress(OSError), peer, peer.makefile("rb") as lines:  # it hangs up
+            for line in lines:
+                request = json.loads(line)
+                answer = {"status": {"ready": True}}.get(request["method"], {})
+                peer.sendall(json.dumps({"jsonrpc": "2.0", "id": request["id"], "result": answer}).encode() + b"\n")
+                if request["method"] == "subscribe":
+                    self.send_clouds(peer)
+
+    def send_clouds(self, peer):
+        due = time.monotonic()
+        while not self.stop.is_set():
+            now = time.time_ns() // 1000
+            at = datetime.datetime.fromtimestamp(now // 1_000_000, datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%S")
+            params = {"scan": "replay", "time": f"{at}.{now % 1_000_000:06}Z", "lost": 0, "bytes": len(self.cloud)}
+            message = json.dumps({"jsonrpc": "2.0", "method": "cloud", "params": params}).encode() + b"\n"
+            self.sent.append(now)
+            peer.sendall(message + self.cloud)
+            due += 1 / self.rate_hz
+            time.sleep(max(0, due - time.monotonic()))
+
+
+def measure(scanners=1, points=2600, rate_hz=10.0, seconds=10.0, stalled=False, best_effort=False, environment=None):
+    """@return sent, received, lost (of those after the first that arrived), delays_ms sorted, cpu_s"""
+    domain = 120 + os.getpid() % 100
+    quiet = {**os.environ, **(environment or {})}
+    network = ["--domain", str(domain), "--interface", "lo", "--peer", "127.0.0.1"]
+    names = [f"s{i}" for i in range(scanners)]
+    topics = [word for name in names for word in ("--topic", f"{name}/points")]
+    read = [BIN / "dds_probe", "--domain", str(domain), *topics, "--stamps", "--count", "1000000000", "--seconds", "600"]
+    processes = []
+    with contextlib.ExitStack() as files:
+        folder = files.enter_context(tempfile.TemporaryDirectory())
+        services = {name: Replay(pathlib.Path(folder), name, points, rate_hz) for name in names}
+        try:
+            other = subprocess.Popen(read, stdout=subprocess.DEVNULL, env=quiet) if stalled else None
+            processes += [other] if other else []
+            out = files.enter_context(tempfile.TemporaryFile("w+"))
+            reader = subprocess.Popen(read + (["--best-effort"] if best_effort else []), stdout=out, env=quiet)
+            processes.append(reader)
+            for name in names:
+                processes.append(subprocess.Popen(
+                    [BIN / "slsd-dds", "--name", name, "--socket", services[name].path, *network], env=quiet,
+                    stderr=subprocess.DEVNULL))
+            give_up = time.monotonic() + 60
+            while not all(len(service.sent) > 5 for service in services.values()) and time.monotonic() < give_up:
+                time.sleep(0.1)
+            time.sleep(2)  # until all found each other: nobody counts these
+            if other:
+                other.send_signal(signal.SIGSTOP)
+            begin = time.time_ns() // 1000
+            time.sleep(seconds)
+            end = time.time_ns() // 1000
+            for service in services.values():
+                service.stop.set()
+            time.sleep(2)
+        finally:
+            for process in processes:
+                process.kill()
+                process.wait()
+        out.seek(0)
+        arrived = {name: {} for name in names}
+        for line in out.read().splitlines():
+            topic, stamp, at_ns, _ = line.split()
+            whole, fraction = stamp.split(".")
+            arrived[topic.split("/")[0]][int(whole) * 1_000_000 + round(int(fraction) / 1000)] = int(at_ns) / 1000
+    sent = received = 0
+    delays = []
+    for name in names:
+        due = [stamp for stamp in services[name].sent if begin <= stamp < end]
+        sent += len(due)
+        delays += [(arrived[name][stamp] - stamp) / 1000 for stamp in due if stamp in arrived[name]]
+    received = len(delays)
+    return {"sent": sent, "received": received, "lost": sent - received, "delays_ms": sorted(delays),
+            "cpu_s": resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime + resource.getrusage(resource.RUSAGE_CHILDREN).ru_stime}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--scanners", type=int, default=1)
+    parser.add_argument("--points", type=int, default=2600)
+    parser.add_argument("--rate", type=float, default=10)
+    parser.add_argument("--seconds", type=float, default=10)
+    parser.add_argument("--stalled", action="store_true", help="a second reader of all is stopped meanwhile")
+    parser.add_argument("--best-effort", action="store_true", help="the reader asks for sensors' QoS")
+    given = parser.parse_args()
+    got = measure(given.scanners, given.points, given.rate, given.seconds, given.stalled, given.best_effort)
+    delays = got["delays_ms"] or [float("nan")]
+    print(f"{given.scanners} scanners, {given.points} points, {given.rate:g}/s, {given.seconds:g} s"
+          f"{', a second reader stalled' if given.stalled else ''}{', best effort' if given.best_effort else ''}: "
+          f"{got['sent']} sent, {got['lost']} lost; delay ms: median {delays[len(delays) // 2]:.1f}, "
+          f"p99 {delays[min(len(delays) - 1, int(0.99 * len(delays)))]:.1f}, longest {delays[-1]:.1f}; "
+          f"processor {got['cpu_s']:.1f} s, load {os.getloadavg()[0]:.1f}")
+
+
+if __name__ == "__main__":
+    main()

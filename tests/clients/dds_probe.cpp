@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <unistd.h>
+
+#include <chrono>
+#include <cinttypes>
+#include <cstdio>
+#include <cstring>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <dds/ddsi/ddsi_serdata.h>
+#include <CLI/CLI.hpp>
+
+#include "network.hpp"
+#include "ros.h"
+
+namespace {
+
+using namespace std::chrono_literals;
+using slsd::dds::Network;
+
+const std::map<std::string, const dds_topic_descriptor_t*> kTypes{
+    {"PointCloud2", &sensor_msgs_msg_dds__PointCloud2__desc},
+    {"CameraInfo", &sensor_msgs_msg_dds__CameraInfo__desc},
+    {"Image", &sensor_msgs_msg_dds__Image__desc},
+    {"TFMessage", &tf2_msgs_msg_dds__TFMessage__desc},
+    {"DiagnosticArray", &diagnostic_msgs_msg_dds__DiagnosticArray__desc}};
+
+std::int64_t now_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+// What came, as it was on the wire: whoever reads it needs no IDL.
+std::string taken(dds_entity_t reader) {
+  ddsi_serdata* data = nullptr;
+  dds_sample_info_t info;
+  if (dds_takecdr(reader, &data, 1, &info, DDS_ANY_STATE) <= 0) return {};
+  const std::uint32_t size = ddsi_serdata_size(data);
+  std::string bytes(size, '\0');
+  ddsi_serdata_to_ser(data, 0, size, bytes.data());
+  ddsi_serdata_unref(data);
+  return info.valid_data ? bytes : std::string();
+}
+
+int call(const Network& network, const std::string& name) {
+  const auto requests = network.writer(std_srvs_srv_dds__Trigger_Request__desc, "rq/" + name + "/triggerRequest",
+                                       Network::Quality::kService);
+  const auto replies = network.reader(std_srvs_srv_dds__Trigger_Response__desc, "rr/" + name + "/triggerReply",
+                                      Network::Quality::kService);
+  if (!requests || !replies) return 1;
+  const std_srvs_srv_dds__Trigger_Request_ request{0x1122334455667788, 42, 0};
+  for (int tries = 0; tries < 20; ++tries) {  // the service is to know of both first
+    dds_publication_matched_status_t matched{};
+    dds_get_publication_matched_status(*requests, &matched);
+    dds_subscription_matched_status_t heard{};
+    dds_get_subscription_matched_status(*replies, &heard);
+    if (matched.current_count > 0 && heard.current_count > 0) break;
+    ::usleep(250'000);
+  }
+  ::usleep(500'000);
+  dds_write(*requests, &request);
+  if (!slsd::dds::wait_for({*replies}, 20s)) return 1;
+  void* sample = nullptr;
+  dds_sample_info_t info;
+  if (dds_take(*replies, &sample, &info, 1, 1) != 1) return 1;
+  const auto* reply = static_cast<const std_srvs_srv_dds__Trigger_Response_*>(sample);
+  std::printf("%" PRIx64 " %" PRId64 " %d %s\n", reply->client_guid, reply->sequence_number, reply->success,
+              reply->message);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Reads topics of ROS 2 on loopback: each sample's size (4 bytes) and bytes; or, with --stamps, a line for each.");
+  slsd::dds::NetworkOptions options{0, "lo", {"127.0.0.1"}, false};
+  std::vector<std::string> topics;
+  std::string type = "PointCloud2", service;
+  std::uint64_t count = 1;
+  double seconds = 20;
+  bool stamps = false, sensor = false, latched = false;
+  app.add_option("--domain", options.domain)->required();
+  app.add_option("--topic", topics, "without rt/");
+  app.add_option("--type", type);
+  app.add_option("--count", count);
+  app.add_option("--seconds", seconds);
+  app.add_option("--call", service, "the trigger service of this scanner");
+  app.add_flag("--stamps", stamps, "topic, stamp, time of arrival (ns), bytes");
+  app.add_flag("--best-effort", sensor, "ask for no more than sensors' QoS");
+  app.add_flag("--latched", latched, "ask for what was said before");
+  CLI11_PARSE(app, argc, argv);
+  options.best_effort = sensor;
+  const auto network = Network::open(options);
+  if (!network) return std::fprintf(stderr, "%s\n", to_string(network.error()).c_str()), 1;
+  if (!service.empty()) return call(*network, service);
+  std::vector<dds_entity_t> readers;
+  for (const std::string& topic : topics) {
+    const auto reader = network->reader(*kTypes.at(type), "rt/" + topic,
+                                        latched ? Network::Quality::kLatched : Network::Quality::kSensor);
+    if (!reader) return std::fprintf(stderr, "%s\n", to_string(reader.error()).c_str()), 1;
+    readers.push_back(*reader);
+  }
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  const dds_entity_t set = dds_create_waitset(dds_get_participant(readers.at(0)));
+  for (std::size_t i = 0; i < readers.size(); ++i)
+    dds_waitset_attach(set, dds_create_readcondition(readers[i], DDS_NOT_READ_SAMPLE_STATE),
+                       static_cast<dds_attach_t>(i));
+  for (std::uint64_t seen = 0; seen < count && std::chrono::steady_clock::now() < end;) {
+    dds_waitset_wait(set, nullptr, 0, DDS_MSECS(200));
+    for (std::size_t i = 0; i < readers.size(); ++i) {
+      for (std::string bytes; seen < count && !(bytes = taken(readers[i])).empty(); ++seen) {
+        const std::int64_t arrived = now_ns();
+        const auto size = static_cast<std::uint32_t>(bytes.size());
+        std::int32_t stamp[2] = {};  // behind the encapsulation's four bytes
+        std::memcpy(stamp, bytes.data() + 4, sizeof stamp);
+        if (stamps) {
+          std::printf("%s %d.%09d %" PRId64 " %u\n", topics[i].c_str(), stamp[0], stamp[1], arrived, size);
+        } else {
+          std::fwrite(&size, sizeof size, 1, stdout);
+          std::fwrite(bytes.data(), 1, size, stdout);
+        }
+        std::fflush(stdout);
+      }
+    }
+  }
+}

@@ -1,0 +1,299 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""slsd-dds as the network sees it, on loopback: what it writes is read as bytes, by ROS's message definitions alone.
+
+With SLSD_DDS_PYTHON, an interpreter that has Eclipse's package `cyclonedds` (pip install cyclonedds numpy), that reads the
+same once more.
+"""
+import json
+import os
+import pathlib
+import re
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daemon")]
+
+import numpy as np  # noqa: E402
+
+import slsd  # noqa: E402
+from dds_load import measure  # noqa: E402
+from service import BIN, Service, wait_until  # noqa: E402
+
+DOMAIN = 20 + os.getpid() % 100
+LOOPBACK = ["--domain", str(DOMAIN), "--interface", "lo", "--peer", "127.0.0.1"]
+
+
+class Cdr:
+    """Plain CDR, little-endian: what ROS 2 puts on the wire."""
+
+    def __init__(self, data):
+        assert data[:2] == b"\x00\x01", data[:4]
+        self.data, self.at = data[4:], 0
+
+    def number(self, kind):
+        size = struct.calcsize(kind)
+        self.at += -self.at % size
+        self.at += size
+        return struct.unpack_from("<" + kind, self.data, self.at - size)[0]
+
+    def numbers(self, kind, count):
+        return [self.number(kind) for _ in range(count)]
+
+    def text(self):
+        size = self.number("I")
+        self.at += size
+        return self.data[self.at - size:self.at - 1].decode()
+
+    def octets(self):
+        size = self.number("I")
+        self.at += size
+        return self.data[self.at - size:self.at]
+
+    def sequence(self, item):
+        return [item() for _ in range(self.number("I"))]
+
+    def header(self):
+        return {"stamp": self.number("i") + self.number("I") * 1e-9, "frame_id": self.text()}
+
+    def point_cloud(self):
+        return {"header": self.header(), "height": self.number("I"), "width": self.number("I"),
+                "fields": self.sequence(lambda: (self.text(), self.number("I"), self.number("B"), self.number("I"))),
+                "is_bigendian": self.number("B"), "point_step": self.number("I"), "row_step": self.number("I"),
+                "data": self.octets(), "is_dense": self.number("B")}
+
+    def camera_info(self):
+        return {"header": self.header(), "height": self.number("I"), "width": self.number("I"),
+                "distortion_model": self.text(), "d": self.sequence(lambda: self.number("d")),
+                "k": self.numbers("d", 9), "r": self.numbers("d", 9), "p": self.numbers("d", 12),
+                "binning": self.numbers("I", 2), "roi": self.numbers("I", 4) + [self.number("B")]}
+
+    def image(self):
+        return {"header": self.header(), "height": self.number("I"), "width": self.number("I"), "encoding": self.text(),
+                "is_bigendian": self.number("B"), "step": self.number("I"), "data": self.octets()}
+
+    def transforms(self):
+        return self.sequence(lambda: {"header": self.header(), "child": self.text(), "translation": self.numbers("d", 3),
+                                      "rotation": self.numbers("d", 4)})
+
+    def diagnostics(self):
+        return {"header": self.header(), "status": self.sequence(lambda: {
+            "level": self.number("B"), "name": self.text(), "message": self.text(), "hardware_id": self.text(),
+            "values": dict(self.sequence(lambda: (self.text(), self.text())))})}
+
+
+def probe(topic, kind, *more):
+    done = subprocess.run([BIN / "dds_probe", "--domain", str(DOMAIN), "--topic", topic, "--type", kind, *more],
+                          capture_output=True, timeout=120, check=True)
+    samples, data = [], done.stdout
+    while data:
+        size = struct.unpack_from("<I", data)[0]
+        samples.append(Cdr(data[4:4 + size]))
+        data = data[4 + size:]
+    return samples
+
+
+class Bridge:
+    def __init__(self, service, *more, name="left"):
+        self.log = tempfile.TemporaryFile("w+")
+        self.process = subprocess.Popen([BIN / "slsd-dds", "--socket", service.socket, "--name", name, *LOOPBACK, *more],
+                                        stderr=self.log)
+
+    def said(self):
+        self.log.seek(0)
+        return self.log.read()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGTERM)
+        try:
+            self.process.wait(20)
+        finally:
+            self.process.kill()
+            self.process.wait()
+            self.log.close()
+
+
+FIELDS = [("x", 0, 7, 1), ("y", 4, 7, 1), ("z", 8, 7, 1), ("sigma", 12, 7, 1), ("intensity", 16, 2, 1), ("camera", 17, 2, 1)]
+RECORD = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("sigma", "<f4"), ("intensity", "u1"), ("camera", "u1"),
+                   ("padding", "u1", 2)])
+
+
+def matrix(calibration, key):
+    return [float(number) for number in re.search(key + r":.*?data:\s*\[(.*?)\]", calibration, re.S)[1].split(",")]
+
+
+class Shown(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.service = Service().start()
+        cls.addClassCleanup(cls.service.__exit__)
+        cls.bridge = Bridge(cls.service, "--rate", "5", "--image-rate", "2")
+        cls.addClassCleanup(cls.bridge.__exit__)
+        cls.scanner = slsd.Scanner(cls.service.socket)
+        cls.addClassCleanup(cls.scanner.close)
+
+    def same_cloud(self, message):
+        expected = self.scanner.scan().points
+        self.assertEqual([message["height"], message["width"], message["point_step"], message["row_step"]],
+                         [1, len(expected), 20, 20 * len(expected)])
+        self.assertEqual([message["is_bigendian"], message["is_dense"]], [0, 1])
+        self.assertEqual([tuple(field) for field in message["fields"]], FIELDS)
+        self.assertEqual(message["header"]["frame_id"], "left_optical_frame")
+        self.assertLess(abs(message["header"]["stamp"] - time.time()), 30)
+        points = np.frombuffer(message["data"], RECORD)
+        for ours, theirs in (("x", "x"), ("y", "y"), ("z", "z"), ("sigma", "sigma_mm")):
+            np.testing.assert_array_equal(points[ours], expected[theirs] / np.float32(1000))
+        for name in ("intensity", "camera"):
+            np.testing.assert_array_equal(points[name], expected[name])
+
+    def test_clouds_are_those_of_the_socket_in_metres(self):
+        self.same_cloud(probe("left/points", "PointCloud2")[0].point_cloud())
+        self.same_cloud(probe("left/points", "PointCloud2", "--best-effort")[0].point_cloud())
+
+    def test_camera_info_is_the_calibration(self):
+        calibration = self.scanner.settings()["calibration"]
+        info = probe("left/camera/camera_info", "CameraInfo")[0].camera_info()
+        k = matrix(calibration, "camera_matrix")
+        self.assertEqual(info["k"], k)
+        self.assertEqual(info["d"], matrix(calibration, "camera_distortion"))
+        self.assertEqual(info["r"], [1, 0, 0, 0, 1, 0, 0, 0, 1])
+        self.assertEqual(info["p"], [*k[0:3], 0, *k[3:6], 0, *k[6:9], 0])
+        frame = self.scanner.frame()
+        self.assertEqual((info["height"], info["width"]), frame.image.shape)
+        self.assertEqual([info["distortion_model"], info["binning"], info["roi"]], ["plumb_bob", [0, 0], [0] * 5])
+        self.assertEqual(info["header"]["frame_id"], "left_optical_frame")
+
+    def test_images_are_the_frames(self):
+        message = probe("left/camera/image_raw", "Image")[0].image()
+        frame = self.scanner.frame().image
+        self.assertEqual([message["height"], message["width"], message["step"], message["encoding"]],
+                         [*frame.shape, frame.shape[1], "mono8"])
+        np.testing.assert_array_equal(np.frombuffer(message["data"], np.uint8).reshape(frame.shape), frame)
+
+    def test_the_optical_frame_hangs_on_the_scanners_body(self):
+        (sample,) = probe("tf_static", "TFMessage", "--latched")
+        (transform,) = sample.transforms()
+        self.assertEqual((transform["header"]["frame_id"], transform["child"]), ("left_link", "left_optical_frame"))
+        self.assertEqual(transform["translation"], [0, 0, 0])
+        x, y, z, w = np.array(transform["rotation"])
+        forward = np.array([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)])  # of the optical z
+        np.testing.assert_allclose(forward, [1, 0, 0], atol=1e-12)
+        np.testing.assert_allclose(np.abs([x, y, z, w]), 0.5, atol=1e-12)
+
+    def test_diagnostics_tell_its_state(self):
+        (status,) = probe("diagnostics", "DiagnosticArray")[0].diagnostics()["status"]
+        self.assertEqual((status["level"], status["name"], status["message"]), (0, "left: slsd", "ready to scan"))
+        self.assertEqual(status["values"]["camera"], "ready")
+        self.assertEqual(status["values"]["clouds lost before publishing"], "0")
+
+    def test_the_trigger_service_scans(self):
+        done = subprocess.run([BIN / "dds_probe", "--domain", str(DOMAIN), "--call", "left"], capture_output=True, text=True,
+                              timeout=120, check=True)
+        self.assertRegex(done.stdout, rf"^1122334455667788 42 1 {len(self.scanner.scan())} points, scan ")
+
+    def test_another_of_the_same_name_is_told(self):
+        with Bridge(self.service) as second:
+            self.assertEqual(second.process.wait(30), 1)
+            self.assertIn("name_taken", second.said())
+
+    def test_an_independent_reader_reads_the_same(self):
+        python = os.environ.get("SLSD_DDS_PYTHON")
+        if not python:
+            self.skipTest("SLSD_DDS_PYTHON names no interpreter with cyclonedds")
+        done = subprocess.run([python, HERE / "dds_reader.py", str(DOMAIN)], capture_output=True, text=True, timeout=120,
+                              check=False)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        read = json.loads(done.stdout)
+        cloud = read["points"]
+        cloud["header"]["stamp"] = cloud["header"]["stamp"]["sec"] + cloud["header"]["stamp"]["nanosec"] * 1e-9
+        cloud["data"] = bytes.fromhex(cloud["data"])
+        cloud["fields"] = [tuple(field[key] for key in ("name", "offset", "datatype", "count"))
+                           for field in cloud["fields"]]
+        self.same_cloud(cloud)
+        info = probe("left/camera/camera_info", "CameraInfo")[0].camera_info()
+        for key in ("height", "width", "distortion_model", "d", "k", "r", "p"):
+            self.assertEqual(read["info"][key], info[key], key)
+        (expected,) = probe("tf_static", "TFMessage", "--latched")[0].transforms()
+        (transform,) = read["transforms"]["transforms"]
+        self.assertEqual(transform["child_frame_id"], expected["child"])
+        self.assertEqual(list(transform["transform"]["rotation"].values()), expected["rotation"])
+        self.assertEqual(list(transform["transform"]["translation"].values()), expected["translation"])
+
+
+class Stalling(unittest.TestCase):
+    def test_of_a_reader_costs_the_others_nothing(self):
+        got = measure(points=40_000, rate_hz=10, seconds=4, stalled=True)
+        self.assertGreater(got["sent"], 20)
+        self.assertEqual(got["lost"], 0)
+
+    def test_of_nobody_loses_nothing_among_many(self):
+        got = measure(scanners=4, seconds=3)
+        self.assertGreater(got["sent"], 60)
+        self.assertEqual(got["lost"], 0)
+
+
+class Vanishing(unittest.TestCase):
+    def test_of_the_service_is_told_and_it_is_found_again(self):
+        def state():
+            samples = probe("diagnostics", "DiagnosticArray")
+            (status,) = samples[0].diagnostics()["status"]
+            return status["level"], status["message"]
+
+        with Service() as service, Bridge(service, "--rate", "5", name="top"):
+            wait_until(lambda: state()[0] == 0, "the scanner")
+            service.stop(signal.SIGKILL)
+            wait_until(lambda: state()[0] == 2, "an error")
+            self.assertIn("no daemon answers", state()[1])
+            service.socket.unlink(missing_ok=True)
+            service.start()
+            wait_until(lambda: state()[0] == 0, "the scanner again")
+            self.assertEqual(len(probe("top/points", "PointCloud2")), 1)
+
+
+class ExtrinsicsFile(unittest.TestCase):
+    def write(self, text):
+        file = tempfile.NamedTemporaryFile("w", suffix=".toml", delete=False)
+        self.addCleanup(os.unlink, file.name)
+        with file:
+            file.write(text)
+        return file.name
+
+    GOOD = 'parent = "cell"\n[scanner.left]\nrotation = [0, -1, 0, 1, 0, 0, 0, 0, 1]\ntranslation_mm = [100, 0, 50]\n'
+
+    def test_that_does_not_hold_is_refused_by_name(self):
+        with Service() as service:
+            for text, name in (("parent = \"cell\"\n", "extrinsics_missing"), ("nonsense", ":1"),
+                               (self.GOOD.replace("[0, -1", "[0, -2"), "no rotation"),
+                               (self.GOOD.replace("100, 0, 50", "100, 0"), "3 numbers")):
+                with Bridge(service, "--extrinsics", self.write(text)) as bridge:
+                    self.assertEqual(bridge.process.wait(30), 1)
+                    self.assertIn(name, bridge.said())
+
+    def test_says_where_the_scanner_stands(self):
+        with Service() as service, Bridge(service, "--extrinsics", self.write(self.GOOD), "--rate", "0"):
+            (transform,) = probe("tf_static", "TFMessage", "--latched")[0].transforms()
+            self.assertEqual((transform["header"]["frame_id"], transform["child"]), ("cell", "left_optical_frame"))
+            np.testing.assert_allclose(transform["translation"], [0.1, 0, 0.05])
+            np.testing.assert_allclose(transform["rotation"], [0, 0, 0.5**0.5, 0.5**0.5], atol=1e-12)
+
+    def test_of_another_calibration_places_nothing(self):
+        stale = self.write(self.GOOD + 'calibration_date = "2001-01-01T00:00:00Z"\n')
+        with Service() as service, Bridge(service, "--extrinsics", stale, "--rate", "0"):
+            self.assertEqual(probe("tf_static", "TFMessage", "--latched")[0].transforms(), [])
+            (status,) = probe("diagnostics", "DiagnosticArray")[0].diagnostics()["status"]
+            self.assertEqual(status["level"], 2)
+            self.assertIn("extrinsics_stale", status["message"])
+
+
+if __name__ == "__main__":
+    unittest.main()
