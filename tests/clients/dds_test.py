@@ -202,6 +202,7 @@ class Shown(unittest.TestCase):
         self.assertRegex(done.stdout, rf"^1122334455667788 42 1 {len(self.scanner.scan())} points, scan ")
 
     def test_another_of_the_same_name_is_told(self):
+        probe("left/points", "PointCloud2")  # it is there
         with Bridge(self.service) as second:
             self.assertEqual(second.process.wait(30), 1)
             self.assertIn("name_taken", second.said())
@@ -228,6 +229,12 @@ class Shown(unittest.TestCase):
         self.assertEqual(transform["child_frame_id"], expected["child"])
         self.assertEqual(list(transform["transform"]["rotation"].values()), expected["rotation"])
         self.assertEqual(list(transform["transform"]["translation"].values()), expected["translation"])
+
+
+class Twins(unittest.TestCase):
+    def test_that_start_at_once_are_told_too(self):
+        with Service() as service, Bridge(service, name="twin") as one, Bridge(service, name="twin") as other:
+            wait_until(lambda: "name_taken" in one.said() + other.said(), "that the name is taken")
 
 
 class Stalling(unittest.TestCase):
