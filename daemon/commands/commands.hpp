@@ -32,8 +32,8 @@ namespace slsd {
 /// @return whether a scan is possible
 [[nodiscard]] bool check_everything(const std::optional<std::filesystem::path>& configuration_file);
 
-/// Looks at the configuration alone, and the files that it names: it opens no device, and asks no service. Prints that all
-/// is well, with warnings, where it is.
+/// Looks at the configuration alone, and the files that it names: it opens no device, and asks no service. Prints that
+/// all is well, with warnings, where it is.
 /// @errors as the service's start has them
 [[nodiscard]] Result<> check_configuration(const std::optional<std::filesystem::path>& configuration_file);
 
