@@ -11,6 +11,7 @@ import pathlib
 import random
 import signal
 import socket
+import subprocess
 import sys
 import tempfile
 import threading
@@ -18,12 +19,13 @@ import unittest
 import unittest.mock
 
 HERE = pathlib.Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daemon")]
+sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daemon"), str(HERE)]
 
 import numpy as np  # noqa: E402
 
 import slsd  # noqa: E402
 from point_cloud import vertices  # noqa: E402
+from python_cost import measure  # noqa: E402
 from service import SCENE, Service, wait_until  # noqa: E402
 
 
@@ -116,6 +118,15 @@ class Scans(unittest.TestCase):
             self.assertEqual(len(os.listdir("/proc/self/fd")), before)
             wait_until(lambda: scanner.status()["clients_memory"]["lent_bytes"] < 2_000_000, "memory given back")
 
+    def test_of_a_million_points_take_no_memory(self):
+        _, allocated, owns = measure(1_000_000, scans=1)
+        self.assertFalse(owns)
+        self.assertLess(allocated, 1_000_000)
+
+    def test_say_what_one_may(self):
+        with slsd.Scanner(self.service.socket) as scanner:
+            self.assertEqual(scanner.role, "administer")  # who runs the service
+
     def test_take_two_lines(self):
         example = [line.strip() for line in inspect.getdoc(slsd).splitlines()[1:] if line]
         self.assertEqual(len(example), 2)
@@ -201,6 +212,45 @@ class Vanishing(unittest.TestCase):
         with Impostor(lambda request: result(request, b"ply", bytes=100), hangs_up=True) as cut:
             with slsd.Scanner(cut.path) as scanner, self.assertRaisesRegex(slsd.ConnectionLost, "middle"):
                 scanner.scan()
+
+
+class Ending(unittest.TestCase):
+    """Of either side, in the middle of a stream."""
+
+    def test_of_the_service_is_told_and_the_next_stream_finds_it_again(self):
+        with Service() as service, slsd.Scanner(service.socket) as scanner:
+            stream = scanner.stream()
+            next(stream)
+            service.stop(signal.SIGKILL)
+            with self.assertRaises(slsd.ConnectionLost):
+                while True:
+                    next(stream)
+            service.socket.unlink(missing_ok=True)
+            service.start()
+            self.assertGreater(len(next(scanner.stream())), 0)
+
+    def test_of_the_program_leaves_nothing_with_the_service(self):
+        program = ("import slsd, sys\n"
+                   "for cloud in slsd.Scanner(sys.argv[1]).stream(density='pixels'): print(len(cloud), flush=True)\n")
+        with Service() as service, slsd.Scanner(service.socket) as scanner:
+            for end in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT):
+                reader = subprocess.Popen([sys.executable, "-c", program, service.socket], stdout=subprocess.PIPE,
+                                          stderr=subprocess.DEVNULL,
+                                          env={**os.environ, "PYTHONPATH": str(HERE.parents[1] / "clients/python")})
+                reader.stdout.readline()
+                reader.send_signal(end)
+                reader.wait(60)
+                reader.stdout.close()
+                wait_until(lambda: scanner.status()["subscribers"] == 0, "no subscriber")
+            self.assertGreater(len(scanner.scan(timeout_s=60)), 0)  # behind what was begun for them
+
+    def test_a_stream_that_falls_silent_is_told(self):
+        def answer(request):
+            return result(request)
+
+        with Impostor(answer) as silent, slsd.Scanner(silent.path) as scanner:
+            with self.assertRaises(slsd.TimedOut):
+                next(scanner.stream(idle_s=0.2))
 
 
 class Lies(unittest.TestCase):

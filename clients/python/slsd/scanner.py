@@ -144,6 +144,14 @@ class Scanner:
         """What clouds depend on: pattern, calibration, projector, cameras, configuration."""
         return self._call("settings", {}, _GRACE_S)[0]
 
+    @property
+    def role(self) -> str:
+        """What this user may: "observe", "scan" (that too) or "administer" (everything)."""
+        role = self.status().get("role")
+        if not isinstance(role, str):
+            raise ProtocolError("the service tells no role: it is older than this package")
+        return role
+
     def reload(self) -> list[str]:
         """Reads the configuration anew. Returns the tables that need a restart."""
         return list(self._call("reload", {}, 60.0)[0].get("needs_restart", []))
