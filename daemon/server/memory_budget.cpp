@@ -25,6 +25,9 @@ void MemoryBudget::give_back(std::size_t bytes) {
 
 MemoryAccount::~MemoryAccount() {
   budget_.held_ -= held();
+  if (!user_) return;
+  const auto others = budget_.held_by_user_.find(*user_);
+  if (others != budget_.held_by_user_.end() && (others->second -= held()) == 0) budget_.held_by_user_.erase(others);
 }
 
 std::size_t MemoryAccount::held() const {
@@ -36,7 +39,7 @@ bool MemoryAccount::resize(Part part, std::size_t bytes) {
   if (bytes > now && bytes > kAlwaysGranted) {
     const std::size_t limit = budget_.limit_bytes_;
     if (bytes > limit) return false;  // and the sums below cannot overflow
-    const std::size_t mine = held() - now + bytes;
+    const std::size_t mine = (user_ ? budget_.held_by_user_[*user_] : held()) - now + bytes;
     const std::size_t all = budget_.held_ - now + bytes;
     if (all > limit || mine > limit - all) return false;
   }
@@ -47,6 +50,7 @@ bool MemoryAccount::resize(Part part, std::size_t bytes) {
 void MemoryAccount::set(Part part, std::size_t bytes) {
   std::size_t& held = parts_[static_cast<std::size_t>(part)];
   budget_.held_ = budget_.held_ - held + bytes;
+  if (user_) budget_.held_by_user_[*user_] += bytes - held;
   held = bytes;
 }
 

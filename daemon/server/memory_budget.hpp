@@ -4,6 +4,9 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
 
 namespace slsd {
 
@@ -14,6 +17,8 @@ namespace slsd {
 /// It is shared by one rule (dynamic thresholds: Choudhury and Hahne 1998): no client may come to hold more than is
 /// then free for all the others. One alone gets a half, two that take all they can a third each, and a hundred and one
 /// leave a hundredth free: who asks for more waits, and who asks for little is served as if nobody else were there.
+///
+/// The connections of one user may count as one client, so that nobody gets more by opening many.
 ///
 /// A few bytes are always granted, as each request is to have a reply: they come on top, at most 20 kB for each part of
 /// a client's.
@@ -37,6 +42,7 @@ class MemoryBudget {
   std::size_t limit_bytes_;
   std::size_t held_ = 0;  ///< what is lent, too
   std::size_t lent_ = 0;
+  std::map<std::uint32_t, std::size_t> held_by_user_;  ///< of those that count as one client
 };
 
 /// What one client holds of it.
@@ -45,7 +51,9 @@ class MemoryAccount {
  public:
   enum class Part { kRequest, kReply, kEvent, kWaiting };
 
-  explicit MemoryAccount(MemoryBudget& budget) : budget_(budget) {}
+  /// @param user  whose accounts count as one client; without one this account is a client
+  explicit MemoryAccount(MemoryBudget& budget, std::optional<std::uint32_t> user = std::nullopt)
+      : budget_(budget), user_(user) {}
   ~MemoryAccount();
   MemoryAccount(const MemoryAccount&) = delete;
   MemoryAccount& operator=(const MemoryAccount&) = delete;
@@ -60,6 +68,7 @@ class MemoryAccount {
   void set(Part part, std::size_t bytes);
 
   MemoryBudget& budget_;
+  std::optional<std::uint32_t> user_;
   std::array<std::size_t, 4> parts_{};
 };
 

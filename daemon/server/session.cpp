@@ -74,7 +74,8 @@ Session::Session(Socket socket, std::shared_ptr<SessionRoom> room)
       room_(*shared_room_),
       peer_(peer_of(socket_.native_handle())),
       role_(room_.access.role_of(peer_)),
-      memory_(room_.memory),
+      // Who administers may use several programs at once, each of which is a client.
+      memory_(room_.memory, role_ == Role::kAdminister ? std::nullopt : std::optional(peer_.user)),
       progress_(socket_.get_executor()),
       glance_(socket_.get_executor()),
       lines_(static_cast<std::size_t>(room_.options.request_bytes_max)) {}

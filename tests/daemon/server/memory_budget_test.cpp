@@ -42,6 +42,27 @@ TEST(MemoryBudget, ModestClientsAreServedBesideGreedyOnes) {
   EXPECT_EQ(budget.held(), kMB / 16);
 }
 
+TEST(MemoryBudget, ManyConnectionsOfOneUserAreOneClient) {
+  constexpr std::uint32_t kGreedy = 1000, kOther = 1001;
+  MemoryBudget budget(512 * kMB);
+  {
+    std::vector<std::unique_ptr<MemoryAccount>> greedy;
+    for (int i = 0; i < 20; ++i) {
+      greedy.push_back(std::make_unique<MemoryAccount>(budget, kGreedy));
+      for (std::size_t mb = 1; greedy.back()->resize(Part::kReply, mb * kMB); ++mb) {
+      }
+    }
+    EXPECT_EQ(budget.held(), 256 * kMB);
+    MemoryAccount other(budget, kOther);
+    EXPECT_TRUE(other.resize(Part::kReply, 128 * kMB)) << "as if the user had one connection";
+    greedy.front()->release(Part::kReply);
+    greedy.pop_back();
+  }
+  EXPECT_EQ(budget.held(), 0U);
+  MemoryAccount again(budget, kGreedy);
+  EXPECT_TRUE(again.resize(Part::kReply, 256 * kMB)) << "what its connections held is given back";
+}
+
 TEST(MemoryBudget, LendsAtMostAHalf) {
   MemoryBudget budget(100 * kMB);
   EXPECT_TRUE(budget.lend(50 * kMB));
