@@ -10,9 +10,7 @@ namespace {
 
 constexpr std::size_t kMaxElements = 9;
 
-bool is_number(const cv::FileNode& node) {
-  return node.isInt() || node.isReal();
-}
+using Kind = FileNode::Kind;
 
 bool is_control(char letter) {
   return static_cast<unsigned char>(letter) < 0x20 || letter == 0x7f;
@@ -25,25 +23,23 @@ void FileSection::refuse(const std::string& key, const std::string& problem) {
 }
 
 bool FileSection::has(const char* key) const {
-  return node_.isMap() && !node_[key].empty();
+  return node_.find(key) != nullptr;
 }
 
-std::optional<cv::FileNode> FileSection::find(const char* key) {
-  if (!has(key)) {
-    refuse(key, "is missing");
-    return std::nullopt;
-  }
-  return node_[key];
+const FileNode* FileSection::find(const char* key) {
+  const FileNode* const node = node_.find(key);
+  if (node == nullptr) refuse(key, "is missing");
+  return node;
 }
 
 double FileSection::number(const char* key) {
-  const auto node = find(key);
-  if (!node) return 0.0;
-  if (!is_number(*node) || !std::isfinite(node->real())) {
+  const FileNode* const node = find(key);
+  if (node == nullptr) return 0.0;
+  if (node->kind != Kind::kNumber || !std::isfinite(node->number)) {
     refuse(key, "must be a number");
     return 0.0;
   }
-  return node->real();
+  return node->number;
 }
 
 int FileSection::whole(const char* key, int low, int high) {
@@ -56,9 +52,9 @@ int FileSection::whole(const char* key, int low, int high) {
 }
 
 std::string FileSection::text(const char* key) {
-  const auto node = find(key);
-  if (!node) return {};
-  std::string value = node->isString() ? node->string() : std::string();
+  const FileNode* const node = find(key);
+  if (node == nullptr) return {};
+  const std::string& value = node->text;
   if (value.empty() || value.size() > kMaxTextLength || std::any_of(value.begin(), value.end(), is_control)) {
     refuse(key, "must be a text in quotes, of 1 to " + std::to_string(kMaxTextLength) + " bytes");
     return {};
@@ -66,26 +62,21 @@ std::string FileSection::text(const char* key) {
   return value;
 }
 
-// Element by element: reading into a cv::Mat would first allocate whatever size the file claims.
 std::vector<double> FileSection::elements(const char* key, int& rows, int& columns) {
-  const auto node = find(key);
-  if (!node) return {};
-  if (!node->isMap() || (*node)["data"].empty() || (*node)["rows"].empty() || (*node)["cols"].empty()) {
+  const FileNode* const node = find(key);
+  if (node == nullptr) return {};
+  const FileNode* const data = node->find("data");
+  if (data == nullptr || node->find("rows") == nullptr || node->find("cols") == nullptr) {
     refuse(key, "must be a matrix (!!opencv-matrix with rows, cols, dt and data)");
     return {};
   }
   FileSection matrix(*node, path_ + key + ".", where_);
   rows = matrix.whole("rows", 1, kMaxElements);
   columns = matrix.whole("cols", 1, kMaxElements);
-  const cv::FileNode data = (*node)["data"];
-  if (matrix.error() || !data.isSeq() || data.size() != static_cast<std::size_t>(rows) * columns ||
-      data.size() > kMaxElements) {
+  const std::vector<double>& values = data->numbers;
+  if (matrix.error() || values.size() != static_cast<std::size_t>(rows) * columns || values.size() > kMaxElements) {
     refuse(key, "must have rows x cols numbers, at most 9");
     return {};
-  }
-  std::vector<double> values;
-  for (const cv::FileNode& element : data) {
-    values.push_back(is_number(element) ? element.real() : std::nan(""));
   }
   if (!std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); })) {
     refuse(key, "holds something that is not a finite number");

@@ -7,20 +7,21 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <opencv2/core/persistence.hpp>
 
+#include "core/geometry/file_tree.hpp"
 #include "core/result.hpp"
 
 namespace slsd {
 
-/// A map of an OpenCV FileStorage, read key by key. The first key that is missing or wrong is kept as the error; from
+/// A map of a calibration file, read key by key. The first key that is missing or wrong is kept as the error; from
 /// then on every read gives zeros.
 /// @thread thread-bound
 class FileSection {
  public:
+  /// @param node   outlives this
   /// @param path   what stands before the keys in messages: "cameras[0] (left): ", or empty
   /// @param where  the file's name
-  FileSection(const cv::FileNode& node, std::string path, std::string where)
+  FileSection(const FileNode& node, std::string path, std::string where)
       : node_(node), path_(std::move(path)), where_(std::move(where)) {}
 
   [[nodiscard]] bool has(const char* key) const;
@@ -41,10 +42,10 @@ class FileSection {
   static constexpr std::size_t kMaxTextLength = 256;
 
  private:
-  [[nodiscard]] std::optional<cv::FileNode> find(const char* key);
+  [[nodiscard]] const FileNode* find(const char* key);
   [[nodiscard]] std::vector<double> elements(const char* key, int& rows, int& columns);
 
-  cv::FileNode node_;
+  const FileNode& node_;
   std::string path_;
   std::string where_;
   std::optional<Error> error_;

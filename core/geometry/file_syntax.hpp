@@ -13,8 +13,8 @@ struct SyntaxProblem {
   std::string message;
 };
 
-/// Whether every line has a form that a calibration file can have; OpenCV's YAML reader may be given nothing else, as
-/// it recurses without bound, loops or reads past a line's end on some of what is not YAML (4.6).
+/// Whether every line has a form that a calibration file can have, of what OpenCV writes and
+/// people change in it.
 ///
 ///     %YAML:1.0                       first, then one ---
 ///     key: value                      value: number, word, "text", !!opencv-matrix, or nothing

@@ -4,11 +4,10 @@
 #include <set>
 
 #include <Eigen/Geometry>
-#include <opencv2/core/persistence.hpp>
 
 #include "core/geometry/calibration.hpp"
 #include "core/geometry/file_section.hpp"
-#include "core/geometry/file_syntax.hpp"
+#include "core/geometry/file_tree.hpp"
 #include "core/image_size.hpp"
 
 namespace slsd {
@@ -133,11 +132,11 @@ CalibrationReport read_report(FileSection& section) {
   return report;
 }
 
-std::optional<Error> read_cameras(const cv::FileNode& sequence, std::string_view name, Calibration& calibration) {
+std::optional<Error> read_cameras(const std::vector<FileNode>& items, std::string_view name, Calibration& calibration) {
   std::set<std::string> names;
   std::vector<std::string> serials;
   std::vector<std::vector<double>> sigmas;
-  for (const cv::FileNode& node : sequence) {
+  for (const FileNode& node : items) {
     FileSection section(node, {}, std::string(name));
     CalibratedCamera camera = read_camera(section, calibration.cameras.size());
     if (!names.insert(camera.name).second) section.refuse("name", "is another camera's name already");
@@ -153,18 +152,18 @@ std::optional<Error> read_cameras(const cv::FileNode& sequence, std::string_view
   return std::nullopt;
 }
 
-Result<Calibration> read_root(const cv::FileNode& root, std::string_view name) {
+Result<Calibration> read_root(const FileNode& root, std::string_view name) {
   FileSection section(root, {}, std::string(name));
   Calibration calibration;
   calibration.projector = read_lens(section, kProjectorKeys);
   calibration.report = read_report(section);
-  const bool listed = section.has("cameras") && root["cameras"].isSeq();
-  const std::size_t count = listed ? root["cameras"].size() : 0;
+  const FileNode* const cameras = root.find("cameras");
+  const std::size_t count = cameras != nullptr ? cameras->items.size() : 0;
   if (count < 1 || count > kMaxCameras) {
     section.refuse("cameras", "must be a sequence of 1 to " + std::to_string(kMaxCameras) + " maps");
   }
   if (section.error()) return tl::unexpected(*section.error());
-  if (auto error = read_cameras(root["cameras"], name, calibration)) return tl::unexpected(*error);
+  if (auto error = read_cameras(cameras->items, name, calibration)) return tl::unexpected(*error);
   return calibration;
 }
 
@@ -173,16 +172,9 @@ Result<Calibration> read_root(const cv::FileNode& root, std::string_view name) {
 Result<Calibration> read_calibration(std::string_view text, std::string_view name) {
   const std::string where(name);
   if (text.size() > kMaxFileSize) return fail(ErrorCode::kMalformed, "is no calibration file: above 1 MiB", where);
-  if (const auto problem = syntax_problem(text)) {
-    return fail(ErrorCode::kMalformed, problem->message, where + ":" + std::to_string(problem->line));
-  }
-  try {
-    const cv::FileStorage storage(std::string(text),
-                                  cv::FileStorage::READ | cv::FileStorage::MEMORY | cv::FileStorage::FORMAT_YAML);
-    return read_root(storage.root(), name);
-  } catch (const std::exception& exception) {
-    return fail(ErrorCode::kMalformed, std::string("is not YAML as OpenCV writes it: ") + exception.what(), where);
-  }
+  const auto root = read_file_tree(text);
+  if (!root) return fail(ErrorCode::kMalformed, root.error().message, where + ":" + std::to_string(root.error().line));
+  return read_root(*root, name);
 }
 
 }  // namespace slsd

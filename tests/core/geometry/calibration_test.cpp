@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+#include <opencv2/core/persistence.hpp>
 
 #include "tests/core/geometry/paper_rig.hpp"
 
@@ -235,6 +236,78 @@ TEST(ReadCalibration, TakesNamesWithQuotesAndUmlauts) {
   const auto read = read_calibration(write_calibration(rig), "calibration.yml");
   ASSERT_TRUE(read) << to_string(read.error());
   EXPECT_EQ(read->cameras[0].name, rig.cameras[0].name);
+}
+
+TEST(ReadCalibration, RefusesWhatIsNoTree) {
+  const std::string begin = "%YAML:1.0\n---\n";
+  EXPECT_THAT(message_of(begin + "a: 1\n   b: 2\n"), HasSubstr("calibration.yml:4: is indented too far"));
+  EXPECT_THAT(message_of(begin + "   a: 1\nb: 2\n"),
+              HasSubstr("calibration.yml:4: is indented too far, or too little"));
+  EXPECT_THAT(message_of(begin + "a: 1\na: 2\n"), HasSubstr("calibration.yml:4: a is there twice"));
+  std::string keys, list = "a: [ 1";
+  for (int i = 0; i < 50'000; ++i) keys += "a" + std::to_string(i) + ":\n", list += ",\n1";
+  EXPECT_THAT(message_of(begin + keys), HasSubstr("too many keys"));
+  EXPECT_THAT(message_of(begin + list + "]\n"), HasSubstr("projector_width is missing"));
+}
+
+TEST(ReadCalibration, TakesASequenceAsOthersIndentIt) {
+  std::string text = write_calibration(paper_rig());
+  const std::size_t item = text.find("   -\n");
+  std::string rest = text.substr(item + 5);
+  for (std::size_t at = 0; (at = rest.find("\n      ", at)) != rest.npos; at += 1) rest.replace(at + 1, 6, "  ");
+  EXPECT_EQ(message_of(text.substr(0, item) + "- " + rest.substr(6)), "accepted");
+}
+
+TEST(WriteCalibration, IsReadByOpenCvToTheLastBit) {
+  Calibration rig = two_cameras();
+  rig.projector.fx = 1e10 / 3, rig.cameras[0].lens.distortion[0] = -1e-7 / 3,
+  rig.cameras[1].name = "the \"left\" \\ # one: 2";
+  const cv::FileStorage file(write_calibration(rig), cv::FileStorage::READ | cv::FileStorage::MEMORY);
+  cv::Mat matrix, distortion;
+  file["projector_matrix"] >> matrix;
+  file["cameras"][0]["camera_distortion"] >> distortion;
+  EXPECT_EQ(matrix.at<double>(0, 0), rig.projector.fx);
+  EXPECT_EQ(matrix.at<double>(2, 2), 1.0);
+  EXPECT_EQ(distortion.at<double>(0, 0), rig.cameras[0].lens.distortion[0]);
+  EXPECT_EQ(file["cameras"][1]["name"].string(), rig.cameras[1].name);
+  EXPECT_EQ(static_cast<int>(file["cameras"][1]["width"]), rig.cameras[1].lens.width_px);
+  EXPECT_EQ(file["reprojection_error_camera_px"].real(), 0.11);
+}
+
+TEST(ReadCalibration, ReadsWhatOpenCvWrites) {
+  const Calibration rig = paper_rig();
+  const cv::FileStorage read(write_calibration(rig), cv::FileStorage::READ | cv::FileStorage::MEMORY);
+  cv::FileStorage file(".yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
+  const auto copy_matrix = [&](const cv::FileNode& node, const char* key) {
+    cv::Mat matrix;
+    node[key] >> matrix;
+    file << key << matrix;
+  };
+  for (const char* key : {"projector_width", "projector_height"}) file << key << static_cast<int>(read[key]);
+  for (const char* key : {"projector_matrix", "projector_distortion"}) copy_matrix(read.root(), key);
+  file << "held_out_error_px" << 0.1 / 3 << "verdict"
+       << "good"
+       << "date"
+       << "2026-03-01"
+       << "cameras"
+       << "["
+       << "{"
+       << "name"
+       << "a: \"b\"";
+  const cv::FileNode camera = read["cameras"][0];
+  for (const char* key : {"width", "height"}) file << key << static_cast<int>(camera[key]);
+  for (const char* key : {"camera_matrix", "camera_distortion", "R", "T"}) copy_matrix(camera, key);
+  file << "}"
+       << "]";
+  const auto again = read_calibration(file.releaseAndGetString(), "calibration.yml");
+  ASSERT_TRUE(again) << to_string(again.error());
+  EXPECT_EQ(again->projector, rig.projector);
+  EXPECT_EQ(again->cameras[0].lens, rig.cameras[0].lens);
+  EXPECT_EQ(again->cameras[0].name, "a: \"b\"");
+  EXPECT_EQ(again->report.held_out_error_px, 0.1 / 3);
+  EXPECT_EQ(again->report.verdict, "good");
+  EXPECT_EQ(again->report.date, "2026-03-01");
+  expect_same(again->cameras[0].projector_from_camera, rig.cameras[0].projector_from_camera);
 }
 
 RC_GTEST_PROP(ReadCalibration, RefusesEveryTruncation, ()) {
