@@ -278,6 +278,12 @@ void MapCleaner::drop_islands(DenseMap& map, std::size_t least) {
   }
 }
 
+std::size_t MapCleaner::bytes() const {
+  const auto of = [](const auto& held) { return held.capacity() * sizeof held[0]; };
+  return of(label_) + of(runs_) + of(bits_) + of(rows_) + of(measured_) + of(right_) + of(below_) + of(distance_) +
+         of(nearest_);
+}
+
 void MapCleaner::prune(DenseMap& map, double reach_px) {
   if (!(reach_px > 0)) return;
   find_joined(map);

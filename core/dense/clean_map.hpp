@@ -28,6 +28,7 @@ class MapCleaner {
   void drop_islands(DenseMap& map, std::size_t least);
   /// What is nearer than that to a hole or to a jump goes.
   void prune(DenseMap& map, double reach_px);
+  [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory
 
  private:
   CalibratedCamera camera_;

@@ -3,6 +3,7 @@
 #include "core/dense/dense_cloud.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -23,6 +24,8 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr float kJump = 0.004F;
 /// Of full: noise and the sensor's own unevenness keep some pixels below.
 constexpr double kSaturated = 0.985;
+/// Print and shading change white by less within the window of a fit, at most pixels.
+constexpr double kWhiteOff = 0.3;
 
 /// The points of a view in the rig frame, pixel by pixel.
 class ViewPoints {
@@ -104,18 +107,34 @@ std::size_t shade_view(DenseView& view, const SceneLight& light) {
   const auto level = [](const GreyView& frame, int x, int y) {
     return std::visit([&](const auto& pixels) { return static_cast<double>(pixels.at(x, y)); }, frame);
   };
+  // What white is over what the pattern's frame makes of it, in steps of 1/32 up to 4: the usual one is the light's.
+  constexpr int kSteps = 128, kPerUnit = 32;
+  std::array<std::size_t, kSteps> ratios{};
   for (int y = 0; y < view.map.height; ++y) {
     for (int x = 0; x < view.map.width; ++x) {
       const std::size_t pixel = static_cast<std::size_t>(y) * view.map.width + x;
       if (!view.map.measured(pixel)) continue;
       const double dark = light.dark ? level(*light.dark, x, y) : 0;
-      const double white = light.white ? level(*light.white, x, y) : view.map.intensity[pixel] / 255.0 * light.full;
+      const double of_pattern = view.map.intensity[pixel] / 255.0 * light.full;
+      const double white = light.white ? level(*light.white, x, y) : of_pattern;
       const bool clipped = light.white && white >= kSaturated * light.full;
       saturated += clipped;
+      if (!clipped) ++ratios[std::min(kSteps - 1, static_cast<int>(kPerUnit * white / std::max(of_pattern, 1.0)))];
       const double share = clipped ? 1 : (white - dark) / light.full;
       view.map.intensity[pixel] = static_cast<std::uint8_t>(std::lround(std::clamp(255 * share, 0.0, 255.0)));
     }
   }
+  std::size_t all = 0, usual = 0;
+  for (const std::size_t count : ratios) all += count;
+  if (!light.white || all == 0) return saturated;
+  std::size_t below = 0;
+  int middle = 0;
+  while (middle + 1 < kSteps && 2 * (below + ratios[middle]) < all) below += ratios[middle++];
+  const double usual_ratio = (middle + 0.5) / kPerUnit;
+  for (int step = 0; step < kSteps; ++step)
+    if (std::abs((step + 0.5) / kPerUnit - usual_ratio) <= std::max(kWhiteOff * usual_ratio, 1.5 / kPerUnit))
+      usual += ratios[step];
+  view.white_differs = static_cast<double>(all - usual) / static_cast<double>(all);
   return saturated;
 }
 

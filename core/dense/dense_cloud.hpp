@@ -21,6 +21,9 @@ struct DenseView {
   RigidTransform rig_from_camera;
   std::uint8_t camera = 0;  ///< index in the calibration
   std::string camera_name;
+  std::size_t symbols = 0;   ///< decoded in the frame: where there are none, nothing grows
+  float epipolar_px = 0;     ///< how far off its epipolar lines the frame has the pattern, projector px
+  double white_differs = 0;  ///< share of the points whose white frame is not as bright as the pattern's frame says
 };
 
 /// A point for each camera pixel that was measured: clouds as docs/formats.md says.
@@ -35,6 +38,7 @@ struct DenseCloud {
 };
 
 /// Gives measured pixels the intensity of the white frame, as shade_points() does for symbols.
+/// Counts also those where white is not what the pattern's frame lets expect: what moved between the two.
 /// @return how many of them were saturated
 std::size_t shade_view(DenseView& view, const SceneLight& light);
 

@@ -47,6 +47,10 @@ struct DenseMap {
     pixels.assign(count, DensePixel::kNotReached);
     firm.assign(count, 0);
   }
+  [[nodiscard]] std::size_t bytes() const {
+    return depth_mm.capacity() * sizeof(float) + sigma_mm.capacity() * sizeof(float) + intensity.capacity() +
+           pixels.capacity() + firm.capacity();
+  }
   void count_pixels() {
     counts.fill(0);
     // Four tallies: most pixels are as the one before, and would wait for its count.

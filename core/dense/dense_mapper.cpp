@@ -64,16 +64,16 @@ DenseMapper::DenseMapper(const Pattern& pattern, const Calibration& calibration,
         const CalibratedCamera& camera = calibration.cameras[camera_index];
         const ExpectedFrames expected(camera, calibration.projector, decode.middle_depth_mm());
         const double pitch = pattern.pitch_px() * static_cast<double>(expected.in_the_middle().scale);
-        return std::shared_ptr<const Fixed>(
-            new Fixed{PatchGeometry(camera, calibration.projector), decode,
-                      slsd::window_px(pitch, decode.dense.stride_px), judge_reach_px(pitch), slsd::close_px(pitch),
-                      PatternFields(draw_pattern(pattern)), std::make_shared<const RayGrid>(camera.lens)});
+        return std::shared_ptr<const Fixed>(new Fixed{
+            PatchGeometry(camera, calibration.projector), decode,
+            slsd::window_px(pitch, stride_px(camera.lens, decode.dense)), judge_reach_px(pitch), slsd::close_px(pitch),
+            PatternFields(draw_pattern(pattern)), std::make_shared<const RayGrid>(camera.lens)});
       }()) {}
 
 DenseMapper::DenseMapper(std::shared_ptr<const Fixed> fixed)
     : fixed_(std::move(fixed)),
-      grid_(fixed_->geometry, {fixed_->decode.dense.stride_px, fixed_->window_px, fixed_->decode.depth_min_mm,
-                               fixed_->decode.depth_max_mm}),
+      grid_(fixed_->geometry, {stride_px(fixed_->geometry.camera.lens, fixed_->decode.dense), fixed_->window_px,
+                               fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
       judge_({fixed_->reach_px, fixed_->window_px, fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
       cleaner_(fixed_->geometry.camera, fixed_->geometry.projector, fixed_->rays) {}
 
@@ -83,6 +83,32 @@ DenseMapper DenseMapper::another() const {
 
 const std::shared_ptr<const RayGrid>& DenseMapper::rays() const {
   return fixed_->rays;
+}
+
+int DenseMapper::window_px() const {
+  return fixed_->window_px;
+}
+
+std::size_t DenseMapper::bytes() const {
+  return grid_.bytes() + cleaner_.bytes() + map_.bytes();
+}
+
+std::size_t DenseMapper::bytes_of_fields(const Lens& projector) {
+  const auto samples = [](int px) {
+    return static_cast<std::size_t>(px + 2 * PatternField::kBorderPx) * PatternField::kSamplesPerPx;
+  };
+  return PatternFields::kBlursPx.size() * samples(projector.width_px) * samples(projector.height_px) *
+         sizeof(std::uint32_t);
+}
+
+int DenseMapper::stride_px(const Lens& camera, const DenseOptions& options) {
+  int stride = options.stride_px;
+  const auto nodes = [&] {
+    return static_cast<std::size_t>(camera.width_px / stride + 1) *
+           static_cast<std::size_t>(camera.height_px / stride + 1);
+  };
+  while (nodes() > kNodesMost) ++stride;
+  return stride;
 }
 
 void DenseMapper::warm_up(Executor& executor) {
@@ -132,9 +158,12 @@ const DenseMap& DenseMapper::measure(const GreyView& frame, double full, const D
   map_.reset(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
   find_seeds(symbols);
   blur_ = 1;
+  // What is off looks blurred, and with the wrong blur less of it is found: one after the other, and again.
+  grid_.find_epipolar_offset(seen, fixed_->fields.at(blur_), seeds_);
   if (!seeds_.empty()) find_blur(seen);
-  done(DenseStage::kFindBlur);
   const PatternField& field = fixed_->fields.at(blur_);
+  grid_.find_epipolar_offset(seen, field, seeds_);
+  done(DenseStage::kFindBlur);
   grid_.grow(seen, field, seeds_, executor);
   done(DenseStage::kGrow);
   grid_.fuse(executor);

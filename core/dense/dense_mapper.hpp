@@ -42,13 +42,26 @@ class DenseMapper {
   const DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
                           DenseObserver* observer = nullptr);
 
+  /// What it holds of memory, but for what it shares with others; bytes_of_fields() is that.
+  [[nodiscard]] std::size_t bytes() const;
+  /// Of the pattern's fields, at most: one to a blur.
+  [[nodiscard]] static std::size_t bytes_of_fields(const Lens& projector);
+  /// The stride that a frame is measured with: as dense_stride_px says, but for frames so large that it would take more
+  /// than kNodesMost nodes, some 300 MB.
+  [[nodiscard]] static int stride_px(const Lens& camera, const DenseOptions& options);
+  static constexpr std::size_t kNodesMost = 2'000'000;
+
   /// Makes beforehand what the first frame would wait for.
   void warm_up(Executor& executor);
 
   /// Of the camera's pixels.
   [[nodiscard]] const std::shared_ptr<const RayGrid>& rays() const;
+  /// The side of the patches that the surface is fitted to.
+  [[nodiscard]] int window_px() const;
   /// Of the last frame: the blur of the pattern, projector px.
   [[nodiscard]] float blur_sigma_px() const { return PatternFields::kBlursPx[blur_]; }
+  /// Of the last frame: how far off its epipolar lines it had the pattern in the frame's middle, projector px.
+  [[nodiscard]] float epipolar_offset_px() const { return grid_.epipolar_offset().middle; }
 
  private:
   struct Fixed;

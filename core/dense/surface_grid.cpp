@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Cholesky>
+
 #include "core/clones.hpp"
 #include "core/decode/lanes.hpp"
 
@@ -33,6 +35,13 @@ constexpr float kLeastPx = 0.003F, kOfScatter = 0.7F;
 /// Of the share of the window that is saturated: its rims are wrong too.
 constexpr float kOfUnseen = 4;
 
+/// The epipolar offset: how many seeds tell of it, how many at least of its middle, and of its slopes.
+constexpr std::size_t kOffsetSeeds = 256, kOffsetSeedsLeast = 8, kOffsetSlopeSeeds = 48;
+/// What is off across the lines by more is likely to be as far off along them, where it is depth.
+constexpr float kUsualOffsetPx = 0.2F;
+constexpr float kOffsetPx = 0.05F;      // how far relief and noise put a seed off
+constexpr float kOffsetSlope = 0.001F;  // for one camera px: more is no knock that the symbols would decode after
+
 constexpr AlignOptions kAlign{.gain_slope_sigma = kGainSlopeSigma};
 
 }  // namespace
@@ -48,6 +57,12 @@ SurfaceGrid::SurfaceGrid(const PatchGeometry& geometry, const GridOptions& optio
       turned_.push_back(
           turned_by(geometry.rays.ray(Eigen::Vector2d(x_of(column), y_of(row))), geometry.camera.projector_from_camera)
               .cast<float>());
+}
+
+std::size_t SurfaceGrid::bytes() const {
+  const auto of = [](const auto& held) { return held.capacity() * sizeof held[0]; };
+  return of(turned_) + of(nodes_) + of(around_) + of(front_) + of(next_) + of(accepted_) + of(pending_) +
+         of(attempts_) + of(batches_) + of(misfits_) + of(offsets_);
 }
 
 std::int32_t SurfaceGrid::node_at(const Eigen::Vector2f& camera_px) const {
@@ -68,8 +83,7 @@ bool SurfaceGrid::begin(const DenseFrame& frame, const Attempt& attempt, PatchTa
   // Half a window tells little of a slope: the frame's rim takes its planes from farther in.
   const Lens& lens = geometry_->camera.lens;
   if (task.x < half || task.y < half || task.x + half >= lens.width_px || task.y + half >= lens.height_px) return false;
-  task.map = make_patch_map(turned_[attempt.node].cast<double>(), {task.x, task.y},
-                            geometry_->camera.projector_from_camera.translation, geometry_->projector, inverse_depth);
+  task.map = map_at(attempt.node % columns_, attempt.node / columns_, inverse_depth);
   const float px = static_cast<float>(1 / task.map.inverse_depth_per_px);
   task.state = {};
   task.state.slope_x = start.slope_x * px, task.state.slope_y = start.slope_y * px;
@@ -124,25 +138,32 @@ bool SurfaceGrid::accept(const DenseFrame& frame, const PatchTask& task, Surface
   return true;
 }
 
-float SurfaceGrid::misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds) {
-  const std::size_t step = (seeds.size() + kBatchNodes - 1) / kBatchNodes;
-  if (batches_.empty()) batches_.resize(1);
-  Batch& batch = batches_[0];
-  std::size_t count = 0, all = 0;
-  for (std::size_t i = step / 2; i < seeds.size(); i += step) {
+/// Aligns every so manieth seed, at most a batch of them. @return how many could be begun, at the batch's front
+std::size_t SurfaceGrid::align_some(const DenseFrame& frame, const PatternField& field,
+                                    std::span<const SurfaceSeed> seeds, std::size_t first, std::size_t step,
+                                    Batch& batch) {
+  std::size_t count = 0;
+  for (std::size_t i = first; i < seeds.size() && count < kBatchNodes; i += step) {
     const std::int32_t index = node_at(seeds[i].camera_px);
     if (index < 0) continue;
     const float dx = static_cast<float>(x_of(index % columns_)) - seeds[i].camera_px.x(),
                 dy = static_cast<float>(y_of(index / columns_)) - seeds[i].camera_px.y();
     const SurfacePlane& plane = seeds[i].plane;
     const Attempt attempt{index, 0, {plane.at(dx, dy), plane.slope_x, plane.slope_y}, 0, 0, 0, 0, 0};
-    ++all;
     batch.tasks[count].settled = false;
     if (begin(frame, attempt, batch.tasks[count])) ++count;
   }
   for (std::size_t i = 0; i < count; ++i) batch.active[i] = &batch.tasks[i];
   align(frame, field, batch, count);
-  misfits_.assign(all - count, 1);
+  return count;
+}
+
+float SurfaceGrid::misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds) {
+  const std::size_t step = (seeds.size() + kBatchNodes - 1) / kBatchNodes;
+  if (batches_.empty()) batches_.resize(1);
+  Batch& batch = batches_[0];
+  const std::size_t count = align_some(frame, field, seeds, step / 2, step, batch);
+  misfits_.clear();
   for (std::size_t i = 0; i < count; ++i) {
     SurfaceNode node;
     misfits_.push_back(accept(frame, batch.tasks[i], node) ? node.residual : 1);
@@ -151,6 +172,54 @@ float SurfaceGrid::misfit(const DenseFrame& frame, const PatternField& field, st
   const auto middle = misfits_.begin() + static_cast<std::ptrdiff_t>(misfits_.size() / 2);
   std::nth_element(misfits_.begin(), middle, misfits_.end());
   return *middle;
+}
+
+void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const PatternField& field,
+                                       std::span<const SurfaceSeed> seeds) {
+  const Lens& lens = geometry_->camera.lens;
+  if (batches_.empty()) batches_.resize(1);
+  Batch& batch = batches_[0];
+  epipolar_ = {};
+  epipolar_.middle_px = 0.5F * Eigen::Vector2f(static_cast<float>(lens.width_px), static_cast<float>(lens.height_px));
+  const EpipolarOffset none = epipolar_;
+  const std::size_t step = std::max<std::size_t>(1, seeds.size() / kOffsetSeeds);
+  // The aligner holds the pattern to its line by some; a second round, from what the first has found, takes that back.
+  for (int round = 0; round < 2; ++round) {
+    offsets_.clear();
+    for (std::size_t first = step / 2; first < seeds.size(); first += step * kBatchNodes) {
+      const std::size_t count = align_some(frame, field, seeds, first, step, batch);
+      for (std::size_t i = 0; i < count; ++i) {
+        SurfaceNode node;
+        const PatchTask& task = batch.tasks[i];
+        if (!accept(frame, task, node)) continue;
+        const Eigen::Vector2f from_middle = task.map.middle_px - epipolar_.middle_px;
+        offsets_.emplace_back(from_middle.x(), from_middle.y(), epipolar_.at(task.map.middle_px) + node.across);
+      }
+    }
+    if (offsets_.size() < kOffsetSeedsLeast) return void(epipolar_ = none);
+    const auto middle = offsets_.begin() + static_cast<std::ptrdiff_t>(offsets_.size() / 2);
+    std::nth_element(offsets_.begin(), middle, offsets_.end(),
+                     [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) { return a.z() < b.z(); });
+    epipolar_.middle = middle->z(), epipolar_.slope_x = epipolar_.slope_y = 0;
+    if (offsets_.size() < kOffsetSlopeSeeds) continue;
+    // A plane through them, those that are far off it counting less; what is known of its slopes is that they are
+    // small.
+    for (int pass = 0; pass < 4; ++pass) {
+      Eigen::Matrix3f normal = Eigen::Matrix3f::Zero();
+      Eigen::Vector3f right = Eigen::Vector3f::Zero();
+      for (const Eigen::Vector3f& seen : offsets_) {
+        const Eigen::Vector3f row(1, seen.x(), seen.y());
+        const float off = seen.z() - row.dot(Eigen::Vector3f(epipolar_.middle, epipolar_.slope_x, epipolar_.slope_y));
+        const float weight = 1 / (1 + off * off / (kOffsetPx * kOffsetPx));
+        normal += weight * row * row.transpose(), right += weight * row * seen.z();
+      }
+      normal(1, 1) += kOffsetPx * kOffsetPx / (kOffsetSlope * kOffsetSlope);
+      normal(2, 2) += kOffsetPx * kOffsetPx / (kOffsetSlope * kOffsetSlope);
+      const Eigen::Vector3f plane = normal.ldlt().solve(right);
+      if (!plane.allFinite()) break;
+      epipolar_.middle = plane.x(), epipolar_.slope_x = plane.y(), epipolar_.slope_y = plane.z();
+    }
+  }
 }
 
 void SurfaceGrid::offer(const Attempt& attempt) {
@@ -388,7 +457,10 @@ void SurfaceGrid::fuse(Executor& executor) {
         if (!node.good) continue;
         node.plane.inverse_depth += fused.off[lane] * node.per_px;
         node.plane.slope_x = fused.slope_x[lane], node.plane.slope_y = fused.slope_y[lane];
-        node.sigma_px = std::sqrt(fused.left[lane] * (node.sigma_px * node.sigma_px + fused.more[lane]));
+        const float off = epipolar_.at({static_cast<float>(x_of(column + lane)), static_cast<float>(y_of(at_row))});
+        const float unknown = std::max(0.F, std::abs(off) - kUsualOffsetPx);
+        node.sigma_px =
+            std::sqrt(fused.left[lane] * (node.sigma_px * node.sigma_px + fused.more[lane]) + unknown * unknown);
       }
     }
   });

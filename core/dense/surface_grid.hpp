@@ -45,6 +45,16 @@ struct SurfaceNode {
   bool good = false;
 };
 
+/// How far off its epipolar lines the pattern lies, projector px, over the frame: the calibration's error, or a knock.
+struct EpipolarOffset {
+  Eigen::Vector2f middle_px = Eigen::Vector2f::Zero();  ///< of the frame
+  float middle = 0, slope_x = 0, slope_y = 0;           ///< there, and its change for one camera px
+
+  [[nodiscard]] float at(const Eigen::Vector2f& camera_px) const {
+    return middle + slope_x * (camera_px.x() - middle_px.x()) + slope_y * (camera_px.y() - middle_px.y());
+  }
+};
+
 /// One frame as the dense stages see it.
 struct DenseFrame {
   GreyView pixels;
@@ -93,15 +103,26 @@ class SurfaceGrid {
     return node.good ? &node : nullptr;
   }
 
-  /// How the pattern falls around a node.
+  /// How the pattern falls around a node, as far off its epipolar line as this frame has it there.
   [[nodiscard]] PatchMap map_at(int column, int row, double inverse_depth) const {
-    return make_patch_map(turned_[static_cast<std::size_t>(row) * columns_ + column].cast<double>(),
-                          Eigen::Vector2d(x_of(column), y_of(row)), geometry_->camera.projector_from_camera.translation,
-                          geometry_->projector, inverse_depth);
+    PatchMap map =
+        make_patch_map(turned_[static_cast<std::size_t>(row) * columns_ + column].cast<double>(),
+                       Eigen::Vector2d(x_of(column), y_of(row)), geometry_->camera.projector_from_camera.translation,
+                       geometry_->projector, inverse_depth);
+    const float off = epipolar_.at(map.middle_px);
+    const Eigen::Vector2f across(-off * map.along.y(), off * map.along.x());
+    map.base.topRows<2>() += across * map.base.row(2);
+    map.shift.head<2>() += across * map.shift.z();
+    return map;
   }
 
   /// How badly the pattern at a blur fits the seeds: the median of residual over gain; 1 where nothing fits.
   [[nodiscard]] float misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
+
+  /// Measures at some of the seeds how far off its epipolar lines the frame has the pattern; what follows starts there.
+  void find_epipolar_offset(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
+  [[nodiscard]] const EpipolarOffset& epipolar_offset() const { return epipolar_; }
+  [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory
 
   void grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds, Executor& executor);
   /// Where a node and those around it agree to within their noise they are one smooth surface, and their mean is more
@@ -124,6 +145,8 @@ class SurfaceGrid {
   [[nodiscard]] bool begin(const DenseFrame& frame, const Attempt& attempt, PatchTask& task) const;
   void align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t count) const;
   [[nodiscard]] bool accept(const DenseFrame& frame, const PatchTask& task, SurfaceNode& node) const;
+  std::size_t align_some(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+                         std::size_t first, std::size_t step, Batch& batch);
   void offer(const Attempt& attempt);
   void offer_neighbours(std::int32_t index);
   [[nodiscard]] std::int32_t node_at(const Eigen::Vector2f& camera_px) const;
@@ -140,6 +163,8 @@ class SurfaceGrid {
   std::vector<std::uint8_t> attempts_;  // of a node
   std::vector<Batch> batches_;          // one to a worker
   std::vector<float> misfits_;
+  EpipolarOffset epipolar_;
+  std::vector<Eigen::Vector3f> offsets_;  // of seeds: camera px, off by
 };
 
 }  // namespace slsd

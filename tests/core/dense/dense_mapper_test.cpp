@@ -167,6 +167,41 @@ TEST(DenseMapper, WithoutPruningItReachesFartherAndNearerToWrong) {
   EXPECT_GT(usual, pruned + 500);
 }
 
+/// A frame of a rig whose projector's image has moved since it was calibrated.
+Measured measure_moved(double moved_px, float* offset_px) {
+  Calibration moved = small_rig();
+  moved.projector.cy += moved_px;
+  const Grey8 frame = simulate(draw_pattern(pattern()), moved, kTilted, {});
+  Decoder decoder = Decoder::create(pattern(), small_rig(), 0, {}).value();
+  EXPECT_TRUE(decoder.decode(frame.view(), 255));
+  DenseMapper mapper(pattern(), small_rig(), 0, {});
+  SerialExecutor serial;
+  const DecodedSymbols symbols = decoder.symbols();
+  Measured measured{symbols.lattice->symbols.size(), mapper.measure(frame.view(), 255, symbols, serial)};
+  *offset_px = mapper.epipolar_offset_px();
+  return measured;
+}
+
+TEST(DenseMapper, TellsHowFarOffItsEpipolarLinesAFrameIs) {
+  float offset_px = 0;
+  for (const double moved_px : {-0.2, 0.0, 0.2, 0.6}) {
+    const Score got = score(measure_moved(moved_px, &offset_px).map, tilted());
+    EXPECT_NEAR(std::abs(offset_px), std::abs(moved_px), 0.02) << moved_px;
+    EXPECT_GT(share(got.measured, got.lit), 0.97) << moved_px;
+    EXPECT_LT(got.median_px, 0.03) << moved_px;
+  }
+}
+
+TEST(DenseMapper, SigmaTellsOfACalibrationThatIsFarOff) {
+  float offset_px = 0;
+  const auto middle_sigma = [&](double moved_px) {
+    const DenseMap map = measure_moved(moved_px, &offset_px).map;
+    return map.sigma_mm[static_cast<std::size_t>(map.height / 2) * map.width + map.width / 2];
+  };
+  EXPECT_GT(middle_sigma(0.7), 2.5F);  // 0.5 px beyond what is usual, of 6.3 mm
+  EXPECT_LT(middle_sigma(0.1), 1.F);
+}
+
 TEST(DenseMapper, NothingInNoise) {
   Grey8 frame(360, 280);
   std::mt19937 random(3);
