@@ -9,10 +9,14 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
+#include <opencv2/core/utility.hpp>
+
 #include "core/dense/dense_mapper.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/files/read_image.hpp"
+#include "tests/corpus/dense_others.hpp"
 #include "tests/corpus/dense_score.hpp"
 
 namespace slsd {
@@ -50,11 +54,39 @@ class StageTimes final : public DenseObserver {
   Clock::time_point last_;
 };
 
-Result<> report(const Pattern& pattern, const std::string& folder, const DenseOptions& options) {
+/// Turns the calibration wrong: the projector's image by so many px across the epipolar line in the frame's middle.
+void move_across(Calibration& calibration, double px) {
+  const CalibratedCamera& camera = calibration.cameras[0];
+  const Eigen::Vector3d ray =
+      camera.lens.undistort({0.5 * camera.lens.width_px, 0.5 * camera.lens.height_px}).homogeneous();
+  const auto pixel = [&](double depth_mm) {
+    const Eigen::Vector3d point =
+        camera.projector_from_camera.rotation * (depth_mm * ray) + camera.projector_from_camera.translation;
+    return calibration.projector.distort(point.head<2>() / point.z());
+  };
+  const Eigen::Vector2d along = (pixel(1990) - pixel(2010)).normalized();
+  calibration.projector.cx -= px * along.y(), calibration.projector.cy += px * along.x();
+}
+
+/// The same figures of what others make of the frame.
+void report_other(const char* name, const DepthMap& depths, double ms, const DenseTruth& truth,
+                  const Calibration& calibration) {
+  const std::vector<float> sigma_mm(depths.size(), 1);
+  const DenseScore s = score_dense(truth, calibration, depths, sigma_mm);
+  std::printf("  %-22s       %5.1f  %.3f %.3f  %.2f %.2f  %5.2f %5.2f %5.2f              ", name, 100 * s.complete,
+              s.median_px, s.rms_px, s.median_mm, s.rms_mm, 100 * s.gross, 100 * s.unlit, 100 * s.unlit_far);
+  for (const auto& edge : s.edges) std::printf(" %2.0f/%.1f", 100 * edge.complete, 100 * edge.gross);
+  std::printf("  %4.0f\n", ms);
+}
+
+Result<> report(const Pattern& pattern, const std::string& folder, const DenseOptions& options, double offset_px,
+                bool compare) {
   const auto text = read_file(folder + "/calibration.yml", kLargestFileBytes);
   if (!text) return tl::unexpected(text.error());
-  const auto calibration = read_calibration(*text, folder + "/calibration.yml");
+  auto calibration = read_calibration(*text, folder + "/calibration.yml");
   if (!calibration) return tl::unexpected(calibration.error());
+  const Calibration true_calibration = *calibration;
+  move_across(*calibration, offset_px);
   const auto frame = read_image(folder + "/frame.png");
   if (!frame) return tl::unexpected(frame.error());
   const auto truth = read_dense_truth(folder);
@@ -74,7 +106,7 @@ Result<> report(const Pattern& pattern, const std::string& folder, const DenseOp
   const auto begin = Clock::now();
   const DenseMap& map = mapper.measure(view(*frame), full, decoder->symbols(), executor, &times);
   const double total_ms = ms_since(begin);
-  const DenseScore s = score_dense(*truth, *calibration, map.depth_mm, map.sigma_mm);
+  const DenseScore s = score_dense(*truth, true_calibration, map.depth_mm, map.sigma_mm);
   const auto slash = folder.find_last_of('/');
   std::printf("%-24s %5zu %5.1f  %.3f %.3f  %.2f %.2f  %5.2f %5.2f %5.2f  %4.2f %5.2f ",
               folder.substr(slash + 1).c_str(), (*decoding)->points.size(), 100 * s.complete, s.median_px, s.rms_px,
@@ -83,9 +115,18 @@ Result<> report(const Pattern& pattern, const std::string& folder, const DenseOp
   for (const auto& edge : s.edges) std::printf(" %2.0f/%.1f", 100 * edge.complete, 100 * edge.gross);
   std::printf("  %4.0f:", total_ms);
   for (const double ms : times.ms) std::printf(" %.0f", ms);
-  std::printf("  %.2f", static_cast<double>(mapper.blur_sigma_px()));
+  std::printf("  %.2f %+.2f", static_cast<double>(mapper.blur_sigma_px()),
+              static_cast<double>(mapper.epipolar_offset_px()));
   for (int i = 1; i < kDensePixelCount; ++i) std::printf(" %.1f", 100.0 * map.counts[i] / static_cast<double>(s.lit));
   std::printf("\n");
+  if (!compare) return {};
+  const std::vector<CloudPoint> points = (*decoding)->points;
+  auto other_begin = Clock::now();
+  const DepthMap matched = match_semi_global(view(*frame), full, pattern, *calibration, points);
+  report_other("StereoSGBM", matched, ms_since(other_begin), *truth, true_calibration);
+  other_begin = Clock::now();
+  const DepthMap joined = join_by_triangles(pattern, *calibration, points);
+  report_other("triangles of centres", joined, ms_since(other_begin), *truth, true_calibration);
   return {};
 }
 
@@ -94,7 +135,10 @@ Result<> report(const Pattern& pattern, const std::string& folder, const DenseOp
 
 int main(int argc, char** argv) {
   using namespace slsd;
+  cv::setNumThreads(1);  // the times are those of one core
   DenseOptions options;
+  double offset_px = 0;
+  bool compare = false;
   std::string pattern_file;
   std::vector<std::string> folders;
   for (int i = 1; i < argc; ++i) {
@@ -102,13 +146,18 @@ int main(int argc, char** argv) {
       options.stride_px = std::atoi(argv[++i]);
     else if (std::strcmp(argv[i], "--prune") == 0 && i + 1 < argc)
       options.prune_px = std::atof(argv[++i]);
+    else if (std::strcmp(argv[i], "--offset") == 0 && i + 1 < argc)
+      offset_px = std::atof(argv[++i]);
+    else if (std::strcmp(argv[i], "--compare") == 0)
+      compare = true;
     else if (pattern_file.empty())
       pattern_file = argv[i];
     else
       folders.emplace_back(argv[i]);
   }
   if (folders.empty()) {
-    std::fputs("usage: dense-report PATTERN.toml FOLDER... [--stride PX] [--prune PX]\n", stderr);
+    std::fputs("usage: dense-report PATTERN.toml FOLDER... [--stride PX] [--prune PX] [--offset PX] [--compare]\n",
+               stderr);
     return 2;
   }
   const auto text = read_file(pattern_file, kLargestFileBytes);
@@ -116,9 +165,9 @@ int main(int argc, char** argv) {
   if (!pattern) return std::fprintf(stderr, "dense-report: %s\n", to_string(pattern.error()).c_str()), 1;
   std::printf(
       "scene                    seeds compl med px rms px  mm med rms  gross unlit   far  err/s  >3   edges 0-2 2-4 "
-      "4-6 6- (complete/gross %%)  ms: blur grow fuse judge clean  blur  reasons %%\n");
+      "4-6 6- (complete/gross %%)  ms: blur grow fuse judge clean  blur off  reasons %%\n");
   for (const std::string& folder : folders) {
-    const auto done = report(*pattern, folder, options);
+    const auto done = report(*pattern, folder, options, offset_px, compare);
     if (!done) std::fprintf(stderr, "dense-report: %s: %s\n", folder.c_str(), to_string(done.error()).c_str());
   }
   return 0;
