@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "core/dense/dense_mapper.hpp"
+#include "core/dense/dense_outlook.hpp"
 #include "core/image_size.hpp"
 #include "core/printable.hpp"
 #include "daemon/client/connection.hpp"
@@ -17,6 +19,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/configuration/exposure_warnings.hpp"
 #include "daemon/latency/latency_file.hpp"
+#include "daemon/scan/crew.hpp"
 #include "daemon/scan/devices.hpp"
 #include "daemon/scan/hardware.hpp"
 #include "daemon/scan/scan_setup.hpp"
@@ -34,6 +37,8 @@ using std::filesystem::path;
 constexpr std::size_t kMaxLatencyBytes = 1 << 20;
 constexpr std::size_t kLongestProblem = 1000;
 constexpr auto kOpenTime = std::chrono::seconds(30);
+constexpr int kDenseRuns = 3;                  // the first has buffers to make
+constexpr std::size_t kCloudBytesAPixel = 28;  // the map's 10 and a file's 18
 
 /// Prints findings, and keeps whether one of them forbids a scan.
 class Findings {
@@ -150,7 +155,10 @@ class Check {
     if (configuration_.cameras.empty()) findings_.bad("no camera: add a [[camera]] table to the configuration");
     for (const CameraOptions& camera : configuration_.cameras) check_camera(camera);
     for (const std::string& warning : exposure_warnings(configuration_)) findings_.warn(warning);
-    if (pattern && calibration_) findings_.note(ScanSetup::create(configuration_, 1), "decoder");
+    if (pattern && calibration_) {
+      const auto setup = ScanSetup::create(configuration_, 1);
+      if (findings_.note(setup, "decoder")) check_dense(*setup);
+    }
     check_latency();
   }
 
@@ -268,6 +276,61 @@ class Check {
     findings_.bad(name + " gives frames of " + size + " px, its calibration is for " +
                   size_text(known->lens.width_px, known->lens.height_px) +
                   " px: set the camera's size, or calibrate it again");
+  }
+
+  // Tried on a wall as each camera would see it: the time is that of this machine, and the memory what it took.
+  void check_dense(const ScanSetup& setup) {
+    for (const std::string& warning : calibration_error_warnings(*setup.calibration)) findings_.warn(warning);
+    Crew crew(Crew::helpers_here());
+    for (const Decoder& made : setup.lanes.front()) {
+      const std::string name =
+          "dense clouds of camera \"" + setup.calibration->cameras[made.camera_index()].name + "\"";
+      const CalibratedCamera& camera = setup.calibration->cameras[made.camera_index()];
+      DenseMapper mapper(setup.pattern, *setup.calibration, made.camera_index(), setup.decode);
+      const DenseOutlook outlook =
+          dense_outlook(setup.pattern, *setup.calibration, made.camera_index(), setup.decode, mapper.window_px());
+      if (outlook.too_coarse) {
+        findings_.warn(
+            fmt::format("{}: the pattern is too coarse for this camera, which sees its symbols {:.0f} px apart; the "
+                        "surface is fitted "
+                        "in windows of {} px: take smaller symbols, such as those of config/patterns/8px-6-dense.toml",
+                        name, outlook.pitch_px, mapper.window_px()));
+      }
+      const int stride = DenseMapper::stride_px(camera.lens, setup.decode.dense);
+      if (stride != setup.decode.dense.stride_px) {
+        findings_.warn(
+            fmt::format("{}: dense_stride_px = {} would take too much memory with so many pixels: {} is used", name,
+                        setup.decode.dense.stride_px, stride));
+      }
+      const Grey8 frame = wall_frame(setup.pattern, *setup.calibration, made.camera_index(), outlook.depth_mm);
+      Decoder decoder = made.another();
+      std::uint32_t points = 0;
+      auto least = std::chrono::steady_clock::duration::max();
+      for (int run = 0; run < kDenseRuns; ++run) {
+        const auto begin = std::chrono::steady_clock::now();
+        if (const auto decoding = decoder.decode(frame.view(), 255); !decoding) {
+          return findings_.bad(name + ": " + to_string(decoding.error()));
+        }
+        points = mapper.measure(frame.view(), 255, decoder.symbols(), crew).count(DensePixel::kMeasured);
+        least = std::min(least, std::chrono::steady_clock::now() - begin);
+      }
+      const auto pixels = static_cast<std::size_t>(frame.width()) * static_cast<std::size_t>(frame.height());
+      if (points == 0) {
+        findings_.warn(name + " would be empty: of a wall at " + fmt::format("{:.0f}", outlook.depth_mm) +
+                       " mm nothing is decoded; take symbols that the camera sees larger, or look at depth_min_mm and "
+                       "depth_max_mm");
+        continue;
+      }
+      constexpr double kMega = 1e6;
+      findings_.good(fmt::format(
+          "{}, at {:.0f} mm: parts from {:.1f} mm on, half of waves with a period of {:.1f} mm, {:.2f} mm of depth for "
+          "one px; of a wall {} points of {} pixels in {:.0f} ms a frame; memory {:.0f} MB, {:.0f} MB shared by all "
+          "that decode, and {:.0f} MB for each cloud under way",
+          name, outlook.depth_mm, outlook.thinnest_part_mm, outlook.half_transfer_mm, outlook.mm_per_px, points, pixels,
+          std::chrono::duration<double, std::milli>(least).count(), static_cast<double>(mapper.bytes()) / kMega,
+          static_cast<double>(DenseMapper::bytes_of_fields(setup.calibration->projector)) / kMega,
+          static_cast<double>(pixels * kCloudBytesAPixel) / kMega));
+    }
   }
 
   void check_drift(const std::string& name, const json& drift) {

@@ -96,8 +96,13 @@ DenseView measure_pixels(const GreyView& frame, Decoder& decoder, ScanSetup& set
   if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may be those of the quotient
   Executor& executor = setup.dense->crew();
   const CalibratedCamera& calibrated = setup.calibration->cameras[decoder.camera_index()];
-  DenseView view{mapper.measure(frame, light.full, symbols, executor), mapper.rays(), calibrated.rig_from_camera,
-                 decoder.camera_index(), setup.camera_names[camera]};
+  DenseView view{mapper.measure(frame, light.full, symbols, executor),
+                 mapper.rays(),
+                 calibrated.rig_from_camera,
+                 decoder.camera_index(),
+                 setup.camera_names[camera],
+                 symbols.lattice->symbols.size(),
+                 mapper.epipolar_offset_px()};
   if (light.white || light.dark) {
     const std::size_t saturated = shade_view(view, light);
     if (light.white) result.dense_saturated = result.dense_saturated.value_or(0) + saturated;

@@ -6,6 +6,8 @@
 #include <future>
 #include <limits>
 
+#include <fmt/format.h>
+
 #include "core/decode/lattice_frame.hpp"
 #include "core/decode/separability.hpp"
 #include "core/image_size.hpp"
@@ -124,6 +126,23 @@ std::vector<std::string> symbol_warnings(const PatternOptions& pattern, double s
   const auto separability = assess_separability(pattern.symbols, look);
   if (!separability) return {to_string(separability.error())};
   return separability_warnings(*separability, pattern.symbol_size_px);
+}
+
+std::vector<std::string> calibration_error_warnings(const Calibration& calibration) {
+  constexpr double kLargePx = 0.3;
+  const CalibrationReport& report = calibration.report;
+  std::vector<std::string> warnings;
+  const auto look = [&](const std::optional<double>& error_px, const char* what) {
+    if (!error_px || !(*error_px > kLargePx)) return;
+    warnings.push_back(fmt::format(
+        "the calibration's {} is {:.2f} px, and dense clouds measure to some hundredths: their points agree with each "
+        "other and are off together; calibrate again",
+        what, *error_px));
+  };
+  look(report.reprojection_error_camera_px, "reprojection error in the camera");
+  look(report.reprojection_error_projector_px, "reprojection error in the projector");
+  look(report.epipolar_error_px, "error across the epipolar lines");
+  return warnings;
 }
 
 Result<std::optional<Calibration>> configured_calibration(const Configuration& configuration) {

@@ -45,6 +45,10 @@ struct ScanFiles {
   std::string calibration;  ///< a calibration file; empty: none
 };
 
+/// What the calibration's own error, as its report has it, would do to dense clouds: warnings, each with what to do.
+/// Empty where it is small beside what the clouds measure, or not known.
+[[nodiscard]] std::vector<std::string> calibration_error_warnings(const Calibration& calibration);
+
 /// The levels of saturated pixels that the cameras' frames have shown: where no format says, a faint frame after a
 /// bright one is not of fewer bits.
 /// @thread thread-safe: lanes share it

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 
 #include "core/printable.hpp"
@@ -141,6 +142,10 @@ double latency_ms(MonotonicTime received) {
 
 namespace {
 
+double rounded(double value) {
+  return std::round(1e4 * value) / 1e4;
+}
+
 void add_pixels(const DenseCloud& dense, const ScanResult& scan, json& result) {
   result["density"] = to_string(Density::kPixels);
   result["width_px"] = dense.views.front().map.width;
@@ -155,6 +160,22 @@ void add_pixels(const DenseCloud& dense, const ScanResult& scan, json& result) {
     pixels[std::string(to_string(static_cast<DensePixel>(i)))] = count;
   }
   result["pixels"] = std::move(pixels);
+  json epipolar = json::array();
+  std::size_t symbols = 0;
+  double white_differs = 0;
+  for (const DenseView& view : dense.views) {
+    epipolar.push_back(rounded(view.epipolar_px));
+    symbols += view.symbols;
+    white_differs = std::max(white_differs, view.white_differs);
+  }
+  result["epipolar_px"] = std::move(epipolar);
+  if (scan.dense_saturated) result["white_differs"] = rounded(white_differs);
+  if (dense.points() > 0) return;
+  result["empty"] =
+      symbols == 0 ? "no symbol of the pattern was decoded in any frame: look at a picture of one (slsctl preview), "
+                     "whether the projector shows this pattern (slsd --pattern) and the light and focus suffice"
+                   : "symbols were decoded, but around none the surface fits the pattern within the working range: "
+                     "\"pixels\" has the reasons; look at depth_min_mm, depth_max_mm and the calibration";
 }
 
 }  // namespace

@@ -62,6 +62,8 @@ Result<std::unique_ptr<Service>> Service::create(Configuration configuration, co
   if (!setup) return tl::unexpected(setup.error());
   warn_of_symbols(setup->pattern.options, pattern_scale(setup->calibration, configuration.decode));
   for (const std::string& warning : exposure_warnings(configuration)) spdlog::warn("{}", warning);
+  if (configuration.decode.density == Density::kPixels && setup->calibration)
+    for (const std::string& warning : calibration_error_warnings(*setup->calibration)) spdlog::warn("{}", warning);
   auto rig = std::make_unique<Rig>(std::move(*projector), std::move(cameras), setup->image, configuration.scan);
   rig->set_idle(draw_idle(configuration.projector), std::chrono::milliseconds(configuration.projector.idle_after_ms));
   std::error_code ignored;

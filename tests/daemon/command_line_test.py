@@ -5,6 +5,7 @@
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -104,6 +105,39 @@ class Slsd(unittest.TestCase):
         service = Service()
         result = slsd("--check", "--config", service.file)
         self.assertEqual(result.returncode, 0, result.stdout)
+
+    def checked_with(self, change, decode=""):
+        """What --check says with another calibration."""
+        service = Service()
+        text = change((SCENE / "calibration.yml").read_text(encoding="utf-8"))
+        (service.folder / "other.yml").write_text(text, encoding="utf-8")
+        configuration = service.file.read_text(encoding="utf-8")
+        service.file.write_text(configuration.replace(f"{SCENE}/calibration.yml", "other.yml") + decode, encoding="utf-8")
+        return slsd("--check", "--config", service.file).stdout
+
+    def test_check_says_what_dense_clouds_would_give(self):
+        said = self.checked_with(lambda text: text)
+        self.assertRegex(said, r'ok +dense clouds of camera "camera", at 1000 mm: parts from \d+\.\d mm on, half of waves '
+                               r'with a period of \d+\.\d mm, .* points of 1920000 pixels in \d+ ms a frame; memory \d+ MB')
+        self.assertNotIn("dense_stride_px", said)
+        self.assertNotIn("calibrate again", said)
+
+    def test_check_warns_of_a_calibration_that_is_far_off(self):
+        said = self.checked_with(lambda text: text + "\nreprojection_error_projector_px: 0.62\n")
+        self.assertIn("warning  the calibration's reprojection error in the projector is 0.62 px", said)
+
+    def test_check_warns_of_a_pattern_that_is_too_coarse(self):
+        def nearer(text):
+            matrix = re.search(r"camera_matrix:.*?data: \[(.*?)\]", text, re.S).group(1)
+            values = [float(value) for value in matrix.split(",")]
+            values[0], values[4] = 3 * values[0], 3 * values[4]
+            return text.replace(matrix, ", ".join(map(repr, values)))
+        self.assertIn("the pattern is too coarse for this camera", self.checked_with(nearer))
+
+    def test_check_names_the_stride_that_memory_allows(self):
+        larger = lambda text: text.replace("width: 1600", "width: 3200", 1)
+        said = self.checked_with(larger, "\n[decode]\ndense_stride_px = 1\n")
+        self.assertIn("dense_stride_px = 1 would take too much memory", said)
 
     def test_warns_of_symbols_that_look_alike(self):
         self.file.write_text("[pattern]\nsymbol_size_px = 8\nsymbols = [1, 7, 22, 25]\n", encoding="utf-8")
