@@ -53,7 +53,7 @@ LentMemory::~LentMemory() {
   for (const Lent& lent : lent_) budget_.give_back(lent.bytes);
 }
 
-Result<> LentMemory::add(FileDescriptor kept, std::size_t bytes) {
+Result<> LentMemory::add(FileDescriptor kept, std::size_t bytes, const void* to) {
   sweep();
   if (lent_.size() == kMemoriesMax || !budget_.lend(bytes)) {
     return fail(ErrorCode::kBusy, std::to_string(lent_.size()) + " clouds that were sent as memfds, " +
@@ -61,8 +61,13 @@ Result<> LentMemory::add(FileDescriptor kept, std::size_t bytes) {
                                       " MB, are still open or mapped by clients: close them, or ask with " +
                                       "\"transport\": \"inline\"");
   }
-  lent_.push_back({std::move(kept), bytes});
+  lent_.push_back({std::move(kept), bytes, to});
   return {};
+}
+
+std::size_t LentMemory::count_of(const void* to) {
+  sweep();
+  return static_cast<std::size_t>(std::ranges::count(lent_, to, &Lent::to));
 }
 
 void LentMemory::sweep() {

@@ -38,15 +38,19 @@ class LentMemory {
 
   /// Counts it from now on, before it is sent. @param kept  of sealed_memory()
   /// @errors kBusy: too much is lent already
-  [[nodiscard]] Result<> add(FileDescriptor kept, std::size_t bytes);
+  /// @param to  who it is lent to; null: nobody in particular
+  [[nodiscard]] Result<> add(FileDescriptor kept, std::size_t bytes, const void* to = nullptr);
   /// Forgets those that nobody has any more.
   void sweep();
   [[nodiscard]] std::size_t count() const { return lent_.size(); }
+  /// How many somebody still has.
+  [[nodiscard]] std::size_t count_of(const void* to);
 
  private:
   struct Lent {
     FileDescriptor kept;
     std::size_t bytes;
+    const void* to;
   };
   MemoryBudget& budget_;
   std::vector<Lent> lent_;

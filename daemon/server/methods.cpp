@@ -272,6 +272,7 @@ void run_status(ServiceState& state, const json& params, Session& session, Respo
 void run_subscribe(ServiceState& state, const json& params, Session& session, Respond respond) {
   ParamReader reader(params);
   const CloudForm form = read_form(reader, state);
+  const bool as_memfd = reader.choice("transport", {"inline", "memfd"}) == "memfd";
   const std::optional<double> rate_hz = reader.number("rate_hz", kRateMinHz, kRateMaxHz);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
   if (auto refused = refused_form(form)) return respond(tl::unexpected(*refused));
@@ -279,7 +280,7 @@ void run_subscribe(ServiceState& state, const json& params, Session& session, Re
   if (form.dense()) result["density"] = to_string(form.density);
   result["rate_hz"] = rate_hz ? json(*rate_hz) : json();
   respond(Reply{std::move(result)});
-  session.subscribe(Subscription(form, rate_hz));
+  session.subscribe(Subscription(form, rate_hz, as_memfd));
   state.server->update_demand();
 }
 

@@ -24,6 +24,8 @@ struct Outgoing {
   std::string line;
   SharedBytes bytes;          ///< null: none
   FileDescriptor descriptor;  ///< sent with the line's first byte
+  FileDescriptor kept;        ///< where the descriptor is that of a SealedMemory: its other one, to be counted as lent
+  std::size_t lent_bytes = 0;
 
   [[nodiscard]] std::size_t size() const { return line.size() + (bytes ? bytes->size() : 0); }
 };

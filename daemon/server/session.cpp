@@ -291,11 +291,15 @@ void Session::weigh_waiting() {
 }
 
 void Session::send_waiting_event() {
+  constexpr std::size_t kMemfdsOfOne = 2;
   if (over_ || closing_ || !subscription_ || std::ranges::any_of(outgoing_, is_event)) return;
+  // Descriptors wait in the socket for nothing: one that is read, and one to come.
+  if (subscription_->as_memfd() && room_.lent.count_of(this) >= kMemfdsOfOne) return;
   auto event = subscription_->take(Subscription::Clock::now());
   weigh_waiting();
   if (!event) return;
-  if (memory_.resize(MemoryAccount::Part::kEvent, event->size())) return send(std::move(*event));
+  const bool granted = !event->kept || room_.lent.add(std::move(event->kept), event->lent_bytes, this);
+  if (granted && memory_.resize(MemoryAccount::Part::kEvent, event->size())) return send(std::move(*event));
   subscription_->note_lost(1);  // the next one tells
 }
 

@@ -49,10 +49,22 @@ std::optional<Outgoing> Subscription::take(Clock::time_point now) {
     event.line = to_line(event_message("scan_failed", {{"error", rpc_error(publication->scan().error()).to_json()}}));
     return event;
   }
-  event.bytes = publication->cloud(form_);
+  const SharedBytes cloud = publication->cloud(form_);
   nlohmann::json params = scan_json(*publication->scan(), form_.density);
   params["format"] = to_string(form_.format);
-  params["bytes"] = event.bytes->size();
+  if (as_memfd_) {
+    auto memory = sealed_memory(*cloud);
+    if (!memory) {
+      ++lost_;  // the next one tells
+      event.line = to_line(event_message("scan_failed", {{"error", rpc_error(memory.error()).to_json()}}));
+      return event;
+    }
+    params["memfd_bytes"] = event.lent_bytes = memory->bytes;
+    event.descriptor = std::move(memory->given), event.kept = std::move(memory->kept);
+  } else {
+    event.bytes = cloud;
+    params["bytes"] = cloud->size();
+  }
   params["latency_ms"] = latency_ms(publication->scan()->received);
   params["lost"] = std::exchange(lost_, 0);
   event.line = to_line(event_message("cloud", std::move(params)));

@@ -52,10 +52,13 @@ class Subscription {
   static constexpr std::size_t kWaitingMax = 4;
   static constexpr std::chrono::milliseconds kTurn{100};  ///< after which a newer one takes its place
 
-  Subscription(CloudForm form, std::optional<double> rate_hz) : form_(form), rate_hz_(rate_hz) {}
+  /// @param as_memfd  each cloud comes as a sealed memfd, not inline
+  Subscription(CloudForm form, std::optional<double> rate_hz, bool as_memfd = false)
+      : form_(form), rate_hz_(rate_hz), as_memfd_(as_memfd) {}
 
   [[nodiscard]] std::optional<double> rate_hz() const { return rate_hz_; }
   [[nodiscard]] CloudForm form() const { return form_; }
+  [[nodiscard]] bool as_memfd() const { return as_memfd_; }
 
   /// Takes a scan in, unless it comes sooner than the client wants one.
   void offer(SharedPublication publication, Clock::time_point now);
@@ -81,6 +84,7 @@ class Subscription {
 
   CloudForm form_;
   std::optional<double> rate_hz_;
+  bool as_memfd_;
   Clock::time_point next_{};
   std::deque<Waiting> waiting_;
   std::uint64_t lost_ = 0;

@@ -79,6 +79,17 @@ class Client:
         self.request(method, **params)
         return self.reply()
 
+    def receive_with_descriptor(self):
+        """The next message, and the file that came with it or None. Nothing else may be waiting in the buffer."""
+        assert not self.buffer
+        line, control, _, _ = self.socket.recvmsg(65536, socket.CMSG_SPACE(array.array("i").itemsize))
+        descriptors = array.array("i")
+        for level, kind, data in control:
+            if level == socket.SOL_SOCKET and kind == socket.SCM_RIGHTS:
+                descriptors.frombytes(data)
+        self.buffer += line
+        return self.receive_line(), os.fdopen(descriptors[0], "rb") if descriptors else None
+
     def call_for_descriptor(self, method, **params):
         """A call whose reply comes with one descriptor."""
         self.request(method, **params)

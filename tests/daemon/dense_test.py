@@ -4,15 +4,30 @@
 """A point for each camera pixel: what a request gets, in every format, and what is refused."""
 import math
 import pathlib
+import shutil
 import struct
 import tempfile
 import unittest
 
 from client import RpcError
-from service import Service, slsctl
+from record_test import lines_of, measured, two_cameras
+from service import SCENE, Service, slsctl
 
 INVALID_PARAMS = -32602
 NO_POINT = b"\x00\x00\xc0\x7f"
+PIXELS = '\n[decode]\ndensity = "pixels"\n'
+PIXEL_SCAN = {"density": "pixels", "timeout_ms": 60_000}
+OTHER_PATTERN = """
+[pattern]
+seed = 7
+[[camera]]
+name = "camera"
+path = "{scene}/frame.png"
+[calibration]
+file = "{scene}/calibration.yml"
+[server]
+socket = "slsd.sock"
+"""
 
 
 def ply(bytes_):
@@ -104,6 +119,59 @@ class Dense(unittest.TestCase):
                     self.client.call(method, **params)
                 self.assertEqual(refused.exception.code, INVALID_PARAMS)
 
+    def test_memfd_holds_the_same_bytes(self):
+        with self.service.client() as client:
+            scan, memory = client.call_for_descriptor("scan", transport="memfd", format="pcd", **PIXEL_SCAN)
+            with memory:
+                cloud = memory.read()
+        self.assertEqual(scan["memfd_bytes"], len(cloud))
+        self.assertEqual(pcd(cloud)[3], pcd(self.organised)[3])
+
+    def test_subscriber_gets_clouds_of_pixels(self):
+        with self.service.client() as client:
+            told, _ = client.call("subscribe", density="pixels", format="pcd")
+            self.assertEqual(told["density"], "pixels")
+            for _ in range(2):
+                event, cloud = client.receive()
+                self.assertEqual((event["method"], event["params"]["density"]), ("cloud", "pixels"))
+                self.assertEqual(pcd(cloud)[3], pcd(self.organised)[3])
+
+    def test_subscriber_gets_memfds(self):
+        with self.service.client() as client:
+            client.call("subscribe", density="pixels", transport="memfd", format="pcd")
+            frames = []
+            for _ in range(3):
+                event, memory = client.receive_with_descriptor()
+                with memory:
+                    cloud = memory.read()
+                self.assertEqual(event["params"]["memfd_bytes"], len(cloud))
+                self.assertNotIn("bytes", event["params"])
+                self.assertEqual(pcd(cloud)[3], pcd(self.organised)[3])
+                frames.append(event["params"]["frame"])
+            self.assertEqual(frames, sorted(set(frames)))
+
+    def test_subscriber_that_keeps_memfds_gets_no_more(self):
+        """Two of them, and then the newest once one is given back."""
+        with self.service.client() as client, self.service.client() as other:
+            client.call("subscribe", density="pixels", transport="memfd")
+            kept = [client.receive_with_descriptor()[1] for _ in range(2)]
+            before = other.call("status")[0]["scans"]["succeeded"]
+            for _ in range(2):
+                other.call("scan", **PIXEL_SCAN)
+            self.assertGreater(other.call("status")[0]["scans"]["succeeded"], before)
+            for memory in kept:
+                memory.close()
+            event, memory = client.receive_with_descriptor()
+            memory.close()
+            self.assertEqual(event["method"], "cloud")
+            self.assertGreater(event["params"]["lost"], 0)
+
+    def test_how_far_off_its_epipolar_lines_it_is(self):
+        scan, _ = self.client.call("scan", **PIXEL_SCAN)
+        self.assertEqual(len(scan["epipolar_px"]), 1)
+        self.assertLess(abs(scan["epipolar_px"][0]), 0.03)
+        self.assertNotIn("empty", scan)
+
     def test_symbols_stay_the_default(self):
         scan, cloud = self.client.call("scan")
         self.assertNotIn("density", scan)
@@ -125,6 +193,76 @@ class Dense(unittest.TestCase):
             self.assertEqual(len(tiff_pages((out / "a.tiff").read_bytes())), 2)
             self.assertEqual(pcd((out / "a.pcd").read_bytes())[3], pcd(self.organised)[3])
             self.assertTrue((out / "b.png").read_bytes().startswith(b"\x89PNG"))
+
+
+class DenseElsewhere(unittest.TestCase):
+    """With services of their own."""
+
+    def folder(self):
+        temporary = tempfile.TemporaryDirectory(prefix="slsd-test-")
+        self.addCleanup(temporary.cleanup)
+        return pathlib.Path(temporary.name)
+
+    def test_recording_replays_byte_for_byte(self):
+        recording = self.folder() / "recording"
+        with Service(camera=PIXELS) as service:
+            done = slsctl("--socket", service.socket, "record", recording, "--frames", "1", "--clouds", "--timeout-ms", "60000")
+            self.assertEqual(done.returncode, 0, done.stderr)
+        again = Service(configuration=(recording / "slsd.toml").read_text(encoding="utf-8"))
+        shutil.copytree(recording, again.folder, dirs_exist_ok=True)
+        with again, again.client() as client:
+            scan, cloud = client.call("scan", timeout_ms=60_000)
+        self.assertEqual(scan["density"], "pixels")
+        line, = lines_of(recording)
+        recorded = (recording / line["cloud"]).read_bytes()
+        self.assertGreater(scan["points"], 100_000)
+        self.assertEqual(measured(recorded), measured(cloud))
+
+    def test_cameras_stand_one_below_the_other(self):
+        with Service() as one, one.client() as client:
+            told, pixels = client.call("frame", format="raw")
+        with two_cameras(pixels, told["width_px"], told["height_px"]) as service, service.client() as client:
+            scan, cloud = client.call("scan", format="pcd", **PIXEL_SCAN)
+            _, width, height, records = pcd(cloud)
+            self.assertEqual((width, height), (1600, 2400))
+            self.assertEqual(len(scan["epipolar_px"]), 2)
+            self.assertEqual(sum(scan["pixels"].values()), width * height)
+            self.assertEqual({record[17] for record in records[:width * height // 2]}, {0})
+            self.assertEqual({record[17] for record in records[width * height // 2:]}, {1})
+            _, depth_maps = client.call("scan", format="tiff", **PIXEL_SCAN)
+            self.assertEqual([page[:2] for page in tiff_pages(depth_maps)], 4 * [(1600, 1200)])
+
+    def test_texture_colours_every_pixel(self):
+        frames = self.folder() / "frames"
+        for name, image in (("0", "frame"), ("white/0", "grey"), ("dark/0", "dim")):
+            (frames / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(SCENE / (image + ".png"), frames / (name + ".png"))
+        with Service(camera_path=frames) as service, service.client() as client:
+            scan, cloud = client.call("scan", texture=True, ambient=True, **PIXEL_SCAN)
+            self.assertGreater(scan["points"], 100_000)
+            self.assertEqual({point[16] for point in ply(cloud)[1]}, {60})
+            self.assertEqual(scan["saturated"], 0)
+            self.assertLess(scan["white_differs"], 0.1)
+
+    def test_white_that_is_of_another_scene_is_told(self):
+        frames = self.folder() / "frames"
+        for name, image in (("0", "frame"), ("white/0", "frame")):
+            (frames / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(SCENE / (image + ".png"), frames / (name + ".png"))
+        with Service(camera_path=frames) as service, service.client() as client:
+            scan, _ = client.call("scan", texture=True, **PIXEL_SCAN)
+            if scan["points"]:
+                self.assertGreater(scan["white_differs"], 0.2)
+
+    def test_empty_cloud_says_why(self):
+        dark = Service(camera_path=SCENE / "black.png")
+        other = Service(configuration=OTHER_PATTERN.format(scene=SCENE))
+        for each in (dark, other):
+            with each as service, service.client() as client:
+                scan, cloud = client.call("scan", **PIXEL_SCAN)
+                self.assertEqual((scan["points"], len(ply(cloud)[1])), (0, 0))
+                self.assertEqual(scan["pixels"]["not_reached"], scan["width_px"] * scan["height_px"])
+                self.assertIn("no symbol of the pattern was decoded", scan["empty"])
 
 
 if __name__ == "__main__":
