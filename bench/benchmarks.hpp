@@ -17,4 +17,7 @@ void register_anchor(FrameRing& ring);
 /// @param decoder  for the ring's pattern and calibration
 void register_decode(FrameRing& ring, Decoder& decoder);
 
+/// A point for each pixel, and each stage of it, on one core and on all.
+void register_dense(FrameRing& ring);
+
 }  // namespace slsd

@@ -44,6 +44,7 @@ bool decodes_most(slsd::Decoder& decoder, const slsd::FrameRing& ring) {
 void register_all(slsd::FrameRing& ring, slsd::Decoder& decoder) {
   slsd::register_anchor(ring);
   slsd::register_decode(ring, decoder);
+  slsd::register_dense(ring);
 }
 
 }  // namespace
