@@ -155,7 +155,9 @@ RC_GTEST_PROP(GreyMoments, MoveWithTheRegionAndDoNotChange, ()) {
   const GreyMoments a = measure(here, regions_of(here)), b = measure(there, regions_of(there));
   RC_ASSERT(std::abs(b.x - a.x - static_cast<float>(dx)) < 1e-5F);
   RC_ASSERT(std::abs(b.y - a.y - static_cast<float>(dy)) < 1e-5F);
-  const auto same = [](float one, float two) { return std::abs(one - two) < 1e-5F * std::max(std::abs(one), 100.F); };
+  const auto same = [](float first, float second) {
+    return std::abs(first - second) < 1e-5F * std::max(std::abs(first), 100.F);
+  };
   RC_ASSERT(same(a.weight, b.weight) && same(a.m20, b.m20) && same(a.m11, b.m11) && same(a.m02, b.m02));
   RC_ASSERT(same(a.m30, b.m30) && same(a.m21, b.m21) && same(a.m12, b.m12) && same(a.m03, b.m03));
 }
