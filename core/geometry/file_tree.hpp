@@ -19,10 +19,10 @@ struct FileNode {
   enum class Kind { kEmpty, kNumber, kText, kNumbers, kMap, kSequence };
   Kind kind = Kind::kEmpty;
   double number = 0;
-  std::string text;
-  std::vector<double> numbers;  ///< NaN for what is none
-  std::vector<std::pair<std::string, FileNode>> entries;
-  std::vector<FileNode> items;
+  std::string text{};
+  std::vector<double> numbers{};  ///< NaN for what is none
+  std::vector<std::pair<std::string, FileNode>> entries{};
+  std::vector<FileNode> items{};
 
   /// What the key of this map holds; null where it is not there or holds nothing.
   [[nodiscard]] const FileNode* find(std::string_view key) const;

@@ -3,6 +3,7 @@
 "use strict";
 
 const $ = (id) => document.getElementById(id);
+const countOf = (n, what) => `${n} ${what}${n === 1 ? "" : "s"}`;
 const kStatusPause = 1000, kRetryPause = 1500;
 
 // ---- what is asked for ----
@@ -108,9 +109,9 @@ function showStatus(told) {
     ...status.cameras.map((camera) => deviceItem(camera, `Camera ${camera.name}`)));
   const scans = status.scans;
   const failed = Object.values(scans.failed).reduce((sum, count) => sum + count, 0);
-  $("figures").textContent = `slsd ${status.version}, up ${Math.round(status.uptime_s)} s: ${scans.succeeded} scans, ` +
+  $("figures").textContent = `slsd ${status.version}, up ${Math.round(status.uptime_s)} s: ${countOf(scans.succeeded, "scan")}, ` +
     `${failed} failed; decoding takes ${scans.decode_ms.mean.toFixed(1)} ms, ${scans.latency_ms.mean.toFixed(1)} ms to the ` +
-    `client; ${status.clients} clients; ${(status.resident_bytes / 1048576).toFixed(0)} MiB.` +
+    `client; ${countOf(status.clients, "client")}; ${(status.resident_bytes / 1048576).toFixed(0)} MiB.` +
     (scans.last_error ? ` Last error: ${scans.last_error.message}` : "");
   showCameras(status.cameras.map((camera) => camera.name));
   showPast(told.past);
