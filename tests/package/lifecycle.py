@@ -10,6 +10,7 @@ import hashlib
 import os
 import pathlib
 import random
+import re
 import shutil
 import signal
 import stat
@@ -17,7 +18,7 @@ import subprocess
 import sys
 import time
 
-NAMES = ("slsd", "slsd-client", "slsd-calibrate", "slsd-display", "slsd-web", "libslsd-dev", "python3-slsd")
+NAMES = ("slsd", "slsd-client", "slsd-calibrate", "slsd-display", "slsd-web", "slsd-dds", "libslsd-dev", "python3-slsd")
 # What dpkg, the loader and the tools of users keep for themselves, whatever is installed.
 KEPT_BY_OTHERS = ("proc", "sys", "dev", "tmp", "packages", "var/lib/dpkg", "var/log", "var/cache", "etc/ld.so.cache", "etc/passwd-", "etc/group-",
                   "etc/shadow-", "etc/gshadow-", "etc/.pwd.lock", "etc/subuid-", "etc/subgid-", "var/lib/systemd/catalog", "run/lock", "usr/share/mime",
@@ -59,9 +60,10 @@ def make_next_version(packages, folder):
         tree = folder / "tree"
         subprocess.run(["dpkg-deb", "-R", package, tree], check=True)
         control = tree / "DEBIAN/control"
-        lines = control.read_text(encoding="utf-8").splitlines(keepends=True)
-        control.write_text("".join(line.replace("\n", "+next\n") if line.startswith("Version:") else line for line in lines),
-                           encoding="utf-8")
+        text = control.read_text(encoding="utf-8")
+        version = re.search(r"^Version: (.*)$", text, re.MULTILINE)[1]
+        text = text.replace(f"Version: {version}\n", f"Version: {version}+next\n").replace(f"(= {version})", f"(= {version}+next)")
+        control.write_text(text, encoding="utf-8")
         if (tree / CONFIGURATION).exists():
             with open(tree / CONFIGURATION, "a", encoding="utf-8") as file:
                 file.write("# A line of the next version.\n")
