@@ -96,7 +96,19 @@ Result<> DeviceFeatures::choose(const char* name, const std::string& entry) cons
   return taken == entry ? Result<>() : fail_taken(name, entry, taken == nullptr ? "nothing" : printable(taken));
 }
 
+// Many a camera takes what lies beyond its range in silence, and exposes as it likes.
+Result<> DeviceFeatures::check_range(const char* name, double value, double tolerance) const {
+  GErrorSlot error;
+  double low = 0, high = 0;
+  arv_camera_get_float_bounds(camera_, name, &low, &high, error.out());
+  if (error.failed() || !(low < high)) return {};  // it does not tell
+  if (value >= low - tolerance && value <= high + tolerance) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              "the camera goes from " + text(low) + " to " + text(high) + ", not to " + text(value), name);
+}
+
 Result<> DeviceFeatures::set(const char* name, double value, double tolerance) const {
+  if (auto within = check_range(name, value, tolerance); !within) return within;
   GErrorSlot error;
   arv_camera_set_float(camera_, name, value, error.out());
   if (auto done = check(error, name); !done) return done;

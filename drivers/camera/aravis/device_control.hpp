@@ -30,6 +30,7 @@ class DeviceFeatures {
 
   /// @errors for all of these: kUnsupported (lacking or refused), kMismatch (it took another value), kDisconnected
   [[nodiscard]] Result<> choose(const char* name, const std::string& entry) const;
+  /// @errors also kInvalidArgument: beyond the range that the camera tells
   [[nodiscard]] Result<> set(const char* name, double value, double tolerance) const;
   [[nodiscard]] Result<> set(const char* name, std::int64_t value) const;
   [[nodiscard]] Result<> turn(const char* name, bool on) const;
@@ -44,6 +45,7 @@ class DeviceFeatures {
 
  private:
   [[nodiscard]] Result<> check(const GErrorSlot& error, const char* name) const;
+  [[nodiscard]] Result<> check_range(const char* name, double value, double tolerance) const;
 
   ArvCamera* camera_;
 };

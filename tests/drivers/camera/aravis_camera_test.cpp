@@ -68,6 +68,22 @@ TEST_F(AravisCameraTest, RefusesASettingThatTheCameraDoesNotTake) {
   EXPECT_THAT(to_string(opened.error()), HasSubstr("ExposureTime: the camera took 123 where 10000 was set"));
 }
 
+// Which the double, as many a camera, takes in silence.
+TEST_F(AravisCameraTest, RefusesWhatIsBeyondTheRangeThatTheCameraTells) {
+  for (const bool exposure : {true, false}) {
+    AravisCameraOptions options = options_for(device_);
+    (exposure ? options.exposure_us : options.gain_db) = exposure ? 2e6 : 30.0;
+    AravisCamera camera(options);
+    const auto opened = camera.open();
+    ASSERT_FALSE(opened);
+    EXPECT_EQ(opened.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(to_string(opened.error()),
+                HasSubstr(exposure ? "ExposureTime: the camera goes from 10 to 1000000, not to "
+                                     "2000000"
+                                   : "Gain: the camera goes from 0 to 24, not to 30"));
+  }
+}
+
 TEST_F(AravisCameraTest, RefusesAPixelFormatThatTheCameraLacks) {
   AravisCameraOptions options = options_for(device_);
   options.pixel_format = "BayerGB8";
