@@ -102,12 +102,30 @@ void add_view(CLI::App& app, ClientOptions& options) {
   top->add_option("--count", options.count, "end after so many looks")->check(CLI::Range(1, 1'000'000'000));
 }
 
+const CLI::Validator kAssignment(
+    [](const std::string& text) {
+      const bool whole = text.find('=') != std::string::npos && text.find('.') < text.find('=');
+      return whole ? "" : "write TABLE.KEY=VALUE or camera.NAME.KEY=VALUE; the value \"default\" takes it back";
+    },
+    "TABLE.KEY=VALUE");
+
+void add_set(CLI::App& app, ClientOptions& options) {
+  app.add_subcommand("settings", "the settings that are given, and where each is from");
+  CLI::App* set =
+      app.add_subcommand("set", "set exposure, gain, pattern, calibration and decoder options without a restart");
+  set->add_option("SETTING", options.assignments, "decode.KEY=VALUE or camera.NAME.exposure_us=N")
+      ->required()
+      ->check(kAssignment);
+}
+
 int run(const CLI::App& app, const ClientOptions& options) {
   const std::string command = app.get_subcommands().front()->get_name();
   if (command == "scan") return slsd::scan_command(options);
   if (command == "status") return slsd::status_command(options);
   if (command == "watch") return slsd::watch_command(options);
   if (command == "metrics") return slsd::metrics_command(options);
+  if (command == "set") return slsd::set_command(options);
+  if (command == "settings") return slsd::settings_command(options);
   if (command == "top") return slsd::top_command(options);
   if (command == "exposure") return slsd::exposure_command(options);
   if (command == "project") return slsd::project_command(options);
@@ -136,6 +154,7 @@ int main(int argc, char** argv) {
   add_scan(app, options);
   app.add_subcommand("status", "the state of the service, and what its scans came to");
   add_watch(app, options);
+  add_set(app, options);
   add_view(app, options);
   try {
     app.parse(argc, argv);

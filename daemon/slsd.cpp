@@ -6,6 +6,8 @@
 #include <array>
 #include <csignal>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -14,6 +16,7 @@
 #include "core/printable.hpp"
 #include "daemon/command_line.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/configuration/settings_over.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "daemon/service/logging.hpp"
 #include "daemon/service/notifier.hpp"
@@ -43,6 +46,26 @@ int not_served(const slsd::Error& error, bool passes) {
   return passes ? slsd::kFailed : kWrongConfiguration;
 }
 
+using MadeService = slsd::Result<std::unique_ptr<slsd::Service>>;
+
+/// The service with what was set over its socket before, as far as that still fits: it holds up no start.
+MadeService make_service(const std::filesystem::path& file, slsd::Configuration configuration) {
+  const auto kept_file = slsd::kept_settings_file(file);
+  const auto kept = slsd::read_kept_settings(kept_file);
+  std::optional<slsd::Error> why;
+  if (!kept) {
+    why = kept.error();
+  } else if (!kept->empty()) {
+    auto with_kept = slsd::load_configuration_with(file, *kept);
+    MadeService made = with_kept ? slsd::Service::create(std::move(*with_kept), file, *kept)
+                                 : MadeService(tl::unexpected(with_kept.error()));
+    if (made) return made;
+    why = made.error();
+  }
+  if (why) spdlog::warn("{}: what was set over the socket is passed over: {}", kept_file.string(), to_string(*why));
+  return slsd::Service::create(std::move(configuration), file, nlohmann::json::object());
+}
+
 int serve(const std::filesystem::path& configuration_file) {
   // Else the first frame's buffer that is freed raises this, and those of cameras that come and go fragment the heap:
   // by 20 % in 240 losses of one.
@@ -54,7 +77,7 @@ int serve(const std::filesystem::path& configuration_file) {
   slsd::queue_log();
   auto configuration = slsd::load_configuration(configuration_file);
   if (!configuration) return not_served(configuration.error(), configuration.error().code == slsd::ErrorCode::kIo);
-  auto service = slsd::Service::create(std::move(*configuration), configuration_file);
+  auto service = make_service(configuration_file, std::move(*configuration));
   const auto served = service ? (*service)->run() : slsd::Result<>(tl::unexpected(service.error()));
   return served ? slsd::kDone : not_served(served.error(), may_pass(served.error().code));
 }

@@ -215,6 +215,66 @@ int image_command(const ClientOptions& options, const std::string& method) {
   return kDone;
 }
 
+// "camera.NAME.KEY=VALUE": a name may have dots in it, a key has none.
+int set_command(const ClientOptions& options) {
+  json params = json::object();
+  for (const std::string& assignment : options.assignments) {
+    const std::string where = assignment.substr(0, assignment.find('='));
+    const std::string text = assignment.substr(std::min(where.size() + 1, assignment.size()));
+    const std::size_t first = where.find('.'), last = where.rfind('.');
+    json value = text == "default" ? json() : json::parse(text, nullptr, /*allow_exceptions=*/false);
+    if (value.is_discarded()) value = text;
+    const std::string table = where.substr(0, first), key = last == std::string::npos ? "" : where.substr(last + 1);
+    if (table == "camera" && first != last) {
+      params[table][where.substr(first + 1, last - first - 1)][key] = std::move(value);
+    } else {
+      params[table][key] = std::move(value);
+    }
+  }
+  const auto answered = ask(options, "set", std::move(params));
+  if (!answered) return report(options, answered.error());
+  const json& result = answered->reply.message["result"];
+  if (options.json) std::cout << to_line(result);
+  if (const json why = result.value("not_kept", json()); !options.json && why.is_string())
+    std::cerr << "slsctl: in force, and not kept: " << printable(why.get<std::string>(), 1000) << "\n";
+  return kDone;
+}
+
+namespace {
+
+void print_settings(const json& keys, const json& set, const std::string& where, const std::string& file) {
+  for (const auto& [key, value] : keys.items()) {
+    const bool here = set.is_object() && set.contains(key);
+    std::cout << printable(where + key + " = " + value.dump(-1, ' ', false, json::error_handler_t::replace), 1000)
+              << "  (" << (here ? "set" : file) << ")\n";
+  }
+}
+
+}  // namespace
+
+// Where each is from; those that are not listed are the defaults.
+int settings_command(const ClientOptions& options) {
+  const auto answered = ask(options, "settings", json::object());
+  if (!answered) return report(options, answered.error());
+  const json& result = answered->reply.message["result"];
+  if (options.json) {
+    std::cout << to_line(result);
+    return kDone;
+  }
+  const std::string file = printable(std::filesystem::path(result.value("file", "")).filename().string(), 200);
+  const json set = result.value("set", json::object()), given = result.value("configuration", json::object());
+  for (const auto& [table, keys] : given.items()) {
+    const json of_table = set.value(table, json::object());
+    if (keys.is_object()) print_settings(keys, of_table, table + ".", file);
+    for (const json& camera : keys.is_array() ? keys : json::array()) {
+      if (!camera.is_object()) continue;
+      const std::string name = camera.value("name", "camera");
+      print_settings(camera, of_table.value(name, json()), table + "." + name + ".", file);
+    }
+  }
+  return kDone;
+}
+
 int project_command(const ClientOptions& options) {
   json params{{"picture", options.picture.string()}};
   if (options.picture.extension() == ".png") {

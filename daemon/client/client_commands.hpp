@@ -31,6 +31,10 @@ struct Failure;
 [[nodiscard]] int metrics_command(const ClientOptions& options);
 /// Shows rates, latencies and states, again and again.
 [[nodiscard]] int top_command(const ClientOptions& options);
+/// Sets keys of the service without a restart.
+[[nodiscard]] int set_command(const ClientOptions& options);
+/// Shows the keys that are given, and where each is from.
+[[nodiscard]] int settings_command(const ClientOptions& options);
 /// Scans on and on, each while the frames of the one before are written, until as many as asked for are
 /// there, the time is over, or an interrupt comes.
 [[nodiscard]] int record_command(const ClientOptions& options);

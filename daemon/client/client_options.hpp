@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace slsd {
 
@@ -33,9 +34,10 @@ struct ClientOptions {
   std::optional<double> exposure_max_us;  ///< exposure: the longest that is proposed
   std::optional<double> gain_max_db;      ///< exposure: the highest that is proposed
   std::optional<int> timeout_ms;
-  double interval_s = 1.0;        ///< top: between two looks
-  std::optional<double> rate_hz;  ///< watch
-  std::uint64_t count = 0;        ///< watch: clouds, record: scans, top: looks, after which it ends; 0: none
+  std::vector<std::string> assignments;  ///< set: "decode.density=pixels"
+  double interval_s = 1.0;               ///< top: between two looks
+  std::optional<double> rate_hz;         ///< watch
+  std::uint64_t count = 0;               ///< watch: clouds, record: scans, top: looks, after which it ends; 0: none
 };
 
 }  // namespace slsd

@@ -121,7 +121,9 @@ void CameraRunner::run(const std::stop_token& stop) {
   name_this_thread("cam " + name_);
   const LogField about("SLSD_CAMERA", name_);
   while (!stop.stop_requested()) {
-    if (!is_open(status().state)) {
+    if (auto replacement = take_replacement()) {
+      exchange(std::move(*replacement));
+    } else if (!is_open(status().state)) {
       open_or_pause(stop);
     } else if (const auto order = next_order(stop)) {
       take_frame(*order);
@@ -130,6 +132,69 @@ void CameraRunner::run(const std::stop_token& stop) {
     }
   }
   close();
+}
+
+Result<> CameraRunner::replace(std::unique_ptr<Camera> next, std::unique_ptr<Camera> otherwise,
+                               MonotonicTime deadline) {
+  std::unique_lock lock(mutex_);
+  replaced_.reset();
+  replacement_.emplace(Replacement{std::move(next), std::move(otherwise)});
+  ++replacements_;
+  changed_.notify_all();
+  changed_.wait_until(lock, deadline, [this] { return stopped_ || replaced_.has_value(); });
+  if (replaced_) return *replaced_;
+  replacement_.reset();  // where it was not begun; else what it put there is taken back
+  ++replacements_;
+  if (stopped_) return fail(ErrorCode::kCancelled, "the service is stopping", "camera " + name_);
+  return fail(ErrorCode::kTimeout, "the camera does not take other settings in time: look at its status",
+              "camera " + name_);
+}
+
+std::optional<CameraRunner::Replacement> CameraRunner::take_replacement() {
+  const std::lock_guard lock(mutex_);
+  if (replacement_) replacement_->number = replacements_;
+  return std::exchange(replacement_, std::nullopt);
+}
+
+void CameraRunner::exchange(Replacement replacement) {
+  const bool was_open = is_open(status().state);
+  const auto open = [this](std::unique_ptr<Camera> camera) {
+    heartbeat_.promise(kPausePromise + camera->open_time_max());
+    put(std::move(camera));
+    return camera_->open();
+  };
+  Result<> opened = open(std::move(replacement.next));
+  Result<> outcome;
+  if (!opened && was_open) {
+    outcome = opened;
+    outcome.error().where = "camera " + name_ + (opened.error().where.empty() ? "" : ", " + opened.error().where);
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    const bool awaited = replacement.number == replacements_;
+    if (!awaited) outcome = fail(ErrorCode::kTimeout, "nobody waits for it any more");
+    if (outcome) replaced_ = Result<>();  // from here on nobody gives it up
+  }
+  if (!outcome) opened = open(std::move(replacement.otherwise));
+  heartbeat_.promise(kPromise);
+  note_opened(opened);
+  const std::lock_guard lock(mutex_);
+  if (!outcome && replacement.number == replacements_) replaced_ = std::move(outcome);
+  changed_.notify_all();
+}
+
+// The device belongs to one camera at a time: the one before ends first.
+void CameraRunner::put(std::unique_ptr<Camera> camera) {
+  camera->set_found([this] { note_found(); });
+  std::unique_ptr<Camera> before;
+  {
+    const std::lock_guard lock(mutex_);
+    status_.state = DeviceState::kOpening;
+    before = std::move(camera_);
+  }
+  before.reset();
+  const std::lock_guard lock(mutex_);
+  camera_ = std::move(camera);
 }
 
 void CameraRunner::close() {

@@ -78,6 +78,13 @@ class CameraRunner {
   /// @errors kTimeout, with the reason why it is not open; kCancelled
   [[nodiscard]] Result<> wait_ready(const Patience& patience);
 
+  /// Puts another camera in the place of this one, with other settings of the same device: closes it, and opens that.
+  /// Where the device was open and refuses them, `otherwise` is opened: the same as before, made anew; also
+  /// where it takes longer than the deadline. Where it was not open, the other is opened when it can be.
+  /// @errors of Camera::open(): why it refuses; kTimeout: its thread did not get to it; kCancelled
+  [[nodiscard]] Result<> replace(std::unique_ptr<Camera> next, std::unique_ptr<Camera> otherwise,
+                                 MonotonicTime deadline);
+
   /// Lets the camera expose one frame, now; wait_captured() and end_capture() belong to it.
   void begin_capture(MonotonicTime deadline, Exposure exposure = Exposure::kFresh, Picture light = Picture::kPattern);
   /// Waits for the driver's answer. @return whether it is there, or never will be
@@ -95,8 +102,16 @@ class CameraRunner {
     Picture light = Picture::kPattern;
     bool cancelled = false;
   };
+  struct Replacement {
+    std::unique_ptr<Camera> next;
+    std::unique_ptr<Camera> otherwise;
+    std::uint64_t number = 0;
+  };
   void run(const std::stop_token& stop);
   void close();
+  [[nodiscard]] std::optional<Replacement> take_replacement();
+  void exchange(Replacement replacement);
+  void put(std::unique_ptr<Camera> camera);
   void cancel();
   void open_or_pause(const std::stop_token& stop);
   void note_found();
@@ -122,7 +137,10 @@ class CameraRunner {
   SequenceGaps gaps_;
   std::optional<Order> order_;
   std::optional<Result<Frame>> answer_;
-  bool given_up_ = false;  ///< the driver is over its time; its answer is thrown away
+  std::optional<Replacement> replacement_;  ///< that its thread has not begun
+  std::uint64_t replacements_ = 0;          ///< begun and given up: one of another number is not awaited
+  std::optional<Result<>> replaced_;        ///< how the last one ended
+  bool given_up_ = false;                   ///< the driver is over its time; its answer is thrown away
   bool stopped_ = false;
   std::atomic<bool> ended_{false};
   std::jthread thread_;

@@ -70,6 +70,12 @@ class Rig {
   /// Shows the idle picture, at once. @errors as hold()
   [[nodiscard]] Result<> release(const Patience& patience);
 
+  /// As CameraRunner::replace(). @param camera  its index @thread thread-safe
+  [[nodiscard]] Result<> replace(std::size_t camera, std::unique_ptr<Camera> next, std::unique_ptr<Camera> otherwise,
+                                 MonotonicTime deadline) {
+    return runners_[camera]->replace(std::move(next), std::move(otherwise), deadline);
+  }
+
   void request_stop();
   /// Whether the cameras are closed, after request_stop().
   [[nodiscard]] bool stopped() const;

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <random>
 
+#include "daemon/configuration/settings_over.hpp"
+#include "daemon/scan/devices.hpp"
 #include "daemon/scan/log_field.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "drivers/files/encode_png.hpp"
@@ -326,26 +328,51 @@ void Scanner::pattern(Answer<std::string> answer) {
   });
 }
 
-void Scanner::reload(const std::filesystem::path& file, const Configuration& running, Answer<Configuration> answer) {
-  submit_chore([this, file, running, answer = std::move(answer)](const Result<>& permission) {
-    if (!permission) return answer(tl::unexpected(permission.error()));
-    auto configuration = load_configuration(file);
-    if (!configuration) return answer(configuration);
-    Configuration with_devices = *configuration;
-    with_devices.projector = running.projector;
-    with_devices.pattern.projector_width_px = running.projector.width_px;
-    with_devices.pattern.projector_height_px = running.projector.height_px;
-    with_devices.cameras = running.cameras;
-    auto made = ScanSetup::create(with_devices, DecodeLanes::lanes_here());
-    if (!made) return answer(tl::unexpected(made.error()));
-    auto setup = std::make_shared<ScanSetup>(std::move(*made));
-    {
-      const std::lock_guard lock(mutex_);
-      setup_.swap(setup);
+// All cameras take theirs, or each is as before.
+Result<> Scanner::set_exposures(const std::vector<CameraOptions>& running, const std::vector<CameraOptions>& wanted) {
+  constexpr auto kTime = 20s;
+  const auto exchange = [&](std::size_t i, const CameraOptions& to, const CameraOptions& from) -> Result<> {
+    auto camera = make_camera(to), otherwise = make_camera(from);
+    if (!camera || !otherwise) return tl::unexpected((camera ? otherwise : camera).error());
+    chore_heartbeat_.promise(kWorkPromise);
+    return rig_->replace(i, std::move(*camera), std::move(*otherwise), steady_clock::now() + kTime);
+  };
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    if (wanted[i] == running[i]) continue;
+    auto taken = exchange(i, wanted[i], running[i]);
+    if (taken) continue;
+    for (std::size_t back = 0; back < i; ++back) {
+      if (!(wanted[back] == running[back])) (void)exchange(back, running[back], running[back]);
     }
-    queue_.wake();
-    answer(configuration);
-  });
+    return taken;
+  }
+  return {};
+}
+
+void Scanner::reload(const std::filesystem::path& file, const Configuration& running, nlohmann::json settings,
+                     Answer<Configuration> answer) {
+  submit_chore(
+      [this, file, running, settings = std::move(settings), answer = std::move(answer)](const Result<>& permission) {
+        if (!permission) return answer(tl::unexpected(permission.error()));
+        auto configuration = load_configuration_with(file, settings);
+        if (!configuration) return answer(configuration);
+        Configuration with_devices = *configuration;
+        with_devices.projector = running.projector;
+        with_devices.pattern.projector_width_px = running.projector.width_px;
+        with_devices.pattern.projector_height_px = running.projector.height_px;
+        with_devices.cameras = running.cameras;
+        auto made = ScanSetup::create(with_devices, DecodeLanes::lanes_here());
+        if (!made) return answer(tl::unexpected(made.error()));
+        auto setup = std::make_shared<ScanSetup>(std::move(*made));
+        auto taken = set_exposures(running.cameras, with_exposures_of(running.cameras, configuration->cameras));
+        if (!taken) return answer(tl::unexpected(taken.error()));
+        {
+          const std::lock_guard lock(mutex_);
+          setup_.swap(setup);
+        }
+        queue_.wake();
+        answer(configuration);
+      });
 }
 
 void Scanner::run_freely(std::optional<FreeRun> demand) {

@@ -71,7 +71,10 @@ class Scanner {
   /// Reads the configuration anew, makes what follows from its pattern, calibration and decoder options, and puts that
   /// in force for the next scan; where something is wrong nothing changes.
   /// @param running  the configuration whose projector and cameras are in use, and stay
-  void reload(const std::filesystem::path& file, const Configuration& running, Answer<Configuration> answer);
+  /// @param settings  set over the socket, over the file's: those of the cameras are in force at once, too, where no
+  ///                  camera refuses them
+  void reload(const std::filesystem::path& file, const Configuration& running, nlohmann::json settings,
+              Answer<Configuration> answer);
 
   /// Scans by itself from now on, or no longer. Results go to the listener.
   void run_freely(std::optional<FreeRun> demand);
@@ -113,6 +116,8 @@ class Scanner {
   void submit(Turn turn, const std::stop_token& gone);
   void submit_chore(Chore chore);
   void refuse_chores();
+  [[nodiscard]] Result<> set_exposures(const std::vector<CameraOptions>& running,
+                                       const std::vector<CameraOptions>& wanted);
   [[nodiscard]] std::shared_ptr<Scan> make_scan(ScanRequest request, bool listened, Answer<ScanResult> answer);
   [[nodiscard]] Patience patience_of(Task& task);
   [[nodiscard]] std::function<bool(const Error&)> wait_for_frames(Task& task);

@@ -11,6 +11,7 @@
 
 #include "core/nearest_name.hpp"
 #include "core/printable.hpp"
+#include "daemon/configuration/settings_over.hpp"
 #include "daemon/rpc/base64.hpp"
 #include "daemon/rpc/message.hpp"
 #include "daemon/rpc/param_reader.hpp"
@@ -193,6 +194,8 @@ void run_settings(ServiceState& state, const json& params, Session&, Respond res
   Reply reply{settings_json(state.configuration)};
   reply.result["pattern"] = files.pattern;
   reply.result["calibration"] = files.calibration;
+  reply.result["set"] = state.settings;
+  reply.result["file"] = state.configuration_file.string();
   respond(std::move(reply));
 }
 
@@ -295,7 +298,19 @@ void run_unsubscribe(ServiceState& state, const json& params, Session& session, 
 void run_reload(ServiceState& state, const json& params, Session&, Respond respond) {
   const ParamReader reader(params);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
-  state.reload(std::move(respond));
+  state.reload(state.settings, std::move(respond));
+}
+
+void run_set(ServiceState& state, const json& params, Session&, Respond respond) {
+  auto settings = merge_settings(state.settings, params);
+  if (!settings) return respond(tl::unexpected(invalid_params(settings.error().message)));
+  state.reload(std::move(*settings), [&state, respond = std::move(respond)](Outcome outcome) {
+    if (outcome) {
+      outcome->result["set"] = state.settings;
+      if (!outcome->result.contains("not_kept")) outcome->result["not_kept"] = nullptr;
+    }
+    respond(std::move(outcome));
+  });
 }
 
 constexpr std::array kMethods{
@@ -306,6 +321,7 @@ constexpr std::array kMethods{
     RpcMethod{"project", Role::kAdminister, run_project},
     RpcMethod{"reload", Role::kAdminister, run_reload},
     RpcMethod{"scan", Role::kScan, run_scan},
+    RpcMethod{"set", Role::kAdminister, run_set},
     RpcMethod{"settings", Role::kObserve, run_settings},
     RpcMethod{"status", Role::kObserve, run_status},
     RpcMethod{"subscribe", Role::kScan, run_subscribe},

@@ -35,7 +35,9 @@ struct ServiceState {
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   Server* server = nullptr;
   std::function<std::uint64_t()> log_lines_dropped = {};
-  std::function<void(Respond)> reload = {};  ///< reads the configuration anew, then answers
+  /// Reads the configuration anew, with these settings over it, then answers.
+  std::function<void(nlohmann::json settings, Respond)> reload = {};
+  nlohmann::json settings = nlohmann::json::object();  ///< set over the socket, as merge_settings() has them
   RequestCounts requests = {};
 };
 

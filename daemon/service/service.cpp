@@ -4,16 +4,19 @@
 
 #include <csignal>
 #include <cstdlib>
+#include <utility>
 #include <vector>
 
 #include <spdlog/spdlog.h>
 #include <asio/post.hpp>
 
 #include "daemon/configuration/exposure_warnings.hpp"
+#include "daemon/configuration/settings_over.hpp"
 #include "daemon/scan/devices.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "daemon/scan/projected_picture.hpp"
 #include "daemon/service/logging.hpp"
+#include "drivers/files/file.hpp"
 
 namespace slsd {
 namespace {
@@ -38,7 +41,7 @@ void warn_of_symbols(const PatternOptions& pattern, double scale) {
 nlohmann::json tables_that_need_restart(const Configuration& now, const Configuration& next) {
   nlohmann::json tables = nlohmann::json::array();
   if (!(now.projector == next.projector)) tables.push_back("projector");
-  if (!(now.cameras == next.cameras)) tables.push_back("camera");
+  if (!(with_exposures_of(now.cameras, next.cameras) == next.cameras)) tables.push_back("camera");
   if (!(now.server == next.server)) tables.push_back("server");
   ScanOptions in_force = now.scan;
   in_force.timeout_ms = next.scan.timeout_ms;  // taken at once
@@ -46,9 +49,24 @@ nlohmann::json tables_that_need_restart(const Configuration& now, const Configur
   return tables;
 }
 
+// Of the cameras' tables only these keys come into force.
+void note_exposures(nlohmann::json& given, const nlohmann::json& next) {
+  if (!given.contains("camera") || !next.contains("camera")) return;
+  for (nlohmann::json& camera : given["camera"]) {
+    for (const nlohmann::json& other : next["camera"]) {
+      if (other.value("name", "camera") != camera.value("name", "camera")) continue;
+      for (const char* const key : {"exposure_us", "gain_db", "gain_steps"}) {
+        camera.erase(key);
+        if (other.contains(key)) camera[key] = other[key];
+      }
+    }
+  }
+}
+
 }  // namespace
 
-Result<std::unique_ptr<Service>> Service::create(Configuration configuration, const std::filesystem::path& file) {
+Result<std::unique_ptr<Service>> Service::create(Configuration configuration, const std::filesystem::path& file,
+                                                 nlohmann::json settings) {
   auto projector = make_projector(configuration.projector);
   if (!projector) return tl::unexpected(projector.error());
   std::vector<std::unique_ptr<Camera>> cameras;
@@ -68,8 +86,10 @@ Result<std::unique_ptr<Service>> Service::create(Configuration configuration, co
   rig->set_idle(draw_idle(configuration.projector), std::chrono::milliseconds(configuration.projector.idle_after_ms));
   std::error_code ignored;
   const auto known_from_anywhere = std::filesystem::absolute(file, ignored);
-  return std::unique_ptr<Service>(
+  std::unique_ptr<Service> service(
       new Service(std::move(configuration), known_from_anywhere, std::move(rig), std::move(*setup)));
+  service->state_.settings = std::move(settings);
+  return service;
 }
 
 Service::Service(Configuration configuration, const std::filesystem::path& file, std::unique_ptr<Rig> rig,
@@ -87,7 +107,9 @@ Service::Service(Configuration configuration, const std::filesystem::path& file,
   server_ = std::make_unique<Server>(events_, state_.configuration.server, handler, demand_changed);
   state_.server = server_.get();
   state_.log_lines_dropped = log_lines_dropped;
-  state_.reload = [this](Respond answered) { reload(std::move(answered)); };
+  state_.reload = [this](nlohmann::json settings, Respond answered) {
+    reload(std::move(settings), std::move(answered));
+  };
   server_->set_delivered(
       [this](const ScanResult& scan) { scanner_.note_latency(std::chrono::steady_clock::now() - scan.received); });
   scanner_.set_listener([this](FreeScan scan) { server_->publish(std::move(scan)); });
@@ -131,7 +153,11 @@ void Service::on_signal(int number) {
     spdlog::info("stopping: {}", number == SIGINT ? "SIGINT" : "SIGTERM");
     return stop();
   }
-  reload([](Outcome) {});
+  if (setting_) {
+    reload_again_ = true;
+  } else {
+    reload(state_.settings, [](Outcome) {});
+  }
   await_signal();
 }
 
@@ -165,16 +191,30 @@ void Service::await_end(std::chrono::steady_clock::time_point began) {
   std::_Exit(EXIT_SUCCESS);
 }
 
-void Service::reload(Respond answered) {
+// Of two that set something at once the later would know nothing of the other's.
+void Service::reload(nlohmann::json settings, Respond answered) {
+  const bool sets = settings != state_.settings;
+  if (setting_ || (sets && reloads_ > 0)) {
+    const Error busy{ErrorCode::kBusy, "another change of the settings is under way: ask again", {}};
+    return answered(tl::unexpected(rpc_error(busy)));
+  }
+  ++reloads_;
+  setting_ = sets;
   notifier_.reloading();
-  scanner_.reload(state_.configuration_file, state_.configuration,
-                  [this, answered = std::move(answered)](const Result<Configuration>& configuration) {
-                    asio::post(events_, [this, configuration, answered] { on_reloaded(configuration, answered); });
+  scanner_.reload(state_.configuration_file, state_.configuration, settings,
+                  [this, settings, answered = std::move(answered)](const Result<Configuration>& configuration) {
+                    asio::post(events_, [this, configuration, settings, answered] {
+                      on_reloaded(configuration, settings, answered);
+                    });
                   });
 }
 
-void Service::on_reloaded(const Result<Configuration>& configuration, const Respond& answered) {
+void Service::on_reloaded(const Result<Configuration>& configuration, nlohmann::json settings,
+                          const Respond& answered) {
   notifier_.ready("ready");
+  --reloads_;
+  setting_ = false;
+  if (std::exchange(reload_again_, false)) asio::post(events_, [this] { reload(state_.settings, [](Outcome) {}); });
   if (!configuration) {
     const MessageId id(MessageId::kReloadRefused);
     spdlog::error("reload refused, everything stays as it was: {}", to_string(configuration.error()));
@@ -188,11 +228,27 @@ void Service::on_reloaded(const Result<Configuration>& configuration, const Resp
   state_.configuration.calibration_file = configuration->calibration_file;
   state_.configuration.other_hardware = configuration->other_hardware;
   state_.configuration.decode = configuration->decode;
+  state_.configuration.cameras = with_exposures_of(state_.configuration.cameras, configuration->cameras);
   state_.configuration.scan.timeout_ms = configuration->scan.timeout_ms;
   for (const char* table : {"pattern", "calibration", "decode"}) {
     state_.configuration.given[table] = configuration->given.value(table, nlohmann::json::object());
   }
-  answered(Reply{{{"needs_restart", std::move(restart)}}});
+  note_exposures(state_.configuration.given, configuration->given);
+  // What next start reads: the configuration itself is the administrator's.
+  const bool changed = settings != state_.settings;
+  const std::filesystem::path kept = kept_settings_file(state_.configuration_file);
+  nlohmann::json why_not_kept;
+  state_.settings = std::move(settings);
+  if (changed && kept.empty()) why_not_kept = "there is no $STATE_DIRECTORY: the next start knows nothing of it";
+  if (changed && !kept.empty()) {
+    if (auto written = write_file_atomically(kept, state_.settings.dump(2) + "\n"); !written) {
+      why_not_kept = to_string(written.error());
+      spdlog::warn("settings are in force, and are not kept: {}", to_string(written.error()));
+    }
+  }
+  nlohmann::json reply{{"needs_restart", std::move(restart)}};
+  if (changed) reply["not_kept"] = std::move(why_not_kept);
+  answered(Reply{std::move(reply)});
 }
 
 void Service::watch() {

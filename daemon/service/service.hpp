@@ -41,8 +41,10 @@ class Service {
   /// Makes everything from the configuration; nothing answers yet.
   /// @param file  the configuration's, to be read again by a reload
   /// @errors of ScanSetup::create(), make_projector() and make_camera()
+  /// @param settings  set over the socket before, which the configuration has in it
   [[nodiscard]] static Result<std::unique_ptr<Service>> create(Configuration configuration,
-                                                               const std::filesystem::path& file);
+                                                               const std::filesystem::path& file,
+                                                               nlohmann::json settings);
   ~Service();
 
   /// Serves until SIGTERM or SIGINT. @errors of Server::open()
@@ -55,11 +57,14 @@ class Service {
   void on_signal(int number);
   void stop();
   void await_end(std::chrono::steady_clock::time_point began);
-  void reload(Respond answered);
-  void on_reloaded(const Result<Configuration>& configuration, const Respond& answered);
+  void reload(nlohmann::json settings, Respond answered);
+  void on_reloaded(const Result<Configuration>& configuration, nlohmann::json settings, const Respond& answered);
   void watch();
   void update_status();
 
+  int reloads_ = 0;            ///< under way, one after the other
+  bool setting_ = false;       ///< the last of them has other settings than those in force
+  bool reload_again_ = false;  ///< a signal came meanwhile
   Notifier notifier_;
   asio::io_context events_;
   asio::signal_set signals_;

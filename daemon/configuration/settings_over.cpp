@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/configuration/settings_over.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <sstream>
+#include <string_view>
+#include <utility>
+
+#include <toml++/toml.h>
+
+#include "core/printable.hpp"
+#include "drivers/files/file.hpp"
+
+namespace slsd {
+namespace {
+
+using nlohmann::json;
+using std::filesystem::path;
+
+constexpr std::size_t kConfigurationBytesMax = 1 << 20;
+constexpr std::size_t kKeptBytesMax = 64 << 10;
+constexpr std::size_t kKeysMax = 64;
+constexpr std::size_t kListMax = 64;
+constexpr std::array kTables{"pattern", "calibration", "decode"};
+constexpr std::array kCameraKeys{"exposure_us", "gain_db", "gain_steps"};
+
+tl::unexpected<Error> refuse(const std::string& what) {
+  return fail(ErrorCode::kInvalidArgument, what);
+}
+
+bool is_plain(const json& value) {
+  return value.is_boolean() || value.is_number() || value.is_string();
+}
+
+bool is_value(const json& value) {
+  return is_plain(value) || (value.is_array() && value.size() <= kListMax && std::ranges::all_of(value, is_plain));
+}
+
+Result<> merge_keys(json& before, const json& changes, const std::string& where) {
+  if (!changes.is_object()) return refuse("\"" + where + "\" must be an object of keys and values");
+  if (before.is_null()) before = json::object();
+  for (const auto& [key, value] : changes.items()) {
+    if (value.is_null()) {
+      before.erase(key);
+    } else if (is_value(value)) {
+      before[key] = value;
+    } else {
+      return refuse("\"" + where + "." + printable(key, 64) +
+                    "\" must be a value as the configuration has it, or null");
+    }
+  }
+  return before.size() <= kKeysMax ? Result<>() : refuse("\"" + where + "\" has too many keys");
+}
+
+Result<> merge_camera(json& before, const json& changes, const std::string& where) {
+  if (!changes.is_object()) return refuse("\"" + where + "\" must be an object of keys and values");
+  for (const auto& [key, value] : changes.items()) {
+    if (std::ranges::find(kCameraKeys, key) == kCameraKeys.end())
+      return refuse("of \"" + where + "\" exposure_us, gain_db and gain_steps can be set; \"" + printable(key, 64) +
+                    "\" is for the configuration file");
+  }
+  return merge_keys(before, changes, where);
+}
+
+template <class Insert>
+void with_value(const json& value, Insert insert) {
+  if (value.is_boolean()) insert(value.get<bool>());
+  if (value.is_number_integer()) insert(value.get<std::int64_t>());
+  if (value.is_number_float()) insert(value.get<double>());
+  if (value.is_string()) insert(value.get<std::string>());
+}
+
+void insert(toml::table& table, const std::string& key, const json& value) {
+  with_value(value, [&](auto each) { table.insert_or_assign(key, std::move(each)); });
+  if (!value.is_array()) return;
+  toml::array list;
+  for (const json& each : value) with_value(each, [&](auto plain) { list.push_back(std::move(plain)); });
+  table.insert_or_assign(key, std::move(list));
+}
+
+toml::table* camera_named(toml::table& document, const std::string& name) {
+  toml::array* const cameras = document["camera"].as_array();
+  if (cameras == nullptr) return nullptr;
+  for (toml::node& camera : *cameras) {
+    toml::table* const table = camera.as_table();
+    if (table != nullptr && (*table)["name"].value_or(std::string("camera")) == name) return table;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+Result<json> merge_settings(json before, const json& changes) {
+  for (const auto& [table, keys] : changes.items()) {
+    Result<> merged;
+    if (std::ranges::find(kTables, table) != kTables.end()) {
+      merged = merge_keys(before[table], keys, table);
+      if (merged && before[table].empty()) before.erase(table);
+    } else if (table == "camera" && keys.is_object()) {
+      for (const auto& [name, of_camera] : keys.items()) {
+        json& kept = before[table][name];
+        if (merged) merged = merge_camera(kept, of_camera, "camera." + printable(name, 64));
+        if (kept.empty()) before[table].erase(name);
+      }
+      if (before.contains(table) && before[table].empty()) before.erase(table);
+    } else {
+      merged = refuse("\"pattern\", \"calibration\", \"decode\" and \"camera\" can be set; \"" + printable(table, 64) +
+                      "\" is for the configuration file");
+    }
+    if (!merged) return tl::unexpected(merged.error());
+  }
+  return before;
+}
+
+Result<Configuration> load_configuration_with(const path& file, const json& settings) {
+  auto plain = load_configuration(file);  // what is wrong with the file itself is told by its own lines
+  if (!plain || settings.empty()) return plain;
+  const auto text = read_file(file, kConfigurationBytesMax);
+  if (!text) return tl::unexpected(text.error());
+  std::ostringstream merged;
+  try {
+    toml::table document = toml::parse(*text, file.string());
+    for (const char* const name : kTables) {
+      if (!settings.contains(name)) continue;
+      // A pattern's keys belong together: the file's other ones could only contradict those that are set.
+      if (!document.contains(name) || name == std::string_view("pattern"))
+        document.insert_or_assign(name, toml::table());
+      for (const auto& [key, value] : settings[name].items()) insert(*document[name].as_table(), key, value);
+    }
+    const json cameras = settings.value("camera", json::object());
+    for (const auto& [name, keys] : cameras.items()) {
+      toml::table* const camera = camera_named(document, name);
+      if (camera == nullptr)
+        return fail(ErrorCode::kNotFound, "no camera \"" + printable(name, 64) + "\" is configured");
+      for (const auto& [key, value] : keys.items()) insert(*camera, key, value);
+    }
+    merged << document;
+  } catch (const toml::parse_error& error) {
+    return fail(ErrorCode::kMalformed, std::string(error.description()), file.string());
+  }
+  auto configuration = read_configuration(merged.str(), file);
+  if (!configuration) configuration.error().where.clear();  // a line of no file
+  return configuration;
+}
+
+path kept_settings_file(const path& configuration) {
+  const char* const folders = std::getenv("STATE_DIRECTORY");
+  if (folders == nullptr) return {};
+  const std::string first(folders, std::string_view(folders).find_first_of(':') == std::string_view::npos
+                                       ? std::string_view(folders).size()
+                                       : std::string_view(folders).find_first_of(':'));
+  return first.empty() ? path() : path(first) / ("settings-" + configuration.stem().string() + ".json");
+}
+
+Result<json> read_kept_settings(const path& file) {
+  std::error_code ignored;
+  if (file.empty() || !std::filesystem::exists(file, ignored)) return json::object();
+  const auto text = read_file(file, kKeptBytesMax);
+  if (!text) return tl::unexpected(text.error());
+  const json kept = json::parse(*text, nullptr, /*allow_exceptions=*/false);
+  if (!kept.is_object()) return fail(ErrorCode::kMalformed, "is no JSON object", file.string());
+  auto merged = merge_settings(json::object(), kept);
+  if (!merged) merged.error().where = file.string();
+  return merged;
+}
+
+std::vector<CameraOptions> with_exposures_of(std::vector<CameraOptions> cameras,
+                                             const std::vector<CameraOptions>& others) {
+  for (CameraOptions& camera : cameras) {
+    const auto other = std::ranges::find(others, camera.name(), [](const auto& each) { return each.name(); });
+    if (other == others.end()) continue;
+    if (auto* v4l2 = std::get_if<V4l2CameraOptions>(&camera.of_driver)) {
+      if (const auto* from = std::get_if<V4l2CameraOptions>(&other->of_driver))
+        v4l2->exposure_us = from->exposure_us, v4l2->gain_db = from->gain_db, v4l2->gain_steps = from->gain_steps;
+    } else if (auto* aravis = std::get_if<AravisCameraOptions>(&camera.of_driver)) {
+      if (const auto* from = std::get_if<AravisCameraOptions>(&other->of_driver))
+        aravis->exposure_us = from->exposure_us, aravis->gain_db = from->gain_db;
+    }
+  }
+  return cameras;
+}
+
+}  // namespace slsd
