@@ -60,6 +60,19 @@ CLI::Option* add_print_options(CLI::App& app, PrintRequest& request) {
   return print;
 }
 
+void add_extrinsics_options(CLI::App& app, ExtrinsicsRequest& request) {
+  auto* extrinsics = app.add_option("--extrinsics", request.file,
+                                    "measure where several scanners stand, by a board that they see, and write it");
+  app.add_option("--scanner", request.scanners, "with --extrinsics: NAME=SOCKET; the first is the frame of all")
+      ->needs(extrinsics);
+  app.add_option("--parent", request.parent, "with --extrinsics: the name of that frame (cell)")->needs(extrinsics);
+  app.add_option("--places", request.places, "with --extrinsics: places of the board (3)")
+      ->check(CLI::Range(1, 99))
+      ->needs(extrinsics);
+  for (const char* other : {"--calibrate", "--verify", "--pattern", "--check", "--check-config", "--list"})
+    extrinsics->excludes(app.get_option(other));
+}
+
 void add_options(CLI::App& app, CommandLine& line) {
   app.set_version_flag("--version", "slsd " SLSD_VERSION);
   app.add_option("--config", line.configuration, "configuration file; without it " + std::string(kConfigurationFile));
@@ -79,13 +92,15 @@ void add_options(CLI::App& app, CommandLine& line) {
   pattern->excludes(check)->excludes(list);
   check->excludes(list);
   check_configuration->excludes(calibrate)->excludes(verify)->excludes(pattern)->excludes(check)->excludes(list);
+  add_extrinsics_options(app, line.extrinsics);
   add_print_options(app, line.print)
       ->excludes(pattern)
       ->excludes(calibrate)
       ->excludes(verify)
       ->excludes(check)
       ->excludes(check_configuration)
-      ->excludes(list);
+      ->excludes(list)
+      ->excludes("--extrinsics");
 }
 
 /// --from, --board and --ruler belong to several commands.
@@ -94,11 +109,13 @@ void check_commands(const CLI::App& app, const CommandLine& line) {
     throw CLI::RequiresError("--ruler with --verify", "--board");
   }
   if (line.calibrate || line.verify) return;
+  const bool extrinsics = !line.extrinsics.file.empty();
   for (const char* option : {"--from", "--ruler"}) {
-    if (app.count(option) > 0) throw CLI::RequiresError(option, "--calibrate or --verify");
+    if (app.count(option) > 0 && !(extrinsics && option == std::string_view("--ruler")))
+      throw CLI::RequiresError(option, "--calibrate or --verify");
   }
-  if (app.count("--board") > 0 && line.print.file.empty()) {
-    throw CLI::RequiresError("--board", "--calibrate, --verify or --print-board");
+  if (app.count("--board") > 0 && line.print.file.empty() && !extrinsics) {
+    throw CLI::RequiresError("--board", "--calibrate, --verify, --extrinsics or --print-board");
   }
 }
 

@@ -9,6 +9,7 @@
 #include <tl/expected.hpp>
 
 #include "daemon/calibrate/calibrate_request.hpp"
+#include "daemon/calibrate/measure_extrinsics.hpp"
 #include "daemon/commands/commands.hpp"
 
 namespace slsd {
@@ -26,9 +27,10 @@ struct CommandLine {
   bool calibrate = false, latency = false, verify = false;
   CalibrateRequest request;
   PrintRequest print;
+  ExtrinsicsRequest extrinsics;
 
   /// Whether slsd-calibrate carries it out.
-  [[nodiscard]] bool calibrates() const { return calibrate || verify || !print.file.empty(); }
+  [[nodiscard]] bool calibrates() const { return calibrate || verify || !print.file.empty() || !extrinsics.file.empty(); }
 };
 
 /// Prints help, version or what is wrong with the usage.

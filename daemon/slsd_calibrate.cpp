@@ -5,6 +5,7 @@
 #include <glog/logging.h>
 
 #include "daemon/calibrate/calibrate_from_files.hpp"
+#include "daemon/calibrate/measure_extrinsics.hpp"
 #include "daemon/calibrate/session.hpp"
 #include "daemon/calibrate/verify_from_files.hpp"
 #include "daemon/calibrate/verify_live.hpp"
@@ -22,17 +23,18 @@ slsd::Result<> calibrate(const slsd::CommandLine& line) {
 slsd::Result<> carry_out(const slsd::CommandLine& line) {
   if (!line.print.file.empty()) return slsd::print_board(line.print);
   if (line.calibrate) return calibrate(line);
+  if (!line.extrinsics.file.empty()) return slsd::measure_extrinsics(line.extrinsics, line.request);
   return line.request.from.empty() ? slsd::verify_live(line.request) : slsd::verify_from_files(line.request);
 }
 
 }  // namespace
 
-// What slsd becomes for --calibrate, --verify and --print-board.
+// What slsd becomes for --calibrate, --verify, --extrinsics and --print-board.
 int main(int argc, char** argv) {
   const auto line = slsd::parse_command_line(argc, argv);
   if (!line) return line.error();
   if (!line->calibrates()) {
-    std::cerr << "slsd-calibrate: needs --calibrate, --verify or --print-board; slsd is the service\n";
+    std::cerr << "slsd-calibrate: needs --calibrate, --verify, --extrinsics or --print-board; slsd is the service\n";
     return slsd::kWrongUsage;
   }
   FLAGS_minloglevel = google::GLOG_FATAL;  // what Ceres warns of is judged by the result
