@@ -15,6 +15,7 @@
 #include <slsd/scanner.hpp>
 
 #include "drivers/files/file.hpp"
+#include "endpoints.hpp"
 #include "extrinsics.hpp"
 #include "messages.hpp"
 
@@ -27,13 +28,6 @@ using nlohmann::json;
 constexpr auto kDiscovery = 1500ms;  // until others of the same name are known
 constexpr auto kRetry = 1s;
 constexpr std::size_t kExtrinsicsBytesMax = 1 << 20;
-enum Level : std::uint8_t { kOk = 0, kWarn = 1, kError = 2 };
-
-bool is_ros_name(const std::string& name) {
-  const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
-  return !name.empty() && letter(name[0]) &&
-         std::all_of(name.begin(), name.end(), [&](char c) { return letter(c) || (c >= '0' && c <= '9') || c == '_'; });
-}
 
 // A camera may have any name.
 std::string ros_name(std::string name) {
@@ -77,12 +71,9 @@ class Running : public Bridge {
     keep(transforms_, network_.writer(tf2_msgs_msg_dds__TFMessage__desc, "rt/tf_static", Quality::kLatched));
     keep(diagnostics_,
          network_.writer(diagnostic_msgs_msg_dds__DiagnosticArray__desc, "rt/diagnostics", Quality::kService));
-    keep(trigger_,
-         network_.reader(std_msgs_msg_dds__Empty__desc, "rt/" + options_.name + "/trigger", Quality::kService));
-    keep(requests_, network_.reader(std_srvs_srv_dds__Trigger_Request__desc, "rq/" + options_.name + "/triggerRequest",
-                                    Quality::kService));
-    keep(replies_, network_.writer(std_srvs_srv_dds__Trigger_Response__desc, "rr/" + options_.name + "/triggerReply",
-                                   Quality::kService));
+    auto trigger = Trigger::open(network_, options_.name);
+    if (!trigger) return tl::unexpected(trigger.error());
+    trigger_ = *trigger;
     return opened;
   }
 
@@ -93,7 +84,7 @@ class Running : public Bridge {
       });
     }
     triggers_ = std::jthread([this](const std::stop_token& stop) {
-      while (!stop.stop_requested()) answer_triggers();
+      while (!stop.stop_requested()) trigger_.answer([this] { return scan(); });
     });
     state_ = std::jthread([this](const std::stop_token& stop) {
       while (!stop.stop_requested()) tell_state();
@@ -145,67 +136,45 @@ class Running : public Bridge {
     }
   }
 
-  void answer_triggers() {
-    if (!wait_for({requests_, trigger_}, 1s)) return;
-    void* sample = nullptr;
-    dds_sample_info_t info;
-    while (dds_take(requests_, &sample, &info, 1, 1) > 0) {
-      const auto request = *static_cast<const std_srvs_srv_dds__Trigger_Request_*>(sample);
-      dds_return_loan(requests_, &sample, 1);
-      sample = nullptr;
-      if (!info.valid_data) continue;
-      auto [done, text] = scan();
-      const std_srvs_srv_dds__Trigger_Response_ reply{request.client_guid, request.sequence_number, done, text.data()};
-      dds_write(replies_, &reply);
-    }
-    // However many came meanwhile: each of them came before the scan began.
-    bool asked = false;
-    while (dds_take(trigger_, &sample, &info, 1, 1) > 0) {
-      asked = asked || info.valid_data;
-      dds_return_loan(trigger_, &sample, 1);
-      sample = nullptr;
-    }
-    if (asked) (void)scan();
-  }
-
   void tell_state() {
-    std::vector<std::pair<std::string, std::string>> values;
-    Level level = kOk;
-    std::string message = "ready to scan";
-    const auto worse = [&](Level how, const std::string& why) {
-      if (how > level) level = how, message = why;
-    };
+    Diagnosis state{Level::kOk, "ready to scan", {}};
+    auto& values = state.values;
     try {
       client::Scanner scanner(options_.socket);
       const json status = json::parse(scanner.status());
       const json settings = json::parse(scanner.settings());
       if (settings.value("calibration", "") != calibration_text_ || cameras_.empty()) {
         const std::lock_guard lock(mutex_);
-        if (auto read = take_calibration(settings); !read) worse(kError, "calibration: " + to_string(read.error()));
+        if (auto read = take_calibration(settings); !read)
+          state.worse(Level::kError, "calibration: " + to_string(read.error()));
       }
-      if (!status.value("ready", false)) worse(kWarn, "not ready to scan");
+      if (!status.value("ready", false)) state.worse(Level::kWarn, "not ready to scan");
       json devices = status.value("cameras", json::array());
       if (status.contains("projector")) devices.push_back(status["projector"]);
       for (const json& device : devices) {
         values.emplace_back(device.value("name", ""), device.value("state", ""));
-        if (const std::string problem = device.value("problem", ""); !problem.empty()) worse(kError, problem);
+        if (const std::string problem = device.value("problem", ""); !problem.empty())
+          state.worse(Level::kError, problem);
       }
       values.emplace_back("scans succeeded", status.value("scans", json::object()).value("succeeded", json(0)).dump());
-      if (calibration_text_.empty()) worse(kError, "not calibrated");
-      if (stale_) worse(kError, "extrinsics_stale: the scanner was calibrated anew since; measure where it stands");
+      if (calibration_text_.empty()) state.worse(Level::kError, "not calibrated");
+      if (stale_)
+        state.worse(Level::kError, "extrinsics_stale: the scanner was calibrated anew since; measure where it stands");
       publish_images(scanner);
     } catch (const client::ScannerError& error) {
-      worse(kError, error.what());
+      state.worse(Level::kError, error.what());
     } catch (const json::exception& error) {
-      worse(kError, std::string("the service's state is not slsd's: ") + error.what());
+      state.worse(Level::kError, std::string("the service's state is not slsd's: ") + error.what());
     }
     if (network_.other_writers("rt/" + options_.name + "/points") > 0)
-      worse(kError, "name_taken: another scanner publishes as \"" + options_.name + "\"; rename one of them");
+      state.worse(Level::kError,
+                  "name_taken: another scanner publishes as \"" + options_.name + "\"; rename one of them");
     values.emplace_back("clouds published", std::to_string(published_));
     values.emplace_back("clouds lost before publishing", std::to_string(lost_));
-    if (level == kError && message != said_) say(said_ = message);
-    if (level == kOk) said_.clear();
-    write_diagnostics(level, message, values);
+    if (!calibration_date_.empty()) values.emplace_back(kCalibrationDate, calibration_date_);
+    if (state.level == Level::kError && state.message != said_) say(said_ = state.message);
+    if (state.level == Level::kOk) said_.clear();
+    write_diagnosis(diagnostics_, std::move(state), options_.name, options_.name + ": slsd");
     std::this_thread::sleep_for(options_.image_rate_hz > 1
                                     ? std::chrono::duration_cast<std::chrono::nanoseconds>(
                                           std::chrono::duration<double>(1 / options_.image_rate_hz))
@@ -238,6 +207,7 @@ class Running : public Bridge {
       const CalibratedCamera* calibrated = calibration ? calibration->camera(name) : nullptr;
       known->calibrated = calibrated ? std::optional(*calibrated) : std::nullopt;
     }
+    calibration_date_ = calibration ? calibration->report.date.value_or("") : "";
     stale_ = extrinsics_ && calibration && !extrinsics_->calibration_date.empty() &&
              calibration->report.date.value_or("") != extrinsics_->calibration_date;
     publish_transforms();
@@ -274,17 +244,6 @@ class Running : public Bridge {
     }
   }
 
-  void write_diagnostics(Level level, std::string message, std::vector<std::pair<std::string, std::string>>& values) {
-    std::string name = options_.name + ": slsd", none;
-    std::vector<diagnostic_msgs_msg_dds__KeyValue_> pairs;
-    for (auto& [key, value] : values) pairs.push_back({key.data(), value.data()});
-    const auto count = static_cast<std::uint32_t>(pairs.size());
-    diagnostic_msgs_msg_dds__DiagnosticStatus_ status{
-        level, name.data(), message.data(), options_.name.data(), {count, count, pairs.data(), false}};
-    const diagnostic_msgs_msg_dds__DiagnosticArray_ all{{stamp_now(), none.data()}, {1, 1, &status, false}};
-    dds_write(diagnostics_, &all);
-  }
-
   void say(const std::string& text) const {
     std::fprintf(stderr, "slsd-dds: %s: %s\n", options_.name.c_str(), text.c_str());
   }
@@ -293,11 +252,12 @@ class Running : public Bridge {
   Network network_;
   std::optional<Extrinsics> extrinsics_;
   std::string frame_id_;
-  dds_entity_t points_ = 0, transforms_ = 0, diagnostics_ = 0, trigger_ = 0, requests_ = 0, replies_ = 0;
+  dds_entity_t points_ = 0, transforms_ = 0, diagnostics_ = 0;
+  Trigger trigger_;
   std::mutex mutex_;  ///< of what is below, up to the threads
   CloudMessage message_;
   std::list<Camera> cameras_;  ///< changed by the thread of the state alone
-  std::string calibration_text_, said_;
+  std::string calibration_text_, calibration_date_, said_;
   bool stale_ = false;
   std::atomic<std::uint64_t> published_{0}, lost_{0};
   std::jthread clouds_, triggers_, state_;

@@ -25,16 +25,31 @@ std::optional<std::vector<double>> numbers(const toml::table& table, const char*
   return read;
 }
 
-}  // namespace
-
-Result<Extrinsics> read_extrinsics(std::string_view text, const std::string& scanner, const std::string& file) {
-  toml::table table;
+Result<toml::table> parse(std::string_view text, const std::string& file) {
   try {
-    table = toml::parse(text);
+    return toml::parse(text);
   } catch (const toml::parse_error& error) {
     return fail(ErrorCode::kMalformed, std::string(error.description()),
                 file + ":" + std::to_string(error.source().begin.line));
   }
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> scanners_in(std::string_view text, const std::string& file) {
+  auto table = parse(text, file);
+  if (!table) return tl::unexpected(table.error());
+  std::vector<std::string> names;
+  if (const toml::table* scanners = (*table)["scanner"].as_table()) {
+    for (const auto& [name, entry] : *scanners) names.emplace_back(name.str());
+  }
+  return names;
+}
+
+Result<Extrinsics> read_extrinsics(std::string_view text, const std::string& scanner, const std::string& file) {
+  auto parsed = parse(text, file);
+  if (!parsed) return tl::unexpected(parsed.error());
+  toml::table& table = *parsed;
   const toml::table* entry = table["scanner"][scanner].as_table();
   if (!entry) {
     return fail(ErrorCode::kNotFound,

@@ -4,6 +4,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/geometry/calibration.hpp"
 
@@ -25,5 +26,8 @@ struct Extrinsics {
 /// @errors kMalformed: no such file, or no rotation; kNotFound: it does not name the scanner
 [[nodiscard]] Result<Extrinsics> read_extrinsics(std::string_view text, const std::string& scanner,
                                                  const std::string& file);
+
+/// The scanners that the file names, by name. @errors kMalformed
+[[nodiscard]] Result<std::vector<std::string>> scanners_in(std::string_view text, const std::string& file);
 
 }  // namespace slsd::dds

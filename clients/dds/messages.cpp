@@ -20,14 +20,23 @@ char* text(const std::string& text) {
   return const_cast<char*>(text.c_str());
 }
 
-constexpr std::uint32_t kPointStep = 20;
-constexpr std::uint8_t kUint8 = 2, kFloat32 = 7;  // of sensor_msgs/PointField
+}  // namespace
 
 sensor_msgs_msg_dds__PointField_ field(const char* name, std::uint32_t offset, std::uint8_t type) {
   return {const_cast<char*>(name), offset, type, 1};
 }
 
-}  // namespace
+void set_points(sensor_msgs_msg_dds__PointCloud2_& message, sensor_msgs_msg_dds__PointField_* fields,
+                std::uint32_t field_count, std::vector<std::uint8_t>& data) {
+  message.height = 1;
+  message.width = static_cast<std::uint32_t>(data.size() / kPointStep);
+  message.fields = {field_count, field_count, fields, false};
+  message.is_bigendian = false;
+  message.point_step = kPointStep;
+  message.row_step = static_cast<std::uint32_t>(data.size());
+  message.data = {message.row_step, message.row_step, data.data(), false};
+  message.is_dense = true;
+}
 
 builtin_interfaces_msg_dds__Time_ stamp_now() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
@@ -68,14 +77,7 @@ const sensor_msgs_msg_dds__PointCloud2_& CloudMessage::of(const client::Cloud& c
     to += kPointStep;
   }
   message_.header = {stamp, text(frame_id)};
-  message_.height = 1;
-  message_.width = static_cast<std::uint32_t>(cloud.size());
-  message_.fields = {std::size(fields), std::size(fields), fields, false};
-  message_.is_bigendian = false;
-  message_.point_step = kPointStep;
-  message_.row_step = static_cast<std::uint32_t>(data_.size());
-  message_.data = {message_.row_step, message_.row_step, data_.data(), false};
-  message_.is_dense = true;
+  set_points(message_, fields, std::size(fields), data_);
   return message_;
 }
 

@@ -127,8 +127,8 @@ int Network::other_writers(const std::string& name) const {
   return others;
 }
 
-bool wait_for(std::initializer_list<dds_entity_t> readers, std::chrono::milliseconds time) {
-  const dds_entity_t set = dds_create_waitset(dds_get_participant(*readers.begin()));
+bool wait_for(const std::vector<dds_entity_t>& readers, std::chrono::milliseconds time) {
+  const dds_entity_t set = dds_create_waitset(dds_get_participant(readers.front()));
   std::vector<dds_entity_t> conditions;
   for (const dds_entity_t reader : readers) {
     conditions.push_back(dds_create_readcondition(reader, DDS_NOT_READ_SAMPLE_STATE));

@@ -4,7 +4,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -59,6 +58,6 @@ class Network {
 };
 
 /// Waits until one of these readers has a sample that was not read, or the time is over.
-bool wait_for(std::initializer_list<dds_entity_t> readers, std::chrono::milliseconds time);
+bool wait_for(const std::vector<dds_entity_t>& readers, std::chrono::milliseconds time);
 
 }  // namespace slsd::dds

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "bridge.hpp"
+#include "merge.hpp"
 
 namespace {
 
@@ -24,7 +25,7 @@ int main(int argc, char** argv) {
   slsd::dds::BridgeOptions options;
   slsd::dds::NetworkOptions network;
   app.set_version_flag("--version", "slsd-dds " SLSD_VERSION);
-  app.add_option("--name", options.name, "of the scanner: its topics begin with it (scanner)");
+  auto* name = app.add_option("--name", options.name, "of the scanner: its topics begin with it (scanner; merged)");
   app.add_option("--socket", options.socket, "of its service");
   app.add_option("--rate", options.rate_hz, "at most so many clouds a second; 0: only those that are triggered")
       ->check(CLI::Range(0.0, 1000.0));
@@ -33,6 +34,17 @@ int main(int argc, char** argv) {
   app.add_option("--image-rate", options.image_rate_hz, "images a second, 1 or more; 0: none (0)")
       ->check(CLI::Range(0.0, 100.0));
   app.add_option("--extrinsics", options.extrinsics, "where the scanners stand, as TOML");
+  bool merges = false;
+  slsd::dds::MergeOptions merge;
+  double max_age_s = merge.max_age.count();
+  auto* merging = app.add_flag("--merge", merges, "one cloud of several scanners, by --extrinsics");
+  for (const char* alone : {"--socket", "--rate", "--density", "--image-rate"})
+    merging->excludes(app.get_option(alone));
+  app.add_option("--scanner", merge.scanners, "with --merge: a scanner to merge; without it all of the file")
+      ->needs(merging);
+  app.add_option("--max-age", max_age_s, "with --merge: seconds by which a cloud may be older than the newest (1)")
+      ->check(CLI::Range(0.01, 3600.0))
+      ->needs(merging);
   app.add_option("--domain", network.domain, "of DDS (0)")->envname("ROS_DOMAIN_ID")->check(CLI::Range(0, 232));
   app.add_option("--interface", network.interface, "of the network: eth0, lo");
   app.add_option("--peer", network.peers, "an address of others, where the network has no multicast; may be repeated");
@@ -50,8 +62,18 @@ int main(int argc, char** argv) {
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);
   auto joined = slsd::dds::Network::open(network);
   if (!joined) return failed(joined.error());
-  const auto bridge = slsd::dds::Bridge::start(options, std::move(*joined));
+  slsd::Result<std::unique_ptr<slsd::dds::Bridge>> bridge;
+  slsd::Result<std::unique_ptr<slsd::dds::Merge>> merged;
+  if (merges) {
+    if (name->count() > 0) merge.name = options.name;
+    merge.extrinsics = options.extrinsics;
+    merge.max_age = std::chrono::duration<double>(max_age_s);
+    merged = slsd::dds::Merge::start(merge, std::move(*joined));
+  } else {
+    bridge = slsd::dds::Bridge::start(options, std::move(*joined));
+  }
   if (!bridge) return failed(bridge.error());
+  if (!merged) return failed(merged.error());
   int signal = 0;
   sigwait(&ends, &signal);
   dds_delete(DDS_CYCLONEDDS_HANDLE);  // tells the others that it goes

@@ -2,8 +2,10 @@
 // Copyright the slsd authors
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <cinttypes>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <map>
@@ -27,6 +29,8 @@ const std::map<std::string, const dds_topic_descriptor_t*> kTypes{
     {"Image", &sensor_msgs_msg_dds__Image__desc},
     {"TFMessage", &tf2_msgs_msg_dds__TFMessage__desc},
     {"DiagnosticArray", &diagnostic_msgs_msg_dds__DiagnosticArray__desc}};
+
+std::atomic<bool> ended{false};
 
 std::int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
@@ -72,6 +76,37 @@ int call(const Network& network, const std::string& name) {
   return 0;
 }
 
+/// A cloud as somebody else may write it: its header says what it wants to.
+struct ForeignCloud {
+  std::string frame_id = "left_optical_frame";
+  std::uint32_t width = 100, height = 1, point_step = 20, row_step = 2000, bytes = 2000, x_offset = 0;
+  bool is_bigendian = false;
+};
+
+int write_clouds(const Network& network, const std::string& topic, ForeignCloud cloud, double seconds) {
+  const auto writer = network.writer(sensor_msgs_msg_dds__PointCloud2__desc, "rt/" + topic, Network::Quality::kSensor);
+  if (!writer) return 1;
+  std::string x = "x", y = "y", z = "z";
+  sensor_msgs_msg_dds__PointField_ fields[] = {
+      {x.data(), cloud.x_offset, 7, 1}, {y.data(), 4, 7, 1}, {z.data(), 8, 7, 1}};
+  std::vector<std::uint8_t> data(cloud.bytes);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  while (!ended && std::chrono::steady_clock::now() < end) {
+    const std::int64_t now = now_ns();
+    sensor_msgs_msg_dds__PointCloud2_ message{};
+    message.header = {{static_cast<std::int32_t>(now / 1'000'000'000), static_cast<std::uint32_t>(now % 1'000'000'000)},
+                      cloud.frame_id.data()};
+    message.height = cloud.height, message.width = cloud.width;
+    message.fields = {3, 3, fields, false};
+    message.is_bigendian = cloud.is_bigendian;
+    message.point_step = cloud.point_step, message.row_step = cloud.row_step;
+    message.data = {cloud.bytes, cloud.bytes, data.data(), false};
+    dds_write(*writer, &message);
+    ::usleep(100'000);
+  }
+  return 0;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -89,13 +124,26 @@ int main(int argc, char** argv) {
   app.add_option("--count", count);
   app.add_option("--seconds", seconds);
   app.add_option("--call", service, "the trigger service of this scanner");
+  std::string written;
+  ForeignCloud cloud;
+  app.add_option("--write", written, "write clouds to this topic, of a header with these:");
+  app.add_option("--frame", cloud.frame_id);
+  app.add_option("--width", cloud.width);
+  app.add_option("--height", cloud.height);
+  app.add_option("--point-step", cloud.point_step);
+  app.add_option("--row-step", cloud.row_step);
+  app.add_option("--bytes", cloud.bytes);
+  app.add_option("--x-offset", cloud.x_offset);
+  app.add_flag("--big-endian", cloud.is_bigendian);
   app.add_flag("--stamps", stamps, "topic, stamp, time of arrival (ns), bytes");
   app.add_flag("--best-effort", sensor, "ask for no more than sensors' QoS");
   app.add_flag("--latched", latched, "ask for what was said before");
   CLI11_PARSE(app, argc, argv);
   options.best_effort = sensor;
+  std::signal(SIGTERM, [](int) { ended = true; });  // the others are told then
   const auto network = Network::open(options);
   if (!network) return std::fprintf(stderr, "%s\n", to_string(network.error()).c_str()), 1;
+  if (!written.empty()) return write_clouds(*network, written, cloud, seconds);
   if (!service.empty()) return call(*network, service);
   std::vector<dds_entity_t> readers;
   for (const std::string& topic : topics) {
@@ -109,7 +157,7 @@ int main(int argc, char** argv) {
   for (std::size_t i = 0; i < readers.size(); ++i)
     dds_waitset_attach(set, dds_create_readcondition(readers[i], DDS_NOT_READ_SAMPLE_STATE),
                        static_cast<dds_attach_t>(i));
-  for (std::uint64_t seen = 0; seen < count && std::chrono::steady_clock::now() < end;) {
+  for (std::uint64_t seen = 0; !ended && seen < count && std::chrono::steady_clock::now() < end;) {
     dds_waitset_wait(set, nullptr, 0, DDS_MSECS(200));
     for (std::size_t i = 0; i < readers.size(); ++i) {
       for (std::string bytes; seen < count && !(bytes = taken(readers[i])).empty(); ++seen) {

@@ -15,6 +15,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 
@@ -100,11 +101,56 @@ def probe(topic, kind, *more):
     return samples
 
 
+class Listener:
+    """What is published on a topic, as it comes: the newest sample, and a reader of its own process."""
+
+    def __init__(self, topic, kind, *more):
+        self.process = subprocess.Popen([BIN / "dds_probe", "--domain", str(DOMAIN), "--topic", topic, "--type", kind, "--count",
+                                         "1000000000", "--seconds", "3600", *more], stdout=subprocess.PIPE)
+        self.samples, self.count = {}, 0
+        self.thread = threading.Thread(target=self.read, daemon=True)
+        self.thread.start()
+
+    def read(self):
+        while size := self.process.stdout.read(4):
+            self.take(Cdr(self.process.stdout.read(struct.unpack("<I", size)[0])))
+            self.count += 1
+
+    def take(self, sample):
+        self.samples = {"": sample}
+
+    def next(self):
+        """One that came after this was asked for."""
+        seen = self.count
+        wait_until(lambda: self.count > seen, "a sample")
+        return self.samples[""]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.terminate()
+        self.process.wait(20)
+        self.thread.join()
+        self.process.stdout.close()
+
+
+class States(Listener):
+    """/diagnostics, the newest of each name."""
+
+    def __init__(self):
+        super().__init__("diagnostics", "DiagnosticArray")
+
+    def take(self, sample):
+        for status in sample.diagnostics()["status"]:
+            self.samples[status["name"]] = status
+
+
 class Bridge:
     def __init__(self, service, *more, name="left"):
         self.log = tempfile.TemporaryFile("w+")
-        self.process = subprocess.Popen([BIN / "slsd-dds", "--socket", service.socket, "--name", name, *LOOPBACK, *more],
-                                        stderr=self.log)
+        socket = ["--socket", service.socket] if service else []
+        self.process = subprocess.Popen([BIN / "slsd-dds", *socket, "--name", name, *LOOPBACK, *more], stderr=self.log)
 
     def said(self):
         self.log.seek(0)
