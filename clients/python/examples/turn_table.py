@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Views of a turn-table in one frame: turn_table.py OUT.npy VIEWS  (Enter after each turn by 360/VIEWS degrees)
+"""Views of a turn-table in one frame: turn_table.py OUT.npy VIEWS [X,Y,Z DX,DY,DZ]  (Enter after each turn by 360/VIEWS degrees)
 
-Its axis is measured once, as a point and a direction in the scanner's frame: with a sphere on the table, the circle that
-its centres describe.
+Its axis is measured once, as a point (mm) and a direction in the scanner's frame: with a sphere on the table, the circle that
+its centres describe (axis_of).
 """
 import sys
 
@@ -38,13 +38,14 @@ def merged(views, point_on_axis_mm, axis):
     return np.concatenate([turned(view, -i * step, point_on_axis_mm, axis) for i, view in enumerate(views)])
 
 
-def main(out, count, point_on_axis_mm=(0, 0, 1000), axis=(0, 1, 0)):
+def main(out, count, point_on_axis_mm="0,0,1000", axis="0,1,0"):
+    point, direction = (np.array([float(word) for word in text.split(",")]) for text in (point_on_axis_mm, axis))
     views = []
     with slsd.Scanner() as scanner:
         for i in range(int(count)):
             input(f"view {i + 1} of {count}: ")
-            views.append(scanner.scan().xyz)
-    np.save(out, merged(views, np.asarray(point_on_axis_mm, float), axis))
+            views.append(scanner.scan(timeout_s=60).xyz)
+    np.save(out, merged(views, point, direction))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""Where to set a suction cup on the topmost part of a bin: pick.py [CUP_MM]
+
+Prints the point (mm, the scanner's frame), the direction to come from, and how sure the place is. Of the places where a cup of this
+diameter (40) finds a plane, the nearest.
+"""
+import sys
+
+import numpy as np
+
+import slsd
+
+FLAT_MM = 0.5    # how far a surface may be off a plane for the cup to hold
+COVERED = 0.9    # of the cup's area, where points must be
+
+
+def patches(xyz, cup_mm):
+    """Points by squares of a cup's width, seen along z, in two grids that are half a width apart."""
+    for shift in (0, cup_mm / 2):
+        cells = np.floor((xyz[:, :2] + shift) / cup_mm).astype(int)
+        _, first, which = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+        which = which.ravel()
+        order = np.argsort(which, kind="stable")
+        for part in np.split(order, np.flatnonzero(np.diff(which[order])) + 1):
+            yield xyz[part]
+
+
+def plane_of(points):
+    """Middle, unit normal towards the scanner, root mean square off the plane."""
+    middle = points.mean(axis=0)
+    _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
+    normal = axes[2] if axes[2] @ middle < 0 else -axes[2]
+    return middle, normal, spread[2] / np.sqrt(len(points))
+
+
+def places(xyz, cup_mm):
+    """(point, normal, off_mm) of all places that hold, the nearest first."""
+    density = np.median([len(patch) for patch in patches(xyz, cup_mm)])
+    found = []
+    for patch in patches(xyz, cup_mm):
+        if len(patch) < COVERED * density:
+            continue
+        middle, normal, off_mm = plane_of(patch)
+        covered = np.ptp(patch[:, :2], axis=0).min() > COVERED * cup_mm
+        if off_mm < FLAT_MM and covered:
+            found.append((middle, normal, off_mm))
+    return sorted(found, key=lambda place: place[0][2])
+
+
+def main(cup_mm=40):
+    with slsd.Scanner() as scanner:
+        cloud = scanner.scan(density="pixels")
+    found = places(cloud.xyz.astype(float), float(cup_mm))
+    if not found:
+        sys.exit("no place for this cup: the bin is empty, or nothing in it is flat")
+    point, normal, off_mm = found[0]
+    print("point mm {:.2f} {:.2f} {:.2f}, normal {:.4f} {:.4f} {:.4f}, flat to {:.2f} mm, {} places".format(
+        *point, *normal, off_mm, len(found)))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
