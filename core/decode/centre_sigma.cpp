@@ -14,7 +14,7 @@ namespace {
 
 constexpr float kLeastPx = 0.01F;  // what is left of sampling and blur
 constexpr float kOfAcross = 0.4F, kOfRoughness = 1;
-constexpr float kOfMisfitSquared = 0.03F;  // px
+constexpr float kOfMisfitSquared = 0.018F;  // px
 /// What lies across on the smoothest of surfaces, besides noise.
 constexpr float kSmoothAcrossPx = 0.022F;
 constexpr float kUnknownBendPx = 0.02F;

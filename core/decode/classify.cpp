@@ -106,6 +106,7 @@ Classification Classifier::classify(const ShapeFeatures& features) const {
     if (verdict.likelihood[i] > best) best = verdict.likelihood[i], letter = i;
   }
   result.distance = std::sqrt(nearest);
+  result.likelihood = best;
   if (result.distance <= distance_max_) result.letter = static_cast<std::int8_t>(letter);
   return result;
 }

@@ -16,6 +16,7 @@ struct Classification {
   std::array<float, kMaxLetters>
       log_probability{};    ///< of each letter, given that it is one of them; natural logarithm
   float distance = 0;       ///< from the nearest prototype, in standard deviations
+  float likelihood = 0;     ///< of the features if it is the likeliest letter, up to a factor common to all classifiers
   std::int8_t letter = -1;  ///< the likeliest, or -1: like none of them
 };
 

@@ -32,6 +32,18 @@ class Surroundings {
     });
   }
 
+  /// All that is left of a line, as far as it is looked at.
+  [[nodiscard]] bool is_left(std::int32_t node) const {
+    return std::ranges::any_of(std::array{kRight, kDown}, [&](Direction forth) {
+      int refused = 0;
+      for (const Direction d : {forth, opposite(forth)}) {
+        std::int32_t other = beside(node, d);
+        for (int i = 0; i < kReach && other >= 0 && !stands(node, other); ++i, other = beside(other, d)) ++refused;
+      }
+      return refused == 2 * kReach;
+    });
+  }
+
  private:
   static constexpr int kReach = 3;
 
@@ -133,7 +145,7 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, std::vector
     return !lone_.empty();
   };
   if (!refuse([&](std::int32_t node) { return around.leave_alone(node); })) return;
-  while (refuse([&](std::int32_t node) { return around.is_last(node); })) continue;
+  while (refuse([&](std::int32_t node) { return around.is_last(node) || around.is_left(node); })) continue;
 }
 
 void Correspondence::correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,

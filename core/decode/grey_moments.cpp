@@ -80,10 +80,10 @@ GreyMoments central(const RawMoments& raw, const PatchLevels& levels, double mid
   const double x = m[1][0] * n, y = m[0][1] * n;
   const double xx = m[2][0] * n, xy = m[1][1] * n, yy = m[0][2] * n;
   g.weight = m[0][0];
-  g.shape_x = static_cast<float>(middle_x + x);
-  g.shape_y = static_cast<float>(middle_y + y);
-  // Where there is a shape there is a centre: its ramp begins as low.
-  const double per_centre = 1 / static_cast<double>(raw.centre);
+  // The brightest pixels, from which the peak is taken, have weight in every ramp.
+  const double per_steady = 1 / static_cast<double>(raw.steady), per_centre = 1 / static_cast<double>(raw.centre);
+  g.steady_x = static_cast<float>(middle_x + raw.steady_x * per_steady);
+  g.steady_y = static_cast<float>(middle_y + raw.steady_y * per_steady);
   g.x = static_cast<float>(middle_x + raw.centre_x * per_centre);
   g.y = static_cast<float>(middle_y + raw.centre_y * per_centre);
   g.m20 = static_cast<float>(xx - x * x);

@@ -13,13 +13,13 @@
 
 namespace slsd {
 
-/// What a region weighs: moments of its grey values through a soft threshold, a ramp from 20 to 65 % of the way from
-/// the region's own background to its own peak; its centre through one from 20 to 80 %. A pixel on the edge counts by
-/// how much of it is lit, so the centre is good to some hundredths of a pixel, where the binary mask's is eight times
-/// worse.
+/// What a region weighs: moments of its grey values through a soft threshold, a ramp from 10 to 30 % of the way from
+/// the region's own background to its own peak; its centre through one from 20 to 80 %, and to 65 % where the light is
+/// uneven. A pixel on the edge counts by how much of it is lit, so the centre is good to some hundredths of a pixel,
+/// where the binary mask's is eight times worse.
 struct GreyMoments {
   float x = 0, y = 0;                        ///< centre, camera px
-  float shape_x = 0, shape_y = 0;            ///< centroid of the shape, which uneven light pulls less than the centre
+  float steady_x = 0, steady_y = 0;          ///< centre that uneven light pulls less, and noise more
   float weight = 0;                          ///< lit area, camera px squared
   float m20 = 0, m11 = 0, m02 = 0;           ///< about the centroid, over the weight: px^2
   float m30 = 0, m21 = 0, m12 = 0, m03 = 0;  ///< px^3

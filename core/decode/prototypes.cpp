@@ -28,7 +28,7 @@ constexpr double kLogVolumeScale = -40;
 
 struct Look {
   GreyMoments moments;
-  Eigen::Vector2f centroid_px, shape_centroid_px;
+  Eigen::Vector2f centroid_px, steady_centroid_px;
   bool whole;  ///< no other region in its cell
 };
 
@@ -80,8 +80,8 @@ class Observer {
     if ((middle.array() - low).max(high - middle.array()).maxCoeff() > reach_px(view)) return std::nullopt;
     const GreyMoments moments = meter_.measure(view.image.view(), *nearest, regions_.runs_of(*nearest));
     const Eigen::Vector2f centroid = Eigen::Vector2f(moments.x, moments.y) - view.middle_px,
-                          shape_centroid = Eigen::Vector2f(moments.shape_x, moments.shape_y) - view.middle_px;
-    return Look{moments, inverse * centroid, inverse * shape_centroid, in_the_cell == 1};
+                          steady_centroid = Eigen::Vector2f(moments.steady_x, moments.steady_y) - view.middle_px;
+    return Look{moments, inverse * centroid, inverse * steady_centroid, in_the_cell == 1};
   }
 
   float cell_px_, symbol_px_;  // projector px; camera px
@@ -137,7 +137,7 @@ int threshold_tile_px(int pitch_px, float camera_px_per_projector_px) {
 
 float threshold_level(int spacing_px, float camera_px_per_projector_px) {
   constexpr float kWideGapPx = 2.2F;
-  return static_cast<float>(spacing_px) * camera_px_per_projector_px >= kWideGapPx ? 0.3F : 0.45F;
+  return static_cast<float>(spacing_px) * camera_px_per_projector_px >= kWideGapPx ? 0.25F : 0.45F;
 }
 
 std::vector<SymbolSpread> spread_of_symbols(const PrototypeOptions& options) {
@@ -176,7 +176,7 @@ std::vector<std::vector<Prototype>> make_prototypes(const PrototypeOptions& opti
   SymbolViewer viewer = viewer_of(options);
   for (std::size_t letter = 0; letter < options.symbols.size(); ++letter) {
     std::vector<std::vector<ShapeFeatures>> looks(frame_errors.size());
-    std::vector<Eigen::Vector2f> centroids, shape_centroids;
+    std::vector<Eigen::Vector2f> centroids, steady_centroids;
     for (int sample = 0; sample < options.samples; ++sample) {
       const SymbolView& tilted = viewer.view(static_cast<int>(letter), 1);
       const FrameError error = viewer.frame_error();
@@ -190,13 +190,13 @@ std::vector<std::vector<Prototype>> make_prototypes(const PrototypeOptions& opti
       (void)viewer.frame_error();  // as for the tilted one, so that both see the same numbers of the series
       if (const auto look = observer.look_at(upright)) {
         centroids.push_back(look->centroid_px);
-        shape_centroids.push_back(look->shape_centroid_px);
+        steady_centroids.push_back(look->steady_centroid_px);
       }
     }
     for (std::size_t i = 0; i < frame_errors.size(); ++i) {
       prototypes[i].push_back(prototype_of(spread_of(looks[i])));
       prototypes[i].back().centroid_px = mean_of(centroids);
-      prototypes[i].back().shape_centroid_px = mean_of(shape_centroids);
+      prototypes[i].back().steady_centroid_px = mean_of(steady_centroids);
     }
   }
   return prototypes;

@@ -16,10 +16,10 @@ namespace slsd {
 struct Prototype {
   ShapeFeatures mean;
   Eigen::Matrix<float, kFeatureCount, kFeatureCount>
-      whitening;                      ///< features minus mean, times this, have unit covariance
-  float density;                      ///< at the mean, up to a factor common to all: 1 / volume of the covariance
-  Eigen::Vector2f centroid_px;        ///< centre of its grey moments, from the middle of its square, projector px
-  Eigen::Vector2f shape_centroid_px;  ///< centroid of its shape, likewise
+      whitening;                       ///< features minus mean, times this, have unit covariance
+  float density;                       ///< at the mean, up to a factor common to all: 1 / volume of the covariance
+  Eigen::Vector2f centroid_px;         ///< centre of its grey moments, from the middle of its square, projector px
+  Eigen::Vector2f steady_centroid_px;  ///< its steady centre, likewise
 
   /// In standard deviations.
   [[nodiscard]] float squared_distance(const ShapeFeatures& features) const {
@@ -37,7 +37,7 @@ struct PrototypeOptions {
   /// is off by the tilt of the surface, a frame measured from neighbours by a few hundredths.
   float frame_error = 0.05F;
   int samples = 120;  ///< looks at each symbol
-  /// Standard deviation of the blur of projector and camera, camera px, to a fifth; without it all that occurs.
+  /// Standard deviation of the blur of projector and camera, camera px, to a third; without it all that occurs.
   std::optional<float> blur_px{};
   /// Standard deviation of the noise as a share of the contrast; without it all that occurs.
   std::optional<float> noise{};

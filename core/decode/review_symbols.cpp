@@ -53,9 +53,8 @@ std::optional<Eigen::Vector2f> centre_from_neighbours(const std::vector<GridNode
 
 }  // namespace
 
-SymbolReview::SymbolReview(const Pattern& pattern, const std::vector<Prototype>& prototypes, ReviewOptions options)
+SymbolReview::SymbolReview(const Pattern& pattern, ReviewOptions options)
     : array_(pattern.array),
-      prototypes_(prototypes),
       size_px_(static_cast<float>(pattern.options.symbol_size_px)),
       pitch_px_(static_cast<float>(pattern.pitch_px())),
       options_(options) {}
@@ -154,15 +153,16 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
   }
   if (per_cell.cwiseAbs().maxCoeff() > options_.uneven_light) {
     const Prototype& prototype = prototype_of(seen.claims[node]);
-    const Eigen::Vector2f from_shape = lattice_frame * (prototype.centroid_px - prototype.shape_centroid_px);
-    moments.x = moments.shape_x + from_shape.x(), moments.y = moments.shape_y + from_shape.y();
+    const Eigen::Vector2f from_steady = lattice_frame * (prototype.centroid_px - prototype.steady_centroid_px);
+    moments.x = moments.steady_x + from_steady.x(), moments.y = moments.steady_y + from_steady.y();
   }
   const float distance_max = is_inside(seen, node) ? options_.damaged_distance_inside : options_.damaged_distance;
   if (distance > distance_max) seen.claims[node].status = RegionStatus::kDamagedShape;
 }
 
 void SymbolReview::review(const GreyView& frame, const Regions& regions, const GridLinker& linker,
-                          GreyMomentMeter& meter, Sightings& seen) {
+                          const std::vector<Prototype>& prototypes, GreyMomentMeter& meter, Sightings& seen) {
+  prototypes_ = &prototypes;
   trust_whole_symbols(linker, seen);
   measure_light_changes(seen);
   std::visit(

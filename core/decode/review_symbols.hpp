@@ -11,7 +11,7 @@ namespace slsd {
 struct ReviewOptions {
   /// Change of the light from cell to cell from which on a symbol is measured again with the light levelled.
   float shading_min = 0.04F;
-  /// The same from which on the centre is that of the shape, which uneven light pulls less.
+  /// The same from which on the centre is the steady one.
   float uneven_light = 0.1F;
   /// Standard deviations from its letter's prototype from which on a symbol is measured again where its neighbours put
   /// it.
@@ -30,11 +30,12 @@ struct ReviewOptions {
 /// @thread thread-bound: keeps its buffers
 class SymbolReview {
  public:
-  SymbolReview(const Pattern& pattern, const std::vector<Prototype>& prototypes, ReviewOptions options);
+  SymbolReview(const Pattern& pattern, ReviewOptions options);
 
-  /// @param seen  in and out: moments, frames and claims change
-  void review(const GreyView& frame, const Regions& regions, const GridLinker& linker, GreyMomentMeter& meter,
-              Sightings& seen);
+  /// @param prototypes  of the letters in measured frames
+  /// @param seen        in and out: moments, frames and claims change
+  void review(const GreyView& frame, const Regions& regions, const GridLinker& linker,
+              const std::vector<Prototype>& prototypes, GreyMomentMeter& meter, Sightings& seen);
 
  private:
   void measure_around_distrusted(const GridLinker& linker, Sightings& seen);
@@ -44,14 +45,14 @@ class SymbolReview {
   [[nodiscard]] bool is_inside(const Sightings& seen, std::size_t node) const;
   [[nodiscard]] float distance_from_letter(const Sightings& seen, std::size_t node, const GreyMoments& moments) const;
   [[nodiscard]] const Prototype& prototype_of(const CellClaim& claim) const {
-    return prototypes_[array_.at(claim.row, claim.column)];
+    return (*prototypes_)[array_.at(claim.row, claim.column)];
   }
   template <class T>
   void review_node(const ImageView<T>& frame, const Regions& regions, GreyMomentMeter& meter, Sightings& seen,
                    std::size_t node) const;
 
   CodeArray array_;
-  std::vector<Prototype> prototypes_;
+  const std::vector<Prototype>* prototypes_ = nullptr;  // of this review
   float size_px_, pitch_px_;
   ReviewOptions options_;
   std::vector<std::uint8_t> trusted_;

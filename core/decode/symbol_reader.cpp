@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #include "core/decode/symbol_reader.hpp"
 
+#include <algorithm>
+
 #include <Eigen/LU>
 
 #include "core/decode/centre_sigma.hpp"
@@ -9,13 +11,6 @@
 namespace slsd {
 namespace {
 
-/// How far frames are off: the calibration's expectation by the tilt of the surface, a measured one by noise and
-/// curvature.
-constexpr float kExpectedFrameError = 0.15F;
-constexpr float kMeasuredFrameError = 0.05F;
-/// Standard deviations from the nearest prototype beyond which a shape is none of the pattern's.
-constexpr float kExpectedDistanceMax = 25;
-constexpr float kMeasuredDistanceMax = 20;
 /// A shape this near to its prototype, and this much likelier than any other, need not be looked at in the measured
 /// frame.
 constexpr float kDecidedDistance = 3;
@@ -34,32 +29,22 @@ std::vector<Prototype> with_centroids_of(Method centre, const Pattern& pattern, 
 
 }  // namespace
 
-SymbolReader::Prototypes SymbolReader::Prototypes::of(const Pattern& pattern, float scale) {
-  constexpr float kFrameErrors[] = {kExpectedFrameError, kMeasuredFrameError};
-  auto made = make_prototypes(
-      {pattern.options.symbols, pattern.options.symbol_size_px, pattern.options.spacing_px, scale}, kFrameErrors);
-  return {std::move(made[0]), std::move(made[1])};
-}
-
-SymbolReader::Fixed::Fixed(const Pattern& shown, const Lens& projector, Method centre, Prototypes&& made)
+SymbolReader::Fixed::Fixed(const Pattern& shown, const Lens& projector, Method centre, float scale)
     : pattern(shown),
-      prototypes(std::move(made)),
-      as_expected(prototypes.as_expected, kExpectedDistanceMax),
-      as_measured(prototypes.as_measured, kMeasuredDistanceMax),
-      cells(pattern, with_centroids_of(centre, pattern, prototypes.as_measured), projector) {}
+      appearances(pattern.options, scale),
+      cells(pattern, with_centroids_of(centre, pattern, appearances.usual().as_measured), projector) {}
 
 SymbolReader::SymbolReader(const Pattern& pattern, const Lens& projector, ExpectedFrames expected,
                            const DecodeOptions& options, std::optional<PaperWay> paper)
     : options_(options),
-      fixed_(std::make_shared<const Fixed>(pattern, projector, options.centre,
-                                           Prototypes::of(pattern, expected.in_the_middle().scale))),
+      fixed_(std::make_shared<const Fixed>(pattern, projector, options.centre, expected.in_the_middle().scale)),
       paper_(std::move(paper)),
       finder_(pattern.options, std::move(expected), options.binarize, options.find_regions),
       linker_({.pitch_px = static_cast<float>(pattern.pitch_px())}),
       window_decoder_(pattern, {.rows = pattern.whole_rows(), .columns = pattern.whole_columns()}),
-      review_(pattern, fixed_->prototypes.as_measured, {}),
+      review_(pattern, {}),
       correspondence_({}),
-      centre_correction_(fixed_->prototypes.as_measured, static_cast<float>(pattern.pitch_px()),
+      centre_correction_(fixed_->appearances.usual().as_measured, static_cast<float>(pattern.pitch_px()),
                          static_cast<float>(pattern.options.symbol_size_px)) {}
 
 const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarView* view, StageObserver* observer) {
@@ -82,7 +67,22 @@ const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarVi
   return lattice_;
 }
 
+/// How symbols look in this frame, by a sample of those whose neighbours show how they lie.
+void SymbolReader::measure_look() {
+  constexpr std::size_t kSamples = 200;
+  const float size = static_cast<float>(pattern().options.symbol_size_px);
+  sample_.clear();
+  const std::size_t step = std::max<std::size_t>(1, seen_.size() / kSamples);
+  for (std::size_t i = step / 2; i < seen_.size(); i += step) {
+    const GridNode& node = seen_.nodes[i];
+    if (!node.measured_u || !node.measured_v) continue;
+    sample_.push_back(shape_features(seen_.moments[i], node.frame.inverse(), size));
+  }
+  look_ = &fixed_->appearances.likeliest(sample_);
+}
+
 void SymbolReader::classify() {
+  look_ = &fixed_->appearances.usual();
   const float size = static_cast<float>(pattern().options.symbol_size_px);
   seen_.shapes.resize(seen_.size());
   seen_.nodes.assign(seen_.size(), {});
@@ -94,10 +94,10 @@ void SymbolReader::classify() {
     node.frame = expected.frame;
     node.centre_px = {moments.x, moments.y};
     if (options_.classify == Method::kDefault) {
-      seen_.shapes[i] = fixed_->as_expected.classify(shape_features(moments, expected.inverse, size));
+      seen_.shapes[i] = look_->expected.classify(shape_features(moments, expected.inverse, size));
     }
     if (seen_.shapes[i].letter >= 0)
-      node.centre_px -= node.frame * fixed_->prototypes.as_expected[seen_.shapes[i].letter].centroid_px;
+      node.centre_px -= node.frame * look_->as_expected[seen_.shapes[i].letter].centroid_px;
   }
 }
 
@@ -105,6 +105,7 @@ void SymbolReader::link_grid() {
   if (options_.link_grid == Method::kPaper)
     return paper_->link_grid(finder_.regions(), finder_.mask().width(), finder_.mask().height(), seen_);
   linker_.link(seen_.nodes);
+  measure_look();
   if (options_.classify == Method::kDefault) classify_in_measured_frames();
 }
 
@@ -116,7 +117,7 @@ void SymbolReader::classify_in_measured_frames() {
     const bool decided = before.letter >= 0 && before.distance < kDecidedDistance &&
                          before.log_probability[before.letter] > kDecidedLogProbability;
     if (decided || !node.measured_u || !node.measured_v) continue;
-    seen_.shapes[i] = fixed_->as_measured.classify(shape_features(seen_.moments[i], node.frame.inverse(), size));
+    seen_.shapes[i] = look_->measured.classify(shape_features(seen_.moments[i], node.frame.inverse(), size));
   }
 }
 
@@ -132,7 +133,7 @@ void SymbolReader::decode_windows(const EpipolarView* view) {
 void SymbolReader::review(const GreyView& frame) {
   const bool paper_before = options_.classify == Method::kPaper || options_.centre == Method::kPaper ||
                             options_.decode_windows == Method::kPaper;
-  if (!paper_before) review_.review(frame, finder_.regions(), linker_, finder_.meter(), seen_);
+  if (!paper_before) review_.review(frame, finder_.regions(), linker_, look_->as_measured, finder_.meter(), seen_);
 }
 
 void SymbolReader::correspond(const EpipolarView* view) {
@@ -155,11 +156,38 @@ void SymbolReader::fit_lattice(const GreyView& frame, double full, const GreyVie
   }
   noise_ = measured_noise_ = measure_noise(sharp, 255.0 * finder_.frame_levels());
   centre_judge_.judge(noise_, view, cells(), lattice_);
+  refuse_cut();
   const float scale = static_cast<float>(full / 255) / finder_.frame_levels();
   if (scale == 1) return;
   // Sharpening makes noise; from here on it is the frame that counts.
   for (LatticeSymbol& symbol : lattice_.symbols) symbol.background *= scale, symbol.gain *= scale;
   noise_ = measure_noise(frame, full);
+}
+
+/// What is left of a symbol that an edge cuts may still look like it, but its centre lies elsewhere: at a rim what is
+/// an order less certain than most goes.
+void SymbolReader::refuse_cut() {
+  constexpr float kOfMedian = 10;
+  std::vector<LatticeSymbol>& symbols = lattice_.symbols;
+  if (symbols.empty()) return;
+  sigmas_.clear();
+  for (const LatticeSymbol& symbol : symbols) sigmas_.push_back(symbol.sigma_px);
+  const auto middle = sigmas_.begin() + static_cast<std::ptrdiff_t>(sigmas_.size() / 2);
+  std::ranges::nth_element(sigmas_, middle);
+  const float limit = kOfMedian * *middle;
+  kept_.clear();
+  std::int32_t count = 0;
+  for (const LatticeSymbol& symbol : symbols) {
+    const bool is_cut = symbol.sigma_px > limit && std::ranges::find(symbol.neighbours, -1) != symbol.neighbours.end();
+    kept_.push_back(is_cut ? -1 : count++);
+    if (is_cut) reject(symbol, RegionStatus::kDamagedShape);
+  }
+  for (std::size_t i = 0; i < symbols.size(); ++i) {
+    if (kept_[i] < 0) continue;
+    LatticeSymbol& symbol = symbols[static_cast<std::size_t>(kept_[i])] = symbols[i];
+    for (std::int32_t& other : symbol.neighbours) other = other < 0 ? -1 : kept_[static_cast<std::size_t>(other)];
+  }
+  symbols.erase(symbols.begin() + count, symbols.end());
 }
 
 std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, double full) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/code/pattern.hpp"
+#include "core/decode/appearance.hpp"
 #include "core/decode/centre_sigma.hpp"
 #include "core/decode/correspond.hpp"
 #include "core/decode/curvature.hpp"
@@ -65,24 +66,21 @@ class SymbolReader {
   [[nodiscard]] std::size_t shapes() const { return seen_.size(); }
 
  private:
-  struct Prototypes {
-    std::vector<Prototype> as_expected, as_measured;
-    static Prototypes of(const Pattern& pattern, float scale);
-  };
   struct Fixed {
     Pattern pattern;
-    Prototypes prototypes;
-    Classifier as_expected, as_measured;
+    Appearances appearances;
     CellRays cells;
-    Fixed(const Pattern& pattern, const Lens& projector, Method centre, Prototypes&& prototypes);
+    Fixed(const Pattern& pattern, const Lens& projector, Method centre, float scale);
   };
 
+  void measure_look();
   void classify();
   void link_grid();
   void classify_in_measured_frames();
   void decode_windows(const EpipolarView* view);
   void review(const GreyView& frame);
   void correspond(const EpipolarView* view);
+  void refuse_cut();
   void fit_lattice(const GreyView& frame, double full, const GreyView& sharp, const EpipolarView* view);
 
   DecodeOptions options_;
@@ -96,6 +94,10 @@ class SymbolReader {
   CentreCorrection centre_correction_;
   CentreJudge centre_judge_;
 
+  const Appearance* look_ = nullptr;  // of this frame's symbols
+  std::vector<ShapeFeatures> sample_;
+  std::vector<float> sigmas_;
+  std::vector<std::int32_t> kept_;  // of the lattice's symbols: where they are then
   Sightings seen_;
   Lattice lattice_;
   FrameNoise noise_, measured_noise_;  // of the frame, and of what the symbols were measured in

@@ -15,6 +15,10 @@ namespace {
 constexpr int kCells = 3;
 constexpr int kSubpixels = 3;
 constexpr float kLight = 160, kDark = 20;
+/// Frames sharper than a lens makes them are drawn ones, whose pixels may well lie on the pattern's: one view in so
+/// many.
+constexpr float kDrawnBlurPx = 0.3F;
+constexpr int kDrawnOneIn = 4;
 
 /// From -reach to reach, with the sum 1.
 std::vector<float> gaussian(float sigma_px, int reach) {
@@ -145,7 +149,9 @@ const SymbolView& SymbolViewer::view(int letter, float tilt) {
   const float scale = options_.camera_px_per_projector_px;
   Eigen::Matrix2f stretch;
   stretch << 1 + tilt * uniform(-0.4F, 0.15F), 0, 0, 1 + tilt * uniform(-0.25F, 0.15F);
-  const float roll = uniform(-0.1F, 0.1F);
+  const bool drawn = options_.blur_px && *options_.blur_px < kDrawnBlurPx && random_() % kDrawnOneIn == 0;
+  const float roll = (drawn ? 0.F : 1.F) * uniform(-0.1F, 0.1F);
+  if (drawn) stretch.setIdentity();
   Eigen::Matrix2f turn;
   turn << std::cos(roll), -std::sin(roll), std::sin(roll), std::cos(roll);
   view_.frame = scale * turn * stretch;
@@ -155,10 +161,13 @@ const SymbolView& SymbolViewer::view(int letter, float tilt) {
   view_.middle_px.setConstant(0.5F * static_cast<float>(side));
   view_.middle_px.x() += uniform(-0.5F, 0.5F);
   view_.middle_px.y() += uniform(-0.5F, 0.5F);
+  if (drawn)
+    view_.middle_px.setConstant(static_cast<float>(side / 2) +
+                                0.5F * static_cast<float>((options_.symbol_size_px + 1) % 2));
   view_.image = Grey8(side, side);
   view_.mask = Grey8(side, side);
   expose(side);
-  blur(options_.blur_px ? *options_.blur_px * uniform(0.8F, 1.2F) : uniform(0.5F, std::max(1.1F, 0.07F * size_px)));
+  blur(options_.blur_px ? *options_.blur_px * uniform(0.65F, 1.35F) : uniform(0.5F, std::max(1.1F, 0.07F * size_px)));
   add_noise(options_.noise ? *options_.noise * (kLight - kDark) : uniform(0.F, 6.F));
   return view_;
 }

@@ -21,7 +21,7 @@ struct SymbolViewOptions {
   int spacing_px;
   float camera_px_per_projector_px;
   float threshold_level;           ///< between dark and light
-  std::optional<float> blur_px{};  ///< standard deviation, to a fifth; without it all that occurs
+  std::optional<float> blur_px{};  ///< standard deviation, to a third; without it all that occurs
   std::optional<float> noise{};    ///< standard deviation, as a share of the contrast; without it all that occurs
 };
 

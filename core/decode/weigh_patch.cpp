@@ -57,24 +57,29 @@ inline __attribute__((always_inline)) void sum_moments_of(const Pixel* patch, in
   const Lanes zero{}, one = zero + 1;
   const Lanes offset = zero + (levels.background + kRampStart * range);
   const Lanes scale = zero + 1 / ((kRampEnd - kRampStart) * range);
-  static_assert(kCentreRampStart == kRampStart);
+  const Lanes centre_offset = zero + (levels.background + kCentreRampStart * range);
   const Lanes centre_scale = zero + 1 / ((kCentreRampEnd - kCentreRampStart) * range);
-  Lanes centre{}, centre_x{}, centre_y{};
+  const Lanes steady_scale = zero + (kCentreRampEnd - kCentreRampStart) / (kSteadyRampEnd - kCentreRampStart);
+  Lanes centre{}, centre_x{}, centre_y{}, steady{}, steady_x{}, steady_y{};
   // Sums over y stay in their columns, and are then taken over x; lanes are summed once at the end.
   Lanes m00{}, m01{}, m02{}, m03{}, m10{}, m11{}, m12{}, m20{}, m21{}, m30{};
   for (int left = 0; left < width; left += kLanes) {
-    Lanes s0{}, s1{}, s2{}, s3{}, c0{}, y = zero - middle_y;
+    Lanes s0{}, s1{}, s2{}, s3{}, c0{}, t0{}, y = zero - middle_y;
     for (int row = 0; row < height; ++row) {
       Lanes grey;
       load_grey(patch + row * stride + left, grey);
-      // Both ramps begin at one place.
-      grey -= offset;
-      grey = grey > zero ? grey : zero;
-      Lanes c = grey * centre_scale, w = grey * scale;
+      Lanes c = (grey - centre_offset) * centre_scale, w = (grey - offset) * scale;
+      c = c > zero ? c : zero;
+      w = w > zero ? w : zero;
+      // Both begin at one place.
+      Lanes t = c * steady_scale;
+      t = t < one ? t : one;
       c = c < one ? c : one;
       w = w < one ? w : one;
       c0 += c;
       centre_y += c * y;
+      t0 += t;
+      steady_y += t * y;
       const Lanes wy = w * y, wyy = wy * y;
       s0 += w;
       s1 += wy;
@@ -84,6 +89,7 @@ inline __attribute__((always_inline)) void sum_moments_of(const Pixel* patch, in
     }
     const Lanes x = kLane + (static_cast<float>(left) - middle_x);
     centre += c0, centre_x += c0 * x;
+    steady += t0, steady_x += t0 * x;
     const Lanes x0 = s0 * x, x1 = s1 * x, xx0 = x0 * x;
     m00 += s0, m01 += s1, m02 += s2, m03 += s3;
     m10 += x0, m11 += x1, m12 += s2 * x;
@@ -91,6 +97,7 @@ inline __attribute__((always_inline)) void sum_moments_of(const Pixel* patch, in
     m30 += xx0 * x;
   }
   moments.centre = sum_of(centre), moments.centre_x = sum_of(centre_x), moments.centre_y = sum_of(centre_y);
+  moments.steady = sum_of(steady), moments.steady_x = sum_of(steady_x), moments.steady_y = sum_of(steady_y);
   auto& m = moments.m;
   m[0][0] = sum_of(m00), m[0][1] = sum_of(m01), m[0][2] = sum_of(m02), m[0][3] = sum_of(m03);
   m[1][0] = sum_of(m10), m[1][1] = sum_of(m11), m[1][2] = sum_of(m12);

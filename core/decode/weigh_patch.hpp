@@ -12,14 +12,16 @@
 
 namespace slsd {
 
-/// Where the soft threshold begins and ends, between a region's background and its peak: for a shape, whose bright part
-/// may bear print or shading,
-inline constexpr float kRampStart = 0.2F;
-inline constexpr float kRampEnd = 0.65F;
-/// and for its centre. Even about the middle and as wide as background and peak allow, so that blur does not move it:
-/// on planes at 2 m 0.09 mm are left of the 0.16 mm of the other.
+/// Where the soft threshold begins and ends, between a region's background and its peak. For a shape it ends where even
+/// print, shading or a camera's gamma leave the bright part bright: it is where light is, however much of it.
+inline constexpr float kRampStart = 0.1F;
+inline constexpr float kRampEnd = 0.3F;
+/// For its centre it is even about the middle and as wide as background and peak allow, so that blur does not move it:
+/// on planes at 2 m 0.09 mm are left of the 0.16 mm of one that is not.
 inline constexpr float kCentreRampStart = 0.2F;
 inline constexpr float kCentreRampEnd = 0.8F;
+/// Where the light changes within the symbol it ends lower: what is less bright counts as well.
+inline constexpr float kSteadyRampEnd = 0.65F;
 
 /// Pixels of a patch that belong to others: every comparison with them is false.
 inline constexpr float kOutside = std::numeric_limits<float>::quiet_NaN();
@@ -45,6 +47,7 @@ void find_levels(const float* patch, int count, const PatchRange& range, PatchLe
 struct RawMoments {
   float m[4][4] = {};
   float centre = 0, centre_x = 0, centre_y = 0;  ///< the sums of w, w x and w y through the centre's ramp
+  float steady = 0, steady_x = 0, steady_y = 0;  ///< and through that of uneven light
 };
 
 /// @param stride              columns of the patch, a multiple of kLanes

@@ -41,7 +41,7 @@ TEST(CentreJudge, GrowsWithTheMisfitOfTheShapeAndWhereNothingTellsOfItsBend) {
   const float good = judged(symbol);
   EXPECT_NEAR(good, 0.01, 1e-6);
   symbol.misfit = 2;
-  EXPECT_NEAR(judged(symbol), std::hypot(0.01, 0.03 * 4), 1e-6);
+  EXPECT_NEAR(judged(symbol), std::hypot(0.01, 0.018 * 4), 1e-6);
   symbol.misfit = 0;
   symbol.neighbours = {0, 0, -1, -1};
   EXPECT_NEAR(judged(symbol), std::hypot(0.01, 0.02), 1e-6);

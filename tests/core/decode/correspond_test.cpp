@@ -143,6 +143,16 @@ TEST(RefuseLone, RefusesTheLastOfARefusedRow) {
   for (const int column : {1, 2, 3}) EXPECT_EQ(sheet.at(5, column).status, RegionStatus::kNeighboursDisagree) << column;
 }
 
+// What goes first may be what another stood with.
+TEST(RefuseLone, RefusesAllThatIsLeftOfARow) {
+  RimSheet sheet;
+  for (const int column : {1, 2, 3, 5, 6, 8}) sheet.at(2, column).status = RegionStatus::kDamagedShape;
+  sheet.at(1, 7) = sheet.at(6, 7);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  EXPECT_EQ(sheet.at(2, 7).status, RegionStatus::kNeighboursDisagree);
+  EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
+}
+
 // An edge that runs through a row breaks its links: what is beside a symbol then shows from the row within alone.
 TEST(RefuseLone, LooksAlongTheRowWithinWhereTheRowIsBroken) {
   RimSheet sheet;

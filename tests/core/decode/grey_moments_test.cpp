@@ -79,7 +79,7 @@ std::vector<Pixel> pixels_around(const Grey8& frame, std::span<const Run> runs) 
 }
 
 struct PlainMoments {
-  double shape_x = 0, shape_y = 0;
+  double steady_x = 0, steady_y = 0;
   double x = 0, y = 0, weight = 0, background = 0, peak = 0;
   double m20 = 0, m11 = 0, m02 = 0, m30 = 0, m21 = 0, m12 = 0, m03 = 0;
 };
@@ -96,18 +96,21 @@ PlainMoments plain_moments(const std::vector<Pixel>& pixels) {
   PlainMoments m;
   m.background = low_sum / low_count, m.peak = high_sum / high_count;
   const auto weight = [&](const Pixel& p) {
-    return std::clamp(((p.grey - m.background) / (m.peak - m.background) - 0.2) / 0.45, 0., 1.);
+    return std::clamp(((p.grey - m.background) / (m.peak - m.background) - 0.1) / 0.2, 0., 1.);
   };
-  for (const Pixel& p : pixels) m.weight += weight(p), m.shape_x += weight(p) * p.x, m.shape_y += weight(p) * p.y;
-  m.shape_x /= m.weight, m.shape_y /= m.weight;
-  double centre = 0;
+  double shape_x = 0, shape_y = 0, centre = 0, steady = 0;
+  for (const Pixel& p : pixels) m.weight += weight(p), shape_x += weight(p) * p.x, shape_y += weight(p) * p.y;
+  shape_x /= m.weight, shape_y /= m.weight;
   for (const Pixel& p : pixels) {
-    const double c = std::clamp(((p.grey - m.background) / (m.peak - m.background) - 0.2) / 0.6, 0., 1.);
+    const double above = ((p.grey - m.background) / (m.peak - m.background) - 0.2);
+    const double c = std::clamp(above / 0.6, 0., 1.), s = std::clamp(above / 0.45, 0., 1.);
     centre += c, m.x += c * p.x, m.y += c * p.y;
+    steady += s, m.steady_x += s * p.x, m.steady_y += s * p.y;
   }
   m.x /= centre, m.y /= centre;
+  m.steady_x /= steady, m.steady_y /= steady;
   for (const Pixel& p : pixels) {
-    const double w = weight(p) / m.weight, x = p.x - m.shape_x, y = p.y - m.shape_y;
+    const double w = weight(p) / m.weight, x = p.x - shape_x, y = p.y - shape_y;
     m.m20 += w * x * x, m.m11 += w * x * y, m.m02 += w * y * y;
     m.m30 += w * x * x * x, m.m21 += w * x * x * y, m.m12 += w * x * y * y, m.m03 += w * y * y * y;
   }
@@ -138,7 +141,7 @@ RC_GTEST_PROP(GreyMoments, EqualPlainSumsInDoublePrecision, ()) {
     const PlainMoments plain = plain_moments(pixels_around(frame, regions.runs_of(regions.regions[i])));
     const auto near = [](double a, double b, double tolerance) { return std::abs(a - b) <= tolerance; };
     RC_ASSERT(near(fast.x, plain.x, 1e-4) && near(fast.y, plain.y, 1e-4));
-    RC_ASSERT(near(fast.shape_x, plain.shape_x, 1e-4) && near(fast.shape_y, plain.shape_y, 1e-4));
+    RC_ASSERT(near(fast.steady_x, plain.steady_x, 1e-4) && near(fast.steady_y, plain.steady_y, 1e-4));
     RC_ASSERT(near(fast.weight, plain.weight, 1e-4 * plain.weight));
     RC_ASSERT(near(fast.background, plain.background, 1e-3) && near(fast.peak, plain.peak, 1e-3));
     RC_ASSERT(near(fast.m20, plain.m20, 1e-3) && near(fast.m11, plain.m11, 1e-3) && near(fast.m02, plain.m02, 1e-3));
@@ -169,7 +172,8 @@ RC_GTEST_PROP(GreyMoments, FindTheCentreBetweenPixels, ()) {
   const GreyMoments moments = measure(frame, regions_of(frame));
   RC_ASSERT(std::abs(moments.x - 0.5 * (box.left + box.right)) < 0.08);
   RC_ASSERT(std::abs(moments.y - 0.5 * (box.top + box.bottom)) < 0.08);
-  RC_ASSERT(std::abs(moments.weight / (12.4 * 11) - 1) < 0.08);
+  // Blurred by one pixel, the edge's height of a fifth lies that much further out.
+  RC_ASSERT(std::abs(moments.weight / (13.9 * 12.5) - 1) < 0.15);
 }
 
 TEST(GreyMoments, OfSixteenBitsAreThoseOfEight) {

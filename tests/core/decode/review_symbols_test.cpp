@@ -64,7 +64,7 @@ class ReviewSymbols : public testing::Test {
     seen_.claims.push_back({row, column, 20, RegionStatus::kDecoded});
   }
 
-  void review() { SymbolReview(pattern_, prototypes_, {}).review(frame_.view(), regions_, linker_, meter_, seen_); }
+  void review() { SymbolReview(pattern_, {}).review(frame_.view(), regions_, linker_, prototypes_, meter_, seen_); }
 
   [[nodiscard]] std::size_t sighting_at(int row, int column) const {
     for (std::size_t i = 0; i < seen_.size(); ++i) {

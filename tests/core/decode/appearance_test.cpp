@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/appearance.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace slsd {
+namespace {
+
+constexpr float kScale = 1.4F;
+
+PatternOptions options() {
+  PatternOptions options;
+  options.symbols = {9, 11, 13, 18, 19};
+  return options;
+}
+
+std::vector<ShapeFeatures> shapes_at(float blur_px) {
+  std::vector<ShapeFeatures> shapes;
+  for (const Prototype& prototype : make_prototypes({.symbols = options().symbols,
+                                    .symbol_size_px = options().symbol_size_px,
+                                    .spacing_px = options().spacing_px,
+                                    .camera_px_per_projector_px = kScale,
+                                    .frame_error = 0.01F,
+                                    .blur_px = blur_px})) {
+    shapes.push_back(prototype.mean);
+  }
+  return shapes;
+}
+
+class Blurs : public testing::TestWithParam<float> {};
+
+// Each appearance is of blurs to a third, so that those beside it know the same shapes.
+TEST_P(Blurs, AreToldByTheShapesToOneStep) {
+  const Appearances appearances(options(), kScale);
+  EXPECT_NEAR(std::log(*appearances.likeliest(shapes_at(GetParam())).blur_px / GetParam()), 0, std::log(1.6));
+}
+
+INSTANTIATE_TEST_SUITE_P(Appearances, Blurs, testing::Values(0.7F, 1.0F, 1.4F, 2.0F));
+
+TEST(Appearances, OfNoShapesIsTheUsual) {
+  const Appearances appearances(options(), kScale);
+  EXPECT_EQ(&appearances.likeliest({}), &appearances.usual());
+  EXPECT_FALSE(appearances.usual().blur_px);
+}
+
+// One object that lies before all else must not decide.
+TEST(Appearances, OfAFrameAreThoseOfMostShapes) {
+  const Appearances appearances(options(), kScale);
+  std::vector<ShapeFeatures> shapes = shapes_at(0.7F);
+  for (const ShapeFeatures& blurred : shapes_at(0.7F)) shapes.push_back(blurred);
+  for (const ShapeFeatures& blurred : shapes_at(2)) shapes.push_back(blurred);
+  EXPECT_LE(appearances.likeliest(shapes).blur_px, 1);
+}
+
+TEST(Appearances, AreMadeOnce) {
+  const Appearances appearances(options(), kScale);
+  const auto shapes = shapes_at(1);
+  EXPECT_EQ(&appearances.likeliest(shapes), &appearances.likeliest(shapes));
+}
+
+}  // namespace
+}  // namespace slsd
