@@ -22,6 +22,7 @@ file = "{pattern}"
 name = "camera"
 driver = "file"
 path = "{scene}/frame.png"
+rate_hz = 30
 [calibration]
 file = "{scene}/calibration.yml"
 [decode]
