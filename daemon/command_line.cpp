@@ -51,6 +51,13 @@ void add_calibration_options(CLI::App& app, CommandLine& line) {
   app.add_option("--record", request.record,
                  "with --calibrate: the folder that the captures go to; poses in it already are taken over")
       ->needs(calibrate);
+  app.add_option("--socket", request.socket,
+                 "with --calibrate: take the poses with the devices of the service that listens there")
+      ->needs(calibrate)
+      ->excludes(latency)
+      ->excludes("--from");
+  app.add_flag("--progress", request.progress, "with --calibrate: tell what is seen in JSON, too, a line each")
+      ->needs(calibrate);
 }
 
 CLI::Option* add_print_options(CLI::App& app, PrintRequest& request) {

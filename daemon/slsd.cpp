@@ -78,6 +78,7 @@ int serve(const std::filesystem::path& configuration_file) {
   auto configuration = slsd::load_configuration(configuration_file);
   if (!configuration) return not_served(configuration.error(), configuration.error().code == slsd::ErrorCode::kIo);
   auto service = make_service(configuration_file, std::move(*configuration));
+  if (service) (*service)->set_calibrator(slsd::find_calibrator());
   const auto served = service ? (*service)->run() : slsd::Result<>(tl::unexpected(service.error()));
   return served ? slsd::kDone : not_served(served.error(), may_pass(served.error().code));
 }

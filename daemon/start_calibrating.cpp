@@ -15,6 +15,14 @@ constexpr const char* kProgram = "slsd-calibrate";
 
 }  // namespace
 
+std::filesystem::path find_calibrator() {
+  std::error_code ignored;
+  const auto folder = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
+  const auto beside = folder / kProgram;
+  return std::filesystem::exists(beside, ignored) ? beside
+                                                  : (folder / SLSD_LIBEXEC_FROM_BIN / kProgram).lexically_normal();
+}
+
 Result<> start_calibrating(char** argv) {
   std::error_code error;
   const auto folder = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();

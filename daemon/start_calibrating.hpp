@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <filesystem>
+
 #include "core/result.hpp"
 
 namespace slsd {
@@ -12,5 +14,8 @@ namespace slsd {
 /// @param argv  as main() was given it
 /// @return      only where that fails. @errors kNotFound where it is not installed
 [[nodiscard]] Result<> start_calibrating(char** argv);
+
+/// Where slsd-calibrate is; where it will be once it is installed, if it is not.
+[[nodiscard]] std::filesystem::path find_calibrator();
 
 }  // namespace slsd

@@ -111,7 +111,7 @@ Result<> calibrate_from_files(const CalibrateRequest& request) {
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
   std::cout << fmt::format("calibrated in {:.1f} s, {:.2f} s a pose\n", spent.count(),
                            spent.count() / static_cast<double>(poses->size()));
-  return finish_calibration(request, *file, found, captures->refused, std::move(*outcome));
+  return finish_calibration(request, *file, *file, found, captures->refused, std::move(*outcome));
 }
 
 }  // namespace slsd

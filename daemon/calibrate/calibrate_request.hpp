@@ -21,6 +21,8 @@ struct CalibrateRequest {
   bool force = false;            ///< replaces the calibration in force though distances are of another scale by it
   bool gray_code = false;        ///< instead of the pattern
   std::filesystem::path record;  ///< where a session's captures go; empty: beside the calibration file
+  std::filesystem::path socket;  ///< of a running service, whose devices a session uses; empty: the configured ones
+  bool progress = false;         ///< a session tells what it sees in JSON, too, a line each
   int poses = 12;                ///< 3 to 99; how many poses a session takes, those recorded before among them
   int planes = 3;                ///< 1 to 99; how many looks at the reference plane it takes, likewise
 };

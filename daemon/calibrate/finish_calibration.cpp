@@ -39,9 +39,10 @@ Result<> write_report(const path& file, const CalibrationOutcome& outcome) {
 }
 
 /// Whether a calibration may replace the one in force without being asked to.
-Result<> check_gain(const CalibrationOutcome& outcome, const path& file) {
+Result<> check_gain(const CalibrateRequest& request, const CalibrationOutcome& outcome, const path& file) {
   const Grade grade = outcome.verdict.grade;
-  const std::string nevertheless = ", or keep it nevertheless by --output " + file.string();
+  const std::string nevertheless =
+      request.socket.empty() ? ", or keep it nevertheless by --output " + file.string() : std::string();
   if (grade == Grade::kBad) {
     return fail(ErrorCode::kImpossible,
                 "the calibration is bad and was not put in force; take the poses again as advised" + nevertheless,
@@ -72,22 +73,22 @@ CalibrateOptions calibrate_options(const Configuration& configuration) {
   return {configuration.decode.depth_min_mm, configuration.decode.depth_max_mm};
 }
 
-Result<> finish_calibration(const CalibrateRequest& request, const path& file, const Board& board,
+Result<> finish_calibration(const CalibrateRequest& request, const path& file, const path& in_force, const Board& board,
                             const std::vector<PoseReport>& refused, CalibrationOutcome outcome) {
   outcome.poses.insert(outcome.poses.end(), refused.begin(), refused.end());
   std::ranges::sort(outcome.poses, {}, [](const PoseReport& pose) { return std::pair(pose.subject, pose.name); });
   outcome.calibration.report.board = to_string(board);
   outcome.calibration.report.date = utc_text(std::chrono::system_clock::now());
   std::cout << outcome_text(outcome) << std::flush;
-  if (request.output.empty()) {
-    const std::string scale = request.force ? "" : other_scale(outcome, board, file);
+  if (request.output.empty() || !request.socket.empty()) {
+    const std::string scale = request.force ? "" : other_scale(outcome, board, in_force);
     if (!scale.empty()) {
       return fail(
           ErrorCode::kMismatch,
           scale + ". Where the new one is right, replace that in force by --force, or keep it elsewhere by --output",
-          file.string());
+          in_force.string());
     }
-    if (auto gain = check_gain(outcome, file); !gain) return gain;
+    if (auto gain = check_gain(request, outcome, in_force); !gain) return gain;
   }
   if (auto reported = write_report(file, outcome); !reported) return reported;
   const auto kept = keep_calibration(outcome, file);

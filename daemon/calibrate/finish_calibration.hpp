@@ -22,11 +22,12 @@ namespace slsd {
 
 /// Prints the result, writes the report, and keeps the calibration: last, so that where something fails what is in
 /// force stays.
+/// @param in_force  the calibration that a bad one, a worse one of the same devices or one of another scale must not
+///                  replace, unless an output was asked for on a command line; empty: none
 /// @param refused  poses that took no part, for the report
-/// @errors of the files; kImpossible: no output was asked for, and the verdict is bad, or worse than that of the
-///         calibration in force of the same devices, so that what is in force stays
+/// @errors of the files; kImpossible, kMismatch: it would replace a better one, so that what is in force stays
 [[nodiscard]] Result<> finish_calibration(const CalibrateRequest& request, const std::filesystem::path& file,
-                                          const Board& board, const std::vector<PoseReport>& refused,
-                                          CalibrationOutcome outcome);
+                                          const std::filesystem::path& in_force, const Board& board,
+                                          const std::vector<PoseReport>& refused, CalibrationOutcome outcome);
 
 }  // namespace slsd

@@ -106,6 +106,7 @@ void PoseSession::show_state(const BoardSightings& sightings, double moved) {
       fmt::format("{} {} of {}: {} ({})", is_board ? "pose" : "plane", parts_.poses.size() + 1, options_.poses,
                   state == "done" ? next : state, look_text(sightings, parts_.source.cameras())),
       state);
+  parts_.progress({state, {}, options_.poses, parts_.poses, sightings});
 }
 
 Result<> PoseSession::attempt(const BoardSightings& sightings) {
@@ -149,10 +150,12 @@ Result<> PoseSession::keep(PoseTrial trial, BoardSightings sightings) {
 
 void PoseSession::refuse(const std::string& why) {
   parts_.terminal.say("not taken: " + why);
-  show(Sign::kAgain);
+  show(Sign::kAgain, why);
 }
 
-void PoseSession::show(Sign sign) {
+void PoseSession::show(Sign sign, const std::string& why) {
+  const std::string_view state = sign == Sign::kHold ? "hold" : sign == Sign::kTaken ? "taken" : "again";
+  parts_.progress({state, why, options_.poses, parts_.poses, last_});
   parts_.source.show(draw_sign(sign, parts_.source.projector(), sign_centre_px_));
   parts_.time.sleep(options_.sign);
 }

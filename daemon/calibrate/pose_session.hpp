@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "daemon/calibrate/pose_collection.hpp"
 #include "daemon/calibrate/pose_recorder.hpp"
@@ -27,6 +28,15 @@ struct PoseSessionOptions {
   bool begun = false;                    ///< the devices have given a picture before: they are worth patience at once
 };
 
+/// What a session is at, for who shows it in another way than a terminal does.
+struct PoseProgress {
+  std::string_view state;  ///< "no board", "moving", "still", "done", "hold", "taken" or "again"
+  std::string text;        ///< why a pose was not taken; else empty
+  std::size_t wanted = 0;
+  const PoseCollection& poses;
+  const BoardSightings& sightings;
+};
+
 /// What a session works with; all of it outlives it.
 struct PoseSessionParts {
   PoseSource& source;
@@ -36,6 +46,7 @@ struct PoseSessionParts {
   SessionTerminal& terminal;
   Timepiece time;
   std::function<bool()> interrupted;
+  std::function<void(const PoseProgress&)> progress = [](const PoseProgress&) {};
 };
 
 /// Takes poses of a board that a person holds, without a key pressed:
@@ -63,7 +74,7 @@ class PoseSession {
   [[nodiscard]] Result<> attempt(const BoardSightings& sightings);
   [[nodiscard]] Result<> keep(PoseTrial trial, BoardSightings sightings);
   void refuse(const std::string& why);
-  void show(Sign sign);
+  void show(Sign sign, const std::string& why = {});
 
   PoseSessionParts parts_;
   PoseSessionOptions options_;

@@ -15,7 +15,9 @@
 #include "daemon/calibrate/device_source.hpp"
 #include "daemon/calibrate/finish_calibration.hpp"
 #include "daemon/calibrate/pose_session.hpp"
+#include "daemon/calibrate/progress_json.hpp"
 #include "daemon/calibrate/session_record.hpp"
+#include "daemon/calibrate/socket_source.hpp"
 #include "daemon/scan/hardware.hpp"
 #include "drivers/system/interrupt.hpp"
 
@@ -34,6 +36,8 @@ struct Preparation {
   path file;    // where the calibration is kept
   path folder;  // where the pictures are
   Pattern pattern;
+  path in_force;                         // the calibration that a worse one must not replace; empty: none
+  std::unique_ptr<SocketSource> source;  // that of a running service, where it has the devices
 };
 
 Result<Preparation> prepare(const CalibrateRequest& request) {
@@ -52,10 +56,22 @@ Result<Preparation> prepare(const CalibrateRequest& request) {
   auto file = file_to_keep(request, *configuration);
   if (!file) return tl::unexpected(file.error());
   path folder = record_folder(request, *file);
-  auto pattern = session_pattern(folder, *configuration);
+  path in_force = *file;
+  std::unique_ptr<SocketSource> source;
+  if (!request.socket.empty()) {
+    auto connected = SocketSource::create(request.socket);
+    if (!connected) return tl::unexpected(connected.error());
+    source = std::move(*connected);
+    in_force = source->calibration();
+    configuration->projector.width_px = source->projector().width_px;
+    configuration->projector.height_px = source->projector().height_px;
+  }
+  auto pattern = source && !holds_poses(folder) ? read_pattern(source->pattern(), request.socket.string())
+                                                : session_pattern(folder, *configuration);
   if (!pattern) return tl::unexpected(pattern.error());
-  return Preparation{std::move(*configuration), *board, *plane, std::move(*file), std::move(folder),
-                     std::move(*pattern)};
+  return Preparation{
+      std::move(*configuration), *board,           *plane, std::move(*file), std::move(folder), std::move(*pattern),
+      std::move(in_force),       std::move(source)};
 }
 
 std::string resume_text(const path& folder, std::size_t poses) {
@@ -67,6 +83,10 @@ void print(const std::string& line) {
   std::cout << line << std::endl;
 }
 
+void print(const nlohmann::json& told) {
+  print(told.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace));
+}
+
 /// @param begun  the devices have given pictures already
 Result<> take_poses(const CalibrateRequest& request, const Preparation& prepared, PoseSource& source,
                     PoseObserver& observer, PoseRecorder& recorder, PoseCollection& poses, bool begun) {
@@ -75,11 +95,14 @@ Result<> take_poses(const CalibrateRequest& request, const Preparation& prepared
                   request.gray_code ? draw_gray_code(source.projector()) : std::vector{draw_pattern(prepared.pattern)},
                   request.gray_code);
   const Timepiece time;
-  SessionTerminal terminal(std::cout, SessionTerminal::columns_of_stdout(), time.now);
+  SessionTerminal terminal(
+      std::cout, request.progress ? SessionTerminal::kNoLive : SessionTerminal::columns_of_stdout(), time.now);
   PoseSessionOptions options;
   options.poses = static_cast<std::size_t>(poses.subject() == PoseSubject::kBoard ? request.poses : request.planes);
   options.begun = begun;
-  return PoseSession({source, taker, recorder, poses, terminal, time, Interrupt::came}, options).run();
+  PoseSessionParts parts{source, taker, recorder, poses, terminal, time, Interrupt::came};
+  if (request.progress) parts.progress = [](const PoseProgress& progress) { print(progress_json(progress)); };
+  return PoseSession(std::move(parts), options).run();
 }
 
 /// The poses, then the looks at the reference plane; what was recorded before is among them.
@@ -105,6 +128,7 @@ Result<Observations> take_all(const CalibrateRequest& request, const Preparation
 Result<> calibrate_from(const CalibrateRequest& request, const Preparation& prepared, const Observations& observations,
                         const std::vector<PoseReport>& refused, const RigStatus& rig) {
   const std::size_t poses = observations.count(PoseSubject::kBoard);
+  if (request.progress) print(nlohmann::json{{"state", "computing"}});
   if (poses < static_cast<std::size_t>(kPosesMin)) {
     return fail(ErrorCode::kCancelled, fmt::format("ended with {} poses, and {} are the least; {}", poses, kPosesMin,
                                                    resume_text(prepared.folder, poses)));
@@ -120,7 +144,8 @@ Result<> calibrate_from(const CalibrateRequest& request, const Preparation& prep
                     std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), poses,
                     prepared.folder.string()));
   note_hardware(rig, outcome->calibration);
-  return finish_calibration(request, prepared.file, prepared.board, refused, std::move(*outcome));
+  if (request.progress) print(nlohmann::json{{"outcome", outcome_json(*outcome)}});
+  return finish_calibration(request, prepared.file, prepared.in_force, prepared.board, refused, std::move(*outcome));
 }
 
 }  // namespace
@@ -128,9 +153,14 @@ Result<> calibrate_from(const CalibrateRequest& request, const Preparation& prep
 Result<> calibrate_by_session(const CalibrateRequest& request) {
   const auto prepared = prepare(request);
   if (!prepared) return tl::unexpected(prepared.error());
-  auto source = DeviceSource::create(prepared->configuration);
-  if (!source) return tl::unexpected(source.error());
-  const ImageSize projector = (*source)->projector();
+  std::unique_ptr<DeviceSource> devices;
+  if (!prepared->source) {
+    auto made = DeviceSource::create(prepared->configuration);
+    if (!made) return tl::unexpected(made.error());
+    devices = std::move(*made);
+  }
+  PoseSource& source = devices ? static_cast<PoseSource&>(*devices) : *prepared->source;
+  const ImageSize projector = source.projector();
   Interrupt::watch();
   print(fmt::format("board {}{}, projector {}x{}, pictures in {}; Ctrl-C ends it with the poses that are there",
                     to_string(prepared->board),
@@ -138,14 +168,15 @@ Result<> calibrate_by_session(const CalibrateRequest& request) {
                     projector.height_px, prepared->folder.string()));
   PoseObservers observers =
       make_observers(prepared->board, prepared->plane, prepared->pattern, projector, request.gray_code);
-  auto record = read_record(prepared->folder, (*source)->cameras(), projector, request.gray_code, observers, print);
+  auto record = read_record(prepared->folder, source.cameras(), projector, request.gray_code, observers,
+                            [](const std::string& line) { print(line); });
   if (!record) return tl::unexpected(record.error());
-  auto recorder = PoseRecorder::create(prepared->folder, (*source)->cameras(), prepared->pattern);
+  auto recorder = PoseRecorder::create(prepared->folder, source.cameras(), prepared->pattern);
   if (!recorder) return tl::unexpected(recorder.error());
-  const auto observations = take_all(request, *prepared, **source, observers, *recorder, record->observations);
+  const auto observations = take_all(request, *prepared, source, observers, *recorder, record->observations);
   if (!observations) return tl::unexpected(observations.error());
-  const RigStatus rig = (*source)->status();
-  source->reset();
+  const RigStatus rig = devices ? devices->status() : prepared->source->status();
+  devices.reset();
   return calibrate_from(request, *prepared, *observations, record->refused, rig);
 }
 

@@ -24,6 +24,7 @@ int SessionTerminal::columns_of_stdout() {
 }
 
 void SessionTerminal::live(const std::string& text, const std::string& state) {
+  if (columns_ == kNoLive) return;
   if (columns_ > 0) {
     out_ << kEraseLine << text.substr(0, static_cast<std::size_t>(columns_ - 1)) << std::flush;
     live_ = true;

@@ -16,9 +16,11 @@ namespace slsd {
 class SessionTerminal {
  public:
   /// @param out      outlives this
-  /// @param columns  to which the live line is cut; 0: what is written cannot be rewritten
+  /// @param columns  to which the live line is cut; 0: what is written cannot be rewritten; kNoLive: it is left out
   SessionTerminal(std::ostream& out, int columns, std::function<MonotonicTime()> now)
       : out_(out), columns_(columns), now_(std::move(now)) {}
+
+  static constexpr int kNoLive = -1;
 
   /// Of the standard output: 0 where it is no terminal.
   [[nodiscard]] static int columns_of_stdout();

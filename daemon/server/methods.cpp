@@ -313,7 +313,57 @@ void run_set(ServiceState& state, const json& params, Session&, Respond respond)
   });
 }
 
+// Where the calibrations that were made over the socket are kept, beside the settings.
+std::filesystem::path made_calibration(const ServiceState& state) {
+  const auto settings = kept_settings_file(state.configuration_file);
+  if (settings.empty()) return {};
+  return settings.parent_path() / ("calibration-" + state.configuration_file.stem().string() + ".yml");
+}
+
+Result<> begin_calibration(ServiceState& state, const std::vector<std::string>& wanted, bool resume) {
+  const auto file = made_calibration(state);
+  if (file.empty())
+    return fail(ErrorCode::kNotFound,
+                "there is no $STATE_DIRECTORY to keep a calibration in: start the service by its unit");
+  if (state.calibration->under_way())
+    return fail(ErrorCode::kBusy, "a calibration is under way: end or cancel that one first");
+  const auto poses = std::filesystem::path(file).replace_extension(".poses");
+  std::error_code ignored;
+  if (!resume) std::filesystem::remove_all(poses, ignored);
+  std::vector<std::string> arguments{"--calibrate",
+                                     "--progress",
+                                     "--config=" + state.configuration_file.string(),
+                                     "--socket=" + state.configuration.server.socket.string(),
+                                     "--output=" + file.string(),
+                                     "--record=" + poses.string()};
+  arguments.insert(arguments.end(), wanted.begin(), wanted.end());
+  auto begun = state.calibration->begin(state.calibrator, arguments);
+  if (begun) state.scanner.run_freely(std::nullopt);
+  return begun;
+}
+
+void run_calibrate(ServiceState& state, const json& params, Session&, Respond respond) {
+  ParamReader reader(params);
+  const std::string action = reader.choice("action", {"look", "begin", "end", "cancel"});
+  const std::string board = reader.text("board"), ruler = reader.text("ruler");
+  const std::string code = reader.choice("code", {"pattern", "gray"});
+  const int poses = reader.integer("poses", 12, 3, 99);
+  const bool resume = reader.boolean("resume", false);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  if (action == "begin") {
+    std::vector<std::string> wanted{"--poses=" + std::to_string(poses), "--code=" + code};
+    if (!board.empty()) wanted.push_back("--board=" + board);
+    if (!ruler.empty()) wanted.push_back("--ruler=" + ruler);
+    if (auto begun = begin_calibration(state, wanted, resume); !begun)
+      return respond(tl::unexpected(rpc_error(begun.error())));
+  }
+  if (action == "end") state.calibration->end();
+  if (action == "cancel") state.calibration->cancel();
+  respond(Reply{state.calibration->look()});
+}
+
 constexpr std::array kMethods{
+    RpcMethod{"calibrate", Role::kAdminister, run_calibrate},
     RpcMethod{"frame", Role::kScan, run_frame},
     RpcMethod{"metrics", Role::kObserve, run_metrics},
     RpcMethod{"pattern", Role::kObserve, run_pattern},
@@ -342,10 +392,37 @@ RpcError not_for(Session& session, const RpcMethod& method) {
                     {}});
 }
 
+// While somebody holds a board into the light nobody else's scan changes it.
+bool would_disturb(const ServiceState& state, const Request& request, const Session& session) {
+  if (!state.calibration || !state.calibration->under_way()) return false;
+  if (session.peer().process == state.calibration->process()) return false;
+  constexpr std::array<std::string_view, 5> kDisturb{"preview", "project", "reload", "scan", "set"};
+  const json as_shown = request.method == "frame" ? request.params.value("as_shown", json()) : json();
+  return std::ranges::find(kDisturb, request.method) != kDisturb.end() ||
+         (request.method == "frame" && as_shown != true);
+}
+
 }  // namespace
 
 std::span<const RpcMethod> methods() {
   return kMethods;
+}
+
+void calibrated(ServiceState& state, bool made) {
+  const auto release = [&state] {
+    const MonotonicTime deadline = deadline_in(state.configuration.scan.timeout_ms);
+    state.scanner.project({Picture::kIdle, {}, deadline, {}}, [](const auto&) {});
+    state.server->update_demand();
+  };
+  if (!made) return release();
+  const auto conclude = [&state, release](const Outcome& outcome) {
+    state.calibration->conclude(
+        outcome ? Result<>() : fail(ErrorCode::kIo, "it is kept, but not in force: " + outcome.error().message));
+    release();
+  };
+  auto settings = merge_settings(state.settings, {{"calibration", {{"file", made_calibration(state).string()}}}});
+  if (settings) return state.reload(std::move(*settings), conclude);
+  conclude(tl::unexpected(rpc_error(settings.error())));
 }
 
 void dispatch(ServiceState& state, const Request& request, Session& session, Respond respond) {
@@ -356,7 +433,12 @@ void dispatch(ServiceState& state, const Request& request, Session& session, Res
   const auto found = std::ranges::lower_bound(kMethods, request.method, {}, &RpcMethod::name);
   if (found != kMethods.end() && found->name == request.method) {
     if (session.role() < found->role) return respond(tl::unexpected(not_for(session, *found)));
-    if (found->role == Role::kAdminister)
+    if (would_disturb(state, request, session))
+      return respond(tl::unexpected(rpc_error(
+          {ErrorCode::kBusy, "a calibration is under way: wait until it has ended, or cancel it (calibrate)", {}})));
+    const bool is_look = request.method == "calibrate" && request.params.value("action", json("look")) == "look";
+    const bool is_own = state.calibration && session.peer().process == state.calibration->process();
+    if (found->role == Role::kAdminister && !is_look && !is_own)
       spdlog::info("{}: by user {} (process {})", found->name, session.peer().user, session.peer().process);
     ++state.requests.by_method[found->name];
     return found->run(state, request.params, session, std::move(respond));

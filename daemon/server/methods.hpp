@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -15,6 +16,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/rpc/request.hpp"
 #include "daemon/scan/scanner.hpp"
+#include "daemon/server/calibration_run.hpp"
 #include "daemon/server/reply.hpp"
 #include "daemon/server/server.hpp"
 
@@ -39,6 +41,8 @@ struct ServiceState {
   std::function<void(nlohmann::json settings, Respond)> reload = {};
   nlohmann::json settings = nlohmann::json::object();  ///< set over the socket, as merge_settings() has them
   RequestCounts requests = {};
+  std::filesystem::path calibrator = {};  ///< slsd-calibrate; empty: not found
+  std::unique_ptr<CalibrationRun> calibration = {};
 };
 
 /// One method of the socket's protocol.
@@ -50,6 +54,9 @@ struct RpcMethod {
 
 /// All methods, by name.
 [[nodiscard]] std::span<const RpcMethod> methods();
+
+/// What follows when slsd-calibrate has ended: what it made comes into force as `set` does it, and scans go on.
+void calibrated(ServiceState& state, bool made);
 
 /// Carries a request out. @thread thread-bound to the event loop's
 void dispatch(ServiceState& state, const Request& request, Session& session, Respond respond);

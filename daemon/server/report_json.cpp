@@ -245,6 +245,7 @@ json status_json(const ServiceState& state) {
           {"process", ::getpid()},
           {"uptime_s", uptime.count()},
           {"ready", is_ready(state)},
+          {"calibrating", state.calibration && state.calibration->under_way()},
           {"resident_bytes", resident_bytes()},
           {"log_lines_dropped", state.log_lines_dropped()},
           {"clients", state.server->clients()},

@@ -103,13 +103,17 @@ Service::Service(Configuration configuration, const std::filesystem::path& file,
   const auto handler = [this](const Request& request, Session& session, Respond respond) {
     dispatch(state_, request, session, std::move(respond));
   };
-  const auto demand_changed = [this](std::optional<FreeRun> demand) { scanner_.run_freely(demand); };
+  const auto demand_changed = [this](std::optional<FreeRun> demand) {
+    const bool calibrates = state_.calibration && state_.calibration->under_way();
+    scanner_.run_freely(calibrates ? std::nullopt : demand);
+  };
   server_ = std::make_unique<Server>(events_, state_.configuration.server, handler, demand_changed);
   state_.server = server_.get();
   state_.log_lines_dropped = log_lines_dropped;
   state_.reload = [this](nlohmann::json settings, Respond answered) {
     reload(std::move(settings), std::move(answered));
   };
+  state_.calibration = std::make_unique<CalibrationRun>(events_, [this](bool made) { calibrated(state_, made); });
   server_->set_delivered(
       [this](const ScanResult& scan) { scanner_.note_latency(std::chrono::steady_clock::now() - scan.received); });
   scanner_.set_listener([this](FreeScan scan) { server_->publish(std::move(scan)); });
@@ -163,6 +167,7 @@ void Service::on_signal(int number) {
 
 void Service::stop() {
   notifier_.stopping();
+  state_.calibration->cancel();
   server_->wind_down();
   watchdog_.cancel();
   status_.cancel();

@@ -19,7 +19,7 @@ BELOW = {
     "service": {"configuration", "scan", "rpc", "server", "service"},
     "client": {"rpc", "client"},
     "latency": {"configuration", "latency"},
-    "calibrate": {"configuration", "scan", "latency", "calibrate"},
+    "calibrate": {"configuration", "scan", "latency", "rpc", "client", "calibrate"},
     "commands": {"configuration", "scan", "rpc", "server", "client", "latency", "commands"},
 }
 

@@ -45,7 +45,9 @@ def wait_until(condition, what):
 
 
 class Service:
-    def __init__(self, camera_path=None, camera="", server="", configuration=None, environment=None, preexec=None):
+    def __init__(self, camera_path=None, camera="", server="", configuration=None, environment=None, preexec=None,
+                 program="slsd"):
+        self.program = program
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="slsd-test-"))
         atexit.register(shutil.rmtree, self.folder, ignore_errors=True)
         self.file = self.folder / "slsd.toml"
@@ -63,7 +65,7 @@ class Service:
 
     def launch(self):
         with open(self.log, "ab") as log:
-            self.process = subprocess.Popen([BIN / "slsd", "--config", self.file, "--log-level", "debug"], stderr=log,
+            self.process = subprocess.Popen([BIN / self.program, "--config", self.file, "--log-level", "debug"], stderr=log,
                                             env=self.environment, preexec_fn=self.preexec)
 
     def start(self):
