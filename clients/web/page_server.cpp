@@ -209,6 +209,19 @@ void PageServer::add_requests(httplib::Server& server) {
     const auto answered = call("project", {{"picture", *picture}});
     answered ? send_json(response, answered->reply.message["result"]) : refuse(response, answered.error());
   });
+  // The service says what can be set, and to whom it is given.
+  post("/api/set", false, [this](const Request&, const json& body, Response& response) {
+    const auto answered = call("set", body);
+    answered ? send_json(response, answered->reply.message["result"]) : refuse(response, answered.error());
+  });
+  post("/api/calibrate", false, [this](const Request&, const json& body, Response& response) {
+    const auto answered = call("calibrate", body);
+    answered ? send_json(response, answered->reply.message["result"]) : refuse(response, answered.error());
+  });
+  get("/api/calibration", [this](const Request&, Response& response) {
+    const auto answered = call("calibrate", {{"action", "look"}});
+    answered ? send_json(response, answered->reply.message["result"]) : refuse(response, answered.error());
+  });
   post("/api/login", true, [this](const Request& request, const json& body, Response& response) {
     const auto token = body.find("token");
     Refusal refusal{};

@@ -17,6 +17,8 @@ import unittest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
 from browser import Browser, free_port, is_there
 from point_cloud import vertices
+from calibrate_test import BOARD, stage
+from gige_double import Double, service_on
 from service import BIN, PATIENCE_S, Service, wait_until
 
 PAGE = {"X-Slsd-Page": "1"}
@@ -248,7 +250,7 @@ class Views(unittest.TestCase):
             browser.wait(f"shownScan.scan !== '{shown}'", "no live cloud")
             browser.click("#cloud-live")
             browser.resize(390, 844)
-            for view in ("devices", "camera", "cloud", "history"):
+            for view in ("devices", "camera", "cloud", "calibrate", "history"):
                 browser.click(f"nav [data-view={view}]")
                 time.sleep(0.3)
                 self.assertEqual(browser.run("return [...document.querySelectorAll('main section')]"
@@ -256,6 +258,61 @@ class Views(unittest.TestCase):
                 self.assertLessEqual(browser.run("return document.documentElement.scrollWidth;"), 390, view)
                 browser.picture(self.folder / f"{view}-390.png")
             self.assertEqual(browser.complaints(), [])
+
+    def test_a_calibration_from_the_first_pose_to_the_verdict(self):
+        with tempfile.TemporaryDirectory() as state, stage(state) as service, Web(service) as web, Browser() as browser:
+            browser.resize(1600, 1400)
+            browser.open(f"http://127.0.0.1:{web.port}/")
+            browser.wait("/Not calibrated/.test(document.getElementById('state').textContent)", "no state")
+            browser.run("document.getElementById('board').value = arguments[0];"
+                        "document.getElementById('poses').value = 8;", BOARD)
+            browser.run("""
+                window.seen = new Set();
+                new MutationObserver(() => window.seen.add(document.getElementById('calibrate-state').textContent))
+                  .observe(document.getElementById('calibrate-state'), {childList: true, characterData: true, subtree: true});""")
+            browser.wait("!document.getElementById('calibrate-begin').disabled", "not allowed to")
+            browser.click("#calibrate-begin")
+            browser.wait("/^[3-7] of 8 poses/.test(document.getElementById('calibrate-next').textContent)", "no poses")
+            browser.wait("document.querySelectorAll('#calibrate-pictures figure').length === 2", "no pictures")
+            browser.wait("/Being|being calibrated/.test(document.getElementById('state').textContent)", "no state")
+            self.assertEqual(browser.run("return [...document.querySelectorAll('#calibrate .bar')].map((b) => b.offsetParent !== null);"),
+                             [False, True])
+            browser.picture(self.folder / "calibrating-1600.png")
+            browser.resize(390, 844)
+            browser.click("nav [data-view=calibrate]")
+            browser.wait("/% covered/.test(document.getElementById('calibrate-pictures').textContent)", "no coverage")
+            self.assertLessEqual(browser.run("return document.documentElement.scrollWidth;"), 390)
+            browser.picture(self.folder / "calibrating-390.png")
+            browser.wait("document.getElementById('calibrate-state').textContent === 'Calibrated, and in force'", "no verdict")
+            self.assertIn("The calibration is ", browser.run("return document.getElementById('verdict').textContent;"))
+            self.assertTrue({"TAKEN ✓", "HOLD"} & set(browser.run("return [...window.seen];")))
+            browser.picture(self.folder / "calibrated-390.png")
+            browser.wait("document.getElementById('state').textContent === 'Ready to scan.'", "not ready")
+            self.assertEqual(browser.complaints(), [])
+
+    def test_an_exposure_is_taken_and_one_that_the_camera_refuses_is_not(self):
+        double = Double()
+        self.addCleanup(double.close)
+        with service_on(double, "exposure_us = 4000.0") as service, Web(service) as web, Browser() as browser, \
+                service.client() as client:
+            service.wait_ready()
+            client.call("set", decode={"density": "pixels"})
+            browser.resize(1600, 1100)
+            browser.open(f"http://127.0.0.1:{web.port}/")
+            browser.wait("document.getElementById('which-camera').value === 'camera'", "no camera")
+            self.assertEqual(browser.run("return document.getElementById('density').value;"), "pixels")
+            told = {"present": {"exposure_us": 4000, "gain_db": 0}, "proposed": {"exposure_us": 9000, "gain_db": 0}}
+            take = "document.getElementById('exposure').replaceChildren(takeExposure('camera', arguments[0]));"
+            browser.run(take, told)
+            browser.click("#take-exposure")
+            browser.wait("/Taken: exposure_us = 9000/.test(document.getElementById('exposure').textContent)", "not taken")
+            self.assertEqual(client.call("settings")[0]["cameras"][0]["exposure_us"], 9000)
+            told["proposed"]["gain_db"] = 59
+            browser.run(take, told)
+            browser.click("#take-exposure")
+            browser.wait("/0 to 24, not to 59/.test(document.getElementById('message').textContent)", "no reason")
+            browser.picture(self.folder / "refused-1600.png")
+            self.assertEqual(client.call("settings")[0]["cameras"][0]["gain_db"], 0)
 
     def measure(self, browser):
         """Clicks at two points of the cloud, where they are on the screen."""

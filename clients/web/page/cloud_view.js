@@ -23,17 +23,21 @@ function readPly(buffer) {
   return {buffer, begin, count, record, fields};
 }
 
+// Points are drawn in this order of records: each beginning of it is spread over the whole cloud, so that a part can be
+// drawn while it turns.
+const kSpread = [0, 16, 8, 24, 4, 20, 12, 28, 2, 18, 10, 26, 6, 22, 14, 30, 1, 17, 9, 25, 5, 21, 13, 29, 3, 19, 11, 27, 7, 23, 15, 31];
+
 function column(ply, name) {
   const field = ply.fields[name];
   if (!field) return null;
-  const values = new Float32Array(ply.count);
-  if (field.type === "uchar") {
-    const bytes = new Uint8Array(ply.buffer);
-    for (let i = 0, at = ply.begin + field.offset; i < ply.count; ++i, at += ply.record) values[i] = bytes[at];
-  } else {
-    const view = new DataView(ply.buffer);
-    for (let i = 0, at = ply.begin + field.offset; i < ply.count; ++i, at += ply.record)
-      values[i] = view.getFloat32(at, true);
+  const values = new Float32Array(ply.count), step = kSpread.length * ply.record;
+  const bytes = new Uint8Array(ply.buffer), view = new DataView(ply.buffer);
+  const end = ply.begin + ply.count * ply.record;
+  let i = 0;
+  for (const first of kSpread) {
+    const begin = ply.begin + first * ply.record + field.offset;
+    if (field.type === "uchar") for (let at = begin; at < end; at += step) values[i++] = bytes[at];
+    else for (let at = begin; at < end; at += step) values[i++] = view.getFloat32(at, true);
   }
   return values;
 }
@@ -41,12 +45,15 @@ function column(ply, name) {
 // y and z are turned round, as the screen has y up and looks along -z.
 function positions(ply) {
   const view = new DataView(ply.buffer);
-  const values = new Float32Array(3 * ply.count);
-  let at = ply.begin;
-  for (let i = 0; i < values.length; i += 3, at += ply.record) {
-    values[i] = view.getFloat32(at, true);
-    values[i + 1] = -view.getFloat32(at + 4, true);
-    values[i + 2] = -view.getFloat32(at + 8, true);
+  const values = new Float32Array(3 * ply.count), step = kSpread.length * ply.record;
+  const end = ply.begin + ply.count * ply.record;
+  let i = 0;
+  for (const first of kSpread) {
+    for (let at = ply.begin + first * ply.record; at < end; at += step) {
+      values[i++] = view.getFloat32(at, true);
+      values[i++] = -view.getFloat32(at + 4, true);
+      values[i++] = -view.getFloat32(at + 8, true);
+    }
   }
   return values;
 }
@@ -74,28 +81,39 @@ function rangeOf(values) {
   return high > low ? [low, high] : [low, low + 1];
 }
 
-const kVertexShader = `
-attribute float value;
-uniform float low, high, size;
-uniform int grey;
-varying vec3 tint;
-vec3 turbo(float x) {  // Mikhailov 2019, the polynomial approximation
-  vec4 r = vec4(0.13572138, 4.61539260, -42.66032258, 132.13108234);
-  vec4 g = vec4(0.09140261, 2.19418839, 4.84296658, -14.18503333);
-  vec4 b = vec4(0.10667330, 12.64194608, -60.58204836, 110.36276771);
-  vec4 p = vec4(1.0, x, x * x, x * x * x);
-  vec2 q = p.zw * p.z;
-  return clamp(vec3(dot(p, r) + dot(q, vec2(-152.94239396, 59.28637943)),
-                    dot(p, g) + dot(q, vec2(4.27729857, 2.82956604)),
-                    dot(p, b) + dot(q, vec2(-89.90310912, 27.34824973))), 0.0, 1.0);
+// Colours are worked out once a cloud, not once a frame: without a graphics card each frame would pay for them.
+const kTurbo = [  // Mikhailov 2019, the polynomial approximation
+  [0.13572138, 4.61539260, -42.66032258, 132.13108234, -152.94239396, 59.28637943],
+  [0.09140261, 2.19418839, 4.84296658, -14.18503333, 4.27729857, 2.82956604],
+  [0.10667330, 12.64194608, -60.58204836, 110.36276771, -89.90310912, 27.34824973]];
+
+function coloursOf(values, [low, high], grey) {
+  const table = new Uint32Array(256);
+  const bytes = new Uint8ClampedArray(table.buffer);
+  for (let i = 0; i < 256; ++i) {
+    const x = 0.05 + 0.9 * i / 255;
+    for (let c = 0; c < 3; ++c)
+      bytes[4 * i + c] = 255 * (grey ? 0.08 + 0.92 * i / 255 : kTurbo[c].reduceRight((sum, factor) => sum * x + factor, 0));
+    bytes[4 * i + 3] = 255;
+  }
+  const colours = new Uint32Array(values.length), scale = 255 / (high - low);
+  for (let i = 0; i < values.length; ++i)
+    colours[i] = table[Math.max(0, Math.min(255, Math.round((values[i] - low) * scale)))];
+  return new Uint8Array(colours.buffer);
 }
+
+const kVertexShader = `
+attribute vec4 colour;
+uniform float size;
+varying vec3 tint;
 void main() {
-  float x = clamp((value - low) / (high - low), 0.0, 1.0);
-  tint = grey == 1 ? vec3(0.08 + 0.92 * x) : turbo(0.05 + 0.9 * x);
-  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  tint = colour.rgb;
+  gl_Position = projectionMatrix * (modelViewMatrix * vec4(position, 1.0));
   gl_PointSize = size;
 }`;
 const kFragmentShader = "varying vec3 tint; void main() { gl_FragColor = vec4(tint, 1.0); }";
+
+const kTurn = 1500, kSlowest = 120, kFastest = 60, kRest = 300;  // ms between two frames
 
 class CloudView {
   constructor(place) {
@@ -108,7 +126,7 @@ class CloudView {
     this.controls = new THREE.OrbitControls(this.camera, this.renderer.domElement);
     this.controls.addEventListener("change", () => this.draw());
     this.material = new THREE.ShaderMaterial({
-      uniforms: {low: {value: 0}, high: {value: 1}, size: {value: 2}, grey: {value: 0}},
+      uniforms: {size: {value: 2}},
       vertexShader: kVertexShader, fragmentShader: kFragmentShader});
     this.marks = new THREE.Group();
     this.scene.add(this.marks);
@@ -117,6 +135,9 @@ class CloudView {
     this.framed = false;
     this.colour = "z";
     this.drawn = 0;
+    this.range = [0, 1];
+    this.part = 1;  // of the points, what is drawn while it turns
+    this.drawnAt = -Infinity;
     new ResizeObserver(() => this.resize()).observe(place);
     this.resize();
   }
@@ -145,6 +166,7 @@ class CloudView {
     this.ply = ply;
     this.picked = [];
     this.marks.clear ? this.marks.clear() : this.marks.remove(...this.marks.children);
+    this.drawnAt = -Infinity;  // a new cloud is drawn whole, however soon it comes
     this.paint();
     if (!this.framed && ply.count > 0) this.frameAll();
     this.draw();
@@ -154,18 +176,14 @@ class CloudView {
   paint() {
     if (!this.ply) return null;
     const values = column(this.ply, this.colour) || column(this.ply, "z");
-    const [low, high] = this.colour === "intensity" ? [0, 255] : rangeOf(values);
-    this.points.geometry.setAttribute("value", new THREE.BufferAttribute(values, 1));
-    const uniforms = this.material.uniforms;
-    uniforms.low.value = low;
-    uniforms.high.value = high;
-    uniforms.grey.value = this.colour === "intensity" ? 1 : 0;
-    uniforms.size.value = this.ply.count > 50000 ? 2 : 4;
+    const grey = this.colour === "intensity";
+    this.range = grey ? [0, 255] : rangeOf(values);
+    const colours = coloursOf(values, this.range, grey);
+    this.points.geometry.setAttribute("colour", new THREE.BufferAttribute(colours, 4, true));
+    this.material.uniforms.size.value = this.ply.count > 50000 ? 2 : 4;
     this.draw();
-    return [low, high];
+    return this.range;
   }
-
-  get range() { return [this.material.uniforms.low.value, this.material.uniforms.high.value]; }
 
   frameAll() {
     if (!this.ply || this.ply.count === 0) return;
@@ -188,11 +206,27 @@ class CloudView {
   draw() {
     if (this.waiting) return;
     this.waiting = true;
-    requestAnimationFrame(() => {
+    requestAnimationFrame((now) => {
       this.waiting = false;
-      this.renderer.render(this.scene, this.camera);
-      ++this.drawn;
+      this.render(now);
     });
+  }
+
+  // While frames follow one another only so many points are drawn as make ten frames a second; all of them when it rests.
+  render(now) {
+    const since = now - this.drawnAt;
+    const turns = since < kTurn;
+    if (turns && since > kSlowest) this.part = Math.max(1 / 16, this.part / 2);
+    if (turns && since < kFastest) this.part = Math.min(1, 1.25 * this.part);
+    this.drawnAt = now;
+    if (this.points) this.points.geometry.setDrawRange(0, turns ? Math.ceil(this.part * this.ply.count) : Infinity);
+    this.renderer.render(this.scene, this.camera);
+    ++this.drawn;
+    clearTimeout(this.rest);
+    if (turns && this.part < 1) this.rest = setTimeout(() => {
+      this.drawnAt = -Infinity;
+      this.draw();
+    }, Math.max(kRest, 2 * since));
   }
 
   // The index of the point that is seen there: of those within some pixels the nearest to the eye.

@@ -93,14 +93,22 @@ function stateInWords({status}) {
   const bad = devices.find(([, device]) => !["ready", "capturing"].includes(device.state));
   if (status.cameras.length === 0) return ["bad", "No camera is configured: name one in slsd.toml."];
   if (bad) return [kStates[bad[1].state][0], `Not ready: ${bad[0]} ${kStates[bad[1].state][1]}.`];
-  if (!status.calibration) return ["bad", "Not calibrated: run slsd --calibrate."];
+  if (status.calibrating) return ["wait", "Is being calibrated."];
+  if (!status.calibration) return ["bad", "Not calibrated: calibrate it."];
   if (status.cameras.some((camera) => camera.calibration && camera.calibration.off_since_scan !== null))
     return ["bad", "Scans, but was knocked out of its calibration."];
   return ["good", "Ready to scan."];
 }
 
+let densityChosen = false;
+
 function showStatus(told) {
   const {status} = told;
+  mayAdminister = status.role === "administer";
+  if (!densityChosen) $("density").value = told.density;
+  $("calibrate-begin").disabled = !mayAdminister;
+  if (!mayAdminister) $("calibrate-next").textContent =
+    "slsd-web may not administer this scanner: docs/page.md says how it is allowed to.";
   const [kind, words] = stateInWords(told);
   $("state").className = kind;
   $("state").textContent = words;
@@ -160,10 +168,28 @@ async function followCamera() {
   }
 }
 
+let mayAdminister = false;
+
+// What the proposal would set; the gain only where it is to be another.
+function takeExposure(camera, {present, proposed}) {
+  const button = element("button", "Take it");
+  button.id = "take-exposure";
+  onClick(button, async () => {
+    const set = {exposure_us: Math.round(proposed.exposure_us)};
+    if (Math.abs(proposed.gain_db - present.gain_db) > 0.05) set.gain_db = Math.round(10 * proposed.gain_db) / 10;
+    const told = await (await ask("/api/set", {camera: {[camera]: set}})).json();
+    $("exposure").replaceChildren(element("p", `Taken: ${Object.entries(set).map(([key, value]) => `${key} = ${value}`).join(", ")}.` +
+      (told.not_kept ? ` The next start will not know it: ${told.not_kept}` : ""), "good"));
+    await takePicture();
+  });
+  return button;
+}
+
 async function proposeExposure() {
   $("exposure").replaceChildren(element("p", "looks at two frames…"));
   try {
-    const told = await (await ask("/api/exposure?camera=" + encodeURIComponent($("which-camera").value))).json();
+    const camera = $("which-camera").value;
+    const told = await (await ask("/api/exposure?camera=" + encodeURIComponent(camera))).json();
     const lines = [];
     lines.push(element("p", told.patterned_share === 0 ? "No pattern is seen in the frame." :
       `Symbols reach ${Math.round(told.lit)} of ${told.full}; the pattern covers ${Math.round(100 * told.patterned_share)} % ` +
@@ -171,7 +197,7 @@ async function proposeExposure() {
     if (told.proposed && told.present)
       lines.push(element("p", `Set exposure_us = ${Math.round(told.proposed.exposure_us)} and a gain of ` +
         `${told.proposed.gain_db.toFixed(1)} dB; now they are ${Math.round(told.present.exposure_us)} and ` +
-        `${told.present.gain_db.toFixed(1)} dB.`));
+        `${told.present.gain_db.toFixed(1)} dB.`), takeExposure(camera, told));
     else if (told.patterned_share > 0)
       lines.push(element("p", told.brighter === 1 ? "The brightness is good as it is." :
         `${told.brighter.toPrecision(2)} times as much light would be best.`));
@@ -289,6 +315,8 @@ function showPast(past) {
 
 // ---- the whole ----
 
+const isShown = (name) => $(name).offsetParent !== null;
+
 function choose(name) {
   for (const button of document.querySelectorAll("nav button")) button.classList.toggle("chosen", button.dataset.view === name);
   for (const section of document.querySelectorAll("main section")) section.classList.toggle("chosen", section.id === name);
@@ -331,11 +359,14 @@ function begin() {
       $("login-message").textContent = error.message;
     }
   });
+  $("density").addEventListener("change", () => { densityChosen = true; });
   $("scan").disabled = $("cloud-live").disabled = true;  // until there is something to draw clouds with
+  const pictured = takePicture().catch(say);
   followStatus();
-  takePicture().catch(say);
   followCamera();
-  prepareCloud();
+  beginCalibrating();
+  // What draws clouds is large, and would hold the picture up; a camera that is gone does not hold it up for long.
+  Promise.race([pictured, pause(3000)]).then(prepareCloud);
 }
 
 function load(script) {
