@@ -7,6 +7,7 @@
 #include <charconv>
 #include <utility>
 
+#include "clients/web/connections.hpp"
 #include "clients/web/pages.hpp"
 #include "core/printable.hpp"
 #include "core/utc_text.hpp"
@@ -108,13 +109,9 @@ PageServer::PageServer(PageOptions options, std::string token)
       pixels_(options_.socket, "pixels", kPixelsHz) {}
 
 Result<> PageServer::run() {
-  httplib::Server server;
+  Connections server;
   server.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
   server.set_payload_max_length(kBodyMax);
-  server.set_read_timeout(5s);
-  server.set_write_timeout(5s);
-  server.set_keep_alive_timeout(5);
-  server.set_keep_alive_max_count(1000);
   server.set_tcp_nodelay(true);
   server.set_default_headers({{"Content-Security-Policy", kPolicy},
                               {"X-Content-Type-Options", "nosniff"},
@@ -267,10 +264,12 @@ void PageServer::send_image(const Request& request, Response& response, const ch
   json params = json::object();
   if (const std::string camera = request.get_param_value("camera"); !camera.empty()) params["camera"] = camera;
   if (request.get_param_value("as_shown") == "1") params["as_shown"] = true;
+  const bool raw = request.get_param_value("format") == "raw" && method == std::string_view("frame");
+  if (raw) params["format"] = "raw";
   auto answered = call(method, std::move(params));
   if (!answered) return refuse(response, answered.error());
   const json about = answered->reply.message["result"];
-  send_bytes(response, answered->reply.bytes, "image/png",
+  send_bytes(response, answered->reply.bytes, raw ? "application/octet-stream" : "image/png",
              method == std::string_view("preview") ? brief(about) : about);
 }
 

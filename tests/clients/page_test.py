@@ -3,6 +3,7 @@
 # Copyright the slsd authors
 """slsd-web: who is let in, what is refused, and each view in a browser. SLSD_PICTURES=FOLDER keeps pictures of them."""
 import http.client
+import itertools
 import json
 import os
 import pathlib
@@ -160,6 +161,83 @@ class Door(unittest.TestCase):
             self.assertEqual(web.get("/api/status")[0], 200)
             for connection in idle:
                 connection.close()
+            self.assertIsNone(web.process.poll())
+
+    def test_who_is_slow_or_takes_nothing_holds_up_nobody(self):
+        with Service() as service, Web(service) as web:
+            service.wait_ready()
+            ends, slow = threading.Event(), []
+
+            def dribble(head):
+                while not ends.is_set():  # again and again, as an enemy would
+                    with socket.create_connection(("127.0.0.1", web.port)) as connection:
+                        try:
+                            for letter in itertools.cycle(head):
+                                connection.sendall(letter)
+                                if ends.wait(0.4):
+                                    return
+                        except ConnectionError:
+                            pass
+            for head in 40 * [[b"G"]] + 40 * [[b"POST /api/scan HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9999\r\n\r\n", b"x"]]:
+                slow.append(threading.Thread(target=dribble, args=(head,)))
+                slow[-1].start()
+            deaf = []
+            for _ in range(20):  # ask for a picture and read nothing of it
+                connection = socket.create_connection(("127.0.0.1", web.port))
+                connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+                connection.sendall(b"GET /api/frame?format=raw HTTP/1.1\r\nHost: localhost\r\nX-Slsd-Page: 1\r\n\r\n")
+                deaf.append(connection)
+            time.sleep(3)
+            took = []
+            for _ in range(5):
+                begin = time.monotonic()
+                self.assertEqual(web.get("/api/status")[0], 200)
+                took.append(time.monotonic() - begin)
+            ends.set()
+            for each in slow:
+                each.join()
+            for connection in deaf:
+                connection.close()
+            self.assertLess(sorted(took)[2], 8, took)
+            with service.client() as client:
+                self.assertGreater(client.call("scan")[0]["points"], 2000)
+            self.assertLess(self.resident_mib(web), 160)
+
+    def resident_mib(self, web):
+        with open(f"/proc/{web.process.pid}/status", encoding="ascii") as lines:
+            return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024
+
+    def test_wrong_tokens_ten_times_a_second_disturb_nobody(self):
+        with tempfile.TemporaryDirectory() as folder, Service() as service:
+            file = pathlib.Path(folder, "token")
+            file.write_text(TOKEN, encoding="utf-8")
+            with Web(service, "--token-file", file) as web:
+                session = web.post("/api/login", token=TOKEN)[1]["Set-Cookie"].split(";")[0]
+                answers = []
+                for i in range(60):
+                    answers.append(web.name_of(web.post("/api/login", token=f"{TOKEN}{i}"))[1])
+                    self.assertEqual(web.get("/api/status", Cookie=session)[0], 200)
+                    time.sleep(0.05)
+                self.assertEqual(answers, ["wrong_token"] * 5 + ["too_many_tokens"] * 55)
+
+    def test_watchers_that_are_killed_leave_nothing(self):
+        with Service() as service, Web(service) as web, service.client() as client:
+            service.wait_ready()
+            client.call("subscribe", rate_hz=10)
+            files = lambda: len(list(pathlib.Path(f"/proc/{web.process.pid}/fd").iterdir()))
+            before = files()
+            lost = 0
+            for i in range(60):
+                connection = socket.create_connection(("127.0.0.1", web.port))
+                what = ("cloud?density=symbols&after=0", "frame?format=raw", "status")[i % 3]
+                connection.sendall(f"GET /api/{what} HTTP/1.1\r\nHost: localhost\r\nX-Slsd-Page: 1\r\n\r\n".encode())
+                time.sleep(0.01 * (i % 5))
+                connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")  # a reset
+                connection.close()
+                if i % 10 == 0:
+                    lost += client.receive()[0]["params"].get("lost", 0)
+            self.assertEqual(web.get("/api/status")[0], 200)
+            wait_until(lambda: files() <= before + 3, "what they had open")
             self.assertIsNone(web.process.poll())
 
     def test_without_a_service_the_page_says_so(self):

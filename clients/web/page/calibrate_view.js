@@ -46,14 +46,11 @@ function figureOf(name, width, height) {
 }
 
 async function drawCamera(camera, moves) {
-  const response = await ask("/api/frame?as_shown=1&camera=" + encodeURIComponent(camera.name));
-  const bitmap = await createImageBitmap(await response.blob());
-  const figure = figureOf("camera " + camera.name, bitmap.width, bitmap.height);
+  const frame = await askFrame(camera.name);
+  const figure = figureOf("camera " + camera.name, frame.width, frame.height);
   const canvas = figure.firstChild, context = canvas.getContext("2d");
-  if (canvas.width !== bitmap.width || canvas.height !== bitmap.height)
-    [canvas.width, canvas.height] = [bitmap.width, bitmap.height];
-  context.drawImage(bitmap, 0, 0);
-  bitmap.close();
+  fitCanvas(canvas, frame);
+  context.putImageData(imageOf(frame), 0, 0);
   drawCoverage(context, camera.coverage);
   context.fillStyle = "#3df06b";
   for (const [x, y] of moves ? [] : camera.points) {

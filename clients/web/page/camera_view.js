@@ -5,25 +5,41 @@
 const kClipped = 250;
 const kTile = 32;  // px: sharpness is judged for each
 
+// What a camera sees, as it is: to code and decode a picture takes longer than to send it.
+async function askFrame(camera) {
+  const response = await ask("/api/frame?as_shown=1&format=raw&camera=" + encodeURIComponent(camera));
+  const {width_px: width, height_px: height, bits} = aboutOf(response);
+  const bytes = new Uint8Array(await response.arrayBuffer());
+  const grey = bits === 16 ? bytes.filter((_, i) => i % 2 === 1) : bytes;  // the upper half of each pixel
+  if (grey.length !== width * height) throw new Error("the frame is cut off");
+  return {width, height, grey};
+}
+
+function imageOf({width, height, grey}) {
+  const image = new ImageData(width, height);
+  const pixels = new Uint32Array(image.data.buffer);
+  for (let i = 0; i < grey.length; ++i) pixels[i] = 0xff000000 | (grey[i] * 0x10101);
+  return image;
+}
+
+function fitCanvas(canvas, {width, height}) {
+  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+}
+
 // Draws a frame of a camera; over it, in red, what is as bright as the sensor can tell, and in green how sharp each part
 // is. @return figures of the frame: the part clipped, and the sharpness (below)
-async function drawFrame(canvas, blob, {clipping, sharpness}) {
-  const bitmap = await createImageBitmap(blob);
-  canvas.width = bitmap.width;
-  canvas.height = bitmap.height;
-  const context = canvas.getContext("2d", {willReadFrequently: true});
-  context.drawImage(bitmap, 0, 0);
-  bitmap.close();
+async function drawFrame(canvas, frame, {clipping, sharpness}) {
+  const {width, height, grey} = frame;
+  fitCanvas(canvas, frame);
+  const context = canvas.getContext("2d");
+  const image = imageOf(frame), data = image.data;
   if (!canvas.dataset.frames) {  // the first is seen before it is judged; later ones would flicker
+    context.putImageData(image, 0, 0);
     canvas.dataset.frames = "1";
     await new Promise((done) => setTimeout(done));
   }
-  const image = context.getImageData(0, 0, canvas.width, canvas.height);
-  const {data, width, height} = image;
-  const grey = new Uint8Array(width * height);
   let clipped = 0;
   for (let i = 0, at = 0; i < grey.length; ++i, at += 4) {
-    grey[i] = data[at];
     if (grey[i] < kClipped) continue;
     ++clipped;
     if (clipping) data[at] = 255, data[at + 1] = data[at + 2] = 0;

@@ -113,7 +113,7 @@ void main() {
 }`;
 const kFragmentShader = "varying vec3 tint; void main() { gl_FragColor = vec4(tint, 1.0); }";
 
-const kTurn = 1500, kSlowest = 120, kFastest = 60, kRest = 300;  // ms between two frames
+const kTurn = 1500, kSlowest = 110, kAim = 80, kFastest = 50, kRest = 300, kPace = 500;  // ms between two frames
 
 class CloudView {
   constructor(place) {
@@ -138,6 +138,7 @@ class CloudView {
     this.range = [0, 1];
     this.part = 1;  // of the points, what is drawn while it turns
     this.drawnAt = -Infinity;
+    [this.paceBegin, this.paceFrames] = [0, 0];
     new ResizeObserver(() => this.resize()).observe(place);
     this.resize();
   }
@@ -216,8 +217,8 @@ class CloudView {
   render(now) {
     const since = now - this.drawnAt;
     const turns = since < kTurn;
-    if (turns && since > kSlowest) this.part = Math.max(1 / 16, this.part / 2);
-    if (turns && since < kFastest) this.part = Math.min(1, 1.25 * this.part);
+    if (turns) this.keepPace(now);
+    else [this.paceBegin, this.paceFrames] = [now, 0];
     this.drawnAt = now;
     if (this.points) this.points.geometry.setDrawRange(0, turns ? Math.ceil(this.part * this.ply.count) : Infinity);
     this.renderer.render(this.scene, this.camera);
@@ -227,6 +228,17 @@ class CloudView {
       this.drawnAt = -Infinity;
       this.draw();
     }, Math.max(kRest, 2 * since));
+  }
+
+  // Frames come in bursts, as the browser draws behind what asks for it: their mean over a while counts.
+  keepPace(now) {
+    ++this.paceFrames;
+    const passed = now - this.paceBegin;
+    if (passed < kPace) return;
+    const mean = passed / this.paceFrames;
+    if (mean > kSlowest || mean < kFastest)
+      this.part = Math.max(1 / 16, Math.min(1, this.part * Math.max(1 / 4, Math.min(3 / 2, kAim / mean))));
+    [this.paceBegin, this.paceFrames] = [now, 0];
   }
 
   // The index of the point that is seen there: of those within some pixels the nearest to the eye.

@@ -146,9 +146,7 @@ async function followStatus() {
 // ---- camera ----
 
 async function takePicture() {
-  const camera = encodeURIComponent($("which-camera").value);
-  const response = await ask(`/api/frame?as_shown=1&camera=${camera}`);
-  const figures = await drawFrame($("picture"), await response.blob(),
+  const figures = await drawFrame($("picture"), await askFrame($("which-camera").value),
                                   {clipping: $("show-clipping").checked, sharpness: $("show-sharpness").checked});
   $("picture-figures").textContent = `${figures.width} × ${figures.height} px, ${(100 * figures.clipped).toFixed(2)} % clipped` +
     (figures.sharpness === null ? "; too little contrast to judge how sharp it is"
