@@ -30,8 +30,8 @@ THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
 class Web:
     """slsd-web on a port of its own."""
 
-    def __init__(self, service, *arguments):
-        self.port = free_port()
+    def __init__(self, service, *arguments, port=None):
+        self.port = port or free_port()
         self.process = subprocess.Popen([BIN / "slsd-web", "--socket", service.socket, "--port", str(self.port),
                                          *map(str, arguments)])
 
@@ -391,6 +391,44 @@ class Views(unittest.TestCase):
             browser.wait("/0 to 24, not to 59/.test(document.getElementById('message').textContent)", "no reason")
             browser.picture(self.folder / "refused-1600.png")
             self.assertEqual(client.call("settings")[0]["cameras"][0]["gain_db"], 0)
+
+    def test_a_page_that_is_open_for_long_holds_no_more_and_outlives_both_services(self):
+        with Service() as service, Browser() as browser:
+            web = Web(service)
+            with web:
+                service.wait_ready()
+                browser.resize(1600, 1100)
+                browser.open(f"http://127.0.0.1:{web.port}/")
+                browser.wait("!document.getElementById('scan').disabled", "nothing to draw clouds with")
+                browser.click("#scan")
+                browser.wait("view.ply && view.ply.count > 2000", "no cloud")
+                browser.run("document.getElementById('measure').checked = true;")
+
+                def held():  # what three.js holds of the graphics card's memory, after clouds and measurements
+                    self.measure(browser)
+                    return browser.run("""
+                        const buffer = view.ply.buffer;
+                        for (let i = 0; i < 30; ++i) { view.show(buffer); view.renderer.render(view.scene, view.camera); }
+                        return view.renderer.info.memory.geometries;""")
+                first = held()
+                for _ in range(5):
+                    self.assertLessEqual(held(), first)
+                nodes = browser.run("return document.querySelectorAll('*').length;")
+                browser.click("#cloud-live")
+                service.stop()
+                browser.wait("document.getElementById('state').className === 'bad'", "it does not say that slsd is gone")
+                service.start()
+                service.wait_ready()
+                browser.wait("document.getElementById('state').textContent === 'Ready to scan.'", "slsd is not back")
+                shown = browser.run("return shownScan.scan;")
+                browser.wait(f"shownScan.scan !== '{shown}'", "no live cloud after slsd came back")
+            browser.wait("/slsd-web does not answer/.test(document.body.innerText)", "it does not say that slsd-web is gone")
+            again = Web(service, port=web.port)
+            with again:
+                browser.wait("document.getElementById('state').textContent === 'Ready to scan.'", "slsd-web is not back")
+                shown = browser.run("return shownScan.scan;")
+                browser.wait(f"shownScan.scan !== '{shown}'", "no live cloud after slsd-web came back")
+                self.assertLessEqual(browser.run("return document.querySelectorAll('*').length;"), nodes + 5)
 
     def measure(self, browser):
         """Clicks at two points of the cloud, where they are on the screen."""

@@ -16,7 +16,8 @@ LOG_LINE = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3} (debug|info|warnin
 # Every text that a client can send: the parameters of every method that takes some.
 TEXTS = {"scan": ["format", "transport", "camera", "frames"], "preview": ["camera"], "frame": ["format", "camera"],
          "pattern": ["format"], "project": ["picture", "png"], "subscribe": ["format"], "status": [], "settings": [],
-         "reload": [], "set": ["decode", "camera", "pattern", "calibration"], "unsubscribe": []}
+         "reload": [], "set": ["decode", "camera", "pattern", "calibration"],
+         "calibrate": ["action", "code"], "unsubscribe": []}
 
 
 class Rubbish(unittest.TestCase):

@@ -114,6 +114,7 @@ void main() {
 const kFragmentShader = "varying vec3 tint; void main() { gl_FragColor = vec4(tint, 1.0); }";
 
 const kTurn = 1500, kSlowest = 110, kAim = 80, kFastest = 50, kRest = 300, kPace = 500;  // ms between two frames
+const kFew = 50000;  // points that are always drawn
 
 class CloudView {
   constructor(place) {
@@ -150,6 +151,7 @@ class CloudView {
     this.renderer.setSize(width, height);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    this.drawnAt = -Infinity;
     this.draw();
   }
 
@@ -165,8 +167,7 @@ class CloudView {
     this.points.frustumCulled = false;
     this.scene.add(this.points);
     this.ply = ply;
-    this.picked = [];
-    this.marks.clear ? this.marks.clear() : this.marks.remove(...this.marks.children);
+    this.clearMarks();
     this.drawnAt = -Infinity;  // a new cloud is drawn whole, however soon it comes
     this.paint();
     if (!this.framed && ply.count > 0) this.frameAll();
@@ -220,7 +221,7 @@ class CloudView {
     if (turns) this.keepPace(now);
     else [this.paceBegin, this.paceFrames] = [now, 0];
     this.drawnAt = now;
-    if (this.points) this.points.geometry.setDrawRange(0, turns ? Math.ceil(this.part * this.ply.count) : Infinity);
+    if (this.points) this.points.geometry.setDrawRange(0, turns ? Math.max(kFew, Math.ceil(this.part * this.ply.count)) : Infinity);
     this.renderer.render(this.scene, this.camera);
     ++this.drawn;
     clearTimeout(this.rest);
@@ -265,13 +266,22 @@ class CloudView {
     return {at: [at[0], -at[1], -at[2]], sigma: sigma ? sigma[index] : NaN, first: !camera || camera[index] === 0};
   }
 
+  clearMarks() {
+    this.picked = [];
+    for (const ball of [...this.marks.children]) {
+      this.marks.remove(ball);
+      ball.geometry.dispose();
+      ball.material.dispose();
+    }
+  }
+
   // Marks a point; with the second of two, the distance between them and its standard deviation: each point is uncertain
   // along its ray, and of that what points along the line between them counts. Rays of other cameras than the first do
   // not come from the origin: theirs counts in full.
   mark(x, y) {
     const index = this.points ? this.pick(x, y) : -1;
     if (index < 0) return null;
-    if (this.picked.length === 2) this.picked = [], this.marks.remove(...this.marks.children);
+    if (this.picked.length === 2) this.clearMarks();
     this.picked.push(this.point(index));
     const [px, py, pz] = this.picked[this.picked.length - 1].at;
     const reach = this.camera.position.distanceTo(this.controls.target) / 120;
