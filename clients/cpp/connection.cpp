@@ -7,6 +7,7 @@
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -29,6 +30,7 @@ constexpr std::size_t kMaxLine = 1 << 24;
 constexpr std::size_t kMaxBytes = std::size_t{1} << 32;
 constexpr std::size_t kMaxDescriptors = 16;
 constexpr int kMaxDepth = 64;
+constexpr std::chrono::seconds kConnectMax{5};
 
 [[noreturn]] void no_connection(int number, const std::string& path) {
   if (number == ENOENT || number == ECONNREFUSED || number == ENOTDIR) {
@@ -37,6 +39,7 @@ constexpr int kMaxDepth = 64;
   if (number == EACCES || number == EPERM) {
     throw PermissionDenied("not allowed: join the group that owns the socket", "permission_denied", path);
   }
+  if (number == EAGAIN) throw TimedOut("the daemon accepts nobody: look at its log, or restart it", "timeout", path);
   throw ConnectionLost(std::strerror(number), "io", path);
 }
 
@@ -75,6 +78,9 @@ Connection::Connection(const std::string& socket) : path_(socket) {
   if (socket_ < 0) no_connection(errno, path_);
   address.sun_family = AF_UNIX;
   path_.copy(address.sun_path, path_.size());
+  // A service that accepts nobody any more fills its queue, and connecting would then wait for ever.
+  const timeval patience{kConnectMax.count(), 0};
+  ::setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
   if (::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     const int number = errno;
     close();

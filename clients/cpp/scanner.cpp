@@ -166,6 +166,7 @@ Stream::Stream(Connection connection, const StreamOptions& options)
   if (options.rate_hz) params["rate_hz"] = *options.rate_hz;
   if (!options.density.empty()) params["density"] = options.density;
   if (options.normals) params["normals"] = true;
+  if (options.shared) params["transport"] = "memfd";
   id_ = connection_.send("subscribe", text_of(params), Clock::now() + kGrace);
 }
 

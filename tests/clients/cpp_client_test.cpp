@@ -218,6 +218,61 @@ TEST(Scan, ThrowsTheProtocolsErrorsByName) {
   EXPECT_EQ(refused<ScannerError>(answered("of_another_version")), "why");
 }
 
+TEST(AStream, EndsWhereTheServiceVanishesStallsOrLies) {
+  const auto event = [](const std::string& bytes) {
+    return result("") + R"({"jsonrpc":"2.0","method":"cloud","params":{"scan":"a-1","bytes":)" +
+           std::to_string(bytes.size()) + "}}\n" + bytes;
+  };
+  const auto stream_of = [](const Impostor& service) {
+    StreamOptions options;
+    options.idle = 50ms;
+    return Scanner(service.path()).stream(options);
+  };
+  const Impostor vanishing(event(ply(3)));
+  Stream one = stream_of(vanishing);
+  EXPECT_EQ(one.next().size(), 3U);
+  EXPECT_THROW((void)one.next(), ConnectionLost);
+  const Impostor stalling(event(ply(3)), -1, /*hangs_up=*/false);
+  Stream two = stream_of(stalling);
+  EXPECT_EQ(two.next().size(), 3U);
+  EXPECT_THROW((void)two.next(), TimedOut);
+  const Impostor lying(event(ply(3, "4")));
+  Stream three = stream_of(lying);
+  EXPECT_THROW((void)three.next(), ProtocolError);
+}
+
+TEST(AStream, TakesCloudsInSharedMemory) {
+  const std::string file = ply(3);
+  const int sealed = memfd(file, kSealed);
+  const Impostor service(result("") + R"({"jsonrpc":"2.0","method":"cloud","params":{"memfd_bytes":)" +
+                             std::to_string(file.size()) + "}}\n",
+                         sealed);
+  StreamOptions options;
+  options.shared = true;
+  Stream stream = Scanner(service.path()).stream(options);
+  EXPECT_EQ(stream.next().size(), 3U);
+  ::close(sealed);
+}
+
+TEST(AScanner, TellsThatNobodyIsAccepted) {
+  const std::string path = ::testing::TempDir() + "/slsd-accepts-nobody.sock";
+  std::filesystem::remove(path);
+  const int listener = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.copy(address.sun_path, sizeof address.sun_path - 1);
+  ASSERT_EQ(::bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  ASSERT_EQ(::listen(listener, 0), 0);
+  std::vector<Scanner> waiting;
+  EXPECT_THROW(
+      {
+        for (int i = 0; i < 10; ++i) waiting.emplace_back(path);
+      },
+      TimedOut);
+  ::close(listener);
+  std::filesystem::remove(path);
+}
+
 TEST(AScanner, TellsThatNobodyListens) {
   EXPECT_THROW(Scanner("/nonexistent/slsd.sock"), NoService);
   EXPECT_THROW(Scanner("/" + std::string(200, 'a')), ConnectionLost);

@@ -208,6 +208,34 @@ class Vanishing(unittest.TestCase):
             with slsd.Scanner(silent.path) as scanner, self.assertRaises(slsd.TimedOut):
                 scanner.scan(timeout_s=0.1)
 
+    def test_stopping_while_a_client_waits_ends_in_time_and_is_overcome(self):
+        with Service() as service, slsd.Scanner(service.socket) as scanner:
+            stream = scanner.stream(idle_s=1)
+            next(stream)
+            service.send_signal(signal.SIGSTOP)
+            try:
+                with self.assertRaises(slsd.TimedOut):
+                    while True:
+                        next(stream)
+                with self.assertRaises(slsd.TimedOut):
+                    scanner.scan(timeout_s=0.1)
+            finally:
+                service.send_signal(signal.SIGCONT)
+            self.assertGreater(len(scanner.scan()), 0)
+            self.assertGreater(len(next(scanner.stream())), 0)
+
+    def test_accepting_nobody_is_told(self):
+        with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX) as listener:
+            path = os.path.join(folder, "slsd.sock")
+            listener.bind(path)
+            listener.listen(0)
+            waiting = []
+            with self.assertRaisesRegex(slsd.TimedOut, "accepts nobody"):
+                for _ in range(10):
+                    waiting.append(slsd.Scanner(path))
+            for scanner in waiting:
+                scanner.close()
+
     def test_in_the_middle_of_a_cloud_is_told(self):
         with Impostor(lambda request: result(request, b"ply", bytes=100), hangs_up=True) as cut:
             with slsd.Scanner(cut.path) as scanner, self.assertRaisesRegex(slsd.ConnectionLost, "middle"):

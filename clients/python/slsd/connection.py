@@ -27,11 +27,15 @@ class Connection:
         self._descriptors: list[int] = []
         self._last_id = 0
         try:
+            self._socket.settimeout(5)
             self._socket.connect(self.path)
         except PermissionError as error:
             self.close()
             raise PermissionDenied(f"{self.path}: you may not use this scanner; join the group that owns the socket",
                                    "permission_denied", self.path) from error
+        except (BlockingIOError, TimeoutError) as error:  # its queue is full: it accepts nobody any more
+            self.close()
+            raise TimedOut(f"{self.path}: the service accepts nobody; systemctl restart slsd", "timeout", self.path) from error
         except OSError as error:
             self.close()
             raise ConnectionLost(f"{self.path}: {error.strerror}; is slsd running? systemctl status slsd",

@@ -47,7 +47,7 @@ class Connection {
  public:
   using Deadline = std::optional<std::chrono::steady_clock::time_point>;
 
-  /// @throws NoService, PermissionDenied, ConnectionLost
+  /// @throws NoService, PermissionDenied, ConnectionLost, TimedOut
   explicit Connection(const std::string& socket);
   ~Connection();
   Connection(Connection&&) noexcept;

@@ -29,6 +29,8 @@ struct StreamOptions {
   std::optional<double> rate_hz;                  ///< at most so many; nothing: every frame
   std::string density;                            ///< as for a scan
   bool normals = false;                           ///< of pixels
+  bool shared = false;                            ///< in memory that is shared with the service, without a copy; while
+                                                  ///< two clouds are kept, those that come are lost
   std::optional<std::chrono::milliseconds> idle;  ///< next() throws TimedOut where no cloud came for so long
 };
 
