@@ -98,6 +98,7 @@ class Running : public Bridge {
       client::StreamOptions options;
       options.rate_hz = options_.rate_hz;
       options.density = options_.density;
+      options.shared = true;
       client::Stream stream = client::Scanner(options_.socket).stream(options);
       while (true) publish(stream.next());
     } catch (const client::ScannerError& error) {

@@ -10,6 +10,7 @@ the service's socket to the reader.
 import argparse
 import contextlib
 import datetime
+import fcntl
 import json
 import os
 import pathlib
@@ -49,17 +50,24 @@ class Replay:
                 answer = {"status": {"ready": True}}.get(request["method"], {})
                 peer.sendall(json.dumps({"jsonrpc": "2.0", "id": request["id"], "result": answer}).encode() + b"\n")
                 if request["method"] == "subscribe":
-                    self.send_clouds(peer)
+                    self.send_clouds(peer, request["params"].get("transport") == "memfd")
 
-    def send_clouds(self, peer):
+    def send_clouds(self, peer, shared):
         due = time.monotonic()
         while not self.stop.is_set():
             now = time.time_ns() // 1000
             at = datetime.datetime.fromtimestamp(now // 1_000_000, datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%S")
-            params = {"scan": "replay", "time": f"{at}.{now % 1_000_000:06}Z", "lost": 0, "bytes": len(self.cloud)}
+            params = {"scan": "replay", "time": f"{at}.{now % 1_000_000:06}Z", "lost": 0, "memfd_bytes" if shared else "bytes": len(self.cloud)}
             message = json.dumps({"jsonrpc": "2.0", "method": "cloud", "params": params}).encode() + b"\n"
             self.sent.append(now)
-            peer.sendall(message + self.cloud)
+            if shared:  # as the service does
+                memory = os.memfd_create("cloud", os.MFD_ALLOW_SEALING)
+                os.write(memory, self.cloud)
+                fcntl.fcntl(memory, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_WRITE | fcntl.F_SEAL_SEAL)
+                socket.send_fds(peer, [message], [memory])
+                os.close(memory)
+            else:
+                peer.sendall(message + self.cloud)
             due += 1 / self.rate_hz
             time.sleep(max(0, due - time.monotonic()))
 
