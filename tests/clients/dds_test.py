@@ -17,6 +17,7 @@ import sys
 import tempfile
 import threading
 import time
+import types
 import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -26,6 +27,7 @@ import numpy as np  # noqa: E402
 
 import slsd  # noqa: E402
 from dds_load import measure  # noqa: E402
+from python_test import Impostor, ply, result  # noqa: E402
 from service import BIN, Service, wait_until  # noqa: E402
 
 DOMAIN = 20 + os.getpid() % 100
@@ -270,9 +272,26 @@ class Shown(unittest.TestCase):
         info = probe("left/camera/camera_info", "CameraInfo")[0].camera_info()
         for key in ("height", "width", "distortion_model", "d", "k", "r", "p"):
             self.assertEqual(read["info"][key], info[key], key)
+        self.assertEqual([read["info"]["binning_x"], read["info"]["binning_y"]], info["binning"])
+        self.assertEqual([int(value) for value in read["info"]["roi"].values()], info["roi"])
+        self.assertEqual(read["info"]["header"]["frame_id"], info["header"]["frame_id"])
+        image = probe("left/camera/image_raw", "Image")[0].image()
+        read["image"]["data"] = bytes.fromhex(read["image"]["data"])
+        for key in ("height", "width", "encoding", "is_bigendian", "step", "data"):
+            self.assertEqual(read["image"][key], image[key], key)
+        (status,) = read["diagnostics"]["status"]
+        (expected,) = probe("diagnostics", "DiagnosticArray")[0].diagnostics()["status"]
+        for key in ("level", "name", "message", "hardware_id"):
+            self.assertEqual(status[key], expected[key], key)
+        self.assertEqual([pair["key"] for pair in status["values"]], list(expected["values"]))
+        self.assertEqual({pair["key"]: pair["value"] for pair in status["values"]}["camera"], "ready")
+        self.assertEqual((read["trigger"]["client_guid"], read["trigger"]["sequence_number"], read["trigger"]["success"]),
+                         (0x1122334455667788, 7, True))
+        self.assertRegex(read["trigger"]["message"], rf"^{len(self.scanner.scan())} points, scan ")
         (expected,) = probe("tf_static", "TFMessage", "--latched")[0].transforms()
         (transform,) = read["transforms"]["transforms"]
         self.assertEqual(transform["child_frame_id"], expected["child"])
+        self.assertEqual(transform["header"]["frame_id"], expected["header"]["frame_id"])
         self.assertEqual(list(transform["transform"]["rotation"].values()), expected["rotation"])
         self.assertEqual(list(transform["transform"]["translation"].values()), expected["translation"])
 
@@ -295,7 +314,77 @@ class Stalling(unittest.TestCase):
         self.assertEqual(got["lost"], 0)
 
 
+class Strangers(unittest.TestCase):
+    def test_of_the_domain_cost_nothing(self):
+        others = [subprocess.Popen([BIN / "dds_probe", "--domain", str(DOMAIN), "--seconds", "600", "--write" if i % 2 else "--topic",
+                                    f"stranger{i}/points"], stdout=subprocess.DEVNULL) for i in range(24)]
+        # One has other things to say about scanners, under a name of its own.
+        others.append(subprocess.Popen([BIN / "dds_probe", "--domain", str(DOMAIN), "--seconds", "600", "--write", "map/points",
+                                        "--bytes", "7", "--width", "4294967295"]))
+        try:
+            with Service() as service, Bridge(service, "--rate", "10", name="known") as bridge, States() as states, \
+                    Listener("known/points", "PointCloud2") as clouds:
+                wait_until(lambda: states.samples.get("known: slsd", {}).get("level") == 0, "the scanner")
+                with slsd.Scanner(service.socket) as scanner:
+                    self.assertEqual(clouds.next().point_cloud()["width"], len(scanner.scan()))
+                self.assertEqual(bridge.said(), "")
+        finally:
+            for other in others:
+                other.terminate()
+            for other in others:
+                other.wait(30)
+
+    def test_that_are_not_there_are_not_waited_for(self):
+        with Service() as service, Bridge(service, "--peer", "192.0.2.1", "--peer", "192.0.2.2", "--rate", "5", name="known"), \
+                Listener("known/points", "PointCloud2") as clouds:
+            self.assertGreater(clouds.next().point_cloud()["width"], 0)
+
+    def test_that_are_no_addresses_are_refused(self):
+        for word in ("--interface", "--peer"):
+            done = subprocess.run([BIN / "slsd-dds", word, "<no>"], capture_output=True, text=True, timeout=30, check=False)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn("a name or an address", done.stderr)
+
+
+class Impostors(unittest.TestCase):
+    """What listens where slsd would is another program, or another version."""
+
+    def told(self, answer, text):
+        with Impostor(answer) as other, States() as states, Listener("left/points", "PointCloud2") as clouds:
+            with Bridge(types.SimpleNamespace(socket=other.path)) as bridge:
+                wait_until(lambda: text in bridge.said(), text)
+                wait_until(lambda: states.samples.get("left: slsd", {}).get("level") == 2, "that something is wrong")
+                self.assertIsNone(bridge.process.poll())
+                self.assertEqual(clouds.count, 0)
+
+    def test_are_told_and_nothing_of_theirs_is_published(self):
+        def lies(request):
+            answer = result(request, **({"ready": True} if request["method"] == "status" else {}))
+            if request["method"] == "subscribe":
+                cloud = ply(3, said=4)
+                return answer + json.dumps({"jsonrpc": "2.0", "method": "cloud", "params": {"bytes": len(cloud)}}).encode() + b"\n" + cloud
+            return answer
+
+        self.told(lies, "where its header says")
+        self.told(lambda request: b'{"jsonrpc": "3.0", "id": 1, "result": {}}\n', "no JSON-RPC 2.0")
+        self.told(lambda request: b"220 mail ready\n", "not slsd's")
+        self.told(lambda request: result(request, cameras="none", calibration=7, ready=[]), "not slsd's")
+
+
 class Vanishing(unittest.TestCase):
+    def test_of_a_service_that_stalls_is_told_and_overcome(self):
+        with Service() as service, Bridge(service, "--rate", "5", name="top"), States() as states, \
+                Listener("top/points", "PointCloud2") as clouds:
+            wait_until(lambda: states.samples.get("top: slsd", {}).get("level") == 0, "the scanner")
+            clouds.next()
+            service.send_signal(signal.SIGSTOP)
+            try:
+                wait_until(lambda: "does not answer" in states.samples["top: slsd"]["message"], "that it stalls")
+            finally:
+                service.send_signal(signal.SIGCONT)
+            wait_until(lambda: states.samples["top: slsd"]["level"] == 0, "the scanner again")
+            clouds.next()
+
     def test_of_the_service_is_told_and_it_is_found_again(self):
         def state():
             samples = probe("diagnostics", "DiagnosticArray")
