@@ -44,13 +44,17 @@ Appearances::Appearances(const PatternOptions& pattern, float camera_px_per_proj
       usual_(pattern, camera_px_per_projector_px, std::nullopt) {}
 
 const Appearance& Appearances::at(std::size_t blur) const {
-  std::call_once(made_[blur],
-                 [&] { appearances_[blur] = std::make_unique<const Appearance>(pattern_, scale_, kBlursPx[blur]); });
+  std::call_once(made_[blur], [&] {
+    const float symbol_px = static_cast<float>(pattern_.symbol_size_px) * scale_;
+    const float times = blur == 0 ? 1 : std::max(1.F, symbol_px / kUsualSymbolPx);
+    appearances_[blur] = std::make_unique<const Appearance>(pattern_, scale_, times * kBlursPx[blur]);
+  });
   return *appearances_[blur];
 }
 
 const Appearance& Appearances::likeliest(std::span<const ShapeFeatures> shapes) const {
-  if (shapes.empty()) return usual_;
+  constexpr std::size_t kTelling = 12;
+  if (shapes.size() < kTelling) return usual_;
   std::vector<float> likelihoods(shapes.size());
   const auto middle = likelihoods.begin() + static_cast<std::ptrdiff_t>(likelihoods.size() / 2);
   std::size_t best = 0;

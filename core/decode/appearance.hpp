@@ -37,12 +37,15 @@ class Appearances {
   /// Of every blur that occurs, for what does not depend on it.
   [[nodiscard]] const Appearance& usual() const { return usual_; }
 
-  /// That in which half of the shapes are the likeliest; the usual one where there are none.
+  /// That in which half of the shapes are the likeliest; the usual one where there are too few to tell.
   /// @param shapes  a sample of a frame's, in measured frames
   [[nodiscard]] const Appearance& likeliest(std::span<const ShapeFeatures> shapes) const;
 
  private:
+  /// Standard deviations, camera px: first of a drawn frame, then of lenses. Where symbols are larger than usual, blurs
+  /// are, too.
   static constexpr std::array kBlursPx{0.2F, 0.45F, 0.7F, 1.0F, 1.4F, 2.0F};
+  static constexpr float kUsualSymbolPx = 24;
   [[nodiscard]] const Appearance& at(std::size_t blur) const;
 
   PatternOptions pattern_;

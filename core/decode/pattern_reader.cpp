@@ -15,11 +15,15 @@ namespace slsd {
 namespace {
 
 /// Camera px per projector px that are tried, in this order around 1.
-constexpr double kScaleMin = 0.35, kScaleMax = 4, kScaleStep = 1.3;
+constexpr double kScaleMin = 0.35, kScaleMax = 16, kScaleStep = 1.3;
+/// Symbols that are larger in the camera than the first are read in a frame where they are as large as the second, at
+/// least.
+constexpr double kLargePx = 48, kLargeEnoughPx = 24;
 /// Turns of the pattern in the camera's image that are tried, of a full turn.
 constexpr int kTurns = 12;
-/// A scale is likely where shapes have a symbol's size, this part at least of those at the best of all.
-constexpr std::size_t kFewOfMany = 4;
+/// A scale is likely where shapes of a symbol's size cover this part at least of what they cover at the best of all:
+/// specks are many, but small.
+constexpr double kFewOfMany = 4;
 /// So many symbols on one plane do not agree by chance; of another pattern some in a hundred are read, all over.
 constexpr std::size_t kCertain = 40, kLeast = 12;
 /// The share of symbols that has to lie within this part of a cell from where the plane of the others puts them.
@@ -56,6 +60,24 @@ Homography turned_and_scaled(double angle, double scale) {
   return homography;
 }
 
+/// Means of squares of pixels; what is left over at the right and at the bottom is left out.
+template <class T>
+Image<T> shrink(const ImageView<T>& frame, int factor) {
+  Image<T> small(frame.width / factor, frame.height / factor);
+  std::vector<std::uint32_t> sums(static_cast<std::size_t>(small.width()));
+  const auto pixels = static_cast<std::uint32_t>(factor * factor);
+  for (int y = 0; y < small.height(); ++y) {
+    std::ranges::fill(sums, pixels / 2);
+    for (int row = y * factor; row < (y + 1) * factor; ++row) {
+      const T* from = frame.row(row);
+      for (std::uint32_t& sum : sums)
+        for (int i = 0; i < factor; ++i) sum += *from++;
+    }
+    std::ranges::transform(sums, small.row(y), [&](std::uint32_t sum) { return static_cast<T>(sum / pixels); });
+  }
+  return small;
+}
+
 Homography homography_of(const std::vector<SymbolMatch>& matches) {
   std::vector<Eigen::Vector2d> from, to;
   for (const SymbolMatch& match : matches) from.push_back(match.projector_px), to.push_back(match.camera_px);
@@ -88,9 +110,27 @@ PatternReader::PatternReader(PatternReader&&) noexcept = default;
 PatternReader& PatternReader::operator=(PatternReader&&) noexcept = default;
 PatternReader::~PatternReader() = default;
 
-std::vector<SymbolMatch> PatternReader::attempt(const Homography& camera_from_projector, const GreyView& frame) {
+PatternReader::Shrunk PatternReader::frame_for(double scale, const GreyView& frame) {
+  const double symbol_px = pattern_.options.symbol_size_px * scale;
   const auto [width, height] = size_of(frame);
-  ExpectedFrames frames(camera_from_projector.matrix, width, height);
+  const int factor = std::min(static_cast<int>(symbol_px / kLargeEnoughPx), std::min(width, height));
+  if (symbol_px <= kLargePx || factor <= 1) return {frame, 1};
+  const auto [at, is_new] = shrunk_.try_emplace(factor);
+  if (is_new) std::visit([&](const auto& view) { at->second = shrink(view, factor); }, frame);
+  return {std::visit([](const auto& image) { return GreyView(image.view()); }, at->second), factor};
+}
+
+std::vector<SymbolMatch> PatternReader::attempt(const Homography& camera_from_projector, const GreyView& whole,
+                                                bool is_there) {
+  const auto [whole_width, whole_height] = size_of(whole);
+  const auto [frame, factor] =
+      frame_for(ExpectedFrames(camera_from_projector.matrix, whole_width, whole_height).in_the_middle().scale, whole);
+  const auto [width, height] = size_of(frame);
+  Eigen::Matrix3d shrinking = Eigen::Matrix3d::Identity();
+  const double middle = 0.5 * (factor - 1);  // of a square of pixels, from the first of them
+  shrinking.topLeftCorner<2, 2>() /= factor;
+  shrinking.topRightCorner<2, 1>().setConstant(-middle / factor);
+  ExpectedFrames frames(shrinking * camera_from_projector.matrix, width, height);
   const double scale = frames.in_the_middle().scale;
   auto at = std::ranges::find_if(trials_, [&](const auto& trial) {
     return scale < kSameScale * trial->scale && trial->scale < kSameScale * scale;
@@ -101,30 +141,40 @@ std::vector<SymbolMatch> PatternReader::attempt(const Homography& camera_from_pr
   } else {
     (*at)->reader.expect(std::move(frames));
   }
-  std::vector<SymbolMatch> matches = (*at)->reader.read_anywhere(frame, full_);
+  std::vector<SymbolMatch> matches = (*at)->reader.read_anywhere(frame, full_, is_there);
+  for (SymbolMatch& match : matches) {
+    match.camera_px = factor * match.camera_px.array() + middle;
+    match.sigma_px *= factor;
+  }
   shapes_ = std::max(shapes_, (*at)->reader.shapes());
   return matches;
 }
 
-/// Those at which shapes have a symbol's size, nearly as many as at any other: prototypes are made for these alone.
-std::vector<double> PatternReader::likely_scales(const GreyView& frame) {
-  const auto [width, height] = size_of(frame);
+/// Those at which shapes have a symbol's size, on nearly as many pixels as at any other: prototypes are made for these
+/// alone.
+std::vector<double> PatternReader::likely_scales(const GreyView& whole) {
   const std::vector<double> scales = scales_to_try();
+  std::vector<double> lit_px;
   std::vector<std::size_t> shapes;
   Sightings seen;
   for (const double scale : scales) {
-    ShapeFinder finder(pattern_.options, ExpectedFrames(turned_and_scaled(0, scale).matrix, width, height),
+    const auto [frame, factor] = frame_for(scale, whole);
+    const auto [width, height] = size_of(frame);
+    ShapeFinder finder(pattern_.options, ExpectedFrames(turned_and_scaled(0, scale / factor).matrix, width, height),
                        Method::kDefault, Method::kDefault);
     const GreyView sharp = finder.binarize(frame, full_);
     finder.find_regions(sharp);
     finder.describe(sharp, seen);
     shapes.push_back(seen.size());
+    double sum = 0;
+    for (const GreyMoments& moments : seen.moments) sum += static_cast<double>(moments.weight);
+    lit_px.push_back(sum * factor * factor);
   }
   shapes_ = std::max(shapes_, std::ranges::max(shapes));
-  const std::size_t enough = std::max(kLeast, shapes_ / kFewOfMany);
+  const double enough = std::ranges::max(lit_px) / kFewOfMany;
   std::vector<double> likely;
   for (std::size_t i = 0; i < scales.size(); ++i) {
-    if (shapes[i] >= enough) likely.push_back(scales[i]);
+    if (shapes[i] >= kLeast && lit_px[i] >= enough) likely.push_back(scales[i]);
   }
   return likely;
 }
@@ -133,7 +183,7 @@ std::vector<double> PatternReader::likely_scales(const GreyView& frame) {
 std::vector<SymbolMatch> PatternReader::search(const GreyView& frame) {
   std::vector<SymbolMatch> best;
   const auto found_at = [&](double angle, double scale) {
-    std::vector<SymbolMatch> matches = attempt(turned_and_scaled(angle, scale), frame);
+    std::vector<SymbolMatch> matches = attempt(turned_and_scaled(angle, scale), frame, false);
     const bool better = matches.size() > best.size() && lie_on_one_plane(matches, pattern_.pitch_px());
     if (better) best = std::move(matches);
     return best.size() >= kCertain;
@@ -153,7 +203,7 @@ std::vector<SymbolMatch> PatternReader::refine(std::vector<SymbolMatch> found, c
   constexpr double kWorthwhile = 1.03;
   for (int round = 0; round < kRounds && found.size() >= kCertain; ++round) {
     last_ = homography_of(found);
-    auto again = attempt(*last_, frame);
+    auto again = attempt(*last_, frame, true);
     const bool grows = static_cast<double>(again.size()) > kWorthwhile * static_cast<double>(found.size());
     if (again.size() >= found.size()) found = std::move(again);
     if (!grows) break;
@@ -167,7 +217,8 @@ Result<std::vector<SymbolMatch>> PatternReader::read(const GreyView& frame) {
   std::vector<SymbolMatch> found;
   shapes_ = 0;
   full_ = full_level_.of(frame);
-  if (last_) found = attempt(*last_, frame);
+  shrunk_.clear();
+  if (last_) found = attempt(*last_, frame, true);
   if (found.size() < kCertain || !lie_on_one_plane(found, pattern_.pitch_px())) found = search(frame);
   return refine(std::move(found), frame);
 }

@@ -2,8 +2,11 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
+#include <variant>
 #include <vector>
 
 #include <Eigen/Core>
@@ -38,14 +41,23 @@ class PatternReader {
 
  private:
   struct Trial;
-  [[nodiscard]] std::vector<SymbolMatch> attempt(const Homography& camera_from_projector, const GreyView& frame);
+  /// A frame, and how many times smaller it is than the one that is read.
+  struct Shrunk {
+    GreyView frame;
+    int factor;
+  };
+  /// The frame in which symbols of a scale have a size that is quick to read, and no larger than needed to be exact.
+  [[nodiscard]] Shrunk frame_for(double scale, const GreyView& frame);
+  [[nodiscard]] std::vector<SymbolMatch> attempt(const Homography& camera_from_projector, const GreyView& frame,
+                                                 bool is_there);
   [[nodiscard]] std::vector<double> likely_scales(const GreyView& frame);
   [[nodiscard]] std::vector<SymbolMatch> search(const GreyView& frame);
   [[nodiscard]] std::vector<SymbolMatch> refine(std::vector<SymbolMatch> found, const GreyView& frame);
 
   Pattern pattern_;
-  std::vector<std::unique_ptr<Trial>> trials_;  // one to a scale
-  std::optional<Homography> last_;              // camera from projector
+  std::vector<std::unique_ptr<Trial>> trials_;                                     // one to a scale
+  std::optional<Homography> last_;                                                 // camera from projector
+  std::map<int, std::variant<Image<std::uint8_t>, Image<std::uint16_t>>> shrunk_;  // of this frame, by their factors
   HeldFullLevel full_level_;
   double full_ = 255;  // of the frame that is read
   std::size_t shapes_ = 0;

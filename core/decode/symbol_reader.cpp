@@ -105,7 +105,7 @@ void SymbolReader::link_grid() {
   if (options_.link_grid == Method::kPaper)
     return paper_->link_grid(finder_.regions(), finder_.mask().width(), finder_.mask().height(), seen_);
   linker_.link(seen_.nodes);
-  measure_look();
+  if (is_there_) measure_look();
   if (options_.classify == Method::kDefault) classify_in_measured_frames();
 }
 
@@ -190,8 +190,9 @@ void SymbolReader::refuse_cut() {
   symbols.erase(symbols.begin() + count, symbols.end());
 }
 
-std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, double full) {
+std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, double full, bool is_there) {
   std::vector<SymbolMatch> matches;
+  is_there_ = is_there;
   for (const LatticeSymbol& symbol : read(frame, full, nullptr).symbols) {
     matches.push_back({symbol.centre_px.cast<double>(), cells().pixel(symbol.row, symbol.column), symbol.sigma_px});
   }

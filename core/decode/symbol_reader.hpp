@@ -49,7 +49,8 @@ class SymbolReader {
   /// @return      stands until the next call
   const Lattice& read(const GreyView& frame, double full, EpipolarView* view, StageObserver* observer = nullptr);
   /// The same as pairs of pixels, wherever the symbols lie.
-  [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, double full);
+  /// @param is_there  whether the pattern is likely to be seen: otherwise it is not worth to find out how blurred it is
+  [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, double full, bool is_there = true);
 
   /// The symbols of the last frame whose cells are certain and not on their epipolar lines, where they are seen.
   [[nodiscard]] std::vector<SymbolMatch> off_line() const;
@@ -94,6 +95,7 @@ class SymbolReader {
   CentreCorrection centre_correction_;
   CentreJudge centre_judge_;
 
+  bool is_there_ = true;
   const Appearance* look_ = nullptr;  // of this frame's symbols
   std::vector<ShapeFeatures> sample_;
   std::vector<float> sigmas_;

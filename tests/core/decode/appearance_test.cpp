@@ -31,34 +31,42 @@ std::vector<ShapeFeatures> shapes_at(float blur_px) {
   return shapes;
 }
 
+std::vector<ShapeFeatures> many_shapes_at(float blur_px) {
+  const std::vector<ShapeFeatures> few = shapes_at(blur_px);
+  std::vector<ShapeFeatures> many;
+  for (int i = 0; i < 5; ++i) many.insert(many.end(), few.begin(), few.end());
+  return many;
+}
+
 class Blurs : public testing::TestWithParam<float> {};
 
 // Each appearance is of blurs to a third, so that those beside it know the same shapes.
 TEST_P(Blurs, AreToldByTheShapesToOneStep) {
   const Appearances appearances(options(), kScale);
-  EXPECT_NEAR(std::log(*appearances.likeliest(shapes_at(GetParam())).blur_px / GetParam()), 0, std::log(1.6));
+  EXPECT_NEAR(std::log(*appearances.likeliest(many_shapes_at(GetParam())).blur_px / GetParam()), 0, std::log(1.6));
 }
 
 INSTANTIATE_TEST_SUITE_P(Appearances, Blurs, testing::Values(0.7F, 1.0F, 1.4F, 2.0F));
 
-TEST(Appearances, OfNoShapesIsTheUsual) {
+TEST(Appearances, OfFewShapesIsTheUsual) {
   const Appearances appearances(options(), kScale);
   EXPECT_EQ(&appearances.likeliest({}), &appearances.usual());
+  EXPECT_EQ(&appearances.likeliest(shapes_at(1)), &appearances.usual());
   EXPECT_FALSE(appearances.usual().blur_px);
 }
 
 // One object that lies before all else must not decide.
 TEST(Appearances, OfAFrameAreThoseOfMostShapes) {
   const Appearances appearances(options(), kScale);
-  std::vector<ShapeFeatures> shapes = shapes_at(0.7F);
-  for (const ShapeFeatures& blurred : shapes_at(0.7F)) shapes.push_back(blurred);
-  for (const ShapeFeatures& blurred : shapes_at(2)) shapes.push_back(blurred);
+  std::vector<ShapeFeatures> shapes = many_shapes_at(0.7F);
+  for (int i = 0; i < 2; ++i)
+    for (const ShapeFeatures& blurred : shapes_at(2)) shapes.push_back(blurred);
   EXPECT_LE(appearances.likeliest(shapes).blur_px, 1);
 }
 
 TEST(Appearances, AreMadeOnce) {
   const Appearances appearances(options(), kScale);
-  const auto shapes = shapes_at(1);
+  const auto shapes = many_shapes_at(1);
   EXPECT_EQ(&appearances.likeliest(shapes), &appearances.likeliest(shapes));
 }
 

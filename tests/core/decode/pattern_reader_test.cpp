@@ -25,20 +25,22 @@ Pattern small_pattern(std::uint32_t seed = 1) {
 /// How a pattern lies in the frame: its middle in the frame's, turned clockwise, so many camera px to a projector px.
 struct Lie {
   double turn_deg = 0, scale = 1.4;
+  int width = kWidth, height = kHeight;  ///< of the frame
+  double blur_px = 0.8;
 
   [[nodiscard]] Eigen::Affine2d camera_from_projector() const {
-    return Eigen::Translation2d(0.5 * kWidth, 0.5 * kHeight) * Eigen::Rotation2Dd(turn_deg / 180 * std::numbers::pi) *
+    return Eigen::Translation2d(0.5 * width, 0.5 * height) * Eigen::Rotation2Dd(turn_deg / 180 * std::numbers::pi) *
            Eigen::Scaling(scale) * Eigen::Translation2d(-320, -180);
   }
 };
 
 Grey8 seen(const Pattern& pattern, const Lie& lie) {
-  Grey8 image = draw_pattern(pattern), frame(kWidth, kHeight);
+  Grey8 image = draw_pattern(pattern), frame(lie.width, lie.height);
   const Eigen::Affine2d map = lie.camera_from_projector();
   const cv::Matx23d matrix(map(0, 0), map(0, 1), map(0, 2), map(1, 0), map(1, 1), map(1, 2));
-  cv::Mat from(image.height(), image.width(), CV_8U, image.data()), to(kHeight, kWidth, CV_8U, frame.data());
+  cv::Mat from(image.height(), image.width(), CV_8U, image.data()), to(lie.height, lie.width, CV_8U, frame.data());
   cv::warpAffine(from, to, matrix, to.size());
-  cv::GaussianBlur(to, to, {}, 0.8);
+  cv::GaussianBlur(to, to, {}, lie.blur_px);
   to.convertTo(to, -1, 150.0 / 255, 20);
   return frame;
 }
@@ -57,7 +59,7 @@ std::size_t visible(const Pattern& pattern, const Lie& lie) {
     for (int column = 0; column < pattern.whole_columns(); ++column) {
       const Eigen::Vector2d at = lie.camera_from_projector() *
                                  Eigen::Vector2d(pattern.symbol_centre_u_px(column), pattern.symbol_centre_v_px(row));
-      count += at.x() > margin && at.y() > margin && at.x() < kWidth - margin && at.y() < kHeight - margin;
+      count += at.x() > margin && at.y() > margin && at.x() < lie.width - margin && at.y() < lie.height - margin;
     }
   }
   return count;
@@ -88,6 +90,21 @@ TEST(ReadPatternAnywhere, FindsItAtAnyScale) {
   for (const double scale : {0.8, 1.15, 2.0, 2.9}) {
     PatternReader reader(pattern);
     expect_read(read(reader, seen(pattern, {10, scale}).view()), pattern, {10, scale});
+  }
+}
+
+// A camera of many more pixels than the projector has, and blurred by as many more.
+TEST(ReadPatternAnywhere, FindsItInLargeFrames) {
+  const Pattern pattern = small_pattern();
+  for (const double scale : {4.3, 6.5, 9.0}) {
+    const Lie lie{7, scale, 3600, 2700, 0.4 * scale};
+    PatternReader reader(pattern);
+    const auto matches = read(reader, seen(pattern, lie).view());
+    expect_read(matches, pattern, lie);
+    double squares = 0;
+    for (const SymbolMatch& match : matches)
+      squares += (lie.camera_from_projector() * match.projector_px - match.camera_px).squaredNorm();
+    EXPECT_LT(std::sqrt(squares / static_cast<double>(matches.size())), 0.03 * scale);
   }
 }
 
