@@ -16,6 +16,19 @@ int failed(const slsd::Error& error) {
   return error.code == slsd::ErrorCode::kInvalidArgument ? 2 : 1;
 }
 
+void add_merge_options(CLI::App& app, bool& merges, slsd::dds::MergeOptions& merge) {
+  auto* merging = app.add_flag("--merge", merges, "one cloud of several scanners, by --extrinsics");
+  for (const char* alone : {"--socket", "--rate", "--density", "--image-rate"})
+    merging->excludes(app.get_option(alone));
+  app.add_option("--scanner", merge.scanners, "with --merge: a scanner to merge; without it all of the file")
+      ->needs(merging);
+  app.add_option_function<double>(
+         "--max-age", [&merge](double seconds) { merge.max_age = std::chrono::duration<double>(seconds); },
+         "with --merge: seconds by which a cloud may be older than the newest (1)")
+      ->check(CLI::Range(0.01, 3600.0))
+      ->needs(merging);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -36,15 +49,7 @@ int main(int argc, char** argv) {
   app.add_option("--extrinsics", options.extrinsics, "where the scanners stand, as TOML");
   bool merges = false;
   slsd::dds::MergeOptions merge;
-  double max_age_s = merge.max_age.count();
-  auto* merging = app.add_flag("--merge", merges, "one cloud of several scanners, by --extrinsics");
-  for (const char* alone : {"--socket", "--rate", "--density", "--image-rate"})
-    merging->excludes(app.get_option(alone));
-  app.add_option("--scanner", merge.scanners, "with --merge: a scanner to merge; without it all of the file")
-      ->needs(merging);
-  app.add_option("--max-age", max_age_s, "with --merge: seconds by which a cloud may be older than the newest (1)")
-      ->check(CLI::Range(0.01, 3600.0))
-      ->needs(merging);
+  add_merge_options(app, merges, merge);
   app.add_option("--domain", network.domain, "of DDS (0)")->envname("ROS_DOMAIN_ID")->check(CLI::Range(0, 232));
   app.add_option("--interface", network.interface, "of the network: eth0, lo");
   app.add_option("--peer", network.peers, "an address of others, where the network has no multicast; may be repeated");
@@ -67,7 +72,6 @@ int main(int argc, char** argv) {
   if (merges) {
     if (name->count() > 0) merge.name = options.name;
     merge.extrinsics = options.extrinsics;
-    merge.max_age = std::chrono::duration<double>(max_age_s);
     merged = slsd::dds::Merge::start(merge, std::move(*joined));
   } else {
     bridge = slsd::dds::Bridge::start(options, std::move(*joined));
