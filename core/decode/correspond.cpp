@@ -44,8 +44,22 @@ class Surroundings {
     });
   }
 
+  /// At the corner of what was put there: on two sides that meet, and between them, it has been refused.
+  [[nodiscard]] bool is_corner(std::int32_t node) const {
+    return std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp}, [&](Direction one) {
+      const auto two = static_cast<Direction>((one + 1) % 4);
+      const std::int32_t first = beside(node, one), second = beside(node, two);
+      return misread(first) && misread(second) && !stands(node, beside(first, two)) &&
+             !stands(node, beside(second, one));
+    });
+  }
+
  private:
   static constexpr int kReach = 3;
+  /// Its letter is another than its cell's.
+  [[nodiscard]] bool misread(std::int32_t node) const {
+    return node >= 0 && claims_[node].status == RegionStatus::kClassDisagrees;
+  }
 
   [[nodiscard]] bool stands(std::int32_t node, std::int32_t other) const {
     return other >= 0 && claims_[other].status == RegionStatus::kDecoded &&
@@ -144,7 +158,9 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, std::vector
     for (const std::int32_t node : lone_) claims[node].status = RegionStatus::kNeighboursDisagree;
     return !lone_.empty();
   };
-  if (!refuse([&](std::int32_t node) { return around.leave_alone(node); })) return;
+  const bool some_lone = refuse([&](std::int32_t node) { return around.leave_alone(node); });
+  const bool some_corners = refuse([&](std::int32_t node) { return around.is_corner(node); });
+  if (!some_lone && !some_corners) return;
   while (refuse([&](std::int32_t node) { return around.is_last(node) || around.is_left(node); })) continue;
 }
 

@@ -153,6 +153,18 @@ TEST(RefuseLone, RefusesAllThatIsLeftOfARow) {
   EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
 }
 
+// The corner of something that was put there agrees by chance.
+TEST(RefuseLone, RefusesTheCornerOfWhatIsMisread) {
+  RimSheet sheet;
+  for (const auto& [row, column] : {std::pair(2, 5), std::pair(3, 4)})
+    sheet.at(row, column).status = RegionStatus::kClassDisagrees;
+  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  EXPECT_EQ(sheet.at(2, 4).status, kDecoded) << "what lies between the two stands";
+  sheet.at(3, 5).status = RegionStatus::kNoCodeword;
+  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
+}
+
 // An edge that runs through a row breaks its links: what is beside a symbol then shows from the row within alone.
 TEST(RefuseLone, LooksAlongTheRowWithinWhereTheRowIsBroken) {
   RimSheet sheet;
