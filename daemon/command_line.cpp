@@ -89,6 +89,11 @@ void add_options(CLI::App& app, CommandLine& line) {
   auto* check = app.add_flag("--check", line.check, "look at everything that a scan needs, and say what to do");
   auto* check_configuration = app.add_flag("--check-config", line.check_configuration,
                                            "look at the configuration alone: no device, no service");
+  auto* replay =
+      app.add_option("--replay", line.bundle,
+                     "decode the scans of a bundle of slsctl bundle, and say whether their clouds are the same");
+  app.add_option("--unpack", line.folder, "with --replay: a new folder, for what is in the bundle and the clouds")
+      ->needs(replay);
   auto* list = app.add_flag("--list", line.list, "list the cameras and projectors that are seen");
   app.add_flag("--json", line.as_json, "list as JSON")->needs(list);
   auto* calibrate = app.add_flag("--calibrate", line.calibrate, "measure the scanner itself");
@@ -100,7 +105,10 @@ void add_options(CLI::App& app, CommandLine& line) {
   check->excludes(list);
   check_configuration->excludes(calibrate)->excludes(verify)->excludes(pattern)->excludes(check)->excludes(list);
   add_extrinsics_options(app, line.extrinsics);
+  replay->excludes(calibrate)->excludes(verify)->excludes(pattern)->excludes(check)->excludes(check_configuration);
+  replay->excludes(list);
   add_print_options(app, line.print)
+      ->excludes(replay)
       ->excludes(pattern)
       ->excludes(calibrate)
       ->excludes(verify)

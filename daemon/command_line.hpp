@@ -23,6 +23,8 @@ struct CommandLine {
   std::optional<std::filesystem::path> configuration;
   std::string level = "info";
   std::filesystem::path pattern_image;
+  std::filesystem::path bundle;  ///< to be replayed
+  std::filesystem::path folder;  ///< where it is unpacked; empty: nowhere
   bool check = false, check_configuration = false, list = false, as_json = false;
   bool calibrate = false, latency = false, verify = false;
   CalibrateRequest request;

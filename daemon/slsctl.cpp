@@ -97,6 +97,9 @@ void add_image(CLI::App& app, ClientOptions& options, const std::string& name, c
 void add_view(CLI::App& app, ClientOptions& options) {
   CLI::App* metrics = app.add_subcommand("metrics", "what the service counts and measures, as OpenMetrics text");
   metrics->add_option("-o,--output,FILE", options.output, "write it there, whole or not at all: for node_exporter");
+  CLI::App* bundle =
+      app.add_subcommand("bundle", "write the last scans, with frames, settings and counters, to one file");
+  bundle->add_option("-o,--output,FILE", options.output, "the file; without it slsd-TIME.tar, here");
   CLI::App* top = app.add_subcommand("top", "rates, latencies and states, live in a terminal");
   top->add_option("--interval", options.interval_s, "seconds between two looks (1)")->check(CLI::Range(0.1, 3600.0));
   top->add_option("--count", options.count, "end after so many looks")->check(CLI::Range(1, 1'000'000'000));
@@ -126,6 +129,7 @@ int run(const CLI::App& app, const ClientOptions& options) {
   if (command == "metrics") return slsd::metrics_command(options);
   if (command == "set") return slsd::set_command(options);
   if (command == "settings") return slsd::settings_command(options);
+  if (command == "bundle") return slsd::bundle_command(options);
   if (command == "top") return slsd::top_command(options);
   if (command == "exposure") return slsd::exposure_command(options);
   if (command == "project") return slsd::project_command(options);

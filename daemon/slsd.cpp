@@ -92,6 +92,7 @@ int check_configuration(const slsd::CommandLine& line) {
 int carry_out(const slsd::CommandLine& line) {
   if (!line.pattern_image.empty())
     return slsd::exit_status(slsd::write_pattern_image(line.configuration, line.pattern_image));
+  if (!line.bundle.empty()) return slsd::exit_status(slsd::replay_bundle(line.bundle, line.folder));
   if (line.list) return slsd::exit_status(slsd::list_devices(line.configuration, line.as_json));
   if (line.check_configuration) return check_configuration(line);
   if (line.check) return slsd::check_everything(line.configuration) ? slsd::kDone : slsd::kFailed;

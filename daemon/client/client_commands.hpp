@@ -29,6 +29,8 @@ struct Failure;
 [[nodiscard]] tl::expected<nlohmann::json, Failure> look_at_exposure(const ClientOptions& options);
 /// Prints the service's metrics, or writes them to a file, whole or not at all.
 [[nodiscard]] int metrics_command(const ClientOptions& options);
+/// Writes the last scans that the service kept, and prints the file's name.
+[[nodiscard]] int bundle_command(const ClientOptions& options);
 /// Shows rates, latencies and states, again and again.
 [[nodiscard]] int top_command(const ClientOptions& options);
 /// Sets keys of the service without a restart.

@@ -2,9 +2,7 @@
 // Copyright the slsd authors
 #include "daemon/client/recording.hpp"
 
-#include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <system_error>
 
 #include "daemon/rpc/message.hpp"
@@ -17,12 +15,6 @@ namespace {
 
 using nlohmann::json;
 using std::filesystem::path;
-
-std::string numbered(std::uint64_t number, const char* extension) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%08llu%s", static_cast<unsigned long long>(number), extension);
-  return text;
-}
 
 Result<> make_folder(const path& folder) {
   std::error_code error;
@@ -41,27 +33,6 @@ Result<> check_empty(const path& folder) {
   return fail(ErrorCode::kAlreadyExists, "is there already, and not an empty folder: name a new one", folder.string());
 }
 
-constexpr int kSkewMaxMs = 10'000;  // files have no exposure; the skew is that of two threads
-
-bool plain(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
-}
-
-// Numbers, texts and lists of them are written in TOML as in JSON.
-std::string line(const std::string& key, const json& value) {
-  return key + " = " + value.dump() + "\n";
-}
-
-std::string lines(const json& table) {
-  std::string text;
-  for (const auto& [key, value] : table.items()) text += line(key, value);
-  return text;
-}
-
-std::string camera_table(const RecordedCamera& camera) {
-  return "\n[[camera]]\n" + line("name", camera.name) + line("driver", "file") + line("path", camera.folder);
-}
-
 Result<const Received*> find_frame(const Answered& scan, const std::string& camera) {
   for (const Received& event : scan.events) {
     const bool frame = event.message.value("method", "") == "frame" && event.message.contains("params");
@@ -71,35 +42,6 @@ Result<const Received*> find_frame(const Answered& scan, const std::string& came
 }
 
 }  // namespace
-
-std::vector<RecordedCamera> recorded_cameras(const json& settings) {
-  std::vector<RecordedCamera> cameras;
-  for (const json& camera : settings.value("cameras", json::array())) {
-    const std::string name = camera.value("name", "");
-    std::string folder = name;
-    std::ranges::replace_if(
-        folder, [](char c) { return !plain(c); }, '_');
-    const auto taken = [&](const RecordedCamera& other) { return other.folder == folder; };
-    while (folder.empty() || folder == "clouds" || std::ranges::any_of(cameras, taken)) {
-      folder.append("-").append(std::to_string(cameras.size()));
-    }
-    cameras.push_back({name, folder});
-  }
-  return cameras;
-}
-
-std::string replay_configuration(const json& settings, const std::vector<RecordedCamera>& cameras) {
-  const json decode = settings.value("configuration", json::object()).value("decode", json::object());
-  std::string text = "# Replays this recording: slsd --config slsd.toml, and slsctl --socket slsd.sock scan\n";
-  text += "[pattern]\n" + line("file", "pattern.toml");
-  text += "\n[projector]\n" + line("driver", "headless") + lines(settings.value("projector", json::object()));
-  for (const RecordedCamera& camera : cameras) text += camera_table(camera);
-  text += "\n[calibration]\n" + line("file", "calibration.yml");
-  text += "\n[scan]\n" + line("exposure_skew_ms", kSkewMaxMs);
-  text += "\n[decode]\n" + lines(decode);
-  text += "\n[server]\n" + line("socket", "slsd.sock");
-  return text;
-}
 
 Recording::Recording(path folder, json settings, bool clouds)
     : folder_(std::move(folder)),

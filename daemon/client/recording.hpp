@@ -12,25 +12,9 @@
 
 #include "core/result.hpp"
 #include "daemon/client/connection.hpp"
+#include "daemon/recording/layout.hpp"
 
 namespace slsd {
-
-/// A camera of a recording, and the folder of its frames.
-struct RecordedCamera {
-  std::string name;
-  std::string folder;
-};
-
-/// The cameras that `settings` names, each with a folder whose name is safe and its own.
-/// @thread reentrant
-[[nodiscard]] std::vector<RecordedCamera> recorded_cameras(const nlohmann::json& settings);
-
-/// A configuration, as TOML, with which slsd replays a recording: its frames by file cameras, its pattern and its
-/// calibration beside it, its keys of [decode].
-/// @param settings  what `settings` answered
-/// @thread reentrant
-[[nodiscard]] std::string replay_configuration(const nlohmann::json& settings,
-                                               const std::vector<RecordedCamera>& cameras);
 
 /// A folder of frames with all that their clouds depend on, laid out as docs/formats.md says.
 /// @thread thread-bound

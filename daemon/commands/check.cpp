@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <iostream>
 #include <thread>
@@ -160,6 +161,7 @@ class Check {
       if (findings_.note(setup, "decoder")) check_dense(*setup);
     }
     check_latency();
+    check_black_box();
   }
 
  private:
@@ -364,6 +366,26 @@ class Check {
     for (const std::string& warning : latency_warnings(configuration_, *report, projector_in_use())) {
       findings_.warn(warning);
     }
+  }
+
+  // By frames of the calibration's size and two bytes a pixel, the most that there are.
+  void check_black_box() {
+    const BlackBoxOptions& options = configuration_.black_box;
+    if (options.memory_max_mb == 0) return findings_.warn("black box: off, so that no failure can be explained later");
+    double scan_bytes = 0;
+    for (const CameraOptions& camera : configuration_.cameras) {
+      const CalibratedCamera* const known = calibration_ ? calibration_->camera(camera.name()) : nullptr;
+      if (known != nullptr) scan_bytes += 2.0 * known->lens.width_px * known->lens.height_px;
+    }
+    const double scans = scan_bytes > 0 ? static_cast<double>(options.memory_max_bytes()) / scan_bytes : 0;
+    const std::string memory = fmt::format("black box: {} MB of memory", options.memory_max_mb);
+    if (scan_bytes > 0 && scans < 1) {
+      return findings_.warn(fmt::format("{}, and the frames of a scan may take {:.0f}: raise [black_box] memory_max_mb",
+                                        memory, std::ceil(scan_bytes / (1 << 20))));
+    }
+    findings_.good(scan_bytes > 0 ? fmt::format("{} for the last {:.0f} scans of 8 bits, or {:.0f} of 16", memory,
+                                                std::floor(2 * scans), std::floor(scans))
+                                  : memory);
   }
 
   const Configuration& configuration_;

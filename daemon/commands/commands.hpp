@@ -37,6 +37,11 @@ namespace slsd {
 /// @errors as the service's start has them
 [[nodiscard]] Result<> check_configuration(const std::optional<std::filesystem::path>& configuration_file);
 
+/// Decodes the scans of a bundle anew, and prints for each whether its cloud is the same.
+/// @param folder  a new one, which the bundle is unpacked into and the clouds are written to; empty: none
+/// @errors those of read_file() and read_bundle(); kMismatch: a cloud differs; of the folder
+[[nodiscard]] Result<> replay_bundle(const std::filesystem::path& bundle, const std::filesystem::path& folder);
+
 /// What --print-board is to write.
 struct PrintRequest {
   std::filesystem::path file;  ///< .pdf, .svg or .png

@@ -128,6 +128,14 @@ Result<> read_server(const toml::table* table, const path& file, ServerOptions& 
   return reader.finish(options.validate());
 }
 
+Result<> read_black_box(const toml::table* table, const path& file, BlackBoxOptions& options) {
+  TableReader reader(table, "[black_box]", file);
+  reader.read("memory_max_mb", options.memory_max_mb);
+  reader.read("disk_max_mb", options.disk_max_mb);
+  reader.read("folder", options.folder);
+  return reader.finish(options.validate());
+}
+
 // The keys as they were given, table by table. Dates and times, which no key has, become null.
 json given_keys(const toml::node& node);
 
@@ -162,6 +170,7 @@ Result<Configuration> read_tables(const toml::table& document, const path& file)
   const toml::table* decode = top.table("decode");
   const toml::table* scan = top.table("scan");
   const toml::table* server = top.table("server");
+  const toml::table* black_box = top.table("black_box");
   Configuration configuration;
   Result<> read = top.finish();
   if (read) read = read_projector(projector, file, configuration.projector);
@@ -175,6 +184,7 @@ Result<Configuration> read_tables(const toml::table& document, const path& file)
   if (read) read = read_decode(decode, file, configuration.decode);
   if (read) read = read_scan(scan, file, configuration.scan);
   if (read) read = read_server(server, file, configuration.server);
+  if (read) read = read_black_box(black_box, file, configuration.black_box);
   if (!read) return tl::unexpected(read.error());
   configuration.given = given_keys(document);
   return configuration;

@@ -12,6 +12,7 @@
 #include "core/code/pattern.hpp"
 #include "core/decode/options.hpp"
 #include "core/result.hpp"
+#include "daemon/configuration/black_box_options.hpp"
 #include "daemon/configuration/camera_options.hpp"
 #include "daemon/configuration/projector_options.hpp"
 #include "daemon/configuration/scan_options.hpp"
@@ -35,6 +36,7 @@ struct Configuration {
   DecodeOptions decode;
   ScanOptions scan;
   ServerOptions server;
+  BlackBoxOptions black_box;
   nlohmann::json given = nlohmann::json::object();  ///< the keys as the file has them, table by table, for a record
 };
 

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include <cstdint>
+#include <cstdlib>
 #include <string>
+#include <string_view>
 
 #include "core/printable.hpp"
 #include "daemon/configuration/access.hpp"
+#include "daemon/configuration/black_box_options.hpp"
 #include "daemon/configuration/camera_options.hpp"
 #include "daemon/configuration/projector_options.hpp"
 #include "daemon/configuration/scan_options.hpp"
@@ -82,6 +85,19 @@ Result<> ScanOptions::validate() const {
   }
   if (power_line_hz == 0 || power_line_hz == 50 || power_line_hz == 60) return {};
   return fail(ErrorCode::kInvalidArgument, "power_line_hz must be 50, 60, or 0 where no lamps are near");
+}
+
+std::filesystem::path BlackBoxOptions::bundles() const {
+  if (!folder.empty()) return folder;
+  const char* const state = std::getenv("STATE_DIRECTORY");
+  const std::string_view first =
+      state == nullptr ? "" : std::string_view(state).substr(0, std::string_view(state).find(':'));
+  return first.empty() ? std::filesystem::path() : std::filesystem::path(first) / "bundles";
+}
+
+Result<> BlackBoxOptions::validate() const {
+  if (auto valid = in_range("memory_max_mb", memory_max_mb, 0, 512); !valid) return valid;
+  return in_range("disk_max_mb", disk_max_mb, 0, 65'536);
 }
 
 Result<> ServerOptions::validate() const {

@@ -18,6 +18,10 @@ namespace slsd {
 
 /// A frame's pixels row by row, 16 bits little-endian. @thread reentrant
 [[nodiscard]] Result<FrameImage> raw_of(const Frame& frame);
+/// The same into an image whose memory may do. @thread reentrant
+void copy_raw(const Frame& frame, FrameImage& image);
+/// The pixels of an image that is raw. It has to outlive them.
+[[nodiscard]] GreyView view_of(const FrameImage& image);
 
 /// A frame as it is to be kept. @param coding  not kNone @errors of encode_png() @thread reentrant
 [[nodiscard]] Result<FrameImage> image_of(const Frame& frame, FrameCoding coding, std::string camera);

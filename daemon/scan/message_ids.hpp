@@ -29,6 +29,7 @@ class MessageId {
   static constexpr std::string_view kClientDropped = "60ee2824ab474af9beae94870643e285";
   static constexpr std::string_view kClientRefused = "f2409a92560c460db8edd9acbbb3e527";
   static constexpr std::string_view kLogDropped = "aa938ec835dc4c28b302cff082de3384";
+  static constexpr std::string_view kBundleWritten = "214f95d4483d44b1ba3a4215c68bef6d";
 
  private:
   LogField field_;

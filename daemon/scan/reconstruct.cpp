@@ -135,7 +135,8 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     clock.start();
     const auto begin = steady_clock::now();
     Decoder& decoder = setup.lanes[lane][i];
-    const SceneLight light = light_of(set, i, full_level_of(set, setup, i));
+    result.full_levels.push_back(full_level_of(set, setup, i));
+    const SceneLight light = light_of(set, i, result.full_levels.back());
     const auto decoding = decode_in_light(decoder, set.frames[i].image(), light, &clock);
     result.decode_time += steady_clock::now() - begin;
     if (!decoding) {

@@ -40,12 +40,13 @@ bool may_be_taken_again(const Error& error) {
   }
 }
 
-Scan::Scan(ScanRequest request, std::uint64_t number, std::string id, Told told)
+Scan::Scan(ScanRequest request, std::uint64_t number, std::string id, Told told, Keep keep)
     : TaskOf(request.deadline,
              [this, told = std::move(told)](Result<ScanResult> result) { told(*this, std::move(result)); }),
       request_(std::move(request)),
       number_(number),
       id_(std::move(id)),
+      keep_(std::move(keep)),
       set_(fail_stopping()),
       result_(fail_stopping()) {}
 
@@ -70,10 +71,12 @@ void Scan::expose(Rig& rig, HardwareGuard& hardware, SharedSetup setup, const Pa
 }
 
 void Scan::compute(std::size_t lane) {
-  if (set_ && over()) return set_->give_back();
-  result_ = set_ ? reconstruct(*set_, *setup_, lane, request_, id_) : tl::unexpected(set_.error());
+  const bool in_time = !over();
+  if (set_ && in_time) result_ = reconstruct(*set_, *setup_, lane, request_, id_);
+  if (!set_) result_ = tl::unexpected(set_.error());
+  if (set_ && keep_) keep_(*this, *set_);
   if (set_) set_->give_back();  // back to the driver before others have had their turn
-  if (!result_) return;
+  if (!result_ || !in_time) return;
   result_->lost = std::move(lost_);
   result_->files = CloudFiles(result_->cloud, result_->dense.get(), request_.formats);
 }

@@ -27,10 +27,12 @@ namespace slsd {
 class Scan final : public TaskOf<ScanResult>, public FrameJob {
  public:
   using Told = std::function<void(const Scan&, Result<ScanResult>)>;
+  using Keep = std::function<void(const Scan&, const FrameSet&)>;
   /// @param number  counts the scans of this run
   /// @param id      its name for clients
   /// @param told    called once, with the outcome
-  Scan(ScanRequest request, std::uint64_t number, std::string id, Told told);
+  /// @param keep    called with its frames, before they go back to the drivers; may be empty
+  Scan(ScanRequest request, std::uint64_t number, std::string id, Told told, Keep keep = {});
 
   [[nodiscard]] const ScanRequest& request() const { return request_; }
   [[nodiscard]] std::uint64_t number() const { return number_; }
@@ -54,6 +56,7 @@ class Scan final : public TaskOf<ScanResult>, public FrameJob {
   ScanRequest request_;
   std::uint64_t number_;
   std::string id_;
+  Keep keep_;
   SharedSetup setup_;
   LostTries lost_;
   Result<FrameSet> set_;

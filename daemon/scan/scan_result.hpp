@@ -103,9 +103,10 @@ struct ScanResult {
   std::chrono::nanoseconds decode_time{};
   std::chrono::nanoseconds dense_time{};  ///< of that, for the points of pixels
   StageTimes stage_times{};
-  std::string picture_png;         ///< empty unless asked for
-  std::vector<FrameImage> frames;  ///< one to a camera, in the configuration's order, those of the pattern, of
-                                   ///< white, of dark; empty unless asked for
+  std::vector<double> full_levels;  ///< the level of a saturated pixel, of each camera
+  std::string picture_png;          ///< empty unless asked for
+  std::vector<FrameImage> frames;   ///< one to a camera, in the configuration's order, those of the pattern, of
+                                    ///< white, of dark; empty unless asked for
 };
 
 }  // namespace slsd

@@ -187,7 +187,12 @@ Result<ScanSetup> ScanSetup::create(const Configuration& configuration, std::siz
   if (!pattern) return tl::unexpected(pattern.error());
   auto calibration = configured_calibration(configuration);
   if (!calibration) return tl::unexpected(calibration.error());
-  ScanSetup setup{std::move(*pattern), {}, std::move(*calibration), {}, {}, configuration.other_hardware};
+  return of(std::move(*pattern), std::move(*calibration), configuration, lanes);
+}
+
+Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> calibration,
+                                const Configuration& configuration, std::size_t lanes) {
+  ScanSetup setup{std::move(pattern), {}, std::move(calibration), {}, {}, configuration.other_hardware};
   for (const CameraOptions& camera : configuration.cameras) {
     setup.camera_names.push_back(camera.name());
     setup.camera_formats.push_back(camera.format());

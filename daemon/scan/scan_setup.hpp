@@ -99,6 +99,10 @@ struct ScanSetup {
   /// @errors of the two above; of Decoder::create()
   [[nodiscard]] static Result<ScanSetup> create(const Configuration& configuration, std::size_t lanes);
 
+  /// The same of a pattern and a calibration that are there already. @errors kMismatch; of Decoder::create()
+  [[nodiscard]] static Result<ScanSetup> of(Pattern pattern, std::optional<Calibration> calibration,
+                                            const Configuration& configuration, std::size_t lanes);
+
   /// Whether a scan is possible. @errors kNotFound: no calibration, or no camera of the name
   [[nodiscard]] Result<> check(const ScanRequest& request) const;
   /// @errors kNotFound: no camera of the name

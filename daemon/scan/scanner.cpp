@@ -49,12 +49,13 @@ Error stopping() {
 
 }  // namespace
 
-Scanner::Scanner(std::unique_ptr<Rig> rig, ScanSetup setup)
+Scanner::Scanner(std::unique_ptr<Rig> rig, ScanSetup setup, std::size_t black_box_bytes)
     : rig_(std::move(rig)),
       setup_(std::make_shared<ScanSetup>(std::move(setup))),
       adopted_(setup_),
       queue_(kMaxWaiting),
       chores_(kMaxChores),
+      black_box_(black_box_bytes),
       run_id_(make_run_id()),
       lanes_(DecodeLanes::lanes_here()),
       deadlines_([this](const Task& task) { return overdue(task); }) {
@@ -239,6 +240,13 @@ Error Scanner::overdue(const Task& task) const {
 
 std::shared_ptr<Scan> Scanner::make_scan(ScanRequest request, bool listened, Answer<ScanResult> answer) {
   const std::uint64_t number = ++scans_;
+  Scan::Keep keep;
+  if (black_box_.bytes_max() > 0) {
+    keep = [this](const Scan& scan, const FrameSet& set) {
+      const Density density = scan.request().formats.dense() ? Density::kPixels : Density::kSymbols;
+      black_box_.keep_frames(scan.id(), set, scan.setup(), density);
+    };
+  }
   return std::make_shared<Scan>(
       std::move(request), number, run_id_ + "-" + std::to_string(number),
       [this, listened, answer = std::move(answer)](const Scan& scan, Result<ScanResult> result) {
@@ -248,7 +256,8 @@ std::shared_ptr<Scan> Scanner::make_scan(ScanRequest request, bool listened, Ans
         if (!for_all || !listener_) return;
         if (result) result->frames = {}, result->picture_png = {};  // one client's alone, and large
         listener_(std::make_shared<Result<ScanResult>>(std::move(result)));
-      });
+      },
+      std::move(keep));
 }
 
 void Scanner::scan(ScanRequest request, Answer<ScanResult> answer) {
@@ -375,6 +384,13 @@ void Scanner::reload(const std::filesystem::path& file, const Configuration& run
       });
 }
 
+void Scanner::last_scans(Answer<std::vector<KeptScan>> answer) {
+  submit_chore([this, answer = std::move(answer)](const Result<>& permission) {
+    if (!permission) return answer(tl::unexpected(permission.error()));
+    answer(black_box_.scans());
+  });
+}
+
 void Scanner::run_freely(std::optional<FreeRun> demand) {
   if (demand) free_formats_ = demand->formats;
   free_rate_hz_ = demand ? demand->rate_hz : 0;
@@ -391,7 +407,10 @@ void Scanner::conclude(const Scan& scan, Result<ScanResult>& result) {
   if (result) result->skipped = skipped_now;
   statistics_.note(result, skipped_now);
   if (result) watch_.note(scan.setup(), *result, scan.number());
+  if (black_box_.bytes_max() > 0 && (result || result.error().code != ErrorCode::kCancelled))
+    black_box_.keep_outcome(scan.id(), result ? scan.setup() : setup(), result);
   log_outcome(scan.id(), result);
+  if (!result && failure_listener_) failure_listener_(scan.id(), result.error());
 }
 
 void Scanner::log_outcome(const std::string& scan_id, const Result<ScanResult>& result) {

@@ -13,6 +13,7 @@
 
 #include "core/result.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/scan/black_box.hpp"
 #include "daemon/scan/bounded_queue.hpp"
 #include "daemon/scan/calibration_watch.hpp"
 #include "daemon/scan/deadlines.hpp"
@@ -46,7 +47,8 @@ class Scanner {
   template <class Value>
   using Answer = std::function<void(const Result<Value>&)>;
 
-  Scanner(std::unique_ptr<Rig> rig, ScanSetup setup);
+  /// @param black_box_bytes  as BlackBox has it
+  Scanner(std::unique_ptr<Rig> rig, ScanSetup setup, std::size_t black_box_bytes = 0);
   ~Scanner();
   Scanner(const Scanner&) = delete;
   Scanner& operator=(const Scanner&) = delete;
@@ -76,11 +78,19 @@ class Scanner {
   void reload(const std::filesystem::path& file, const Configuration& running, nlohmann::json settings,
               Answer<Configuration> answer);
 
+  /// The last scans, on a thread that has time to write them.
+  void last_scans(Answer<std::vector<KeptScan>> answer);
+
   /// Scans by itself from now on, or no longer. Results go to the listener.
   void run_freely(std::optional<FreeRun> demand);
   /// Called on one of the scanner's threads with each free scan and each asked-for one, in their order. Set before the
   /// first request.
   void set_listener(std::function<void(FreeScan)> listener) { listener_ = std::move(listener); }
+
+  /// Called with each scan that failed, on one of the scanner's threads. Set before the first request.
+  void set_failure_listener(std::function<void(const std::string& scan_id, const Error&)> listener) {
+    failure_listener_ = std::move(listener);
+  }
 
   /// Whether all its threads keep their promises to the watchdog.
   [[nodiscard]] bool kept() const;
@@ -89,7 +99,8 @@ class Scanner {
   void note_latency(std::chrono::nanoseconds time) { statistics_.note_latency(time); }
   /// What the scans say of the calibration, one to a configured camera; empty before the first scan.
   [[nodiscard]] std::vector<DriftState> drifts() const { return watch_.states(); }
-  [[nodiscard]] const Rig& rig() const { return *rig_; }  ///< for its statuses
+  [[nodiscard]] const BlackBox& black_box() const { return black_box_; }  ///< for its figures
+  [[nodiscard]] const Rig& rig() const { return *rig_; }                  ///< for its statuses
 
   /// Ends what is under way, soon, and the threads; requests that wait are answered kCancelled.
   void request_stop();
@@ -132,12 +143,14 @@ class Scanner {
   std::shared_ptr<Task> under_way_;  ///< on the scanner's thread
   SharedSetup adopted_;              ///< by the scanner's thread
   std::function<void(FreeScan)> listener_;
+  std::function<void(const std::string&, const Error&)> failure_listener_;
   BoundedQueue<Turn> queue_;
   BoundedQueue<Chore> chores_;
   Heartbeat heartbeat_;
   Heartbeat chore_heartbeat_;
   ScanStatistics statistics_;
   CalibrationWatch watch_;
+  BlackBox black_box_;
   HardwareGuard hardware_;
   std::string run_id_;
   std::atomic<std::uint64_t> scans_{0};

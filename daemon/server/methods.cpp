@@ -237,6 +237,18 @@ void run_metrics(ServiceState& state, const json& params, Session&, Respond resp
   respond(bytes_reply(metrics_text(state), {{"format", "openmetrics"}}));
 }
 
+constexpr std::size_t kBundleNotesBytes = 1 << 20;
+
+void run_bundle(ServiceState& state, const json& params, Session& session, Respond respond) {
+  const ParamReader reader(params);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  if (auto refused = session.reserve(state.scanner.black_box().bytes() + kBundleNotesBytes))
+    return respond(tl::unexpected(*refused));
+  state.bundle(carry<std::string>(state, std::move(respond), [](const std::string& bundle) {
+    return bytes_reply(bundle, {{"format", "tar"}});
+  }));
+}
+
 void run_pattern(ServiceState& state, const json& params, Session&, Respond respond) {
   ParamReader reader(params);
   (void)reader.choice("format", {"png"});
@@ -363,6 +375,7 @@ void run_calibrate(ServiceState& state, const json& params, Session&, Respond re
 }
 
 constexpr std::array kMethods{
+    RpcMethod{"bundle", Role::kAdminister, run_bundle},
     RpcMethod{"calibrate", Role::kAdminister, run_calibrate},
     RpcMethod{"frame", Role::kScan, run_frame},
     RpcMethod{"metrics", Role::kObserve, run_metrics},

@@ -40,6 +40,9 @@ struct ServiceState {
   /// Reads the configuration anew, with these settings over it, then answers.
   std::function<void(nlohmann::json settings, Respond)> reload = {};
   nlohmann::json settings = nlohmann::json::object();  ///< set over the socket, as merge_settings() has them
+  /// Writes a bundle of the last scans, then answers with its bytes.
+  std::function<void(Scanner::Answer<std::string>)> bundle = {};
+  std::function<std::uint64_t()> bundles_written = {};  ///< by itself
   RequestCounts requests = {};
   std::filesystem::path calibrator = {};  ///< slsd-calibrate; empty: not found
   std::unique_ptr<CalibrationRun> calibration = {};

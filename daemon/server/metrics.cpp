@@ -90,6 +90,13 @@ void tell_service(const ServiceState& state, Exposition& out) {
           static_cast<double>(state.log_lines_dropped()));
 }
 
+void tell_black_box(const ServiceState& state, Exposition& out) {
+  out.one("slsd_black_box_bytes", "gauge", "Memory of the last scans.",
+          static_cast<double>(state.scanner.black_box().bytes()), "bytes");
+  out.one("slsd_bundles_written", "counter", "Bundles that the service wrote by itself, as scans failed in a new way.",
+          static_cast<double>(state.bundles_written()));
+}
+
 void tell_clients(const ServiceState& state, Exposition& out) {
   const Server& server = *state.server;
   const Traffic& traffic = server.traffic();
@@ -226,6 +233,7 @@ std::string metrics_text(const ServiceState& state) {
   tell_projector(state, out);
   tell_cameras(state, out);
   tell_clients(state, out);
+  tell_black_box(state, out);
   return std::move(out).finish();
 }
 

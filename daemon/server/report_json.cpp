@@ -115,6 +115,11 @@ json pattern_json(const Configuration& configuration) {
           {"seed", pattern.seed}};
 }
 
+json black_box_json(const ServiceState& state) {
+  const BlackBox& box = state.scanner.black_box();
+  return {{"held_bytes", box.bytes()}, {"limit_bytes", box.bytes_max()}, {"bundles_written", state.bundles_written()}};
+}
+
 json memory_json(const MemoryBudget& memory) {
   return {{"held_bytes", memory.held()}, {"lent_bytes", memory.lent()}, {"limit_bytes", memory.limit()}};
 }
@@ -252,6 +257,7 @@ json status_json(const ServiceState& state) {
           {"clients_dropped", state.server->dropped()},
           {"subscribers", state.server->subscribers()},
           {"clients_memory", memory_json(state.server->memory())},
+          {"black_box", black_box_json(state)},
           {"configuration", state.configuration_file.string()},
           {"calibration", state.configuration.calibration_file.string()},
           {"pattern", pattern_json(state.configuration)},

@@ -10,11 +10,14 @@
 #include <spdlog/spdlog.h>
 #include <asio/post.hpp>
 
+#include "daemon/bundle/bundle.hpp"
 #include "daemon/configuration/exposure_warnings.hpp"
 #include "daemon/configuration/settings_over.hpp"
 #include "daemon/scan/devices.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "daemon/scan/projected_picture.hpp"
+#include "daemon/server/metrics.hpp"
+#include "daemon/server/report_json.hpp"
 #include "daemon/service/logging.hpp"
 #include "drivers/files/file.hpp"
 
@@ -46,6 +49,7 @@ nlohmann::json tables_that_need_restart(const Configuration& now, const Configur
   ScanOptions in_force = now.scan;
   in_force.timeout_ms = next.scan.timeout_ms;  // taken at once
   if (!(in_force == next.scan)) tables.push_back("scan");
+  if (!(now.black_box == next.black_box)) tables.push_back("black_box");
   return tables;
 }
 
@@ -98,7 +102,8 @@ Service::Service(Configuration configuration, const std::filesystem::path& file,
       watchdog_(events_),
       status_(events_),
       ending_(events_),
-      scanner_(std::move(rig), std::move(setup)),
+      bundles_(configuration.black_box.bundles(), configuration.black_box.disk_max_bytes()),
+      scanner_(std::move(rig), std::move(setup), configuration.black_box.memory_max_bytes()),
       state_{events_, scanner_, file, std::move(configuration)} {
   const auto handler = [this](const Request& request, Session& session, Respond respond) {
     dispatch(state_, request, session, std::move(respond));
@@ -114,6 +119,9 @@ Service::Service(Configuration configuration, const std::filesystem::path& file,
     reload(std::move(settings), std::move(answered));
   };
   state_.calibration = std::make_unique<CalibrationRun>(events_, [this](bool made) { calibrated(state_, made); });
+  state_.bundle = [this](Scanner::Answer<std::string> answer) { bundle(nullptr, std::move(answer)); };
+  state_.bundles_written = [this] { return bundles_.written(); };
+  scanner_.set_failure_listener([this](const std::string& scan_id, const Error& error) { on_failure(scan_id, error); });
   server_->set_delivered(
       [this](const ScanResult& scan) { scanner_.note_latency(std::chrono::steady_clock::now() - scan.received); });
   scanner_.set_listener([this](FreeScan scan) { server_->publish(std::move(scan)); });
@@ -190,7 +198,8 @@ void Service::await_end(std::chrono::steady_clock::time_point began) {
   server_->end_all();
   events_.stop();
   if (stopped) return spdlog::info("stopped");
-  // A driver or a long computation that cannot be interrupted. Nothing is half written: the service writes no files.
+  // A driver or a long computation that cannot be interrupted. Nothing is half written: a bundle is there whole or not
+  // at all.
   spdlog::warn("stopped without waiting for a device or a computation");
   flush_log(kLogPatience);
   std::_Exit(EXIT_SUCCESS);
@@ -254,6 +263,36 @@ void Service::on_reloaded(const Result<Configuration>& configuration, nlohmann::
   nlohmann::json reply{{"needs_restart", std::move(restart)}};
   if (changed) reply["not_kept"] = std::move(why_not_kept);
   answered(Reply{std::move(reply)});
+}
+
+void Service::bundle(nlohmann::json reason, Scanner::Answer<std::string> answer) {
+  const BundleNotes notes{std::move(reason), status_json(state_), settings_json(state_.configuration),
+                          metrics_text(state_)};
+  scanner_.last_scans([notes, answer = std::move(answer)](const Result<std::vector<KeptScan>>& scans) {
+    answer(scans ? write_bundle(*scans, notes, std::chrono::system_clock::now()) : tl::unexpected(scans.error()));
+  });
+}
+
+// On one of the scanner's threads. What the status says is known to the event loop's alone.
+void Service::on_failure(const std::string& scan_id, const Error& error) {
+  if (!bundles_.claim(error, std::chrono::system_clock::now())) return;
+  asio::post(events_, [this, scan_id, error] {
+    nlohmann::json reason{{"scan", scan_id}, {"error", rpc_error(error).to_json()}};
+    bundle(std::move(reason), [this, scan_id, error](const Result<std::string>& bytes) {
+      const LogField about("SLSD_SCAN", scan_id);
+      const LogField code("SLSD_ERROR", std::string(to_string(error.code)));
+      const auto file =
+          bytes ? bundles_.put(error, *bytes, std::chrono::system_clock::now()) : tl::unexpected(bytes.error());
+      if (!file) {
+        if (file.error().code != ErrorCode::kCancelled)
+          spdlog::warn("no bundle of scan {} was written: {}", scan_id, to_string(file.error()));
+        return;
+      }
+      const MessageId id(MessageId::kBundleWritten);
+      spdlog::warn("scan {} failed in a new way ({}): the last scans are in {}; look at them by slsd --replay", scan_id,
+                   to_string(error.code), file->string());
+    });
+  });
 }
 
 void Service::watch() {

@@ -13,6 +13,7 @@
 #include <asio/steady_timer.hpp>
 
 #include "core/result.hpp"
+#include "daemon/bundle/bundle_store.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/scan/scanner.hpp"
 #include "daemon/server/methods.hpp"
@@ -62,6 +63,8 @@ class Service {
   void await_end(std::chrono::steady_clock::time_point began);
   void reload(nlohmann::json settings, Respond answered);
   void on_reloaded(const Result<Configuration>& configuration, nlohmann::json settings, const Respond& answered);
+  void bundle(nlohmann::json reason, Scanner::Answer<std::string> answer);
+  void on_failure(const std::string& scan_id, const Error& error);
   void watch();
   void update_status();
 
@@ -74,6 +77,7 @@ class Service {
   asio::steady_timer watchdog_;
   asio::steady_timer status_;
   asio::steady_timer ending_;
+  BundleStore bundles_;
   Scanner scanner_;
   ServiceState state_;
   std::unique_ptr<Server> server_;

@@ -68,7 +68,7 @@ class Access(unittest.TestCase):
             status = ask(service, STRANGER, "status")
             self.assertEqual(status["role"], "scan")
             self.assertIn("pattern", ask(service, STRANGER, "settings"))
-            for method in ("reload", "project", "set", "calibrate"):
+            for method in ("reload", "project", "set", "calibrate", "bundle"):
                 error = ask(service, STRANGER, method)
                 self.assertEqual(error["data"]["name"], "permission_denied")
                 self.assertIn(f'"{method}" takes the role "administer", and user {STRANGER.pw_uid} has "scan"',

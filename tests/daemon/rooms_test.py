@@ -16,11 +16,14 @@ BELOW = {
     "rpc": {"rpc"},
     "scan": {"configuration", "scan"},
     "server": {"configuration", "scan", "rpc", "server"},
-    "service": {"configuration", "scan", "rpc", "server", "service"},
-    "client": {"rpc", "client"},
+    "recording": {"recording"},
+    "bundle": {"configuration", "scan", "rpc", "server", "recording", "bundle"},
+    "service": {"configuration", "scan", "rpc", "server", "bundle", "service"},
+    "client": {"rpc", "recording", "client"},
     "latency": {"configuration", "latency"},
     "calibrate": {"configuration", "scan", "latency", "rpc", "client", "calibrate"},
-    "commands": {"configuration", "scan", "rpc", "server", "client", "latency", "commands"},
+    "commands": {"configuration", "scan", "rpc", "server", "recording", "bundle", "client", "latency",
+                 "commands"},
 }
 
 

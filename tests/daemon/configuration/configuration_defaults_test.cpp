@@ -34,6 +34,7 @@ void expect_equal(const Configuration& a, const Configuration& b) {
   EXPECT_EQ(a.decode, b.decode);
   EXPECT_EQ(a.scan, b.scan);
   EXPECT_EQ(a.server, b.server);
+  EXPECT_EQ(a.black_box, b.black_box);
 }
 
 TEST(ReadConfiguration, OfNothingGivesTheDefaults) {

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "core/result.hpp"
+#include "daemon/scan/black_box.hpp"
+#include "drivers/files/tar.hpp"
+
+namespace slsd {
+
+/// The version of bundles that is written, and read.
+inline constexpr int kBundleVersion = 1;
+/// A longer file is refused before it is read.
+inline constexpr std::size_t kBundleBytesMax = std::size_t{1} << 30U;
+
+/// What a bundle tells besides the scans.
+struct BundleNotes {
+  nlohmann::json reason;  ///< the scan that failed and its error; null where somebody asked
+  nlohmann::json status;  ///< as `status`, `settings` and `metrics` answer
+  nlohmann::json settings;
+  std::string metrics;
+};
+
+/// A bundle: a tar archive of recordings, one to each setup that the scans were decoded by, laid out as docs/formats.md
+/// says.
+/// @errors of encode_png()
+/// @thread reentrant
+[[nodiscard]] Result<std::string> write_bundle(const std::vector<KeptScan>& scans, const BundleNotes& notes,
+                                               std::chrono::system_clock::time_point now);
+
+/// The keys of [decode], every one: what is in force, wherever it came from.
+[[nodiscard]] nlohmann::json decode_keys(const DecodeOptions& options);
+
+/// A frame of a bundle.
+struct BundledFrame {
+  std::string camera;
+  std::string light;     ///< "pattern", "white" or "dark"
+  std::string_view png;  ///< or any other format of read_image()
+  std::uint64_t sequence = 0;
+};
+
+/// A scan of a bundle.
+struct BundledScan {
+  std::string id;
+  std::string time;
+  std::string error;  ///< its name; empty: it gave a cloud
+  std::vector<BundledFrame> frames;
+  std::vector<double> full_levels;
+  bool dense = false;
+  std::optional<std::string_view> cloud;  ///< the PLY of its symbols
+};
+
+/// Scans that were decoded by the same.
+struct BundledRecording {
+  std::string name;
+  std::string_view configuration, pattern, calibration;  ///< the texts of these files
+  std::vector<BundledScan> scans;
+};
+
+/// A bundle as it was read; its views are of the archive's bytes, which outlive it.
+struct Bundle {
+  std::string version;  ///< of slsd that wrote it
+  std::string written;
+  std::string reason;  ///< of the failed scan, or empty
+  std::vector<TarFile> files;
+  std::vector<BundledRecording> recordings;
+};
+
+/// Reads a bundle of whatever origin.
+/// @errors those of read_tar(); kMalformed: a part of it is missing, too long, or not what it says; kUnsupported:
+///         another version
+/// @thread reentrant
+[[nodiscard]] Result<Bundle> read_bundle(std::string_view archive);
+
+}  // namespace slsd

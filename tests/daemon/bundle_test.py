@@ -1,0 +1,235 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""The black box: bundles of the last scans, by hand and by the service itself, and their replay."""
+import io
+import json
+import os
+import pathlib
+import shutil
+import stat
+import subprocess
+import tarfile
+import tempfile
+import unittest
+
+from client import RpcError
+from service import BIN, SCENE, Service, slsctl, wait_until
+
+CORPUS = pathlib.Path(__file__).parent.parent / "corpus"
+BUST = CORPUS / "16px-5-bust"
+DENSE = """
+[pattern]
+file = "{corpus}/pattern.toml"
+[[camera]]
+name = "camera"
+path = "frames"
+{camera}
+[calibration]
+file = "{corpus}/calibration.yml"
+[decode]
+depth_min_mm = 1500.0
+[scan]
+reopen_first_ms = 20
+reopen_longest_ms = 50
+[server]
+socket = "slsd.sock"
+[black_box]
+{black_box}
+"""
+
+
+def replay(bundle, *arguments):
+    return subprocess.run([BIN / "slsd", "--replay", bundle, *arguments], capture_output=True, text=True, check=False,
+                          timeout=120)
+
+
+def service_on(scenes, camera="", black_box="", environment=None):
+    """A service that sees the scenes in turn."""
+    service = Service(configuration=DENSE.format(corpus=BUST, camera=camera, black_box=black_box),
+                      environment=environment)
+    (service.folder / "frames").mkdir()
+    for i, scene in enumerate(scenes):
+        shutil.copy(CORPUS / scene / "frame.png", service.folder / "frames" / f"{i}.png")
+        for light in ("white", "dark"):
+            if (CORPUS / scene / f"{light}.png").exists():
+                (service.folder / "frames" / light).mkdir(exist_ok=True)
+                shutil.copy(CORPUS / scene / f"{light}.png", service.folder / "frames" / light / f"{i}.png")
+    return service
+
+
+def unpacked(file):
+    """Name and bytes of each file, as Python's own reader has them."""
+    with tarfile.open(file, "r:") as archive:
+        return {member.name: archive.extractfile(member).read() for member in archive.getmembers()}
+
+
+class Bundle(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory(prefix="slsd-test-")
+        self.addCleanup(temporary.cleanup)
+        self.folder = pathlib.Path(temporary.name)
+        self.file = self.folder / "bundle.tar"
+
+    def bundle(self, service):
+        result = slsctl("--socket", service.socket, "bundle", "-o", self.file)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stdout.strip(), str(self.file))
+        return unpacked(self.file)
+
+    def test_replays_to_the_same_bytes(self):
+        with service_on(["16px-5-bust", "16px-5-plane_0"]) as service:
+            service.wait_ready()
+            with service.client() as client:
+                clouds = [client.call("scan", timeout_ms=60000)[1] for _ in range(2)]
+                dense = client.call("scan", timeout_ms=60000, density="pixels")[1]
+            files = self.bundle(service)
+        self.assertEqual([files[f"recording-1/clouds/0000000{i}.ply"] for i in range(2)], clouds)
+        result = replay(self.file, "--unpack", self.folder / "unpacked")
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        self.assertEqual(result.stdout.count("the same cloud, byte for byte"), 3)
+        replayed = self.folder / "unpacked" / "recording-1" / "replayed"
+        self.assertEqual([(replayed / f"0000000{i}.ply").read_bytes() for i in range(2)], clouds)
+        self.assertEqual((replayed / "00000002.dense.ply").read_bytes(), dense)
+        self.assertEqual({name for name in files if name.startswith("recording-1/camera")},
+                         {f"recording-1/camera/0000000{i}.png" for i in range(3)})
+        # As every recording does, it replays through the service, too.
+        again = Service(configuration=files["recording-1/slsd.toml"].decode())
+        shutil.copytree(self.folder / "unpacked" / "recording-1", again.folder, dirs_exist_ok=True)
+        with again, again.client() as client:
+            cloud = client.call("scan", timeout_ms=60000)[1]
+        self.assertEqual(cloud.split(b"end_header\n", 1)[1], clouds[0].split(b"end_header\n", 1)[1])
+
+    def test_holds_what_the_service_says_of_itself(self):
+        with service_on(["16px-5-bust"]) as service:
+            slsctl("--socket", service.socket, "scan")
+            files = self.bundle(service)
+        about = json.loads(files["bundle.json"])
+        self.assertEqual((about["format"], about["version"], about["reason"]), ("slsd bundle", 1, None))
+        self.assertEqual(json.loads(files["status.json"])["scans"]["succeeded"], 1)
+        self.assertEqual(json.loads(files["settings.json"])["cameras"][0]["name"], "camera")
+        self.assertIn(b"slsd_scans_succeeded_total 1", files["metrics.txt"])
+        line, = map(json.loads, files["recording-1/scans.jsonl"].splitlines())
+        self.assertGreater(line["points"], 1000)
+        self.assertIn(b"depth_min_mm = 1500.0", files["recording-1/slsd.toml"])
+
+    def test_a_reload_begins_another_recording(self):
+        with service_on(["16px-5-bust"]) as service, service.client() as client:
+            client.call("scan", timeout_ms=60000)
+            text = service.file.read_text(encoding="utf-8")
+            service.file.write_text(text.replace("1500.0", "1600.0"), encoding="utf-8")
+            client.call("reload")
+            client.call("scan", timeout_ms=60000)
+            files = self.bundle(service)
+        self.assertIn(b"1500.0", files["recording-1/slsd.toml"])
+        self.assertIn(b"1600.0", files["recording-2/slsd.toml"])
+        self.assertEqual(replay(self.file).stdout.count("the same cloud"), 2)
+
+    def test_keeps_the_newest_within_its_memory(self):
+        """A frame is 1.92 MB."""
+        with service_on(["16px-5-bust"], black_box="memory_max_mb = 4") as service, service.client() as client:
+            names = [client.call("scan", timeout_ms=60000)[0]["scan"] for _ in range(4)]
+            held = client.call("status")[0]["black_box"]
+            files = self.bundle(service)
+            lines = [json.loads(line) for line in files["recording-1/scans.jsonl"].splitlines()]
+            self.assertEqual([line["scan"] for line in lines], names[2:])
+            self.assertLessEqual(held["held_bytes"], held["limit_bytes"])
+        for memory, what in ((1, "larger than"), (0, None)):
+            with service_on(["16px-5-bust"], black_box=f"memory_max_mb = {memory}") as service:
+                slsctl("--socket", service.socket, "scan")
+                files = self.bundle(service)
+                if what is None:
+                    self.assertNotIn("recording-1/scans.jsonl", files)
+                else:
+                    line, = map(json.loads, files["recording-1/scans.jsonl"].splitlines())
+                    self.assertIn(what, line["frames_left_out"])
+            self.assertEqual(replay(self.file).returncode, 0)
+
+    def test_a_scan_that_fails_in_a_new_way_writes_one(self):
+        """A camera of another size than calibrated: the frame that explains it is there, and no command was needed."""
+        state = self.folder / "state"
+        with service_on(["16px-5-bust"], environment={"STATE_DIRECTORY": str(state)}) as service:
+            service.wait_ready()
+            with service.client() as client:
+                client.call("scan", timeout_ms=60000)
+                (service.folder / "frames" / "0.png").write_bytes(b"P5 640 480 255\n" + bytes(640 * 480))
+                for _ in range(3):
+                    with self.assertRaises(RpcError):
+                        client.call("scan", timeout_ms=500)
+                wait_until(lambda: client.call("status")[0]["black_box"]["bundles_written"] > 0, "a bundle")
+                self.assertEqual(client.call("status")[0]["black_box"]["bundles_written"], 1)
+            self.assertIn("failed in a new way", service.log_text())
+            file, = (state / "bundles").iterdir()
+            self.assertEqual(stat.S_IMODE((state / "bundles").stat().st_mode), 0o700)
+        files = unpacked(file)
+        reason = json.loads(files["bundle.json"])["reason"]
+        self.assertIn(reason["error"]["data"]["name"], file.name)
+        result = replay(file)
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        self.assertIn(reason["error"]["message"], result.stdout)
+        self.assertIn("the same cloud, byte for byte", result.stdout)
+        # The way is known, in a second life too.
+        with service_on(["16px-5-bust"], camera='faults = ["disconnect@1:1h"]',
+                        environment={"STATE_DIRECTORY": str(state)}) as service:
+            slsctl("--socket", service.socket, "scan", "--timeout-ms", "300")
+        self.assertLessEqual(len(list((state / "bundles").iterdir())), 2)
+
+    def refused(self, files, expected, **changes):
+        """What a bundle of these files is refused with."""
+        with tarfile.open(self.file, "w", format=tarfile.USTAR_FORMAT) as archive:
+            for name, content in files.items():
+                member = tarfile.TarInfo(name)
+                member.size = len(content)
+                for key, value in changes.get(name.replace("/", "_").replace(".", "_"), {}).items():
+                    setattr(member, key, value)
+                archive.addfile(member, io.BytesIO(content))
+        result = replay(self.file, "--unpack", self.folder / "unpacked")
+        self.assertEqual(result.returncode, 1, result.stdout)
+        self.assertRegex(result.stderr, expected)
+        shutil.rmtree(self.folder / "unpacked", ignore_errors=True)
+
+    def test_refuses_what_an_enemy_made(self):
+        with service_on(["16px-5-bust"]) as service:
+            slsctl("--socket", service.socket, "scan")
+            files = self.bundle(service)
+        whole = self.file.read_bytes()
+        for length in (0, 100, 511, 512, 5000, len(whole) // 2, len(whole) - 1024, len(whole) - 512):
+            self.file.write_bytes(whole[:length])
+            result = replay(self.file)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn("is cut", result.stderr)
+        self.file.write_bytes(whole + b"x" * 512)
+        self.assertIn("behind its end", replay(self.file).stderr)
+        version = files["bundle.json"].replace(b'"version": 1', b'"version": 2')
+        self.refused({"bundle.json": version}, "is of version 2")
+        self.refused({"bundle.json": b"{}"}, "no bundle of slsd")
+        self.refused({"bundle.json": b"[" * 60000}, "no JSON object")
+        self.refused({"bundle.json": b"x" * 100_000}, "longer than")
+        self.refused({"other": b""}, "does not begin with bundle.json")
+        for name in ("../escape", "/etc/escape", "recording-1/../../escape", "a//b", "a/", ".bashrc", "a/.ssh", "-rf",
+                     "a\nb", "a" * 100):
+            self.refused({"bundle.json": files["bundle.json"], name: b""}, "might lead elsewhere|no regular file|dialect")
+        for kind in (tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.CHRTYPE, tarfile.FIFOTYPE, tarfile.DIRTYPE):
+            self.refused({"bundle.json": files["bundle.json"], "link": b""}, "no regular file",
+                         link={"type": kind, "linkname": "/etc/passwd"})
+        self.refused({"bundle.json": files["bundle.json"], **{f"{i}": b"" for i in range(5000)}}, "more than 4096")
+        for missing in ("recording-1/calibration.yml", "recording-1/pattern.toml", "recording-1/scans.jsonl",
+                        "recording-1/camera/00000000.png", "recording-1/clouds/00000000.ply"):
+            self.refused({name: data for name, data in files.items() if name != missing}, f"{missing}: is missing")
+        # A picture of 4 gigapixels in 70 bytes, and one of another camera.
+        bomb = bytes.fromhex("89504e470d0a1a0a0000000d49484452") + b"\0\1\0\0\0\1\0\0\10\0\0\0\0" + bytes(40)
+        self.refused({**files, "recording-1/camera/00000000.png": bomb}, "recording-1")
+        self.refused({**files, "recording-1/camera/00000000.png": b"P5 8 8 255\n" + bytes(64)}, "something else")
+        lines = files["recording-1/scans.jsonl"].replace(b'"camera":"camera"', b'"camera":"other"')
+        self.refused({**files, "recording-1/scans.jsonl": lines}, "order of the cameras")
+        lines = files["recording-1/scans.jsonl"].replace(b"camera/00000000.png", b"../../../etc/passwd")
+        self.refused({**files, "recording-1/scans.jsonl": lines}, "passwd: is missing in the bundle")
+        other = files["recording-1/clouds/00000000.ply"][:-1] + b"\x7f"
+        self.refused({**files, "recording-1/clouds/00000000.ply": other}, "something else than in the bundle")
+        self.assertEqual(replay(self.folder).returncode, 1)
+        self.assertEqual(replay(self.folder / "none").returncode, 1)
+        self.assertEqual(os.listdir(self.folder), ["bundle.tar"])
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
