@@ -158,8 +158,24 @@ class Bundle(unittest.TestCase):
                         client.call("scan", timeout_ms=500)
                 wait_until(lambda: client.call("status")[0]["black_box"]["bundles_written"] > 0, "a bundle")
                 self.assertEqual(client.call("status")[0]["black_box"]["bundles_written"], 1)
-            self.assertIn("failed in a new way", service.log_text())
+            wait_until(lambda: "failed in a new way" in service.log_text(), "the line of the log")
             file, = (state / "bundles").iterdir()
+            # Opened with that picture, it is the decoder that refuses: another way, of which the frame is there. In a third
+            # life both are known.
+            for life in (2, 3):
+                service.stop()
+                service.log.unlink()
+                service.start()
+                self.assertEqual(slsctl("--socket", service.socket, "scan").returncode, 1)
+                wait_until(lambda: len(list((state / "bundles").glob("*.tar"))) == 2, "another bundle")
+                if life == 3:
+                    service.stop()
+                    self.assertNotIn("new way", service.log_text())
+            self.assertEqual(len(list((state / "bundles").iterdir())), 2)
+            second, = set((state / "bundles").iterdir()) - {file}
+            result = replay(second)
+            self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+            self.assertIn("failed (mismatch): fails again: ", result.stdout)
             self.assertEqual(stat.S_IMODE((state / "bundles").stat().st_mode), 0o700)
         files = unpacked(file)
         reason = json.loads(files["bundle.json"])["reason"]
@@ -168,11 +184,6 @@ class Bundle(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
         self.assertIn(reason["error"]["message"], result.stdout)
         self.assertIn("the same cloud, byte for byte", result.stdout)
-        # The way is known, in a second life too.
-        with service_on(["16px-5-bust"], camera='faults = ["disconnect@1:1h"]',
-                        environment={"STATE_DIRECTORY": str(state)}) as service:
-            slsctl("--socket", service.socket, "scan", "--timeout-ms", "300")
-        self.assertLessEqual(len(list((state / "bundles").iterdir())), 2)
 
     def refused(self, files, expected, **changes):
         """What a bundle of these files is refused with."""
