@@ -11,7 +11,10 @@ import tempfile
 import unittest
 
 CMAKE, BUILD = sys.argv[1:3]
-UNITS = ("slsd.service", "slsd.socket", "slsd@.service", "slsd@.socket", "slsd-display.service", "slsd-web.service")
+UNITS = ("slsd.service", "slsd.socket", "slsd@.service", "slsd@.socket", "slsd-display.service", "slsd-web.service",
+         "slsd-metrics.service", "slsd-metrics.timer")
+DDS_UNITS = ("slsd-dds.service", "slsd-dds@.service") if (pathlib.Path(BUILD) / "bin/slsd-dds").exists() else ()
+UNITS += DDS_UNITS
 
 
 def install(prefix, destination):
@@ -32,7 +35,7 @@ class Install(unittest.TestCase):
                      "usr/lib/sysusers.d/slsd.conf", "usr/lib/systemd/catalog/slsd.catalog", "usr/lib/udev/rules.d/60-slsd.rules",
                      "usr/share/bash-completion/completions/slsctl", "etc/slsd/slsd.toml",
                      "etc/slsd/patterns/16px-5.toml",
-                     "usr/share/slsd/boards/charuco-11x7-23mm-a4.pdf", "usr/share/man/man1/slsctl.1", "usr/share/man/man5/slsd.toml.5",
+                     "usr/share/slsd/boards/charuco-11x7-23mm-a4.pdf", "usr/share/man/man1/slsctl.1", "usr/share/man/man8/slsd-display.8", "usr/share/man/man5/slsd.toml.5",
                      "usr/share/man/man8/slsd.8"):
             self.assertTrue((self.root / file).is_file(), file)
         for name in UNITS:
@@ -40,6 +43,10 @@ class Install(unittest.TestCase):
         self.assertIn("ExecStart=/usr/bin/slsd --config /etc/slsd/slsd.toml\n", self.unit("slsd.service"))
         self.assertIn("ExecStart=/usr/bin/slsd --config /etc/slsd/%i.toml\n", self.unit("slsd@.service"))
         self.assertIn("ListenStream=/run/slsd/%i.sock\n", self.unit("slsd@.socket"))
+        if DDS_UNITS:
+            dds = "ExecStart=/usr/bin/slsd-dds --name {} --socket /run/slsd/{}.sock\n"
+            self.assertIn(dds.format("scanner", "slsd"), self.unit("slsd-dds.service"))
+            self.assertIn(dds.format("%i", "%i"), self.unit("slsd-dds@.service"))
 
     def unit(self, name, prefix="usr"):
         return (self.root / prefix / "lib/systemd/system" / name).read_text(encoding="utf-8")
@@ -52,11 +59,13 @@ class Install(unittest.TestCase):
         units = self.root / "usr/lib/systemd/system"
         for kind in ("service", "socket"):
             shutil.copy(units / f"slsd@.{kind}", units / f"slsd@left.{kind}")
+        if DDS_UNITS:
+            shutil.copy(units / "slsd-dds@.service", units / "slsd-dds@left.service")
         for program in ("usr/lib/xorg/Xorg", "bin/kill", "bin/sh"):
             (self.root / program).parent.mkdir(parents=True, exist_ok=True)
             (self.root / program).write_text("#!/bin/sh\n", encoding="utf-8")
             (self.root / program).chmod(0o755)
-        for target in ("sysinit", "basic", "shutdown", "multi-user", "sockets"):  # systemd's own, which every unit needs
+        for target in ("sysinit", "basic", "shutdown", "multi-user", "sockets", "network-online", "timers", "time-set", "time-sync"):  # systemd's own, which every unit needs
             (units / f"{target}.target").write_text("[Unit]\n", encoding="utf-8")
 
     def test_units_are_sound(self):
@@ -69,7 +78,7 @@ class Install(unittest.TestCase):
     def test_units_have_few_rights(self):
         self.lay_out_for_systemd()
         for name, highest in (("slsd.service", 1.8), ("slsd@left.service", 1.8), ("slsd-display.service", 3.5),
-                              ("slsd-web.service", 1.5)):
+                              ("slsd-web.service", 1.5), ("slsd-metrics.service", 2.0), *((unit.replace("@", "@left"), 1.6) for unit in DDS_UNITS)):
             weighed = subprocess.run(["systemd-analyze", "security", "--offline=yes", "--no-pager", f"--root={self.root}", name],
                                      capture_output=True, text=True, check=True).stdout
             exposure = float(re.search(r"Overall exposure level for .*: ([0-9.]+)", weighed).group(1))
@@ -107,6 +116,28 @@ class Install(unittest.TestCase):
             completed = subprocess.run(["bash", "-c", code], env={"PATH": f"{self.root}/usr/bin:/usr/bin:/bin"}, check=True,
                                        capture_output=True, text=True)
             self.assertEqual(completed.stdout.strip(), expected, line)
+
+    def test_completes_every_option_of_every_program(self):
+        install("/usr", str(self.root))
+        programs = self.root / "usr/bin"
+        for program in sorted(programs.iterdir()):
+            script = self.root / "usr/share/bash-completion/completions" / program.name
+            self.assertTrue(script.is_file(), f"{program.name} has no completion")
+            def help_of(*command):
+                return subprocess.run([program, *command, "--help"], check=True, capture_output=True, text=True).stdout
+            usages = [()]
+            if "Subcommands:" in help_of():
+                usages += [(command,) for command in re.findall(r"(?m)^  ([a-z]+) ", help_of().split("Subcommands:")[1])]
+            for usage in usages:
+                line = " ".join((program.name, *usage, "--"))
+                code = (f"source {script}; COMP_WORDS=({line}); COMP_CWORD={len(usage) + 1}; "
+                        f"_slsd {program.name} -- {(usage or (program.name,))[-1]}; echo \"${{COMPREPLY[*]}}\"")
+                if usage == ("project",):
+                    continue  # its picture comes first
+                completed = subprocess.run(["bash", "-c", code], env={"PATH": f"{programs}:/usr/bin:/bin"}, check=True,
+                                           capture_output=True, text=True).stdout.split()
+                options = set(re.findall(r"(?:^| |,)(--[a-z][a-z-]*)", help_of(*usage)))
+                self.assertEqual(set(completed), options, line)
 
     def test_leaves_the_administrators_configuration_alone(self):
         file = self.root / "etc/slsd/slsd.toml"
