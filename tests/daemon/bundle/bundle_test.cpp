@@ -43,25 +43,35 @@ TEST(ReadTar, RefusesEachBitThatIsTurnedInAHeader) {
   for (std::size_t bit = 0; bit < 8 * 512; ++bit) {
     archive[bit / 8] = static_cast<char>(archive[bit / 8] ^ (1 << bit % 8));
     const auto files = read_tar(archive);
-    EXPECT_FALSE(files && files->size() == 1 && files->front().name != "name") << bit;
+    if (files) {  // a blank in the place of the zero after a number
+      ASSERT_EQ(files->size(), 1U) << bit;
+      EXPECT_EQ(files->front().name + std::string(files->front().bytes), "namebytes") << bit;
+    }
     archive[bit / 8] = static_cast<char>(archive[bit / 8] ^ (1 << bit % 8));
   }
 }
 
 TEST(DecodeKeys, AreEveryKeyThere) {
-  DecodeOptions options;
-  options.depth_min_mm = 123.456789012345678;
-  options.depth_max_mm = 2345.6;
-  options.precision = Precision::kFine;
-  options.density = Density::kPixels;
-  options.dense = {.stride_px = 7, .prune_px = 2.25};
-  for (Method* method : {&options.binarize, &options.find_regions, &options.classify, &options.centre,
-                         &options.link_grid, &options.decode_windows, &options.correspond}) {
-    *method = Method::kPaper;
+  const auto come_back = [](const DecodeOptions& options) {
     const nlohmann::json settings{{"configuration", {{"decode", decode_keys(options)}}}};
     const auto read = test::read(replay_configuration(settings, {}));
     ASSERT_TRUE(read) << to_string(read.error());
     EXPECT_EQ(read->decode, options);
+  };
+  DecodeOptions options;
+  options.depth_min_mm = 123.456789012345678;
+  options.depth_max_mm = 2345.6;
+  options.precision = Precision::kFine;
+  come_back(options);
+  options.precision = Precision::kStandard;
+  options.density = Density::kPixels;
+  options.dense = {.stride_px = 7, .prune_px = 2.25};
+  come_back(options);
+  options.density = Density::kSymbols;
+  for (Method* method : {&options.binarize, &options.find_regions, &options.classify, &options.centre,
+                         &options.link_grid, &options.decode_windows, &options.correspond}) {
+    *method = Method::kPaper;
+    come_back(options);
   }
 }
 
