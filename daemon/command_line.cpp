@@ -106,7 +106,7 @@ void add_options(CLI::App& app, CommandLine& line) {
   check_configuration->excludes(calibrate)->excludes(verify)->excludes(pattern)->excludes(check)->excludes(list);
   add_extrinsics_options(app, line.extrinsics);
   replay->excludes(calibrate)->excludes(verify)->excludes(pattern)->excludes(check)->excludes(check_configuration);
-  replay->excludes(list);
+  replay->excludes(list)->excludes(app.get_option("--extrinsics"));
   add_print_options(app, line.print)
       ->excludes(replay)
       ->excludes(pattern)
