@@ -18,7 +18,7 @@ PAGES = {
               "docs/calibration.md": "Calibrating", "docs/page.md": "The page"},
     "Use": {"docs/configuration.md": "Configuration", "docs/dense.md": "Dense clouds", "docs/formats.md": "File formats",
             "docs/protocol.md": "Protocol", "clients/python/README.md": "Python", "clients/cpp/README.md": "C++",
-            "docs/ros.md": "ROS 2", "docs/fleet.md": "Many scanners"},
+            "docs/examples.md": "Examples", "docs/ros.md": "ROS 2", "docs/fleet.md": "Many scanners"},
     "Run": {"docs/supervision.md": "Supervision", "docs/metrics.md": "Metrics"},
     "Understand": {"docs/decoder.md": "The decoder", "docs/alphabet.md": "The alphabet", "docs/arrays.md": "The arrays",
                    "docs/developing.md": "Developing", "tests/corpus/README.md": "The corpus", "CHANGELOG.md": "Changes"},

@@ -95,6 +95,7 @@ TEST_F(ScannerTest, FreeRunAfterAPauseTakesNoFrameOfBefore) {
   scanner_->run_freely(FreeRun{kEveryFrame, {}});
   while (clouds == before) std::this_thread::sleep_for(1ms);
   EXPECT_GE(frame, resumed);
+  scanner_.reset();  // scans on, and would tell what is no longer there
 }
 
 TEST_F(ScannerTest, ScanTellsSkewAndWhenItsFramesWereThere) {
