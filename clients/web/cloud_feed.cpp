@@ -61,7 +61,8 @@ Failure CloudFeed::follow(const std::stop_token& stop) {
   if (!connection) return failure(connection.error());
   connection->set_patience(kPatience);
   const auto subscribed =
-      ask(*connection, "subscribe", {{"format", "ply"}, {"density", density_}, {"rate_hz", rate_hz_}});
+      ask(*connection, "subscribe",
+          {{"format", "ply"}, {"density", density_}, {"rate_hz", rate_hz_}, {"transport", "memfd"}});
   if (!subscribed) return subscribed.error();
   for (;;) {
     auto event = connection->receive();
@@ -69,7 +70,7 @@ Failure CloudFeed::follow(const std::stop_token& stop) {
     const std::lock_guard lock(mutex_);
     if (stop.stop_requested() || !wanted()) return failure({ErrorCode::kCancelled, "nobody watches", {}});
     nlohmann::json params = event->message.value("params", nlohmann::json::object());
-    if (event->message.value("method", "") == "cloud") {
+    if (event->message.value("method", "") == "cloud" && params.contains("memfd_bytes")) {
       newest_ =
           std::make_shared<const WatchedCloud>(WatchedCloud{++clouds_, std::move(params), std::move(event->bytes)});
     } else if (params.contains("error")) {

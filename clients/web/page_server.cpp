@@ -4,7 +4,11 @@
 
 #include <httplib.h>
 
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <charconv>
+#include <cstdint>
 #include <utility>
 
 #include "clients/web/connections.hpp"
@@ -66,6 +70,28 @@ void refuse(Response& response, const Failure& failure) {
 
 void send_json(Response& response, const json& value) {
   response.set_content(to_line(value), "application/json");
+}
+
+/// Takes pages of a memfd out of this process again: they stay where the service has them, and may be read anew.
+void forget(const char* data, std::size_t size) {
+  const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
+  const auto begin = reinterpret_cast<std::uintptr_t>(data), first = (begin + page - 1) / page * page;
+  const std::uintptr_t end = (begin + size) / page * page;
+  if (first < end) ::madvise(reinterpret_cast<void*>(first), end - first, MADV_DONTNEED);
+}
+
+// Clouds are memfds, of which no more is here than is being sent, however many read however many.
+void send_cloud_bytes(Response& response, client::Bytes bytes, const json& about) {
+  response.set_header("X-Slsd-About", about.dump(-1, ' ', true, json::error_handler_t::replace));
+  const std::size_t size = bytes.size();
+  response.set_content_provider(
+      size, "application/octet-stream",
+      [bytes = std::move(bytes)](std::size_t at, std::size_t length, httplib::DataSink& sink) {
+        const std::size_t part = std::min<std::size_t>(length, 1 << 20);
+        const bool sent = sink.write(bytes.data() + at, part);
+        forget(bytes.data() + at, part);
+        return sent;
+      });
 }
 
 // The bytes stay one piece, however many read them.
@@ -287,11 +313,11 @@ void PageServer::send_cloud(const Request& request, Response& response) {
   }
   json about = brief((*next)->about);
   about["number"] = (*next)->number;
-  send_bytes(response, (*next)->ply, "application/octet-stream", about);
+  send_cloud_bytes(response, (*next)->ply, about);
 }
 
 void PageServer::scan(const json& body, Response& response) {
-  json params{{"format", "ply"}, {"timeout_ms", 60'000}};
+  json params{{"format", "ply"}, {"timeout_ms", 60'000}, {"transport", "memfd"}};
   for (const auto& [key, value] : body.items()) {
     const bool known = key == "density" || key == "texture" || key == "ambient" || key == "normals";
     if (!known) return refuse(response, 400, "invalid_params", "no such parameter: \"" + printable(key, 64) + "\"");
@@ -304,9 +330,12 @@ void PageServer::scan(const json& body, Response& response) {
           {}});
     return refuse(response, answered.error());
   }
+  if (!answered->reply.message["result"].contains("memfd_bytes"))
+    return refuse(response, 502, "malformed",
+                  "the service sends clouds otherwise than asked: it is of another version");
   const json about = brief(answered->reply.message["result"]);
   keep({about, answered->reply.bytes});
-  send_bytes(response, answered->reply.bytes, "application/octet-stream", about);
+  send_cloud_bytes(response, answered->reply.bytes, about);
 }
 
 void PageServer::send_past(const Request& request, Response& response) {
@@ -314,7 +343,7 @@ void PageServer::send_past(const Request& request, Response& response) {
   const std::lock_guard lock(mutex_);
   for (const PastScan& scan : past_) {
     if (!scan.ply.empty() && scan.about.value("scan", "") == id)
-      return send_bytes(response, scan.ply, "application/octet-stream", scan.about);
+      return send_cloud_bytes(response, scan.ply, scan.about);
   }
   refuse(response, 404, "not_found", "this cloud is not kept any more: scan again");
 }

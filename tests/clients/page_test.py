@@ -77,6 +77,11 @@ class Web:
             return answer
 
 
+def resident_mib(web):
+    with open(f"/proc/{web.process.pid}/status", encoding="ascii") as lines:
+        return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024
+
+
 class Door(unittest.TestCase):
     def test_the_page_has_a_policy_without_exceptions(self):
         with Service() as service, Web(service) as web:
@@ -201,11 +206,7 @@ class Door(unittest.TestCase):
             self.assertLess(sorted(took)[2], 8, took)
             with service.client() as client:
                 self.assertGreater(client.call("scan")[0]["points"], 2000)
-            self.assertLess(self.resident_mib(web), 160)
-
-    def resident_mib(self, web):
-        with open(f"/proc/{web.process.pid}/status", encoding="ascii") as lines:
-            return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024
+            self.assertLess(resident_mib(web), 160)
 
     def test_wrong_tokens_ten_times_a_second_disturb_nobody(self):
         with tempfile.TemporaryDirectory() as folder, Service() as service:
@@ -259,6 +260,33 @@ class Clouds(unittest.TestCase):
             past = json.loads(web.get("/api/status")[2])["past"]
             self.assertEqual([scan["scan"] for scan in past], [about["scan"]])
             self.assertEqual(web.get("/api/past?scan=" + about["scan"])[2], ply)
+
+    def test_clouds_of_pixels_are_not_held_while_they_are_watched(self):
+        with Service() as service, Web(service) as web:
+            service.wait_ready()
+            ends, sizes, most = threading.Event(), [], [0]
+
+            def watch():
+                after = 0
+                for _ in range(2):
+                    status, headers, ply = web.get(f"/api/cloud?density=pixels&after={after}")
+                    about = json.loads(headers["X-Slsd-About"])
+                    after = about["number"]
+                    sizes.append((status, len(ply) > 18 * about["points"] > 1_000_000))
+
+            def look():
+                while not ends.wait(0.005):
+                    most[0] = max(most[0], resident_mib(web))
+            watchers = [threading.Thread(target=watch) for _ in range(4)]
+            looking = threading.Thread(target=look)
+            for thread in (*watchers, looking):
+                thread.start()
+            for watcher in watchers:
+                watcher.join()
+            ends.set()
+            looking.join()
+            self.assertEqual(sizes, [(200, True)] * 8)
+            self.assertLess(most[0], 40)  # a cloud alone has 30 MiB
 
     def test_watchers_get_each_newer_cloud_and_cost_one_subscription(self):
         with Service() as service, Web(service) as web, service.client() as client:
