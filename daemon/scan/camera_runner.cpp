@@ -264,7 +264,8 @@ std::optional<CameraRunner::Order> CameraRunner::next_order(const std::stop_toke
   heartbeat_.promise(kPromise);
   std::unique_lock lock(mutex_);
   const auto waiting = [this] { return order_.has_value() && !answer_.has_value(); };
-  if (!changed_.wait_for(lock, stop, kLookPeriod, waiting)) return std::nullopt;
+  const auto asked = [&] { return waiting() || replacement_.has_value(); };
+  if (!changed_.wait_for(lock, stop, kLookPeriod, asked) || !waiting()) return std::nullopt;
   status_.state = DeviceState::kCapturing;
   return order_;
 }

@@ -3,6 +3,10 @@
 #include "daemon/scan/camera_runner.hpp"
 
 #include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 
@@ -52,6 +56,56 @@ struct Watched {
   ScriptedCamera* camera = nullptr;
   std::unique_ptr<CameraRunner> runner;
 };
+
+std::unique_ptr<ScriptedCamera> another(const std::string& device, std::optional<ErrorCode> error = {}) {
+  auto made = std::make_unique<ScriptedCamera>(device, picture());
+  made->open_error = error;
+  return made;
+}
+
+TEST(CameraRunner, PutsAnotherInThePlaceOfACameraOrLeavesItAsItWas) {
+  Watched run;
+  ASSERT_TRUE(run.capture(5s));
+  ASSERT_TRUE(run.runner->replace(another("a"), another("b"), steady_clock::now() + 5s));
+  EXPECT_TRUE(run.capture(5s));
+  const auto refused =
+      run.runner->replace(another("c", ErrorCode::kInvalidArgument), another("d"), steady_clock::now() + 5s);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(refused.error().where, "camera left");
+  EXPECT_EQ(run.runner->status().state, DeviceState::kReady);  // d
+  EXPECT_TRUE(run.capture(5s));
+}
+
+// It gets the other settings when it is there again: nobody could be told now that it refuses them.
+TEST(CameraRunner, PutsAnotherInThePlaceOfACameraThatIsNotThere) {
+  Watched run({}, true);
+  run.wait_for(DeviceState::kAbsent);
+  auto next = another("a");
+  next->gone = true;
+  ScriptedCamera* const now = next.get();
+  ASSERT_TRUE(run.runner->replace(std::move(next), another("b"), steady_clock::now() + 5s));
+  now->gone = false;
+  run.wait_for(DeviceState::kReady);
+  EXPECT_TRUE(run.capture(5s));
+}
+
+TEST(CameraRunner, TakesBackASettingThatCameTooLate) {
+  Watched run;
+  ASSERT_TRUE(run.capture(5s));
+  std::promise<void> configured;
+  auto slow = another("slow");
+  slow->configured = configured.get_future().share();
+  auto otherwise = another("otherwise");
+  const ScriptedCamera* const back = otherwise.get();
+  const auto late = run.runner->replace(std::move(slow), std::move(otherwise), steady_clock::now() + 500ms);
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().code, ErrorCode::kTimeout);
+  configured.set_value();
+  ASSERT_TRUE(run.capture(5s));
+  EXPECT_EQ(back->opens, 1);
+  EXPECT_EQ(back->captures, 1);
+}
 
 TEST(CameraRunner, NoticesAnIdleCameraThatIsGoneAndOpensItWhenItIsBack) {
   Watched run;
