@@ -114,8 +114,8 @@ Prototype prototype_of(const SymbolSpread& spread) {
 
 SymbolViewer viewer_of(const PrototypeOptions& options) {
   return SymbolViewer({options.symbols, options.symbol_size_px, options.spacing_px, options.camera_px_per_projector_px,
-                       threshold_level(options.spacing_px, options.camera_px_per_projector_px), options.blur_px,
-                       options.noise});
+                       threshold_level(options.symbol_size_px, options.spacing_px, options.camera_px_per_projector_px),
+                       options.blur_px, options.noise});
 }
 
 Eigen::Vector2f mean_of(const std::vector<Eigen::Vector2f>& points) {
@@ -135,9 +135,10 @@ int threshold_tile_px(int pitch_px, float camera_px_per_projector_px) {
   return std::clamp(static_cast<int>(std::lround(half_px)), 4, 64);
 }
 
-float threshold_level(int spacing_px, float camera_px_per_projector_px) {
-  constexpr float kWideGapPx = 2.2F;
-  return static_cast<float>(spacing_px) * camera_px_per_projector_px >= kWideGapPx ? 0.25F : 0.45F;
+float threshold_level(int symbol_size_px, int spacing_px, float camera_px_per_projector_px) {
+  constexpr float kWideGapPx = 2.2F, kLargeSymbolPx = 16;
+  if (static_cast<float>(spacing_px) * camera_px_per_projector_px < kWideGapPx) return 0.45F;
+  return static_cast<float>(symbol_size_px) * camera_px_per_projector_px < kLargeSymbolPx ? 0.3F : 0.25F;
 }
 
 std::vector<SymbolSpread> spread_of_symbols(const PrototypeOptions& options) {

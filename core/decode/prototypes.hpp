@@ -76,7 +76,7 @@ struct SymbolSpread {
 [[nodiscard]] int threshold_tile_px(int pitch_px, float camera_px_per_projector_px);
 
 /// Where between dark and light the threshold lies: below the middle where the gaps are wide enough for it, so that a
-/// symbol whose parts touch at a corner stays in one piece.
-[[nodiscard]] float threshold_level(int spacing_px, float camera_px_per_projector_px);
+/// symbol whose parts touch at a corner stays in one piece; less so for small symbols, of which more run together.
+[[nodiscard]] float threshold_level(int symbol_size_px, int spacing_px, float camera_px_per_projector_px);
 
 }  // namespace slsd

@@ -26,7 +26,7 @@ constexpr float kContrastMin = 8;
 
 BinarizeOptions binarize_options(const PatternOptions& pattern, float scale) {
   return {.tile_px = threshold_tile_px(pattern.symbol_size_px + pattern.spacing_px, scale),
-          .level = threshold_level(pattern.spacing_px, scale)};
+          .level = threshold_level(pattern.symbol_size_px, pattern.spacing_px, scale)};
 }
 
 }  // namespace

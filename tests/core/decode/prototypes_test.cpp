@@ -87,8 +87,9 @@ TEST(MarginPx, StaysWithinHalfTheGap) {
 }
 
 TEST(ThresholdLevel, IsLowWhereGapsAreWide) {
-  EXPECT_FLOAT_EQ(threshold_level(2, 1.4F), 0.25F);
-  EXPECT_FLOAT_EQ(threshold_level(2, 0.7F), 0.45F);
+  EXPECT_FLOAT_EQ(threshold_level(16, 2, 1.4F), 0.25F);
+  EXPECT_FLOAT_EQ(threshold_level(8, 2, 1.4F), 0.3F);
+  EXPECT_FLOAT_EQ(threshold_level(16, 2, 0.7F), 0.45F);
 }
 
 }  // namespace
