@@ -32,7 +32,9 @@ struct CommandLine {
   ExtrinsicsRequest extrinsics;
 
   /// Whether slsd-calibrate carries it out.
-  [[nodiscard]] bool calibrates() const { return calibrate || verify || !print.file.empty() || !extrinsics.file.empty(); }
+  [[nodiscard]] bool calibrates() const {
+    return calibrate || verify || !print.file.empty() || !extrinsics.file.empty();
+  }
 };
 
 /// Prints help, version or what is wrong with the usage.
