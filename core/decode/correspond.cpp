@@ -44,6 +44,25 @@ class Surroundings {
     });
   }
 
+  /// Of the few that are left of a line, between refused ones and its end, each beside what is none of its island.
+  [[nodiscard]] bool is_rest(std::int32_t node) const {
+    return std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp}, [&](Direction aside) {
+      if (!is_beside_others(node, aside)) return false;
+      int length = 1;
+      bool beside_refused = false;
+      for (const int turn : {1, 3}) {
+        const auto along = static_cast<Direction>((aside + turn) % 4);
+        std::int32_t other = beside(node, along);
+        for (; stands(node, other) && is_beside_others(other, aside); other = beside(other, along)) ++length;
+        int refused = 0;
+        for (; refused < kReach && other >= 0 && !stands(node, other); other = beside(other, along)) ++refused;
+        if (refused < kReach && other >= 0) return false;
+        beside_refused |= refused == kReach;
+      }
+      return beside_refused && length <= kReach;
+    });
+  }
+
   /// At the corner of what was put there: on two sides that meet, and between them, it has been refused.
   [[nodiscard]] bool is_corner(std::int32_t node) const {
     return std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp}, [&](Direction one) {
@@ -56,6 +75,10 @@ class Surroundings {
 
  private:
   static constexpr int kReach = 3;
+  /// There lies what is none of its island, or what is misread.
+  [[nodiscard]] bool is_beside_others(std::int32_t node, Direction d) const {
+    return contradicts(node, d) || misread(beside(node, d));
+  }
   /// Its letter is another than its cell's.
   [[nodiscard]] bool misread(std::int32_t node) const {
     return node >= 0 && claims_[node].status == RegionStatus::kClassDisagrees;
@@ -161,7 +184,9 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, std::vector
   const bool some_lone = refuse([&](std::int32_t node) { return around.leave_alone(node); });
   const bool some_corners = refuse([&](std::int32_t node) { return around.is_corner(node); });
   if (!some_lone && !some_corners) return;
-  while (refuse([&](std::int32_t node) { return around.is_last(node) || around.is_left(node); })) continue;
+  while (
+      refuse([&](std::int32_t node) { return around.is_last(node) || around.is_left(node) || around.is_rest(node); }))
+    continue;
 }
 
 void Correspondence::correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,

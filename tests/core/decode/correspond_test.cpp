@@ -153,6 +153,17 @@ TEST(RefuseLone, RefusesAllThatIsLeftOfARow) {
   EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
 }
 
+// Some that agree by chance, where the frame ends.
+TEST(RefuseLone, RefusesTheFewThatAreLeftOfAMisreadRow) {
+  RimSheet sheet;
+  for (int column = 0; column < 7; ++column) sheet.at(1, column).status = RegionStatus::kClassDisagrees;
+  sheet.at(2, 2).status = RegionStatus::kDamagedShape;
+  for (const int column : {4, 5, 6}) sheet.at(2, column).status = RegionStatus::kClassDisagrees;
+  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  for (const int column : {0, 1, 3}) EXPECT_EQ(sheet.at(2, column).status, RegionStatus::kNeighboursDisagree) << column;
+  for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(3, column).status, kDecoded) << column;
+}
+
 // The corner of something that was put there agrees by chance.
 TEST(RefuseLone, RefusesTheCornerOfWhatIsMisread) {
   RimSheet sheet;
