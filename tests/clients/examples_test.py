@@ -119,7 +119,7 @@ class Examples(unittest.TestCase):
 
     def test_live_view_follows_the_clouds(self):
         if not there("matplotlib"):
-            self.skipTest("matplotlib is not installed (pip install matplotlib)")
+            self.skipTest("matplotlib is not installed (apt install python3-matplotlib)")
         view = subprocess.Popen([PYTHON, PACKAGE / "examples/live_view.py"], env=environment(self.service), stderr=subprocess.DEVNULL)
         try:
             with slsd.Scanner(self.service.socket) as scanner:
