@@ -23,12 +23,24 @@ path report_of(path file) {
   return file.replace_extension(".html");
 }
 
+// What cannot be written is told before poses are taken, not after.
 Result<path> checked(path file, const std::string& named_by) {
-  if (report_of(file) != file) return file;
-  return fail(ErrorCode::kInvalidArgument,
-              "is where the report goes, which is written beside the calibration as .html: name it otherwise, such as "
-              "calibration.yml",
-              named_by);
+  if (report_of(file) == file) {
+    return fail(
+        ErrorCode::kInvalidArgument,
+        "is where the report goes, which is written beside the calibration as .html: name it otherwise, such as "
+        "calibration.yml",
+        named_by);
+  }
+  for (const path& written : {file, report_of(file)}) {
+    if (auto place = check_writable(written); !place) {
+      Error error = place.error();
+      error.message +=
+          "; nothing was begun: the calibration and its report are to be written there, or where --output says";
+      return tl::unexpected(std::move(error));
+    }
+  }
+  return file;
 }
 
 Result<> write_report(const path& file, const CalibrationOutcome& outcome) {

@@ -14,7 +14,7 @@
 namespace slsd {
 
 /// Where a calibration is to be kept: as asked for, or where the configuration has it.
-/// @errors kInvalidArgument: neither says, or it is the place of the report
+/// @errors kInvalidArgument: neither says, or it is the place of the report; those of check_writable()
 [[nodiscard]] Result<std::filesystem::path> file_to_keep(const CalibrateRequest& request,
                                                          const Configuration& configuration);
 

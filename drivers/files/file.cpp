@@ -120,6 +120,15 @@ fs::path follow_links(fs::path path) {
   return path;
 }
 
+Result<> check_place(const fs::path& path, mode_t mode) {
+  if (path.empty()) return fail(ErrorCode::kInvalidArgument, "the path of the file to write is empty");
+  if (S_ISDIR(mode)) return fail(ErrorCode::kInvalidArgument, "is a folder; name a file in it", path.string());
+  // Renaming would get round a file's own write protection.
+  const bool is_there = ::access(path.c_str(), F_OK) == 0;
+  if (is_there && ::access(path.c_str(), W_OK) != 0) return fail_call("cannot write", path);
+  return {};
+}
+
 Result<> write_in_place(const fs::path& path, std::string_view bytes) {
   const FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
   if (!file) return fail_call("cannot write", path);
@@ -137,13 +146,18 @@ Result<std::string> read_file(const fs::path& path, std::size_t limit_bytes) {
 }
 
 Result<> write_file_atomically(const fs::path& path, std::string_view bytes) {
-  if (path.empty()) return fail(ErrorCode::kInvalidArgument, "the path of the file to write is empty");
   const mode_t mode = mode_of(path);
-  if (S_ISDIR(mode)) return fail(ErrorCode::kInvalidArgument, "is a folder; name a file in it", path.string());
-  if (!S_ISREG(mode)) return write_in_place(path, bytes);
-  // Renaming would get round a file's own write protection.
-  if (::access(path.c_str(), F_OK) == 0 && ::access(path.c_str(), W_OK) != 0) return fail_call("cannot write", path);
-  return replace_file(follow_links(path), mode, bytes);
+  if (auto place = check_place(path, mode); !place) return place;
+  return S_ISREG(mode) ? replace_file(follow_links(path), mode, bytes) : write_in_place(path, bytes);
+}
+
+Result<> check_writable(const fs::path& path) {
+  const mode_t mode = mode_of(path);
+  if (auto place = check_place(path, mode); !place || !S_ISREG(mode)) return place;
+  const fs::path target = follow_links(path), temporary = temporary_beside(target);
+  Result<> done = write_temporary(temporary, target, mode, {});
+  ::unlink(temporary.c_str());
+  return done;
 }
 
 }  // namespace slsd

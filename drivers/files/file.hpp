@@ -24,4 +24,9 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] Result<> write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
 
+/// Whether write_file_atomically() would find a place there now, for those who work long before they write. What is
+/// there stays as it is.
+/// @errors as write_file_atomically(), but for a disk that is full
+[[nodiscard]] Result<> check_writable(const std::filesystem::path& path);
+
 }  // namespace slsd

@@ -328,6 +328,15 @@ TEST_F(FromFiles, KeepsNothingWhereTheReportCannotBeWritten) {
   EXPECT_THAT(refusal(), HasSubstr("calibration.html"));
 }
 
+TEST_F(FromFiles, SaysWhatCannotBeWrittenBeforeItBegins) {
+  testing::internal::CaptureStdout();
+  request_.output = home_;
+  EXPECT_THAT(refusal(), HasSubstr("is a folder; name a file in it; nothing was begun"));
+  request_.output = home_ / "none/calibration.yml";
+  EXPECT_THAT(refusal(), HasSubstr("nothing was begun"));
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+}
+
 TEST_F(FromFiles, RefusesTheReportsOwnPlace) {
   request_.output = home_ / "result.html";
   EXPECT_THAT(refusal(), HasSubstr("result.html: is where the report goes"));

@@ -187,5 +187,19 @@ TEST(WriteFileAtomically, RespectsAWriteProtectedFile) {
   EXPECT_EQ(bytes_of(path), "old");
 }
 
+TEST(CheckWritable, AgreesWithWritingAndLeavesEverythingAsItWas) {
+  const TemporaryFolder folder;
+  const fs::path there = folder.write("there", "old");
+  EXPECT_TRUE(check_writable(there));
+  EXPECT_EQ(bytes_of(there), "old");
+  EXPECT_TRUE(check_writable(folder.path() / "new"));
+  EXPECT_EQ(entries(folder.path()), 1U);
+  for (const fs::path& path : {folder.path(), folder.path() / "none" / "file", there / "file", fs::path()}) {
+    const auto checked = check_writable(path), written = write_file_atomically(path, "x");
+    ASSERT_FALSE(checked) << path;
+    EXPECT_EQ(to_string(checked.error()), to_string(written.error()));
+  }
+}
+
 }  // namespace
 }  // namespace slsd
