@@ -79,6 +79,20 @@ const CLI::Validator kPicture(
     },
     "pattern|idle|white|black|focus|grid|FILE.png");
 
+void add_calibrate(CLI::App& app, ClientOptions& options) {
+  CLI::App* calibrate = app.add_subcommand(
+      "calibrate",
+      "calibrate with the service's devices, and put the result in force; Ctrl-C ends it with the poses there are");
+  calibrate->add_option("ACTION", options.action, "begin one and follow it; look at, end or cancel the one under way")
+      ->check(CLI::IsMember({"begin", "look", "end", "cancel"}));
+  calibrate->add_option("--board", options.board, "the board, such as charuco:11x7:25:18.75:DICT_5X5_1000");
+  calibrate->add_option("--ruler", options.ruler, "NOMINAL:MEASURED in mm, of the ruler printed beside it");
+  calibrate->add_option("--code", options.code, "what is projected on it (pattern)")
+      ->check(CLI::IsMember({"pattern", "gray"}));
+  calibrate->add_option("--poses", options.poses, "how many poses to take (12)")->check(CLI::Range(3, 99));
+  calibrate->add_flag("--resume", options.resume, "go on with the pictures of the last session");
+}
+
 void add_project(CLI::App& app, ClientOptions& options) {
   CLI::App* project = app.add_subcommand("project", "show a picture until the next scan");
   project->add_option("PICTURE", options.picture, "what to show; a file's image has the projector's size")
@@ -130,6 +144,7 @@ int run(const CLI::App& app, const ClientOptions& options) {
   if (command == "set") return slsd::set_command(options);
   if (command == "settings") return slsd::settings_command(options);
   if (command == "bundle") return slsd::bundle_command(options);
+  if (command == "calibrate") return slsd::calibrate_command(options);
   if (command == "top") return slsd::top_command(options);
   if (command == "exposure") return slsd::exposure_command(options);
   if (command == "project") return slsd::project_command(options);
@@ -152,6 +167,7 @@ int main(int argc, char** argv) {
   add_image(app, options, "frame", "write what the camera sees");
   add_image(app, options, "pattern", "write the pattern that the projector shows");
   add_image(app, options, "preview", "scan, and write the frame with what was decoded");
+  add_calibrate(app, options);
   add_exposure(app, options);
   add_project(app, options);
   add_record(app, options);

@@ -11,6 +11,7 @@ _slsd() {
     --log-level) mapfile -t COMPREPLY < <(compgen -W 'trace debug info warning error critical' -- "$current"); return ;;
     --density) mapfile -t COMPREPLY < <(compgen -W 'symbols pixels' -- "$current"); return ;;
     --code) mapfile -t COMPREPLY < <(compgen -W 'pattern gray' -- "$current"); return ;;
+    calibrate) if [[ $current != -* ]]; then mapfile -t COMPREPLY < <(compgen -W 'begin look end cancel' -- "$current"); return; fi ;;
     project) mapfile -t COMPREPLY < <(compgen -W 'pattern idle black white focus grid' -- "$current"); return ;;
     --paper) mapfile -t COMPREPLY < <(compgen -W 'A0 A1 A2 A3 A4 letter' -- "$current"); return ;;
   esac

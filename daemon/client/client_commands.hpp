@@ -31,6 +31,8 @@ struct Failure;
 [[nodiscard]] int metrics_command(const ClientOptions& options);
 /// Writes the last scans that the service kept, and prints the file's name.
 [[nodiscard]] int bundle_command(const ClientOptions& options);
+/// Begins a calibration with the service's devices and shows it to its end, or looks at, ends or cancels one.
+[[nodiscard]] int calibrate_command(const ClientOptions& options);
 /// Shows rates, latencies and states, again and again.
 [[nodiscard]] int top_command(const ClientOptions& options);
 /// Sets keys of the service without a restart.

@@ -35,6 +35,10 @@ struct ClientOptions {
   std::optional<double> gain_max_db;      ///< exposure: the highest that is proposed
   std::optional<int> timeout_ms;
   std::vector<std::string> assignments;  ///< set: "decode.density=pixels"
+  std::string action = "begin";          ///< calibrate: or "look", "end" or "cancel"
+  std::string board, ruler, code;        ///< calibrate: as slsd --calibrate has them; empty: its own
+  std::optional<int> poses;              ///< calibrate
+  bool resume = false;                   ///< calibrate: the pictures of the last session count
   double interval_s = 1.0;               ///< top: between two looks
   std::optional<double> rate_hz;         ///< watch
   std::uint64_t count = 0;               ///< watch: clouds, record: scans, top: looks, after which it ends; 0: none

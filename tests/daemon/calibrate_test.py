@@ -5,12 +5,13 @@
 import os
 import pathlib
 import signal
+import subprocess
 import tempfile
 import time
 import unittest
 
 from client import RpcError
-from service import BIN, Service, wait_until
+from service import BIN, Service, slsctl, wait_until
 
 CONFIGURATION = """
 [[camera]]
@@ -85,6 +86,27 @@ class Calibrate(unittest.TestCase):
                 self.assertEqual(client.call("settings")[0]["set"], {"calibration": {"file": str(kept)}})
                 self.assertGreater(client.call("scan", timeout_ms=20000)[0]["points"], 500)
             self.assertEqual(service.stop()[0], 0)
+
+    def test_by_slsctl(self):
+        with stage(self.state) as service:
+            self.assertIn("no calibration", slsctl("--socket", service.socket, "calibrate", "look").stdout)
+            done = slsctl("--socket", service.socket, "calibrate", "--poses", 8, "--board", BOARD)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertRegex(done.stdout, r"(?s)pictures in .*verdict: (good|usable).*in force: (good|usable)\n$")
+            lines = [line for line in done.stdout.splitlines() if line.startswith("verdict")]
+            self.assertEqual(len(lines), 1, done.stdout)
+            self.assertEqual(slsctl("--socket", service.socket, "calibrate", "look").stdout, "in force, 8 of 8 poses\n")
+            failed = slsctl("--socket", service.socket, "calibrate", "--board", "no board at all")
+            self.assertEqual(failed.returncode, 1)
+            self.assertIn("board", failed.stderr)
+            self.assertEqual(slsctl("--socket", service.socket, "calibrate", "--poses", 2).returncode, 2)
+            with subprocess.Popen([BIN / "slsctl", "--socket", service.socket, "calibrate", "--board", BOARD],
+                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+                self.assertIn("pictures in", running.stdout.readline())
+                running.send_signal(signal.SIGINT)  # ends it with the poses that are there
+                out, said = running.communicate(timeout=60)
+                self.assertEqual(running.returncode, 1, out)
+                self.assertIn("3 are the least", said)
 
     def test_one_that_is_ended_too_early_cancelled_or_killed_changes_nothing(self):
         with stage(self.state) as service, service.client() as client:
