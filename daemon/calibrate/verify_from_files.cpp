@@ -2,8 +2,11 @@
 // Copyright the slsd authors
 #include "daemon/calibrate/verify_from_files.hpp"
 
+#include <iostream>
+
 #include "daemon/calibrate/captured_pattern.hpp"
 #include "daemon/calibrate/verifier.hpp"
+#include "daemon/configuration/settings_over.hpp"
 #include "drivers/files/read_image.hpp"
 
 namespace slsd {
@@ -38,7 +41,7 @@ Result<CapturedPictures> load(const CaptureFiles& files, bool gray_code) {
 }  // namespace
 
 Result<> verify_from_files(const CalibrateRequest& request) {
-  const auto configuration = load_configuration_or_defaults(request.configuration_file);
+  const auto configuration = load_configuration_in_force(request.configuration_file, std::cout);
   if (!configuration) return tl::unexpected(configuration.error());
   const auto poses = list_captures(request.from, WhitePicture::kOptional);
   if (!poses) return tl::unexpected(poses.error());

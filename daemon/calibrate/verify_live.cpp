@@ -2,8 +2,11 @@
 // Copyright the slsd authors
 #include "daemon/calibrate/verify_live.hpp"
 
+#include <iostream>
+
 #include "daemon/calibrate/device_source.hpp"
 #include "daemon/calibrate/verifier.hpp"
+#include "daemon/configuration/settings_over.hpp"
 #include "daemon/scan/scan_setup.hpp"
 
 namespace slsd {
@@ -19,7 +22,7 @@ Result<std::vector<GreyImage>> look_under(const Grey8& image, PoseSource& source
 }  // namespace
 
 Result<> verify_live(const CalibrateRequest& request) {
-  const auto configuration = load_configuration_or_defaults(request.configuration_file);
+  const auto configuration = load_configuration_in_force(request.configuration_file, std::cout);
   if (!configuration) return tl::unexpected(configuration.error());
   auto pattern = configured_pattern(*configuration);
   if (!pattern) return tl::unexpected(pattern.error());

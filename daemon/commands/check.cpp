@@ -19,6 +19,7 @@
 #include "daemon/configuration/access.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/configuration/exposure_warnings.hpp"
+#include "daemon/configuration/settings_over.hpp"
 #include "daemon/latency/latency_file.hpp"
 #include "daemon/scan/crew.hpp"
 #include "daemon/scan/devices.hpp"
@@ -101,6 +102,10 @@ class LiveService {
     }
     return tables;
   }
+  /// What was set over its socket, in the places of the file's keys.
+  [[nodiscard]] Result<json> set() const {
+    return merge_settings(json::object(), settings_.value("set", json::object()));
+  }
   [[nodiscard]] json projector() const { return status_.value("projector", json::object()); }
   [[nodiscard]] json camera(const std::string& name) const {
     for (const json& camera : status_.value("cameras", json::array()))
@@ -135,8 +140,8 @@ class LiveService {
 /// One after the other, what a scan needs.
 class Check {
  public:
-  Check(const Configuration& configuration, const path& file, Findings& findings)
-      : configuration_(configuration), file_(file), findings_(findings) {}
+  Check(Configuration configuration, const path& file, Findings& findings)
+      : configuration_(std::move(configuration)), file_(file), findings_(findings) {}
 
   void look() {
     look_for_service();
@@ -167,7 +172,7 @@ class Check {
  private:
   // One that runs is asked of its devices; one that does not answer is left alone with them.
   void look_for_service() {
-    const path& socket = configuration_.server.socket;
+    const path socket = configuration_.server.socket;
     auto service = LiveService::ask(socket);
     if (!service) {
       held_ = true;
@@ -175,7 +180,7 @@ class Check {
     }
     if (!*service) {
       findings_.note(check_socket_path(socket), "socket " + socket.string());
-      return;
+      return take_settings(find_kept_settings(file_));
     }
     if (!(*service)->serves(file_)) {
       return findings_.bad("socket " + socket.string() + ": the service there runs with another configuration, " +
@@ -184,6 +189,7 @@ class Check {
     }
     live_ = std::move(**service);
     findings_.good("service: it runs, at " + socket.string());
+    take_settings(live_->set());
     for (const std::string& table : live_->tables_behind(configuration_)) {
       findings_.warn("service: [" + printable(table) +
                      "] is not yet as in this file: reload the service; what is left then needs a restart");
@@ -192,6 +198,16 @@ class Check {
       findings_.warn("service: " + std::to_string(dropped) +
                      " lines of its log were dropped: whoever reads it is too slow");
     }
+  }
+
+  // As the service has it, or will have it when it starts.
+  void take_settings(const Result<json>& settings) {
+    if (settings && settings->empty()) return;
+    auto with_them = settings ? load_configuration_with(file_, *settings) : tl::unexpected(settings.error());
+    if (!with_them)
+      return findings_.warn("what was set over the socket is passed over: " + to_string(with_them.error()));
+    configuration_ = std::move(*with_them);
+    findings_.good("as set over the socket: " + names_of_settings(*settings));
   }
 
   /// What the service says of a device that it holds. @return whether it is open
@@ -388,7 +404,7 @@ class Check {
                                   : memory);
   }
 
-  const Configuration& configuration_;
+  Configuration configuration_;
   const path& file_;
   Findings& findings_;
   std::optional<Calibration> calibration_;
@@ -420,9 +436,9 @@ Result<> check_configuration(const std::optional<path>& configuration_file) {
 bool check_everything(const std::optional<path>& configuration_file) {
   Findings findings;
   const path file = configuration_file.value_or(kConfigurationFile);
-  const auto configuration = load_configuration(file);
+  auto configuration = load_configuration(file);
   if (!findings.note(configuration, "configuration " + file.string())) return false;
-  Check(*configuration, file, findings).look();
+  Check(std::move(*configuration), file, findings).look();
   return findings.scan_possible();
 }
 

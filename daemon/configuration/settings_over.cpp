@@ -167,6 +167,48 @@ Result<json> read_kept_settings(const path& file) {
   return merged;
 }
 
+Result<json> find_kept_settings(const path& configuration) {
+  constexpr const char* kState = "/var/lib/slsd";  // StateDirectory= of the unit, which others than it have no name for
+  path file = kept_settings_file(configuration);
+  std::error_code ignored;
+  const path folder = std::filesystem::absolute(configuration, ignored).parent_path();
+  if (file.empty() && folder == path(kConfigurationFile).parent_path())
+    file = path(kState) / ("settings-" + configuration.stem().string() + ".json");
+  return read_kept_settings(file);
+}
+
+std::string names_of_settings(const json& settings) {
+  std::string names;
+  const auto add = [&](const std::string& table, const json& keys) {
+    for (const auto& [key, value] : keys.items())
+      names += (names.empty() ? "" : ", ") + printable(table + "." + key, 200);
+  };
+  for (const auto& [table, keys] : settings.items()) {
+    if (table != "camera") {
+      add(table, keys);
+      continue;
+    }
+    for (const auto& [camera, of_camera] : keys.items()) add("camera." + camera, of_camera);
+  }
+  return names;
+}
+
+Result<Configuration> load_configuration_in_force(const std::optional<path>& file, std::ostream& told) {
+  auto configuration = load_configuration_or_defaults(file);
+  const path own = file.value_or(kConfigurationFile);
+  std::error_code ignored;
+  if (!configuration || !std::filesystem::exists(own, ignored)) return configuration;
+  const auto kept = find_kept_settings(own);
+  if (kept && kept->empty()) return configuration;
+  auto with_kept = kept ? load_configuration_with(own, *kept) : tl::unexpected(kept.error());
+  if (!with_kept) {
+    told << "warning: what was set over the socket is passed over: " << to_string(with_kept.error()) << "\n";
+    return configuration;
+  }
+  told << "as set over the socket: " << names_of_settings(*kept) << "\n";
+  return with_kept;
+}
+
 std::vector<CameraOptions> with_exposures_of(std::vector<CameraOptions> cameras,
                                              const std::vector<CameraOptions>& others) {
   for (CameraOptions& camera : cameras) {

@@ -3,6 +3,9 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <ostream>
+#include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -33,6 +36,17 @@ namespace slsd {
 /// What is kept there; nothing where there is no file.
 /// @errors kMalformed: it is not what was written; of read_file()
 [[nodiscard]] Result<nlohmann::json> read_kept_settings(const std::filesystem::path& file);
+/// For others than the service: what it kept, where systemd keeps the state of a configuration in /etc/slsd, whoever
+/// asks. @errors as read_kept_settings()
+[[nodiscard]] Result<nlohmann::json> find_kept_settings(const std::filesystem::path& configuration);
+/// "calibration.file, camera.left.gain_db"
+[[nodiscard]] std::string names_of_settings(const nlohmann::json& settings);
+
+/// As load_configuration_or_defaults(), with what was set over the service's socket and kept. What no longer fits is
+/// passed over, as the service does.
+/// @param told  gets a line that says what is not as the file has it
+[[nodiscard]] Result<Configuration> load_configuration_in_force(const std::optional<std::filesystem::path>& file,
+                                                                std::ostream& told);
 
 /// The same cameras with exposures and gains as those of their names have them; as they are where the drivers differ.
 [[nodiscard]] std::vector<CameraOptions> with_exposures_of(std::vector<CameraOptions> cameras,

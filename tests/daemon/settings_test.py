@@ -3,15 +3,17 @@
 # Copyright the slsd authors
 """Settings without a restart: set over the socket, kept beside the configuration, refused by a camera."""
 import json
+import os
 import pathlib
 import shutil
+import subprocess
 import tempfile
 import unittest
 
 from client import RpcError
 from gige_double import Double, service_on
 from recovery import scan_until_it_works
-from service import SCENE, Service, slsctl
+from service import BIN, SCENE, Service, slsctl
 
 
 def configured(client):
@@ -49,6 +51,29 @@ class Decoding(unittest.TestCase):
             self.assertGreater(client.call("scan")[0]["points"], 2000)
             self.assertEqual(configured(client)["set"], {})
         self.assertEqual(json.loads((self.state / "settings-slsd.json").read_text(encoding="utf-8")), {})
+
+    def test_check_and_verify_take_what_was_set(self):
+        other = self.state / "other.yml"
+        shutil.copy(SCENE / "calibration.yml", other)
+        own = {**os.environ, **self.environment}
+
+        def slsd(*arguments):
+            done = subprocess.run([BIN / "slsd", *map(str, arguments), "--config", service.file], capture_output=True, text=True,
+                                  check=False, env=own)
+            return done.stdout + done.stderr
+        service = Service(environment=self.environment)
+        with service:
+            with service.client() as client:
+                client.call("set", calibration={"file": str(other)}, decode={"depth_max_mm": 2000.0})
+            said = slsd("--check")
+            self.assertIn("as set over the socket: calibration.file, decode.depth_max_mm", said)
+            self.assertNotIn("not yet as in this file", said)
+            self.assertEqual(service.stop()[0], 0)
+        self.assertIn("as set over the socket: calibration.file, decode.depth_max_mm", slsd("--check"))
+        if (BIN / "slsd-calibrate").exists():
+            self.assertIn("as set over the socket: calibration.file", slsd("--verify", "--from", self.state))
+        (self.state / "settings-slsd.json").write_text("{", encoding="utf-8")
+        self.assertIn("what was set over the socket is passed over", slsd("--check"))
 
     def test_what_cannot_be_set_changes_nothing(self):
         with Service(environment=self.environment) as service, service.client() as client:
