@@ -76,7 +76,13 @@ int serve(const std::filesystem::path& configuration_file) {
   spdlog::info("slsd {} starts with {}", SLSD_VERSION, configuration_file.string());
   slsd::queue_log();
   auto configuration = slsd::load_configuration(configuration_file);
-  if (!configuration) return not_served(configuration.error(), configuration.error().code == slsd::ErrorCode::kIo);
+  if (!configuration) {
+    // What is not found of a file that is there is a user or a group, which may come later from another host.
+    const slsd::ErrorCode code = configuration.error().code;
+    std::error_code ignored;
+    const bool named = code == slsd::ErrorCode::kNotFound && std::filesystem::exists(configuration_file, ignored);
+    return not_served(configuration.error(), named || code == slsd::ErrorCode::kIo);
+  }
   auto service = make_service(configuration_file, std::move(*configuration));
   if (service) (*service)->set_calibrator(slsd::find_calibrator());
   const auto served = service ? (*service)->run() : slsd::Result<>(tl::unexpected(service.error()));

@@ -122,6 +122,13 @@ class Life(unittest.TestCase):
         self.assertEqual(result.returncode, 78)
         self.assertIn("slsd.toml:2:10: [server] socket must be a path of 1 to 107 bytes", result.stderr)
 
+    def test_a_group_that_is_missing_may_come_later(self):
+        service = Service()
+        service.file.write_text('[server]\nscan = ["@nobody-made-this"]\n', encoding="utf-8")
+        result = slsd("--config", service.file)
+        self.assertIn('the group "nobody-made-this", which this host does not know', result.stderr)
+        self.assertEqual(result.returncode, 1)  # the unit tries it again
+
     def test_folder_that_is_missing_is_named(self):
         service = Service()
         service.file.write_text('[server]\nsocket = "missing/slsd.sock"\n', encoding="utf-8")
