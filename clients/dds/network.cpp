@@ -2,11 +2,15 @@
 // Copyright the slsd authors
 #include "network.hpp"
 
+#include <sys/socket.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <utility>
+
+#include "drivers/system/file_descriptor.hpp"
 
 namespace slsd::dds {
 namespace {
@@ -23,6 +27,7 @@ constexpr const char* kInternal =
     "<HeartbeatInterval>20 ms</HeartbeatInterval>"
     "<MaxQueuedRexmitBytes>32 MB</MaxQueuedRexmitBytes>"
     "<MaxQueuedRexmitMessages>4000</MaxQueuedRexmitMessages></Internal>";
+constexpr int kDenseCloudBytes = 10 << 20;
 constexpr int kParticipantsMax = 120;  // of one host, found one by one where there is no multicast
 
 bool plain(const std::string& text) {
@@ -62,7 +67,25 @@ Result<dds_entity_t> made(dds_entity_t entity, const std::string& what) {
   return fail(ErrorCode::kIo, "DDS: " + std::string(dds_strretcode(entity)), what);
 }
 
+// Asked of a socket, as a unit may hide /proc/sys. The kernel doubles what it grants.
+int largest_receive_buffer() {
+  constexpr int kMost = 1 << 30;
+  const FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  int granted = 0;
+  socklen_t size = sizeof granted;
+  ::setsockopt(socket.number(), SOL_SOCKET, SO_RCVBUF, &kMost, sizeof kMost);
+  return ::getsockopt(socket.number(), SOL_SOCKET, SO_RCVBUF, &granted, &size) == 0 ? granted / 2 : kMost;
+}
+
 }  // namespace
+
+std::string receive_buffer_warning() {
+  const int largest = largest_receive_buffer();
+  if (largest >= kDenseCloudBytes) return {};
+  return "net.core.rmem_max is " + std::to_string(largest) +
+         ": of a dense cloud a reader on this host may lose a part, and get it late or never: "
+         "echo net.core.rmem_max=67108864 >/etc/sysctl.d/60-clouds.conf, and run sysctl --system";
+}
 
 Result<Network> Network::open(const NetworkOptions& options) {
   if (!plain(options.interface) || !std::all_of(options.peers.begin(), options.peers.end(), plain)) {

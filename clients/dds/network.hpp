@@ -57,6 +57,9 @@ class Network {
   bool best_effort_;
 };
 
+/// What to do where this host's sockets cannot hold a dense cloud; empty: nothing. @thread reentrant
+[[nodiscard]] std::string receive_buffer_warning();
+
 /// Waits until one of these readers has a sample that was not read, or the time is over.
 bool wait_for(const std::vector<dds_entity_t>& readers, std::chrono::milliseconds time);
 

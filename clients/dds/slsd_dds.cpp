@@ -3,6 +3,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <string>
 
 #include <CLI/CLI.hpp>
 
@@ -65,6 +66,8 @@ int main(int argc, char** argv) {
   sigaddset(&ends, SIGINT);
   sigaddset(&ends, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);
+  const std::string warning = slsd::dds::receive_buffer_warning();
+  if (!warning.empty()) std::fprintf(stderr, "slsd-dds: %s\n", warning.c_str());
   auto joined = slsd::dds::Network::open(network);
   if (!joined) return failed(joined.error());
   slsd::Result<std::unique_ptr<slsd::dds::Bridge>> bridge;

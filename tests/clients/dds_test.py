@@ -255,6 +255,11 @@ class Shown(unittest.TestCase):
             self.assertEqual(second.process.wait(30), 1)
             self.assertIn("name_taken", second.said())
 
+    def test_buffers_too_small_for_a_dense_cloud_are_told(self):
+        allowed = int(pathlib.Path("/proc/sys/net/core/rmem_max").read_text(encoding="utf-8"))
+        probe("left/points", "PointCloud2")  # it has begun
+        self.assertEqual(f"net.core.rmem_max is {allowed}: " in self.bridge.said(), allowed < 10 << 20)
+
     def test_an_independent_reader_reads_the_same(self):
         python = os.environ.get("SLSD_DDS_PYTHON")
         if not python:
