@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #include "daemon/server/methods.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <vector>
@@ -258,6 +260,28 @@ void run_pattern(ServiceState& state, const json& params, Session&, Respond resp
   }));
 }
 
+// A user's pictures, each of which is decoded and changes the light: so many a second, and as many at once. No camera
+// takes more of them. Root and the service's own user, as whom slsd-calibrate runs, are not counted.
+constexpr double kPicturesPerSecond = 30.0;
+
+std::optional<RpcError> refused_picture(ServiceState& state, const Session& session) {
+  const auto user = session.peer().user;
+  if (user == 0 || user == ::geteuid()) return std::nullopt;
+  const auto now = std::chrono::steady_clock::now();
+  for (auto& [_, allowance] : state.pictures) {
+    allowance.left += std::chrono::duration<double>(now - allowance.since).count() * kPicturesPerSecond;
+    allowance.since = now;
+  }
+  std::erase_if(state.pictures, [](const auto& entry) { return entry.second.left >= kPicturesPerSecond; });
+  double& left = state.pictures.try_emplace(user, PictureAllowance{kPicturesPerSecond, now}).first->second.left;
+  if (left >= 1.0) return left -= 1.0, std::nullopt;
+  return rpc_error({ErrorCode::kBusy,
+                    "user " + std::to_string(user) + " has had " +
+                        std::to_string(static_cast<int>(kPicturesPerSecond)) +
+                        " pictures shown within a second, which is what one user gets: ask again later",
+                    {}});
+}
+
 void run_project(ServiceState& state, const json& params, Session& session, Respond respond) {
   ParamReader reader(params);
   const std::string name = reader.choice("picture", {"pattern", "idle", "black", "white", "focus", "grid", "image"});
@@ -268,6 +292,7 @@ void run_project(ServiceState& state, const json& params, Session& session, Resp
   if (!png || (name == "image") == png->empty()) {
     return respond(tl::unexpected(invalid_params("\"png\" must be an image as base64, and only with \"image\"")));
   }
+  if (auto refused = refused_picture(state, session)) return respond(tl::unexpected(*refused));
   state.scanner.project({*picture_named(name), std::move(*png), deadline_in(timeout_ms), session.gone()},
                         [&events = state.events, respond = std::move(respond), name](const Result<>& shown) {
                           auto outcome = std::make_shared<Outcome>(Reply{{{"picture", name}}});

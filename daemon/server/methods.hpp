@@ -28,6 +28,12 @@ struct RequestCounts {
   std::map<std::string, std::uint64_t> failed;  ///< by the error's name
 };
 
+/// How many pictures one user may have shown at a time, which fills up again as time goes by.
+struct PictureAllowance {
+  double left;
+  std::chrono::steady_clock::time_point since;
+};
+
 /// What the methods act on. Everything outlives the server's sessions.
 struct ServiceState {
   asio::io_context& events;
@@ -44,7 +50,8 @@ struct ServiceState {
   std::function<void(Scanner::Answer<std::string>)> bundle = {};
   std::function<std::uint64_t()> bundles_written = {};  ///< by itself
   RequestCounts requests = {};
-  std::filesystem::path calibrator = {};  ///< slsd-calibrate; empty: not found
+  std::map<std::uint32_t, PictureAllowance> pictures = {};  ///< by user; who is not in it has all
+  std::filesystem::path calibrator = {};                    ///< slsd-calibrate; empty: not found
   std::unique_ptr<CalibrationRun> calibration = {};
 };
 

@@ -6,6 +6,7 @@ import json
 import os
 import pwd
 import socket
+import time
 import unittest
 
 from client import RpcError
@@ -13,6 +14,7 @@ from service import Service
 
 STRANGER = pwd.getpwnam("nobody")
 OTHER = pwd.getpwnam("daemon")
+DOT = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="  # a PNG
 
 
 def as_user(user, act):
@@ -106,6 +108,32 @@ class Access(unittest.TestCase):
                 return taken
 
             self.assertEqual(as_user(STRANGER, fill), [True] * 8 + [False] * 4)
+
+    def test_one_user_has_only_so_many_pictures_shown_a_second(self):
+        request = json.dumps({"jsonrpc": "2.0", "id": 1, "method": "project", "params": {"picture": "image", "png": DOT}})
+        request = request.encode() + b"\n"
+        with self.service('administer = ["daemon"]') as service:
+            service.wait_ready()
+
+            def show():
+                with socket.socket(socket.AF_UNIX) as connection:
+                    connection.connect(str(service.socket))
+                    with connection.makefile("rwb") as stream:
+                        def one():
+                            stream.write(request)
+                            stream.flush()
+                            return json.loads(stream.readline())
+                        begin = time.monotonic()
+                        replies = [one() for _ in range(200)]
+                        took = time.monotonic() - begin
+                        time.sleep(0.5)
+                        return took, [reply["error"]["data"]["name"] for reply in (*replies, one())]
+
+            took, (*names, later) = as_user(OTHER, show)
+            self.assertEqual(set(names), {"mismatch", "busy"})
+            self.assertEqual(set(names[:30]), {"mismatch"})  # which is of the picture: it was looked at
+            self.assertLessEqual(names.count("mismatch"), 31 + 30 * took)
+            self.assertEqual(later, "mismatch")
 
     def test_a_group_that_nobody_made_is_an_error_and_the_old_state_stays(self):
         with self.service("") as service, service.client() as client:
