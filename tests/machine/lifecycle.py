@@ -62,7 +62,8 @@ def make_next_version(packages, folder):
         control = tree / "DEBIAN/control"
         text = control.read_text(encoding="utf-8")
         version = re.search(r"^Version: (.*)$", text, re.MULTILINE)[1]
-        text = text.replace(f"Version: {version}\n", f"Version: {version}+next\n").replace(f"(= {version})", f"(= {version}+next)")
+        text = text.replace(f"Version: {version}\n", f"Version: {version}+next\n")
+        text = re.sub(rf"\((=|<<|>=) {re.escape(version)}\)", rf"(\1 {version}+next)", text)
         control.write_text(text, encoding="utf-8")
         if (tree / CONFIGURATION).exists():
             with open(tree / CONFIGURATION, "a", encoding="utf-8") as file:
