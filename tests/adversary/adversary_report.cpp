@@ -55,7 +55,8 @@ void print(const char* name, const Row& row) {
               row.undecidable, row.right, row.visible == 0 ? 0. : 100. * row.right / row.visible);
 }
 
-Result<int> report(int frames, int only_kind, int only_number, const char* picture) {
+/// @param first  number of each kind's first frame: those of another number are other frames
+Result<int> report(int frames, int first, int only_kind, bool single, const char* picture) {
   std::vector<Reader> readers;
   for (const PatternOptions& options :
        {PatternOptions{.symbol_size_px = 16, .spacing_px = 2}, PatternOptions{.symbol_size_px = 8, .spacing_px = 2}}) {
@@ -71,8 +72,7 @@ Result<int> report(int frames, int only_kind, int only_number, const char* pictu
     if (only_kind >= 0 && k != only_kind) continue;
     const Kind kind = static_cast<Kind>(k);
     Row row;
-    for (int n = 0; n < (frames + kKinds - 1) / kKinds; ++n) {
-      if (only_number >= 0 && n != only_number) continue;
+    for (int n = first; n < first + (frames + kKinds - 1) / kKinds; ++n) {
       Reader& reader = readers[n % 2];
       const Frame frame = reader.maker->make(kind, static_cast<std::uint32_t>(n));
       const auto decoding = reader.decoders[n / 2 % 3].decode(frame.image.view(), 255);
@@ -86,7 +86,7 @@ Result<int> report(int frames, int only_kind, int only_number, const char* pictu
                      point.column, point.camera_u, point.camera_v);
       }
       if (picture != nullptr) write_pgm(frame.image, picture);
-      if (only_number >= 0) {
+      if (single) {
         for (int i = 0; i < kRegionStatusCount; ++i)
           std::fprintf(stderr, "%s %u\n", std::string(to_string(static_cast<RegionStatus>(i))).c_str(),
                        (*decoding)->counts[i]);
@@ -106,9 +106,9 @@ Result<int> report(int frames, int only_kind, int only_number, const char* pictu
 }  // namespace
 }  // namespace slsd::adversary
 
-// adversary-report [FRAMES] [--kind K] [--frame N [--picture FILE.pgm]]
+// adversary-report [FRAMES] [--first N] [--kind K] [--frame N [--picture FILE.pgm]]
 int main(int count, char** arguments) {
-  int frames = 1000, kind = -1, number = -1;
+  int frames = 1000, first = 0, kind = -1, number = -1;
   const char* picture = nullptr;
   for (int i = 1; i < count; ++i) {
     const bool more = i + 1 < count;
@@ -116,14 +116,16 @@ int main(int count, char** arguments) {
       kind = std::atoi(arguments[++i]);
     } else if (std::strcmp(arguments[i], "--frame") == 0 && more) {
       number = std::atoi(arguments[++i]);
+    } else if (std::strcmp(arguments[i], "--first") == 0 && more) {
+      first = std::atoi(arguments[++i]);
     } else if (std::strcmp(arguments[i], "--picture") == 0 && more) {
       picture = arguments[++i];
     } else {
       frames = std::atoi(arguments[i]);
     }
   }
-  if (number >= 0) frames = std::max(frames, (number + 1) * slsd::adversary::kKinds);
-  const auto wrong = slsd::adversary::report(frames, kind, number, picture);
+  if (number >= 0) first = number, frames = slsd::adversary::kKinds;
+  const auto wrong = slsd::adversary::report(frames, first, kind, number >= 0, picture);
   if (!wrong) std::fprintf(stderr, "adversary-report: %s\n", slsd::to_string(wrong.error()).c_str());
   return wrong && *wrong == 0 ? 0 : 1;
 }
