@@ -44,23 +44,39 @@ class Surroundings {
     });
   }
 
-  /// Of the few that are left of a line, between refused ones and its end, each beside what is none of its island.
+  /// Of the few that are left of a line, between as many refused ones and its end, with nothing of their island on one
+  /// side of them, and there something that is none of it.
   [[nodiscard]] bool is_rest(std::int32_t node) const {
     return std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp}, [&](Direction aside) {
-      if (!is_beside_others(node, aside)) return false;
-      int length = 1;
-      bool beside_refused = false;
+      if (stands(node, beside(node, aside))) return false;
+      int length = 1, most_refused = 0;
+      bool others = is_beside_others(node, aside);
       for (const int turn : {1, 3}) {
         const auto along = static_cast<Direction>((aside + turn) % 4);
         std::int32_t other = beside(node, along);
-        for (; stands(node, other) && is_beside_others(other, aside); other = beside(other, along)) ++length;
+        for (; stands(node, other) && !stands(node, beside(other, aside)); other = beside(other, along)) {
+          others |= is_beside_others(other, aside);
+          ++length;
+        }
         int refused = 0;
         for (; refused < kReach && other >= 0 && !stands(node, other); other = beside(other, along)) ++refused;
         if (refused < kReach && other >= 0) return false;
-        beside_refused |= refused == kReach;
+        most_refused = std::max(most_refused, refused);
       }
-      return beside_refused && length <= kReach;
+      return others && length <= most_refused;
     });
+  }
+
+  /// All of those beside it stand.
+  [[nodiscard]] bool is_inside(std::int32_t node) const {
+    return std::ranges::all_of(std::array{kRight, kDown, kLeft, kUp},
+                               [&](Direction d) { return stands(node, beside(node, d)); });
+  }
+
+  /// None of those beside it stands.
+  [[nodiscard]] bool is_alone(std::int32_t node) const {
+    return std::ranges::none_of(std::array{kRight, kDown, kLeft, kUp},
+                                [&](Direction d) { return stands(node, beside(node, d)); });
   }
 
   /// At the corner of what was put there: on two sides that meet, and between them, it has been refused.
@@ -119,7 +135,7 @@ class Surroundings {
     }
     const auto aside = static_cast<Direction>((forth + 1) % 4);
     const bool inside = continues(node, aside) && continues(node, opposite(aside));
-    return inside ? refused == 2 * kReach : refused > standing || next_refused == 2;
+    return inside ? standing == 0 && refused > kReach : refused > standing || next_refused == 2;
   }
 
   /// The same, seen from the row within: its links lead on where those of a row that an edge runs through are broken.
@@ -181,11 +197,12 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, std::vector
     for (const std::int32_t node : lone_) claims[node].status = RegionStatus::kNeighboursDisagree;
     return !lone_.empty();
   };
-  const bool some_lone = refuse([&](std::int32_t node) { return around.leave_alone(node); });
-  const bool some_corners = refuse([&](std::int32_t node) { return around.is_corner(node); });
-  if (!some_lone && !some_corners) return;
-  while (
-      refuse([&](std::int32_t node) { return around.is_last(node) || around.is_left(node) || around.is_rest(node); }))
+  refuse([&](std::int32_t node) { return around.leave_alone(node); });
+  refuse([&](std::int32_t node) { return around.is_corner(node); });
+  while (refuse([&](std::int32_t node) {
+    return !around.is_inside(node) &&
+           (around.is_alone(node) || around.is_last(node) || around.is_left(node) || around.is_rest(node));
+  }))
     continue;
 }
 

@@ -164,6 +164,38 @@ TEST(RefuseLone, RefusesTheFewThatAreLeftOfAMisreadRow) {
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(3, column).status, kDecoded) << column;
 }
 
+// One of them has nothing above it, and a broken link ends what was refused.
+TEST(RefuseLone, RefusesTheFewThatAreLeftOfABrokenRow) {
+  RimSheet sheet;
+  for (int column = 0; column < 9; ++column) sheet.at(1, column).status = RegionStatus::kClassDisagrees;
+  for (const int column : {4, 5, 6}) {
+    sheet.at(2, column).status = RegionStatus::kNeighboursDisagree;
+    sheet.grid.nodes[sheet.grid.node_at(3, column)].links[kUp] = -1;
+  }
+  sheet.grid.nodes[sheet.grid.node_at(2, 5)].broken[kLeft] = true;
+  sheet.grid.nodes[sheet.grid.node_at(2, 7)].links[kUp] = -1;
+  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  for (const int column : {7, 8}) EXPECT_EQ(sheet.at(2, column).status, RegionStatus::kNeighboursDisagree) << column;
+  for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(3, column).status, kDecoded) << column;
+}
+
+// One symbol of a row of another surface, which joins the rows above to those below.
+TEST(RefuseLone, RefusesABridgeOverARefusedRow) {
+  RimSheet sheet;
+  for (const int column : {0, 1, 2, 3, 5, 6, 7, 8}) sheet.at(2, column).status = RegionStatus::kNoCodeword;
+  sheet.grid.nodes[sheet.grid.node_at(2, 5)].broken[kRight] = true;
+  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
+}
+
+TEST(RefuseLone, RefusesWhatHasNothingStandingBesideIt) {
+  RimSheet sheet;
+  sheet.at(0, 1).status = sheet.at(1, 0).status = RegionStatus::kDamagedShape;
+  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  EXPECT_EQ(sheet.at(0, 0).status, RegionStatus::kNeighboursDisagree);
+  EXPECT_EQ(sheet.at(1, 1).status, kDecoded);
+}
+
 // The corner of something that was put there agrees by chance.
 TEST(RefuseLone, RefusesTheCornerOfWhatIsMisread) {
   RimSheet sheet;
