@@ -28,6 +28,32 @@ class CellGate {
     return segments_.empty() ||
            std::abs(segments_[node].residual_px(cells_.ray(row, column).direction)) <= tolerance_px_;
   }
+  [[nodiscard]] bool knows_lines() const { return !segments_.empty(); }
+  /// Calls visit(row, column) for the cells that a node can be, found from one that lies on its epipolar line, which is
+  /// left out: the line is followed from row to row or from column to column, whichever are more.
+  template <class Visit>
+  void visit_line(std::int32_t node, int row, int column, Visit&& visit) const {
+    const auto off_line = [&](int r, int c) {
+      return std::abs(segments_[node].residual_px(cells_.ray(r, c).direction));
+    };
+    const auto change = [&](int down, int right) {
+      const bool forth = row + down < cells_.rows() && column + right < cells_.columns();
+      return off_line(forth ? row + down : row - down, forth ? column + right : column - right);
+    };
+    const int down = change(1, 0) < change(0, 1) ? 1 : 0, right = 1 - down;
+    for (const int way : {1, -1}) {
+      int r = row + way * down, c = column + way * right;
+      for (; r >= 0 && c >= 0 && r < cells_.rows() && c < cells_.columns(); r += way * down, c += way * right) {
+        for (const int aside : {-1, 1}) {
+          const int beside_row = r + aside * right, beside_column = c + aside * down;
+          if (beside_row < 0 || beside_column < 0 || beside_row >= cells_.rows() || beside_column >= cells_.columns())
+            continue;
+          if (off_line(beside_row, beside_column) < off_line(r, c)) r = beside_row, c = beside_column;
+        }
+        if (admits(node, r, c)) visit(r, c);
+      }
+    }
+  }
   /// Calls visit(row, column) for every cell that a node can be; with `anywhere` for every cell.
   template <class Visit>
   void visit(std::int32_t node, bool anywhere, Visit&& visit) const {

@@ -38,9 +38,10 @@ class Surroundings {
       int refused = 0;
       for (const Direction d : {forth, opposite(forth)}) {
         std::int32_t other = beside(node, d);
-        for (int i = 0; i < kReach && other >= 0 && !stands(node, other); ++i, other = beside(other, d)) ++refused;
+        for (int i = 0; i < kReach && other >= 0; ++i, other = beside(other, d), ++refused)
+          if (stands(node, other)) return false;
       }
-      return refused == 2 * kReach;
+      return refused > kReach;
     });
   }
 

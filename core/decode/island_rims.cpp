@@ -107,6 +107,83 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth) {
   }
 }
 
+/// Refuses what another surface explains better: stretches of a row or a column of the island, with what lies right
+/// beside it, whose shapes fit the cells at another place on their epipolar lines, all of them moved by the same step.
+void IslandJudge::cut_slid(const Frame& frame, std::int32_t island) {
+  const auto members = std::span(members_).subspan(islands_[island].first, islands_[island].size);
+  if (!frame.gate.knows_lines() ||
+      std::ranges::all_of(members, [&](std::int32_t node) { return links_[node] == kAllAgree; }))
+    return;
+  Piece all{options_.rows, options_.columns, 0, 0};
+  const auto place = [&](int row, int column, std::int32_t node) {
+    if (!shown(row, column)) return;
+    std::int32_t& there = around_[index_of(row, column)];
+    if (there < 0) there = node, placed_.push_back(static_cast<std::int32_t>(index_of(row, column)));
+    all.row = std::min(all.row, row), all.column = std::min(all.column, column);
+    all.rows = std::max(all.rows, row + 1), all.columns = std::max(all.columns, column + 1);
+  };
+  placed_.clear();
+  for (const std::int32_t node : members) place(frame.claims[node].row, frame.claims[node].column, node);
+  for (const std::int32_t node : members) {
+    if (links_[node] == kAllAgree) continue;
+    for (const Direction d : kAllDirections) {
+      const Beyond cell(frame.claims[node], d);
+      const std::int32_t other = frame.beside[node][d];
+      if (other >= 0 && !continues(frame, node, d)) place(cell.row, cell.column, other);
+    }
+  }
+  for (int row = all.row; row < all.rows; ++row)
+    cut_slid_along(frame, island, {row, all.column, 1, all.columns - all.column});
+  for (int column = all.column; column < all.columns; ++column)
+    cut_slid_along(frame, island, {all.row, column, all.rows - all.row, 1});
+  for (const std::int32_t at : placed_) around_[at] = -1;
+}
+
+/// @param line  one cell wide or high
+void IslandJudge::cut_slid_along(const Frame& frame, std::int32_t island, const Piece& line) {
+  constexpr float kUnlikely = -0.3F;
+  constexpr int kGapMax = 3;
+  const int down = line.columns == 1, right = 1 - down, count = line.rows * line.columns;
+  line_.clear(), own_ratios_.clear();
+  std::int32_t probe = -1;
+  float least = 0;
+  for (int i = 0; i < count; ++i) {
+    const int row = line.row + i * down, column = line.column + i * right;
+    const std::int32_t node = line_.emplace_back(around_[index_of(row, column)]);
+    own_ratios_.push_back(node < 0 ? 0 : ratio(frame, node, row, column));
+    least = std::min(least, own_ratios_.back());
+    if (node >= 0 && island_of_[node] == island) probe = node;
+  }
+  if (least > kUnlikely || probe < 0) return;
+  const CellClaim& claim = frame.claims[probe];
+  slides_.clear();
+  frame.gate.visit_line(probe, claim.row, claim.column, [&](int r, int c) {
+    slides_.push_back({r - claim.row, c - claim.column});
+  });
+  const float evidence_min = std::log(static_cast<float>(slides_.size() + 1)) + link_weight_;
+  for (const auto& [slide_down, slide_right] : slides_) {
+    int start = 0, end = 0, gap = 0;
+    float sum = 0, most = 0;
+    const auto refuse = [&] {
+      if (most < evidence_min) return;
+      for (int i = start; i < end; ++i)
+        if (line_[i] >= 0 && island_of_[line_[i]] == island) cut_[line_[i]] = 1;
+    };
+    for (int i = 0; i < count; ++i) {
+      gap = line_[i] < 0 ? gap + 1 : 0;
+      if (line_[i] >= 0) {
+        const int r = line.row + i * down + slide_down, c = line.column + i * right + slide_right;
+        sum += (shown(r, c) ? ratio(frame, line_[i], r, c) : -log_letters_) - own_ratios_[i];
+        if (sum >= most) most = sum, end = i + 1;
+      }
+      if (sum >= 0 && sum > most - 2 * log_letters_ - link_weight_ && gap <= kGapMax) continue;
+      refuse();
+      start = end = i + 1, sum = most = 0;
+    }
+    refuse();
+  }
+}
+
 /// How many nodes on from the end of a line, of so many, may be its own and say nothing for it.
 float IslandJudge::count_doubtful(const Frame& frame, std::int32_t node, Direction d, int most) const {
   const Beyond first(frame.claims[node], d);
@@ -353,6 +430,8 @@ void IslandJudge::cut_rims(const Frame& frame) {
   cut_.assign(frame.nodes.size(), 0);
   holder_.assign(static_cast<std::size_t>(options_.rows) * options_.columns, -1);
   looked_at_ = -1;
+  around_.assign(holder_.size(), -1);
+  for (std::size_t id = 0; id < islands_.size(); ++id) cut_slid(frame, static_cast<std::int32_t>(id));
   cut_contradicted_lines(frame);
   cut_back(frame);
   cut_pieces(frame);

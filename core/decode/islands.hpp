@@ -152,6 +152,8 @@ class IslandJudge {
   [[nodiscard]] bool is_left(int row, int column) const {
     return shown(row, column) && holder_[index_of(row, column)] >= 0;
   }
+  void cut_slid(const Frame& frame, std::int32_t island);
+  void cut_slid_along(const Frame& frame, std::int32_t island, const Piece& line);
   void cut_contradicted_lines(const Frame& frame);
   void find_contradicted_lines(const Frame& frame, Direction forth);
   [[nodiscard]] bool fits_between(const Frame& frame, const Line& line, float evidence_min);
@@ -173,9 +175,12 @@ class IslandJudge {
   std::vector<Links> links_;
   std::vector<CellClaim> adopted_;
   std::vector<std::uint8_t> cut_;
-  std::vector<std::int8_t> held_;     // by so many links more than contradict
-  std::vector<std::int32_t> line_;    // of nodes
-  std::vector<double> line_ratios_;   // their sums before each of them
+  std::vector<std::int8_t> held_;              // by so many links more than contradict
+  std::vector<std::int32_t> line_;             // of nodes
+  std::vector<double> line_ratios_;            // their sums before each of them
+  std::vector<float> own_ratios_;              // of line_
+  std::vector<std::int32_t> around_, placed_;  // the node of each cell of an island and beside it; where one is
+  std::vector<std::array<int, 2>> slides_;
   std::vector<Line> lines_;           // contradicted ones
   std::vector<std::int32_t> holder_;  // of each cell: of the island that is looked at, or of all
   std::int32_t looked_at_ = -1;

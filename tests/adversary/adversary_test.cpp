@@ -86,6 +86,16 @@ TEST(AdversaryFrames, NameNothingBesideWhatIsPutInThePatternsPlace) {
   coarse.expect_none_wrong(Kind::kSlats1to2, 760);
 }
 
+// Letters of another surface that fit because they come again some columns on.
+TEST(AdversaryFrames, NameNoRowThatIsAnotherOneSlid) {
+  Bench fine = Bench::of(8), coarse = Bench::of(16);
+  for (const int number : {2329, 2365, 3333, 3363, 4521}) fine.expect_none_wrong(Kind::kShelves, number);
+  for (const int number : {3020, 3312, 4088}) coarse.expect_none_wrong(Kind::kShelves, number);
+  fine.expect_none_wrong(Kind::kSlats1, 1555);
+  coarse.expect_none_wrong(Kind::kSlats1to2, 4272);
+  coarse.expect_none_wrong(Kind::kSlats2, 3068);
+}
+
 std::vector<Kind> all_kinds() {
   std::vector<Kind> kinds;
   for (int i = 0; i < kKinds; ++i) kinds.push_back(static_cast<Kind>(i));

@@ -9,6 +9,7 @@
 #include <random>
 
 #include <gmock/gmock.h>
+#include <Eigen/Geometry>
 
 #include "core/decode/decode_windows.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
@@ -52,6 +53,19 @@ class Islands : public testing::Test {
       for (int column = left; column < right; ++column) show(row, column, pattern_.array.at(row, column + slid));
   }
 
+  /// The line of each node's pixel, were the cells at one depth, those of a row as many columns on as it is slid.
+  std::vector<EpipolarSegment> lines_through(double depth_mm, const std::function<int(int)>& slid) const {
+    const Calibration rig = paper_rig();
+    const RigidTransform& to_projector = rig.cameras[0].projector_from_camera;
+    const EpipolarGate gate(rig.cameras[0], rig.projector, 350, 3200);
+    std::vector<EpipolarSegment> segments;
+    for (const auto& [row, column] : grid_.cells) {
+      const Eigen::Vector3d point = depth_mm * cells_.ray(row, column + slid(row)).direction.homogeneous();
+      const Eigen::Vector3d seen = to_projector.rotation.transpose() * (point - to_projector.translation);
+      segments.push_back(gate.prepare(seen.hnormalized()));
+    }
+    return segments;
+  }
   std::vector<CellClaim> decode(std::span<const EpipolarSegment> segments = {}) {
     grid_.link_truly();
     WindowDecoder decoder(pattern_, {.rows = kRows, .columns = kColumns});
@@ -119,6 +133,23 @@ TEST_F(Islands, NameNoSevenOfARowBetweenThemThatAgreeByChance) {
   show_pattern(21, 10, 30, 50);
   const auto claims = decode();
   for (int column = 27; column < 34; ++column) EXPECT_FALSE(is_decoded(claims, 20, column)) << column;
+}
+
+// Letters that come again some columns on: as many as chance never brings agree with the row of another depth.
+TEST_F(Islands, NameNothingThatARowSlidAlongItsLineExplainsBetter) {
+  constexpr int kSlid = 3, kFirst = 25, kLast = 40;
+  for (int column = kFirst; column < kLast; ++column)
+    pattern_.array.cells[20 * pattern_.array.columns + column + kSlid] =
+        pattern_.array.cells[20 * pattern_.array.columns + column];
+  show_pattern(10, 10, 20, 50);
+  show_pattern(20, 10, 21, 50, kSlid);
+  show_pattern(21, 10, 30, 50);
+  const auto slid = [](int row) { return row == 20 ? kSlid : 0; };
+  const auto without_lines = decode();
+  EXPECT_TRUE(is_decoded(without_lines, 20, (kFirst + kLast) / 2)) << "the letters alone tell nothing";
+  const auto claims = decode(lines_through(2000, slid));
+  for (int column = 10; column < 50; ++column) EXPECT_FALSE(is_decoded(claims, 20, column)) << column;
+  EXPECT_GT(decoded(claims), 690);
 }
 
 TEST_F(Islands, LoseNothingAtAStraightEdgeInDepth) {
