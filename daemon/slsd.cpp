@@ -22,6 +22,7 @@
 #include "daemon/service/notifier.hpp"
 #include "daemon/service/service.hpp"
 #include "daemon/start_calibrating.hpp"
+#include "drivers/system/own_program.hpp"
 
 namespace {
 
@@ -84,7 +85,7 @@ int serve(const std::filesystem::path& configuration_file) {
     return not_served(configuration.error(), named || code == slsd::ErrorCode::kIo);
   }
   auto service = make_service(configuration_file, std::move(*configuration));
-  if (service) (*service)->set_calibrator(slsd::find_calibrator());
+  if (service) (*service)->set_calibrator(slsd::find_own_program(slsd::kCalibrator));
   const auto served = service ? (*service)->run() : slsd::Result<>(tl::unexpected(service.error()));
   return served ? slsd::kDone : not_served(served.error(), may_pass(served.error().code));
 }

@@ -26,12 +26,12 @@ struct ProjectRequest {
 
 /// The picture in the projector's size; nothing for the pattern.
 /// @param picture  neither kIdle nor kHeld
-/// @param png      for kImage, of that size
-/// @errors kMalformed, kUnsupported: no image; kMismatch: of another size, or of 16 bits; kNotFound: a grid, and no
-///         calibration
+/// @param png      for kImage, of that size; decoded by a process without rights
+/// @param until    the end of the time for that
+/// @errors those of decode_apart(); kNotFound: a grid, and no calibration
 /// @thread reentrant
-[[nodiscard]] Result<std::optional<Grey8>> draw_projected(Picture picture, std::string_view png,
-                                                          const ScanSetup& setup);
+[[nodiscard]] Result<std::optional<Grey8>> draw_projected(Picture picture, std::string_view png, const ScanSetup& setup,
+                                                          MonotonicTime until);
 
 /// What the configuration has shown when nobody scans; nothing for the pattern. @thread reentrant
 [[nodiscard]] std::optional<Grey8> draw_idle(const ProjectorOptions& options);

@@ -298,7 +298,7 @@ void Scanner::project(ProjectRequest request, Answer<void> answer) {
             const Patience patience = patience_of(*task);
             if (request.picture == Picture::kIdle) return task->end(rig_->release(patience));
             heartbeat_.promise(kWorkPromise);
-            auto drawn = draw_projected(request.picture, request.png, *adopted_);
+            auto drawn = draw_projected(request.picture, request.png, *adopted_, request.deadline);
             task->end(drawn ? rig_->hold(std::move(*drawn), patience) : tl::unexpected(drawn.error()));
           }},
          gone);

@@ -3,7 +3,6 @@
 #include "daemon/server/calibration_run.hpp"
 
 #include <fcntl.h>
-#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -15,6 +14,7 @@
 
 #include "core/printable.hpp"
 #include "drivers/system/file_descriptor.hpp"
+#include "drivers/system/own_program.hpp"
 
 namespace slsd {
 namespace {
@@ -29,43 +29,6 @@ constexpr auto kExitGlance = 20ms;
 constexpr std::size_t kLineMax = 256 << 10;
 constexpr std::size_t kLogLines = 300;
 constexpr std::size_t kLogLineBytes = 500;
-
-/// What slsd-calibrate begins with: no descriptor but its output, no signal ignored or held back.
-class SpawnSetting {
- public:
-  explicit SpawnSetting(int output) {
-    ::posix_spawn_file_actions_init(&actions_);
-    ::posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    ::posix_spawn_file_actions_adddup2(&actions_, output, STDOUT_FILENO);
-    ::posix_spawn_file_actions_adddup2(&actions_, output, STDERR_FILENO);
-    ::posix_spawn_file_actions_addclosefrom_np(&actions_, STDERR_FILENO + 1);
-    ::posix_spawnattr_init(&attributes_);
-    sigset_t none, all;
-    sigemptyset(&none);
-    sigfillset(&all);
-    ::posix_spawnattr_setsigmask(&attributes_, &none);
-    ::posix_spawnattr_setsigdefault(&attributes_, &all);
-    ::posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-  }
-  ~SpawnSetting() {
-    ::posix_spawn_file_actions_destroy(&actions_);
-    ::posix_spawnattr_destroy(&attributes_);
-  }
-  SpawnSetting(const SpawnSetting&) = delete;
-  SpawnSetting& operator=(const SpawnSetting&) = delete;
-
-  int spawn(pid_t& process, const std::filesystem::path& program, const std::vector<std::string>& arguments) {
-    std::string name = program.string();
-    std::vector<char*> pointers{name.data()};
-    for (const std::string& argument : arguments) pointers.push_back(const_cast<char*>(argument.c_str()));
-    pointers.push_back(nullptr);
-    return ::posix_spawn(&process, program.c_str(), &actions_, &attributes_, pointers.data(), environ);
-  }
-
- private:
-  posix_spawn_file_actions_t actions_{};
-  posix_spawnattr_t attributes_{};
-};
 
 }  // namespace
 
@@ -86,14 +49,13 @@ Result<> CalibrationRun::begin(const std::filesystem::path& program, const std::
   std::error_code ignored;
   output_.close(ignored);
   output_.assign(ends[0]);
-  if (const int error = SpawnSetting(writing.number()).spawn(process_, program, arguments); error != 0) {
-    process_ = 0;
-    const bool missing = error == ENOENT || error == ENOTDIR;
-    return fail(missing ? ErrorCode::kNotFound : ErrorCode::kIo,
-                missing ? "what calibrates is not installed: install the package slsd-calibrate"
-                        : "does not start: " + std::generic_category().message(error),
-                program.string());
+  auto started = start_own_program(program, arguments, {-1, writing.number(), writing.number()});
+  if (!started) {
+    if (started.error().code == ErrorCode::kNotFound)
+      started.error().message = "what calibrates is not installed: install the package slsd-calibrate";
+    return tl::unexpected(std::move(started.error()));
   }
+  process_ = *started;
   phase_ = Phase::kUnderWay;
   cancelled_ = false;
   progress_ = {{"state", "starting"}};

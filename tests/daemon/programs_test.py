@@ -36,6 +36,18 @@ class Programs(unittest.TestCase):
         self.assertEqual([name for name in names if re.search(OF_CALIBRATING, name)], [])
         self.assertLessEqual(len(names), 60)
 
+    def test_what_decodes_a_strangers_picture_is_linked_with_nothing_else(self):
+        loaded = subprocess.run(["ldd", BIN / "slsd-picture"], capture_output=True, text=True, check=True).stdout
+        names = {re.split(r"(?:16)?\.so", pathlib.Path(line.split()[0]).name)[0] for line in loaded.splitlines()}
+        allowed = {"linux-vdso", "ld-linux-x86-64", "ld-linux-aarch64", "libpng", "libz", "libstdc++", "libgcc_s", "libc", "libm"}
+        if not os.environ.get("SLSD_SANITIZE"):
+            self.assertEqual(names - allowed, set())
+
+    def test_what_decodes_pictures_takes_nothing_but_a_size(self):
+        for arguments in ([], ["1", "x"], ["0", "5"], ["1", "99999999"], ["1", "1", "1"]):
+            done = subprocess.run([BIN / "slsd-picture", *arguments], capture_output=True, check=False, timeout=60, stdin=subprocess.DEVNULL)
+            self.assertEqual((done.returncode, done.stdout), (2, b""), arguments)
+
     def test_it_is_found_beside_the_service(self):
         slsd = self.put("slsd", "build/slsd")
         self.put("slsd-calibrate", "build/slsd-calibrate")

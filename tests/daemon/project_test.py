@@ -4,11 +4,12 @@
 """What the projector shows while nobody scans, and by hand."""
 import base64
 import pathlib
+import shutil
 import tempfile
 import unittest
 
 from client import RpcError
-from service import CONFIGURATION, SCENE, Service, slsctl, slsd, wait_until
+from service import BIN, CONFIGURATION, SCENE, Service, slsctl, slsd, wait_until
 
 IDLE = CONFIGURATION.format(scene=SCENE, camera_path=SCENE / "frame.png", camera="", server="") + """
 [projector]
@@ -91,6 +92,42 @@ class Project(unittest.TestCase):
         seen = self.folder / "seen.png"
         self.assertEqual(slsctl("--socket", self.service.socket, "frame", "--as-shown", seen).returncode, 0)
         self.assertIn("shows held", slsctl("--socket", self.service.socket, "status").stdout)
+
+
+class TakenOver(unittest.TestCase):
+    """A client's file has made what decodes it do something else."""
+
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory(prefix="slsd-test-")
+        self.addCleanup(temporary.cleanup)
+        self.folder = pathlib.Path(temporary.name)
+        shutil.copy(BIN / "slsd", self.folder)
+
+    def refusal(self, script, timeout_ms=30000):
+        if script:
+            (self.folder / "slsd-picture").write_text(f"#!/bin/sh\n{script}\n", encoding="ascii")
+            (self.folder / "slsd-picture").chmod(0o755)
+        with Service(program=self.folder / "slsd") as service, service.client() as client:
+            with self.assertRaises(RpcError) as caught:
+                client.call("project", picture="image", png="bm8=", timeout_ms=timeout_ms)
+            self.assertGreater(client.call("scan")[0]["points"], 2000)
+        return caught.exception
+
+    def test_its_death_is_an_error(self):
+        refused = self.refusal("kill -SEGV $$")
+        self.assertEqual(refused.name, "malformed")
+        self.assertIn("killed by signal 11", str(refused))
+
+    def test_its_silence_is_over_in_time(self):
+        self.assertEqual(self.refusal("exec sleep 1000", timeout_ms=500).name, "timeout")
+
+    def test_its_answer_is_counted(self):
+        self.assertEqual(self.refusal("echo ok; exec cat /dev/zero").name, "malformed")
+
+    def test_without_it_no_image_is_shown(self):
+        refused = self.refusal(None)
+        self.assertEqual(refused.name, "not_found")
+        self.assertIn("slsd-picture: is not installed", str(refused))
 
 
 class Idle(unittest.TestCase):

@@ -43,6 +43,8 @@ def who_may_what(machine):
     require(status != 0, "a stranger scans")
     status, output = machine.run("slsctl", "project", "white", user="alice", check=False)
     require(status == 1 and "slsd-admin" in output, f"a member of slsd who may not project is told: {output}")
+    machine.run("slsctl", "pattern", "/tmp/mine.png", user="carol")
+    machine.run("slsctl", "project", "/tmp/mine.png", user="carol")  # by slsd-picture, within the unit's own walls
     machine.run("slsctl", "project", "idle", user="carol")
     return "slsd scans, slsd-admin projects, a stranger does not get in; each is told which group"
 
