@@ -13,7 +13,7 @@ namespace {
 
 constexpr float kLeftPx = 1;  // of the blur, as a camera in focus has
 constexpr float kNoiseShare = 0.1F;
-constexpr float kReach = 3.5F;  // in standard deviations
+constexpr float kReach = 6;  // in standard deviations; cut off sooner, the filter is another
 constexpr float kHighest = 65535;
 
 /// The filter's weights from its middle outwards; altogether they make 1.

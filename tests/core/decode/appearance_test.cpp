@@ -18,12 +18,12 @@ PatternOptions options() {
   return options;
 }
 
-std::vector<ShapeFeatures> shapes_at(float blur_px) {
+std::vector<ShapeFeatures> shapes_at(float blur_px, float scale = kScale) {
   std::vector<ShapeFeatures> shapes;
   for (const Prototype& prototype : make_prototypes({.symbols = options().symbols,
                                     .symbol_size_px = options().symbol_size_px,
                                     .spacing_px = options().spacing_px,
-                                    .camera_px_per_projector_px = kScale,
+                                    .camera_px_per_projector_px = scale,
                                     .frame_error = 0.01F,
                                     .blur_px = blur_px})) {
     shapes.push_back(prototype.mean);
@@ -31,8 +31,8 @@ std::vector<ShapeFeatures> shapes_at(float blur_px) {
   return shapes;
 }
 
-std::vector<ShapeFeatures> many_shapes_at(float blur_px) {
-  const std::vector<ShapeFeatures> few = shapes_at(blur_px);
+std::vector<ShapeFeatures> many_shapes_at(float blur_px, float scale = kScale) {
+  const std::vector<ShapeFeatures> few = shapes_at(blur_px, scale);
   std::vector<ShapeFeatures> many;
   for (int i = 0; i < 5; ++i) many.insert(many.end(), few.begin(), few.end());
   return many;
@@ -62,6 +62,14 @@ TEST(Appearances, OfAFrameAreThoseOfMostShapes) {
   for (int i = 0; i < 2; ++i)
     for (const ShapeFeatures& blurred : shapes_at(2)) shapes.push_back(blurred);
   EXPECT_LE(appearances.likeliest(shapes).blur_px, 1);
+}
+
+// In a camera of twice the pixels symbols are larger, and so is their blur.
+TEST(Appearances, OfLargerSymbolsAreOfLargerBlurs) {
+  constexpr float kBlurPx = 3.7F;
+  const Appearances appearances(options(), 2 * kScale);
+  EXPECT_NEAR(std::log(*appearances.likeliest(many_shapes_at(kBlurPx, 2 * kScale)).blur_px / kBlurPx), 0,
+              std::log(1.2));
 }
 
 TEST(Appearances, AreMadeOnce) {
