@@ -3,6 +3,7 @@
 // What another surface may have lent an island at its rim: docs/decoder.md.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 
 #include "core/decode/islands.hpp"
@@ -61,9 +62,9 @@ void IslandJudge::cut_back(const Frame& frame) {
 
 /// Keeps for every node the evidence of the line of nodes through it, as far as it agrees and so far around it, where
 /// something contradicts it.
-void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth) {
+void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, float evidence_min) {
   constexpr int kReach = 10, kBeyond = 3;
-  constexpr float kUsualShare = 0.5F;
+  constexpr float kUsualShare = 0.5F, kClean = 0.8F;
   const Direction back = opposite(forth);
   const auto leads = [&](std::int32_t node, Direction d) {
     return continues(frame, node, d) && frame.beside[frame.beside[node][d]][opposite(d)] == node;
@@ -88,10 +89,11 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth) {
     }
     const End begin = look_beyond(first, back), end = look_beyond(line_.back(), forth);
     const int count = static_cast<int>(line_.size());
+    slides_.clear(), slid_ratios_.clear();
     for (int i = 0; i < count; ++i) {
       const int from = std::max(i - kReach, 0), to = std::min(i + kReach, count - 1);
       const bool begins = i - kReach<0, ends = i + kReach> count - 1;
-      const auto evidence = static_cast<float>(line_ratios_[to + 1] - line_ratios_[from]);
+      auto evidence = static_cast<float>(line_ratios_[to + 1] - line_ratios_[from]);
       const float length =
           static_cast<float>(to - from + 1) + (begins ? begin.doubtful : 0) + (ends ? end.doubtful : 0);
       const bool contradicted = own_ratio(line_[i]) < kSpeaksAgainst || (begins && begin.contradicts) ||
@@ -101,10 +103,43 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth) {
       int begun = i, last = i;
       while (begun > from && own_ratio(line_[begun - 1]) > 0) --begun;
       while (last < to && own_ratio(line_[last + 1]) > 0) ++last;
-      lines_.push_back({line_[i], line_[begun], line_[last], evidence,
-                        static_cast<float>(line_ratios_[last + 1] - line_ratios_[begun])});
+      auto agreeing = static_cast<float>(line_ratios_[last + 1] - line_ratios_[begun]);
+      if (agreeing < kClean * log_letters_ * static_cast<float>(last - begun + 1)) agreeing = 0;
+      if (evidence >= evidence_min) evidence = std::min(evidence, evidence_against_slides(frame, from, to));
+      if (agreeing >= evidence_min) agreeing = std::min(agreeing, evidence_against_slides(frame, begun, last));
+      lines_.push_back({line_[i], line_[begun], line_[last], evidence, agreeing});
     }
   }
+}
+
+/// How much a part of line_ speaks for its own cells against those of another surface, which lie some step on along the
+/// epipolar lines, each step as likely as the others. Where letters do not come again it says the same as against
+/// chance.
+float IslandJudge::evidence_against_slides(const Frame& frame, int from, int to) {
+  if (!frame.gate.knows_lines()) return std::numeric_limits<float>::infinity();
+  const std::size_t count = line_.size();
+  if (slides_.empty()) {
+    const CellClaim& claim = frame.claims[line_[count / 2]];
+    frame.gate.visit_line(line_[count / 2], claim.row, claim.column, [&](int row, int column) {
+      slides_.push_back({row - claim.row, column - claim.column});
+    });
+    for (const auto& [down, right] : slides_) {
+      float sum = slid_ratios_.emplace_back(0);
+      for (const std::int32_t node : line_) {
+        const int row = frame.claims[node].row + down, column = frame.claims[node].column + right;
+        sum += shown(row, column) ? ratio(frame, node, row, column) : -log_letters_;
+        slid_ratios_.push_back(sum);
+      }
+    }
+  }
+  if (slides_.empty()) return std::numeric_limits<float>::infinity();
+  const auto own = static_cast<float>(line_ratios_[to + 1] - line_ratios_[from]);
+  float likelihood = 0;  // of these shapes where another surface shows them, as a share of their own
+  for (std::size_t slide = 0; slide < slides_.size(); ++slide) {
+    const float* sums = &slid_ratios_[slide * (count + 1)];
+    likelihood += std::exp(sums[to + 1] - sums[from] - own);
+  }
+  return -std::log(likelihood / static_cast<float>(slides_.size()));
 }
 
 /// Refuses what another surface explains better: stretches of a row or a column of the island, with what lies right
@@ -198,10 +233,8 @@ float IslandJudge::count_doubtful(const Frame& frame, std::int32_t node, Directi
 
 /// Whether a line agrees from end to end, says enough by itself, and ends where the rim turns oftener without it.
 bool IslandJudge::fits_between(const Frame& frame, const Line& line, float evidence_min) {
-  constexpr float kClean = 0.8F;
   const CellClaim &first = frame.claims[line.first], &last = frame.claims[line.last];
   const Piece piece{first.row, first.column, last.row - first.row + 1, last.column - first.column + 1};
-  if (line.agreeing < kClean * log_letters_ * static_cast<float>(piece.rows * piece.columns)) return false;
   if (line.agreeing < evidence_min) return false;
   look_at_cells(frame, island_of_[line.node]);
   return turns_without(piece) > 0;
@@ -221,8 +254,8 @@ void IslandJudge::cut_contradicted_lines(const Frame& frame) {
   }
   const auto cut = [&](Direction forth, double count) {
     lines_.clear();
-    find_contradicted_lines(frame, forth);
     const auto evidence_min = static_cast<float>(std::log(count / (kShareOfBudget * options_.wrong_cells_max)));
+    find_contradicted_lines(frame, forth, evidence_min);
     for (const Line& line : lines_)
       if (line.evidence < evidence_min && !fits_between(frame, line, evidence_min)) cut_[line.node] = 1;
   };

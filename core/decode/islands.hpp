@@ -155,7 +155,8 @@ class IslandJudge {
   void cut_slid(const Frame& frame, std::int32_t island);
   void cut_slid_along(const Frame& frame, std::int32_t island, const Piece& line);
   void cut_contradicted_lines(const Frame& frame);
-  void find_contradicted_lines(const Frame& frame, Direction forth);
+  void find_contradicted_lines(const Frame& frame, Direction forth, float evidence_min);
+  [[nodiscard]] float evidence_against_slides(const Frame& frame, int from, int to);
   [[nodiscard]] bool fits_between(const Frame& frame, const Line& line, float evidence_min);
   [[nodiscard]] float count_doubtful(const Frame& frame, std::int32_t node, Direction direction, int most) const;
 
@@ -180,9 +181,10 @@ class IslandJudge {
   std::vector<double> line_ratios_;            // their sums before each of them
   std::vector<float> own_ratios_;              // of line_
   std::vector<std::int32_t> around_, placed_;  // the node of each cell of an island and beside it; where one is
-  std::vector<std::array<int, 2>> slides_;
-  std::vector<Line> lines_;           // contradicted ones
-  std::vector<std::int32_t> holder_;  // of each cell: of the island that is looked at, or of all
+  std::vector<std::array<int, 2>> slides_;     // rows and columns of each step along the epipolar lines
+  std::vector<float> slid_ratios_;             // of line_ after each of them, summed up as line_ratios_
+  std::vector<Line> lines_;                    // contradicted ones
+  std::vector<std::int32_t> holder_;           // of each cell: of the island that is looked at, or of all
   std::int32_t looked_at_ = -1;
 };
 

@@ -152,6 +152,25 @@ TEST_F(Islands, NameNothingThatARowSlidAlongItsLineExplainsBetter) {
   EXPECT_GT(decoded(claims), 690);
 }
 
+// Ten letters that come again three columns on fit one depth as well as the other.
+TEST_F(Islands, NameNoRowThatItsOwnLettersElsewhereExplainAsWell) {
+  constexpr int kSlid = 3, kFirst = 25, kLast = 35;
+  const auto letter = [&](int column) -> auto& {
+    return pattern_.array.cells[20 * pattern_.array.columns + column];
+  };
+  for (int column = kFirst; column < kLast; ++column) letter(column + kSlid) = letter(column);
+  show_pattern(10, 10, 20, 50);
+  show_pattern(20, kFirst, 21, kLast, kSlid);
+  show_pattern(21, 10, 30, 50);
+  int other = 0;  // of neither depth
+  while (other == letter(kFirst - 1) || other == letter(kFirst - 1 + kSlid)) ++other;
+  show(20, kFirst - 1, other);
+  const auto of_one_depth = [](int) { return 0; };
+  const auto claims = decode(lines_through(2000, of_one_depth));
+  for (int column = kFirst; column < kLast; ++column) EXPECT_FALSE(is_decoded(claims, 20, column)) << column;
+  EXPECT_GT(decoded(claims), 690);
+}
+
 TEST_F(Islands, LoseNothingAtAStraightEdgeInDepth) {
   show_pattern(10, 10, 20, 40);
   show_pattern(20, 10, 30, 40, 7);
