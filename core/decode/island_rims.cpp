@@ -98,7 +98,9 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
           static_cast<float>(to - from + 1) + (begins ? begin.doubtful : 0) + (ends ? end.doubtful : 0);
       const bool contradicted = own_ratio(line_[i]) < kSpeaksAgainst || (begins && begin.contradicts) ||
                                 (ends && end.contradicts) || evidence < kUsualShare * log_letters_ * length;
-      if (!contradicted) continue;
+      const bool misread = std::any_of(line_.begin() + from, line_.begin() + to + 1,
+                                       [&](std::int32_t node) { return own_ratio(node) < kSpeaksAgainst; });
+      if (!contradicted && (!misread || evidence_against_slides(frame, from, to) >= evidence_min)) continue;
       // As far as it agrees: what ends it may have been read as one of the island.
       int begun = i, last = i;
       while (begun > from && own_ratio(line_[begun - 1]) > 0) --begun;
