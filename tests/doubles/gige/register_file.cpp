@@ -4,6 +4,7 @@
 
 #include <array>
 #include <bit>
+#include <cstdlib>
 #include <cstring>
 
 #include <arv.h>
@@ -11,13 +12,19 @@
 namespace slsd::test {
 namespace {
 
+// The program may run where the sources are not.
+const char* description_file() {
+  const char* elsewhere = std::getenv("SLSD_GIGE_DESCRIPTION");
+  return elsewhere != nullptr ? elsewhere : SLSD_SOURCE_DIR "/tests/doubles/gige/camera.xml";
+}
+
 constexpr std::uint32_t kResendAndWriteMemory = 1u << 2 | 1u << 1;
 constexpr std::uint32_t kPacketBytes = 1400;
 
 }  // namespace
 
 RegisterFile::RegisterFile(const std::string& serial, int width_px, int height_px)
-    : camera_(arv_fake_camera_new_full(serial.c_str(), SLSD_SOURCE_DIR "/tests/doubles/gige/camera.xml")) {
+    : camera_(arv_fake_camera_new_full(serial.c_str(), description_file())) {
   arv_fake_camera_get_genicam_xml(camera_, &description_bytes_);
   for (const auto address : {kSensorWidth, kWidth}) write(address, static_cast<std::uint32_t>(width_px));
   for (const auto address : {kSensorHeight, kHeight}) write(address, static_cast<std::uint32_t>(height_px));
