@@ -42,7 +42,9 @@ Result<> ProjectorScreen::open() {
   if (auto opened = open_session(); !opened) return opened;
   if (auto found = find_output(); !found) return found;
   if (auto opened = open_window(); !opened) {
-    close();
+    // GLFW keeps the modes of the monitor that it first saw at an output: where another stands there now, it would set
+    // the nearest of those for ever.
+    opened.error().code == ErrorCode::kMismatch ? end() : close();
     return opened;
   }
   const auto shown = show(Grey8(options_.width_px, options_.height_px));
