@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""A guest of QEMU with Debian's kernel, whose disk make_guest.sh makes."""
+"""A guest of QEMU with Debian's kernel, its second monitor, and what it shows. make_guest.sh makes its disk."""
 import contextlib
 import itertools
 import json
@@ -8,6 +8,7 @@ import pathlib
 import queue
 import shutil
 import socket
+import struct
 import subprocess
 import tempfile
 import threading
@@ -16,6 +17,7 @@ import time
 from machine import ENVIRONMENT, Machine, require, wait_for
 
 BOOT_S = 600
+SECOND_HEAD = 1
 
 
 def accelerator():
@@ -35,6 +37,15 @@ def connect(path, patience_s=30):
             return client
         require(time.monotonic() < end, f"QEMU does not open {path}")
         time.sleep(0.1)
+
+
+def receive(client, size):
+    data = b""
+    while len(data) < size:
+        part = client.recv(size - len(data))
+        require(part, "QEMU hung up")
+        data += part
+    return data
 
 
 class Running:
@@ -79,7 +90,9 @@ class Guest(Machine):
                  "-drive", f"file={folder}/disk.img,format=raw,if=virtio,snapshot=on,cache=unsafe",
                  "-drive", f"file={at}/packages.img,format=raw,if=virtio,snapshot=on,cache=unsafe",
                  "-device", "virtio-rng-pci", "-device", "virtio-serial",
-                 "-chardev", f"socket,id=agent,path={at}/agent,server=on,wait=off", "-device", "virtserialport,chardev=agent,name=slsd.agent"],
+                 "-chardev", f"socket,id=agent,path={at}/agent,server=on,wait=off", "-device", "virtserialport,chardev=agent,name=slsd.agent",
+                 "-device", "virtio-vga,id=screen,max_outputs=2,xres=1024,yres=768", "-vnc", f"unix:{at}/monitor,display=screen,head=1",
+                 "-qmp", f"unix:{at}/qmp,server=on,wait=off"],
                 stdin=subprocess.DEVNULL, stdout=log, stderr=log)
         self.port = connect(at / "agent")
         threading.Thread(target=self.listen, daemon=True).start()
@@ -111,3 +124,41 @@ class Guest(Machine):
         asked = {"number": number, "command": started.words, "text": text, "environment": ENVIRONMENT}
         self.port.sendall(json.dumps(asked).encode() + b"\n")
         return started
+
+    def reboot(self):
+        self.start("systemctl", "reboot")
+        self.wait_until_booted()
+
+    def plug_monitor(self, width, height):
+        """The second head, as RFB's SetDesktopSize has it; of no size it is unplugged. Its EDID names the size as preferred."""
+        with contextlib.closing(connect(self.folder / "monitor")) as client:
+            receive(client, 12)
+            client.sendall(b"RFB 003.008\n")
+            receive(client, receive(client, 1)[0])
+            client.sendall(b"\x01")  # no password
+            receive(client, 4)
+            client.sendall(b"\x01")  # shared
+            receive(client, 20)
+            receive(client, struct.unpack(">I", receive(client, 4))[0])
+            client.sendall(struct.pack(">BBHi", 2, 0, 1, -308))  # ExtendedDesktopSize
+            time.sleep(0.3)
+            client.sendall(struct.pack(">BBHHBB", 251, 0, width, height, 1, 0) + struct.pack(">IHHHHI", 0, 0, 0, width, height, 0))
+            time.sleep(0.7)
+
+    def unplug_monitor(self):
+        self.plug_monitor(0, 0)
+
+    def screen(self, head=SECOND_HEAD):
+        """@return width, height and the bytes of red, green and blue that the head shows"""
+        path = self.folder / "screen.ppm"
+        with contextlib.closing(connect(self.folder / "qmp")) as client, client.makefile("rw", encoding="utf-8") as lines:
+            for asked in ({"execute": "qmp_capabilities"},
+                          {"execute": "screendump", "arguments": {"filename": str(path), "device": "screen", "head": head}}):
+                lines.readline()
+                lines.write(json.dumps(asked) + "\n")
+                lines.flush()
+            while "return" not in (answer := json.loads(lines.readline())):
+                require("error" not in answer, str(answer))
+        kind, width, height, _, pixels = path.read_bytes().split(None, 4)
+        require(kind == b"P6", "not a PPM")
+        return int(width), int(height), pixels

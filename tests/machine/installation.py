@@ -136,6 +136,20 @@ def upgrade(machine):
     return f"upgrade and downgrade keep everything; {output.count('scanned')} scans beside them, none failed"
 
 
+def reboot(machine):
+    if not machine.has_drivers:
+        return None
+    machine.write(CALIBRATION, "mine\n")
+    begin = time.monotonic()
+    machine.reboot()
+    took = time.monotonic() - begin
+    require(machine.is_active("slsd.service"), "not active after a boot")
+    status, output = machine.scan()
+    require(status == 0, f"the scan after a boot: {output}")
+    require(machine.read(CALIBRATION) == "mine\n", "the calibration is gone")
+    return f"a boot: active, and scans, {took:.0f} s after it was asked for; the calibration is there"
+
+
 def at_rest(machine):
     machine.scan()
     time.sleep(2)

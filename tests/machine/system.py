@@ -14,6 +14,7 @@ import time
 
 import bad_state
 import cameras
+import display
 import installation
 import lifecycle
 from guest import Guest
@@ -24,8 +25,9 @@ SHARED = (installation.nothing_plugged_in, installation.few_rights, installation
           bad_state.missing_socket_folder, bad_state.bad_state_folder, bad_state.two_versions, bad_state.full_disk)
 # These set the service up themselves, which takes 15 s where a processor is emulated.
 OF_DEVICES = (cameras.usb_camera, cameras.usb_faults, cameras.usb_unplugged, cameras.hung_camera, cameras.vivid, cameras.gige,
-              cameras.gige_of_others)
-WITH_DRIVERS = OF_DEVICES
+              cameras.gige_of_others, display.projector, display.projector_unplugged, display.projector_late, display.server_killed,
+              display.server_hung)
+WITH_DRIVERS = (*OF_DEVICES, installation.reboot)
 AT_THE_END = (installation.upgrade, installation.at_rest, installation.removed)
 
 
