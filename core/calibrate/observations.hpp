@@ -29,8 +29,10 @@ struct PoseView {
   std::size_t camera = 0;
   std::vector<BoardPoint> corners;
   std::vector<ProjectedPoint> symbols;
-  double blur_px = 0;        ///< one standard deviation of the blur at the board's edges; 0: not known
-  double clipped_share = 0;  ///< of the board's pixels, those at full level
+  double blur_px = 0;              ///< one standard deviation of the blur at the board's edges; 0: not known
+  double clipped_share = 0;        ///< of the board's pixels, those at full level
+  std::size_t hidden_symbols = 0;  ///< in one place on the board, where the pattern should be seen
+  bool hidden_clipped = false;     ///< and the white picture is at full level there
   std::optional<Eigen::Vector2d>
       shift_px;  ///< of the print from the white picture to the pattern's, where both show it
 };

@@ -7,6 +7,7 @@
 #include "core/calibrate/board_region.hpp"
 #include "core/calibrate/gray_code.hpp"
 #include "core/calibrate/print_shift.hpp"
+#include "core/calibrate/symbol_gap.hpp"
 #include "core/exposure/divide_light.hpp"
 
 namespace slsd {
@@ -47,14 +48,16 @@ Result<> observe_pattern(const PosePictures& pictures, const Board& board, const
   if (shift.certain()) view.shift_px = shift.px;
   const auto levelled = divide_light(pictures.coded.at(0), pictures.white);
   if (!levelled) return tl::unexpected(levelled.error());
-  const auto matches = reader.read(levelled->view());
+  auto matches = reader.read(levelled->view());
   if (!matches) return tl::unexpected(matches.error());
   const BoardRegion region(board, sighting);
-  for (const SymbolMatch& match : *matches) {
-    if (region.contains(match.camera_px)) view.symbols.push_back({match.camera_px, match.projector_px, match.sigma_px});
-  }
-  if (view.symbols.size() < kSymbolsCertain && reader.shapes() > kPatternRegions) view.symbols.clear();
-  if (view.symbols.empty()) return fail(ErrorCode::kNotFound, why_no_symbols(reader.shapes()));
+  std::erase_if(*matches, [&](const SymbolMatch& match) { return !region.contains(match.camera_px); });
+  if (matches->size() < kSymbolsCertain && reader.shapes() > kPatternRegions) matches->clear();
+  if (matches->empty()) return fail(ErrorCode::kNotFound, why_no_symbols(reader.shapes()));
+  for (const SymbolMatch& match : *matches)
+    view.symbols.push_back({match.camera_px, match.projector_px, match.sigma_px});
+  const SymbolGap gap = find_symbol_gap(*matches, reader.pattern(), region, pictures.white);
+  view.hidden_symbols = gap.symbols, view.hidden_clipped = gap.clipped;
   return {};
 }
 

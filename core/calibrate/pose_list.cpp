@@ -13,6 +13,19 @@ namespace {
 
 constexpr double kClippedToSay = 0.02;  // as a session on hardware does not take it
 
+std::string text_of_gap(const PoseView& view) {
+  if (view.hidden_clipped) {
+    return fmt::format(
+        "clipped: where {} symbols should be seen, in one place, the white picture is at full level; turn "
+        "the reflection away, or expose less",
+        view.hidden_symbols);
+  }
+  return fmt::format(
+      "covered: {} symbols are not seen in one place, where the white picture shows the board; keep hands "
+      "and cables out of the light, and between the pictures too",
+      view.hidden_symbols);
+}
+
 }  // namespace
 
 PoseList::PoseList(const Observations& observations) {
@@ -22,6 +35,7 @@ PoseList::PoseList(const Observations& observations) {
     used_.push_back(used_.size());
     for (const PoseView& view : pose.views) {
       report.corners += view.corners.size(), report.symbols += view.symbols.size();
+      if (view.hidden_symbols > 0) report.remarks.push_back(text_of_gap(view));
       if (view.clipped_share <= kClippedToSay) continue;
       report.remarks.push_back(
           fmt::format("{:.0f} % of the board's pixels are at full level: expose less", 100 * view.clipped_share));

@@ -36,6 +36,7 @@ class PatternReader {
   /// @errors kUnsupported: the frame is too large
   [[nodiscard]] Result<std::vector<SymbolMatch>> read(const GreyView& frame);
 
+  [[nodiscard]] const Pattern& pattern() const { return pattern_; }
   /// How many shapes of a symbol's size the last frame had: many, and none read, is another pattern.
   [[nodiscard]] std::size_t shapes() const { return shapes_; }
 

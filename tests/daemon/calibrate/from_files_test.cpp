@@ -270,6 +270,29 @@ TEST_F(FromFiles, NamesAPatternThatIsShifted) {
                         "by 9 px"));
 }
 
+TEST_F(FromFiles, NamesAPatternOfWhichAPartIsCovered) {
+  copy_captures();
+  const path file = request_.from / "pose_02/pattern.png";
+  const Grey8 picture = std::get<Grey8>(*read_image(file));
+  constexpr int kLeft = 330, kTop = 230, kWidth = 130, kHeight = 130, kAside = 23;
+  const auto told = [&](bool copied) {
+    Grey8 spoilt = picture;
+    for (int y = kTop; y < kTop + kHeight; ++y)
+      for (int x = kLeft; x < kLeft + kWidth; ++x) spoilt.row(y)[x] = copied ? picture.row(y)[x + kAside] : 90;
+    EXPECT_TRUE(write_file_atomically(file, *encode_png(spoilt)));
+    testing::internal::CaptureStdout();
+    const auto done = calibrate_from_files(request_);
+    const std::string said = testing::internal::GetCapturedStdout();
+    EXPECT_TRUE(done) << to_string(done.error());
+    return said;
+  };
+  const std::string hidden = "symbols are not seen in one place, where the white picture shows the board";
+  EXPECT_THAT(told(false), HasSubstr(hidden));
+  const std::string said = told(true);
+  EXPECT_THAT(said, HasSubstr(hidden));
+  EXPECT_EQ(said.find(hidden), said.rfind(hidden));  // of that pose alone
+}
+
 TEST_F(FromFiles, TakesABoardNamedRowsByColumns) {
   request_.board = "charuco:5x7:60:45:DICT_5X5_100";
   testing::internal::CaptureStdout();
