@@ -14,6 +14,7 @@
 #include "daemon/calibrate/finish_calibration.hpp"
 #include "daemon/calibrate/read_captures.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/configuration/settings_over.hpp"
 
 namespace slsd {
 namespace {
@@ -76,7 +77,7 @@ Result<std::vector<CapturedPose>> list_all(const std::filesystem::path& folder, 
 
 Result<> calibrate_from_files(const CalibrateRequest& request) {
   const auto begin = std::chrono::steady_clock::now();
-  const auto configuration = load_configuration_or_defaults(request.configuration_file);
+  const auto configuration = load_configuration_in_force(request.configuration_file, std::cout);
   if (!configuration) return tl::unexpected(configuration.error());
   const auto board = requested_board(request);
   if (!board) return tl::unexpected(board.error());

@@ -7,6 +7,7 @@
 #include <iostream>
 #include <iterator>
 #include <optional>
+#include <sstream>
 
 #include <fmt/format.h>
 
@@ -18,6 +19,7 @@
 #include "daemon/calibrate/progress_json.hpp"
 #include "daemon/calibrate/session_record.hpp"
 #include "daemon/calibrate/socket_source.hpp"
+#include "daemon/configuration/settings_over.hpp"
 #include "daemon/scan/hardware.hpp"
 #include "drivers/system/interrupt.hpp"
 
@@ -47,7 +49,9 @@ Result<Preparation> prepare(const CalibrateRequest& request) {
   if (request.planes < kPlanesMin || request.planes > kPosesMax) {
     return fail(ErrorCode::kInvalidArgument, fmt::format("must be {} to {}", kPlanesMin, kPosesMax), "--planes");
   }
-  auto configuration = load_configuration_or_defaults(request.configuration_file);
+  std::ostringstream untold;  // whoever asks a running service asks it, too, what was set
+  auto configuration =
+      load_configuration_in_force(request.configuration_file, request.socket.empty() ? std::cout : untold);
   if (!configuration) return tl::unexpected(configuration.error());
   auto board = requested_board(request);
   if (!board) return tl::unexpected(board.error());

@@ -403,6 +403,20 @@ TEST_F(FromFiles, ReplacesABetterCalibrationOfOtherDevices) {
   EXPECT_EQ(kept().projector.width_px, 640);
 }
 
+// A calibration beside the one that is in force would never be used.
+TEST_F(FromFiles, ReplacesTheCalibrationThatWasSetOverTheSocket) {
+  write_text(home_ / "set.yml", write_calibration(small_rig()));
+  write_text(home_ / "settings-slsd.json", R"({"calibration": {"file": ")" + (home_ / "set.yml").string() + R"("}})");
+  setenv("STATE_DIRECTORY", home_.c_str(), 1);
+  testing::internal::CaptureStdout();
+  const auto done = calibrate_from_files(request_);
+  unsetenv("STATE_DIRECTORY");
+  EXPECT_THAT(testing::internal::GetCapturedStdout(), HasSubstr("as set over the socket: calibration.file"));
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_TRUE(std::filesystem::exists(home_ / "set.yml.old"));
+  EXPECT_FALSE(std::filesystem::exists(home_ / "calibration.yml"));
+}
+
 TEST_F(FromFiles, NeedsAPlaceToKeepIt) {
   write_text(home_ / "slsd.toml", "[projector]\nwidth_px = 640\nheight_px = 400\n");
   EXPECT_THAT(refusal(), HasSubstr("nowhere to keep the calibration"));
