@@ -46,8 +46,8 @@ StreamSender::StreamSender(in_addr address) : socket_(::socket(AF_INET, SOCK_DGR
   local.sin_addr = address;
   if (socket_ < 0 || ::bind(socket_, reinterpret_cast<const sockaddr*>(&local), sizeof(local)) != 0)
     throw std::runtime_error("the double has no socket for its stream");
-  // As cameras have it: packets that are too large for the network are lost, and not sent in fragments. So the sizes that a
-  // host tries tell what the network takes.
+  // As cameras have it: packets that are too large for the network are lost, and not sent in fragments. So the sizes
+  // that a host tries tell what the network takes.
   const int never = IP_PMTUDISC_DO;
   ::setsockopt(socket_, IPPROTO_IP, IP_MTU_DISCOVER, &never, sizeof(never));
 }
