@@ -20,7 +20,7 @@ WindowDecoder::WindowDecoder(const Pattern& pattern, DecodeWindowsOptions option
       unique_(pattern.array.minimum_distance > 0),
       corrects_(pattern.array.minimum_distance >= 3),
       log_letters_(std::log(static_cast<float>(pattern.letters()))),
-      judge_(pattern, {.rows = options.rows, .columns = options.columns}) {}
+      judge_(pattern, {.rows = options.rows, .columns = options.columns, .wrong_cells_max = options.wrong_cells_max}) {}
 
 std::optional<std::uint32_t> WindowDecoder::key_of(const Neighbourhood& around,
                                                    const std::vector<Classification>& shapes) const {

@@ -19,7 +19,8 @@
 namespace slsd {
 
 struct DecodeWindowsOptions {
-  int rows = 0, columns = 0;  ///< of the part of the array that is shown
+  int rows = 0, columns = 0;       ///< of the part of the array that is shown
+  double wrong_cells_max = 0.001;  ///< see IslandOptions
 };
 
 /// Names the cell of each node.

@@ -26,6 +26,10 @@ Result<> DecodeOptions::validate() const {
     return fail(ErrorCode::kInvalidArgument, "depth_max_mm has to be greater than depth_min_mm, and finite",
                 "decode.depth_max_mm");
   }
+  if (!(wrong_cells_max >= 1e-9 && wrong_cells_max <= 1)) {
+    return fail(ErrorCode::kInvalidArgument, "wrong_cells_max must be 1e-9 to 1: how many a frame may have, on average",
+                "decode.wrong_cells_max");
+  }
   if (precision == Precision::kFine && centre == Method::kPaper) {
     return fail(ErrorCode::kInvalidArgument,
                 "precision = \"fine\" aligns symbols and takes no centroids; leave centre at \"default\"",

@@ -120,6 +120,7 @@ std::string_view method_name(Method method) {
 json decode_keys(const DecodeOptions& options) {
   return {{"depth_min_mm", options.depth_min_mm},
           {"depth_max_mm", options.depth_max_mm},
+          {"wrong_cells_max", options.wrong_cells_max},
           {"precision", options.precision == Precision::kFine ? "fine" : "standard"},
           {"density", to_string(options.density)},
           {"dense_stride_px", options.dense.stride_px},

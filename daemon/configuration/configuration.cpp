@@ -82,6 +82,7 @@ Result<> read_decode(const toml::table* table, const path& file, DecodeOptions& 
   TableReader reader(table, "[decode]", file);
   reader.read("depth_min_mm", options.depth_min_mm);
   reader.read("depth_max_mm", options.depth_max_mm);
+  reader.read("wrong_cells_max", options.wrong_cells_max);
   reader.choose("precision", options.precision, span_of(kPrecisions));
   reader.choose("density", options.density, span_of(kDensities));
   reader.read("dense_stride_px", options.dense.stride_px);

@@ -306,6 +306,22 @@ TEST(AnotherDecoder, OutlivesTheFirst) {
   EXPECT_TRUE(same_points(decode(second, frame.view()), expected));
 }
 
+// What lies beside an edge in depth is the first to go.
+TEST(CreateDecoder, TakesLessForASmallerBudgetOfWrongCells) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  const Surface step = [](const Ray& ray) {
+    return plane({0, 0, ray.direction.x() < 0 ? 2000. : 1900.}, {0, 0, 1})(ray);
+  };
+  const Grey8 frame = frame_of(pattern, step);
+  std::size_t before = 0;
+  for (const double budget : {1e-9, 1e-3, 1.}) {
+    Decoder decoder = decoder_of(pattern, {.wrong_cells_max = budget});
+    const std::size_t points = decode(decoder, frame.view()).points.size();
+    EXPECT_GT(points, before) << budget;
+    before = points;
+  }
+}
+
 TEST(CreateDecoder, RefusesAnEmptyDepthRange) {
   const auto decoder =
       Decoder::create(shipped_pattern("16px-5.toml"), paper_rig(), 0, {.depth_min_mm = 900, .depth_max_mm = 800});

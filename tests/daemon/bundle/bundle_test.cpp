@@ -65,6 +65,7 @@ TEST(DecodeKeys, AreEveryKeyThere) {
   come_back(options);
   options.precision = Precision::kStandard;
   options.density = Density::kPixels;
+  options.wrong_cells_max = 0.0005;
   options.dense = {.stride_px = 7, .prune_px = 2.25};
   come_back(options);
   options.density = Density::kSymbols;

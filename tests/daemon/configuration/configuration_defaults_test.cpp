@@ -110,7 +110,8 @@ TEST(ReadConfiguration, ShippedFileHasEveryKey) {
        "frames_held_max"},
       {"[calibration]", "file other_hardware"},
       {"[decode]",
-       "depth_min_mm depth_max_mm precision binarize find_regions classify centre link_grid decode_windows correspond"},
+       "depth_min_mm depth_max_mm wrong_cells_max precision binarize find_regions classify centre link_grid "
+       "decode_windows correspond"},
       {"[scan]", "timeout_ms exposure_skew_ms reopen_first_ms reopen_longest_ms projector_latency_ms power_line_hz"},
       {"[server]",
        "socket socket_mode observe scan administer clients_max request_bytes_max memory_max_mb send_timeout_ms"}};

@@ -52,13 +52,26 @@ TEST(ReadConfiguration, PlacesRangesAtTheKey) {
 }
 
 TEST(ReadConfiguration, RefusesWrongTypes) {
-  for (const char* text :
-       {"pattern = 3", "camera = 3", "[camera]", "camera = [3]", "[pattern]\nsymbols = 5",
-        "[pattern]\nsymbols = [\"5\"]", "[pattern]\nsymbols = [99999999999]", "[pattern]\nhalf_turn_unique = 1",
-        "[pattern]\nseed = 1.0", "[pattern]\nseed = -1", "[decode]\ndepth_min_mm = nan", "[decode]\ndepth_min_mm = inf",
-        "[decode]\ndepth_min_mm = \"1\"", "[server]\nsocket = 1", "[server]\nsocket = \"\\u0000\"",
-        "[calibration]\nfile = []", "[[camera]]\npath = \"x\"\nfaults = [1]",
-        "[[camera]]\npath = \"x\"\nwidth_px = 5"}) {
+  for (const char* text : {"pattern = 3",
+                           "camera = 3",
+                           "[camera]",
+                           "camera = [3]",
+                           "[pattern]\nsymbols = 5",
+                           "[pattern]\nsymbols = [\"5\"]",
+                           "[pattern]\nsymbols = [99999999999]",
+                           "[pattern]\nhalf_turn_unique = 1",
+                           "[pattern]\nseed = 1.0",
+                           "[pattern]\nseed = -1",
+                           "[decode]\ndepth_min_mm = nan",
+                           "[decode]\ndepth_min_mm = inf",
+                           "[decode]\ndepth_min_mm = \"1\"",
+                           "[decode]\nwrong_cells_max = 0.0",
+                           "[decode]\nwrong_cells_max = 1.5",
+                           "[server]\nsocket = 1",
+                           "[server]\nsocket = \"\\u0000\"",
+                           "[calibration]\nfile = []",
+                           "[[camera]]\npath = \"x\"\nfaults = [1]",
+                           "[[camera]]\npath = \"x\"\nwidth_px = 5"}) {
     EXPECT_THAT(error_of(text), HasSubstr("slsd.toml:")) << text;
   }
 }

@@ -53,6 +53,7 @@ other_hardware = "warn"
 [decode]
 depth_min_mm = 100
 depth_max_mm = 200.5
+wrong_cells_max = 0.0001
 precision = "fine"
 find_regions = "paper"
 classify = "paper"
@@ -90,6 +91,7 @@ socket_mode = 0o600
   EXPECT_EQ(configuration->decode.find_regions, Method::kPaper);
   EXPECT_EQ(configuration->decode.classify, Method::kPaper);
   EXPECT_EQ(configuration->decode.depth_min_mm, 100.0);
+  EXPECT_EQ(configuration->decode.wrong_cells_max, 0.0001);
   EXPECT_EQ(configuration->server.socket, "etc/run/s");
   EXPECT_EQ(configuration->server.socket_mode, 0600);
 }
