@@ -332,7 +332,8 @@ class Strangers(unittest.TestCase):
                 wait_until(lambda: states.samples.get("known: slsd", {}).get("level") == 0, "the scanner")
                 with slsd.Scanner(service.socket) as scanner:
                     self.assertEqual(clouds.next().point_cloud()["width"], len(scanner.scan()))
-                self.assertEqual(bridge.said(), "")
+                # It may say of this host that its sockets are small.
+                self.assertEqual([line for line in bridge.said().splitlines() if "net.core.rmem_max" not in line], [])
         finally:
             for other in others:
                 other.terminate()
