@@ -275,13 +275,8 @@ void put(Eight& e, int lane, const PatchTask& task, const AlignOptions& options)
   e.offset[lane] = state.offset, e.noise[lane] = task.noise, e.across[lane] = state.across;
   const float squares = task.noise * task.noise + options.misfit_share * options.misfit_share * state.gain * state.gain;
   e.per_scale[lane] = state.gain > 0 ? 1 / (options.outlier_sigmas * std::sqrt(squares)) : 0;
-  const float gain = std::max(1.F, state.gain), per_gain = 1 / (gain * gain);
-  const float of_across = task.noise * task.noise * per_gain;
-  e.across_weight[lane] =
-      options.across_sigma_px > 0 ? of_across / (options.across_sigma_px * options.across_sigma_px) : 1e9F;
-  e.gain_slope_weight[lane] = options.gain_slope_sigma > 0 ? (of_across + options.misfit_share * options.misfit_share) /
-                                                                 (options.gain_slope_sigma * options.gain_slope_sigma)
-                                                           : 0;
+  const AlignPriors priors = align_priors(options, task.noise, state.gain);
+  e.across_weight[lane] = priors.across, e.gain_slope_weight[lane] = priors.gain_slope;
 }
 
 void take(const Eight& e, int lane, PatchTask& task) {

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <span>
 
 #include "core/align/align_patch.hpp"
@@ -27,6 +28,21 @@ struct PatchTask {
   float variance = 0;        ///< of the disparity, for a noise of one grey level in each pixel
   float slope_variance = 0;  ///< of its slopes, the mean of both
 };
+
+/// What is known beforehand of `across` and of each of the gain's slopes, as what it adds to the diagonal of the normal
+/// matrix, whose unknowns are in units of gain times px and of levels.
+struct AlignPriors {
+  float across, gain_slope;
+};
+/// @param noise  one standard deviation of a pixel, grey levels
+[[nodiscard]] inline AlignPriors align_priors(const AlignOptions& options, float noise, float gain) {
+  const float per_gain = 1 / std::max(1.F, gain), of_noise = noise * noise * per_gain * per_gain;
+  const auto weight = [](float squares, float sigma) { return squares / (sigma * sigma); };
+  return {options.across_sigma_px > 0 ? weight(of_noise, options.across_sigma_px) : 1e9F,
+          options.gain_slope_sigma > 0
+              ? weight(of_noise + options.misfit_share * options.misfit_share, options.gain_slope_sigma)
+              : 0};
+}
 
 /// One step of PatchAligner for up to eight windows of the same size: the same equations, a patch to each lane. Eight
 /// are some four times as fast as one after the other, as none of it goes across lanes, and the eight systems of

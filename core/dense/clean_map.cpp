@@ -22,6 +22,9 @@ namespace {
 constexpr float kJump = 0.004F;
 /// Of the distance from the projector: what lies farther behind is another surface.
 constexpr float kBehind = 1.01F;
+/// Growth that has crossed an edge can go on over a surface that is not there, in scraps: what bears no decoded symbol
+/// has to hang together with so many times more pixels.
+constexpr std::size_t kWithoutSymbol = 20;
 constexpr auto kMeasuredByte = static_cast<std::uint8_t>(DensePixel::kMeasured);
 
 /// Eight pixels of a row, and where the projector lights them.
@@ -234,9 +237,10 @@ void MapCleaner::find_joined(const DenseMap& map) {
 }
 
 // Runs of pixels that hang together in a row, joined with those of the row before that they touch.
-void MapCleaner::drop_islands(DenseMap& map, std::size_t least) {
+void MapCleaner::drop_islands(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds) {
   find_joined(map);
   runs_.clear();
+  first_runs_.clear();
   const std::size_t words = static_cast<std::size_t>(map.width + 63) / 64;
   const auto root = [&](std::int32_t run) {
     while (runs_[run].parent != run) run = runs_[run].parent = runs_[runs_[run].parent].parent;
@@ -245,12 +249,13 @@ void MapCleaner::drop_islands(DenseMap& map, std::size_t least) {
   std::size_t before = 0;  // the first run of the row before
   for (int y = 0; y < map.height; ++y) {
     const std::size_t begin = runs_.size();
+    first_runs_.push_back(begin);
     const std::uint64_t *const measured = measured_.data() + words * static_cast<std::size_t>(y),
                                *const right = right_.data() + words * static_cast<std::size_t>(y);
     for (int x = next_bit(measured, 0, map.width, true); x < map.width;) {
       const int last = next_bit(right, x, map.width - 1, false);
       runs_.push_back(
-          {y, x, last + 1, static_cast<std::int32_t>(runs_.size()), static_cast<std::uint32_t>(last + 1 - x)});
+          {y, x, last + 1, static_cast<std::int32_t>(runs_.size()), static_cast<std::uint32_t>(last + 1 - x), false});
       x = next_bit(measured, last + 1, map.width, true);
     }
     if (y > 0) {
@@ -271,8 +276,21 @@ void MapCleaner::drop_islands(DenseMap& map, std::size_t least) {
     }
     before = begin;
   }
+  first_runs_.push_back(runs_.size());
+  for (const SurfaceSeed& seed : seeds) {
+    const auto x = static_cast<int>(std::lround(seed.camera_px.x())),
+               y = static_cast<int>(std::lround(seed.camera_px.y()));
+    if (x < 0 || y < 0 || x >= map.width || y >= map.height) continue;
+    const float depth = map.depth_mm[static_cast<std::size_t>(y) * map.width + x];
+    if (!(std::abs(depth * seed.plane.inverse_depth - 1) < kJump)) continue;
+    const auto end = runs_.begin() + static_cast<std::ptrdiff_t>(first_runs_[y + 1]);
+    const auto run = std::partition_point(runs_.begin() + static_cast<std::ptrdiff_t>(first_runs_[y]), end,
+                                          [&](const Run& each) { return each.end <= x; });
+    if (run != end) runs_[root(static_cast<std::int32_t>(run - runs_.begin()))].borne = true;
+  }
   for (std::size_t run = 0; run < runs_.size(); ++run) {
-    if (runs_[root(static_cast<std::int32_t>(run))].pixels >= least) continue;
+    const Run& all = runs_[root(static_cast<std::int32_t>(run))];
+    if (all.pixels >= (all.borne ? least : kWithoutSymbol * least)) continue;
     for (int x = runs_[run].first; x < runs_[run].end; ++x)
       map.drop(static_cast<std::size_t>(runs_[run].y) * map.width + x, DensePixel::kIsland);
   }
@@ -280,8 +298,8 @@ void MapCleaner::drop_islands(DenseMap& map, std::size_t least) {
 
 std::size_t MapCleaner::bytes() const {
   const auto of = [](const auto& held) { return held.capacity() * sizeof held[0]; };
-  return of(label_) + of(runs_) + of(bits_) + of(rows_) + of(measured_) + of(right_) + of(below_) + of(distance_) +
-         of(nearest_);
+  return of(label_) + of(runs_) + of(first_runs_) + of(bits_) + of(rows_) + of(measured_) + of(right_) + of(below_) +
+         of(distance_) + of(nearest_);
 }
 
 void MapCleaner::prune(DenseMap& map, double reach_px) {

@@ -11,7 +11,9 @@
 
 #include <Eigen/Geometry>
 
+#include "core/clones.hpp"
 #include "core/cloud/point_record.hpp"
+#include "core/decode/lanes.hpp"
 
 namespace slsd {
 namespace {
@@ -72,6 +74,56 @@ class ViewPoints {
 void put(char*& to, const Eigen::Vector3f& vector) {
   std::memcpy(to, vector.data(), 12);
   to += 12;
+}
+
+/// A row of a view, from one pixel on whose rays are known to the next such.
+struct RowPiece {
+  float turned[3], per_px[3];  // R r of the first pixel, and its change for one px
+  float translation[3];
+  const float *depth_mm, *sigma_mm;
+  const std::uint8_t *intensity, *pixels;
+  int count;  // up to kLanes
+  std::uint8_t camera;
+};
+
+/// Puts the points of the measured pixels, each with what follows it. @return where the next goes
+inline __attribute__((always_inline)) char* put_points(const RowPiece& in, char* to) {
+  constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
+  constexpr auto kMeasured = static_cast<std::uint8_t>(DensePixel::kMeasured);
+  Lanes depth{};
+  std::memcpy(&depth, in.depth_mm, sizeof(float) * static_cast<std::size_t>(in.count));
+  float places[3][kLanes];
+  for (int k = 0; k < 3; ++k) {
+    const Lanes place = depth * (in.turned[k] + in.per_px[k] * kLane) + in.translation[k];
+    std::memcpy(places[k], &place, sizeof place);
+  }
+  for (int i = 0; i < in.count; ++i) {
+    if (in.pixels[i] != kMeasured) continue;
+    const float record[4] = {places[0][i], places[1][i], places[2][i], in.sigma_mm[i]};
+    std::memcpy(to, record, sizeof record);
+    to[16] = static_cast<char>(in.intensity[i]), to[17] = static_cast<char>(in.camera);
+    to += kPointBytes;
+  }
+  return to;
+}
+
+/// The same of a whole row, which needs room for all its pixels.
+char* put_row(const DenseView& view, const Eigen::Matrix3f& rotation, int y, char* to) {
+  RowPiece piece;
+  Eigen::Map<Eigen::Vector3f>(piece.translation) = view.rig_from_camera.translation.cast<float>();
+  piece.camera = view.camera;
+  for (int x = 0; x < view.map.width; x += kLanes) {
+    const std::size_t pixel = static_cast<std::size_t>(y) * view.map.width + x;
+    const Eigen::Vector2f first = view.rays->at(x, y), last = view.rays->before_next(x, y);
+    Eigen::Map<Eigen::Vector3f>(piece.turned) = rotation * first.homogeneous();
+    Eigen::Map<Eigen::Vector3f>(piece.per_px) = rotation.leftCols<2>() * (last - first) / (RayGrid::kPitchPx - 1);
+    piece.depth_mm = &view.map.depth_mm[pixel], piece.sigma_mm = &view.map.sigma_mm[pixel];
+    piece.intensity = &view.map.intensity[pixel];
+    piece.pixels = reinterpret_cast<const std::uint8_t*>(&view.map.pixels[pixel]);
+    piece.count = std::min(kLanes, view.map.width - x);
+    to = Cloned<put_points>::call(piece, to);
+  }
+  return to;
 }
 
 void put_point(char*& to, const DenseView& view, const ViewPoints& points, int x, int y, bool normals) {
@@ -148,16 +200,23 @@ std::string write_dense_ply(const DenseCloud& cloud, bool normals) {
                       "intensity\nproperty uchar camera\n";
   if (normals) bytes += "property float nx\nproperty float ny\nproperty float nz\n";
   bytes += "end_header\n";
-  const std::size_t begin = bytes.size();
-  bytes.resize(begin + cloud.points() * bytes_of_point(normals));
-  char* to = bytes.data() + begin;
+  bytes.reserve(bytes.size() + cloud.points() * bytes_of_point(normals));
+  std::string row;
   for (const DenseView& view : cloud.views) {
     const ViewPoints points(view);
+    const Eigen::Matrix3f rotation = view.rig_from_camera.rotation.cast<float>();
+    row.resize(static_cast<std::size_t>(view.map.width) * bytes_of_point(normals));
     for (int y = 0; y < view.map.height; ++y) {
-      for (int x = 0; x < view.map.width; ++x) {
-        if (view.map.measured(static_cast<std::size_t>(y) * view.map.width + x))
-          put_point(to, view, points, x, y, normals);
+      char* to = row.data();
+      if (normals) {
+        for (int x = 0; x < view.map.width; ++x) {
+          if (view.map.measured(static_cast<std::size_t>(y) * view.map.width + x))
+            put_point(to, view, points, x, y, normals);
+        }
+      } else {
+        to = put_row(view, rotation, y, to);
       }
+      bytes.append(row.data(), to);
     }
   }
   return bytes;

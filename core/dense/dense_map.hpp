@@ -2,7 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <string_view>
@@ -38,14 +40,24 @@ struct DenseMap {
   std::vector<std::uint8_t> firm;  ///< 1 where a pixel itself shows the light that falls there, or all around it does
   std::array<std::uint32_t, kDensePixelCount> counts{};  ///< of pixels
 
-  void reset(int to_width, int to_height) {
+  /// What is in it then means nothing.
+  void resize(int to_width, int to_height) {
     width = to_width, height = to_height;
     const std::size_t count = static_cast<std::size_t>(width) * height;
-    depth_mm.assign(count, std::numeric_limits<float>::quiet_NaN());
-    sigma_mm.assign(count, std::numeric_limits<float>::quiet_NaN());
-    intensity.assign(count, 0);
-    pixels.assign(count, DensePixel::kNotReached);
-    firm.assign(count, 0);
+    depth_mm.resize(count), sigma_mm.resize(count), intensity.resize(count), pixels.resize(count), firm.resize(count);
+  }
+  /// Nothing is measured in these rows. @param end  beyond the last
+  void clear_rows(int first, int end) {
+    const auto clear = [&](auto& values, auto none) {
+      std::fill(values.begin() + static_cast<std::ptrdiff_t>(first) * width,
+                values.begin() + static_cast<std::ptrdiff_t>(end) * width, none);
+    };
+    clear(depth_mm, std::numeric_limits<float>::quiet_NaN()), clear(sigma_mm, std::numeric_limits<float>::quiet_NaN());
+    clear(intensity, std::uint8_t{0}), clear(pixels, DensePixel::kNotReached), clear(firm, std::uint8_t{0});
+  }
+  void reset(int to_width, int to_height) {
+    resize(to_width, to_height);
+    clear_rows(0, height);
   }
   [[nodiscard]] std::size_t bytes() const {
     return depth_mm.capacity() * sizeof(float) + sigma_mm.capacity() * sizeof(float) + intensity.capacity() +

@@ -74,11 +74,14 @@ DenseMapper::DenseMapper(std::shared_ptr<const Fixed> fixed)
     : fixed_(std::move(fixed)),
       grid_(fixed_->geometry, {stride_px(fixed_->geometry.camera.lens, fixed_->decode.dense), fixed_->window_px,
                                fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
+      follower_(fixed_->window_px),
       judge_({fixed_->reach_px, fixed_->window_px, fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
       cleaner_(fixed_->geometry.camera, fixed_->geometry.projector, fixed_->rays) {}
 
 DenseMapper DenseMapper::another() const {
-  return DenseMapper(fixed_);
+  DenseMapper other(fixed_);
+  other.follower_ = follower_.another();
+  return other;
 }
 
 const std::shared_ptr<const RayGrid>& DenseMapper::rays() const {
@@ -90,7 +93,7 @@ int DenseMapper::window_px() const {
 }
 
 std::size_t DenseMapper::bytes() const {
-  return grid_.bytes() + cleaner_.bytes() + map_.bytes();
+  return grid_.bytes() + follower_.bytes() + cleaner_.bytes() + map_.bytes();
 }
 
 std::size_t DenseMapper::bytes_of_fields(const Lens& projector) {
@@ -113,7 +116,7 @@ int DenseMapper::stride_px(const Lens& camera, const DenseOptions& options) {
 
 void DenseMapper::warm_up(Executor& executor) {
   executor.run(kUsualBlurs, [&](int blur, int) { (void)fixed_->fields.at(static_cast<std::size_t>(blur)); });
-  map_.reset(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
+  map_.resize(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
 }
 
 /// The plane of a symbol: its depth, and the slopes that make the map turn as the grid of symbols does.
@@ -149,22 +152,36 @@ void DenseMapper::find_blur(const DenseFrame& frame) {
   }
 }
 
-const DenseMap& DenseMapper::measure(const GreyView& frame, double full, const DecodedSymbols& symbols,
-                                     Executor& executor, DenseObserver* observer) {
+/// How far off its epipolar lines the frame is, and how blurred.
+const PatternField& DenseMapper::find_field(const DenseFrame& frame) {
+  blur_ = 1;
+  // What is off looks blurred, and with the wrong blur less of it is found: one after the other, and again.
+  grid_.find_epipolar_offset(frame, fixed_->fields.at(blur_), seeds_);
+  if (!seeds_.empty()) find_blur(frame);
+  grid_.find_epipolar_offset(frame, fixed_->fields.at(blur_), seeds_);
+  return fixed_->fields.at(blur_);
+}
+
+DenseMap& DenseMapper::measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
+                               DenseObserver* observer, bool next) {
   const auto done = [&](DenseStage stage) {
     if (observer != nullptr) observer->stage_done(stage);
   };
   const DenseFrame seen{frame, full, symbols.noise};
-  map_.reset(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
+  map_.resize(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
   find_seeds(symbols);
-  blur_ = 1;
-  // What is off looks blurred, and with the wrong blur less of it is found: one after the other, and again.
-  grid_.find_epipolar_offset(seen, fixed_->fields.at(blur_), seeds_);
-  if (!seeds_.empty()) find_blur(seen);
-  const PatternField& field = fixed_->fields.at(blur_);
-  grid_.find_epipolar_offset(seen, field, seeds_);
+  const auto from = next ? follower_.follow(seen, grid_, executor) : nullptr;
+  followed_ = from ? follower_.followed() : 0;
+  if (from) {
+    blur_ = from->blur;
+    grid_.set_epipolar_offset(from->epipolar);
+  } else {
+    grid_.clear();
+  }
+  const PatternField& field = from ? fixed_->fields.at(blur_) : find_field(seen);
   done(DenseStage::kFindBlur);
   grid_.grow(seen, field, seeds_, executor);
+  if (next) follower_.keep(seen, field, blur_, grid_, executor);
   done(DenseStage::kGrow);
   grid_.fuse(executor);
   done(DenseStage::kFuse);
@@ -172,9 +189,10 @@ const DenseMap& DenseMapper::measure(const GreyView& frame, double full, const D
   done(DenseStage::kJudge);
   cleaner_.drop_occluded(map_, executor);
   cleaner_.drop_unlit_rims(map_, fixed_->close_px);
-  cleaner_.drop_islands(map_, static_cast<std::size_t>(fixed_->window_px) * fixed_->window_px);
+  cleaner_.drop_islands(map_, static_cast<std::size_t>(fixed_->window_px) * fixed_->window_px, seeds_);
   cleaner_.prune(map_, fixed_->decode.dense.prune_px);
   map_.count_pixels();
+  if (next) follower_.finish(map_, grid_);
   done(DenseStage::kClean);
   return map_;
 }

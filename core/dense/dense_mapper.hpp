@@ -11,6 +11,7 @@
 #include "core/dense/clean_map.hpp"
 #include "core/dense/dense_map.hpp"
 #include "core/dense/executor.hpp"
+#include "core/dense/follow_grid.hpp"
 #include "core/dense/pixel_judge.hpp"
 #include "core/dense/surface_grid.hpp"
 
@@ -38,9 +39,18 @@ class DenseMapper {
   [[nodiscard]] DenseMapper another() const;
 
   /// @param symbols  those that the decoder has found in this frame
-  /// @return         stands until the next call
-  const DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
-                          DenseObserver* observer = nullptr);
+  /// @return         stands until the next call, which writes over whatever is there: another map may be put in its
+  ///                 place, whose memory is then used
+  DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
+                    DenseObserver* observer = nullptr) {
+    return measure(frame, full, symbols, executor, observer, false);
+  }
+  /// The same of the next frame of a stream: where the scene stands still since the frame before, this costs a part of
+  /// it, see GridFollower. The cloud is as exact, and not to the last bit that of measure().
+  DenseMap& measure_next(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
+                         DenseObserver* observer = nullptr) {
+    return measure(frame, full, symbols, executor, observer, true);
+  }
 
   /// What it holds of memory, but for what it shares with others; bytes_of_fields() is that.
   [[nodiscard]] std::size_t bytes() const;
@@ -58,6 +68,8 @@ class DenseMapper {
   [[nodiscard]] const std::shared_ptr<const RayGrid>& rays() const;
   /// The side of the patches that the surface is fitted to.
   [[nodiscard]] int window_px() const;
+  /// Of the last frame: how many nodes of the surface went on from the frame before.
+  [[nodiscard]] std::size_t followed_nodes() const { return followed_; }
   /// Of the last frame: the blur of the pattern, projector px.
   [[nodiscard]] float blur_sigma_px() const { return PatternFields::kBlursPx[blur_]; }
   /// Of the last frame: how far off its epipolar lines it had the pattern in the frame's middle, projector px.
@@ -68,9 +80,14 @@ class DenseMapper {
   explicit DenseMapper(std::shared_ptr<const Fixed> fixed);
   void find_seeds(const DecodedSymbols& symbols);
   void find_blur(const DenseFrame& frame);
+  const PatternField& find_field(const DenseFrame& frame);
+  DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
+                    DenseObserver* observer, bool next);
 
   std::shared_ptr<const Fixed> fixed_;  // shared: mappers of several threads use one
   SurfaceGrid grid_;
+  GridFollower follower_;
+  std::size_t followed_ = 0;  // nodes, of the last frame
   PixelJudge judge_;
   MapCleaner cleaner_;
   std::vector<SurfaceSeed> seeds_;

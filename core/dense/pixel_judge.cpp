@@ -525,11 +525,12 @@ void PixelJudge::judge(const DenseFrame& frame, const PatternField& field, const
   resize(stride, executor.workers());
   executor.run(grid.rows() + 1, [&](int part, int worker) {
     const int row = part - 1;
+    const int top = std::max(0, grid.y_of(row)), bottom = std::min(map.height, grid.y_of(row) + stride);
+    if (top < bottom) map.clear_rows(top, bottom);
     for (int column = -1; column < grid.columns(); ++column) {
       Cell cell{frame, field, grid, map, column, row, 0, 0, 0, 0};
-      cell.left = std::max(0, grid.x_of(column)), cell.top = std::max(0, grid.y_of(row));
-      cell.right = std::min(map.width, grid.x_of(column) + stride);
-      cell.bottom = std::min(map.height, grid.y_of(row) + stride);
+      cell.left = std::max(0, grid.x_of(column)), cell.top = top;
+      cell.right = std::min(map.width, grid.x_of(column) + stride), cell.bottom = bottom;
       if (cell.left < cell.right && cell.top < cell.bottom) judge_cell(cell, scratch_[worker]);
     }
   });

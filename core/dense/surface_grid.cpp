@@ -16,12 +16,9 @@ namespace {
 /// A start that the last step has moved by less stands: what is left is less than a hundredth of that.
 constexpr float kSettledPx = 0.1F;
 constexpr int kStepsMost = 4;
-/// Of the gain, for one camera px: how fast light and colour change on most of what is scanned.
-constexpr float kGainSlopeSigma = 0.02F;
-constexpr int kAttemptsMax = 4;
 
 /// What makes a fit one: docs/dense.md has what each is for.
-constexpr float kSupportMin = 0.5F;   // of the window's pixels agree
+constexpr float kSupportMin = 0.6F;   // of the window's pixels agree
 constexpr float kSeenMin = 0.7F;      // of them are in the frame and not saturated
 constexpr float kResidualMax = 0.3F;  // of the gain
 constexpr float kStepMaxPx = 0.8F;    // from the neighbour's plane: within the pull of the fit
@@ -41,8 +38,6 @@ constexpr std::size_t kOffsetSeeds = 256, kOffsetSeedsLeast = 8, kOffsetSlopeSee
 constexpr float kUsualOffsetPx = 0.2F;
 constexpr float kOffsetPx = 0.05F;      // how far relief and noise put a seed off
 constexpr float kOffsetSlope = 0.001F;  // for one camera px: more is no knock that the symbols would decode after
-
-constexpr AlignOptions kAlign{.gain_slope_sigma = kGainSlopeSigma};
 
 }  // namespace
 
@@ -240,6 +235,7 @@ void SurfaceGrid::offer_neighbours(std::int32_t index) {
   const auto stride = static_cast<float>(options_.stride_px);
   const auto to = [&](int dx, int dy) {
     if (column + dx < 0 || row + dy < 0 || column + dx >= columns_ || row + dy >= rows_) return;
+    if (nodes_[index + dy * columns_ + dx].good) return;
     const float x = stride * static_cast<float>(dx), y = stride * static_cast<float>(dy);
     const float gain = std::max(0.5F * node.gain, node.gain + node.gain_x * x + node.gain_y * y);
     offer({index + dy * columns_ + dx,
@@ -254,12 +250,15 @@ void SurfaceGrid::offer_neighbours(std::int32_t index) {
   to(1, 0), to(-1, 0), to(0, 1), to(0, -1);
 }
 
-void SurfaceGrid::grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
-                       Executor& executor) {
+void SurfaceGrid::clear() {
   const std::size_t count = static_cast<std::size_t>(columns_) * rows_;
   nodes_.assign(count, SurfaceNode{});
   pending_.assign(count, -1);
   attempts_.assign(count, 0);
+}
+
+void SurfaceGrid::grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+                       Executor& executor) {
   if (batches_.size() < static_cast<std::size_t>(executor.workers())) batches_.resize(executor.workers());
   next_.clear();
   for (const SurfaceSeed& seed : seeds) {
@@ -269,6 +268,8 @@ void SurfaceGrid::grow(const DenseFrame& frame, const PatternField& field, std::
                 dy = static_cast<float>(y_of(index / columns_)) - seed.camera_px.y();
     offer({index, 0, {seed.plane.at(dx, dy), seed.plane.slope_x, seed.plane.slope_y}, 0, 0, 0, 0, 0});
   }
+  for (std::size_t i = 0; i < nodes_.size(); ++i)
+    if (nodes_[i].good) offer_neighbours(static_cast<std::int32_t>(i));
   while (!next_.empty()) {
     front_.swap(next_);
     next_.clear();

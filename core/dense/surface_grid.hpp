@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -122,8 +123,25 @@ class SurfaceGrid {
   /// Measures at some of the seeds how far off its epipolar lines the frame has the pattern; what follows starts there.
   void find_epipolar_offset(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
   [[nodiscard]] const EpipolarOffset& epipolar_offset() const { return epipolar_; }
+  void set_epipolar_offset(const EpipolarOffset& offset) { epipolar_ = offset; }
   [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory
 
+  /// Forgets every node.
+  void clear();
+  /// Row by row. What is good before grow() stays, and is grown from.
+  [[nodiscard]] std::span<SurfaceNode> nodes() { return nodes_; }
+  [[nodiscard]] std::span<const SurfaceNode> nodes() const { return nodes_; }
+  /// This node need not be tried.
+  void close(std::size_t node) { attempts_[node] = kAttemptsMax; }
+  [[nodiscard]] std::pair<int, int> frame_px() const {
+    return {geometry_->camera.lens.width_px, geometry_->camera.lens.height_px};
+  }
+
+  /// How nodes are aligned: light and colour change by some 2 % of the gain for one camera px on most of what is
+  /// scanned.
+  static constexpr AlignOptions kAlign{.gain_slope_sigma = 0.02F};
+
+  /// From the seeds and what is good already, since clear().
   void grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds, Executor& executor);
   /// Where a node and those around it agree to within their noise they are one smooth surface, and their mean is more
   /// exact than each: wide windows where it is flat. Where they differ by more, that is what sigma is made of.
@@ -131,6 +149,7 @@ class SurfaceGrid {
 
  private:
   static constexpr std::size_t kBatchNodes = 64;
+  static constexpr std::uint8_t kAttemptsMax = 4;
   struct Attempt {
     std::int32_t node;
     float cost;

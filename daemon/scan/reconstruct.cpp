@@ -90,13 +90,15 @@ void shade(std::span<CloudPoint> points, const SceneLight& light, ScanResult& re
 
 /// A point for each pixel of a camera, from the symbols of its frame.
 DenseView measure_pixels(const GreyView& frame, Decoder& decoder, ScanSetup& setup, std::size_t lane,
-                         std::size_t camera, const SceneLight& light, ScanResult& result) {
+                         std::size_t camera, const SceneLight& light, bool next_of_stream, ScanResult& result) {
   DenseMapper& mapper = setup.dense->of(lane, camera, decoder, setup.pattern, *setup.calibration, setup.decode);
   DecodedSymbols symbols = decoder.symbols();
   if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may be those of the quotient
   Executor& executor = setup.dense->crew();
   const CalibratedCamera& calibrated = setup.calibration->cameras[decoder.camera_index()];
-  DenseView view{mapper.measure(frame, light.full, symbols, executor),
+  DenseMap& map = next_of_stream ? mapper.measure_next(frame, light.full, symbols, executor)
+                                 : mapper.measure(frame, light.full, symbols, executor);
+  DenseView view{std::exchange(map, setup.dense->spare_map()),
                  mapper.rays(),
                  calibrated.rig_from_camera,
                  decoder.camera_index(),
@@ -130,7 +132,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
   ScanResult result = describe(set, setup, scan_id);
   const std::size_t pictured = setup.camera_index(request.camera);
   StageClock clock;
-  auto dense = request.formats.dense() ? std::make_shared<DenseCloud>() : nullptr;
+  auto dense = request.formats.dense() ? setup.dense->cloud() : nullptr;
   for (std::size_t i = 0; i < set.frames.size(); ++i) {
     clock.start();
     const auto begin = steady_clock::now();
@@ -149,7 +151,8 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     shade(std::span(result.cloud.points).subspan(before), light, result);
     if (dense) {
       const auto dense_begin = steady_clock::now();
-      dense->views.push_back(measure_pixels(set.frames[i].image(), decoder, setup, lane, i, light, result));
+      dense->views.push_back(
+          measure_pixels(set.frames[i].image(), decoder, setup, lane, i, light, request.of_stream, result));
       const auto took = steady_clock::now() - dense_begin;
       result.dense_time += took, result.decode_time += took;
     }

@@ -60,6 +60,7 @@ struct ScanRequest {
   bool ambient = false;                     ///< less those in the light of the room alone
   CloudFormats formats = {};                ///< in which the cloud is written
   std::stop_token gone = {};                ///< requested when nobody waits for the outcome any more
+  bool of_stream = false;                   ///< follows another: pixels where nothing moves are measured from there
 };
 
 /// One frame of one camera is asked for.

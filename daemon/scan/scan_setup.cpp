@@ -171,6 +171,26 @@ Executor& DenseMappers::crew() {
   return *crew_;
 }
 
+std::shared_ptr<DenseCloud> DenseMappers::cloud() {
+  constexpr std::size_t kSpareMost = 2;
+  return {new DenseCloud, [spare = spare_](DenseCloud* cloud) {
+            {
+              const std::lock_guard lock(spare->mutex);
+              for (DenseView& view : cloud->views)
+                if (spare->maps.size() < kSpareMost) spare->maps.push_back(std::move(view.map));
+            }
+            delete cloud;
+          }};
+}
+
+DenseMap DenseMappers::spare_map() {
+  const std::lock_guard lock(spare_->mutex);
+  if (spare_->maps.empty()) return {};
+  DenseMap map = std::move(spare_->maps.back());
+  spare_->maps.pop_back();
+  return map;
+}
+
 DenseMapper& DenseMappers::of(std::size_t lane, std::size_t camera, const Decoder& decoder, const Pattern& pattern,
                               const Calibration& calibration, const DecodeOptions& options) {
   const std::lock_guard lock(mutex_);

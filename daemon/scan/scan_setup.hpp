@@ -12,6 +12,7 @@
 
 #include "core/code/pattern.hpp"
 #include "core/decode/decoder.hpp"
+#include "core/dense/dense_cloud.hpp"
 #include "core/dense/dense_mapper.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/image.hpp"
@@ -68,6 +69,11 @@ class DenseMappers {
  public:
   /// The threads that help the lanes, which sleep meanwhile.
   [[nodiscard]] Executor& crew();
+  /// A cloud whose maps come back, for the next ones, when nobody holds it any more: new ones would be tens of
+  /// megabytes that the kernel has to fill with zeros.
+  [[nodiscard]] std::shared_ptr<DenseCloud> cloud();
+  /// A map that came back; an empty one where none has.
+  [[nodiscard]] DenseMap spare_map();
   /// The mapper of a lane for the camera of a decoder.
   [[nodiscard]] DenseMapper& of(std::size_t lane, std::size_t camera, const Decoder& decoder, const Pattern& pattern,
                                 const Calibration& calibration, const DecodeOptions& options);
@@ -75,6 +81,11 @@ class DenseMappers {
  private:
   std::mutex mutex_;
   std::optional<Crew> crew_;
+  struct Spare {
+    std::mutex mutex;
+    std::vector<DenseMap> maps;
+  };
+  std::shared_ptr<Spare> spare_ = std::make_shared<Spare>();  // shared: clouds may outlive a reload
   std::map<std::pair<std::size_t, std::size_t>, std::unique_ptr<DenseMapper>> mappers_;  // by camera, lane
 };
 

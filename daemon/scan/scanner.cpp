@@ -155,7 +155,7 @@ void Scanner::scan_freely() {
   const MonotonicTime begin = steady_clock::now();
   const double rate_hz = free_rate_hz_;
   ScanRequest request;
-  request.deadline = begin + kFreeScanTimeout;
+  request.deadline = begin + kFreeScanTimeout, request.of_stream = true;
   const auto scan = make_scan(std::move(request), true, {});
   take_turn({scan, [&] {
                Patience patience = patience_of(*scan);

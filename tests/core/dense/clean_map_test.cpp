@@ -53,17 +53,39 @@ MapCleaner cleaner() {
   return {rig.cameras[0], rig.projector, std::make_shared<const RayGrid>(rig.cameras[0].lens)};
 }
 
+SurfaceSeed seed_at(float x, float y, float depth_mm = 1000) {
+  return {{x, y}, {1 / depth_mm, 0, 0}};
+}
+
 TEST(DropIslands, KeepsWhatIsLargeEnough) {
   DenseMap map = map_of({"##...#", "##...#", "......", "###..."});
-  cleaner().drop_islands(map, 3);
+  const std::vector<SurfaceSeed> seeds = {seed_at(0, 0), seed_at(5, 1), seed_at(2.3F, 2.8F)};
+  cleaner().drop_islands(map, 3, seeds);
   EXPECT_EQ(left_of(map), "##....\n##....\n......\n###...\n");
   EXPECT_EQ(map.pixels[5], DensePixel::kIsland);
 }
 
 TEST(DropIslands, AJumpInDepthParts) {
   DenseMap map = map_of({"####22", "####22"});
-  cleaner().drop_islands(map, 5);
+  const std::vector<SurfaceSeed> seeds = {seed_at(1, 1), seed_at(5, 1, 2000)};
+  cleaner().drop_islands(map, 5, seeds);
   EXPECT_EQ(left_of(map), "####..\n####..\n");
+}
+
+TEST(DropIslands, WhatBearsNoSymbolHasToBeFarLarger) {
+  const Drawing rows = {"###############..........", ".........................", "#########################"};
+  const auto after = [&](const std::vector<SurfaceSeed>& seeds) {
+    DenseMap map = map_of(rows);
+    cleaner().drop_islands(map, 1, seeds);
+    return map.measured(0);
+  };
+  EXPECT_FALSE(after({}));
+  EXPECT_TRUE(after({seed_at(7, 0)}));
+  EXPECT_FALSE(after({seed_at(7, 0, 2000)})) << "a symbol behind it";
+  EXPECT_FALSE(after({seed_at(7, 1), seed_at(7, 2), seed_at(20, 0), seed_at(-3, 0), seed_at(9, 40)})) << "beside it";
+  DenseMap map = map_of(rows);
+  cleaner().drop_islands(map, 1, {});
+  EXPECT_TRUE(map.measured(50)) << "25 pixels are enough by themselves";
 }
 
 TEST(Prune, TakesWhatIsNearerToAHoleThanAsked) {

@@ -154,6 +154,20 @@ TEST(DenseMapper, DrawsNoSurfaceOverAShadow) {
   EXPECT_LT(share(got.unlit, got.measured), 0.001);
 }
 
+/// A strip of wall, too narrow for its symbols to be decoded, beside a column: growth runs off the column's rim there.
+TEST(DenseMapper, DrawsNoSurfaceThatNoSymbolBears) {
+  const auto strip = [](const Ray& ray) -> std::optional<double> {
+    const auto wall = plane({0, 0, 2150}, {0, 0, 1})(ray), near = cylinder({40, 0, 1990}, {0, 1, 0}, 40)(ray);
+    return near ? near : wall;
+  };
+  SimulationOptions options;
+  options.seed = 4;
+  const Seen seen = see(strip, draw_pattern(pattern()), options);
+  const Score got = score(measure(seen.frame.view()).map, seen);
+  EXPECT_GT(share(got.measured, got.lit), 0.8);
+  EXPECT_LT(share(got.gross, got.measured), 0.003);
+}
+
 TEST(DenseMapper, WithoutPruningItReachesFartherAndNearerToWrong) {
   DenseOptions all;
   all.prune_px = 0;
@@ -360,6 +374,129 @@ TEST(DenseMapper, AllocatesNothingAfterTheFirstFrame) {
   const auto before = test::allocations();
   (void)mapper.measure(tilted().frame.view(), 255, symbols, executor);
   EXPECT_EQ(test::allocations(), before);
+}
+
+/// Frames one after the other, as a subscriber has them measured.
+class Stream {
+ public:
+  const DenseMap& next(const Grey8& frame) {
+    EXPECT_TRUE(decoder_.decode(frame.view(), 255));
+    return mapper_.measure_next(frame.view(), 255, decoder_.symbols(), executor_);
+  }
+  [[nodiscard]] double followed(const DenseMap& map) const {
+    const double nodes = map.count(DensePixel::kMeasured) / 16.0;  // one to a square of the stride
+    return static_cast<double>(mapper_.followed_nodes()) / std::max(1.0, nodes);
+  }
+
+ private:
+  Decoder decoder_ = Decoder::create(pattern(), small_rig(), 0, {}).value();
+  DenseMapper mapper_{pattern(), small_rig(), 0, {}};
+  SerialExecutor executor_;
+};
+
+Seen see_again(const Surface& surface, std::uint32_t seed, double lit = SimulationOptions{}.lit) {
+  SimulationOptions options;
+  options.seed = seed, options.lit = lit;
+  return see(surface, draw_pattern(pattern()), options);
+}
+
+/// Errors of the mean of several maps, mm, where all have a point.
+double rms_of_mean(const std::vector<DenseMap>& maps, const Seen& seen) {
+  double squares = 0;
+  std::size_t count = 0;
+  for (std::size_t pixel = 0; pixel < maps[0].pixels.size(); ++pixel) {
+    if (!std::ranges::all_of(maps, [&](const DenseMap& map) { return map.measured(pixel); })) continue;
+    double sum = 0;
+    for (const DenseMap& map : maps) sum += static_cast<double>(map.depth_mm[pixel]);
+    const Eigen::Vector2d at(static_cast<double>(pixel % 360), static_cast<double>(pixel / 360));
+    const Eigen::Vector3d ray = seen.rig.cameras[0].lens.undistort(at).homogeneous();
+    const double off = sum / static_cast<double>(maps.size()) - *seen.surface({Eigen::Vector3d::Zero(), ray});
+    if (std::abs(off) < 2) squares += off * off, ++count;
+  }
+  return std::sqrt(squares / static_cast<double>(count));
+}
+
+TEST(DenseStream, AStillSceneIsFollowedAsExactlyAndItsNoiseIsEachFramesOwn) {
+  Stream stream;
+  std::vector<DenseMap> followed, single;
+  for (std::uint32_t frame = 1; frame <= 8; ++frame) {
+    const Seen seen = see_again(column_and_wall, frame);
+    const DenseMap& map = stream.next(seen.frame);
+    if (frame <= 2) continue;
+    EXPECT_GT(stream.followed(map), 0.9) << frame;
+    followed.push_back(map), single.push_back(measure(seen.frame.view()).map);
+    const Score got = score(followed.back(), seen), alone = score(single.back(), seen);
+    EXPECT_NEAR(share(got.measured, got.lit), share(alone.measured, alone.lit), 0.01);
+    EXPECT_LT(got.rms_mm, 1.05 * alone.rms_mm) << frame;
+    EXPECT_LT(share(got.gross, got.measured), share(alone.gross, alone.measured) + 0.0005) << frame;
+    EXPECT_LT(share(got.unlit, got.measured), share(alone.unlit, alone.measured) + 0.0005) << frame;
+    EXPECT_LT(share(got.beyond_three, got.measured), share(alone.beyond_three, alone.measured) + 0.005) << frame;
+  }
+  // What the mean of several gains is gone where they share their noise.
+  EXPECT_LT(rms_of_mean(followed, column()), 1.05 * rms_of_mean(single, column()));
+}
+
+TEST(DenseStream, WhatMovesIsNeverDrawnWhereItWas) {
+  for (const double step_mm : {0.02, 0.2, 1.0, 6.0, 40.0}) {
+    Stream stream;
+    for (std::uint32_t frame = 1; frame <= 7; ++frame) {
+      // Still, and then on the move, sideways and towards the camera.
+      const double moved = frame < 4 ? 0 : step_mm * (frame - 3);
+      const auto surface = [&](const Ray& ray) -> std::optional<double> {
+        const auto wall = plane({0, 0, 2150}, {0, 0, 1})(ray),
+                   column = cylinder({moved, 0, 2030 - moved}, {0, 1, 0}, 40)(ray);
+        return column ? column : wall;
+      };
+      const Seen seen = see_again(surface, frame);
+      const DenseMap one = measure(seen.frame.view()).map;
+      const Score got = score(stream.next(seen.frame), seen), alone = score(one, seen);
+      EXPECT_NEAR(share(got.measured, got.lit), share(alone.measured, alone.lit), 0.015) << step_mm << ' ' << frame;
+      EXPECT_LT(got.rms_mm, 1.1 * alone.rms_mm) << step_mm << ' ' << frame;
+      EXPECT_LT(share(got.gross, got.measured), share(alone.gross, alone.measured) + 0.001) << step_mm << ' ' << frame;
+      EXPECT_LT(share(got.unlit, got.measured), share(alone.unlit, alone.measured) + 0.001) << step_mm << ' ' << frame;
+    }
+  }
+}
+
+TEST(DenseStream, SlowDriftIsFollowedToItsEnd) {
+  Stream stream;
+  for (std::uint32_t frame = 1; frame <= 40; ++frame) {
+    const double moved = 0.05 * frame;
+    const Seen seen = see_again(plane({0, 0, 2000 - moved}, {0.3, 0.15, -1}), frame);
+    const DenseMap& map = stream.next(seen.frame);
+    if (frame % 8 != 0) continue;
+    const Score got = score(map, seen), alone = score(measure(seen.frame.view()).map, seen);
+    EXPECT_LT(got.rms_mm, 1.2 * alone.rms_mm) << frame;
+    EXPECT_LT(rms_of_mean({map}, seen), 0.3) << frame;
+  }
+}
+
+TEST(DenseStream, LightThatChangesMovesNothing) {
+  Stream stream;
+  for (std::uint32_t frame = 1; frame <= 8; ++frame) {
+    const Seen seen = see_again(kTilted, frame, frame < 4 ? 170 : 170 - 4.0 * frame);
+    const Score got = score(stream.next(seen.frame), seen), alone = score(measure(seen.frame.view()).map, seen);
+    EXPECT_LT(got.rms_mm, 1.1 * alone.rms_mm) << frame;
+    EXPECT_NEAR(share(got.measured, got.lit), share(alone.measured, alone.lit), 0.01) << frame;
+  }
+}
+
+TEST(DenseStream, NothingStaysOfAPatternThatIsGone) {
+  const auto noise = [] {
+    Grey8 frame(360, 280);
+    std::mt19937 random(3);
+    std::uniform_int_distribution<int> level(0, 255);
+    for (int y = 0; y < frame.height(); ++y)
+      for (int x = 0; x < frame.width(); ++x) frame.at(x, y) = static_cast<std::uint8_t>(level(random));
+    return frame;
+  }();
+  for (const Grey8& after :
+       {noise, Grey8(360, 280), Grey8(360, 280, 255), see(kTilted, draw_pattern(pattern_of(2))).frame}) {
+    Stream stream;
+    for (std::uint32_t frame = 1; frame <= 4; ++frame) (void)stream.next(see_again(kTilted, frame).frame);
+    EXPECT_EQ(stream.next(after).count(DensePixel::kMeasured), 0U);
+    EXPECT_EQ(stream.next(after).count(DensePixel::kMeasured), 0U);
+  }
 }
 
 TEST(DenseOptions, AreChecked) {

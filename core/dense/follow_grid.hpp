@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "core/align/pattern_field.hpp"
+#include "core/dense/dense_map.hpp"
+#include "core/dense/executor.hpp"
+#include "core/dense/surface_grid.hpp"
+
+namespace slsd {
+
+/// A frame whose nodes were measured, and what follows from it for frames that differ from it by little.
+struct FollowedFrame {
+  std::vector<std::uint16_t> pixels;
+  double full = 0;
+  std::size_t blur = 0;  ///< of the field that the nodes were aligned with
+  EpipolarOffset epipolar;
+  std::vector<SurfaceNode> nodes;                  ///< good are those that bore points
+  std::vector<char> tried;                         ///< of them: nothing fitted
+  std::size_t good = 0;                            ///< of them
+  std::vector<std::int16_t> along, across, light;  ///< per pixel: the derivatives of the light, and the light
+  float slope_unit = 0;                            ///< of a step of the derivatives
+  std::vector<float> inverses;                     ///< N^-1 of each node, its upper triangle by rows
+
+  [[nodiscard]] std::size_t bytes() const;
+};
+
+/// Carries a grid's planes on from frame to frame where the scene stands still, at a small part of what aligning them
+/// costs. Where a frame I differs by little from one that was measured, I0, the aligner's model is linear, and its
+/// least squares move by
+///
+///     N^-1 sum J (I - I0),  N = sum J J^T and what is known beforehand
+///
+/// over a node's window, J the model's derivatives. These hang on the surface alone: they are kept, and of a new frame
+/// only sums are made. What comes of it has the new frame's noise, not that of I0.
+///
+/// A node whose window has changed by more than noise, beyond what its plane's move explains, or whose plane moves
+/// farther than the model is linear, is aligned as in any frame. So prediction saves time, and decides nothing.
+/// @thread thread-bound: keeps its buffers; what another() makes is for another thread, and shares the followed frame
+class GridFollower {
+ public:
+  /// @param window_px  of a node, as GridOptions has it
+  explicit GridFollower(int window_px) : window_px_(window_px), shared_(std::make_shared<Shared>()) {}
+  /// For another thread that measures frames of the same camera.
+  [[nodiscard]] GridFollower another() const { return {window_px_, shared_}; }
+
+  /// Begins a frame: gives the grid those nodes that go on, and closes those that have been tried on the same pixels
+  /// in vain.
+  /// @return what they go on from; null where most do not, and the grid begins from nothing
+  [[nodiscard]] std::shared_ptr<const FollowedFrame> follow(const DenseFrame& frame, SurfaceGrid& grid,
+                                                            Executor& executor);
+
+  /// When the grid has grown and is not fused yet: where more stands still since the frame before than went on, this
+  /// frame is what others are to be held against.
+  /// @param blur  of the field, see FollowedFrame
+  void keep(const DenseFrame& frame, const PatternField& field, std::size_t blur, const SurfaceGrid& grid,
+            Executor& executor);
+
+  /// Ends it: of the nodes only those go on where the map has a point.
+  void finish(const DenseMap& map, const SurfaceGrid& grid);
+
+  /// Of the last frame, how many nodes went on.
+  [[nodiscard]] std::size_t followed() const { return followed_; }
+  [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory, with what is shared
+
+ private:
+  struct Shared {
+    std::mutex mutex;
+    std::shared_ptr<const FollowedFrame> frame;
+  };
+  GridFollower(int window_px, std::shared_ptr<Shared> shared) : window_px_(window_px), shared_(std::move(shared)) {}
+
+  struct Moved {
+    float square = 0, by_noise = 0;  // of what a plane moved, and what is expected of it
+  };
+  void stop_what_moves(SurfaceGrid& grid);
+  void follow_row(const DenseFrame& frame, const FollowedFrame& from, SurfaceGrid& grid, int row, int worker);
+  [[nodiscard]] double still_share(const DenseFrame& frame, const SurfaceGrid& grid) const;
+  void find_derivatives(const PatternField& field, const SurfaceGrid& grid, FollowedFrame& to, Executor& executor);
+  void find_inverses(const DenseFrame& frame, const SurfaceGrid& grid, FollowedFrame& to, Executor& executor);
+
+  int window_px_;
+  std::shared_ptr<Shared> shared_;
+  std::vector<std::uint16_t> last_;          // the pixels of the frame before; empty: there was none
+  std::vector<std::vector<float>> columns_;  // sums over a row of windows, one to a worker
+  std::vector<Moved> moves_;                 // of the nodes
+  std::shared_ptr<FollowedFrame> kept_;      // until it is finished
+  std::size_t followed_ = 0;
+};
+
+}  // namespace slsd
