@@ -197,6 +197,11 @@ void MapCleaner::drop_occluded(DenseMap& map, Executor& executor) {
   }
 }
 
+void MapCleaner::drop_beyond_the_light(DenseMap& map) {
+  for (std::size_t pixel = 0; pixel < label_.size(); ++pixel)
+    if (label_[pixel] < 0 && map.measured(pixel)) map.drop(pixel, DensePixel::kUnlit);
+}
+
 void MapCleaner::drop_unlit_rims(DenseMap& map, int reach_px) {
   const BitRows rows{static_cast<std::size_t>(map.width + 63) / 64, map.height};
   bits_.assign(rows.words * static_cast<std::size_t>(map.height), 0);
@@ -236,47 +241,57 @@ void MapCleaner::find_joined(const DenseMap& map) {
   }
 }
 
-// Runs of pixels that hang together in a row, joined with those of the row before that they touch.
-void MapCleaner::drop_islands(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds) {
-  find_joined(map);
+std::int32_t MapCleaner::root(std::int32_t run) {
+  while (runs_[run].parent != run) run = runs_[run].parent = runs_[runs_[run].parent].parent;
+  return run;
+}
+
+/// Finds runs of pixels row by row, and joins them with those of the row before that they touch.
+/// @param first  (y, from): of the next run; the map's width where there is none
+/// @param end    (y, first): beyond the run's last
+/// @param touch  (y, from, to): whether a run of this row and one of the row before do, in those columns of both
+template <class First, class End, class Touch>
+void MapCleaner::find_runs(int width, int height, const First& first, const End& end, const Touch& touch) {
   runs_.clear();
   first_runs_.clear();
-  const std::size_t words = static_cast<std::size_t>(map.width + 63) / 64;
-  const auto root = [&](std::int32_t run) {
-    while (runs_[run].parent != run) run = runs_[run].parent = runs_[runs_[run].parent].parent;
-    return run;
-  };
   std::size_t before = 0;  // the first run of the row before
-  for (int y = 0; y < map.height; ++y) {
+  for (int y = 0; y < height; ++y) {
     const std::size_t begin = runs_.size();
     first_runs_.push_back(begin);
-    const std::uint64_t *const measured = measured_.data() + words * static_cast<std::size_t>(y),
-                               *const right = right_.data() + words * static_cast<std::size_t>(y);
-    for (int x = next_bit(measured, 0, map.width, true); x < map.width;) {
-      const int last = next_bit(right, x, map.width - 1, false);
-      runs_.push_back(
-          {y, x, last + 1, static_cast<std::int32_t>(runs_.size()), static_cast<std::uint32_t>(last + 1 - x), false});
-      x = next_bit(measured, last + 1, map.width, true);
+    for (int x = first(y, 0); x < width;) {
+      Run run;
+      run.y = y, run.first = x, run.end = end(y, x);
+      run.parent = static_cast<std::int32_t>(runs_.size()), run.pixels = static_cast<std::uint32_t>(run.end - x);
+      runs_.push_back(run);
+      x = first(y, run.end);
     }
-    if (y > 0) {
-      const std::uint64_t* const joined = below_.data() + words * static_cast<std::size_t>(y - 1);
-      std::size_t above = before;
-      for (std::size_t run = begin; run < runs_.size(); ++run) {
-        while (above < begin && runs_[above].end <= runs_[run].first) ++above;
-        for (std::size_t other = above; other < begin && runs_[other].first < runs_[run].end; ++other) {
-          const int from = std::max(runs_[other].first, runs_[run].first),
-                    to = std::min(runs_[other].end, runs_[run].end);
-          if (next_bit(joined, from, to, true) == to) continue;
-          const std::int32_t a = root(static_cast<std::int32_t>(other)), b = root(static_cast<std::int32_t>(run));
-          if (a == b) continue;
-          runs_[std::max(a, b)].parent = std::min(a, b);
-          runs_[std::min(a, b)].pixels += runs_[std::max(a, b)].pixels;
-        }
+    std::size_t above = before;
+    for (std::size_t run = begin; y > 0 && run < runs_.size(); ++run) {
+      while (above < begin && runs_[above].end <= runs_[run].first) ++above;
+      for (std::size_t other = above; other < begin && runs_[other].first < runs_[run].end; ++other) {
+        if (!touch(y, std::max(runs_[other].first, runs_[run].first), std::min(runs_[other].end, runs_[run].end)))
+          continue;
+        const std::int32_t a = root(static_cast<std::int32_t>(other)), b = root(static_cast<std::int32_t>(run));
+        if (a == b) continue;
+        runs_[std::max(a, b)].parent = std::min(a, b);
+        runs_[std::min(a, b)].pixels += runs_[std::max(a, b)].pixels;
       }
     }
     before = begin;
   }
   first_runs_.push_back(runs_.size());
+}
+
+void MapCleaner::drop_islands(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds) {
+  find_joined(map);
+  const std::size_t words = static_cast<std::size_t>(map.width + 63) / 64;
+  const auto row = [&](const std::vector<std::uint64_t>& bits, int y) {
+    return bits.data() + words * static_cast<std::size_t>(y);
+  };
+  find_runs(
+      map.width, map.height, [&](int y, int from) { return next_bit(row(measured_, y), from, map.width, true); },
+      [&](int y, int first) { return next_bit(row(right_, y), first, map.width - 1, false) + 1; },
+      [&](int y, int from, int to) { return next_bit(row(below_, y - 1), from, to, true) < to; });
   for (const SurfaceSeed& seed : seeds) {
     const auto x = static_cast<int>(std::lround(seed.camera_px.x())),
                y = static_cast<int>(std::lround(seed.camera_px.y()));
@@ -299,12 +314,45 @@ void MapCleaner::drop_islands(DenseMap& map, std::size_t least, std::span<const 
 std::size_t MapCleaner::bytes() const {
   const auto of = [](const auto& held) { return held.capacity() * sizeof held[0]; };
   return of(label_) + of(runs_) + of(first_runs_) + of(bits_) + of(rows_) + of(measured_) + of(right_) + of(below_) +
-         of(distance_) + of(nearest_);
+         of(holes_) + of(distance_) + of(nearest_);
 }
 
-void MapCleaner::prune(DenseMap& map, double reach_px) {
+/// Holes of at most so many pixels that one surface is all around: print or dust, as nothing so small is told from it.
+void MapCleaner::find_small_holes(const DenseMap& map, std::size_t most) {
+  const std::size_t words = static_cast<std::size_t>(map.width + 63) / 64;
+  const auto row = [&](int y) { return measured_.data() + words * static_cast<std::size_t>(y); };
+  find_runs(
+      map.width, map.height, [&](int y, int from) { return next_bit(row(y), from, map.width, false); },
+      [&](int y, int first) { return next_bit(row(y), first, map.width, true); }, [](int, int, int) { return true; });
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    const Run& run = runs_[i];
+    Run& all = runs_[root(static_cast<std::int32_t>(i))];
+    if (all.pixels > most) continue;
+    const bool at_the_rim = run.first == 0 || run.end == map.width || run.y == 0 || run.y + 1 == map.height;
+    if (at_the_rim) {
+      all.farthest = std::numeric_limits<float>::infinity();
+      continue;
+    }
+    const float* depth = map.depth_mm.data() + static_cast<std::size_t>(run.y) * map.width;
+    const auto see = [&](float around) {
+      if (around > 0) all.nearest = std::min(all.nearest, around), all.farthest = std::max(all.farthest, around);
+    };
+    see(depth[run.first - 1]), see(depth[run.end]);
+    for (int x = run.first; x < run.end; ++x) see(depth[x - map.width]), see(depth[x + map.width]);
+  }
+  holes_.assign(measured_.size(), 0);
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    const Run& all = runs_[root(static_cast<std::int32_t>(i))];
+    if (all.pixels > most || !(all.farthest - all.nearest <= kJump * all.nearest)) continue;
+    std::uint64_t* const bits = holes_.data() + words * static_cast<std::size_t>(runs_[i].y);
+    for (int x = runs_[i].first; x < runs_[i].end; ++x) bits[x / 64] |= std::uint64_t{1} << (x % 64);
+  }
+}
+
+void MapCleaner::prune(DenseMap& map, double reach_px, std::size_t hole_most) {
   if (!(reach_px > 0)) return;
   find_joined(map);
+  find_small_holes(map, hole_most);
   const BitRows rows{static_cast<std::size_t>(map.width + 63) / 64, map.height};
   const std::size_t words = rows.words;
   const auto either = [](std::uint64_t a, std::uint64_t b) { return a | b; };
@@ -316,12 +364,15 @@ void MapCleaner::prune(DenseMap& map, double reach_px) {
     for (std::size_t w = 0; w < words; ++w) {
       const std::uint64_t here = measured_[row + w];
       const std::uint64_t next = here >> 1 | (w + 1 < words ? measured_[row + w + 1] << 63 : 0);
-      std::uint64_t parted = (here | next) & ~right_[row + w];
+      const std::uint64_t hole = holes_[row + w];
+      const std::uint64_t next_hole = hole >> 1 | (w + 1 < words ? holes_[row + w + 1] << 63 : 0);
+      std::uint64_t parted = (here | next) & ~(right_[row + w] | hole | next_hole);
       if (w + 1 == words) parted &= ~(beyond | std::uint64_t{1} << ((map.width - 1) % 64));
       bits_[row + w] |= parted | parted << 1;
       if (w + 1 < words) bits_[row + w + 1] |= parted >> 63;
       if (y + 1 == map.height) continue;
-      const std::uint64_t down = (here | measured_[row + words + w]) & ~below_[row + w];
+      const std::uint64_t down =
+          (here | measured_[row + words + w]) & ~(below_[row + w] | hole | holes_[row + words + w]);
       bits_[row + w] |= down, bits_[row + words + w] |= down;
     }
   }

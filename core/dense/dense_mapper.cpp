@@ -189,8 +189,10 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   done(DenseStage::kJudge);
   cleaner_.drop_occluded(map_, executor);
   cleaner_.drop_unlit_rims(map_, fixed_->close_px);
-  cleaner_.drop_islands(map_, static_cast<std::size_t>(fixed_->window_px) * fixed_->window_px, seeds_);
-  cleaner_.prune(map_, fixed_->decode.dense.prune_px);
+  const std::size_t patch = static_cast<std::size_t>(fixed_->window_px) * fixed_->window_px;
+  cleaner_.drop_islands(map_, patch, seeds_);
+  cleaner_.prune(map_, fixed_->decode.dense.prune_px, patch);
+  cleaner_.drop_beyond_the_light(map_);
   map_.count_pixels();
   if (next) follower_.finish(map_, grid_);
   done(DenseStage::kClean);

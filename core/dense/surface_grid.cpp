@@ -306,14 +306,14 @@ constexpr float kFuseSigmas = 3;
 /// Of the scatter of the nodes around over what noise does: beyond it there is relief, and the mean is of fewer.
 constexpr float kFuseExcess[kFuseReach] = {1.6F, 0.8F};
 /// Parts of sigma: of what the nodes beside, continued, are off, and of what the bend moved.
-constexpr float kOfLift = 0.5F;
+constexpr float kOfLift = 0.6F;
 /// Over a bend the neighbours' planes, continued by a stride, are off by half its square, and the window's plane by a
 /// 24th of its own: so much of the one stands for the other.
 constexpr float kOfBendLeft = 1.6F, kOfDisagreementLeast = 0.3F, kOfDisagreementMost = 4;
 /// Of that disagreement's square this much of what noise does is no relief.
-constexpr float kOfNoise = 0.5F;
+constexpr float kOfNoise = 0.6F;
 /// Of the variance, where the mean is of this reach and those smaller.
-constexpr float kLeftOfVariance[kFuseReach] = {1, 0.85F};
+constexpr float kLeftOfVariance[kFuseReach] = {0.75F, 0.27F};
 
 /// How much slopes beside each other are wrong together, as their windows overlap.
 constexpr float kOverlap = 3;
@@ -324,7 +324,7 @@ struct Fusing {
   std::ptrdiff_t row;  // from a row to the next
   float stride, of_bend, of_disagreement;
 };
-enum Around { kInverseDepth, kSlopeX, kSlopeY, kPxPer, kNoisePx, kSlopeNoise, kGood };
+enum Around { kInverseDepth, kSlopeX, kSlopeY, kPxPer, kNoisePx, kSlopeNoise, kGood, kVariance };
 
 /// What comes of them: their planes, in projector px, from their own; what is added to sigma's
 /// square, and the share of it that stays.
@@ -419,7 +419,7 @@ void SurfaceGrid::fuse(Executor& executor) {
   // All that is asked of the nodes around, a number of all nodes after the other, with a rim where none is good.
   const std::size_t row = static_cast<std::size_t>(columns_) + 2 * kFuseReach + kLanes,
                     plane = row * (static_cast<std::size_t>(rows_) + 2 * kFuseReach);
-  if (around_.size() != 7 * plane) around_.assign(7 * plane, 0);
+  if (around_.size() != 8 * plane) around_.assign(8 * plane, 0);
   const auto place = [&](int at_row, int column, int what) {
     return around_.data() + what * plane + (static_cast<std::size_t>(at_row) + kFuseReach) * row + column + kFuseReach;
   };
@@ -435,6 +435,7 @@ void SurfaceGrid::fuse(Executor& executor) {
                                node.slope_noise,
                                1};
       for (int k = 0; k < 7; ++k) *place(at_row, column, k) = node.good ? values[k] : 0;
+      *place(at_row, column, kVariance) = 0;
     }
   });
   const auto side = static_cast<float>(options_.window_px), stride = static_cast<float>(options_.stride_px);
@@ -458,11 +459,24 @@ void SurfaceGrid::fuse(Executor& executor) {
         if (!node.good) continue;
         node.plane.inverse_depth += fused.off[lane] * node.per_px;
         node.plane.slope_x = fused.slope_x[lane], node.plane.slope_y = fused.slope_y[lane];
-        const float off = epipolar_.at({static_cast<float>(x_of(column + lane)), static_cast<float>(y_of(at_row))});
-        const float unknown = std::max(0.F, std::abs(off) - kUsualOffsetPx);
-        node.sigma_px =
-            std::sqrt(fused.left[lane] * (node.sigma_px * node.sigma_px + fused.more[lane]) + unknown * unknown);
+        *place(at_row, column + lane, kVariance) =
+            fused.left[lane] * (node.sigma_px * node.sigma_px + fused.more[lane]);
       }
+    }
+  });
+  // A node's own variance is of few numbers, and itself uncertain: the mean with those around it is less so.
+  executor.run(rows_, [&](int at_row, int) {
+    SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
+    for (int column = 0; column < columns_; ++column) {
+      if (!nodes[column].good) continue;
+      float sum = 0, count = 0;
+      for (int dy = -2; dy <= 2; ++dy) {
+        const float *variance = place(at_row + dy, column, kVariance), *good = place(at_row + dy, column, kGood);
+        for (int dx = -2; dx <= 2; ++dx) sum += variance[dx], count += good[dx];
+      }
+      const float off = epipolar_.at({static_cast<float>(x_of(column)), static_cast<float>(y_of(at_row))});
+      const float unknown = std::max(0.F, std::abs(off) - kUsualOffsetPx);
+      nodes[column].sigma_px = std::sqrt(sum / count + unknown * unknown);
     }
   });
 }

@@ -91,19 +91,35 @@ TEST(DropIslands, WhatBearsNoSymbolHasToBeFarLarger) {
 TEST(Prune, TakesWhatIsNearerToAHoleThanAsked) {
   const Drawing rows = {"......", ".#####", ".#####", ".#####", ".#####"};
   DenseMap map = map_of(rows);
-  cleaner().prune(map, 0);
+  cleaner().prune(map, 0, 0);
   EXPECT_EQ(left_of(map), "......\n.#####\n.#####\n.#####\n.#####\n");
-  cleaner().prune(map, 1);
+  cleaner().prune(map, 1, 0);
   EXPECT_EQ(left_of(map), "......\n......\n..####\n..####\n..####\n");
   EXPECT_EQ(map.pixels[7], DensePixel::kAtAnEdge);
   map = map_of(rows);
-  cleaner().prune(map, 2);
+  cleaner().prune(map, 2, 0);
   EXPECT_EQ(left_of(map), "......\n......\n......\n...###\n...###\n");
+}
+
+TEST(Prune, ASmallHoleWithinOneSurfaceIsNoEdge) {
+  const Drawing rows = {"########", "#..##.##", "#.###..#", "########"};
+  const auto after = [&](const Drawing& drawing, std::size_t most) {
+    DenseMap map = map_of(drawing);
+    cleaner().prune(map, 1, most);
+    return left_of(map);
+  };
+  EXPECT_EQ(after(rows, 3), "########\n#..##.##\n#.###..#\n########\n");
+  EXPECT_NE(after(rows, 2), after(rows, 3));
+  // At the map's rim, or between two surfaces, nobody knows what is there.
+  EXPECT_EQ(after({"#.####", "######"}, 9), "...###\n#.####\n");
+  EXPECT_EQ(after({"#####", "##.##", "#####"}, 9), "#####\n##.##\n#####\n");
+  EXPECT_EQ(after({"#####", "##.#2", "#####"}, 9), "####.\n##...\n####.\n") << "the jump alone";
+  EXPECT_EQ(after({"#####", "##.22", "#####"}, 9).substr(6, 5), "#....");
 }
 
 TEST(Prune, TakesBothSidesOfAJump) {
   DenseMap map = map_of({"###222", "###222", "###222"});
-  cleaner().prune(map, 1);
+  cleaner().prune(map, 1, 0);
   EXPECT_EQ(left_of(map), "##..##\n##..##\n##..##\n");
 }
 
