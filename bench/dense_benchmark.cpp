@@ -59,6 +59,17 @@ struct Bench {
   }
 };
 
+/// Of a scene that stands still: every frame but the first two goes on from the one before.
+void measure_stream(Bench& bench, Executor& executor, benchmark::State& state) {
+  const auto next = [&] {
+    return bench.mapper.measure_next(bench.frame.view(), 255, bench.decoder.symbols(), executor)
+        .count(DensePixel::kMeasured);
+  };
+  for (int i = 0; i < 3; ++i) (void)next();
+  for (auto _ : state) benchmark::DoNotOptimize(next());
+  state.counters["followed_nodes"] = static_cast<double>(bench.mapper.followed_nodes());
+}
+
 }  // namespace
 
 void register_dense(FrameRing& ring) {
@@ -76,6 +87,10 @@ void register_dense(FrameRing& ring) {
       std::uint32_t points = bench->measure(executor);
       for (auto _ : state) points = bench->measure(executor);
       state.counters["points"] = points;
+    })->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark(("dense/still_one_core" + of).c_str(), [made](benchmark::State& state) {
+      SerialExecutor executor;
+      measure_stream(*made(), executor, state);
     })->Unit(benchmark::kMillisecond);
     // The wall clock: on a busy machine it measures the others too.
     benchmark::RegisterBenchmark(("dense/all_cores" + of).c_str(),

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "core/code/pattern.hpp"
@@ -68,6 +69,9 @@ class DenseMapper {
   [[nodiscard]] const std::shared_ptr<const RayGrid>& rays() const;
   /// The side of the patches that the surface is fitted to.
   [[nodiscard]] int window_px() const;
+  /// Of the last frame: where growth began, and what it came to.
+  [[nodiscard]] std::span<const SurfaceSeed> seeds() const { return seeds_; }
+  [[nodiscard]] const SurfaceGrid& grid() const { return grid_; }
   /// Of the last frame: how many nodes of the surface went on from the frame before.
   [[nodiscard]] std::size_t followed_nodes() const { return followed_; }
   /// Of the last frame: the blur of the pattern, projector px.

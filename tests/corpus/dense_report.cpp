@@ -14,10 +14,12 @@
 
 #include "core/dense/dense_mapper.hpp"
 #include "core/exposure/light_levels.hpp"
+#include "drivers/files/encode_png.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/files/read_image.hpp"
 #include "tests/corpus/dense_others.hpp"
 #include "tests/corpus/dense_score.hpp"
+#include "tests/corpus/dense_steps.hpp"
 
 namespace slsd {
 namespace {
@@ -79,8 +81,14 @@ void report_other(const char* name, const DepthMap& depths, double ms, const Den
   std::printf("  %4.0f\n", ms);
 }
 
+/// A picture of the steps, of a part of the frame.
+struct Steps {
+  std::string file;  ///< empty: none
+  FramePart part{};
+};
+
 Result<> report(const Pattern& pattern, const std::string& folder, const DenseOptions& options, double offset_px,
-                bool compare) {
+                bool compare, const Steps& steps) {
   const auto text = read_file(folder + "/calibration.yml", kLargestFileBytes);
   if (!text) return tl::unexpected(text.error());
   auto calibration = read_calibration(*text, folder + "/calibration.yml");
@@ -119,6 +127,11 @@ Result<> report(const Pattern& pattern, const std::string& folder, const DenseOp
               static_cast<double>(mapper.epipolar_offset_px()));
   for (int i = 1; i < kDensePixelCount; ++i) std::printf(" %.1f", 100.0 * map.counts[i] / static_cast<double>(s.lit));
   std::printf("\n");
+  if (!steps.file.empty()) {
+    const auto png = encode_png(draw_dense_steps(view(*frame), mapper, map, steps.part));
+    if (!png) return tl::unexpected(png.error());
+    if (auto written = write_file_atomically(steps.file, *png); !written) return written;
+  }
   if (!compare) return {};
   const std::vector<CloudPoint> points = (*decoding)->points;
   auto other_begin = Clock::now();
@@ -139,6 +152,7 @@ int main(int argc, char** argv) {
   DenseOptions options;
   double offset_px = 0;
   bool compare = false;
+  Steps steps;
   std::string pattern_file;
   std::vector<std::string> folders;
   for (int i = 1; i < argc; ++i) {
@@ -150,14 +164,20 @@ int main(int argc, char** argv) {
       offset_px = std::atof(argv[++i]);
     else if (std::strcmp(argv[i], "--compare") == 0)
       compare = true;
-    else if (pattern_file.empty())
+    else if (std::strcmp(argv[i], "--steps") == 0 && i + 2 < argc) {
+      steps.file = argv[++i];
+      FramePart& part = steps.part;
+      if (std::sscanf(argv[++i], "%d,%d,%d,%d", &part.left, &part.top, &part.width, &part.height) != 4) folders.clear();
+    } else if (pattern_file.empty())
       pattern_file = argv[i];
     else
       folders.emplace_back(argv[i]);
   }
   if (folders.empty()) {
-    std::fputs("usage: dense-report PATTERN.toml FOLDER... [--stride PX] [--prune PX] [--offset PX] [--compare]\n",
-               stderr);
+    std::fputs(
+        "usage: dense-report PATTERN.toml FOLDER... [--stride PX] [--prune PX] [--offset PX] [--compare] [--steps "
+        "FILE.png LEFT,TOP,WIDTH,HEIGHT]\n",
+        stderr);
     return 2;
   }
   const auto text = read_file(pattern_file, kLargestFileBytes);
@@ -167,7 +187,7 @@ int main(int argc, char** argv) {
       "scene                    seeds compl med px rms px  mm med rms  gross unlit   far  err/s  >3   edges 0-2 2-4 "
       "4-6 6- (complete/gross %%)  ms: blur grow fuse judge clean  blur off  reasons %%\n");
   for (const std::string& folder : folders) {
-    const auto done = report(*pattern, folder, options, offset_px, compare);
+    const auto done = report(*pattern, folder, options, offset_px, compare, steps);
     if (!done) std::fprintf(stderr, "dense-report: %s: %s\n", folder.c_str(), to_string(done.error()).c_str());
   }
   return 0;

@@ -118,7 +118,7 @@ class Slsd(unittest.TestCase):
     def test_check_says_what_dense_clouds_would_give(self):
         said = self.checked_with(lambda text: text)
         self.assertRegex(said, r'ok +dense clouds of camera "camera", at 1000 mm: parts from \d+\.\d mm on, half of waves '
-                               r'with a period of \d+\.\d mm, .* points of 1920000 pixels in \d+ ms a frame; memory \d+ MB')
+                               r'with a period of \d+\.\d mm, .* points of 1920000 pixels in \d+ ms a frame, \d+ ms .* stands still; memory \d+ MB')
         self.assertNotIn("dense_stride_px", said)
         self.assertNotIn("calibrate again", said)
 

@@ -436,6 +436,38 @@ TEST(DenseStream, AStillSceneIsFollowedAsExactlyAndItsNoiseIsEachFramesOwn) {
   EXPECT_LT(rms_of_mean(followed, column()), 1.05 * rms_of_mean(single, column()));
 }
 
+TEST(DenseStream, AllocatesNothingWhileTheSceneStandsStill) {
+  const Calibration rig = small_rig();
+  Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
+  DenseMapper mapper(pattern(), rig, 0, {});
+  SerialExecutor executor;
+  const Seen again = see_again(kTilted, 2);
+  ASSERT_TRUE(decoder.decode(tilted().frame.view(), 255));
+  const DecodedSymbols symbols = decoder.symbols();
+  for (int frame = 0; frame < 3; ++frame) (void)mapper.measure_next(tilted().frame.view(), 255, symbols, executor);
+  const auto before = test::allocations();
+  (void)mapper.measure_next(again.frame.view(), 255, symbols, executor);
+  EXPECT_EQ(test::allocations(), before);
+  EXPECT_GT(mapper.followed_nodes(), 4000U);
+}
+
+TEST(DenseStream, ThreadsAndLanesChangeNothing) {
+  const Calibration rig = small_rig();
+  Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
+  DenseMapper mapper(pattern(), rig, 0, {});
+  DenseMapper other = mapper.another();
+  SerialExecutor serial;
+  TwoThreads threads;
+  const Seen again = see_again(kTilted, 2);
+  ASSERT_TRUE(decoder.decode(tilted().frame.view(), 255));
+  const DecodedSymbols symbols = decoder.symbols();
+  for (int frame = 0; frame < 2; ++frame) (void)mapper.measure_next(tilted().frame.view(), 255, symbols, serial);
+  const DenseMap one = mapper.measure_next(again.frame.view(), 255, symbols, serial);
+  EXPECT_TRUE(same(one, mapper.measure_next(again.frame.view(), 255, symbols, threads)));
+  EXPECT_TRUE(same(one, other.measure_next(again.frame.view(), 255, symbols, serial))) << "goes on from the same frame";
+  EXPECT_GT(other.followed_nodes(), 4000U);
+}
+
 TEST(DenseStream, WhatMovesIsNeverDrawnWhereItWas) {
   for (const double step_mm : {0.02, 0.2, 1.0, 6.0, 40.0}) {
     Stream stream;
