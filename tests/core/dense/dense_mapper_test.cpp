@@ -292,11 +292,15 @@ TEST(DenseMapper, DepthBeyondTheWorkingRangeIsNone) {
   EXPECT_FALSE(std::ranges::any_of(map.depth_mm, [](float depth) { return depth < 2000; }));
 }
 
+Grey16 sixteen_bits(const Grey8& frame) {
+  Grey16 wide(frame.width(), frame.height());
+  std::transform(frame.data(), frame.data() + frame.size(), wide.data(),
+                 [](std::uint8_t level) { return 257 * level; });
+  return wide;
+}
+
 TEST(DenseMapper, SixteenBitsAreAsGood) {
-  Grey16 frame(360, 280);
-  for (int y = 0; y < frame.height(); ++y)
-    for (int x = 0; x < frame.width(); ++x) frame.at(x, y) = static_cast<std::uint16_t>(257 * tilted().frame.at(x, y));
-  const Score got = score(measure(frame.view(), 65535).map, tilted());
+  const Score got = score(measure(sixteen_bits(tilted().frame).view(), 65535).map, tilted());
   EXPECT_GT(share(got.measured, got.lit), 0.97);
   EXPECT_LT(got.rms_mm, 0.35);
 }
@@ -466,6 +470,42 @@ TEST(DenseStream, ThreadsAndLanesChangeNothing) {
   EXPECT_TRUE(same(one, mapper.measure_next(again.frame.view(), 255, symbols, threads)));
   EXPECT_TRUE(same(one, other.measure_next(again.frame.view(), 255, symbols, serial))) << "goes on from the same frame";
   EXPECT_GT(other.followed_nodes(), 4000U);
+}
+
+/// The third frame of a still scene, of another noise than the first two.
+template <class Image>
+DenseMap third_of_stream(const Image& first, const Image& third, double full) {
+  Decoder decoder = Decoder::create(pattern(), small_rig(), 0, {}).value();
+  DenseMapper mapper(pattern(), small_rig(), 0, {});
+  SerialExecutor executor;
+  for (const Image* frame : {&first, &first, &third}) {
+    EXPECT_TRUE(decoder.decode(frame->view(), full));
+    (void)mapper.measure_next(frame->view(), full, decoder.symbols(), executor);
+  }
+  EXPECT_GT(mapper.followed_nodes(), 4000U);
+  return mapper.measure_next(third.view(), full, decoder.symbols(), executor);
+}
+
+TEST(DenseStream, ClonesFollowTheSame) {
+  const Grey8 third = see_again(kTilted, 2).frame;
+  const Clone usual = clone_in_use.exchange(Clone::kPlain);
+  const DenseMap plain = third_of_stream(tilted().frame, third, 255);
+  for (const Clone clone : clones_here()) {
+    clone_in_use = clone;
+    const DenseMap map = third_of_stream(tilted().frame, third, 255);
+    if (clone == Clone::kAvx2) {
+      EXPECT_TRUE(same(plain, map));
+    }
+    EXPECT_NEAR(share(map.count(DensePixel::kMeasured), plain.count(DensePixel::kMeasured)), 1, 0.002);
+  }
+  clone_in_use = usual;
+}
+
+TEST(DenseStream, SixteenBitsAreAsGood) {
+  const Seen again = see_again(kTilted, 2);
+  const Score got = score(third_of_stream(sixteen_bits(tilted().frame), sixteen_bits(again.frame), 65535), again);
+  EXPECT_GT(share(got.measured, got.lit), 0.97);
+  EXPECT_LT(got.rms_mm, 0.35);
 }
 
 TEST(DenseStream, WhatMovesIsNeverDrawnWhereItWas) {
