@@ -53,6 +53,9 @@ class DenseMapper {
     return measure(frame, full, symbols, executor, observer, true);
   }
 
+  /// Gives back what measure_next() keeps of frames. @thread reentrant, also while another measures
+  void end_stream() { follower_.forget(); }
+
   /// What it holds of memory, but for what it shares with others; bytes_of_fields() is that.
   [[nodiscard]] std::size_t bytes() const;
   /// Of the pattern's fields, at most: one to a blur.

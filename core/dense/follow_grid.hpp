@@ -65,6 +65,11 @@ class GridFollower {
   /// Ends it: of the nodes only those go on where the map has a point.
   void finish(const DenseMap& map, const SurfaceGrid& grid);
 
+  /// Gives back what is shared: no frame is gone on from until another is kept. @thread reentrant
+  void forget() {
+    const std::lock_guard lock(shared_->mutex);
+    shared_->frame.reset();
+  }
   /// Of the last frame, how many nodes went on.
   [[nodiscard]] std::size_t followed() const { return followed_; }
   [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory, with what is shared

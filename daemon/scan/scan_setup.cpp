@@ -171,6 +171,16 @@ Executor& DenseMappers::crew() {
   return *crew_;
 }
 
+void DenseMappers::end_stream() {
+  // Whoever makes a mapper takes a while; he has nothing to give back yet.
+  if (const std::unique_lock lock(mutex_, std::try_to_lock); lock) {
+    for (auto& [lane, mapper] : mappers_)
+      if (mapper) mapper->end_stream();
+  }
+  const std::lock_guard lock(spare_->mutex);
+  spare_->maps.clear();
+}
+
 std::shared_ptr<DenseCloud> DenseMappers::cloud() {
   constexpr std::size_t kSpareMost = 2;
   return {new DenseCloud, [spare = spare_](DenseCloud* cloud) {

@@ -69,6 +69,8 @@ class DenseMappers {
  public:
   /// The threads that help the lanes, which sleep meanwhile.
   [[nodiscard]] Executor& crew();
+  /// Nobody wants a stream any more: what was kept of its frames, and maps that wait, are given back.
+  void end_stream();
   /// A cloud whose maps come back, for the next ones, when nobody holds it any more: new ones would be tens of
   /// megabytes that the kernel has to fill with zeros.
   [[nodiscard]] std::shared_ptr<DenseCloud> cloud();

@@ -394,6 +394,7 @@ void Scanner::last_scans(Answer<std::vector<KeptScan>> answer) {
 void Scanner::run_freely(std::optional<FreeRun> demand) {
   if (demand) free_formats_ = demand->formats;
   free_rate_hz_ = demand ? demand->rate_hz : 0;
+  if (!demand) setup()->dense->end_stream();
   queue_.wake();
 }
 
