@@ -27,7 +27,7 @@ constexpr float kGainChange = 0.1F;
 constexpr float kSeenMin = 0.7F;
 /// Of a frame's nodes: fewer, and the next frame begins from nothing.
 constexpr double kFollowedMin = 0.5;
-/// So many more than went on have to stand still before another frame is kept: it costs as much as some frames save.
+/// So many more than went on have to stand still before another frame is kept, which takes some time itself.
 constexpr double kStillMore = 0.2;
 /// Windows of one in so many nodes are looked at for that.
 constexpr std::size_t kSampled = 37;
