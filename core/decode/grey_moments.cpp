@@ -81,9 +81,12 @@ GreyMoments central(const RawMoments& raw, const PatchLevels& levels, double mid
   const double xx = m[2][0] * n, xy = m[1][1] * n, yy = m[0][2] * n;
   g.weight = m[0][0];
   // The brightest pixels, from which the peak is taken, have weight in every ramp.
-  const double per_steady = 1 / static_cast<double>(raw.steady), per_centre = 1 / static_cast<double>(raw.centre);
-  g.steady_x = static_cast<float>(middle_x + raw.steady_x * per_steady);
-  g.steady_y = static_cast<float>(middle_y + raw.steady_y * per_steady);
+  if (raw.steady > 0) {
+    const double per_steady = 1 / static_cast<double>(raw.steady);
+    g.steady_x = static_cast<float>(middle_x + raw.steady_x * per_steady);
+    g.steady_y = static_cast<float>(middle_y + raw.steady_y * per_steady);
+  }
+  const double per_centre = 1 / static_cast<double>(raw.centre);
   g.x = static_cast<float>(middle_x + raw.centre_x * per_centre);
   g.y = static_cast<float>(middle_y + raw.centre_y * per_centre);
   g.m20 = static_cast<float>(xx - x * x);
@@ -180,33 +183,41 @@ void GreyMomentMeter::level_light(const Eigen::Vector2f& centre_px, const Eigen:
   range_ = range_of(patch_.data(), stride_ * height_);
 }
 
-GreyMoments GreyMomentMeter::moments_of_patch() const {
+GreyMoments GreyMomentMeter::moments_of_patch() {
   PatchLevels levels;
   find_levels(patch_.data(), stride_ * height_, range_, levels);
   if (!(levels.peak > levels.background)) return {};
   const float middle_x = 0.5F * static_cast<float>(width_ - 1), middle_y = 0.5F * static_cast<float>(height_ - 1);
+  rows_.clear();
+  for (int row = 0; row < height_; ++row) {
+    const float y = static_cast<float>(row) - middle_y;
+    rows_.push_back({y, y * y, y * y * y});
+  }
   RawMoments raw;
-  sum_moments(patch_.data(), stride_, height_, middle_x, middle_y, levels, raw);
+  sum_moments(patch_.data(), stride_, rows_, middle_x, levels, raw);
   return central(raw, levels, static_cast<float>(left_) + middle_x, static_cast<float>(top_) + middle_y);
 }
 
 template <class T>
 GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
-                                     const Eigen::Vector2f& shading) {
+                                     SteadyCentre steady) {
   if constexpr (std::is_same_v<T, std::uint8_t>) {
     PatchLevels levels;
     RawMoments raw;
-    if (shading.isZero() && weigh_region(frame, region, runs, margin_px_, levels, raw)) {
+    if (weigh_region(frame, region, runs, margin_px_, steady, levels, raw)) {
       const Eigen::Vector2f middle = region.middle_px();
       return central(raw, levels, middle.x(), middle.y());
     }
   }
   copy_patch(frame, region, runs);
-  if (!shading.isZero()) {
-    const Eigen::Vector2f middle(0.5F * static_cast<float>(region.left + region.right),
-                                 0.5F * static_cast<float>(region.top + region.bottom));
-    level_light(middle, shading);
-  }
+  return moments_of_patch();
+}
+
+template <class T>
+GreyMoments GreyMomentMeter::measure_levelled(const ImageView<T>& frame, const Region& region,
+                                              std::span<const Run> runs, const Eigen::Vector2f& shading) {
+  copy_patch(frame, region, runs);
+  level_light(region.middle_px(), shading);
   return moments_of_patch();
 }
 
@@ -221,10 +232,12 @@ GreyMoments GreyMomentMeter::measure_cell(const ImageView<T>& frame, const Eigen
 
 using View8 = ImageView<std::uint8_t>;
 using View16 = ImageView<std::uint16_t>;
-template GreyMoments GreyMomentMeter::measure(const View8&, const Region&, std::span<const Run>,
-                                              const Eigen::Vector2f&);
-template GreyMoments GreyMomentMeter::measure(const View16&, const Region&, std::span<const Run>,
-                                              const Eigen::Vector2f&);
+template GreyMoments GreyMomentMeter::measure(const View8&, const Region&, std::span<const Run>, SteadyCentre);
+template GreyMoments GreyMomentMeter::measure(const View16&, const Region&, std::span<const Run>, SteadyCentre);
+template GreyMoments GreyMomentMeter::measure_levelled(const View8&, const Region&, std::span<const Run>,
+                                                       const Eigen::Vector2f&);
+template GreyMoments GreyMomentMeter::measure_levelled(const View16&, const Region&, std::span<const Run>,
+                                                       const Eigen::Vector2f&);
 template GreyMoments GreyMomentMeter::measure_cell(const View8&, const Eigen::Vector2f&, const LatticeFrame&, float,
                                                    const Eigen::Vector2f&);
 template GreyMoments GreyMomentMeter::measure_cell(const View16&, const Eigen::Vector2f&, const LatticeFrame&, float,

@@ -19,7 +19,7 @@ namespace slsd {
 /// where the binary mask's is eight times worse.
 struct GreyMoments {
   float x = 0, y = 0;                        ///< centre, camera px
-  float steady_x = 0, steady_y = 0;          ///< centre that uneven light pulls less, and noise more
+  float steady_x = 0, steady_y = 0;          ///< centre that uneven light pulls less, and noise more; where measured
   float weight = 0;                          ///< lit area, camera px squared
   float m20 = 0, m11 = 0, m02 = 0;           ///< about the centroid, over the weight: px^2
   float m30 = 0, m21 = 0, m12 = 0, m03 = 0;  ///< px^3
@@ -38,12 +38,16 @@ class GreyMomentMeter {
   /// @param margin_px  how far beyond the mask a region's blurred edge is followed; less than the gap to its neighbours
   explicit GreyMomentMeter(int margin_px) : margin_px_(margin_px) {}
 
-  /// @param shading  relative change of the light for one camera px, levelled out about the middle of the region's box
   template <class T>
   [[nodiscard]] GreyMoments measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
-                                    const Eigen::Vector2f& shading = Eigen::Vector2f::Zero());
+                                    SteadyCentre steady = SteadyCentre::kLeftOut);
+  /// With the steady centre.
+  /// @param shading  relative change of the light for one camera px, levelled out about the middle of the region's box
+  template <class T>
+  [[nodiscard]] GreyMoments measure_levelled(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
+                                             const Eigen::Vector2f& shading);
 
-  /// Measures what lies in a cell of the grid, wherever a mask ends, with the light levelled.
+  /// Measures what lies in a cell of the grid, wherever a mask ends, with the light levelled; with the steady centre.
   /// @param centre_px    middle of the symbol's square, in the camera
   /// @param half_px      from there to the side of the cell, projector px
   /// @param shading      relative change of the light for one camera px, from the centre
@@ -60,13 +64,14 @@ class GreyMomentMeter {
   void copy_cell(const ImageView<T>& frame, const Eigen::Vector2f& centre_px, const LatticeFrame& lattice_frame,
                  float half_px);
   void level_light(const Eigen::Vector2f& centre_px, const Eigen::Vector2f& shading);
-  [[nodiscard]] GreyMoments moments_of_patch() const;
+  [[nodiscard]] GreyMoments moments_of_patch();
 
   int margin_px_;
   int left_ = 0, top_ = 0, width_ = 0, height_ = 0, stride_ = 0;  // of the patch
   std::vector<std::int16_t> edges_;
   std::vector<float> patch_;  // grey values; kOutside where they belong to others
   PatchRange range_;          // of the patch
+  std::vector<RowPowers> rows_;
 };
 
 }  // namespace slsd

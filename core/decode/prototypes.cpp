@@ -78,7 +78,8 @@ class Observer {
     if (nearest == nullptr) return std::nullopt;
     const Eigen::Array2f low(nearest->left, nearest->top), high(nearest->right, nearest->bottom);
     if ((middle.array() - low).max(high - middle.array()).maxCoeff() > reach_px(view)) return std::nullopt;
-    const GreyMoments moments = meter_.measure(view.image.view(), *nearest, regions_.runs_of(*nearest));
+    const GreyMoments moments =
+        meter_.measure(view.image.view(), *nearest, regions_.runs_of(*nearest), SteadyCentre::kMeasured);
     const Eigen::Vector2f centroid = Eigen::Vector2f(moments.x, moments.y) - view.middle_px,
                           steady_centroid = Eigen::Vector2f(moments.steady_x, moments.steady_y) - view.middle_px;
     return Look{moments, inverse * centroid, inverse * steady_centroid, in_the_cell == 1};

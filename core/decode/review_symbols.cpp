@@ -133,17 +133,18 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
                                Sightings& seen, std::size_t node) const {
   GreyMoments& moments = seen.moments[node];
   float& distance = seen.misfits[node];
+  const Region& region = regions.regions[seen.region[node]];
+  bool has_steady_centre = false;
   const auto adopt_if_better = [&](const GreyMoments& again, float tolerance) {
     const float distance_again = distance_from_letter(seen, node, again);
-    if (again.weight > 0 && distance_again < distance + tolerance) moments = again, distance = distance_again;
+    if (!(again.weight > 0 && distance_again < distance + tolerance)) return;
+    moments = again, distance = distance_again, has_steady_centre = true;
   };
   const LatticeFrame& lattice_frame = seen.nodes[node].frame;
   const Eigen::Vector2f per_cell = light_change_around(seen, node);
   const Eigen::Vector2f shading = lattice_frame.inverse().transpose() * per_cell / pitch_px_;
-  if (per_cell.cwiseAbs().maxCoeff() > options_.shading_min) {
-    const Region& region = regions.regions[seen.region[node]];
-    adopt_if_better(meter.measure(frame, region, regions.runs_of(region), shading), kLevellingTolerance);
-  }
+  if (per_cell.cwiseAbs().maxCoeff() > options_.shading_min)
+    adopt_if_better(meter.measure_levelled(frame, region, regions.runs_of(region), shading), kLevellingTolerance);
   if (distance > options_.doubtful_distance) {
     const Eigen::Vector2f centroid(moments.x, moments.y);
     const Eigen::Vector2f own_centre = centroid - lattice_frame * prototype_of(seen.claims[node]).centroid_px;
@@ -152,6 +153,7 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
     adopt_if_better(meter.measure_cell(frame, centre, lattice_frame, half_px, shading), 0);
   }
   if (per_cell.cwiseAbs().maxCoeff() > options_.uneven_light) {
+    if (!has_steady_centre) moments = meter.measure(frame, region, regions.runs_of(region), SteadyCentre::kMeasured);
     const Prototype& prototype = prototype_of(seen.claims[node]);
     const Eigen::Vector2f from_steady = lattice_frame * (prototype.centroid_px - prototype.steady_centroid_px);
     moments.x = moments.steady_x + from_steady.x(), moments.y = moments.steady_y + from_steady.y();

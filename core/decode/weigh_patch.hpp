@@ -47,14 +47,24 @@ void find_levels(const float* patch, int count, const PatchRange& range, PatchLe
 struct RawMoments {
   float m[4][4] = {};
   float centre = 0, centre_x = 0, centre_y = 0;  ///< the sums of w, w x and w y through the centre's ramp
-  float steady = 0, steady_x = 0, steady_y = 0;  ///< and through that of uneven light
+  float steady = 0, steady_x = 0, steady_y = 0;  ///< and through that of uneven light, where it is measured
 };
 
-/// @param stride              columns of the patch, a multiple of kLanes
-/// @param middle_x, middle_y  origin of x and y, from the first pixel's centre
+/// Whether the centre that uneven light pulls less is measured too: few symbols are asked for it.
+enum class SteadyCentre : std::uint8_t { kLeftOut, kMeasured };
+
+/// A row's y, from the patch's middle, and its powers.
+struct RowPowers {
+  float y, yy, yyy;
+};
+
+/// @param stride    columns of the patch, a multiple of kLanes
+/// @param rows      one to a row of the patch
+/// @param middle_x  origin of x, from the first pixel's centre
+/// @param moments   with the steady centre
 /// @thread reentrant
-void sum_moments(const float* patch, int stride, int height, float middle_x, float middle_y, const PatchLevels& levels,
-                 RawMoments& moments);
+void sum_moments(const float* patch, int stride, std::span<const RowPowers> rows, float middle_x,
+                 const PatchLevels& levels, RawMoments& moments);
 
 /// All of it at once for a region of an 8-bit frame, in 16 bits a pixel: half the memory, and twice the pixels to a
 /// register.
@@ -63,6 +73,6 @@ void sum_moments(const float* patch, int stride, int height, float middle_x, flo
 /// @return           false, and nothing done, where the patch is too large or reaches beyond the frame
 /// @thread reentrant
 [[nodiscard]] bool weigh_region(const ImageView<std::uint8_t>& frame, const Region& region, std::span<const Run> runs,
-                                int margin_px, PatchLevels& levels, RawMoments& moments);
+                                int margin_px, SteadyCentre steady, PatchLevels& levels, RawMoments& moments);
 
 }  // namespace slsd

@@ -55,7 +55,7 @@ Regions regions_of(const Grey8& frame, int threshold = 70) {
 
 GreyMoments measure(const Grey8& frame, const Regions& regions, std::size_t index = 0) {
   const Region& region = regions.regions[index];
-  return GreyMomentMeter(kMarginPx).measure(frame.view(), region, regions.runs_of(region));
+  return GreyMomentMeter(kMarginPx).measure(frame.view(), region, regions.runs_of(region), SteadyCentre::kMeasured);
 }
 
 struct Pixel {
@@ -202,8 +202,8 @@ TEST(GreyMoments, LevelTheLight) {
   const Region& region = regions.regions[0];
   const double middle = 0.5 * (box.left + box.right);
   const double as_seen = std::abs(measure(frame, regions).x - middle);
-  const GreyMoments levelled = GreyMomentMeter(kMarginPx).measure(frame.view(), region, regions.runs_of(region),
-                                                                  {static_cast<float>(kShading), 0.F});
+  const GreyMoments levelled = GreyMomentMeter(kMarginPx).measure_levelled(
+      frame.view(), region, regions.runs_of(region), {static_cast<float>(kShading), 0.F});
   EXPECT_GT(as_seen, 0.08);
   EXPECT_LT(std::abs(levelled.x - middle), 0.3 * as_seen);
 }
