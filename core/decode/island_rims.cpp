@@ -281,13 +281,25 @@ bool IslandJudge::is_of_another(const Frame& frame, std::int32_t node, Direction
   return !continues(frame, node, d) && is_well_seen(frame, frame.beside[node][d]);
 }
 
-IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, Direction d) const {
+/// Calls visit(node) for those of a piece along one of its sides, until it returns true.
+template <class Visit>
+bool IslandJudge::any_along(const Piece& piece, Direction d, Visit&& visit) const {
   const bool along_row = d == kUp || d == kDown;
-  Side side;
   for (int i = 0; i < (along_row ? piece.columns : piece.rows); ++i) {
     const int row = along_row ? piece.row + (d == kDown ? piece.rows - 1 : 0) : piece.row + i,
               column = along_row ? piece.column + i : piece.column + (d == kRight ? piece.columns - 1 : 0);
-    const std::int32_t node = holder_[index_of(row, column)];
+    if (visit(holder_[index_of(row, column)])) return true;
+  }
+  return false;
+}
+
+bool IslandJudge::is_held(const Piece& piece, Direction d) const {
+  return any_along(piece, d, [&](std::int32_t node) { return links_[node][d] == Link::kAgrees; });
+}
+
+IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, Direction d) const {
+  Side side;
+  any_along(piece, d, [&](std::int32_t node) {
     if (links_[node][d] == Link::kAgrees) side.bend += bend_of(frame, node, d), ++side.held_by;
     const Beyond cell(frame.claims[node], d);
     if (shown(cell.row, cell.column)) {
@@ -295,7 +307,8 @@ IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, D
       if (links_[node][d] == Link::kNeutral) side.beyond += ratio(frame, frame.beside[node][d], cell.row, cell.column);
     }
     side.broken |= frame.nodes[node].broken[d];
-  }
+    return false;
+  });
   return side;
 }
 
@@ -304,10 +317,11 @@ IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, D
 /// holds the piece is bent.
 bool IslandJudge::may_be_apart(const Frame& frame, const Piece& piece) const {
   constexpr float kBent = 0.06F;  // surfaces bend by a third of it and less
+  // Asked first, as most pieces are held on both sides.
+  const auto held = [&](Direction d) { return is_held(piece, d); };
+  if ((held(kLeft) && held(kRight)) || (held(kUp) && held(kDown))) return false;
   std::array<Side, 4> sides;
   for (const Direction d : kAllDirections) sides[d] = side_of(frame, piece, d);
-  const auto held = [&](Direction d) { return sides[d].held_by > 0; };
-  if ((held(kLeft) && held(kRight)) || (held(kUp) && held(kDown))) return false;
   float bend = 0, links = 0, beyond = 0;
   bool contradicted = false, broken = false;
   for (const Side& side : sides) {
@@ -372,16 +386,18 @@ void IslandJudge::cut_pieces_through(const Frame& frame, std::int32_t node, floa
     for (int width = 1; width <= kWidest; ++width) {
       for (int side = across - width + 1; side <= across; ++side) {
         float before = 0;
+        beyond_.clear();  // the slices after `along`, as far as they were asked for
         for (int first = along;; --first) {
           const auto added = evidence_of(slice(side, width, first));
           if (!added || (before += *added) >= evidence_min) break;
           float evidence = before;
-          for (int last = along;;) {
+          for (int last = along;; ++last) {
             const int length = last - first + 1;
             cut_piece(frame, along_row ? Piece{side, first, width, length} : Piece{first, side, length, width},
                       evidence_min - evidence);
-            const auto next = evidence_of(slice(side, width, ++last));
-            if (!next || (evidence += *next) >= evidence_min) break;
+            const auto asked = static_cast<std::size_t>(last - along);
+            if (asked == beyond_.size()) beyond_.push_back(evidence_of(slice(side, width, last + 1)));
+            if (!beyond_[asked] || (evidence += *beyond_[asked]) >= evidence_min) break;
           }
         }
       }

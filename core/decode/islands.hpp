@@ -136,6 +136,10 @@ class IslandJudge {
     return frame.shapes[node].letter >= 0 && frame.shapes[node].distance < kWellSeen;
   }
   [[nodiscard]] bool is_of_another(const Frame& frame, std::int32_t node, Direction d) const;
+  template <class Visit>
+  bool any_along(const Piece& piece, Direction d, Visit&& visit) const;
+  /// Whether the island goes on beyond that side.
+  [[nodiscard]] bool is_held(const Piece& piece, Direction d) const;
   [[nodiscard]] Side side_of(const Frame& frame, const Piece& piece, Direction d) const;
   [[nodiscard]] float bend_of(const Frame& frame, std::int32_t node, Direction d) const;
   [[nodiscard]] int turns_without(const Piece& piece) const;
@@ -180,6 +184,7 @@ class IslandJudge {
   std::vector<std::int32_t> line_;             // of nodes
   std::vector<double> line_ratios_;            // their sums before each of them
   std::vector<float> own_ratios_;              // of line_
+  std::vector<std::optional<float>> beyond_;   // evidence of slices of pieces
   std::vector<std::int32_t> around_, placed_;  // the node of each cell of an island and beside it; where one is
   std::vector<std::array<int, 2>> slides_;     // rows and columns of each step along the epipolar lines
   std::vector<float> slid_ratios_;             // of line_ after each of them, summed up as line_ratios_
