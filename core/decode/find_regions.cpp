@@ -49,9 +49,10 @@ std::int32_t RegionFinder::join(std::int32_t a, std::int32_t b) {
 
 /// Gives each run the label of the runs that it touches in the row above, all made one; a new label where it touches
 /// none.
-void RegionFinder::label_row(int y, int runs, const Row& above, Row& row) {
-  const std::uint16_t *ends = row.ends.data(), *above_ends = above.ends.data();
-  const std::int32_t* above_label = above.labels.data();
+/// @param first_above  the first run of the row above
+void RegionFinder::label_row(int y, int runs, const std::uint16_t* above_ends, const std::uint16_t* ends,
+                             std::size_t first_above) {
+  const std::int32_t* above_label = label_of_run_.data() + first_above;
   Run* out = runs_.data() + run_count_;
   std::int32_t* out_label = label_of_run_.data() + run_count_;
   for (int i = 0; i < runs; ++i, ends += 2) {
@@ -67,7 +68,6 @@ void RegionFinder::label_row(int y, int runs, const Row& above, Row& row) {
         if (*other != label) (void)join(label, *other);
     }
     ++labels_[label].runs;
-    row.labels[i] = label;
     *out++ = {static_cast<std::int16_t>(y), static_cast<std::int16_t>(left), static_cast<std::int16_t>(right)};
     *out_label++ = label;
   }
@@ -116,22 +116,23 @@ void RegionFinder::gather(Regions& found) {
 void RegionFinder::find(const Mask& mask, Regions& found) {
   constexpr std::uint16_t kBeyond = std::numeric_limits<std::uint16_t>::max();
   const std::size_t row_max = static_cast<std::size_t>(mask.width()) / 2 + 1;
-  for (Row& row : rows_) {
-    row.ends.resize(2 * row_max + kEndsAtOnce + 2);
-    row.labels.resize(row_max + 1);
-  }
+  for (std::vector<std::uint16_t>& ends : ends_) ends.resize(2 * row_max + kEndsAtOnce + 2);
   labels_.clear();
   run_count_ = 0;
-  Row *above = &rows_[0], *row = &rows_[1];
-  above->ends[0] = above->ends[1] = kBeyond;
+  std::uint16_t *above = ends_[0].data(), *row = ends_[1].data();
+  above[0] = above[1] = kBeyond;
+  std::size_t first_above = 0;
   for (int y = 0; y < mask.height(); ++y) {
-    const int runs = Cloned<find_ends>::call(mask.row(y), mask.width(), row->ends.data());
-    row->ends[2 * runs] = row->ends[2 * runs + 1] = kBeyond;
-    if (runs_.size() < run_count_ + row_max) {
-      runs_.resize(2 * (run_count_ + row_max));
+    const int runs = Cloned<find_ends>::call(mask.row(y), mask.width(), row);
+    row[2 * runs] = row[2 * runs + 1] = kBeyond;
+    // With one more, which is read and not used.
+    if (runs_.size() < run_count_ + row_max + 1) {
+      runs_.resize(2 * (run_count_ + row_max + 1));
       label_of_run_.resize(runs_.size());
     }
-    label_row(y, runs, *above, *row);
+    const std::size_t first = run_count_;
+    label_row(y, runs, above, row, first_above);
+    first_above = first;
     std::swap(above, row);
   }
   number_regions(found);

@@ -12,8 +12,8 @@
 
 namespace slsd {
 
-/// Lit pixels left to right - 1 of a row.
-struct Run {
+/// Lit pixels left to right - 1 of a row. Copied as one number.
+struct alignas(8) Run {
   std::int16_t row, left, right;
 };
 
@@ -55,19 +55,14 @@ class RegionFinder {
   void find(const Mask& mask, Regions& found);
 
  private:
-  /// The runs of a row, left and right in turn, then a run beyond every other, and a label to each run.
-  struct Row {
-    std::vector<std::uint16_t> ends;
-    std::vector<std::int32_t> labels;
-  };
-  void label_row(int y, int runs, const Row& above, Row& row);
+  void label_row(int y, int runs, const std::uint16_t* above_ends, const std::uint16_t* ends, std::size_t first_above);
   [[nodiscard]] std::int32_t join(std::int32_t a, std::int32_t b);
   [[nodiscard]] std::int32_t root(std::int32_t label);
   void number_regions(Regions& found);
   void gather(Regions& found);
 
-  Row rows_[2];
-  std::vector<Run> runs_;  // run_count_ of them, then room for more
+  std::vector<std::uint16_t> ends_[2];  // of a row's runs, left and right in turn, then of one beyond every other
+  std::vector<Run> runs_;               // run_count_ of them, then room for more
   std::vector<std::int32_t> label_of_run_;
   std::size_t run_count_ = 0;
   /// A part of a region, found row by row; its parent is not above it: labels of one region have one root.
