@@ -115,9 +115,10 @@ PatternReader::Shrunk PatternReader::frame_for(double scale, const GreyView& fra
   const auto [width, height] = size_of(frame);
   const int factor = std::min(static_cast<int>(symbol_px / kLargeEnoughPx), std::min(width, height));
   if (symbol_px <= kLargePx || factor <= 1) return {frame, 1};
-  const auto [at, is_new] = shrunk_.try_emplace(factor);
-  if (is_new) std::visit([&](const auto& view) { at->second = shrink(view, factor); }, frame);
-  return {std::visit([](const auto& image) { return GreyView(image.view()); }, at->second), factor};
+  const auto placed = shrunk_.try_emplace(factor);
+  auto& shrunk = placed.first->second;
+  if (placed.second) std::visit([&](const auto& view) { shrunk = shrink(view, factor); }, frame);
+  return {std::visit([](const auto& image) { return GreyView(image.view()); }, shrunk), factor};
 }
 
 std::vector<SymbolMatch> PatternReader::attempt(const Homography& camera_from_projector, const GreyView& whole,
