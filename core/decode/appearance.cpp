@@ -55,7 +55,9 @@ const Appearance& Appearances::at(std::size_t blur) const {
 const Appearance& Appearances::likeliest(std::span<const ShapeFeatures> shapes) const {
   constexpr std::size_t kTelling = 12;
   if (shapes.size() < kTelling) return usual_;
-  std::vector<float> likelihoods(shapes.size());
+  std::array<float, kShapesMax> buffer;
+  shapes = shapes.first(std::min(shapes.size(), kShapesMax));
+  const std::span likelihoods = std::span(buffer).first(shapes.size());
   const auto middle = likelihoods.begin() + static_cast<std::ptrdiff_t>(likelihoods.size() / 2);
   std::size_t best = 0;
   float best_median = -1;

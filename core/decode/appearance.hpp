@@ -37,8 +37,9 @@ class Appearances {
   /// Of every blur that occurs, for what does not depend on it.
   [[nodiscard]] const Appearance& usual() const { return usual_; }
 
+  static constexpr std::size_t kShapesMax = 512;
   /// That in which half of the shapes are the likeliest; the usual one where there are too few to tell.
-  /// @param shapes  a sample of a frame's, in measured frames
+  /// @param shapes  a sample of a frame's, in measured frames; kShapesMax of them are looked at
   [[nodiscard]] const Appearance& likeliest(std::span<const ShapeFeatures> shapes) const;
 
  private:

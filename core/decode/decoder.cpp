@@ -113,7 +113,7 @@ Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<dou
     if (observer != nullptr) observer->stage_done(Stage::kAlign);
   }
   parts_->triangulate(lattice, level);
-  parts_->decoding.off_line = parts_->reader.off_line();
+  parts_->reader.list_off_line(parts_->decoding.off_line);
   parts_->reader.report(parts_->decoding);
   if (observer != nullptr) observer->stage_done(Stage::kTriangulate);
   return &parts_->decoding;

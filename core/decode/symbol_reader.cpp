@@ -201,8 +201,8 @@ std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, doub
   return matches;
 }
 
-std::vector<SymbolMatch> SymbolReader::off_line() const {
-  std::vector<SymbolMatch> matches;
+void SymbolReader::list_off_line(std::vector<SymbolMatch>& matches) const {
+  matches.clear();
   for (std::size_t i = 0; i < seen_.size(); ++i) {
     const CellClaim& claim = seen_.claims[i];
     if (claim.status != RegionStatus::kOffEpipolarLine || !claim.named()) continue;
@@ -211,7 +211,6 @@ std::vector<SymbolMatch> SymbolReader::off_line() const {
                        cells().pixel(claim.row, claim.column),
                        noise_of_centre_px(m.weight, m.background, m.peak - m.background, measured_noise_)});
   }
-  return matches;
 }
 
 void SymbolReader::report(Decoding& decoding) const {

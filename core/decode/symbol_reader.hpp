@@ -53,7 +53,7 @@ class SymbolReader {
   [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, double full, bool is_there = true);
 
   /// The symbols of the last frame whose cells are certain and not on their epipolar lines, where they are seen.
-  [[nodiscard]] std::vector<SymbolMatch> off_line() const;
+  void list_off_line(std::vector<SymbolMatch>& matches) const;
   /// The symbol turned out to be no point.
   void reject(const LatticeSymbol& symbol, RegionStatus status) { seen_.claims[symbol.sighting].status = status; }
   /// What became of every region, with the counters.

@@ -16,6 +16,7 @@
 #include "tests/core/decode/decoded_scene.hpp"
 #include "tests/core/decode/images.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
+#include "tests/drivers/allocations.hpp"
 #include "tests/simulator/simulator.hpp"
 
 namespace slsd {
@@ -327,6 +328,16 @@ TEST(CreateDecoder, RefusesAnEmptyDepthRange) {
       Decoder::create(shipped_pattern("16px-5.toml"), paper_rig(), 0, {.depth_min_mm = 900, .depth_max_mm = 800});
   ASSERT_FALSE(decoder);
   EXPECT_EQ(decoder.error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(Decoder, AllocatesNothingAfterTheFirstFrame) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  const Grey8 frame = frame_of(pattern, kCylinder);
+  Decoder decoder = decoder_of(pattern);
+  ASSERT_TRUE(decoder.decode(frame.view()));
+  const auto before = test::allocations();
+  for (int again = 0; again < 3; ++again) ASSERT_TRUE(decoder.decode(frame.view()));
+  EXPECT_EQ(test::allocations(), before);
 }
 
 }  // namespace
