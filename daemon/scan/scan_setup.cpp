@@ -48,12 +48,12 @@ Result<std::vector<std::size_t>> calibrated_cameras(const Calibration& calibrati
   return indices;
 }
 
-// The decoder's buffers grow with its first frame. One full of symbols here makes the first scan as quick as the
-// others, and the service as large when it starts as it will be.
+// The decoder's buffers grow with its first frame. One with the whole pattern, of which no frame shows more, makes the
+// first scan as quick as the others, and the service as large when it starts as it will be.
 Result<> warm_up(Decoder& decoder, const Lens& lens, const Grey8& symbols) {
   Grey8 frame(lens.width_px, lens.height_px);
-  for (int y = 0; y < frame.height(); ++y) {
-    for (int x = 0; x < frame.width(); ++x) frame.at(x, y) = symbols.at(x % symbols.width(), y % symbols.height());
+  for (int y = 0; y < std::min(frame.height(), symbols.height()); ++y) {
+    for (int x = 0; x < std::min(frame.width(), symbols.width()); ++x) frame.at(x, y) = symbols.at(x, y);
   }
   const auto decoded = decoder.decode(frame.view());
   return decoded ? Result<>() : tl::unexpected(decoded.error());

@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <cassert>
 #include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <type_traits>
 #include <utility>
 #include <variant>
-#include <vector>
 
 namespace slsd {
 
@@ -17,11 +18,11 @@ struct FramePool::Buffers final : LentBuffers {
       : LentBuffers(static_cast<std::size_t>(count)),
         format(of),
         words_each((static_cast<std::size_t>(of.width_px) * of.height_px * of.bytes_per_pixel + 1) / 2),
-        memory(words_each * size()) {}
+        memory(std::make_unique_for_overwrite<std::uint16_t[]>(words_each * size())) {}
 
   FrameFormat format;
   std::size_t words_each;
-  std::vector<std::uint16_t> memory;
+  std::unique_ptr<std::uint16_t[]> memory;  // resident as far as it was lent: unwritten pages take nothing
 };
 
 namespace {
@@ -58,7 +59,7 @@ std::optional<Frame> FramePool::lend(const GreyView& image, std::uint64_t sequen
   assert(format_of(image) == buffers_->format);
   const auto buffer = buffers_->find_free();
   if (!buffer) return std::nullopt;
-  void* memory = buffers_->memory.data() + *buffer * buffers_->words_each;
+  void* memory = buffers_->memory.get() + *buffer * buffers_->words_each;
   const GreyView pixels = std::visit([&](const auto& view) { return copy_pixels(view, memory); }, image);
   return std::make_optional<Frame>(pixels, sequence, exposure_start, std::chrono::steady_clock::now(),
                                    buffers_->lend(*buffer));

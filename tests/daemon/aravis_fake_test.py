@@ -10,22 +10,19 @@ SLSD_ARAVIS_TOOLS names, and in PATH. Status 77 where they are nowhere, or no ne
 import argparse
 import collections
 import contextlib
-import fcntl
 import os
 import pathlib
 import re
 import shutil
-import socket
-import struct
 import subprocess
 import sys
 import time
 import unittest
 
+from own_network import enter_own_network, skip
+
 ADDRESS = "127.0.0.1"
 SERIAL = "SLSD01"
-IN_OWN_NETWORK = "SLSD_IN_OWN_NETWORK"
-SKIPPED = 77
 CONFIGURATION = """
 [projector]
 driver = "headless"
@@ -39,29 +36,11 @@ socket = "slsd.sock"
 """
 
 
-def skip(reason):
-    print(f"skipped: {reason}", file=sys.stderr)
-    sys.exit(SKIPPED)
-
-
 def tool(name):
     folder = os.environ.get("SLSD_ARAVIS_TOOLS")
     own = pathlib.Path(folder, name) if folder else None
     found = str(own) if own and own.exists() else shutil.which(name)
     return found or skip(f"{name} of the package aravis-tools is neither in SLSD_ARAVIS_TOOLS nor in PATH")
-
-
-def enter_own_network():
-    """So that no other test, nor a camera on this host's network, is met."""
-    if os.environ.get(IN_OWN_NETWORK) is None:
-        alone = ["unshare", "--user", "--map-root-user", "--net"]
-        if subprocess.run([*alone, "true"], capture_output=True, check=False).returncode != 0:
-            skip("this user may not make a network namespace")
-        os.environ[IN_OWN_NETWORK] = "1"
-        os.execvp(alone[0], [*alone, sys.executable, *sys.argv])
-    up, running, set_flags = 0x1, 0x40, 0x8914  # of linux/if.h
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
-        fcntl.ioctl(any_socket, set_flags, struct.pack("16sh14x", b"lo", up | running))
 
 
 class AravisFake(unittest.TestCase):

@@ -2,8 +2,11 @@
 // Copyright the slsd authors
 #include "tests/drivers/allocations.hpp"
 
+#include <unistd.h>
+
 #include <atomic>
 #include <cstdlib>
+#include <fstream>
 #include <new>
 
 namespace {
@@ -13,6 +16,12 @@ std::atomic<std::uint64_t> count{0};
 namespace slsd::test {
 std::uint64_t allocations() {
   return count.load();
+}
+
+double resident_mib() {
+  long total = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> total >> resident;
+  return static_cast<double>(resident * ::sysconf(_SC_PAGESIZE)) / (1 << 20);
 }
 }  // namespace slsd::test
 

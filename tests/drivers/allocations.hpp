@@ -9,4 +9,7 @@ namespace slsd::test {
 /// How often operator new was called in this program so far, on all threads; 0 under the thread sanitizer.
 [[nodiscard]] std::uint64_t allocations();
 
+/// Of this process.
+[[nodiscard]] double resident_mib();
+
 }  // namespace slsd::test

@@ -85,7 +85,9 @@ Result<Frame> AravisCamera::capture_next(MonotonicTime deadline) {
 }
 
 Result<Frame> AravisCamera::note(Result<Frame> frame) {
-  if (session_->note_clock()) log_warnings();
+  const bool clock = session_->note_clock();
+  const bool fragments = !frame && session_->note_fragments();
+  if (clock || fragments) log_warnings();
   if (frame) last_start_ = frame->exposure_start();
   if (!frame && frame.error().code == ErrorCode::kDisconnected) end_session();
   return frame;

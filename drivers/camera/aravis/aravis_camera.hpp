@@ -61,7 +61,7 @@ class AravisCamera final : public Camera {
   /// By how much the device's clock goes faster than the host's; 0 while that cannot be told.
   [[nodiscard]] double clock_drift_ppm() const;
   /// The names of what on this system may cost frames, or could not be made sure of: "receive_buffer", "packet_size",
-  /// "packet_resend", "device_clock", "chunks", "first_frame".
+  /// "fragments", "packet_resend", "device_clock", "chunks", "first_frame".
   [[nodiscard]] std::vector<std::string> warnings() const;
 
  private:

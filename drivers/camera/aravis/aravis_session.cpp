@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #include "drivers/camera/aravis/aravis_session.hpp"
 
+#include <arpa/inet.h>
+
 #include <chrono>
 #include <thread>
 #include <utility>
@@ -79,6 +81,8 @@ Result<> AravisSession::prepare() {
   chunks_ = *chunks;
   if (auto done = configure_clock(features, options_); !done) return done;
   if (auto done = configure_packets(device_.camera.get(), options_, warnings_); !done) return done;
+  in_addr camera{};
+  if (::inet_pton(AF_INET, device_.address.c_str(), &camera) == 1) fragments_ = FragmentWatch(camera);
   read_clock_first();
   control_lost_handler_ = report_loss(arv_camera_get_device(device_.camera.get()), events_, number_);
   if (auto done = join_group(); !done) return done;
@@ -86,6 +90,7 @@ Result<> AravisSession::prepare() {
   control_ = std::make_unique<DeviceControl>(device_.camera.get(), events_, number_, first_clock_, first_ptp_);
   frame_capture_.emplace(options_, device_.name, events_, *receiver_, *control_, action_ ? &*action_ : nullptr);
   note_clock();
+  note_fragments();
   return {};
 }
 
@@ -150,6 +155,12 @@ bool AravisSession::note_clock() {
   return clock_told_ = true;
 }
 
+bool AravisSession::note_fragments() {
+  if (fragments_told_ || !fragments_.seen()) return false;
+  warnings_.push_back(fragments_warning(options_.packet_bytes, interface_of(device_.camera.get())));
+  return fragments_told_ = true;
+}
+
 // Software triggers and a camera that runs freely prove their way on the stream that stays. For a line or an action a
 // command proves it, and the camera must stop in between. Many then number their frames from 1 again, which Aravis
 // would discard as late ones of before: so what follows gets a stream of its own.
@@ -182,6 +193,7 @@ Result<> AravisSession::warm_up(AravisTrigger trigger) {
     unreadable = unreadable || *first == FirstFrame::kUnreadable;
   }
   if (unreadable) return go_without_chunks(trigger);
+  if (note_fragments()) return fail_here(ErrorCode::kDisconnected, warnings_.back().advice);
   return fail_here(ErrorCode::kDisconnected,
                    "the camera answers, and sends no frame; check that it is reached through the right interface, and "
                    "that no firewall holds back UDP from its address");

@@ -17,6 +17,7 @@
 #include "drivers/camera/aravis/configure_device.hpp"
 #include "drivers/camera/aravis/configure_network.hpp"
 #include "drivers/camera/aravis/device_control.hpp"
+#include "drivers/camera/aravis/fragment_watch.hpp"
 #include "drivers/camera/aravis/frame_capture.hpp"
 #include "drivers/camera/aravis/frame_receiver.hpp"
 #include "drivers/camera/aravis/g_object.hpp"
@@ -51,6 +52,8 @@ class AravisSession {
   [[nodiscard]] DeviceClock clock() const { return control_->clock(); }
   /// Looks whether the device's clock can still be trusted. @return whether there is a new warning
   bool note_clock();
+  /// To be asked after a frame that did not come whole. @return whether there is a new warning
+  bool note_fragments();
   /// Whether the device still answers; waits a little for a trigger under way.
   [[nodiscard]] bool answers();
   /// @errors kDisconnected: it was lost while nobody asked for a frame
@@ -100,7 +103,9 @@ class AravisSession {
   std::optional<FrameCapture> frame_capture_;  ///< once it is prepared, until it is abandoned
   unsigned long control_lost_handler_ = 0;
   bool abandoned_ = false;
-  bool clock_told_ = false;  ///< the warning of it
+  FragmentWatch fragments_;
+  bool clock_told_ = false;      ///< the warning of it
+  bool fragments_told_ = false;  ///< and of these
 };
 
 }  // namespace slsd

@@ -94,16 +94,6 @@ Result<> set_packet_size(ArvCamera* camera, const AravisCameraOptions& options) 
   return fail(ErrorCode::kMismatch, "the camera took packets of " + std::to_string(taken) + " bytes", "packet_bytes");
 }
 
-std::optional<HostInterface> interface_of(ArvCamera* camera) {
-  auto* const device = ARV_GV_DEVICE(arv_camera_get_device(camera));
-  auto* const address = G_INET_SOCKET_ADDRESS(arv_gv_device_get_interface_address(device));
-  in_addr local{};
-  std::memcpy(&local, g_inet_address_to_bytes(g_inet_socket_address_get_address(address)), sizeof(local));
-  for (const HostInterface& interface : list_host_interfaces())
-    if (interface.reaches(local)) return interface;
-  return std::nullopt;
-}
-
 }  // namespace
 
 bool HostInterface::reaches(in_addr other) const {
@@ -166,6 +156,27 @@ NetworkWarning packet_size_warning(unsigned packet_bytes, const std::optional<Ho
   else
     advice += "; set the MTU of " + (interface ? interface->name : "the interface") + ", and of every switch, to 9000";
   return {"packet_size", advice};
+}
+
+NetworkWarning fragments_warning(int packet_bytes, const std::optional<HostInterface>& interface) {
+  const char* const sizes = packet_bytes != 0 ? "set packet_bytes to 1500 or less, or to 0, so that sizes are tried"
+                                              : "it breaks up those that try sizes, too; set packet_bytes to 1500";
+  return {"fragments",
+          std::string("the camera's packets are larger than the network takes whole, arrive in pieces, and "
+                      "frames are torn: ") +
+              sizes + "; or set the MTU of " + (interface ? interface->name : "the interface") +
+              ", and of every switch, to 9000"};
+}
+
+std::optional<HostInterface> interface_of(ArvCamera* camera) {
+  if (!arv_camera_is_gv_device(camera)) return std::nullopt;
+  auto* const device = ARV_GV_DEVICE(arv_camera_get_device(camera));
+  auto* const address = G_INET_SOCKET_ADDRESS(arv_gv_device_get_interface_address(device));
+  in_addr local{};
+  std::memcpy(&local, g_inet_address_to_bytes(g_inet_socket_address_get_address(address)), sizeof(local));
+  for (const HostInterface& interface : list_host_interfaces())
+    if (interface.reaches(local)) return interface;
+  return std::nullopt;
 }
 
 Result<> configure_packets(ArvCamera* camera, const AravisCameraOptions& options,

@@ -45,7 +45,8 @@ struct HostInterface {
 
 /// Something about the system that may cost frames, or that could not be made sure of, by name and with what to do.
 struct NetworkWarning {
-  std::string name;  ///< "receive_buffer", "packet_size", "packet_resend", "device_clock", "chunks" or "first_frame"
+  std::string name;  ///< "receive_buffer", "packet_size", "fragments", "packet_resend", "device_clock", "chunks" or
+                     ///< "first_frame"
   std::string advice;
 };
 
@@ -59,6 +60,13 @@ struct NetworkWarning {
 /// What to do about packets that are small for large frames.
 /// @param interface  of this host to the camera, as far as it is known
 [[nodiscard]] NetworkWarning packet_size_warning(unsigned packet_bytes, const std::optional<HostInterface>& interface);
+
+/// What to do about packets that arrive in pieces.
+/// @param packet_bytes  that were set; 0: the camera's packets were tried
+[[nodiscard]] NetworkWarning fragments_warning(int packet_bytes, const std::optional<HostInterface>& interface);
+
+/// Of this host to the camera, as far as it is known. Nothing for one that is not GigE Vision.
+[[nodiscard]] std::optional<HostInterface> interface_of(ArvCamera* camera);
 
 /// Sets packet size and delay of a GigE Vision camera; nothing for another. To be called before the stream is made.
 /// @errors kMismatch, kUnsupported, kDisconnected

@@ -31,6 +31,7 @@ GigeCamera::GigeCamera(GigeCameraOptions options) : options_(std::move(options))
   broadcast_socket_ = bind_broadcast_port();
   wake_event_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   sender_ = std::make_unique<StreamSender>(in_addr{::inet_addr(options_.address.c_str())});
+  if (options_.breaks_up) sender_->break_up();
   command_.resize(65536);
   power_up();
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });

@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 //
 // A GigE Vision camera on this host:
-//   gige-camera [--address A] [--serial S] [--size WxH] [--images PATH] [--chunks 0|1]
+//   gige-camera [--address A] [--serial S] [--size WxH] [--images PATH] [--chunks 0|1] [--breaks-up 0|1]
 //               [--restarts-ids 0|1] [--arming-us N] [--clock good|still|epoch|rate|back]
 // Serves counted frames, or one image or those of a folder. Prints its address, and then obeys the commands that it
 // reads, a line each, and answers "ok" or "?", until "quit" or the end of the input.
@@ -27,7 +27,7 @@ namespace slsd::test {
 namespace {
 
 constexpr const char* kUsage =
-    "usage: gige-camera [--address A] [--serial S] [--size WxH] [--images PATH] [--chunks 0|1]\n"
+    "usage: gige-camera [--address A] [--serial S] [--size WxH] [--images PATH] [--chunks 0|1] [--breaks-up 0|1]\n"
     "                   [--restarts-ids 0|1] [--arming-us N] [--clock good|still|epoch|rate|back]\n"
     "commands: lose SHARE | drop N | truncate N | stale N | silent 0|1 | gone 0|1 | resends 0|1 | stall MS |\n"
     "          misexpose N | misgain N | cut N | garble N |\n"
@@ -60,6 +60,7 @@ bool set_option(const std::string& name, const std::string& value, GigeCameraOpt
   if (name == "--serial") return options.serial = value, true;
   if (name == "--size") return std::sscanf(value.c_str(), "%dx%d", &options.width_px, &options.height_px) == 2;
   if (name == "--chunks") return options.chunks = value != "0", true;
+  if (name == "--breaks-up") return options.breaks_up = value != "0", true;
   if (name == "--restarts-ids") return options.restarts_ids = value != "0", true;
   if (name == "--arming-us") return options.arming = std::chrono::microseconds(std::atoi(value.c_str())), true;
   if (name == "--clock") return set_clock(value, options);

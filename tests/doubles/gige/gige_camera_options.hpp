@@ -35,6 +35,7 @@ struct GigeCameraOptions {
   std::optional<std::chrono::microseconds> readout = {};
   std::chrono::microseconds arming{0};    ///< so long after AcquisitionStart it hears no trigger
   std::uint32_t packet_bytes_max = 9000;  ///< larger test packets get lost, as by a switch without jumbo frames
+  bool breaks_up = false;                 ///< packets that the network does not take whole are sent in fragments
   bool chunks = true;                     ///< it has a chunk mode
   bool chunks_in_ns = false;              ///< the chunks' time stamp is in nanoseconds, and not in ticks
   std::uint32_t chunk_payload = 0x4001;   ///< how a frame with chunks is called

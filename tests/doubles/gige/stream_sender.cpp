@@ -52,6 +52,11 @@ StreamSender::StreamSender(in_addr address) : socket_(::socket(AF_INET, SOCK_DGR
   ::setsockopt(socket_, IPPROTO_IP, IP_MTU_DISCOVER, &never, sizeof(never));
 }
 
+void StreamSender::break_up() {
+  const int always = IP_PMTUDISC_DONT;
+  ::setsockopt(socket_, IPPROTO_IP, IP_MTU_DISCOVER, &always, sizeof(always));
+}
+
 StreamSender::~StreamSender() {
   ::close(socket_);
 }

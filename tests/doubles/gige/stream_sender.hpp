@@ -42,6 +42,8 @@ class StreamSender {
 
   /// The share of packets that are not sent, sent-again ones too; seeded.
   void lose(double share, std::uint32_t seed);
+  /// Packets that are too large for the network are sent in fragments, as few cameras have it.
+  void break_up();
 
   /// A frame to fill for begin(); it is the oldest of those kept.
   [[nodiscard]] WireFrame& next_frame();

@@ -2,11 +2,9 @@
 // Copyright the slsd authors
 #include "drivers/camera/file_camera.hpp"
 
-#include <unistd.h>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <variant>
 
@@ -22,6 +20,7 @@ namespace {
 using test::far_away;
 using test::FileCameraTest;
 using test::ramp8;
+using test::resident_mib;
 using test::samples_of;
 
 TEST_F(FileCameraTest, ReplaysAFolderInTheOrderOfNamesAndBeginsAnew) {
@@ -73,12 +72,6 @@ TEST_F(FileCameraTest, AllocatesNothingOnceItsImagesAreDecoded) {
   const std::uint64_t before = test::allocations();
   for (int i = 0; i < 10000; ++i) ASSERT_TRUE(camera.capture(MonotonicTime::max()).has_value());
   EXPECT_EQ(test::allocations(), before);
-}
-
-double resident_mib() {
-  long total = 0, resident = 0;
-  std::ifstream("/proc/self/statm") >> total >> resident;
-  return static_cast<double>(resident * ::sysconf(_SC_PAGESIZE)) / (1 << 20);
 }
 
 TEST_F(FileCameraTest, KeepsItsMemoryFlatWhereTheCacheIsTooSmall) {

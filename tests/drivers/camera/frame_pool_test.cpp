@@ -100,6 +100,16 @@ TEST(FramePool, TakesFramesBackFromOtherThreads) {
   EXPECT_TRUE(pool.lend(image.view(), 0, {}));
 }
 
+TEST(FramePool, TakesMemoryAsFarAsItIsLent) {
+  const double before_mib = test::resident_mib();
+  FramePool pool({8192, 8192, 1}, 4);                  // 256 MiB
+  EXPECT_LT(test::resident_mib() - before_mib, 64.0);  // the shadow of the address sanitizer is an eighth
+  const Grey8 image = ramp8(8192, 8192);
+  const double with_image_mib = test::resident_mib();
+  for (std::uint64_t i = 0; i < 4; ++i) EXPECT_TRUE(pool.lend(image.view(), i, {}).has_value());
+  EXPECT_LT(test::resident_mib() - with_image_mib, 100.0);  // one frame after the other is in the same buffer
+}
+
 TEST(FramePool, AllocatesNothingToLend) {
   FramePool pool({64, 48, 1}, 3);
   const Grey8 image = ramp8(64, 48);

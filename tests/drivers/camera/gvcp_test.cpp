@@ -66,6 +66,14 @@ TEST(PacketSizeWarning, AsksForNoMtuThatIsThere) {
   EXPECT_THAT(packet_size_warning(1400, interface).advice, HasSubstr("eth1 takes 9000: let every switch"));
 }
 
+TEST(FragmentsWarning, NamesTheRemedy) {
+  HostInterface interface;
+  interface.name = "eth1";
+  EXPECT_THAT(fragments_warning(9000, interface).advice, HasSubstr("set packet_bytes to 1500 or less, or to 0"));
+  EXPECT_THAT(fragments_warning(0, interface).advice, HasSubstr("set packet_bytes to 1500; or set the MTU of eth1"));
+  EXPECT_THAT(fragments_warning(0, std::nullopt).advice, HasSubstr("set the MTU of the interface"));
+}
+
 TEST(ReadGvcpDiscovery, RefusesOtherAnswers) {
   for (const std::size_t place : {0, 1, 2, 3, 6, 7}) {
     auto answer = discovery_answer();

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <netinet/in.h>
+
+#include "drivers/system/file_descriptor.hpp"
+
+namespace slsd {
+
+/// Whether packets of a camera arrive in pieces (IP fragments), because they are larger than the way to this host lets
+/// through. A packet socket sees no such packet whole, and without one a frame is lost with any of its pieces.
+/// @thread thread-bound
+class FragmentWatch {
+ public:
+  /// Of nothing: it sees none.
+  FragmentWatch() = default;
+  /// From now on. Without CAP_NET_RAW it sees none.
+  explicit FragmentWatch(in_addr camera);
+
+  [[nodiscard]] bool seen();
+
+ private:
+  FileDescriptor socket_;
+  bool seen_ = false;
+};
+
+}  // namespace slsd
