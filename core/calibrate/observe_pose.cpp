@@ -46,11 +46,15 @@ Result<> observe_pattern(const PosePictures& pictures, const Board& board, const
                          PatternReader& reader, PoseView& view) {
   const PrintShift shift = find_print_shift(pictures.white, pictures.coded.at(0), board, sighting);
   if (shift.certain()) view.shift_px = shift.px;
-  const auto levelled = divide_light(pictures.coded.at(0), pictures.white);
+  const BoardRegion region(board, sighting);
+  const auto levelled = divide_light(pictures.coded.at(0), pictures.white,
+                                     PrintedSurface{[&](int x, int y) {
+                                                      return region.contains({x, y});
+                                                    },
+                                                    sighting.edge_px});
   if (!levelled) return tl::unexpected(levelled.error());
   auto matches = reader.read(levelled->view());
   if (!matches) return tl::unexpected(matches.error());
-  const BoardRegion region(board, sighting);
   std::erase_if(*matches, [&](const SymbolMatch& match) { return !region.contains(match.camera_px); });
   if (matches->size() < kSymbolsCertain && reader.shapes() > kPatternRegions) matches->clear();
   if (matches->empty()) return fail(ErrorCode::kNotFound, why_no_symbols(reader.shapes()));
