@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #include "core/calibrate/observe_pose.hpp"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "core/calibrate/board_region.hpp"
@@ -35,7 +37,8 @@ Result<PoseView> observe_board(const PosePictures& pictures, const Board& board,
   if (!found) return tl::unexpected(found.error());
   sighting = std::move(*found);
   PoseView view;
-  view.blur_px = sighting.edge_px, view.clipped_share = sighting.full_share;
+  view.blur_px = sighting.edge_px;
+  view.clipped_share = std::max(sighting.full_share, full_share_of_print(pictures.white, board, sighting));
   for (const SeenPoint& point : sighting.points) {
     view.corners.push_back({point.pixel, board.point(point.id).head<2>()});
   }

@@ -10,6 +10,8 @@
 #include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 
+#include "core/calibrate/board_region.hpp"
+
 namespace slsd {
 namespace {
 
@@ -145,6 +147,22 @@ TEST(ObservePattern, FindsThemUnderAnyBlackLevel) {
     EXPECT_NEAR(errors.on_paper_px, 0, 0.03);
     EXPECT_LT(errors.all_px, 0.06);
   }
+}
+
+TEST(FullShareOfPrint, CountsWhatAReflectionLeavesNoPointOf) {
+  const Board board = *parse_board("chessboard:7x6:40");
+  const Scene scene;
+  Grey8 white = photograph(scene, Grey8(640, 480, 255), 1);
+  const auto sighting = find_board(white.view(), board);
+  ASSERT_TRUE(sighting) << to_string(sighting.error());
+  EXPECT_LT(full_share_of_print(white.view(), board, *sighting), 0.01);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      if ((scene.camera_from_board.inverse() * Eigen::Vector2d(x, y)).x() < 0.82 * kColumns * kSquareMm)
+        white.at(x, y) = 255;
+    }
+  }
+  EXPECT_NEAR(full_share_of_print(white.view(), board, *sighting), 0.82, 0.02);
 }
 
 }  // namespace
