@@ -101,6 +101,18 @@ def clipped(factor):
                                  lambda image: np.clip(factor * image.astype(float), 0, 255).astype(np.uint8))
 
 
+def burnt(share):
+    """As a reflection does: that share of the board at full level in both pictures, the rest as it was."""
+    def how(image):
+        rows, columns = np.where(image > 60)
+        last = np.quantile(columns, share)
+        image[rows[columns < last], columns[columns < last]] = 255
+        dark = (slice(rows.min(), rows.max()), slice(columns.min(), int(last)))
+        image[dark] = 255
+        return image
+    return lambda folder: change(folder, NAMES[5], ("white", "pattern"), how)
+
+
 def covered(copied):
     def spoil(folder):
         row, column = on_board(folder, NAMES[7])
@@ -158,6 +170,8 @@ FAULTS = [
     ("three poses, copied four times", copies, (r"shows the board where pose_00 does",), KEPT, None),
     ("the same with noise of their own", same_poses_anew, (r"shows the board where pose_00 does",), KEPT, None),
     ("4 times as bright: clipped", clipped(4), (r"pose_05.*left out:.*(full level|clipped)",), NEW, None),
+    ("58 % of a board clipped by a reflection", burnt(0.58), (r"pose_05.*left out: clipped",), NEW, None),
+    ("82 % of it", burnt(0.82), (r"pose_05.*(left out: clipped|not used)",), NEW, None),
     ("twice as bright", clipped(2), (r"pose_05.*full level",), NEW, None),
     ("a part of the pattern covered", covered(False), (r"covered: .* not seen in one place",), NEW, None),
     ("a part of it copied from beside", covered(True), (r"covered: .* not seen in one place",), NEW, None),

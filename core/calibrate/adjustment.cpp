@@ -33,6 +33,15 @@ void visit_views(Observations& observations, Visit visit) {
   }
 }
 
+/// The noise of a view over the session's, which counts as so many components more: of few points little can be told.
+/// One that is far off is no noise.
+double noise_over(const std::vector<double>& components, double session) {
+  constexpr double kSession = 60, kLeast = 0.5, kMost = 2.5;
+  const auto count = static_cast<double>(components.size());
+  const double own = robust_sigma_px(components) / session;
+  return std::clamp(std::sqrt((count * own * own + kSession) / (count + kSession)), kLeast, kMost);
+}
+
 /// The highest term less likely, where a lens turns back on itself within its picture.
 bool tighten(const DeviceModel& device, DistortionPrior& prior) {
   constexpr double kLess = 0.2;
@@ -60,39 +69,54 @@ double value_of(const SharedParameter& parameter, const RigModel& rig) {
   return parameter.kind == SharedParameter::Kind::kLens ? device.lens[index] : device.device_from_rig[index];
 }
 
-void Adjustment::measure_noise(const Observations& observations) {
-  std::vector<double> board_corners, plane_corners, symbols;
-  for (std::size_t i = 0; i < observations.poses.size(); ++i) {
-    const PoseSubject subject = observations.poses[i].subject;
-    auto& corners = subject == PoseSubject::kBoard ? board_corners : plane_corners;
-    for (const PoseView& view : observations.poses[i].views) {
-      const ViewResiduals residuals = residuals_of(view, rig_, rig_.rig_from_board[i], subject);
-      for (const Eigen::Vector2d& r : residuals.corners_px) corners.push_back(r.x()), corners.push_back(r.y());
-      if (!options_.with_symbols) continue;
-      for (std::size_t j = 0; j < view.symbols.size(); ++j) {
-        const Eigen::Vector2d r = residuals.symbols_px[j] / view.symbols[j].sigma_px;
-        symbols.push_back(r.x()), symbols.push_back(r.y());
-      }
+/// Calls with each view, what it shows, and the components of its corners' and of its symbols' residuals, these in
+/// their own deviations.
+template <class Visit>
+void Adjustment::visit_components(Observations& observations, Visit visit) const {
+  visit_views(observations, [&](PoseView& view, std::size_t pose) {
+    const PoseSubject subject = observations.poses[pose].subject;
+    const ViewResiduals residuals = residuals_of(view, rig_, rig_.rig_from_board[pose], subject);
+    std::vector<double> corners, symbols;
+    for (const Eigen::Vector2d& r : residuals.corners_px) corners.push_back(r.x()), corners.push_back(r.y());
+    for (std::size_t j = 0; options_.with_symbols && j < view.symbols.size(); ++j) {
+      const Eigen::Vector2d r = residuals.symbols_px[j] / view.symbols[j].sigma_px;
+      symbols.push_back(r.x()), symbols.push_back(r.y());
     }
-  }
+    visit(view, subject, corners, symbols);
+  });
+}
+
+void Adjustment::measure_noise(Observations& observations) {
+  std::vector<double> board_corners, plane_corners, symbols;
+  visit_components(observations, [&](PoseView&, PoseSubject subject, const auto& of_corners, const auto& of_symbols) {
+    auto& corners = subject == PoseSubject::kBoard ? board_corners : plane_corners;
+    corners.insert(corners.end(), of_corners.begin(), of_corners.end());
+    symbols.insert(symbols.end(), of_symbols.begin(), of_symbols.end());
+  });
   options_.corner_sigma_px = std::max(robust_sigma_px(std::move(board_corners)), kSigmaMinPx);
   options_.plane_corner_sigma_px = options_.corner_sigma_px;
   if (!plane_corners.empty())
     options_.plane_corner_sigma_px = std::max(robust_sigma_px(std::move(plane_corners)), kSigmaMinPx);
   if (options_.with_symbols) options_.symbol_sigma_factor = std::max(robust_sigma_px(std::move(symbols)), 1e-3);
+  visit_components(observations,
+                   [&](PoseView& view, PoseSubject subject, const auto& of_corners, const auto& of_symbols) {
+                     view.corner_noise = noise_over(of_corners, options_.corner_sigma_of(subject));
+                     view.symbol_noise = noise_over(of_symbols, options_.symbol_sigma_factor);
+                   });
 }
 
 void Adjustment::mark_outlying(Observations& observations) const {
   visit_views(observations, [&](PoseView& view, std::size_t pose) {
     const PoseSubject subject = observations.poses[pose].subject;
     const ViewResiduals residuals = residuals_of(view, rig_, rig_.rig_from_board[pose], subject);
-    const double corner_limit_px = kOutlyingSigmas * options_.corner_sigma_of(subject) * std::sqrt(2.0);
+    const double corner_limit_px =
+        kOutlyingSigmas * options_.corner_sigma_of(subject) * view.corner_noise * std::sqrt(2.0);
     for (std::size_t j = 0; j < view.corners.size(); ++j) {
       view.corners[j].outlying = residuals.corners_px[j].norm() > corner_limit_px;
     }
     if (!options_.with_symbols) return;
     for (std::size_t j = 0; j < view.symbols.size(); ++j) {
-      const double sigma_px = options_.symbol_sigma_factor * view.symbols[j].sigma_px;
+      const double sigma_px = options_.symbol_sigma_factor * view.symbol_noise * view.symbols[j].sigma_px;
       view.symbols[j].outlying = !(residuals.symbols_px[j].norm() < kOutlyingSigmas * sigma_px * std::sqrt(2.0));
     }
   });

@@ -51,7 +51,9 @@ class Adjustment {
   explicit Adjustment(RigModel rig) : rig_(std::move(rig)) {}
   [[nodiscard]] Result<> find_influence_of(const Observations& observations);
   [[nodiscard]] std::string unplaced_text(const Observations& observations) const;
-  void measure_noise(const Observations& observations);
+  template <class Visit>
+  void visit_components(Observations& observations, Visit visit) const;
+  void measure_noise(Observations& observations);
   void mark_outlying(Observations& observations) const;
   [[nodiscard]] Result<> adjust_to_lenses(const Observations& observations);
   [[nodiscard]] bool is_stretched() const;

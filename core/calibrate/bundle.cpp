@@ -118,7 +118,7 @@ class Problem {
     DeviceModel& camera = rig_.cameras[view.camera];
     const PoseSubject subject = observations_.poses[pose].subject;
     const bool is_board = subject == PoseSubject::kBoard;
-    const double sigma_px = options_.corner_sigma_of(subject);
+    const double sigma_px = options_.corner_sigma_of(subject) * view.corner_noise;
     double* const scale = is_board ? &rig_.board_scale : &true_scale_;
     double* const stretch = is_board ? &rig_.board_stretch : &true_stretch_;
     for (const BoardPoint& point : view.corners) {
@@ -136,7 +136,7 @@ class Problem {
     DeviceModel &camera = rig_.cameras[view.camera], &projector = rig_.projector;
     for (const ProjectedPoint& point : view.symbols) {
       if (point.outlying) continue;
-      const double sigma_px = point.sigma_px * options_.symbol_sigma_factor;
+      const double sigma_px = point.sigma_px * options_.symbol_sigma_factor * view.symbol_noise;
       auto* cost = new ceres::AutoDiffCostFunction<SymbolResidual, 2, 9, 6, 9, 6, 6>(
           new SymbolResidual{point.camera_px, point.projector_px, sigma_px});
       blocks.push_back(problem_.AddResidualBlock(cost, &loss_, camera.lens.data(),

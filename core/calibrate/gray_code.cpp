@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <map>
+#include <cstdint>
 #include <string>
 #include <tuple>
 #include <utility>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/structured_light/graycodepattern.hpp>
 
@@ -36,7 +37,7 @@ constexpr double kMemberOffPx = 0.75;
 constexpr std::ptrdiff_t kPixelsTelling = 2000;
 constexpr double kBeyondShareMax = 0.02, kFittingShareMin = 0.3;
 
-/// @param full  the level of a saturated pixel, which becomes 255
+/// @param full  the level of a saturated pixel, which becomes 255. Where it is that already nothing is copied
 cv::Mat to_mat(const GreyView& view, double full) {
   return std::visit(
       [full](const auto& image) {
@@ -44,6 +45,7 @@ cv::Mat to_mat(const GreyView& view, double full) {
         const cv::Mat borrowed(image.height, image.width, sizeof(Pixel) == 1 ? CV_8U : CV_16U,
                                const_cast<Pixel*>(image.pixels),
                                static_cast<std::size_t>(image.stride) * sizeof(Pixel));
+        if (sizeof(Pixel) == 1 && full == 255) return borrowed;
         cv::Mat copy;
         borrowed.convertTo(copy, CV_8U, 255 / full);
         return copy;
@@ -51,8 +53,13 @@ cv::Mat to_mat(const GreyView& view, double full) {
       view);
 }
 
+/// A pixel of the camera and its place in the projector. Eight bytes: a camera may have tens of millions.
 struct Member {
-  Eigen::Vector2d camera_px, projector_px;
+  std::uint16_t x, y;                          // camera px
+  std::uint16_t half_pixels_u, half_pixels_v;  // projector, from the first pixel's centre
+
+  [[nodiscard]] Eigen::Vector2d camera_px() const { return {x, y}; }
+  [[nodiscard]] Eigen::Vector2d projector_px() const { return {0.5 * half_pixels_u, 0.5 * half_pixels_v}; }
 };
 
 /// Members of a square, and the bins that the code tells apart, projector px.
@@ -67,18 +74,18 @@ std::vector<double> distances_from_affine(const Square& square) {
   const std::vector<Member>& members = square.members;
   Eigen::Matrix3d normal = Eigen::Matrix3d::Identity() * 1e-9;
   Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
-  const Eigen::Vector2d origin = members[0].projector_px;
+  const Eigen::Vector2d origin = members[0].projector_px();
   for (const Member& member : members) {
-    const Eigen::Vector3d p(member.projector_px.x() - origin.x(), member.projector_px.y() - origin.y(), 1);
+    const Eigen::Vector3d p = (member.projector_px() - origin).homogeneous();
     normal += p * p.transpose();
-    right += p * member.camera_px.transpose();
+    right += p * member.camera_px().transpose();
   }
   const Eigen::Matrix<double, 3, 2> affine = normal.ldlt().solve(right);
   const double half_bin_px = 0.5 * (affine.topRows<2>().transpose() * square.bin_px.asDiagonal()).norm();
   std::vector<double> distances;
   for (const Member& member : members) {
-    const Eigen::Vector3d p(member.projector_px.x() - origin.x(), member.projector_px.y() - origin.y(), 1);
-    distances.push_back((affine.transpose() * p - member.camera_px).norm() - half_bin_px);
+    const Eigen::Vector3d p = (member.projector_px() - origin).homogeneous();
+    distances.push_back((affine.transpose() * p - member.camera_px()).norm() - half_bin_px);
   }
   return distances;
 }
@@ -89,8 +96,8 @@ ProjectedPoint mean_of(const Square& square) {
   mean.camera_px = mean.projector_px = Eigen::Vector2d::Zero();
   const auto count = static_cast<double>(square.members.size());
   for (const Member& member : square.members) {
-    mean.camera_px += member.camera_px / count;
-    mean.projector_px += member.projector_px / count;
+    mean.camera_px += member.camera_px() / count;
+    mean.projector_px += member.projector_px() / count;
   }
   const double sigma_px = square.bin_px.norm() / std::sqrt(12);  // of a place in a bin
   mean.sigma_px = std::max(sigma_px / std::sqrt(count), 0.02);
@@ -178,7 +185,8 @@ Result<Reading> read_places(std::span<const cv::Mat> code, const ImageSize& proj
       ++beyond;
       continue;
     }
-    reading.seen.push_back({{pixel.x, pixel.y}, {*u, *v}});
+    const auto small = [](auto value) { return static_cast<std::uint16_t>(value); };
+    reading.seen.push_back({small(pixel.x), small(pixel.y), small(2 * *u), small(2 * *v)});
   }
   const auto all = static_cast<double>(std::ssize(reading.seen) + beyond);
   if (beyond > kPixelsTelling / 10 && static_cast<double>(beyond) > kBeyondShareMax * all) {
@@ -190,16 +198,19 @@ Result<Reading> read_places(std::span<const cv::Mat> code, const ImageSize& proj
   return reading;
 }
 
-/// The points of all squares that have enough, and of how many members.
-std::pair<std::vector<ProjectedPoint>, std::size_t> summarise(const Reading& reading, int side_px) {
-  std::map<std::pair<int, int>, Square> squares;
-  for (const Member& member : reading.seen) {
-    Square& square = squares[{static_cast<int>(member.projector_px.x()) / side_px,
-                              static_cast<int>(member.projector_px.y()) / side_px}];
-    square.members.push_back(member), square.bin_px = reading.bin_px;
-  }
+/// The points of all squares that have enough, and of how many members. Brings the pixels of a square together.
+std::pair<std::vector<ProjectedPoint>, std::size_t> summarise(Reading& reading, int side_px) {
+  const auto place = [side_px](const Member& member) {
+    return std::pair(member.half_pixels_u / (2 * side_px), member.half_pixels_v / (2 * side_px));
+  };
+  std::ranges::sort(reading.seen, {},
+                    [&](const Member& member) { return std::tuple(place(member), member.y, member.x); });
   std::pair<std::vector<ProjectedPoint>, std::size_t> points;
-  for (auto& [place, square] : squares) {
+  for (auto first = reading.seen.begin(); first != reading.seen.end();) {
+    const auto last =
+        std::find_if(first, reading.seen.end(), [&](const Member& member) { return place(member) != place(*first); });
+    Square square{{first, last}, reading.bin_px};
+    first = last;
     keep_fitting(square);
     if (square.members.size() < kSeenMin) continue;
     points.first.push_back(mean_of(square)), points.second += square.members.size();
@@ -230,7 +241,7 @@ Result<std::vector<ProjectedPoint>> read_gray_code(const GrayCapture& capture, c
   if (!images) return tl::unexpected(images.error());
   const auto lit = lit_pixels(images->at(0), images->at(1), wanted);
   if (!lit) return tl::unexpected(lit.error());
-  const auto reading = read_places(std::span(*images).subspan(2), projector, *lit);
+  auto reading = read_places(std::span(*images).subspan(2), projector, *lit);
   if (!reading) return tl::unexpected(reading.error());
   std::vector<ProjectedPoint> points;
   std::size_t fitting = 0;

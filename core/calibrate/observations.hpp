@@ -29,6 +29,8 @@ struct PoseView {
   std::size_t camera = 0;
   std::vector<BoardPoint> corners;
   std::vector<ProjectedPoint> symbols;
+  /// Noise of this view's points over that of all, as the adjustment finds it: pictures differ in sharpness and light.
+  double corner_noise = 1, symbol_noise = 1;
   double blur_px = 0;              ///< one standard deviation of the blur at the board's edges; 0: not known
   double clipped_share = 0;        ///< of the board's pixels, those at full level
   std::size_t hidden_symbols = 0;  ///< in one place on the board, where the pattern should be seen

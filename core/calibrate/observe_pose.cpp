@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #include "core/calibrate/observe_pose.hpp"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "core/calibrate/board_region.hpp"
@@ -35,7 +37,8 @@ Result<PoseView> observe_board(const PosePictures& pictures, const Board& board,
   if (!found) return tl::unexpected(found.error());
   sighting = std::move(*found);
   PoseView view;
-  view.blur_px = sighting.edge_px, view.clipped_share = sighting.full_share;
+  view.blur_px = sighting.edge_px;
+  view.clipped_share = std::max(sighting.full_share, full_share_of_print(pictures.white, board, sighting));
   for (const SeenPoint& point : sighting.points) {
     view.corners.push_back({point.pixel, board.point(point.id).head<2>()});
   }
@@ -46,11 +49,15 @@ Result<> observe_pattern(const PosePictures& pictures, const Board& board, const
                          PatternReader& reader, PoseView& view) {
   const PrintShift shift = find_print_shift(pictures.white, pictures.coded.at(0), board, sighting);
   if (shift.certain()) view.shift_px = shift.px;
-  const auto levelled = divide_light(pictures.coded.at(0), pictures.white);
+  const BoardRegion region(board, sighting);
+  const auto levelled = divide_light(pictures.coded.at(0), pictures.white,
+                                     PrintedSurface{[&](int x, int y) {
+                                                      return region.contains({x, y});
+                                                    },
+                                                    sighting.edge_px});
   if (!levelled) return tl::unexpected(levelled.error());
   auto matches = reader.read(levelled->view());
   if (!matches) return tl::unexpected(matches.error());
-  const BoardRegion region(board, sighting);
   std::erase_if(*matches, [&](const SymbolMatch& match) { return !region.contains(match.camera_px); });
   if (matches->size() < kSymbolsCertain && reader.shapes() > kPatternRegions) matches->clear();
   if (matches->empty()) return fail(ErrorCode::kNotFound, why_no_symbols(reader.shapes()));

@@ -3,7 +3,10 @@
 #include "core/exposure/divide_light.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -47,9 +50,67 @@ float brightest(const GreyView& image) {
       image);
 }
 
-}  // namespace
+/// Images of one camera have the same depth; if not, full levels are what they have in common.
+float scale_between(const GreyView& white, const GreyView& other) {
+  return full_of(white) / full_of(other);
+}
 
-Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white, const std::optional<GreyView>& dark) {
+constexpr std::size_t kBins = 32;
+constexpr std::size_t kBinLeast = 200;            // pixels
+constexpr double kPixelsLookedAt = 2e6;           // more tell no more
+constexpr double kDarkFrom = 0.1, kDarkTo = 0.3;  // of a bin's pixels by their levels: those between the symbols
+constexpr double kRoomMax = 0.8;                  // of white
+
+/// The middle of what lies between the symbols. Reorders the levels.
+double dark_of(std::vector<float>& levels) {
+  std::ranges::sort(levels);
+  const auto first = static_cast<std::size_t>(kDarkFrom * static_cast<double>(levels.size()));
+  const auto last = static_cast<std::size_t>(kDarkTo * static_cast<double>(levels.size()));
+  return std::accumulate(levels.begin() + static_cast<std::ptrdiff_t>(first),
+                         levels.begin() + static_cast<std::ptrdiff_t>(last), 0.0) /
+         static_cast<double>(last - first);
+}
+
+/// The level of a pixel that no light falls on. Between the symbols there is a part of the light that there is under
+/// white, of the room's and what the projector scatters, the same part on ink and on paper: by how much it does not go
+/// to 0 with the white level is the black level.
+double find_black_level(const GreyView& pattern, const GreyView& white,
+                        const std::function<bool(int x, int y)>& contains) {
+  const auto [width, height] = size_of(white);
+  const float most = brightest(white), full = static_cast<float>(guess_full_level(white));
+  const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / kPixelsLookedAt)));
+  std::array<std::vector<float>, kBins> bins;  // the pattern's levels, by those of white
+  std::array<double, kBins> white_sums{};
+  std::vector<float> lit, light;
+  for (int y = 0; y < height; y += step) {
+    copy_row(pattern, y, scale_between(white, pattern), lit);
+    copy_row(white, y, 1, light);
+    for (int x = 0; x < width; x += step) {
+      if (light[x] >= full || !contains(x, y)) continue;
+      const std::size_t bin = std::min(kBins - 1, static_cast<std::size_t>(kBins * light[x] / (most + 1)));
+      bins[bin].push_back(lit[x]), white_sums[bin] += light[x];
+    }
+  }
+  // A line through dark over white, each bin by its pixels.
+  double count = 0, sum_white = 0, sum_dark = 0, white_white = 0, white_dark = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < kBins; ++i) {
+    if (bins[i].size() < kBinLeast) continue;
+    const auto pixels = static_cast<double>(bins[i].size());
+    const double at = white_sums[i] / pixels, dark = dark_of(bins[i]);
+    count += pixels, sum_white += pixels * at, sum_dark += pixels * dark;
+    white_white += pixels * at * at, white_dark += pixels * at * dark;
+    least = std::min(least, dark);
+  }
+  const double spread = count * white_white - sum_white * sum_white;
+  if (!(spread > 0)) return 0;
+  const double slope = (count * white_dark - sum_white * sum_dark) / spread;
+  if (!(slope < kRoomMax)) return 0;
+  // Where dark and white are one there is no light.
+  return std::clamp((sum_dark - slope * sum_white) / count / (1 - slope), 0.0, least);
+}
+
+Result<> check_sizes(const GreyView& pattern, const GreyView& white, const std::optional<GreyView>& dark) {
   const auto [width, height] = size_of(white);
   for (const auto& [name, other] : {std::pair("pattern's", std::optional(pattern)), std::pair("black", dark)}) {
     if (!other || size_of(*other) == size_of(white)) continue;
@@ -58,23 +119,90 @@ Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white, cons
                                           size_text(other_width, other_height) + " pixels, the white one " +
                                           size_text(width, height) + "; all have to come from one camera in one mode");
   }
-  const float faint = std::max(
+  return {};
+}
+
+/// What light is trusted, in levels of the white image.
+float faint_light(const GreyView& white) {
+  return std::max(
       {kFaintLevels, kFaintShare * brightest(white), kFaintSigma * pixel_noise(white, guess_full_level(white))});
-  // Images of one camera have the same depth; if not, full levels are what they have in common.
-  const float white_levels = full_of(white) / full_of(pattern);
+}
+
+/// Exact where the light is more than faint; below that the less, the fainter it is.
+float share_of(float lit, float light, float faint) {
+  return light >= faint ? lit / light : lit * std::max(0.F, light) / (faint * faint);
+}
+
+std::uint16_t level_of(float share) {
+  return static_cast<std::uint16_t>(
+      std::clamp(static_cast<float>(kAsBrightAsWhite) * share, 0.F, static_cast<float>(kQuotientFull)));
+}
+
+/// A row of the white image above the black level, and the pattern's share of it.
+struct DividedRow {
+  std::vector<float> light, share;
+};
+
+/// Where the quotient of a pixel comes from, moved back along one axis; by half the differences of its neighbours.
+float moved_back(float variance, float light, float light_before, float light_after, float before, float after,
+                 float faint) {
+  if (light_before < faint || light_after < faint) return 0;
+  const float limit = 2 * std::sqrt(variance);
+  const float farther = std::clamp(variance * 0.5F * (light_after - light_before) / light, -limit, limit);
+  return farther * 0.5F * (after - before);
+}
+
+}  // namespace
+
+Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white, const std::optional<GreyView>& dark) {
+  if (auto fit = check_sizes(pattern, white, dark); !fit) return tl::unexpected(fit.error());
+  const auto [width, height] = size_of(white);
+  const float faint = faint_light(white);
   Grey16 quotient(width, height);
   std::vector<float> lit, light, room(width, 0.F);
   for (int y = 0; y < height; ++y) {
-    copy_row(pattern, y, white_levels, lit);
+    copy_row(pattern, y, scale_between(white, pattern), lit);
     copy_row(white, y, 1, light);
-    if (dark) copy_row(*dark, y, full_of(white) / full_of(*dark), room);
+    if (dark) copy_row(*dark, y, scale_between(white, *dark), room);
     std::uint16_t* const row = quotient.row(y);
     for (int x = 0; x < width; ++x) {
-      // As Wiener's filter divides: by no less than what noise may be.
-      const float divisor = std::max(0.F, light[x] - room[x]);
-      const float share = std::max(0.F, lit[x] - room[x]) * divisor / (divisor * divisor + faint * faint);
-      row[x] = static_cast<std::uint16_t>(
-          std::min(static_cast<float>(kAsBrightAsWhite) * share, static_cast<float>(kQuotientFull)));
+      row[x] = level_of(share_of(std::max(0.F, lit[x] - room[x]), light[x] - room[x], faint));
+    }
+  }
+  return quotient;
+}
+
+Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white, const PrintedSurface& surface) {
+  if (auto fit = check_sizes(pattern, white, std::nullopt); !fit) return tl::unexpected(fit.error());
+  const auto [width, height] = size_of(white);
+  const float faint = faint_light(white);
+  const auto black = static_cast<float>(find_black_level(pattern, white, surface.contains));
+  const auto variance = static_cast<float>(surface.blur_px * surface.blur_px);
+  std::array<DividedRow, 3> rows;  // of row y at y % 3
+  const auto divide_row = [&](int y) {
+    DividedRow& row = rows[y % 3];
+    copy_row(pattern, y, scale_between(white, pattern), row.share);
+    copy_row(white, y, 1, row.light);
+    for (int x = 0; x < width; ++x) {
+      row.light[x] -= black;
+      row.share[x] = share_of(std::max(0.F, row.share[x] - black), row.light[x], faint);
+    }
+  };
+  Grey16 quotient(width, height);
+  for (int y = 0; y < height; ++y) {
+    if (y == 0) divide_row(0);
+    if (y + 1 < height) divide_row(y + 1);
+    const DividedRow &here = rows[y % 3], &above = rows[(y + 2) % 3], &below = rows[(y + 1) % 3];
+    const bool inner_row = y > 0 && y + 1 < height;
+    for (int x = 0; x < width; ++x) {
+      float share = here.share[x];
+      if (inner_row && x > 0 && x + 1 < width && here.light[x] >= faint) {
+        share -=
+            moved_back(variance, here.light[x], here.light[x - 1], here.light[x + 1], here.share[x - 1],
+                       here.share[x + 1], faint) +
+            moved_back(variance, here.light[x], above.light[x], below.light[x], above.share[x], below.share[x], faint);
+      }
+      quotient.row(y)[x] = level_of(share);
     }
   }
   return quotient;

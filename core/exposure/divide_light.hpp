@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <functional>
 #include <optional>
 
 #include "core/image.hpp"
@@ -22,5 +23,22 @@ inline constexpr double kAsBrightAsWhite = 50000, kQuotientFull = 65535;
 /// @thread reentrant
 [[nodiscard]] Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white,
                                           const std::optional<GreyView>& dark = std::nullopt);
+
+/// What is known of a surface with a print on it, whose edges are sharp.
+struct PrintedSurface {
+  std::function<bool(int x, int y)> contains;  ///< the pixels that show it
+  double blur_px = 0;  ///< one standard deviation of the blur at the print's edges; 0: not known
+};
+
+/// The same to fractions of a pixel at the print's edges, where there is no dark image. Two things of the camera stay
+/// in a plain quotient, and pull what lies across an edge towards the ink:
+///
+/// - The level of a pixel without light, on top of which both images lie. It is a larger share of what little light ink
+///   gives back, so that the dark of the pattern is brighter there than on paper. It is found by that.
+/// - The camera's blur. What a pixel shows of the pattern is not what is there but what is where most of its light
+/// comes
+///   from: with a Gaussian blur s and a white image W, farther by s^2 grad W / W. The quotient is moved back by that.
+[[nodiscard]] Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white,
+                                          const PrintedSurface& surface);
 
 }  // namespace slsd

@@ -34,6 +34,29 @@ TEST(Calibrate, RecoversTheRig) {
   EXPECT_GT(outcome->held_out_corner_px, outcome->camera_rms_px);
 }
 
+TEST(Calibrate, WeighsEachPoseByItsOwnNoise) {
+  const RigModel truth = true_rig();
+  Observations observations = see(truth, true_poses(12));
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 0.05);
+  for (BoardPoint& corner : observations.poses[3].views[0].corners)
+    corner.camera_px += Eigen::Vector2d(noise(random), noise(random));
+  for (ProjectedPoint& symbol : observations.poses[7].views[0].symbols)
+    symbol.camera_px += Eigen::Vector2d(noise(random), noise(random));
+  const auto outcome = calibrate(std::move(observations), {});
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(left_out(*outcome), 0U);
+  for (std::size_t i = 0; i < 12; ++i) {
+    const PoseView& view = outcome->observations.poses[i].views[0];
+    SCOPED_TRACE(outcome->observations.poses[i].name);
+    EXPECT_GT(view.corner_noise, i == 3 ? 1.25 : 0.8);
+    EXPECT_LT(view.corner_noise, i == 3 ? 2.5 : 1.2);
+    EXPECT_GT(view.symbol_noise, i == 7 ? 1.1 : 0.7);
+    EXPECT_LT(view.symbol_noise, i == 7 ? 1.4 : 1.1);
+  }
+  expect_near_truth(*outcome, truth);
+}
+
 TEST(Calibrate, SaysHowSureItIsOfEachParameter) {
   const RigModel truth = true_rig();
   constexpr int kTrials = 5;
