@@ -2,6 +2,7 @@
 # Copyright the slsd authors
 """Xorg with the dummy driver: an operator's monitor, DUMMY0, and a projector, DUMMY1, that is plugged in and out."""
 import ctypes
+import os
 import pathlib
 import shutil
 import signal
@@ -48,16 +49,19 @@ class XImage(ctypes.Structure):
 
 
 class XServer:
-    """Raises OSError where it does not start."""
+    """Raises OSError where it does not start. Its display has a number that no other server takes by itself: those take
+    the lowest that is free, which would be that of one that is about to be started again."""
 
     x11 = ctypes.CDLL("libX11.so.6")
+    started = 0
 
     def __init__(self, display=None):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="slsd-test-"))
         (self.folder / "xorg.conf").write_text(CONFIGURATION, encoding="utf-8")
-        arguments = [display] if display else []
-        arguments += ["-config", str(self.folder / "xorg.conf"), "-configdir", str(self.folder / "none"), "-logfile",
-                      str(self.folder / "log"), "-nolisten", "tcp", "-noreset", "-displayfd", "1"]
+        XServer.started += 1
+        own = f":{1000 + (16 * os.getpid() + XServer.started) % 50000}"
+        arguments = [display or own, "-config", str(self.folder / "xorg.conf"), "-configdir", str(self.folder / "none"),
+                     "-logfile", str(self.folder / "log"), "-nolisten", "tcp", "-noreset", "-displayfd", "1"]
         self.process = subprocess.Popen([XORG, *arguments], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         number = self.process.stdout.readline().strip()
         self.display = ":" + number
