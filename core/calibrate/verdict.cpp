@@ -12,16 +12,6 @@
 namespace slsd {
 namespace {
 
-/// Bounds of a figure: up to the first it is good, up to the second usable.
-struct Bounds {
-  double good, usable;
-};
-constexpr Bounds kHeldOutPx{0.3, 1.0};
-constexpr Bounds kEpipolarPx{0.3, 1.0};
-constexpr Bounds kDepthShare{0.001, 0.005};  // of the distance, in the middle of the range
-constexpr double kCoverageGood = 0.5;
-constexpr double kTiltGood = 15;  // degrees, of the most tilted pose
-constexpr std::size_t kPosesGood = 8;
 constexpr double kDistanceSpread = 1.15;  // of the farthest to the nearest pose
 
 class Jury {
@@ -57,7 +47,7 @@ void judge_poses(const CalibrationOutcome& outcome, Jury& jury) {
     jury.verdict.reasons.push_back(fmt::format("only {} poses were used; {} are good", tilts.size(), kPosesGood));
     jury.verdict.advice.push_back("take more poses");
   }
-  if (std::ranges::max(tilts) < kTiltGood) {
+  if (std::ranges::max(tilts) < kTiltGoodDeg) {
     jury.lower(Grade::kUsable);
     jury.verdict.reasons.push_back(
         fmt::format("no pose is tilted by more than {:.0f} degrees, which leaves the focal lengths uncertain",

@@ -10,6 +10,7 @@
 
 #include "core/calibrate/coverage.hpp"
 #include "core/calibrate/point_residuals.hpp"
+#include "core/calibrate/verdict.hpp"
 #include "daemon/calibrate/svg_figure.hpp"
 
 namespace slsd {
@@ -92,8 +93,8 @@ std::string coverage_figure(const ImageSize& size, const Coverage& coverage, con
   }
   for (const DrawnPoint& point : thinned(points)) figure.dot(point.pixel, 1.3, pose_colour(point.pose));
   figure.frame();
-  return figure.str(
-      fmt::format("{}: points in {:.0f} % of the image; cells without any are red", device, 100 * coverage.share()));
+  return figure.str(fmt::format("{}: points in {:.0f} % of the image, {:.0f} % are good; cells without any are red",
+                                device, 100 * coverage.share(), 100 * kCoverageGood));
 }
 
 double rms_of(const Points& points) {
@@ -108,19 +109,23 @@ std::string residual_figure(const ImageSize& size, const Points& points, const s
   SvgFigure figure = figure_of(size);
   const double rms = rms_of(points);
   const double magnified = kArrowPx / figure.scale() / std::max(rms, 1e-6);
-  const double longest = 0.25 * size.width_px;  // of an outlying point's arrow
-  for (const DrawnPoint& point : thinned(points)) {
-    const std::string colour = point.outlying ? kOutlying : pose_colour(point.pose);
-    Eigen::Vector2d arrow = magnified * point.residual_px;
-    if (arrow.norm() > longest) arrow *= longest / arrow.norm();
-    figure.dot(point.pixel, 1.2, colour);
-    figure.line(point.pixel, point.pixel + arrow, colour, 0.7);
+  // Outlying points lie beneath the others, and say no more than where to: at their length they would hide all.
+  for (const bool outlying : {true, false}) {
+    const double longest = (outlying ? 1 : 8) * kArrowPx / figure.scale();
+    for (const DrawnPoint& point : thinned(points)) {
+      if (point.outlying != outlying) continue;
+      const std::string colour = outlying ? kOutlying : pose_colour(point.pose);
+      Eigen::Vector2d arrow = magnified * point.residual_px;
+      if (arrow.norm() > longest) arrow *= longest / arrow.norm();
+      figure.dot(point.pixel, 1.2, colour);
+      figure.line(point.pixel, point.pixel + arrow, colour, 0.7);
+    }
   }
   figure.frame();
   const auto outlying = std::ranges::count_if(points, &DrawnPoint::outlying);
   return figure.str(
-      fmt::format("{}: {:.3f} px RMS, arrows {:.0f} times as long as they are; {} points lie off (red) "
-                  "and took no part",
+      fmt::format("{}: {:.3f} px RMS, arrows {:.0f} times as long as they are; {} points lie off "
+                  "(red, their arrows cut short) and took no part",
                   device, rms, magnified, outlying));
 }
 

@@ -18,7 +18,8 @@ namespace {
 constexpr double kFigurePx = 460;
 constexpr double kAbovePx = -8;  // of a label's foot from its dot
 constexpr double kBelowPx = 16;
-constexpr double kDeviceMm = 120;  // how far before a device its image is drawn
+constexpr double kNamePx = 60, kLinePx = 13;  // a device's name: about so wide, and so high
+constexpr double kDeviceMm = 120;             // how far before a device its image is drawn
 
 using Quad = std::array<Eigen::Vector3d, 4>;
 using Projection = Eigen::Matrix<double, 2, 3>;
@@ -94,10 +95,18 @@ std::string poses_figure(const CalibrationOutcome& outcome, const Projection& lo
   const Eigen::Vector2d border = Eigen::Vector2d::Constant(0.05 * box.sizes().maxCoeff());
   SvgFigure figure(box.min() - border, box.max() + border, kFigurePx);
   for (std::size_t i = 0; i < boards.size(); ++i) draw_quad(figure, look, boards[i], pose_colour(i), 1.6);
+  std::vector<Eigen::Vector2d> named;
   for (const auto& device : devices) {
     draw_quad(figure, look, device.image, "#333", 1);
     for (const auto& corner : device.image) figure.line(look * device.eye, look * corner, "#333", 1);
-    figure.text(look * device.image[0] + 0.15 * border, device.name);
+    Eigen::Vector2d at = look * device.image[0] + 0.15 * border;
+    // Below the names that stand where it would.
+    for (const Eigen::Vector2d& other : named) {
+      const Eigen::Vector2d apart = figure.scale() * (at - other).cwiseAbs();
+      if (apart.x() < kNamePx && apart.y() < kLinePx) at.y() = other.y() + kLinePx / figure.scale();
+    }
+    named.push_back(at);
+    figure.text(at, device.name);
   }
   figure.frame();
   return figure.str(fmt::format("{}; the figure is {:.0f} mm wide", caption, box.sizes().x() + 2 * border.x()));

@@ -69,6 +69,24 @@ TEST(ReportHtml, ShowsWhatTheReferencePlaneSays) {
                               "<td colspan='4'>not measured</td></tr>"));
 }
 
+TEST(ReportHtml, NamesSizesUnitsGoalsAndTheProgram) {
+  const std::string html = report_html(an_outcome());
+  EXPECT_THAT(html, HasSubstr("projector, 1280 x 800 px"));
+  EXPECT_THAT(html, HasSubstr("slsd " SLSD_VERSION));
+  EXPECT_THAT(html, HasSubstr("up to 0.3 px"));
+  EXPECT_THAT(html, HasSubstr("50 % are good"));
+  EXPECT_THAT(html, HasSubstr("Good up to 0.1 % of the distance"));
+  EXPECT_EQ(count_of(html, "<td class='words'>px</td>"), 12U);  // fx, fy, cx, cy of three devices
+  EXPECT_EQ(count_of(html, "<td class='words'>mm</td>"), 6U);   // where the projector and the second camera are
+  EXPECT_EQ(count_of(html, "<td class='words'>rad</td>"), 6U);
+}
+
+TEST(ReportHtml, FitsANarrowScreen) {
+  const std::string html = report_html(an_outcome());
+  EXPECT_THAT(html, HasSubstr("name='viewport'"));
+  EXPECT_EQ(count_of(html, "<table>"), count_of(html, "<div class='wide'><table>"));
+}
+
 TEST(ReportHtml, StandsByItself) {
   const std::string html = report_html(an_outcome());
   EXPECT_THAT(html, Not(HasSubstr("<script")));
