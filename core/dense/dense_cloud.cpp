@@ -76,59 +76,58 @@ void put(char*& to, const Eigen::Vector3f& vector) {
   to += 12;
 }
 
-/// A row of a view, from one pixel on whose rays are known to the next such.
+/// Eight pixels of a row, or what is left of it.
 struct RowPiece {
   float turned[3], per_px[3];  // R r of the first pixel, and its change for one px
   float translation[3];
-  const float *depth_mm, *sigma_mm;
-  const std::uint8_t *intensity, *pixels;
-  int count;  // up to kLanes
-  std::uint8_t camera;
+  const float* depth_mm;
+  int count;
 };
 
-/// Puts the points of the measured pixels, each with what follows it. @return where the next goes
-inline __attribute__((always_inline)) char* put_points(const RowPiece& in, char* to) {
+inline __attribute__((always_inline)) void place_lanes(const RowPiece& in, float* x, float* y, float* z) {
   constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
-  constexpr auto kMeasured = static_cast<std::uint8_t>(DensePixel::kMeasured);
   Lanes depth{};
   std::memcpy(&depth, in.depth_mm, sizeof(float) * static_cast<std::size_t>(in.count));
-  float places[3][kLanes];
+  float* const to[3] = {x, y, z};
   for (int k = 0; k < 3; ++k) {
     const Lanes place = depth * (in.turned[k] + in.per_px[k] * kLane) + in.translation[k];
-    std::memcpy(places[k], &place, sizeof place);
+    std::memcpy(to[k], &place, sizeof place);
   }
-  for (int i = 0; i < in.count; ++i) {
-    if (in.pixels[i] != kMeasured) continue;
-    const float record[4] = {places[0][i], places[1][i], places[2][i], in.sigma_mm[i]};
-    std::memcpy(to, record, sizeof record);
-    to[16] = static_cast<char>(in.intensity[i]), to[17] = static_cast<char>(in.camera);
-    to += kPointBytes;
-  }
-  return to;
 }
 
-/// The same of a whole row, which needs room for all its pixels.
-char* put_row(const DenseView& view, const Eigen::Matrix3f& rotation, int y, char* to) {
-  RowPiece piece;
-  Eigen::Map<Eigen::Vector3f>(piece.translation) = view.rig_from_camera.translation.cast<float>();
-  piece.camera = view.camera;
-  for (int x = 0; x < view.map.width; x += kLanes) {
-    const std::size_t pixel = static_cast<std::size_t>(y) * view.map.width + x;
-    const Eigen::Vector2f first = view.rays->at(x, y), last = view.rays->before_next(x, y);
-    Eigen::Map<Eigen::Vector3f>(piece.turned) = rotation * first.homogeneous();
-    Eigen::Map<Eigen::Vector3f>(piece.per_px) = rotation.leftCols<2>() * (last - first) / (RayGrid::kPitchPx - 1);
-    piece.depth_mm = &view.map.depth_mm[pixel], piece.sigma_mm = &view.map.sigma_mm[pixel];
-    piece.intensity = &view.map.intensity[pixel];
-    piece.pixels = reinterpret_cast<const std::uint8_t*>(&view.map.pixels[pixel]);
-    piece.count = std::min(kLanes, view.map.width - x);
-    to = Cloned<put_points>::call(piece, to);
-  }
-  return to;
-}
+/// Where the points of a view's row are, in the rig's frame: the same for every format.
+class RowPlaces {
+ public:
+  static_assert(RayGrid::kPitchPx == kLanes);  // rays between those that are known lie on a line
 
-void put_point(char*& to, const DenseView& view, const ViewPoints& points, int x, int y, bool normals) {
+  explicit RowPlaces(const DenseView& view) : view_(view), rotation_(view.rig_from_camera.rotation.cast<float>()) {
+    Eigen::Map<Eigen::Vector3f>(piece_.translation) = view.rig_from_camera.translation.cast<float>();
+    for (auto& of_axis : places_) of_axis.resize(static_cast<std::size_t>(view.map.width) + kLanes);
+  }
+  void place(int y) {
+    for (int x = 0; x < view_.map.width; x += kLanes) {
+      const Eigen::Vector2f first = view_.rays->at(x, y), last = view_.rays->before_next(x, y);
+      Eigen::Map<Eigen::Vector3f>(piece_.turned) = rotation_ * first.homogeneous();
+      Eigen::Map<Eigen::Vector3f>(piece_.per_px) = rotation_.leftCols<2>() * (last - first) / (RayGrid::kPitchPx - 1);
+      piece_.depth_mm = &view_.map.depth_mm[static_cast<std::size_t>(y) * view_.map.width + x];
+      piece_.count = std::min(kLanes, view_.map.width - x);
+      Cloned<place_lanes>::call(piece_, &places_[0][x], &places_[1][x], &places_[2][x]);
+    }
+  }
+  [[nodiscard]] Eigen::Vector3f at(int x) const { return {places_[0][x], places_[1][x], places_[2][x]}; }
+
+ private:
+  const DenseView& view_;
+  Eigen::Matrix3f rotation_;
+  RowPiece piece_{};
+  std::array<std::vector<float>, 3> places_;
+};
+
+/// @param row  of y
+void put_point(char*& to, const DenseView& view, const RowPlaces& row, const ViewPoints& points, int x, int y,
+               bool normals) {
   const std::size_t pixel = static_cast<std::size_t>(y) * view.map.width + x;
-  put(to, points.at(x, y));
+  put(to, row.at(x));
   std::memcpy(to, &view.map.sigma_mm[pixel], 4);
   to[4] = static_cast<char>(view.map.intensity[pixel]);
   to[5] = static_cast<char>(view.camera);
@@ -204,18 +203,14 @@ std::string write_dense_ply(const DenseCloud& cloud, bool normals) {
   std::string row;
   for (const DenseView& view : cloud.views) {
     const ViewPoints points(view);
-    const Eigen::Matrix3f rotation = view.rig_from_camera.rotation.cast<float>();
+    RowPlaces places(view);
     row.resize(static_cast<std::size_t>(view.map.width) * bytes_of_point(normals));
     for (int y = 0; y < view.map.height; ++y) {
+      places.place(y);
       char* to = row.data();
-      if (normals) {
-        for (int x = 0; x < view.map.width; ++x) {
-          if (view.map.measured(static_cast<std::size_t>(y) * view.map.width + x))
-            put_point(to, view, points, x, y, normals);
-        }
-      } else {
-        to = put_row(view, rotation, y, to);
-      }
+      for (int x = 0; x < view.map.width; ++x)
+        if (view.map.measured(static_cast<std::size_t>(y) * view.map.width + x))
+          put_point(to, view, places, points, x, y, normals);
       bytes.append(row.data(), to);
     }
   }
@@ -241,10 +236,12 @@ std::string write_dense_pcd(const DenseCloud& cloud, bool normals) {
   const Eigen::Vector3f none = Eigen::Vector3f::Constant(kNone);
   for (const DenseView& view : cloud.views) {
     const ViewPoints points(view);
+    RowPlaces places(view);
     for (int y = 0; y < view.map.height; ++y) {
+      places.place(y);
       for (int x = 0; x < width; ++x) {
         if (x < view.map.width && view.map.measured(static_cast<std::size_t>(y) * view.map.width + x)) {
-          put_point(to, view, points, x, y, normals);
+          put_point(to, view, places, points, x, y, normals);
           continue;
         }
         put(to, none);
