@@ -95,7 +95,7 @@ struct ColumnsOf {
   float full, slope_unit;
 };
 
-/// Eight columns at a time: a set of ColumnSum to each. What is left of the row is done by the scalar loop below it.
+/// Eight columns at a time: a set of ColumnSum to each.
 template <class T>
 inline __attribute__((always_inline)) void sum_columns(const ColumnsOf<T>& in, float* to) {
   const Lanes zero{}, one = zero + 1;
@@ -136,7 +136,7 @@ void call_sums(const ColumnsOf<std::uint16_t>& in, float* to) {
   Cloned<sum_words>::call(in, to);
 }
 
-/// A node's window of them.
+/// How far a node moves, by the sums of its window.
 struct Move {
   float step[kFitted];           // in levels and, but for the last, gain times px
   float squares, left, counted;  // of d: all, and what the step leaves
@@ -329,7 +329,7 @@ void copy_levels(const GreyView& frame, std::vector<std::uint16_t>& to) {
       frame);
 }
 
-/// Rows of windows that lie within the frame, and of such columns of nodes.
+/// Whether a window around there lies within the frame.
 bool within(int middle, int half, int size) {
   return middle >= half && middle + half < size;
 }
