@@ -478,7 +478,7 @@ double GridFollower::still_share(const DenseFrame& frame, const SurfaceGrid& gri
 void GridFollower::find_derivatives(const PatternField& field, const SurfaceGrid& grid, FollowedFrame& to,
                                     Executor& executor) {
   const int stride = grid.stride_px();
-  const auto [width, height] = grid.frame_px();
+  const int width = grid.frame_px().first, height = grid.frame_px().second;
   const std::size_t pixels = static_cast<std::size_t>(width) * height;
   to.along.assign(pixels, 0), to.across.assign(pixels, 0), to.light.assign(pixels, 0);
   to.slope_unit = kOfSlopeUnit * field.slope_unit();
@@ -522,10 +522,10 @@ void GridFollower::find_derivatives(const PatternField& field, const SurfaceGrid
 void GridFollower::find_inverses(const DenseFrame& frame, const SurfaceGrid& grid, FollowedFrame& to,
                                  Executor& executor) {
   const int half = window_px_ / 2;
-  const auto [width, height] = grid.frame_px();
+  const int width = grid.frame_px().first, height = grid.frame_px().second;
   to.inverses.assign(kPacked * to.nodes.size(), 0);
   columns_.resize(std::max(columns_.size(), static_cast<std::size_t>(executor.workers())));
-  executor.run(grid.rows(), [&, width = width, height = height](int row, int worker) {
+  executor.run(grid.rows(), [&](int row, int worker) {
     const int y = grid.y_of(row);
     if (!within(y, half, height) || width < kLanes) return;
     std::vector<float>& columns = columns_[worker];

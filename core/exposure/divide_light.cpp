@@ -174,7 +174,7 @@ Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white, cons
 
 Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white, const PrintedSurface& surface) {
   if (auto fit = check_sizes(pattern, white, std::nullopt); !fit) return tl::unexpected(fit.error());
-  const auto [width, height] = size_of(white);
+  const int width = size_of(white).first, height = size_of(white).second;
   const float faint = faint_light(white);
   const auto black = static_cast<float>(find_black_level(pattern, white, surface.contains));
   const auto variance = static_cast<float>(surface.blur_px * surface.blur_px);
