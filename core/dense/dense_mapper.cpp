@@ -39,7 +39,8 @@ int close_px(double pitch_in_camera_px) {
 }  // namespace
 
 std::string_view to_string(DenseStage stage) {
-  constexpr std::array<std::string_view, kDenseStageCount> kNames{"find_blur", "grow", "fuse", "judge", "clean"};
+  constexpr std::array<std::string_view, kDenseStageCount> kNames{"find_blur", "grow",  "search",
+                                                                  "fuse",      "judge", "clean"};
   return kNames[static_cast<std::size_t>(stage)];
 }
 
@@ -53,7 +54,7 @@ std::string_view to_string(DensePixel pixel) {
 struct DenseMapper::Fixed {
   PatchGeometry geometry;
   DecodeOptions decode;
-  int window_px, reach_px, close_px;
+  int letters, window_px, reach_px, close_px;
   PatternFields fields;
   std::shared_ptr<const RayGrid> rays;
 };
@@ -65,7 +66,7 @@ DenseMapper::DenseMapper(const Pattern& pattern, const Calibration& calibration,
         const ExpectedFrames expected(camera, calibration.projector, decode.middle_depth_mm());
         const double pitch = pattern.pitch_px() * static_cast<double>(expected.in_the_middle().scale);
         return std::shared_ptr<const Fixed>(new Fixed{
-            PatchGeometry(camera, calibration.projector), decode,
+            PatchGeometry(camera, calibration.projector), decode, pattern.letters(),
             slsd::window_px(pitch, stride_px(camera.lens, decode.dense)), judge_reach_px(pitch), slsd::close_px(pitch),
             PatternFields(draw_pattern(pattern)), std::make_shared<const RayGrid>(camera.lens)});
       }()) {}
@@ -74,6 +75,7 @@ DenseMapper::DenseMapper(std::shared_ptr<const Fixed> fixed)
     : fixed_(std::move(fixed)),
       grid_(fixed_->geometry, {stride_px(fixed_->geometry.camera.lens, fixed_->decode.dense), fixed_->window_px,
                                fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
+      search_(fixed_->letters, fixed_->window_px),
       follower_(fixed_->window_px),
       judge_({fixed_->reach_px, fixed_->window_px, fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
       cleaner_(fixed_->geometry.camera, fixed_->geometry.projector, fixed_->rays) {}
@@ -181,8 +183,15 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   const PatternField& field = from ? fixed_->fields.at(blur_) : find_field(seen);
   done(DenseStage::kFindBlur);
   grid_.grow(seen, field, seeds_, executor);
-  if (next) follower_.keep(seen, field, blur_, grid_, executor);
   done(DenseStage::kGrow);
+  const auto of_symbols = static_cast<std::ptrdiff_t>(seeds_.size());
+  if (from) seeds_.insert(seeds_.end(), from->found.begin(), from->found.end());
+  if (const auto found = search_.find(seen, field, grid_, executor); !found.empty()) {
+    grid_.grow_on(seen, field, found, executor);
+    seeds_.insert(seeds_.end(), found.begin(), found.end());
+  }
+  if (next) follower_.keep(seen, field, blur_, grid_, std::span(seeds_).subspan(of_symbols), executor);
+  done(DenseStage::kSearch);
   grid_.fuse(executor);
   done(DenseStage::kFuse);
   judge_.judge(seen, field, grid_, map_, executor);

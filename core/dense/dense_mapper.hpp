@@ -14,12 +14,13 @@
 #include "core/dense/executor.hpp"
 #include "core/dense/follow_grid.hpp"
 #include "core/dense/pixel_judge.hpp"
+#include "core/dense/search_surface.hpp"
 #include "core/dense/surface_grid.hpp"
 
 namespace slsd {
 
-enum class DenseStage : std::uint8_t { kFindBlur, kGrow, kFuse, kJudge, kClean };
-inline constexpr int kDenseStageCount = 5;
+enum class DenseStage : std::uint8_t { kFindBlur, kGrow, kSearch, kFuse, kJudge, kClean };
+inline constexpr int kDenseStageCount = 6;
 [[nodiscard]] std::string_view to_string(DenseStage stage);
 
 /// Is told of each stage as it ends.
@@ -93,6 +94,7 @@ class DenseMapper {
 
   std::shared_ptr<const Fixed> fixed_;  // shared: mappers of several threads use one
   SurfaceGrid grid_;
+  SurfaceSearch search_;
   GridFollower follower_;
   std::size_t followed_ = 0;  // nodes, of the last frame
   PixelJudge judge_;

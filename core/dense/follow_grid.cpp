@@ -338,7 +338,7 @@ bool within(int middle, int half, int size) {
 
 std::size_t FollowedFrame::bytes() const {
   const auto of = [](const auto& held) { return held.capacity() * sizeof held[0]; };
-  return of(pixels) + of(nodes) + of(tried) + of(along) + of(across) + of(light) + of(inverses);
+  return of(pixels) + of(nodes) + of(tried) + of(found) + of(along) + of(across) + of(light) + of(inverses);
 }
 
 std::size_t GridFollower::bytes() const {
@@ -571,7 +571,7 @@ void GridFollower::find_inverses(const DenseFrame& frame, const SurfaceGrid& gri
 }
 
 void GridFollower::keep(const DenseFrame& frame, const PatternField& field, std::size_t blur, const SurfaceGrid& grid,
-                        Executor& executor) {
+                        std::span<const SurfaceSeed> found, Executor& executor) {
   kept_.reset();
   std::size_t good = 0;
   for (const SurfaceNode& node : grid.nodes()) good += node.good;
@@ -581,6 +581,8 @@ void GridFollower::keep(const DenseFrame& frame, const PatternField& field, std:
     copy_levels(frame.pixels, kept_->pixels);
     kept_->full = frame.full, kept_->blur = blur, kept_->epipolar = grid.epipolar_offset();
     kept_->nodes.assign(grid.nodes().begin(), grid.nodes().end());
+    for (const SurfaceSeed& seed : found)
+      if (grid.good_at(seed.camera_px)) kept_->found.push_back(seed);
     find_derivatives(field, grid, *kept_, executor);
     find_inverses(frame, grid, *kept_, executor);
   }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <vector>
 
 #include "core/align/pattern_field.hpp"
@@ -23,6 +24,7 @@ struct FollowedFrame {
   EpipolarOffset epipolar;
   std::vector<SurfaceNode> nodes;                  ///< good are those that bore points
   std::vector<char> tried;                         ///< of them: nothing fitted
+  std::vector<SurfaceSeed> found;                  ///< see SurfaceSearch
   std::size_t good = 0;                            ///< of them
   std::vector<std::int16_t> along, across, light;  ///< per pixel: the derivatives of the light, and the light
   float slope_unit = 0;                            ///< of a step of the derivatives
@@ -58,9 +60,9 @@ class GridFollower {
 
   /// When the grid has grown and is not fused yet: where more stands still since the frame before than went on, this
   /// frame is what others are to be held against.
-  /// @param blur  of the field, see FollowedFrame
+  /// @param blur, found  see FollowedFrame
   void keep(const DenseFrame& frame, const PatternField& field, std::size_t blur, const SurfaceGrid& grid,
-            Executor& executor);
+            std::span<const SurfaceSeed> found, Executor& executor);
 
   /// Ends it: of the nodes only those go on where the map has a point.
   void finish(const DenseMap& map, const SurfaceGrid& grid);

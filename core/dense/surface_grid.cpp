@@ -257,10 +257,7 @@ void SurfaceGrid::clear() {
   attempts_.assign(count, 0);
 }
 
-void SurfaceGrid::grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
-                       Executor& executor) {
-  if (batches_.size() < static_cast<std::size_t>(executor.workers())) batches_.resize(executor.workers());
-  next_.clear();
+void SurfaceGrid::offer_seeds(std::span<const SurfaceSeed> seeds) {
   for (const SurfaceSeed& seed : seeds) {
     const std::int32_t index = node_at(seed.camera_px);
     if (index < 0) continue;
@@ -268,8 +265,28 @@ void SurfaceGrid::grow(const DenseFrame& frame, const PatternField& field, std::
                 dy = static_cast<float>(y_of(index / columns_)) - seed.camera_px.y();
     offer({index, 0, {seed.plane.at(dx, dy), seed.plane.slope_x, seed.plane.slope_y}, 0, 0, 0, 0, 0});
   }
+}
+
+void SurfaceGrid::grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+                       Executor& executor) {
+  next_.clear();
+  offer_seeds(seeds);
   for (std::size_t i = 0; i < nodes_.size(); ++i)
     if (nodes_[i].good) offer_neighbours(static_cast<std::int32_t>(i));
+  grow_fronts(frame, field, executor);
+}
+
+void SurfaceGrid::grow_on(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+                          Executor& executor) {
+  for (std::uint8_t& attempts : attempts_)
+    if (attempts != kClosed) attempts = 0;
+  next_.clear();
+  offer_seeds(seeds);
+  grow_fronts(frame, field, executor);
+}
+
+void SurfaceGrid::grow_fronts(const DenseFrame& frame, const PatternField& field, Executor& executor) {
+  if (batches_.size() < static_cast<std::size_t>(executor.workers())) batches_.resize(executor.workers());
   while (!next_.empty()) {
     front_.swap(next_);
     next_.clear();

@@ -106,15 +106,13 @@ class SurfaceGrid {
 
   /// How the pattern falls around a node, as far off its epipolar line as this frame has it there.
   [[nodiscard]] PatchMap map_at(int column, int row, double inverse_depth) const {
-    PatchMap map =
-        make_patch_map(turned_[static_cast<std::size_t>(row) * columns_ + column].cast<double>(),
-                       Eigen::Vector2d(x_of(column), y_of(row)), geometry_->camera.projector_from_camera.translation,
-                       geometry_->projector, inverse_depth);
-    const float off = epipolar_.at(map.middle_px);
-    const Eigen::Vector2f across(-off * map.along.y(), off * map.along.x());
-    map.base.topRows<2>() += across * map.base.row(2);
-    map.shift.head<2>() += across * map.shift.z();
-    return map;
+    return map_of(turned_[static_cast<std::size_t>(row) * columns_ + column].cast<double>(),
+                  Eigen::Vector2d(x_of(column), y_of(row)), inverse_depth);
+  }
+  /// The same around any pixel.
+  [[nodiscard]] PatchMap map_around(const Eigen::Vector2d& camera_px, double inverse_depth) const {
+    return map_of(turned_by(geometry_->rays.ray(camera_px), geometry_->camera.projector_from_camera), camera_px,
+                  inverse_depth);
   }
 
   /// How badly the pattern at a blur fits the seeds: the median of residual over gain; 1 where nothing fits.
@@ -132,7 +130,21 @@ class SurfaceGrid {
   [[nodiscard]] std::span<SurfaceNode> nodes() { return nodes_; }
   [[nodiscard]] std::span<const SurfaceNode> nodes() const { return nodes_; }
   /// This node need not be tried.
-  void close(std::size_t node) { attempts_[node] = kAttemptsMax; }
+  void close(std::size_t node) { attempts_[node] = kClosed; }
+  /// Whether the node there is good.
+  [[nodiscard]] bool good_at(const Eigen::Vector2f& camera_px) const {
+    const std::int32_t node = node_at(camera_px);
+    return node >= 0 && nodes_[node].good;
+  }
+  /// Whether it is neither good nor closed.
+  [[nodiscard]] bool open_at(const Eigen::Vector2f& camera_px) const {
+    const std::int32_t node = node_at(camera_px);
+    return node >= 0 && !nodes_[node].good && attempts_[node] != kClosed;
+  }
+  /// 1/mm: the least and the most that are looked for.
+  [[nodiscard]] std::pair<double, double> inverse_depths() const {
+    return {1 / options_.depth_max_mm, 1 / options_.depth_min_mm};
+  }
   [[nodiscard]] std::pair<int, int> frame_px() const {
     return {geometry_->camera.lens.width_px, geometry_->camera.lens.height_px};
   }
@@ -143,13 +155,16 @@ class SurfaceGrid {
 
   /// From the seeds and what is good already, since clear().
   void grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds, Executor& executor);
+  /// Goes on from more seeds: what could not be reached from elsewhere is tried again.
+  void grow_on(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+               Executor& executor);
   /// Where a node and those around it agree to within their noise they are one smooth surface, and their mean is more
   /// exact than each: wide windows where it is flat. Where they differ by more, that is what sigma is made of.
   void fuse(Executor& executor);
 
  private:
   static constexpr std::size_t kBatchNodes = 64;
-  static constexpr std::uint8_t kAttemptsMax = 4;
+  static constexpr std::uint8_t kAttemptsMax = 4, kClosed = 255;
   struct Attempt {
     std::int32_t node;
     float cost;
@@ -161,12 +176,24 @@ class SurfaceGrid {
     std::array<PatchTask, kBatchNodes> tasks;
     std::array<PatchTask*, kBatchNodes> active;
   };
+  [[nodiscard]] PatchMap map_of(const Eigen::Matrix3d& turned, const Eigen::Vector2d& camera_px,
+                                double inverse_depth) const {
+    PatchMap map = make_patch_map(turned, camera_px, geometry_->camera.projector_from_camera.translation,
+                                  geometry_->projector, inverse_depth);
+    const float off = epipolar_.at(map.middle_px);
+    const Eigen::Vector2f across(-off * map.along.y(), off * map.along.x());
+    map.base.topRows<2>() += across * map.base.row(2);
+    map.shift.head<2>() += across * map.shift.z();
+    return map;
+  }
   [[nodiscard]] bool begin(const DenseFrame& frame, const Attempt& attempt, PatchTask& task) const;
   void align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t count) const;
   [[nodiscard]] bool accept(const DenseFrame& frame, const PatchTask& task, SurfaceNode& node) const;
   std::size_t align_some(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
                          std::size_t first, std::size_t step, Batch& batch);
   void offer(const Attempt& attempt);
+  void offer_seeds(std::span<const SurfaceSeed> seeds);
+  void grow_fronts(const DenseFrame& frame, const PatternField& field, Executor& executor);
   void offer_neighbours(std::int32_t index);
   [[nodiscard]] std::int32_t node_at(const Eigen::Vector2f& camera_px) const;
 

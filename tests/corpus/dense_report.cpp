@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 #include <opencv2/core/utility.hpp>
 
+#include "core/dense/dense_cloud.hpp"
 #include "core/dense/dense_mapper.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "drivers/files/encode_png.hpp"
@@ -88,7 +89,7 @@ struct Steps {
 };
 
 Result<> report(const Pattern& pattern, const std::string& folder, const DenseOptions& options, double offset_px,
-                bool compare, const Steps& steps) {
+                bool compare, const Steps& steps, const std::string& clouds) {
   const auto text = read_file(folder + "/calibration.yml", kLargestFileBytes);
   if (!text) return tl::unexpected(text.error());
   auto calibration = read_calibration(*text, folder + "/calibration.yml");
@@ -112,7 +113,7 @@ Result<> report(const Pattern& pattern, const std::string& folder, const DenseOp
   (void)mapper.measure(view(*frame), full, decoder->symbols(), executor);
   times.start();
   const auto begin = Clock::now();
-  const DenseMap& map = mapper.measure(view(*frame), full, decoder->symbols(), executor, &times);
+  DenseMap& map = mapper.measure(view(*frame), full, decoder->symbols(), executor, &times);
   const double total_ms = ms_since(begin);
   const DenseScore s = score_dense(*truth, true_calibration, map.depth_mm, map.sigma_mm);
   const auto slash = folder.find_last_of('/');
@@ -131,6 +132,14 @@ Result<> report(const Pattern& pattern, const std::string& folder, const DenseOp
     const auto png = encode_png(draw_dense_steps(view(*frame), mapper, map, steps.part));
     if (!png) return tl::unexpected(png.error());
     if (auto written = write_file_atomically(steps.file, *png); !written) return written;
+  }
+  if (!clouds.empty()) {
+    DenseCloud cloud;
+    DenseView& seen = cloud.views.emplace_back();
+    std::swap(seen.map, map);
+    seen.rays = mapper.rays();
+    const std::string file = clouds + "/" + folder.substr(slash + 1) + ".tiff";
+    if (auto written = write_file_atomically(file, write_dense_tiff(cloud)); !written) return written;
   }
   if (!compare) return {};
   const std::vector<CloudPoint> points = (*decoding)->points;
@@ -153,7 +162,7 @@ int main(int argc, char** argv) {
   double offset_px = 0;
   bool compare = false;
   Steps steps;
-  std::string pattern_file;
+  std::string pattern_file, clouds;
   std::vector<std::string> folders;
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--stride") == 0 && i + 1 < argc)
@@ -164,6 +173,8 @@ int main(int argc, char** argv) {
       offset_px = std::atof(argv[++i]);
     else if (std::strcmp(argv[i], "--compare") == 0)
       compare = true;
+    else if (std::strcmp(argv[i], "--clouds") == 0 && i + 1 < argc)
+      clouds = argv[++i];
     else if (std::strcmp(argv[i], "--steps") == 0 && i + 2 < argc) {
       steps.file = argv[++i];
       FramePart& part = steps.part;
@@ -175,8 +186,8 @@ int main(int argc, char** argv) {
   }
   if (folders.empty()) {
     std::fputs(
-        "usage: dense-report PATTERN.toml FOLDER... [--stride PX] [--prune PX] [--offset PX] [--compare] [--steps "
-        "FILE.png LEFT,TOP,WIDTH,HEIGHT]\n",
+        "usage: dense-report PATTERN.toml FOLDER... [--stride PX] [--prune PX] [--offset PX] [--compare] [--clouds "
+        "FOLDER] [--steps FILE.png LEFT,TOP,WIDTH,HEIGHT]\n",
         stderr);
     return 2;
   }
@@ -185,9 +196,9 @@ int main(int argc, char** argv) {
   if (!pattern) return std::fprintf(stderr, "dense-report: %s\n", to_string(pattern.error()).c_str()), 1;
   std::printf(
       "scene                    seeds compl med px rms px  mm med rms  gross unlit   far  err/s  >3   edges 0-2 2-4 "
-      "4-6 6- (complete/gross %%)  ms: blur grow fuse judge clean  blur off  reasons %%\n");
+      "4-6 6- (complete/gross %%)  ms: blur grow search fuse judge clean  blur off  reasons %%\n");
   for (const std::string& folder : folders) {
-    const auto done = report(*pattern, folder, options, offset_px, compare, steps);
+    const auto done = report(*pattern, folder, options, offset_px, compare, steps, clouds);
     if (!done) std::fprintf(stderr, "dense-report: %s: %s\n", folder.c_str(), to_string(done.error()).c_str());
   }
   return 0;

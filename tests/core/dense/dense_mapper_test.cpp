@@ -168,6 +168,78 @@ TEST(DenseMapper, DrawsNoSurfaceThatNoSymbolBears) {
   EXPECT_LT(share(got.gross, got.measured), 0.003);
 }
 
+/// An upright lath before a wall, leaning a little, as many px wide as that: narrower than any codeword.
+Surface lath(double width_px, double half_height_mm = 1000) {
+  return [=](const Ray& ray) -> std::optional<double> {
+    const auto wall = plane({0, 0, 2150}, {0, 0, 1})(ray), near = plane({0, 0, 2050}, {0.1, 0, -1})(ray);
+    const Eigen::Vector3d at = ray.origin + near.value_or(0) * ray.direction;
+    const double half_mm = 0.5 * width_px * 2050 / small_rig().cameras[0].lens.fx;
+    const bool on_it = near && std::abs(at.x() - 0.1 * at.y()) < half_mm && std::abs(at.y()) < half_height_mm;
+    return on_it ? near : wall;
+  };
+}
+
+/// What was measured nearer than that.
+DenseMap nearer_than(float depth_mm, DenseMap map) {
+  for (std::size_t pixel = 0; pixel < map.pixels.size(); ++pixel)
+    if (map.measured(pixel) && map.depth_mm[pixel] > depth_mm) map.drop(pixel, DensePixel::kNotReached);
+  map.count_pixels();
+  return map;
+}
+
+TEST(DenseSearch, FindsAPartThatIsNarrowerThanACodeword) {
+  for (const double width_px : {14.0, 16.0, 20.0}) {
+    const Seen seen = see(lath(width_px), draw_pattern(pattern()));
+    const auto [symbols, map] = measure(seen.frame.view());
+    const Score all = score(map, seen), near = score(nearer_than(2100, map), seen);
+    EXPECT_GT(static_cast<double>(near.measured), 0.5 * width_px * 280) << width_px;
+    EXPECT_LT(near.median_px, 0.1) << width_px;
+    EXPECT_LT(share(near.gross, near.measured), 0.03) << width_px;  // so little tells few slopes
+    EXPECT_LT(share(near.beyond_three, near.measured), 0.02) << width_px;
+    EXPECT_LT(share(all.unlit, all.measured), 0.001) << width_px;
+  }
+}
+
+TEST(DenseSearch, APartThatIsTooShortToTellStaysMissing) {
+  const Seen seen = see(lath(16, 15), draw_pattern(pattern()));
+  EXPECT_EQ(score(nearer_than(2100, measure(seen.frame.view()).map), seen).measured, 0U);
+}
+
+/// The frame of one surface, but where another image lights what is nearer than that.
+Grey8 lit_by_another(const Seen& seen, const Grey8& image, double depth_mm) {
+  const Grey8 other = see(seen.surface, image).frame;
+  Grey8 frame = seen.frame;
+  for (int y = 0; y < frame.height(); ++y) {
+    for (int x = 0; x < frame.width(); ++x) {
+      const Eigen::Vector3d ray = seen.rig.cameras[0].lens.undistort({x, y}).homogeneous();
+      if (*seen.surface({Eigen::Vector3d::Zero(), ray}) < depth_mm) frame.at(x, y) = other.at(x, y);
+    }
+  }
+  return frame;
+}
+
+TEST(DenseSearch, NothingOnAPartThatAnotherPatternLights) {
+  const Grey8 image = draw_pattern(pattern());
+  std::vector<Grey8> images;
+  for (std::uint32_t seed = 2; seed < 8; ++seed) images.push_back(draw_pattern(pattern_of(seed)));
+  Grey8 mirrored(image.width(), image.height()), a_row_lower = mirrored;
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      mirrored.at(x, y) = image.at(image.width() - 1 - x, y);
+      a_row_lower.at(x, y) = image.at(x, std::max(0, y - 9));
+    }
+  }
+  images.push_back(mirrored), images.push_back(a_row_lower);
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    for (const double width_px : {16.0, 24.0, 60.0}) {
+      const Seen seen = see(lath(width_px), image);
+      const Grey8 frame = lit_by_another(seen, images[i], 2100);
+      const DenseMap near = nearer_than(2100, measure(frame.view()).map);
+      EXPECT_EQ(near.count(DensePixel::kMeasured), 0U) << i << " " << width_px;
+    }
+  }
+}
+
 TEST(DenseMapper, WithoutPruningItReachesFartherAndNearerToWrong) {
   DenseOptions all;
   all.prune_px = 0;
@@ -568,6 +640,17 @@ TEST(DenseStream, NothingStaysOfAPatternThatIsGone) {
     for (std::uint32_t frame = 1; frame <= 4; ++frame) (void)stream.next(see_again(kTilted, frame).frame);
     EXPECT_EQ(stream.next(after).count(DensePixel::kMeasured), 0U);
     EXPECT_EQ(stream.next(after).count(DensePixel::kMeasured), 0U);
+  }
+}
+
+TEST(DenseSearch, AStreamKeepsWhatItFound) {
+  Stream stream;
+  for (std::uint32_t frame = 1; frame <= 5; ++frame) {
+    const Seen seen = see_again(lath(16), frame);
+    const Score got = score(nearer_than(2100, stream.next(seen.frame)), seen);
+    EXPECT_GT(got.measured, 2'200U) << frame;
+    EXPECT_LT(share(got.gross, got.measured), 0.03) << frame;
+    EXPECT_LT(share(got.beyond_three, got.measured), 0.02) << frame;
   }
 }
 

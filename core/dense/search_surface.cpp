@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/dense/search_surface.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/clones.hpp"
+#include "core/decode/lanes.hpp"
+
+namespace slsd {
+namespace {
+
+/// Of a window so many pixels are looked at, all over it.
+constexpr int kPixelsMost = 64;
+/// How far beyond the depths that are known it looks, projector px, and how many depths at most.
+constexpr double kBeyondPx = 32;
+constexpr int kLevelsMost = 320;
+/// Nodes that tell what likeness says: as many as that, and no fewer than this.
+constexpr std::size_t kKnownMost = 256, kKnownLeast = 32;
+/// Nearer to the true depth a window is alike for a reason.
+constexpr int kNearLevels = 4;
+/// The share of the windows on a surface that it only touches.
+constexpr double kPartly = 0.2;
+/// All windows at all depths are some e^13 tries, of which one in a thousand frames may be wrong.
+constexpr float kEvidenceMin = 20;
+/// So much more than any other depth, a thousand to one.
+constexpr float kGapMin = 7;
+/// From line to line the depth stays, or goes on by a level: one of three.
+constexpr float kOfStep = 1.1F;
+/// A window that has no more contrast than so many times the noise has nothing to compare.
+constexpr float kContrastMin = 4;
+constexpr std::size_t kPlacesMost = 8192;  // of lines of one kind: thin parts are few
+
+using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
+
+/// A window and the pattern at some depths.
+struct Comparing {
+  const float *levels, *weights, *x, *y;  // the frame's: without their mean
+  int count;                              // a multiple of the lanes
+  float warp[9], shift[3];                // by rows; and what a level adds to its last column
+  float origin_u, origin_v;
+  const std::uint32_t* samples;
+  int field_width, field_height;
+  float pixels, squares;  // of the frame's levels
+  int depths;
+};
+
+/// How alike they are: the correlation.
+inline __attribute__((always_inline)) void compare_lanes(const Comparing& in, float* to) {
+  constexpr float kScale = PatternField::kSamplesPerPx;
+  constexpr int kBits = PatternField::kSlopeBits;
+  const Lanes zero{}, one = zero + 1;
+  for (int depth = 0; depth < in.depths; ++depth) {
+    const auto by = static_cast<float>(depth);
+    const float c0 = in.warp[2] + by * in.shift[0], c1 = in.warp[5] + by * in.shift[1],
+                c2 = in.warp[8] + by * in.shift[2];
+    Lanes sum = zero, squares = zero, product = zero;
+    for (int first = 0; first < in.count; first += kLanes) {
+      Lanes level, weight, dx, dy;
+      load(in.levels + first, level), load(in.weights + first, weight);
+      load(in.x + first, dx), load(in.y + first, dy);
+      const Lanes per_q2 = one / (in.warp[6] * dx + in.warp[7] * dy + c2);
+      Lanes u = ((in.warp[0] * dx + in.warp[1] * dy + c0) * per_q2 + in.origin_u) * kScale + 0.5F,
+            v = ((in.warp[3] * dx + in.warp[4] * dy + c1) * per_q2 + in.origin_v) * kScale + 0.5F;
+      const Lanes last_u = zero + static_cast<float>(in.field_width - 1),
+                  last_v = zero + static_cast<float>(in.field_height - 1);
+      u = u < last_u ? u : last_u, v = v < last_v ? v : last_v;
+      u = u > zero ? u : zero, v = v > zero ? v : zero;
+      const IntLanes at = __builtin_convertvector(v, IntLanes) * in.field_width + __builtin_convertvector(u, IntLanes);
+      BitLanes bits;
+      for (int lane = 0; lane < kLanes; ++lane) bits[lane] = in.samples[at[lane]];
+      const Lanes light = __builtin_convertvector(reinterpret_cast<IntLanes>(bits >> (2 * kBits)), Lanes) * weight;
+      sum += light, squares += light * light, product += light * level;
+    }
+    constexpr float kUnit = PatternField::kValueUnit;
+    const float light = sum_of(sum) * kUnit;
+    const float spread = sum_of(squares) * kUnit * kUnit - light * light / in.pixels;
+    // A window of one light has nothing to be like.
+    to[depth] = sum_of(product) * kUnit / std::sqrt((spread + 1e-3F * in.pixels) * in.squares);
+  }
+}
+
+int bin_of(float alike, int bins) {
+  return std::clamp(static_cast<int>(alike * static_cast<float>(bins)), 0, bins - 1);
+}
+
+}  // namespace
+
+SurfaceSearch::SurfaceSearch(int letters, int window_px)
+    : window_px_(window_px), most_(std::log(static_cast<float>(letters))) {
+  const int pixels = window_px * window_px, half = window_px / 2;
+  int step = (pixels + kPixelsMost - 1) / kPixelsMost;
+  while (std::gcd(step, window_px) != 1) ++step;
+  for (int i = 0; i < pixels; i += step) {
+    xs_.push_back(static_cast<float>(i % window_px - half)), ys_.push_back(static_cast<float>(i / window_px - half));
+    weights_.push_back(1);
+  }
+  while (xs_.size() % kLanes != 0) xs_.push_back(0), ys_.push_back(0), weights_.push_back(0);
+}
+
+std::size_t SurfaceSearch::bytes() const {
+  const auto of = [](const auto& held) { return held.capacity() * sizeof held[0]; };
+  return of(open_) + of(places_) + of(scores_) + of(before_) + of(after_) + of(ways_) + of(depths_) + of(seeds_);
+}
+
+/// The depths that are known, and some around.
+bool SurfaceSearch::choose_levels(const SurfaceGrid& grid) {
+  depths_.clear();
+  for (const SurfaceNode& node : grid.nodes())
+    if (node.good) depths_.push_back(node.plane.inverse_depth);
+  if (depths_.size() < kKnownLeast) return false;
+  const auto at = [&](double share) {
+    const auto place = depths_.begin() + std::lround(share * static_cast<double>(depths_.size() - 1));
+    std::nth_element(depths_.begin(), place, depths_.end());
+    return static_cast<double>(*place);
+  };
+  const double far = at(0.01), near = at(0.99), middle = at(0.5);
+  const auto [width, height] = grid.frame_px();
+  levels_.step = std::abs(grid.map_around(0.5 * Eigen::Vector2d(width, height), middle).inverse_depth_per_px);
+  const auto [least, most] = grid.inverse_depths();
+  const double first = std::max(least, far - kBeyondPx * levels_.step),
+               last = std::min(most, near + kBeyondPx * levels_.step);
+  levels_.count = static_cast<int>((last - first) / levels_.step) + 1;
+  levels_.first = first;
+  if (levels_.count > kLevelsMost) {
+    levels_.first = std::clamp(middle - kLevelsMost / 2 * levels_.step, first, last - kLevelsMost * levels_.step);
+    levels_.count = kLevelsMost;
+  }
+  return levels_.count > 2 * kNearLevels;
+}
+
+/// How alike the window is to the pattern at each depth; false where it has nothing to compare.
+bool SurfaceSearch::compare(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
+                            const Eigen::Vector2i& place, Scratch& scratch) const {
+  const auto [width, height] = grid.frame_px();
+  const int half = window_px_ / 2;
+  if (place.x() < half || place.y() < half || place.x() + half >= width || place.y() + half >= height) return false;
+  scratch.levels.resize(xs_.size()), scratch.alike.resize(static_cast<std::size_t>(levels_.count));
+  float sum = 0, pixels = 0;
+  const bool seen = std::visit(
+      [&](const auto& image) {
+        for (std::size_t i = 0; i < xs_.size(); ++i) {
+          const auto level =
+              static_cast<float>(image.at(place.x() + static_cast<int>(xs_[i]), place.y() + static_cast<int>(ys_[i])));
+          if (static_cast<double>(level) >= frame.full) return false;
+          scratch.levels[i] = level, sum += weights_[i] * level, pixels += weights_[i];
+        }
+        return true;
+      },
+      frame.pixels);
+  if (!seen) return false;
+  float squares = 0;
+  const float mean = sum / pixels;
+  for (std::size_t i = 0; i < xs_.size(); ++i) {
+    scratch.levels[i] = weights_[i] * (scratch.levels[i] - mean);
+    squares += scratch.levels[i] * scratch.levels[i];
+  }
+  const float noise = kContrastMin * frame.noise.at(mean);
+  if (squares < noise * noise * pixels) return false;
+  Comparing comparing{scratch.levels.data(),
+                      weights_.data(),
+                      xs_.data(),
+                      ys_.data(),
+                      static_cast<int>(xs_.size()),
+                      {},
+                      {},
+                      0,
+                      0,
+                      field.samples(),
+                      field.width(),
+                      field.height(),
+                      pixels,
+                      squares,
+                      0};
+  // The projector's lens is made linear anew every so many levels.
+  constexpr int kLinear = 32;
+  for (int first = 0; first < levels_.count; first += kLinear) {
+    comparing.depths = std::min(kLinear, levels_.count - first);
+    const double middle = levels_.at(first + comparing.depths / 2);
+    const PatchMap map = grid.map_around(place.cast<double>(), middle);
+    const auto per_level = static_cast<float>(levels_.step / map.inverse_depth_per_px);
+    const auto back = static_cast<float>(comparing.depths / 2);
+    for (int row = 0; row < 3; ++row) {
+      comparing.shift[row] = per_level * map.shift[row];
+      for (int column = 0; column < 3; ++column) comparing.warp[3 * row + column] = map.base(row, column);
+      comparing.warp[3 * row + 2] -= back * comparing.shift[row];
+    }
+    comparing.origin_u = static_cast<float>(map.origin_px.x() + PatternField::kBorderPx),
+    comparing.origin_v = static_cast<float>(map.origin_px.y() + PatternField::kBorderPx);
+    Cloned<compare_lanes>::call(comparing, scratch.alike.data() + first);
+  }
+  return true;
+}
+
+/// What likeness says, by windows whose depth is known: there, and at all others.
+bool SurfaceSearch::learn(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid) {
+  std::array<double, kBins> there{}, elsewhere{};
+  double all_there = 0, all_elsewhere = 0;
+  const std::size_t step = std::max<std::size_t>(1, depths_.size() / kKnownMost);
+  std::size_t nth = 0;
+  for (int row = 0; row < grid.rows(); ++row) {
+    for (int column = 0; column < grid.columns(); ++column) {
+      const SurfaceNode* node = grid.good(column, row);
+      if (node == nullptr || nth++ % step != 0) continue;
+      Scratch& scratch = scratch_[0];
+      if (!compare(frame, field, grid, {grid.x_of(column), grid.y_of(row)}, scratch)) continue;
+      const auto level = static_cast<int>(
+          std::lround((static_cast<double>(node->plane.inverse_depth) - levels_.first) / levels_.step));
+      float best = -1;
+      for (int k = 0; k < levels_.count; ++k) {
+        if (std::abs(k - level) <= 1) best = std::max(best, scratch.alike[k]);
+        if (std::abs(k - level) > kNearLevels) ++elsewhere[bin_of(scratch.alike[k], kBins)], ++all_elsewhere;
+      }
+      ++there[bin_of(best, kBins)], ++all_there;
+    }
+  }
+  if (all_there < kKnownLeast || all_elsewhere == 0) return false;
+  double least = 0;
+  for (int bin = 0; bin < kBins; ++bin) {
+    const double by_chance = (elsewhere[bin] + 1) / (all_elsewhere + kBins),
+                 known = (there[bin] + 0.1) / (all_there + 0.1 * kBins);
+    least = std::max(least, (1 - kPartly) * known / by_chance + kPartly);  // what is more alike says no less
+    says_[bin] = std::min(most_, static_cast<float>(std::log(least)));
+  }
+  return true;
+}
+
+/// The places that nothing has reached.
+void SurfaceSearch::find_open(const SurfaceGrid& grid, const Lines& lines) {
+  places_.clear();
+  open_.assign(static_cast<std::size_t>(lines.lines) * lines.per_line, -1);
+  for (int line = 0; line < lines.lines; ++line) {
+    for (int index = 0; index < lines.per_line; ++index) {
+      const Eigen::Vector2i place = lines.place(line, index);
+      if (!grid.open_at(place.cast<float>())) continue;
+      open_[static_cast<std::size_t>(line) * lines.per_line + index] = static_cast<std::int32_t>(places_.size());
+      places_.push_back(place);
+    }
+  }
+}
+
+/// What each of them says at each depth.
+void SurfaceSearch::weigh(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
+                          Executor& executor) {
+  constexpr std::size_t kInPart = 32;
+  const auto count = static_cast<std::size_t>(levels_.count);
+  scores_.resize(places_.size() * count);
+  executor.run(static_cast<int>((places_.size() + kInPart - 1) / kInPart), [&](int part, int worker) {
+    Scratch& scratch = scratch_[worker];
+    const std::size_t first = static_cast<std::size_t>(part) * kInPart, end = std::min(places_.size(), first + kInPart);
+    for (std::size_t i = first; i < end; ++i) {
+      float* const scores = scores_.data() + i * count;
+      if (!compare(frame, field, grid, places_[i], scratch)) {
+        std::fill(scores, scores + count, says_[0]);
+        continue;
+      }
+      for (std::size_t k = 0; k < count; ++k) scores[k] = says_[bin_of(scratch.alike[k], kBins)];
+    }
+  });
+}
+
+/// The most that any way says that ends at a place at a depth.
+/// @param forwards  from the first line on; otherwise from the last
+void SurfaceSearch::add_up(const Lines& lines, bool forwards, std::vector<float>& best) {
+  const int count = levels_.count;
+  best.resize(scores_.size());
+  ways_.resize(static_cast<std::size_t>(count) + 2);
+  float* const from = ways_.data() + 1;  // by level: with one more at each end, where nothing speaks
+  for (int nth = 0; nth < lines.lines; ++nth) {
+    const int line = forwards ? nth : lines.lines - 1 - nth, before = forwards ? line - 1 : line + 1;
+    for (int index = 0; index < lines.per_line; ++index) {
+      const std::int32_t open = open_[static_cast<std::size_t>(line) * lines.per_line + index];
+      if (open < 0) continue;
+      std::fill(ways_.begin(), ways_.end(), 0.F);
+      for (int beside = -1; beside <= 1 && nth > 0; ++beside) {
+        if (index + beside < 0 || index + beside >= lines.per_line) continue;
+        const std::int32_t other = open_[static_cast<std::size_t>(before) * lines.per_line + index + beside];
+        if (other < 0) continue;
+        const float* const at = best.data() + static_cast<std::size_t>(other) * count;
+        for (int k = 0; k < count; ++k) from[k] = std::max(from[k], at[k]);
+      }
+      const float* const scores = scores_.data() + static_cast<std::size_t>(open) * count;
+      float* const to = best.data() + static_cast<std::size_t>(open) * count;
+      for (int k = 0; k < count; ++k)
+        to[k] = scores[k] + std::max(from[k], std::max(from[k - 1], from[k + 1]) - kOfStep);
+    }
+  }
+}
+
+/// Where one depth has enough to say, and far more than any other.
+void SurfaceSearch::take_seeds() {
+  const int count = levels_.count;
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    const std::size_t at = i * static_cast<std::size_t>(count);
+    const auto total = [&](int k) { return before_[at + k] + after_[at + k] - scores_[at + k]; };
+    int best = 0;
+    for (int k = 1; k < count; ++k)
+      if (total(k) > total(best)) best = k;
+    if (total(best) < kEvidenceMin || scores_[at + best] <= 0) continue;
+    float next = 0;
+    for (int k = 0; k < count; ++k)
+      if (std::abs(k - best) > kNearLevels) next = std::max(next, total(k));
+    if (total(best) - next < kGapMin) continue;
+    seeds_.push_back({places_[i].cast<float>(), {static_cast<float>(levels_.at(best)), 0, 0}});
+  }
+}
+
+std::span<const SurfaceSeed> SurfaceSearch::find(const DenseFrame& frame, const PatternField& field,
+                                                 const SurfaceGrid& grid, Executor& executor) {
+  seeds_.clear();
+  if (scratch_.size() < static_cast<std::size_t>(executor.workers())) scratch_.resize(executor.workers());
+  if (!choose_levels(grid) || !learn(frame, field, grid)) return seeds_;
+  const auto [width, height] = grid.frame_px();
+  for (const bool upright : {true, false}) {
+    Lines lines{upright, (window_px_ + 1) / 3, window_px_, 0, 0};
+    for (;; lines.beside_px *= 2) {
+      lines.per_line = (upright ? width : height) / lines.beside_px;
+      lines.lines = (upright ? height : width) / lines.next_px;
+      find_open(grid, lines);
+      if (places_.size() <= kPlacesMost) break;
+    }
+    if (places_.empty()) continue;
+    weigh(frame, field, grid, executor);
+    add_up(lines, true, before_);
+    add_up(lines, false, after_);
+    take_seeds();
+  }
+  return seeds_;
+}
+
+}  // namespace slsd

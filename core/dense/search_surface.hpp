@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/dense/surface_grid.hpp"
+
+namespace slsd {
+
+/// Looks for surface that growth has not reached, as no symbol is decoded on it: parts narrower than a codeword.
+/// Windows where nothing grew are compared with the pattern at each depth, and those that follow on each other, along
+/// an upright or a lying part, speak together:
+///
+///     places   evidence, by depth          the way through all of them that most speaks for, and by far
+///       o      . . 1 . . . 0 . .             |
+///       o      . 0 . 2 . . . . 1             \            two letters alike are common, ten in a row are not
+///       o      1 . . 2 . 0 . . .             |
+///
+/// How much a likeness says is measured in each frame: by how alike windows are where the depth is known, and at all
+/// the depths that are wrong there.
+/// @thread thread-bound: keeps its buffers
+class SurfaceSearch {
+ public:
+  /// @param letters  of the pattern: a window sees no more than one symbol
+  SurfaceSearch(int letters, int window_px);
+
+  /// Where nodes of the grid are neither good nor closed.
+  /// @return seeds to grow from; until the next call
+  [[nodiscard]] std::span<const SurfaceSeed> find(const DenseFrame& frame, const PatternField& field,
+                                                  const SurfaceGrid& grid, Executor& executor);
+  [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory
+
+ private:
+  /// The depths that are tried: inverses of them in equal steps, of one projector px in the middle of the frame.
+  struct Levels {
+    double first = 0, step = 0;
+    int count = 0;
+    [[nodiscard]] double at(int level) const { return first + step * level; }
+  };
+  /// Places on lines across which a part may be thin: close beside each other, a window from line to line.
+  struct Lines {
+    bool upright;  ///< followed from line to line downwards; otherwise from left to right
+    int beside_px, next_px, per_line, lines;
+    [[nodiscard]] Eigen::Vector2i place(int line, int index) const {
+      const int along = next_px / 2 + line * next_px, across = beside_px / 2 + index * beside_px;
+      return upright ? Eigen::Vector2i(across, along) : Eigen::Vector2i(along, across);
+    }
+  };
+  struct Scratch {
+    std::vector<float> levels, alike;
+  };
+  static constexpr int kBins = 16;
+
+  [[nodiscard]] bool choose_levels(const SurfaceGrid& grid);
+  [[nodiscard]] bool compare(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
+                             const Eigen::Vector2i& place, Scratch& scratch) const;
+  [[nodiscard]] bool learn(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid);
+  void find_open(const SurfaceGrid& grid, const Lines& lines);
+  void weigh(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid, Executor& executor);
+  void add_up(const Lines& lines, bool forwards, std::vector<float>& best);
+  void take_seeds();
+
+  int window_px_;
+  float most_;                            // of what a window may say
+  std::vector<float> xs_, ys_, weights_;  // of the window's pixels that are looked at
+  Levels levels_;
+  std::array<float, kBins> says_{};  // by likeness: the logarithm of how much likelier the depth makes it
+  std::vector<std::int32_t> open_;   // of each place: its scores, or -1
+  std::vector<Eigen::Vector2i> places_;
+  std::vector<float> scores_, before_, after_;  // of the open places, by level
+  std::vector<float> ways_, depths_;
+  std::vector<Scratch> scratch_;
+  std::vector<SurfaceSeed> seeds_;
+};
+
+}  // namespace slsd
