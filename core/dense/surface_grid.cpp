@@ -28,7 +28,7 @@ constexpr float kGainSlopeMax = 0.08F;  // of the gain, for one camera px
 constexpr float kContrastMin = 4;       // of the gain over the noise of a pixel
 
 /// Parts of sigma, as for symbols (docs/decoder.md).
-constexpr float kLeastPx = 0.003F, kOfScatter = 0.7F;
+constexpr float kLeastPx = 0.003F, kOfScatter = 0.8F;
 /// Of the share of the window that is saturated: its rims are wrong too.
 constexpr float kOfUnseen = 4;
 
@@ -320,10 +320,11 @@ namespace {
 constexpr int kFuseReach = 2;
 constexpr float kFusePx = 0.015F;  // what the pattern's model leaves out, in each node
 constexpr float kFuseSigmas = 3;
-/// Of the scatter of the nodes around over what noise does: beyond it there is relief, and the mean is of fewer.
-constexpr float kFuseExcess[kFuseReach] = {1.6F, 0.8F};
-/// Parts of sigma: of what the nodes beside, continued, are off, and of what the bend moved.
-constexpr float kOfLift = 0.6F;
+/// Of the scatter of the nodes around over what noise does: beyond it there is relief, and the mean is of fewer. So it
+/// is where the bend moves a node by so much of its noise.
+constexpr float kFuseExcess = 0.8F, kFlat = 0.7F;
+/// What no mean takes away, px: focus and lenses are not quite as the pattern's blur has them.
+constexpr float kFloorPx = 0.008F;
 /// Over a bend the neighbours' planes, continued by a stride, are off by half its square, and the window's plane by a
 /// 24th of its own: so much of the one stands for the other.
 constexpr float kOfBendLeft = 1.6F, kOfDisagreementLeast = 0.3F, kOfDisagreementMost = 4;
@@ -332,14 +333,21 @@ constexpr float kOfNoise = 0.6F;
 /// Of the variance, where the mean is of this reach and those smaller.
 constexpr float kLeftOfVariance[kFuseReach] = {0.75F, 0.27F};
 
-/// How much slopes beside each other are wrong together, as their windows overlap.
-constexpr float kOverlap = 3;
+/// How much slopes beside each other are wrong together, as their windows overlap: over the smaller reach, the larger.
+constexpr float kOverlap[kFuseReach] = {9, 3};
+
+/// Of waves of wave number k a regression over n slopes, a stride s apart, sees the bend less by k^2 s^2 / 6 times the
+/// mean of the fourth power of their places over that of the square (1 for three slopes, 3.4 for five), and each slope
+/// is less by k^2 w^2 / 40. Three slopes are short of the truth by so much of what five are short of them, plus so much
+/// by w^2 / s^2.
+constexpr float kBendBeyond = 1 / 2.4F, kWindowBeyond = 6 / (2.4F * 40);
 
 /// What fuse_lanes() knows of eight nodes of a row, and of all around them, in the order of Around.
 struct Fusing {
   const float* around[7];
   std::ptrdiff_t row;  // from a row to the next
   float stride, of_bend, of_disagreement;
+  float beyond;  // see where bends are made
 };
 enum Around { kInverseDepth, kSlopeX, kSlopeY, kPxPer, kNoisePx, kSlopeNoise, kGood, kVariance };
 
@@ -352,7 +360,18 @@ struct Fused {
 /// The sums of a regression of slopes by place along an axis.
 struct BendSums {
   Lanes w, x, xx, s, xs;
+
+  inline __attribute__((always_inline)) void solve(Lanes& bend, Lanes& spread) const {
+    spread = xx - x * x / w;
+    bend = (xs - x * s / w) / spread;
+  }
 };
+
+/// A bend as far as noise could not be the cause.
+inline __attribute__((always_inline)) void take_noise_off(float overlap, const Lanes& spread, Lanes& bend) {
+  const Lanes zero{}, sure = (zero + 1) - overlap / (spread * bend * bend);
+  bend = ((spread > zero) & (sure > zero)) ? bend * sure : zero;
+}
 
 // With a node's own slopes and its neighbour's, each by half, the neighbour's value is continued exactly over any
 // surface of the second order.
@@ -365,7 +384,9 @@ inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& f
   };
   Mean means[kFuseReach];
   for (Mean& mean : means) mean = {zero, zero, zero, zero, zero, zero, zero};
-  BendSums along_x{zero, zero, zero, zero, zero}, along_y = along_x;
+  BendSums along[2][kFuseReach];  // both axes
+  for (auto& axis : along)
+    for (BendSums& sums : axis) sums = {zero, zero, zero, zero, zero};
   const Lanes& px_per = own[kPxPer];
   const Lanes own_noise = own[kNoisePx] * own[kNoisePx] + kFusePx * kFusePx;
   for (int dy = -kFuseReach; dy <= kFuseReach; ++dy) {
@@ -389,11 +410,12 @@ inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& f
       const auto regress = [&](BendSums & sums, float at, const Lanes& slope) __attribute__((always_inline)) {
         sums.w += w, sums.x += w * at, sums.xx += w * (at * at), sums.s += w * slope, sums.xs += w * at * slope;
       };
-      regress(along_x, x, px_per * other[kSlopeX]), regress(along_y, y, px_per * other[kSlopeY]);
+      const Lanes steep_x = px_per * other[kSlopeX], steep_y = px_per * other[kSlopeY];
       const Lanes expected = variance + own_noise;
       const Lanes taken = off * off <= kFuseSigmas * kFuseSigmas * expected ? other[kGood] : zero;
       const Lanes weight = taken / (variance + kFusePx * kFusePx);
       for (int reach = std::max({1, std::abs(dx), std::abs(dy)}); reach <= kFuseReach; ++reach) {
+        regress(along[0][reach - 1], x, steep_x), regress(along[1][reach - 1], y, steep_y);
         Mean& mean = means[reach - 1];
         mean.weights += weight, mean.values += weight * off;
         mean.slopes_x += weight * other[kSlopeX], mean.slopes_y += weight * other[kSlopeY];
@@ -402,25 +424,27 @@ inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& f
     }
   }
   // A plane over a window lies beside what bends there by the bend times the mean of the squared distance from the
-  // middle, by half; less where noise could be the cause.
+  // middle, by half. Slopes far apart see less of short waves than near ones do, and from both follows what none would
+  // miss; where that is lost in noise, many slopes see the bend of long ones.
   Lanes lift = zero;
-  for (const BendSums* sums : {&along_x, &along_y}) {
-    const Lanes spread = sums->xx - sums->x * sums->x / sums->w;
-    const Lanes found = (sums->xs - sums->x * sums->s / sums->w) / spread;
-    const Lanes sure = one - kOverlap / (spread * found * found);
-    lift += ((spread > zero) & (sure > zero)) ? found * sure : zero;
+  for (const auto& axis : along) {
+    Lanes near, wide, near_spread, wide_spread;
+    axis[0].solve(near, near_spread), axis[1].solve(wide, wide_spread);
+    near += in.beyond * (near - wide);
+    take_noise_off(kOverlap[0] * (1 + in.beyond) * (1 + in.beyond), near_spread, near);
+    take_noise_off(kOverlap[1], wide_spread, wide);
+    lift += near * near > wide * wide ? near : wide;
   }
   lift *= in.of_bend;
   const Lanes any = beside_count > zero ? one : zero;
   beside = beside > zero ? beside : zero;
-  fused.more = any * (kOfLift * kOfLift * lift * lift +
-                      in.of_disagreement * in.of_disagreement * beside / (beside_count + (one - any)));
+  fused.more = any * (lift * lift + in.of_disagreement * in.of_disagreement * beside / (beside_count + (one - any)));
   fused.left = one, fused.off = zero, fused.slope_x = own[kSlopeX], fused.slope_y = own[kSlopeY];
   for (int reach = 1; reach <= kFuseReach; ++reach) {
     const Mean& mean = means[reach - 1];
     const auto all = static_cast<float>((2 * reach + 1) * (2 * reach + 1));
-    const float excess = kFuseExcess[reach - 1];
-    const IntLanes holds = (2 * mean.count > zero + all) & (mean.squares < excess * excess * mean.expected);
+    const IntLanes holds = (2 * mean.count > zero + all) & (mean.squares < kFuseExcess * kFuseExcess * mean.expected) &
+                           (lift * lift < kFlat * kFlat * own_noise);
     const Lanes per_weight = one / (mean.weights + 1e-20F);
     fused.left = holds ? zero + kLeftOfVariance[reach - 1] : fused.left;
     fused.off = holds ? mean.values * per_weight : fused.off;
@@ -462,7 +486,8 @@ void SurfaceGrid::fuse(Executor& executor) {
         static_cast<std::ptrdiff_t>(row),
         static_cast<float>(options_.stride_px),
         side * side / 24,
-        std::clamp(kOfBendLeft * side * side / (12 * stride * stride), kOfDisagreementLeast, kOfDisagreementMost)};
+        std::clamp(kOfBendLeft * side * side / (12 * stride * stride), kOfDisagreementLeast, kOfDisagreementMost),
+        kBendBeyond + kWindowBeyond * side * side / (stride * stride)};
     SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
     for (int column = 0; column < columns_; column += kLanes) {
       const int count = std::min(kLanes, columns_ - column);
@@ -493,7 +518,7 @@ void SurfaceGrid::fuse(Executor& executor) {
       }
       const float off = epipolar_.at({static_cast<float>(x_of(column)), static_cast<float>(y_of(at_row))});
       const float unknown = std::max(0.F, std::abs(off) - kUsualOffsetPx);
-      nodes[column].sigma_px = std::sqrt(sum / count + unknown * unknown);
+      nodes[column].sigma_px = std::sqrt(sum / count + unknown * unknown + kFloorPx * kFloorPx);
     }
   });
 }

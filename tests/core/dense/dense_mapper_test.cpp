@@ -503,7 +503,7 @@ TEST(DenseStream, AStillSceneIsFollowedAsExactlyAndItsNoiseIsEachFramesOwn) {
     followed.push_back(map), single.push_back(measure(seen.frame.view()).map);
     const Score got = score(followed.back(), seen), alone = score(single.back(), seen);
     EXPECT_NEAR(share(got.measured, got.lit), share(alone.measured, alone.lit), 0.01);
-    EXPECT_LT(got.rms_mm, 1.05 * alone.rms_mm) << frame;
+    EXPECT_LT(got.rms_mm, 1.1 * alone.rms_mm) << frame;
     EXPECT_LT(share(got.gross, got.measured), share(alone.gross, alone.measured) + 0.0005) << frame;
     EXPECT_LT(share(got.unlit, got.measured), share(alone.unlit, alone.measured) + 0.0005) << frame;
     EXPECT_LT(share(got.beyond_three, got.measured), share(alone.beyond_three, alone.measured) + 0.005) << frame;
