@@ -14,9 +14,9 @@
 namespace slsd {
 namespace {
 
-/// A window of 3x3 symbols, and some for its rims.
-constexpr double kThinnestPitches = 3.3;
-constexpr double kHalfTransferWindows = 1.5;
+/// Of an upright part of that width half is measured, and its rims are pruned.
+constexpr double kThinnestWindows = 1.3;
+constexpr double kHalfTransferWindows = 1.3;
 /// With less of a cell in a window there is one without an edge in every pattern.
 constexpr double kWindowOfPitchLeast = 0.45;
 
@@ -38,7 +38,7 @@ DenseOutlook dense_outlook(const Pattern& pattern, const Calibration& calibratio
                                       calibration.projector, depth_mm);
   return {depth_mm,
           pitch,
-          kThinnestPitches * pitch * mm_per_px,
+          kThinnestWindows * window_px * mm_per_px,
           kHalfTransferWindows * window_px * mm_per_px,
           std::abs(map.inverse_depth_per_px) * depth_mm * depth_mm,
           window_px < kWindowOfPitchLeast * pitch};

@@ -13,7 +13,7 @@ namespace slsd {
 struct DenseOutlook {
   double depth_mm;          ///< that of the middle, along the camera's z axis
   double pitch_px;          ///< of the symbols, in the camera
-  double thinnest_part_mm;  ///< what is narrower bears too few symbols to be decoded: nothing grows there
+  double thinnest_part_mm;  ///< less than half is measured of what is narrower
   double half_transfer_mm;  ///< the period of waves of which half the height is left: they bend within a window
   double mm_per_px;         ///< of depth, for one projector px
   /// The pitch is so much larger than the largest window that many of those see no edge of a symbol.

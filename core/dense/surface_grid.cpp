@@ -327,7 +327,7 @@ constexpr float kFuseExcess = 0.8F, kFlat = 0.7F;
 constexpr float kFloorPx = 0.008F;
 /// Over a bend the neighbours' planes, continued by a stride, are off by half its square, and the window's plane by a
 /// 24th of its own: so much of the one stands for the other.
-constexpr float kOfBendLeft = 1.6F, kOfDisagreementLeast = 0.3F, kOfDisagreementMost = 4;
+constexpr float kOfBendLeft = 1.6F, kOfDisagreementLeast = 0.5F, kOfDisagreementMost = 4;
 /// Of that disagreement's square this much of what noise does is no relief.
 constexpr float kOfNoise = 0.6F;
 /// Of the variance, where the mean is of this reach and those smaller.
