@@ -12,12 +12,12 @@ namespace slsd {
 
 /// Looks for surface that growth has not reached, as no symbol is decoded on it: parts narrower than a codeword.
 /// Windows where nothing grew are compared with the pattern at each depth, and those that follow on each other, along
-/// an upright or a lying part, speak together:
+/// an upright or a lying part, speak together. Two letters alike are common, ten in a row are not:
 ///
-///     places   evidence, by depth          the way through all of them that most speaks for, and by far
-///       o      . . 1 . . . 0 . .             |
-///       o      . 0 . 2 . . . . 1             \            two letters alike are common, ten in a row are not
-///       o      1 . . 2 . 0 . . .             |
+///     place   how much likelier each depth is
+///       1      .  .  1  .  .  .  0  .
+///       2      .  0  .  2  .  .  .  1
+///       3      1  .  .  2  .  0  .  .      a way: 1 2 2, by neighbouring depths
 ///
 /// How much a likeness says is measured in each frame: by how alike windows are where the depth is known, and at all
 /// the depths that are wrong there.

@@ -339,8 +339,8 @@ constexpr float kOverlap[kFuseReach] = {9, 3};
 /// Of waves of wave number k a regression over n slopes, a stride s apart, sees the bend less by k^2 s^2 / 6 times the
 /// mean of the fourth power of their places over that of the square (1 for three slopes, 3.4 for five), and each slope
 /// is less by k^2 w^2 / 40. Three slopes are short of the truth by so much of what five are short of them, plus so much
-/// by w^2 / s^2.
-constexpr float kBendBeyond = 1 / 2.4F, kWindowBeyond = 6 / (2.4F * 40);
+/// by w^2 / s^2; at most this, as far wider windows than strides leave the series.
+constexpr float kBendBeyond = 1 / 2.4F, kWindowBeyond = 6 / (2.4F * 40), kBeyondMost = 1.2F;
 
 /// What fuse_lanes() knows of eight nodes of a row, and of all around them, in the order of Around.
 struct Fusing {
@@ -487,7 +487,7 @@ void SurfaceGrid::fuse(Executor& executor) {
         static_cast<float>(options_.stride_px),
         side * side / 24,
         std::clamp(kOfBendLeft * side * side / (12 * stride * stride), kOfDisagreementLeast, kOfDisagreementMost),
-        kBendBeyond + kWindowBeyond * side * side / (stride * stride)};
+        std::min(kBeyondMost, kBendBeyond + kWindowBeyond * side * side / (stride * stride))};
     SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
     for (int column = 0; column < columns_; column += kLanes) {
       const int count = std::min(kLanes, columns_ - column);
