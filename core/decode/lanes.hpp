@@ -16,6 +16,15 @@ static inline __attribute__((always_inline)) void load(const float* from, Lanes&
   std::memcpy(&to, from, sizeof to);
 }
 
+/// Numbers of another kind.
+template <class T>
+static inline __attribute__((always_inline)) void load(const T* from, Lanes& to) {
+  using Numbers [[gnu::vector_size(kLanes * sizeof(T))]] = T;
+  Numbers numbers;
+  std::memcpy(&numbers, from, sizeof numbers);
+  to = __builtin_convertvector(numbers, Lanes);
+}
+
 static inline __attribute__((always_inline)) float sum_of(const Lanes& lanes) {
   using Half [[gnu::vector_size(16)]] = float;
   const Half half =

@@ -173,7 +173,7 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   map_.resize(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
   find_seeds(symbols);
   const auto from = next ? follower_.follow(seen, grid_, executor) : nullptr;
-  followed_ = from ? follower_.followed() : 0;
+  followed_ = from ? follower_.followed() : 0, across_px_ = from ? follower_.across_px() : 0;
   if (from) {
     blur_ = from->blur;
     grid_.set_epipolar_offset(from->epipolar);

@@ -81,7 +81,7 @@ class DenseMapper {
   /// Of the last frame: the blur of the pattern, projector px.
   [[nodiscard]] float blur_sigma_px() const { return PatternFields::kBlursPx[blur_]; }
   /// Of the last frame: how far off its epipolar lines it had the pattern in the frame's middle, projector px.
-  [[nodiscard]] float epipolar_offset_px() const { return grid_.epipolar_offset().middle; }
+  [[nodiscard]] float epipolar_offset_px() const { return grid_.epipolar_offset().middle + across_px_; }
 
  private:
   struct Fixed;
@@ -97,6 +97,7 @@ class DenseMapper {
   SurfaceSearch search_;
   GridFollower follower_;
   std::size_t followed_ = 0;  // nodes, of the last frame
+  float across_px_ = 0;       // what these went
   PixelJudge judge_;
   MapCleaner cleaner_;
   std::vector<SurfaceSeed> seeds_;

@@ -12,26 +12,10 @@
 #include "core/align/pattern_field.hpp"
 #include "core/dense/dense_map.hpp"
 #include "core/dense/executor.hpp"
+#include "core/dense/followed_frame.hpp"
 #include "core/dense/surface_grid.hpp"
 
 namespace slsd {
-
-/// A frame whose nodes were measured, and what follows from it for frames that differ from it by little.
-struct FollowedFrame {
-  std::vector<std::uint16_t> pixels;
-  double full = 0;
-  std::size_t blur = 0;  ///< of the field that the nodes were aligned with
-  EpipolarOffset epipolar;
-  std::vector<SurfaceNode> nodes;                  ///< good are those that bore points
-  std::vector<char> tried;                         ///< of them: nothing fitted
-  std::vector<SurfaceSeed> found;                  ///< see SurfaceSearch
-  std::size_t good = 0;                            ///< of them
-  std::vector<std::int16_t> along, across, light;  ///< per pixel: the derivatives of the light, and the light
-  float slope_unit = 0;                            ///< of a step of the derivatives
-  std::vector<float> inverses;                     ///< N^-1 of each node, its upper triangle by rows
-
-  [[nodiscard]] std::size_t bytes() const;
-};
 
 /// Carries a grid's planes on from frame to frame where the scene stands still, at a small part of what aligning them
 /// costs. Where a frame I differs by little from one that was measured, I0, the aligner's model is linear, and its
@@ -74,6 +58,8 @@ class GridFollower {
   }
   /// Of the last frame, how many nodes went on.
   [[nodiscard]] std::size_t followed() const { return followed_; }
+  /// Of the last frame, the mean of how far across the epipolar lines they went, projector px; 0 where none did.
+  [[nodiscard]] float across_px() const { return across_px_; }
   [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory, with what is shared
 
  private:
@@ -85,12 +71,11 @@ class GridFollower {
 
   struct Moved {
     float square = 0, by_noise = 0;  // of what a plane moved, and what is expected of it
+    float across_px = 0;             // off the epipolar line
   };
   void stop_what_moves(SurfaceGrid& grid);
   void follow_row(const DenseFrame& frame, const FollowedFrame& from, SurfaceGrid& grid, int row, int worker);
   [[nodiscard]] double still_share(const DenseFrame& frame, const SurfaceGrid& grid) const;
-  void find_derivatives(const PatternField& field, const SurfaceGrid& grid, FollowedFrame& to, Executor& executor);
-  void find_inverses(const DenseFrame& frame, const SurfaceGrid& grid, FollowedFrame& to, Executor& executor);
 
   int window_px_;
   std::shared_ptr<Shared> shared_;
@@ -99,6 +84,7 @@ class GridFollower {
   std::vector<Moved> moves_;                 // of the nodes
   std::shared_ptr<FollowedFrame> kept_;      // until it is finished
   std::size_t followed_ = 0;
+  float across_px_ = 0;
 };
 
 }  // namespace slsd

@@ -615,6 +615,26 @@ TEST(DenseStream, SlowDriftIsFollowedToItsEnd) {
   }
 }
 
+TEST(DenseStream, TellsHowFarAKnockedRigIsOffItsEpipolarLines) {
+  Decoder decoder = Decoder::create(pattern(), small_rig(), 0, {}).value();
+  DenseMapper mapper(pattern(), small_rig(), 0, {});
+  SerialExecutor executor;
+  std::size_t followed = 0;
+  for (std::uint32_t frame = 1; frame <= 8; ++frame) {
+    Calibration moved = small_rig();
+    const double off_px = frame < 4 ? 0 : 0.02 * (frame - 3);
+    moved.projector.cy += off_px;
+    SimulationOptions options;
+    options.seed = frame;
+    const Grey8 seen = simulate(draw_pattern(pattern()), moved, kTilted, options);
+    ASSERT_TRUE(decoder.decode(seen.view(), 255));
+    (void)mapper.measure_next(seen.view(), 255, decoder.symbols(), executor);
+    EXPECT_NEAR(std::abs(mapper.epipolar_offset_px()), off_px, 0.01) << frame;
+    followed += mapper.followed_nodes() > 2000;
+  }
+  EXPECT_GE(followed, 4U);
+}
+
 TEST(DenseStream, LightThatChangesMovesNothing) {
   Stream stream;
   for (std::uint32_t frame = 1; frame <= 8; ++frame) {

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/align/align_patch.hpp"
+#include "core/align/pattern_field.hpp"
+#include "core/dense/executor.hpp"
+#include "core/dense/surface_grid.hpp"
+
+namespace slsd {
+
+/// A frame whose nodes were measured, and what follows from it for frames that differ from it by little.
+struct FollowedFrame {
+  std::vector<std::uint16_t> pixels;
+  double full = 0;
+  std::size_t blur = 0;  ///< of the field that the nodes were aligned with
+  EpipolarOffset epipolar;
+  std::vector<SurfaceNode> nodes;                  ///< good are those that bore points
+  std::vector<char> tried;                         ///< of them: nothing fitted
+  std::size_t good = 0;                            ///< of them
+  std::vector<SurfaceSeed> found;                  ///< see SurfaceSearch
+  std::vector<std::int16_t> along, across, light;  ///< per pixel: the derivatives of the light, and the light
+  float slope_unit = 0;                            ///< of a step of the derivatives
+  std::vector<float> inverses;                     ///< N^-1 of each node, its upper triangle by rows
+
+  [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory
+
+  /// From the nodes: `along`, `across` and `light`.
+  void find_derivatives(const PatternField& field, const SurfaceGrid& grid, Executor& executor);
+  /// From these: `inverses`.
+  void find_inverses(const DenseFrame& frame, const SurfaceGrid& grid, int window_px, Executor& executor);
+
+  /// The unknowns in the order of their sums; how many numbers an upper triangle has; and the light of a step.
+  enum Unknown { kOffset, kGain, kGainX, kGainY, kAcross, kSlopeX, kSlopeY, kDisparity };
+  static constexpr int kPacked = kFitted * (kFitted + 1) / 2;
+  static constexpr float kLightUnit = 1.F / 16384;
+};
+
+/// Whether a window around there lies within the frame.
+inline bool within(int middle, int half, int size) {
+  return middle >= half && middle + half < size;
+}
+
+}  // namespace slsd
