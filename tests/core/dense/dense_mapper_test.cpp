@@ -221,7 +221,7 @@ Grey8 lit_by_another(const Seen& seen, const Grey8& image, double depth_mm) {
 TEST(DenseSearch, NothingOnAPartThatAnotherPatternLights) {
   const Grey8 image = draw_pattern(pattern());
   std::vector<Grey8> images;
-  for (std::uint32_t seed = 2; seed < 8; ++seed) images.push_back(draw_pattern(pattern_of(seed)));
+  for (std::uint32_t seed = 2; seed < 5; ++seed) images.push_back(draw_pattern(pattern_of(seed)));
   Grey8 mirrored(image.width(), image.height()), a_row_lower = mirrored;
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
