@@ -99,6 +99,8 @@ class Machine:
         lay_out(root, packages)
         self.names = [name for name in NAMES if list(packages.glob(f"{name}_*.deb"))]
         self.sums = {}
+        self.repair()  # a run that was stopped leaves what it had installed
+        self.dpkg("--purge", *reversed(NAMES))
         self.clean = look(root, self.sums)
 
     def run(self, *arguments, kill_after_s=None):
@@ -221,12 +223,12 @@ def main():
     parser.add_argument("--rounds", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
-    machine = Machine(arguments.root.resolve(), arguments.packages)
-    machine.random.seed(arguments.seed)
+    root = arguments.root.resolve()
     with contextlib.ExitStack() as stack:
-        proc = machine.root / "proc"
-        subprocess.run(["mount", "--bind", "/proc", proc], check=True)
-        stack.callback(subprocess.run, ["umount", proc], check=True)
+        subprocess.run(["mount", "--bind", "/proc", root / "proc"], check=True)
+        stack.callback(subprocess.run, ["umount", root / "proc"], check=True)
+        machine = Machine(root, arguments.packages)
+        machine.random.seed(arguments.seed)
         scan_once(machine)
         begin = time.monotonic()
         done = loop(machine, arguments.rounds)
