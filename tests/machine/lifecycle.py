@@ -22,7 +22,9 @@ NAMES = ("slsd", "slsd-client", "slsd-calibrate", "slsd-display", "slsd-web", "s
 # What dpkg, the loader and the tools of users keep for themselves, whatever is installed.
 KEPT_BY_OTHERS = ("proc", "sys", "dev", "tmp", "packages", "var/lib/dpkg", "var/log", "var/cache", "etc/ld.so.cache", "etc/passwd-", "etc/group-",
                   "etc/shadow-", "etc/gshadow-", "etc/.pwd.lock", "etc/subuid-", "etc/subgid-", "var/lib/systemd/catalog", "run/lock", "usr/share/mime",
-                  "var/lib/systemd/deb-systemd-helper-masked", "usr/share/man/index.db")
+                  "var/lib/systemd/deb-systemd-helper-masked", "usr/share/man/index.db",
+                  # with the number of a groupadd or useradd that was killed while it held the lock
+                  "etc/passwd.", "etc/group.", "etc/shadow.", "etc/gshadow.")
 CALIBRATION, CONFIGURATION = "var/lib/slsd/calibration.yml", "etc/slsd/slsd.toml"
 MINE = "# the administrator's own line\n"
 
