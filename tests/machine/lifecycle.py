@@ -22,7 +22,9 @@ NAMES = ("slsd", "slsd-client", "slsd-calibrate", "slsd-display", "slsd-web", "s
 # What dpkg, the loader and the tools of users keep for themselves, whatever is installed.
 KEPT_BY_OTHERS = ("proc", "sys", "dev", "tmp", "packages", "var/lib/dpkg", "var/log", "var/cache", "etc/ld.so.cache", "etc/passwd-", "etc/group-",
                   "etc/shadow-", "etc/gshadow-", "etc/.pwd.lock", "etc/subuid-", "etc/subgid-", "var/lib/systemd/catalog", "run/lock", "usr/share/mime",
-                  "var/lib/systemd/deb-systemd-helper-masked", "usr/share/man/index.db")
+                  "var/lib/systemd/deb-systemd-helper-masked", "usr/share/man/index.db",
+                  # with the number of a groupadd or useradd that was killed while it held the lock
+                  "etc/passwd.", "etc/group.", "etc/shadow.", "etc/gshadow.")
 CALIBRATION, CONFIGURATION = "var/lib/slsd/calibration.yml", "etc/slsd/slsd.toml"
 MINE = "# the administrator's own line\n"
 
@@ -99,6 +101,8 @@ class Machine:
         lay_out(root, packages)
         self.names = [name for name in NAMES if list(packages.glob(f"{name}_*.deb"))]
         self.sums = {}
+        self.repair()  # a run that was stopped leaves what it had installed
+        self.dpkg("--purge", *reversed(NAMES))
         self.clean = look(root, self.sums)
 
     def run(self, *arguments, kill_after_s=None):
@@ -221,12 +225,12 @@ def main():
     parser.add_argument("--rounds", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
-    machine = Machine(arguments.root.resolve(), arguments.packages)
-    machine.random.seed(arguments.seed)
+    root = arguments.root.resolve()
     with contextlib.ExitStack() as stack:
-        proc = machine.root / "proc"
-        subprocess.run(["mount", "--bind", "/proc", proc], check=True)
-        stack.callback(subprocess.run, ["umount", proc], check=True)
+        subprocess.run(["mount", "--bind", "/proc", root / "proc"], check=True)
+        stack.callback(subprocess.run, ["umount", root / "proc"], check=True)
+        machine = Machine(root, arguments.packages)
+        machine.random.seed(arguments.seed)
         scan_once(machine)
         begin = time.monotonic()
         done = loop(machine, arguments.rounds)

@@ -5,7 +5,9 @@
 FOLDER] [PART...]. As root. In a container of ROOT, which takes a minute; or in the guest whose disk make_guest.sh wrote to
 FOLDER, for the parts that need drivers of a kernel too."""
 import argparse
+import concurrent.futures
 import contextlib
+import os
 import pathlib
 import signal
 import subprocess
@@ -20,34 +22,41 @@ import lifecycle
 from guest import Guest
 from machine import Container
 
-SHARED = (installation.nothing_plugged_in, installation.few_rights, installation.who_may_what, installation.calibration,
-          installation.killed, installation.frozen, installation.wrong_configuration, bad_state.unknown_groups,
-          bad_state.missing_socket_folder, bad_state.bad_state_folder, bad_state.two_versions, bad_state.full_disk)
+# What makes the machine that the others look at, and what unmakes it.
+FIRST, LAST = installation.nothing_plugged_in, installation.removed
+# The longest first, so that two guests end together.
+SHARED = (installation.upgrade, bad_state.full_disk, bad_state.two_versions, bad_state.bad_state_folder, bad_state.unknown_groups,
+          installation.wrong_configuration, installation.frozen, bad_state.missing_socket_folder, installation.killed,
+          installation.calibration, installation.few_rights, installation.who_may_what, installation.at_rest)
 # These set the service up themselves, which takes 15 s where a processor is emulated.
-OF_DEVICES = (cameras.usb_camera, cameras.usb_faults, cameras.usb_unplugged, cameras.hung_camera, cameras.vivid, cameras.gige,
-              cameras.gige_of_others, display.projector, display.projector_unplugged, display.projector_late, display.server_killed,
-              display.server_hung)
-WITH_DRIVERS = (*OF_DEVICES, installation.reboot)
-AT_THE_END = (installation.upgrade, installation.at_rest, installation.removed)
+OF_DEVICES = (cameras.usb_unplugged, display.projector_unplugged, display.server_hung, display.server_killed, display.projector_late,
+              cameras.usb_camera, display.projector, cameras.usb_faults, cameras.gige, cameras.vivid, cameras.hung_camera,
+              cameras.gige_of_others)
+WITH_DRIVERS = (installation.reboot, *OF_DEVICES)
 
 
-def run(machine, parts, chosen):
-    """@return how many failed"""
-    failed = 0
-    for part in parts:
-        # The first makes the machine that the others look at.
-        if chosen and part.__name__ not in chosen and part is not parts[0]:
-            continue
-        begin = time.monotonic()
-        try:
-            machine.look_how_slow()
-            if part is not parts[0] and part not in OF_DEVICES:
-                machine.set_up()
-            print(f"ok      {part.__name__}: {part(machine)} ({time.monotonic() - begin:.0f} s)", flush=True)
-        except (AssertionError, TimeoutError, subprocess.SubprocessError) as error:
-            failed += 1
-            print(f"FAILED  {part.__name__}: {error} ({time.monotonic() - begin:.0f} s, {machine.slow:.0f} times as slow as idle)", flush=True)
-    return failed
+def prove(machine, part):
+    """@return whether it holds"""
+    begin = time.monotonic()
+    try:
+        machine.look_how_slow()
+        if part is not FIRST and part not in OF_DEVICES:
+            machine.set_up()
+        print(f"ok      {part.__name__}: {part(machine)} ({time.monotonic() - begin:.0f} s)", flush=True)
+    except (AssertionError, TimeoutError, subprocess.SubprocessError) as error:
+        print(f"FAILED  {part.__name__}: {error} ({time.monotonic() - begin:.0f} s, {machine.slow:.0f} times as slow as idle)", flush=True)
+        return False
+    return True
+
+
+def work(make, machines, parts, last):
+    """Proves what is left of the parts on a machine of its own. @return how many failed"""
+    begin = time.monotonic()
+    machine = machines.enter_context(contextlib.closing(make()))
+    print(f"booted within {time.monotonic() - begin:.0f} s", flush=True)
+    failed = not prove(machine, FIRST)
+    failed += sum(not prove(machine, part) for part in parts)
+    return failed + sum(not prove(machine, part) for part in last)
 
 
 def main():
@@ -57,7 +66,7 @@ def main():
     parser.add_argument("--guest", type=pathlib.Path)
     parser.add_argument("parts", nargs="*", metavar="PART")
     arguments = parser.parse_intermixed_args()
-    parts = (*SHARED, *(WITH_DRIVERS if arguments.guest else ()), *AT_THE_END)
+    parts = (FIRST, *(WITH_DRIVERS if arguments.guest else ()), *SHARED, LAST)
     names = [part.__name__ for part in parts]
     if unknown := set(arguments.parts) - set(names):
         parser.error(f"no such part: {', '.join(sorted(unknown))}; there are: {' '.join(names)}")
@@ -65,11 +74,25 @@ def main():
     root = arguments.root.resolve()
     lifecycle.lay_out(root, arguments.packages)
     begin = time.monotonic()
-    machine = Guest(arguments.guest.resolve(), root / "packages") if arguments.guest else Container(root)
-    with contextlib.closing(machine):
-        print(f"booted within {time.monotonic() - begin:.0f} s", flush=True)
-        failed = run(machine, parts, arguments.parts)
-    print(f"{failed} of {len(parts)} parts failed, {time.monotonic() - begin:.0f} s", flush=True)
+    chosen = [part for part in parts[1:-1] if part.__name__ in arguments.parts or not arguments.parts]
+    last = [LAST] if not arguments.parts or LAST.__name__ in arguments.parts else []
+    left = iter(chosen)  # of which each machine takes the next
+    if arguments.guest:
+        def make():
+            return Guest(arguments.guest.resolve(), root / "packages")
+        count = min(2, len(os.sched_getaffinity(0)), max(1, len(chosen) // 4))  # each emulates on a core of its own
+    else:
+        def make():
+            return Container(root)
+        count = 1
+    with contextlib.ExitStack() as machines, concurrent.futures.ThreadPoolExecutor(count) as threads:
+        workers = [threads.submit(work, make, machines, left, last if number == 0 else ()) for number in range(count)]
+        try:
+            failed = sum(worker.result() for worker in workers)
+        except BaseException:
+            machines.close()  # what a thread waits for ends with them
+            raise
+    print(f"{failed} of {count + len(chosen) + len(last)} proofs failed, {time.monotonic() - begin:.0f} s", flush=True)
     return 1 if failed else 0
 
 
