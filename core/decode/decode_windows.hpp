@@ -36,7 +36,7 @@ class WindowDecoder {
   WindowDecoder(const Pattern& pattern, DecodeWindowsOptions options);
 
   void decode(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes, const CellGate& gate,
-              std::vector<CellClaim>& claims);
+              Executor& executor, std::vector<CellClaim>& claims);
 
  private:
   /// The cell of a window's middle, where the window was found.
@@ -55,14 +55,15 @@ class WindowDecoder {
     int count = 0;
   };
 
-  void look_up_windows(const std::vector<Classification>& shapes, const CellGate& gate);
+  void look_up_windows(std::int32_t first, std::int32_t last, const std::vector<Classification>& shapes,
+                       const CellGate& gate);
   [[nodiscard]] std::optional<std::uint32_t> key_of(const Neighbourhood& around,
                                                     const std::vector<Classification>& shapes) const;
-  [[nodiscard]] Hit continued(std::int32_t node, std::uint32_t key) const;
+  [[nodiscard]] Hit continued(std::int32_t node, std::uint32_t key, std::int32_t first) const;
   [[nodiscard]] Hit look_up(std::int32_t node, std::uint32_t key, const CellGate& gate) const;
   [[nodiscard]] Ballot collect_votes(std::int32_t node, const CellGate& gate) const;
   void vote(std::int32_t node, const Vote& vote, bool strays, const CellGate& gate, Ballot& ballot) const;
-  void elect(const CellGate& gate, std::vector<CellClaim>& claims) const;
+  void elect(std::int32_t node, const CellGate& gate, CellClaim& claim) const;
   [[nodiscard]] bool is_unanimous(std::int32_t node) const;
   void weigh_rivals(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims);
   [[nodiscard]] bool shown(int row, int column) const {

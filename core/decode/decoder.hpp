@@ -13,6 +13,7 @@
 #include "core/decode/frame_noise.hpp"
 #include "core/decode/lattice.hpp"
 #include "core/decode/options.hpp"
+#include "core/executor.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/geometry/pixel_ray.hpp"
 #include "core/image.hpp"
@@ -49,10 +50,11 @@ class Decoder {
   [[nodiscard]] std::uint8_t camera_index() const;  ///< in the calibration
 
   /// Image to points. The result stands until the next call. Nothing found is an empty result with its counters.
-  /// @param full  the level of a saturated pixel: 255, 1023, 65535...; without it as HeldFullLevel has it
+  /// @param full      the level of a saturated pixel: 255, 1023, 65535...; without it as HeldFullLevel has it
+  /// @param executor  helps with the stages, and changes nothing of what they give; null: this thread alone
   /// @errors kMismatch: the frame is not of the calibration's size
   [[nodiscard]] Result<const Decoding*> decode(const GreyView& frame, std::optional<double> full = std::nullopt,
-                                               StageObserver* observer = nullptr);
+                                               StageObserver* observer = nullptr, Executor* executor = nullptr);
   /// Of the last frame that was decoded.
   [[nodiscard]] DecodedSymbols symbols();
 

@@ -163,9 +163,10 @@ std::vector<double> PatternReader::likely_scales(const GreyView& whole) {
     const auto [width, height] = size_of(frame);
     ShapeFinder finder(pattern_.options, ExpectedFrames(turned_and_scaled(0, scale / factor).matrix, width, height),
                        Method::kDefault, Method::kDefault);
-    const GreyView sharp = finder.binarize(frame, full_);
-    finder.find_regions(sharp);
-    finder.describe(sharp, seen);
+    SerialExecutor alone;
+    const GreyView sharp = finder.binarize(frame, full_, alone);
+    finder.find_regions(sharp, alone);
+    finder.describe(sharp, alone, seen);
     shapes.push_back(seen.size());
     double sum = 0;
     for (const GreyMoments& moments : seen.moments) sum += static_cast<double>(moments.weight);

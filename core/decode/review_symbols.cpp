@@ -83,18 +83,18 @@ void SymbolReview::measure_around_distrusted(const GridLinker& linker, Sightings
   }
 }
 
-void SymbolReview::trust_whole_symbols(const GridLinker& linker, Sightings& seen) {
+void SymbolReview::trust_whole_symbols(const GridLinker& linker, Executor& executor, Sightings& seen) {
   trusted_.resize(seen.size());
   seen.misfits.resize(seen.size());
-  distrusted_.clear();
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
-    if (trusted_[i] != 0) {
-      seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
-    } else {
-      distrusted_.push_back(static_cast<std::int32_t>(i));
+  executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
+      if (trusted_[i] != 0) seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
     }
-  }
+  });
+  distrusted_.clear();
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    if (trusted_[i] == 0) distrusted_.push_back(static_cast<std::int32_t>(i));
   measure_around_distrusted(linker, seen);
   distrusted_.clear();
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -105,10 +105,12 @@ void SymbolReview::trust_whole_symbols(const GridLinker& linker, Sightings& seen
   measure_around_distrusted(linker, seen);
 }
 
-void SymbolReview::measure_light_changes(const Sightings& seen) {
+void SymbolReview::measure_light_changes(const Sightings& seen, Executor& executor) {
   light_changes_.resize(seen.size());
-  for (std::size_t i = 0; i < seen.size(); ++i)
-    light_changes_[i] = {light_change(seen, i, kRight), light_change(seen, i, kDown)};
+  executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i)
+      light_changes_[i] = {light_change(seen, i, kRight), light_change(seen, i, kDown)};
+  });
 }
 
 /// The mean with those beside, across the direction of the change: small symbols blur to lower peaks, which is not the
@@ -163,15 +165,18 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
 }
 
 void SymbolReview::review(const GreyView& frame, const Regions& regions, const GridLinker& linker,
-                          const std::vector<Prototype>& prototypes, GreyMomentMeter& meter, Sightings& seen) {
+                          const std::vector<Prototype>& prototypes, std::span<GreyMomentMeter> meters,
+                          Executor& executor, Sightings& seen) {
   prototypes_ = &prototypes;
-  trust_whole_symbols(linker, seen);
-  measure_light_changes(seen);
+  trust_whole_symbols(linker, executor, seen);
+  measure_light_changes(seen, executor);
   std::visit(
       [&](const auto& view) {
-        for (std::size_t i = 0; i < seen.size(); ++i) {
-          if (seen.claims[i].status == RegionStatus::kDecoded) review_node(view, regions, meter, seen, i);
-        }
+        executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int worker) {
+          for (std::size_t i = first; i < last; ++i) {
+            if (seen.claims[i].status == RegionStatus::kDecoded) review_node(view, regions, meters[worker], seen, i);
+          }
+        });
       },
       frame);
 }

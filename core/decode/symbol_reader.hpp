@@ -47,7 +47,8 @@ class SymbolReader {
   /// @param view  what the calibration knows; null: symbols may lie anywhere, and without their epipolar lines to check
   ///              them by, some in a thousand are wrong
   /// @return      stands until the next call
-  const Lattice& read(const GreyView& frame, double full, EpipolarView* view, StageObserver* observer = nullptr);
+  const Lattice& read(const GreyView& frame, double full, EpipolarView* view, Executor& executor,
+                      StageObserver* observer = nullptr);
   /// The same as pairs of pixels, wherever the symbols lie.
   /// @param is_there  whether the pattern is likely to be seen: otherwise it is not worth to find out how blurred it is
   [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, double full, bool is_there = true);
@@ -75,14 +76,15 @@ class SymbolReader {
   };
 
   void measure_look();
-  void classify();
-  void link_grid();
-  void classify_in_measured_frames();
-  void decode_windows(const EpipolarView* view);
-  void review(const GreyView& frame);
-  void correspond(const EpipolarView* view);
+  void classify(Executor& executor);
+  void link_grid(Executor& executor);
+  void classify_in_measured_frames(Executor& executor);
+  void decode_windows(const EpipolarView* view, Executor& executor);
+  void review(const GreyView& frame, Executor& executor);
+  void correspond(const EpipolarView* view, Executor& executor);
   void refuse_cut();
-  void fit_lattice(const GreyView& frame, double full, const GreyView& sharp, const EpipolarView* view);
+  void fit_lattice(const GreyView& frame, double full, const GreyView& sharp, const EpipolarView* view,
+                   Executor& executor);
 
   DecodeOptions options_;
   std::shared_ptr<const Fixed> fixed_;

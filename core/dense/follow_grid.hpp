@@ -10,8 +10,8 @@
 
 #include "core/align/pattern_field.hpp"
 #include "core/dense/dense_map.hpp"
-#include "core/dense/executor.hpp"
 #include "core/dense/surface_grid.hpp"
+#include "core/executor.hpp"
 
 namespace slsd {
 

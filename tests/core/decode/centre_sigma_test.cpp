@@ -13,6 +13,8 @@
 namespace slsd {
 namespace {
 
+SerialExecutor alone;
+
 LatticeSymbol symbol_of(float weight, float gain) {
   LatticeSymbol symbol{};
   symbol.weight = weight, symbol.background = 20, symbol.gain = gain;
@@ -32,7 +34,7 @@ float judged(const LatticeSymbol& symbol) {
   const Pattern pattern = shipped_pattern("16px-5.toml");
   const CellRays cells(pattern, std::vector<Prototype>(5), paper_rig().projector);
   Lattice lattice{{symbol}};
-  CentreJudge().judge({}, nullptr, cells, lattice);
+  CentreJudge().judge({}, nullptr, cells, alone, lattice);
   return lattice.symbols[0].sigma_px;
 }
 

@@ -15,6 +15,8 @@
 namespace slsd {
 namespace {
 
+SerialExecutor alone;
+
 constexpr int kRows = 44, kColumns = 71;
 
 struct Damage {
@@ -71,7 +73,7 @@ class DecodeWindows : public testing::Test {
   std::vector<CellClaim> decode(const Sheet& sheet, std::span<const EpipolarSegment> segments = {}) {
     WindowDecoder decoder(pattern_, {.rows = kRows, .columns = kColumns});
     std::vector<CellClaim> claims;
-    decoder.decode(sheet.grid.nodes, sheet.shapes, CellGate(cells_, segments, 1.5), claims);
+    decoder.decode(sheet.grid.nodes, sheet.shapes, CellGate(cells_, segments, 1.5), alone, claims);
     return claims;
   }
 
@@ -180,7 +182,7 @@ TEST_F(DecodeWindows, NamesAPartThatIsAskedForAlone) {
   const Sheet sheet = sheet_of(pattern_.array, {});
   WindowDecoder decoder(pattern_, {.rows = 20, .columns = 30});
   std::vector<CellClaim> claims;
-  decoder.decode(sheet.grid.nodes, sheet.shapes, CellGate(cells_, {}, 1.5), claims);
+  decoder.decode(sheet.grid.nodes, sheet.shapes, CellGate(cells_, {}, 1.5), alone, claims);
   EXPECT_EQ(score(sheet, claims).decoded, 20 * 30);
   EXPECT_EQ(score(sheet, claims).wrong, 0);
 }

@@ -19,6 +19,8 @@
 namespace slsd {
 namespace {
 
+SerialExecutor alone;
+
 constexpr int kRows = 44, kColumns = 71;
 constexpr auto kDecoded = RegionStatus::kDecoded;
 
@@ -70,7 +72,7 @@ class Islands : public testing::Test {
     grid_.link_truly();
     WindowDecoder decoder(pattern_, {.rows = kRows, .columns = kColumns});
     std::vector<CellClaim> claims;
-    decoder.decode(grid_.nodes, shapes_, CellGate(cells_, segments, 1.5), claims);
+    decoder.decode(grid_.nodes, shapes_, CellGate(cells_, segments, 1.5), alone, claims);
     return claims;
   }
   int decoded(const std::vector<CellClaim>& claims) const {
