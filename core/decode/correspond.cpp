@@ -16,6 +16,7 @@ class Surroundings {
       : nodes_(nodes), claims_(claims) {}
 
   [[nodiscard]] bool leave_alone(std::int32_t node) const {
+    if (goes_on_all_around(node)) return false;  // as most do, and then none of the following can be
     return is_lone(node, kRight) || is_lone(node, kDown) ||
            std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp},
                                [&](Direction d) { return is_lone_at_rim(node, d); });
@@ -92,6 +93,13 @@ class Surroundings {
 
  private:
   static constexpr int kReach = 3;
+  /// Those beside it stand, and their cells lie beside its own.
+  [[nodiscard]] bool goes_on_all_around(std::int32_t node) const {
+    return std::ranges::all_of(std::array{kRight, kDown, kLeft, kUp}, [&](Direction d) {
+      const std::int32_t other = beside(node, d);
+      return stands(node, other) && fits(node, other, d);
+    });
+  }
   /// There lies what is none of its island, or what is misread.
   [[nodiscard]] bool is_beside_others(std::int32_t node, Direction d) const {
     return contradicts(node, d) || misread(beside(node, d));

@@ -144,24 +144,25 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
   };
   const LatticeFrame& lattice_frame = seen.nodes[node].frame;
   const Eigen::Vector2f per_cell = light_change_around(seen, node);
-  const Eigen::Vector2f shading = lattice_frame.inverse().transpose() * per_cell / pitch_px_;
-  if (per_cell.cwiseAbs().maxCoeff() > options_.shading_min)
-    adopt_if_better(meter.measure_levelled(frame, region, regions.runs_of(region), shading), kLevellingTolerance);
+  const float change = per_cell.cwiseAbs().maxCoeff();
+  const auto shading = [&]() -> Eigen::Vector2f { return lattice_frame.inverse().transpose() * per_cell / pitch_px_; };
+  if (change > options_.shading_min)
+    adopt_if_better(meter.measure_levelled(frame, region, regions.runs_of(region), shading()), kLevellingTolerance);
   if (distance > options_.doubtful_distance) {
     const Eigen::Vector2f centroid(moments.x, moments.y);
     const Eigen::Vector2f own_centre = centroid - lattice_frame * prototype_of(seen.claims[node]).centroid_px;
     const Eigen::Vector2f centre = centre_from_neighbours(seen.nodes, node).value_or(own_centre);
     const float half_px = 0.25F * (size_px_ + pitch_px_);
-    adopt_if_better(meter.measure_cell(frame, centre, lattice_frame, half_px, shading), 0);
+    adopt_if_better(meter.measure_cell(frame, centre, lattice_frame, half_px, shading()), 0);
   }
-  if (per_cell.cwiseAbs().maxCoeff() > options_.uneven_light) {
+  if (change > options_.uneven_light) {
     if (!has_steady_centre) moments = meter.measure(frame, region, regions.runs_of(region), SteadyCentre::kMeasured);
     const Prototype& prototype = prototype_of(seen.claims[node]);
     const Eigen::Vector2f from_steady = lattice_frame * (prototype.centroid_px - prototype.steady_centroid_px);
     moments.x = moments.steady_x + from_steady.x(), moments.y = moments.steady_y + from_steady.y();
   }
-  const float distance_max = is_inside(seen, node) ? options_.damaged_distance_inside : options_.damaged_distance;
-  if (distance > distance_max) seen.claims[node].status = RegionStatus::kDamagedShape;
+  if (distance > options_.damaged_distance_inside || (distance > options_.damaged_distance && !is_inside(seen, node)))
+    seen.claims[node].status = RegionStatus::kDamagedShape;
 }
 
 void SymbolReview::review(const GreyView& frame, const Regions& regions, const GridLinker& linker,

@@ -192,6 +192,7 @@ void SymbolReader::refuse_cut() {
     kept_.push_back(is_cut ? -1 : count++);
     if (is_cut) reject(symbol, RegionStatus::kDamagedShape);
   }
+  if (count == static_cast<std::int32_t>(symbols.size())) return;
   for (std::size_t i = 0; i < symbols.size(); ++i) {
     if (kept_[i] < 0) continue;
     LatticeSymbol& symbol = symbols[static_cast<std::size_t>(kept_[i])] = symbols[i];
