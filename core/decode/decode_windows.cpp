@@ -13,14 +13,14 @@ constexpr int kCorrectedWeight = 1;
 
 }  // namespace
 
-WindowDecoder::WindowDecoder(const Pattern& pattern, DecodeWindowsOptions options)
+WindowDecoder::WindowDecoder(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max)
     : array_(pattern.array),
-      options_(options),
-      codebook_(std::make_shared<const Codebook>(pattern.array, options.rows, options.columns)),
+      codebook_(std::move(codebook)),
       unique_(pattern.array.minimum_distance > 0),
       corrects_(pattern.array.minimum_distance >= 3),
       log_letters_(std::log(static_cast<float>(pattern.letters()))),
-      judge_(pattern, {.rows = options.rows, .columns = options.columns, .wrong_cells_max = options.wrong_cells_max}) {}
+      judge_(pattern,
+             {.rows = codebook_->rows(), .columns = codebook_->columns(), .wrong_cells_max = wrong_cells_max}) {}
 
 std::optional<std::uint32_t> WindowDecoder::key_of(const Neighbourhood& around,
                                                    const std::vector<Classification>& shapes) const {
@@ -160,9 +160,9 @@ void WindowDecoder::elect(std::int32_t node, const CellGate& gate, CellClaim& cl
 /// Weighs the claims on cells that are claimed more than once: the log-likelihood of each window's shapes against
 /// chance.
 void WindowDecoder::weigh_rivals(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims) {
-  claimed_.assign(static_cast<std::size_t>(options_.rows) * options_.columns, 0);
+  claimed_.assign(static_cast<std::size_t>(codebook_->rows()) * codebook_->columns(), 0);
   const auto claimed = [&](const CellClaim& claim) -> std::uint8_t& {
-    return claimed_[static_cast<std::size_t>(claim.row) * options_.columns + claim.column];
+    return claimed_[static_cast<std::size_t>(claim.row) * codebook_->columns() + claim.column];
   };
   bool rivals = false;
   for (const CellClaim& claim : claims) {

@@ -43,12 +43,13 @@ Decoder::Decoder(Decoder&&) noexcept = default;
 Decoder& Decoder::operator=(Decoder&&) noexcept = default;
 Decoder::~Decoder() = default;
 
-Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
+Result<Decoder> Decoder::create(const IndexedPattern& indexed, const Calibration& calibration, std::size_t camera_index,
                                 const DecodeOptions& options) {
   if (auto valid = options.validate(); !valid) return tl::unexpected(valid.error());
   if (camera_index >= calibration.cameras.size()) {
     return fail(ErrorCode::kInvalidArgument, "the calibration has no camera " + std::to_string(camera_index));
   }
+  const Pattern& pattern = indexed.pattern();
   const CalibratedCamera& camera = calibration.cameras[camera_index];
   if (auto fits = check_image_size(camera.lens.width_px, camera.lens.height_px); !fits) {
     return fail(fits.error().code, fits.error().message, "camera " + camera.name);
@@ -73,7 +74,7 @@ Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calib
       Parts{.camera = camera,
             .camera_index = static_cast<std::uint8_t>(camera_index),
             .options = options,
-            .reader = SymbolReader(pattern, projector, std::move(expected), options, std::move(paper)),
+            .reader = SymbolReader(indexed, projector, std::move(expected), options, std::move(paper)),
             .view = EpipolarView(camera, projector, options.depth_min_mm, options.depth_max_mm,
                                  epipolar_gate_px(calibration.report.epipolar_error_px)),
             .triangulator = Triangulator(camera, projector),

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "core/code/pattern.hpp"
+#include "core/code/codebook.hpp"
 #include "core/decode/decoding.hpp"
 #include "core/decode/frame_noise.hpp"
 #include "core/decode/lattice.hpp"
@@ -34,10 +34,11 @@ struct DecodedSymbols {
 /// @thread thread-bound: one decoder to a thread
 class Decoder {
  public:
-  /// Prepares the codebook, the prototypes and the rays of the pattern's cells.
+  /// Prepares the prototypes and the rays of the pattern's cells.
+  /// @param pattern  one for all cameras that see it: what it holds is shared
   /// @errors kMismatch: the calibration's projector is not of the pattern's size; kInvalidArgument; kUnsupported: the
   ///         camera's images are too large
-  [[nodiscard]] static Result<Decoder> create(const Pattern& pattern, const Calibration& calibration,
+  [[nodiscard]] static Result<Decoder> create(const IndexedPattern& pattern, const Calibration& calibration,
                                               std::size_t camera_index, const DecodeOptions& options);
   /// A decoder of the same for another thread, in a hundredth of the time: it shares what never changes, and its
   /// buffers are as large as these have grown.

@@ -29,25 +29,23 @@ std::vector<Prototype> with_centroids_of(Method centre, const Pattern& pattern, 
 
 }  // namespace
 
-SymbolReader::Fixed::Fixed(const Pattern& shown, const Lens& projector, Method centre, float scale)
+SymbolReader::Fixed::Fixed(const IndexedPattern& shown, const Lens& projector, Method centre, float scale)
     : pattern(shown),
-      appearances(pattern.options, scale),
-      cells(pattern, with_centroids_of(centre, pattern, appearances.usual().as_measured), projector) {}
+      appearances(shown.pattern().options, scale),
+      cells(shown.pattern(), with_centroids_of(centre, shown.pattern(), appearances.usual().as_measured), projector) {}
 
-SymbolReader::SymbolReader(const Pattern& pattern, const Lens& projector, ExpectedFrames expected,
+SymbolReader::SymbolReader(const IndexedPattern& indexed, const Lens& projector, ExpectedFrames expected,
                            const DecodeOptions& options, std::optional<PaperWay> paper)
     : options_(options),
-      fixed_(std::make_shared<const Fixed>(pattern, projector, options.centre, expected.in_the_middle().scale)),
+      fixed_(std::make_shared<const Fixed>(indexed, projector, options.centre, expected.in_the_middle().scale)),
       paper_(std::move(paper)),
-      finder_(pattern.options, std::move(expected), options.binarize, options.find_regions),
-      linker_({.pitch_px = static_cast<float>(pattern.pitch_px())}),
-      window_decoder_(pattern, {.rows = pattern.whole_rows(),
-                                .columns = pattern.whole_columns(),
-                                .wrong_cells_max = options.wrong_cells_max}),
-      review_(pattern, {}),
+      finder_(pattern().options, std::move(expected), options.binarize, options.find_regions),
+      linker_({.pitch_px = static_cast<float>(pattern().pitch_px())}),
+      window_decoder_(pattern(), indexed.codebook(), options.wrong_cells_max),
+      review_(pattern(), {}),
       correspondence_({}),
-      centre_correction_(fixed_->appearances.usual().as_measured, static_cast<float>(pattern.pitch_px()),
-                         static_cast<float>(pattern.options.symbol_size_px)) {}
+      centre_correction_(fixed_->appearances.usual().as_measured, static_cast<float>(pattern().pitch_px()),
+                         static_cast<float>(pattern().options.symbol_size_px)) {}
 
 const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarView* view, Executor& executor,
                                   StageObserver* observer) {

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/code/pattern.hpp"
+#include "core/code/codebook.hpp"
 #include "core/decode/appearance.hpp"
 #include "core/decode/centre_sigma.hpp"
 #include "core/decode/correspond.hpp"
@@ -35,8 +35,8 @@ class SymbolReader {
   /// @param expected   how the pattern lies in the frame, to half a step of the grid
   /// @param projector  whose pixels the symbols are
   /// @param paper      there where a stage is asked for the paper's way
-  SymbolReader(const Pattern& pattern, const Lens& projector, ExpectedFrames expected, const DecodeOptions& options,
-               std::optional<PaperWay> paper);
+  SymbolReader(const IndexedPattern& pattern, const Lens& projector, ExpectedFrames expected,
+               const DecodeOptions& options, std::optional<PaperWay> paper);
 
   /// Of the same scale, to an eighth.
   void expect(ExpectedFrames expected) { finder_.expect(std::move(expected)); }
@@ -60,7 +60,7 @@ class SymbolReader {
   /// What became of every region, with the counters.
   void report(Decoding& decoding) const;
 
-  [[nodiscard]] const Pattern& pattern() const { return fixed_->pattern; }
+  [[nodiscard]] const Pattern& pattern() const { return fixed_->pattern.pattern(); }
   /// Of the last frame.
   [[nodiscard]] const FrameNoise& noise() const { return noise_; }
   [[nodiscard]] const CellRays& cells() const { return fixed_->cells; }
@@ -69,10 +69,10 @@ class SymbolReader {
 
  private:
   struct Fixed {
-    Pattern pattern;
+    IndexedPattern pattern;
     Appearances appearances;
     CellRays cells;
-    Fixed(const Pattern& pattern, const Lens& projector, Method centre, float scale);
+    Fixed(const IndexedPattern& pattern, const Lens& projector, Method centre, float scale);
   };
 
   void measure_look();

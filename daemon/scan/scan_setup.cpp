@@ -62,10 +62,11 @@ Result<> warm_up(Decoder& decoder, const Lens& lens, const Grey8& symbols, Crew&
 // Each in a thread of its own, as each takes some hundredths of a second.
 Result<std::vector<Decoder>> make_lane(const ScanSetup& setup, const std::vector<std::size_t>& cameras,
                                        const DecodeOptions& options) {
+  const IndexedPattern pattern(setup.pattern);
   std::vector<std::future<Result<Decoder>>> prepared;
   for (const std::size_t index : cameras) {
     prepared.push_back(std::async(std::launch::async, [&, index]() -> Result<Decoder> {
-      auto decoder = Decoder::create(setup.pattern, *setup.calibration, index, options);
+      auto decoder = Decoder::create(pattern, *setup.calibration, index, options);
       if (!decoder) return decoder;
       const auto warm = warm_up(*decoder, setup.calibration->cameras[index].lens, setup.image, *setup.crew);
       if (!warm) return tl::unexpected(warm.error());

@@ -331,6 +331,19 @@ TEST(CreateDecoder, RefusesAnEmptyDepthRange) {
   EXPECT_EQ(decoder.error().code, ErrorCode::kInvalidArgument);
 }
 
+TEST(CreateDecoder, CamerasShareOneCodebook) {
+  const Pattern pattern = shipped_pattern("8px-6-dense.toml");
+  const auto bytes_for = [&](const auto& of) {
+    const std::uint64_t before = test::allocated_bytes();
+    EXPECT_TRUE(Decoder::create(of, paper_rig(), 0, {}));
+    return test::allocated_bytes() - before;
+  };
+  const std::uint64_t alone = bytes_for(pattern), one_of_several = bytes_for(IndexedPattern(pattern));
+  if (alone == 0) GTEST_SKIP() << "nothing is counted here";
+  const std::size_t cells = static_cast<std::size_t>(pattern.whole_rows()) * pattern.whole_columns();
+  EXPECT_GE(alone, one_of_several + cells * (sizeof(std::uint32_t) + 2 * sizeof(Codebook::Entry)));
+}
+
 /// Frames that take every way through the stages: light that falls off, noise, edges in depth, out of focus, 16 bits.
 struct Views {
   Pattern pattern = shipped_pattern("16px-5.toml");
