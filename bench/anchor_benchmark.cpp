@@ -3,6 +3,7 @@
 #include <string>
 
 #include <benchmark/benchmark.h>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "bench/benchmarks.hpp"
@@ -22,8 +23,8 @@ cv::Mat1b as_mat(const Grey8& image) {
 }  // namespace
 
 void register_anchor(FrameRing& ring) {
-  const std::string name = "opencv_anchor/1600x1200_" + std::to_string(ring.pattern().options.symbol_size_px) + "px";
-  benchmark::RegisterBenchmark(name.c_str(), [&ring](benchmark::State& state) {
+  const auto run = [&ring](benchmark::State& state, int threads) {
+    cv::setNumThreads(threads);
     cv::Mat mask, labels, statistics, centroids;
     int regions = 0;
     for (auto _ : state) {
@@ -32,7 +33,19 @@ void register_anchor(FrameRing& ring) {
       regions = cv::connectedComponentsWithStats(mask, labels, statistics, centroids);
     }
     state.counters["regions"] = regions - 1;
+    cv::setNumThreads(1);
+  };
+  const std::string size = "1600x1200_" + std::to_string(ring.pattern().options.symbol_size_px) + "px";
+  benchmark::RegisterBenchmark(("opencv_anchor/" + size).c_str(), [run](benchmark::State& state) {
+    run(state, 1);
   })->Unit(benchmark::kMillisecond);
+  benchmark::RegisterBenchmark(("opencv_anchor/all_cores_" + size).c_str(),
+                               [run](benchmark::State& state) {
+                                 constexpr int kAsManyAsThereAre = -1;
+                                 run(state, kAsManyAsThereAre);
+                               })
+      ->Unit(benchmark::kMillisecond)
+      ->UseRealTime();
 }
 
 }  // namespace slsd

@@ -9,6 +9,7 @@
 
 #include "bench/benchmarks.hpp"
 #include "core/decode/decoder.hpp"
+#include "daemon/scan/crew.hpp"
 
 namespace slsd {
 namespace {
@@ -38,9 +39,10 @@ class StageTimer : public StageObserver {
   std::array<double, kStageCount> spent_{};
 };
 
-void decode(benchmark::State& state, FrameRing& ring, Decoder& decoder) {
+void decode(benchmark::State& state, FrameRing& ring, Decoder& decoder, Executor* executor) {
   std::size_t points = 0;
-  for (auto _ : state) points = decoder.decode(ring.next().view()).value()->points.size();
+  for (auto _ : state)
+    points = decoder.decode(ring.next().view(), std::nullopt, nullptr, executor).value()->points.size();
   state.counters["points"] = static_cast<double>(points);
 }
 
@@ -58,8 +60,17 @@ void stage(benchmark::State& state, FrameRing& ring, Decoder& decoder, Stage sta
 void register_decode(FrameRing& ring, Decoder& decoder) {
   const std::string size = std::to_string(ring.pattern().options.symbol_size_px) + "px";
   benchmark::RegisterBenchmark(("decode/1600x1200_" + size).c_str(), [&](benchmark::State& state) {
-    decode(state, ring, decoder);
+    decode(state, ring, decoder, nullptr);
   })->Unit(benchmark::kMillisecond);
+  // The wall clock: on a busy machine it measures the others too.
+  benchmark::RegisterBenchmark(("decode/all_cores_1600x1200_" + size).c_str(),
+                               [&](benchmark::State& state) {
+                                 Crew crew(Crew::helpers_here());
+                                 decode(state, ring, decoder, &crew);
+                                 state.counters["workers"] = crew.workers();
+                               })
+      ->Unit(benchmark::kMillisecond)
+      ->UseRealTime();
   for (int i = 0; i < kStageCount; ++i) {
     const auto which = static_cast<Stage>(i);
     const std::string name = "stage/" + std::string(to_string(which)) + "_" + size;

@@ -4,9 +4,12 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/code/code_array.hpp"
+#include "core/code/pattern.hpp"
 
 namespace slsd {
 
@@ -27,6 +30,9 @@ class Codebook {
 
   /// @param rows, columns  the part of the array that is shown
   Codebook(const CodeArray& array, int rows, int columns);
+
+  [[nodiscard]] int rows() const { return rows_; }
+  [[nodiscard]] int columns() const { return columns_; }
 
   /// The key of a codeword, letter by letter: append(append(0, first), second) and so on to the ninth.
   [[nodiscard]] std::uint32_t append(std::uint32_t key, std::uint8_t letter) const { return key * letters_ + letter; }
@@ -70,5 +76,25 @@ class Codebook {
 
 /// The codeword around a cell that has all its neighbours.
 [[nodiscard]] Codeword codeword_at(const CodeArray& array, int row, int column);
+
+/// A pattern with the codebook of the symbols that it shows whole. Copies share both, which never change: one serves
+/// every camera, thread and trial.
+class IndexedPattern {
+ public:
+  IndexedPattern(Pattern pattern) : both_(std::make_shared<const Both>(std::move(pattern))) {}  // NOLINT: a pattern is one
+
+  [[nodiscard]] const Pattern& pattern() const { return both_->pattern; }
+  /// Keeps the pattern, too.
+  [[nodiscard]] std::shared_ptr<const Codebook> codebook() const { return {both_, &both_->codebook}; }
+
+ private:
+  struct Both {
+    explicit Both(Pattern shown)
+        : pattern(std::move(shown)), codebook(pattern.array, pattern.whole_rows(), pattern.whole_columns()) {}
+    Pattern pattern;
+    Codebook codebook;
+  };
+  std::shared_ptr<const Both> both_;
+};
 
 }  // namespace slsd

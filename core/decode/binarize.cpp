@@ -117,29 +117,23 @@ void combine_3x3(const std::vector<float>& tiles, int stride, Operation operatio
 
 }  // namespace
 
+/// Of a row of tiles.
 template <class T>
-void Binarizer::find_extremes(const ImageView<T>& frame) {
+void Binarizer::find_extremes(const ImageView<T>& frame, int row, RowBuffers<T>& buffers) {
   const int tile = options_.tile_px;
-  columns_ = (frame.width + tile - 1) / tile;
-  rows_ = (frame.height + tile - 1) / tile;
-  stride_ = columns_ + 2;
-  least_.assign(static_cast<std::size_t>(stride_) * (rows_ + 2), std::numeric_limits<float>::max());
-  greatest_.assign(least_.size(), 0);
-  auto& [threshold, least, greatest] = std::get<RowBuffers<T>>(row_buffers_);
-  for (int row = 0; row < rows_; ++row) {
-    const int top = row * tile, bottom = std::min(top + tile, frame.height);
-    least.assign(frame.row(top), frame.row(top) + frame.width);
-    greatest = least;
-    for (int y = top + 1; y < bottom; ++y)
-      Cloned<extend_columns<T>>::call(frame.row(y), frame.width, least.data(), greatest.data());
-    // The last tile may reach beyond the frame.
-    least.resize(static_cast<std::size_t>(columns_) * tile, std::numeric_limits<T>::max());
-    greatest.resize(least.size(), 0);
-    Cloned<slide_extremes<T>>::call(least.data(), greatest.data(), static_cast<int>(least.size()), tile);
-    for (int column = 0; column < columns_; ++column) {
-      least_[(row + 1) * stride_ + 1 + column] = least[column * tile];
-      greatest_[(row + 1) * stride_ + 1 + column] = greatest[column * tile];
-    }
+  auto& [threshold, least, greatest] = buffers;
+  const int top = row * tile, bottom = std::min(top + tile, frame.height);
+  least.assign(frame.row(top), frame.row(top) + frame.width);
+  greatest = least;
+  for (int y = top + 1; y < bottom; ++y)
+    Cloned<extend_columns<T>>::call(frame.row(y), frame.width, least.data(), greatest.data());
+  // The last tile may reach beyond the frame.
+  least.resize(static_cast<std::size_t>(columns_) * tile, std::numeric_limits<T>::max());
+  greatest.resize(least.size(), 0);
+  Cloned<slide_extremes<T>>::call(least.data(), greatest.data(), static_cast<int>(least.size()), tile);
+  for (int column = 0; column < columns_; ++column) {
+    least_[(row + 1) * stride_ + 1 + column] = least[column * tile];
+    greatest_[(row + 1) * stride_ + 1 + column] = greatest[column * tile];
   }
 }
 
@@ -171,29 +165,54 @@ void Binarizer::set_thresholds(float greatest) {
 }
 
 template <class T>
-void Binarizer::binarize_as(const ImageView<T>& frame, double full, Mask& mask) {
-  if (mask.width() != frame.width || mask.height() != frame.height) mask = Mask(frame.width, frame.height);
-  const auto floor = static_cast<int>(options_.contrast_min * full / 255);
-  contrast_min_ =
-      static_cast<float>(std::max(floor, static_cast<int>(options_.contrast_min_sigma * pixel_noise(frame, full))));
-  find_extremes(frame);
-  set_thresholds(static_cast<float>(full));
-  auto& threshold = std::get<RowBuffers<T>>(row_buffers_).threshold;
+void Binarizer::compare_rows(const ImageView<T>& frame, int top, int bottom, Buffers& buffers, Mask& mask) const {
+  auto& threshold = std::get<RowBuffers<T>>(buffers.rows).threshold;
   threshold.resize(static_cast<std::size_t>(columns_) * options_.tile_px + kLanes);
-  for (int y = 0; y < frame.height; ++y) {
+  for (int y = top; y < bottom; ++y) {
     // Thresholds change little from row to row.
-    if (y % kRowsAlike == 0) interpolate_row(y + kRowsAlike / 2, frame.width, threshold.data());
+    if (y % kRowsAlike == 0) interpolate_row(y + kRowsAlike / 2, frame.width, buffers, threshold.data());
     Cloned<compare_row<T>>::call(frame.row(y), threshold.data(), frame.width, mask.row(y));
   }
 }
 
 template <class T>
-float Binarizer::edge_blur_of(const ImageView<T>& frame) {
+void Binarizer::binarize_as(const ImageView<T>& frame, double full, Mask& mask, Executor& executor) {
+  constexpr int kTileRows = 8, kRows = 16 * kRowsAlike;  // at once
+  if (mask.width() != frame.width || mask.height() != frame.height) mask = Mask(frame.width, frame.height);
+  columns_ = (frame.width + options_.tile_px - 1) / options_.tile_px;
+  rows_ = (frame.height + options_.tile_px - 1) / options_.tile_px;
+  stride_ = columns_ + 2;
+  least_.assign(static_cast<std::size_t>(stride_) * (rows_ + 2), std::numeric_limits<float>::max());
+  greatest_.assign(least_.size(), 0);
+  if (buffers_.size() < static_cast<std::size_t>(executor.workers())) buffers_.resize(executor.workers());
+  float noise = 0;
+  executor.run(1 + (rows_ + kTileRows - 1) / kTileRows, [&](int part, int worker) {
+    if (part == 0) {
+      noise = pixel_noise(frame, full);
+      return;
+    }
+    for (int row = (part - 1) * kTileRows; row < std::min(part * kTileRows, rows_); ++row)
+      find_extremes(frame, row, std::get<RowBuffers<T>>(buffers_[worker].rows));
+  });
+  const auto floor = static_cast<int>(options_.contrast_min * full / 255);
+  contrast_min_ = static_cast<float>(std::max(floor, static_cast<int>(options_.contrast_min_sigma * noise)));
+  set_thresholds(static_cast<float>(full));
+  executor.run(1 + (frame.height + kRows - 1) / kRows, [&](int part, int worker) {
+    Buffers& buffers = buffers_[worker];
+    if (part == 0) {
+      edge_blur_px_ = measure_edge_blur(frame, std::get<RowBuffers<T>>(buffers.rows).greatest);
+    } else {
+      compare_rows(frame, (part - 1) * kRows, std::min(part * kRows, frame.height), buffers, mask);
+    }
+  });
+}
+
+template <class T>
+float Binarizer::measure_edge_blur(const ImageView<T>& frame, std::vector<T>& steepest) {
   constexpr int kStepRows = 37;
   constexpr float kSharpShare = 0.9F;
   const int tile = options_.tile_px;
   steepness_.clear();
-  std::vector<T>& steepest = std::get<RowBuffers<T>>(row_buffers_).greatest;
   steepest.assign(static_cast<std::size_t>(columns_) * tile, 0);
   for (int y = kStepRows / 2; y + 1 < frame.height; y += kStepRows) {
     Cloned<find_steepest<T>>::call(frame.row(y - 1), frame.row(y), frame.row(y + 1), frame.width, tile, columns_ * tile,
@@ -213,14 +232,10 @@ float Binarizer::edge_blur_of(const ImageView<T>& frame) {
   return *sharp > 0 ? 0.399F / *sharp : 0;
 }
 
-float Binarizer::edge_blur_px(const GreyView& frame) {
-  return std::visit([&](const auto& view) { return edge_blur_of(view); }, frame);
-}
-
 /// Tile centres carry the thresholds; between them they are interpolated in both directions, and rounded down: what is
 /// above the whole number is above the threshold.
 template <class T>
-void Binarizer::interpolate_row(int y, int width, T* threshold) {
+void Binarizer::interpolate_row(int y, int width, Buffers& buffers, T* threshold) const {
   constexpr float kUnit = 1 << kFractionBits<T>;
   const int tile = options_.tile_px;
   const float v = (static_cast<float>(y) + 0.5F) / static_cast<float>(tile) - 0.5F;
@@ -229,26 +244,27 @@ void Binarizer::interpolate_row(int y, int width, T* threshold) {
   const float fraction = inside - static_cast<float>(above);
   const float* upper = threshold_.data() + (above + 1) * stride_ + 1;
   const float* lower = threshold_.data() + (below + 1) * stride_ + 1;
-  at_centre_.resize(columns_);
-  step_.resize(columns_);
+  auto& [rows, at_centre, step] = buffers;
+  at_centre.resize(columns_);
+  step.resize(columns_);
   for (int column = 0; column < columns_; ++column) {
-    at_centre_[column] = static_cast<int>((upper[column] + fraction * (lower[column] - upper[column])) * kUnit);
+    at_centre[column] = static_cast<int>((upper[column] + fraction * (lower[column] - upper[column])) * kUnit);
   }
   // Not divided by the tile in whole numbers, which takes longer than all the rest.
   const float per_px = 1 / static_cast<float>(tile);
   for (int column = 0; column + 1 < columns_; ++column) {
-    step_[column] = static_cast<int>(static_cast<float>(at_centre_[column + 1] - at_centre_[column]) * per_px);
+    step[column] = static_cast<int>(static_cast<float>(at_centre[column + 1] - at_centre[column]) * per_px);
   }
   // Flat before the first centre and after the last.
   const int first = tile / 2, last = first + (columns_ - 1) * tile;
-  std::fill_n(threshold, std::min(first, width), static_cast<T>(at_centre_.front() >> kFractionBits<T>));
-  Cloned<draw_line<T>>::call({at_centre_.data(), step_.data(), columns_, tile}, threshold + first);
+  std::fill_n(threshold, std::min(first, width), static_cast<T>(at_centre.front() >> kFractionBits<T>));
+  Cloned<draw_line<T>>::call({at_centre.data(), step.data(), columns_, tile}, threshold + first);
   if (last < width)
-    std::fill(threshold + last, threshold + width, static_cast<T>(at_centre_.back() >> kFractionBits<T>));
+    std::fill(threshold + last, threshold + width, static_cast<T>(at_centre.back() >> kFractionBits<T>));
 }
 
-void Binarizer::binarize(const GreyView& frame, double full, Mask& mask) {
-  std::visit([&](const auto& view) { binarize_as(view, full, mask); }, frame);
+void Binarizer::binarize(const GreyView& frame, double full, Mask& mask, Executor& executor) {
+  std::visit([&](const auto& view) { binarize_as(view, full, mask, executor); }, frame);
 }
 
 }  // namespace slsd

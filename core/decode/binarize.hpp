@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/decode/mask.hpp"
+#include "core/executor.hpp"
 #include "core/image.hpp"
 
 namespace slsd {
@@ -33,39 +34,44 @@ class Binarizer {
 
   /// @param full  the level of a saturated pixel of the frame
   /// @param mask  becomes of the frame's size
-  void binarize(const GreyView& frame, double full, Mask& mask);
+  void binarize(const GreyView& frame, double full, Mask& mask, Executor& executor);
 
   [[nodiscard]] const BinarizeOptions& options() const { return options_; }
   /// Between light and dark of what was taken for the pattern in the last frame, in its levels.
   [[nodiscard]] float contrast_min() const { return contrast_min_; }
   /// One standard deviation of the blur at the sharpest edges of the last frame, from how steep they are between its
   /// tiles' least and greatest values; 0 where there are none.
-  /// @param frame  the last
-  [[nodiscard]] float edge_blur_px(const GreyView& frame);
+  [[nodiscard]] float edge_blur_px() const { return edge_blur_px_; }
 
  private:
-  template <class T>
-  [[nodiscard]] float edge_blur_of(const ImageView<T>& frame);
-  template <class T>
-  void binarize_as(const ImageView<T>& frame, double full, Mask& mask);
-  template <class T>
-  void find_extremes(const ImageView<T>& frame);
-  template <class T>
-  void interpolate_row(int y, int width, T* threshold);
-  void set_thresholds(float greatest);
-
-  BinarizeOptions options_;
-  float contrast_min_ = 0;
-  int columns_ = 0, rows_ = 0;  // of tiles
-  int stride_ = 0;              // of the tiles with a border of one all round
-  std::vector<float> least_, greatest_, across_, low_, high_, midway_, threshold_;
-  std::vector<float> steepness_;
-  std::vector<int> at_centre_, step_;  // of a row of thresholds, binary fractions
   template <class T>
   struct RowBuffers {
     std::vector<T> threshold, least, greatest;
   };
-  std::tuple<RowBuffers<std::uint8_t>, RowBuffers<std::uint16_t>> row_buffers_;
+  /// Of one worker.
+  struct Buffers {
+    std::tuple<RowBuffers<std::uint8_t>, RowBuffers<std::uint16_t>> rows;
+    std::vector<int> at_centre, step;  // of a row of thresholds, binary fractions
+  };
+  template <class T>
+  void binarize_as(const ImageView<T>& frame, double full, Mask& mask, Executor& executor);
+  template <class T>
+  void find_extremes(const ImageView<T>& frame, int row, RowBuffers<T>& buffers);
+  void set_thresholds(float greatest);
+  template <class T>
+  [[nodiscard]] float measure_edge_blur(const ImageView<T>& frame, std::vector<T>& steepest);
+  template <class T>
+  void compare_rows(const ImageView<T>& frame, int top, int bottom, Buffers& buffers, Mask& mask) const;
+  template <class T>
+  void interpolate_row(int y, int width, Buffers& buffers, T* threshold) const;
+
+  BinarizeOptions options_;
+  float contrast_min_ = 0, edge_blur_px_ = 0;
+  int columns_ = 0, rows_ = 0;  // of tiles
+  int stride_ = 0;              // of the tiles with a border of one all round
+  std::vector<float> least_, greatest_, across_, low_, high_, midway_, threshold_;
+  std::vector<float> steepness_;
+  std::vector<Buffers> buffers_;
 };
 
 }  // namespace slsd

@@ -34,24 +34,28 @@ float noise_of_centre_px(float weight, float background, float gain, const Frame
   return relative / std::sqrt(std::sqrt(weight));
 }
 
-void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const CellRays& cells, Lattice& lattice) {
+void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const CellRays& cells, Executor& executor,
+                        Lattice& lattice) {
   std::vector<LatticeSymbol>& symbols = lattice.symbols;
   across_px_.assign(symbols.size(), 0);
   if (view != nullptr && !symbols.empty()) {
-    for (std::size_t i = 0; i < symbols.size(); ++i) {
-      const LatticeSymbol& symbol = symbols[i];
-      across_px_[i] = static_cast<float>(
-          view->residual_px(symbol.sighting, symbol.centre_px, cells.ray(symbol.row, symbol.column)));
-    }
+    executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
+      for (std::size_t i = first; i < last; ++i) {
+        const LatticeSymbol& symbol = symbols[i];
+        across_px_[i] = static_cast<float>(
+            view->residual_px(symbol.sighting, symbol.centre_px, cells.ray(symbol.row, symbol.column)));
+      }
+    });
     sorted_ = across_px_;
     const auto middle = sorted_.begin() + static_cast<std::ptrdiff_t>(sorted_.size() / 2);
     std::nth_element(sorted_.begin(), middle, sorted_.end());
+    const float usual_px = *middle;
     for (std::size_t i = 0; i < symbols.size(); ++i)
-      across_px_[i] = std::abs(across_px_[i] - *middle) * std::sqrt(std::abs(symbols[i].frame.determinant()));
+      across_px_[i] = std::abs(across_px_[i] - usual_px) * std::sqrt(std::abs(symbols[i].frame.determinant()));
   }
   const auto square = [](float x) { return x * x; };
-  for (std::size_t i = 0; i < symbols.size(); ++i) {
-    LatticeSymbol& symbol = symbols[i];
+  const auto sigma_of = [&](std::size_t i) {
+    const LatticeSymbol& symbol = symbols[i];
     float around = square(across_px_[i]), count = 1;
     for (const std::int32_t other : symbol.neighbours) {
       if (other < 0) continue;
@@ -60,10 +64,13 @@ void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const
     }
     const float noise_px = noise_of_centre_px(symbol.weight, symbol.background, symbol.gain, noise);
     const float roughness = std::max(0.F, around / count - square(noise_px) - square(kSmoothAcrossPx));
-    symbol.sigma_px = std::sqrt(square(noise_px) + square(kLeastPx) + square(kOfAcross * across_px_[i]) +
-                                square(kOfRoughness) * roughness + square(kOfMisfitSquared * square(symbol.misfit)) +
-                                (has_bend(symbol) ? 0 : square(kUnknownBendPx)));
-  }
+    return std::sqrt(square(noise_px) + square(kLeastPx) + square(kOfAcross * across_px_[i]) +
+                     square(kOfRoughness) * roughness + square(kOfMisfitSquared * square(symbol.misfit)) +
+                     (has_bend(symbol) ? 0 : square(kUnknownBendPx)));
+  };
+  executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) symbols[i].sigma_px = sigma_of(i);
+  });
 }
 
 }  // namespace slsd

@@ -35,7 +35,8 @@ namespace slsd {
 class CentreJudge {
  public:
   /// @param view  null where there is no calibration: nothing is known then of what lies across
-  void judge(const FrameNoise& noise, const EpipolarView* view, const CellRays& cells, Lattice& lattice);
+  void judge(const FrameNoise& noise, const EpipolarView* view, const CellRays& cells, Executor& executor,
+             Lattice& lattice);
 
  private:
   std::vector<float> across_px_, sorted_;

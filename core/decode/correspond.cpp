@@ -16,6 +16,7 @@ class Surroundings {
       : nodes_(nodes), claims_(claims) {}
 
   [[nodiscard]] bool leave_alone(std::int32_t node) const {
+    if (goes_on_all_around(node)) return false;  // as most do, and then none of the following can be
     return is_lone(node, kRight) || is_lone(node, kDown) ||
            std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp},
                                [&](Direction d) { return is_lone_at_rim(node, d); });
@@ -92,6 +93,13 @@ class Surroundings {
 
  private:
   static constexpr int kReach = 3;
+  /// Those beside it stand, and their cells lie beside its own.
+  [[nodiscard]] bool goes_on_all_around(std::int32_t node) const {
+    return std::ranges::all_of(std::array{kRight, kDown, kLeft, kUp}, [&](Direction d) {
+      const std::int32_t other = beside(node, d);
+      return stands(node, other) && fits(node, other, d);
+    });
+  }
   /// There lies what is none of its island, or what is misread.
   [[nodiscard]] bool is_beside_others(std::int32_t node, Direction d) const {
     return contradicts(node, d) || misread(beside(node, d));
@@ -189,14 +197,23 @@ void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellCl
   }
 }
 
-void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, std::vector<CellClaim>& claims) {
+void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, Executor& executor,
+                                 std::vector<CellClaim>& claims) {
   const Surroundings around(nodes, claims);
+  refused_.resize(nodes.size());
+  // All are asked before any is refused.
   const auto refuse = [&](auto&& asked) {
-    lone_.clear();
-    for (std::int32_t node = 0; node < static_cast<std::int32_t>(nodes.size()); ++node)
-      if (claims[node].status == RegionStatus::kDecoded && asked(node)) lone_.push_back(node);
-    for (const std::int32_t node : lone_) claims[node].status = RegionStatus::kNeighboursDisagree;
-    return !lone_.empty();
+    executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
+      for (std::size_t node = first; node < last; ++node)
+        refused_[node] = claims[node].status == RegionStatus::kDecoded && asked(static_cast<std::int32_t>(node));
+    });
+    bool any = false;
+    for (std::size_t node = 0; node < nodes.size(); ++node) {
+      if (refused_[node] == 0) continue;
+      claims[node].status = RegionStatus::kNeighboursDisagree;
+      any = true;
+    }
+    return any;
   };
   refuse([&](std::int32_t node) { return around.leave_alone(node); });
   refuse([&](std::int32_t node) { return around.is_corner(node); });
@@ -208,17 +225,19 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, std::vector
 }
 
 void Correspondence::correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,
-                                std::vector<CellClaim>& claims) {
-  for (std::size_t node = 0; node < claims.size(); ++node) {
-    CellClaim& claim = claims[node];
-    if (claim.status != RegionStatus::kDecoded) continue;
-    const Eigen::Vector2d& direction = cells.ray(claim.row, claim.column).direction;
-    if (std::abs(segments[node].residual_px(direction)) > tolerance_px) {
-      claim.status = RegionStatus::kOffEpipolarLine;
-    } else if (!segments[node].passes(direction, tolerance_px)) {
-      claim.status = RegionStatus::kOutOfDepthRange;
+                                Executor& executor, std::vector<CellClaim>& claims) {
+  executor.run_ranges(claims.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t node = first; node < last; ++node) {
+      CellClaim& claim = claims[node];
+      if (claim.status != RegionStatus::kDecoded) continue;
+      const Eigen::Vector2d& direction = cells.ray(claim.row, claim.column).direction;
+      if (std::abs(segments[node].residual_px(direction)) > tolerance_px) {
+        claim.status = RegionStatus::kOffEpipolarLine;
+      } else if (!segments[node].passes(direction, tolerance_px)) {
+        claim.status = RegionStatus::kOutOfDepthRange;
+      }
     }
-  }
+  });
   settle_duplicates(cells, claims);
 }
 

@@ -24,20 +24,20 @@ class Correspondence {
   explicit Correspondence(CorrespondOptions options) : options_(options) {}
 
   void correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,
-                  std::vector<CellClaim>& claims);
+                  Executor& executor, std::vector<CellClaim>& claims);
 
   /// Refuses symbols at a rim most of whose neighbours along their row, or their column, were refused: the edge that
   /// cut those runs through them as well, and what is left of two symbols can look like a whole one. Between decoded
   /// ones on both sides it takes that all of them were.
-  void refuse_lone(const std::vector<GridNode>& nodes, std::vector<CellClaim>& claims);
+  void refuse_lone(const std::vector<GridNode>& nodes, Executor& executor, std::vector<CellClaim>& claims);
 
   /// The duplicates alone, where there is no calibration.
   void settle_duplicates(const CellRays& cells, std::vector<CellClaim>& claims);
 
  private:
   CorrespondOptions options_;
-  std::vector<std::int32_t> holder_;  // of each cell
-  std::vector<std::int32_t> lone_;
+  std::vector<std::int32_t> holder_;   // of each cell
+  std::vector<std::uint8_t> refused_;  // of each node, in one round
 };
 
 }  // namespace slsd

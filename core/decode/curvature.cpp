@@ -53,37 +53,25 @@ std::int32_t CentreCorrection::named_neighbour(const std::vector<GridNode>& node
              : -1;
 }
 
-void CentreCorrection::find_named_neighbours(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims) {
-  named_.assign(nodes.size(), {-1, -1, -1, -1});
-  for (std::int32_t i = 0; i < static_cast<std::int32_t>(nodes.size()); ++i) {
-    if (claims[i].status != RegionStatus::kDecoded) continue;
-    for (const Direction d : {kRight, kDown, kLeft, kUp}) named_[i][d] = named_neighbour(nodes, claims, i, d);
-  }
-}
-
-void CentreCorrection::measure_bends(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims) {
-  derivatives_.assign(nodes.size(), {});
-  find_named_neighbours(nodes, claims);
+void CentreCorrection::measure_bends(std::int32_t node) {
   const auto next = [&](std::int32_t from, Direction d) { return from < 0 ? -1 : named_[from][d]; };
   const float per_squared_px = 1 / (pitch_px_ * pitch_px_);
-  for (std::int32_t i = 0; i < static_cast<std::int32_t>(nodes.size()); ++i) {
-    const auto [right, down, left, up] = named_[i];
-    Derivatives& at = derivatives_[i];
-    if (right >= 0 && left >= 0) {
-      at.bend.uu = (centres_[right] + centres_[left] - 2 * centres_[i]) * per_squared_px;
-      at.has_uu = true;
-    }
-    if (up >= 0 && down >= 0) {
-      at.bend.vv = (centres_[up] + centres_[down] - 2 * centres_[i]) * per_squared_px;
-      at.has_vv = true;
-    }
-    const std::int32_t up_left = next(up, kLeft), up_right = next(up, kRight), down_left = next(down, kLeft),
-                       down_right = next(down, kRight);
-    if (up_left >= 0 && up_right >= 0 && down_left >= 0 && down_right >= 0) {
-      at.bend.uv = (centres_[down_right] + centres_[up_left] - centres_[up_right] - centres_[down_left]) *
-                   (0.25F * per_squared_px);
-      at.has_uv = true;
-    }
+  const auto [right, down, left, up] = named_[node];
+  Derivatives& at = derivatives_[node] = {};
+  if (right >= 0 && left >= 0) {
+    at.bend.uu = (centres_[right] + centres_[left] - 2 * centres_[node]) * per_squared_px;
+    at.has_uu = true;
+  }
+  if (up >= 0 && down >= 0) {
+    at.bend.vv = (centres_[up] + centres_[down] - 2 * centres_[node]) * per_squared_px;
+    at.has_vv = true;
+  }
+  const std::int32_t up_left = next(up, kLeft), up_right = next(up, kRight), down_left = next(down, kLeft),
+                     down_right = next(down, kRight);
+  if (up_left >= 0 && up_right >= 0 && down_left >= 0 && down_right >= 0) {
+    at.bend.uv = (centres_[down_right] + centres_[up_left] - centres_[up_right] - centres_[down_left]) *
+                 (0.25F * per_squared_px);
+    at.has_uv = true;
   }
 }
 
@@ -122,48 +110,65 @@ std::optional<Bend> CentreCorrection::bend_of(const std::vector<GridNode>& nodes
               median_around(nodes, node, &Derivatives::has_vv, &Bend::vv)};
 }
 
+/// @param letter  of its cell
+LatticeSymbol CentreCorrection::symbol_of(const std::vector<GridNode>& nodes, const GreyMoments& seen,
+                                          const CellClaim& claim, std::int32_t node, std::size_t letter,
+                                          std::optional<float> misfit) const {
+  LatticeSymbol symbol{.sighting = node,
+                       .row = claim.row,
+                       .column = claim.column,
+                       .centre_px = {seen.x, seen.y},
+                       .frame = nodes[node].frame,
+                       .bend = {},
+                       .background = seen.background,
+                       .gain = seen.peak - seen.background,
+                       .misfit = 0,
+                       .weight = seen.weight,
+                       .sigma_px = 0,
+                       .neighbours = {-1, -1, -1, -1}};
+  symbol.misfit =
+      misfit ? *misfit
+             : std::sqrt(prototypes_[letter].squared_distance(shape_features(seen, symbol.frame.inverse(), size_px_)));
+  for (const Direction d : {kRight, kDown, kLeft, kUp}) {
+    if (named_[node][d] >= 0) symbol.neighbours[d] = symbol_of_[named_[node][d]];
+  }
+  if (const std::optional<Bend> bend = bend_of(nodes, node)) {
+    symbol.bend = *bend;
+    symbol.centre_px -= pull_of(*bend, symbol.frame, second_moments_px2_[letter]);
+  }
+  return symbol;
+}
+
 void CentreCorrection::correct(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
-                               const std::vector<CellClaim>& claims, const CodeArray& array, Lattice& lattice,
-                               std::span<const float> misfits) {
+                               const std::vector<CellClaim>& claims, const CodeArray& array, Executor& executor,
+                               Lattice& lattice, std::span<const float> misfits) {
   centres_.resize(nodes.size());
-  symbol_of_.assign(nodes.size(), -1);
+  named_.resize(nodes.size());
+  derivatives_.resize(nodes.size());
+  symbol_of_.resize(nodes.size());
   std::int32_t symbols = 0;
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    symbol_of_[i] = claims[i].status == RegionStatus::kDecoded ? symbols++ : -1;
+  const auto for_each_node = [&](auto&& work) {
+    executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
+      for (std::size_t i = first; i < last; ++i) work(i);
+    });
+  };
+  for_each_node([&](std::size_t i) {
     centres_[i] = {moments[i].x, moments[i].y};
     if (claims[i].named()) centres_[i] -= nodes[i].frame * centroids_px_[array.at(claims[i].row, claims[i].column)];
-    if (claims[i].status == RegionStatus::kDecoded) symbol_of_[i] = symbols++;
-  }
-  measure_bends(nodes, claims);
-  lattice.symbols.clear();
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    if (symbol_of_[i] < 0) continue;
-    const GreyMoments& seen = moments[i];
-    LatticeSymbol symbol{.sighting = static_cast<std::int32_t>(i),
-                         .row = claims[i].row,
-                         .column = claims[i].column,
-                         .centre_px = {seen.x, seen.y},
-                         .frame = nodes[i].frame,
-                         .bend = {},
-                         .background = seen.background,
-                         .gain = seen.peak - seen.background,
-                         .misfit = 0,
-                         .weight = seen.weight,
-                         .sigma_px = 0,
-                         .neighbours = {-1, -1, -1, -1}};
-    const std::size_t letter = array.at(symbol.row, symbol.column);
-    symbol.misfit =
-        !misfits.empty()
-            ? misfits[i]
-            : std::sqrt(prototypes_[letter].squared_distance(shape_features(seen, symbol.frame.inverse(), size_px_)));
     for (const Direction d : {kRight, kDown, kLeft, kUp}) {
-      if (named_[i][d] >= 0) symbol.neighbours[d] = symbol_of_[named_[i][d]];
+      named_[i][d] = symbol_of_[i] < 0 ? -1 : named_neighbour(nodes, claims, static_cast<std::int32_t>(i), d);
     }
-    if (const std::optional<Bend> bend = bend_of(nodes, symbol.sighting)) {
-      symbol.bend = *bend;
-      symbol.centre_px -= pull_of(*bend, symbol.frame, second_moments_px2_[letter]);
-    }
-    lattice.symbols.push_back(symbol);
-  }
+  });
+  for_each_node([&](std::size_t i) { measure_bends(static_cast<std::int32_t>(i)); });
+  lattice.symbols.resize(static_cast<std::size_t>(symbols));
+  for_each_node([&](std::size_t i) {
+    if (symbol_of_[i] < 0) return;
+    const auto misfit = misfits.empty() ? std::nullopt : std::optional<float>(misfits[i]);
+    lattice.symbols[static_cast<std::size_t>(symbol_of_[i])] = symbol_of(
+        nodes, moments[i], claims[i], static_cast<std::int32_t>(i), array.at(claims[i].row, claims[i].column), misfit);
+  });
 }
 
 }  // namespace slsd

@@ -35,7 +35,7 @@ class CentreCorrection {
   /// @param lattice  becomes one symbol to each node that is decoded, in their order, with its place, map and
   /// neighbours; what its centre's sigma is remains to be told
   void correct(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
-               const std::vector<CellClaim>& claims, const CodeArray& array, Lattice& lattice,
+               const std::vector<CellClaim>& claims, const CodeArray& array, Executor& executor, Lattice& lattice,
                std::span<const float> misfits = {});
 
  private:
@@ -43,8 +43,10 @@ class CentreCorrection {
     Bend bend;
     bool has_uu = false, has_uv = false, has_vv = false;
   };
-  void find_named_neighbours(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims);
-  void measure_bends(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims);
+  void measure_bends(std::int32_t node);
+  [[nodiscard]] LatticeSymbol symbol_of(const std::vector<GridNode>& nodes, const GreyMoments& seen,
+                                        const CellClaim& claim, std::int32_t node, std::size_t letter,
+                                        std::optional<float> misfit) const;
   template <class Part>
   [[nodiscard]] Eigen::Vector2f median_around(const std::vector<GridNode>& nodes, std::int32_t node,
                                               bool Derivatives::*has, Part part) const;

@@ -7,15 +7,15 @@
 namespace slsd {
 
 Result<const Decoding*> decode_in_light(Decoder& decoder, const GreyView& frame, const SceneLight& light,
-                                        StageObserver* observer) {
-  auto plain = decoder.decode(frame, light.full, observer);
+                                        StageObserver* observer, Executor* executor) {
+  auto plain = decoder.decode(frame, light.full, observer, executor);
   if (!plain || !light.white) return plain;
   const std::size_t points = (*plain)->points.size();
   const auto quotient = divide_light(frame, *light.white, light.dark);
   if (!quotient) return tl::unexpected(quotient.error());
-  auto divided = decoder.decode(quotient->view(), kQuotientFull, observer);
+  auto divided = decoder.decode(quotient->view(), kQuotientFull, observer, executor);
   if (!divided || (*divided)->points.size() >= points) return divided;
-  return decoder.decode(frame, light.full, observer);
+  return decoder.decode(frame, light.full, observer, executor);
 }
 
 }  // namespace slsd

@@ -13,6 +13,6 @@ namespace slsd {
 /// @errors as Decoder::decode(); kMismatch: the frames are not of one size
 /// @thread thread-bound, as the decoder
 [[nodiscard]] Result<const Decoding*> decode_in_light(Decoder& decoder, const GreyView& frame, const SceneLight& light,
-                                                      StageObserver* observer = nullptr);
+                                                      StageObserver* observer = nullptr, Executor* executor = nullptr);
 
 }  // namespace slsd

@@ -13,14 +13,14 @@ constexpr int kCorrectedWeight = 1;
 
 }  // namespace
 
-WindowDecoder::WindowDecoder(const Pattern& pattern, DecodeWindowsOptions options)
+WindowDecoder::WindowDecoder(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max)
     : array_(pattern.array),
-      options_(options),
-      codebook_(std::make_shared<const Codebook>(pattern.array, options.rows, options.columns)),
+      codebook_(std::move(codebook)),
       unique_(pattern.array.minimum_distance > 0),
       corrects_(pattern.array.minimum_distance >= 3),
       log_letters_(std::log(static_cast<float>(pattern.letters()))),
-      judge_(pattern, {.rows = options.rows, .columns = options.columns, .wrong_cells_max = options.wrong_cells_max}) {}
+      judge_(pattern,
+             {.rows = codebook_->rows(), .columns = codebook_->columns(), .wrong_cells_max = wrong_cells_max}) {}
 
 std::optional<std::uint32_t> WindowDecoder::key_of(const Neighbourhood& around,
                                                    const std::vector<Classification>& shapes) const {
@@ -34,11 +34,14 @@ std::optional<std::uint32_t> WindowDecoder::key_of(const Neighbourhood& around,
 
 /// Where the window above, or the one to the left, was found, this one lies beside it: one comparison instead of a
 /// search, as long as no other window is like it.
-WindowDecoder::Hit WindowDecoder::continued(std::int32_t node, std::uint32_t key) const {
+/// @param first  from which node on there are hits
+WindowDecoder::Hit WindowDecoder::continued(std::int32_t node, std::uint32_t key, std::int32_t first) const {
   if (!unique_) return {};
   constexpr int kAbove = 1, kLeftOf = 3;
   for (const int beside : {kAbove, kLeftOf}) {
-    const Hit& hit = hits_[around_[node][beside]];
+    const std::int32_t other = around_[node][beside];
+    if (other < first || other >= node) continue;
+    const Hit& hit = hits_[other];
     const int row = hit.row + (beside == kAbove), column = hit.column + (beside == kLeftOf);
     if (hit.weight == 0 || codebook_->key_at(row, column) != key) continue;
     return {static_cast<std::int16_t>(row), static_cast<std::int16_t>(column), kExactWeight};
@@ -67,17 +70,18 @@ WindowDecoder::Hit WindowDecoder::look_up(std::int32_t node, std::uint32_t key, 
   return hits == 1 ? found : Hit{};
 }
 
-void WindowDecoder::look_up_windows(const std::vector<Classification>& shapes, const CellGate& gate) {
-  hits_.assign(around_.size(), {});
-  for (std::size_t i = 0; i < around_.size(); ++i) {
-    const auto key = key_of(around_[i], shapes);
+/// Of a range of nodes.
+void WindowDecoder::look_up_windows(std::int32_t first, std::int32_t last, const std::vector<Classification>& shapes,
+                                    const CellGate& gate) {
+  for (std::int32_t node = first; node < last; ++node) {
+    Hit& hit = hits_[node] = {};
+    const auto key = key_of(around_[node], shapes);
     if (!key) continue;
-    const auto node = static_cast<std::int32_t>(i);
-    hits_[i] = continued(node, *key);
-    if (hits_[i].weight == 0) {
-      hits_[i] = look_up(node, *key, gate);
+    hit = continued(node, *key, first);
+    if (hit.weight == 0) {
+      hit = look_up(node, *key, gate);
     } else {
-      hits_[i].strays = !gate.admits(node, hits_[i].row, hits_[i].column);
+      hit.strays = !gate.admits(node, hit.row, hit.column);
     }
   }
 }
@@ -127,41 +131,38 @@ bool WindowDecoder::is_unanimous(std::int32_t node) const {
   return unanimous;
 }
 
-void WindowDecoder::elect(const CellGate& gate, std::vector<CellClaim>& claims) const {
-  for (std::size_t node = 0; node < claims.size(); ++node) {
-    if (is_unanimous(static_cast<std::int32_t>(node))) {
-      claims[node] = {hits_[node].row, hits_[node].column, 0, RegionStatus::kDecoded};
-      continue;
-    }
-    const Ballot ballot = collect_votes(static_cast<std::int32_t>(node), gate);
-    CellClaim& claim = claims[node];
-    claim = {};
-    const bool linked = std::ranges::count_if(around_[node], [](std::int32_t other) { return other >= 0; }) > 1;
-    claim.status = linked ? RegionStatus::kNoCodeword : RegionStatus::kNoNeighbour;
-    int best = 0, second = 0;
-    for (int i = 0; i < ballot.count; ++i) {
-      const int weight = ballot.votes[i].weight;
-      if (weight > best) {
-        second = best;
-        best = weight;
-        claim.row = static_cast<std::int16_t>(ballot.votes[i].row);
-        claim.column = static_cast<std::int16_t>(ballot.votes[i].column);
-      } else {
-        second = std::max(second, weight);
-      }
-    }
-    if (best == 0) continue;
-    claim.status = RegionStatus::kDecoded;
-    if (2 * second > best) claim = {-1, -1, 0, RegionStatus::kAmbiguousCodeword};
+void WindowDecoder::elect(std::int32_t node, const CellGate& gate, CellClaim& claim) const {
+  if (is_unanimous(node)) {
+    claim = {hits_[node].row, hits_[node].column, 0, RegionStatus::kDecoded};
+    return;
   }
+  const Ballot ballot = collect_votes(node, gate);
+  claim = {};
+  const bool linked = std::ranges::count_if(around_[node], [](std::int32_t other) { return other >= 0; }) > 1;
+  claim.status = linked ? RegionStatus::kNoCodeword : RegionStatus::kNoNeighbour;
+  int best = 0, second = 0;
+  for (int i = 0; i < ballot.count; ++i) {
+    const int weight = ballot.votes[i].weight;
+    if (weight > best) {
+      second = best;
+      best = weight;
+      claim.row = static_cast<std::int16_t>(ballot.votes[i].row);
+      claim.column = static_cast<std::int16_t>(ballot.votes[i].column);
+    } else {
+      second = std::max(second, weight);
+    }
+  }
+  if (best == 0) return;
+  claim.status = RegionStatus::kDecoded;
+  if (2 * second > best) claim = {-1, -1, 0, RegionStatus::kAmbiguousCodeword};
 }
 
 /// Weighs the claims on cells that are claimed more than once: the log-likelihood of each window's shapes against
 /// chance.
 void WindowDecoder::weigh_rivals(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims) {
-  claimed_.assign(static_cast<std::size_t>(options_.rows) * options_.columns, 0);
+  claimed_.assign(static_cast<std::size_t>(codebook_->rows()) * codebook_->columns(), 0);
   const auto claimed = [&](const CellClaim& claim) -> std::uint8_t& {
-    return claimed_[static_cast<std::size_t>(claim.row) * options_.columns + claim.column];
+    return claimed_[static_cast<std::size_t>(claim.row) * codebook_->columns() + claim.column];
   };
   bool rivals = false;
   for (const CellClaim& claim : claims) {
@@ -183,14 +184,23 @@ void WindowDecoder::weigh_rivals(const std::vector<Classification>& shapes, std:
 }
 
 void WindowDecoder::decode(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes,
-                           const CellGate& gate, std::vector<CellClaim>& claims) {
+                           const CellGate& gate, Executor& executor, std::vector<CellClaim>& claims) {
   around_.resize(nodes.size());
+  hits_.resize(nodes.size());
+  claims.resize(nodes.size());
   find_beside(nodes, beside_);
-  for (std::size_t i = 0; i < nodes.size(); ++i) around_[i] = neighbourhood(beside_, static_cast<std::int32_t>(i));
-  claims.assign(nodes.size(), {});
-  look_up_windows(shapes, gate);
-  elect(gate, claims);
-  judge_.judge(nodes, beside_, shapes, gate, claims);
+  constexpr std::size_t kRange = 768;  // some rows of windows: most continue one of their range
+  executor.run_ranges(
+      nodes.size(),
+      [&](std::size_t first, std::size_t last, int) {
+        for (std::size_t i = first; i < last; ++i) around_[i] = neighbourhood(beside_, static_cast<std::int32_t>(i));
+        look_up_windows(static_cast<std::int32_t>(first), static_cast<std::int32_t>(last), shapes, gate);
+      },
+      kRange);
+  executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) elect(static_cast<std::int32_t>(i), gate, claims[i]);
+  });
+  judge_.judge(nodes, beside_, shapes, gate, executor, claims);
   weigh_rivals(shapes, claims);
 }
 

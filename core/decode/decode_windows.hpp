@@ -18,11 +18,6 @@
 
 namespace slsd {
 
-struct DecodeWindowsOptions {
-  int rows = 0, columns = 0;       ///< of the part of the array that is shown
-  double wrong_cells_max = 0.001;  ///< see IslandOptions
-};
-
 /// Names the cell of each node.
 ///
 /// 1. Every full 3x3 window is looked up: exactly wherever it lies, and with as many errors as the array's distance
@@ -33,10 +28,12 @@ struct DecodeWindowsOptions {
 /// @thread thread-bound: keeps its buffers
 class WindowDecoder {
  public:
-  WindowDecoder(const Pattern& pattern, DecodeWindowsOptions options);
+  /// @param codebook         of the part of the pattern's array that is shown
+  /// @param wrong_cells_max  see IslandOptions
+  WindowDecoder(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max);
 
   void decode(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes, const CellGate& gate,
-              std::vector<CellClaim>& claims);
+              Executor& executor, std::vector<CellClaim>& claims);
 
  private:
   /// The cell of a window's middle, where the window was found.
@@ -55,23 +52,23 @@ class WindowDecoder {
     int count = 0;
   };
 
-  void look_up_windows(const std::vector<Classification>& shapes, const CellGate& gate);
+  void look_up_windows(std::int32_t first, std::int32_t last, const std::vector<Classification>& shapes,
+                       const CellGate& gate);
   [[nodiscard]] std::optional<std::uint32_t> key_of(const Neighbourhood& around,
                                                     const std::vector<Classification>& shapes) const;
-  [[nodiscard]] Hit continued(std::int32_t node, std::uint32_t key) const;
+  [[nodiscard]] Hit continued(std::int32_t node, std::uint32_t key, std::int32_t first) const;
   [[nodiscard]] Hit look_up(std::int32_t node, std::uint32_t key, const CellGate& gate) const;
   [[nodiscard]] Ballot collect_votes(std::int32_t node, const CellGate& gate) const;
   void vote(std::int32_t node, const Vote& vote, bool strays, const CellGate& gate, Ballot& ballot) const;
-  void elect(const CellGate& gate, std::vector<CellClaim>& claims) const;
+  void elect(std::int32_t node, const CellGate& gate, CellClaim& claim) const;
   [[nodiscard]] bool is_unanimous(std::int32_t node) const;
   void weigh_rivals(const std::vector<Classification>& shapes, std::vector<CellClaim>& claims);
   [[nodiscard]] bool shown(int row, int column) const {
-    return row >= 0 && column >= 0 && row < options_.rows && column < options_.columns;
+    return row >= 0 && column >= 0 && row < codebook_->rows() && column < codebook_->columns();
   }
 
   CodeArray array_;
-  DecodeWindowsOptions options_;
-  std::shared_ptr<const Codebook> codebook_;  // shared with copies: it never changes
+  std::shared_ptr<const Codebook> codebook_;  // shared by all decoders of the pattern: it never changes
   bool unique_, corrects_;                    // no two windows alike; none alike but for two letters
   float log_letters_;
   std::vector<Beside> beside_;

@@ -27,12 +27,13 @@ struct Decoder::Parts {
   std::vector<PixelRay> rays{};  // of the symbols to align, and their depths
   std::vector<double> depths_mm{};
   const std::vector<AlignedSymbol>* aligned = nullptr;  // of this frame
+  std::vector<TriangulatedPoint> solutions{};           // one to a symbol
 
   const Lattice* lattice_read = nullptr;  // of this frame
 
   [[nodiscard]] TriangulatedPoint solve(const LatticeSymbol& symbol) const;
   void place_symbols();
-  void triangulate(const Lattice& lattice, double full);
+  void triangulate(const Lattice& lattice, double full, Executor& executor);
   void add_point(const LatticeSymbol& symbol, const Eigen::Vector2f& centre_px, const TriangulatedPoint& solved,
                  double full);
 };
@@ -42,12 +43,13 @@ Decoder::Decoder(Decoder&&) noexcept = default;
 Decoder& Decoder::operator=(Decoder&&) noexcept = default;
 Decoder::~Decoder() = default;
 
-Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
+Result<Decoder> Decoder::create(const IndexedPattern& indexed, const Calibration& calibration, std::size_t camera_index,
                                 const DecodeOptions& options) {
   if (auto valid = options.validate(); !valid) return tl::unexpected(valid.error());
   if (camera_index >= calibration.cameras.size()) {
     return fail(ErrorCode::kInvalidArgument, "the calibration has no camera " + std::to_string(camera_index));
   }
+  const Pattern& pattern = indexed.pattern();
   const CalibratedCamera& camera = calibration.cameras[camera_index];
   if (auto fits = check_image_size(camera.lens.width_px, camera.lens.height_px); !fits) {
     return fail(fits.error().code, fits.error().message, "camera " + camera.name);
@@ -72,7 +74,7 @@ Result<Decoder> Decoder::create(const Pattern& pattern, const Calibration& calib
       Parts{.camera = camera,
             .camera_index = static_cast<std::uint8_t>(camera_index),
             .options = options,
-            .reader = SymbolReader(pattern, projector, std::move(expected), options, std::move(paper)),
+            .reader = SymbolReader(indexed, projector, std::move(expected), options, std::move(paper)),
             .view = EpipolarView(camera, projector, options.depth_min_mm, options.depth_max_mm,
                                  epipolar_gate_px(calibration.report.epipolar_error_px)),
             .triangulator = Triangulator(camera, projector),
@@ -101,10 +103,13 @@ Result<> Decoder::check_size(const GreyView& frame) const {
                                         "; set the camera to the calibrated size, or calibrate again");
 }
 
-Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<double> full, StageObserver* observer) {
+Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<double> full, StageObserver* observer,
+                                        Executor* executor) {
+  SerialExecutor alone;
+  Executor& shared = executor != nullptr ? *executor : alone;
   if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
   const double level = full ? *full : parts_->full_level.of(frame);
-  const Lattice& lattice = parts_->reader.read(frame, level, &parts_->view, observer);
+  const Lattice& lattice = parts_->reader.read(frame, level, &parts_->view, shared, observer);
   parts_->lattice_read = &lattice;
   if (parts_->aligner) {
     parts_->place_symbols();
@@ -112,7 +117,7 @@ Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<dou
                                               parts_->depths_mm, parts_->reader.cells());
     if (observer != nullptr) observer->stage_done(Stage::kAlign);
   }
-  parts_->triangulate(lattice, level);
+  parts_->triangulate(lattice, level, shared);
   parts_->reader.list_off_line(parts_->decoding.off_line);
   parts_->reader.report(parts_->decoding);
   if (observer != nullptr) observer->stage_done(Stage::kTriangulate);
@@ -140,8 +145,15 @@ void Decoder::Parts::place_symbols() {
   }
 }
 
-void Decoder::Parts::triangulate(const Lattice& lattice, double full) {
+void Decoder::Parts::triangulate(const Lattice& lattice, double full, Executor& executor) {
   const bool gated = options.correspond == Method::kDefault;
+  solutions.resize(lattice.symbols.size());
+  executor.run_ranges(solutions.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      solutions[i] = aligner ? TriangulatedPoint{(*aligned)[i].point_in_camera, (*aligned)[i].sigma_mm}
+                             : solve(lattice.symbols[i]);
+    }
+  });
   decoding.points.clear();
   for (std::size_t i = 0; i < lattice.symbols.size(); ++i) {
     const LatticeSymbol& symbol = lattice.symbols[i];
@@ -149,12 +161,11 @@ void Decoder::Parts::triangulate(const Lattice& lattice, double full) {
       reader.reject(symbol, RegionStatus::kDamagedShape);
       continue;
     }
-    const TriangulatedPoint solved =
-        aligner ? TriangulatedPoint{(*aligned)[i].point_in_camera, (*aligned)[i].sigma_mm} : solve(symbol);
-    const double depth = solved.point_in_camera.z();
+    const TriangulatedPoint& point = solutions[i];
+    const double depth = point.point_in_camera.z();
     const bool in_range = gated ? depth >= options.depth_min_mm && depth <= options.depth_max_mm : depth > 0;
-    if (in_range && solved.point_in_camera.allFinite()) {
-      add_point(symbol, aligner ? (*aligned)[i].centre_px : symbol.centre_px, solved, full);
+    if (in_range && point.point_in_camera.allFinite()) {
+      add_point(symbol, aligner ? (*aligned)[i].centre_px : symbol.centre_px, point, full);
     } else {
       reader.reject(symbol, RegionStatus::kOutOfDepthRange);
     }

@@ -8,11 +8,12 @@
 #include <span>
 #include <vector>
 
-#include "core/code/pattern.hpp"
+#include "core/code/codebook.hpp"
 #include "core/decode/decoding.hpp"
 #include "core/decode/frame_noise.hpp"
 #include "core/decode/lattice.hpp"
 #include "core/decode/options.hpp"
+#include "core/executor.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/geometry/pixel_ray.hpp"
 #include "core/image.hpp"
@@ -33,10 +34,11 @@ struct DecodedSymbols {
 /// @thread thread-bound: one decoder to a thread
 class Decoder {
  public:
-  /// Prepares the codebook, the prototypes and the rays of the pattern's cells.
+  /// Prepares the prototypes and the rays of the pattern's cells.
+  /// @param pattern  one for all cameras that see it: what it holds is shared
   /// @errors kMismatch: the calibration's projector is not of the pattern's size; kInvalidArgument; kUnsupported: the
   ///         camera's images are too large
-  [[nodiscard]] static Result<Decoder> create(const Pattern& pattern, const Calibration& calibration,
+  [[nodiscard]] static Result<Decoder> create(const IndexedPattern& pattern, const Calibration& calibration,
                                               std::size_t camera_index, const DecodeOptions& options);
   /// A decoder of the same for another thread, in a hundredth of the time: it shares what never changes, and its
   /// buffers are as large as these have grown.
@@ -49,10 +51,11 @@ class Decoder {
   [[nodiscard]] std::uint8_t camera_index() const;  ///< in the calibration
 
   /// Image to points. The result stands until the next call. Nothing found is an empty result with its counters.
-  /// @param full  the level of a saturated pixel: 255, 1023, 65535...; without it as HeldFullLevel has it
+  /// @param full      the level of a saturated pixel: 255, 1023, 65535...; without it as HeldFullLevel has it
+  /// @param executor  helps with the stages, and changes nothing of what they give; null: this thread alone
   /// @errors kMismatch: the frame is not of the calibration's size
   [[nodiscard]] Result<const Decoding*> decode(const GreyView& frame, std::optional<double> full = std::nullopt,
-                                               StageObserver* observer = nullptr);
+                                               StageObserver* observer = nullptr, Executor* executor = nullptr);
   /// Of the last frame that was decoded.
   [[nodiscard]] DecodedSymbols symbols();
 

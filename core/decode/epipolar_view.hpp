@@ -8,6 +8,7 @@
 
 #include "core/decode/cell_rays.hpp"
 #include "core/decode/sightings.hpp"
+#include "core/executor.hpp"
 #include "core/geometry/epipolar_gate.hpp"
 #include "core/geometry/ray_table.hpp"
 
@@ -23,15 +24,17 @@ class EpipolarView {
                double tolerance_px)
       : camera_rays_(camera.lens), gate_(camera, projector, depth_min_mm, depth_max_mm), tolerance_px_(tolerance_px) {}
 
-  void look_at(const Sightings& seen) {
+  void look_at(const Sightings& seen, Executor& executor) {
     rays_.resize(seen.size());
     pixels_.resize(seen.size());
     segments_.resize(seen.size());
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-      pixels_[i] = {seen.moments[i].x, seen.moments[i].y};
-      rays_[i] = camera_rays_.ray(pixels_[i].cast<double>());
-      segments_[i] = gate_.prepare(rays_[i].direction);
-    }
+    executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
+      for (std::size_t i = first; i < last; ++i) {
+        pixels_[i] = {seen.moments[i].x, seen.moments[i].y};
+        rays_[i] = camera_rays_.ray(pixels_[i].cast<double>());
+        segments_[i] = gate_.prepare(rays_[i].direction);
+      }
+    });
   }
   /// One to a sighting.
   [[nodiscard]] std::span<const EpipolarSegment> segments() const { return segments_; }

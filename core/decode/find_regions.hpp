@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "core/decode/mask.hpp"
+#include "core/executor.hpp"
 
 namespace slsd {
 
@@ -47,30 +48,47 @@ struct Regions {
   }
 };
 
-/// Labels 8-connected regions by runs and union-find (Haralick and Shapiro's local table method, on runs).
+/// Labels 8-connected regions by runs and union-find (Haralick and Shapiro's local table method, on runs), bands of
+/// rows by themselves, which are then joined.
 /// @thread thread-bound: keeps its buffers
 class RegionFinder {
  public:
   /// @param mask  of a readable size
-  void find(const Mask& mask, Regions& found);
+  void find(const Mask& mask, Regions& found, Executor& executor);
+  void find(const Mask& mask, Regions& found) {
+    SerialExecutor alone;
+    find(mask, found, alone);
+  }
 
  private:
-  void label_row(int y, int runs, const std::uint16_t* above_ends, const std::uint16_t* ends, std::size_t first_above);
-  [[nodiscard]] std::int32_t join(std::int32_t a, std::int32_t b);
-  [[nodiscard]] std::int32_t root(std::int32_t label);
-  void number_regions(Regions& found);
-  void gather(Regions& found);
-
-  std::vector<std::uint16_t> ends_[2];  // of a row's runs, left and right in turn, then of one beyond every other
-  std::vector<Run> runs_;               // run_count_ of them, then room for more
-  std::vector<std::int32_t> label_of_run_;
-  std::size_t run_count_ = 0;
   /// A part of a region, found row by row; its parent is not above it: labels of one region have one root.
   struct Label {
     std::int32_t parent, runs;
   };
-  std::vector<Label> labels_;
-  std::vector<std::int32_t> next_run_;  // of each region, where its next run goes
+  using Labels = std::vector<Label>;
+  struct Band {
+    std::vector<std::uint16_t> ends[2];  // of a row's runs, left and right in turn, then of one beyond every other
+    std::vector<Run> runs;               // run_count of them, then room for more
+    std::vector<std::int32_t> label_of_run;
+    Labels labels;
+    std::size_t run_count = 0, first_row_runs = 0, first_of_last_row = 0;
+    std::int32_t first_label = 0;  // among those of all bands
+  };
+  static void label_rows(const Mask& mask, int top, int bottom, Band& band);
+  static void label_row(int y, int runs, const std::uint16_t* above_ends, const std::uint16_t* ends,
+                        std::size_t first_above, Band& band);
+  [[nodiscard]] static std::int32_t join(Labels& labels, std::int32_t a, std::int32_t b);
+  [[nodiscard]] static std::int32_t root(Labels& labels, std::int32_t label);
+  void collect_labels(std::span<Band> bands);
+  void join_bands(const Band& above, const Band& below);
+  void number_regions(Regions& found);
+  void place_runs(std::span<const Band> bands, Regions& found);
+  void gather(const Band& band, Regions& found);
+
+  std::vector<Band> bands_;
+  Labels labels_;                              // of all bands
+  std::vector<std::int32_t> next_run_;         // of each label that is the first of its region in its band
+  std::vector<std::int32_t> holder_, cursor_;  // of each region
 };
 
 }  // namespace slsd

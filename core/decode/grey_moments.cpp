@@ -101,6 +101,11 @@ GreyMoments central(const RawMoments& raw, const PatchLevels& levels, double mid
 
 }  // namespace
 
+GreyMomentMeter::GreyMomentMeter(int margin_px, float patch_px) : margin_px_(margin_px), patch_px_(patch_px) {
+  const std::size_t side = static_cast<std::size_t>(padded(static_cast<int>(patch_px))) + kLanes;
+  edges_.reserve(2 * side), rows_.reserve(side), patch_.reserve(side * side);
+}
+
 /// In each row of the patch, from the leftmost to the rightmost pixel within the margin of the region.
 PatchEdges GreyMomentMeter::follow_edge(const Region& region, std::span<const Run> runs) {
   // The edges of the region's rows, with as many empty rows above and below as the margin reaches twice.

@@ -36,7 +36,10 @@ struct PatchEdges {
 class GreyMomentMeter {
  public:
   /// @param margin_px  how far beyond the mask a region's blurred edge is followed; less than the gap to its neighbours
-  explicit GreyMomentMeter(int margin_px) : margin_px_(margin_px) {}
+  /// @param patch_px   side of a patch that its buffers are made for
+  explicit GreyMomentMeter(int margin_px, float patch_px = 0);
+  /// For another worker.
+  [[nodiscard]] GreyMomentMeter another() const { return GreyMomentMeter(margin_px_, patch_px_); }
 
   template <class T>
   [[nodiscard]] GreyMoments measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
@@ -67,6 +70,7 @@ class GreyMomentMeter {
   [[nodiscard]] GreyMoments moments_of_patch();
 
   int margin_px_;
+  float patch_px_;
   int left_ = 0, top_ = 0, width_ = 0, height_ = 0, stride_ = 0;  // of the patch
   std::vector<std::int16_t> edges_;
   std::vector<float> patch_;  // grey values; kOutside where they belong to others

@@ -89,6 +89,8 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
     }
     const End begin = look_beyond(first, back), end = look_beyond(line_.back(), forth);
     const int count = static_cast<int>(line_.size());
+    const auto is_misread = [&](std::int32_t node) { return own_ratio(node) < kSpeaksAgainst; };
+    const bool any_misread = std::ranges::any_of(line_, is_misread);  // of most lines none is
     slides_.clear(), slid_ratios_.clear();
     for (int i = 0; i < count; ++i) {
       const int from = std::max(i - kReach, 0), to = std::min(i + kReach, count - 1);
@@ -96,10 +98,9 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
       auto evidence = static_cast<float>(line_ratios_[to + 1] - line_ratios_[from]);
       const float length =
           static_cast<float>(to - from + 1) + (begins ? begin.doubtful : 0) + (ends ? end.doubtful : 0);
-      const bool contradicted = own_ratio(line_[i]) < kSpeaksAgainst || (begins && begin.contradicts) ||
-                                (ends && end.contradicts) || evidence < kUsualShare * log_letters_ * length;
-      const bool misread = std::any_of(line_.begin() + from, line_.begin() + to + 1,
-                                       [&](std::int32_t node) { return own_ratio(node) < kSpeaksAgainst; });
+      const bool contradicted = is_misread(line_[i]) || (begins && begin.contradicts) || (ends && end.contradicts) ||
+                                evidence < kUsualShare * log_letters_ * length;
+      const bool misread = any_misread && std::any_of(line_.begin() + from, line_.begin() + to + 1, is_misread);
       if (!contradicted && (!misread || evidence_against_slides(frame, from, to) >= evidence_min)) continue;
       // As far as it agrees: what ends it may have been read as one of the island.
       int begun = i, last = i;

@@ -104,9 +104,8 @@ void IslandJudge::grow(const Frame& frame) {
   }
 }
 
-void IslandJudge::look_at_own_cells(const Frame& frame) {
-  own_.resize(frame.nodes.size());
-  for (std::size_t i = 0; i < own_.size(); ++i) {
+void IslandJudge::look_at_own_cells(const Frame& frame, std::size_t first, std::size_t last) {
+  for (std::size_t i = first; i < last; ++i) {
     const auto node = static_cast<std::int32_t>(i);
     const CellClaim& claim = frame.claims[i];
     if (!claim.named()) {
@@ -165,9 +164,11 @@ IslandJudge::Link IslandJudge::read_link(const Frame& frame, std::int32_t node, 
   return speaks < kSpeaksAgainst || (apart && speaks > 0) ? Link::kAgainst : Link::kNeutral;
 }
 
-void IslandJudge::read_links(const Frame& frame) {
+void IslandJudge::read_links(const Frame& frame, Executor& executor) {
   links_.resize(frame.nodes.size());
-  for (const std::int32_t node : members_) read_links_of(frame, node);
+  executor.run_ranges(members_.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) read_links_of(frame, members_[i]);
+  });
 }
 
 /// Only links to nodes that are of an island no longer say something else than before.
@@ -306,7 +307,7 @@ void IslandJudge::drop_rejected(const Frame& frame) {
 }
 
 /// Without the nodes that were cut. What they have parted has to stand by itself.
-void IslandJudge::part_islands(const Frame& frame) {
+void IslandJudge::part_islands(const Frame& frame, Executor& executor) {
   queue_.clear();
   for (const std::int32_t node : members_) {
     if (cut_[node] == 0) continue;
@@ -320,19 +321,21 @@ void IslandJudge::part_islands(const Frame& frame) {
   if (static_cast<std::ptrdiff_t>(islands_.size()) == left) {
     read_links_around(frame, queue_);
   } else {
-    read_links(frame);
+    read_links(frame, executor);
   }
   for (Island& island : islands_) weigh(frame, island);
 }
 
 void IslandJudge::judge(const std::vector<GridNode>& nodes, const std::vector<Beside>& beside,
-                        const std::vector<Classification>& shapes, const CellGate& gate,
+                        const std::vector<Classification>& shapes, const CellGate& gate, Executor& executor,
                         std::vector<CellClaim>& claims) {
   const Frame frame{nodes, beside, shapes, gate, claims};
   grow(frame);
-  look_at_own_cells(frame);
+  own_.resize(nodes.size());
+  executor.run_ranges(nodes.size(),
+                      [&](std::size_t first, std::size_t last, int) { look_at_own_cells(frame, first, last); });
   find_islands(frame);
-  read_links(frame);
+  read_links(frame, executor);
   for (Island& island : islands_) weigh(frame, island);
   const auto take_over = [&] {
     for (const std::int32_t node : members_) {
@@ -346,7 +349,7 @@ void IslandJudge::judge(const std::vector<GridNode>& nodes, const std::vector<Be
   take_over();
   drop_rejected(frame);
   cut_rims(frame);
-  part_islands(frame);
+  part_islands(frame, executor);
   refuse_doubles(frame);
   take_over();
   for (const std::int32_t node : members_) {

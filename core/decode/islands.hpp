@@ -54,7 +54,8 @@ class IslandJudge {
 
   /// @param claims  in: cells as proposed, or none; out: with the reason where it is rejected
   void judge(const std::vector<GridNode>& nodes, const std::vector<Beside>& beside,
-             const std::vector<Classification>& shapes, const CellGate& gate, std::vector<CellClaim>& claims);
+             const std::vector<Classification>& shapes, const CellGate& gate, Executor& executor,
+             std::vector<CellClaim>& claims);
 
  private:
   /// What a link says of the cell of the node that it leads from.
@@ -105,9 +106,9 @@ class IslandJudge {
   }
   void grow(const Frame& frame);
   bool adopt(const Frame& frame, std::int32_t node, CellClaim& adopted) const;
-  void look_at_own_cells(const Frame& frame);
+  void look_at_own_cells(const Frame& frame, std::size_t first, std::size_t last);
   void find_islands(const Frame& frame);
-  void read_links(const Frame& frame);
+  void read_links(const Frame& frame, Executor& executor);
   void read_links_of(const Frame& frame, std::int32_t node) {
     for (const Direction d : {kRight, kDown, kLeft, kUp}) links_[node][d] = read_link(frame, node, d);
   }
@@ -117,7 +118,7 @@ class IslandJudge {
     return own_[node].fits[direction] && island_of_[frame.beside[node][direction]] == island_of_[node];
   }
   void drop_rejected(const Frame& frame);
-  void part_islands(const Frame& frame);
+  void part_islands(const Frame& frame, Executor& executor);
   [[nodiscard]] Link read_link(const Frame& frame, std::int32_t node, Direction direction) const;
   [[nodiscard]] bool runs_along_edge(const Frame& frame, std::int32_t node, Direction direction) const;
   void weigh(const Frame& frame, Island& island) const;

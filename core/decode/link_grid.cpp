@@ -42,7 +42,7 @@ std::optional<Eigen::Vector2f> measured_step(const std::vector<GridNode>& nodes,
 }
 
 /// Whether a node is so near to where the frame puts the neighbour that no other can be nearer.
-bool is_evident(const std::vector<GridNode>& nodes, std::size_t from, std::int32_t other, Direction direction,
+bool is_evident(const std::vector<GridNode>& nodes, std::int32_t from, std::int32_t other, Direction direction,
                 const Eigen::Matrix2f& cells_from_camera) {
   constexpr float kEvident = 0.15F;
   const Eigen::Vector2f there = nodes[other].centre_px - nodes[from].centre_px;
@@ -118,41 +118,51 @@ std::int32_t GridLinker::nearest(const std::vector<GridNode>& nodes, std::size_t
 }
 
 /// A node that is likely to be the neighbour: the one linked before, or the one that the links beside lead to.
-std::int32_t GridLinker::likely(const std::vector<GridNode>& nodes, std::size_t from, Direction direction) const {
-  if (nodes[from].links[direction] >= 0) return nodes[from].links[direction];
+std::int32_t GridLinker::likely(const Range& range, std::int32_t from, Direction direction) const {
+  if (hints_[from][direction] >= 0) return hints_[from][direction];
   const Direction aside = direction == kDown ? kLeft : kUp;
   const std::int32_t beside = chosen_[from][aside];
-  const std::int32_t corner = beside >= 0 ? chosen_[beside][direction] : -1;
-  return corner >= 0 ? chosen_[corner][opposite(aside)] : -1;
+  const std::int32_t corner = range.contains(beside) ? chosen_[beside][direction] : -1;
+  return range.contains(corner) ? chosen_[corner][opposite(aside)] : -1;
 }
 
-void GridLinker::choose(std::vector<GridNode>& nodes, std::size_t from, float radius) {
+void GridLinker::choose(const std::vector<GridNode>& nodes, const Range& range, std::int32_t from, float radius) {
   const Eigen::Matrix2f cells_from_camera = nodes[from].frame.inverse() / options_.pitch_px;
   for (const Direction d : {kUp, kLeft, kRight, kDown}) {
-    std::int32_t other = likely(nodes, from, d);
+    std::int32_t other = likely(range, from, d);
     if (other < 0 || !is_evident(nodes, from, other, d, cells_from_camera))
       other = nearest(nodes, from, d, cells_from_camera, radius);
     chosen_[from][d] = other;
-    if (other >= 0 && nodes[other].links[opposite(d)] < 0)
-      nodes[other].links[opposite(d)] = static_cast<std::int32_t>(from);
+    if (range.contains(other) && hints_[other][opposite(d)] < 0) hints_[other][opposite(d)] = from;
   }
 }
 
-void GridLinker::find_mutual(std::vector<GridNode>& nodes, float radius) {
+void GridLinker::find_mutual(std::vector<GridNode>& nodes, float radius, Executor& executor) {
+  constexpr std::size_t kRange = 768;  // some rows of symbols: a row's help the next
   chosen_.assign(nodes.size(), {-1, -1, -1, -1});
-  before_.resize(nodes.size());
-  for (std::size_t i = 0; i < nodes.size(); ++i) before_[i] = nodes[i].links;
-  for (std::size_t i = 0; i < nodes.size(); ++i) choose(nodes, i, radius);
-  relinked_.clear();
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    bool relinked = false;
-    for (const Direction d : kDirections) {
-      const std::int32_t other = chosen_[i][d];
-      nodes[i].links[d] = other >= 0 && chosen_[other][opposite(d)] == static_cast<std::int32_t>(i) ? other : -1;
-      relinked |= nodes[i].links[d] != before_[i][d];
+  hints_.resize(nodes.size());
+  relinked_.resize(nodes.size());
+  executor.run_ranges(
+      nodes.size(),
+      [&](std::size_t first, std::size_t last, int) {
+        const Range range{static_cast<std::int32_t>(first), static_cast<std::int32_t>(last)};
+        for (std::size_t i = first; i < last; ++i) hints_[i] = nodes[i].links;
+        for (std::int32_t i = range.first; i < range.last; ++i) choose(nodes, range, i, radius);
+      },
+      kRange);
+  executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      bool relinked = false;
+      for (const Direction d : kDirections) {
+        const std::int32_t other = chosen_[i][d];
+        const std::int32_t link =
+            other >= 0 && chosen_[other][opposite(d)] == static_cast<std::int32_t>(i) ? other : -1;
+        relinked |= nodes[i].links[d] != link;
+        nodes[i].links[d] = link;
+      }
+      relinked_[i] = relinked ? 1 : 0;
     }
-    if (relinked) relinked_.push_back(static_cast<std::int32_t>(i));
-  }
+  });
 }
 
 void GridLinker::measure_frame(std::vector<GridNode>& nodes, const std::vector<std::uint8_t>& trusted,
@@ -170,9 +180,11 @@ void GridLinker::measure_frame(std::vector<GridNode>& nodes, const std::vector<s
 
 /// Those which the links that changed have a part in; a node that lost a link counts as one that has it.
 void GridLinker::measure_changed_frames(std::vector<GridNode>& nodes) {
-  for (const std::int32_t node : relinked_) {
-    visit_measured_with(
-        nodes, node, [&](std::int32_t other) { measure_frame(nodes, all_trusted_, static_cast<std::size_t>(other)); });
+  for (std::size_t node = 0; node < nodes.size(); ++node) {
+    if (relinked_[node] == 0) continue;
+    visit_measured_with(nodes, static_cast<std::int32_t>(node), [&](std::int32_t other) {
+      measure_frame(nodes, all_trusted_, static_cast<std::size_t>(other));
+    });
   }
 }
 
@@ -196,26 +208,31 @@ bool GridLinker::is_inconsistent(const std::vector<GridNode>& nodes, std::size_t
   return 2 * against > count;
 }
 
-void GridLinker::break_inconsistent(std::vector<GridNode>& nodes) {
+void GridLinker::break_inconsistent(std::vector<GridNode>& nodes, Executor& executor) {
   inconsistent_.assign(nodes.size(), {});
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    for (const Direction d : {kRight, kDown}) {
-      const std::int32_t other = nodes[i].links[d];
-      if (other >= 0 && is_inconsistent(nodes, i, d)) inconsistent_[i][d] = inconsistent_[other][opposite(d)] = true;
+  // Each link is asked about once, as links are mutual, and by one of its ends.
+  executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      for (const Direction d : {kRight, kDown}) {
+        const std::int32_t other = nodes[i].links[d];
+        if (other >= 0 && is_inconsistent(nodes, i, d)) inconsistent_[i][d] = inconsistent_[other][opposite(d)] = true;
+      }
     }
-  }
+  });
   for (std::size_t i = 0; i < nodes.size(); ++i) nodes[i].broken = inconsistent_[i];
 }
 
-void GridLinker::link(std::vector<GridNode>& nodes) {
+void GridLinker::link(std::vector<GridNode>& nodes, Executor& executor) {
   if (nodes.empty()) return;
   sort_into_buckets(nodes);
   all_trusted_.assign(nodes.size(), 1);
-  find_mutual(nodes, options_.search_radius);
-  for (std::size_t i = 0; i < nodes.size(); ++i) measure_frame(nodes, all_trusted_, i);
-  find_mutual(nodes, options_.refined_radius);
+  find_mutual(nodes, options_.search_radius, executor);
+  executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) measure_frame(nodes, all_trusted_, i);
+  });
+  find_mutual(nodes, options_.refined_radius, executor);
   measure_changed_frames(nodes);
-  break_inconsistent(nodes);
+  break_inconsistent(nodes, executor);
 }
 
 }  // namespace slsd

@@ -10,6 +10,7 @@
 
 #include "core/decode/decoding.hpp"
 #include "core/decode/lattice_frame.hpp"
+#include "core/executor.hpp"
 
 namespace slsd {
 
@@ -66,7 +67,7 @@ class GridLinker {
  public:
   explicit GridLinker(LinkGridOptions options) : options_(options) {}
 
-  void link(std::vector<GridNode>& nodes);
+  void link(std::vector<GridNode>& nodes, Executor& executor);
 
   /// Measures a node's frame again from those neighbours alone that are trusted: the fragment of a symbol at the edge
   /// of a surface draws the frames beside it to itself.
@@ -77,12 +78,17 @@ class GridLinker {
   void sort_into_buckets(const std::vector<GridNode>& nodes);
   [[nodiscard]] std::int32_t nearest(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
                                      const Eigen::Matrix2f& cells_from_camera, float radius) const;
-  [[nodiscard]] std::int32_t likely(const std::vector<GridNode>& nodes, std::size_t from, Direction direction) const;
-  void choose(std::vector<GridNode>& nodes, std::size_t from, float radius);
-  void find_mutual(std::vector<GridNode>& nodes, float radius);
+  /// Nodes that are looked at one after the other: what is known of one helps with the next.
+  struct Range {
+    std::int32_t first, last;
+    [[nodiscard]] bool contains(std::int32_t node) const { return node >= first && node < last; }
+  };
+  [[nodiscard]] std::int32_t likely(const Range& range, std::int32_t from, Direction direction) const;
+  void choose(const std::vector<GridNode>& nodes, const Range& range, std::int32_t from, float radius);
+  void find_mutual(std::vector<GridNode>& nodes, float radius, Executor& executor);
   void measure_changed_frames(std::vector<GridNode>& nodes);
   [[nodiscard]] bool is_inconsistent(const std::vector<GridNode>& nodes, std::size_t from, Direction direction) const;
-  void break_inconsistent(std::vector<GridNode>& nodes);
+  void break_inconsistent(std::vector<GridNode>& nodes, Executor& executor);
 
   LinkGridOptions options_;
   float bucket_px_ = 1;
@@ -94,9 +100,9 @@ class GridLinker {
   };
   std::vector<std::int32_t> first_of_bucket_;
   std::vector<Place> in_buckets_;
-  std::vector<std::array<std::int32_t, 4>> chosen_, before_;
+  std::vector<std::array<std::int32_t, 4>> chosen_, hints_;
   std::vector<std::array<bool, 4>> inconsistent_;
-  std::vector<std::int32_t> relinked_;  // nodes whose links the last search changed
+  std::vector<std::uint8_t> relinked_;  // of each node: whether the last search changed its links
   std::vector<std::uint8_t> all_trusted_;
 };
 

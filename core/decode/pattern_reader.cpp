@@ -100,18 +100,18 @@ struct PatternReader::Trial {
   SymbolReader reader;
   double scale;
 
-  Trial(const Pattern& pattern, ExpectedFrames frames)
-      : reader(pattern, any_lens(pattern.options), std::move(frames), {}, std::nullopt),
+  Trial(const IndexedPattern& pattern, ExpectedFrames frames)
+      : reader(pattern, any_lens(pattern.pattern().options), std::move(frames), {}, std::nullopt),
         scale(reader.expected_scale()) {}
 };
 
-PatternReader::PatternReader(const Pattern& pattern) : pattern_(pattern) {}
+PatternReader::PatternReader(IndexedPattern pattern) : pattern_(std::move(pattern)) {}
 PatternReader::PatternReader(PatternReader&&) noexcept = default;
 PatternReader& PatternReader::operator=(PatternReader&&) noexcept = default;
 PatternReader::~PatternReader() = default;
 
 PatternReader::Shrunk PatternReader::frame_for(double scale, const GreyView& frame) {
-  const double symbol_px = pattern_.options.symbol_size_px * scale;
+  const double symbol_px = pattern().options.symbol_size_px * scale;
   const auto [width, height] = size_of(frame);
   const int factor = std::min(static_cast<int>(symbol_px / kLargeEnoughPx), std::min(width, height));
   if (symbol_px <= kLargePx || factor <= 1) return {frame, 1};
@@ -161,11 +161,12 @@ std::vector<double> PatternReader::likely_scales(const GreyView& whole) {
   for (const double scale : scales) {
     const auto [frame, factor] = frame_for(scale, whole);
     const auto [width, height] = size_of(frame);
-    ShapeFinder finder(pattern_.options, ExpectedFrames(turned_and_scaled(0, scale / factor).matrix, width, height),
+    ShapeFinder finder(pattern().options, ExpectedFrames(turned_and_scaled(0, scale / factor).matrix, width, height),
                        Method::kDefault, Method::kDefault);
-    const GreyView sharp = finder.binarize(frame, full_);
-    finder.find_regions(sharp);
-    finder.describe(sharp, seen);
+    SerialExecutor alone;
+    const GreyView sharp = finder.binarize(frame, full_, alone);
+    finder.find_regions(sharp, alone);
+    finder.describe(sharp, alone, seen);
     shapes.push_back(seen.size());
     double sum = 0;
     for (const GreyMoments& moments : seen.moments) sum += static_cast<double>(moments.weight);
@@ -185,7 +186,7 @@ std::vector<SymbolMatch> PatternReader::search(const GreyView& frame) {
   std::vector<SymbolMatch> best;
   const auto found_at = [&](double angle, double scale) {
     std::vector<SymbolMatch> matches = attempt(turned_and_scaled(angle, scale), frame, false);
-    const bool better = matches.size() > best.size() && lie_on_one_plane(matches, pattern_.pitch_px());
+    const bool better = matches.size() > best.size() && lie_on_one_plane(matches, pattern().pitch_px());
     if (better) best = std::move(matches);
     return best.size() >= kCertain;
   };
@@ -220,7 +221,7 @@ Result<std::vector<SymbolMatch>> PatternReader::read(const GreyView& frame) {
   full_ = full_level_.of(frame);
   shrunk_.clear();
   if (last_) found = attempt(*last_, frame, true);
-  if (found.size() < kCertain || !lie_on_one_plane(found, pattern_.pitch_px())) found = search(frame);
+  if (found.size() < kCertain || !lie_on_one_plane(found, pattern().pitch_px())) found = search(frame);
   return refine(std::move(found), frame);
 }
 

@@ -11,7 +11,7 @@
 
 #include <Eigen/Core>
 
-#include "core/code/pattern.hpp"
+#include "core/code/codebook.hpp"
 #include "core/decode/symbol_match.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "core/geometry/homography.hpp"
@@ -26,7 +26,7 @@ namespace slsd {
 /// @thread thread-bound
 class PatternReader {
  public:
-  explicit PatternReader(const Pattern& pattern);
+  explicit PatternReader(IndexedPattern pattern);
   PatternReader(PatternReader&&) noexcept;
   PatternReader& operator=(PatternReader&&) noexcept;
   ~PatternReader();
@@ -36,7 +36,7 @@ class PatternReader {
   /// @errors kUnsupported: the frame is too large
   [[nodiscard]] Result<std::vector<SymbolMatch>> read(const GreyView& frame);
 
-  [[nodiscard]] const Pattern& pattern() const { return pattern_; }
+  [[nodiscard]] const Pattern& pattern() const { return pattern_.pattern(); }
   /// How many shapes of a symbol's size the last frame had: many, and none read, is another pattern.
   [[nodiscard]] std::size_t shapes() const { return shapes_; }
 
@@ -55,7 +55,7 @@ class PatternReader {
   [[nodiscard]] std::vector<SymbolMatch> search(const GreyView& frame);
   [[nodiscard]] std::vector<SymbolMatch> refine(std::vector<SymbolMatch> found, const GreyView& frame);
 
-  Pattern pattern_;
+  IndexedPattern pattern_;                                                         // shared with its trials
   std::vector<std::unique_ptr<Trial>> trials_;                                     // one to a scale
   std::optional<Homography> last_;                                                 // camera from projector
   std::map<int, std::variant<Image<std::uint8_t>, Image<std::uint16_t>>> shrunk_;  // of this frame, by their factors

@@ -83,18 +83,18 @@ void SymbolReview::measure_around_distrusted(const GridLinker& linker, Sightings
   }
 }
 
-void SymbolReview::trust_whole_symbols(const GridLinker& linker, Sightings& seen) {
+void SymbolReview::trust_whole_symbols(const GridLinker& linker, Executor& executor, Sightings& seen) {
   trusted_.resize(seen.size());
   seen.misfits.resize(seen.size());
-  distrusted_.clear();
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
-    if (trusted_[i] != 0) {
-      seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
-    } else {
-      distrusted_.push_back(static_cast<std::int32_t>(i));
+  executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
+      if (trusted_[i] != 0) seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
     }
-  }
+  });
+  distrusted_.clear();
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    if (trusted_[i] == 0) distrusted_.push_back(static_cast<std::int32_t>(i));
   measure_around_distrusted(linker, seen);
   distrusted_.clear();
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -105,10 +105,12 @@ void SymbolReview::trust_whole_symbols(const GridLinker& linker, Sightings& seen
   measure_around_distrusted(linker, seen);
 }
 
-void SymbolReview::measure_light_changes(const Sightings& seen) {
+void SymbolReview::measure_light_changes(const Sightings& seen, Executor& executor) {
   light_changes_.resize(seen.size());
-  for (std::size_t i = 0; i < seen.size(); ++i)
-    light_changes_[i] = {light_change(seen, i, kRight), light_change(seen, i, kDown)};
+  executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i)
+      light_changes_[i] = {light_change(seen, i, kRight), light_change(seen, i, kDown)};
+  });
 }
 
 /// The mean with those beside, across the direction of the change: small symbols blur to lower peaks, which is not the
@@ -142,36 +144,40 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
   };
   const LatticeFrame& lattice_frame = seen.nodes[node].frame;
   const Eigen::Vector2f per_cell = light_change_around(seen, node);
-  const Eigen::Vector2f shading = lattice_frame.inverse().transpose() * per_cell / pitch_px_;
-  if (per_cell.cwiseAbs().maxCoeff() > options_.shading_min)
-    adopt_if_better(meter.measure_levelled(frame, region, regions.runs_of(region), shading), kLevellingTolerance);
+  const float change = per_cell.cwiseAbs().maxCoeff();
+  const auto shading = [&]() -> Eigen::Vector2f { return lattice_frame.inverse().transpose() * per_cell / pitch_px_; };
+  if (change > options_.shading_min)
+    adopt_if_better(meter.measure_levelled(frame, region, regions.runs_of(region), shading()), kLevellingTolerance);
   if (distance > options_.doubtful_distance) {
     const Eigen::Vector2f centroid(moments.x, moments.y);
     const Eigen::Vector2f own_centre = centroid - lattice_frame * prototype_of(seen.claims[node]).centroid_px;
     const Eigen::Vector2f centre = centre_from_neighbours(seen.nodes, node).value_or(own_centre);
     const float half_px = 0.25F * (size_px_ + pitch_px_);
-    adopt_if_better(meter.measure_cell(frame, centre, lattice_frame, half_px, shading), 0);
+    adopt_if_better(meter.measure_cell(frame, centre, lattice_frame, half_px, shading()), 0);
   }
-  if (per_cell.cwiseAbs().maxCoeff() > options_.uneven_light) {
+  if (change > options_.uneven_light) {
     if (!has_steady_centre) moments = meter.measure(frame, region, regions.runs_of(region), SteadyCentre::kMeasured);
     const Prototype& prototype = prototype_of(seen.claims[node]);
     const Eigen::Vector2f from_steady = lattice_frame * (prototype.centroid_px - prototype.steady_centroid_px);
     moments.x = moments.steady_x + from_steady.x(), moments.y = moments.steady_y + from_steady.y();
   }
-  const float distance_max = is_inside(seen, node) ? options_.damaged_distance_inside : options_.damaged_distance;
-  if (distance > distance_max) seen.claims[node].status = RegionStatus::kDamagedShape;
+  if (distance > options_.damaged_distance_inside || (distance > options_.damaged_distance && !is_inside(seen, node)))
+    seen.claims[node].status = RegionStatus::kDamagedShape;
 }
 
 void SymbolReview::review(const GreyView& frame, const Regions& regions, const GridLinker& linker,
-                          const std::vector<Prototype>& prototypes, GreyMomentMeter& meter, Sightings& seen) {
+                          const std::vector<Prototype>& prototypes, std::span<GreyMomentMeter> meters,
+                          Executor& executor, Sightings& seen) {
   prototypes_ = &prototypes;
-  trust_whole_symbols(linker, seen);
-  measure_light_changes(seen);
+  trust_whole_symbols(linker, executor, seen);
+  measure_light_changes(seen, executor);
   std::visit(
       [&](const auto& view) {
-        for (std::size_t i = 0; i < seen.size(); ++i) {
-          if (seen.claims[i].status == RegionStatus::kDecoded) review_node(view, regions, meter, seen, i);
-        }
+        executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int worker) {
+          for (std::size_t i = first; i < last; ++i) {
+            if (seen.claims[i].status == RegionStatus::kDecoded) review_node(view, regions, meters[worker], seen, i);
+          }
+        });
       },
       frame);
 }

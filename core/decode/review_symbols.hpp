@@ -2,8 +2,12 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "core/code/pattern.hpp"
 #include "core/decode/sightings.hpp"
+#include "core/executor.hpp"
 #include "core/image.hpp"
 
 namespace slsd {
@@ -33,14 +37,16 @@ class SymbolReview {
   SymbolReview(const Pattern& pattern, ReviewOptions options);
 
   /// @param prototypes  of the letters in measured frames
+  /// @param meters      one to a worker
   /// @param seen        in and out: moments, frames and claims change
   void review(const GreyView& frame, const Regions& regions, const GridLinker& linker,
-              const std::vector<Prototype>& prototypes, GreyMomentMeter& meter, Sightings& seen);
+              const std::vector<Prototype>& prototypes, std::span<GreyMomentMeter> meters, Executor& executor,
+              Sightings& seen);
 
  private:
   void measure_around_distrusted(const GridLinker& linker, Sightings& seen);
-  void trust_whole_symbols(const GridLinker& linker, Sightings& seen);
-  void measure_light_changes(const Sightings& seen);
+  void trust_whole_symbols(const GridLinker& linker, Executor& executor, Sightings& seen);
+  void measure_light_changes(const Sightings& seen, Executor& executor);
   [[nodiscard]] Eigen::Vector2f light_change_around(const Sightings& seen, std::size_t node) const;
   [[nodiscard]] bool is_inside(const Sightings& seen, std::size_t node) const;
   [[nodiscard]] float distance_from_letter(const Sightings& seen, std::size_t node, const GreyMoments& moments) const;

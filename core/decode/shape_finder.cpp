@@ -38,27 +38,29 @@ ShapeFinder::ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected,
       find_regions_(find_regions),
       expected_(std::move(expected)),
       binarizer_(binarize_options(pattern, expected_.in_the_middle().scale)),
-      splitter_({.tile_px = binarizer_.options().tile_px}),
-      meter_(margin_px(pattern.spacing_px, expected_.in_the_middle().scale)) {}
+      splitter_({.tile_px = binarizer_.options().tile_px}) {
+  const float scale = expected_.in_the_middle().scale;
+  meters_.emplace_back(margin_px(pattern.spacing_px, scale), 2 * pitch_px_ * scale);
+}
 
-GreyView ShapeFinder::binarize(const GreyView& frame, double full) {
+GreyView ShapeFinder::binarize(const GreyView& frame, double full, Executor& executor) {
   frame_levels_ = static_cast<float>(full / 255);
   if (binarize_ == Method::kPaper) {
     mask_ = binarize_paper(frame);
     return frame;
   }
-  binarizer_.binarize(frame, full, mask_);
-  const float blur_px = binarizer_.edge_blur_px(frame);
+  binarizer_.binarize(frame, full, mask_, executor);
+  const float blur_px = binarizer_.edge_blur_px();
   if (blur_px < kBlurMinPx) return frame;
   const float symbol_px = symbol_size_px_ * expected_.in_the_middle().scale;
   const GreyView sharp = sharpener_.sharpen(frame, std::min(kBlurUndone * blur_px, kBlurMax * symbol_px), full).view();
   frame_levels_ = kSharpenedFull / 255;
-  binarizer_.binarize(sharp, kSharpenedFull, mask_);
+  binarizer_.binarize(sharp, kSharpenedFull, mask_, executor);
   return sharp;
 }
 
-void ShapeFinder::find_regions(const GreyView& frame) {
-  region_finder_.find(mask_, regions_);
+void ShapeFinder::find_regions(const GreyView& frame, Executor& executor) {
+  region_finder_.find(mask_, regions_, executor);
   if (find_regions_ == Method::kPaper) return;
   splitter_.split_all(frame, std::max(binarizer_.contrast_min(), kContrastMin * frame_levels_), regions_,
                       [this](const Region& region) { return is_too_large(region); });
@@ -83,22 +85,34 @@ RegionStatus ShapeFinder::judge_size(const Region& region) const {
   return is_too_large(region) ? RegionStatus::kTooLarge : RegionStatus::kNoNeighbour;
 }
 
-void ShapeFinder::describe(const GreyView& frame, Sightings& seen) {
+void ShapeFinder::describe(const GreyView& frame, Executor& executor, Sightings& seen) {
   status_.resize(regions_.regions.size());
   seen.clear();
   for (std::size_t i = 0; i < regions_.regions.size(); ++i) {
-    const Region& region = regions_.regions[i];
-    status_[i] = judge_size(region);
-    if (status_[i] != RegionStatus::kNoNeighbour) continue;
-    const GreyMoments moments =
-        std::visit([&](const auto& view) { return meter_.measure(view, region, regions_.runs_of(region)); }, frame);
+    status_[i] = judge_size(regions_.regions[i]);
+    if (status_[i] == RegionStatus::kNoNeighbour) seen.region.push_back(static_cast<std::int32_t>(i));
+  }
+  const std::size_t workers = executor.workers();
+  while (meters_.size() < workers) meters_.push_back(meters_.front().another());
+  seen.moments.resize(seen.region.size());
+  executor.run_ranges(seen.region.size(), [&](std::size_t first, std::size_t last, int worker) {
+    for (std::size_t i = first; i < last; ++i) {
+      const Region& region = regions_.regions[seen.region[i]];
+      seen.moments[i] = std::visit(
+          [&](const auto& view) { return meters_[worker].measure(view, region, regions_.runs_of(region)); }, frame);
+    }
+  });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < seen.region.size(); ++i) {
+    const GreyMoments& moments = seen.moments[i];
     if (moments.weight <= 0 || moments.peak - moments.background < kContrastMin * frame_levels_) {
-      status_[i] = RegionStatus::kLowContrast;
+      status_[seen.region[i]] = RegionStatus::kLowContrast;
       continue;
     }
-    seen.region.push_back(static_cast<std::int32_t>(i));
-    seen.moments.push_back(moments);
+    seen.region[kept] = seen.region[i], seen.moments[kept] = moments;
+    ++kept;
   }
+  seen.region.resize(kept), seen.moments.resize(kept);
 }
 
 }  // namespace slsd

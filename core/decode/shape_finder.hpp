@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "core/code/pattern.hpp"
@@ -34,16 +35,17 @@ class ShapeFinder {
   /// @param full  the level of a saturated pixel of the frame
   /// @return      what the stages that follow have to look at, the frame itself or as it was sharpened; stands until
   ///              the next call
-  GreyView binarize(const GreyView& frame, double full);
-  void find_regions(const GreyView& frame);
+  GreyView binarize(const GreyView& frame, double full, Executor& executor);
+  void find_regions(const GreyView& frame, Executor& executor);
   /// Puts the shapes that may be symbols into the sightings, in place of what was there.
-  void describe(const GreyView& frame, Sightings& seen);
+  void describe(const GreyView& frame, Executor& executor, Sightings& seen);
 
   [[nodiscard]] const Mask& mask() const { return mask_; }
   [[nodiscard]] const Regions& regions() const { return regions_; }
   /// Why a region is no sighting; kNoNeighbour where it is one.
   [[nodiscard]] RegionStatus status(std::size_t region) const { return status_[region]; }
-  [[nodiscard]] GreyMomentMeter& meter() { return meter_; }
+  /// One to a worker.
+  [[nodiscard]] std::span<GreyMomentMeter> meters() { return meters_; }
   /// Levels of the frame for one of 255.
   [[nodiscard]] float frame_levels() const { return frame_levels_; }
 
@@ -58,7 +60,7 @@ class ShapeFinder {
   Sharpener sharpener_;
   RegionFinder region_finder_;
   RegionSplitter splitter_;
-  GreyMomentMeter meter_;
+  std::vector<GreyMomentMeter> meters_;
 
   Mask mask_;
   Regions regions_;

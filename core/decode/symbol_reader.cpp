@@ -29,43 +29,42 @@ std::vector<Prototype> with_centroids_of(Method centre, const Pattern& pattern, 
 
 }  // namespace
 
-SymbolReader::Fixed::Fixed(const Pattern& shown, const Lens& projector, Method centre, float scale)
+SymbolReader::Fixed::Fixed(const IndexedPattern& shown, const Lens& projector, Method centre, float scale)
     : pattern(shown),
-      appearances(pattern.options, scale),
-      cells(pattern, with_centroids_of(centre, pattern, appearances.usual().as_measured), projector) {}
+      appearances(shown.pattern().options, scale),
+      cells(shown.pattern(), with_centroids_of(centre, shown.pattern(), appearances.usual().as_measured), projector) {}
 
-SymbolReader::SymbolReader(const Pattern& pattern, const Lens& projector, ExpectedFrames expected,
+SymbolReader::SymbolReader(const IndexedPattern& indexed, const Lens& projector, ExpectedFrames expected,
                            const DecodeOptions& options, std::optional<PaperWay> paper)
     : options_(options),
-      fixed_(std::make_shared<const Fixed>(pattern, projector, options.centre, expected.in_the_middle().scale)),
+      fixed_(std::make_shared<const Fixed>(indexed, projector, options.centre, expected.in_the_middle().scale)),
       paper_(std::move(paper)),
-      finder_(pattern.options, std::move(expected), options.binarize, options.find_regions),
-      linker_({.pitch_px = static_cast<float>(pattern.pitch_px())}),
-      window_decoder_(pattern, {.rows = pattern.whole_rows(),
-                                .columns = pattern.whole_columns(),
-                                .wrong_cells_max = options.wrong_cells_max}),
-      review_(pattern, {}),
+      finder_(pattern().options, std::move(expected), options.binarize, options.find_regions),
+      linker_({.pitch_px = static_cast<float>(pattern().pitch_px())}),
+      window_decoder_(pattern(), indexed.codebook(), options.wrong_cells_max),
+      review_(pattern(), {}),
       correspondence_({}),
-      centre_correction_(fixed_->appearances.usual().as_measured, static_cast<float>(pattern.pitch_px()),
-                         static_cast<float>(pattern.options.symbol_size_px)) {}
+      centre_correction_(fixed_->appearances.usual().as_measured, static_cast<float>(pattern().pitch_px()),
+                         static_cast<float>(pattern().options.symbol_size_px)) {}
 
-const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarView* view, StageObserver* observer) {
+const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarView* view, Executor& executor,
+                                  StageObserver* observer) {
   const auto done = [&](Stage stage) {
     if (observer != nullptr) observer->stage_done(stage);
   };
-  const GreyView sharp = finder_.binarize(frame, full);
+  const GreyView sharp = finder_.binarize(frame, full, executor);
   done(Stage::kBinarize);
-  finder_.find_regions(sharp), done(Stage::kFindRegions);
-  finder_.describe(sharp, seen_);
+  finder_.find_regions(sharp, executor), done(Stage::kFindRegions);
+  finder_.describe(sharp, executor, seen_);
   if (paper_) paper_->describe(finder_.regions(), seen_, options_.centre);
   done(Stage::kDescribe);
-  classify(), done(Stage::kClassify);
-  link_grid(), done(Stage::kLinkGrid);
-  if (view != nullptr) view->look_at(seen_);
-  decode_windows(view), done(Stage::kDecodeWindows);
-  review(sharp), done(Stage::kReview);
-  correspond(view);
-  fit_lattice(frame, full, sharp, view), done(Stage::kCorrespond);
+  classify(executor), done(Stage::kClassify);
+  link_grid(executor), done(Stage::kLinkGrid);
+  if (view != nullptr) view->look_at(seen_, executor);
+  decode_windows(view, executor), done(Stage::kDecodeWindows);
+  review(sharp, executor), done(Stage::kReview);
+  correspond(view, executor);
+  fit_lattice(frame, full, sharp, view, executor), done(Stage::kCorrespond);
   return lattice_;
 }
 
@@ -83,73 +82,80 @@ void SymbolReader::measure_look() {
   look_ = &fixed_->appearances.likeliest(sample_);
 }
 
-void SymbolReader::classify() {
+void SymbolReader::classify(Executor& executor) {
   look_ = &fixed_->appearances.usual();
   const float size = static_cast<float>(pattern().options.symbol_size_px);
   seen_.shapes.resize(seen_.size());
   seen_.nodes.assign(seen_.size(), {});
   if (options_.classify == Method::kPaper) paper_->classify(size * expected_scale(), seen_);
-  for (std::size_t i = 0; i < seen_.size(); ++i) {
-    const GreyMoments& moments = seen_.moments[i];
-    GridNode& node = seen_.nodes[i];
-    const ExpectedFrame& expected = finder_.expected().at(moments.x, moments.y);
-    node.frame = expected.frame;
-    node.centre_px = {moments.x, moments.y};
-    if (options_.classify == Method::kDefault) {
-      seen_.shapes[i] = look_->expected.classify(shape_features(moments, expected.inverse, size));
+  executor.run_ranges(seen_.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      const GreyMoments& moments = seen_.moments[i];
+      GridNode& node = seen_.nodes[i];
+      const ExpectedFrame& expected = finder_.expected().at(moments.x, moments.y);
+      node.frame = expected.frame;
+      node.centre_px = {moments.x, moments.y};
+      if (options_.classify == Method::kDefault) {
+        seen_.shapes[i] = look_->expected.classify(shape_features(moments, expected.inverse, size));
+      }
+      if (seen_.shapes[i].letter >= 0)
+        node.centre_px -= node.frame * look_->as_expected[seen_.shapes[i].letter].centroid_px;
     }
-    if (seen_.shapes[i].letter >= 0)
-      node.centre_px -= node.frame * look_->as_expected[seen_.shapes[i].letter].centroid_px;
-  }
+  });
 }
 
-void SymbolReader::link_grid() {
+void SymbolReader::link_grid(Executor& executor) {
   if (options_.link_grid == Method::kPaper)
     return paper_->link_grid(finder_.regions(), finder_.mask().width(), finder_.mask().height(), seen_);
-  linker_.link(seen_.nodes);
+  linker_.link(seen_.nodes, executor);
   if (is_there_) measure_look();
-  if (options_.classify == Method::kDefault) classify_in_measured_frames();
+  if (options_.classify == Method::kDefault) classify_in_measured_frames(executor);
 }
 
-void SymbolReader::classify_in_measured_frames() {
+void SymbolReader::classify_in_measured_frames(Executor& executor) {
   const float size = static_cast<float>(pattern().options.symbol_size_px);
-  for (std::size_t i = 0; i < seen_.size(); ++i) {
-    const GridNode& node = seen_.nodes[i];
-    const Classification& before = seen_.shapes[i];
-    const bool decided = before.letter >= 0 && before.distance < kDecidedDistance &&
-                         before.log_probability[before.letter] > kDecidedLogProbability;
-    if (decided || !node.measured_u || !node.measured_v) continue;
-    seen_.shapes[i] = look_->measured.classify(shape_features(seen_.moments[i], node.frame.inverse(), size));
-  }
+  executor.run_ranges(seen_.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      const GridNode& node = seen_.nodes[i];
+      const Classification& before = seen_.shapes[i];
+      const bool decided = before.letter >= 0 && before.distance < kDecidedDistance &&
+                           before.log_probability[before.letter] > kDecidedLogProbability;
+      if (decided || !node.measured_u || !node.measured_v) continue;
+      seen_.shapes[i] = look_->measured.classify(shape_features(seen_.moments[i], node.frame.inverse(), size));
+    }
+  });
 }
 
-void SymbolReader::decode_windows(const EpipolarView* view) {
+void SymbolReader::decode_windows(const EpipolarView* view, Executor& executor) {
   if (options_.decode_windows == Method::kPaper)
     return paper_->decode_windows(pattern().whole_rows(), pattern().whole_columns(), seen_);
   const bool gated = view != nullptr && options_.correspond == Method::kDefault;
   const CellGate gate(cells(), gated ? view->segments() : std::span<const EpipolarSegment>(),
                       gated ? view->tolerance_px() : 0);
-  window_decoder_.decode(seen_.nodes, seen_.shapes, gate, seen_.claims);
+  window_decoder_.decode(seen_.nodes, seen_.shapes, gate, executor, seen_.claims);
 }
 
-void SymbolReader::review(const GreyView& frame) {
+void SymbolReader::review(const GreyView& frame, Executor& executor) {
   const bool paper_before = options_.classify == Method::kPaper || options_.centre == Method::kPaper ||
                             options_.decode_windows == Method::kPaper;
-  if (!paper_before) review_.review(frame, finder_.regions(), linker_, look_->as_measured, finder_.meter(), seen_);
+  if (!paper_before)
+    review_.review(frame, finder_.regions(), linker_, look_->as_measured, finder_.meters(), executor, seen_);
 }
 
-void SymbolReader::correspond(const EpipolarView* view) {
-  if (options_.decode_windows == Method::kDefault) correspondence_.refuse_lone(seen_.nodes, seen_.claims);
+void SymbolReader::correspond(const EpipolarView* view, Executor& executor) {
+  if (options_.decode_windows == Method::kDefault) correspondence_.refuse_lone(seen_.nodes, executor, seen_.claims);
   if (view == nullptr) {
     correspondence_.settle_duplicates(cells(), seen_.claims);
   } else if (options_.correspond == Method::kDefault) {
-    correspondence_.correspond(cells(), view->segments(), view->tolerance_px(), seen_.claims);
+    correspondence_.correspond(cells(), view->segments(), view->tolerance_px(), executor, seen_.claims);
   }
 }
 
 /// @param sharp  what the symbols were measured in
-void SymbolReader::fit_lattice(const GreyView& frame, double full, const GreyView& sharp, const EpipolarView* view) {
-  centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, pattern().array, lattice_, seen_.misfits);
+void SymbolReader::fit_lattice(const GreyView& frame, double full, const GreyView& sharp, const EpipolarView* view,
+                               Executor& executor) {
+  centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, pattern().array, executor, lattice_,
+                             seen_.misfits);
   if (options_.centre == Method::kPaper) {
     for (LatticeSymbol& symbol : lattice_.symbols) {
       const GreyMoments& moments = seen_.moments[symbol.sighting];
@@ -157,7 +163,7 @@ void SymbolReader::fit_lattice(const GreyView& frame, double full, const GreyVie
     }
   }
   noise_ = measured_noise_ = measure_noise(sharp, 255.0 * finder_.frame_levels());
-  centre_judge_.judge(noise_, view, cells(), lattice_);
+  centre_judge_.judge(noise_, view, cells(), executor, lattice_);
   refuse_cut();
   const float scale = static_cast<float>(full / 255) / finder_.frame_levels();
   if (scale == 1) return;
@@ -184,6 +190,7 @@ void SymbolReader::refuse_cut() {
     kept_.push_back(is_cut ? -1 : count++);
     if (is_cut) reject(symbol, RegionStatus::kDamagedShape);
   }
+  if (count == static_cast<std::int32_t>(symbols.size())) return;
   for (std::size_t i = 0; i < symbols.size(); ++i) {
     if (kept_[i] < 0) continue;
     LatticeSymbol& symbol = symbols[static_cast<std::size_t>(kept_[i])] = symbols[i];
@@ -195,7 +202,8 @@ void SymbolReader::refuse_cut() {
 std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, double full, bool is_there) {
   std::vector<SymbolMatch> matches;
   is_there_ = is_there;
-  for (const LatticeSymbol& symbol : read(frame, full, nullptr).symbols) {
+  SerialExecutor alone;
+  for (const LatticeSymbol& symbol : read(frame, full, nullptr, alone).symbols) {
     matches.push_back({symbol.centre_px.cast<double>(), cells().pixel(symbol.row, symbol.column), symbol.sigma_px});
   }
   return matches;

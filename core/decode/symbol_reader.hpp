@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/code/pattern.hpp"
+#include "core/code/codebook.hpp"
 #include "core/decode/appearance.hpp"
 #include "core/decode/centre_sigma.hpp"
 #include "core/decode/correspond.hpp"
@@ -35,8 +35,8 @@ class SymbolReader {
   /// @param expected   how the pattern lies in the frame, to half a step of the grid
   /// @param projector  whose pixels the symbols are
   /// @param paper      there where a stage is asked for the paper's way
-  SymbolReader(const Pattern& pattern, const Lens& projector, ExpectedFrames expected, const DecodeOptions& options,
-               std::optional<PaperWay> paper);
+  SymbolReader(const IndexedPattern& pattern, const Lens& projector, ExpectedFrames expected,
+               const DecodeOptions& options, std::optional<PaperWay> paper);
 
   /// Of the same scale, to an eighth.
   void expect(ExpectedFrames expected) { finder_.expect(std::move(expected)); }
@@ -47,7 +47,8 @@ class SymbolReader {
   /// @param view  what the calibration knows; null: symbols may lie anywhere, and without their epipolar lines to check
   ///              them by, some in a thousand are wrong
   /// @return      stands until the next call
-  const Lattice& read(const GreyView& frame, double full, EpipolarView* view, StageObserver* observer = nullptr);
+  const Lattice& read(const GreyView& frame, double full, EpipolarView* view, Executor& executor,
+                      StageObserver* observer = nullptr);
   /// The same as pairs of pixels, wherever the symbols lie.
   /// @param is_there  whether the pattern is likely to be seen: otherwise it is not worth to find out how blurred it is
   [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, double full, bool is_there = true);
@@ -59,7 +60,7 @@ class SymbolReader {
   /// What became of every region, with the counters.
   void report(Decoding& decoding) const;
 
-  [[nodiscard]] const Pattern& pattern() const { return fixed_->pattern; }
+  [[nodiscard]] const Pattern& pattern() const { return fixed_->pattern.pattern(); }
   /// Of the last frame.
   [[nodiscard]] const FrameNoise& noise() const { return noise_; }
   [[nodiscard]] const CellRays& cells() const { return fixed_->cells; }
@@ -68,21 +69,22 @@ class SymbolReader {
 
  private:
   struct Fixed {
-    Pattern pattern;
+    IndexedPattern pattern;
     Appearances appearances;
     CellRays cells;
-    Fixed(const Pattern& pattern, const Lens& projector, Method centre, float scale);
+    Fixed(const IndexedPattern& pattern, const Lens& projector, Method centre, float scale);
   };
 
   void measure_look();
-  void classify();
-  void link_grid();
-  void classify_in_measured_frames();
-  void decode_windows(const EpipolarView* view);
-  void review(const GreyView& frame);
-  void correspond(const EpipolarView* view);
+  void classify(Executor& executor);
+  void link_grid(Executor& executor);
+  void classify_in_measured_frames(Executor& executor);
+  void decode_windows(const EpipolarView* view, Executor& executor);
+  void review(const GreyView& frame, Executor& executor);
+  void correspond(const EpipolarView* view, Executor& executor);
   void refuse_cut();
-  void fit_lattice(const GreyView& frame, double full, const GreyView& sharp, const EpipolarView* view);
+  void fit_lattice(const GreyView& frame, double full, const GreyView& sharp, const EpipolarView* view,
+                   Executor& executor);
 
   DecodeOptions options_;
   std::shared_ptr<const Fixed> fixed_;

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "core/dense/dense_map.hpp"
-#include "core/dense/executor.hpp"
 #include "core/dense/ray_grid.hpp"
 #include "core/dense/surface_grid.hpp"
+#include "core/executor.hpp"
 #include "core/geometry/calibration.hpp"
 
 namespace slsd {

@@ -11,11 +11,11 @@
 #include "core/decode/decoder.hpp"
 #include "core/dense/clean_map.hpp"
 #include "core/dense/dense_map.hpp"
-#include "core/dense/executor.hpp"
 #include "core/dense/follow_grid.hpp"
 #include "core/dense/pixel_judge.hpp"
 #include "core/dense/search_surface.hpp"
 #include "core/dense/surface_grid.hpp"
+#include "core/executor.hpp"
 
 namespace slsd {
 

@@ -11,9 +11,9 @@
 
 #include "core/align/pattern_field.hpp"
 #include "core/dense/dense_map.hpp"
-#include "core/dense/executor.hpp"
 #include "core/dense/followed_frame.hpp"
 #include "core/dense/surface_grid.hpp"
+#include "core/executor.hpp"
 
 namespace slsd {
 

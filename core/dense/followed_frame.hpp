@@ -8,8 +8,8 @@
 
 #include "core/align/align_patch.hpp"
 #include "core/align/pattern_field.hpp"
-#include "core/dense/executor.hpp"
 #include "core/dense/surface_grid.hpp"
+#include "core/executor.hpp"
 
 namespace slsd {
 

@@ -12,7 +12,7 @@
 
 #include "core/align/align_eight.hpp"
 #include "core/decode/frame_noise.hpp"
-#include "core/dense/executor.hpp"
+#include "core/executor.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/geometry/ray_table.hpp"
 #include "core/image.hpp"

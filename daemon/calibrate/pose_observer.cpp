@@ -4,7 +4,8 @@
 
 namespace slsd {
 
-PoseObserver::PoseObserver(const Board& board, const Pattern& pattern, const ImageSize& projector, bool gray_code)
+PoseObserver::PoseObserver(const Board& board, const IndexedPattern& pattern, const ImageSize& projector,
+                           bool gray_code)
     : board_(board), pattern_(pattern), projector_(projector), gray_code_(gray_code) {}
 
 Result<PoseView> PoseObserver::observe(std::size_t camera, const PosePictures& pictures) {
@@ -28,7 +29,7 @@ PrintShift PoseObserver::print_shift(const GreyView& white, const GreyView& patt
   return sighting ? find_print_shift(white, pattern, board_, *sighting) : PrintShift{};
 }
 
-PoseObservers make_observers(const Board& board, const std::optional<Board>& plane, const Pattern& pattern,
+PoseObservers make_observers(const Board& board, const std::optional<Board>& plane, const IndexedPattern& pattern,
                              const ImageSize& projector, bool gray_code) {
   PoseObservers observers{PoseObserver(board, pattern, projector, gray_code), std::nullopt};
   if (plane) observers.plane.emplace(*plane, pattern, projector, gray_code);

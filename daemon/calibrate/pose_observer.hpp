@@ -10,7 +10,7 @@
 #include "core/board/find_board.hpp"
 #include "core/calibrate/observe_pose.hpp"
 #include "core/calibrate/print_shift.hpp"
-#include "core/code/pattern.hpp"
+#include "core/code/codebook.hpp"
 
 namespace slsd {
 
@@ -19,7 +19,7 @@ namespace slsd {
 class PoseObserver {
  public:
   /// @param gray_code  whether a Gray code is projected instead of the pattern
-  PoseObserver(const Board& board, const Pattern& pattern, const ImageSize& projector, bool gray_code);
+  PoseObserver(const Board& board, const IndexedPattern& pattern, const ImageSize& projector, bool gray_code);
 
   /// @errors what observe_board(), observe_pattern() and observe_gray_code() say
   [[nodiscard]] Result<PoseView> observe(std::size_t camera, const PosePictures& pictures);
@@ -33,7 +33,7 @@ class PoseObserver {
 
  private:
   Board board_;
-  Pattern pattern_;
+  IndexedPattern pattern_;
   ImageSize projector_;
   bool gray_code_;
   bool seen_ = false;                             // the board, so that it is known which way it was named
@@ -50,6 +50,6 @@ struct PoseObservers {
 
 /// @param plane  nothing: there is none
 [[nodiscard]] PoseObservers make_observers(const Board& board, const std::optional<Board>& plane,
-                                           const Pattern& pattern, const ImageSize& projector, bool gray_code);
+                                           const IndexedPattern& pattern, const ImageSize& projector, bool gray_code);
 
 }  // namespace slsd

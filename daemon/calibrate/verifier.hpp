@@ -9,7 +9,7 @@
 #include "core/board/board.hpp"
 #include "core/calibrate/observe_pose.hpp"
 #include "core/calibrate/verify.hpp"
-#include "core/code/pattern.hpp"
+#include "core/code/codebook.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/result.hpp"
 #include "daemon/calibrate/calibrate_request.hpp"
@@ -40,7 +40,7 @@ class Verifier {
   ///         measured, or the board that was asked for was never seen
   [[nodiscard]] Result<> finish() const;
 
-  [[nodiscard]] const Pattern& pattern() const { return pattern_; }
+  [[nodiscard]] const Pattern& pattern() const { return pattern_.pattern(); }
 
  private:
   Verifier(Calibration calibration, Board board, Pattern pattern)
@@ -51,7 +51,7 @@ class Verifier {
 
   Calibration calibration_;
   Board board_;
-  Pattern pattern_;
+  IndexedPattern pattern_;
   std::string first_camera_;
   bool gray_code_ = false;
   bool board_asked_for_ = false;

@@ -21,7 +21,6 @@
 #include "daemon/configuration/exposure_warnings.hpp"
 #include "daemon/configuration/settings_over.hpp"
 #include "daemon/latency/latency_file.hpp"
-#include "daemon/scan/crew.hpp"
 #include "daemon/scan/devices.hpp"
 #include "daemon/scan/hardware.hpp"
 #include "daemon/scan/scan_setup.hpp"
@@ -299,7 +298,7 @@ class Check {
   // Tried on a wall as each camera would see it: the time is that of this machine, and the memory what it took.
   void check_dense(const ScanSetup& setup) {
     for (const std::string& warning : calibration_error_warnings(*setup.calibration)) findings_.warn(warning);
-    Crew crew(Crew::helpers_here());
+    Crew& crew = *setup.crew;
     for (const Decoder& made : setup.lanes.front()) {
       const std::string name =
           "dense clouds of camera \"" + setup.calibration->cameras[made.camera_index()].name + "\"";
@@ -326,7 +325,7 @@ class Check {
       auto least = std::chrono::steady_clock::duration::max();
       for (int run = 0; run < kDenseRuns; ++run) {
         const auto begin = std::chrono::steady_clock::now();
-        if (const auto decoding = decoder.decode(frame.view(), 255); !decoding) {
+        if (const auto decoding = decoder.decode(frame.view(), 255, nullptr, &crew); !decoding) {
           return findings_.bad(name + ": " + to_string(decoding.error()));
         }
         points = mapper.measure(frame.view(), 255, decoder.symbols(), crew).count(DensePixel::kMeasured);

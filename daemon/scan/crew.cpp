@@ -3,11 +3,24 @@
 #include "daemon/scan/crew.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <string>
 
 #include "drivers/system/thread_name.hpp"
 
 namespace slsd {
+namespace {
+
+/// Until it is so, or not for long. Between the stages of a frame lie some microseconds, and a thread that sleeps takes
+/// more to wake up.
+template <class Predicate>
+void stay_awake(Predicate&& is_so) {
+  constexpr std::chrono::microseconds kAwake{50};
+  const auto end = std::chrono::steady_clock::now() + kAwake;
+  while (!is_so() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+}
+
+}  // namespace
 
 int Crew::helpers_here() {
   constexpr int kMost = 15;
@@ -32,20 +45,25 @@ void Crew::run_parts(int parts, Part part, const void* work) {
   {
     const std::lock_guard lock(mutex_);
     part_ = part, work_ = work, parts_ = parts, next_ = 0;
-    ++call_;
+    on_offer_ = ++call_;
   }
   changed_.notify_all();
   for (int i = next_++; i < parts; i = next_++) part(work, i, 0);
+  {
+    const std::lock_guard lock(mutex_);
+    on_offer_ = 0;
+  }
+  // For as long as the last part takes.
+  stay_awake([this] { return helping_ == 0; });
   std::unique_lock lock(mutex_);
-  parts_ = 0;
   changed_.wait(lock, [this] { return helping_ == 0; });
 }
 
 void Crew::help(int worker, const std::stop_token& stop) {
-  name_this_thread("dense " + std::to_string(worker));
+  name_this_thread("helper " + std::to_string(worker));
   std::uint64_t done = 0;
   std::unique_lock lock(mutex_);
-  while (changed_.wait(lock, stop, [&] { return parts_ > 0 && call_ != done; })) {
+  while (changed_.wait(lock, stop, [&] { return wants(done); })) {
     done = call_;
     ++helping_;
     const Part part = part_;
@@ -54,7 +72,11 @@ void Crew::help(int worker, const std::stop_token& stop) {
     lock.unlock();
     for (int i = next_++; i < parts; i = next_++) part(work, i, worker);
     lock.lock();
-    if (--helping_ == 0) changed_.notify_all();
+    --helping_;
+    lock.unlock();
+    changed_.notify_all();
+    stay_awake([&] { return wants(done) || stop.stop_requested(); });
+    lock.lock();
   }
 }
 

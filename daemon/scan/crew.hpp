@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
@@ -9,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/dense/executor.hpp"
+#include "core/executor.hpp"
 
 namespace slsd {
 
@@ -18,7 +19,19 @@ namespace slsd {
 /// @thread thread-safe
 class Crew final : public Executor {
  public:
-  /// @param helpers  threads besides the caller's
+  /// While it lives, its thread computes, and the helpers leave it a processor.
+  class Turn {
+   public:
+    explicit Turn(Crew& crew) : crew_(crew) { ++crew_.turns_; }
+    ~Turn() { --crew_.turns_; }
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+   private:
+    Crew& crew_;
+  };
+
+  /// @param helpers  threads besides the caller's: with it, one to a processor
   explicit Crew(int helpers);
   ~Crew() override;
   /// As many as leave no processor without one.
@@ -31,15 +44,22 @@ class Crew final : public Executor {
 
  private:
   void help(int worker, const std::stop_token& stop);
+  /// Whether there are parts that a helper has not been at, and a processor for it besides those that help.
+  [[nodiscard]] bool wants(std::uint64_t done) const {
+    const std::uint64_t call = on_offer_;
+    return call != 0 && call != done && std::max(turns_.load(), 1) + helping_ < workers();
+  }
 
   std::mutex in_use_;  // by one caller at a time
   std::mutex mutex_;
   std::condition_variable_any changed_;
   Part part_ = nullptr;
   const void* work_ = nullptr;
-  int parts_ = 0;  // 0: nothing to help with
-  int helping_ = 0;
+  int parts_ = 0;
   std::uint64_t call_ = 0;
+  // What helpers look at before they take the mutex.
+  std::atomic<std::uint64_t> on_offer_ = 0;  // the call whose parts there are; 0: nothing to help with
+  std::atomic<int> helping_ = 0, turns_ = 0;
   std::atomic<int> next_ = 0;
   std::vector<std::jthread> threads_;
 };

@@ -94,10 +94,9 @@ DenseView measure_pixels(const GreyView& frame, Decoder& decoder, ScanSetup& set
   DenseMapper& mapper = setup.dense->of(lane, camera, decoder, setup.pattern, *setup.calibration, setup.decode);
   DecodedSymbols symbols = decoder.symbols();
   if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may be those of the quotient
-  Executor& executor = setup.dense->crew();
   const CalibratedCamera& calibrated = setup.calibration->cameras[decoder.camera_index()];
-  DenseMap& map = next_of_stream ? mapper.measure_next(frame, light.full, symbols, executor)
-                                 : mapper.measure(frame, light.full, symbols, executor);
+  DenseMap& map = next_of_stream ? mapper.measure_next(frame, light.full, symbols, *setup.crew)
+                                 : mapper.measure(frame, light.full, symbols, *setup.crew);
   DenseView view{std::exchange(map, setup.dense->spare_map()),
                  mapper.rays(),
                  calibrated.rig_from_camera,
@@ -132,6 +131,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
   ScanResult result = describe(set, setup, scan_id);
   const std::size_t pictured = setup.camera_index(request.camera);
   StageClock clock;
+  const Crew::Turn turn(*setup.crew);
   auto dense = request.formats.dense() ? setup.dense->cloud() : nullptr;
   for (std::size_t i = 0; i < set.frames.size(); ++i) {
     clock.start();
@@ -139,7 +139,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     Decoder& decoder = setup.lanes[lane][i];
     result.full_levels.push_back(full_level_of(set, setup, i));
     const SceneLight light = light_of(set, i, result.full_levels.back());
-    const auto decoding = decode_in_light(decoder, set.frames[i].image(), light, &clock);
+    const auto decoding = decode_in_light(decoder, set.frames[i].image(), light, &clock, setup.crew.get());
     result.decode_time += steady_clock::now() - begin;
     if (!decoding) {
       return fail(decoding.error().code, decoding.error().message, "camera " + setup.camera_names[i]);

@@ -50,24 +50,25 @@ Result<std::vector<std::size_t>> calibrated_cameras(const Calibration& calibrati
 
 // The decoder's buffers grow with its first frame. One with the whole pattern, of which no frame shows more, makes the
 // first scan as quick as the others, and the service as large when it starts as it will be.
-Result<> warm_up(Decoder& decoder, const Lens& lens, const Grey8& symbols) {
+Result<> warm_up(Decoder& decoder, const Lens& lens, const Grey8& symbols, Crew& crew) {
   Grey8 frame(lens.width_px, lens.height_px);
   for (int y = 0; y < std::min(frame.height(), symbols.height()); ++y) {
     for (int x = 0; x < std::min(frame.width(), symbols.width()); ++x) frame.at(x, y) = symbols.at(x, y);
   }
-  const auto decoded = decoder.decode(frame.view());
+  const auto decoded = decoder.decode(frame.view(), std::nullopt, nullptr, &crew);
   return decoded ? Result<>() : tl::unexpected(decoded.error());
 }
 
 // Each in a thread of its own, as each takes some hundredths of a second.
 Result<std::vector<Decoder>> make_lane(const ScanSetup& setup, const std::vector<std::size_t>& cameras,
                                        const DecodeOptions& options) {
+  const IndexedPattern pattern(setup.pattern);
   std::vector<std::future<Result<Decoder>>> prepared;
   for (const std::size_t index : cameras) {
     prepared.push_back(std::async(std::launch::async, [&, index]() -> Result<Decoder> {
-      auto decoder = Decoder::create(setup.pattern, *setup.calibration, index, options);
+      auto decoder = Decoder::create(pattern, *setup.calibration, index, options);
       if (!decoder) return decoder;
-      const auto warm = warm_up(*decoder, setup.calibration->cameras[index].lens, setup.image);
+      const auto warm = warm_up(*decoder, setup.calibration->cameras[index].lens, setup.image, *setup.crew);
       if (!warm) return tl::unexpected(warm.error());
       return decoder;
     }));
@@ -165,12 +166,6 @@ double FullLevels::raise(std::size_t camera, double level) {
   return greatest_[camera] = std::max(greatest_[camera], level);
 }
 
-Executor& DenseMappers::crew() {
-  const std::lock_guard lock(mutex_);
-  if (!crew_) crew_.emplace(Crew::helpers_here());
-  return *crew_;
-}
-
 void DenseMappers::end_stream() {
   // Whoever makes a mapper takes a while; he has nothing to give back yet.
   if (const std::unique_lock lock(mutex_, std::try_to_lock); lock) {
@@ -243,7 +238,7 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
   for (std::size_t lane = 0; lane < setup.lanes.size(); ++lane) {
     for (std::size_t camera = 0; camera < cameras->size(); ++camera) {
       setup.dense->of(lane, camera, setup.lanes[lane][camera], setup.pattern, *setup.calibration, setup.decode)
-          .warm_up(setup.dense->crew());
+          .warm_up(*setup.crew);
     }
   }
   return setup;

@@ -67,8 +67,6 @@ class FullLevels {
 /// @thread thread-safe; what it lends belongs to the lane's thread
 class DenseMappers {
  public:
-  /// The threads that help the lanes, which sleep meanwhile.
-  [[nodiscard]] Executor& crew();
   /// Nobody wants a stream any more: what was kept of its frames, and maps that wait, are given back.
   void end_stream();
   /// A cloud whose maps come back, for the next ones, when nobody holds it any more: new ones would be tens of
@@ -82,7 +80,6 @@ class DenseMappers {
 
  private:
   std::mutex mutex_;
-  std::optional<Crew> crew_;
   struct Spare {
     std::mutex mutex;
     std::vector<DenseMap> maps;
@@ -105,6 +102,7 @@ struct ScanSetup {
   std::unique_ptr<FullLevels> full_levels = std::make_unique<FullLevels>();
   DecodeOptions decode = {};
   std::unique_ptr<DenseMappers> dense = std::make_unique<DenseMappers>();
+  std::unique_ptr<Crew> crew = std::make_unique<Crew>(Crew::helpers_here());  ///< helps the lanes
   double depth_min_mm = DecodeOptions{}.depth_min_mm;  ///< where along the cameras' axes there may be something
   double depth_max_mm = DecodeOptions{}.depth_max_mm;
 

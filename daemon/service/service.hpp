@@ -30,7 +30,9 @@ namespace slsd {
 ///   cam NAME one to a camera: cameras expose at the same time, and opening one may take seconds.
 ///   log      writes the log: whoever reads that may stand still.
 ///   decode N one or two, from frames to clouds and pictures: each uses a processor fully while the next frames come.
-///   dense N  help those with the parts of dense clouds, one to each processor but one; none before the first.
+///   helper N help those with the parts of a frame or a dense cloud, one to each processor but one, as far as lanes
+///   that
+///            compute leave processors free.
 ///   deadlines  ends requests whose time is over, whatever the others wait for.
 ///   chores   what needs no device and takes long: a reload's pattern and decoders, the pattern as a PNG.
 ///

@@ -10,12 +10,16 @@
 #include <new>
 
 namespace {
-std::atomic<std::uint64_t> count{0};
+std::atomic<std::uint64_t> count{0}, bytes{0};
 }
 
 namespace slsd::test {
 std::uint64_t allocations() {
   return count.load();
+}
+
+std::uint64_t allocated_bytes() {
+  return bytes.load();
 }
 
 double resident_mib() {
@@ -28,6 +32,7 @@ double resident_mib() {
 #if !defined(__SANITIZE_THREAD__)  // whose own cannot be replaced: there nothing is counted
 void* operator new(std::size_t size) {
   ++count;
+  bytes += size;
   if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
   throw std::bad_alloc();
 }

@@ -17,9 +17,11 @@
 namespace slsd {
 namespace {
 
+SerialExecutor alone;
+
 Mask binarize(const GreyView& frame, const BinarizeOptions& options = {}, double full = 0) {
   Mask mask;
-  Binarizer(options).binarize(frame, full > 0 ? full : frame.index() == 0 ? 255 : 65535, mask);
+  Binarizer(options).binarize(frame, full > 0 ? full : frame.index() == 0 ? 255 : 65535, mask, alone);
   return mask;
 }
 
@@ -198,10 +200,10 @@ TEST(Binarize, ReadsFramesSmallerThanATile) {
 TEST(Binarize, TakesAMaskOfAnotherSize) {
   Binarizer binarizer({});
   Mask mask(Grey8(5, 5, 255).view());
-  binarizer.binarize(uneven_light(360, 90).view(), 255, mask);
+  binarizer.binarize(uneven_light(360, 90).view(), 255, mask, alone);
   EXPECT_EQ(mask.width(), 360);
   EXPECT_EQ(wrong_pixels(mask), 0);
-  binarizer.binarize(Grey8(40, 30, 90).view(), 255, mask);
+  binarizer.binarize(Grey8(40, 30, 90).view(), 255, mask, alone);
   EXPECT_EQ(mask, Mask(40, 30));
 }
 

@@ -3,6 +3,7 @@
 #include "core/decode/centre_sigma.hpp"
 
 #include <cmath>
+#include <numbers>
 
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>
@@ -12,6 +13,8 @@
 
 namespace slsd {
 namespace {
+
+SerialExecutor alone;
 
 LatticeSymbol symbol_of(float weight, float gain) {
   LatticeSymbol symbol{};
@@ -32,7 +35,7 @@ float judged(const LatticeSymbol& symbol) {
   const Pattern pattern = shipped_pattern("16px-5.toml");
   const CellRays cells(pattern, std::vector<Prototype>(5), paper_rig().projector);
   Lattice lattice{{symbol}};
-  CentreJudge().judge({}, nullptr, cells, lattice);
+  CentreJudge().judge({}, nullptr, cells, alone, lattice);
   return lattice.symbols[0].sigma_px;
 }
 
@@ -91,6 +94,27 @@ TEST(Sigma, IsTrueAtEveryNoise) {
 TEST(Sigma, WithoutNoiseIsNotTooSmall) {
   for (const Precision precision : {Precision::kStandard, Precision::kFine})
     EXPECT_LT(truth_of(precision, 0, test::kTilted).over_sigma, 1.5);
+}
+
+/// A plate of waves at 2 m.
+Surface waves(double period_mm, double height_mm) {
+  return [=](const Ray& ray) -> std::optional<double> {
+    double depth_mm = 2000;
+    for (int i = 0; i < 4; ++i) {
+      const Eigen::Vector3d at = ray.origin + (depth_mm - ray.origin.z()) / ray.direction.z() * ray.direction;
+      const double per_mm = 2 * std::numbers::pi / period_mm;
+      depth_mm = 2000 + 0.5 * height_mm * std::sin(per_mm * at.x()) * std::sin(per_mm * at.y());
+    }
+    return (depth_mm - ray.origin.z()) / ray.direction.z();
+  };
+}
+
+// Relief that a patch cannot follow scatters within it, and sigma knows two thirds of what that does. With twice the
+// scatter's factor the errors would be 1.0 sigma, with half of it 2.0, without it 2.7.
+TEST(Sigma, OfFinePatchesFollowsReliefWithinThem) {
+  const Truth truth = truth_of(Precision::kFine, 2, waves(34, 4));
+  EXPECT_GT(truth.over_sigma, 1.25);
+  EXPECT_LT(truth.over_sigma, 1.75);
 }
 
 TEST(Precision, FineIsSeveralTimesAsExact) {

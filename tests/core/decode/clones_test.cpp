@@ -21,6 +21,8 @@
 namespace slsd {
 namespace {
 
+SerialExecutor alone;
+
 std::string name_of(Clone clone) {
   switch (clone) {
     case Clone::kPlain:
@@ -74,7 +76,7 @@ Image<T> some_frame(int width, int height, double full) {
 template <class T>
 Mask binarized(const Image<T>& frame, double full, int tile_px) {
   Mask mask;
-  Binarizer({.tile_px = tile_px}).binarize(frame.view(), full, mask);
+  Binarizer({.tile_px = tile_px}).binarize(frame.view(), full, mask, alone);
   return mask;
 }
 
@@ -92,8 +94,8 @@ TEST_P(Clones, MeasureTheSameBlur) {
     const Grey8 frame = some_frame<std::uint8_t>(333, 101, 255);
     Binarizer binarizer({.tile_px = 8});
     Mask mask;
-    binarizer.binarize(frame.view(), 255, mask);
-    return binarizer.edge_blur_px(frame.view());
+    binarizer.binarize(frame.view(), 255, mask, alone);
+    return binarizer.edge_blur_px();
   });
 }
 

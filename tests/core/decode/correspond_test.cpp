@@ -11,6 +11,8 @@
 namespace slsd {
 namespace {
 
+SerialExecutor alone;
+
 constexpr auto kDecoded = RegionStatus::kDecoded;
 constexpr auto kDuplicate = RegionStatus::kDuplicateCell;
 
@@ -38,7 +40,7 @@ class Correspond : public testing::Test {
   }
 
   std::vector<RegionStatus> statuses() {
-    Correspondence({}).correspond(cells_, segments_, 1.5, claims_);
+    Correspondence({}).correspond(cells_, segments_, 1.5, alone, claims_);
     std::vector<RegionStatus> result;
     for (const CellClaim& claim : claims_) result.push_back(claim.status);
     return result;
@@ -130,7 +132,7 @@ struct RimSheet {
 TEST(RefuseLone, RefusesWhatStandsBetweenRefusedOnesAtARim) {
   RimSheet sheet;
   for (const int column : {0, 1, 2, 3, 5, 6, 8}) sheet.at(5, column).status = RegionStatus::kDamagedShape;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
   EXPECT_EQ(sheet.at(5, 4).status, RegionStatus::kNeighboursDisagree);
   EXPECT_EQ(sheet.at(5, 7).status, RegionStatus::kNeighboursDisagree);
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(4, column).status, kDecoded);
@@ -139,7 +141,7 @@ TEST(RefuseLone, RefusesWhatStandsBetweenRefusedOnesAtARim) {
 TEST(RefuseLone, RefusesTheLastOfARefusedRow) {
   RimSheet sheet;
   for (const int column : {0, 4, 5, 6, 7, 8}) sheet.at(5, column).status = RegionStatus::kClassDisagrees;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
   for (const int column : {1, 2, 3}) EXPECT_EQ(sheet.at(5, column).status, RegionStatus::kNeighboursDisagree) << column;
 }
 
@@ -148,7 +150,7 @@ TEST(RefuseLone, RefusesAllThatIsLeftOfARow) {
   RimSheet sheet;
   for (const int column : {1, 2, 3, 5, 6, 8}) sheet.at(2, column).status = RegionStatus::kDamagedShape;
   sheet.at(1, 7) = sheet.at(6, 7);
-  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
   EXPECT_EQ(sheet.at(2, 7).status, RegionStatus::kNeighboursDisagree);
   EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
 }
@@ -159,7 +161,7 @@ TEST(RefuseLone, RefusesTheFewThatAreLeftOfAMisreadRow) {
   for (int column = 0; column < 7; ++column) sheet.at(1, column).status = RegionStatus::kClassDisagrees;
   sheet.at(2, 2).status = RegionStatus::kDamagedShape;
   for (const int column : {4, 5, 6}) sheet.at(2, column).status = RegionStatus::kClassDisagrees;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
   for (const int column : {0, 1, 3}) EXPECT_EQ(sheet.at(2, column).status, RegionStatus::kNeighboursDisagree) << column;
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(3, column).status, kDecoded) << column;
 }
@@ -174,7 +176,7 @@ TEST(RefuseLone, RefusesTheFewThatAreLeftOfABrokenRow) {
   }
   sheet.grid.nodes[sheet.grid.node_at(2, 5)].broken[kLeft] = true;
   sheet.grid.nodes[sheet.grid.node_at(2, 7)].links[kUp] = -1;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
   for (const int column : {7, 8}) EXPECT_EQ(sheet.at(2, column).status, RegionStatus::kNeighboursDisagree) << column;
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(3, column).status, kDecoded) << column;
 }
@@ -184,14 +186,14 @@ TEST(RefuseLone, RefusesABridgeOverARefusedRow) {
   RimSheet sheet;
   for (const int column : {0, 1, 2, 3, 5, 6, 7, 8}) sheet.at(2, column).status = RegionStatus::kNoCodeword;
   sheet.grid.nodes[sheet.grid.node_at(2, 5)].broken[kRight] = true;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
   EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
 }
 
 TEST(RefuseLone, RefusesWhatHasNothingStandingBesideIt) {
   RimSheet sheet;
   sheet.at(0, 1).status = sheet.at(1, 0).status = RegionStatus::kDamagedShape;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
   EXPECT_EQ(sheet.at(0, 0).status, RegionStatus::kNeighboursDisagree);
   EXPECT_EQ(sheet.at(1, 1).status, kDecoded);
 }
@@ -201,10 +203,10 @@ TEST(RefuseLone, RefusesTheCornerOfWhatIsMisread) {
   RimSheet sheet;
   for (const auto& [row, column] : {std::pair(2, 5), std::pair(3, 4)})
     sheet.at(row, column).status = RegionStatus::kClassDisagrees;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
   EXPECT_EQ(sheet.at(2, 4).status, kDecoded) << "what lies between the two stands";
   sheet.at(3, 5).status = RegionStatus::kNoCodeword;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
   EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
 }
 
@@ -216,11 +218,11 @@ TEST(RefuseLone, LooksAlongTheRowWithinWhereTheRowIsBroken) {
     sheet.grid.nodes[node].broken[kRight] = sheet.grid.nodes[node].broken[kLeft] = true;
     if (column != 4) sheet.claims[node].status = RegionStatus::kClassDisagrees;
   }
-  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
   EXPECT_EQ(sheet.at(5, 4).status, RegionStatus::kNeighboursDisagree);
   for (const int column : {1, 2}) sheet.at(5, column).status = kDecoded;
   sheet.at(5, 5).status = sheet.at(5, 6).status = sheet.at(5, 4).status = kDecoded;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
   EXPECT_EQ(sheet.at(5, 4).status, kDecoded);
 }
 
@@ -229,7 +231,7 @@ TEST(RefuseLone, KeepsWhatIsWholeAtARimAndInside) {
   for (const int column : {2, 6}) sheet.at(5, column).status = RegionStatus::kDamagedShape;
   for (const int column : {0, 1, 2, 3, 5, 6}) sheet.at(2, column).status = RegionStatus::kDamagedShape;
   const std::vector<CellClaim> before = sheet.claims;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, sheet.claims);
+  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
   for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(sheet.claims[i].status, before[i].status) << i;
 }
 

@@ -14,6 +14,8 @@
 namespace slsd {
 namespace {
 
+SerialExecutor alone;
+
 constexpr int kSizePx = 16;
 constexpr int kSide = 7;  // of the block of cells
 
@@ -65,7 +67,7 @@ class Block {
     grid_.link_truly();
     const CodeArray one_letter{kSide, kSide, 1, std::vector<std::uint8_t>(kSide * kSide, 0)};
     Lattice lattice;
-    CentreCorrection({prototype}, 18, kSizePx).correct(grid_.nodes, moments_, claims_, one_letter, lattice);
+    CentreCorrection({prototype}, 18, kSizePx).correct(grid_.nodes, moments_, claims_, one_letter, alone, lattice);
     Errors sum;
     for (std::size_t i = 0; i < moments_.size(); ++i) {
       sum.before += (Eigen::Vector2d(moments_[i].x, moments_[i].y) - truth_[i]).squaredNorm();
@@ -152,7 +154,8 @@ TEST(CentreCorrection, LeavesOutWhatHasNoCell) {
   const std::vector<GridNode> nodes(1, GridNode{{10, 20}, LatticeFrame::Identity()});
   const std::vector<GreyMoments> moments(1);
   Lattice lattice{{LatticeSymbol{}}};
-  CentreCorrection({exact_prototype(lit_places(7))}, 18, kSizePx).correct(nodes, moments, {CellClaim{}}, {}, lattice);
+  CentreCorrection({exact_prototype(lit_places(7))}, 18, kSizePx)
+      .correct(nodes, moments, {CellClaim{}}, {}, alone, lattice);
   EXPECT_TRUE(lattice.symbols.empty());
 }
 

@@ -15,6 +15,9 @@
 namespace slsd {
 namespace {
 
+SerialExecutor alone;
+
+constexpr double kWrongCellsMax = 0.001;
 constexpr int kRows = 44, kColumns = 71;
 
 struct Damage {
@@ -69,9 +72,9 @@ class DecodeWindows : public testing::Test {
   }
 
   std::vector<CellClaim> decode(const Sheet& sheet, std::span<const EpipolarSegment> segments = {}) {
-    WindowDecoder decoder(pattern_, {.rows = kRows, .columns = kColumns});
+    WindowDecoder decoder(pattern_, std::make_shared<const Codebook>(pattern_.array, kRows, kColumns), kWrongCellsMax);
     std::vector<CellClaim> claims;
-    decoder.decode(sheet.grid.nodes, sheet.shapes, CellGate(cells_, segments, 1.5), claims);
+    decoder.decode(sheet.grid.nodes, sheet.shapes, CellGate(cells_, segments, 1.5), alone, claims);
     return claims;
   }
 
@@ -178,9 +181,9 @@ TEST_F(DecodeWindows, TakesNoCellThatTheGateExcludes) {
 
 TEST_F(DecodeWindows, NamesAPartThatIsAskedForAlone) {
   const Sheet sheet = sheet_of(pattern_.array, {});
-  WindowDecoder decoder(pattern_, {.rows = 20, .columns = 30});
+  WindowDecoder decoder(pattern_, std::make_shared<const Codebook>(pattern_.array, 20, 30), kWrongCellsMax);
   std::vector<CellClaim> claims;
-  decoder.decode(sheet.grid.nodes, sheet.shapes, CellGate(cells_, {}, 1.5), claims);
+  decoder.decode(sheet.grid.nodes, sheet.shapes, CellGate(cells_, {}, 1.5), alone, claims);
   EXPECT_EQ(score(sheet, claims).decoded, 20 * 30);
   EXPECT_EQ(score(sheet, claims).wrong, 0);
 }

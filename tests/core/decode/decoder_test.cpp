@@ -16,6 +16,7 @@
 #include "tests/core/decode/decoded_scene.hpp"
 #include "tests/core/decode/images.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
+#include "tests/core/threads.hpp"
 #include "tests/drivers/allocations.hpp"
 #include "tests/simulator/simulator.hpp"
 
@@ -330,14 +331,83 @@ TEST(CreateDecoder, RefusesAnEmptyDepthRange) {
   EXPECT_EQ(decoder.error().code, ErrorCode::kInvalidArgument);
 }
 
+TEST(CreateDecoder, CamerasShareOneCodebook) {
+  const Pattern pattern = shipped_pattern("8px-6-dense.toml");
+  const auto bytes_for = [&](const auto& of) {
+    const std::uint64_t before = test::allocated_bytes();
+    EXPECT_TRUE(Decoder::create(of, paper_rig(), 0, {}));
+    return test::allocated_bytes() - before;
+  };
+  const std::uint64_t alone = bytes_for(pattern), one_of_several = bytes_for(IndexedPattern(pattern));
+  if (alone == 0) GTEST_SKIP() << "nothing is counted here";
+  const std::size_t cells = static_cast<std::size_t>(pattern.whole_rows()) * pattern.whole_columns();
+  EXPECT_GE(alone, one_of_several + cells * (sizeof(std::uint32_t) + 2 * sizeof(Codebook::Entry)));
+}
+
+/// Frames that take every way through the stages: light that falls off, noise, edges in depth, out of focus, 16 bits.
+struct Views {
+  Pattern pattern = shipped_pattern("16px-5.toml");
+  Grey8 cylinder = frame_of(pattern, kCylinder), tilted = frame_of(pattern, kTilted), blurred;
+  Grey16 wide = sixteen_bits(cylinder);
+
+  Views() {
+    SimulationOptions out_of_focus;
+    out_of_focus.blur_sigma_px = 2.5;
+    blurred = simulate(draw_pattern(pattern), paper_rig(), kTilted, out_of_focus);
+  }
+  [[nodiscard]] std::vector<GreyView> all() const {
+    return {cylinder.view(), tilted.view(), blurred.view(), wide.view()};
+  }
+};
+
+bool same(const RegionSeen& a, const RegionSeen& b) {
+  return a.centre_px == b.centre_px && a.status == b.status && a.letter == b.letter && a.links == b.links &&
+         a.broken == b.broken && a.column == b.column && a.row == b.row;
+}
+
+TEST(Decoder, WorkersChangeNothing) {
+  const Views views;
+  for (const GreyView& frame : views.all()) {
+    Decoder decoder = decoder_of(views.pattern);
+    const Decoding alone = decode(decoder, frame);
+    ASSERT_GT(alone.points.size(), 500U);
+    for (const int workers : {1, 2, 3}) {
+      test::Threads threads(workers);
+      const auto together = decoder.decode(frame, std::nullopt, nullptr, &threads);
+      ASSERT_TRUE(together);
+      EXPECT_EQ((*together)->points, alone.points);
+      EXPECT_EQ((*together)->counts, alone.counts);
+      EXPECT_TRUE(std::ranges::equal((*together)->regions, alone.regions, same));
+    }
+  }
+}
+
+/// As many workers as asked for, one after the other, so that it is known who does what.
+class InTurn final : public Executor {
+ public:
+  explicit InTurn(int workers) : workers_(workers) {}
+  [[nodiscard]] int workers() const override { return workers_; }
+
+ protected:
+  void run_parts(int parts, Part part, const void* work) override {
+    for (int i = 0; i < parts; ++i) part(work, i, (i + turn_) % workers_);
+    ++turn_;
+  }
+
+ private:
+  int workers_, turn_ = 0;
+};
+
 TEST(Decoder, AllocatesNothingAfterTheFirstFrame) {
-  const Pattern pattern = shipped_pattern("16px-5.toml");
-  const Grey8 frame = frame_of(pattern, kCylinder);
-  Decoder decoder = decoder_of(pattern);
-  ASSERT_TRUE(decoder.decode(frame.view()));
-  const auto before = test::allocations();
-  for (int again = 0; again < 3; ++again) ASSERT_TRUE(decoder.decode(frame.view()));
-  EXPECT_EQ(test::allocations(), before);
+  const Views views;
+  for (const int workers : {1, 3}) {
+    Decoder decoder = decoder_of(views.pattern);
+    InTurn executor(workers);
+    ASSERT_TRUE(decoder.decode(views.cylinder.view(), 255, nullptr, &executor));
+    const auto before = test::allocations();
+    for (int frame = 0; frame < 3; ++frame) ASSERT_TRUE(decoder.decode(views.cylinder.view(), 255, nullptr, &executor));
+    EXPECT_EQ(test::allocations(), before) << workers << " workers";
+  }
 }
 
 }  // namespace

@@ -19,6 +19,9 @@
 namespace slsd {
 namespace {
 
+SerialExecutor alone;
+
+constexpr double kWrongCellsMax = 0.001;
 constexpr int kRows = 44, kColumns = 71;
 constexpr auto kDecoded = RegionStatus::kDecoded;
 
@@ -68,9 +71,9 @@ class Islands : public testing::Test {
   }
   std::vector<CellClaim> decode(std::span<const EpipolarSegment> segments = {}) {
     grid_.link_truly();
-    WindowDecoder decoder(pattern_, {.rows = kRows, .columns = kColumns});
+    WindowDecoder decoder(pattern_, std::make_shared<const Codebook>(pattern_.array, kRows, kColumns), kWrongCellsMax);
     std::vector<CellClaim> claims;
-    decoder.decode(grid_.nodes, shapes_, CellGate(cells_, segments, 1.5), claims);
+    decoder.decode(grid_.nodes, shapes_, CellGate(cells_, segments, 1.5), alone, claims);
     return claims;
   }
   int decoded(const std::vector<CellClaim>& claims) const {

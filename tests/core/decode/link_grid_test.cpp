@@ -13,6 +13,8 @@
 namespace slsd {
 namespace {
 
+SerialExecutor alone;
+
 constexpr int kRows = 24, kColumns = 30;
 constexpr Direction kDirections[] = {kRight, kDown, kLeft, kUp};
 
@@ -73,7 +75,7 @@ constexpr float kRolls[] = {0, 0.3F, -1.1F, 3.1F};
 TEST(LinkGrid, LinksEveryNodeOfAPerspectiveGrid) {
   for (const float roll : kRolls) {
     SimulatedGrid grid = grid_of(tilted(roll), 0);
-    GridLinker({}).link(grid.nodes);
+    GridLinker({}).link(grid.nodes, alone);
     const LinkCount count = count_links(grid);
     EXPECT_EQ(count.right, count.possible) << roll;
     EXPECT_EQ(count.wrong, 0) << roll;
@@ -84,7 +86,7 @@ TEST(LinkGrid, LinksEveryNodeOfAPerspectiveGrid) {
 TEST(LinkGrid, LinksAroundMissingNodes) {
   for (const float roll : kRolls) {
     SimulatedGrid grid = grid_of(tilted(roll), 0.2);
-    GridLinker({}).link(grid.nodes);
+    GridLinker({}).link(grid.nodes, alone);
     const LinkCount count = count_links(grid);
     EXPECT_GE(count.right, 0.995 * count.possible) << roll;
     EXPECT_EQ(count.wrong, 0) << roll;
@@ -93,7 +95,7 @@ TEST(LinkGrid, LinksAroundMissingNodes) {
 
 TEST(LinkGrid, LinksAreMutual) {
   SimulatedGrid grid = grid_of(tilted(0.3F), 0.3);
-  GridLinker({}).link(grid.nodes);
+  GridLinker({}).link(grid.nodes, alone);
   for (std::size_t i = 0; i < grid.nodes.size(); ++i) {
     for (const Direction d : kDirections) {
       const std::int32_t other = grid.nodes[i].links[d];
@@ -110,7 +112,7 @@ TEST(LinkGrid, BreaksALinkThatLeadsOntoARidge) {
     // The right half of one row stands out and is seen a quarter of a step farther along.
     const Eigen::Vector2f jump = 0.25F * SimulatedGrid::kPitchPx * expected_frame(map).col(0);
     for (int column = kColumns / 2; column < kColumns; ++column) grid.nodes[grid.node_at(10, column)].centre_px += jump;
-    GridLinker({}).link(grid.nodes);
+    GridLinker({}).link(grid.nodes, alone);
     const GridNode& before = grid.nodes[grid.node_at(10, kColumns / 2 - 1)];
     EXPECT_TRUE(before.links[kRight] < 0 || before.broken[kRight]) << roll;
     EXPECT_EQ(count_links(grid).wrong, 0) << roll;
@@ -126,7 +128,7 @@ TEST(LinkGrid, BreaksEveryLinkAcrossAStraightEdge) {
       for (int column = kColumns / 2; column < kColumns; ++column)
         grid.nodes[grid.node_at(row, column)].centre_px += jump;
     }
-    GridLinker({}).link(grid.nodes);
+    GridLinker({}).link(grid.nodes, alone);
     for (int row = 0; row < kRows; ++row) {
       for (int column = 0; column + 1 < kColumns; ++column) {
         const GridNode& node = grid.nodes[grid.node_at(row, column)];
@@ -140,7 +142,7 @@ TEST(LinkGrid, BreaksEveryLinkAcrossAStraightEdge) {
 TEST(LinkGrid, MeasuresTheFramesOfATiltedPlane) {
   const Homography map = tilted(0.3F);
   SimulatedGrid grid = grid_of(map, 0);
-  GridLinker({}).link(grid.nodes);
+  GridLinker({}).link(grid.nodes, alone);
   double expected_error = 0, measured_error = 0;
   for (std::size_t i = 0; i < grid.nodes.size(); ++i) {
     const auto [row, column] = grid.cells[i];
@@ -159,7 +161,7 @@ TEST(MeasureFrame, LeavesNodesOutThatAreNotTrusted) {
   const Homography map = Homography::Identity();
   SimulatedGrid grid = grid_of(map, 0);
   GridLinker linker({});
-  linker.link(grid.nodes);
+  linker.link(grid.nodes, alone);
   const std::int32_t fragment = grid.node_at(10, 10), beside = grid.node_at(10, 9);
   grid.nodes[fragment].centre_px.x() -= 4;
   std::vector<std::uint8_t> trusted(grid.nodes.size(), 1);
@@ -173,19 +175,19 @@ TEST(MeasureFrame, LeavesNodesOutThatAreNotTrusted) {
 TEST(LinkGrid, OfNoneOneAndTwoNodes) {
   GridLinker linker({});
   std::vector<GridNode> nodes;
-  linker.link(nodes);
+  linker.link(nodes, alone);
   nodes.push_back({{100, 100}, LatticeFrame::Identity()});
-  linker.link(nodes);
+  linker.link(nodes, alone);
   EXPECT_THAT(nodes[0].links, testing::Each(-1));
   nodes.push_back({{118, 101}, LatticeFrame::Identity()});
-  linker.link(nodes);
+  linker.link(nodes, alone);
   EXPECT_THAT(nodes[0].links, testing::ElementsAre(1, -1, -1, -1));
   EXPECT_THAT(nodes[1].links, testing::ElementsAre(-1, -1, 0, -1));
 }
 
 TEST(LinkGrid, OfNodesAtOnePlace) {
   std::vector<GridNode> nodes(50, GridNode{{5, 5}, LatticeFrame::Identity()});
-  GridLinker({}).link(nodes);
+  GridLinker({}).link(nodes, alone);
   for (const GridNode& node : nodes) EXPECT_THAT(node.links, testing::Each(-1));
 }
 

@@ -119,6 +119,37 @@ TEST(ReadPatternAnywhere, FindsItWhereverItWasBefore) {
   }
 }
 
+TEST(ReadPatternAnywhere, AllScalesReadOneCodebook) {
+  const IndexedPattern pattern(small_pattern());
+  const auto codebook = pattern.codebook();
+  PatternReader reader(pattern);
+  long users = codebook.use_count();
+  for (const double scale : {1.1, 2.2}) {
+    const Lie lie{0, scale};
+    const Grey8 frame = seen(pattern.pattern(), lie);
+    expect_read(read(reader, frame.view()), pattern.pattern(), lie);
+    EXPECT_GT(codebook.use_count(), users);
+    users = codebook.use_count();
+    // What is there for a scale serves those that are nearly the same.
+    const Lie nearly{0, 0.98 * scale};
+    expect_read(read(reader, seen(pattern.pattern(), nearly).view()), pattern.pattern(), nearly);
+    EXPECT_EQ(codebook.use_count(), users);
+  }
+}
+
+TEST(ReadPatternAnywhere, ReadsAnotherScaleAsIfItWereTheFirst) {
+  const Pattern pattern = small_pattern();
+  const Grey8 frame = seen(pattern, {0, 2.2});
+  PatternReader used(pattern), fresh(pattern);
+  (void)read(used, seen(pattern, {0, 1.1}).view());
+  const auto again = read(used, frame.view()), first = read(fresh, frame.view());
+  ASSERT_EQ(again.size(), first.size());
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    EXPECT_EQ(again[i].camera_px, first[i].camera_px);
+    EXPECT_EQ(again[i].projector_px, first[i].projector_px);
+  }
+}
+
 TEST(ReadPatternAnywhere, DoesNotTakeAnotherPatternForItsOwn) {
   PatternReader reader(small_pattern(2));
   const std::vector<SymbolMatch> matches = read(reader, seen(small_pattern(1), {}).view());

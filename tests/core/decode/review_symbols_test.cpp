@@ -14,6 +14,8 @@
 namespace slsd {
 namespace {
 
+SerialExecutor alone;
+
 constexpr int kCells = 10, kScale = 2, kPitchPx = 18 * kScale;
 constexpr int kSidePx = kCells * kPitchPx;
 
@@ -46,7 +48,7 @@ class ReviewSymbols : public testing::Test {
     cv::threshold(frame, lit, 60, 255, cv::THRESH_BINARY);
     RegionFinder().find(Mask(mask.view()), regions_);
     for (std::size_t i = 0; i < regions_.regions.size(); ++i) add(i);
-    linker_.link(seen_.nodes);
+    linker_.link(seen_.nodes, alone);
   }
 
   void add(std::size_t index) {
@@ -64,7 +66,10 @@ class ReviewSymbols : public testing::Test {
     seen_.claims.push_back({row, column, 20, RegionStatus::kDecoded});
   }
 
-  void review() { SymbolReview(pattern_, {}).review(frame_.view(), regions_, linker_, prototypes_, meter_, seen_); }
+  void review() {
+    SymbolReview(pattern_, {})
+        .review(frame_.view(), regions_, linker_, prototypes_, std::span(&meter_, 1), alone, seen_);
+  }
 
   [[nodiscard]] std::size_t sighting_at(int row, int column) const {
     for (std::size_t i = 0; i < seen_.size(); ++i) {

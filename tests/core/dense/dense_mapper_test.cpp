@@ -7,13 +7,13 @@
 #include <cstring>
 #include <numeric>
 #include <random>
-#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
 #include "core/clones.hpp"
+#include "tests/core/threads.hpp"
 #include "tests/drivers/allocations.hpp"
 #include "tests/simulator/simulator.hpp"
 
@@ -377,22 +377,6 @@ TEST(DenseMapper, SixteenBitsAreAsGood) {
   EXPECT_LT(got.rms_mm, 0.35);
 }
 
-/// Two threads that share the parts as they come.
-class TwoThreads final : public Executor {
- public:
-  [[nodiscard]] int workers() const override { return 2; }
-
- protected:
-  void run_parts(int parts, Part part, const void* work) override {
-    const auto run = [&](int worker) {
-      for (int i = worker; i < parts; i += 2) part(work, i, worker);
-    };
-    std::thread other(run, 1);
-    run(0);
-    other.join();
-  }
-};
-
 bool same(const DenseMap& a, const DenseMap& b) {
   const auto equal = [](const auto& one, const auto& other) {
     return one.size() == other.size() && std::memcmp(one.data(), other.data(), one.size() * sizeof one[0]) == 0;
@@ -402,7 +386,7 @@ bool same(const DenseMap& a, const DenseMap& b) {
 }
 
 TEST(DenseMapper, ThreadsChangeNothing) {
-  TwoThreads threads;
+  test::Threads threads(2);
   EXPECT_TRUE(same(measure(column().frame.view()).map, measure(column().frame.view(), 255, {}, &threads).map));
 }
 
@@ -533,7 +517,7 @@ TEST(DenseStream, ThreadsAndLanesChangeNothing) {
   DenseMapper mapper(pattern(), rig, 0, {});
   DenseMapper other = mapper.another();
   SerialExecutor serial;
-  TwoThreads threads;
+  test::Threads threads(2);
   const Seen again = see_again(kTilted, 2);
   ASSERT_TRUE(decoder.decode(tilted().frame.view(), 255));
   const DecodedSymbols symbols = decoder.symbols();

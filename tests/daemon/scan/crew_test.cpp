@@ -75,5 +75,13 @@ TEST(Crew, WithoutHelpersTheCallerDoesAll) {
   EXPECT_EQ(sum, 45);
 }
 
+TEST(Crew, HelpersLeaveAProcessorToEachThatComputes) {
+  Crew crew(1);
+  std::set<int> workers;
+  const Crew::Turn one(crew), other(crew);
+  for (int round = 0; round < 50; ++round) crew.run(16, [&](int, int worker) { workers.insert(worker); });
+  EXPECT_EQ(workers, std::set{0});
+}
+
 }  // namespace
 }  // namespace slsd

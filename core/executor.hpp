@@ -2,6 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+
 namespace slsd {
 
 /// Runs the parts of a stage, beside each other or one after the other, and returns when all are done. Core starts no
@@ -21,6 +24,17 @@ class Executor {
   void run(int parts, const Work& work) {
     run_parts(
         parts, [](const void* of, int part, int worker) { (*static_cast<const Work*>(of))(part, worker); }, &work);
+  }
+
+  /// A loop in ranges of one length, however many the workers are: what is done in the order of a range does not depend
+  /// on them.
+  /// @param work  called as work(first, last, worker) for each range of what is counted from 0 on, last not in it
+  template <class Work>
+  void run_ranges(std::size_t count, const Work& work, std::size_t length = 256) {
+    run(static_cast<int>((count + length - 1) / length), [&](int part, int worker) {
+      const std::size_t first = static_cast<std::size_t>(part) * length;
+      work(first, std::min(first + length, count), worker);
+    });
   }
 
  protected:
