@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "core/calibrate/verify.hpp"
+#include "core/calibrate/judge/verify.hpp"
 #include "core/geometry/epipolar_limit.hpp"
 #include "core/geometry/median.hpp"
 #include "core/geometry/triangulate.hpp"
