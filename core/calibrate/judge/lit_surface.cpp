@@ -9,7 +9,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/QR>
 
-#include "core/geometry/median.hpp"
+#include "core/geometry/robust.hpp"
 #include "core/geometry/triangulate.hpp"
 
 namespace slsd {
@@ -50,7 +50,7 @@ SurfaceFit fit(const Eigen::MatrixXd& terms, const Eigen::VectorXd& z) {
   for (int round = 0; round < kRounds; ++round) {
     const Eigen::VectorXd off = (z - terms * found.coefficients).cwiseAbs();
     const double scale = 4 * std::max(median_of(std::vector<double>(off.begin(), off.end())), 1e-9);
-    found.weights = (1 + (off / scale).array().square()).square().inverse();
+    found.weights = off.unaryExpr([&](double each) { return robust_weight(each, scale); });
     const Eigen::VectorXd root = found.weights.cwiseSqrt();
     found.coefficients = (root.asDiagonal() * terms).colPivHouseholderQr().solve(root.cwiseProduct(z));
   }

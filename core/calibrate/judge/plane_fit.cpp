@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 
 #include "core/calibrate/solve/point_residuals.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 namespace {
@@ -36,9 +37,7 @@ double median_offset(Points points, const PlaneFit& plane) {
   const std::size_t step = std::max<std::size_t>(1, points.size() / kScored);
   std::vector<double> off;
   for (std::size_t i = 0; i < points.size(); i += step) off.push_back(std::abs(plane.off_mm(points[i])));
-  const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
-  std::ranges::nth_element(off, middle);
-  return *middle;
+  return median_in_place(off);
 }
 
 std::optional<PlaneFit> through_three(Points points, std::mt19937& random) {

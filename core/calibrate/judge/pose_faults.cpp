@@ -12,7 +12,7 @@
 #include "core/calibrate/judge/lit_surface.hpp"
 #include "core/calibrate/judge/view_demands.hpp"
 #include "core/calibrate/solve/corner_pose.hpp"
-#include "core/geometry/median.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 namespace {

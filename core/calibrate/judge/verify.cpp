@@ -14,6 +14,7 @@
 
 #include "core/calibrate/judge/plane_fit.hpp"
 #include "core/calibrate/solve/point_residuals.hpp"
+#include "core/geometry/robust.hpp"
 #include "core/geometry/triangulate.hpp"
 
 namespace slsd {
@@ -36,9 +37,7 @@ struct MeasuredSymbol {
 std::vector<MeasuredSymbol> without_misread(std::vector<MeasuredSymbol> symbols) {
   std::vector<double> residuals;
   for (const MeasuredSymbol& symbol : symbols) residuals.push_back(symbol.epipolar_px);
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::ranges::nth_element(residuals, middle);
-  const double median = *middle;
+  const double median = median_of(residuals);
   for (double& residual : residuals) residual -= median;
   const double gate = std::max(kMisreadMinPx, kMisreadSigmas * robust_sigma_px(residuals));
   std::erase_if(symbols, [&](const MeasuredSymbol& symbol) { return std::abs(symbol.epipolar_px - median) > gate; });

@@ -9,7 +9,7 @@
 #include <Eigen/Geometry>
 
 #include "core/calibrate/observe/board_region.hpp"
-#include "core/geometry/median.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 namespace {
@@ -19,7 +19,6 @@ constexpr std::size_t kEdgesUsed = 6000, kEdgesMin = 200;
 constexpr float kEdgeMin = 0.1F;   // of the light, in natural logarithms a pixel
 constexpr float kCapped = 0.3F;    // beyond which an edge weighs no more
 constexpr float kFaintLevels = 4;  // of 255: added, so that noise in the dark is no edge
-constexpr double kSigmaOfMedian = 1.4826;
 
 /// The logarithm of a picture's light, smoothed over its pixels' neighbours.
 Image<float> log_light(const GreyView& picture) {

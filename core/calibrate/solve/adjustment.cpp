@@ -52,14 +52,6 @@ bool tighten(const DeviceModel& device, DistortionPrior& prior) {
 
 }  // namespace
 
-std::string short_name_of(const SharedParameter& parameter) {
-  static constexpr const char* kMotionNames[] = {"turn_x", "turn_y", "turn_z", "place_x", "place_y", "place_z"};
-  if (parameter.kind == SharedParameter::Kind::kScale) return "board_scale";
-  if (parameter.kind == SharedParameter::Kind::kStretch) return "board_stretch";
-  return parameter.kind == SharedParameter::Kind::kMotion ? kMotionNames[parameter.index]
-                                                          : std::string(kLensParameterNames[parameter.index]);
-}
-
 double value_of(const SharedParameter& parameter, const RigModel& rig) {
   if (parameter.kind == SharedParameter::Kind::kScale) return rig.board_scale;
   if (parameter.kind == SharedParameter::Kind::kStretch) return rig.board_stretch;

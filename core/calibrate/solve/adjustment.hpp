@@ -66,8 +66,6 @@ class Adjustment {
   std::vector<std::string> warnings_;
 };
 
-/// "fx", "turn about x" ...
-[[nodiscard]] std::string short_name_of(const SharedParameter& parameter);
 [[nodiscard]] double value_of(const SharedParameter& parameter, const RigModel& rig);
 
 }  // namespace slsd

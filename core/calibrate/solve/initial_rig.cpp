@@ -16,7 +16,7 @@
 #include "core/calibrate/solve/bundle.hpp"
 #include "core/calibrate/solve/point_residuals.hpp"
 #include "core/calibrate/solve/resection.hpp"
-#include "core/geometry/median.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "core/calibrate/solve/board_plane.hpp"
-#include "core/geometry/median.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 
@@ -38,7 +38,6 @@ double rms_px(const std::vector<Eigen::Vector2d>& residuals) {
 }
 
 double robust_sigma_px(std::vector<double> components) {
-  constexpr double kSigmaOfMedian = 1.4826;  // of a normal distribution's median absolute value
   for (double& component : components) component = std::abs(component);
   return kSigmaOfMedian * median_of(std::move(components));
 }

@@ -90,17 +90,41 @@ Result<Eigen::MatrixXd> invert(const Eigen::MatrixXd& normal, const std::vector<
   return Eigen::MatrixXd(scale.asDiagonal() * inverse * scale.asDiagonal());
 }
 
+struct ParameterNames {
+  std::string brief, full;
+};
+
+ParameterNames names_of(const SharedParameter& parameter) {
+  static const ParameterNames kMotion[] = {{"turn_x", "turn about x"},   {"turn_y", "turn about y"},
+                                           {"turn_z", "turn about z"},   {"place_x", "place along x"},
+                                           {"place_y", "place along y"}, {"place_z", "place along z"}};
+  switch (parameter.kind) {
+    case SharedParameter::Kind::kScale:
+      return {"board_scale", "scale"};
+    case SharedParameter::Kind::kStretch:
+      return {"board_stretch", "stretch"};
+    case SharedParameter::Kind::kMotion:
+    case SharedParameter::Kind::kMovedTo:
+      return kMotion[parameter.index];
+    case SharedParameter::Kind::kLens:
+      break;
+  }
+  const std::string lens(kLensParameterNames[parameter.index]);
+  return {lens, lens};
+}
+
 }  // namespace
 
+std::string short_name_of(const SharedParameter& parameter) {
+  return names_of(parameter).brief;
+}
+
 std::string name_of(const SharedParameter& parameter) {
-  static constexpr const char* kMotionNames[] = {"turn about x",  "turn about y",  "turn about z",
-                                                 "place along x", "place along y", "place along z"};
-  if (parameter.kind == SharedParameter::Kind::kScale) return "the board's scale";
-  if (parameter.kind == SharedParameter::Kind::kStretch) return "the board's stretch";
-  const std::string device =
-      parameter.device < 0 ? "the projector's " : "camera " + std::to_string(parameter.device) + "'s ";
-  if (parameter.kind == SharedParameter::Kind::kMotion) return device + kMotionNames[parameter.index];
-  return device + std::string(kLensParameterNames[parameter.index]);
+  using Kind = SharedParameter::Kind;
+  const std::string device = parameter.kind == Kind::kScale || parameter.kind == Kind::kStretch ? "the board's "
+                             : parameter.device < 0                                             ? "the projector's "
+                                                    : "camera " + std::to_string(parameter.device) + "'s ";
+  return device + names_of(parameter).full;
 }
 
 double PoseInfluence::sigma(std::size_t parameter) const {

@@ -45,5 +45,7 @@ struct PoseInfluence {
 
 /// "camera 0's fx", "the projector's place (z)".
 [[nodiscard]] std::string name_of(const SharedParameter& parameter);
+/// "fx", "turn_x" ...
+[[nodiscard]] std::string short_name_of(const SharedParameter& parameter);
 
 }  // namespace slsd

@@ -11,7 +11,7 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 
-#include "core/geometry/median.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 namespace {
@@ -71,7 +71,7 @@ std::vector<double> weigh(std::span<const SpacePoint> points, const Scaling& sca
     errors[i] = ((projection * scaling.point(points[i])).hnormalized() - scaling.pixel(points[i])).norm();
   }
   const double scale = 3 * std::max(median_of(errors), 1e-12);
-  for (double& error : errors) error = 1 / std::pow(1 + error * error / (scale * scale), 2);
+  for (double& error : errors) error = robust_weight(error, scale);
   return errors;
 }
 

@@ -14,7 +14,7 @@
 
 #include "core/calibrate/solve/point_residuals.hpp"
 #include "core/calibrate/solve/pose_influence.hpp"
-#include "core/geometry/median.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 namespace {
@@ -90,12 +90,12 @@ RigModel split_at(const RigModel& rig, std::size_t first_pose) {
 
 /// Adjusts until the symbols' noise is that which the model leaves.
 Model adjusted(const Observations& seen, BundleOptions options, RigModel rig, int rounds = 2) {
-  constexpr double kSigmaOfMedian = 1 / 1.1774;  // of the distance in a plane
+  constexpr double kSigmaOfDistance = 1 / 1.1774;  // of the median distance in a plane
   Model model{std::move(rig), options};
   for (int round = 0; round < rounds; ++round) {
     if (!adjust(seen, model.options, model.rig)) return model;
     if (round + 1 < rounds) {
-      model.options.symbol_sigma_factor = std::max(kSigmaOfMedian * median_of(usual_errors(seen, model.rig)), 1e-3);
+      model.options.symbol_sigma_factor = std::max(kSigmaOfDistance * median_of(usual_errors(seen, model.rig)), 1e-3);
     }
   }
   model.cost = cost_of(seen, model.options, model.rig);
