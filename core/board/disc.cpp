@@ -11,6 +11,8 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 
+#include "core/geometry/robust.hpp"
+
 namespace slsd {
 namespace {
 
@@ -98,8 +100,8 @@ double blur_at_edge(const Image<float>& light, const Homography& local, const Ei
     }
     blurs.push_back(step / steepest / std::sqrt(2 * std::numbers::pi));
   }
-  std::ranges::nth_element(blurs, blurs.begin() + kRays / 2);
-  return std::sqrt(std::max(0.0, blurs[kRays / 2] * blurs[kRays / 2] - kOwnVariancePx2));
+  const double blur = median_in_place(blurs);
+  return std::sqrt(std::max(0.0, blur * blur - kOwnVariancePx2));
 }
 
 }  // namespace

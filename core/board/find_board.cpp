@@ -2,6 +2,10 @@
 // Copyright the slsd authors
 #include "core/board/find_board.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <string>
+
 #include "core/board/board_photo.hpp"
 #include "core/board/find_charuco.hpp"
 #include "core/board/find_chessboard.hpp"
@@ -12,13 +16,19 @@ namespace slsd {
 namespace {
 
 constexpr int kLeastSidePx = 16;
+/// Of a picture's pixels at full level: a reflection on a board is some of them at least.
+constexpr double kClippedShare = 0.01;
 
-}  // namespace
+double full_share(const BoardPhoto& photo) {
+  std::size_t full = 0;
+  for (int y = 0; y < photo.light.height(); ++y)
+    full +=
+        static_cast<std::size_t>(std::count_if(photo.light.row(y), photo.light.row(y) + photo.light.width(),
+                                               [&](float level) { return static_cast<double>(level) >= photo.full; }));
+  return static_cast<double>(full) / (static_cast<double>(photo.light.width()) * photo.light.height());
+}
 
-Result<BoardSighting> find_board(const GreyView& image, const Board& board) {
-  const bool too_small = std::visit([](const auto& v) { return std::min(v.width, v.height) < kLeastSidePx; }, image);
-  if (too_small) return fail(ErrorCode::kInvalidArgument, "an image of less than 16 x 16 px shows no board");
-  const BoardPhoto photo = photograph(image);
+Result<BoardSighting> find(const BoardPhoto& photo, const Board& board) {
   switch (board.kind) {
     case BoardKind::kCharuco:
       return find_charuco(photo, board);
@@ -29,6 +39,22 @@ Result<BoardSighting> find_board(const GreyView& image, const Board& board) {
     default:
       return find_plane(photo, board);
   }
+}
+
+}  // namespace
+
+Result<BoardSighting> find_board(const GreyView& image, const Board& board) {
+  const bool too_small = std::visit([](const auto& v) { return std::min(v.width, v.height) < kLeastSidePx; }, image);
+  if (too_small) return fail(ErrorCode::kInvalidArgument, "an image of less than 16 x 16 px shows no board");
+  const BoardPhoto photo = photograph(image);
+  auto found = find(photo, board);
+  if (const double share = found ? 0 : full_share(photo); share > kClippedShare) {
+    return fail(found.error().code,
+                "clipped: " + std::to_string(std::lround(100 * share)) +
+                    " % of the picture's pixels are at full level, and the board is not found in the rest (" +
+                    found.error().message + "); expose less, or turn what shines away");
+  }
+  return found;
 }
 
 }  // namespace slsd

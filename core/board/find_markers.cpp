@@ -9,6 +9,7 @@
 #include <opencv2/aruco.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/geometry/robust.hpp"
 namespace slsd {
 namespace {
 
@@ -62,10 +63,7 @@ SeenMarkers detect(const cv::Mat& image, const MarkerFamily& family, double scal
 double median_side(const SeenMarkers& seen) {
   std::vector<double> sides;
   for (const SeenMarker& marker : seen.markers) sides.push_back(marker.side_px());
-  if (sides.empty()) return 0;
-  const auto middle = sides.begin() + static_cast<std::ptrdiff_t>(sides.size() / 2);
-  std::ranges::nth_element(sides, middle);
-  return *middle;
+  return median_in_place(sides);
 }
 
 // Adds the markers that are not there; a second marker of the same id is a false one or another board's, and goes.

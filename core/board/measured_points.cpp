@@ -8,21 +8,16 @@
 #include <Eigen/Geometry>
 
 #include "core/board/tie.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 template <class Measure>
 double median_of(const std::vector<MeasuredPoint>& points, Measure&& measure) {
   std::vector<double> values;
   for (const auto& point : points) values.push_back(measure(point));
-  return median(std::move(values));
+  return median_in_place(values);
 }
 
 std::vector<Tie> ties_of_points(const std::vector<MeasuredPoint>& points, const Board& board) {

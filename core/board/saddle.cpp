@@ -7,14 +7,16 @@
 #include <numbers>
 #include <vector>
 
-#include <Eigen/Cholesky>
+#include <ceres/tiny_solver.h>
 #include <Eigen/Geometry>
 
 namespace slsd {
 namespace {
 
-constexpr int kMaxRounds = 30;
-constexpr double kConverged_px = 1e-4;
+constexpr int kMaxSteps = 30;
+constexpr double kConverged = 1e-9;  // a step that lowers the squares by less than that share
+constexpr int kMaxCentres = 8;
+constexpr double kStays_px = 0.05;
 constexpr double kLeastBlur_px = 0.2;
 constexpr double kMaxMisfit = 0.15;  // of the step; noise and markers leave less than 0.1
 constexpr double kLeastStep = 3;     // levels
@@ -22,7 +24,6 @@ constexpr double kLeastAngle = 0.3;  // sine of the angle between the edges
 
 enum Parameter { kX, kY, kAngleU, kAngleV, kBlur, kMean, kHalfStep, kSlopeX, kSlopeY, kParameters };
 using Vector = Eigen::Matrix<double, kParameters, 1>;
-using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
 
 struct Edge {
   double value;  // E(distance / blur)
@@ -56,13 +57,6 @@ std::vector<Sample> samples_around(const Image<float>& light, const Eigen::Vecto
   return samples;
 }
 
-struct Normal {
-  Matrix left = Matrix::Zero();
-  Vector right = Vector::Zero();
-  double cost = 0;
-  double weight = 0;
-};
-
 // The model's level at a sample, and its derivatives.
 double model(const Vector& p, const Eigen::Vector2d& at, Vector& gradient) {
   const Eigen::Vector2d d = at - p.head<2>();
@@ -88,18 +82,26 @@ double model(const Vector& p, const Eigen::Vector2d& at, Vector& gradient) {
   return albedo * light;
 }
 
-Normal normal_equations(const std::vector<Sample>& samples, const Vector& parameters) {
-  Normal normal;
-  Vector gradient;
-  for (const Sample& sample : samples) {
-    const double error = sample.level - model(parameters, sample.at, gradient);
-    normal.left.selfadjointView<Eigen::Lower>().rankUpdate(gradient, sample.weight);
-    normal.right += sample.weight * error * gradient;
-    normal.cost += sample.weight * error * error;
-    normal.weight += sample.weight;
+/// What the model leaves of each sample, by the root of its weight: as Ceres' small solver asks for it.
+struct Residuals {
+  using Scalar = double;
+  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = kParameters };
+  const std::vector<Sample>& samples;
+
+  [[nodiscard]] int NumResiduals() const { return static_cast<int>(samples.size()); }
+  bool operator()(const double* parameters, double* residuals, double* jacobian) const {
+    Vector p(parameters), gradient;
+    p[kBlur] = std::max(p[kBlur], kLeastBlur_px);  // what goes below is no corner, and is looked at afterwards
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const double root = std::sqrt(samples[i].weight);
+      residuals[i] = root * (model(p, samples[i].at, gradient) - samples[i].level);
+      if (jacobian == nullptr) continue;
+      for (int k = 0; k < kParameters; ++k)
+        jacobian[static_cast<std::size_t>(k) * samples.size() + i] = root * gradient[k];
+    }
+    return true;
   }
-  return normal;
-}
+};
 
 Vector first_estimate(const std::vector<Sample>& samples, const SaddleGuess& guess) {
   double sum = 0;
@@ -139,35 +141,23 @@ std::optional<Saddle> fit_saddle(const Image<float>& light, const SaddleGuess& g
   auto samples = samples_around(light, guess.pixel, reach_px);
   if (samples.empty()) return std::nullopt;
   Vector p = first_estimate(samples, guess);
+  ceres::TinySolver<Residuals> solver;
+  solver.options.max_num_iterations = kMaxSteps, solver.options.function_tolerance = kConverged;
+  // Weights are about the corner, lest they pull it to the guess.
   Eigen::Vector2d centre = guess.pixel;
-  Normal normal = normal_equations(samples, p);
-  double damping = 1e-3;
-  for (int round = 0; round < kMaxRounds; ++round) {
-    Matrix left = normal.left.selfadjointView<Eigen::Lower>();
-    left.diagonal() *= 1 + damping;
-    const Vector step = left.ldlt().solve(normal.right);
-    Vector next = p + step;
-    next[kBlur] = std::max(next[kBlur], kLeastBlur_px * 1.01);
-    if (!step.allFinite()) return std::nullopt;
-    const Normal tried = normal_equations(samples, next);
-    if (tried.cost > normal.cost) {
-      if ((damping *= 10) > 1e6) break;
-      continue;
-    }
-    damping = std::max(damping / 10, 1e-9);
-    p = next;
-    normal = tried;
-    if (!plausible(p, guess, reach_px)) return std::nullopt;
-    if (step.head<2>().norm() > kConverged_px) continue;
-    if ((p.head<2>() - centre).norm() < 0.05) break;
-    centre = p.head<2>();  // weights are about the corner, lest they pull towards the guess
+  for (int nth = 0;; ++nth) {
+    solver.Solve(Residuals{samples}, &p);
+    if (!p.allFinite() || !plausible(p, guess, reach_px) || nth == kMaxCentres) return std::nullopt;
+    if ((p.head<2>() - centre).norm() < kStays_px) break;
+    centre = p.head<2>();
     samples = samples_around(light, centre, reach_px);
     if (samples.empty()) return std::nullopt;
-    normal = normal_equations(samples, p);
   }
+  double weight = 0;
+  for (const Sample& sample : samples) weight += sample.weight;
   const double step = 2 * p[kHalfStep];
-  const double misfit = std::sqrt(normal.cost / normal.weight) / std::max(std::abs(step), 1e-9);
-  if (!plausible(p, guess, reach_px) || std::abs(step) < kLeastStep || misfit > kMaxMisfit) return std::nullopt;
+  const double misfit = std::sqrt(2 * solver.summary.final_cost / weight) / std::max(std::abs(step), 1e-9);
+  if (std::abs(step) < kLeastStep || misfit > kMaxMisfit) return std::nullopt;
   return Saddle{p.head<2>(), step, p[kBlur], misfit};
 }
 

@@ -33,8 +33,9 @@ struct Saddle {
 ///     I(p) = (m + k E(u / s) E(v / s)) (1 + g (p - c)),    E(x) = erf(x / sqrt 2),
 ///
 /// to the pixels around a corner, where u and v are the distances from two edges through c: two step edges blurred by
-/// s under a light that changes linearly. By Levenberg and Marquardt from the guess, with weights that fall to 0 at
-/// reach_px. What is not of the model but symmetrical about the corner, as a ChArUco's markers are, does not move c.
+/// s under a light that changes linearly. By Levenberg and Marquardt (Ceres' small solver) from the guess, with weights
+/// that fall to 0 at reach_px. What is not of the model but symmetrical about the corner, as a ChArUco's markers are,
+/// does not move c.
 /// @param reach_px  at least 2.5
 /// @return          nothing where no such corner is: outside the image, no contrast, no convergence, another shape
 /// @thread reentrant

@@ -8,10 +8,10 @@
 
 #include <fmt/format.h>
 
-#include "core/calibrate/adjustment.hpp"
-#include "core/calibrate/initial_rig.hpp"
-#include "core/calibrate/point_residuals.hpp"
-#include "core/calibrate/pose_list.hpp"
+#include "core/calibrate/judge/pose_list.hpp"
+#include "core/calibrate/solve/adjustment.hpp"
+#include "core/calibrate/solve/initial_rig.hpp"
+#include "core/calibrate/solve/point_residuals.hpp"
 #include "core/geometry/triangulate.hpp"
 
 namespace slsd {

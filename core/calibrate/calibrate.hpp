@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "core/calibrate/depth_uncertainty.hpp"
-#include "core/calibrate/lens_terms.hpp"
-#include "core/calibrate/observations.hpp"
-#include "core/calibrate/pose_list.hpp"
-#include "core/calibrate/reference_plane.hpp"
-#include "core/calibrate/rig_model.hpp"
-#include "core/calibrate/verdict.hpp"
+#include "core/calibrate/judge/depth_uncertainty.hpp"
+#include "core/calibrate/judge/pose_list.hpp"
+#include "core/calibrate/judge/reference_plane.hpp"
+#include "core/calibrate/judge/verdict.hpp"
+#include "core/calibrate/observe/observations.hpp"
+#include "core/calibrate/solve/lens_terms.hpp"
+#include "core/calibrate/solve/rig_model.hpp"
 #include "core/result.hpp"
 
 namespace slsd {

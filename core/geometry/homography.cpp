@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "core/geometry/median.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 namespace {
@@ -68,10 +68,7 @@ Homography fit_robust_homography(std::span<const Eigen::Vector2d> from, std::spa
   for (int round = 0; round < kRounds && from.size() > 4; ++round) {
     for (std::size_t i = 0; i < from.size(); ++i) distances[i] = (homography.map(from[i]) - to[i]).norm();
     const double scale = std::max(median_of(distances), 1e-9);
-    for (std::size_t i = 0; i < from.size(); ++i) {
-      const double ratio = distances[i] / (3 * scale);
-      weights[i] = 1 / ((1 + ratio * ratio) * (1 + ratio * ratio));
-    }
+    for (std::size_t i = 0; i < from.size(); ++i) weights[i] = robust_weight(distances[i], 3 * scale);
     homography = solve(from, to, weights);
   }
   return homography;

@@ -11,7 +11,7 @@
 #include "core/board/board.hpp"
 #include "core/board/find_board.hpp"
 #include "core/board/tie.hpp"
-#include "core/calibrate/observations.hpp"
+#include "core/calibrate/observe/observations.hpp"
 
 namespace slsd {
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/calibrate/observations.hpp"
+#include "core/calibrate/observe/observations.hpp"
 #include "core/result.hpp"
 
 namespace slsd {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/calibrate/observe_pose.hpp"
+#include "core/calibrate/observe/observe_pose.hpp"
 #include "drivers/files/grey_image.hpp"
 
 namespace slsd {

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "core/calibrate/coverage.hpp"
+#include "core/calibrate/judge/coverage.hpp"
 
 namespace slsd {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "core/calibrate/observations.hpp"
+#include "core/calibrate/observe/observations.hpp"
 
 namespace slsd {
 

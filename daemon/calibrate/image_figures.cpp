@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "core/calibrate/coverage.hpp"
-#include "core/calibrate/point_residuals.hpp"
-#include "core/calibrate/verdict.hpp"
+#include "core/calibrate/judge/coverage.hpp"
+#include "core/calibrate/judge/verdict.hpp"
+#include "core/calibrate/solve/point_residuals.hpp"
 #include "daemon/calibrate/svg_figure.hpp"
 
 namespace slsd {

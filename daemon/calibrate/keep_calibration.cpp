@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
-#include "core/calibrate/verify.hpp"
+#include "core/calibrate/judge/verify.hpp"
 #include "core/geometry/epipolar_limit.hpp"
-#include "core/geometry/median.hpp"
+#include "core/geometry/robust.hpp"
 #include "core/geometry/triangulate.hpp"
 #include "daemon/scan/hardware.hpp"
 #include "drivers/files/file.hpp"

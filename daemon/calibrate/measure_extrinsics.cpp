@@ -14,7 +14,7 @@
 #include <slsd/scanner.hpp>
 
 #include "core/board/find_board.hpp"
-#include "core/calibrate/place_scanners.hpp"
+#include "core/calibrate/solve/place_scanners.hpp"
 #include "daemon/calibrate/board_request.hpp"
 #include "drivers/files/file.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/calibrate/observations.hpp"
+#include "core/calibrate/observe/observations.hpp"
 #include "daemon/calibrate/board_look.hpp"
 #include "daemon/calibrate/board_place.hpp"
 

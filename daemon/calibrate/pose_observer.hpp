@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/board/find_board.hpp"
-#include "core/calibrate/observe_pose.hpp"
-#include "core/calibrate/print_shift.hpp"
+#include "core/calibrate/observe/observe_pose.hpp"
+#include "core/calibrate/observe/print_shift.hpp"
 #include "core/code/codebook.hpp"
 
 namespace slsd {

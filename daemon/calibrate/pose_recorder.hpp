@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/calibrate/observations.hpp"
+#include "core/calibrate/observe/observations.hpp"
 #include "core/code/pattern.hpp"
 #include "core/result.hpp"
 #include "daemon/calibrate/captured_pictures.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/calibrate/observations.hpp"
+#include "core/calibrate/observe/observations.hpp"
 #include "core/image.hpp"
 #include "core/result.hpp"
 #include "drivers/files/grey_image.hpp"

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "core/calibrate/view_demands.hpp"
+#include "core/calibrate/judge/view_demands.hpp"
 
 namespace slsd {
 namespace {

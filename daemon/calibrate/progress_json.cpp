@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/calibrate/coverage.hpp"
+#include "core/calibrate/judge/coverage.hpp"
 
 namespace slsd {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "core/calibrate/verdict.hpp"
+#include "core/calibrate/judge/verdict.hpp"
 #include "daemon/calibrate/image_figures.hpp"
 #include "daemon/calibrate/rig_figures.hpp"
 #include "daemon/calibrate/svg_figure.hpp"

@@ -11,7 +11,7 @@
 
 #include <fmt/format.h>
 
-#include "core/calibrate/gray_code.hpp"
+#include "core/calibrate/observe/gray_code.hpp"
 #include "daemon/calibrate/board_request.hpp"
 #include "daemon/calibrate/device_source.hpp"
 #include "daemon/calibrate/finish_calibration.hpp"

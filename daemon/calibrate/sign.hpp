@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "core/calibrate/observations.hpp"
+#include "core/calibrate/observe/observations.hpp"
 #include "core/image.hpp"
 
 namespace slsd {

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "core/calibrate/observe_plane.hpp"
+#include "core/calibrate/observe/observe_plane.hpp"
 #include "daemon/calibrate/board_request.hpp"
 #include "daemon/calibrate/verify_text.hpp"
 #include "daemon/scan/scan_setup.hpp"

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "core/calibrate/verify.hpp"
+#include "core/calibrate/judge/verify.hpp"
 
 namespace slsd {
 

@@ -10,7 +10,7 @@
 #include "core/decode/decode_in_light.hpp"
 #include "core/decode/frame_noise.hpp"
 #include "core/exposure/light_levels.hpp"
-#include "core/geometry/median.hpp"
+#include "core/geometry/robust.hpp"
 #include "core/utc_text.hpp"
 #include "daemon/scan/frame_image.hpp"
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/robust.hpp"
 #include "core/geometry/triangulate.hpp"
 
 namespace slsd {
@@ -20,12 +21,6 @@ constexpr std::uint64_t kSpeaksFor = 20;     // scans that a quarter's average i
 constexpr double kSpreadMaxPx = 2, kSpreadMaxShare = 0.5;
 constexpr double kFineAgainShare = 0.8;    // of the limit: no to and fro at it
 constexpr double kLearntLimitMaxPx = 1.0;  // a rig may be out already as the service starts
-
-double median(std::span<float> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 }  // namespace
 
@@ -58,9 +53,9 @@ std::optional<double> DriftWatch::average_quarters() {
   for (Quarter& quarter : quarters_) {
     if (quarter.count >= kPointsMin) {
       const std::span<float> residuals = std::span(quarter.residuals_px).first(quarter.count);
-      const double off_px = median(residuals);
+      const double off_px = median_in_place(residuals);
       for (float& residual : residuals) residual = std::abs(residual - static_cast<float>(off_px));
-      if (median(residuals) > std::max(kSpreadMaxPx, kSpreadMaxShare * std::abs(off_px))) continue;
+      if (median_in_place(residuals) > std::max(kSpreadMaxPx, kSpreadMaxShare * std::abs(off_px))) continue;
       quarter.last = state_.scans;
       quarter.scans = std::min(quarter.scans + 1, kAveragedScans);
       quarter.running_px += (off_px - quarter.running_px) / static_cast<double>(quarter.scans);

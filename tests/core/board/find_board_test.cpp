@@ -199,6 +199,13 @@ TEST(FindBoard, SeesClippedLight) {
   EXPECT_LT(sighting->clipped_share, 0.6);
 }
 
+TEST(FindBoard, NamesTheReflectionThatHidesTheBoard) {
+  Grey8 image = photograph8(view_of(kCharuco, 30));
+  for (int y = 0; y < image.height(); ++y) std::fill_n(image.row(y), image.width() * 9 / 10, std::uint8_t{255});
+  EXPECT_THAT(error_of(image, kCharuco).message,
+              testing::StartsWith("clipped: 90 % of the picture's pixels are at full level"));
+}
+
 TEST(FindBoard, MeasuresBlur) {
   BoardScene scene = view_of(kChessboard, 30);
   scene.blur_px = 2;

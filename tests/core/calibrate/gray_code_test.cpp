@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/gray_code.hpp"
+#include "core/calibrate/observe/gray_code.hpp"
 
 #include <algorithm>
 #include <cmath>

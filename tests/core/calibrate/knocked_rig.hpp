@@ -4,7 +4,7 @@
 
 #include <Eigen/Geometry>
 
-#include "core/calibrate/rig_model.hpp"
+#include "core/calibrate/solve/rig_model.hpp"
 
 namespace slsd {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/observe_pose.hpp"
+#include "core/calibrate/observe/observe_pose.hpp"
 
 #include <cmath>
 #include <numbers>
@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 
-#include "core/calibrate/board_region.hpp"
+#include "core/calibrate/observe/board_region.hpp"
 
 namespace slsd {
 namespace {

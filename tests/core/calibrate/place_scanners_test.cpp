@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/place_scanners.hpp"
+#include "core/calibrate/solve/place_scanners.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/residuals.hpp"
+#include "core/calibrate/solve/residuals.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 #include <opencv2/calib3d.hpp>
 
-#include "core/calibrate/point_residuals.hpp"
-#include "core/calibrate/pose_influence.hpp"
-#include "core/calibrate/resection.hpp"
+#include "core/calibrate/solve/point_residuals.hpp"
+#include "core/calibrate/solve/pose_influence.hpp"
+#include "core/calibrate/solve/resection.hpp"
 #include "tests/core/calibrate/synthetic_rig.hpp"
 
 namespace slsd {

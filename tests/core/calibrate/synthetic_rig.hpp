@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "core/calibrate/rig_model.hpp"
+#include "core/calibrate/solve/rig_model.hpp"
 
 namespace slsd {
 

@@ -7,7 +7,7 @@
 
 #include <gmock/gmock.h>
 
-#include "core/calibrate/gray_code.hpp"
+#include "core/calibrate/observe/gray_code.hpp"
 #include "daemon/calibrate/capture_folder.hpp"
 #include "daemon/calibrate/session_record.hpp"
 #include "drivers/files/file.hpp"

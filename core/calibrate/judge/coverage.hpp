@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "core/calibrate/observe/observations.hpp"
+#include "core/calibrate/solve/rig_model.hpp"
+
+namespace slsd {
+
+inline constexpr int kCoverageColumns = 8, kCoverageRows = 6;
+
+/// Where in a device's image points were seen: how many in each cell of a coarse grid.
+struct Coverage {
+  std::array<int, kCoverageColumns * kCoverageRows> counts{};
+
+  void add(const Eigen::Vector2d& pixel, const ImageSize& size);
+  /// Of the cells, those with any point: 0 to 1.
+  [[nodiscard]] double share() const;
+  /// "the upper left", "the right": the region with the fewest points, or empty where all have some.
+  [[nodiscard]] std::string emptiest() const;
+};
+
+[[nodiscard]] Coverage camera_coverage(const Observations& observations, std::size_t camera);
+[[nodiscard]] Coverage projector_coverage(const Observations& observations);
+
+/// The board's tilt against the first camera's axis, degrees, one to a pose.
+[[nodiscard]] std::vector<double> tilts_deg(const RigModel& rig);
+
+/// The board's distances, mm along the first camera's axis, one to a pose.
+[[nodiscard]] std::vector<double> distances_mm(const RigModel& rig);
+
+}  // namespace slsd

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/judge/pose_faults.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "core/calibrate/judge/lit_surface.hpp"
+#include "core/calibrate/judge/view_demands.hpp"
+#include "core/calibrate/solve/corner_pose.hpp"
+#include "core/geometry/robust.hpp"
+
+namespace slsd {
+namespace {
+
+/// An error this much above that of the other poses is no chance.
+constexpr double kContradiction = 2.5;
+constexpr double kContradictionMinPx = 0.1;
+/// The same in standard deviations of what the poses say of the rig: about 1 of poses that agree, and one that turned
+/// by 0.1 degrees before the pattern came is at 4, and moves the principal point by 3 px.
+constexpr double kDisagreementMin = 3;
+/// Of a pose's points, those that lie off the rest: above this share they are no wrong points but a wrong pose.
+constexpr double kOutlyingShare = 0.15, kUsualOutlyingShare = 0.05;
+/// A bend or a shift this much above that of the other poses is what explains an error.
+constexpr double kExplains = 3;
+constexpr double kBowShareMin = 0.4;
+/// Corners that are bent say a plane that is off by about the bend; a move without a bend shows none.
+constexpr double kBowOfShiftMin = 0.3;
+/// Of half the board's size: root mean square off a plane beyond which it is no board.
+constexpr double kUnevenShareMax = 0.1;
+/// Of the board's pixels: from here on what is left of its edges and of the symbols is not where it was.
+constexpr double kClippedMax = 0.25;
+/// The print lies this much elsewhere under the pattern: the picture of the board tells nothing of it.
+constexpr double kShiftMaxPx = 1;
+/// Corners that are this near those of an earlier pose, as a share of the picture's width, say what those said.
+constexpr double kSamePlaceShare = 0.005;
+/// Of a pose's symbols, those that something stands before; of more it is the board that moved.
+constexpr double kCoveredShare = 0.08, kUncoveredShare = 0.5;
+/// Times the usual error from which on the figure tells nothing more.
+constexpr double kTimesTelling = 100;
+
+/// The blurriest view of a pose.
+double blur_of(const PoseObservation& pose) {
+  double blur = 0;
+  for (const PoseView& view : pose.views) blur = std::max(blur, view.blur_px);
+  return blur;
+}
+
+double usual_blur_of(PoseSubject subject, const Observations& observations) {
+  std::vector<double> blurs;
+  for (const PoseObservation& pose : observations.poses) {
+    if (pose.subject == subject && blur_of(pose) > 0) blurs.push_back(blur_of(pose));
+  }
+  return median_of(std::move(blurs));
+}
+
+/// What the view with the most corners lacks of them, where all views lack some.
+std::string least_lack_of_corners(const PoseObservation& pose) {
+  std::string lack = "the board was not found";
+  std::size_t most = 0;
+  for (const PoseView& view : pose.views) {
+    std::string of_view = lack_of_corners(view);
+    if (of_view.empty()) return {};
+    if (view.corners.size() >= most) most = view.corners.size(), lack = std::move(of_view);
+  }
+  return lack;
+}
+
+/// Of views that have corners enough.
+std::string least_lack_of_symbols(const PoseObservation& pose) {
+  std::size_t most = 0;
+  for (const PoseView& view : pose.views) {
+    if (lack_of_corners(view).empty()) most = std::max(most, view.symbols.size());
+  }
+  return lack_of_symbols(most);
+}
+
+double clipped_share_of(const PoseObservation& pose) {
+  double share = 0;
+  for (const PoseView& view : pose.views) share = std::max(share, view.clipped_share);
+  return share;
+}
+
+double shift_of(const PoseObservation& pose) {
+  double shift = 0;
+  for (const PoseView& view : pose.views) shift = std::max(shift, view.shift_px ? view.shift_px->norm() : 0);
+  return shift;
+}
+
+/// How far the corners that both views have are apart, root mean square; nothing where hardly any are.
+std::optional<double> apart_px(const PoseView& one, const PoseView& other) {
+  constexpr std::size_t kCommonMin = 4;
+  std::map<std::pair<double, double>, Eigen::Vector2d> places;
+  for (const BoardPoint& corner : one.corners) places[{corner.board_mm.x(), corner.board_mm.y()}] = corner.camera_px;
+  double sum = 0;
+  std::size_t count = 0;
+  for (const BoardPoint& corner : other.corners) {
+    const auto place = places.find({corner.board_mm.x(), corner.board_mm.y()});
+    if (place != places.end()) sum += (place->second - corner.camera_px).squaredNorm(), ++count;
+  }
+  if (count < kCommonMin) return std::nullopt;
+  return std::sqrt(sum / static_cast<double>(count));
+}
+
+/// Whether all views of the later pose show the board where the earlier one's do.
+bool repeats(const PoseObservation& earlier, const PoseObservation& later, const Observations& observations) {
+  if (earlier.subject != later.subject) return false;
+  bool any = false;
+  for (const PoseView& view : later.views) {
+    const auto before = std::ranges::find(earlier.views, view.camera, &PoseView::camera);
+    if (before == earlier.views.end()) return false;
+    const auto apart = apart_px(*before, view);
+    const double width_px = observations.cameras[view.camera].size.width_px;
+    if (!apart || *apart > kSamePlaceShare * width_px) return false;
+    any = true;
+  }
+  return any;
+}
+
+/// Of the corners or of the symbols of a pose, whichever is more.
+double outlying_share(const PoseObservation& pose) {
+  double corners = 0, outlying_corners = 0, symbols = 0, outlying_symbols = 0;
+  for (const PoseView& view : pose.views) {
+    for (const BoardPoint& corner : view.corners) corners += 1, outlying_corners += corner.outlying ? 1 : 0;
+    for (const ProjectedPoint& symbol : view.symbols) symbols += 1, outlying_symbols += symbol.outlying ? 1 : 0;
+  }
+  return std::max(outlying_corners / std::max(corners, 1.0), outlying_symbols / std::max(symbols, 1.0));
+}
+
+/// Of the poses that show the same.
+double usual(const std::vector<double>& values, PoseSubject subject, const Observations& observations) {
+  std::vector<double> same;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (observations.poses[i].subject == subject) same.push_back(values[i]);
+  }
+  return median_of(std::move(same));
+}
+
+/// The surface of the symbols against the plane that the corners alone say: that of the rig is drawn to both.
+LitSurface surface_of(std::size_t pose, const Observations& observations, const RigModel& rig) {
+  const MotionVector& joint = rig.rig_from_board[pose];
+  const auto by_corners = pose_by_corners(observations.poses[pose], rig, joint);
+  return measure_lit_surface(observations.poses[pose], rig, by_corners.value_or(joint));
+}
+
+/// Surfaces of a pose and how they compare with the others'.
+struct Explanation {
+  LitSurface surface;
+  double shift_mm = 0;
+  double bow_factor = 0, shift_factor = 0, flatness_factor = 0;
+  double believable_mm = 0;  ///< what lies off farther than this is no board that was held
+
+  /// Of second order, like a print that is mounted on cardboard.
+  [[nodiscard]] bool is_bowed() const {
+    return surface.bow_share > kBowShareMin && bow_factor > kExplains && surface.bow_mm > kBowOfShiftMin * shift_mm &&
+           surface.bow_mm < believable_mm;
+  }
+  /// Of any shape: the symbols lie on no plane.
+  [[nodiscard]] bool is_uneven() const {
+    return flatness_factor > kExplains && surface.flatness_mm < kUnevenShareMax * believable_mm;
+  }
+  /// The symbols lie on a plane as those of other poses do, but not on that of the corners.
+  [[nodiscard]] bool is_moved() const {
+    return shift_factor > kExplains && flatness_factor <= kExplains && shift_mm < believable_mm;
+  }
+};
+
+Explanation compare(std::size_t pose, const Observations& observations, const RigModel& rig) {
+  std::vector<LitSurface> surfaces;
+  std::vector<double> bows, shifts, flatnesses;
+  for (std::size_t i = 0; i < observations.poses.size(); ++i) {
+    surfaces.push_back(surface_of(i, observations, rig));
+    bows.push_back(surfaces.back().bow_mm);
+    shifts.push_back(surfaces.back().shift_mm(half_size_mm(observations.poses[i])));
+    flatnesses.push_back(surfaces.back().flatness_mm);
+  }
+  const auto factor = [pose](const std::vector<double>& values) {
+    return values[pose] / std::max(median_of(values), 1e-6);
+  };
+  return {surfaces[pose], shifts[pose],       factor(bows),
+          factor(shifts), factor(flatnesses), half_size_mm(observations.poses[pose])};
+}
+
+/// @param error  what is said where nothing explains it
+FaultyPose explain(std::size_t pose, const std::string& error, const Observations& observations, const RigModel& rig) {
+  const Explanation shown = compare(pose, observations, rig);
+  const char* const subject = observations.poses[pose].subject == PoseSubject::kBoard ? "board" : "plane";
+  const auto& surface = shown.surface;
+  if (surface.before_share > kCoveredShare && surface.before_share < kUncoveredShare) {
+    return {pose, PoseFault::kCovered,
+            fmt::format("something stood before the {}: {:.0f} % of the symbols lie about {:.0f} mm before it; keep "
+                        "hands and cables out of its light",
+                        subject, 100 * surface.before_share, surface.before_mm)};
+  }
+  if (shown.is_bowed()) {
+    return {pose, PoseFault::kBent,
+            fmt::format("the {} is not flat: it is bent by {:.1f} mm, {:.0f} times as much as in the other poses; "
+                        "mount the print on a stiff plate",
+                        subject, shown.surface.bow_mm, shown.bow_factor)};
+  }
+  if (shown.is_uneven()) {
+    return {
+        pose, PoseFault::kBent,
+        fmt::format("the {} is not flat: its symbols lie off any plane by {:.1f} mm, {:.0f} times as much as in the "
+                    "other poses; mount the print on a stiff plate, and hold it still",
+                    subject, shown.surface.flatness_mm, shown.flatness_factor)};
+  }
+  if (shown.is_moved()) {
+    return {pose, PoseFault::kMoved,
+            fmt::format("the {} moved between the white picture and the pattern: by {:.1f} mm and {:.2f} degrees; "
+                        "hold it still, or lean it against something",
+                        subject, std::abs(shown.surface.offset_mm), shown.surface.tilt_deg)};
+  }
+  return {pose, PoseFault::kUnlike, fmt::format("it contradicts the other poses: {}; take it again", error)};
+}
+
+}  // namespace
+
+std::string_view to_string(PoseFault fault) {
+  switch (fault) {
+    case PoseFault::kNotSeen:
+      return "not_seen";
+    case PoseFault::kTooFewCorners:
+      return "too_few_corners";
+    case PoseFault::kTooFewSymbols:
+      return "too_few_symbols";
+    case PoseFault::kBlurred:
+      return "blurred";
+    case PoseFault::kClipped:
+      return "clipped";
+    case PoseFault::kRepeated:
+      return "repeated";
+    case PoseFault::kSwapped:
+      return "swapped";
+    case PoseFault::kCovered:
+      return "covered";
+    case PoseFault::kBent:
+      return "bent";
+    case PoseFault::kMoved:
+      return "moved";
+    case PoseFault::kUnlike:
+      break;
+  }
+  return "unlike_the_others";
+}
+
+std::vector<FaultyPose> find_unusable(const Observations& observations) {
+  std::vector<FaultyPose> faulty;
+  for (std::size_t i = 0; i < observations.poses.size(); ++i) {
+    const PoseObservation& pose = observations.poses[i];
+    std::string corners = least_lack_of_corners(pose), symbols = least_lack_of_symbols(pose);
+    const auto is_fine = [&](std::size_t other) {
+      return std::ranges::none_of(faulty, [&](const FaultyPose& one) { return one.pose == other; });
+    };
+    std::size_t same = 0;
+    while (same < i && !(is_fine(same) && repeats(observations.poses[same], pose, observations))) ++same;
+    const double blur = blur_of(pose), usual_blur = usual_blur_of(pose.subject, observations);
+    if (!corners.empty()) {
+      faulty.push_back({i, PoseFault::kTooFewCorners, std::move(corners)});
+    } else if (!symbols.empty()) {
+      faulty.push_back({i, PoseFault::kTooFewSymbols, std::move(symbols)});
+    } else if (is_blurred(blur, usual_blur)) {
+      faulty.push_back({i, PoseFault::kBlurred,
+                        fmt::format("blurred: the board's edges are {:.1f} px wide, {:.1f} px in the other poses; hold "
+                                    "it still, and within the depth of focus",
+                                    blur, usual_blur)});
+    } else if (clipped_share_of(pose) > kClippedMax) {
+      faulty.push_back({i, PoseFault::kClipped,
+                        fmt::format("clipped: {:.0f} % of the board's pixels are at full level; expose less, or turn a "
+                                    "reflection away",
+                                    100 * clipped_share_of(pose))});
+    } else if (shift_of(pose) > kShiftMaxPx) {
+      faulty.push_back(
+          {i, PoseFault::kMoved,
+           fmt::format("the board moved between the white picture and the pattern: its print by {:.0f} px; "
+                       "hold it still, or lean it against something",
+                       shift_of(pose))});
+    } else if (same < i) {
+      faulty.push_back({i, PoseFault::kRepeated,
+                        fmt::format("it shows the board where {} does, so that both count once; move, tilt or turn it "
+                                    "between the poses",
+                                    observations.poses[same].name)});
+    }
+  }
+  return faulty;
+}
+
+std::optional<FaultyPose> find_unplaced(const Observations& observations, const RigModel& rig,
+                                        const PoseInfluence& influence) {
+  const auto at = std::ranges::find(influence.held_out, false, &HeldOut::placed);
+  if (at == influence.held_out.end()) return std::nullopt;
+  return explain(static_cast<std::size_t>(at - influence.held_out.begin()), "hardly a point of it agrees with them",
+                 observations, rig);
+}
+
+std::optional<FaultyPose> find_contradiction(const Observations& observations, const RigModel& rig,
+                                             const PoseInfluence& influence) {
+  if (auto unplaced = find_unplaced(observations, rig, influence)) return unplaced;
+  std::vector<double> corner, symbol, shares, disagreement;
+  for (const PoseObservation& pose : observations.poses) shares.push_back(outlying_share(pose));
+  for (const HeldOut& held_out : influence.held_out) {
+    corner.push_back(held_out.corner_rms_px), symbol.push_back(held_out.symbol_rms_px);
+    disagreement.push_back(held_out.disagreement);
+  }
+  const double usual_disagreement = std::max(median_of(disagreement), 1.0);
+  // Corners of the board and of the plane are not found equally well.
+  const std::map<PoseSubject, double> usual_corner{
+      {PoseSubject::kBoard, usual(corner, PoseSubject::kBoard, observations)},
+      {PoseSubject::kPlane, usual(corner, PoseSubject::kPlane, observations)}};
+  const double usual_symbol = median_of(symbol), usual_share = median_of(shares);
+  std::size_t worst = 0;
+  double times = 0;
+  for (std::size_t i = 0; i < influence.held_out.size(); ++i) {
+    const double by_corner =
+        corner[i] > kContradictionMinPx ? corner[i] / usual_corner.at(observations.poses[i].subject) : 0;
+    const double by_symbol = symbol[i] > kContradictionMinPx ? symbol[i] / usual_symbol : 0;
+    const double by_share = shares[i] > kOutlyingShare ? shares[i] / std::max(usual_share, kUsualOutlyingShare) : 0;
+    const double by_rig = disagreement[i] > kDisagreementMin ? disagreement[i] / usual_disagreement : 0;
+    const double most = std::max({by_corner, by_symbol, by_share, by_rig});
+    if (most > times) times = most, worst = i;
+  }
+  if (times < kContradiction) return std::nullopt;
+  return explain(worst,
+                 times < kTimesTelling ? fmt::format("its error is {:.1f} times theirs", times)
+                                       : fmt::format("its error is more than {:.0f} times theirs", kTimesTelling),
+                 observations, rig);
+}
+
+}  // namespace slsd

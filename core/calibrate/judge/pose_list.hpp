@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/calibrate/judge/pose_faults.hpp"
+#include "core/calibrate/observe/observations.hpp"
+#include "core/calibrate/solve/rig_model.hpp"
+
+namespace slsd {
+
+/// What became of one pose.
+struct PoseReport {
+  std::string name;
+  PoseSubject subject = PoseSubject::kBoard;
+  std::optional<PoseFault> fault;    ///< why it was left out
+  std::string reason;                ///< the same for a person, with the figure; empty where it was used
+  std::vector<std::string> without;  ///< of a pose that was used: cameras whose view was left out, and why
+  std::vector<std::string> remarks;  ///< of a pose that was used: what is not as it should be
+  std::size_t corners = 0, symbols = 0;
+  std::size_t outlying_corners = 0, outlying_symbols = 0;
+  double corner_rms_px = 0, symbol_rms_px = 0;  ///< in the camera
+  HeldOut held_out;                             ///< under the rig that the other poses give
+};
+
+/// Which poses of the input take part, and why the others do not.
+/// @thread thread-bound
+class PoseList {
+ public:
+  /// All of them take part.
+  explicit PoseList(const Observations& observations);
+
+  /// Takes a pose, by its index among those that take part, out of everything.
+  /// @param rig  nothing: it has no poses yet
+  void leave_out(const FaultyPose& faulty, Observations& observations, RigModel* rig);
+  /// Takes the views that cannot take part out of the poses that take part.
+  void leave_views_out(Observations& observations);
+  /// Adds to why a pose was left out, where it was.
+  void explain(const std::string& pose, const std::string& more);
+
+  /// Whether there were any of a subject, and all of them were left out.
+  [[nodiscard]] bool lacks(PoseSubject subject) const;
+  /// By its index among those that take part.
+  [[nodiscard]] PoseReport& used(std::size_t pose) { return reports_[used_[pose]]; }
+  /// All, in the order of the input.
+  [[nodiscard]] const std::vector<PoseReport>& reports() const { return reports_; }
+  /// "pose_01: blurred ...; pose_03: ..."; empty where none was left out.
+  [[nodiscard]] std::string faults() const;
+
+ private:
+  std::vector<PoseReport> reports_;
+  std::vector<std::size_t> used_;  // indices of those that take part
+};
+
+}  // namespace slsd

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/calibrate/judge/plane_fit.hpp"
+#include "core/calibrate/observe/observations.hpp"
+#include "core/geometry/lens.hpp"
+
+namespace slsd {
+
+/// How true measured distances between a board's points are. Per cent; positive: measured too long.
+struct Trueness {
+  std::size_t corners = 0;
+  double scale_percent = 0;     ///< of all distances together: a common factor
+  double long_rms_percent = 0;  ///< root mean square over the distances of at least half the longest
+  double worst_percent = 0;     ///< of these, the one that is farthest off
+};
+
+/// Carries a board's points to where the camera's rays meet the plane that the symbols were measured on, so that camera
+/// and projector both have a part, and compares their distances with the true ones.
+/// @param corners  camera px, distorted; board mm. Outlying ones are left out
+/// @param plane    mm, in the camera's frame
+/// @return         nothing with fewer than four points
+/// @thread reentrant
+[[nodiscard]] std::optional<Trueness> measure_trueness(const std::vector<BoardPoint>& corners, const Lens& camera,
+                                                       const PlaneFit& plane);
+
+}  // namespace slsd

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/judge/verdict.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "core/calibrate/calibrate.hpp"
+#include "core/calibrate/judge/coverage.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr double kDistanceSpread = 1.15;  // of the farthest to the nearest pose
+
+class Jury {
+ public:
+  Verdict verdict{.grade = Grade::kGood, .reasons = {}, .advice = {}};
+
+  void judge(double value, const Bounds& bounds, const std::string& reason) {
+    if (value <= bounds.good) return;
+    lower(value <= bounds.usable ? Grade::kUsable : Grade::kBad);
+    verdict.reasons.push_back(reason);
+  }
+  void lower(Grade grade) { verdict.grade = std::max(verdict.grade, grade); }
+};
+
+void judge_coverage(const CalibrationOutcome& outcome, Jury& jury) {
+  const auto ask = [&](const Coverage& coverage, const std::string& device) {
+    if (coverage.share() >= kCoverageGood) return;
+    jury.lower(Grade::kUsable);
+    jury.verdict.reasons.push_back(fmt::format("the poses cover {:.0f} % of {}'s image, {:.0f} % are good",
+                                               100 * coverage.share(), device, 100 * kCoverageGood));
+    jury.verdict.advice.push_back(fmt::format("show the board in {} of {}'s image", coverage.emptiest(), device));
+  };
+  for (std::size_t i = 0; i < outcome.observations.cameras.size(); ++i) {
+    ask(camera_coverage(outcome.observations, i), "camera " + outcome.observations.cameras[i].name);
+  }
+  ask(projector_coverage(outcome.observations), "the projector");
+}
+
+void judge_poses(const CalibrationOutcome& outcome, Jury& jury) {
+  const auto tilts = tilts_deg(outcome.rig), distances = distances_mm(outcome.rig);
+  if (tilts.size() < kPosesGood) {
+    jury.lower(Grade::kUsable);
+    jury.verdict.reasons.push_back(fmt::format("only {} poses were used; {} are good", tilts.size(), kPosesGood));
+    jury.verdict.advice.push_back("take more poses");
+  }
+  if (std::ranges::max(tilts) < kTiltGoodDeg) {
+    jury.lower(Grade::kUsable);
+    jury.verdict.reasons.push_back(
+        fmt::format("no pose is tilted by more than {:.0f} degrees, which leaves the focal lengths uncertain",
+                    std::ranges::max(tilts)));
+    jury.verdict.advice.push_back("tilt the board by 20 to 40 degrees, each time towards another side");
+  }
+  if (std::ranges::max(distances) < kDistanceSpread * std::ranges::min(distances)) {
+    jury.verdict.advice.push_back("vary the board's distance over the working range");
+  }
+}
+
+}  // namespace
+
+std::string_view to_string(Grade grade) {
+  switch (grade) {
+    case Grade::kGood:
+      return "good";
+    case Grade::kUsable:
+      return "usable";
+    case Grade::kBad:
+      break;
+  }
+  return "bad";
+}
+
+std::optional<Grade> parse_grade(std::string_view name) {
+  for (const Grade grade : {Grade::kGood, Grade::kUsable, Grade::kBad}) {
+    if (to_string(grade) == name) return grade;
+  }
+  return std::nullopt;
+}
+
+Verdict judge(const CalibrationOutcome& outcome) {
+  Jury jury;
+  jury.judge(outcome.held_out_corner_px, kHeldOutPx,
+             fmt::format("corners of poses held out are off by {:.2f} px, {:.1f} px are good",
+                         outcome.held_out_corner_px, kHeldOutPx.good));
+  jury.judge(outcome.held_out_symbol_px, kHeldOutPx,
+             fmt::format("symbols of poses held out are off by {:.2f} px, {:.1f} px are good",
+                         outcome.held_out_symbol_px, kHeldOutPx.good));
+  jury.judge(outcome.epipolar_rms_px, kEpipolarPx,
+             fmt::format("symbols lie off their epipolar lines by {:.2f} px, {:.1f} px are good",
+                         outcome.epipolar_rms_px, kEpipolarPx.good));
+  if (outcome.depth.empty()) {
+    jury.lower(Grade::kBad);
+    jury.verdict.reasons.emplace_back(
+        "nowhere in the working range do the first camera and the projector see the same place");
+    jury.verdict.advice.emplace_back(
+        "set depth_min_mm and depth_max_mm of [decode] to the distances that are scanned, or turn camera and projector "
+        "towards each other and calibrate again");
+  } else {
+    const DepthUncertainty& middle = outcome.depth[outcome.depth.size() / 2];
+    jury.judge(middle.calibration_mm / middle.depth_mm, kDepthShare,
+               fmt::format("the calibration leaves the depth at {:.0f} mm uncertain by {:.2f} mm, {:.2f} mm are good",
+                           middle.depth_mm, middle.calibration_mm, kDepthShare.good * middle.depth_mm));
+  }
+  judge_coverage(outcome, jury);
+  judge_poses(outcome, jury);
+  if (!outcome.warnings.empty()) jury.lower(Grade::kUsable);
+  return jury.verdict;
+}
+
+}  // namespace slsd

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/judge/view_demands.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kCornersMin = 8;
+constexpr std::size_t kSymbolsMin = 30;
+constexpr std::ptrdiff_t kLinesMin = 2;  // rows, and columns, with two corners or more
+/// As a factor and in px, both.
+constexpr double kBlurFactor = 1.5, kBlurMorePx = 0.35;
+
+/// Of lines along one axis of the board, those with two corners or more.
+std::ptrdiff_t lines(const PoseView& view, Eigen::Index axis) {
+  constexpr double kSameMm = 1e-3;
+  std::map<long, int> counts;
+  for (const BoardPoint& corner : view.corners) ++counts[std::lround(corner.board_mm(axis) / kSameMm)];
+  return std::ranges::count_if(counts, [](const auto& line) { return line.second > 1; });
+}
+
+}  // namespace
+
+std::string lack_of_corners(const PoseView& view) {
+  if (view.corners.size() < kCornersMin) {
+    return fmt::format(
+        "only {} of the board's corners were found, {} are the least; bring more of the board into the picture",
+        view.corners.size(), kCornersMin);
+  }
+  if (std::min(lines(view, 0), lines(view, 1)) < kLinesMin) {
+    return fmt::format(
+        "the {} corners found are along a line of the board, and have to be in two rows and two columns; bring more of "
+        "the board into the picture",
+        view.corners.size());
+  }
+  return {};
+}
+
+std::string lack_of_symbols(std::size_t symbols) {
+  if (symbols >= kSymbolsMin) return {};
+  return fmt::format(
+      "only {} of the pattern's symbols were read on the board, {} are the least; hold it where the projector lights "
+      "it, in focus, and shade it from other light",
+      symbols, kSymbolsMin);
+}
+
+bool is_blurred(double blur_px, double usual_px) {
+  return usual_px > 0 && blur_px > kBlurFactor * usual_px && blur_px > usual_px + kBlurMorePx;
+}
+
+}  // namespace slsd

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+
+#include "core/calibrate/observe/observations.hpp"
+
+namespace slsd {
+
+/// What a view lacks to take part, whatever others show: the same for a session, which takes the pose again, and for a
+/// calibration, which leaves it out. For a person, with the figure and what to do; empty where it lacks nothing.
+
+/// Corners: enough of them, in two rows and two columns of two or more each, without which they fit any pose.
+/// @thread reentrant
+[[nodiscard]] std::string lack_of_corners(const PoseView& view);
+
+/// @param symbols  read on the board by one camera
+/// @thread reentrant
+[[nodiscard]] std::string lack_of_symbols(std::size_t symbols);
+
+/// Whether a blur is so far above that of the other poses that it moves corners and symbols.
+/// @param usual_px  0: there are none
+/// @thread reentrant
+[[nodiscard]] bool is_blurred(double blur_px, double usual_px);
+
+}  // namespace slsd

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/observe/observe_pose.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "core/calibrate/observe/board_region.hpp"
+#include "core/calibrate/observe/gray_code.hpp"
+#include "core/calibrate/observe/print_shift.hpp"
+#include "core/calibrate/observe/symbol_gap.hpp"
+#include "core/exposure/divide_light.hpp"
+
+namespace slsd {
+namespace {
+
+/// Regions of the size of symbols from which on it is a pattern that is seen, though not this one.
+constexpr std::size_t kPatternRegions = 60;
+/// So few symbols of so many shapes agree by chance.
+constexpr std::size_t kSymbolsCertain = 20;
+
+std::string why_no_symbols(std::size_t shapes) {
+  if (shapes > kPatternRegions) {
+    return fmt::format(
+        "{} shapes are seen, but they are not those of the configured pattern: the pattern that was "
+        "projected, or the projector's size, is another one",
+        shapes);
+  }
+  return "none of the projected pattern is seen on the board; light it with the projector, in focus, without clipping";
+}
+
+}  // namespace
+
+Result<PoseView> observe_board(const PosePictures& pictures, const Board& board, BoardSighting& sighting) {
+  auto found = find_board(pictures.white, board);
+  if (!found) return tl::unexpected(found.error());
+  sighting = std::move(*found);
+  PoseView view;
+  view.blur_px = sighting.edge_px;
+  view.clipped_share = std::max(sighting.full_share, full_share_of_print(pictures.white, board, sighting));
+  for (const SeenPoint& point : sighting.points) {
+    view.corners.push_back({point.pixel, board.point(point.id).head<2>()});
+  }
+  return view;
+}
+
+Result<> observe_pattern(const PosePictures& pictures, const Board& board, const BoardSighting& sighting,
+                         PatternReader& reader, PoseView& view) {
+  const PrintShift shift = find_print_shift(pictures.white, pictures.coded.at(0), board, sighting);
+  if (shift.certain()) view.shift_px = shift.px;
+  const BoardRegion region(board, sighting);
+  const auto levelled = divide_light(pictures.coded.at(0), pictures.white,
+                                     PrintedSurface{[&](int x, int y) {
+                                                      return region.contains({x, y});
+                                                    },
+                                                    sighting.edge_px});
+  if (!levelled) return tl::unexpected(levelled.error());
+  auto matches = reader.read(levelled->view());
+  if (!matches) return tl::unexpected(matches.error());
+  std::erase_if(*matches, [&](const SymbolMatch& match) { return !region.contains(match.camera_px); });
+  if (matches->size() < kSymbolsCertain && reader.shapes() > kPatternRegions) matches->clear();
+  if (matches->empty()) return fail(ErrorCode::kNotFound, why_no_symbols(reader.shapes()));
+  for (const SymbolMatch& match : *matches)
+    view.symbols.push_back({match.camera_px, match.projector_px, match.sigma_px});
+  const SymbolGap gap = find_symbol_gap(*matches, reader.pattern(), region, pictures.white);
+  view.hidden_symbols = gap.symbols, view.hidden_clipped = gap.clipped;
+  return {};
+}
+
+Result<> observe_gray_code(const PosePictures& pictures, const Board& board, const BoardSighting& sighting,
+                           const ImageSize& projector, PoseView& view) {
+  if (!pictures.black) return fail(ErrorCode::kNotFound, "the Gray code needs a picture under the black projector too");
+  const BoardRegion region(board, sighting);
+  auto points = read_gray_code({pictures.white, *pictures.black, pictures.coded}, projector, [&](int x, int y) {
+    return region.contains({x, y});
+  });
+  if (!points) return tl::unexpected(points.error());
+  view.symbols = std::move(*points);
+  if (view.symbols.empty()) {
+    return fail(ErrorCode::kNotFound,
+                "none of the Gray code can be read on the board; expose so that it is not clipped");
+  }
+  return {};
+}
+
+}  // namespace slsd

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/calibrate/solve/lens_terms.hpp"
+#include "core/calibrate/solve/rig_model.hpp"
+#include "core/result.hpp"
+
+namespace slsd {
+
+struct BundleOptions {
+  std::vector<DistortionPrior> cameras;  ///< one to a camera
+  DistortionPrior projector = kUsualDistortion;
+  bool with_symbols = true;  ///< otherwise the cameras and poses alone are adjusted
+  bool scale = false;        ///< whether the board's scale is adjusted too, against that of the reference plane
+  bool stretch = false;      ///< whether the board's aspect is adjusted too
+  int iterations_max = 60;
+  double corner_sigma_px = 0.1;
+  double plane_corner_sigma_px = 0.1;  ///< of the reference plane's corners
+  double symbol_sigma_factor = 1;      ///< of ProjectedPoint::sigma_px
+
+  [[nodiscard]] double corner_sigma_of(PoseSubject subject) const {
+    return subject == PoseSubject::kBoard ? corner_sigma_px : plane_corner_sigma_px;
+  }
+};
+
+/// Adjusts a rig to what was seen of it: all lenses, the devices' places and all poses at once (Ceres, Huber's
+/// loss). Points marked as outlying have no part.
+/// @param rig  in: near the solution; out: the solution
+/// @return whether it settled within its iterations; where not, the rig is the best so far
+/// @errors kImpossible: no solution was reached
+/// @thread reentrant
+[[nodiscard]] Result<bool> adjust(const Observations& observations, const BundleOptions& options, RigModel& rig);
+
+/// Half of the sum of all squared residuals, lessened by the loss.
+[[nodiscard]] double cost_of(const Observations& observations, const BundleOptions& options, RigModel rig);
+
+/// The equations of the adjustment at its solution, linear: residuals of each pose and their derivatives. Empty where
+/// all points of a pose are outlying.
+struct PoseEquations {
+  Eigen::MatrixXd by_shared;  ///< residuals x shared parameters
+  Eigen::MatrixXd by_pose;    ///< residuals x 6
+  Eigen::VectorXd residuals;  ///< standard deviations, two to a point: first the corners, then the symbols, by view
+  Eigen::VectorXd sigmas_px;  ///< one to a residual: what it is in px, the loss undone
+  Eigen::Index corner_residuals = 0;
+};
+
+/// One adjusted parameter that all poses share.
+struct SharedParameter {
+  enum class Kind { kLens, kMotion, kMovedTo, kScale, kStretch };
+  Kind kind;
+  int device;  ///< index of the camera, or -1: the projector
+  int index;   ///< in LensVector or MotionVector
+};
+
+struct BundleEquations {
+  std::vector<SharedParameter> shared;
+  Eigen::VectorXd prior_weight;  ///< one to a shared parameter: of what was plausible before; 0: anything was
+  Eigen::VectorXd prior_pull;    ///< its part in the gradient
+  std::vector<PoseEquations> poses;
+};
+
+[[nodiscard]] BundleEquations linearise(const Observations& observations, const BundleOptions& options, RigModel rig);
+
+}  // namespace slsd

@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/solve/place_scanners.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <optional>
+#include <random>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+
+#include "core/board/tie.hpp"
+#include "core/calibrate/judge/plane_fit.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr int kPartsAcross = 5, kPartsDown = 4;
+constexpr int kPartsMin = 10;
+constexpr int kPointsOfAPart = 4;
+constexpr std::size_t kPointsMax = 20'000;  // of a dense cloud's, that the plane is fitted to
+constexpr double kBendMax = 5e-4;           // of the distance
+constexpr std::size_t kSharedMin = 4;
+constexpr int kRounds = 200;
+constexpr double kSettledMm = 1e-6;
+constexpr double kNothingMm2 = 1e-12;
+constexpr int kDraws = 200;
+
+using Places = std::vector<std::vector<CloudLook>>;
+
+/// Pairs of a scanner's corners and where the others have them.
+struct Pairs {
+  std::vector<Eigen::Vector3d> from, to;
+
+  [[nodiscard]] RigidTransform fit() const {
+    const auto columns = [](const std::vector<Eigen::Vector3d>& points) {
+      return Eigen::Map<const Eigen::Matrix3Xd>(points.data()->data(), 3, static_cast<Eigen::Index>(points.size()));
+    };
+    const Eigen::Matrix4d moved = Eigen::umeyama(columns(from), columns(to), /*with_scaling=*/false);
+    return {moved.topLeftCorner<3, 3>(), moved.topRightCorner<3, 1>()};
+  }
+};
+
+using Poses = std::vector<std::optional<RigidTransform>>;
+
+// The corners of one scanner with the means of where those that are placed have them.
+Pairs pairs_of(std::size_t scanner, const Places& places, const Poses& poses) {
+  Pairs pairs;
+  for (const auto& looks : places) {
+    std::map<int, std::pair<Eigen::Vector3d, int>> others;
+    for (const CloudLook& look : looks) {
+      if (look.scanner == scanner || !poses[look.scanner]) continue;
+      for (const auto& corner : look.corners) {
+        auto& [sum, count] = others.try_emplace(corner.id, Eigen::Vector3d::Zero(), 0).first->second;
+        sum += *poses[look.scanner] * corner.point_mm;
+        ++count;
+      }
+    }
+    for (const CloudLook& look : looks) {
+      if (look.scanner != scanner) continue;
+      for (const auto& corner : look.corners) {
+        const auto other = others.find(corner.id);
+        if (other == others.end()) continue;
+        pairs.from.push_back(corner.point_mm);
+        pairs.to.emplace_back(other->second.first / other->second.second);
+      }
+    }
+  }
+  return pairs;
+}
+
+// From the first on, the one that shares most is next.
+Poses solve(const Places& places, std::size_t scanners, const Poses& begin) {
+  Poses poses = begin;
+  poses[0] = RigidTransform();
+  while (true) {
+    std::size_t next = 0;
+    Pairs most;
+    for (std::size_t i = 1; i < scanners; ++i) {
+      if (poses[i]) continue;
+      if (Pairs pairs = pairs_of(i, places, poses); pairs.from.size() > most.from.size()) next = i, most = pairs;
+    }
+    if (most.from.size() < kSharedMin) break;
+    poses[next] = most.fit();
+  }
+  for (int round = 0; round < kRounds; ++round) {
+    double moved_mm = 0;
+    for (std::size_t i = 1; i < scanners; ++i) {
+      if (!poses[i]) continue;
+      const Pairs pairs = pairs_of(i, places, poses);
+      const RigidTransform now = pairs.fit();
+      for (const auto& point : pairs.from) moved_mm = std::max(moved_mm, (now * point - *poses[i] * point).norm());
+      poses[i] = now;
+    }
+    if (moved_mm < kSettledMm) break;
+  }
+  return poses;
+}
+
+/// Squares of corners off the means of all scanners, with the degrees of freedom that are in them.
+struct Residuals {
+  double in_plane = 0, off_plane = 0, freedom = 0;
+  std::vector<double> place_mm;
+};
+
+Residuals residuals_of(const Places& places, const Poses& poses) {
+  Residuals all;
+  for (const auto& looks : places) {
+    std::map<int, std::vector<Eigen::Vector3d>> seen;
+    Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+    for (const CloudLook& look : looks) {
+      if (!poses[look.scanner]) continue;
+      normal = poses[look.scanner]->rotation * look.normal;
+      for (const auto& corner : look.corners) seen[corner.id].push_back(*poses[look.scanner] * corner.point_mm);
+    }
+    double squares = 0;
+    std::size_t count = 0;
+    for (const auto& [id, points] : seen) {
+      if (points.size() < 2) continue;
+      Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+      for (const auto& point : points) mean += point / static_cast<double>(points.size());
+      for (const auto& point : points) {
+        const double off = normal.dot(point - mean), square = (point - mean).squaredNorm();
+        all.off_plane += off * off;
+        all.in_plane += square - off * off;
+        squares += square;
+        ++count;
+      }
+      all.freedom += static_cast<double>(points.size() - 1);
+    }
+    all.place_mm.push_back(count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0);
+  }
+  return all;
+}
+
+// The same looks without what they disagree in.
+Places agreeing(Places places, const Poses& poses) {
+  for (auto& looks : places) {
+    std::map<int, std::pair<Eigen::Vector3d, int>> sums;
+    for (const CloudLook& look : looks) {
+      for (const auto& [id, point] : look.corners) {
+        auto& [sum, count] = sums.try_emplace(id, Eigen::Vector3d::Zero(), 0).first->second;
+        sum += *poses[look.scanner] * point;
+        ++count;
+      }
+    }
+    for (CloudLook& look : looks) {
+      const RigidTransform scanner_from_first = poses[look.scanner]->inverse();
+      for (auto& [id, point] : look.corners) point = scanner_from_first * (sums[id].first / sums[id].second);
+    }
+  }
+  return places;
+}
+
+// The same looks with errors of the size that theirs may have.
+Places with_errors(Places places, double corner_mm, std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  const auto draw = [&] { return normal(random); };
+  for (auto& looks : places) {
+    for (CloudLook& look : looks) {
+      const Eigen::Matrix3d root = look.covariance.llt().matrixL();
+      const Eigen::Vector3d off = root * Eigen::Vector3d(draw(), draw(), draw());
+      for (auto& [id, point] : look.corners) {
+        const Eigen::Vector3d from_middle = point - look.middle_mm;
+        const double off_mm = off[0] + off[1] * look.along.dot(from_middle) + off[2] * look.across.dot(from_middle);
+        point *= 1 + off_mm / look.normal.dot(point);  // along the ray
+        point += corner_mm * (draw() * look.along + draw() * look.across);
+      }
+    }
+  }
+  return places;
+}
+
+void estimate_sigmas(const Places& places, const Poses& poses, const Residuals& found, PlacedScanners& placed) {
+  struct Scatter {
+    std::vector<Eigen::Vector3d> points;  ///< the middle first
+    std::vector<double> squares;
+  };
+  std::vector<Scatter> scatters(placed.scanners.size());
+  for (const auto& looks : places) {
+    for (const CloudLook& look : looks) {
+      for (const auto& corner : look.corners) scatters[look.scanner].points.push_back(corner.point_mm);
+    }
+  }
+  for (Scatter& scatter : scatters) {
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+    for (const auto& point : scatter.points) middle += point / static_cast<double>(scatter.points.size());
+    scatter.points.insert(scatter.points.begin(), middle);
+    scatter.squares.assign(scatter.points.size(), 0);
+  }
+  const double corner_mm = std::sqrt(found.in_plane / (2 * std::max(1.0, found.freedom)));
+  const Places exact = agreeing(places, poses);
+  std::mt19937 random(1);
+  double expected_off_plane = 0;
+  for (int i = 0; i < kDraws; ++i) {
+    const Places other = with_errors(exact, corner_mm, random);
+    const Poses moved = solve(other, scatters.size(), poses);
+    expected_off_plane += residuals_of(other, moved).off_plane / kDraws;
+    for (std::size_t s = 1; s < scatters.size(); ++s) {
+      for (std::size_t p = 0; p < scatters[s].points.size(); ++p) {
+        const Eigen::Vector3d& point = scatters[s].points[p];
+        scatters[s].squares[p] += (*moved[s] * point - *poses[s] * point).squaredNorm() / kDraws;
+      }
+    }
+  }
+  // Planes that fit each other less well than their own points let expect: something else is wrong with them too.
+  const double worse =
+      expected_off_plane > kNothingMm2 ? std::max(1.0, std::sqrt(found.off_plane / expected_off_plane)) : 1.0;
+  for (std::size_t s = 1; s < scatters.size(); ++s) {
+    const std::vector<double>& squares = scatters[s].squares;
+    placed.scanners[s].sigma_mm = worse * std::sqrt(squares.front());
+    placed.scanners[s].sigma_far_mm = worse * std::sqrt(*std::ranges::max_element(squares));
+  }
+}
+
+}  // namespace
+
+Result<CloudLook> look_in_cloud(std::span<const Eigen::Vector3d> cloud, const BoardSighting& sighting,
+                                const Board& board, const Lens& lens) {
+  std::vector<Tie> ties;  // of the board and directions without the lens's distortion
+  for (const SeenPoint& point : sighting.points)
+    ties.push_back({board.point(point.id).head<2>(), lens.undistort(point.pixel)});
+  const auto direction_of_board = fit_homography(ties);
+  if (!direction_of_board) return fail(ErrorCode::kNotFound, "the board's points do not span a plane");
+  const Homography board_of_direction = direction_of_board->inverse();
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector2d> places;
+  const double width = board.width_mm(), height = board.height_mm();
+  for (const Eigen::Vector3d& point : cloud) {
+    const Eigen::Vector2d at = board_of_direction.map(point.hnormalized());
+    if (!(at.x() > 0 && at.x() < width && at.y() > 0 && at.y() < height)) continue;
+    points.push_back(point);
+    places.push_back(at);
+  }
+  const std::size_t step = points.size() / kPointsMax + 1;
+  for (std::size_t i = 0; i * step < points.size(); ++i) points[i] = points[i * step], places[i] = places[i * step];
+  points.resize((points.size() + step - 1) / step);
+  const auto plane = fit_plane(points);
+  if (!plane)
+    return fail(ErrorCode::kNotFound, "the cloud has no points on the board: light it, or move it into the light");
+
+  CloudLook look;
+  look.normal = plane->normal;
+  look.middle_mm = plane->middle;
+  look.along = plane->normal.unitOrthogonal();
+  look.across = plane->normal.cross(look.along);
+  // What is common to a part of the board is no noise of its points: its parts tell how well the plane is known.
+  std::map<int, std::pair<Eigen::Vector4d, int>> parts;
+  for (const std::size_t i : plane->on_plane) {
+    const int part = static_cast<int>(places[i].x() / width * kPartsAcross) +
+                     kPartsAcross * static_cast<int>(places[i].y() / height * kPartsDown);
+    auto& [sum, count] = parts.try_emplace(part, Eigen::Vector4d::Zero(), 0).first->second;
+    const Eigen::Vector3d from_middle = points[i] - plane->middle;
+    sum += Eigen::Vector4d(1, look.along.dot(from_middle), look.across.dot(from_middle), plane->off_mm(points[i]));
+    ++count;
+  }
+  std::erase_if(parts, [](const auto& part) { return part.second.second < kPointsOfAPart; });
+  const auto part_count = static_cast<double>(parts.size());
+  if (parts.size() < kPartsMin) {
+    return fail(ErrorCode::kNotFound, "the cloud covers too little of the board: " + std::to_string(parts.size()) +
+                                          " of " + std::to_string(kPartsAcross * kPartsDown) + " parts of it");
+  }
+  Eigen::Matrix3d design = Eigen::Matrix3d::Zero();
+  double squares = 0;
+  for (const auto& [part, sum_and_count] : parts) {
+    const Eigen::Vector4d mean = sum_and_count.first / sum_and_count.second;
+    design += mean.head<3>() * mean.head<3>().transpose();
+    squares += mean[3] * mean[3];
+  }
+  look.bend_mm = std::sqrt(squares / part_count);
+  look.covariance = squares / (part_count - 3) * design.inverse();
+  if (const double most_mm = kBendMax * plane->middle.norm(); look.bend_mm > most_mm) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "the board is not flat in the cloud: its parts are %.2f mm off a plane (at most %.2f); use a stiff "
+                  "one, or calibrate this scanner anew",
+                  look.bend_mm, most_mm);
+    return fail(ErrorCode::kMismatch, text);
+  }
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero(), mean_on_board = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < ties.size(); ++i) {
+    look.corners.push_back({sighting.points[i].id, plane->meet(ties[i].pixel)});
+    mean += look.corners[i].point_mm / static_cast<double>(ties.size());
+    mean_on_board += board.point(sighting.points[i].id) / static_cast<double>(ties.size());
+  }
+  double measured = 0, said = 0;
+  for (const auto& [id, point] : look.corners) {
+    measured += (point - mean).squaredNorm();
+    said += (board.point(id) - mean_on_board).squaredNorm();
+  }
+  look.scale_percent = 100 * (std::sqrt(measured / said) - 1);
+  return look;
+}
+
+Result<PlacedScanners> place_scanners(const Places& places, const std::vector<std::string>& names) {
+  const std::size_t scanners = names.size();
+  const Poses poses = solve(places, scanners, Poses(scanners));
+  PlacedScanners placed;
+  placed.scanners.resize(scanners);
+  for (std::size_t i = 0; i < scanners; ++i) {
+    if (!poses[i]) {
+      return fail(ErrorCode::kNotFound, "saw the board at no place together with another that reaches the first",
+                  names[i]);
+    }
+    placed.scanners[i].first_from_scanner = *poses[i];
+    placed.scanners[i].places = static_cast<std::size_t>(std::ranges::count_if(places, [&](const auto& looks) {
+      return looks.size() > 1 && std::ranges::find(looks, i, &CloudLook::scanner) != looks.end();
+    }));
+  }
+  const Residuals found = residuals_of(places, poses);
+  placed.off_mm = found.place_mm;
+  estimate_sigmas(places, poses, found, placed);
+  return placed;
+}
+
+}  // namespace slsd

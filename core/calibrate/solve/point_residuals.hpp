@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/calibrate/solve/rig_model.hpp"
+
+namespace slsd {
+
+/// Residuals of one view, camera px: where the model sees each point, less where the camera saw it. Outlying points
+/// too.
+struct ViewResiduals {
+  std::vector<Eigen::Vector2d> corners_px;
+  std::vector<Eigen::Vector2d> symbols_px;
+  std::vector<Eigen::Vector2d> symbols_projector_px;  ///< the same in the projector: its image of the camera's point
+};
+
+/// @thread reentrant
+[[nodiscard]] ViewResiduals residuals_of(const PoseView& view, const RigModel& rig, const MotionVector& rig_from_board,
+                                         PoseSubject subject = PoseSubject::kBoard);
+
+/// Root mean square of the lengths, as OpenCV counts it.
+[[nodiscard]] double rms_px(const std::vector<Eigen::Vector2d>& residuals);
+/// One standard deviation of a component, from the median: outliers have no part.
+[[nodiscard]] double robust_sigma_px(std::vector<double> components);
+
+}  // namespace slsd

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/solve/pose_influence.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+namespace slsd {
+namespace {
+
+/// Of the smallest to the largest eigenvalue of the correlations.
+constexpr double kRankTolerance = 1e-13;
+/// Of what all poses say of a parameter: of less a pose says nothing.
+constexpr double kShareMin = 1e-4;
+/// Points below which a pose that fits them tells nothing.
+constexpr Eigen::Index kPointsMin = 4;
+/// Of the smallest to the largest eigenvalue of the correlations between a pose's own six parameters.
+constexpr double kPlacedTolerance = 1e-12;
+
+/// The equations of one pose with its own place eliminated (Schur's complement).
+struct Reduced {
+  Eigen::MatrixXd normal;    // shared x shared
+  Eigen::VectorXd gradient;  // shared
+};
+
+using PoseNormal = Eigen::Matrix<double, 6, 6>;
+
+Eigen::LLT<PoseNormal> pose_normal(const PoseEquations& pose) {
+  const PoseNormal normal = pose.by_pose.transpose() * pose.by_pose;
+  return normal.llt();
+}
+
+Reduced reduce(const PoseEquations& pose, Eigen::Index shared) {
+  if (!is_placed(pose)) return {Eigen::MatrixXd::Zero(shared, shared), Eigen::VectorXd::Zero(shared)};
+  const Eigen::MatrixXd cross = pose.by_shared.transpose() * pose.by_pose;
+  const auto own = pose_normal(pose);
+  return {pose.by_shared.transpose() * pose.by_shared - cross * own.solve(cross.transpose()),
+          pose.by_shared.transpose() * pose.residuals -
+              cross * own.solve(Eigen::VectorXd(pose.by_pose.transpose() * pose.residuals))};
+}
+
+/// Of the points' distances, from their components in px.
+double rms(const Eigen::Ref<const Eigen::VectorXd>& components) {
+  return components.size() == 0 ? 0 : std::sqrt(2 * components.squaredNorm() / static_cast<double>(components.size()));
+}
+
+/// The residuals of a pose under changed shared parameters, its own place fitted to them.
+HeldOut hold_out(const PoseEquations& pose, const Eigen::VectorXd& change) {
+  const Eigen::VectorXd moved = pose.residuals + pose.by_shared * change;
+  const Eigen::VectorXd own = -pose_normal(pose).solve(Eigen::VectorXd(pose.by_pose.transpose() * moved));
+  const Eigen::VectorXd left_px = (moved + pose.by_pose * own).cwiseProduct(pose.sigmas_px);
+  return {rms(left_px.head(pose.corner_residuals)), rms(left_px.tail(left_px.size() - pose.corner_residuals))};
+}
+
+/// What a pose asks to be changed, against what the others leave open. In coordinates in which all poses together have
+/// the unit matrix for their normal equations and this one diag(share), the difference of its own solution to that of
+/// the others is gradient / (share (1 - share)), its variance 1 / share + 1 / (1 - share).
+void compare(const Reduced& pose, const Eigen::MatrixXd& normal, HeldOut& held_out) {
+  const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(
+      scale.asDiagonal() * pose.normal * scale.asDiagonal(), scale.asDiagonal() * normal * scale.asDiagonal());
+  if (solver.info() != Eigen::Success) return;
+  const Eigen::VectorXd gradient = solver.eigenvectors().transpose() * (scale.asDiagonal() * pose.gradient);
+  double sum = 0, count = 0;
+  for (Eigen::Index i = 0; i < gradient.size(); ++i) {
+    const double share = solver.eigenvalues()(i);
+    if (share < kShareMin || share > 1 - kShareMin) continue;
+    sum += gradient(i) * gradient(i) / (share * (1 - share)), count += 1;
+  }
+  held_out.directions = count;
+  held_out.disagreement = count > 0 ? std::sqrt(sum / count) : 0;
+}
+
+/// Inverts a normal matrix after scaling its diagonal to one.
+Result<Eigen::MatrixXd> invert(const Eigen::MatrixXd& normal, const std::vector<SharedParameter>& names) {
+  const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * normal * scale.asDiagonal());
+  const Eigen::VectorXd values = solver.eigenvalues();
+  if (!(values(0) > kRankTolerance * values(values.size() - 1))) {
+    Eigen::Index worst = 0;
+    solver.eigenvectors().col(0).cwiseAbs().maxCoeff(&worst);
+    return fail(ErrorCode::kImpossible, "the poses leave " + name_of(names[static_cast<std::size_t>(worst)]) +
+                                            " open; show the board at more angles, distances and places");
+  }
+  const Eigen::MatrixXd inverse =
+      solver.eigenvectors() * values.cwiseInverse().asDiagonal() * solver.eigenvectors().transpose();
+  return Eigen::MatrixXd(scale.asDiagonal() * inverse * scale.asDiagonal());
+}
+
+struct ParameterNames {
+  std::string brief, full;
+};
+
+ParameterNames names_of(const SharedParameter& parameter) {
+  static const ParameterNames kMotion[] = {{"turn_x", "turn about x"},   {"turn_y", "turn about y"},
+                                           {"turn_z", "turn about z"},   {"place_x", "place along x"},
+                                           {"place_y", "place along y"}, {"place_z", "place along z"}};
+  switch (parameter.kind) {
+    case SharedParameter::Kind::kScale:
+      return {"board_scale", "scale"};
+    case SharedParameter::Kind::kStretch:
+      return {"board_stretch", "stretch"};
+    case SharedParameter::Kind::kMotion:
+    case SharedParameter::Kind::kMovedTo:
+      return kMotion[parameter.index];
+    case SharedParameter::Kind::kLens:
+      break;
+  }
+  const std::string lens(kLensParameterNames[parameter.index]);
+  return {lens, lens};
+}
+
+}  // namespace
+
+std::string short_name_of(const SharedParameter& parameter) {
+  return names_of(parameter).brief;
+}
+
+std::string name_of(const SharedParameter& parameter) {
+  using Kind = SharedParameter::Kind;
+  const std::string device = parameter.kind == Kind::kScale || parameter.kind == Kind::kStretch ? "the board's "
+                             : parameter.device < 0                                             ? "the projector's "
+                                                    : "camera " + std::to_string(parameter.device) + "'s ";
+  return device + names_of(parameter).full;
+}
+
+double PoseInfluence::sigma(std::size_t parameter) const {
+  const auto i = static_cast<Eigen::Index>(parameter);
+  return std::sqrt(std::max(covariance(i, i), 0.0));
+}
+
+bool is_placed(const PoseEquations& pose) {
+  if (pose.residuals.size() < 2 * kPointsMin) return false;
+  const PoseNormal normal = pose.by_pose.transpose() * pose.by_pose;
+  const Eigen::Matrix<double, 6, 1> scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<PoseNormal> solver(scale.asDiagonal() * normal * scale.asDiagonal());
+  return solver.eigenvalues()(0) > kPlacedTolerance * solver.eigenvalues()(5);
+}
+
+Result<PoseInfluence> find_influence(const BundleEquations& equations) {
+  const auto size = static_cast<Eigen::Index>(equations.shared.size());
+  std::vector<Reduced> reduced;
+  Eigen::MatrixXd said = Eigen::MatrixXd::Zero(size, size);
+  Eigen::VectorXd gradient = equations.prior_pull;
+  for (const PoseEquations& pose : equations.poses) {
+    reduced.push_back(reduce(pose, size));
+    said += reduced.back().normal, gradient += reduced.back().gradient;
+  }
+  Eigen::MatrixXd normal = said;
+  normal.diagonal() += equations.prior_weight;
+  PoseInfluence influence;
+  double squares = 0, directions = 0;
+  for (std::size_t i = 0; i < reduced.size(); ++i) {
+    if (!is_placed(equations.poses[i])) {
+      influence.held_out.push_back({.placed = false});
+      continue;
+    }
+    const auto without = invert(normal - reduced[i].normal, equations.shared);
+    if (!without) return tl::unexpected(without.error());
+    HeldOut& held_out = influence.held_out.emplace_back(
+        hold_out(equations.poses[i], Eigen::VectorXd(-*without * (gradient - reduced[i].gradient))));
+    compare(reduced[i], normal, held_out);
+    squares += held_out.directions * held_out.disagreement * held_out.disagreement;
+    directions += held_out.directions;
+  }
+  // Over all poses and directions at once: of each parameter by itself a dozen poses would tell little.
+  influence.scatter = directions > 0 ? std::max(1.0, std::sqrt(squares / directions)) : 1;
+  Eigen::MatrixXd scattered = said / (influence.scatter * influence.scatter);
+  scattered.diagonal() += equations.prior_weight;
+  auto covariance = invert(scattered, equations.shared);
+  if (!covariance) return tl::unexpected(covariance.error());
+  influence.covariance = std::move(*covariance);
+  return influence;
+}
+
+}  // namespace slsd

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "core/calibrate/observe/observations.hpp"
+#include "core/geometry/calibration.hpp"
+
+namespace slsd {
+
+/// A rigid motion as it is optimised: angle-axis (rad), then translation (mm).
+using MotionVector = std::array<double, 6>;
+/// fx fy cx cy (px) k1 k2 p1 p2 k3: in the order of a calibration file.
+using LensVector = std::array<double, 9>;
+
+[[nodiscard]] MotionVector to_vector(const RigidTransform& motion);
+[[nodiscard]] RigidTransform to_motion(const MotionVector& vector);
+[[nodiscard]] LensVector to_vector(const Lens& lens);
+[[nodiscard]] Lens to_lens(const LensVector& vector, const ImageSize& size);
+
+/// A camera, or the projector as an inverse one.
+struct DeviceModel {
+  ImageSize size;
+  LensVector lens{};
+  MotionVector device_from_rig{};
+};
+
+/// Where the devices are from a pose on, for the question whether a session is one rig.
+struct MovedDevices {
+  std::size_t first_pose = 0;
+  std::vector<MotionVector> cameras;  ///< the first one's, which is the rig's frame, has no part
+  MotionVector projector{};
+};
+
+/// Everything that is adjusted: the devices and the poses of the board and the reference plane. The rig's frame is that
+/// of the first camera.
+struct RigModel {
+  std::vector<DeviceModel> cameras;
+  DeviceModel projector;
+  std::vector<MotionVector> rig_from_board;  ///< one to a pose
+  double board_stretch = 0;                  ///< by how much the print is longer along y than it should be against x
+  double board_scale = 0;                    ///< by how much the board's print is larger than it should be, by the
+                                             ///< reference plane's measure
+  std::optional<MovedDevices> moved;         ///< nothing: the session is one rig
+  std::map<std::size_t, MotionVector>
+      rig_from_lit;  ///< of poses whose symbols lie on a plane of their own, where it is
+
+  /// Where a point is on the print: on that of the board with its scale and stretch.
+  /// @param nominal_mm  where it should be
+  [[nodiscard]] Eigen::Vector3d printed_mm(const Eigen::Vector2d& nominal_mm, PoseSubject subject) const;
+  /// The rig as it was at a pose.
+  [[nodiscard]] RigModel as_of(std::size_t pose) const;
+  [[nodiscard]] Calibration calibration(const std::vector<NamedCamera>& names) const;
+};
+
+}  // namespace slsd

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <algorithm>
+#include <ranges>
+#include <vector>
+
+namespace slsd {
+
+/// The middle of the values, the upper one of two; 0 of none. It puts them into another order.
+/// @thread reentrant
+template <std::ranges::random_access_range Values>
+[[nodiscard]] auto median_in_place(Values&& values) -> std::ranges::range_value_t<Values> {
+  if (std::ranges::empty(values)) return 0;
+  const auto middle = std::ranges::begin(values) + std::ranges::ssize(values) / 2;
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+[[nodiscard]] inline double median_of(std::vector<double> values) {
+  return median_in_place(values);
+}
+
+/// A normal distribution's standard deviation over the median of its absolute values.
+inline constexpr double kSigmaOfMedian = 1.4826;
+
+/// What counts of a value that is so far off, 1 to 0: a quarter at the scale, next to nothing far beyond it.
+[[nodiscard]] inline double robust_weight(double off, double scale) {
+  const double ratio = off / scale, by = 1 + ratio * ratio;
+  return 1 / (by * by);
+}
+
+}  // namespace slsd
