@@ -91,7 +91,7 @@ struct Residuals {
   [[nodiscard]] int NumResiduals() const { return static_cast<int>(samples.size()); }
   bool operator()(const double* parameters, double* residuals, double* jacobian) const {
     Vector p(parameters), gradient;
-    p[kBlur] = std::max(p[kBlur], kLeastBlur_px);  // what goes below is no corner, and is looked at afterwards
+    p[kBlur] = std::max(p[kBlur], kLeastBlur_px);  // a sharper picture looks the same
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const double root = std::sqrt(samples[i].weight);
       residuals[i] = root * (model(p, samples[i].at, gradient) - samples[i].level);
@@ -126,7 +126,7 @@ Vector first_estimate(const std::vector<Sample>& samples, const SaddleGuess& gue
 }
 
 bool plausible(const Vector& p, const SaddleGuess& guess, double reach) {
-  return (p.head<2>() - guess.pixel).norm() < reach && p[kBlur] > kLeastBlur_px && p[kBlur] < reach &&
+  return (p.head<2>() - guess.pixel).norm() < reach && p[kBlur] < reach &&
          std::abs(std::sin(p[kAngleV] - p[kAngleU])) > kLeastAngle;
 }
 
@@ -158,7 +158,7 @@ std::optional<Saddle> fit_saddle(const Image<float>& light, const SaddleGuess& g
   const double step = 2 * p[kHalfStep];
   const double misfit = std::sqrt(2 * solver.summary.final_cost / weight) / std::max(std::abs(step), 1e-9);
   if (std::abs(step) < kLeastStep || misfit > kMaxMisfit) return std::nullopt;
-  return Saddle{p.head<2>(), step, p[kBlur], misfit};
+  return Saddle{p.head<2>(), step, std::max(p[kBlur], kLeastBlur_px), misfit};
 }
 
 }  // namespace slsd

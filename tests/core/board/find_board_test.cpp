@@ -214,5 +214,17 @@ TEST(FindBoard, MeasuresBlur) {
   EXPECT_NEAR(sighting->edge_px, 2, 0.2);
 }
 
+TEST(FindBoard, NeedsNoBlur) {
+  BoardScene scene = view_of(kCharuco, 40, 0.1);
+  scene.blur_px = scene.noise_levels = scene.falling_light = 0;
+  Grey8 image = photograph8(scene);
+  for (int y = 0; y < image.height(); ++y)
+    for (int x = 0; x < image.width(); ++x) image.row(y)[x] = image.row(y)[x] > 100 ? 190 : 15;
+  const auto sighting = find_board(image.view(), scene.board);
+  ASSERT_TRUE(sighting) << to_string(sighting.error());
+  EXPECT_EQ(sighting->points.size(), static_cast<std::size_t>(scene.board.point_count()));
+  EXPECT_LT(errors_of(*sighting, scene).rms_px, 0.2);  // edges are stairs of whole pixels
+}
+
 }  // namespace
 }  // namespace slsd
