@@ -12,20 +12,13 @@ endif()
 
 include(CTest)
 option(SLSD_BENCHMARKS "Build the benchmarks" ON)
+option(SLSD_UNITY "Compile the files of a library together: quicker from nothing, slower after a change of one of them" ON)
 option(SLSD_FUZZERS "Build the libFuzzer targets (needs clang)" OFF)
 set(SLSD_SANITIZE "" CACHE STRING "Sanitizers to build with, as for -fsanitize=")
 
-# Clang's needs a linker of its own, which Debian's check for it does not.
-if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
-  include(CheckIPOSupported)
-  check_ipo_supported(RESULT SLSD_HAS_IPO LANGUAGES CXX OUTPUT ignored)
-endif()
-
-# Lets a release's compiler inline from one file of the target into another.
-function(slsd_inline_across_files target)
-  if(SLSD_HAS_IPO)
-    set_target_properties(${target} PROPERTIES INTERPROCEDURAL_OPTIMIZATION_RELEASE ON)
-  endif()
+# For files whose names, or whose headers' macros, stand in each other's way.
+function(slsd_compile_apart)
+  set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
 add_library(slsd_settings INTERFACE)

@@ -5,11 +5,11 @@
 namespace slsd {
 namespace {
 
-constexpr Rgb kInk{222, 228, 238};
+constexpr Rgb kLegendInk{222, 228, 238};
 
 // In heights of a letter.
 constexpr double kMarkWidth = 1.9;
-constexpr double kGap = 2.1;
+constexpr double kEntryGap = 2.1;
 constexpr double kLinePitch = 2.2;
 
 }  // namespace
@@ -24,8 +24,8 @@ Eigen::Vector2d Legend::begin(const std::string& words) {
 }
 
 void Legend::write(const std::string& words) {
-  canvas_.text(place_ + Eigen::Vector2d(kMarkWidth * text_px_, 0), words, text_px_, kInk);
-  place_.x() += (kMarkWidth + kGap) * text_px_ + Canvas::text_width_px(words, text_px_);
+  canvas_.text(place_ + Eigen::Vector2d(kMarkWidth * text_px_, 0), words, text_px_, kLegendInk);
+  place_.x() += (kMarkWidth + kEntryGap) * text_px_ + Canvas::text_width_px(words, text_px_);
 }
 
 void Legend::disc(Rgb colour, const std::string& words) {

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kAzimuthRad = 0.56;
 constexpr double kElevationRad = 0.36;
-constexpr double kTrimmedShare = 0.002;  // at either end of an axis
+constexpr double kTrimmedOfAxis = 0.002;  // at either end of an axis
 constexpr double kMargin = 0.05;
 constexpr double kThinnest = 0.2;  // of the widest side
 constexpr double kSmallestMm = 1.0;
@@ -22,7 +22,7 @@ constexpr double kSmallestMm = 1.0;
 // Nearly all values: a few stray points do not shrink the rest to a dot.
 void span(std::vector<double> values, double& low, double& high) {
   std::sort(values.begin(), values.end());
-  const auto skipped = static_cast<std::size_t>(kTrimmedShare * static_cast<double>(values.size()));
+  const auto skipped = static_cast<std::size_t>(kTrimmedOfAxis * static_cast<double>(values.size()));
   low = values[skipped];
   high = values[values.size() - 1 - skipped];
   const double margin = kMargin * std::max(high - low, 1e-3);

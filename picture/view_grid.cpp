@@ -16,7 +16,7 @@ namespace {
 
 constexpr Rgb kLine{70, 70, 70};
 constexpr Rgb kFrame{255, 255, 255};
-constexpr Rgb kInk{0, 0, 0};
+constexpr Rgb kBlack{0, 0, 0};
 constexpr int kPitchPx = 64;
 
 /// One of the depths at which a view is drawn.
@@ -67,7 +67,7 @@ void name_outline(ColourImage& picture, const std::vector<Eigen::Vector2d>& outl
     if (base.x() < 0 || base.x() + width_px >= picture.width()) continue;
     if (base.y() < height_px || base.y() + height_px >= picture.height()) continue;
     canvas.rectangle(static_cast<int>(base.x()), static_cast<int>(base.y() - 1.2 * height_px),
-                     static_cast<int>(width_px), static_cast<int>(1.6 * height_px), kInk);
+                     static_cast<int>(width_px), static_cast<int>(1.6 * height_px), kBlack);
     return canvas.text(base, words, height_px, kFrame);
   }
 }

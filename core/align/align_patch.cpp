@@ -80,7 +80,6 @@ enum RowSum {
 };
 
 inline __attribute__((always_inline)) void sum_patch(const Pass& pass, Sums& sums) {
-  constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
   const Warp& warp = pass.warp;
   const Lanes zero{}, one = zero + 1;
   Lanes total[kRowSums], gg_y{}, gg_xy{}, gg_yy{}, gp_y{}, gp_xy{}, gp_yy{}, pp_y{}, pp_xy{}, pp_yy{}, g_y{}, p_y{},

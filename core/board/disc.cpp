@@ -16,7 +16,7 @@
 namespace slsd {
 namespace {
 
-constexpr double kLeastStep = 3;  // levels
+constexpr double kLeastStepOfDisc = 3;  // levels
 constexpr int kRays = 24;
 constexpr double kOwnVariancePx2 = 0.25;  // what reading between pixels, a pixel apart, adds to a blur
 
@@ -123,7 +123,7 @@ std::optional<Disc> measure_disc(const Image<float>& light, const Homography& lo
   const Eigen::Vector2d centroid = sum / weight;
   const double step = (1 - black) * white.dot(Eigen::Vector3d(1, centroid.x(), centroid.y()));
   const bool inside = (centroid - local.map(centre_mm)).norm() < local.jacobian(centre_mm).norm() * radius_mm;
-  if (!(step > kLeastStep) || !inside) return std::nullopt;
+  if (!(step > kLeastStepOfDisc) || !inside) return std::nullopt;
   return Disc{centroid, step, blur_at_edge(light, local, centre_mm, radius_mm, step)};
 }
 

@@ -19,7 +19,7 @@ constexpr float kSupportWeak = 0.94F;
 /// The share that noise alone leaves, and that below which a symbol is not there as a whole.
 constexpr float kSupportUsual = 0.95F, kSupportMin = 0.55F;
 /// What a patch's place is off by, fitted to rendered frames (docs/decoder.md): see AlignedSymbol::sigma_mm.
-constexpr float kLeastPx = 0.002F;        // sampling of the pattern, projector px
+constexpr float kSamplingPx = 0.002F;     // sampling of the pattern, projector px
 constexpr float kOfNoise = 1.1F;          // of the covariance
 constexpr float kOfScatter = 1.2F;        // of the disparities of the patch's parts
 constexpr float kOfDisagreement = 0.17F;  // with the neighbours' planes
@@ -166,6 +166,7 @@ void SymbolAligner::try_neighbours(const GreyView& frame, double full, const Fra
 float SymbolAligner::disagreement_px(const Lattice& lattice, std::size_t index) const {
   const Patch& own = patches_[index];
   std::array<float, 4> off;
+  off.fill(std::numeric_limits<float>::max());
   int count = 0;
   float noise = 0;
   for (const std::int32_t other : lattice.symbols[index].neighbours) {
@@ -179,7 +180,7 @@ float SymbolAligner::disagreement_px(const Lattice& lattice, std::size_t index) 
                  beside.fit.residual * squared_px;
   }
   if (count == 0) return 0;
-  std::sort(off.begin(), off.begin() + count);
+  std::sort(off.begin(), off.end());
   const float median = 0.5F * (off[(count - 1) / 2] + off[count / 2]);
   constexpr float kMedianOfNormal = 0.6745F;
   return std::sqrt(
@@ -202,7 +203,7 @@ AlignedSymbol SymbolAligner::point_of(const Lattice& lattice, std::size_t index,
   const auto square = [](float x) { return x * x; };
   const float lack = std::max(0.F, kSupportUsual - fit.support),
               shading = std::hypot(state.gain_x, state.gain_y) / state.gain;
-  const float sigma_px = std::sqrt(square(kLeastPx) + square(kOfNoise) * noise + square(kOfScatter * fit.scatter) +
+  const float sigma_px = std::sqrt(square(kSamplingPx) + square(kOfNoise) * noise + square(kOfScatter * fit.scatter) +
                                    square(kOfDisagreement * disagreement_px(lattice, index)) + square(kOfLack * lack) +
                                    square(kOfShading * shading));
   aligned.sigma_mm = static_cast<float>(map.inverse_depth_per_px / (inverse * inverse) * direction.norm() * sigma_px);

@@ -94,10 +94,9 @@ struct ThresholdLine {
 /// end, where the next tile's follow.
 template <class T>
 inline __attribute__((always_inline)) void draw_line(const ThresholdLine& line, T* threshold) {
-  constexpr IntLanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
   for (int tile = 0; tile + 1 < line.tiles; ++tile) {
     const int step = line.step[tile];
-    IntLanes value = line.at_centre[tile] + kLane * step;
+    IntLanes value = line.at_centre[tile] + kIntLane * step;
     for (int x = 0; x < line.tile_px; x += kLanes, value += kLanes * step)
       store_pixels(value >> kFractionBits<T>, threshold + tile * line.tile_px + x);
   }

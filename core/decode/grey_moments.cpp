@@ -46,13 +46,12 @@ inline __attribute__((always_inline)) Words load_pixels(const std::uint8_t* pixe
 template <class T>
 inline __attribute__((always_inline)) void copy_rows(const ImageView<T>& frame, const PatchPlace& place,
                                                      const PatchEdges& edges, float* patch, PatchRange& range) {
-  constexpr IntLanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
   Lanes least = Lanes{} + range.least, greatest = Lanes{} + range.greatest;
   for (int y = 0; y < place.height; ++y) {
     const T* row = frame.row(place.top + y) + place.left;
     const int before = edges.before[y], after = edges.after[y];
     for (int x = 0; x < place.stride; x += kLanes, patch += kLanes) {
-      const IntLanes at = kLane + x;
+      const IntLanes at = kIntLane + x;
       const Lanes grey = __builtin_convertvector(__builtin_convertvector(load_pixels(row + x), IntLanes), Lanes);
       const Lanes value = ((at > before) & (at < after)) ? grey : Lanes{} + kOutside;
       std::memcpy(patch, &value, sizeof value);

@@ -10,6 +10,9 @@ namespace slsd {
 inline constexpr int kLanes = 8;
 using Lanes [[gnu::vector_size(32)]] = float;
 using IntLanes [[gnu::vector_size(32)]] = int;
+/// Each lane's number.
+inline constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
+inline constexpr IntLanes kIntLane = {0, 1, 2, 3, 4, 5, 6, 7};
 
 // Never passed by value between functions that are not inlined: how that is done depends on the processor.
 static inline __attribute__((always_inline)) void load(const float* from, Lanes& to) {

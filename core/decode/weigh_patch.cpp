@@ -14,8 +14,6 @@
 namespace slsd {
 namespace {
 
-constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
-
 inline __attribute__((always_inline)) void load_grey(const float* from, Lanes& grey) {
   load(from, grey);
 }

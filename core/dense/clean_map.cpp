@@ -18,8 +18,6 @@
 namespace slsd {
 namespace {
 
-/// Of the depth, from a pixel to the next: more is a jump.
-constexpr float kJump = 0.004F;
 /// Of the distance from the projector: what lies farther behind is another surface.
 constexpr float kBehind = 1.01F;
 /// Growth that has crossed an edge can go on over a surface that is not there, in scraps: what bears no decoded symbol
@@ -38,7 +36,6 @@ struct Rays {
 /// @param to  the projector's pixel, -1 where there is none; and the distance from the projector along its z axis
 inline __attribute__((always_inline)) void find_rays(const Rays& in, const float* depth_mm, std::int32_t* to,
                                                      float* distance_mm) {
-  constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
   const Lanes zero{};
   Lanes depth, q[3];
   load(depth_mm, depth);
@@ -65,7 +62,7 @@ inline __attribute__((always_inline)) void find_joined(const float* depth_mm, co
   Lanes here, beside;
   load(depth_mm, here), load(beside_mm, beside);
   const Lanes off = beside - here, far = off > none ? off : -off;
-  const IntLanes near = far <= kJump * here;
+  const IntLanes near = far <= kDepthJump * here;
   std::uint64_t bits = 0;
   for (int lane = 0; lane < kLanes; ++lane) bits |= static_cast<std::uint64_t>(near[lane] & 1) << lane;
   joined = bits;
@@ -80,7 +77,7 @@ inline __attribute__((always_inline)) void join_row(const float* depth_mm, const
     bits[x / 64] |= joined << (x % 64);
   }
   for (int x = count / kLanes * kLanes; x < count; ++x) {
-    const bool near = std::abs(beside_mm[x] - depth_mm[x]) <= kJump * depth_mm[x];
+    const bool near = std::abs(beside_mm[x] - depth_mm[x]) <= kDepthJump * depth_mm[x];
     bits[x / 64] |= static_cast<std::uint64_t>(near) << (x % 64);
   }
 }
@@ -297,7 +294,7 @@ void MapCleaner::drop_islands(DenseMap& map, std::size_t least, std::span<const 
                y = static_cast<int>(std::lround(seed.camera_px.y()));
     if (x < 0 || y < 0 || x >= map.width || y >= map.height) continue;
     const float depth = map.depth_mm[static_cast<std::size_t>(y) * map.width + x];
-    if (!(std::abs(depth * seed.plane.inverse_depth - 1) < kJump)) continue;
+    if (!(std::abs(depth * seed.plane.inverse_depth - 1) < kDepthJump)) continue;
     const auto end = runs_.begin() + static_cast<std::ptrdiff_t>(first_runs_[y + 1]);
     const auto run = std::partition_point(runs_.begin() + static_cast<std::ptrdiff_t>(first_runs_[y]), end,
                                           [&](const Run& each) { return each.end <= x; });
@@ -343,7 +340,7 @@ void MapCleaner::find_small_holes(const DenseMap& map, std::size_t most) {
   holes_.assign(measured_.size(), 0);
   for (std::size_t i = 0; i < runs_.size(); ++i) {
     const Run& all = runs_[root(static_cast<std::int32_t>(i))];
-    if (all.pixels > most || !(all.farthest - all.nearest <= kJump * all.nearest)) continue;
+    if (all.pixels > most || !(all.farthest - all.nearest <= kDepthJump * all.nearest)) continue;
     std::uint64_t* const bits = holes_.data() + words * static_cast<std::size_t>(runs_[i].y);
     for (int x = runs_[i].first; x < runs_[i].end; ++x) bits[x / 64] |= std::uint64_t{1} << (x % 64);
   }

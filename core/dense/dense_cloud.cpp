@@ -22,8 +22,6 @@ static_assert(std::endian::native == std::endian::little, "the records are copie
 
 constexpr std::size_t kPointBytes = 18, kNormalBytes = 12;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-/// Of the depth, to a neighbour that still belongs to the same surface.
-constexpr float kJump = 0.004F;
 /// Of full: noise and the sensor's own unevenness keep some pixels below.
 constexpr double kSaturated = 0.985;
 /// Print and shading change white by less within the window of a fit, at most pixels.
@@ -58,7 +56,7 @@ class ViewPoints {
   [[nodiscard]] bool joined(int x, int y, int to_x, int to_y) const {
     if (to_x < 0 || to_y < 0 || to_x >= view_.map.width || to_y >= view_.map.height) return false;
     const float depth = view_.map.depth_mm[index(x, y)], other = view_.map.depth_mm[index(to_x, to_y)];
-    return std::abs(other - depth) < kJump * depth;
+    return std::abs(other - depth) < kDepthJump * depth;
   }
   [[nodiscard]] Eigen::Vector3f slope(int x, int y, int dx, int dy) const {
     const bool before = joined(x, y, x - dx, y - dy), behind = joined(x, y, x + dx, y + dy);
@@ -85,7 +83,6 @@ struct RowPiece {
 };
 
 inline __attribute__((always_inline)) void place_lanes(const RowPiece& in, float* x, float* y, float* z) {
-  constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
   Lanes depth{};
   std::memcpy(&depth, in.depth_mm, sizeof(float) * static_cast<std::size_t>(in.count));
   float* const to[3] = {x, y, z};

@@ -25,6 +25,8 @@ enum class DensePixel : std::uint8_t {
   kAtAnEdge,  ///< as near to a hole or a jump as dense_prune_px says
 };
 inline constexpr int kDensePixelCount = 9;
+/// Of the depth, from a pixel to the next: more is a jump, to another surface.
+inline constexpr float kDepthJump = 0.004F;
 
 /// "no_support", as in the counters of a reply.
 [[nodiscard]] std::string_view to_string(DensePixel pixel);

@@ -21,7 +21,7 @@ constexpr double kHalfTransferWindows = 1.3;
 constexpr double kWindowOfPitchLeast = 0.45;
 
 constexpr float kBlurPx = 0.55F;
-constexpr float kDark = 20, kLight = 180;
+constexpr float kDarkLevel = 20, kLightLevel = 180;
 
 }  // namespace
 
@@ -58,7 +58,7 @@ Grey8 wall_frame(const Pattern& pattern, const Calibration& calibration, std::si
           camera.projector_from_camera.rotation * point + camera.projector_from_camera.translation;
       const Eigen::Vector2d pixel = projector.distort(seen.head<2>() / seen.z());
       const float light = field.at(static_cast<float>(pixel.x()), static_cast<float>(pixel.y())).value;
-      frame.at(x, y) = static_cast<std::uint8_t>(std::lround(kDark + kLight * light));
+      frame.at(x, y) = static_cast<std::uint8_t>(std::lround(kDarkLevel + kLightLevel * light));
     }
   }
   return frame;

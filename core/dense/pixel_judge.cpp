@@ -232,7 +232,6 @@ struct Blending {
 /// A row of them.
 inline __attribute__((always_inline)) void blend_lanes(const Blending& in, int row, int first, float* depth,
                                                        float* sigma, std::int32_t* light) {
-  constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
   const Lanes x = kLane + static_cast<float>(in.first_x + first);
   const auto y = static_cast<float>(in.first_y + row);
   const Lanes fx = x * in.per_stride;

@@ -24,13 +24,13 @@ constexpr int kNearLevels = 4;
 /// The share of the windows on a surface that it only touches.
 constexpr double kPartly = 0.2;
 /// All windows at all depths are some e^13 tries, of which one in a thousand frames may be wrong.
-constexpr float kEvidenceMin = 20;
+constexpr float kTotalEvidenceMin = 20;
 /// So much more than any other depth, a thousand to one.
 constexpr float kGapMin = 7;
 /// From line to line the depth stays, or goes on by a level: one of three.
 constexpr float kOfStep = 1.1F;
 /// A window that has no more contrast than so many times the noise has nothing to compare.
-constexpr float kContrastMin = 4;
+constexpr float kNoiseMultipleMin = 4;
 constexpr std::size_t kPlacesMost = 8192;  // of lines of one kind: thin parts are few
 
 using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
@@ -157,7 +157,7 @@ bool SurfaceSearch::compare(const DenseFrame& frame, const PatternField& field, 
     scratch.levels[i] = weights_[i] * (scratch.levels[i] - mean);
     squares += scratch.levels[i] * scratch.levels[i];
   }
-  const float noise = kContrastMin * frame.noise.at(mean);
+  const float noise = kNoiseMultipleMin * frame.noise.at(mean);
   if (squares < noise * noise * pixels) return false;
   Comparing comparing{scratch.levels.data(),
                       weights_.data(),
@@ -298,7 +298,7 @@ void SurfaceSearch::take_seeds() {
     int best = 0;
     for (int k = 1; k < count; ++k)
       if (total(k) > total(best)) best = k;
-    if (total(best) < kEvidenceMin || scores_[at + best] <= 0) continue;
+    if (total(best) < kTotalEvidenceMin || scores_[at + best] <= 0) continue;
     float next = 0;
     for (int k = 0; k < count; ++k)
       if (std::abs(k - best) > kNearLevels) next = std::max(next, total(k));

@@ -20,13 +20,6 @@ bool only_this_frame(ErrorCode code) {
          code == ErrorCode::kFrameLate || code == ErrorCode::kMismatch;
 }
 
-template <class T>
-GreyImage copy_of(const ImageView<T>& view) {
-  Image<T> image(view.width, view.height);
-  for (int y = 0; y < view.height; ++y) std::copy_n(view.row(y), view.width, image.row(y));
-  return image;
-}
-
 ScanOptions patient(ScanOptions options) {
   options.timeout_ms = std::max(options.timeout_ms, kPatienceMs);
   options.exposure_skew_ms = std::max(options.exposure_skew_ms, kSkewMs);
@@ -76,7 +69,7 @@ Result<std::vector<GreyImage>> DeviceSource::grab() {
     if (set) {
       std::vector<GreyImage> pictures;
       for (const Frame& frame : set->frames) {
-        pictures.push_back(std::visit([](const auto& view) { return copy_of(view); }, frame.image()));
+        pictures.push_back(copy_of(frame.image()));
       }
       return pictures;
     }

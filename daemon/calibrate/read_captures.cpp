@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "core/image_size.hpp"
 #include "daemon/calibrate/captured_pictures.hpp"
 #include "drivers/files/read_image.hpp"
 
@@ -23,7 +24,7 @@ ImageSize size_of(const GreyImage& image) {
 }
 
 std::string size_text(const ImageSize& size) {
-  return fmt::format("{}x{}", size.width_px, size.height_px);
+  return slsd::size_text(size.width_px, size.height_px);
 }
 
 Result<CapturedPictures> load(const CaptureFiles& files, bool gray_code) {

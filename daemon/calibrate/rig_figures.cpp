@@ -15,7 +15,7 @@
 namespace slsd {
 namespace {
 
-constexpr double kFigurePx = 460;
+constexpr double kRigPx = 460;
 constexpr double kAbovePx = -8;  // of a label's foot from its dot
 constexpr double kBelowPx = 16;
 constexpr double kNamePx = 60, kLinePx = 13;  // a device's name: about so wide, and so high
@@ -93,7 +93,7 @@ std::string poses_figure(const CalibrationOutcome& outcome, const Projection& lo
     for (const auto& corner : board) box.extend(look * corner);
   }
   const Eigen::Vector2d border = Eigen::Vector2d::Constant(0.05 * box.sizes().maxCoeff());
-  SvgFigure figure(box.min() - border, box.max() + border, kFigurePx);
+  SvgFigure figure(box.min() - border, box.max() + border, kRigPx);
   for (std::size_t i = 0; i < boards.size(); ++i) draw_quad(figure, look, boards[i], pose_colour(i), 1.6);
   std::vector<Eigen::Vector2d> named;
   for (const auto& device : devices) {
@@ -146,7 +146,7 @@ std::string depth_figure(const CalibrationOutcome& outcome) {
   const double unit = 0.35 * range / largest_mm(depths);
   const Eigen::Vector2d first(depths.front().depth_mm - 0.1 * range, -0.45 * range);
   const Eigen::Vector2d last(depths.back().depth_mm + 0.1 * range, 0.1 * range);
-  SvgFigure figure(first, last, kFigurePx);
+  SvgFigure figure(first, last, kRigPx);
   figure.line({first.x(), 0}, {last.x(), 0}, "#888");
   for (const auto& depth : depths) {
     figure.text({depth.depth_mm, 0.06 * range}, fmt::format("{:.0f} mm", depth.depth_mm), "middle");

@@ -21,13 +21,6 @@ constexpr int kTimeoutMs = 10'000;  // cameras on a network take seconds to open
 constexpr auto kPatience = 30s;
 constexpr auto kLatency = 200ms;  // covers what projectors take for their image processing, where nobody measured it
 
-template <class T>
-GreyImage copy_of(const ImageView<T>& view) {
-  Image<T> image(view.width, view.height);
-  for (int y = 0; y < view.height; ++y) std::copy_n(view.row(y), view.width, image.row(y));
-  return image;
-}
-
 /// The service's error as one of ours, by its name.
 Error error_of(const json& told) {
   const std::string name = told.value("/data/name"_json_pointer, std::string());
@@ -114,7 +107,7 @@ Result<std::vector<GreyImage>> SocketSource::grab() {
     }
     const auto image = frame->image(frame->message["result"]);
     if (!image) return tl::unexpected(image.error());
-    pictures.push_back(std::visit([](const auto& view) { return copy_of(view); }, *image));
+    pictures.push_back(copy_of(*image));
   }
   return pictures;
 }

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <utility>
 
+#include "core/image_size.hpp"
 #include "core/printable.hpp"
 #include "daemon/commands/commands.hpp"
 #include "drivers/projector/x11/choose_output.hpp"
@@ -30,15 +31,11 @@ ListingPlaces places_of(const Configuration& configuration) {
   return places;
 }
 
-std::string size_text(const std::pair<int, int>& size) {
-  return std::to_string(size.first) + "x" + std::to_string(size.second);
-}
-
 std::string formats_text(const ListedCamera& camera) {
   std::string text;
   for (const ListedFormat& format : camera.formats) {
     text += (text.empty() ? "" : "; ") + printable(format.name);
-    for (const auto& size : format.sizes_px) (text += " ") += size_text(size);
+    for (const auto& [width, height] : format.sizes_px) (text += " ") += size_text(width, height);
   }
   return text;
 }

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -35,17 +34,12 @@ std::array<std::pair<std::string_view, OfDriver>, std::variant_size_v<OfDriver>>
            {AravisCameraOptions::kDriver, AravisCameraOptions{}}}};
 }
 
-template <class Choices>
-auto span_of(const Choices& choices) {
-  return std::span<const typename Choices::value_type>(choices);
-}
-
 void read_keys(TableReader& reader, FileCameraOptions& options) {
   reader.read("path", options.path);
   reader.read("loop", options.loop);
   reader.read("rate_hz", options.rate_hz);
   reader.read_both("width_px", "height_px", options.size_px);
-  reader.choose("bayer", options.bayer, span_of(kMosaics));
+  reader.choose("bayer", options.bayer, kMosaics);
 }
 
 void read_keys(TableReader& reader, V4l2CameraOptions& options) {
@@ -70,7 +64,7 @@ void read_keys(TableReader& reader, V4l2CameraOptions& options) {
 void read_keys(TableReader& reader, AravisCameraOptions& options) {
   reader.read("id", options.id);
   reader.read("interface", options.interface);
-  reader.choose("trigger", options.trigger, span_of(kTriggers));
+  reader.choose("trigger", options.trigger, kTriggers);
   reader.read("trigger_line", options.trigger_line);
   reader.read("action_device_key", options.action.device_key);
   reader.read("action_group_key", options.action.group_key);
@@ -78,7 +72,7 @@ void read_keys(TableReader& reader, AravisCameraOptions& options) {
   reader.read("action_lead_us", options.action_lead_us);
   reader.read("ptp", options.ptp);
   reader.read("rate_hz", options.rate_hz);
-  reader.choose("device_clock", options.device_clock, span_of(kClocks));
+  reader.choose("device_clock", options.device_clock, kClocks);
   reader.read("readout_us", options.readout_us);
   reader.read("exposure_us", options.exposure_us);
   reader.read("gain_db", options.gain_db);
@@ -128,7 +122,7 @@ Result<CameraOptions> read_camera(const toml::table& table, const path& file) {
   std::string name = options.name();
   reader.read("name", name);
   const auto of_drivers = drivers();
-  reader.choose("driver", options.of_driver, span_of(of_drivers));
+  reader.choose("driver", options.of_driver, of_drivers);
   std::visit([&](auto& of_driver) { of_driver.name = name; }, options.of_driver);
   read_driver_keys(reader, options.of_driver);
   read_faults(reader, options);

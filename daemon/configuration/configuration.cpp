@@ -30,14 +30,9 @@ constexpr std::array kMethods{std::pair("default"sv, Method::kDefault), std::pai
 constexpr std::array kOtherHardware{std::pair("error"sv, OtherHardware::kError),
                                     std::pair("warn"sv, OtherHardware::kWarn)};
 
-template <class Choices>
-auto span_of(const Choices& choices) {
-  return std::span<const typename Choices::value_type>(choices);
-}
-
 Result<> read_projector(const toml::table* table, const path& file, ProjectorOptions& options) {
   TableReader reader(table, "[projector]", file);
-  reader.choose("driver", options.driver, span_of(kProjectorDrivers));
+  reader.choose("driver", options.driver, kProjectorDrivers);
   reader.read("monitor", options.monitor);
   reader.read("width_px", options.width_px);
   reader.read("height_px", options.height_px);
@@ -69,7 +64,7 @@ Result<> read_pattern_table(const toml::table* table, const path& file, Configur
   reader.read("spacing_px", options.spacing_px);
   reader.read("symbols", options.symbols);
   reader.read("seed", options.seed);
-  reader.choose("method", options.method, span_of(kArrayMethods));
+  reader.choose("method", options.method, kArrayMethods);
   reader.read("minimum_distance", options.minimum_distance);
   reader.read("half_turn_unique", options.half_turn_unique);
   if (!configuration.pattern_file.empty()) refuse_keys_beside_file(reader);
@@ -83,24 +78,24 @@ Result<> read_decode(const toml::table* table, const path& file, DecodeOptions& 
   reader.read("depth_min_mm", options.depth_min_mm);
   reader.read("depth_max_mm", options.depth_max_mm);
   reader.read("wrong_cells_max", options.wrong_cells_max);
-  reader.choose("precision", options.precision, span_of(kPrecisions));
-  reader.choose("density", options.density, span_of(kDensities));
+  reader.choose("precision", options.precision, kPrecisions);
+  reader.choose("density", options.density, kDensities);
   reader.read("dense_stride_px", options.dense.stride_px);
   reader.read("dense_prune_px", options.dense.prune_px);
-  reader.choose("binarize", options.binarize, span_of(kMethods));
-  reader.choose("find_regions", options.find_regions, span_of(kMethods));
-  reader.choose("classify", options.classify, span_of(kMethods));
-  reader.choose("centre", options.centre, span_of(kMethods));
-  reader.choose("link_grid", options.link_grid, span_of(kMethods));
-  reader.choose("decode_windows", options.decode_windows, span_of(kMethods));
-  reader.choose("correspond", options.correspond, span_of(kMethods));
+  reader.choose("binarize", options.binarize, kMethods);
+  reader.choose("find_regions", options.find_regions, kMethods);
+  reader.choose("classify", options.classify, kMethods);
+  reader.choose("centre", options.centre, kMethods);
+  reader.choose("link_grid", options.link_grid, kMethods);
+  reader.choose("decode_windows", options.decode_windows, kMethods);
+  reader.choose("correspond", options.correspond, kMethods);
   return reader.finish(options.validate());
 }
 
 Result<> read_calibration_table(const toml::table* table, const path& file, Configuration& configuration) {
   TableReader reader(table, "[calibration]", file);
   reader.read("file", configuration.calibration_file);
-  reader.choose("other_hardware", configuration.other_hardware, span_of(kOtherHardware));
+  reader.choose("other_hardware", configuration.other_hardware, kOtherHardware);
   return reader.finish();
 }
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <span>
+#include <ranges>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -49,8 +49,9 @@ class TableReader {
   void read_both(std::string_view first_key, std::string_view second_key, std::optional<std::pair<int, int>>& values);
 
   /// One of several words.
-  template <class Value>
-  void choose(std::string_view key, Value& value, std::span<const std::pair<std::string_view, Value>> choices) {
+  /// @param choices  pairs of a word and its value
+  template <class Value, std::ranges::forward_range Choices>
+  void choose(std::string_view key, Value& value, const Choices& choices) {
     std::string word;
     read(key, word);
     if (word.empty() && !has(key)) return;

@@ -9,13 +9,6 @@
 #include "drivers/system/thread_name.hpp"
 
 namespace slsd {
-namespace {
-
-using namespace std::chrono_literals;
-
-constexpr auto kWorkPromise = 60s;  // decoding, or drawing a picture
-
-}  // namespace
 
 std::size_t DecodeLanes::lanes_here() {
   return std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMaxLanes);

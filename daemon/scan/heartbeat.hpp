@@ -7,6 +7,9 @@
 
 namespace slsd {
 
+/// Within which a piece of work is done: decoding a frame, drawing a picture, making a pattern and its decoders.
+inline constexpr auto kWorkPromise = std::chrono::seconds(60);
+
 /// A thread's promise to be heard of again before a certain time, for the watchdog of another thread.
 /// @thread thread-safe
 class Heartbeat {

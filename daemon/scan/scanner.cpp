@@ -23,8 +23,7 @@ using std::chrono::steady_clock;
 constexpr std::size_t kMaxWaiting = 64;
 constexpr std::size_t kMaxChores = 16;
 constexpr auto kIdleWake = 1s;
-constexpr auto kStepPromise = 7s;   // waiting goes by steps of a second
-constexpr auto kWorkPromise = 60s;  // drawing, or making a pattern and its decoders
+constexpr auto kStepPromise = 7s;  // waiting goes by steps of a second
 constexpr auto kFreeScanTimeout = 5s;
 constexpr auto kPauseAfterFailure = 500ms;
 constexpr int kFailuresToPause = 2;

@@ -44,10 +44,10 @@ struct SurfaceFit {
 };
 
 SurfaceFit fit(const Eigen::MatrixXd& terms, const Eigen::VectorXd& z) {
-  constexpr int kRounds = 8;
+  constexpr int kFitRounds = 8;
   SurfaceFit found{Eigen::VectorXd::Zero(terms.cols()), {}};
   found.coefficients(0) = median_of(std::vector<double>(z.begin(), z.end()));
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kFitRounds; ++round) {
     const Eigen::VectorXd off = (z - terms * found.coefficients).cwiseAbs();
     const double scale = 4 * std::max(median_of(std::vector<double>(off.begin(), off.end())), 1e-9);
     found.weights = off.unaryExpr([&](double each) { return robust_weight(each, scale); });

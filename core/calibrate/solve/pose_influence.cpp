@@ -12,11 +12,11 @@ namespace slsd {
 namespace {
 
 /// Of the smallest to the largest eigenvalue of the correlations.
-constexpr double kRankTolerance = 1e-13;
+constexpr double kInvertTolerance = 1e-13;
 /// Of what all poses say of a parameter: of less a pose says nothing.
 constexpr double kShareMin = 1e-4;
 /// Points below which a pose that fits them tells nothing.
-constexpr Eigen::Index kPointsMin = 4;
+constexpr Eigen::Index kPointsOfPose = 4;
 /// Of the smallest to the largest eigenvalue of the correlations between a pose's own six parameters.
 constexpr double kPlacedTolerance = 1e-12;
 
@@ -79,7 +79,7 @@ Result<Eigen::MatrixXd> invert(const Eigen::MatrixXd& normal, const std::vector<
   const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * normal * scale.asDiagonal());
   const Eigen::VectorXd values = solver.eigenvalues();
-  if (!(values(0) > kRankTolerance * values(values.size() - 1))) {
+  if (!(values(0) > kInvertTolerance * values(values.size() - 1))) {
     Eigen::Index worst = 0;
     solver.eigenvectors().col(0).cwiseAbs().maxCoeff(&worst);
     return fail(ErrorCode::kImpossible, "the poses leave " + name_of(names[static_cast<std::size_t>(worst)]) +
@@ -133,7 +133,7 @@ double PoseInfluence::sigma(std::size_t parameter) const {
 }
 
 bool is_placed(const PoseEquations& pose) {
-  if (pose.residuals.size() < 2 * kPointsMin) return false;
+  if (pose.residuals.size() < 2 * kPointsOfPose) return false;
   const PoseNormal normal = pose.by_pose.transpose() * pose.by_pose;
   const Eigen::Matrix<double, 6, 1> scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::SelfAdjointEigenSolver<PoseNormal> solver(scale.asDiagonal() * normal * scale.asDiagonal());

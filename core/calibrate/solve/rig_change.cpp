@@ -19,7 +19,7 @@
 namespace slsd {
 namespace {
 
-constexpr std::size_t kPosesMin = 5, kPosesOfPart = 2;
+constexpr std::size_t kPosesOfSession = 5, kPosesOfPart = 2;
 constexpr std::size_t kSymbolsOfView = 50;  // enough by far: a device that moved takes all of them along
 constexpr int kRoundsOfSearch = 5;          // of the adjustment at each moment tried: from one rig it is near
 constexpr std::size_t kMomentsTried = 24;   // at first; then those beside the best
@@ -274,7 +274,7 @@ std::optional<RigChange> find_rig_change(const Observations& observations, const
   const auto wrong_max = static_cast<std::size_t>(kWrongShare * static_cast<double>(seen.poses.size()));
   std::vector<std::size_t> original(seen.poses.size());
   for (std::size_t i = 0; i < original.size(); ++i) original[i] = i;
-  for (std::size_t left_out = 0; left_out <= wrong_max && seen.poses.size() >= kPosesMin; ++left_out) {
+  for (std::size_t left_out = 0; left_out <= wrong_max && seen.poses.size() >= kPosesOfSession; ++left_out) {
     const Model split = adjusted(seen, options, split_at(one_rig, most_likely_moment(seen, options, one_rig)), 3);
     if (const auto wrong = wrong_pose(seen, split.rig)) {
       const auto at = static_cast<std::ptrdiff_t>(*wrong);

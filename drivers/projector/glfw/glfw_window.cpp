@@ -17,7 +17,7 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr auto kPatience = 5s;  // for a window manager
+constexpr auto kManagersPatience = 5s;  // a busy window manager
 
 std::atomic_flag in_use;  // GLFW is the process's
 
@@ -140,7 +140,7 @@ bool FullscreenWindow::covers(const DesktopArea& area) const {
 }
 
 bool FullscreenWindow::wait_until_it_covers(unsigned long output, int width_px, int height_px) {
-  const auto deadline = steady_clock::now() + kPatience;
+  const auto deadline = steady_clock::now() + kManagersPatience;
   while (steady_clock::now() < deadline && !session_.lost()) {
     session_.handle_events();
     const auto area = lit_area(session_.display(), output);
