@@ -21,6 +21,11 @@ function(slsd_compile_apart)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
+# For libraries of which a small program, as slsd-picture, is linked with what it needs alone.
+function(slsd_link_by_file target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
+endfunction()
+
 add_library(slsd_settings INTERFACE)
 target_include_directories(slsd_settings INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(slsd_settings INTERFACE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion
