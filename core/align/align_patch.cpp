@@ -11,7 +11,7 @@
 #include <Eigen/LU>
 
 #include "core/clones.hpp"
-#include "core/decode/lanes.hpp"
+#include "core/lanes.hpp"
 
 namespace slsd {
 namespace {

@@ -4,8 +4,9 @@
 
 #include <algorithm>
 
-#include "core/decode/align_symbols.hpp"
+#include "core/decode/centres/align_symbols.hpp"
 #include "core/decode/symbol_reader.hpp"
+#include "core/exposure/divide_light.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "core/geometry/epipolar_limit.hpp"
 #include "core/geometry/triangulator.hpp"
@@ -187,6 +188,18 @@ void Decoder::Parts::add_point(const LatticeSymbol& symbol, const Eigen::Vector2
   out.camera = camera_index;
   const Pattern& pattern = reader.pattern();
   out.symbol = static_cast<std::uint8_t>(pattern.options.symbols[pattern.array.at(symbol.row, symbol.column)]);
+}
+
+Result<const Decoding*> decode_in_light(Decoder& decoder, const GreyView& frame, const SceneLight& light,
+                                        StageObserver* observer, Executor* executor) {
+  auto plain = decoder.decode(frame, light.full, observer, executor);
+  if (!plain || !light.white) return plain;
+  const std::size_t points = (*plain)->points.size();
+  const auto quotient = divide_light(frame, *light.white, light.dark);
+  if (!quotient) return tl::unexpected(quotient.error());
+  auto divided = decoder.decode(quotient->view(), kQuotientFull, observer, executor);
+  if (!divided || (*divided)->points.size() >= points) return divided;
+  return decoder.decode(frame, light.full, observer, executor);
 }
 
 }  // namespace slsd

@@ -8,9 +8,10 @@
 #include <span>
 #include <vector>
 
+#include "core/cloud/shade_points.hpp"
 #include "core/code/codebook.hpp"
+#include "core/decode/centres/frame_noise.hpp"
 #include "core/decode/decoding.hpp"
-#include "core/decode/frame_noise.hpp"
 #include "core/decode/lattice.hpp"
 #include "core/decode/options.hpp"
 #include "core/executor.hpp"
@@ -65,5 +66,13 @@ class Decoder {
   explicit Decoder(std::unique_ptr<Parts> parts);
   std::unique_ptr<Parts> parts_;
 };
+
+/// Decodes a frame, or where there is one in white light too, what is left when that is divided out: print and wood
+/// have edges of their own, which then do not count. Where the scene has moved between the two, and the frame by itself
+/// gives more points, these: white light costs no point.
+/// @errors as Decoder::decode(); kMismatch: the frames are not of one size
+/// @thread thread-bound, as the decoder
+[[nodiscard]] Result<const Decoding*> decode_in_light(Decoder& decoder, const GreyView& frame, const SceneLight& light,
+                                                      StageObserver* observer = nullptr, Executor* executor = nullptr);
 
 }  // namespace slsd

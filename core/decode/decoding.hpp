@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "core/cloud/cloud.hpp"
-#include "core/decode/symbol_match.hpp"
+#include "core/decode/centres/symbol_match.hpp"
 
 namespace slsd {
 

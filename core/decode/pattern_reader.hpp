@@ -12,7 +12,7 @@
 #include <Eigen/Core>
 
 #include "core/code/codebook.hpp"
-#include "core/decode/symbol_match.hpp"
+#include "core/decode/centres/symbol_match.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "core/geometry/homography.hpp"
 #include "core/image.hpp"

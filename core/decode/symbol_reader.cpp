@@ -6,7 +6,7 @@
 
 #include <Eigen/LU>
 
-#include "core/decode/centre_sigma.hpp"
+#include "core/decode/centres/centre_sigma.hpp"
 
 namespace slsd {
 namespace {

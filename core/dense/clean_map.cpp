@@ -13,7 +13,7 @@
 #include <Eigen/Geometry>
 
 #include "core/clones.hpp"
-#include "core/decode/lanes.hpp"
+#include "core/lanes.hpp"
 
 namespace slsd {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "core/clones.hpp"
 #include "core/cloud/point_record.hpp"
-#include "core/decode/lanes.hpp"
+#include "core/lanes.hpp"
 
 namespace slsd {
 namespace {

@@ -8,7 +8,7 @@
 
 #include <Eigen/LU>
 
-#include "core/decode/lattice_frame.hpp"
+#include "core/decode/grid/lattice_frame.hpp"
 
 namespace slsd {
 namespace {

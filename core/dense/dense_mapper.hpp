@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/code/pattern.hpp"
-#include "core/decode/align_symbols.hpp"
+#include "core/decode/centres/align_symbols.hpp"
 #include "core/decode/decoder.hpp"
 #include "core/dense/clean_map.hpp"
 #include "core/dense/dense_map.hpp"

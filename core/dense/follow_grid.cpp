@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/clones.hpp"
-#include "core/decode/lanes.hpp"
+#include "core/lanes.hpp"
 
 namespace slsd {
 namespace {

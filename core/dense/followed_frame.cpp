@@ -7,7 +7,7 @@
 
 #include "core/align/align_eight.hpp"
 #include "core/clones.hpp"
-#include "core/decode/lanes.hpp"
+#include "core/lanes.hpp"
 
 namespace slsd {
 namespace {

@@ -8,7 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "core/clones.hpp"
-#include "core/decode/lanes.hpp"
+#include "core/lanes.hpp"
 
 namespace slsd {
 namespace {

@@ -11,7 +11,7 @@
 #include <Eigen/Core>
 
 #include "core/align/align_eight.hpp"
-#include "core/decode/frame_noise.hpp"
+#include "core/decode/centres/frame_noise.hpp"
 #include "core/executor.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/geometry/ray_table.hpp"

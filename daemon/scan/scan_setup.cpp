@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
-#include "core/decode/lattice_frame.hpp"
-#include "core/decode/separability.hpp"
+#include "core/decode/grid/lattice_frame.hpp"
+#include "core/decode/symbols/separability.hpp"
 #include "core/image_size.hpp"
 #include "core/printable.hpp"
 #include "drivers/files/file.hpp"

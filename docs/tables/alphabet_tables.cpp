@@ -7,9 +7,9 @@
 
 #include "core/code/pattern.hpp"
 #include "core/code/symbol.hpp"
-#include "core/decode/descriptors.hpp"
-#include "core/decode/prototypes.hpp"
-#include "core/decode/separability.hpp"
+#include "core/decode/regions/descriptors.hpp"
+#include "core/decode/symbols/prototypes.hpp"
+#include "core/decode/symbols/separability.hpp"
 #include "docs/tables/best_symbols.hpp"
 #include "docs/tables/table.hpp"
 
@@ -33,8 +33,8 @@ the cell's side (`core/code/symbol_rules.cpp`); a pixel belongs to a primitive w
 constexpr const char* kDescriptorText = R"(
 ## Descriptors and centroid
 
-The paper's ten descriptors, computed on the shapes as they are drawn (`core/decode/descriptors.hpp`), at each size in projector pixels,
-and the centroid for the estimator in use (grey values through a soft threshold, `core/decode/prototypes.hpp`, 1.4 camera pixels to a
+The paper's ten descriptors, computed on the shapes as they are drawn (`core/decode/regions/descriptors.hpp`), at each size in projector pixels,
+and the centroid for the estimator in use (grey values through a soft threshold, `core/decode/symbols/prototypes.hpp`, 1.4 camera pixels to a
 projector pixel): from the middle of the symbol's square, in projector pixels, x to the right, y down.
 
 )";
@@ -45,8 +45,8 @@ constexpr const char* kSeparabilityText = R"(
 A simulated camera looks at each symbol among random neighbours (spacing 2 px, 1.4 camera pixels to a projector pixel; blur with a
 standard deviation of 0.8, 1.1 and 1.4 camera pixels, each varied by a fifth; tilt that shortens to 0.6 and lengthens to 1.15, roll of up to 6
 degrees, any position on the pixels, noise of 2 % of the contrast). It is the one by which the decoder's prototypes are made
-(`core/decode/prototypes.hpp`): the decoder's threshold, its way of taking apart what ran together, its moments, in a frame that is off by up to 7 %. Two
-figures come of it (`core/decode/separability.hpp`):
+(`core/decode/symbols/prototypes.hpp`): the decoder's threshold, its way of taking apart what ran together, its moments, in a frame that is off by up to 7 %. Two
+figures come of it (`core/decode/symbols/separability.hpp`):
 
 - **distance** of a pair: standard deviations from each symbol's mean to the boundary between the two along the direction that parts them best.
   Below 4 a pair is risky: at 4 the Gaussian error is 1 in 30,000, so that even tails ten times as heavy stay far below the 2 % of

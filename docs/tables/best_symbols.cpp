@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "core/code/symbol.hpp"
-#include "core/decode/separability.hpp"
+#include "core/decode/symbols/separability.hpp"
 
 namespace slsd {
 namespace {

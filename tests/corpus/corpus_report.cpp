@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/decode/decode_in_light.hpp"
+#include "core/decode/decoder.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "drivers/files/read_image.hpp"
 #include "tests/corpus/expectations.hpp"

@@ -11,7 +11,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/decode/lattice_frame.hpp"
+#include "core/decode/grid/lattice_frame.hpp"
 
 namespace slsd {
 namespace {

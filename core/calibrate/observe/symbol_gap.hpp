@@ -7,7 +7,7 @@
 
 #include "core/calibrate/observe/board_region.hpp"
 #include "core/code/pattern.hpp"
-#include "core/decode/symbol_match.hpp"
+#include "core/decode/centres/symbol_match.hpp"
 #include "core/image.hpp"
 
 namespace slsd {

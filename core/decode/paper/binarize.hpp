@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "core/decode/mask.hpp"
+#include "core/decode/regions/mask.hpp"
 #include "core/image.hpp"
 
 namespace slsd {

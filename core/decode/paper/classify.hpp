@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "core/decode/descriptors.hpp"
+#include "core/decode/regions/descriptors.hpp"
 #include "core/result.hpp"
 
 namespace slsd {

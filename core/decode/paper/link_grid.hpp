@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/decode/decoding.hpp"
-#include "core/decode/descriptors.hpp"
+#include "core/decode/regions/descriptors.hpp"
 
 namespace slsd {
 

@@ -5,11 +5,11 @@
 #include <optional>
 
 #include "core/code/pattern.hpp"
-#include "core/decode/find_regions.hpp"
+#include "core/decode/grid/sightings.hpp"
 #include "core/decode/options.hpp"
 #include "core/decode/paper/classify.hpp"
 #include "core/decode/paper/link_grid.hpp"
-#include "core/decode/sightings.hpp"
+#include "core/decode/regions/find_regions.hpp"
 
 namespace slsd {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/appearance.hpp"
+#include "core/decode/symbols/appearance.hpp"
 
 #include <cmath>
 #include <vector>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/binarize.hpp"
+#include "core/decode/regions/binarize.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
 
-#include "core/decode/find_regions.hpp"
 #include "core/decode/paper/binarize.hpp"
+#include "core/decode/regions/find_regions.hpp"
 #include "tests/core/decode/images.hpp"
 
 namespace slsd {

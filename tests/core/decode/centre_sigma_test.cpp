@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/centre_sigma.hpp"
+#include "core/decode/centres/centre_sigma.hpp"
 
 #include <cmath>
 #include <numbers>

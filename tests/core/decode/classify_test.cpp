@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/classify.hpp"
+#include "core/decode/symbols/classify.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <Eigen/LU>
 
-#include "core/decode/prototypes.hpp"
+#include "core/decode/symbols/prototypes.hpp"
 
 namespace slsd {
 namespace {

@@ -9,11 +9,11 @@
 
 #include <gmock/gmock.h>
 
-#include "core/decode/binarize.hpp"
-#include "core/decode/classify.hpp"
-#include "core/decode/find_regions.hpp"
-#include "core/decode/sharpen.hpp"
-#include "core/decode/weigh_patch.hpp"
+#include "core/decode/regions/binarize.hpp"
+#include "core/decode/regions/find_regions.hpp"
+#include "core/decode/regions/sharpen.hpp"
+#include "core/decode/symbols/classify.hpp"
+#include "core/decode/symbols/weigh_patch.hpp"
 #include "tests/core/decode/decoded_scene.hpp"
 #include "tests/core/decode/images.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/correspond.hpp"
+#include "core/decode/centres/correspond.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/curvature.hpp"
+#include "core/decode/centres/curvature.hpp"
 
 #include <cmath>
 

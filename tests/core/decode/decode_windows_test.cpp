@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/decode_windows.hpp"
+#include "core/decode/grid/decode_windows.hpp"
 
 #include <cmath>
 #include <optional>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/descriptors.hpp"
+#include "core/decode/regions/descriptors.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +13,7 @@
 #include <rapidcheck/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-#include "core/decode/convex_hull.hpp"
+#include "core/decode/regions/convex_hull.hpp"
 
 namespace slsd {
 namespace {

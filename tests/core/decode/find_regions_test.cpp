@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/find_regions.hpp"
+#include "core/decode/regions/find_regions.hpp"
 
 #include <map>
 #include <random>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/frame_noise.hpp"
+#include "core/decode/centres/frame_noise.hpp"
 
 #include <random>
 

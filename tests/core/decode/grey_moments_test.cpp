@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/grey_moments.hpp"
+#include "core/decode/symbols/grey_moments.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
 
-#include "core/decode/find_regions.hpp"
+#include "core/decode/regions/find_regions.hpp"
 #include "tests/core/decode/images.hpp"
 
 namespace slsd {

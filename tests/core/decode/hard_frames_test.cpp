@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-#include "core/decode/decode_in_light.hpp"
+#include "core/decode/decoder.hpp"
 #include "tests/core/decode/decoded_scene.hpp"
 #include "tests/core/decode/images.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/decode/mask.hpp"
+#include "core/decode/regions/mask.hpp"
 #include "core/image.hpp"
 
 namespace slsd {

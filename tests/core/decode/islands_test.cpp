@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/islands.hpp"
+#include "core/decode/grid/islands.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>
 
-#include "core/decode/decode_windows.hpp"
+#include "core/decode/grid/decode_windows.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
 #include "tests/core/decode/simulated_grid.hpp"
 #include "tests/simulator/simulator.hpp"

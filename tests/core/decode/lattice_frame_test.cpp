@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/lattice_frame.hpp"
+#include "core/decode/grid/lattice_frame.hpp"
 
 #include <utility>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/link_grid.hpp"
+#include "core/decode/grid/link_grid.hpp"
 
 #include <cmath>
 #include <random>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/mask.hpp"
+#include "core/decode/regions/mask.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

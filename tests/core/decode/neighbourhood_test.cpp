@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/neighbourhood.hpp"
+#include "core/decode/grid/neighbourhood.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/prototypes.hpp"
+#include "core/decode/symbols/prototypes.hpp"
 
 #include <cmath>
 
@@ -8,7 +8,7 @@
 
 #include "core/code/pattern.hpp"
 #include "core/code/symbol.hpp"
-#include "core/decode/descriptors.hpp"
+#include "core/decode/regions/descriptors.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/review_symbols.hpp"
+#include "core/decode/symbols/review_symbols.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <opencv2/imgproc.hpp>
 
-#include "core/decode/link_grid.hpp"
+#include "core/decode/grid/link_grid.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
 
 namespace slsd {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/separability.hpp"
+#include "core/decode/symbols/separability.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "core/code/pattern.hpp"
-#include "core/decode/prototypes.hpp"
+#include "core/decode/symbols/prototypes.hpp"
 
 namespace slsd {
 namespace {

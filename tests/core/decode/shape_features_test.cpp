@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/shape_features.hpp"
+#include "core/decode/symbols/shape_features.hpp"
 
 #include <cmath>
 #include <random>

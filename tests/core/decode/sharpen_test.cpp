@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/sharpen.hpp"
+#include "core/decode/regions/sharpen.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "core/decode/link_grid.hpp"
+#include "core/decode/grid/link_grid.hpp"
 
 namespace slsd {
 

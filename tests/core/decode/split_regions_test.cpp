@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/split_regions.hpp"
+#include "core/decode/regions/split_regions.hpp"
 
 #include <gmock/gmock.h>
 

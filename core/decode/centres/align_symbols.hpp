@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/align/align_patch.hpp"
+#include "core/align/pattern_field.hpp"
+#include "core/code/pattern.hpp"
+#include "core/decode/centres/frame_noise.hpp"
+#include "core/decode/grid/cell_rays.hpp"
+#include "core/decode/lattice.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// The pattern at some blurs, each made when it is first asked for.
+/// @thread thread-safe
+class PatternFields {
+ public:
+  static constexpr std::array<float, 7> kBlursPx{0.42F, 0.55F, 0.72F, 0.95F, 1.25F, 1.65F, 2.15F};
+  explicit PatternFields(Grey8 pattern) : pattern_(std::move(pattern)) {}
+  [[nodiscard]] const PatternField& at(std::size_t blur) const;
+
+ private:
+  Grey8 pattern_;
+  mutable std::array<std::once_flag, kBlursPx.size()> made_;
+  mutable std::array<std::optional<PatternField>, kBlursPx.size()> fields_;
+};
+
+/// A symbol's place after its patch was aligned with the pattern.
+struct AlignedSymbol {
+  Eigen::Vector3d point_in_camera;  ///< mm: what the symbol's centroid in the projector lights
+  Eigen::Vector2f centre_px;        ///< where the camera sees it
+  /// One standard deviation along the camera's ray: of noise, of relief within the patch (its parts' disparities
+  /// scatter), between patches (neighbours' planes, continued, disagree), of what is not there as it should be, and of
+  /// light that changes.
+  float sigma_mm;
+  bool whole;  ///< the pattern is there as it should be
+};
+
+/// Aligns each symbol of a lattice with the pattern: its depth, its tilt, how the light falls on it.
+/// @thread thread-bound: keeps its buffers; the pattern is shared with copies
+class SymbolAligner {
+ public:
+  SymbolAligner(const Pattern& pattern, const CalibratedCamera& camera, const Lens& projector);
+
+  /// @param rays       one to a symbol: that of its centre
+  /// @param depths_mm  one to a symbol, along the camera's z axis, as triangulated from its centre
+  /// @param noise      one standard deviation of a pixel, grey levels
+  /// @return           one to a symbol; stands until the next call
+  [[nodiscard]] const std::vector<AlignedSymbol>& align(const GreyView& frame, double full, const FrameNoise& noise,
+                                                        const Lattice& lattice, std::span<const PixelRay> rays,
+                                                        std::span<const double> depths_mm, const CellRays& cells);
+
+ private:
+  struct Patch {
+    PatchMap map;
+    PatchWindow window;
+    PatchState start;
+    PatchFit fit;
+    float level;  // midway between dark and lit
+  };
+  [[nodiscard]] Patch patch_of(const LatticeSymbol& symbol, const PixelRay& ray, double depth_mm) const;
+  [[nodiscard]] std::size_t find_blur(const GreyView& frame, double full, const FrameNoise& noise);
+  [[nodiscard]] PatchFit fit(const GreyView& frame, double full, const FrameNoise& noise, const Patch& patch,
+                             const PatchState& start, std::size_t blur);
+  void try_neighbours(const GreyView& frame, double full, const FrameNoise& noise, const Lattice& lattice,
+                      std::size_t index, std::size_t blur);
+  [[nodiscard]] AlignedSymbol point_of(const Lattice& lattice, std::size_t index, const PixelRay& ray,
+                                       const Eigen::Vector2f& projector_px) const;
+  [[nodiscard]] float disagreement_px(const Lattice& lattice, std::size_t index) const;
+
+  CalibratedCamera camera_;
+  Lens projector_;
+  PatternOptions options_;
+  float pitch_px_, half_px_;
+  std::shared_ptr<const PatternFields> fields_;
+  PatchAligner aligner_{{}};
+  std::vector<Patch> patches_;
+  std::vector<AlignedSymbol> aligned_;
+  std::vector<float> misfits_;
+};
+
+}  // namespace slsd

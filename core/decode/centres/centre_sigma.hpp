@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include "core/decode/centres/frame_noise.hpp"
+#include "core/decode/grid/cell_rays.hpp"
+#include "core/decode/grid/epipolar_view.hpp"
+#include "core/decode/lattice.hpp"
+
+namespace slsd {
+
+/// One standard deviation of a symbol's centre from the noise of the pixels alone, camera px.
+///
+/// The soft threshold lets noise in along the edge alone, a band about a pixel and a half wide: with w the area, n the
+/// noise and c the contrast, var = (n / r c)^2 / sqrt(w), r the ramp, for a compact symbol.
+/// @param weight            lit area, camera px squared
+/// @param background, gain  grey levels: the dark, and what light adds to it
+/// @thread reentrant
+[[nodiscard]] float noise_of_centre_px(float weight, float background, float gain, const FrameNoise& noise);
+
+/// Tells how exact each centre of a lattice is, along the epipolar line and across it.
+///
+/// What disturbs a centre besides noise is relief, print, shadow or an edge under the symbol. It shows in two ways:
+/// across the epipolar line, where no depth moves a symbol and what is left over is error alone; and in the symbol's
+/// shape. So, all in camera px and added in squares,
+///
+///     noise,  0.01,  0.4 across,  roughness,  0.03 misfit^2,  0.02 where no neighbours tell of its bend
+///
+/// across: the residual less the frame's median (that is the calibration's); roughness: the root mean square of the
+/// symbol's and its neighbours', beyond noise and the 0.022 px of smooth surfaces; misfit: of the shape, in standard
+/// deviations. The factors are fitted to rendered frames (docs/decoder.md).
+/// @thread thread-bound: keeps its buffers
+class CentreJudge {
+ public:
+  /// @param view  null where there is no calibration: nothing is known then of what lies across
+  void judge(const FrameNoise& noise, const EpipolarView* view, const CellRays& cells, Executor& executor,
+             Lattice& lattice);
+
+ private:
+  std::vector<float> across_px_, sorted_;
+};
+
+}  // namespace slsd

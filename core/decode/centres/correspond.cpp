@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/centres/correspond.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace slsd {
+namespace {
+
+/// What became of the nodes along a node's row and column.
+class Surroundings {
+ public:
+  Surroundings(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims)
+      : nodes_(nodes), claims_(claims) {}
+
+  [[nodiscard]] bool leave_alone(std::int32_t node) const {
+    if (goes_on_all_around(node)) return false;  // as most do, and then none of the following can be
+    return is_lone(node, kRight) || is_lone(node, kDown) ||
+           std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp},
+                               [&](Direction d) { return is_lone_at_rim(node, d); });
+  }
+
+  /// The last of a line that has been refused, beside what is none of its island or has been refused, too.
+  [[nodiscard]] bool is_last(std::int32_t node) const {
+    return std::ranges::any_of(std::array{kRight, kDown}, [&](Direction forth) {
+      for (const Direction d : {forth, opposite(forth)})
+        if (const std::int32_t other = beside(node, d); other < 0 || stands(node, other)) return false;
+      const auto one = static_cast<Direction>((forth + 1) % 4), two = opposite(one);
+      return contradicts(node, one) || contradicts(node, two) ||
+             (!stands(node, beside(node, one)) && !stands(node, beside(node, two)));
+    });
+  }
+
+  /// All that is left of a line, as far as it is looked at.
+  [[nodiscard]] bool is_left(std::int32_t node) const {
+    return std::ranges::any_of(std::array{kRight, kDown}, [&](Direction forth) {
+      int refused = 0;
+      for (const Direction d : {forth, opposite(forth)}) {
+        std::int32_t other = beside(node, d);
+        for (int i = 0; i < kReach && other >= 0; ++i, other = beside(other, d), ++refused)
+          if (stands(node, other)) return false;
+      }
+      return refused > kReach;
+    });
+  }
+
+  /// Of the few that are left of a line, between as many refused ones and its end, with nothing of their island on one
+  /// side of them, and there something that is none of it.
+  [[nodiscard]] bool is_rest(std::int32_t node) const {
+    return std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp}, [&](Direction aside) {
+      if (stands(node, beside(node, aside))) return false;
+      int length = 1, most_refused = 0;
+      bool others = is_beside_others(node, aside);
+      for (const int turn : {1, 3}) {
+        const auto along = static_cast<Direction>((aside + turn) % 4);
+        std::int32_t other = beside(node, along);
+        for (; stands(node, other) && !stands(node, beside(other, aside)); other = beside(other, along)) {
+          others |= is_beside_others(other, aside);
+          ++length;
+        }
+        int refused = 0;
+        for (; refused < kReach && other >= 0 && !stands(node, other); other = beside(other, along)) ++refused;
+        if (refused < kReach && other >= 0) return false;
+        most_refused = std::max(most_refused, refused);
+      }
+      return others && length <= most_refused;
+    });
+  }
+
+  /// All of those beside it stand.
+  [[nodiscard]] bool is_inside(std::int32_t node) const {
+    return std::ranges::all_of(std::array{kRight, kDown, kLeft, kUp},
+                               [&](Direction d) { return stands(node, beside(node, d)); });
+  }
+
+  /// None of those beside it stands.
+  [[nodiscard]] bool is_alone(std::int32_t node) const {
+    return std::ranges::none_of(std::array{kRight, kDown, kLeft, kUp},
+                                [&](Direction d) { return stands(node, beside(node, d)); });
+  }
+
+  /// At the corner of what was put there: on two sides that meet, and between them, it has been refused.
+  [[nodiscard]] bool is_corner(std::int32_t node) const {
+    return std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp}, [&](Direction one) {
+      const auto two = static_cast<Direction>((one + 1) % 4);
+      const std::int32_t first = beside(node, one), second = beside(node, two);
+      return misread(first) && misread(second) && !stands(node, beside(first, two)) &&
+             !stands(node, beside(second, one));
+    });
+  }
+
+ private:
+  static constexpr int kReach = 3;
+  /// Those beside it stand, and their cells lie beside its own.
+  [[nodiscard]] bool goes_on_all_around(std::int32_t node) const {
+    return std::ranges::all_of(std::array{kRight, kDown, kLeft, kUp}, [&](Direction d) {
+      const std::int32_t other = beside(node, d);
+      return stands(node, other) && fits(node, other, d);
+    });
+  }
+  /// There lies what is none of its island, or what is misread.
+  [[nodiscard]] bool is_beside_others(std::int32_t node, Direction d) const {
+    return contradicts(node, d) || misread(beside(node, d));
+  }
+  /// Its letter is another than its cell's.
+  [[nodiscard]] bool misread(std::int32_t node) const {
+    return node >= 0 && claims_[node].status == RegionStatus::kClassDisagrees;
+  }
+
+  [[nodiscard]] bool stands(std::int32_t node, std::int32_t other) const {
+    return other >= 0 && claims_[other].status == RegionStatus::kDecoded &&
+           claims_[other].island == claims_[node].island;
+  }
+  [[nodiscard]] std::int32_t beside(std::int32_t node, Direction d) const { return neighbour(nodes_, node, d); }
+
+  /// Whether a node's cell lies beside another's as the nodes do.
+  [[nodiscard]] bool fits(std::int32_t node, std::int32_t other, Direction d) const {
+    const Eigen::Vector2f to = step(d);
+    return claims_[other].same_cell(claims_[node].row + static_cast<int>(to.y()),
+                                    claims_[node].column + static_cast<int>(to.x()));
+  }
+
+  [[nodiscard]] bool contradicts(std::int32_t node, Direction d) const {
+    const std::int32_t other = beside(node, d);
+    return other >= 0 && !fits(node, other, d);
+  }
+
+  /// Whether the island goes on there, refused or not, or no node is there that could be of another surface. What was
+  /// refused by its surroundings could.
+  [[nodiscard]] bool continues(std::int32_t node, Direction d) const {
+    const std::int32_t other = beside(node, d);
+    return other < 0 || (claims_[other].status != RegionStatus::kNeighboursDisagree && fits(node, other, d));
+  }
+
+  [[nodiscard]] bool is_lone(std::int32_t node, Direction forth) const {
+    int standing = 0, refused = 0, next_refused = 0;
+    for (const Direction d : {forth, opposite(forth)}) {
+      std::int32_t other = beside(node, d);
+      next_refused += other >= 0 && !stands(node, other);
+      for (int i = 0; i < kReach && other >= 0; ++i, other = beside(other, d))
+        ++(stands(node, other) ? standing : refused);
+    }
+    const auto aside = static_cast<Direction>((forth + 1) % 4);
+    const bool inside = continues(node, aside) && continues(node, opposite(aside));
+    return inside ? standing == 0 && refused > kReach : refused > standing || next_refused == 2;
+  }
+
+  /// The same, seen from the row within: its links lead on where those of a row that an edge runs through are broken.
+  /// What is damaged counts half: the symbols at a limb are, too.
+  [[nodiscard]] bool is_lone_at_rim(std::int32_t node, Direction outwards) const {
+    const std::int32_t within = beside(node, opposite(outwards));
+    if (!stands(node, within) || stands(node, beside(node, outwards))) return false;
+    int standing = 0, refused = 0;
+    for (const int turn : {1, 3}) {
+      const auto along = static_cast<Direction>((outwards + turn) % 4);
+      std::int32_t before = within;
+      for (int i = 0; i < kReach; ++i) {
+        const std::int32_t at = beside(before, along);
+        if (at < 0 || !fits(before, at, along)) break;
+        before = at;
+        const std::int32_t other = nodes_[at].links[outwards];
+        if (other < 0) continue;
+        if (stands(node, other) && !nodes_[at].broken[outwards]) {
+          standing += 2;
+        } else {
+          refused += claims_[other].status == RegionStatus::kDamagedShape ? 1 : 2;
+        }
+      }
+    }
+    return refused > standing;
+  }
+
+  const std::vector<GridNode>& nodes_;
+  const std::vector<CellClaim>& claims_;
+};
+
+}  // namespace
+
+void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellClaim>& claims) {
+  holder_.assign(static_cast<std::size_t>(cells.rows()) * cells.columns(), -1);
+  for (std::size_t node = 0; node < claims.size(); ++node) {
+    CellClaim& claim = claims[node];
+    if (claim.status != RegionStatus::kDecoded) continue;
+    std::int32_t& holder = holder_[static_cast<std::size_t>(claim.row) * cells.columns() + claim.column];
+    if (holder < 0) {
+      holder = static_cast<std::int32_t>(node);
+      continue;
+    }
+    CellClaim& other = claims[holder];
+    // Of two islands nothing says which is right; within one a symbol may have been taken apart.
+    const float lead = claim.island == other.island ? claim.evidence - other.evidence : 0;
+    if (lead > -options_.evidence_margin) other.status = RegionStatus::kDuplicateCell;
+    if (lead < options_.evidence_margin) claim.status = RegionStatus::kDuplicateCell;
+    if (lead > 0) holder = static_cast<std::int32_t>(node);
+  }
+}
+
+void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, Executor& executor,
+                                 std::vector<CellClaim>& claims) {
+  const Surroundings around(nodes, claims);
+  refused_.resize(nodes.size());
+  // All are asked before any is refused.
+  const auto refuse = [&](auto&& asked) {
+    executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
+      for (std::size_t node = first; node < last; ++node)
+        refused_[node] = claims[node].status == RegionStatus::kDecoded && asked(static_cast<std::int32_t>(node));
+    });
+    bool any = false;
+    for (std::size_t node = 0; node < nodes.size(); ++node) {
+      if (refused_[node] == 0) continue;
+      claims[node].status = RegionStatus::kNeighboursDisagree;
+      any = true;
+    }
+    return any;
+  };
+  refuse([&](std::int32_t node) { return around.leave_alone(node); });
+  refuse([&](std::int32_t node) { return around.is_corner(node); });
+  while (refuse([&](std::int32_t node) {
+    return !around.is_inside(node) &&
+           (around.is_alone(node) || around.is_last(node) || around.is_left(node) || around.is_rest(node));
+  }))
+    continue;
+}
+
+void Correspondence::correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,
+                                Executor& executor, std::vector<CellClaim>& claims) {
+  executor.run_ranges(claims.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t node = first; node < last; ++node) {
+      CellClaim& claim = claims[node];
+      if (claim.status != RegionStatus::kDecoded) continue;
+      const Eigen::Vector2d& direction = cells.ray(claim.row, claim.column).direction;
+      if (std::abs(segments[node].residual_px(direction)) > tolerance_px) {
+        claim.status = RegionStatus::kOffEpipolarLine;
+      } else if (!segments[node].passes(direction, tolerance_px)) {
+        claim.status = RegionStatus::kOutOfDepthRange;
+      }
+    }
+  });
+  settle_duplicates(cells, claims);
+}
+
+}  // namespace slsd

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/decode/grid/decode_windows.hpp"
+
+namespace slsd {
+
+struct CorrespondOptions {
+  float evidence_margin = 2;  ///< by how much the better of two claims on one cell has to be better to stand
+};
+
+/// Makes correspondences of claims: each cell belongs to one node at most, on its epipolar line and within the working
+/// depth. Of two claims on one cell the better stands, if it is clearly better; otherwise neither.
+/// @param segments      one to a node
+/// @param tolerance_px  distance from the epipolar line, projector px: epipolar_gate_px()
+/// @param claims        in and out: rejected ones change their status
+/// @thread thread-bound: keeps its buffers
+class Correspondence {
+ public:
+  explicit Correspondence(CorrespondOptions options) : options_(options) {}
+
+  void correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,
+                  Executor& executor, std::vector<CellClaim>& claims);
+
+  /// Refuses symbols at a rim most of whose neighbours along their row, or their column, were refused: the edge that
+  /// cut those runs through them as well, and what is left of two symbols can look like a whole one. Between decoded
+  /// ones on both sides it takes that all of them were.
+  void refuse_lone(const std::vector<GridNode>& nodes, Executor& executor, std::vector<CellClaim>& claims);
+
+  /// The duplicates alone, where there is no calibration.
+  void settle_duplicates(const CellRays& cells, std::vector<CellClaim>& claims);
+
+ private:
+  CorrespondOptions options_;
+  std::vector<std::int32_t> holder_;   // of each cell
+  std::vector<std::uint8_t> refused_;  // of each node, in one round
+};
+
+}  // namespace slsd

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/decode/grid/decode_windows.hpp"
+#include "core/decode/grid/link_grid.hpp"
+#include "core/decode/lattice.hpp"
+#include "core/decode/symbols/grey_moments.hpp"
+#include "core/decode/symbols/prototypes.hpp"
+
+namespace slsd {
+
+/// Where the camera sees the point of the surface that a symbol's centroid in the projector lights. The centroid of the
+/// symbol's image is not that point: perspective and curvature show more of one half than of the other, by some
+/// hundredths of a pixel on planes and by half a pixel at the limb of a cylinder. With the map c(u) = c0 + F u + Q(u)/2
+/// around the centroid, M the symbol's second moments and J = det(dc/du),
+///
+///     centroid of the image = c0 + Q(M)/2 + F M grad(log J)
+///
+/// and Q follows from the neighbours, whose second differences span a whole pitch: their noise enters with a weight of
+/// some percent.
+/// @thread thread-bound: keeps its buffers
+class CentreCorrection {
+ public:
+  CentreCorrection(const std::vector<Prototype>& prototypes, float pitch_px, float symbol_size_px);
+
+  /// @param misfits  of the nodes, where they are known
+  /// @param array    of the pattern: tells the letters of the cells
+  /// @param lattice  becomes one symbol to each node that is decoded, in their order, with its place, map and
+  /// neighbours; what its centre's sigma is remains to be told
+  void correct(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
+               const std::vector<CellClaim>& claims, const CodeArray& array, Executor& executor, Lattice& lattice,
+               std::span<const float> misfits = {});
+
+ private:
+  struct Derivatives {
+    Bend bend;
+    bool has_uu = false, has_uv = false, has_vv = false;
+  };
+  void measure_bends(std::int32_t node);
+  [[nodiscard]] LatticeSymbol symbol_of(const std::vector<GridNode>& nodes, const GreyMoments& seen,
+                                        const CellClaim& claim, std::int32_t node, std::size_t letter,
+                                        std::optional<float> misfit) const;
+  template <class Part>
+  [[nodiscard]] Eigen::Vector2f median_around(const std::vector<GridNode>& nodes, std::int32_t node,
+                                              bool Derivatives::*has, Part part) const;
+  /// Nothing where it is negligible.
+  [[nodiscard]] std::optional<Bend> bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const;
+  [[nodiscard]] std::int32_t named_neighbour(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims,
+                                             std::int32_t node, Direction direction) const;
+
+  std::vector<Prototype> prototypes_;
+  float size_px_;
+  float pitch_px_;
+  float negligible_bend_;
+  std::vector<Eigen::Vector2f> centroids_px_;
+  std::vector<Eigen::Matrix2f> second_moments_px2_;
+  std::vector<Eigen::Vector2f> centres_;            // of the squares
+  std::vector<std::int32_t> symbol_of_;             // in the lattice
+  std::vector<std::array<std::int32_t, 4>> named_;  // by Direction: neighbours that are decoded, and as such agree
+  std::vector<Derivatives> derivatives_;
+};
+
+}  // namespace slsd

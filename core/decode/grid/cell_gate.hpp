@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <span>
+
+#include "core/decode/grid/cell_rays.hpp"
+#include "core/geometry/epipolar_gate.hpp"
+
+namespace slsd {
+
+/// Which cells a node can be: those on its epipolar line, within the working depth. Leaves one in 25 to 200.
+/// @thread reentrant
+class CellGate {
+ public:
+  /// @param segments      one to a node; empty admits every cell (the paper has no gate)
+  /// @param tolerance_px  distance from the epipolar line, projector px
+  CellGate(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px)
+      : cells_(cells), segments_(segments), tolerance_px_(tolerance_px) {}
+
+  [[nodiscard]] bool admits(std::int32_t node, int row, int column) const {
+    return segments_.empty() || segments_[node].passes(cells_.ray(row, column).direction, tolerance_px_);
+  }
+  /// Whether the cell lies on the node's epipolar line, at whatever depth.
+  [[nodiscard]] bool on_line(std::int32_t node, int row, int column) const {
+    return segments_.empty() ||
+           std::abs(segments_[node].residual_px(cells_.ray(row, column).direction)) <= tolerance_px_;
+  }
+  [[nodiscard]] bool knows_lines() const { return !segments_.empty(); }
+  /// Calls visit(row, column) for the cells that a node can be, found from one that lies on its epipolar line, which is
+  /// left out: the line is followed from row to row or from column to column, whichever are more.
+  template <class Visit>
+  void visit_line(std::int32_t node, int row, int column, Visit&& visit) const {
+    const auto off_line = [&](int r, int c) {
+      return std::abs(segments_[node].residual_px(cells_.ray(r, c).direction));
+    };
+    const auto change = [&](int down, int right) {
+      const bool forth = row + down < cells_.rows() && column + right < cells_.columns();
+      return off_line(forth ? row + down : row - down, forth ? column + right : column - right);
+    };
+    const int down = change(1, 0) < change(0, 1) ? 1 : 0, right = 1 - down;
+    for (const int way : {1, -1}) {
+      int r = row + way * down, c = column + way * right;
+      for (; r >= 0 && c >= 0 && r < cells_.rows() && c < cells_.columns(); r += way * down, c += way * right) {
+        for (const int aside : {-1, 1}) {
+          const int beside_row = r + aside * right, beside_column = c + aside * down;
+          if (beside_row < 0 || beside_column < 0 || beside_row >= cells_.rows() || beside_column >= cells_.columns())
+            continue;
+          if (off_line(beside_row, beside_column) < off_line(r, c)) r = beside_row, c = beside_column;
+        }
+        if (admits(node, r, c)) visit(r, c);
+      }
+    }
+  }
+  /// Calls visit(row, column) for every cell that a node can be; with `anywhere` for every cell.
+  template <class Visit>
+  void visit(std::int32_t node, bool anywhere, Visit&& visit) const {
+    for (int row = 0; row < cells_.rows(); ++row) {
+      for (int column = 0; column < cells_.columns(); ++column)
+        if (anywhere || admits(node, row, column)) visit(row, column);
+    }
+  }
+
+ private:
+  const CellRays& cells_;
+  std::span<const EpipolarSegment> segments_;
+  double tolerance_px_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include "core/code/pattern.hpp"
+#include "core/decode/symbols/prototypes.hpp"
+#include "core/geometry/pixel_ray.hpp"
+
+namespace slsd {
+
+/// Where each cell's symbol leaves the projector: its centroid as the camera's estimator sees it, and that pixel's ray.
+/// @thread reentrant
+class CellRays {
+ public:
+  CellRays(const Pattern& pattern, const std::vector<Prototype>& prototypes, const Lens& projector);
+
+  [[nodiscard]] int rows() const { return rows_; }
+  [[nodiscard]] int columns() const { return columns_; }
+  [[nodiscard]] const Eigen::Vector2d& pixel(int row, int column) const { return pixels_[index(row, column)]; }
+  [[nodiscard]] const PixelRay& ray(int row, int column) const { return rays_[index(row, column)]; }
+
+ private:
+  [[nodiscard]] std::size_t index(int row, int column) const {
+    return static_cast<std::size_t>(row) * columns_ + column;
+  }
+
+  int rows_, columns_;
+  std::vector<Eigen::Vector2d> pixels_;
+  std::vector<PixelRay> rays_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/decode/grid/cell_rays.hpp"
+#include "core/decode/grid/sightings.hpp"
+#include "core/executor.hpp"
+#include "core/geometry/epipolar_gate.hpp"
+#include "core/geometry/ray_table.hpp"
+
+namespace slsd {
+
+/// What the calibration knows of the sightings of a frame: the ray on which each lies, and the part of the projector's
+/// epipolar line that the working depth leaves.
+/// @thread thread-bound: keeps its buffers
+class EpipolarView {
+ public:
+  /// @param tolerance_px  distance from the epipolar line, projector px: epipolar_gate_px()
+  EpipolarView(const CalibratedCamera& camera, const Lens& projector, double depth_min_mm, double depth_max_mm,
+               double tolerance_px)
+      : camera_rays_(camera.lens), gate_(camera, projector, depth_min_mm, depth_max_mm), tolerance_px_(tolerance_px) {}
+
+  void look_at(const Sightings& seen, Executor& executor) {
+    rays_.resize(seen.size());
+    pixels_.resize(seen.size());
+    segments_.resize(seen.size());
+    executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
+      for (std::size_t i = first; i < last; ++i) {
+        pixels_[i] = {seen.moments[i].x, seen.moments[i].y};
+        rays_[i] = camera_rays_.ray(pixels_[i].cast<double>());
+        segments_[i] = gate_.prepare(rays_[i].direction);
+      }
+    });
+  }
+  /// One to a sighting.
+  [[nodiscard]] std::span<const EpipolarSegment> segments() const { return segments_; }
+  [[nodiscard]] double tolerance_px() const { return tolerance_px_; }
+  /// The ray of a pixel that lies some tenths beside a sighting's: so far it turns evenly.
+  [[nodiscard]] PixelRay ray_near(std::int32_t sighting, const Eigen::Vector2f& camera_px) const {
+    PixelRay ray = rays_[sighting];
+    ray.direction += ray.turn * (camera_px - pixels_[sighting]).cast<double>();
+    return ray;
+  }
+  /// How far a cell lies off the epipolar line of a pixel near a sighting's, projector px, signed.
+  [[nodiscard]] double residual_px(std::int32_t sighting, const Eigen::Vector2f& camera_px,
+                                   const PixelRay& cell) const {
+    const bool moved = camera_px != pixels_[sighting];
+    return moved ? gate_.residual_px(ray_near(sighting, camera_px).direction, cell.direction)
+                 : segments_[sighting].residual_px(cell.direction);
+  }
+
+ private:
+  RayTable camera_rays_;
+  EpipolarGate gate_;
+  double tolerance_px_;
+  std::vector<PixelRay> rays_;
+  std::vector<Eigen::Vector2f> pixels_;
+  std::vector<EpipolarSegment> segments_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/grid/lattice_frame.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+namespace slsd {
+namespace {
+
+constexpr int kSpacingPx = 64;
+
+int spaces(int length_px) {
+  return (length_px + kSpacingPx - 1) / kSpacingPx;
+}
+
+/// Projector pixel that lights what the camera sees at a pixel, on a plane z = depth of the camera.
+Eigen::Vector2d projector_pixel(const CalibratedCamera& camera, const Lens& projector, double x, double y,
+                                double depth_mm) {
+  const Eigen::Vector2d direction = camera.lens.undistort({x, y});
+  return projector.project(camera.projector_from_camera *
+                           Eigen::Vector3d(direction.x() * depth_mm, direction.y() * depth_mm, depth_mm));
+}
+
+}  // namespace
+
+template <class ProjectorPixelAt>
+void ExpectedFrames::differentiate(const ProjectorPixelAt& projector_pixel_at) {
+  constexpr double kStep = 2;
+  for (int row = 0; row < rows_; ++row) {
+    for (int column = 0; column < columns_; ++column) {
+      const double x = (column + 0.5) * kSpacingPx, y = (row + 0.5) * kSpacingPx;
+      Eigen::Matrix2d projector_from_camera;
+      projector_from_camera.col(0) =
+          (projector_pixel_at(x + kStep, y) - projector_pixel_at(x - kStep, y)) / (2 * kStep);
+      projector_from_camera.col(1) =
+          (projector_pixel_at(x, y + kStep) - projector_pixel_at(x, y - kStep)) / (2 * kStep);
+      frames_.push_back({projector_from_camera.inverse().cast<float>(), projector_from_camera.cast<float>(),
+                         static_cast<float>(1 / std::sqrt(std::abs(projector_from_camera.determinant())))});
+    }
+  }
+}
+
+ExpectedFrames::ExpectedFrames(const CalibratedCamera& camera, const Lens& projector, double depth_mm)
+    : columns_(spaces(camera.lens.width_px)), rows_(spaces(camera.lens.height_px)) {
+  differentiate([&](double x, double y) { return projector_pixel(camera, projector, x, y, depth_mm); });
+}
+
+ExpectedFrames::ExpectedFrames(const Eigen::Matrix3d& camera_from_projector, int camera_width_px, int camera_height_px)
+    : columns_(spaces(camera_width_px)), rows_(spaces(camera_height_px)) {
+  const Eigen::Matrix3d projector_from_camera = camera_from_projector.inverse();
+  differentiate([&](double x, double y) -> Eigen::Vector2d {
+    return (projector_from_camera * Eigen::Vector3d(x, y, 1)).hnormalized();
+  });
+}
+
+const ExpectedFrame& ExpectedFrames::at(float x, float y) const {
+  const int column = std::clamp(static_cast<int>(x) / kSpacingPx, 0, columns_ - 1);
+  const int row = std::clamp(static_cast<int>(y) / kSpacingPx, 0, rows_ - 1);
+  return frames_[static_cast<std::size_t>(row) * columns_ + column];
+}
+
+}  // namespace slsd

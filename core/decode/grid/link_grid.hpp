@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/decode/decoding.hpp"
+#include "core/decode/grid/lattice_frame.hpp"
+#include "core/executor.hpp"
+
+namespace slsd {
+
+/// A place on the grid as link_grid sees it.
+struct GridNode {
+  Eigen::Vector2f centre_px;  ///< middle of the symbol's square, in the camera
+  LatticeFrame frame;         ///< in: as expected; out: as measured from the neighbours, where there are some
+  std::array<std::int32_t, 4> links{-1, -1, -1, -1};  ///< by Direction
+  std::array<bool, 4> broken{};
+  bool measured_u = false, measured_v = false;  ///< which steps of the frame come from neighbours
+};
+
+struct LinkGridOptions {
+  float pitch_px = 18;           ///< projector px from cell to cell
+  float search_radius = 0.42F;   ///< of the pitch: how far from its expected place a first neighbour may be
+  float refined_radius = 0.28F;  ///< the same once the frame is measured
+  float deviation_max = 0.17F;   ///< of the pitch: how far a link may differ from those beside and behind it
+};
+
+/// The opposite way along a link.
+[[nodiscard]] constexpr Direction opposite(Direction d) {
+  return static_cast<Direction>((d + 2) % 4);
+}
+
+/// One step of the pattern in a direction, in cells.
+[[nodiscard]] Eigen::Vector2f step(Direction direction);
+
+/// Calls visit(other) for a node and for every other whose frame is measured with it: up to two links along a line.
+template <class Visit>
+void visit_measured_with(const std::vector<GridNode>& nodes, std::int32_t node, Visit&& visit) {
+  visit(node);
+  for (const Direction d : {kRight, kDown, kLeft, kUp}) {
+    std::int32_t other = node;
+    for (int links = 0; links < 2; ++links) {
+      other = nodes[other].links[d];
+      if (other < 0) break;
+      visit(other);
+    }
+  }
+}
+
+/// Links each symbol with its four neighbours on the grid. A neighbour is the nearest one to where the local frame puts
+/// it, and the choice has to be mutual. Frames are then measured from the links and the search repeated more narrowly;
+/// last, links whose step disagrees with those beside and behind them are broken: they were carried across an edge in
+/// depth.
+///
+///        up
+///         |          frame.col(0) = camera px for one projector px to the right
+///  left --o-- right  frame.col(1) = the same for one down
+///         |
+///       down
+/// @thread thread-bound: keeps its buffers
+class GridLinker {
+ public:
+  explicit GridLinker(LinkGridOptions options) : options_(options) {}
+
+  void link(std::vector<GridNode>& nodes, Executor& executor);
+
+  /// Measures a node's frame again from those neighbours alone that are trusted: the fragment of a symbol at the edge
+  /// of a surface draws the frames beside it to itself.
+  /// @param trusted  one to a node, non-zero where it is
+  void measure_frame(std::vector<GridNode>& nodes, const std::vector<std::uint8_t>& trusted, std::size_t node) const;
+
+ private:
+  void sort_into_buckets(const std::vector<GridNode>& nodes);
+  [[nodiscard]] std::int32_t nearest(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
+                                     const Eigen::Matrix2f& cells_from_camera, float radius) const;
+  /// Nodes that are looked at one after the other: what is known of one helps with the next.
+  struct Range {
+    std::int32_t first, last;
+    [[nodiscard]] bool contains(std::int32_t node) const { return node >= first && node < last; }
+  };
+  [[nodiscard]] std::int32_t likely(const Range& range, std::int32_t from, Direction direction) const;
+  void choose(const std::vector<GridNode>& nodes, const Range& range, std::int32_t from, float radius);
+  void find_mutual(std::vector<GridNode>& nodes, float radius, Executor& executor);
+  void measure_changed_frames(std::vector<GridNode>& nodes);
+  [[nodiscard]] bool is_inconsistent(const std::vector<GridNode>& nodes, std::size_t from, Direction direction) const;
+  void break_inconsistent(std::vector<GridNode>& nodes, Executor& executor);
+
+  LinkGridOptions options_;
+  float bucket_px_ = 1;
+  Eigen::Vector2f origin_px_{0, 0};
+  int columns_ = 0, rows_ = 0;
+  struct Place {
+    Eigen::Vector2f centre_px;
+    std::int32_t node;
+  };
+  std::vector<std::int32_t> first_of_bucket_;
+  std::vector<Place> in_buckets_;
+  std::vector<std::array<std::int32_t, 4>> chosen_, hints_;
+  std::vector<std::array<bool, 4>> inconsistent_;
+  std::vector<std::uint8_t> relinked_;  // of each node: whether the last search changed its links
+  std::vector<std::uint8_t> all_trusted_;
+};
+
+}  // namespace slsd

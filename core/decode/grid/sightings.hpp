@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/decode/grid/decode_windows.hpp"
+#include "core/decode/grid/link_grid.hpp"
+#include "core/decode/symbols/classify.hpp"
+#include "core/decode/symbols/grey_moments.hpp"
+
+namespace slsd {
+
+/// The regions that may be symbols, and what the stages find out about them: one entry to each, at the same index.
+struct Sightings {
+  std::vector<std::int32_t> region;  ///< index in Regions
+  std::vector<GreyMoments> moments;
+  std::vector<Classification> shapes;
+  std::vector<GridNode> nodes;
+  std::vector<CellClaim> claims;
+  std::vector<float> misfits;  ///< of each from its cell's letter, standard deviations, where review measured it
+
+  [[nodiscard]] std::size_t size() const { return region.size(); }
+  void clear() { region.clear(), moments.clear(), shapes.clear(), nodes.clear(), claims.clear(), misfits.clear(); }
+};
+
+}  // namespace slsd

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <tuple>
+#include <vector>
+
+#include "core/decode/regions/mask.hpp"
+#include "core/executor.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+struct BinarizeOptions {
+  /// Side of a tile in camera pixels. A threshold is taken from 3x3 tiles, which have to hold a symbol and a gap: half
+  /// the pitch of the grid as the camera sees it.
+  int tile_px = 12;
+  /// Where the threshold lies between dark and light. Below the middle keeps a symbol whose parts touch at a corner in
+  /// one piece; at the middle keeps neighbours apart that are less than two pixels from each other.
+  float level = 0.5F;
+  /// Smallest difference between light and dark that is taken for the pattern, of 255 levels.
+  int contrast_min = 8;
+  /// The same in standard deviations of the frame's noise: the range that plain noise spans in a window, and some more.
+  float contrast_min_sigma = 9;
+};
+
+/// Separates lit from dark by a threshold midway between the least and the greatest grey value around each pixel,
+/// interpolated between tiles: it follows light that falls off over the frame, where one threshold for all cannot.
+/// @thread thread-bound: keeps its buffers
+class Binarizer {
+ public:
+  explicit Binarizer(BinarizeOptions options) : options_(options) {}
+
+  /// @param full  the level of a saturated pixel of the frame
+  /// @param mask  becomes of the frame's size
+  void binarize(const GreyView& frame, double full, Mask& mask, Executor& executor);
+
+  [[nodiscard]] const BinarizeOptions& options() const { return options_; }
+  /// Between light and dark of what was taken for the pattern in the last frame, in its levels.
+  [[nodiscard]] float contrast_min() const { return contrast_min_; }
+  /// One standard deviation of the blur at the sharpest edges of the last frame, from how steep they are between its
+  /// tiles' least and greatest values; 0 where there are none.
+  [[nodiscard]] float edge_blur_px() const { return edge_blur_px_; }
+
+ private:
+  template <class T>
+  struct RowBuffers {
+    std::vector<T> threshold, least, greatest;
+  };
+  /// Of one worker.
+  struct Buffers {
+    std::tuple<RowBuffers<std::uint8_t>, RowBuffers<std::uint16_t>> rows;
+    std::vector<int> at_centre, step;  // of a row of thresholds, binary fractions
+  };
+  template <class T>
+  void binarize_as(const ImageView<T>& frame, double full, Mask& mask, Executor& executor);
+  template <class T>
+  void find_extremes(const ImageView<T>& frame, int row, RowBuffers<T>& buffers);
+  void set_thresholds(float greatest);
+  template <class T>
+  [[nodiscard]] float measure_edge_blur(const ImageView<T>& frame, std::vector<T>& steepest);
+  template <class T>
+  void compare_rows(const ImageView<T>& frame, int top, int bottom, Buffers& buffers, Mask& mask) const;
+  template <class T>
+  void interpolate_row(int y, int width, Buffers& buffers, T* threshold) const;
+
+  BinarizeOptions options_;
+  float contrast_min_ = 0, edge_blur_px_ = 0;
+  int columns_ = 0, rows_ = 0;  // of tiles
+  int stride_ = 0;              // of the tiles with a border of one all round
+  std::vector<float> least_, greatest_, across_, low_, high_, midway_, threshold_;
+  std::vector<float> steepness_;
+  std::vector<Buffers> buffers_;
+};
+
+}  // namespace slsd

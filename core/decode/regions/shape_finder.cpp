@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/regions/shape_finder.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/decode/paper/binarize.hpp"
+#include "core/decode/symbols/prototypes.hpp"
+
+namespace slsd {
+namespace {
+
+/// Least and greatest area of a region, as a share of a symbol's square and of a cell.
+constexpr float kAreaMin = 0.08F;
+constexpr float kAreaMax = 1.1F;
+constexpr int kAreaMinPx = 6;
+constexpr float kExtentMax = 1.5F;  // of a cell's side
+/// Blur up to which the prototypes know how symbols look; what of more is undone, rather less than too much, as
+/// sharpening by too much makes ripples; and how much at the most, of a symbol's side.
+constexpr float kBlurMinPx = 1.9F;
+constexpr float kBlurUndone = 0.85F;
+constexpr float kBlurMax = 0.2F;
+/// Between a region's peak and its background, of 255 levels.
+constexpr float kContrastMin = 8;
+
+BinarizeOptions binarize_options(const PatternOptions& pattern, float scale) {
+  return {.tile_px = threshold_tile_px(pattern.symbol_size_px + pattern.spacing_px, scale),
+          .level = threshold_level(pattern.symbol_size_px, pattern.spacing_px, scale)};
+}
+
+}  // namespace
+
+ShapeFinder::ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize, Method find_regions)
+    : symbol_size_px_(static_cast<float>(pattern.symbol_size_px)),
+      pitch_px_(static_cast<float>(pattern.symbol_size_px + pattern.spacing_px)),
+      binarize_(binarize),
+      find_regions_(find_regions),
+      expected_(std::move(expected)),
+      binarizer_(binarize_options(pattern, expected_.in_the_middle().scale)),
+      splitter_({.tile_px = binarizer_.options().tile_px}) {
+  const float scale = expected_.in_the_middle().scale;
+  meters_.emplace_back(margin_px(pattern.spacing_px, scale), 2 * pitch_px_ * scale);
+}
+
+GreyView ShapeFinder::binarize(const GreyView& frame, double full, Executor& executor) {
+  frame_levels_ = static_cast<float>(full / 255);
+  if (binarize_ == Method::kPaper) {
+    mask_ = binarize_paper(frame);
+    return frame;
+  }
+  binarizer_.binarize(frame, full, mask_, executor);
+  const float blur_px = binarizer_.edge_blur_px();
+  if (blur_px < kBlurMinPx) return frame;
+  const float symbol_px = symbol_size_px_ * expected_.in_the_middle().scale;
+  const GreyView sharp = sharpener_.sharpen(frame, std::min(kBlurUndone * blur_px, kBlurMax * symbol_px), full).view();
+  frame_levels_ = kSharpenedFull / 255;
+  binarizer_.binarize(sharp, kSharpenedFull, mask_, executor);
+  return sharp;
+}
+
+void ShapeFinder::find_regions(const GreyView& frame, Executor& executor) {
+  region_finder_.find(mask_, regions_, executor);
+  if (find_regions_ == Method::kPaper) return;
+  splitter_.split_all(frame, std::max(binarizer_.contrast_min(), kContrastMin * frame_levels_), regions_,
+                      [this](const Region& region) { return is_too_large(region); });
+}
+
+bool ShapeFinder::is_too_large(const Region& region) const {
+  const Eigen::Vector2f middle = region.middle_px();
+  const float pitch_px = pitch_px_ * expected_.at(middle.x(), middle.y()).scale;
+  const float extent = static_cast<float>(std::max(region.width_px(), region.height_px()));
+  return static_cast<float>(region.area_px) > kAreaMax * pitch_px * pitch_px || extent > kExtentMax * pitch_px;
+}
+
+RegionStatus ShapeFinder::judge_size(const Region& region) const {
+  if (region.left == 0 || region.top == 0 || region.right == mask_.width() - 1 || region.bottom == mask_.height() - 1) {
+    return RegionStatus::kTouchesBorder;
+  }
+  const Eigen::Vector2f middle = region.middle_px();
+  const float symbol_px = symbol_size_px_ * expected_.at(middle.x(), middle.y()).scale;
+  if (region.area_px < kAreaMinPx || static_cast<float>(region.area_px) < kAreaMin * symbol_px * symbol_px) {
+    return RegionStatus::kTooSmall;
+  }
+  return is_too_large(region) ? RegionStatus::kTooLarge : RegionStatus::kNoNeighbour;
+}
+
+void ShapeFinder::describe(const GreyView& frame, Executor& executor, Sightings& seen) {
+  status_.resize(regions_.regions.size());
+  seen.clear();
+  for (std::size_t i = 0; i < regions_.regions.size(); ++i) {
+    status_[i] = judge_size(regions_.regions[i]);
+    if (status_[i] == RegionStatus::kNoNeighbour) seen.region.push_back(static_cast<std::int32_t>(i));
+  }
+  const std::size_t workers = executor.workers();
+  while (meters_.size() < workers) meters_.push_back(meters_.front().another());
+  seen.moments.resize(seen.region.size());
+  executor.run_ranges(seen.region.size(), [&](std::size_t first, std::size_t last, int worker) {
+    for (std::size_t i = first; i < last; ++i) {
+      const Region& region = regions_.regions[seen.region[i]];
+      seen.moments[i] = std::visit(
+          [&](const auto& view) { return meters_[worker].measure(view, region, regions_.runs_of(region)); }, frame);
+    }
+  });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < seen.region.size(); ++i) {
+    const GreyMoments& moments = seen.moments[i];
+    if (moments.weight <= 0 || moments.peak - moments.background < kContrastMin * frame_levels_) {
+      status_[seen.region[i]] = RegionStatus::kLowContrast;
+      continue;
+    }
+    seen.region[kept] = seen.region[i], seen.moments[kept] = moments;
+    ++kept;
+  }
+  seen.region.resize(kept), seen.moments.resize(kept);
+}
+
+}  // namespace slsd

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/code/pattern.hpp"
+#include "core/decode/decoding.hpp"
+#include "core/decode/grid/lattice_frame.hpp"
+#include "core/decode/grid/sightings.hpp"
+#include "core/decode/options.hpp"
+#include "core/decode/regions/binarize.hpp"
+#include "core/decode/regions/find_regions.hpp"
+#include "core/decode/regions/mask.hpp"
+#include "core/decode/regions/sharpen.hpp"
+#include "core/decode/regions/split_regions.hpp"
+#include "core/decode/symbols/grey_moments.hpp"
+
+namespace slsd {
+
+/// The first stages of a frame, from the grey values to the shapes that may be symbols by their size and contrast:
+/// whatever symbols the pattern has.
+/// @thread thread-bound
+class ShapeFinder {
+ public:
+  /// @param expected  how the pattern lies in the frame, to half a step of the grid
+  ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize, Method find_regions);
+
+  /// Of the same scale, to an eighth.
+  void expect(ExpectedFrames expected) { expected_ = std::move(expected); }
+  [[nodiscard]] const ExpectedFrames& expected() const { return expected_; }
+
+  /// A frame that is out of focus is sharpened before.
+  /// @param full  the level of a saturated pixel of the frame
+  /// @return      what the stages that follow have to look at, the frame itself or as it was sharpened; stands until
+  ///              the next call
+  GreyView binarize(const GreyView& frame, double full, Executor& executor);
+  void find_regions(const GreyView& frame, Executor& executor);
+  /// Puts the shapes that may be symbols into the sightings, in place of what was there.
+  void describe(const GreyView& frame, Executor& executor, Sightings& seen);
+
+  [[nodiscard]] const Mask& mask() const { return mask_; }
+  [[nodiscard]] const Regions& regions() const { return regions_; }
+  /// Why a region is no sighting; kNoNeighbour where it is one.
+  [[nodiscard]] RegionStatus status(std::size_t region) const { return status_[region]; }
+  /// One to a worker.
+  [[nodiscard]] std::span<GreyMomentMeter> meters() { return meters_; }
+  /// Levels of the frame for one of 255.
+  [[nodiscard]] float frame_levels() const { return frame_levels_; }
+
+ private:
+  [[nodiscard]] bool is_too_large(const Region& region) const;
+  [[nodiscard]] RegionStatus judge_size(const Region& region) const;
+
+  float symbol_size_px_, pitch_px_;
+  Method binarize_, find_regions_;
+  ExpectedFrames expected_;
+  Binarizer binarizer_;
+  Sharpener sharpener_;
+  RegionFinder region_finder_;
+  RegionSplitter splitter_;
+  std::vector<GreyMomentMeter> meters_;
+
+  Mask mask_;
+  Regions regions_;
+  std::vector<RegionStatus> status_;
+  float frame_levels_ = 1;
+};
+
+}  // namespace slsd

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/decode/regions/find_regions.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+struct SplitOptions {
+  /// Side of a tile in camera pixels, as for binarize.
+  int tile_px = 12;
+  /// Where the threshold lies between the least and the greatest grey value of the region's own pixels around.
+  float level = 0.35F;
+  /// How often what is left in one piece is asked again; each time the gaps have to be less dark.
+  int rounds = 4;
+};
+
+/// Takes apart regions in which symbols have run together: where blur has filled the gaps between them, or where a lit
+/// surface ends before a dark background and all that is on it is bright. The threshold is found anew from the
+/// region's own pixels, tile by tile, so that what is dark beside it has no part, and light may fall off over it.
+/// @thread thread-bound: keeps its buffers
+class RegionSplitter {
+ public:
+  explicit RegionSplitter(SplitOptions options) : options_(options) {}
+
+  /// Takes every region apart that is `merged`; a part that is merged still, again.
+  /// @param contrast_min  between light and dark of what is taken apart, levels of the frame
+  /// @param merged        bool(const Region&)
+  template <class Merged>
+  void split_all(const GreyView& frame, float contrast_min, Regions& regions, Merged&& merged) {
+    suspects_.clear();
+    const auto suspect_from = [&](std::size_t first) {
+      for (std::size_t i = first; i < regions.regions.size(); ++i)
+        if (merged(regions.regions[i])) suspects_.push_back(i);
+    };
+    suspect_from(0);
+    if (suspects_.empty()) return;
+    for (int round = 0; round < options_.rounds && !suspects_.empty(); ++round) {
+      asked_.swap(suspects_);
+      suspects_.clear();
+      const std::size_t first_part = regions.regions.size();
+      for (const std::size_t i : asked_) split(frame, contrast_min, i, regions);
+      suspect_from(first_part);
+    }
+    std::erase_if(regions.regions, [](const Region& region) { return region.area_px == 0; });
+  }
+
+ private:
+  /// What a region's pixels span in a tile of its box.
+  struct TileRange {
+    float least, greatest;
+  };
+  void split(const GreyView& frame, float contrast_min, std::size_t index, Regions& regions);
+  template <class T>
+  void find_parts(const ImageView<T>& frame, const Region& region, std::span<const Run> runs, float contrast_min);
+  template <class T>
+  void measure_tiles(const ImageView<T>& frame, const Region& region, std::span<const Run> runs);
+  void set_thresholds(float contrast_min);
+  template <class T>
+  void compare(const ImageView<T>& frame, const Region& region, std::span<const Run> runs);
+  template <class Visit>
+  void visit_around(int column, int row, Visit&& visit) const;
+
+  SplitOptions options_;
+  int columns_ = 0, rows_ = 0;  // of tiles
+  std::vector<TileRange> tiles_;
+  std::vector<float> midway_, threshold_, line_;
+  Mask mask_;
+  RegionFinder finder_;
+  Regions parts_;
+  std::vector<std::size_t> suspects_, asked_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/code/pattern.hpp"
+#include "core/decode/symbols/classify.hpp"
+#include "core/decode/symbols/prototypes.hpp"
+
+namespace slsd {
+
+/// How a pattern's symbols look, in the frames that the calibration expects and in those that their neighbours show.
+struct Appearance {
+  std::optional<float> blur_px;  ///< of projector and camera together, camera px; without it all that occurs
+  std::vector<Prototype> as_expected, as_measured;
+  Classifier expected, measured;
+
+  Appearance(const PatternOptions& pattern, float camera_px_per_projector_px, std::optional<float> blur);
+
+ private:
+  Appearance(std::optional<float> blur, std::vector<std::vector<Prototype>>&& made);
+};
+
+/// How they look at each blur that occurs. A soft threshold that is low enough to take in what print leaves of a symbol
+/// takes in more of a blurred one, too: what a symbol looks like depends on the blur.
+/// @thread reentrant: each appearance is made when it is first asked for, once for all who share this
+class Appearances {
+ public:
+  Appearances(const PatternOptions& pattern, float camera_px_per_projector_px);
+
+  /// Of every blur that occurs, for what does not depend on it.
+  [[nodiscard]] const Appearance& usual() const { return usual_; }
+
+  static constexpr std::size_t kShapesMax = 512;
+  /// That in which half of the shapes are the likeliest; the usual one where there are too few to tell.
+  /// @param shapes  a sample of a frame's, in measured frames; kShapesMax of them are looked at
+  [[nodiscard]] const Appearance& likeliest(std::span<const ShapeFeatures> shapes) const;
+
+ private:
+  /// Standard deviations, camera px: first of a drawn frame, then of lenses. Where symbols are larger than usual, blurs
+  /// are, too.
+  static constexpr std::array kBlursPx{0.2F, 0.45F, 0.7F, 1.0F, 1.4F, 2.0F};
+  static constexpr float kUsualSymbolPx = 24;
+  [[nodiscard]] const Appearance& at(std::size_t blur) const;
+
+  PatternOptions pattern_;
+  float scale_;
+  Appearance usual_;
+  mutable std::array<std::once_flag, kBlursPx.size()> made_;
+  mutable std::array<std::unique_ptr<const Appearance>, kBlursPx.size()> appearances_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/symbols/grey_moments.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <type_traits>
+
+#include <Eigen/LU>
+
+#include "core/clones.hpp"
+#include "core/decode/regions/slide.hpp"
+
+namespace slsd {
+namespace {
+
+/// What is left of the light at the dark end of a symbol, at the least.
+constexpr float kLeastLight = 0.3F;
+
+struct PatchPlace {
+  int left, top, stride, height;
+};
+
+using Words [[gnu::vector_size(2 * kLanes)]] = std::uint16_t;
+using Bytes [[gnu::vector_size(2 * kLanes)]] = std::uint8_t;
+
+// The compiler converts words in one step, bytes one by one.
+inline __attribute__((always_inline)) Words load_pixels(const std::uint16_t* pixels) {
+  Words words;
+  std::memcpy(&words, pixels, sizeof words);
+  return words;
+}
+inline __attribute__((always_inline)) Words load_pixels(const std::uint8_t* pixels) {
+  std::uint64_t eight = 0;
+  std::memcpy(&eight, pixels, sizeof eight);
+  using Halves [[gnu::vector_size(2 * kLanes)]] = std::uint64_t;
+  static_assert(std::endian::native == std::endian::little);
+  return reinterpret_cast<Words>(__builtin_shufflevector(reinterpret_cast<Bytes>(Halves{eight, 0}), Bytes{}, 0, 16, 1,
+                                                         16, 2, 16, 3, 16, 4, 16, 5, 16, 6, 16, 7, 16));
+}
+
+/// Grey values between before[y] and after[y] of each row, kOutside elsewhere; the patch lies in the frame, padding and
+/// all.
+template <class T>
+inline __attribute__((always_inline)) void copy_rows(const ImageView<T>& frame, const PatchPlace& place,
+                                                     const PatchEdges& edges, float* patch, PatchRange& range) {
+  Lanes least = Lanes{} + range.least, greatest = Lanes{} + range.greatest;
+  for (int y = 0; y < place.height; ++y) {
+    const T* row = frame.row(place.top + y) + place.left;
+    const int before = edges.before[y], after = edges.after[y];
+    for (int x = 0; x < place.stride; x += kLanes, patch += kLanes) {
+      const IntLanes at = kIntLane + x;
+      const Lanes grey = __builtin_convertvector(__builtin_convertvector(load_pixels(row + x), IntLanes), Lanes);
+      const Lanes value = ((at > before) & (at < after)) ? grey : Lanes{} + kOutside;
+      std::memcpy(patch, &value, sizeof value);
+      least = value < least ? value : least;
+      greatest = value > greatest ? value : greatest;
+    }
+  }
+  for (int lane = 0; lane < kLanes; ++lane) {
+    range.least = std::min(range.least, least[lane]);
+    range.greatest = std::max(range.greatest, greatest[lane]);
+  }
+}
+
+int padded(int width) {
+  return (width + kLanes - 1) / kLanes * kLanes;
+}
+
+/// Raw moments about the patch's middle, to central ones over the weight.
+GreyMoments central(const RawMoments& raw, const PatchLevels& levels, double middle_x, double middle_y) {
+  const auto& m = raw.m;
+  GreyMoments g;
+  if (m[0][0] <= 0) return g;
+  g.background = levels.background, g.peak = levels.peak;
+  const double n = 1 / static_cast<double>(m[0][0]);
+  const double x = m[1][0] * n, y = m[0][1] * n;
+  const double xx = m[2][0] * n, xy = m[1][1] * n, yy = m[0][2] * n;
+  g.weight = m[0][0];
+  // The brightest pixels, from which the peak is taken, have weight in every ramp.
+  if (raw.steady > 0) {
+    const double per_steady = 1 / static_cast<double>(raw.steady);
+    g.steady_x = static_cast<float>(middle_x + raw.steady_x * per_steady);
+    g.steady_y = static_cast<float>(middle_y + raw.steady_y * per_steady);
+  }
+  const double per_centre = 1 / static_cast<double>(raw.centre);
+  g.x = static_cast<float>(middle_x + raw.centre_x * per_centre);
+  g.y = static_cast<float>(middle_y + raw.centre_y * per_centre);
+  g.m20 = static_cast<float>(xx - x * x);
+  g.m11 = static_cast<float>(xy - x * y);
+  g.m02 = static_cast<float>(yy - y * y);
+  g.m30 = static_cast<float>(m[3][0] * n - 3 * x * xx + 2 * x * x * x);
+  g.m21 = static_cast<float>(m[2][1] * n - 2 * x * xy - y * xx + 2 * x * x * y);
+  g.m12 = static_cast<float>(m[1][2] * n - 2 * y * xy - x * yy + 2 * y * y * x);
+  g.m03 = static_cast<float>(m[0][3] * n - 3 * y * yy + 2 * y * y * y);
+  return g;
+}
+
+}  // namespace
+
+GreyMomentMeter::GreyMomentMeter(int margin_px, float patch_px) : margin_px_(margin_px), patch_px_(patch_px) {
+  const std::size_t side = static_cast<std::size_t>(padded(static_cast<int>(patch_px))) + kLanes;
+  edges_.reserve(2 * side), rows_.reserve(side), patch_.reserve(side * side);
+}
+
+/// In each row of the patch, from the leftmost to the rightmost pixel within the margin of the region.
+PatchEdges GreyMomentMeter::follow_edge(const Region& region, std::span<const Run> runs) {
+  // The edges of the region's rows, with as many empty rows above and below as the margin reaches twice.
+  const int reach = 2 * margin_px_, rows = height_ + reach;
+  edges_.resize(2 * static_cast<std::size_t>(rows));
+  std::int16_t* before = edges_.data();
+  std::int16_t* after = before + rows;
+  std::fill_n(before, rows, std::numeric_limits<std::int16_t>::max());
+  std::fill_n(after, rows, std::numeric_limits<std::int16_t>::min());
+  int row = -1;
+  for (const Run& run : runs) {
+    const int y = run.row - region.top + reach;
+    if (run.row != row) before[y] = static_cast<std::int16_t>(run.left - region.left - 1);
+    after[y] = static_cast<std::int16_t>(run.right - region.left + reach);
+    row = run.row;
+  }
+  slide_least(before, rows, reach + 1);
+  slide_greatest(after, rows, reach + 1);
+  return {before, after};
+}
+
+template <class T>
+void GreyMomentMeter::copy_patch(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
+  left_ = region.left - margin_px_, top_ = region.top - margin_px_;
+  width_ = region.width_px() + 2 * margin_px_;
+  height_ = region.height_px() + 2 * margin_px_;
+  stride_ = padded(width_);
+  const PatchEdges edges = follow_edge(region, runs);
+  range_ = {};
+  if (left_ >= 0 && top_ >= 0 && left_ + stride_ <= frame.width && top_ + height_ <= frame.height) {
+    patch_.resize(static_cast<std::size_t>(stride_) * height_);
+    return Cloned<copy_rows<T>>::call(frame, {left_, top_, stride_, height_}, edges, patch_.data(), range_);
+  }
+  patch_.assign(static_cast<std::size_t>(stride_) * height_, kOutside);
+  for (int y = 0; y < height_; ++y) {
+    if (top_ + y < 0 || top_ + y >= frame.height) continue;
+    const T* pixels = frame.row(top_ + y);
+    float* row = patch_.data() + y * stride_;
+    const int end = std::min<int>(edges.after[y], frame.width - left_);
+    for (int x = std::max(edges.before[y] + 1, -left_); x < end; ++x) row[x] = static_cast<float>(pixels[left_ + x]);
+  }
+  range_ = range_of(patch_.data(), stride_ * height_);
+}
+
+template <class T>
+void GreyMomentMeter::copy_cell(const ImageView<T>& frame, const Eigen::Vector2f& centre_px,
+                                const LatticeFrame& lattice_frame, float half_px) {
+  const Eigen::Vector2f reach = half_px * lattice_frame.cwiseAbs().rowwise().sum();
+  left_ = static_cast<int>(std::floor(centre_px.x() - reach.x())),
+  top_ = static_cast<int>(std::floor(centre_px.y() - reach.y()));
+  width_ = static_cast<int>(std::ceil(2 * reach.x())) + 2;
+  height_ = static_cast<int>(std::ceil(2 * reach.y())) + 2;
+  stride_ = padded(width_);
+  const Eigen::Matrix2f inverse = lattice_frame.inverse();
+  patch_.assign(static_cast<std::size_t>(stride_) * height_, kOutside);
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      if (!frame.contains(left_ + x, top_ + y)) continue;
+      const Eigen::Vector2f from_centre(static_cast<float>(left_ + x) - centre_px.x(),
+                                        static_cast<float>(top_ + y) - centre_px.y());
+      if ((inverse * from_centre).cwiseAbs().maxCoeff() > half_px) continue;
+      patch_[y * stride_ + x] = static_cast<float>(frame.at(left_ + x, top_ + y));
+    }
+  }
+  range_ = range_of(patch_.data(), stride_ * height_);
+}
+
+void GreyMomentMeter::level_light(const Eigen::Vector2f& centre_px, const Eigen::Vector2f& shading) {
+  PatchLevels levels;
+  find_levels(patch_.data(), stride_ * height_, range_, levels);
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      float& value = patch_[y * stride_ + x];
+      if (std::isnan(value)) continue;
+      const float light = 1 + shading.x() * (static_cast<float>(left_ + x) - centre_px.x()) +
+                          shading.y() * (static_cast<float>(top_ + y) - centre_px.y());
+      value = std::max(0.F, levels.background + (value - levels.background) / std::max(light, kLeastLight));
+    }
+  }
+  range_ = range_of(patch_.data(), stride_ * height_);
+}
+
+GreyMoments GreyMomentMeter::moments_of_patch() {
+  PatchLevels levels;
+  find_levels(patch_.data(), stride_ * height_, range_, levels);
+  if (!(levels.peak > levels.background)) return {};
+  const float middle_x = 0.5F * static_cast<float>(width_ - 1), middle_y = 0.5F * static_cast<float>(height_ - 1);
+  rows_.clear();
+  for (int row = 0; row < height_; ++row) {
+    const float y = static_cast<float>(row) - middle_y;
+    rows_.push_back({y, y * y, y * y * y});
+  }
+  RawMoments raw;
+  sum_moments(patch_.data(), stride_, rows_, middle_x, levels, raw);
+  return central(raw, levels, static_cast<float>(left_) + middle_x, static_cast<float>(top_) + middle_y);
+}
+
+template <class T>
+GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
+                                     SteadyCentre steady) {
+  if constexpr (std::is_same_v<T, std::uint8_t>) {
+    PatchLevels levels;
+    RawMoments raw;
+    if (weigh_region(frame, region, runs, margin_px_, steady, levels, raw)) {
+      const Eigen::Vector2f middle = region.middle_px();
+      return central(raw, levels, middle.x(), middle.y());
+    }
+  }
+  copy_patch(frame, region, runs);
+  return moments_of_patch();
+}
+
+template <class T>
+GreyMoments GreyMomentMeter::measure_levelled(const ImageView<T>& frame, const Region& region,
+                                              std::span<const Run> runs, const Eigen::Vector2f& shading) {
+  copy_patch(frame, region, runs);
+  level_light(region.middle_px(), shading);
+  return moments_of_patch();
+}
+
+template <class T>
+GreyMoments GreyMomentMeter::measure_cell(const ImageView<T>& frame, const Eigen::Vector2f& centre_px,
+                                          const LatticeFrame& lattice_frame, float half_px,
+                                          const Eigen::Vector2f& shading) {
+  copy_cell(frame, centre_px, lattice_frame, half_px);
+  level_light(centre_px, shading);
+  return moments_of_patch();
+}
+
+using View8 = ImageView<std::uint8_t>;
+using View16 = ImageView<std::uint16_t>;
+template GreyMoments GreyMomentMeter::measure(const View8&, const Region&, std::span<const Run>, SteadyCentre);
+template GreyMoments GreyMomentMeter::measure(const View16&, const Region&, std::span<const Run>, SteadyCentre);
+template GreyMoments GreyMomentMeter::measure_levelled(const View8&, const Region&, std::span<const Run>,
+                                                       const Eigen::Vector2f&);
+template GreyMoments GreyMomentMeter::measure_levelled(const View16&, const Region&, std::span<const Run>,
+                                                       const Eigen::Vector2f&);
+template GreyMoments GreyMomentMeter::measure_cell(const View8&, const Eigen::Vector2f&, const LatticeFrame&, float,
+                                                   const Eigen::Vector2f&);
+template GreyMoments GreyMomentMeter::measure_cell(const View16&, const Eigen::Vector2f&, const LatticeFrame&, float,
+                                                   const Eigen::Vector2f&);
+
+}  // namespace slsd

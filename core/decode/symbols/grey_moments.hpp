@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/decode/grid/lattice_frame.hpp"
+#include "core/decode/regions/find_regions.hpp"
+#include "core/decode/symbols/weigh_patch.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// What a region weighs: moments of its grey values through a soft threshold, a ramp from 10 to 30 % of the way from
+/// the region's own background to its own peak; its centre through one from 20 to 80 %, and to 65 % where the light is
+/// uneven. A pixel on the edge counts by how much of it is lit, so the centre is good to some hundredths of a pixel,
+/// where the binary mask's is eight times worse.
+struct GreyMoments {
+  float x = 0, y = 0;                        ///< centre, camera px
+  float steady_x = 0, steady_y = 0;          ///< centre that uneven light pulls less, and noise more; where measured
+  float weight = 0;                          ///< lit area, camera px squared
+  float m20 = 0, m11 = 0, m02 = 0;           ///< about the centroid, over the weight: px^2
+  float m30 = 0, m21 = 0, m12 = 0, m03 = 0;  ///< px^3
+  float background = 0, peak = 0;            ///< grey levels of the frame
+};
+
+/// What of a patch's rows belongs to the region or its margin: the columns between these two.
+struct PatchEdges {
+  const std::int16_t *before, *after;
+};
+
+/// Measures regions one by one.
+/// @thread thread-bound: keeps its buffers
+class GreyMomentMeter {
+ public:
+  /// @param margin_px  how far beyond the mask a region's blurred edge is followed; less than the gap to its neighbours
+  /// @param patch_px   side of a patch that its buffers are made for
+  explicit GreyMomentMeter(int margin_px, float patch_px = 0);
+  /// For another worker.
+  [[nodiscard]] GreyMomentMeter another() const { return GreyMomentMeter(margin_px_, patch_px_); }
+
+  template <class T>
+  [[nodiscard]] GreyMoments measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
+                                    SteadyCentre steady = SteadyCentre::kLeftOut);
+  /// With the steady centre.
+  /// @param shading  relative change of the light for one camera px, levelled out about the middle of the region's box
+  template <class T>
+  [[nodiscard]] GreyMoments measure_levelled(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
+                                             const Eigen::Vector2f& shading);
+
+  /// Measures what lies in a cell of the grid, wherever a mask ends, with the light levelled; with the steady centre.
+  /// @param centre_px    middle of the symbol's square, in the camera
+  /// @param half_px      from there to the side of the cell, projector px
+  /// @param shading      relative change of the light for one camera px, from the centre
+  template <class T>
+  [[nodiscard]] GreyMoments measure_cell(const ImageView<T>& frame, const Eigen::Vector2f& centre_px,
+                                         const LatticeFrame& lattice_frame, float half_px,
+                                         const Eigen::Vector2f& shading);
+
+ private:
+  [[nodiscard]] PatchEdges follow_edge(const Region& region, std::span<const Run> runs);
+  template <class T>
+  void copy_patch(const ImageView<T>& frame, const Region& region, std::span<const Run> runs);
+  template <class T>
+  void copy_cell(const ImageView<T>& frame, const Eigen::Vector2f& centre_px, const LatticeFrame& lattice_frame,
+                 float half_px);
+  void level_light(const Eigen::Vector2f& centre_px, const Eigen::Vector2f& shading);
+  [[nodiscard]] GreyMoments moments_of_patch();
+
+  int margin_px_;
+  float patch_px_;
+  int left_ = 0, top_ = 0, width_ = 0, height_ = 0, stride_ = 0;  // of the patch
+  std::vector<std::int16_t> edges_;
+  std::vector<float> patch_;  // grey values; kOutside where they belong to others
+  PatchRange range_;          // of the patch
+  std::vector<RowPowers> rows_;
+};
+
+}  // namespace slsd

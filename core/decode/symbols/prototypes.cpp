@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/symbols/prototypes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "core/code/symbol.hpp"
+#include "core/decode/regions/find_regions.hpp"
+#include "core/decode/regions/split_regions.hpp"
+#include "core/decode/symbols/grey_moments.hpp"
+#include "core/decode/symbols/symbol_view.hpp"
+
+namespace slsd {
+namespace {
+
+/// What the model leaves out (uneven light, curvature, texture) as a standard deviation of each feature, so that no
+/// direction is held for more certain than it is.
+constexpr double kFeatureFloor[kFeatureCount] = {0.02, 0.003, 0.003, 0.003, 0.0008, 0.0006, 0.0006, 0.0008};
+
+/// Brings the densities to where floats have room on both sides.
+constexpr double kLogVolumeScale = -40;
+
+struct Look {
+  GreyMoments moments;
+  Eigen::Vector2f centroid_px, steady_centroid_px;
+  bool whole;  ///< no other region in its cell
+};
+
+/// Between light and dark of what is taken apart, of 255 levels.
+constexpr float kContrastMin = 8;
+
+/// Looks at views as the decoder does.
+/// @thread thread-bound: keeps its buffers
+class Observer {
+ public:
+  explicit Observer(const PrototypeOptions& options)
+      : cell_px_(static_cast<float>(options.symbol_size_px + options.spacing_px)),
+        symbol_px_(static_cast<float>(options.symbol_size_px) * options.camera_px_per_projector_px),
+        splitter_({.tile_px = threshold_tile_px(options.symbol_size_px + options.spacing_px,
+                                                options.camera_px_per_projector_px)}),
+        meter_(margin_px(options.spacing_px, options.camera_px_per_projector_px)) {}
+
+  /// The region nearest to the middle of the view.
+  std::optional<Look> look_at(const SymbolView& view) {
+    finder_.find(Mask(view.mask.view()), regions_);
+    return measure(view);
+  }
+  /// The same once what ran together in the last look is taken apart.
+  std::optional<Look> look_closer(const SymbolView& view) {
+    const float reach = reach_px(view);
+    splitter_.split_all(view.image.view(), kContrastMin, regions_, [&](const Region& region) {
+      return static_cast<float>(std::max(region.width_px(), region.height_px())) > 2 * reach;
+    });
+    return measure(view);
+  }
+
+ private:
+  [[nodiscard]] float reach_px(const SymbolView& view) const {
+    return 0.6F * view.frame.colwise().norm().maxCoeff() * cell_px_ + 1;
+  }
+  std::optional<Look> measure(const SymbolView& view) {
+    const Eigen::Vector2f middle = Eigen::Vector2f::Constant(0.5F * static_cast<float>(view.image.width() - 1));
+    const Eigen::Matrix2f inverse = view.frame.inverse();
+    const Region* nearest = nullptr;
+    float nearest_px = 0.5F * symbol_px_;
+    int in_the_cell = 0;
+    for (const Region& region : regions_.regions) {
+      const float distance_px = (region.middle_px() - middle).norm();
+      if (distance_px < nearest_px) nearest = &region, nearest_px = distance_px;
+      in_the_cell += (inverse * (region.middle_px() - view.middle_px)).cwiseAbs().maxCoeff() < 0.42F * cell_px_;
+    }
+    if (nearest == nullptr) return std::nullopt;
+    const Eigen::Array2f low(nearest->left, nearest->top), high(nearest->right, nearest->bottom);
+    if ((middle.array() - low).max(high - middle.array()).maxCoeff() > reach_px(view)) return std::nullopt;
+    const GreyMoments moments =
+        meter_.measure(view.image.view(), *nearest, regions_.runs_of(*nearest), SteadyCentre::kMeasured);
+    const Eigen::Vector2f centroid = Eigen::Vector2f(moments.x, moments.y) - view.middle_px,
+                          steady_centroid = Eigen::Vector2f(moments.steady_x, moments.steady_y) - view.middle_px;
+    return Look{moments, inverse * centroid, inverse * steady_centroid, in_the_cell == 1};
+  }
+
+  float cell_px_, symbol_px_;  // projector px; camera px
+  RegionFinder finder_;
+  RegionSplitter splitter_;
+  GreyMomentMeter meter_;
+  Regions regions_;
+};
+
+SymbolSpread spread_of(const std::vector<ShapeFeatures>& looks) {
+  SymbolSpread spread{.mean = decltype(spread.mean)::Zero(), .covariance = FeatureCovariance::Zero(), .lost = 0};
+  for (const ShapeFeatures& look : looks) spread.mean += look.cast<double>() / static_cast<double>(looks.size());
+  for (int i = 0; i < kFeatureCount; ++i) spread.covariance(i, i) = kFeatureFloor[i] * kFeatureFloor[i];
+  for (const ShapeFeatures& look : looks) {
+    const auto deviation = (look.cast<double>() - spread.mean).eval();
+    spread.covariance += deviation * deviation.transpose() / static_cast<double>(looks.size());
+  }
+  return spread;
+}
+
+Prototype prototype_of(const SymbolSpread& spread) {
+  const Eigen::LLT<FeatureCovariance> root(spread.covariance);
+  const FeatureCovariance lower = root.matrixL();
+  Prototype prototype;
+  prototype.mean = spread.mean.cast<float>();
+  prototype.whitening = lower.inverse().cast<float>();
+  prototype.density = static_cast<float>(std::exp(kLogVolumeScale - lower.diagonal().array().log().sum()));
+  return prototype;
+}
+
+SymbolViewer viewer_of(const PrototypeOptions& options) {
+  return SymbolViewer({options.symbols, options.symbol_size_px, options.spacing_px, options.camera_px_per_projector_px,
+                       threshold_level(options.symbol_size_px, options.spacing_px, options.camera_px_per_projector_px),
+                       options.blur_px, options.noise});
+}
+
+Eigen::Vector2f mean_of(const std::vector<Eigen::Vector2f>& points) {
+  Eigen::Vector2f sum = Eigen::Vector2f::Zero();
+  for (const Eigen::Vector2f& point : points) sum += point;
+  return points.empty() ? sum : (sum / static_cast<float>(points.size())).eval();
+}
+
+}  // namespace
+
+int margin_px(int spacing_px, float camera_px_per_projector_px) {
+  return std::clamp(static_cast<int>(0.5F * static_cast<float>(spacing_px) * camera_px_per_projector_px), 1, 2);
+}
+
+int threshold_tile_px(int pitch_px, float camera_px_per_projector_px) {
+  const float half_px = 0.5F * static_cast<float>(pitch_px) * camera_px_per_projector_px;
+  return std::clamp(static_cast<int>(std::lround(half_px)), 4, 64);
+}
+
+float threshold_level(int symbol_size_px, int spacing_px, float camera_px_per_projector_px) {
+  constexpr float kWideGapPx = 2.2F, kLargeSymbolPx = 16;
+  if (static_cast<float>(spacing_px) * camera_px_per_projector_px < kWideGapPx) return 0.45F;
+  return static_cast<float>(symbol_size_px) * camera_px_per_projector_px < kLargeSymbolPx ? 0.3F : 0.25F;
+}
+
+std::vector<SymbolSpread> spread_of_symbols(const PrototypeOptions& options) {
+  std::vector<SymbolSpread> spreads;
+  Observer observer(options);
+  SymbolViewer viewer = viewer_of(options);
+  for (std::size_t letter = 0; letter < options.symbols.size(); ++letter) {
+    std::vector<ShapeFeatures> looks;
+    int lost = 0;
+    for (int sample = 0; sample < options.samples; ++sample) {
+      const SymbolView& view = viewer.view(static_cast<int>(letter), 1);
+      const LatticeFrame assumed = view.frame * viewer.frame_error().of_size(options.frame_error);
+      const auto look = observer.look_at(view);
+      if (look && look->whole) {
+        looks.push_back(shape_features(look->moments, assumed.inverse(), static_cast<float>(options.symbol_size_px)));
+      } else {
+        const auto closer = observer.look_closer(view);
+        lost += !closer || !closer->whole;
+      }
+    }
+    spreads.push_back(spread_of(looks));
+    spreads.back().lost = static_cast<double>(lost) / options.samples;
+  }
+  return spreads;
+}
+
+std::vector<Prototype> make_prototypes(const PrototypeOptions& options) {
+  return std::move(make_prototypes(options, std::span(&options.frame_error, 1)).front());
+}
+
+std::vector<std::vector<Prototype>> make_prototypes(const PrototypeOptions& options,
+                                                    std::span<const float> frame_errors) {
+  std::vector<std::vector<Prototype>> prototypes(frame_errors.size());
+  const auto size_px = static_cast<float>(options.symbol_size_px);
+  Observer observer(options);
+  SymbolViewer viewer = viewer_of(options);
+  for (std::size_t letter = 0; letter < options.symbols.size(); ++letter) {
+    std::vector<std::vector<ShapeFeatures>> looks(frame_errors.size());
+    std::vector<Eigen::Vector2f> centroids, steady_centroids;
+    for (int sample = 0; sample < options.samples; ++sample) {
+      const SymbolView& tilted = viewer.view(static_cast<int>(letter), 1);
+      const FrameError error = viewer.frame_error();
+      if (const auto look = observer.look_at(tilted)) {
+        for (std::size_t i = 0; i < frame_errors.size(); ++i) {
+          const LatticeFrame assumed = tilted.frame * error.of_size(frame_errors[i]);
+          looks[i].push_back(shape_features(look->moments, assumed.inverse(), size_px));
+        }
+      }
+      const SymbolView& upright = viewer.view(static_cast<int>(letter), 0);
+      (void)viewer.frame_error();  // as for the tilted one, so that both see the same numbers of the series
+      if (const auto look = observer.look_at(upright)) {
+        centroids.push_back(look->centroid_px);
+        steady_centroids.push_back(look->steady_centroid_px);
+      }
+    }
+    for (std::size_t i = 0; i < frame_errors.size(); ++i) {
+      prototypes[i].push_back(prototype_of(spread_of(looks[i])));
+      prototypes[i].back().centroid_px = mean_of(centroids);
+      prototypes[i].back().steady_centroid_px = mean_of(steady_centroids);
+    }
+  }
+  return prototypes;
+}
+
+}  // namespace slsd

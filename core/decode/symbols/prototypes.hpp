@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/decode/symbols/shape_features.hpp"
+
+namespace slsd {
+
+/// How a symbol looks: the distribution of its features over blur, tilt, noise and where it falls on the pixels.
+struct Prototype {
+  ShapeFeatures mean;
+  Eigen::Matrix<float, kFeatureCount, kFeatureCount>
+      whitening;                       ///< features minus mean, times this, have unit covariance
+  float density;                       ///< at the mean, up to a factor common to all: 1 / volume of the covariance
+  Eigen::Vector2f centroid_px;         ///< centre of its grey moments, from the middle of its square, projector px
+  Eigen::Vector2f steady_centroid_px;  ///< its steady centre, likewise
+
+  /// In standard deviations.
+  [[nodiscard]] float squared_distance(const ShapeFeatures& features) const {
+    return whitening.lazyProduct(features - mean).squaredNorm();
+  }
+};
+
+/// What the prototypes are made for.
+struct PrototypeOptions {
+  std::vector<int> symbols;
+  int symbol_size_px = 16;
+  int spacing_px = 2;
+  float camera_px_per_projector_px = 1.4F;
+  /// How far the frame that the features are taken in may be off, as a share of a step: the calibration's expectation
+  /// is off by the tilt of the surface, a frame measured from neighbours by a few hundredths.
+  float frame_error = 0.05F;
+  int samples = 120;  ///< looks at each symbol
+  /// Standard deviation of the blur of projector and camera, camera px, to a third; without it all that occurs.
+  std::optional<float> blur_px{};
+  /// Standard deviation of the noise as a share of the contrast; without it all that occurs.
+  std::optional<float> noise{};
+};
+
+using FeatureCovariance = Eigen::Matrix<double, kFeatureCount, kFeatureCount>;
+
+/// How one symbol's features are distributed, and how often there are none.
+struct SymbolSpread {
+  Eigen::Matrix<double, kFeatureCount, 1> mean;
+  FeatureCovariance covariance;  ///< with what the model leaves out
+  double lost;                   ///< share of the looks in which it broke into pieces or grew together with a neighbour
+};
+
+/// One to each symbol, from the looks that show it whole and by itself.
+/// @thread reentrant
+[[nodiscard]] std::vector<SymbolSpread> spread_of_symbols(const PrototypeOptions& options);
+
+/// Draws each symbol among random neighbours as a camera would see it, many times, reads it with the decoder's own
+/// stages, and keeps mean, covariance and centre. The same options give the same prototypes.
+/// @return one to a letter, in the order of `symbols`
+/// @thread reentrant
+[[nodiscard]] std::vector<Prototype> make_prototypes(const PrototypeOptions& options);
+
+/// The same for frames that are off by more than one amount, in hardly more time than for one: the looks are the same.
+/// @param frame_errors  in place of that of the options
+/// @return one set to each of them
+/// @thread reentrant
+[[nodiscard]] std::vector<std::vector<Prototype>> make_prototypes(const PrototypeOptions& options,
+                                                                  std::span<const float> frame_errors);
+
+/// Largest margin that a region's edge can be followed by without reaching its neighbour.
+[[nodiscard]] int margin_px(int spacing_px, float camera_px_per_projector_px);
+
+/// Side of the tiles that thresholds are taken from, three by three: half the pitch as the camera sees it.
+[[nodiscard]] int threshold_tile_px(int pitch_px, float camera_px_per_projector_px);
+
+/// Where between dark and light the threshold lies: below the middle where the gaps are wide enough for it, so that a
+/// symbol whose parts touch at a corner stays in one piece; less so for small symbols, of which more run together.
+[[nodiscard]] float threshold_level(int symbol_size_px, int spacing_px, float camera_px_per_projector_px);
+
+}  // namespace slsd

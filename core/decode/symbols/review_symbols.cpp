@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/symbols/review_symbols.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <Eigen/LU>
+
+namespace slsd {
+namespace {
+
+constexpr Direction kDirections[] = {kRight, kDown, kLeft, kUp};
+/// How much farther from its letter a symbol may come to be by levelling the light: its centre gains even so.
+constexpr float kLevellingTolerance = 0.3F;
+
+float light_of(const Sightings& seen, std::int32_t node) {
+  return seen.moments[node].peak - seen.moments[node].background;
+}
+
+/// Relative change of the light from one cell to the next along a direction, from the peaks of the neighbours. At the
+/// edge of a surface the change grows; the second neighbour tells how fast.
+float light_change(const Sightings& seen, std::size_t node, Direction direction) {
+  const auto self = static_cast<std::int32_t>(node);
+  const std::int32_t next = neighbour(seen.nodes, self, direction),
+                     last = neighbour(seen.nodes, self, opposite(direction));
+  const float own = light_of(seen, self);
+  if (next >= 0 && last >= 0) return (light_of(seen, next) - light_of(seen, last)) / (2 * own);
+  if (next < 0 && last < 0) return 0;
+  const Direction inwards = next >= 0 ? direction : opposite(direction);
+  const std::int32_t first = next >= 0 ? next : last, second = neighbour(seen.nodes, first, inwards);
+  const float step = light_of(seen, first) - own;
+  const float change = second >= 0 ? 1.5F * step - 0.5F * (light_of(seen, second) - light_of(seen, first)) : step;
+  return (inwards == direction ? change : -change) / own;
+}
+
+/// Where the neighbours put a node, by continuing the steps of those beside it; quadratic, as steps shrink towards a
+/// limb.
+std::optional<Eigen::Vector2f> centre_from_neighbours(const std::vector<GridNode>& nodes, std::size_t node) {
+  Eigen::Vector2f sum = Eigen::Vector2f::Zero();
+  int count = 0;
+  for (const Direction d : kDirections) {
+    const std::int32_t first = neighbour(nodes, static_cast<std::int32_t>(node), d);
+    const std::int32_t second = neighbour(nodes, first, d), third = neighbour(nodes, second, d);
+    if (third < 0) continue;
+    sum += 3 * nodes[first].centre_px - 3 * nodes[second].centre_px + nodes[third].centre_px;
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return sum / static_cast<float>(count);
+}
+
+}  // namespace
+
+SymbolReview::SymbolReview(const Pattern& pattern, ReviewOptions options)
+    : array_(pattern.array),
+      size_px_(static_cast<float>(pattern.options.symbol_size_px)),
+      pitch_px_(static_cast<float>(pattern.pitch_px())),
+      options_(options) {}
+
+float SymbolReview::distance_from_letter(const Sightings& seen, std::size_t node, const GreyMoments& moments) const {
+  const Prototype& prototype = prototype_of(seen.claims[node]);
+  return std::sqrt(prototype.squared_distance(shape_features(moments, seen.nodes[node].frame.inverse(), size_px_)));
+}
+
+bool SymbolReview::is_inside(const Sightings& seen, std::size_t node) const {
+  return std::ranges::all_of(kDirections, [&](Direction d) {
+    const std::int32_t other = neighbour(seen.nodes, static_cast<std::int32_t>(node), d);
+    return other >= 0 && seen.claims[other].named();
+  });
+}
+
+/// Frames, and with them distances, are measured anew around those symbols that are no longer trusted.
+void SymbolReview::measure_around_distrusted(const GridLinker& linker, Sightings& seen) {
+  for (const std::int32_t node : distrusted_) {
+    visit_measured_with(seen.nodes, node, [&](std::int32_t other) {
+      const auto i = static_cast<std::size_t>(other);
+      linker.measure_frame(seen.nodes, trusted_, i);
+      if (seen.claims[i].status == RegionStatus::kDecoded)
+        seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
+    });
+  }
+}
+
+void SymbolReview::trust_whole_symbols(const GridLinker& linker, Executor& executor, Sightings& seen) {
+  trusted_.resize(seen.size());
+  seen.misfits.resize(seen.size());
+  executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
+      if (trusted_[i] != 0) seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
+    }
+  });
+  distrusted_.clear();
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    if (trusted_[i] == 0) distrusted_.push_back(static_cast<std::int32_t>(i));
+  measure_around_distrusted(linker, seen);
+  distrusted_.clear();
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (trusted_[i] == 0 || seen.misfits[i] <= options_.damaged_distance) continue;
+    trusted_[i] = 0;
+    distrusted_.push_back(static_cast<std::int32_t>(i));
+  }
+  measure_around_distrusted(linker, seen);
+}
+
+void SymbolReview::measure_light_changes(const Sightings& seen, Executor& executor) {
+  light_changes_.resize(seen.size());
+  executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i)
+      light_changes_[i] = {light_change(seen, i, kRight), light_change(seen, i, kDown)};
+  });
+}
+
+/// The mean with those beside, across the direction of the change: small symbols blur to lower peaks, which is not the
+/// light's doing. Along it the change itself changes.
+Eigen::Vector2f SymbolReview::light_change_around(const Sightings& seen, std::size_t node) const {
+  const auto mean_with = [&](int axis, Direction one_side, Direction other_side) {
+    float sum = light_changes_[node][axis], count = 1;
+    for (const Direction d : {one_side, other_side}) {
+      const std::int32_t other = neighbour(seen.nodes, static_cast<std::int32_t>(node), d);
+      if (other < 0) continue;
+      sum += light_changes_[other][axis], ++count;
+      const std::int32_t next = neighbour(seen.nodes, other, d);
+      if (next >= 0) sum += light_changes_[next][axis], ++count;
+    }
+    return sum / count;
+  };
+  return {mean_with(0, kUp, kDown), mean_with(1, kLeft, kRight)};
+}
+
+template <class T>
+void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions, GreyMomentMeter& meter,
+                               Sightings& seen, std::size_t node) const {
+  GreyMoments& moments = seen.moments[node];
+  float& distance = seen.misfits[node];
+  const Region& region = regions.regions[seen.region[node]];
+  bool has_steady_centre = false;
+  const auto adopt_if_better = [&](const GreyMoments& again, float tolerance) {
+    const float distance_again = distance_from_letter(seen, node, again);
+    if (!(again.weight > 0 && distance_again < distance + tolerance)) return;
+    moments = again, distance = distance_again, has_steady_centre = true;
+  };
+  const LatticeFrame& lattice_frame = seen.nodes[node].frame;
+  const Eigen::Vector2f per_cell = light_change_around(seen, node);
+  const float change = per_cell.cwiseAbs().maxCoeff();
+  const auto shading = [&]() -> Eigen::Vector2f { return lattice_frame.inverse().transpose() * per_cell / pitch_px_; };
+  if (change > options_.shading_min)
+    adopt_if_better(meter.measure_levelled(frame, region, regions.runs_of(region), shading()), kLevellingTolerance);
+  if (distance > options_.doubtful_distance) {
+    const Eigen::Vector2f centroid(moments.x, moments.y);
+    const Eigen::Vector2f own_centre = centroid - lattice_frame * prototype_of(seen.claims[node]).centroid_px;
+    const Eigen::Vector2f centre = centre_from_neighbours(seen.nodes, node).value_or(own_centre);
+    const float half_px = 0.25F * (size_px_ + pitch_px_);
+    adopt_if_better(meter.measure_cell(frame, centre, lattice_frame, half_px, shading()), 0);
+  }
+  if (change > options_.uneven_light) {
+    if (!has_steady_centre) moments = meter.measure(frame, region, regions.runs_of(region), SteadyCentre::kMeasured);
+    const Prototype& prototype = prototype_of(seen.claims[node]);
+    const Eigen::Vector2f from_steady = lattice_frame * (prototype.centroid_px - prototype.steady_centroid_px);
+    moments.x = moments.steady_x + from_steady.x(), moments.y = moments.steady_y + from_steady.y();
+  }
+  if (distance > options_.damaged_distance_inside || (distance > options_.damaged_distance && !is_inside(seen, node)))
+    seen.claims[node].status = RegionStatus::kDamagedShape;
+}
+
+void SymbolReview::review(const GreyView& frame, const Regions& regions, const GridLinker& linker,
+                          const std::vector<Prototype>& prototypes, std::span<GreyMomentMeter> meters,
+                          Executor& executor, Sightings& seen) {
+  prototypes_ = &prototypes;
+  trust_whole_symbols(linker, executor, seen);
+  measure_light_changes(seen, executor);
+  std::visit(
+      [&](const auto& view) {
+        executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int worker) {
+          for (std::size_t i = first; i < last; ++i) {
+            if (seen.claims[i].status == RegionStatus::kDecoded) review_node(view, regions, meters[worker], seen, i);
+          }
+        });
+      },
+      frame);
+}
+
+}  // namespace slsd

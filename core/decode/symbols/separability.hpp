@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// Under what circumstances symbols are looked at.
+struct LookOptions {
+  int symbol_size_px = 16;
+  int spacing_px = 2;
+  double camera_px_per_projector_px = 1.4;  ///< 1.4: camera 1600 px and projector 1280 px wide on the paper's rig
+  double blur_px = 1.1;                     ///< standard deviation of the blur of projector and camera, camera px
+  double noise = 0.02;                      ///< standard deviation, as a share of the contrast
+  int looks = 160;                          ///< at each symbol
+  double frame_error = 0.07;  ///< largest error of the grid vectors that a look is measured by, as a share of them
+};
+
+/// A pair of symbols and how far apart they look: standard deviations from each one's mean to the boundary between them
+/// along the direction that parts them best (Fisher's). 3 means one of 740 on the wrong side, if all were Gaussian.
+struct SymbolPair {
+  int first;
+  int second;
+  double distance;
+};
+
+/// What became of one symbol in the simulated camera.
+struct SymbolLoss {
+  int number;
+  double share;  ///< of the looks in which it broke into pieces or grew together with a neighbour, 0 to 1
+};
+
+/// Below this a pair is risky. At 4 the Gaussian error is 1 in 30,000, so that even tails ten times as heavy stay
+/// far below the 2 % of symbols misread that a pattern of minimum distance 3 survives.
+inline constexpr double kRiskyDistance = 4.0;
+
+/// Above this a symbol is risky: what is lost is missing in the nine windows around it. The looks are of every tilt
+/// that occurs; a pattern of which each symbol is lost in one of ten still decodes to nine tenths on a sculpture.
+inline constexpr double kRiskyLoss = 0.15;
+
+/// How far apart the members of a set of symbols are.
+struct Separability {
+  std::vector<SymbolPair> pairs;   ///< all of them, the closest first
+  std::vector<SymbolLoss> losses;  ///< in the order of the symbols
+
+  [[nodiscard]] double smallest_distance() const { return pairs.front().distance; }
+  [[nodiscard]] std::vector<SymbolPair> risky_pairs() const;
+  [[nodiscard]] std::vector<SymbolLoss> risky_symbols() const;
+};
+
+/// Looks at each of the symbols as the decoder's prototypes are made (core/decode/symbols/prototypes.hpp) and compares
+/// the distributions of their features. The same arguments give the same answer.
+/// @param symbols  2 to 25 different symbol numbers
+/// @errors kInvalidArgument
+/// @thread reentrant
+[[nodiscard]] Result<Separability> assess_separability(const std::vector<int>& symbols, const LookOptions& options);
+
+/// The warnings for a person, one to a line, empty where nothing is risky: "symbols 7 (square) and 3 (frame) look alike
+/// at 8 px: ...".
+[[nodiscard]] std::vector<std::string> separability_warnings(const Separability& separability, int symbol_size_px);
+
+}  // namespace slsd

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/decode/grid/lattice_frame.hpp"
+#include "core/decode/symbols/grey_moments.hpp"
+
+namespace slsd {
+
+inline constexpr int kFeatureCount = 8;
+
+/// Area, second and third central moments of a symbol in units of its own size, as if seen head on:
+/// (area, m20, m11, m02, m30, m21, m12, m03). Moments of order k over the area go with size^k.
+using ShapeFeatures = Eigen::Matrix<float, kFeatureCount, 1>;
+
+/// Takes a region's moments from the camera's image into the pattern's. Moments are tensors, so an affine map of the
+/// image is a linear map of them: nothing has to be resampled.
+/// @param pattern_from_camera  projector pixels for one camera pixel, the inverse of the lattice frame
+[[nodiscard]] ShapeFeatures shape_features(const GreyMoments& moments, const Eigen::Matrix2f& pattern_from_camera,
+                                           float symbol_size_px);
+
+}  // namespace slsd

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/symbols/symbol_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/LU>
+
+#include "core/code/symbol.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr int kCells = 3;
+constexpr int kSubpixels = 3;
+constexpr float kLight = 160, kDark = 20;
+/// Frames sharper than a lens makes them are drawn ones, whose pixels may well lie on the pattern's: one view in so
+/// many.
+constexpr float kDrawnBlurPx = 0.3F;
+constexpr int kDrawnOneIn = 4;
+
+/// From -reach to reach, with the sum 1.
+std::vector<float> gaussian(float sigma_px, int reach) {
+  std::vector<float> weights;
+  float sum = 0;
+  for (int i = -reach; i <= reach; ++i)
+    sum += weights.emplace_back(std::exp(-0.5F * static_cast<float>(i * i) / (sigma_px * sigma_px)));
+  for (float& weight : weights) weight /= sum;
+  return weights;
+}
+
+float between(float low, float high, float share) {
+  return low + (high - low) * share;
+}
+
+void add_scaled(float weight, const float* from, int count, float* to) {
+#pragma omp simd
+  for (int x = 0; x < count; ++x) to[x] += weight * from[x];
+}
+
+}  // namespace
+
+SymbolViewer::SymbolViewer(SymbolViewOptions options) : options_(std::move(options)) {
+  for (const int number : options_.symbols) drawings_.push_back(draw_symbol(number, options_.symbol_size_px));
+}
+
+float SymbolViewer::share() {
+  return static_cast<float>(random_()) * 0x1p-32F;
+}
+
+float SymbolViewer::uniform(float low, float high) {
+  return between(low, high, share());
+}
+
+Eigen::Matrix2f FrameError::of_size(float size) const {
+  const auto within = [](float reach, float share) { return between(-reach, reach, share); };
+  Eigen::Matrix2f error;
+  // A tilted surface stretches and shears along the base line, which is mostly the pattern's u; the rest is smaller.
+  error << 1 + within(size, shares[0]), within(size, shares[1]), within(0.5F * size, shares[2]),
+      1 + within(0.5F * size, shares[3]);
+  return error;
+}
+
+FrameError SymbolViewer::frame_error() {
+  return {{share(), share(), share(), share()}};
+}
+
+void SymbolViewer::draw_cells(int letter) {
+  const int pitch = options_.symbol_size_px + options_.spacing_px;
+  cells_ = Grey8(kCells * pitch + 2, kCells * pitch + 2);
+  for (int row = 0; row < kCells; ++row) {
+    for (int column = 0; column < kCells; ++column) {
+      const bool middle = row == 1 && column == 1;
+      const Grey8& drawing = drawings_[middle ? static_cast<std::size_t>(letter) : random_() % drawings_.size()];
+      for (int y = 0; y < drawing.height(); ++y) {
+        std::copy_n(
+            drawing.row(y), drawing.width(),
+            cells_.row(row * pitch + y + options_.spacing_px / 2 + 1) + column * pitch + options_.spacing_px / 2 + 1);
+      }
+    }
+  }
+}
+
+void SymbolViewer::expose(int side_px) {
+  const Eigen::Matrix2f inverse = view_.frame.inverse();
+  const float middle_of_square =
+      static_cast<float>(options_.symbol_size_px + options_.spacing_px + options_.spacing_px / 2) +
+      0.5F * static_cast<float>(options_.symbol_size_px);
+  const auto subpixel = [](int index) {
+    return static_cast<float>(index / kSubpixels) + (static_cast<float>(index % kSubpixels) - 1) / kSubpixels;
+  };
+  const int across = kSubpixels * side_px, width = cells_.width(), last = width - 1;
+  column_u_.resize(across), column_v_.resize(across), pixels_.resize(across);
+  for (int i = 0; i < across; ++i) {
+    const float x = subpixel(i) - view_.middle_px.x();
+    column_u_[i] = inverse(0, 0) * x, column_v_[i] = inverse(1, 0) * x;
+  }
+  light_.assign(static_cast<std::size_t>(side_px) * side_px, 0.F);
+  lit_.resize(side_px);
+  for (int row = 0; row < across; ++row) {
+    if (row % kSubpixels == 0) lit_.assign(side_px, 0);
+    const float y = subpixel(row) - view_.middle_px.y();
+    const float row_u = inverse(0, 1) * y, row_v = inverse(1, 1) * y;
+    const float *const columns_u = column_u_.data(), *const columns_v = column_v_.data();
+    std::int32_t* const pixels = pixels_.data();
+#pragma omp simd
+    for (int i = 0; i < across; ++i) {
+      // One further for the border, onto which everything outside falls.
+      const float u = columns_u[i] + row_u + middle_of_square, v = columns_v[i] + row_v + middle_of_square;
+      const int right = u < 0 ? 0 : std::min(static_cast<int>(u) + 1, last);
+      const int down = v < 0 ? 0 : std::min(static_cast<int>(v) + 1, last);
+      pixels[i] = down * width + right;
+    }
+    const std::uint8_t* const cells = cells_.data();
+    for (int x = 0; x < side_px; ++x) {
+      const std::int32_t* const three = pixels + kSubpixels * x;
+      lit_[x] += cells[three[0]] + cells[three[1]] + cells[three[2]];
+    }
+    if (row % kSubpixels != kSubpixels - 1) continue;
+    float* const light = light_.data() + static_cast<std::ptrdiff_t>(row / kSubpixels) * side_px;
+    for (int x = 0; x < side_px; ++x) light[x] = static_cast<float>(lit_[x]) / (kSubpixels * kSubpixels);
+  }
+}
+
+// The edge goes on beyond the image.
+void SymbolViewer::blur(float sigma_px) {
+  const int side = view_.image.width(), reach = static_cast<int>(std::ceil(3 * sigma_px));
+  const std::vector<float> weights = gaussian(sigma_px, reach);
+  const auto row = [side](std::vector<float>& light, int y) {
+    return light.data() + static_cast<std::ptrdiff_t>(y) * side;
+  };
+  blurred_.assign(light_.size(), 0.F);
+  wide_row_.resize(side + 2 * reach);
+  for (int y = 0; y < side; ++y) {
+    for (int x = -reach; x < side + reach; ++x) wide_row_[x + reach] = row(light_, y)[std::clamp(x, 0, side - 1)];
+    for (int i = 0; i <= 2 * reach; ++i) add_scaled(weights[i], wide_row_.data() + i, side, row(blurred_, y));
+  }
+  light_.assign(light_.size(), 0.F);
+  for (int y = 0; y < side; ++y) {
+    for (int i = -reach; i <= reach; ++i) {
+      add_scaled(weights[i + reach], row(blurred_, std::clamp(y + i, 0, side - 1)), side, row(light_, y));
+    }
+  }
+}
+
+const SymbolView& SymbolViewer::view(int letter, float tilt) {
+  draw_cells(letter);
+  const float scale = options_.camera_px_per_projector_px;
+  Eigen::Matrix2f stretch;
+  stretch << 1 + tilt * uniform(-0.4F, 0.15F), 0, 0, 1 + tilt * uniform(-0.25F, 0.15F);
+  const bool drawn = options_.blur_px && *options_.blur_px < kDrawnBlurPx && random_() % kDrawnOneIn == 0;
+  const float roll = (drawn ? 0.F : 1.F) * uniform(-0.1F, 0.1F);
+  if (drawn) stretch.setIdentity();
+  Eigen::Matrix2f turn;
+  turn << std::cos(roll), -std::sin(roll), std::sin(roll), std::cos(roll);
+  view_.frame = scale * turn * stretch;
+
+  const float size_px = static_cast<float>(options_.symbol_size_px) * scale;
+  const int side = static_cast<int>(std::ceil(1.7F * (size_px + static_cast<float>(options_.spacing_px) * scale))) + 6;
+  view_.middle_px.setConstant(0.5F * static_cast<float>(side));
+  view_.middle_px.x() += uniform(-0.5F, 0.5F);
+  view_.middle_px.y() += uniform(-0.5F, 0.5F);
+  if (drawn)
+    view_.middle_px.setConstant(static_cast<float>(side / 2) +
+                                0.5F * static_cast<float>((options_.symbol_size_px + 1) % 2));
+  view_.image = Grey8(side, side);
+  view_.mask = Grey8(side, side);
+  expose(side);
+  blur(options_.blur_px ? *options_.blur_px * uniform(0.65F, 1.35F) : uniform(0.5F, std::max(1.1F, 0.07F * size_px)));
+  add_noise(options_.noise ? *options_.noise * (kLight - kDark) : uniform(0.F, 6.F));
+  return view_;
+}
+
+void SymbolViewer::add_noise(float size) {
+  const int pixels = view_.image.width() * view_.image.height();
+  std::uint8_t *const image = view_.image.data(), *const mask = view_.mask.data();
+  const float threshold = kDark + options_.threshold_level * (kLight - kDark);
+  for (int i = 0; i < pixels; ++i) {
+    const float gauss = uniform(-1, 1) + uniform(-1, 1) + uniform(-1, 1);  // variance 1
+    const float level = kDark + (kLight - kDark) * light_[i] + size * gauss;
+    image[i] = static_cast<std::uint8_t>(std::clamp(level, 0.F, 255.F));
+    mask[i] = level > threshold ? 255 : 0;
+  }
+}
+
+}  // namespace slsd

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "core/decode/regions/find_regions.hpp"
+#include "core/image.hpp"
+#include "core/lanes.hpp"
+
+namespace slsd {
+
+/// Where the soft threshold begins and ends, between a region's background and its peak. For a shape it ends where even
+/// print, shading or a camera's gamma leave the bright part bright: it is where light is, however much of it.
+inline constexpr float kRampStart = 0.1F;
+inline constexpr float kRampEnd = 0.3F;
+/// For its centre it is even about the middle and as wide as background and peak allow, so that blur does not move it:
+/// on planes at 2 m 0.09 mm are left of the 0.16 mm of one that is not.
+inline constexpr float kCentreRampStart = 0.2F;
+inline constexpr float kCentreRampEnd = 0.8F;
+/// Where the light changes within the symbol it ends lower: what is less bright counts as well.
+inline constexpr float kSteadyRampEnd = 0.65F;
+
+/// Pixels of a patch that belong to others: every comparison with them is false.
+inline constexpr float kOutside = std::numeric_limits<float>::quiet_NaN();
+
+/// Least and greatest grey value of a patch.
+struct PatchRange {
+  float least = std::numeric_limits<float>::max(), greatest = 0;
+};
+
+/// Background and peak of a patch as the means of the lowest and the highest quarter of its range: single noisy pixels
+/// do not move them.
+struct PatchLevels {
+  float background = 0, peak = 0;
+};
+
+/// @param patch  grey values or kOutside
+/// @param count  a multiple of kLanes
+/// @thread reentrant
+[[nodiscard]] PatchRange range_of(const float* patch, int count);
+void find_levels(const float* patch, int count, const PatchRange& range, PatchLevels& levels);
+
+/// Raw moments of a patch, the sum of w x^p y^q in [p][q], w the soft threshold's weight of a pixel, 0 to 1.
+struct RawMoments {
+  float m[4][4] = {};
+  float centre = 0, centre_x = 0, centre_y = 0;  ///< the sums of w, w x and w y through the centre's ramp
+  float steady = 0, steady_x = 0, steady_y = 0;  ///< and through that of uneven light, where it is measured
+};
+
+/// Whether the centre that uneven light pulls less is measured too: few symbols are asked for it.
+enum class SteadyCentre : std::uint8_t { kLeftOut, kMeasured };
+
+/// A row's y, from the patch's middle, and its powers.
+struct RowPowers {
+  float y, yy, yyy;
+};
+
+/// @param stride    columns of the patch, a multiple of kLanes
+/// @param rows      one to a row of the patch
+/// @param middle_x  origin of x, from the first pixel's centre
+/// @param moments   with the steady centre
+/// @thread reentrant
+void sum_moments(const float* patch, int stride, std::span<const RowPowers> rows, float middle_x,
+                 const PatchLevels& levels, RawMoments& moments);
+
+/// All of it at once for a region of an 8-bit frame, in 16 bits a pixel: half the memory, and twice the pixels to a
+/// register.
+/// @param margin_px  how far beyond the region's pixels the patch reaches
+/// @param moments    about the middle of the region's box; none where the peak is not above the background
+/// @return           false, and nothing done, where the patch is too large or reaches beyond the frame
+/// @thread reentrant
+[[nodiscard]] bool weigh_region(const ImageView<std::uint8_t>& frame, const Region& region, std::span<const Run> runs,
+                                int margin_px, SteadyCentre steady, PatchLevels& levels, RawMoments& moments);
+
+}  // namespace slsd
