@@ -6,9 +6,9 @@
 
 #include "daemon/calibrate/calibrate_from_files.hpp"
 #include "daemon/calibrate/measure_extrinsics.hpp"
-#include "daemon/calibrate/session.hpp"
-#include "daemon/calibrate/verify_from_files.hpp"
-#include "daemon/calibrate/verify_live.hpp"
+#include "daemon/calibrate/session/session.hpp"
+#include "daemon/calibrate/verify/verify_from_files.hpp"
+#include "daemon/calibrate/verify/verify_live.hpp"
 #include "daemon/command_line.hpp"
 #include "daemon/service/logging.hpp"
 

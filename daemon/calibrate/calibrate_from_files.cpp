@@ -10,9 +10,9 @@
 #include <fmt/format.h>
 
 #include "daemon/calibrate/board_request.hpp"
-#include "daemon/calibrate/captured_pattern.hpp"
+#include "daemon/calibrate/captures/captured_pattern.hpp"
+#include "daemon/calibrate/captures/read_captures.hpp"
 #include "daemon/calibrate/finish_calibration.hpp"
-#include "daemon/calibrate/read_captures.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/configuration/settings_over.hpp"
 

@@ -11,7 +11,7 @@
 
 #include "daemon/calibrate/keep_calibration.hpp"
 #include "daemon/calibrate/outcome_text.hpp"
-#include "daemon/calibrate/report_html.hpp"
+#include "daemon/calibrate/report/report_html.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd {

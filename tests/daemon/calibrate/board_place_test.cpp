@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/calibrate/board_place.hpp"
+#include "daemon/calibrate/session/board_place.hpp"
 
 #include <numbers>
 

@@ -12,7 +12,7 @@
 
 #include "core/board/board.hpp"
 #include "core/board/board_ink.hpp"
-#include "daemon/calibrate/pose_source.hpp"
+#include "daemon/calibrate/session/pose_source.hpp"
 #include "daemon/latency/timepiece.hpp"
 
 namespace slsd {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/calibrate/report_html.hpp"
+#include "daemon/calibrate/report/report_html.hpp"
 
 #include <algorithm>
 #include <stdexcept>

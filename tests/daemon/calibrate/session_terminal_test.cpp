@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/calibrate/session_terminal.hpp"
+#include "daemon/calibrate/session/session_terminal.hpp"
 
 #include <chrono>
 #include <sstream>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/calibrate/pose_session.hpp"
+#include "daemon/calibrate/session/pose_session.hpp"
 
 #include <memory>
 #include <sstream>
@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 
 #include "core/calibrate/observe/gray_code.hpp"
-#include "daemon/calibrate/capture_folder.hpp"
-#include "daemon/calibrate/session_record.hpp"
+#include "daemon/calibrate/captures/capture_folder.hpp"
+#include "daemon/calibrate/session/session_record.hpp"
 #include "drivers/files/file.hpp"
 #include "tests/daemon/calibrate/board_stage.hpp"
 #include "tests/drivers/temporary_folder.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/calibrate/sign.hpp"
+#include "daemon/calibrate/session/sign.hpp"
 
 #include <algorithm>
 

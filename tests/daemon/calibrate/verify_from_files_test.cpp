@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/calibrate/verify_from_files.hpp"
+#include "daemon/calibrate/verify/verify_from_files.hpp"
 
 #include <cstdlib>
 #include <fstream>
