@@ -54,6 +54,7 @@ inline constexpr int kStageCount = 10;
 
 /// Directions of the grid's links, along the pattern's axes: u to the right, v down.
 enum Direction : std::uint8_t { kRight, kDown, kLeft, kUp };
+inline constexpr std::array kDirections{kRight, kDown, kLeft, kUp};
 
 /// One region of the frame, whatever became of it. The trace from which pictures are drawn.
 struct RegionSeen {

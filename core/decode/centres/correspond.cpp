@@ -18,8 +18,7 @@ class Surroundings {
   [[nodiscard]] bool leave_alone(std::int32_t node) const {
     if (goes_on_all_around(node)) return false;  // as most do, and then none of the following can be
     return is_lone(node, kRight) || is_lone(node, kDown) ||
-           std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp},
-                               [&](Direction d) { return is_lone_at_rim(node, d); });
+           std::ranges::any_of(kDirections, [&](Direction d) { return is_lone_at_rim(node, d); });
   }
 
   /// The last of a line that has been refused, beside what is none of its island or has been refused, too.
@@ -49,7 +48,7 @@ class Surroundings {
   /// Of the few that are left of a line, between as many refused ones and its end, with nothing of their island on one
   /// side of them, and there something that is none of it.
   [[nodiscard]] bool is_rest(std::int32_t node) const {
-    return std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp}, [&](Direction aside) {
+    return std::ranges::any_of(kDirections, [&](Direction aside) {
       if (stands(node, beside(node, aside))) return false;
       int length = 1, most_refused = 0;
       bool others = is_beside_others(node, aside);
@@ -71,19 +70,17 @@ class Surroundings {
 
   /// All of those beside it stand.
   [[nodiscard]] bool is_inside(std::int32_t node) const {
-    return std::ranges::all_of(std::array{kRight, kDown, kLeft, kUp},
-                               [&](Direction d) { return stands(node, beside(node, d)); });
+    return std::ranges::all_of(kDirections, [&](Direction d) { return stands(node, beside(node, d)); });
   }
 
   /// None of those beside it stands.
   [[nodiscard]] bool is_alone(std::int32_t node) const {
-    return std::ranges::none_of(std::array{kRight, kDown, kLeft, kUp},
-                                [&](Direction d) { return stands(node, beside(node, d)); });
+    return std::ranges::none_of(kDirections, [&](Direction d) { return stands(node, beside(node, d)); });
   }
 
   /// At the corner of what was put there: on two sides that meet, and between them, it has been refused.
   [[nodiscard]] bool is_corner(std::int32_t node) const {
-    return std::ranges::any_of(std::array{kRight, kDown, kLeft, kUp}, [&](Direction one) {
+    return std::ranges::any_of(kDirections, [&](Direction one) {
       const auto two = static_cast<Direction>((one + 1) % 4);
       const std::int32_t first = beside(node, one), second = beside(node, two);
       return misread(first) && misread(second) && !stands(node, beside(first, two)) &&
@@ -95,7 +92,7 @@ class Surroundings {
   static constexpr int kReach = 3;
   /// Those beside it stand, and their cells lie beside its own.
   [[nodiscard]] bool goes_on_all_around(std::int32_t node) const {
-    return std::ranges::all_of(std::array{kRight, kDown, kLeft, kUp}, [&](Direction d) {
+    return std::ranges::all_of(kDirections, [&](Direction d) {
       const std::int32_t other = beside(node, d);
       return stands(node, other) && fits(node, other, d);
     });

@@ -87,7 +87,7 @@ Eigen::Vector2f CentreCorrection::median_around(const std::vector<GridNode>& nod
     ++count;
   };
   add(node);
-  for (const Direction d : {kRight, kDown, kLeft, kUp}) add(neighbour(nodes, node, d));
+  for (const Direction d : kDirections) add(neighbour(nodes, node, d));
   if (count == 0) return {0, 0};
   const auto median = [count](std::array<float, 5>& values) {
     for (int i = 1; i < count; ++i) {
@@ -129,7 +129,7 @@ LatticeSymbol CentreCorrection::symbol_of(const std::vector<GridNode>& nodes, co
   symbol.misfit =
       misfit ? *misfit
              : std::sqrt(prototypes_[letter].squared_distance(shape_features(seen, symbol.frame.inverse(), size_px_)));
-  for (const Direction d : {kRight, kDown, kLeft, kUp}) {
+  for (const Direction d : kDirections) {
     if (named_[node][d] >= 0) symbol.neighbours[d] = symbol_of_[named_[node][d]];
   }
   if (const std::optional<Bend> bend = bend_of(nodes, node)) {
@@ -157,7 +157,7 @@ void CentreCorrection::correct(const std::vector<GridNode>& nodes, const std::ve
   for_each_node([&](std::size_t i) {
     centres_[i] = {moments[i].x, moments[i].y};
     if (claims[i].named()) centres_[i] -= nodes[i].frame * centroids_px_[array.at(claims[i].row, claims[i].column)];
-    for (const Direction d : {kRight, kDown, kLeft, kUp}) {
+    for (const Direction d : kDirections) {
       named_[i][d] = symbol_of_[i] < 0 ? -1 : named_neighbour(nodes, claims, static_cast<std::int32_t>(i), d);
     }
   });

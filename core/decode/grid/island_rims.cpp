@@ -32,7 +32,7 @@ void IslandJudge::cut_back(const Frame& frame) {
     held_[node] = 4;
     if (links_[node] != kAllAgree) {
       held_[node] = 0;
-      for (const Direction d : kAllDirections) {
+      for (const Direction d : kDirections) {
         const Link link = links_[node][d];
         if (link == Link::kAgrees) ++held_[node];
         // What is well seen and contradicts is other light, which seldom is a symbol wide.
@@ -44,7 +44,7 @@ void IslandJudge::cut_back(const Frame& frame) {
   }
   // A node that is cut holds its neighbours no longer.
   const auto let_go = [&](std::int32_t node) {
-    for (const Direction d : kAllDirections) {
+    for (const Direction d : kDirections) {
       const std::int32_t other = frame.beside[node][d];
       if (other < 0 || island_of_[other] < 0 || frame.beside[other][opposite(d)] != node) continue;
       held_[other] = static_cast<std::int8_t>(held_[other] - (links_[other][opposite(d)] == Link::kAgrees));
@@ -164,7 +164,7 @@ void IslandJudge::cut_slid(const Frame& frame, std::int32_t island) {
   for (const std::int32_t node : members) place(frame.claims[node].row, frame.claims[node].column, node);
   for (const std::int32_t node : members) {
     if (links_[node] == kAllAgree) continue;
-    for (const Direction d : kAllDirections) {
+    for (const Direction d : kDirections) {
       const Beyond cell(frame.claims[node], d);
       const std::int32_t other = frame.beside[node][d];
       if (other >= 0 && !continues(frame, node, d)) place(cell.row, cell.column, other);
@@ -253,7 +253,7 @@ void IslandJudge::cut_contradicted_lines(const Frame& frame) {
     if (!any_against(links)) continue;
     // What chance has added is contradicted all around.
     if (std::ranges::count(links, Link::kAgrees) < std::ranges::count(links, Link::kAgainst) + 2) continue;
-    for (const Direction d : kAllDirections) places[d % 2] += links[d] == Link::kAgainst;
+    for (const Direction d : kDirections) places[d % 2] += links[d] == Link::kAgainst;
   }
   const auto cut = [&](Direction forth, double count) {
     lines_.clear();
@@ -322,7 +322,7 @@ bool IslandJudge::may_be_apart(const Frame& frame, const Piece& piece) const {
   const auto held = [&](Direction d) { return is_held(piece, d); };
   if ((held(kLeft) && held(kRight)) || (held(kUp) && held(kDown))) return false;
   std::array<Side, 4> sides;
-  for (const Direction d : kAllDirections) sides[d] = side_of(frame, piece, d);
+  for (const Direction d : kDirections) sides[d] = side_of(frame, piece, d);
   float bend = 0, links = 0, beyond = 0;
   bool contradicted = false, broken = false;
   for (const Side& side : sides) {
@@ -412,7 +412,7 @@ void IslandJudge::cut_pieces(const Frame& frame) {
   for (const std::int32_t node : members_) {
     if (links_[node] == kAllAgree) continue;
     const auto ends = std::ranges::count_if(
-        kAllDirections, [&](Direction d) { return frame.nodes[node].broken[d] || is_of_another(frame, node, d); });
+        kDirections, [&](Direction d) { return frame.nodes[node].broken[d] || is_of_another(frame, node, d); });
     if (ends > 0 || std::ranges::count(links_[node], Link::kNeutral) > 0) queue_.push_back(node);
     rim += ends;
   }
@@ -466,7 +466,7 @@ void IslandJudge::cut_steps(const Frame& frame) {
   for (const std::int32_t node : queue_) {
     if (cut_[node] != 0) continue;
     if ((held(node, kLeft) && held(node, kRight)) || (held(node, kUp) && held(node, kDown))) continue;
-    for (const Direction d : kAllDirections) {
+    for (const Direction d : kDirections) {
       if (!is_cut(node, d)) continue;
       float evidence = own_ratio(node);
       std::int32_t last = node;

@@ -41,7 +41,7 @@ bool IslandJudge::adopt(const Frame& frame, std::int32_t node, CellClaim& adopte
   };
   std::array<Candidate, 4> candidates;
   int count = 0;
-  for (const Direction d : kAllDirections) {
+  for (const Direction d : kDirections) {
     const std::int32_t other = frame.beside[node][d];
     if (other < 0 || !frame.claims[other].named()) continue;
     const Beyond cell(frame.claims[other], opposite(d));
@@ -94,7 +94,7 @@ void IslandJudge::grow(const Frame& frame) {
     queue_.clear();
     for (std::size_t i = 0; i < adopted_.size(); ++i) frame.claims[next_queue_[i]] = adopted_[i];
     for (const std::int32_t node : next_queue_) {
-      for (const Direction d : kAllDirections) {
+      for (const Direction d : kDirections) {
         const std::int32_t other = frame.beside[node][d];
         if (other >= 0 && !frame.claims[other].named()) queue_.push_back(other);
       }
@@ -116,7 +116,7 @@ void IslandJudge::look_at_own_cells(const Frame& frame, std::size_t first, std::
                frame.gate.on_line(node, claim.row, claim.column),
                frame.gate.admits(node, claim.row, claim.column),
                {}};
-    for (const Direction d : kAllDirections) {
+    for (const Direction d : kDirections) {
       const std::int32_t other = frame.beside[i][d];
       const Beyond cell(claim, d);
       own_[i].fits[d] = other >= 0 && frame.claims[other].same_cell(cell.row, cell.column);
@@ -136,7 +136,7 @@ void IslandJudge::find_islands(const Frame& frame) {
     island_of_[i] = id;
     for (std::size_t at = island.first; at < members_.size(); ++at) {
       const std::int32_t node = members_[at];
-      for (const Direction d : kAllDirections) {
+      for (const Direction d : kDirections) {
         const std::int32_t other = frame.beside[node][d];
         if (!own_[node].fits[d] || island_of_[other] >= 0) continue;
         if (frame.claims[other].status != RegionStatus::kDecoded) continue;
@@ -199,7 +199,7 @@ double IslandJudge::cost_of_rim(const Frame& frame, const Island& island) const 
   for (std::int32_t i = island.first; i < island.first + island.size; ++i) {
     const std::int32_t node = members_[i];
     if (!any_against(links_[node])) continue;
-    for (const Direction d : kAllDirections) {
+    for (const Direction d : kDirections) {
       if (links_[node][d] != Link::kAgainst) continue;
       const std::int32_t beside = frame.beside[node][across(d, 0)];
       const bool goes_on = beside >= 0 && island_of_[beside] == island_of_[node] && links_[beside][d] == Link::kAgainst;

@@ -24,8 +24,6 @@ struct Beyond {
       : row(claim.row + (d == kDown) - (d == kUp)), column(claim.column + (d == kRight) - (d == kLeft)) {}
 };
 
-inline constexpr std::array kAllDirections{kRight, kDown, kLeft, kUp};
-
 /// What may go wrong, and what it is weighed by. docs/decoder.md derives each.
 struct IslandOptions {
   int rows = 0, columns = 0;        ///< of the part of the array that is shown
@@ -110,7 +108,7 @@ class IslandJudge {
   void find_islands(const Frame& frame);
   void read_links(const Frame& frame, Executor& executor);
   void read_links_of(const Frame& frame, std::int32_t node) {
-    for (const Direction d : {kRight, kDown, kLeft, kUp}) links_[node][d] = read_link(frame, node, d);
+    for (const Direction d : kDirections) links_[node][d] = read_link(frame, node, d);
   }
   void read_links_around(const Frame& frame, const std::vector<std::int32_t>& gone);
   /// Whether a link leads to the node of the same island whose cell lies there.

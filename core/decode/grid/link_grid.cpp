@@ -11,8 +11,6 @@
 namespace slsd {
 namespace {
 
-constexpr Direction kDirections[] = {kRight, kDown, kLeft, kUp};
-
 /// How much a measured step may differ from the expected one before it is taken for a wrong link.
 constexpr float kFrameChangeMax = 0.5F;
 

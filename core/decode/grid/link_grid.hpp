@@ -42,7 +42,7 @@ struct LinkGridOptions {
 template <class Visit>
 void visit_measured_with(const std::vector<GridNode>& nodes, std::int32_t node, Visit&& visit) {
   visit(node);
-  for (const Direction d : {kRight, kDown, kLeft, kUp}) {
+  for (const Direction d : kDirections) {
     std::int32_t other = node;
     for (int links = 0; links < 2; ++links) {
       other = nodes[other].links[d];

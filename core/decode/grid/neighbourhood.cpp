@@ -8,7 +8,7 @@ void find_beside(const std::vector<GridNode>& nodes, std::vector<Beside>& beside
   beside.resize(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const GridNode& node = nodes[i];
-    for (const Direction d : {kRight, kDown, kLeft, kUp}) beside[i][d] = node.broken[d] ? -1 : node.links[d];
+    for (const Direction d : kDirections) beside[i][d] = node.broken[d] ? -1 : node.links[d];
   }
 }
 

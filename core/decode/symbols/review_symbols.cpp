@@ -11,7 +11,6 @@
 namespace slsd {
 namespace {
 
-constexpr Direction kDirections[] = {kRight, kDown, kLeft, kUp};
 /// How much farther from its letter a symbol may come to be by levelling the light: its centre gains even so.
 constexpr float kLevellingTolerance = 0.3F;
 

@@ -10,6 +10,10 @@
 
 namespace slsd {
 
+[[nodiscard]] inline ImageSize size_of(const GreyImage& picture) {
+  return std::visit([](const auto& pixels) { return ImageSize{pixels.width(), pixels.height()}; }, picture);
+}
+
 /// The pictures of one pose by one camera, owned.
 struct CapturedPictures {
   GreyImage white;

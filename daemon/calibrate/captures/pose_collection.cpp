@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/calibrate/judge/coverage.hpp"
+#include "daemon/calibrate/captures/captured_pictures.hpp"
 
 namespace slsd {
 namespace {
@@ -18,10 +19,6 @@ constexpr double kTiltedDeg = 15;
 constexpr double kCoverageEnough = 0.5;  // of an image; what the verdict calls good
 constexpr double kDistanceSpread = 1.15;
 constexpr std::size_t kUsualMin = 3;
-
-ImageSize size_of(const GreyImage& picture) {
-  return std::visit([](const auto& pixels) { return ImageSize{pixels.width(), pixels.height()}; }, picture);
-}
 
 /// Towards which side of the camera's picture the board's face is turned.
 std::size_t side_of(const BoardPlace& place) {

@@ -19,10 +19,6 @@ bool is_jpeg(const std::filesystem::path& file) {
   return file.extension() == ".jpg" || file.extension() == ".jpeg";
 }
 
-ImageSize size_of(const GreyImage& image) {
-  return std::visit([](const auto& pixels) { return ImageSize{pixels.width(), pixels.height()}; }, image);
-}
-
 std::string size_text(const ImageSize& size) {
   return slsd::size_text(size.width_px, size.height_px);
 }

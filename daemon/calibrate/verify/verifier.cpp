@@ -28,10 +28,6 @@ Result<Board> board_to_look_for(const CalibrateRequest& request, const Calibrati
   return requested_board(request);
 }
 
-ImageSize size_of(const GreyImage& image) {
-  return std::visit([](const auto& pixels) { return ImageSize{pixels.width(), pixels.height()}; }, image);
-}
-
 ImageSize size_of(const Lens& lens) {
   return {lens.width_px, lens.height_px};
 }
