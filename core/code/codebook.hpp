@@ -81,7 +81,8 @@ class Codebook {
 /// every camera, thread and trial.
 class IndexedPattern {
  public:
-  IndexedPattern(Pattern pattern) : both_(std::make_shared<const Both>(std::move(pattern))) {}  // NOLINT: a pattern is one
+  IndexedPattern(Pattern pattern)  // NOLINT: a pattern is one
+      : both_(std::make_shared<const Both>(std::move(pattern))) {}
 
   [[nodiscard]] const Pattern& pattern() const { return both_->pattern; }
   /// Keeps the pattern, too.
