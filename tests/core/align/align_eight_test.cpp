@@ -19,7 +19,7 @@ namespace {
 constexpr int kSide = 21;
 constexpr float kNoise = 2;
 
-const PatternField& field() {
+const PatternField& blurred_field() {
   static const PatternField made(draw_pattern(make_pattern({}).value()).view(), 0.72F);
   return made;
 }
@@ -65,7 +65,7 @@ template <std::size_t kCount>
 void align(const GreyView& frame, double full, std::array<PatchTask, kCount>& tasks) {
   std::vector<PatchTask*> all;
   for (PatchTask& task : tasks) all.push_back(&task);
-  align_eight(frame, full, field(), options(), kSide, all);
+  align_eight(frame, full, blurred_field(), options(), kSide, all);
 }
 
 void expect_same(const PatchTask& task, const PatchFit& fit, float grey = 1) {
@@ -94,7 +94,7 @@ PatchFit one_step(const GreyView& frame, double full, const PatchTask& start) {
   const PatchWindow window{start.x - kSide / 2, start.y - kSide / 2, kSide, kSide};
   return std::visit(
       [&](const auto& pixels) {
-        return aligner.align(pixels, full, start.noise, field(), start.map, window, start.state);
+        return aligner.align(pixels, full, start.noise, blurred_field(), start.map, window, start.state);
       },
       frame);
 }

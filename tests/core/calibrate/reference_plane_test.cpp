@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 
 #include "core/calibrate/calibrate.hpp"
+#include "tests/core/calibrate/outcome.hpp"
 #include "tests/core/calibrate/synthetic_rig.hpp"
 
 namespace slsd {
@@ -58,10 +59,6 @@ CalibrationOutcome calibrated(Observations observations) {
   auto outcome = calibrate(std::move(observations), {});
   if (!outcome) throw std::runtime_error(outcome.error().message);
   return std::move(*outcome);
-}
-
-const PoseReport& report_of(const CalibrationOutcome& outcome, const std::string& pose) {
-  return *std::ranges::find(outcome.poses, pose, &PoseReport::name);
 }
 
 double baseline_mm(const CalibrationOutcome& outcome) {

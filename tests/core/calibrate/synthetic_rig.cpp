@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kCornerColumns = 10, kCornerRows = 7;
 constexpr int kSymbolColumns = 20, kSymbolRows = 14;
-constexpr double kSquareMm = 50, kSymbolPitchMm = 25;
+constexpr double kBoardSquareMm = 50, kSymbolPitchMm = 25;
 
 struct Sight {
   const RigModel& rig;
@@ -38,7 +38,7 @@ struct Sight {
     PoseView view;
     view.camera = index, view.blur_px = 0.5;
     for (int i = 0; i < kCornerColumns * kCornerRows; ++i) {
-      const Eigen::Vector2d mm = kSquareMm * Eigen::Vector2d(i % kCornerColumns, i / kCornerColumns);
+      const Eigen::Vector2d mm = kBoardSquareMm * Eigen::Vector2d(i % kCornerColumns, i / kCornerColumns);
       const Eigen::Vector2d printed(mm.x(), mm.y() * (1 + options.stretch));
       const Eigen::Vector3d point = in_rig(pose, rig_from_board, printed);
       view.corners.push_back({noisy(camera.project(camera_from_rig * point), options.corner_sigma_px), mm});

@@ -12,12 +12,11 @@
 
 #include "core/decode/paper/binarize.hpp"
 #include "core/decode/regions/find_regions.hpp"
+#include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/images.hpp"
 
 namespace slsd {
 namespace {
-
-SerialExecutor alone;
 
 Mask binarize(const GreyView& frame, const BinarizeOptions& options = {}, double full = 0) {
   Mask mask;

@@ -8,13 +8,12 @@
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>
 
+#include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/decoded_scene.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
 
 namespace slsd {
 namespace {
-
-SerialExecutor alone;
 
 LatticeSymbol symbol_of(float weight, float gain) {
   LatticeSymbol symbol{};

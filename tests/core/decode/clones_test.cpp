@@ -14,14 +14,13 @@
 #include "core/decode/regions/sharpen.hpp"
 #include "core/decode/symbols/classify.hpp"
 #include "core/decode/symbols/weigh_patch.hpp"
+#include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/decoded_scene.hpp"
 #include "tests/core/decode/images.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
 
 namespace slsd {
 namespace {
-
-SerialExecutor alone;
 
 std::string name_of(Clone clone) {
   switch (clone) {

@@ -4,14 +4,13 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
 #include "tests/core/decode/simulated_grid.hpp"
 #include "tests/simulator/simulator.hpp"
 
 namespace slsd {
 namespace {
-
-SerialExecutor alone;
 
 constexpr auto kDecoded = RegionStatus::kDecoded;
 constexpr auto kDuplicate = RegionStatus::kDuplicateCell;

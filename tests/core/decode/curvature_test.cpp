@@ -8,13 +8,12 @@
 #include <Eigen/LU>
 
 #include "core/code/symbol.hpp"
+#include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/simulated_grid.hpp"
 #include "tests/simulator/simulator.hpp"
 
 namespace slsd {
 namespace {
-
-SerialExecutor alone;
 
 constexpr int kSizePx = 16;
 constexpr int kSide = 7;  // of the block of cells
@@ -153,7 +152,8 @@ TEST(CentreCorrection, LeavesAFlatGridAlone) {
 TEST(CentreCorrection, LeavesOutWhatHasNoCell) {
   const std::vector<GridNode> nodes(1, GridNode{{10, 20}, LatticeFrame::Identity()});
   const std::vector<GreyMoments> moments(1);
-  Lattice lattice{{LatticeSymbol{}}};
+  Lattice lattice;
+  lattice.symbols.resize(1);
   CentreCorrection({exact_prototype(lit_places(7))}, 18, kSizePx)
       .correct(nodes, moments, {CellClaim{}}, {}, alone, lattice);
   EXPECT_TRUE(lattice.symbols.empty());

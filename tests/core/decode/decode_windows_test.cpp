@@ -8,17 +8,13 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
 #include "tests/core/decode/simulated_grid.hpp"
 #include "tests/simulator/simulator.hpp"
 
 namespace slsd {
 namespace {
-
-SerialExecutor alone;
-
-constexpr double kWrongCellsMax = 0.001;
-constexpr int kRows = 44, kColumns = 71;
 
 struct Damage {
   double misread = 0, missing = 0;
@@ -32,26 +28,18 @@ struct Sheet {
   std::vector<bool> misread;
 };
 
-Classification read_as(int letter, int letters) {
-  Classification shape;
-  for (int i = 0; i < letters; ++i)
-    shape.log_probability[i] = static_cast<float>(std::log(i == letter ? 0.96 : 0.04 / (letters - 1)));
-  shape.letter = static_cast<std::int8_t>(letter);
-  return shape;
-}
-
 Sheet sheet_of(const CodeArray& array, const Damage& damage) {
   std::mt19937 random(damage.seed);
   std::uniform_real_distribution<double> uniform(0, 1);
   Sheet sheet;
-  for (int row = 0; row < kRows; ++row) {
-    for (int column = 0; column < kColumns; ++column) {
+  for (int row = 0; row < kWholeRows; ++row) {
+    for (int column = 0; column < kWholeColumns; ++column) {
       if (uniform(random) < damage.missing) continue;
       sheet.misread.push_back(uniform(random) < damage.misread);
       const int change = sheet.misread.back() ? 1 + static_cast<int>(random() % (array.letters - 1)) : 0;
       sheet.grid.add(row, column, {18.F * static_cast<float>(column), 18.F * static_cast<float>(row)},
                      LatticeFrame::Identity());
-      sheet.shapes.push_back(read_as((array.at(row, column) + change) % array.letters, array.letters));
+      sheet.shapes.push_back(read_as((array.at(row, column) + change) % array.letters, array.letters, 0.96));
     }
   }
   sheet.grid.link_truly();
@@ -72,7 +60,8 @@ class DecodeWindows : public testing::Test {
   }
 
   std::vector<CellClaim> decode(const Sheet& sheet, std::span<const EpipolarSegment> segments = {}) {
-    WindowDecoder decoder(pattern_, std::make_shared<const Codebook>(pattern_.array, kRows, kColumns), kWrongCellsMax);
+    WindowDecoder decoder(pattern_, std::make_shared<const Codebook>(pattern_.array, kWholeRows, kWholeColumns),
+                          kWrongCellsMax);
     std::vector<CellClaim> claims;
     decoder.decode(sheet.grid.nodes, sheet.shapes, CellGate(cells_, segments, 1.5), alone, claims);
     return claims;
@@ -100,7 +89,7 @@ class DecodeWindows : public testing::Test {
 TEST_F(DecodeWindows, NamesEveryNodeOfAWholeGrid) {
   const Sheet sheet = sheet_of(pattern_.array, {});
   const Score result = score(sheet, decode(sheet));
-  EXPECT_EQ(result.nodes, kRows * kColumns);
+  EXPECT_EQ(result.nodes, kWholeRows * kWholeColumns);
   EXPECT_EQ(result.decoded, result.nodes);
   EXPECT_EQ(result.wrong, 0);
 }
@@ -156,7 +145,7 @@ TEST_F(DecodeWindows, NamesHardlyAnythingOfAnotherArray) {
   std::mt19937 random(8);
   for (std::uint8_t& letter : other.cells) letter = static_cast<std::uint8_t>(random() % 5);
   const Sheet sheet = sheet_of(other, {});
-  EXPECT_LT(score(sheet, decode(sheet)).decoded, kRows * kColumns / 20);
+  EXPECT_LT(score(sheet, decode(sheet)).decoded, kWholeRows * kWholeColumns / 20);
 }
 
 TEST_F(DecodeWindows, SaysWhyLonelyNodesHaveNoCell) {

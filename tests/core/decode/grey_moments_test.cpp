@@ -45,7 +45,7 @@ Grey8 blurred_box(const Box& box, double noise_sigma = 0, double shading = 0) {
   return frame;
 }
 
-Regions regions_of(const Grey8& frame, int threshold = 70) {
+Regions regions_above(const Grey8& frame, int threshold = 70) {
   Grey8 mask(frame.width(), frame.height());
   for (std::size_t i = 0; i < mask.size(); ++i) mask.data()[i] = frame.data()[i] > threshold ? 255 : 0;
   Regions found;
@@ -135,7 +135,7 @@ RC_GTEST_PROP(GreyMoments, EqualPlainSumsInDoublePrecision, ()) {
   std::mt19937 random(*rc::gen::arbitrary<std::uint32_t>());
   const int left = static_cast<int>(random() % 40), top = static_cast<int>(random() % 32);
   const Grey8 frame = random_blob(random, left, top);
-  const Regions regions = regions_of(frame);
+  const Regions regions = regions_above(frame);
   for (std::size_t i = 0; i < regions.regions.size(); ++i) {
     const GreyMoments fast = measure(frame, regions, i);
     const PlainMoments plain = plain_moments(pixels_around(frame, regions.runs_of(regions.regions[i])));
@@ -155,7 +155,7 @@ RC_GTEST_PROP(GreyMoments, MoveWithTheRegionAndDoNotChange, ()) {
   std::mt19937 one(seed), other(seed);
   const int dx = *rc::gen::inRange(0, 20), dy = *rc::gen::inRange(0, 14);
   const Grey8 here = random_blob(one, 8, 8), there = random_blob(other, 8 + dx, 8 + dy);
-  const GreyMoments a = measure(here, regions_of(here)), b = measure(there, regions_of(there));
+  const GreyMoments a = measure(here, regions_above(here)), b = measure(there, regions_above(there));
   RC_ASSERT(std::abs(b.x - a.x - static_cast<float>(dx)) < 1e-5F);
   RC_ASSERT(std::abs(b.y - a.y - static_cast<float>(dy)) < 1e-5F);
   const auto same = [](float first, float second) {
@@ -169,7 +169,7 @@ RC_GTEST_PROP(GreyMoments, FindTheCentreBetweenPixels, ()) {
   const double x = 0.01 * *rc::gen::inRange(0, 100), y = 0.01 * *rc::gen::inRange(0, 100);
   const Box box{14 + x, 12 + y, 26.4 + x, 23 + y};
   const Grey8 frame = blurred_box(box);
-  const GreyMoments moments = measure(frame, regions_of(frame));
+  const GreyMoments moments = measure(frame, regions_above(frame));
   RC_ASSERT(std::abs(moments.x - 0.5 * (box.left + box.right)) < 0.08);
   RC_ASSERT(std::abs(moments.y - 0.5 * (box.top + box.bottom)) < 0.08);
   // Blurred by one pixel, the edge's height of a fifth lies that much further out.
@@ -178,7 +178,7 @@ RC_GTEST_PROP(GreyMoments, FindTheCentreBetweenPixels, ()) {
 
 TEST(GreyMoments, OfSixteenBitsAreThoseOfEight) {
   const Grey8 frame = blurred_box({14.3, 12.8, 26, 23}, 2);
-  const Regions regions = regions_of(frame);
+  const Regions regions = regions_above(frame);
   const Region& region = regions.regions[0];
   const GreyMoments eight = measure(frame, regions);
   const GreyMoments sixteen =
@@ -191,14 +191,14 @@ TEST(GreyMoments, OfSixteenBitsAreThoseOfEight) {
 
 TEST(GreyMoments, OfAnEvenPatchWeighNothing) {
   const Grey8 frame(20, 20, 200);
-  EXPECT_EQ(measure(frame, regions_of(frame)).weight, 0);
+  EXPECT_EQ(measure(frame, regions_above(frame)).weight, 0);
 }
 
 TEST(GreyMoments, LevelTheLight) {
   constexpr double kShading = 0.03;
   const Box box{14.3, 12.8, 27, 23};
   const Grey8 frame = blurred_box(box, 0, kShading);
-  const Regions regions = regions_of(frame);
+  const Regions regions = regions_above(frame);
   const Region& region = regions.regions[0];
   const double middle = 0.5 * (box.left + box.right);
   const double as_seen = std::abs(measure(frame, regions).x - middle);

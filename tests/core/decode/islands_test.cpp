@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 
 #include "core/decode/grid/decode_windows.hpp"
+#include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
 #include "tests/core/decode/simulated_grid.hpp"
 #include "tests/simulator/simulator.hpp"
@@ -19,19 +20,7 @@
 namespace slsd {
 namespace {
 
-SerialExecutor alone;
-
-constexpr double kWrongCellsMax = 0.001;
-constexpr int kRows = 44, kColumns = 71;
-constexpr auto kDecoded = RegionStatus::kDecoded;
-
-Classification read_as(int letter, int letters) {
-  Classification shape;
-  for (int i = 0; i < letters; ++i)
-    shape.log_probability[i] = static_cast<float>(std::log(i == letter ? 0.992 : 0.008 / (letters - 1)));
-  shape.letter = static_cast<std::int8_t>(letter);
-  return shape;
-}
+constexpr double kSure = 0.992;
 
 /// Nodes at places of a grid, linked wherever there are two side by side, that show what they are told to.
 class Islands : public testing::Test {
@@ -49,7 +38,7 @@ class Islands : public testing::Test {
   void show(int row, int column, int letter) {
     grid_.add(row, column, {18.F * static_cast<float>(column), 18.F * static_cast<float>(row)},
               LatticeFrame::Identity());
-    shapes_.push_back(read_as(letter, 5));
+    shapes_.push_back(read_as(letter, 5, kSure));
   }
   void show_pattern(int top, int left, int bottom, int right, int slid = 0) {
     for (int row = top; row < bottom; ++row)
@@ -71,16 +60,17 @@ class Islands : public testing::Test {
   }
   std::vector<CellClaim> decode(std::span<const EpipolarSegment> segments = {}) {
     grid_.link_truly();
-    WindowDecoder decoder(pattern_, std::make_shared<const Codebook>(pattern_.array, kRows, kColumns), kWrongCellsMax);
+    WindowDecoder decoder(pattern_, std::make_shared<const Codebook>(pattern_.array, kWholeRows, kWholeColumns),
+                          kWrongCellsMax);
     std::vector<CellClaim> claims;
     decoder.decode(grid_.nodes, shapes_, CellGate(cells_, segments, 1.5), alone, claims);
     return claims;
   }
   int decoded(const std::vector<CellClaim>& claims) const {
-    return static_cast<int>(std::ranges::count(claims, kDecoded, &CellClaim::status));
+    return static_cast<int>(std::ranges::count(claims, RegionStatus::kDecoded, &CellClaim::status));
   }
   bool is_decoded(const std::vector<CellClaim>& claims, int row, int column) const {
-    return claims[grid_.node_at(row, column)].status == kDecoded;
+    return claims[grid_.node_at(row, column)].status == RegionStatus::kDecoded;
   }
 
   Pattern pattern_;
@@ -106,7 +96,7 @@ TEST_F(Islands, AreNoLargerForNodesThatChanceAddsAtTheirRim) {
   for (std::size_t i = 200; i < claims.size(); ++i) {
     const auto [row, column] = grid_.cells[i];
     alike += shapes_[i].letter == pattern_.array.at(row, column);
-    EXPECT_NE(claims[i].status, kDecoded) << row << ", " << column;
+    EXPECT_NE(claims[i].status, RegionStatus::kDecoded) << row << ", " << column;
   }
   EXPECT_GT(alike, 20);             // so many letters are the pattern's by chance
   EXPECT_GE(decoded(claims), 175);  // corners that lie beside them may be theirs
@@ -122,7 +112,7 @@ TEST_F(Islands, NameNoRowBetweenThemThatIsAtAnotherDepth) {
     const auto claims = decode();
     for (int column = 10; column < 50; ++column) {
       const CellClaim& claim = claims[grid_.node_at(20, column)];
-      EXPECT_FALSE(claim.status == kDecoded && claim.same_cell(20, column)) << slid << ": " << column;
+      EXPECT_FALSE(claim.status == RegionStatus::kDecoded && claim.same_cell(20, column)) << slid << ": " << column;
     }
     EXPECT_GT(decoded(claims), 690);
   }
@@ -181,7 +171,7 @@ TEST_F(Islands, LoseNothingAtAStraightEdgeInDepth) {
   EXPECT_GE(decoded(claims), 560);  // of 600
   for (std::size_t i = 0; i < claims.size(); ++i) {
     const auto [row, column] = grid_.cells[i];
-    if (claims[i].status == kDecoded) {
+    if (claims[i].status == RegionStatus::kDecoded) {
       EXPECT_TRUE(claims[i].same_cell(row, row < 20 ? column : column + 7));
     }
   }
@@ -209,7 +199,7 @@ class PatchedIslands : public Islands {
   }
   /// Its letter, or one that is so many on from it.
   void put(int row, int column, int on) {
-    shapes_[grid_.node_at(row, column)] = read_as((pattern_.array.at(row, column) + on) % 5, 5);
+    shapes_[grid_.node_at(row, column)] = read_as((pattern_.array.at(row, column) + on) % 5, 5, kSure);
   }
 };
 
@@ -239,7 +229,7 @@ TEST_F(Islands, AreBothRefusedWhereTheyShowOnePartOfThePattern) {
 
 TEST_F(Islands, AreNotOneMistakeAwayFromNothing) {
   show_pattern(10, 10, 18, 18);
-  shapes_[grid_.node_at(14, 14)] = read_as((pattern_.array.at(14, 14) + 1) % 5, 5);
+  shapes_[grid_.node_at(14, 14)] = read_as((pattern_.array.at(14, 14) + 1) % 5, 5, kSure);
   const auto claims = decode();
   EXPECT_EQ(claims[grid_.node_at(14, 14)].status, RegionStatus::kClassDisagrees);
   EXPECT_GE(decoded(claims), 48);
@@ -266,7 +256,7 @@ TEST_F(Islands, AreTheSameInWhateverOrderNodesStand) {
   show_pattern(25, 10, 26, 40, 3);
   show_pattern(26, 10, 35, 40);
   for (Classification& shape : shapes_)
-    if (random() % 12 == 0) shape = read_as(static_cast<int>(random() % 5), 5);
+    if (random() % 12 == 0) shape = read_as(static_cast<int>(random() % 5), 5, kSure);
   const auto claims = decode();
   std::vector<std::size_t> order(shapes_.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -292,7 +282,7 @@ TEST_F(Islands, AreTheSameInWhateverOrderNodesStand) {
 
 // Every window of an array whose right half is its left one again answers to two cells.
 TEST_F(Islands, AreNoneWhereEveryWindowAnswersToTwoCells) {
-  for (int row = 0; row < kRows; ++row)
+  for (int row = 0; row < kWholeRows; ++row)
     for (int column = 0; column < 35; ++column)
       pattern_.array.cells[row * pattern_.array.columns + column + 35] =
           pattern_.array.cells[row * pattern_.array.columns + column];

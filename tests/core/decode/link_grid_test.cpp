@@ -8,15 +8,13 @@
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>
 
+#include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/simulated_grid.hpp"
 
 namespace slsd {
 namespace {
 
-SerialExecutor alone;
-
 constexpr int kRows = 24, kColumns = 30;
-constexpr Direction kDirections[] = {kRight, kDown, kLeft, kUp};
 
 /// A tilted plane under a camera that is rolled: steps shrink by a third from side to side.
 Homography tilted(float roll_rad) {

@@ -9,12 +9,11 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/decode/grid/link_grid.hpp"
+#include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
 
 namespace slsd {
 namespace {
-
-SerialExecutor alone;
 
 constexpr int kCells = 10, kScale = 2, kPitchPx = 18 * kScale;
 constexpr int kSidePx = kCells * kPitchPx;

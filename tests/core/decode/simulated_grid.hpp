@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cmath>
 #include <map>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <Eigen/Geometry>
 
 #include "core/decode/grid/link_grid.hpp"
+#include "core/decode/symbols/classify.hpp"
 
 namespace slsd {
 
@@ -44,6 +46,20 @@ struct SimulatedGrid {
     }
   }
 };
+
+/// What the classifier makes of a symbol that is this letter as surely as told, else any other.
+inline Classification read_as(int letter, int letters, double sure) {
+  Classification shape;
+  for (int i = 0; i < letters; ++i)
+    shape.log_probability[i] = static_cast<float>(std::log(i == letter ? sure : (1 - sure) / (letters - 1)));
+  shape.letter = static_cast<std::int8_t>(letter);
+  return shape;
+}
+
+/// Of the shipped pattern of 16 px: the cells that it shows whole.
+constexpr int kWholeRows = 44, kWholeColumns = 71;
+/// The budget that the service ships with.
+constexpr double kWrongCellsMax = 0.001;
 
 inline Eigen::Vector2f through(const Homography& camera_from_pattern, int row, int column) {
   const Eigen::Vector3f cell(SimulatedGrid::kPitchPx * static_cast<float>(column),

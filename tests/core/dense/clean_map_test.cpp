@@ -131,10 +131,10 @@ TEST(DropUnlitRims, KeepsWhatFirmPixelsEnclose) {
 }
 
 TEST(DropUnlitRims, BridgesTwiceItsReachAcrossWords) {
-  const std::string row = std::string(60, '#') + "oooooo" + std::string(60, '#');
+  const std::string lit(60, '#'), row = lit + "oooooo" + lit, whole(126, '#');
   DenseMap map = map_of({row, row});
   cleaner().drop_unlit_rims(map, 3);
-  EXPECT_EQ(left_of(map), std::string(126, '#') + "\n" + std::string(126, '#') + "\n");
+  EXPECT_EQ(left_of(map), whole + "\n" + whole + "\n");
   map = map_of({row, row});
   cleaner().drop_unlit_rims(map, 2);
   EXPECT_EQ(left_of(map).find('.'), 60U);

@@ -21,7 +21,6 @@ using std::filesystem::path;
 using testing::HasSubstr;
 using testing::Not;
 
-constexpr char kBoard[] = "charuco:7x5:60:45:DICT_5X5_100";
 constexpr char kPlane[] = "plane:6x4:70:35:DICT_4X4_50";
 constexpr int kPoses = 7, kPlanes = 2;
 
@@ -49,7 +48,7 @@ class FromFiles : public testing::Test {
     PatternOptions options;
     options.projector_width_px = 640, options.projector_height_px = 400;
     const auto pattern = make_pattern(options);
-    const auto board = parse_board(kBoard);
+    const auto board = parse_board(kSimulatedBoard);
     const auto plane = parse_board(kPlane);
     if (!pattern || !board || !plane) std::abort();
     for (int i = 0; i < kPoses; ++i) {
@@ -71,7 +70,7 @@ class FromFiles : public testing::Test {
     write_text(home_ / "slsd.toml", configuration_text());
     request_.configuration_file = home_ / "slsd.toml";
     request_.from = captures_;
-    request_.board = kBoard;
+    request_.board = kSimulatedBoard;
   }
   void TearDown() override { std::filesystem::remove_all(home_); }
 
@@ -121,7 +120,7 @@ TEST_F(FromFiles, KeepsACalibrationNearTheTruth) {
   const RigidTransform &rig = found->cameras[0].projector_from_camera, &is = truth.cameras[0].projector_from_camera;
   EXPECT_LT(Eigen::AngleAxisd(rig.rotation * is.rotation.transpose()).angle() * 57.3, 0.15);
   EXPECT_NEAR(rig.translation.norm(), is.translation.norm(), 1);
-  EXPECT_EQ(found->report.board, kBoard);
+  EXPECT_EQ(found->report.board, kSimulatedBoard);
   EXPECT_LT(*found->report.reprojection_error_camera_px, 0.1);
   EXPECT_LT(*found->report.reprojection_error_projector_px, 0.15);
 }
@@ -299,8 +298,8 @@ TEST_F(FromFiles, TakesABoardNamedRowsByColumns) {
   const auto done = calibrate_from_files(request_);
   const std::string said = testing::internal::GetCapturedStdout();
   ASSERT_TRUE(done) << to_string(done.error());
-  EXPECT_THAT(said, HasSubstr("the board is " + std::string(kBoard) + ": it was named rows by columns"));
-  EXPECT_EQ(kept().report.board, kBoard);
+  EXPECT_THAT(said, HasSubstr("the board is " + std::string(kSimulatedBoard) + ": it was named rows by columns"));
+  EXPECT_EQ(kept().report.board, kSimulatedBoard);
 }
 
 TEST_F(FromFiles, UsesThePosesOfOnePart) {

@@ -13,6 +13,9 @@ namespace slsd {
 /// Half the paper's rig: a camera of 800x600 and a projector of 640x400, at the same distances.
 [[nodiscard]] Calibration small_rig();
 
+/// Whose captures the tests write.
+constexpr char kSimulatedBoard[] = "charuco:7x5:60:45:DICT_5X5_100";
+
 /// A pose of the board: its plane in the camera's frame.
 [[nodiscard]] RigidTransform simulated_pose(int index);
 

@@ -16,8 +16,6 @@ namespace {
 using std::filesystem::path;
 using testing::HasSubstr;
 
-constexpr char kBoard[] = "charuco:7x5:60:45:DICT_5X5_100";
-
 /// One look at a board, and a calibration that each test writes.
 class VerifyFromFiles : public testing::Test {
  protected:
@@ -29,8 +27,8 @@ class VerifyFromFiles : public testing::Test {
                                           "[calibration]\nfile = \"calibration.yml\"\n";
     PatternOptions options;
     options.projector_width_px = 640, options.projector_height_px = 400;
-    write_simulated_pose(pose(), small_rig(), *parse_board(kBoard), *make_pattern(options), simulated_pose(1));
-    calibrated_.report.board = kBoard;
+    write_simulated_pose(pose(), small_rig(), *parse_board(kSimulatedBoard), *make_pattern(options), simulated_pose(1));
+    calibrated_.report.board = kSimulatedBoard;
     request_.configuration_file = home_ / "slsd.toml";
     request_.from = home_ / "captures";
   }
@@ -60,7 +58,7 @@ TEST_F(VerifyFromFiles, PassesTheCalibrationThatIsTrue) {
 
 TEST_F(VerifyFromFiles, MissesTheBoardThatIsAskedFor) {
   std::filesystem::remove(pose() / "white.png");
-  request_.board = kBoard;
+  request_.board = kSimulatedBoard;
   const auto without = verify();
   ASSERT_FALSE(without);
   EXPECT_EQ(without.error().code, ErrorCode::kNotFound);
@@ -87,7 +85,7 @@ TEST_F(VerifyFromFiles, TakesTheRulerOfABoardThatIsNamed) {
   ASSERT_FALSE(alone);
   EXPECT_EQ(alone.error().code, ErrorCode::kInvalidArgument);
   EXPECT_THAT(to_string(alone.error()), HasSubstr("--ruler 200:200: name the print whose ruler it is by --board too"));
-  request_.board = kBoard;
+  request_.board = kSimulatedBoard;
   const auto done = verify();
   EXPECT_TRUE(done) << to_string(done.error());
 }

@@ -15,7 +15,7 @@
 namespace slsd {
 namespace {
 
-constexpr std::size_t kMB = 1 << 20;
+constexpr std::size_t kLentBytes = 1 << 20;
 
 TEST(SealedMemory, HoldsTheBytesAndCannotChange) {
   const auto memory = sealed_memory("a cloud");
@@ -41,31 +41,31 @@ TEST(SealedMemory, SaysThatNoDescriptorIsLeft) {
 }
 
 TEST(LentMemory, CountsUntilTheClientClosedAndUnmapped) {
-  MemoryBudget budget(100 * kMB);
+  MemoryBudget budget(100 * kLentBytes);
   LentMemory lent(budget);
-  auto memory = sealed_memory(std::string(kMB, 'c'));
+  auto memory = sealed_memory(std::string(kLentBytes, 'c'));
   ASSERT_TRUE(memory);
   ASSERT_TRUE(lent.add(std::move(memory->kept), memory->bytes));
   lent.sweep();
-  EXPECT_EQ(budget.held(), kMB);
-  void* mapped = ::mmap(nullptr, kMB, PROT_READ, MAP_SHARED, memory->given.number(), 0);
+  EXPECT_EQ(budget.held(), kLentBytes);
+  void* mapped = ::mmap(nullptr, kLentBytes, PROT_READ, MAP_SHARED, memory->given.number(), 0);
   ASSERT_NE(mapped, MAP_FAILED);
   memory->given = FileDescriptor();
   lent.sweep();
-  EXPECT_EQ(budget.held(), kMB) << "mapped still";
-  ::munmap(mapped, kMB);
+  EXPECT_EQ(budget.held(), kLentBytes) << "mapped still";
+  ::munmap(mapped, kLentBytes);
   lent.sweep();
   EXPECT_EQ(budget.held(), 0U);
   EXPECT_EQ(lent.count(), 0U);
 }
 
 TEST(LentMemory, LendsNoMoreThanAHalf) {
-  MemoryBudget budget(16 * kMB);
+  MemoryBudget budget(16 * kLentBytes);
   LentMemory lent(budget);
   std::vector<FileDescriptor> given;
   Result<> added;
   while (added && given.size() < 20) {
-    auto memory = sealed_memory(std::string(kMB, 'c'));
+    auto memory = sealed_memory(std::string(kLentBytes, 'c'));
     ASSERT_TRUE(memory);
     added = lent.add(std::move(memory->kept), memory->bytes);
     given.push_back(std::move(memory->given));
