@@ -75,10 +75,11 @@ Grey8 photograph(const Scene& scene, const Grey8& projected, std::uint32_t seed)
 }
 
 /// How far symbols whose centres are within half a pitch of an edge of the print are off, towards the ink; and all of
-/// them, root mean square of a coordinate.
+/// them, root mean square of a coordinate, and the mean.
 struct Errors {
   std::size_t count = 0, beside = 0;
   double on_ink_px = 0, on_paper_px = 0, all_px = 0;
+  Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();
 };
 
 /// Towards the nearest edge of a square, in board coordinates: its direction, and how far it is.
@@ -104,7 +105,7 @@ Errors errors_of(const Scene& scene) {
   for (const ProjectedPoint& symbol : view->symbols) {
     const Eigen::Vector2d truth = scene.camera_from_projector * symbol.projector_px;
     const Eigen::Vector2d off = symbol.camera_px - truth;
-    errors.all_px += off.squaredNorm() / 2;
+    errors.all_px += off.squaredNorm() / 2, errors.mean_px += off;
     ++errors.count;
     const Eigen::Vector2d at = scene.camera_from_board.inverse() * truth;
     const Eigen::Vector2d edge = scene.camera_from_board.linear() * to_edge(at);
@@ -117,6 +118,7 @@ Errors errors_of(const Scene& scene) {
     ++(ink ? on_ink : on_paper);
   }
   errors.all_px = std::sqrt(errors.all_px / static_cast<double>(errors.count));
+  errors.mean_px /= static_cast<double>(errors.count);
   errors.on_ink_px /= static_cast<double>(on_ink), errors.on_paper_px /= static_cast<double>(on_paper);
   errors.beside = on_ink + on_paper;
   return errors;
@@ -146,6 +148,18 @@ TEST(ObservePattern, FindsThemUnderAnyBlackLevel) {
     EXPECT_NEAR(errors.on_ink_px, 0, 0.03);
     EXPECT_NEAR(errors.on_paper_px, 0, 0.03);
     EXPECT_LT(errors.all_px, 0.06);
+  }
+}
+
+// A board that is nearer than the others is less sharp. Did that shift all its symbols by 0.01 px, focal lengths would
+// be off by 0.01 %.
+TEST(ObservePattern, FindsSymbolsOnTheAverageWhereTheyAreHoweverBlurred) {
+  for (const auto& [camera_px, projector_px] : {std::pair(0.4, 0.4), std::pair(0.6, 0.6), std::pair(0.8, 0.9)}) {
+    const Errors errors = errors_of({.blur_px = camera_px, .projector_blur_px = projector_px});
+    SCOPED_TRACE(testing::Message() << "camera " << camera_px << " px, projector " << projector_px << " px, "
+                                    << errors.count << " symbols: " << errors.mean_px.transpose() << " px");
+    EXPECT_GT(errors.count, 300U);
+    EXPECT_LT(errors.mean_px.cwiseAbs().maxCoeff(), 0.008);
   }
 }
 
