@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -59,6 +60,21 @@ Gradient gradient_at(const Image<float>& light, int x, int y) {
   return {capped(light.at(x + 1, y) - light.at(x - 1, y)), capped(light.at(x, y + 1) - light.at(x, y - 1))};
 }
 
+/// The gradients of all of a picture.
+struct GradientField {
+  Image<float> x, y;
+
+  explicit GradientField(const Image<float>& light)
+      : x(light.width(), light.height()), y(light.width(), light.height()) {
+    for (int row = 1; row < light.height() - 1; ++row) {
+      for (int column = 1; column < light.width() - 1; ++column) {
+        const Gradient gradient = gradient_at(light, column, row);
+        x.at(column, row) = gradient.x, y.at(column, row) = gradient.y;
+      }
+    }
+  }
+};
+
 struct Edge {
   int x, y;
   Gradient gradient;
@@ -99,19 +115,18 @@ PrintShift find_print_shift(const GreyView& white, const GreyView& pattern, cons
   if (size_of(white) != size_of(pattern)) return {};
   const std::vector<Edge> edges = edges_of(log_light(white), board, sighting);
   if (edges.size() < kEdgesMin) return {};
-  const Image<float> lit = log_light(pattern);
+  const GradientField lit(log_light(pattern));
   constexpr int kSide = 2 * kReachPx + 1;
-  std::vector<double> agreement(kSide * kSide);
-  for (int dy = -kReachPx; dy <= kReachPx; ++dy) {
-    for (int dx = -kReachPx; dx <= kReachPx; ++dx) {
-      double sum = 0;
-      for (const Edge& edge : edges) {
-        const Gradient there = gradient_at(lit, edge.x + dx, edge.y + dy);
-        sum += edge.gradient.x * there.x + edge.gradient.y * there.y;
-      }
-      agreement[static_cast<std::size_t>((dy + kReachPx) * kSide + dx + kReachPx)] = sum;
+  std::vector<float> sums(kSide * kSide);
+  for (const Edge& edge : edges) {
+    for (int row = 0; row < kSide; ++row) {
+      const float* const x = lit.x.row(edge.y + row - kReachPx) + edge.x - kReachPx;
+      const float* const y = lit.y.row(edge.y + row - kReachPx) + edge.x - kReachPx;
+      float* const sum = sums.data() + static_cast<std::ptrdiff_t>(row) * kSide;
+      for (int i = 0; i < kSide; ++i) sum[i] += edge.gradient.x * x[i] + edge.gradient.y * y[i];
     }
   }
+  const std::vector<double> agreement(sums.begin(), sums.end());
   const auto best = std::ranges::max_element(agreement);
   const auto at = static_cast<int>(best - agreement.begin());
   const double usual = median_of(agreement);

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include <ceres/ceres.h>
+#include <ceres/normal_prior.h>
 
 #include "core/calibrate/solve/residuals.hpp"
 
@@ -123,8 +124,7 @@ class Problem {
     double* const stretch = is_board ? &rig_.board_stretch : &true_stretch_;
     for (const BoardPoint& point : view.corners) {
       if (point.outlying) continue;
-      auto* cost = new ceres::AutoDiffCostFunction<CornerResidual, 2, 9, 6, 6, 1, 1>(
-          new CornerResidual{point.camera_px, point.board_mm, sigma_px});
+      auto* cost = new CornerResidual(point.camera_px, point.board_mm, sigma_px);
       blocks.push_back(problem_.AddResidualBlock(cost, &loss_, camera.lens.data(),
                                                  place_block(static_cast<int>(view.camera), pose), pose_block(pose),
                                                  scale, stretch));
@@ -137,8 +137,7 @@ class Problem {
     for (const ProjectedPoint& point : view.symbols) {
       if (point.outlying) continue;
       const double sigma_px = point.sigma_px * options_.symbol_sigma_factor * view.symbol_noise;
-      auto* cost = new ceres::AutoDiffCostFunction<SymbolResidual, 2, 9, 6, 9, 6, 6>(
-          new SymbolResidual{point.camera_px, point.projector_px, sigma_px});
+      auto* cost = new SymbolResidual(point.camera_px, point.projector_px, sigma_px);
       blocks.push_back(problem_.AddResidualBlock(cost, &loss_, camera.lens.data(),
                                                  place_block(static_cast<int>(view.camera), pose),
                                                  projector.lens.data(), place_block(-1, pose), lit_block(pose)));
@@ -149,8 +148,10 @@ class Problem {
   // Of a lens that nothing was seen by there is none: its block is not part of the problem.
   void add_prior(DeviceModel& device, const DistortionPrior& prior) {
     if (!problem_.HasParameterBlock(device.lens.data())) return;
-    problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<DistortionResidual, 5, 9>(new DistortionResidual{prior}),
-                              nullptr, device.lens.data());
+    ceres::Matrix in_sigmas = ceres::Matrix::Zero(static_cast<Eigen::Index>(prior.size()), 9);
+    for (std::size_t i = 0; i < prior.size(); ++i)
+      in_sigmas(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(kFirstTerm + i)) = 1 / prior[i];
+    problem_.AddResidualBlock(new ceres::NormalPrior(in_sigmas, ceres::Vector::Zero(9)), nullptr, device.lens.data());
   }
 
   void hold_constant() {

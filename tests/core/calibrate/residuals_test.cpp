@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include "core/calibrate/solve/residuals.hpp"
 
+#include <ceres/autodiff_cost_function.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 #include <opencv2/calib3d.hpp>
@@ -9,6 +10,7 @@
 #include "core/calibrate/solve/point_residuals.hpp"
 #include "core/calibrate/solve/pose_influence.hpp"
 #include "core/calibrate/solve/resection.hpp"
+#include "tests/core/calibrate/plain_residuals.hpp"
 #include "tests/core/calibrate/synthetic_rig.hpp"
 
 namespace slsd {
@@ -22,7 +24,7 @@ RC_GTEST_PROP(Distort, IsThatOfTheLens, ()) {
   const RigModel rig = true_rig();
   const Lens lens = to_lens(rig.cameras[0].lens, rig.cameras[0].size);
   const double x = between(-250, 250) / 1000, y = between(-200, 200) / 1000;
-  RC_ASSERT((distort(rig.cameras[0].lens.data(), x, y) - lens.distort({x, y})).norm() < 1e-9);
+  RC_ASSERT((test::distort(rig.cameras[0].lens.data(), x, y) - lens.distort({x, y})).norm() < 1e-9);
 }
 
 RC_GTEST_PROP(Moved, IsThatOfOpenCv, ()) {
@@ -34,10 +36,57 @@ RC_GTEST_PROP(Moved, IsThatOfOpenCv, ()) {
   cv::Rodrigues(cv::Vec3d(motion[0], motion[1], motion[2]), turn);
   const cv::Vec3d other =
       turn * cv::Vec3d(point.x(), point.y(), point.z()) + cv::Vec3d(motion[3], motion[4], motion[5]);
-  const Eigen::Vector3d own = moved(motion.data(), point);
+  const Eigen::Vector3d own = test::moved(motion.data(), point);
   RC_ASSERT((own - Eigen::Vector3d(other[0], other[1], other[2])).norm() < 1e-9);
-  RC_ASSERT((moved_back(motion.data(), own) - point).norm() < 1e-9);
+  RC_ASSERT((test::moved_back(motion.data(), own) - point).norm() < 1e-9);
   RC_ASSERT((to_motion(motion) * point - own).norm() < 1e-9);
+}
+
+/// Residuals and their slopes by each block, one after the other.
+Eigen::VectorXd evaluated(const ceres::CostFunction& cost, const std::vector<const double*>& blocks) {
+  Eigen::Index size = 2;
+  for (const int block : cost.parameter_block_sizes()) size += 2 * block;
+  Eigen::VectorXd values(size);
+  std::vector<double*> slopes;
+  double* next = values.data() + 2;
+  for (const int block : cost.parameter_block_sizes()) slopes.push_back(next), next += 2 * block;
+  EXPECT_TRUE(cost.Evaluate(blocks.data(), values.data(), slopes.data()));
+  return values;
+}
+
+double relative(const Eigen::VectorXd& values, const Eigen::VectorXd& other) {
+  return ((values - other).array() / other.array().abs().max(1)).abs().maxCoeff();
+}
+
+LensVector any_lens() {
+  return {double(between(600, 900)), double(between(600, 900)), double(between(500, 520)),
+          double(between(380, 400)), between(-200, 200) / 1e3,  between(-100, 100) / 1e3,
+          between(-100, 100) / 1e4,  between(-100, 100) / 1e4,  between(-100, 100) / 1e3};
+}
+
+/// A turn, at times none, and a shift.
+MotionVector any_place(double far_mm) {
+  const double turn = between(0, 4) == 0 ? 0 : 1e-3;
+  return {turn * between(-400, 400), turn * between(-400, 400),  turn * between(-400, 400),
+          between(-100, 100),        double(between(-100, 100)), far_mm + between(-100, 100)};
+}
+
+RC_GTEST_PROP(Residuals, HaveTheSlopesThatCeresFindsByItself, ()) {
+  const LensVector camera = any_lens(), projector = any_lens();
+  const MotionVector camera_place = any_place(0), projector_place = any_place(0), board = any_place(1500);
+  const double scale = between(-30, 30) / 1e3, stretch = between(-30, 30) / 1e3, sigma_px = between(1, 100) / 100.0;
+  const Eigen::Vector2d seen_px(between(100, 900), between(100, 700)), other(between(350, 650), between(250, 550));
+  const ceres::AutoDiffCostFunction<test::CornerResidual, 2, 9, 6, 6, 1, 1> corner(
+      new test::CornerResidual{seen_px, other, sigma_px});
+  const std::vector<const double*> of_corner{camera.data(), camera_place.data(), board.data(), &scale, &stretch};
+  RC_ASSERT(relative(evaluated(CornerResidual(seen_px, other, sigma_px), of_corner), evaluated(corner, of_corner)) <
+            1e-8);
+  const ceres::AutoDiffCostFunction<test::SymbolResidual, 2, 9, 6, 9, 6, 6> symbol(
+      new test::SymbolResidual{seen_px, other, sigma_px});
+  const std::vector<const double*> of_symbol{camera.data(), camera_place.data(), projector.data(),
+                                             projector_place.data(), board.data()};
+  RC_ASSERT(relative(evaluated(SymbolResidual(seen_px, other, sigma_px), of_symbol), evaluated(symbol, of_symbol)) <
+            1e-7);
 }
 
 TEST(SymbolResidual, IsZeroForWhatTheRigSees) {
@@ -51,7 +100,7 @@ TEST(SymbolResidual, IsZeroForWhatTheRigSees) {
     EXPECT_LT(rms_px(residuals.symbols_projector_px), 1e-9);
     for (const ProjectedPoint& symbol : seen.poses[i].views[0].symbols) {
       double residual[2];
-      SymbolResidual{symbol.camera_px, symbol.projector_px, 1}(
+      test::SymbolResidual{symbol.camera_px, symbol.projector_px, 1}(
           rig.cameras[0].lens.data(), rig.cameras[0].device_from_rig.data(), rig.projector.lens.data(),
           rig.projector.device_from_rig.data(), poses[i].data(), residual);
       EXPECT_LT(std::hypot(residual[0], residual[1]), 1e-9);
