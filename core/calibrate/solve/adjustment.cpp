@@ -155,9 +155,9 @@ Result<Adjustment> Adjustment::begin(Observations& observations, RigModel rig) {
 Result<> Adjustment::adjust_to_lenses(const Observations& observations) {
   constexpr int kRounds = 8;
   for (int round = 0; round < kRounds; ++round) {
-    const auto settled = adjust(observations, options_, rig_);
-    if (!settled) return tl::unexpected(settled.error());
-    settled_ = *settled;
+    const auto adjusted = adjust(observations, options_, rig_);
+    if (!adjusted) return tl::unexpected(adjusted.error());
+    settled_ = adjusted->settled;
     bool tightened = tighten(rig_.projector, options_.projector);
     for (std::size_t i = 0; i < rig_.cameras.size(); ++i) {
       tightened = tighten(rig_.cameras[i], options_.cameras[i]) || tightened;

@@ -2,7 +2,9 @@
 // Copyright the slsd authors
 #include "core/calibrate/solve/bundle.hpp"
 
+#include <array>
 #include <cmath>
+#include <deque>
 #include <memory>
 
 #include <ceres/ceres.h>
@@ -14,6 +16,9 @@ namespace slsd {
 namespace {
 
 constexpr double kHuberSigmas = 3;
+
+/// By how much the symbols of a view, in camera pixels, are seen shifted: a block of the adjustment.
+using Shift = std::array<double, 2>;
 
 /// The problem of Ceres, and which of its blocks belong to what.
 class Problem {
@@ -32,6 +37,8 @@ class Problem {
   }
   [[nodiscard]] std::size_t corners_of(std::size_t pose) const { return corners_[pose]; }
   [[nodiscard]] const std::vector<double>& sigmas_of(std::size_t pose) const { return sigmas_px_[pose]; }
+  /// Of the pose's views that symbols were seen in.
+  [[nodiscard]] const std::vector<double*>& shifts_of(std::size_t pose) const { return shifts_of_[pose]; }
   double* pose_block(std::size_t pose) { return rig_.rig_from_board[pose].data(); }
   /// Of a camera, by its index, or of the projector: -1.
   double* place_block(int device, std::size_t pose) {
@@ -65,6 +72,7 @@ class Problem {
       add(rig_.moved->projector.data(), ++group);
     }
     for (double* print : {&rig_.board_scale, &rig_.board_stretch, &true_scale_, &true_stretch_}) add(print, ++group);
+    for (Shift& shift : shifts_) add(shift.data(), ++group);
     return ordering;
   }
 
@@ -107,7 +115,7 @@ class Problem {
   }
 
   void add_pose(std::size_t pose) {
-    sigmas_px_.emplace_back();
+    sigmas_px_.emplace_back(), shifts_of_.emplace_back();
     auto& blocks = residuals_.emplace_back();
     for (const PoseView& view : observations_.poses[pose].views) add_corners(view, pose, blocks);
     corners_.push_back(blocks.size());
@@ -134,15 +142,25 @@ class Problem {
 
   void add_symbols(const PoseView& view, std::size_t pose, std::vector<ceres::ResidualBlockId>& blocks) {
     DeviceModel &camera = rig_.cameras[view.camera], &projector = rig_.projector;
+    double* shift = nullptr;
     for (const ProjectedPoint& point : view.symbols) {
       if (point.outlying) continue;
+      if (shift == nullptr) shift = add_shift(pose);
       const double sigma_px = point.sigma_px * options_.symbol_sigma_factor * view.symbol_noise;
       auto* cost = new SymbolResidual(point.camera_px, point.projector_px, sigma_px);
       blocks.push_back(problem_.AddResidualBlock(cost, &loss_, camera.lens.data(),
                                                  place_block(static_cast<int>(view.camera), pose),
-                                                 projector.lens.data(), place_block(-1, pose), lit_block(pose)));
+                                                 projector.lens.data(), place_block(-1, pose), lit_block(pose), shift));
       sigmas_px_[pose].push_back(sigma_px);
     }
+  }
+
+  double* add_shift(std::size_t pose) {
+    double* const shift = shifts_.emplace_back().data();
+    shifts_of_[pose].push_back(shift);
+    const ceres::Matrix in_sigmas = ceres::Matrix::Identity(2, 2) / options_.symbol_shift_px;
+    problem_.AddResidualBlock(new ceres::NormalPrior(in_sigmas, ceres::Vector::Zero(2)), nullptr, shift);
+    return shift;
   }
 
   // Of a lens that nothing was seen by there is none: its block is not part of the problem.
@@ -186,6 +204,8 @@ class Problem {
   ceres::Problem problem_{keeps_loss()};
   std::vector<std::vector<ceres::ResidualBlockId>> residuals_;
   std::vector<std::vector<double>> sigmas_px_;  // of each residual block
+  std::deque<Shift> shifts_;                    // where it is stays where it is
+  std::vector<std::vector<double*>> shifts_of_;
   std::vector<std::size_t> corners_;
 };
 
@@ -199,7 +219,7 @@ Eigen::MatrixXd dense(const ceres::CRSMatrix& sparse) {
 
 }  // namespace
 
-Result<bool> adjust(const Observations& observations, const BundleOptions& options, RigModel& rig) {
+Result<Adjusted> adjust(const Observations& observations, const BundleOptions& options, RigModel& rig) {
   Problem problem(observations, options, rig);
   ceres::Solver::Options how;
   how.linear_solver_type = ceres::DENSE_SCHUR;
@@ -213,14 +233,7 @@ Result<bool> adjust(const Observations& observations, const BundleOptions& optio
   if (!summary.IsSolutionUsable() || !std::isfinite(summary.final_cost)) {
     return fail(ErrorCode::kImpossible, "the adjustment does not converge: the poses do not determine the rig");
   }
-  return summary.termination_type == ceres::CONVERGENCE;
-}
-
-double cost_of(const Observations& observations, const BundleOptions& options, RigModel rig) {
-  Problem problem(observations, options, rig);
-  double cost = 0;
-  problem.ceres().Evaluate({}, &cost, nullptr, nullptr, nullptr);
-  return cost;
+  return Adjusted{summary.termination_type == ceres::CONVERGENCE, summary.final_cost};
 }
 
 BundleEquations linearise(const Observations& observations, const BundleOptions& options, RigModel rig) {
@@ -246,13 +259,17 @@ BundleEquations linearise(const Observations& observations, const BundleOptions&
     ceres::Problem::EvaluateOptions what;
     what.parameter_blocks = shared;
     what.parameter_blocks.push_back(problem.pose_block(pose));
+    const std::vector<double*>& shifts = problem.shifts_of(pose);
+    what.parameter_blocks.insert(what.parameter_blocks.end(), shifts.begin(), shifts.end());
     what.residual_blocks = problem.residuals_of(pose);
     std::vector<double> residuals;
     ceres::CRSMatrix jacobian;
     problem.ceres().Evaluate(what, nullptr, &residuals, nullptr, &jacobian);
     const Eigen::MatrixXd all = dense(jacobian);
     out.by_shared = all.leftCols(columns);
-    out.by_pose = all.rightCols(6);
+    out.by_pose = all.rightCols(all.cols() - columns);
+    out.pose_weight = Eigen::VectorXd::Constant(out.by_pose.cols(), std::pow(options.symbol_shift_px, -2));
+    out.pose_weight.head<6>().setZero();
     out.residuals = Eigen::Map<const Eigen::VectorXd>(residuals.data(), static_cast<Eigen::Index>(residuals.size()));
     what.apply_loss_function = false;
     std::vector<double> plain;

@@ -22,30 +22,37 @@ struct BundleOptions {
   double corner_sigma_px = 0.1;
   double plane_corner_sigma_px = 0.1;  ///< of the reference plane's corners
   double symbol_sigma_factor = 1;      ///< of ProjectedPoint::sigma_px
+  /// Of what all symbols of a view are off by alike, which no count of symbols makes less: light that is skewed out of
+  /// focus, an exposure that moved. docs/calibration.md has what was seen of it.
+  double symbol_shift_px = 0.005;
 
   [[nodiscard]] double corner_sigma_of(PoseSubject subject) const {
     return subject == PoseSubject::kBoard ? corner_sigma_px : plane_corner_sigma_px;
   }
 };
 
+/// How an adjustment ended.
+struct Adjusted {
+  bool settled = false;  ///< within its iterations; where not, the rig is the best so far
+  double cost = 0;       ///< half of the sum of all squared residuals, lessened by the loss
+};
+
 /// Adjusts a rig to what was seen of it: all lenses, the devices' places and all poses at once (Ceres, Huber's
-/// loss). Points marked as outlying have no part.
+/// loss), and what the symbols of each view are shifted by. Points marked as outlying have no part.
 /// @param rig  in: near the solution; out: the solution
-/// @return whether it settled within its iterations; where not, the rig is the best so far
 /// @errors kImpossible: no solution was reached
 /// @thread reentrant
-[[nodiscard]] Result<bool> adjust(const Observations& observations, const BundleOptions& options, RigModel& rig);
-
-/// Half of the sum of all squared residuals, lessened by the loss.
-[[nodiscard]] double cost_of(const Observations& observations, const BundleOptions& options, RigModel rig);
+[[nodiscard]] Result<Adjusted> adjust(const Observations& observations, const BundleOptions& options, RigModel& rig);
 
 /// The equations of the adjustment at its solution, linear: residuals of each pose and their derivatives. Empty where
 /// all points of a pose are outlying.
 struct PoseEquations {
   Eigen::MatrixXd by_shared;  ///< residuals x shared parameters
-  Eigen::MatrixXd by_pose;    ///< residuals x 6
-  Eigen::VectorXd residuals;  ///< standard deviations, two to a point: first the corners, then the symbols, by view
-  Eigen::VectorXd sigmas_px;  ///< one to a residual: what it is in px, the loss undone
+  /// Residuals x what the pose has of its own: its place (6), then the shift of each view's symbols (2 each, at 0).
+  Eigen::MatrixXd by_pose;
+  Eigen::VectorXd pose_weight;  ///< one to a column of by_pose: of what was plausible before; 0: anything was
+  Eigen::VectorXd residuals;    ///< standard deviations, two to a point: first the corners, then the symbols, by view
+  Eigen::VectorXd sigmas_px;    ///< one to a residual: what it is in px, the loss undone
   Eigen::Index corner_residuals = 0;
 };
 

@@ -20,16 +20,16 @@ constexpr Eigen::Index kPointsOfPose = 4;
 /// Of the smallest to the largest eigenvalue of the correlations between a pose's own six parameters.
 constexpr double kPlacedTolerance = 1e-12;
 
-/// The equations of one pose with its own place eliminated (Schur's complement).
+/// The equations of one pose with what is its own eliminated (Schur's complement).
 struct Reduced {
   Eigen::MatrixXd normal;    // shared x shared
   Eigen::VectorXd gradient;  // shared
 };
 
-using PoseNormal = Eigen::Matrix<double, 6, 6>;
-
-Eigen::LLT<PoseNormal> pose_normal(const PoseEquations& pose) {
-  const PoseNormal normal = pose.by_pose.transpose() * pose.by_pose;
+/// What is the pose's own.
+Eigen::LLT<Eigen::MatrixXd> pose_normal(const PoseEquations& pose) {
+  Eigen::MatrixXd normal = pose.by_pose.transpose() * pose.by_pose;
+  normal.diagonal() += pose.pose_weight;
   return normal.llt();
 }
 
@@ -47,7 +47,7 @@ double rms(const Eigen::Ref<const Eigen::VectorXd>& components) {
   return components.size() == 0 ? 0 : std::sqrt(2 * components.squaredNorm() / static_cast<double>(components.size()));
 }
 
-/// The residuals of a pose under changed shared parameters, its own place fitted to them.
+/// The residuals of a pose under changed shared parameters, what is its own fitted to them.
 HeldOut hold_out(const PoseEquations& pose, const Eigen::VectorXd& change) {
   const Eigen::VectorXd moved = pose.residuals + pose.by_shared * change;
   const Eigen::VectorXd own = -pose_normal(pose).solve(Eigen::VectorXd(pose.by_pose.transpose() * moved));
@@ -134,9 +134,10 @@ double PoseInfluence::sigma(std::size_t parameter) const {
 
 bool is_placed(const PoseEquations& pose) {
   if (pose.residuals.size() < 2 * kPointsOfPose) return false;
-  const PoseNormal normal = pose.by_pose.transpose() * pose.by_pose;
+  using PlaceNormal = Eigen::Matrix<double, 6, 6>;
+  const PlaceNormal normal = pose.by_pose.leftCols<6>().transpose() * pose.by_pose.leftCols<6>();
   const Eigen::Matrix<double, 6, 1> scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<PoseNormal> solver(scale.asDiagonal() * normal * scale.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<PlaceNormal> solver(scale.asDiagonal() * normal * scale.asDiagonal());
   return solver.eigenvalues()(0) > kPlacedTolerance * solver.eigenvalues()(5);
 }
 

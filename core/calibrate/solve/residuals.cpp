@@ -151,7 +151,7 @@ bool SymbolResidual::Evaluate(const double* const* blocks, double* residual, dou
   const double towards = normal.dot(ray), along = normal.dot(origin - eye) / towards;
   const Eigen::Vector3d point = eye + along * ray;
   const Sight sight(blocks, point);
-  sight.put_residual(camera_px_, sigma_px_, residual);
+  sight.put_residual(camera_px_ - Eigen::Map<const Eigen::Vector2d>(blocks[5]), sigma_px_, residual);
   if (slopes == nullptr) return true;
   const Slopes<3> by_point = sight.put_slopes(sigma_px_, slopes);
   // Where the ray is shifted or turned the point stays on the plane; where the plane is, on the ray.
@@ -165,6 +165,7 @@ bool SymbolResidual::Evaluate(const double* const* blocks, double* residual, dou
          -by_direction * projector.distort_jacobian(direction).inverse() * slopes_by_lens(projector, direction));
   put<6>(slopes, 3, by_place);
   put<6>(slopes, 4, by_board);
+  put<2>(slopes, 5, Slopes<2>::Identity() / sigma_px_);
   return true;
 }
 

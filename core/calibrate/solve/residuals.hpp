@@ -23,8 +23,8 @@ class CornerResidual final : public ceres::SizedCostFunction<2, 9, 6, 6, 1, 1> {
 
 /// A projector pixel in the camera: its ray meets the board's plane, and the camera sees that point. The pixel is
 /// exact; what measures is the camera. Blocks: the camera's lens and place, the projector's lens and place, the board's
-/// place.
-class SymbolResidual final : public ceres::SizedCostFunction<2, 9, 6, 9, 6, 6> {
+/// place, and by how much all symbols of the view are seen shifted (px of the camera).
+class SymbolResidual final : public ceres::SizedCostFunction<2, 9, 6, 9, 6, 6, 2> {
  public:
   SymbolResidual(const Eigen::Vector2d& camera_px, const Eigen::Vector2d& projector_px, double sigma_px)
       : camera_px_(camera_px), projector_px_(projector_px), sigma_px_(sigma_px) {}

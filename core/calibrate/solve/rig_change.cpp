@@ -93,12 +93,13 @@ Model adjusted(const Observations& seen, BundleOptions options, RigModel rig, in
   constexpr double kSigmaOfDistance = 1 / 1.1774;  // of the median distance in a plane
   Model model{std::move(rig), options};
   for (int round = 0; round < rounds; ++round) {
-    if (!adjust(seen, model.options, model.rig)) return model;
+    const auto adjusted = adjust(seen, model.options, model.rig);
+    if (!adjusted) return {std::move(model.rig), model.options};
+    model.cost = adjusted->cost;
     if (round + 1 < rounds) {
       model.options.symbol_sigma_factor = std::max(kSigmaOfDistance * median_of(usual_errors(seen, model.rig)), 1e-3);
     }
   }
-  model.cost = cost_of(seen, model.options, model.rig);
   return model;
 }
 

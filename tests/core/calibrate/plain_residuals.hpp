@@ -86,14 +86,14 @@ Eigen::Matrix<T, 2, 1> undistort(const T* lens, const Eigen::Vector2d& pixel) {
 }
 
 /// A projector pixel in the camera: its ray meets the board's plane, and the camera sees that point. The pixel is
-/// exact; what measures is the camera.
+/// exact; what measures is the camera, which sees all symbols of a view shifted.
 struct SymbolResidual {
   Eigen::Vector2d camera_px, projector_px;
   double sigma_px;
 
   template <class T>
   bool operator()(const T* camera, const T* camera_from_rig, const T* projector, const T* projector_from_rig,
-                  const T* rig_from_board, T* residual) const {
+                  const T* rig_from_board, const T* shift_px, T* residual) const {
     using Vector = Eigen::Matrix<T, 3, 1>;
     const Eigen::Matrix<T, 2, 1> pixel = undistort(projector, projector_px);
     const Vector eye = moved_back(projector_from_rig, Vector(T(0), T(0), T(0)));
@@ -102,6 +102,7 @@ struct SymbolResidual {
     const Vector normal = moved(rig_from_board, Vector(T(0), T(0), T(1))) - origin;
     const T along = normal.dot(origin - eye) / normal.dot(ray);
     camera_residual(camera, camera_from_rig, Vector(eye + along * ray), camera_px, sigma_px, residual);
+    for (int i = 0; i < 2; ++i) residual[i] += shift_px[i] / sigma_px;
     return true;
   }
 };

@@ -75,16 +75,17 @@ RC_GTEST_PROP(Residuals, HaveTheSlopesThatCeresFindsByItself, ()) {
   const LensVector camera = any_lens(), projector = any_lens();
   const MotionVector camera_place = any_place(0), projector_place = any_place(0), board = any_place(1500);
   const double scale = between(-30, 30) / 1e3, stretch = between(-30, 30) / 1e3, sigma_px = between(1, 100) / 100.0;
+  const std::array<double, 2> shift_px{between(-100, 100) / 1e3, between(-100, 100) / 1e3};
   const Eigen::Vector2d seen_px(between(100, 900), between(100, 700)), other(between(350, 650), between(250, 550));
   const ceres::AutoDiffCostFunction<test::CornerResidual, 2, 9, 6, 6, 1, 1> corner(
       new test::CornerResidual{seen_px, other, sigma_px});
   const std::vector<const double*> of_corner{camera.data(), camera_place.data(), board.data(), &scale, &stretch};
   RC_ASSERT(relative(evaluated(CornerResidual(seen_px, other, sigma_px), of_corner), evaluated(corner, of_corner)) <
             1e-8);
-  const ceres::AutoDiffCostFunction<test::SymbolResidual, 2, 9, 6, 9, 6, 6> symbol(
+  const ceres::AutoDiffCostFunction<test::SymbolResidual, 2, 9, 6, 9, 6, 6, 2> symbol(
       new test::SymbolResidual{seen_px, other, sigma_px});
-  const std::vector<const double*> of_symbol{camera.data(), camera_place.data(), projector.data(),
-                                             projector_place.data(), board.data()};
+  const std::vector<const double*> of_symbol{camera.data(),          camera_place.data(), projector.data(),
+                                             projector_place.data(), board.data(),        shift_px.data()};
   RC_ASSERT(relative(evaluated(SymbolResidual(seen_px, other, sigma_px), of_symbol), evaluated(symbol, of_symbol)) <
             1e-7);
 }
@@ -100,9 +101,10 @@ TEST(SymbolResidual, IsZeroForWhatTheRigSees) {
     EXPECT_LT(rms_px(residuals.symbols_projector_px), 1e-9);
     for (const ProjectedPoint& symbol : seen.poses[i].views[0].symbols) {
       double residual[2];
+      const double unshifted[2] = {0, 0};
       test::SymbolResidual{symbol.camera_px, symbol.projector_px, 1}(
           rig.cameras[0].lens.data(), rig.cameras[0].device_from_rig.data(), rig.projector.lens.data(),
-          rig.projector.device_from_rig.data(), poses[i].data(), residual);
+          rig.projector.device_from_rig.data(), poses[i].data(), unshifted, residual);
       EXPECT_LT(std::hypot(residual[0], residual[1]), 1e-9);
     }
   }
@@ -142,9 +144,9 @@ TEST(Adjust, SaysWhetherItSettled) {
     rig.rig_from_board = poses;
     rig.cameras[0].lens[0] *= 1.1, rig.projector.lens[2] += 20;
     options.iterations_max = iterations;
-    const auto settled = adjust(seen, options, rig);
-    ASSERT_TRUE(settled) << settled.error().message;
-    EXPECT_EQ(*settled, iterations > 1);
+    const auto adjusted = adjust(seen, options, rig);
+    ASSERT_TRUE(adjusted) << adjusted.error().message;
+    EXPECT_EQ(adjusted->settled, iterations > 1);
   }
 }
 

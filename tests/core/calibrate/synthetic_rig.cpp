@@ -43,11 +43,13 @@ struct Sight {
       const Eigen::Vector3d point = in_rig(pose, rig_from_board, printed);
       view.corners.push_back({noisy(camera.project(camera_from_rig * point), options.corner_sigma_px), mm});
     }
+    Eigen::Vector2d shift = Eigen::Vector2d::Zero();
+    if (options.symbol_shift_px > 0) shift = noisy(shift, options.symbol_shift_px);
     const MotionVector then = options.moved ? options.moved(pose, rig_from_board) : rig_from_board;
     for (int i = 0; i < kSymbolColumns * kSymbolRows; ++i) {
       const Eigen::Vector2d mm = kSymbolPitchMm * Eigen::Vector2d(i % kSymbolColumns, i / kSymbolColumns);
       const Eigen::Vector3d point = in_rig(pose, then, mm);
-      const Eigen::Vector2d pixel = noisy(camera.project(camera_from_rig * point), options.symbol_sigma_px);
+      const Eigen::Vector2d pixel = noisy(camera.project(camera_from_rig * point) + shift, options.symbol_sigma_px);
       view.symbols.push_back({pixel, projector.project(projector_from_rig * point), 0.05});
     }
     return view;

@@ -24,7 +24,8 @@ struct SightOptions {
   std::function<double(int pose, const Eigen::Vector2d& board_mm)> relief = {};
   /// Where the board is when the pattern is projected, if not where it was: rig from board.
   std::function<MotionVector(int pose, const MotionVector& before)> moved = {};
-  double stretch = 0;  ///< of the print, along y
+  double stretch = 0;          ///< of the print, along y
+  double symbol_shift_px = 0;  ///< of all symbols of a view alike, along either axis: one standard deviation
 };
 
 /// What the rig sees of the poses: exact but for the noise, and for what the options spoil.
