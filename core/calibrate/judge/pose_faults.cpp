@@ -32,8 +32,6 @@ constexpr double kBowShareMin = 0.4;
 constexpr double kBowOfShiftMin = 0.3;
 /// Of half the board's size: root mean square off a plane beyond which it is no board.
 constexpr double kUnevenShareMax = 0.1;
-/// Of the board's pixels: from here on what is left of its edges and of the symbols is not where it was.
-constexpr double kClippedMax = 0.25;
 /// The print lies this much elsewhere under the pattern: the picture of the board tells nothing of it.
 constexpr double kShiftMaxPx = 1;
 /// Corners that are this near those of an earlier pose, as a share of the picture's width, say what those said.
@@ -252,14 +250,17 @@ std::vector<FaultyPose> find_unusable(const Observations& observations) {
   std::vector<FaultyPose> faulty;
   for (std::size_t i = 0; i < observations.poses.size(); ++i) {
     const PoseObservation& pose = observations.poses[i];
-    std::string corners = least_lack_of_corners(pose), symbols = least_lack_of_symbols(pose);
+    std::string corners = least_lack_of_corners(pose), symbols = least_lack_of_symbols(pose),
+                light = excess_of_light(clipped_share_of(pose));
     const auto is_fine = [&](std::size_t other) {
       return std::ranges::none_of(faulty, [&](const FaultyPose& one) { return one.pose == other; });
     };
     std::size_t same = 0;
     while (same < i && !(is_fine(same) && repeats(observations.poses[same], pose, observations))) ++same;
     const double blur = blur_of(pose), usual_blur = usual_blur_of(pose.subject, observations);
-    if (!corners.empty()) {
+    if (!light.empty()) {
+      faulty.push_back({i, PoseFault::kClipped, std::move(light)});
+    } else if (!corners.empty()) {
       faulty.push_back({i, PoseFault::kTooFewCorners, std::move(corners)});
     } else if (!symbols.empty()) {
       faulty.push_back({i, PoseFault::kTooFewSymbols, std::move(symbols)});
@@ -268,11 +269,6 @@ std::vector<FaultyPose> find_unusable(const Observations& observations) {
                         fmt::format("blurred: the board's edges are {:.1f} px wide, {:.1f} px in the other poses; hold "
                                     "it still, and within the depth of focus",
                                     blur, usual_blur)});
-    } else if (clipped_share_of(pose) > kClippedMax) {
-      faulty.push_back({i, PoseFault::kClipped,
-                        fmt::format("clipped: {:.0f} % of the board's pixels are at full level; expose less, or turn a "
-                                    "reflection away",
-                                    100 * clipped_share_of(pose))});
     } else if (shift_of(pose) > kShiftMaxPx) {
       faulty.push_back(
           {i, PoseFault::kMoved,

@@ -13,6 +13,8 @@ namespace {
 
 constexpr std::size_t kCornersMin = 8;
 constexpr std::size_t kSymbolsMin = 30;
+/// Of the board's pixels: from here on what is left of its edges and of the symbols is not where it was.
+constexpr double kClippedMax = 0.25;
 constexpr std::ptrdiff_t kLinesMin = 2;  // rows, and columns, with two corners or more
 /// As a factor and in px, both.
 constexpr double kBlurFactor = 1.5, kBlurMorePx = 0.35;
@@ -48,6 +50,13 @@ std::string lack_of_symbols(std::size_t symbols) {
       "only {} of the pattern's symbols were read on the board, {} are the least; hold it where the projector lights "
       "it, in focus, and shade it from other light",
       symbols, kSymbolsMin);
+}
+
+std::string excess_of_light(double clipped_share) {
+  if (clipped_share <= kClippedMax) return {};
+  return fmt::format(
+      "clipped: {:.0f} % of the board's pixels are at full level; expose less, or turn a reflection away",
+      100 * clipped_share);
 }
 
 bool is_blurred(double blur_px, double usual_px) {

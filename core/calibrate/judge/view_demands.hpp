@@ -19,6 +19,10 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] std::string lack_of_symbols(std::size_t symbols);
 
+/// @param clipped_share  of the board's pixels, those at full level
+/// @thread reentrant
+[[nodiscard]] std::string excess_of_light(double clipped_share);
+
 /// Whether a blur is so far above that of the other poses that it moves corners and symbols.
 /// @param usual_px  0: there are none
 /// @thread reentrant

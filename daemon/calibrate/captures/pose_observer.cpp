@@ -2,6 +2,10 @@
 // Copyright the slsd authors
 #include "daemon/calibrate/captures/pose_observer.hpp"
 
+#include <string>
+
+#include "core/calibrate/judge/view_demands.hpp"
+
 namespace slsd {
 
 PoseObserver::PoseObserver(const Board& board, const IndexedPattern& pattern, const ImageSize& projector,
@@ -20,8 +24,10 @@ Result<PoseView> PoseObserver::observe(std::size_t camera, const PosePictures& p
   const auto read = gray_code_ ? observe_gray_code(pictures, board_, sighting, projector_, *view)
                                : observe_pattern(pictures, board_, sighting,
                                                  readers_.try_emplace(camera, pattern_).first->second, *view);
-  if (!read) return tl::unexpected(read.error());
-  return view;
+  if (read) return view;
+  // Of a board that is at full level nothing can be read, and that is why.
+  const std::string light = excess_of_light(view->clipped_share);
+  return light.empty() ? tl::unexpected(read.error()) : fail(ErrorCode::kNotFound, light);
 }
 
 PrintShift PoseObserver::print_shift(const GreyView& white, const GreyView& pattern) const {
