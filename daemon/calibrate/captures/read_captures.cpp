@@ -127,6 +127,16 @@ class CaptureReader {
     refused.name = pose.name, refused.subject = pose.subject, refused.fault = fault, refused.reason = reason;
   }
 
+  /// For a reason that goes before all that the pose may have been refused for.
+  void rule_out(const std::string& name, PoseFault fault, const std::string& reason) {
+    const auto refused = std::ranges::find(captures.refused, name, &PoseReport::name);
+    if (refused != captures.refused.end()) refused->fault = fault, refused->reason = reason;
+    auto& poses = captures.observations.poses;
+    const auto at = std::ranges::find(poses, name, &PoseObservation::name);
+    if (at != poses.end()) refuse(*at, fault, reason), poses.erase(at);
+    report_(fmt::format("{}: not used: {}", name, reason));
+  }
+
   /// The size that most poses have; one of another costs that pose alone.
   void take_usual_sizes() {
     auto& cameras = captures.observations.cameras;
@@ -138,21 +148,21 @@ class CaptureReader {
       const auto most = std::ranges::max_element(counts, {}, [](const auto& count) { return count.second; });
       if (most != counts.end()) cameras[camera].size = {most->first.first, most->first.second};
     }
-    std::erase_if(captures.observations.poses, [&](PoseObservation& pose) {
-      std::string reason;
-      std::erase_if(pose.views, [&](const PoseView& view) {
-        const ImageSize own = sizes_.at({pose.name, view.camera}), usual = cameras[view.camera].size;
-        if (own == usual) return false;
-        reason = fmt::format(
-            "its pictures have {} pixels, those of the other poses {}: all have to come from one camera in "
-            "one mode",
-            size_text(own), size_text(usual));
-        report_(fmt::format("{}: not used: {}", pose.name, reason));
-        return true;
-      });
-      if (pose.views.empty()) refuse(pose, PoseFault::kNotSeen, reason);
-      return pose.views.empty();
-    });
+    for (const auto& [look, own] : sizes_) {
+      const auto& [name, camera] = look;
+      if (own == cameras[camera].size) continue;
+      const std::string reason = fmt::format(
+          "its pictures have {} pixels, those of the other poses {}: all have to come from one camera in one mode",
+          size_text(own), size_text(cameras[camera].size));
+      const auto at = std::ranges::find(captures.observations.poses, name, &PoseObservation::name);
+      const bool taken = at != captures.observations.poses.end();
+      if (taken) std::erase_if(at->views, [&](const PoseView& view) { return view.camera == camera; });
+      if (taken && !at->views.empty()) {
+        report_(fmt::format("{} {}: not used: {}", name, names_[camera], reason));
+      } else {
+        rule_out(name, PoseFault::kNotSeen, reason);
+      }
+    }
   }
 
   /// Whose pattern's picture shows the print where another pose's white one has it.
@@ -169,12 +179,7 @@ class CaptureReader {
         const std::string reason = fmt::format(
             "its pattern's picture is that of another pose, and its own lies with {}: put each where it belongs",
             other.pose);
-        auto& poses = captures.observations.poses;
-        const auto at = std::ranges::find(poses, doubt.pose, &PoseObservation::name);
-        const auto refused = std::ranges::find(captures.refused, doubt.pose, &PoseReport::name);
-        if (refused != captures.refused.end()) refused->fault = PoseFault::kSwapped, refused->reason = reason;
-        if (at != poses.end()) refuse(*at, PoseFault::kSwapped, reason), poses.erase(at);
-        report_(fmt::format("{}: not used: {}", doubt.pose, reason));
+        rule_out(doubt.pose, PoseFault::kSwapped, reason);
       }
     }
   }

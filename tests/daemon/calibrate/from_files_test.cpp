@@ -18,6 +18,7 @@ namespace slsd {
 namespace {
 
 using std::filesystem::path;
+using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -218,23 +219,45 @@ TEST_F(FromFiles, LeavesAPoseOutWhosePicturesAreOfTwoSizes) {
   EXPECT_THAT(said, HasSubstr("pose_03/pattern.png: has 640x480 pixels, the pictures before it 800x600"));
 }
 
-// The first pose is no measure for the others.
-TEST_F(FromFiles, LeavesThePoseOutThatIsOfAnotherSizeThanTheOthers) {
+// The first pose is no measure for the others, and what is not seen in the smaller pictures is not what is wrong.
+TEST_F(FromFiles, LeavesPosesOutThatAreOfAnotherSizeThanTheOthers) {
   copy_captures();
-  for (const char* picture : {"white.png", "pattern.png"}) {
-    const auto read = read_image(request_.from / "pose_00" / picture);
-    ASSERT_TRUE(read);
-    const Grey8& whole = std::get<Grey8>(*read);
-    Grey8 cut(whole.width() - 40, whole.height());
-    for (int y = 0; y < cut.height(); ++y) std::copy_n(whole.row(y), cut.width(), cut.row(y));
-    ASSERT_TRUE(write_file_atomically(request_.from / "pose_00" / picture, *encode_png(cut)));
-  }
+  const auto cut_to = [&](const path& pose, int width) {
+    for (const char* picture : {"white.png", "pattern.png"}) {
+      const Grey8 whole = std::get<Grey8>(*read_image(request_.from / pose / picture));
+      Grey8 cut(width, whole.height());
+      for (int y = 0; y < cut.height(); ++y) std::copy_n(whole.row(y), cut.width(), cut.row(y));
+      ASSERT_TRUE(write_file_atomically(request_.from / pose / picture, *encode_png(cut)));
+    }
+  };
+  cut_to("pose_00", 760), cut_to("pose_03", 80);
   testing::internal::CaptureStdout();
   const auto done = calibrate_from_files(request_);
   const std::string said = testing::internal::GetCapturedStdout();
   ASSERT_TRUE(done) << to_string(done.error());
   EXPECT_THAT(said, HasSubstr("pose_00: not used: its pictures have 760x600 pixels, those of the other poses 800x600"));
+  EXPECT_THAT(said, HasSubstr("pose_03: not used: its pictures have 80x600 pixels, those of the other poses 800x600"));
+  EXPECT_THAT(said, ContainsRegex("pose_03 +left out: its pictures have 80x600 pixels"));
   EXPECT_EQ(kept().cameras.at(0).lens.width_px, 800);
+}
+
+TEST_F(FromFiles, NamesAPoseClippedWhosePatternIsLostInTheLight) {
+  copy_captures();
+  const path white = request_.from / "pose_03/white.png";
+  Grey8 picture = std::get<Grey8>(*read_image(white));
+  for (int y = 0; y < picture.height(); ++y) {
+    for (int x = 0; x < picture.width(); ++x) {
+      picture.row(y)[x] = static_cast<std::uint8_t>(std::min(255, 3 * picture.row(y)[x]));
+    }
+  }
+  for (const path& file : {white, request_.from / "pose_03/pattern.png"}) {
+    ASSERT_TRUE(write_file_atomically(file, *encode_png(picture)));
+  }
+  testing::internal::CaptureStdout();
+  const auto done = calibrate_from_files(request_);
+  const std::string said = testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_THAT(said, ContainsRegex("pose_03 +left out: clipped: [0-9]+ % of the board's pixels are at full level"));
 }
 
 TEST_F(FromFiles, NamesPatternsThatWereSwapped) {
