@@ -30,6 +30,7 @@ struct LatticeSymbol {
   float misfit;                            ///< of its shape, standard deviations from its letter's
   float weight;                            ///< its lit area, camera px squared
   float sigma_px;                          ///< one standard deviation of the centre, in x and in y
+  float damage_px;                         ///< by what an edge that cuts it might have moved it
   std::array<std::int32_t, 4> neighbours;  ///< by Direction: symbols of the cells beside, linked to it, or -1
 };
 

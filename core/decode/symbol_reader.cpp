@@ -175,18 +175,18 @@ void SymbolReader::fit_lattice(const GreyView& frame, double full, const GreyVie
 /// What is left of a symbol that an edge cuts may still look like it, but its centre lies elsewhere: at a rim what is
 /// an order less certain than most goes.
 void SymbolReader::refuse_cut() {
-  constexpr float kOfMedian = 10;
+  constexpr float kOfMedian = 13;
   std::vector<LatticeSymbol>& symbols = lattice_.symbols;
   if (symbols.empty()) return;
-  sigmas_.clear();
-  for (const LatticeSymbol& symbol : symbols) sigmas_.push_back(symbol.sigma_px);
-  const auto middle = sigmas_.begin() + static_cast<std::ptrdiff_t>(sigmas_.size() / 2);
-  std::ranges::nth_element(sigmas_, middle);
+  damages_.clear();
+  for (const LatticeSymbol& symbol : symbols) damages_.push_back(symbol.damage_px);
+  const auto middle = damages_.begin() + static_cast<std::ptrdiff_t>(damages_.size() / 2);
+  std::ranges::nth_element(damages_, middle);
   const float limit = kOfMedian * *middle;
   kept_.clear();
   std::int32_t count = 0;
   for (const LatticeSymbol& symbol : symbols) {
-    const bool is_cut = symbol.sigma_px > limit && std::ranges::find(symbol.neighbours, -1) != symbol.neighbours.end();
+    const bool is_cut = symbol.damage_px > limit && std::ranges::find(symbol.neighbours, -1) != symbol.neighbours.end();
     kept_.push_back(is_cut ? -1 : count++);
     if (is_cut) reject(symbol, RegionStatus::kDamagedShape);
   }

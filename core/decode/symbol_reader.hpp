@@ -100,7 +100,7 @@ class SymbolReader {
   bool is_there_ = true;
   const Appearance* look_ = nullptr;  // of this frame's symbols
   std::vector<ShapeFeatures> sample_;
-  std::vector<float> sigmas_;
+  std::vector<float> damages_;
   std::vector<std::int32_t> kept_;  // of the lattice's symbols: where they are then
   Sightings seen_;
   Lattice lattice_;

@@ -63,4 +63,15 @@ double EpipolarGate::residual_px(const Eigen::Vector2d& camera_direction,
   return (line.head<2>().dot(projector_direction) + line.z()) / length;
 }
 
+double EpipolarGate::disparity(const Eigen::Vector2d& camera_direction,
+                               const Eigen::Vector2d& projector_direction) const {
+  const Eigen::Vector3d slope = projector_from_camera_.rotation * camera_direction.homogeneous();
+  const Eigen::Vector3d& start = projector_from_camera_.translation;
+  const Eigen::Vector3d line = start.cross(slope);
+  const Eigen::Vector2d along(-line.y(), line.x());
+  const double there = along.dot(projector_direction), over = along.dot(start.head<2>()) - there * start.z();
+  if (over == 0) return 0;
+  return start.norm() * (there * slope.z() - along.dot(slope.head<2>())) / over;
+}
+
 }  // namespace slsd

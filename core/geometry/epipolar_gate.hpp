@@ -56,6 +56,10 @@ class EpipolarGate {
   /// prepare(camera_direction).residual_px(projector_direction), in less than half the time.
   [[nodiscard]] double residual_px(const Eigen::Vector2d& camera_direction,
                                    const Eigen::Vector2d& projector_direction) const;
+  /// The baseline over the depth where both rays meet, seen along the epipolar line alone: what lies across it has no
+  /// part. Times a focal length it is a disparity. 0 where there is no such line.
+  [[nodiscard]] double disparity(const Eigen::Vector2d& camera_direction,
+                                 const Eigen::Vector2d& projector_direction) const;
 
  private:
   RigidTransform projector_from_camera_;

@@ -3,27 +3,71 @@
 #include "core/decode/centres/centre_sigma.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
+#include <utility>
 
 #include <Eigen/LU>
 
 #include "core/decode/symbols/weigh_patch.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 namespace {
 
+constexpr float kOfNoise = 0.55F;
 constexpr float kLeastPx = 0.01F;  // what is left of sampling and blur
-constexpr float kOfAcross = 0.4F, kOfRoughness = 1;
-constexpr float kOfMisfitSquared = 0.018F;  // px
-/// What lies across on the smoothest of surfaces, besides noise.
-constexpr float kSmoothAcrossPx = 0.022F;
-constexpr float kUnknownBendPx = 0.02F;
+constexpr float kOfAcross = 0.35F, kOfRoughness = 1;
+constexpr float kOfOwnUnevenness = 0.35F, kOfUnevenness = 0.5F;
+constexpr float kOfMisfitSquared = 0.01F;  // px
+/// What lies across, and what is uneven, on the smoothest of surfaces, besides noise.
+constexpr float kSmoothAcrossPx = 0.03F, kSmoothUnevenPx = 0.02F;
+constexpr float kUnknownBendPx = 0.015F;
+/// Of a shape that is cut, not only worn.
+constexpr float kDamageOfMisfitSquared = 0.018F;  // px
 /// Beyond this a neighbour's residual is a fault of its own.
-constexpr float kAcrossAroundMaxPx = 0.3F;
+constexpr float kAroundMaxPx = 0.3F;
+
+float square(float x) {
+  return x * x;
+}
+
+/// Pairs of directions that lead to opposite sides.
+constexpr std::array<std::pair<Direction, Direction>, 2> kAcrossEachOther{{{kLeft, kRight}, {kUp, kDown}}};
 
 bool has_bend(const LatticeSymbol& symbol) {
-  const auto& beside = symbol.neighbours;
-  return (beside[kRight] >= 0 && beside[kLeft] >= 0) || (beside[kUp] >= 0 && beside[kDown] >= 0);
+  return std::ranges::any_of(kAcrossEachOther, [&](const auto& pair) {
+    return symbol.neighbours[pair.first] >= 0 && symbol.neighbours[pair.second] >= 0;
+  });
+}
+
+/// By how much a symbol's disparity is beyond those of its neighbours to both sides, mean of the pairs that are there,
+/// 0 of none. A plane's is linear over the image.
+float off_neighbours(const std::vector<LatticeSymbol>& symbols, const std::vector<float>& disparities_px,
+                     std::size_t i) {
+  float sum = 0, count = 0;
+  for (const auto& [one, other] : kAcrossEachOther) {
+    const std::int32_t a = symbols[i].neighbours[one], b = symbols[i].neighbours[other];
+    if (a < 0 || b < 0) continue;
+    const auto first = static_cast<std::size_t>(a), second = static_cast<std::size_t>(b);
+    const Eigen::Vector2f from = symbols[first].centre_px, way = symbols[second].centre_px - from;
+    const float along = way.dot(symbols[i].centre_px - from) / way.squaredNorm();
+    sum += disparities_px[i] - disparities_px[first] - along * (disparities_px[second] - disparities_px[first]);
+    ++count;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+/// Mean square over a symbol and its neighbours. Of these one that is far off has a fault of its own.
+float mean_square_around(const std::vector<float>& off_px, const LatticeSymbol& symbol, float own_px) {
+  float sum = square(own_px), count = 1;
+  for (const std::int32_t other : symbol.neighbours) {
+    if (other < 0) continue;
+    sum += square(std::min(std::abs(off_px[static_cast<std::size_t>(other)]), kAroundMaxPx));
+    ++count;
+  }
+  return sum / count;
 }
 
 }  // namespace
@@ -34,42 +78,68 @@ float noise_of_centre_px(float weight, float background, float gain, const Frame
   return relative / std::sqrt(std::sqrt(weight));
 }
 
+void CentreJudge::measure_across(const EpipolarView& view, const CellRays& cells, Executor& executor,
+                                 const std::vector<LatticeSymbol>& symbols) {
+  executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      const LatticeSymbol& symbol = symbols[i];
+      const PixelRay cell = cells.ray(symbol.row, symbol.column);
+      across_px_[i] = static_cast<float>(view.residual_px(symbol.sighting, symbol.centre_px, cell));
+      disparities_px_[i] = static_cast<float>(view.disparity_px(symbol.sighting, symbol.centre_px, cell));
+    }
+  });
+  sorted_ = across_px_;
+  const float usual_px = median_in_place(sorted_);
+  for (std::size_t i = 0; i < symbols.size(); ++i)
+    across_px_[i] = std::abs(across_px_[i] - usual_px) * std::sqrt(std::abs(symbols[i].frame.determinant()));
+}
+
+void CentreJudge::measure_unevenness(const std::vector<LatticeSymbol>& symbols, Executor& executor) {
+  executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      beyond_px_[i] = off_neighbours(symbols, disparities_px_, i);
+    }
+  });
+  executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      std::array<float, 4> around;
+      std::size_t count = 0;
+      for (const std::int32_t other : symbols[i].neighbours) {
+        if (other >= 0) around[count++] = beyond_px_[static_cast<std::size_t>(other)];
+      }
+      uneven_px_[i] = count > 0 ? beyond_px_[i] - median_in_place(std::span(around.data(), count)) : 0;
+    }
+  });
+}
+
 void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const CellRays& cells, Executor& executor,
                         Lattice& lattice) {
   std::vector<LatticeSymbol>& symbols = lattice.symbols;
-  across_px_.assign(symbols.size(), 0);
-  if (view != nullptr && !symbols.empty()) {
-    executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
-      for (std::size_t i = first; i < last; ++i) {
-        const LatticeSymbol& symbol = symbols[i];
-        across_px_[i] = static_cast<float>(
-            view->residual_px(symbol.sighting, symbol.centre_px, cells.ray(symbol.row, symbol.column)));
-      }
-    });
-    sorted_ = across_px_;
-    const auto middle = sorted_.begin() + static_cast<std::ptrdiff_t>(sorted_.size() / 2);
-    std::nth_element(sorted_.begin(), middle, sorted_.end());
-    const float usual_px = *middle;
-    for (std::size_t i = 0; i < symbols.size(); ++i)
-      across_px_[i] = std::abs(across_px_[i] - usual_px) * std::sqrt(std::abs(symbols[i].frame.determinant()));
-  }
-  const auto square = [](float x) { return x * x; };
-  const auto sigma_of = [&](std::size_t i) {
-    const LatticeSymbol& symbol = symbols[i];
-    float around = square(across_px_[i]), count = 1;
-    for (const std::int32_t other : symbol.neighbours) {
-      if (other < 0) continue;
-      around += square(std::min(across_px_[static_cast<std::size_t>(other)], kAcrossAroundMaxPx));
-      ++count;
-    }
+  for (std::vector<float>* each : {&across_px_, &disparities_px_, &beyond_px_, &uneven_px_})
+    each->assign(symbols.size(), 0);
+  if (symbols.empty()) return;
+  if (view != nullptr) measure_across(*view, cells, executor, symbols), measure_unevenness(symbols, executor);
+  sorted_.clear();
+  for (const LatticeSymbol& symbol : symbols) sorted_.push_back(square(symbol.misfit));
+  const float usual_misfit_squared = median_in_place(sorted_);
+  const auto judge_one = [&](std::size_t i) {
+    LatticeSymbol& symbol = symbols[i];
     const float noise_px = noise_of_centre_px(symbol.weight, symbol.background, symbol.gain, noise);
-    const float roughness = std::max(0.F, around / count - square(noise_px) - square(kSmoothAcrossPx));
-    return std::sqrt(square(noise_px) + square(kLeastPx) + square(kOfAcross * across_px_[i]) +
-                     square(kOfRoughness) * roughness + square(kOfMisfitSquared * square(symbol.misfit)) +
-                     (has_bend(symbol) ? 0 : square(kUnknownBendPx)));
+    const float roughness = std::max(
+        0.F, mean_square_around(across_px_, symbol, across_px_[i]) - square(noise_px) - square(kSmoothAcrossPx));
+    const float unevenness = std::max(
+        0.F, mean_square_around(uneven_px_, symbol, uneven_px_[i]) - 2 * square(noise_px) - square(kSmoothUnevenPx));
+    const float misfit = std::max(0.F, square(symbol.misfit) - usual_misfit_squared);
+    const float across = square(kOfAcross * across_px_[i]) + square(kOfRoughness) * roughness;
+    const float unbent = has_bend(symbol) ? 0 : square(kUnknownBendPx);
+    symbol.sigma_px = std::sqrt(square(kOfNoise * noise_px) + square(kLeastPx) + across + unbent +
+                                square(kOfOwnUnevenness * uneven_px_[i]) + square(kOfUnevenness) * unevenness +
+                                square(kOfMisfitSquared * misfit));
+    symbol.damage_px = std::sqrt(square(noise_px) + square(kLeastPx) + across + unbent +
+                                 square(kDamageOfMisfitSquared * square(symbol.misfit)));
   };
   executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
-    for (std::size_t i = first; i < last; ++i) symbols[i].sigma_px = sigma_of(i);
+    for (std::size_t i = first; i < last; ++i) judge_one(i);
   });
 }
 

@@ -22,15 +22,19 @@ namespace slsd {
 
 /// Tells how exact each centre of a lattice is, along the epipolar line and across it.
 ///
-/// What disturbs a centre besides noise is relief, print, shadow or an edge under the symbol. It shows in two ways:
-/// across the epipolar line, where no depth moves a symbol and what is left over is error alone; and in the symbol's
-/// shape. So, all in camera px and added in squares,
+/// What disturbs a centre besides noise is relief, print, shadow or an edge under the symbol. It shows in three ways:
+/// across the epipolar line, where no depth moves a symbol and what is left over is error alone; in a disparity off
+/// those around, as no surface that symbols can follow has; and in the symbol's shape. So, all in camera px and added
+/// in squares,
 ///
-///     noise,  0.01,  0.4 across,  roughness,  0.03 misfit^2,  0.02 where no neighbours tell of its bend
+///     0.55 noise,  0.01,  0.35 across,  roughness,  0.35 uneven,  0.5 unevenness,  0.01 misfit^2,
+///     0.015 where no neighbours tell of its bend
 ///
 /// across: the residual less the frame's median (that is the calibration's); roughness: the root mean square of the
-/// symbol's and its neighbours', beyond noise and the 0.022 px of smooth surfaces; misfit: of the shape, in standard
-/// deviations. The factors are fitted to rendered frames (docs/decoder.md).
+/// symbol's and its neighbours', beyond noise and the 0.03 px of smooth surfaces; uneven: the disparity beyond that of
+/// the neighbours to both sides, less the same of the neighbours, which a surface's own curvature has; unevenness: its
+/// root mean square with theirs, beyond noise and 0.02 px; misfit^2: of the shape, in standard deviations, beyond the
+/// frame's median. The factors are fitted to rendered frames (docs/decoder.md).
 /// @thread thread-bound: keeps its buffers
 class CentreJudge {
  public:
@@ -39,7 +43,11 @@ class CentreJudge {
              Lattice& lattice);
 
  private:
-  std::vector<float> across_px_, sorted_;
+  void measure_across(const EpipolarView& view, const CellRays& cells, Executor& executor,
+                      const std::vector<LatticeSymbol>& symbols);
+  void measure_unevenness(const std::vector<LatticeSymbol>& symbols, Executor& executor);
+
+  std::vector<float> across_px_, disparities_px_, beyond_px_, uneven_px_, sorted_;
 };
 
 }  // namespace slsd

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -22,7 +23,10 @@ class EpipolarView {
   /// @param tolerance_px  distance from the epipolar line, projector px: epipolar_gate_px()
   EpipolarView(const CalibratedCamera& camera, const Lens& projector, double depth_min_mm, double depth_max_mm,
                double tolerance_px)
-      : camera_rays_(camera.lens), gate_(camera, projector, depth_min_mm, depth_max_mm), tolerance_px_(tolerance_px) {}
+      : camera_rays_(camera.lens),
+        focal_px_(std::sqrt(camera.lens.fx * camera.lens.fy)),
+        gate_(camera, projector, depth_min_mm, depth_max_mm),
+        tolerance_px_(tolerance_px) {}
 
   void look_at(const Sightings& seen, Executor& executor) {
     rays_.resize(seen.size());
@@ -53,8 +57,15 @@ class EpipolarView {
                  : segments_[sighting].residual_px(cell.direction);
   }
 
+  /// Disparity of a cell that is seen at a pixel near a sighting's, camera px.
+  [[nodiscard]] double disparity_px(std::int32_t sighting, const Eigen::Vector2f& camera_px,
+                                    const PixelRay& cell) const {
+    return focal_px_ * gate_.disparity(ray_near(sighting, camera_px).direction, cell.direction);
+  }
+
  private:
   RayTable camera_rays_;
+  double focal_px_;
   EpipolarGate gate_;
   double tolerance_px_;
   std::vector<PixelRay> rays_;

@@ -30,23 +30,25 @@ TEST(NoiseOfCentre, FollowsNoiseOverContrast) {
   EXPECT_LT(noise_of_centre_px(600, 20, 100, six), noise_of_centre_px(144, 20, 100, six));
 }
 
-float judged(const LatticeSymbol& symbol) {
+/// The last of several.
+float judged(const std::vector<LatticeSymbol>& symbols) {
   const Pattern pattern = shipped_pattern("16px-5.toml");
   const CellRays cells(pattern, std::vector<Prototype>(5), paper_rig().projector);
-  Lattice lattice{{symbol}};
+  Lattice lattice{symbols};
   CentreJudge().judge({}, nullptr, cells, alone, lattice);
-  return lattice.symbols[0].sigma_px;
+  return lattice.symbols.back().sigma_px;
 }
 
 TEST(CentreJudge, GrowsWithTheMisfitOfTheShapeAndWhereNothingTellsOfItsBend) {
   LatticeSymbol symbol = symbol_of(144, 100);
-  const float good = judged(symbol);
-  EXPECT_NEAR(good, 0.01, 1e-6);
+  symbol.misfit = 1;
+  const LatticeSymbol usual = symbol;
+  EXPECT_NEAR(judged({usual, usual, symbol}), 0.01, 1e-6);
   symbol.misfit = 2;
-  EXPECT_NEAR(judged(symbol), std::hypot(0.01, 0.018 * 4), 1e-6);
-  symbol.misfit = 0;
+  EXPECT_NEAR(judged({usual, usual, symbol}), std::hypot(0.01, 0.01 * (4 - 1)), 1e-6);
+  symbol.misfit = 1;
   symbol.neighbours = {0, 0, -1, -1};
-  EXPECT_NEAR(judged(symbol), std::hypot(0.01, 0.02), 1e-6);
+  EXPECT_NEAR(judged({usual, usual, symbol}), std::hypot(0.01, 0.015), 1e-6);
 }
 
 /// Standard deviation of errors over sigma, and the root mean square of the errors, on a plane whose place is known.
@@ -106,6 +108,13 @@ Surface waves(double period_mm, double height_mm) {
     }
     return (depth_mm - ray.origin.z()) / ray.direction.z();
   };
+}
+
+// Relief that symbols cannot follow sets neighbours off each other.
+TEST(Sigma, OfCentresFollowsReliefBelowTheSymbols) {
+  const Truth truth = truth_of(Precision::kStandard, 2, waves(34, 4));
+  EXPECT_GT(truth.over_sigma, 0.55);
+  EXPECT_LT(truth.over_sigma, 1.3);
 }
 
 // Relief that a patch cannot follow scatters within it, and sigma knows two thirds of what that does. With twice the

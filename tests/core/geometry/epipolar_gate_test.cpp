@@ -61,6 +61,20 @@ RC_GTEST_PROP(EpipolarGate, MeasuresAResidualWithoutASegmentToo, ()) {
   RC_ASSERT(std::abs(gate.residual_px(seen, lit) - by_segment) < 1e-9 * std::abs(by_segment) + 1e-9);
 }
 
+RC_GTEST_PROP(EpipolarGate, DisparityIsTheBaselineOverTheDepth, ()) {
+  const Calibration rig = paper_rig();
+  const RigidTransform& projector_from_camera = rig.cameras[0].projector_from_camera;
+  const EpipolarGate gate(rig.cameras[0], rig.projector, kMinMm, kMaxMm);
+  const Eigen::Vector3d point = any_point(rig.cameras[0].lens, kMinMm, kMaxMm);
+  const Eigen::Vector2d seen = point.hnormalized(), lit = projector_direction(rig, point);
+  const double exact = projector_from_camera.translation.norm() / point.z();
+  RC_ASSERT(std::abs(gate.disparity(seen, lit) - exact) < 1e-9);
+  // What lies across the line of this ray does not change it.
+  const Eigen::Vector3d line =
+      projector_from_camera.translation.cross(projector_from_camera.rotation * seen.homogeneous());
+  RC_ASSERT(std::abs(gate.disparity(seen, lit + 0.01 * line.head<2>().normalized()) - exact) < 1e-9);
+}
+
 TEST(EpipolarGate, CutsWhatLiesBehindTheProjector) {
   Calibration rig = paper_rig();
   rig.cameras[0].projector_from_camera = {Eigen::Matrix3d::Identity(), {-180, 0, -1000}};
