@@ -43,6 +43,10 @@ bool same(const sockaddr_in& a, const sockaddr_in& b) {
 ControlPort::ControlPort(RegisterFile& registers, ControlEvents events)
     : registers_(registers), events_(std::move(events)) {}
 
+bool ControlPort::is_sent_again(std::uint32_t id, const sockaddr_in& from) const {
+  return written_ && written_->id == id && same(written_->from, from);
+}
+
 bool ControlPort::may_write(std::uint32_t address, const sockaddr_in& from) const {
   if (occupied_) return false;
   return controller_ ? same(*controller_, from) : address == kControlPrivilege;
@@ -67,10 +71,12 @@ const std::vector<std::uint8_t>& ControlPort::answer(std::span<const std::uint8_
     acknowledge(answer_, 0, what, 4, id).u32(registers_.read(reader.u32()));
   else if (what == kReadMemory)
     answer_read_memory(id, reader.rest());
-  else if (what == kWriteRegister || what == kWriteMemory)
-    answer_write(what, id, reader.rest(), from);
-  else
+  else if (what != kWriteRegister && what != kWriteMemory)
     acknowledge(answer_, kNoSuchCommand, what, 0, id);
+  else if (is_sent_again(id, from))
+    answer_ = answer_to_written_;
+  else
+    answer_write(what, id, reader.rest(), from);
   return answer_;
 }
 
@@ -96,6 +102,8 @@ void ControlPort::answer_write(std::uint32_t what, std::uint32_t id, std::span<c
   const bool allowed = may_write(address, from);
   const bool there = allowed && write_block(address, reader.rest(), from);
   acknowledge(answer_, !allowed ? kAccessDenied : (there ? 0 : kNoSuchAddress), what, 4, id).u16(0).u16(there ? 1 : 0);
+  written_ = {id, from};
+  answer_to_written_ = answer_;
 }
 
 void ControlPort::act(bool scheduled, std::span<const std::uint8_t> body) {

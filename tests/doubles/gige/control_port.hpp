@@ -48,6 +48,7 @@ class ControlPort {
   [[nodiscard]] const ActionCounts& actions() const { return actions_; }
 
  private:
+  [[nodiscard]] bool is_sent_again(std::uint32_t id, const sockaddr_in& from) const;
   [[nodiscard]] bool may_write(std::uint32_t address, const sockaddr_in& from) const;
   void answer_read(std::uint32_t what, std::uint32_t id, std::uint32_t address, std::size_t bytes);
   void answer_read_memory(std::uint32_t id, std::span<const std::uint8_t> body);
@@ -65,7 +66,14 @@ class ControlPort {
   bool occupied_ = false;
   int times_taken_ = 0;
   ActionCounts actions_;
+  /// A write that was answered: whoever did not hear the answer in time sends it again.
+  struct Written {
+    std::uint32_t id;
+    sockaddr_in from;
+  };
+  std::optional<Written> written_;
   std::vector<std::uint8_t> answer_;
+  std::vector<std::uint8_t> answer_to_written_;
   std::vector<std::uint8_t> block_;
 };
 

@@ -10,6 +10,8 @@
 
 #include "core/printable.hpp"
 #include "drivers/camera/aravis/configure_network.hpp"
+#include "tests/doubles/gige/control_port.hpp"
+#include "tests/doubles/gige/wire.hpp"
 
 namespace slsd {
 namespace {
@@ -99,6 +101,27 @@ TEST(ReadGvcpValue, ReadsTheMostSignificantByteFirst) {
 
 TEST(GvcpRead, AsksForARegister) {
   EXPECT_THAT(gvcp_read(0xa00, kId), ElementsAre(0x42, 1, 0, 0x80, 0, 4, 0x12, 0x34, 0, 0, 0x0a, 0));
+}
+
+// Aravis sends a command again whose answer it does not hear within half a second: two triggers would be two frames.
+TEST(GigeDouble, DoesOnceWhatIsSentAgainBecauseItsAnswerWasLate) {
+  test::RegisterFile registers("DOUBLE-1", 64, 48);
+  std::vector<std::uint32_t> written;
+  test::ControlEvents events;
+  events.written = [&](std::uint32_t address, std::uint32_t) { written.push_back(address); };
+  test::ControlPort port(registers, events);
+  std::vector<std::uint8_t> command;
+  const auto write = [&](std::uint32_t address, std::uint32_t value, std::uint32_t id) {
+    test::WireWriter(command).u8(0x42).u8(1).u16(0x82).u16(8).u16(id).u32(address).u32(value);
+    return port.answer(command, sockaddr_in{});
+  };
+  write(test::kControlPrivilege, 2, 1);
+  written.clear();
+  const auto answer = write(test::kTriggerSoftware, 1, 2);
+  EXPECT_EQ(write(test::kTriggerSoftware, 1, 2), answer);
+  EXPECT_EQ(written.size(), 1U);
+  write(test::kTriggerSoftware, 1, 3);
+  EXPECT_EQ(written.size(), 2U);
 }
 
 TEST(HostInterface, ReachesTheAddressesOfItsNetwork) {
