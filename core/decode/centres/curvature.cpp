@@ -125,6 +125,7 @@ LatticeSymbol CentreCorrection::symbol_of(const std::vector<GridNode>& nodes, co
                        .misfit = 0,
                        .weight = seen.weight,
                        .sigma_px = 0,
+                       .damage_px = 0,
                        .neighbours = {-1, -1, -1, -1}};
   symbol.misfit =
       misfit ? *misfit
