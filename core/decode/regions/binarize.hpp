@@ -20,7 +20,7 @@ struct BinarizeOptions {
   /// one piece; at the middle keeps neighbours apart that are less than two pixels from each other.
   float level = 0.5F;
   /// Smallest difference between light and dark that is taken for the pattern, of 255 levels.
-  int contrast_min = 8;
+  int contrast_min = 5;
   /// The same in standard deviations of the frame's noise: the range that plain noise spans in a window, and some more.
   float contrast_min_sigma = 9;
 };

@@ -100,6 +100,22 @@ TEST(HardFrames, ReadsALitObjectThatTheFrameCuts) {
             0.985 * static_cast<double>(whole_on_board(pattern)));
 }
 
+// Six levels of 255 between light and dark, as where light has fallen to a twentieth: faint, and far above the noise.
+TEST(HardFrames, ReadsWhatIsFaintlyLit) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  Decoder decoder = decoder_of(pattern);
+  const std::size_t well_lit = decode(decoder, frame_of(pattern, test::kTilted).view()).points.size();
+  const Grey8 faint =
+      simulate(draw_pattern(pattern), paper_rig(), test::kTilted, {.dark = 4, .lit = 10.5, .noise_sigma = 0.4});
+  const Decoding decoding = decode(decoder, faint.view());
+  EXPECT_GE(static_cast<double>(decoding.points.size()), 0.98 * static_cast<double>(well_lit));
+  EXPECT_EQ(wrong_points(decoding, test::kTilted, 3), 0);
+  // Without the pattern it is a wall, with as much noise and a light that falls off.
+  Grey8 wall =
+      simulate(Grey8(1280, 800, 255), paper_rig(), test::kTilted, {.dark = 4, .lit = 10.5, .noise_sigma = 0.4});
+  EXPECT_EQ(decode(decoder, wall.view()).points.size(), 0);
+}
+
 // As far out of focus as three pixels of the camera: the gaps between symbols are nearly as bright as they are.
 TEST(HardFrames, ReadsAPlaneOutOfFocus) {
   const Pattern pattern = shipped_pattern("16px-5.toml");
