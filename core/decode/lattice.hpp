@@ -25,7 +25,7 @@ struct LatticeSymbol {
   std::int16_t row, column;                ///< cell of the pattern
   Eigen::Vector2f centre_px;               ///< what the camera sees lit by the symbol's centroid in the projector
   LatticeFrame frame;                      ///< camera px for one projector px
-  Bend bend;                               ///< zero where it is negligible
+  Bend bend;                               ///< zero where no neighbours tell
   float background, gain;                  ///< grey levels of the frame: the dark, and what light adds to it
   float misfit;                            ///< of its shape, standard deviations from its letter's
   float weight;                            ///< its lit area, camera px squared

@@ -12,8 +12,8 @@
 namespace slsd {
 namespace {
 
-/// Bend over a symbol's size that moves its centre by a tenth of that, below what noise does.
-constexpr float kNegligiblePx = 0.12F;
+/// Bend over a symbol's size that moves its centre by a tenth of that: about as much as noise does.
+constexpr float kSlightPx = 0.12F;
 
 /// How far the centroid of a symbol's image lies from the point that its centroid lights.
 /// @param m  second moments of the symbol, projector px squared
@@ -32,7 +32,7 @@ CentreCorrection::CentreCorrection(const std::vector<Prototype>& prototypes, flo
     : prototypes_(prototypes),
       size_px_(symbol_size_px),
       pitch_px_(pitch_px),
-      negligible_bend_(kNegligiblePx / (symbol_size_px * symbol_size_px)) {
+      slight_bend_(kSlightPx / (symbol_size_px * symbol_size_px)) {
   for (const Prototype& prototype : prototypes) {
     const ShapeFeatures& mean = prototype.mean;
     Eigen::Matrix2f moments;
@@ -73,6 +73,17 @@ void CentreCorrection::measure_bends(std::int32_t node) {
                  (0.25F * per_squared_px);
     at.has_uv = true;
   }
+  if (!at.has_uu || !at.has_uv || !at.has_vv) return;
+  const float largest =
+      std::max({at.bend.uu.cwiseAbs().maxCoeff(), at.bend.uv.cwiseAbs().maxCoeff(), at.bend.vv.cwiseAbs().maxCoeff()});
+  at.is_slight = largest < slight_bend_;
+  if (!at.is_slight) return;
+  const auto over_two = [&](std::int32_t last, std::int32_t first, const Eigen::Vector2f& over_one) -> Eigen::Vector2f {
+    if (last < 0 || first < 0) return over_one;
+    return (centres_[last] + centres_[first] - 2 * centres_[node]) * (0.25F * per_squared_px);
+  };
+  at.over_two = {over_two(next(right, kRight), next(left, kLeft), at.bend.uu), at.bend.uv,
+                 over_two(next(down, kDown), next(up, kUp), at.bend.vv)};
 }
 
 template <class Part>
@@ -98,16 +109,25 @@ Eigen::Vector2f CentreCorrection::median_around(const std::vector<GridNode>& nod
   return {median(x), median(y)};
 }
 
-std::optional<Bend> CentreCorrection::bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const {
-  const Derivatives& own = derivatives_[node];
-  const float largest = std::max(
-      {own.bend.uu.cwiseAbs().maxCoeff(), own.bend.uv.cwiseAbs().maxCoeff(), own.bend.vv.cwiseAbs().maxCoeff()});
-  if (own.has_uu && own.has_uv && own.has_vv && largest < negligible_bend_) return std::nullopt;
+/// The mean with the neighbours that hardly bend either: less noise than the bend itself.
+Bend CentreCorrection::slight_bend_around(std::int32_t node) const {
+  Bend sum = derivatives_[node].over_two;
+  float count = 1;
+  for (const std::int32_t other : named_[node]) {
+    if (other < 0 || !derivatives_[other].is_slight) continue;
+    const Bend& bend = derivatives_[other].over_two;
+    sum.uu += bend.uu, sum.uv += bend.uv, sum.vv += bend.vv, ++count;
+  }
+  return {sum.uu / count, sum.uv / count, sum.vv / count};
+}
+
+Bend CentreCorrection::bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const {
+  if (derivatives_[node].is_slight) return slight_bend_around(node);
   // The median with the neighbours: less noise, a value where none could be measured, and none from across an edge in
   // depth.
-  return Bend{median_around(nodes, node, &Derivatives::has_uu, &Bend::uu),
-              median_around(nodes, node, &Derivatives::has_uv, &Bend::uv),
-              median_around(nodes, node, &Derivatives::has_vv, &Bend::vv)};
+  return {median_around(nodes, node, &Derivatives::has_uu, &Bend::uu),
+          median_around(nodes, node, &Derivatives::has_uv, &Bend::uv),
+          median_around(nodes, node, &Derivatives::has_vv, &Bend::vv)};
 }
 
 /// @param letter  of its cell
@@ -133,10 +153,8 @@ LatticeSymbol CentreCorrection::symbol_of(const std::vector<GridNode>& nodes, co
   for (const Direction d : kDirections) {
     if (named_[node][d] >= 0) symbol.neighbours[d] = symbol_of_[named_[node][d]];
   }
-  if (const std::optional<Bend> bend = bend_of(nodes, node)) {
-    symbol.bend = *bend;
-    symbol.centre_px -= pull_of(*bend, symbol.frame, second_moments_px2_[letter]);
-  }
+  symbol.bend = bend_of(nodes, node);
+  symbol.centre_px -= pull_of(symbol.bend, symbol.frame, second_moments_px2_[letter]);
   return symbol;
 }
 

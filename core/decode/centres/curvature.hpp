@@ -23,8 +23,8 @@ namespace slsd {
 ///
 ///     centroid of the image = c0 + Q(M)/2 + F M grad(log J)
 ///
-/// and Q follows from the neighbours, whose second differences span a whole pitch: their noise enters with a weight of
-/// some percent.
+/// and Q follows from the neighbours, whose second differences span a pitch, or two where they are slight: their noise
+/// enters with a weight of some percent.
 /// @thread thread-bound: keeps its buffers
 class CentreCorrection {
  public:
@@ -42,6 +42,8 @@ class CentreCorrection {
   struct Derivatives {
     Bend bend;
     bool has_uu = false, has_uv = false, has_vv = false;
+    bool is_slight = false;
+    Bend over_two;  // where slight, from twice as far: a quarter of the noise
   };
   void measure_bends(std::int32_t node);
   [[nodiscard]] LatticeSymbol symbol_of(const std::vector<GridNode>& nodes, const GreyMoments& seen,
@@ -50,15 +52,15 @@ class CentreCorrection {
   template <class Part>
   [[nodiscard]] Eigen::Vector2f median_around(const std::vector<GridNode>& nodes, std::int32_t node,
                                               bool Derivatives::*has, Part part) const;
-  /// Nothing where it is negligible.
-  [[nodiscard]] std::optional<Bend> bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const;
+  [[nodiscard]] Bend slight_bend_around(std::int32_t node) const;
+  [[nodiscard]] Bend bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const;
   [[nodiscard]] std::int32_t named_neighbour(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims,
                                              std::int32_t node, Direction direction) const;
 
   std::vector<Prototype> prototypes_;
   float size_px_;
   float pitch_px_;
-  float negligible_bend_;
+  float slight_bend_;
   std::vector<Eigen::Vector2f> centroids_px_;
   std::vector<Eigen::Matrix2f> second_moments_px2_;
   std::vector<Eigen::Vector2f> centres_;            // of the squares
