@@ -73,7 +73,7 @@ TEST(AdversaryFrames, NameNoPieceOfAnotherSurfaceAtARim) {
     fine.expect_none_wrong(kind, number);
   for (const int number : {68, 82}) coarse.expect_none_wrong(Kind::kSwappedPatch, number);
   // Two halves, of a symbol of a shelf and of one beyond it, that look like one.
-  for (const int number : {128, 166, 332, 334, 390, 566}) coarse.expect_none_wrong(Kind::kShelves, number);
+  for (const int number : {128, 166, 332, 334, 390, 566, 8350}) coarse.expect_none_wrong(Kind::kShelves, number);
   for (const int number : {121, 289, 321, 479, 573, 861, 892, 1161}) fine.expect_none_wrong(Kind::kShelves, number);
 }
 

@@ -28,6 +28,15 @@ class CellGate {
     return segments_.empty() ||
            std::abs(segments_[node].residual_px(cells_.ray(row, column).direction)) <= tolerance_px_;
   }
+  /// Which way a node's epipolar line leads past a cell: cells to the right and down, of length one.
+  [[nodiscard]] Eigen::Vector2f way_of_line(std::int32_t node, int row, int column) const {
+    const auto off_line = [&](int r, int c) { return segments_[node].residual_px(cells_.ray(r, c).direction); };
+    const int down = row + 1 < cells_.rows() ? 1 : -1, right = column + 1 < cells_.columns() ? 1 : -1;
+    const double here = off_line(row, column);
+    return Eigen::Vector2d((off_line(row + down, column) - here) * down, (here - off_line(row, column + right)) * right)
+        .normalized()
+        .cast<float>();
+  }
   [[nodiscard]] bool knows_lines() const { return !segments_.empty(); }
   /// Calls visit(row, column) for the cells that a node can be, found from one that lies on its epipolar line, which is
   /// left out: the line is followed from row to row or from column to column, whichever are more.

@@ -6,6 +6,8 @@
 #include <limits>
 #include <span>
 
+#include <Eigen/LU>
+
 #include "core/decode/grid/islands.hpp"
 
 namespace slsd {
@@ -22,6 +24,39 @@ void IslandJudge::look_at_cells(const Frame& frame, std::int32_t island) {
   looked_at_ = island;
 }
 
+/// How far a link's step is from the one that leads to its node, along the node's epipolar line, in cells; nothing
+/// where none leads to it. Depth moves nothing across the line.
+std::optional<float> IslandJudge::slip_beyond(const Frame& frame, std::int32_t node, Direction d) const {
+  const Direction back = opposite(d);
+  const std::int32_t after = frame.beside[node][d];
+  if (after < 0 || links_[node][back] != Link::kAgrees) return std::nullopt;
+  const std::int32_t before = frame.beside[node][back];
+  const Eigen::Vector2f bend_px =
+      frame.nodes[after].centre_px - 2 * frame.nodes[node].centre_px + frame.nodes[before].centre_px;
+  const CellClaim& claim = frame.claims[node];
+  return (frame.nodes[node].frame.inverse() * bend_px).dot(frame.gate.way_of_line(node, claim.row, claim.column)) /
+         pitch_px_;
+}
+
+/// From which slip on a link leads to another surface: some times what is usual in the frame. Where epipolar lines are
+/// not known, none does.
+void IslandJudge::measure_slips(const Frame& frame) {
+  constexpr std::size_t kSamples = 400, kSamplesMin = 20;
+  constexpr float kOfMedian = 8, kLeast = 0.008F;
+  slip_max_ = std::numeric_limits<float>::infinity();
+  if (!frame.gate.knows_lines()) return;
+  slips_.clear();
+  const std::size_t stride = std::max<std::size_t>(1, members_.size() / kSamples);
+  for (std::size_t i = 0; i < members_.size(); i += stride) {
+    if (links_[members_[i]] != kAllAgree) continue;
+    for (const Direction d : {kRight, kDown}) slips_.push_back(std::abs(*slip_beyond(frame, members_[i], d)));
+  }
+  if (slips_.size() < kSamplesMin) return;
+  const auto middle = slips_.begin() + static_cast<std::ptrdiff_t>(slips_.size() / 2);
+  std::ranges::nth_element(slips_, middle);
+  slip_max_ = std::max(kOfMedian * *middle, kLeast);
+}
+
 /// Nodes that too little holds, in so many rounds as a row of symbols is long that chance could not add.
 void IslandJudge::cut_back(const Frame& frame) {
   const int rounds = static_cast<int>(std::ceil(-std::log(options_.wrong_cells_max) / log_letters_ / 1.5));
@@ -36,7 +71,7 @@ void IslandJudge::cut_back(const Frame& frame) {
         const Link link = links_[node][d];
         if (link == Link::kAgrees) ++held_[node];
         // What is well seen and contradicts is other light, which seldom is a symbol wide.
-        if (link == Link::kAgainst && !runs_along_edge(frame, node, d))
+        if (link == Link::kAgainst && !runs_along_edge(frame, node, d) && !parts(frame, node, d))
           held_[node] = static_cast<std::int8_t>(held_[node] - (is_well_seen(frame, frame.beside[node][d]) ? 2 : 1));
       }
     }
@@ -75,6 +110,7 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
   };
   const auto look_beyond = [&](std::int32_t node, Direction d) {
     const Link link = links_[node][d];
+    if ((link != Link::kAgainst && link != Link::kNeutral) || parts(frame, node, d)) return End{false, 0};
     return End{link == Link::kAgainst && !runs_along_edge(frame, node, d),
                link == Link::kNeutral ? count_doubtful(frame, node, d, kBeyond) : 0};
   };
@@ -299,11 +335,14 @@ bool IslandJudge::is_held(const Piece& piece, Direction d) const {
 }
 
 IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, Direction d) const {
+  constexpr float kTorn = 6;  // standard deviations: from there on a centre lies anywhere
   Side side;
   any_along(piece, d, [&](std::int32_t node) {
     if (links_[node][d] == Link::kAgrees) side.bend += bend_of(frame, node, d), ++side.held_by;
     const Beyond cell(frame.claims[node], d);
-    if (shown(cell.row, cell.column)) {
+    if (parts(frame, node, d) && frame.shapes[frame.beside[node][d]].distance < kTorn) {
+      side.broken |= is_of_another(frame, node, d);
+    } else if (shown(cell.row, cell.column)) {
       side.contradicted |= is_of_another(frame, node, d);
       if (links_[node][d] == Link::kNeutral) side.beyond += ratio(frame, frame.beside[node][d], cell.row, cell.column);
     }
@@ -471,7 +510,7 @@ void IslandJudge::cut_steps(const Frame& frame) {
       float evidence = own_ratio(node);
       std::int32_t last = node;
       while (is_cut(last, d)) last = frame.beside[last][d], evidence += own_ratio(last);
-      const bool ends = links_[last][d] != Link::kAgrees && is_of_another(frame, last, d);
+      const bool ends = links_[last][d] != Link::kAgrees && is_of_another(frame, last, d) && !parts(frame, last, d);
       if (ends && evidence < kFewAgree * log_letters_) next_queue_.push_back(node);
     }
   }
@@ -483,6 +522,7 @@ void IslandJudge::cut_rims(const Frame& frame) {
   holder_.assign(static_cast<std::size_t>(options_.rows) * options_.columns, -1);
   looked_at_ = -1;
   around_.assign(holder_.size(), -1);
+  measure_slips(frame);
   for (std::size_t id = 0; id < islands_.size(); ++id) cut_slid(frame, static_cast<std::int32_t>(id));
   cut_contradicted_lines(frame);
   cut_back(frame);

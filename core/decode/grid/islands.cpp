@@ -26,7 +26,8 @@ IslandJudge::IslandJudge(const Pattern& pattern, IslandOptions options)
     : array_(pattern.array),
       options_(options),
       log_letters_(std::log(static_cast<float>(pattern.letters()))),
-      link_weight_(static_cast<float>(-std::log(options.link_crosses))) {}
+      link_weight_(static_cast<float>(-std::log(options.link_crosses))),
+      pitch_px_(static_cast<float>(pattern.pitch_px())) {}
 
 float IslandJudge::ratio(const Frame& frame, std::int32_t node, int row, int column) const {
   const Classification& shape = frame.shapes[node];

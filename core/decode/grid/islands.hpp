@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <utility>
@@ -155,6 +156,14 @@ class IslandJudge {
   [[nodiscard]] bool is_left(int row, int column) const {
     return shown(row, column) && holder_[index_of(row, column)] >= 0;
   }
+  [[nodiscard]] std::optional<float> slip_beyond(const Frame& frame, std::int32_t node, Direction d) const;
+  void measure_slips(const Frame& frame);
+  /// Whether a link leads to what is not on one surface with the node.
+  [[nodiscard]] bool parts(const Frame& frame, std::int32_t node, Direction d) const {
+    if (std::isinf(slip_max_)) return false;
+    const auto slip = slip_beyond(frame, node, d);
+    return slip && std::abs(*slip) > slip_max_;
+  }
   void cut_slid(const Frame& frame, std::int32_t island);
   void cut_slid_along(const Frame& frame, std::int32_t island, const Piece& line);
   void cut_contradicted_lines(const Frame& frame);
@@ -165,7 +174,7 @@ class IslandJudge {
 
   CodeArray array_;
   IslandOptions options_;
-  float log_letters_, link_weight_;
+  float log_letters_, link_weight_, pitch_px_;
   /// What a node's own cell is to it, once all have one.
   struct Own {
     float ratio;  // as above; 0 without a cell
@@ -190,6 +199,8 @@ class IslandJudge {
   std::vector<Line> lines_;                    // contradicted ones
   std::vector<std::int32_t> holder_;           // of each cell: of the island that is looked at, or of all
   std::int32_t looked_at_ = -1;
+  std::vector<float> slips_;  // of a sample of links
+  float slip_max_ = 0;        // of links on one surface, cells
 };
 
 }  // namespace slsd

@@ -217,6 +217,66 @@ TEST_F(PatchedIslands, GiveUpWhatIsBesideAWellSeenContradiction) {
   EXPECT_TRUE(is_decoded(claims, 25, 28));
 }
 
+/// Four symbols at a rim, below which letters of something else lie, moved along their rows.
+class IslandsAtAnEdge : public Islands {
+ protected:
+  std::vector<CellClaim> decode_with(float away_px, bool knows_lines, float noise_px = 0) {
+    show_pattern(10, 10, 14, 41);
+    for (int row = 14; row < 18; ++row) {
+      show(row, 40, (pattern_.array.at(row, 40) + 1) % 5);
+      grid_.nodes.back().centre_px.x() += away_px;
+    }
+    std::mt19937 random(5);
+    std::normal_distribution<float> noise(0, noise_px);
+    if (noise_px > 0)
+      for (GridNode& node : grid_.nodes) node.centre_px += Eigen::Vector2f(noise(random), noise(random));
+    return knows_lines ? decode(lines_through(2000, [](int) { return 0; })) : decode();
+  }
+  int kept(const std::vector<CellClaim>& claims) const {
+    int count = 0;
+    for (int row = 10; row < 14; ++row) count += is_decoded(claims, row, 40);
+    return count;
+  }
+};
+
+TEST_F(IslandsAtAnEdge, KeepWhatAContradictionOffTheGridLiesBeside) {
+  EXPECT_EQ(kept(decode_with(1.8F, true)), 4);  // a tenth of a step
+}
+
+TEST_F(IslandsAtAnEdge, LoseWhatAContradictionOnTheGridLiesBeside) {
+  EXPECT_EQ(kept(decode_with(0, true)), 0);
+}
+
+TEST_F(IslandsAtAnEdge, TakeAHundredthOfAStepForAnotherDepthAndHalfOfItForNone) {
+  EXPECT_EQ(kept(decode_with(0.1F, true)), 0);
+  grid_ = {}, shapes_.clear();
+  EXPECT_EQ(kept(decode_with(0.2F, true)), 4);
+}
+
+TEST_F(IslandsAtAnEdge, LoseItWhereTheGridItselfIsAsUneven) {
+  EXPECT_EQ(kept(decode_with(1.8F, true, 0.19F)), 0);  // half of its slips are beyond a sixth of it
+}
+
+TEST_F(IslandsAtAnEdge, LoseItWhereNothingTellsWhatDepthWouldMove) {
+  EXPECT_EQ(kept(decode_with(1.8F, false)), 0);
+}
+
+// What lies across the epipolar lines is no other depth: of the island's own surface, whatever moved it.
+TEST_F(PatchedIslands, TellContradictionsOfAnotherDepthAlongTheLinesAlone) {
+  put(25, 30, 1);
+  const std::vector<std::pair<int, int>> around{{24, 30}, {26, 30}, {25, 29}, {25, 31}};
+  const auto lines = lines_through(2000, [](int) { return 0; });
+  const auto kept = [&] {
+    const auto claims = decode(lines);
+    return std::ranges::count_if(around, [&](const auto& cell) { return is_decoded(claims, cell.first, cell.second); });
+  };
+  Eigen::Vector2f& centre_px = grid_.nodes[grid_.node_at(25, 30)].centre_px;
+  centre_px += Eigen::Vector2f(1.8F, 0);
+  EXPECT_EQ(kept(), 4);
+  centre_px += Eigen::Vector2f(-1.8F, 1.8F);
+  EXPECT_EQ(kept(), 0);
+}
+
 TEST_F(Islands, AreBothRefusedWhereTheyShowOnePartOfThePattern) {
   for (int row = 0; row < 8; ++row) {
     for (int column = 0; column < 8; ++column) {
