@@ -140,15 +140,42 @@ Result<Adjustment> Adjustment::begin(Observations& observations, RigModel rig) {
   if (auto solved = adjust(observations, options, adjustment.rig_); !solved) return tl::unexpected(solved.error());
   if (auto tilted = check_tilts(adjustment.rig_); !tilted) return tl::unexpected(tilted.error());
   adjustment.measure_noise(observations);
-  if (auto estimated = estimate_projector(observations, adjustment.rig_); !estimated)
-    return tl::unexpected(estimated.error());
+  const auto doubtful = estimate_projector(observations, adjustment.rig_);
+  if (!doubtful) return tl::unexpected(doubtful.error());
   options.projector = plausible_distortion(adjustment.rig_.projector.size, adjustment.rig_.projector.lens[0]);
   options.with_symbols = true;
+  std::vector<PoseObservation> aside = adjustment.set_aside(*doubtful, observations);
   if (auto solved = adjust(observations, options, adjustment.rig_); !solved) return tl::unexpected(solved.error());
   if (auto solved = adjustment.adjust_again(observations); !solved) return tl::unexpected(solved.error());
   // Before poses and terms are judged: under a stretched board they bear its errors.
   if (auto looked = adjustment.look_for_stretch(observations); !looked) return tl::unexpected(looked.error());
+  if (auto back = adjustment.take_back(*doubtful, std::move(aside), observations); !back)
+    return tl::unexpected(back.error());
   return adjustment;
+}
+
+std::vector<PoseObservation> Adjustment::set_aside(const std::vector<std::size_t>& doubtful,
+                                                   Observations& observations) {
+  std::vector<PoseObservation> aside;
+  for (const std::size_t i : doubtful) aside.push_back(observations.poses[i]);
+  for (auto i = doubtful.rbegin(); i != doubtful.rend(); ++i) {
+    observations.poses.erase(observations.poses.begin() + static_cast<std::ptrdiff_t>(*i));
+    rig_.rig_from_board.erase(rig_.rig_from_board.begin() + static_cast<std::ptrdiff_t>(*i));
+  }
+  return aside;
+}
+
+Result<> Adjustment::take_back(const std::vector<std::size_t>& doubtful, std::vector<PoseObservation> aside,
+                               Observations& observations) {
+  if (doubtful.empty()) return {};
+  for (std::size_t i = 0; i < doubtful.size(); ++i) {
+    const auto at = static_cast<std::ptrdiff_t>(doubtful[i]);
+    rig_.rig_from_board.insert(rig_.rig_from_board.begin() + at,
+                               estimate_pose(aside[i], rig_).value_or(MotionVector{0, 0, 0, 0, 0, 1}));
+    observations.poses.insert(observations.poses.begin() + at, std::move(aside[i]));
+  }
+  mark_outlying(observations);
+  return find_influence_of(observations);
 }
 
 /// Everything at once, with distortions that can be undone over the whole of each picture.

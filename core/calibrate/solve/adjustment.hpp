@@ -51,6 +51,12 @@ class Adjustment {
   explicit Adjustment(RigModel rig) : rig_(std::move(rig)) {}
   [[nodiscard]] Result<> find_influence_of(const Observations& observations);
   [[nodiscard]] std::string unplaced_text(const Observations& observations) const;
+  /// Takes poses out, so that they have no part in what follows.
+  [[nodiscard]] std::vector<PoseObservation> set_aside(const std::vector<std::size_t>& doubtful,
+                                                       Observations& observations);
+  /// Puts them back where their corners say, to be judged by the others.
+  [[nodiscard]] Result<> take_back(const std::vector<std::size_t>& doubtful, std::vector<PoseObservation> aside,
+                                   Observations& observations);
   template <class Visit>
   void visit_components(Observations& observations, Visit visit) const;
   void measure_noise(Observations& observations);

@@ -116,9 +116,9 @@ std::vector<double> errors_px(const Views& views, const LensVector& lens, const 
 }
 
 /// Root mean square of the smallest.
-double judged_px(std::vector<double> errors) {
+double judged_px(std::vector<double> errors, double share = kJudgingShare) {
   std::ranges::sort(errors);
-  const auto count = static_cast<std::size_t>(std::ceil(kJudgingShare * static_cast<double>(errors.size())));
+  const auto count = static_cast<std::size_t>(std::ceil(share * static_cast<double>(errors.size())));
   double sum = 0;
   for (std::size_t i = 0; i < count; ++i) sum += errors[i] * errors[i];
   return std::sqrt(sum / static_cast<double>(count));
@@ -275,6 +275,88 @@ Result<> judge_doubtful(const std::vector<std::size_t>& doubtful, const Observat
   return {};
 }
 
+/// A pose's symbols, where the cameras' rays to them meet its board.
+std::vector<SpacePoint> space_points(const PoseObservation& pose, const RigModel& rig, const MotionVector& place) {
+  std::vector<SpacePoint> points;
+  const RigidTransform rig_from_board = to_motion(place);
+  for (const PoseView& view : pose.views) {
+    for (const ProjectedPoint& symbol : view.symbols) {
+      points.push_back({meet_board(rig.cameras[view.camera], rig_from_board, symbol.camera_px), symbol.projector_px});
+    }
+  }
+  return points;
+}
+
+/// Of each pose: half of its symbols are off by less, in the projector.
+std::vector<double> errors_px(const std::vector<std::vector<SpacePoint>>& poses, const Resection& projector) {
+  std::vector<double> errors;
+  for (const auto& points : poses) {
+    std::vector<double> off;
+    for (const SpacePoint& point : points) {
+      const Eigen::Vector3d seen = projector.device_from_points * point.point_mm;
+      const auto& lens = projector.lens;
+      const Eigen::Vector2d pixel(lens[0] * seen.x() / seen.z() + lens[2], lens[1] * seen.y() / seen.z() + lens[3]);
+      off.push_back((pixel - point.pixel).norm());
+    }
+    errors.push_back(median_of(std::move(off)));
+  }
+  return errors;
+}
+
+/// Poses with more symbols than so are judged as well by these.
+constexpr std::size_t kSymbolsOfPose = 60;
+constexpr std::size_t kStartsTried = 24;
+constexpr double kHalf = 0.5;  // of the poses, that a device which moved in the middle leaves right
+
+/// Ascending: poses that are far off, where half of them or more are not.
+std::vector<std::size_t> far_off(const std::vector<double>& errors) {
+  std::vector<double> sorted = errors;
+  std::ranges::sort(sorted);
+  const double limit = std::max(kGrossFactor * sorted[(sorted.size() - 1) / 2], kNoBoardPx);
+  std::vector<std::size_t> far;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (!(errors[i] <= limit)) far.push_back(i);
+  }
+  return far;
+}
+
+/// By all poses or, where some are far off by these, by the run of poses that suits most of them best: one that is
+/// wholly wrong, and a device that moved during the session, leave some run right.
+Result<Resection> resect_most(const std::vector<std::vector<SpacePoint>>& poses) {
+  const auto resect_but = [](const std::vector<std::vector<SpacePoint>>& some, const std::vector<std::size_t>& wrong) {
+    std::vector<SpacePoint> points;
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      if (!std::ranges::binary_search(wrong, i)) points.insert(points.end(), some[i].begin(), some[i].end());
+    }
+    return resect(points);
+  };
+  const auto of_all = resect_but(poses, {});
+  if (of_all && std::ranges::max(errors_px(poses, *of_all)) <= kNoBoardPx) return of_all;
+  auto few = poses;
+  for (auto& points : few) {
+    const std::size_t step = std::max<std::size_t>(1, points.size() / kSymbolsOfPose);
+    std::size_t i = 0;
+    std::erase_if(points, [&](const SpacePoint&) { return i++ % step != 0; });
+  }
+  const std::size_t count = poses.size();
+  double least =
+      of_all ? judged_px(errors_px(few, *of_all), kHalf) / kNearlyBest : std::numeric_limits<double>::infinity();
+  std::vector<double> best;
+  for (const std::size_t length : {std::max(kPosesMin, count / 3), std::max(kPosesMin, count / 2)}) {
+    for (std::size_t start = 0; start < count && length < count; start += count / kStartsTried + 1) {
+      std::vector<SpacePoint> points;  // from the last pose on to the first
+      for (std::size_t i = start; i < start + length; ++i) {
+        points.insert(points.end(), few[i % count].begin(), few[i % count].end());
+      }
+      const auto of_run = resect(points);
+      if (!of_run) continue;
+      std::vector<double> errors = errors_px(few, *of_run);
+      if (const double error = judged_px(errors, kHalf); error < least) least = error, best = std::move(errors);
+    }
+  }
+  return best.empty() ? of_all : resect_but(poses, far_off(best));
+}
+
 }  // namespace
 
 FaultyPose fits_no_plane(std::size_t pose) {
@@ -335,17 +417,12 @@ std::optional<MotionVector> estimate_pose(const PoseObservation& pose, const Rig
   return std::nullopt;
 }
 
-Result<> estimate_projector(const Observations& observations, RigModel& rig) {
-  std::vector<SpacePoint> points;
+Result<std::vector<std::size_t>> estimate_projector(const Observations& observations, RigModel& rig) {
+  std::vector<std::vector<SpacePoint>> points;
   for (std::size_t i = 0; i < observations.poses.size(); ++i) {
-    const RigidTransform rig_from_board = to_motion(rig.rig_from_board[i]);
-    for (const PoseView& view : observations.poses[i].views) {
-      for (const ProjectedPoint& symbol : view.symbols) {
-        points.push_back({meet_board(rig.cameras[view.camera], rig_from_board, symbol.camera_px), symbol.projector_px});
-      }
-    }
+    points.push_back(space_points(observations.poses[i], rig, rig.rig_from_board[i]));
   }
-  const auto solved = resect(points);
+  const auto solved = resect_most(points);
   if (!solved) return tl::unexpected(solved.error());
   const double focal_max = kFocalMax * rig.projector.size.width_px, focal_min = kFocalMin * rig.projector.size.width_px;
   if (!(solved->lens[0] > focal_min && solved->lens[0] < focal_max && solved->lens[1] > focal_min &&
@@ -356,7 +433,8 @@ Result<> estimate_projector(const Observations& observations, RigModel& rig) {
   }
   rig.projector.lens = solved->lens;
   rig.projector.device_from_rig = to_vector(solved->device_from_points);
-  return {};
+  std::vector<std::size_t> doubtful = far_off(errors_px(points, *solved));
+  return points.size() - doubtful.size() < kPosesMin ? std::vector<std::size_t>() : doubtful;
 }
 
 }  // namespace slsd

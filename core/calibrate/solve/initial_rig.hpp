@@ -41,10 +41,12 @@ struct InitialRig {
 [[nodiscard]] std::optional<MotionVector> estimate_pose(const PoseObservation& pose, const RigModel& rig);
 
 /// A first estimate of the projector, from where the cameras' rays to its pixels meet the board: the direct linear
-/// transformation, robust against wrong pixels.
+/// transformation, robust against wrong pixels, and against wrong poses as long as the others are most.
 /// @param rig  in: cameras and poses; out: the projector too
+/// @return     ascending: the poses that are far off it, which would draw an adjustment to where others seem to be the
+///             wrong ones; none where too few others are left
 /// @errors kImpossible
 /// @thread reentrant
-[[nodiscard]] Result<> estimate_projector(const Observations& observations, RigModel& rig);
+[[nodiscard]] Result<std::vector<std::size_t>> estimate_projector(const Observations& observations, RigModel& rig);
 
 }  // namespace slsd

@@ -65,6 +65,55 @@ TEST(Calibrate, ExplainsNoSkewedPictureByAMove) {
   }
 }
 
+/// Poses as people hold them: not tilted much, nor at many distances.
+std::vector<MotionVector> alike_poses(int count, std::uint32_t seed) {
+  std::vector<MotionVector> poses = true_poses(count, seed);
+  for (MotionVector& pose : poses) pose[0] *= 0.5, pose[1] *= 0.5, pose[5] = 2000 + 0.3 * (pose[5] - 2000);
+  return poses;
+}
+
+void turn_upside_down(PoseView& view, const ImageSize& size) {
+  const auto turn = [&](Eigen::Vector2d& px) { px = {size.width_px - 1 - px.x(), size.height_px - 1 - px.y()}; };
+  for (BoardPoint& corner : view.corners) turn(corner.camera_px);
+  for (ProjectedPoint& symbol : view.symbols) turn(symbol.camera_px);
+}
+
+// Their corners are those of a board, but their symbols are nowhere near where the other poses have them.
+TEST(Calibrate, GivesPicturesThatAreUpsideDownNoPart) {
+  const RigModel truth = true_rig();
+  for (const std::size_t count : {5U, 8U, 10U}) {
+    for (const std::size_t wrong : {1U, 2U}) {
+      for (const std::size_t first : {0U, 3U}) {
+        if (count == 5 && wrong > 1) continue;
+        Observations observations = see(truth, alike_poses(static_cast<int>(count), 3));
+        for (std::size_t i = first; i < first + wrong; ++i) {
+          turn_upside_down(observations.poses[i].views[0], observations.cameras[0].size);
+        }
+        const auto outcome = calibrate(observations, {});
+        ASSERT_TRUE(outcome) << count << " poses: " << outcome.error().message;
+        EXPECT_EQ(left_out(*outcome), wrong) << count << " poses";
+        for (std::size_t i = first; i < first + wrong; ++i) {
+          EXPECT_TRUE(report_of(*outcome, "pose_" + std::to_string(i)).fault) << count << " poses";
+        }
+        EXPECT_NEAR(outcome->rig.cameras[0].lens[0], truth.cameras[0].lens[0], 0.002 * truth.cameras[0].lens[0]);
+      }
+    }
+  }
+}
+
+// Two that are not side by side, among poses that leave no half without one.
+TEST(Calibrate, GivesPicturesThatAreUpsideDownAnywhereNoPart) {
+  const RigModel truth = true_rig();
+  Observations observations = see(truth, alike_poses(10, 3));
+  for (const std::size_t i : {2U, 7U}) {
+    turn_upside_down(observations.poses[i].views[0], observations.cameras[0].size);
+  }
+  const auto outcome = calibrate(observations, {});
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(left_out(*outcome), 2U);
+  EXPECT_TRUE(report_of(*outcome, "pose_2").fault && report_of(*outcome, "pose_7").fault);
+}
+
 TEST(Calibrate, NamesAPoseWhoseBoardMoved) {
   const RigModel truth = true_rig();
   SightOptions options;

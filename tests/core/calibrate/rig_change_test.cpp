@@ -73,6 +73,25 @@ TEST(RigChange, NamesTheDeviceAndTheMoment) {
   }
 }
 
+// So far that no start suits both parts.
+TEST(RigChange, NamesAMomentOfALargeTurn) {
+  for (const double degrees : {2.0, 5.0}) {
+    for (const std::size_t first : {2U, 5U, 7U}) {
+      for (const Eigen::Vector3d& axis : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0.1, 1, 0.3)}) {
+        for (const Device device : {Device::kCamera, Device::kProjector}) {
+          const RigModel truth = true_rig();
+          const auto outcome = calibrate(see_change(truth, turned(truth, device, axis, degrees), first, 10), {});
+          ASSERT_FALSE(outcome) << degrees << " degrees at " << first;
+          EXPECT_THAT(outcome.error().message,
+                      AllOf(HasSubstr("not one rig"), HasSubstr("between pose_" + std::to_string(first - 1) +
+                                                                " and pose_" + std::to_string(first))))
+              << degrees << " degrees at " << first;
+        }
+      }
+    }
+  }
+}
+
 TEST(RigChange, FindsASecondCameraThatMoved) {
   const RigModel truth = true_rig(2);
   RigModel after = truth;
