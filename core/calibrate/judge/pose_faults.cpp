@@ -12,6 +12,7 @@
 #include "core/calibrate/judge/lit_surface.hpp"
 #include "core/calibrate/judge/view_demands.hpp"
 #include "core/calibrate/solve/corner_pose.hpp"
+#include "core/calibrate/solve/point_residuals.hpp"
 #include "core/geometry/robust.hpp"
 
 namespace slsd {
@@ -34,6 +35,9 @@ constexpr double kBowOfShiftMin = 0.3;
 constexpr double kUnevenShareMax = 0.1;
 /// The print lies this much elsewhere under the pattern: the picture of the board tells nothing of it.
 constexpr double kShiftMaxPx = 1;
+/// Symbols that lie off the board as if it had moved so far in the camera, whose print did not move: it is not the
+/// board.
+constexpr double kShownByPrintPx = 5;
 /// Corners that are this near those of an earlier pose, as a share of the picture's width, say what those said.
 constexpr double kSamePlaceShare = 0.005;
 /// Of a pose's symbols, those that something stands before; of more it is the board that moved.
@@ -145,6 +149,26 @@ LitSurface surface_of(std::size_t pose, const Observations& observations, const 
   return measure_lit_surface(observations.poses[pose], rig, by_corners.value_or(joint));
 }
 
+/// By how much the print would lie elsewhere under the pattern if the board had moved along its normal: the view that
+/// would show it most, of those whose print is seen to lie where it was; root mean square over the corners.
+double unshown_px(const PoseObservation& pose, const RigModel& rig, const MotionVector& place, double along_normal_mm) {
+  double most = 0;
+  for (const PoseView& view : pose.views) {
+    if (!view.shift_px) continue;
+    const DeviceModel& device = rig.cameras[view.camera];
+    const RigidTransform camera_from_board = to_motion(device.device_from_rig).after(to_motion(place));
+    const Lens lens = to_lens(device.lens, device.size);
+    std::vector<Eigen::Vector2d> moved;
+    for (const BoardPoint& corner : view.corners) {
+      const Eigen::Vector3d before(corner.board_mm.x(), corner.board_mm.y(), 0),
+          after(corner.board_mm.x(), corner.board_mm.y(), along_normal_mm);
+      moved.push_back(lens.project(camera_from_board * after) - lens.project(camera_from_board * before));
+    }
+    most = std::max(most, rms_px(moved));
+  }
+  return most;
+}
+
 /// Surfaces of a pose and how they compare with the others'.
 struct Explanation {
   LitSurface surface;
@@ -193,6 +217,13 @@ FaultyPose explain(std::size_t pose, const std::string& error, const Observation
             fmt::format("something stood before the {}: {:.0f} % of the symbols lie about {:.0f} mm before it; keep "
                         "hands and cables out of its light",
                         subject, 100 * surface.before_share, surface.before_mm)};
+  }
+  if (unshown_px(observations.poses[pose], rig, rig.rig_from_board[pose], surface.offset_mm) > kShownByPrintPx) {
+    return {pose, PoseFault::kUnlike,
+            fmt::format("its symbols lie {:.0f} mm off the {}, which did not move between the pictures, as its print "
+                        "shows: the camera or the projector stood otherwise than in the other poses; fasten both, and "
+                        "take it again",
+                        std::abs(surface.offset_mm), subject)};
   }
   if (shown.is_bowed()) {
     return {pose, PoseFault::kBent,

@@ -102,6 +102,40 @@ TEST(RigChange, FindsASecondCameraThatMoved) {
               AllOf(HasSubstr("camera camera1 moved"), HasSubstr("between pose_6 and pose_7")));
 }
 
+// Of one pose alone nobody can tell that the rig changed, but the print tells that the board did not move.
+TEST(RigChange, OfOnePoseIsNotBlamedOnABoardWhosePrintStayed) {
+  const RigModel truth = true_rig();
+  for (const std::size_t first : {1U, 11U}) {  // the pose before it, or it, alone
+    for (const bool seen_to_stay : {true, false}) {
+      Observations seen = see_change(truth, turned(truth, Device::kCamera, {0, 1, 0}, 0.3), first, 12);
+      for (PoseObservation& pose : seen.poses) {
+        if (seen_to_stay) pose.views[0].shift_px = Eigen::Vector2d::Zero();
+      }
+      const auto outcome = calibrate(seen, {});
+      ASSERT_TRUE(outcome) << outcome.error().message;
+      const PoseReport& alone = report_of(*outcome, first == 1 ? "pose_0" : "pose_11");
+      EXPECT_TRUE(alone.fault);
+      EXPECT_EQ(alone.reason.find("the camera or the projector stood otherwise") != std::string::npos, seen_to_stay)
+          << alone.reason;
+    }
+  }
+}
+
+// By less than its print would tell.
+TEST(RigChange, LeavesABoardThatMovedALittleTheBlame) {
+  SightOptions options;
+  options.moved = [](int pose, const MotionVector& before) {
+    MotionVector after = before;
+    if (pose == 7) after[5] += 6, after[1] += 0.005;
+    return after;
+  };
+  Observations seen = see(true_rig(), true_poses(12), options);
+  for (PoseObservation& pose : seen.poses) pose.views[0].shift_px = Eigen::Vector2d::Zero();
+  const auto outcome = calibrate(seen, {});
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(report_of(*outcome, "pose_7").fault, PoseFault::kMoved) << report_of(*outcome, "pose_7").reason;
+}
+
 // The camera turned, and one board was moved between its pictures besides.
 TEST(RigChange, IsFoundBesideAWrongPose) {
   const RigModel truth = true_rig();
