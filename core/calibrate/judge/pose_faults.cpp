@@ -44,6 +44,9 @@ constexpr double kSamePlaceShare = 0.005;
 constexpr double kCoveredShare = 0.08, kUncoveredShare = 0.5;
 /// Times the usual error from which on the figure tells nothing more.
 constexpr double kTimesTelling = 100;
+/// Of a pose's points, those that lie off, of which nothing else needs to be said.
+constexpr double kHardlyAnyShare = 0.9;
+constexpr char kHardlyAny[] = "hardly a point of it agrees with them";
 
 /// The blurriest view of a pose.
 double blur_of(const PoseObservation& pose) {
@@ -320,8 +323,7 @@ std::optional<FaultyPose> find_unplaced(const Observations& observations, const 
                                         const PoseInfluence& influence) {
   const auto at = std::ranges::find(influence.held_out, false, &HeldOut::placed);
   if (at == influence.held_out.end()) return std::nullopt;
-  return explain(static_cast<std::size_t>(at - influence.held_out.begin()), "hardly a point of it agrees with them",
-                 observations, rig);
+  return explain(static_cast<std::size_t>(at - influence.held_out.begin()), kHardlyAny, observations, rig);
 }
 
 std::optional<FaultyPose> find_contradiction(const Observations& observations, const RigModel& rig,
@@ -351,6 +353,7 @@ std::optional<FaultyPose> find_contradiction(const Observations& observations, c
     if (most > times) times = most, worst = i;
   }
   if (times < kContradiction) return std::nullopt;
+  if (shares[worst] > kHardlyAnyShare) return explain(worst, kHardlyAny, observations, rig);
   return explain(worst,
                  times < kTimesTelling ? fmt::format("its error is {:.1f} times theirs", times)
                                        : fmt::format("its error is more than {:.0f} times theirs", kTimesTelling),
