@@ -32,12 +32,23 @@ Result<> check_one_rig(const Adjustment& adjustment, const Observations& observa
   const auto change = adjustment.find_change(observations);
   if (!change) return {};
   const auto& poses = observations.poses;
-  return fail(
-      ErrorCode::kImpossible,
-      fmt::format("the session is not one rig: {}. Fasten the devices and take the poses again, or calibrate by "
-                  "those of one part: --use {}:{} is the rig as it stands now, --use {}:{} as it was before",
-                  change->text, poses[change->first_pose].name, poses.back().name, poses.front().name,
-                  poses[change->first_pose - 1].name));
+  const std::size_t before = change->first_pose, after = poses.size() - before;
+  std::string parts;
+  const auto add = [&](std::size_t count, std::size_t first, std::string_view when) {
+    if (count < kPosesMin) return;
+    parts += fmt::format("{} --use {}:{} is the rig as it {}", parts.empty() ? "" : ",", poses[first].name,
+                         poses[first + count - 1].name, when);
+  };
+  add(after, before, "stands now");
+  add(before, 0, "was before");
+  const std::string now = after < kPosesMin ? fmt::format(
+                                                  "; of the rig as it stands now there are {} poses, and {} "
+                                                  "are the least",
+                                                  after, kPosesMin)
+                                            : std::string();
+  return fail(ErrorCode::kImpossible,
+              fmt::format("the session is not one rig: {}. Fasten the devices and take the poses again{}{}",
+                          change->text, parts.empty() ? "" : ", or calibrate by those of one part:" + parts, now));
 }
 
 /// Leaves out what contradicts the rest, one after the other.
