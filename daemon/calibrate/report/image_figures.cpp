@@ -36,6 +36,14 @@ void add_camera_points(const PoseView& view, const ViewResiduals& residuals, std
   }
 }
 
+/// Corners and symbols, which both count for what is covered.
+void add_covered_points(const PoseView& view, const ViewResiduals& residuals, std::size_t pose, Points& points) {
+  add_camera_points(view, residuals, pose, points);
+  for (const ProjectedPoint& symbol : view.symbols) {
+    if (!symbol.outlying) points.push_back({symbol.camera_px, Eigen::Vector2d::Zero(), pose, false});
+  }
+}
+
 void add_projector_points(const PoseView& view, const ViewResiduals& residuals, std::size_t pose, Points& points) {
   for (std::size_t i = 0; i < view.symbols.size(); ++i) {
     points.push_back({view.symbols[i].projector_px, residuals.symbols_projector_px[i], pose, view.symbols[i].outlying});
@@ -54,9 +62,10 @@ Points gather(const CalibrationOutcome& outcome, Add&& add) {
   return points;
 }
 
-Points camera_points(const CalibrationOutcome& outcome, std::size_t camera) {
+template <class Add>
+Points camera_points(const CalibrationOutcome& outcome, std::size_t camera, Add&& add) {
   return gather(outcome, [&](const PoseView& view, const auto& residuals, std::size_t pose, Points& points) {
-    if (view.camera == camera) add_camera_points(view, residuals, pose, points);
+    if (view.camera == camera) add(view, residuals, pose, points);
   });
 }
 
@@ -64,12 +73,15 @@ Points projector_points(const CalibrationOutcome& outcome) {
   return gather(outcome, add_projector_points);
 }
 
-// Few enough for a browser; evenly over all, and every outlying one.
-Points thinned(const Points& points) {
+// Few enough for a browser; evenly over all, every outlying one, and one at least of each cell.
+Points thinned(const Points& points, const ImageSize& size) {
   const std::size_t step = 1 + points.size() / kMaxShapes;
   Points kept;
+  Coverage shown;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (i % step == 0 || points[i].outlying) kept.push_back(points[i]);
+    const double share = shown.share();
+    shown.add(points[i].pixel, size);
+    if (i % step == 0 || points[i].outlying || shown.share() > share) kept.push_back(points[i]);
   }
   return kept;
 }
@@ -91,7 +103,7 @@ std::string coverage_figure(const ImageSize& size, const Coverage& coverage, con
     const Eigen::Vector2d first = cell.cwiseProduct(Eigen::Vector2d(i % kCoverageColumns, i / kCoverageColumns));
     if (coverage.counts[i] == 0) figure.rectangle(first, first + cell, "#f9d9d6");
   }
-  for (const DrawnPoint& point : thinned(points)) figure.dot(point.pixel, 1.3, pose_colour(point.pose));
+  for (const DrawnPoint& point : thinned(points, size)) figure.dot(point.pixel, 1.3, pose_colour(point.pose));
   figure.frame();
   return figure.str(fmt::format("{}: points in {:.0f} % of the image, {:.0f} % are good; cells without any are red",
                                 device, 100 * coverage.share(), 100 * kCoverageGood));
@@ -112,7 +124,7 @@ std::string residual_figure(const ImageSize& size, const Points& points, const s
   // Outlying points lie beneath the others, and say no more than where to: at their length they would hide all.
   for (const bool outlying : {true, false}) {
     const double longest = (outlying ? 1 : 8) * kArrowPx / figure.scale();
-    for (const DrawnPoint& point : thinned(points)) {
+    for (const DrawnPoint& point : thinned(points, size)) {
       if (point.outlying != outlying) continue;
       const std::string colour = outlying ? kOutlying : pose_colour(point.pose);
       Eigen::Vector2d arrow = magnified * point.residual_px;
@@ -130,14 +142,18 @@ std::string residual_figure(const ImageSize& size, const Points& points, const s
 }
 
 std::string name_of(const CalibrationOutcome& outcome, std::size_t camera) {
-  return "camera " + outcome.observations.cameras[camera].name;
+  return camera_text(outcome, outcome.observations.cameras[camera].name);
 }
 
 }  // namespace
 
+std::string camera_text(const CalibrationOutcome& outcome, const std::string& name) {
+  return outcome.observations.cameras.size() > 1 ? "camera " + name : "camera";
+}
+
 std::string camera_coverage_figure(const CalibrationOutcome& outcome, std::size_t camera) {
   return coverage_figure(outcome.observations.cameras[camera].size, camera_coverage(outcome.observations, camera),
-                         camera_points(outcome, camera), name_of(outcome, camera));
+                         camera_points(outcome, camera, add_covered_points), name_of(outcome, camera));
 }
 
 std::string projector_coverage_figure(const CalibrationOutcome& outcome) {
@@ -146,7 +162,7 @@ std::string projector_coverage_figure(const CalibrationOutcome& outcome) {
 }
 
 std::string camera_residual_figure(const CalibrationOutcome& outcome, std::size_t camera) {
-  return residual_figure(outcome.observations.cameras[camera].size, camera_points(outcome, camera),
+  return residual_figure(outcome.observations.cameras[camera].size, camera_points(outcome, camera, add_camera_points),
                          name_of(outcome, camera) + ", corners");
 }
 

@@ -8,6 +8,10 @@
 
 namespace slsd {
 
+/// What a camera is called: by its name only where there are several.
+/// @thread reentrant
+[[nodiscard]] std::string camera_text(const CalibrationOutcome& outcome, const std::string& name);
+
 /// Where in a camera's image, or the projector's, points were seen, a colour to each pose; cells without any are red.
 /// @thread reentrant
 [[nodiscard]] std::string camera_coverage_figure(const CalibrationOutcome& outcome, std::size_t camera);

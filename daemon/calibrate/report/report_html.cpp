@@ -19,8 +19,9 @@ constexpr std::string_view kStyle = R"(
 body { font: 15px/1.45 sans-serif; color: #222; background: #fff; max-width: 980px; margin: 24px auto; padding: 0 12px }
 h1 { font-size: 22px } h2 { font-size: 17px; margin-top: 32px }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums }
-td, th { padding: 2px 10px; border-bottom: 1px solid #ddd; text-align: right }
+td, th { padding: 2px 10px; border-bottom: 1px solid #ddd; text-align: right; white-space: nowrap }
 td:first-child, th:first-child, td.words { text-align: left }
+th, td.words { white-space: normal } .why { max-width: min(680px, calc(100vw - 140px)) }
 tr.out td { color: #b00 }
 figure { display: inline-block; margin: 0 8px 12px 0; width: min(460px, 100%); vertical-align: top }
 figcaption { font-size: 13px; color: #555 }
@@ -55,7 +56,7 @@ std::string verdict_of(const CalibrationOutcome& outcome) {
 }
 
 std::string error_row(std::string_view what, double px, std::optional<double> good) {
-  return fmt::format("<tr><td>{}</td><td>{:.3f} px</td><td class='aside'>{}</td></tr>\n", what, px,
+  return fmt::format("<tr><td class='words'>{}</td><td>{:.3f} px</td><td class='aside'>{}</td></tr>\n", what, px,
                      good ? fmt::format("up to {:.1f} px", *good) : "");
 }
 
@@ -106,7 +107,10 @@ std::string image_figures(const CalibrationOutcome& outcome) {
     coverage += camera_coverage_figure(outcome, i);
     residuals += camera_residual_figure(outcome, i);
   }
-  return "<h2>What the poses cover</h2>\n" + coverage + projector_coverage_figure(outcome) + "<h2>Residuals</h2>\n" +
+  return "<h2>What the poses cover</h2>\n" + coverage + projector_coverage_figure(outcome) +
+         "<h2>Residuals</h2>\n<p>By how much each point is off. Arrows should point anywhere: where neighbours agree, "
+         "the lens "
+         "is not described, or a board is bent.</p>\n" +
          residuals + projector_residual_figure(outcome);
 }
 
@@ -120,36 +124,39 @@ std::string rig_figures(const CalibrationOutcome& outcome) {
                              depth;
 }
 
-/// What is not as in other poses.
-std::string remarks_on(const PoseReport& pose) {
-  std::string text;
-  if (pose.outlying_corners + pose.outlying_symbols > 0) {
-    text = fmt::format("{} corners, {} symbols lie off", pose.outlying_corners, pose.outlying_symbols);
-  }
-  for (const std::string& view : pose.without) text += (text.empty() ? "without " : "; without ") + view;
-  return text;
+/// A row's words over all columns but the first, which a narrow screen shows whole.
+std::string words_of(const std::string& words) {
+  return "<td class='words' colspan='7'><div class='why'>" + escaped(words) + "</div></td></tr>\n";
 }
 
 std::string used_row(const PoseReport& pose, std::size_t index) {
-  return fmt::format(
+  const std::size_t off = pose.outlying_corners + pose.outlying_symbols;
+  std::string rows = fmt::format(
       "<tr><td><span style='color:{}'>&#9632;</span> {}</td><td>{}</td><td>{:.3f}</td><td>{:.3f}</td><td>{}</td>"
-      "<td>{:.3f}</td><td>{:.3f}</td><td class='words'>{}</td></tr>\n",
+      "<td>{:.3f}</td><td>{:.3f}</td><td>{}</td></tr>\n",
       pose_colour(index), escaped(pose.name), pose.corners, pose.corner_rms_px, pose.held_out.corner_rms_px,
-      pose.symbols, pose.symbol_rms_px, pose.held_out.symbol_rms_px, escaped(remarks_on(pose)));
+      pose.symbols, pose.symbol_rms_px, pose.held_out.symbol_rms_px, off > 0 ? std::to_string(off) : "");
+  for (const std::string& remark : pose.remarks) rows += "<tr><td></td>" + words_of(remark);
+  for (const std::string& view : pose.without) rows += "<tr><td></td>" + words_of("without " + view);
+  return rows;
 }
 
 std::string poses_of(const CalibrationOutcome& outcome) {
   std::string html =
       "<tr><th>pose</th><th>corners</th><th>px</th><th>held out, px</th><th>symbols</th><th>px</th>"
-      "<th>held out, px</th><th></th></tr>\n";
+      "<th>held out, px</th><th>points off</th></tr>\n";
   std::size_t used = 0;
   for (const PoseReport& pose : outcome.poses) {
-    html += pose.fault
-                ? fmt::format("<tr class='out'><td>{}</td><td class='words' colspan='7'>left out: {}</td></tr>\n",
-                              escaped(pose.name), escaped(pose.reason))
-                : used_row(pose, used++);
+    html += pose.fault ? "<tr class='out'><td>" + escaped(pose.name) + "</td>" + words_of("left out: " + pose.reason)
+                       : used_row(pose, used++);
   }
-  return fmt::format("<h2>Poses</h2>\n<p>{} were used; {} are good.</p>\n", used, kPosesGood) + table_of(html);
+  return fmt::format(
+             "<h2>Poses</h2>\n<p>{} were used; {} are good. Errors are root mean square, in the camera; held out: "
+             "under "
+             "the calibration by the other poses. Points off lie far from where all others put them, and took no "
+             "part.</p>\n",
+             used, kPosesGood) +
+         table_of(html);
 }
 
 /// Of a parameter's name: "fx" and "cy" are pixels, "k1" and "p1" nothing, turns radians, places mm.
@@ -178,7 +185,7 @@ std::string head_of(const CalibrationOutcome& outcome) {
   };
   std::string devices;
   for (const CalibratedCamera& camera : outcome.calibration.cameras)
-    devices += device("camera " + camera.name, camera.lens.width_px, camera.lens.height_px);
+    devices += device(camera_text(outcome, camera.name), camera.lens.width_px, camera.lens.height_px);
   const Lens& projector = outcome.calibration.projector;
   devices += device("projector", projector.width_px, projector.height_px);
   return fmt::format("<p>{}<br>board {}<br>{}slsd {}</p>\n", escaped(report.date.value_or("")),

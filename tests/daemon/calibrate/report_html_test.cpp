@@ -107,6 +107,32 @@ TEST(ReportHtml, SaysWhyAPoseWasLeftOut) {
   expect_balanced(html);
 }
 
+// As the terminal does.
+TEST(ReportHtml, SaysWhatIsToBeRemarkedOfAPoseThatWasUsed) {
+  CalibrationOutcome outcome = an_outcome();
+  outcome.poses[2].remarks = {"covered: 147 symbols are not seen in one place"};
+  outcome.poses[3].without = {"camera left: cut off"};
+  outcome.poses[3].outlying_corners = 2, outcome.poses[3].outlying_symbols = 5;
+  const std::string html = report_html(outcome);
+  expect_balanced(html);
+  EXPECT_THAT(html, HasSubstr("covered: 147 symbols are not seen in one place"));
+  EXPECT_THAT(html, HasSubstr("without camera left: cut off"));
+  EXPECT_THAT(html, HasSubstr("<td>7</td></tr>"));
+}
+
+TEST(ReportHtml, NamesTheOneCameraOnce) {
+  CalibrationOutcome outcome = an_outcome();
+  EXPECT_THAT(report_html(outcome), HasSubstr("<figcaption>camera camera0: points"));
+  for (PoseObservation& pose : outcome.observations.poses) {
+    std::erase_if(pose.views, [](const PoseView& view) { return view.camera > 0; });
+  }
+  outcome.observations.cameras.resize(1), outcome.calibration.cameras.resize(1), outcome.rig.cameras.resize(1);
+  outcome.observations.cameras[0].name = outcome.calibration.cameras[0].name = "camera";
+  const std::string html = report_html(outcome);
+  EXPECT_THAT(html, Not(HasSubstr("camera camera")));
+  EXPECT_THAT(html, HasSubstr("<figcaption>camera: points"));
+}
+
 TEST(ReportHtml, ShowsWhatToShootNext) {
   CalibrationOutcome outcome = an_outcome();
   outcome.verdict = {Grade::kBad, {"too few poses"}, {"show the board in the upper left"}};
