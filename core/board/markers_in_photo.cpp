@@ -25,7 +25,8 @@ tl::unexpected<Error> refuse(const BoardPhoto& photo, const Board& board, const 
   }
   if (const auto* other = find_other_family(photo.grey, seen.unknown, *board.family)) {
     return fail(ErrorCode::kMismatch, "another board is seen: its markers are of " + std::string(other->name) +
-                                          " and those of " + describe(board) + " are not");
+                                          " and those of " + describe(board) +
+                                          " are not; give the board that was printed");
   }
   return fail(ErrorCode::kNotFound,
               "no marker of " + describe(board) + " is seen; light it, focus, and hold it so that the camera sees it");

@@ -83,6 +83,7 @@ std::optional<Grade> grade_in_force(const Calibration& calibration, const path& 
 
 std::string other_scale(const CalibrationOutcome& outcome, const Board& board, const path& file) {
   constexpr double kNoticedPercent = 0.5;  // more than a rig drifts, and less than a printer that fits to the page
+  constexpr double kMeasuresNothingPx = 10;
   const auto before = in_force(outcome.calibration, file);
   if (!before) return {};
   std::vector<double> percents, off_lines;
@@ -97,12 +98,19 @@ std::string other_scale(const CalibrationOutcome& outcome, const Board& board, c
   }
   const double percent = median_of(percents);
   if (percents.empty() || std::abs(percent) < kNoticedPercent) return {};
+  const std::string dated = before->report.date ? " of " + *before->report.date : "";
+  if (const double off = median_of(off_lines); off > kMeasuresNothingPx) {
+    return fmt::format(
+        "the calibration in force{} does not fit these poses: their symbols lie {:.0f} px off its epipolar lines, as "
+        "where a device was moved or turned since. So it cannot tell whether the print is as large as it is said to "
+        "be: hold a rule to the print's ruler, and give what it measures by --ruler",
+        dated, off);
+  }
   const bool moved = median_of(off_lines) > epipolar_limit_px(before->report.epipolar_error_px);
   return fmt::format(
       "the calibration in force{} measures {:.2f} mm where the board is said to have {:.2f} mm, {:.1f} % "
       "{}: hold a rule to the print's ruler, and give what it measures by --ruler{}",
-      before->report.date ? " of " + *before->report.date : "", board.pitch_mm * (1 + percent / 100), board.pitch_mm,
-      std::abs(percent), percent > 0 ? "more" : "less",
+      dated, board.pitch_mm * (1 + percent / 100), board.pitch_mm, std::abs(percent), percent > 0 ? "more" : "less",
       moved ? ". The rig has moved since, which may have a part in it" : "");
 }
 

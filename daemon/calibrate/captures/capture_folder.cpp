@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <iterator>
 
 namespace slsd {
@@ -28,18 +29,26 @@ std::vector<path> sorted_entries(const path& folder, bool folders) {
 
 constexpr std::array kExtensions{".png", ".tif", ".tiff", ".pgm", ".ppm", ".bmp", ".jpg", ".jpeg"};
 
+/// Its place among those that are read: cameras write .JPG as well. Their number where it is none.
+std::size_t extension_of(const path& file) {
+  std::string extension = file.extension().string();
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return static_cast<std::size_t>(std::ranges::find(kExtensions, extension) - kExtensions.begin());
+}
+
 bool is_picture(const path& file) {
-  return std::ranges::find(kExtensions, file.extension()) != kExtensions.end();
+  return extension_of(file) < kExtensions.size();
 }
 
 /// The picture of a name, in any format that is read; empty where there is none.
 path where_there(const path& folder, const std::string& name) {
-  std::error_code ignored;
-  for (const char* const extension : kExtensions) {
-    path file = folder / (name + extension);
-    if (std::filesystem::exists(file, ignored)) return file;
+  path found;
+  for (const path& file : sorted_entries(folder, false)) {
+    if (file.stem() != name || !is_picture(file)) continue;
+    if (found.empty() || extension_of(file) < extension_of(found)) found = file;
   }
-  return {};
+  return found;
 }
 
 Error lacking(const std::string& message, const path& where) {

@@ -3,6 +3,7 @@
 #include "daemon/calibrate/captures/read_captures.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <map>
 #include <utility>
 
@@ -16,7 +17,10 @@ namespace slsd {
 namespace {
 
 bool is_jpeg(const std::filesystem::path& file) {
-  return file.extension() == ".jpg" || file.extension() == ".jpeg";
+  std::string extension = file.extension().string();
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".jpg" || extension == ".jpeg";
 }
 
 std::string size_text(const ImageSize& size) {

@@ -352,9 +352,37 @@ TEST_F(FromFiles, ReplacesNoCalibrationOfAnotherScaleUnlessForced) {
               1.03 * truth.cameras[0].projector_from_camera.translation.norm(), 1);
 }
 
+// "3189 % more" would be told of the print where it was the camera that was turned upside down.
+TEST_F(FromFiles, MeasuresNoPrintByACalibrationThatDoesNotFit) {
+  Calibration other = small_rig();
+  other.cameras[0].name = "camera";
+  Eigen::Matrix3d& turn = other.cameras[0].projector_from_camera.rotation;
+  turn = Eigen::AngleAxisd(0.2, Eigen::Vector3d(0.5, 0.5, 1).normalized()).toRotationMatrix() * turn;
+  write_text(home_ / "calibration.yml", write_calibration(other));
+  EXPECT_THAT(refusal(), testing::AllOf(ContainsRegex("does not fit these poses: their symbols lie [0-9]+ px off"),
+                                        Not(HasSubstr("measures 6")), HasSubstr("hold a rule"), HasSubstr("--force")));
+  request_.force = true;
+  EXPECT_TRUE(calibrate_from_files(request_));
+}
+
+// As cameras write .JPG.
+TEST_F(FromFiles, TakesExtensionsInCapitals) {
+  copy_captures();
+  for (const char* picture : {"white", "pattern"}) {
+    const path file = request_.from / "pose_03" / picture;
+    std::filesystem::rename(file.string() + ".png", file.string() + ".PNG");
+  }
+  testing::internal::CaptureStdout();
+  const auto done = calibrate_from_files(request_);
+  const std::string said = testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(done) << to_string(done.error());
+  EXPECT_THAT(said, ContainsRegex("pose_03: [0-9]+ corners"));
+}
+
 TEST_F(FromFiles, RefusesAnotherBoard) {
   request_.board = "charuco:7x5:60:45:DICT_4X4_50";
-  EXPECT_THAT(refusal(), HasSubstr("no pose can be used"));
+  EXPECT_THAT(refusal(),
+              testing::AllOf(HasSubstr("no pose can be used"), HasSubstr("give the board that was printed")));
 }
 
 TEST_F(FromFiles, RefusesAnotherPattern) {
