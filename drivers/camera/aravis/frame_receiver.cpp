@@ -245,7 +245,11 @@ std::optional<MonotonicTime> FrameReceiver::exposure_start(ArvBuffer* buffer, co
   if (goes_by_arrival(proof.clock)) return start_by_arrival(there, proof);
   const nanoseconds device = stamp_of(buffer, chunks);
   const MonotonicTime start = proof.clock.host_time(device);
-  if (start + proof.clock.uncertainty(device) < proof.asked) return std::nullopt;
+  // What a command of ours began cannot be older. A line or the camera's own clock begins frames at any time: what may
+  // have been sooner is passed over.
+  const bool commanded = options_.trigger == AravisTrigger::kSoftware || options_.trigger == AravisTrigger::kAction;
+  const nanoseconds uncertain = proof.clock.uncertainty(device);
+  if (start + (commanded ? uncertain : -uncertain) < proof.asked) return std::nullopt;
   if (!proof.clock.may_have_shown(device, there)) return std::nullopt;
   return std::clamp(start, std::min(proof.asked, there), there);
 }

@@ -168,6 +168,31 @@ int from_environment(const char* name, int otherwise) {
   return text == nullptr ? otherwise : std::atoi(text);
 }
 
+// By less than what is known of the camera's clock: the frame may be of before, so it is none of those asked for.
+TEST_F(AravisClockTest, GivesNoFrameThatALineBeganJustBefore) {
+  test::GigeCamera device(with_clock(ClockFault::kNone));
+  AravisCameraOptions options = options_for(device);
+  options.trigger = AravisTrigger::kLine;
+  AravisCamera camera(options);
+  ASSERT_TRUE(opens(camera));
+  for (int i = 0; i < 60; ++i) {
+    device.pulse_line();
+    const auto asked = steady_clock::now();
+    const std::jthread later([&] {
+      std::this_thread::sleep_for(20ms);
+      device.pulse_line();
+    });
+    const auto frame = camera.capture(far_away());
+    if (!frame) {
+      EXPECT_EQ(frame.error().code, ErrorCode::kFrameStale);
+      continue;
+    }
+    const auto counter = counter_of(frame->image());
+    ASSERT_TRUE(counter);
+    EXPECT_GE(device.exposure_of(*counter), asked) << i;
+  }
+}
+
 // SLSD_TEST_OPENINGS=100 SLSD_TEST_FRAMES=1000 for the figure.
 TEST_F(AravisClockTest, GivesEachFirstFrameWhereNumbersStartAgain) {
   const int openings = from_environment("SLSD_TEST_OPENINGS", 3);
