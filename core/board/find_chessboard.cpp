@@ -22,6 +22,10 @@ cv::Mat matrix_of(const Grey8& image) {
   return {image.height(), image.width(), CV_8UC1, const_cast<std::uint8_t*>(image.data())};
 }
 
+double reduction_of(const Grey8& image) {
+  return std::min(1.0, static_cast<double>(kReducedWidthPx) / image.width());
+}
+
 std::vector<Eigen::Vector2d> original(const std::vector<cv::Point2f>& corners, double scale) {
   std::vector<Eigen::Vector2d> pixels;
   for (const auto& corner : corners) {
@@ -35,6 +39,19 @@ cv::Mat reduced(const cv::Mat& image, double scale) {
   cv::Mat small;
   cv::resize(image, small, {}, scale, scale, cv::INTER_AREA);
   return small;
+}
+
+/// Whether there are far more bright patches than a board has squares, as of the projected pattern. The search by
+/// squares does not come to an end with them in any time.
+bool is_crowded(const Grey8& image, const Board& board) {
+  constexpr int kAround = 31, kBrighter = 5, kLeastPx = 12, kOthersMax = 200;
+  cv::Mat bright, labels, statistics, centres;
+  cv::adaptiveThreshold(reduced(matrix_of(image), reduction_of(image)), bright, 255, cv::ADAPTIVE_THRESH_MEAN_C,
+                        cv::THRESH_BINARY, kAround, -kBrighter);
+  const int count = cv::connectedComponentsWithStats(bright, labels, statistics, centres);
+  int patches = 0;
+  for (int i = 1; i < count; ++i) patches += statistics.at<int>(i, cv::CC_STAT_AREA) >= kLeastPx;
+  return patches > (board.columns + 1) * (board.rows + 1) + kOthersMax;
 }
 
 // By the black squares' corners: quick, and sees small squares beside a bright border and a dark room.
@@ -52,14 +69,14 @@ std::vector<cv::Point2f> search_by_saddles(const cv::Mat& image, const cv::Size&
   return corners;
 }
 
-std::vector<Eigen::Vector2d> search(const Grey8& image, const Board& board) {
-  const double scale = std::min(1.0, static_cast<double>(kReducedWidthPx) / image.width());
+std::vector<Eigen::Vector2d> search(const Grey8& image, const Board& board, bool crowded) {
+  const double scale = reduction_of(image);
   const cv::Mat small = reduced(matrix_of(image), scale);
   const cv::Size size(board.columns, board.rows);
-  auto corners = search_by_squares(small, size);
+  auto corners = crowded ? std::vector<cv::Point2f>() : search_by_squares(small, size);
   if (corners.empty()) corners = search_by_saddles(small, size, cv::CALIB_CB_EXHAUSTIVE);
   if (corners.empty()) corners = search_by_saddles(small, size, cv::CALIB_CB_NORMALIZE_IMAGE);
-  if (!corners.empty() || scale == 1) return original(corners, scale);
+  if (!corners.empty() || scale == 1 || crowded) return original(corners, scale);
   return original(search_by_squares(matrix_of(image), size), 1);
 }
 
@@ -71,7 +88,7 @@ struct Part {
 
 // The largest chessboard of any size that is seen.
 Part largest_part(const Grey8& image) {
-  const double scale = std::min(1.0, static_cast<double>(kReducedWidthPx) / image.width());
+  const double scale = reduction_of(image);
   const cv::Mat small = reduced(matrix_of(image), scale);
   std::vector<cv::Point2f> corners;
   cv::Mat cells;
@@ -118,7 +135,13 @@ std::vector<MeasuredPoint> fitted(const BoardPhoto& photo, const Board& board, c
 }  // namespace
 
 Result<BoardSighting> find_chessboard(const BoardPhoto& photo, const Board& board) {
-  const auto found = search(photo.grey, board);
+  const bool crowded = is_crowded(photo.grey, board);
+  const auto found = search(photo.grey, board, crowded);
+  if (found.empty() && crowded) {
+    return fail(ErrorCode::kMismatch,
+                describe(board) + " is not seen, and something finely divided is, such as the projected pattern; the " +
+                    "board is looked for in white light: see that its picture and the pattern's are not exchanged");
+  }
   if (found.size() != static_cast<std::size_t>(board.point_count())) return refuse(photo.grey, board);
   std::vector<MeasuredPoint> most;
   // By the black corner, where a board has one: that tells which end is up. One of 9x7 has four of the same colour,

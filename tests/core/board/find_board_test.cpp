@@ -8,7 +8,9 @@
 #include <gmock/gmock.h>
 
 #include "core/board/board_photo.hpp"
+#include "core/code/pattern.hpp"
 #include "tests/core/board/board_scene.hpp"
+#include "tests/simulator/simulator.hpp"
 
 namespace slsd {
 namespace {
@@ -224,6 +226,16 @@ TEST(FindBoard, NeedsNoBlur) {
   ASSERT_TRUE(sighting) << to_string(sighting.error());
   EXPECT_EQ(sighting->points.size(), static_cast<std::size_t>(scene.board.point_count()));
   EXPECT_LT(errors_of(*sighting, scene).rms_px, 0.2);  // edges are stairs of whole pixels
+}
+
+// Its symbols make so many squares that OpenCV's search by them may not come to an end.
+TEST(FindBoard, NamesThePatternWhereAChessboardIsAskedFor) {
+  const Grey8 frame =
+      simulate(draw_pattern(make_pattern({}).value()), paper_rig(), plane({0, 0, 2100}, {0.3, 0.2, -1}));
+  const auto sighting = find_board(frame.view(), *parse_board("chessboard:7x6:50"));
+  ASSERT_FALSE(sighting);
+  EXPECT_EQ(sighting.error().code, ErrorCode::kMismatch);
+  EXPECT_THAT(sighting.error().message, HasSubstr("not exchanged"));
 }
 
 }  // namespace
