@@ -22,7 +22,7 @@ constexpr float kBlurMinPx = 1.9F;
 constexpr float kBlurUndone = 0.85F;
 constexpr float kBlurMax = 0.2F;
 /// Between a region's peak and its background, of 255 levels.
-constexpr float kContrastMin = 5;
+constexpr float kContrastMin = static_cast<float>(BinarizeOptions().contrast_min);
 
 BinarizeOptions binarize_options(const PatternOptions& pattern, float scale) {
   return {.tile_px = threshold_tile_px(pattern.symbol_size_px + pattern.spacing_px, scale),

@@ -29,16 +29,13 @@ std::vector<path> sorted_entries(const path& folder, bool folders) {
 
 constexpr std::array kExtensions{".png", ".tif", ".tiff", ".pgm", ".ppm", ".bmp", ".jpg", ".jpeg"};
 
-/// Its place among those that are read: cameras write .JPG as well. Their number where it is none.
-std::size_t extension_of(const path& file) {
-  std::string extension = file.extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return static_cast<std::size_t>(std::ranges::find(kExtensions, extension) - kExtensions.begin());
+/// Its place among those that are read; their number where it is none.
+std::size_t rank_of(const path& file) {
+  return static_cast<std::size_t>(std::ranges::find(kExtensions, extension_of(file)) - kExtensions.begin());
 }
 
 bool is_picture(const path& file) {
-  return extension_of(file) < kExtensions.size();
+  return rank_of(file) < kExtensions.size();
 }
 
 /// The picture of a name, in any format that is read; empty where there is none.
@@ -46,7 +43,7 @@ path where_there(const path& folder, const std::string& name) {
   path found;
   for (const path& file : sorted_entries(folder, false)) {
     if (file.stem() != name || !is_picture(file)) continue;
-    if (found.empty() || extension_of(file) < extension_of(found)) found = file;
+    if (found.empty() || rank_of(file) < rank_of(found)) found = file;
   }
   return found;
 }
@@ -93,6 +90,13 @@ std::vector<CapturedPose> list_subject(const path& folder, WhitePicture white, P
 }
 
 }  // namespace
+
+std::string extension_of(const path& file) {
+  std::string extension = file.extension().string();
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
 
 std::string_view folder_prefix(PoseSubject subject) {
   return subject == PoseSubject::kBoard ? "pose_" : "plane_";

@@ -48,6 +48,9 @@ enum class WhitePicture { kNeeded, kOptional };
 [[nodiscard]] Result<std::vector<CapturedPose>> list_captures_with_planes(const std::filesystem::path& folder,
                                                                           bool knows_plane);
 
+/// Of a picture, in small letters: cameras write .JPG as well.
+[[nodiscard]] std::string extension_of(const std::filesystem::path& file);
+
 /// What the folders' names begin with: "pose_" or "plane_".
 [[nodiscard]] std::string_view folder_prefix(PoseSubject subject);
 

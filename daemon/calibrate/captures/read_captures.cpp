@@ -3,7 +3,6 @@
 #include "daemon/calibrate/captures/read_captures.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <map>
 #include <utility>
 
@@ -17,9 +16,7 @@ namespace slsd {
 namespace {
 
 bool is_jpeg(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = extension_of(file);
   return extension == ".jpg" || extension == ".jpeg";
 }
 
