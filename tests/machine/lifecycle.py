@@ -103,6 +103,7 @@ class Machine:
         self.sums = {}
         self.repair()  # a run that was stopped leaves what it had installed
         self.dpkg("--purge", *reversed(NAMES))
+        self.configure_others()
         self.clean = look(root, self.sums)
 
     def run(self, *arguments, kill_after_s=None):
@@ -127,6 +128,12 @@ class Machine:
         """As one does after the power failed in the middle; what was not yet unpacked the next installation brings."""
         with contextlib.suppress(AssertionError):
             self.dpkg("--configure", "-a")
+
+    def configure_others(self):
+        """Whoever is killed while it handles a trigger of ours configures itself anew: what that makes is no matter of ours."""
+        for triggers in sorted((self.root / "var/lib/dpkg/info").glob("*.triggers")):
+            if re.search("^interest", triggers.read_text(encoding="utf-8"), re.MULTILINE):
+                self.run("dpkg-reconfigure", triggers.stem)
 
     def files_of(self, version):
         return sorted(f"/packages/{version}/{file.name}" for file in (self.root / "packages" / version).iterdir())
