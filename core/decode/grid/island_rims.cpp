@@ -302,14 +302,20 @@ void IslandJudge::cut_contradicted_lines(const Frame& frame) {
   cut(kDown, places[0]);
 }
 
-/// How far a link's step is from the one behind it, in cells.
+/// How far a link's step is from the one behind it, in cells, beyond what a surface explains that turns away: each step
+/// of its differs from the next by up to three times what that does from the one after it.
 float IslandJudge::bend_of(const Frame& frame, std::int32_t node, Direction d) const {
+  constexpr float kGrowth = 3;
+  const auto goes_on = [&](std::int32_t from) { return frame.beside[from][d] >= 0 && links_[from][d] == Link::kAgrees; };
+  const auto way = [&](std::int32_t from) -> Eigen::Vector2f {
+    return frame.nodes[frame.beside[from][d]].centre_px - frame.nodes[from].centre_px;
+  };
   const std::int32_t other = frame.beside[node][d];
+  if (!goes_on(other)) return 0;
   const std::int32_t next = frame.beside[other][d];
-  if (next < 0 || links_[other][d] != Link::kAgrees) return 0;
-  const Eigen::Vector2f own = frame.nodes[other].centre_px - frame.nodes[node].centre_px,
-                        behind = frame.nodes[next].centre_px - frame.nodes[other].centre_px;
-  return (own - behind).norm() / behind.norm();
+  const Eigen::Vector2f behind = way(other), bend = way(node) - behind;
+  const float before = goes_on(next) ? bend.normalized().dot(behind - way(next)) : 0;
+  return std::max(0.F, bend.norm() - kGrowth * std::max(0.F, before)) / behind.norm();
 }
 
 /// Whether a link leads to what is none of the island: its letter contradicts, or is well seen and has been refused.

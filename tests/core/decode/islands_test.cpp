@@ -261,6 +261,34 @@ TEST_F(IslandsAtAnEdge, LoseItWhereNothingTellsWhatDepthWouldMove) {
   EXPECT_EQ(kept(decode_with(1.8F, false)), 0);
 }
 
+/// A surface whose last columns come closer together, each by so much, up to where its links break; beyond lies another.
+class IslandsThatTurnAway : public Islands {
+ protected:
+  int kept(std::initializer_list<float> closer) {
+    constexpr int kTop = 10, kBottom = 14, kRim = 40;
+    show_pattern(kTop, 10, kBottom, kRim + 1);
+    for (int row = kBottom; row < 20; ++row)
+      for (int column = 10; column < kRim; ++column) show(row, column, pattern_.array.at(row, column));
+    for (int row = kTop; row < kBottom; ++row) {
+      int column = kRim;
+      for (const float steps : closer) grid_.nodes[grid_.node_at(row, column--)].centre_px.x() -= 18 * steps;
+      grid_.nodes[grid_.node_at(row, kRim)].broken[kRight] = true;
+    }
+    const auto claims = decode();
+    int count = 0;
+    for (int row = kTop; row < kBottom; ++row) count += is_decoded(claims, row, kRim);
+    return count;
+  }
+};
+
+TEST_F(IslandsThatTurnAway, KeepTheirLimb) {
+  EXPECT_EQ(kept({0.18F, 0.04F, 0.01F}), 4);  // bends of 0.11, 0.02 and 0.01
+}
+
+TEST_F(IslandsThatTurnAway, LoseWhatBendsAtOnce) {
+  EXPECT_EQ(kept({0.11F}), 0);
+}
+
 // What lies across the epipolar lines is no other depth: of the island's own surface, whatever moved it.
 TEST_F(PatchedIslands, TellContradictionsOfAnotherDepthAlongTheLinesAlone) {
   put(25, 30, 1);
