@@ -15,8 +15,15 @@ class Surroundings {
   Surroundings(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims)
       : nodes_(nodes), claims_(claims) {}
 
+  /// Those beside it stand, and their cells lie beside its own.
+  [[nodiscard]] bool goes_on_all_around(std::int32_t node) const {
+    return std::ranges::all_of(kDirections, [&](Direction d) {
+      const std::int32_t other = beside(node, d);
+      return stands(node, other) && fits(node, other, d);
+    });
+  }
+
   [[nodiscard]] bool leave_alone(std::int32_t node) const {
-    if (goes_on_all_around(node)) return false;  // as most do, and then none of the following can be
     return is_lone(node, kRight) || is_lone(node, kDown) ||
            std::ranges::any_of(kDirections, [&](Direction d) { return is_lone_at_rim(node, d); });
   }
@@ -90,13 +97,6 @@ class Surroundings {
 
  private:
   static constexpr int kReach = 3;
-  /// Those beside it stand, and their cells lie beside its own.
-  [[nodiscard]] bool goes_on_all_around(std::int32_t node) const {
-    return std::ranges::all_of(kDirections, [&](Direction d) {
-      const std::int32_t other = beside(node, d);
-      return stands(node, other) && fits(node, other, d);
-    });
-  }
   /// There lies what is none of its island, or what is misread.
   [[nodiscard]] bool is_beside_others(std::int32_t node, Direction d) const {
     return contradicts(node, d) || misread(beside(node, d));
@@ -114,9 +114,7 @@ class Surroundings {
 
   /// Whether a node's cell lies beside another's as the nodes do.
   [[nodiscard]] bool fits(std::int32_t node, std::int32_t other, Direction d) const {
-    const Eigen::Vector2f to = step(d);
-    return claims_[other].same_cell(claims_[node].row + static_cast<int>(to.y()),
-                                    claims_[node].column + static_cast<int>(to.x()));
+    return claims_[node].fits(claims_[other], d);
   }
 
   [[nodiscard]] bool contradicts(std::int32_t node, Direction d) const {
@@ -197,19 +195,40 @@ void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellCl
 void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, Executor& executor,
                                  std::vector<CellClaim>& claims) {
   const Surroundings around(nodes, claims);
-  refused_.resize(nodes.size());
-  // All are asked before any is refused.
-  const auto refuse = [&](auto&& asked) {
-    executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
-      for (std::size_t node = first; node < last; ++node)
-        refused_[node] = claims[node].status == RegionStatus::kDecoded && asked(static_cast<std::int32_t>(node));
-    });
-    bool any = false;
-    for (std::size_t node = 0; node < nodes.size(); ++node) {
-      if (refused_[node] == 0) continue;
-      claims[node].status = RegionStatus::kNeighboursDisagree;
-      any = true;
+  // Most are surrounded by their own, and then none of the following can be.
+  at_rim_.resize(nodes.size());
+  executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t node = first; node < last; ++node) {
+      at_rim_[node] = claims[node].status == RegionStatus::kDecoded &&
+                      !around.goes_on_all_around(static_cast<std::int32_t>(node));
     }
+  });
+  rim_.clear();
+  for (std::size_t node = 0; node < nodes.size(); ++node)
+    if (at_rim_[node] != 0) rim_.push_back(static_cast<std::int32_t>(node));
+  // All are asked before any is refused; what lies beside those is then at the rim.
+  const auto refuse = [&](auto&& asked) {
+    refused_.resize(rim_.size());
+    executor.run_ranges(rim_.size(), [&](std::size_t first, std::size_t last, int) {
+      for (std::size_t i = first; i < last; ++i) refused_[i] = asked(rim_[i]);
+    });
+    next_rim_.clear();
+    bool any = false;
+    for (std::size_t i = 0; i < rim_.size(); ++i) {
+      if (refused_[i] == 0) {
+        next_rim_.push_back(rim_[i]);
+        continue;
+      }
+      claims[rim_[i]].status = RegionStatus::kNeighboursDisagree;
+      any = true;
+      for (const Direction d : kDirections) {
+        const std::int32_t other = neighbour(nodes, rim_[i], d);
+        if (other < 0 || at_rim_[other] != 0 || claims[other].status != RegionStatus::kDecoded) continue;
+        at_rim_[other] = 1;
+        next_rim_.push_back(other);
+      }
+    }
+    std::swap(rim_, next_rim_);
     return any;
   };
   refuse([&](std::int32_t node) { return around.leave_alone(node); });

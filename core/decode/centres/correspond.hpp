@@ -36,8 +36,10 @@ class Correspondence {
 
  private:
   CorrespondOptions options_;
-  std::vector<std::int32_t> holder_;   // of each cell
-  std::vector<std::uint8_t> refused_;  // of each node, in one round
+  std::vector<std::int32_t> holder_;          // of each cell
+  std::vector<std::int32_t> rim_, next_rim_;  // nodes beside which the pattern does not go on
+  std::vector<std::uint8_t> at_rim_;          // of each node
+  std::vector<std::uint8_t> refused_;         // of rim_, in one round
 };
 
 }  // namespace slsd

@@ -46,11 +46,7 @@ std::int32_t CentreCorrection::named_neighbour(const std::vector<GridNode>& node
                                                std::int32_t node, Direction direction) const {
   const std::int32_t other = neighbour(nodes, node, direction);
   if (other < 0 || claims[other].status != RegionStatus::kDecoded) return -1;
-  const Eigen::Vector2f to = step(direction);
-  return claims[other].same_cell(claims[node].row + static_cast<int>(to.y()),
-                                 claims[node].column + static_cast<int>(to.x()))
-             ? other
-             : -1;
+  return claims[node].fits(claims[other], direction) ? other : -1;
 }
 
 void CentreCorrection::measure_bends(std::int32_t node) {

@@ -201,7 +201,7 @@ void IslandJudge::cut_slid(const Frame& frame, std::int32_t island) {
   for (const std::int32_t node : members) {
     if (links_[node] == kAllAgree) continue;
     for (const Direction d : kDirections) {
-      const Beyond cell(frame.claims[node], d);
+      const auto cell = frame.claims[node].beyond(d);
       const std::int32_t other = frame.beside[node][d];
       if (other >= 0 && !continues(frame, node, d)) place(cell.row, cell.column, other);
     }
@@ -260,7 +260,7 @@ void IslandJudge::cut_slid_along(const Frame& frame, std::int32_t island, const 
 
 /// How many nodes on from the end of a line, of so many, may be its own and say nothing for it.
 float IslandJudge::count_doubtful(const Frame& frame, std::int32_t node, Direction d, int most) const {
-  const Beyond first(frame.claims[node], d);
+  const auto first = frame.claims[node].beyond(d);
   const int down = first.row - frame.claims[node].row, right = first.column - frame.claims[node].column;
   int row = first.row, column = first.column, count = 0;
   for (std::int32_t at = frame.beside[node][d]; at >= 0 && count < most; at = frame.beside[at][d]) {
@@ -345,7 +345,7 @@ IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, D
   Side side;
   any_along(piece, d, [&](std::int32_t node) {
     if (links_[node][d] == Link::kAgrees) side.bend += bend_of(frame, node, d), ++side.held_by;
-    const Beyond cell(frame.claims[node], d);
+    const auto cell = frame.claims[node].beyond(d);
     if (parts(frame, node, d) && frame.shapes[frame.beside[node][d]].distance < kTorn) {
       side.broken |= is_of_another(frame, node, d);
     } else if (shown(cell.row, cell.column)) {

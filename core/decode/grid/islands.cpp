@@ -45,7 +45,7 @@ bool IslandJudge::adopt(const Frame& frame, std::int32_t node, CellClaim& adopte
   for (const Direction d : kDirections) {
     const std::int32_t other = frame.beside[node][d];
     if (other < 0 || !frame.claims[other].named()) continue;
-    const Beyond cell(frame.claims[other], opposite(d));
+    const auto cell = frame.claims[other].beyond(opposite(d));
     if (!shown(cell.row, cell.column)) continue;
     const auto end = candidates.begin() + count;
     const auto known = std::find_if(candidates.begin(), end, [&](const Candidate& candidate) {
@@ -119,8 +119,7 @@ void IslandJudge::look_at_own_cells(const Frame& frame, std::size_t first, std::
                {}};
     for (const Direction d : kDirections) {
       const std::int32_t other = frame.beside[i][d];
-      const Beyond cell(claim, d);
-      own_[i].fits[d] = other >= 0 && frame.claims[other].same_cell(cell.row, cell.column);
+      own_[i].fits[d] = other >= 0 && claim.fits(frame.claims[other], d);
     }
   }
 }
@@ -157,7 +156,7 @@ IslandJudge::Link IslandJudge::read_link(const Frame& frame, std::int32_t node, 
     const float speaks = own_ratio(other);
     return speaks > 0 ? Link::kAgrees : speaks < kSpeaksAgainst ? Link::kAgainst : Link::kNeutral;
   }
-  const Beyond cell(frame.claims[node], direction);
+  const auto cell = frame.claims[node].beyond(direction);
   if (!shown(cell.row, cell.column)) return Link::kAgainst;
   const float speaks = ratio(frame, other, cell.row, cell.column);
   // A node of another island has a surface of its own, though its letter may fit here too.

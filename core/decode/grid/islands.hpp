@@ -18,13 +18,6 @@
 
 namespace slsd {
 
-/// The cell beside a cell, one step on.
-struct Beyond {
-  int row, column;
-  Beyond(const CellClaim& claim, Direction d)
-      : row(claim.row + (d == kDown) - (d == kUp)), column(claim.column + (d == kRight) - (d == kLeft)) {}
-};
-
 /// What may go wrong, and what it is weighed by. docs/decoder.md derives each.
 struct IslandOptions {
   int rows = 0, columns = 0;        ///< of the part of the array that is shown

@@ -49,20 +49,6 @@ bool is_evident(const std::vector<GridNode>& nodes, std::int32_t from, std::int3
 
 }  // namespace
 
-Eigen::Vector2f step(Direction direction) {
-  switch (direction) {
-    case kRight:
-      return {1, 0};
-    case kDown:
-      return {0, 1};
-    case kLeft:
-      return {-1, 0};
-    case kUp:
-      break;
-  }
-  return {0, -1};
-}
-
 void GridLinker::sort_into_buckets(const std::vector<GridNode>& nodes) {
   float step_px = 0;
   Eigen::Vector2f low = nodes[0].centre_px, high = low;

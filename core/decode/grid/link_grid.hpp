@@ -36,7 +36,9 @@ struct LinkGridOptions {
 }
 
 /// One step of the pattern in a direction, in cells.
-[[nodiscard]] Eigen::Vector2f step(Direction direction);
+[[nodiscard]] inline Eigen::Vector2f step(Direction d) {
+  return {static_cast<float>((d == kRight) - (d == kLeft)), static_cast<float>((d == kDown) - (d == kUp))};
+}
 
 /// Calls visit(other) for a node and for every other whose frame is measured with it: up to two links along a line.
 template <class Visit>
