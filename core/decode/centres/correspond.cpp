@@ -199,8 +199,8 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, Executor& e
   at_rim_.resize(nodes.size());
   executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
     for (std::size_t node = first; node < last; ++node) {
-      at_rim_[node] = claims[node].status == RegionStatus::kDecoded &&
-                      !around.goes_on_all_around(static_cast<std::int32_t>(node));
+      at_rim_[node] =
+          claims[node].status == RegionStatus::kDecoded && !around.goes_on_all_around(static_cast<std::int32_t>(node));
     }
   });
   rim_.clear();

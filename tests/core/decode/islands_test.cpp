@@ -261,7 +261,7 @@ TEST_F(IslandsAtAnEdge, LoseItWhereNothingTellsWhatDepthWouldMove) {
   EXPECT_EQ(kept(decode_with(1.8F, false)), 0);
 }
 
-/// A surface whose last columns come closer together, each by so much, up to where its links break; beyond lies another.
+/// A surface whose last columns come closer together, each by so much, up to where its links break.
 class IslandsThatTurnAway : public Islands {
  protected:
   int kept(std::initializer_list<float> closer) {
