@@ -212,7 +212,20 @@ TEST_F(AravisCameraTest, TakesPacketsBeforeTheSocketWhereItMay) {
   options.packet_socket = true;
   AravisCamera camera(options);
   ASSERT_TRUE(opens(camera));
-  for (int i = 0; i < 10; ++i) EXPECT_TRUE(next(camera));
+  // Until its filter is there such a socket hears all of loopback: what other devices send costs a frame at most, and is
+  // never given out.
+  int refused = 0;
+  for (int whole = 0; whole < 10;) {
+    const auto frame = camera.capture(far_away());
+    if (frame) {
+      EXPECT_EQ(counter_of(frame->image(), 8), device_.frames_exposed() - 1);
+      ++whole;
+      continue;
+    }
+    ASSERT_TRUE(frame.error().code == ErrorCode::kFrameTorn || frame.error().code == ErrorCode::kFrameStale)
+        << to_string(frame.error());
+    ASSERT_LE(++refused, 2);
+  }
 }
 
 TEST_F(AravisCameraTest, FindsTheLargestPacketThatGetsThrough) {
