@@ -212,8 +212,7 @@ TEST_F(AravisCameraTest, TakesPacketsBeforeTheSocketWhereItMay) {
   options.packet_socket = true;
   AravisCamera camera(options);
   ASSERT_TRUE(opens(camera));
-  // Until its filter is there such a socket hears all of loopback: what other devices send costs a frame at most, and is
-  // never given out.
+  // Such a socket hears all of loopback. Beside other devices a frame is now and then refused; a wrong one never comes.
   int refused = 0;
   for (int whole = 0; whole < 10;) {
     const auto frame = camera.capture(far_away());
