@@ -306,9 +306,7 @@ void IslandJudge::cut_contradicted_lines(const Frame& frame) {
 /// of its differs from the next by up to three times what that does from the one after it.
 float IslandJudge::bend_of(const Frame& frame, std::int32_t node, Direction d) const {
   constexpr float kGrowth = 3;
-  const auto goes_on = [&](std::int32_t from) {
-    return frame.beside[from][d] >= 0 && links_[from][d] == Link::kAgrees;
-  };
+  const auto goes_on = [&](std::int32_t from) { return links_[from][d] == Link::kAgrees; };
   const auto way = [&](std::int32_t from) -> Eigen::Vector2f {
     return frame.nodes[frame.beside[from][d]].centre_px - frame.nodes[from].centre_px;
   };

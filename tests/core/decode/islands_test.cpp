@@ -285,6 +285,10 @@ TEST_F(IslandsThatTurnAway, KeepTheirLimb) {
   EXPECT_EQ(kept({0.18F, 0.04F, 0.01F}), 4);  // bends of 0.11, 0.02 and 0.01
 }
 
+TEST_F(IslandsThatTurnAway, LoseWhatBendsFasterThanALimb) {
+  EXPECT_EQ(kept({0.22F, 0.04F, 0.01F}), 0);  // bends of 0.15, 0.02 and 0.01
+}
+
 TEST_F(IslandsThatTurnAway, LoseWhatBendsAtOnce) {
   EXPECT_EQ(kept({0.11F}), 0);
 }
