@@ -120,9 +120,13 @@ void FrameReceiver::restart() {
 }
 
 // The stream tells of a buffer before it hands it over. One that was not waited for would be taken for the next frame,
-// and each one after it too.
+// and each one after it too. For a packet that is of no frame it hands over an untouched buffer, and does not tell.
 ArvBuffer* FrameReceiver::pop() {
-  return arv_stream_timeout_pop_buffer(stream_, kHandOverUs);
+  for (;;) {
+    ArvBuffer* buffer = arv_stream_timeout_pop_buffer(stream_, kHandOverUs);
+    if (buffer == nullptr || arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_CLEARED) return buffer;
+    buffers_.return_unread(buffer);
+  }
 }
 
 void FrameReceiver::return_unread(ArvBuffer* buffer) {

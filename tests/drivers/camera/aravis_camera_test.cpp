@@ -2,7 +2,11 @@
 // Copyright the slsd authors
 #include "drivers/camera/aravis/aravis_camera.hpp"
 
+#include <netinet/in.h>
+#include <sys/socket.h>
+
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
@@ -16,6 +20,8 @@
 
 #include "drivers/camera/aravis/configure_network.hpp"
 #include "drivers/camera/aravis/gige_discovery.hpp"
+#include "drivers/system/file_descriptor.hpp"
+#include "tests/doubles/gige/device_socket.hpp"
 #include "tests/drivers/allocations.hpp"
 #include "tests/drivers/camera/aravis_test.hpp"
 
@@ -213,6 +219,21 @@ TEST_F(AravisCameraTest, TakesPacketsBeforeTheSocketWhereItMay) {
   AravisCamera camera(options);
   ASSERT_TRUE(opens(camera));
   for (int i = 0; i < 10; ++i) EXPECT_TRUE(next(camera));
+}
+
+TEST_F(AravisCameraTest, PassesOverPacketsThatAreOfNoFrame) {
+  AravisCamera camera(options_for(device_));
+  ASSERT_TRUE(opens(camera));
+  const FileDescriptor stranger(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  const sockaddr_in stream =
+      test::socket_address(htonl(INADDR_LOOPBACK), static_cast<std::uint16_t>(device_.read(test::kStreamPort)));
+  for (int i = 0; i < 40; ++i) {
+    const std::array<unsigned char, 16> packet{0, 0, 200, 1};  // of frame 51201, and of no kind
+    ASSERT_EQ(::sendto(stranger.number(), packet.data(), packet.size(), 0, reinterpret_cast<const sockaddr*>(&stream),
+                       sizeof(stream)),
+              16);
+    EXPECT_TRUE(next_is_newest(camera, device_)) << "frame " << i;
+  }
 }
 
 TEST_F(AravisCameraTest, FindsTheLargestPacketThatGetsThrough) {
