@@ -4,6 +4,7 @@
 
 #include <arpa/inet.h>
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 #include <utility>
@@ -24,11 +25,8 @@ constexpr auto kAnswerTime = 100ms;
 constexpr auto kReadoutMost = 1s;
 constexpr auto kClockPause = 3ms;
 constexpr auto kArming = 5ms;
-constexpr int kStreamsMax = 5;
-
-bool heard_others(ArvStream* stream) {
-  return ARV_IS_GV_STREAM(stream) && arv_stream_get_info_uint64_by_name(stream, "n_received_packets") > 0;
-}
+constexpr int kStreamsMax = 10;
+constexpr auto kRingRead = 20ms;  // the kernel hands over every 5 ms what a packet socket took
 
 }  // namespace
 
@@ -110,13 +108,16 @@ void AravisSession::abandon() {
 
 Result<> AravisSession::make_stream() {
   GErrorSlot error;
-  const bool again = stream_ != nullptr;
   receiver_.reset();
   stream_.reset();
+  while (events_.take_buffer()) continue;  // those buffers went with their stream
   stream_ = make_reporting_stream(device_.camera.get(), events_, number_, error);
   if (!stream_) return fail(error.code(), "the camera gives no stream: " + error.message(), options_.name);
-  std::vector<NetworkWarning> told_before;
-  configure_stream(stream_.get(), options_, layout_.bytes(), again ? told_before : warnings_);
+  std::vector<NetworkWarning> warnings;
+  configure_stream(stream_.get(), options_, layout_.bytes(), warnings);
+  for (NetworkWarning& warning : warnings)
+    if (std::ranges::find(warnings_, warning.name, &NetworkWarning::name) == warnings_.end())
+      warnings_.push_back(std::move(warning));
   const auto payload = read_payload_bytes(device_.camera.get(), layout_, chunks_);
   if (!payload) return tl::unexpected(payload.error());
   receiver_ = std::make_unique<FrameReceiver>(stream_.get(), layout_, options_, *payload, make_chunk_reader());
@@ -226,14 +227,32 @@ Result<> AravisSession::go_without_chunks(AravisTrigger trigger) {
   return warm_up(trigger);
 }
 
+bool AravisSession::heard_others() const {
+  if (!takes_packet_socket(stream_.get(), options_)) return false;
+  std::this_thread::sleep_for(kRingRead);
+  return arv_stream_get_info_uint64_by_name(stream_.get(), "n_received_packets") > 0;
+}
+
 // A packet socket hears every packet of the interface before it is narrowed to this stream, and by the number of
-// another camera's frame Aravis would discard this one's as late ones. Some cameras hear no trigger until a moment
-// after they have begun.
+// another camera's frame Aravis would discard this one's as late ones, or wait for the rest of it. Where the interface
+// is never silent for long enough, only the UDP socket is left.
+Result<> AravisSession::hear_camera_only() {
+  for (int streams = 1; heard_others(); ++streams) {
+    if (streams == kStreamsMax) {
+      options_.packet_socket = false;
+      choose_socket(device_.camera.get(), options_);
+      warnings_.push_back(packet_socket_warning(interface_of(device_.camera.get())));
+    }
+    if (auto done = make_stream(); !done) return done;
+  }
+  return {};
+}
+
+// Some cameras hear no trigger until a moment after they have begun.
 Result<> AravisSession::start(AravisTrigger trigger) {
   const DeviceFeatures features(device_.camera.get());
   if (auto done = configure_trigger(features, options_, trigger); !done) return done;
-  for (int i = 0; i < kStreamsMax && heard_others(stream_.get()); ++i)
-    if (auto done = make_stream(); !done) return done;
+  if (auto done = hear_camera_only(); !done) return done;
   while (events_.take_buffer()) receiver_->discard();
   receiver_->begin();
   if (auto done = features.execute("AcquisitionStart"); !done) return done;

@@ -80,6 +80,8 @@ class AravisSession {
   [[nodiscard]] std::unique_ptr<ChunkReader> make_chunk_reader() const;
   [[nodiscard]] Result<> warm_up(AravisTrigger trigger);
   [[nodiscard]] Result<> go_without_chunks(AravisTrigger trigger);
+  [[nodiscard]] bool heard_others() const;
+  [[nodiscard]] Result<> hear_camera_only();
   [[nodiscard]] Result<> start(AravisTrigger trigger);
   [[nodiscard]] Result<> stop();
   [[nodiscard]] Result<FirstFrame> wait_for_first_frame(AravisTrigger trigger, std::chrono::nanoseconds time);

@@ -168,6 +168,13 @@ NetworkWarning fragments_warning(int packet_bytes, const std::optional<HostInter
               ", and of every switch, to 9000"};
 }
 
+NetworkWarning packet_socket_warning(const std::optional<HostInterface>& interface) {
+  return {"packet_socket",
+          "other devices send on " + (interface ? interface->name : "the interface") +
+              " without a pause, so that packets are taken from the UDP socket, which loses more: give the camera an "
+              "interface of its own, or set packet_socket = false to skip the attempts"};
+}
+
 std::optional<HostInterface> interface_of(ArvCamera* camera) {
   if (!arv_camera_is_gv_device(camera)) return std::nullopt;
   auto* const device = ARV_GV_DEVICE(arv_camera_get_device(camera));
@@ -182,8 +189,7 @@ std::optional<HostInterface> interface_of(ArvCamera* camera) {
 Result<> configure_packets(ArvCamera* camera, const AravisCameraOptions& options,
                            std::vector<NetworkWarning>& warnings) {
   if (!arv_camera_is_gv_device(camera)) return {};
-  arv_camera_gv_set_stream_options(
-      camera, options.packet_socket ? ARV_GV_STREAM_OPTION_NONE : ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+  choose_socket(camera, options);
   if (auto done = set_packet_size(camera, options); !done) return done;
   GErrorSlot error;
   arv_camera_gv_set_packet_delay(camera, static_cast<gint64>(options.packet_delay_us * 1e3), error.out());
@@ -192,6 +198,15 @@ Result<> configure_packets(ArvCamera* camera, const AravisCameraOptions& options
   const unsigned payload = arv_camera_get_payload(camera, error.out());
   if (size < kJumboBytes && payload > kManyBytes) warnings.push_back(packet_size_warning(size, interface_of(camera)));
   return {};
+}
+
+void choose_socket(ArvCamera* camera, const AravisCameraOptions& options) {
+  arv_camera_gv_set_stream_options(
+      camera, options.packet_socket ? ARV_GV_STREAM_OPTION_NONE : ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+}
+
+bool takes_packet_socket(ArvStream* stream, const AravisCameraOptions& options) {
+  return ARV_IS_GV_STREAM(stream) && options.packet_socket && packet_socket_allowed();
 }
 
 void configure_stream(ArvStream* stream, const AravisCameraOptions& options, std::size_t frame_bytes,
@@ -208,7 +223,7 @@ void configure_stream(ArvStream* stream, const AravisCameraOptions& options, std
   if (options.packet_resend && resend == ARV_GV_STREAM_PACKET_RESEND_NEVER)
     warnings.push_back({"packet_resend", "the camera cannot send packets again: each one lost is a frame lost"});
   if (!options.packet_resend) g_object_set(stream, "packet-resend", ARV_GV_STREAM_PACKET_RESEND_NEVER, nullptr);
-  if (receive_buffer_allowed() >= wanted || (options.packet_socket && packet_socket_allowed())) return;
+  if (receive_buffer_allowed() >= wanted || takes_packet_socket(stream, options)) return;
   const std::string bytes = std::to_string(wanted);
   warnings.push_back({"receive_buffer", "net.core.rmem_max is " + std::to_string(receive_buffer_allowed()) +
                                             " and frames need " + bytes + ": run sysctl -w net.core.rmem_max=" + bytes +

@@ -45,8 +45,8 @@ struct HostInterface {
 
 /// Something about the system that may cost frames, or that could not be made sure of, by name and with what to do.
 struct NetworkWarning {
-  std::string name;  ///< "receive_buffer", "packet_size", "fragments", "packet_resend", "device_clock", "chunks" or
-                     ///< "first_frame"
+  std::string name;  ///< "receive_buffer", "packet_size", "packet_socket", "fragments", "packet_resend",
+                     ///< "device_clock", "chunks" or "first_frame"
   std::string advice;
 };
 
@@ -65,6 +65,10 @@ struct NetworkWarning {
 /// @param packet_bytes  that were set; 0: the camera's packets were tried
 [[nodiscard]] NetworkWarning fragments_warning(int packet_bytes, const std::optional<HostInterface>& interface);
 
+/// Each packet socket heard other devices before it was narrowed to the camera.
+/// @param interface  of this host to the camera, as far as it is known
+[[nodiscard]] NetworkWarning packet_socket_warning(const std::optional<HostInterface>& interface);
+
 /// Of this host to the camera, as far as it is known. Nothing for one that is not GigE Vision.
 [[nodiscard]] std::optional<HostInterface> interface_of(ArvCamera* camera);
 
@@ -72,6 +76,11 @@ struct NetworkWarning {
 /// @errors kMismatch, kUnsupported, kDisconnected
 [[nodiscard]] Result<> configure_packets(ArvCamera* camera, const AravisCameraOptions& options,
                                          std::vector<NetworkWarning>& warnings);
+
+/// Has streams of a GigE Vision camera take packets before the UDP socket, or not. To be called before they are made.
+void choose_socket(ArvCamera* camera, const AravisCameraOptions& options);
+/// Whether this stream takes them so.
+[[nodiscard]] bool takes_packet_socket(ArvStream* stream, const AravisCameraOptions& options);
 
 /// Sets receive buffer and resend of a GigE Vision stream; nothing for another.
 void configure_stream(ArvStream* stream, const AravisCameraOptions& options, std::size_t frame_bytes,

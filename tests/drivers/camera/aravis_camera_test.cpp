@@ -221,6 +221,28 @@ TEST_F(AravisCameraTest, TakesPacketsBeforeTheSocketWhereItMay) {
   for (int i = 0; i < 10; ++i) EXPECT_TRUE(next(camera));
 }
 
+// Until its filter is there, such a socket hears the whole interface.
+TEST_F(AravisCameraTest, TakesNoPacketsOfOthersThatAreOpenedMeanwhile) {
+  if (!packet_socket_allowed()) GTEST_SKIP() << "needs CAP_NET_RAW";
+  std::vector<std::jthread> others;
+  for (int i = 0; i < 2; ++i)
+    others.emplace_back([](const std::stop_token& stop) {
+      test::GigeCamera device;
+      for (; !stop.stop_requested(); std::this_thread::sleep_for(50ms)) {
+        AravisCamera other(options_for(device));
+        EXPECT_TRUE(opens(other));
+        EXPECT_TRUE(next(other));
+      }
+    });
+  AravisCameraOptions options = options_for(device_);
+  options.packet_socket = true;
+  for (int i = 0; i < 40; ++i) {
+    AravisCamera camera(options);
+    ASSERT_TRUE(opens(camera));
+    for (int k = 0; k < 3; ++k) EXPECT_TRUE(next_is_newest(camera, device_)) << "opening " << i << ", frame " << k;
+  }
+}
+
 TEST_F(AravisCameraTest, PassesOverPacketsThatAreOfNoFrame) {
   AravisCamera camera(options_for(device_));
   ASSERT_TRUE(opens(camera));

@@ -76,6 +76,13 @@ TEST(FragmentsWarning, NamesTheRemedy) {
   EXPECT_THAT(fragments_warning(0, std::nullopt).advice, HasSubstr("set the MTU of the interface"));
 }
 
+TEST(PacketSocketWarning, NamesTheInterface) {
+  HostInterface interface;
+  interface.name = "eth1";
+  EXPECT_THAT(packet_socket_warning(interface).advice, HasSubstr("other devices send on eth1 without a pause"));
+  EXPECT_THAT(packet_socket_warning(std::nullopt).advice, HasSubstr("other devices send on the interface without"));
+}
+
 TEST(ReadGvcpDiscovery, RefusesOtherAnswers) {
   for (const std::size_t place : {0, 1, 2, 3, 6, 7}) {
     auto answer = discovery_answer();
