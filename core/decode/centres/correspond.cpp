@@ -231,7 +231,7 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, Executor& e
     std::swap(rim_, next_rim_);
     return any;
   };
-  refuse([&](std::int32_t node) { return around.leave_alone(node); });
+  refuse([&](std::int32_t node) { return !claims[node].anchored && around.leave_alone(node); });
   refuse([&](std::int32_t node) { return around.is_corner(node); });
   while (refuse([&](std::int32_t node) {
     return !around.is_inside(node) &&

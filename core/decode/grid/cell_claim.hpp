@@ -15,6 +15,7 @@ struct CellClaim {
                        ///< weighed where another claims the cell too
   RegionStatus status = RegionStatus::kNoNeighbour;  ///< kDecoded, or why not
   std::int32_t island = -1;                          ///< that it is part of: see IslandJudge
+  bool anchored = false;                             ///< at a rim: it lies where the island's steps lead, both ways
 
   struct Cell {
     int row, column;

@@ -57,6 +57,26 @@ void IslandJudge::measure_slips(const Frame& frame) {
   slip_max_ = std::max(kOfMedian * *middle, kLeast);
 }
 
+/// Whether a node at a rim lies where its island's steps lead, along rows and along columns, and nothing on the grid
+/// beside it is of other light. Another surface lies there in one of 1 / slip_max_ cases.
+bool IslandJudge::is_anchored(const Frame& frame, std::int32_t node) const {
+  constexpr float kOfSlipMax = 0.5F;
+  if (std::isinf(slip_max_)) return false;
+  std::array<bool, 2> leads{};  // along rows, along columns
+  for (const Direction d : kDirections) {
+    if (links_[node][d] == Link::kAgrees) {
+      const std::int32_t within = frame.beside[node][d];
+      const Direction back = opposite(d);
+      const auto slip = frame.beside[within][back] == node ? slip_beyond(frame, within, back) : std::nullopt;
+      if (slip && std::abs(*slip) > kOfSlipMax * slip_max_) return false;
+      leads[d % 2] |= slip.has_value();
+    } else if (frame.beside[node][d] >= 0 && is_of_another(frame, node, d) && !parts(frame, node, d)) {
+      return false;
+    }
+  }
+  return leads[0] && leads[1];
+}
+
 /// Nodes that too little holds, in so many rounds as a row of symbols is long that chance could not add.
 void IslandJudge::cut_back(const Frame& frame) {
   const int rounds = static_cast<int>(std::ceil(-std::log(options_.wrong_cells_max) / log_letters_ / 1.5));
@@ -529,6 +549,12 @@ void IslandJudge::cut_rims(const Frame& frame) {
   looked_at_ = -1;
   around_.assign(holder_.size(), -1);
   measure_slips(frame);
+  const auto may_come_to_rim = [&](std::int32_t node) {
+    return links_[node] != kAllAgree ||
+           std::ranges::any_of(frame.beside[node], [&](std::int32_t other) { return links_[other] != kAllAgree; });
+  };
+  for (const std::int32_t node : members_)
+    if (may_come_to_rim(node)) frame.claims[node].anchored = is_anchored(frame, node);
   for (std::size_t id = 0; id < islands_.size(); ++id) cut_slid(frame, static_cast<std::int32_t>(id));
   cut_contradicted_lines(frame);
   cut_back(frame);

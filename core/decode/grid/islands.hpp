@@ -151,6 +151,7 @@ class IslandJudge {
   }
   [[nodiscard]] std::optional<float> slip_beyond(const Frame& frame, std::int32_t node, Direction d) const;
   void measure_slips(const Frame& frame);
+  [[nodiscard]] bool is_anchored(const Frame& frame, std::int32_t node) const;
   /// Whether a link leads to what is not on one surface with the node.
   [[nodiscard]] bool parts(const Frame& frame, std::int32_t node, Direction d) const {
     if (std::isinf(slip_max_)) return false;

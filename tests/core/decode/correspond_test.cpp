@@ -137,6 +137,16 @@ TEST(RefuseLone, RefusesWhatStandsBetweenRefusedOnesAtARim) {
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(4, column).status, kDecoded);
 }
 
+TEST(RefuseLone, LeavesWhatIsAnchored) {
+  for (const bool anchored : {false, true}) {
+    RimSheet sheet;
+    for (const int row : {1, 2, 3}) sheet.at(row, 8).status = RegionStatus::kClassDisagrees;
+    sheet.at(4, 8).anchored = sheet.at(5, 8).anchored = anchored;
+    Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+    EXPECT_EQ(sheet.at(4, 8).status, anchored ? kDecoded : RegionStatus::kNeighboursDisagree);
+  }
+}
+
 TEST(RefuseLone, RefusesTheLastOfARefusedRow) {
   RimSheet sheet;
   for (const int column : {0, 4, 5, 6, 7, 8}) sheet.at(5, column).status = RegionStatus::kClassDisagrees;

@@ -261,6 +261,43 @@ TEST_F(IslandsAtAnEdge, LoseItWhereNothingTellsWhatDepthWouldMove) {
   EXPECT_EQ(kept(decode_with(1.8F, false)), 0);
 }
 
+/// How the last row of a sheet is anchored, which lies so far along its line from where the sheet would go on.
+class IslandsWithALastRow : public IslandsAtAnEdge {
+ protected:
+  bool anchored(float away_px, float below_px = 1.8F, bool knows_lines = true) {
+    grid_ = {}, shapes_.clear();
+    show_pattern(10, 10, 14, 41);
+    for (int column = 10; column < 41; ++column) grid_.nodes[grid_.node_at(13, column)].centre_px.x() += away_px;
+    show(14, 30, (pattern_.array.at(14, 30) + 1) % 5);
+    grid_.nodes.back().centre_px.x() += away_px + below_px;
+    const auto claims = knows_lines ? decode(lines_through(2000, [](int) { return 0; })) : decode();
+    return claims[grid_.node_at(13, 30)].anchored;
+  }
+};
+
+TEST_F(IslandsWithALastRow, AnchorItWhereTheyLeadToIt) {
+  EXPECT_TRUE(anchored(0));
+  EXPECT_TRUE(anchored(0.05F));
+}
+
+TEST_F(IslandsWithALastRow, DoNotAnchorItAtAnotherDepth) {
+  EXPECT_FALSE(anchored(0.1F));
+  EXPECT_FALSE(anchored(-0.1F));
+}
+
+TEST_F(IslandsWithALastRow, DoNotAnchorItBesideOtherLightOnTheGrid) {
+  EXPECT_FALSE(anchored(0, 0));
+}
+
+TEST_F(IslandsWithALastRow, DoNotAnchorItWhereNothingTellsWhatDepthWouldMove) {
+  EXPECT_FALSE(anchored(0, 1.8F, false));
+}
+
+TEST_F(IslandsWithALastRow, AnchorNothingThatIsOneNodeWide) {
+  show_pattern(10, 10, 30, 11);
+  for (const CellClaim& claim : decode(lines_through(2000, [](int) { return 0; }))) EXPECT_FALSE(claim.anchored);
+}
+
 /// A surface whose last columns come closer together, each by so much, up to where its links break.
 class IslandsThatTurnAway : public Islands {
  protected:
