@@ -143,7 +143,10 @@ void SymbolReader::review(const GreyView& frame, Executor& executor) {
 }
 
 void SymbolReader::correspond(const EpipolarView* view, Executor& executor) {
-  if (options_.decode_windows == Method::kDefault) correspondence_.refuse_lone(seen_.nodes, executor, seen_.claims);
+  if (options_.decode_windows == Method::kDefault) {
+    correspondence_.refuse_lone(seen_.nodes, executor, seen_.claims);
+    review_.take_back_held(seen_);
+  }
   if (view == nullptr) {
     correspondence_.settle_duplicates(cells(), seen_.claims);
   } else if (options_.correspond == Method::kDefault) {

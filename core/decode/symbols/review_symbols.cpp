@@ -160,7 +160,7 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
     const Eigen::Vector2f from_steady = lattice_frame * (prototype.centroid_px - prototype.steady_centroid_px);
     moments.x = moments.steady_x + from_steady.x(), moments.y = moments.steady_y + from_steady.y();
   }
-  if (distance > options_.damaged_distance_inside || (distance > options_.damaged_distance && !is_inside(seen, node)))
+  if (distance > options_.damaged_distance_held || (distance > options_.damaged_distance && !is_inside(seen, node)))
     seen.claims[node].status = RegionStatus::kDamagedShape;
 }
 
@@ -179,6 +179,23 @@ void SymbolReview::review(const GreyView& frame, const Regions& regions, const G
         });
       },
       frame);
+}
+
+void SymbolReview::take_back_held(Sightings& seen) {
+  constexpr std::ptrdiff_t kHeldBy = 2;
+  held_.clear();
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const CellClaim& claim = seen.claims[i];
+    if (claim.status != RegionStatus::kDamagedShape || seen.misfits[i] > options_.damaged_distance_held) continue;
+    const auto node = static_cast<std::int32_t>(i);
+    const auto holds = [&](Direction d) {
+      const std::int32_t other = neighbour(seen.nodes, node, d);
+      return other >= 0 && seen.claims[other].status == RegionStatus::kDecoded &&
+             seen.claims[other].island == claim.island && claim.fits(seen.claims[other], d);
+    };
+    if (std::ranges::count_if(kDirections, holds) >= kHeldBy) held_.push_back(node);
+  }
+  for (const std::int32_t node : held_) seen.claims[node].status = RegionStatus::kDecoded;
 }
 
 }  // namespace slsd

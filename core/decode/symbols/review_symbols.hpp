@@ -20,17 +20,17 @@ struct ReviewOptions {
   /// Standard deviations from its letter's prototype from which on a symbol is measured again where its neighbours put
   /// it.
   float doubtful_distance = 1.5F;
-  /// The same beyond which a symbol at the edge of what is decoded is damaged (cut by an edge or a shadow), and its
-  /// centre with it.
+  /// The same beyond which a symbol at the edge of what is decoded may be cut by an edge or a shadow: it is damaged,
+  /// but for one that its island holds.
   float damaged_distance = 2.5F;
-  /// The same for a symbol among decoded neighbours on all sides: print on the surface disturbs a shape more than a
-  /// centre.
-  float damaged_distance_inside = 4;
+  /// The same for a symbol among named neighbours on all sides, and for one that two of its island hold: print and
+  /// relief disturb a shape, its cell is certain, and its sigma says by how much they may move its centre.
+  float damaged_distance_held = 8;
 };
 
 /// Looks again at every symbol whose cell is known: with the frame that its whole neighbours show, with the light
 /// levelled as their brightness tells, and, where its shape still is not that of its letter, inside its cell instead of
-/// inside its mask. What is not whole then is rejected: its centre would be wrong.
+/// inside its mask. What is far from whole then is rejected: its centre would be wrong.
 /// @thread thread-bound: keeps its buffers
 class SymbolReview {
  public:
@@ -42,6 +42,9 @@ class SymbolReview {
   void review(const GreyView& frame, const Regions& regions, const GridLinker& linker,
               const std::vector<Prototype>& prototypes, std::span<GreyMomentMeter> meters, Executor& executor,
               Sightings& seen);
+
+  /// Takes back what was damaged and two symbols of its island hold, once none is left that its surroundings refuse.
+  void take_back_held(Sightings& seen);
 
  private:
   void measure_around_distrusted(const GridLinker& linker, Sightings& seen);
@@ -62,7 +65,7 @@ class SymbolReview {
   float size_px_, pitch_px_;
   ReviewOptions options_;
   std::vector<std::uint8_t> trusted_;
-  std::vector<std::int32_t> distrusted_;
+  std::vector<std::int32_t> distrusted_, held_;
   std::vector<Eigen::Vector2f> light_changes_;  // from cell to cell along u and v, relative
 };
 

@@ -127,6 +127,42 @@ TEST_F(ReviewSymbols, RejectsASymbolThatIsCut) {
   EXPECT_EQ(count(RegionStatus::kDecoded), kCells * kCells - 1);
 }
 
+/// Damaged symbols, so far from their letters, with some of those beside them refused.
+class DamagedSymbols : public ReviewSymbols {
+ protected:
+  RegionStatus after(float misfit, std::initializer_list<Direction> refused, std::int32_t island = 0) {
+    seen_ = {};
+    look();
+    seen_.misfits.assign(seen_.size(), 1);
+    const std::size_t damaged = sighting_at(4, 5);
+    seen_.claims[damaged].status = RegionStatus::kDamagedShape, seen_.claims[damaged].island = island;
+    for (CellClaim& claim : seen_.claims) claim.island = claim.island < 0 ? 0 : claim.island;
+    seen_.misfits[damaged] = misfit;
+    for (const Direction d : refused)
+      seen_.claims[neighbour(seen_.nodes, static_cast<std::int32_t>(damaged), d)].status =
+          RegionStatus::kNeighboursDisagree;
+    SymbolReview(pattern_, {}).take_back_held(seen_);
+    return seen_.claims[damaged].status;
+  }
+};
+
+TEST_F(DamagedSymbols, AreTakenBackWhereTwoOfTheirIslandHoldThem) {
+  EXPECT_EQ(after(5, {kUp, kLeft}), RegionStatus::kDecoded);
+  EXPECT_EQ(after(7.9F, {}), RegionStatus::kDecoded);
+}
+
+TEST_F(DamagedSymbols, AreNotTakenBackWhereOneHoldsThem) {
+  EXPECT_EQ(after(5, {kUp, kLeft, kDown}), RegionStatus::kDamagedShape);
+}
+
+TEST_F(DamagedSymbols, AreNotTakenBackByAnotherIsland) {
+  EXPECT_EQ(after(5, {}, 1), RegionStatus::kDamagedShape);
+}
+
+TEST_F(DamagedSymbols, AreNotTakenBackWhereTooLittleIsLeft) {
+  EXPECT_EQ(after(8.1F, {}), RegionStatus::kDamagedShape);
+}
+
 TEST_F(ReviewSymbols, LevelsTheLight) {
   for (int x = 0; x < kSidePx; ++x) light_.col(x) *= std::exp(-0.12 * x / kPitchPx);
   look();
