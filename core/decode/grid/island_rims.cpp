@@ -58,9 +58,9 @@ void IslandJudge::measure_slips(const Frame& frame) {
 }
 
 /// Whether a node at a rim lies where its island's steps lead, along rows and along columns, and nothing on the grid
-/// beside it is of other light. Another surface lies there in one of 1 / slip_max_ cases.
+/// beside it is of other light. Another surface lies there in one of sixty cases at most.
 bool IslandJudge::is_anchored(const Frame& frame, std::int32_t node) const {
-  constexpr float kOfSlipMax = 0.5F;
+  constexpr float kOfSlipMax = 0.5F, kSlipMost = 0.008F;
   if (std::isinf(slip_max_)) return false;
   std::array<bool, 2> leads{};  // along rows, along columns
   for (const Direction d : kDirections) {
@@ -68,7 +68,7 @@ bool IslandJudge::is_anchored(const Frame& frame, std::int32_t node) const {
       const std::int32_t within = frame.beside[node][d];
       const Direction back = opposite(d);
       const auto slip = frame.beside[within][back] == node ? slip_beyond(frame, within, back) : std::nullopt;
-      if (slip && std::abs(*slip) > kOfSlipMax * slip_max_) return false;
+      if (slip && std::abs(*slip) > std::min(kOfSlipMax * slip_max_, kSlipMost)) return false;
       leads[d % 2] |= slip.has_value();
     } else if (frame.beside[node][d] >= 0 && is_of_another(frame, node, d) && !parts(frame, node, d)) {
       return false;
