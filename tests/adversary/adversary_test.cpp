@@ -86,6 +86,13 @@ TEST(AdversaryFrames, NameNothingBesideWhatIsPutInThePatternsPlace) {
   coarse.expect_none_wrong(Kind::kSlats1to2, 760);
 }
 
+// Half of a shelf's letters fit by chance, from edge to edge of it.
+TEST(AdversaryFrames, NameNoRowThatIsOffTheGrid) {
+  Bench fine = Bench::of(8), coarse = Bench::of(16);
+  coarse.expect_none_wrong(Kind::kShelves, 40470);
+  fine.expect_none_wrong(Kind::kShelves, 41119);
+}
+
 // Letters of another surface that fit because they come again some columns on.
 TEST(AdversaryFrames, NameNoRowThatIsAnotherOneSlid) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);

@@ -115,11 +115,41 @@ void IslandJudge::cut_back(const Frame& frame) {
   }
 }
 
+/// Whether a part of line_ is off the grid of what holds it on one side: most of the links across slip the same way. A
+/// surface that turns away slips there, too, by up to three times what the links further in do.
+bool IslandJudge::is_off_grid(const Frame& frame, Direction forth, int from, int to) {
+  constexpr std::size_t kSlipsMin = 4;  // fewer may be torn, all of them
+  constexpr float kGrowth = 3;
+  if (std::isinf(slip_max_)) return false;
+  for (const int side : {0, 1}) {
+    const Direction inwards = across(forth, side), back = opposite(inwards);
+    const auto leads = [&](std::int32_t node) {
+      return links_[node][inwards] == Link::kAgrees && frame.beside[frame.beside[node][inwards]][back] == node;
+    };
+    slips_.clear();
+    for (int i = from; i <= to; ++i) {
+      if (!leads(line_[i])) continue;
+      const std::int32_t within = frame.beside[line_[i]][inwards];
+      const auto slip = slip_beyond(frame, within, back);
+      if (!slip) continue;
+      const auto next = leads(within) ? slip_beyond(frame, frame.beside[within][inwards], back) : std::nullopt;
+      const float grown = next ? kGrowth * *next : 0;
+      slips_.push_back(*slip > 0 ? std::max(0.F, *slip - std::max(0.F, grown))
+                                 : std::min(0.F, *slip - std::min(0.F, grown)));
+    }
+    if (slips_.size() < kSlipsMin) continue;
+    std::ranges::sort(slips_);
+    const std::size_t few = slips_.size() / 4;
+    if (slips_[few] > slip_max_ || slips_[slips_.size() - 1 - few] < -slip_max_) return true;
+  }
+  return false;
+}
+
 /// Keeps for every node the evidence of the line of nodes through it, as far as it agrees and so far around it, where
 /// something contradicts it.
 void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, float evidence_min) {
   constexpr int kReach = 10, kBeyond = 3;
-  constexpr float kUsualShare = 0.5F, kClean = 0.8F;
+  constexpr float kUsualShare = 0.5F, kUsualShareOffGrid = 0.8F, kClean = 0.8F;
   const Direction back = opposite(forth);
   const auto leads = [&](std::int32_t node, Direction d) {
     return continues(frame, node, d) && frame.beside[frame.beside[node][d]][opposite(d)] == node;
@@ -154,8 +184,10 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
       auto evidence = static_cast<float>(line_ratios_[to + 1] - line_ratios_[from]);
       const float length =
           static_cast<float>(to - from + 1) + (begins ? begin.doubtful : 0) + (ends ? end.doubtful : 0);
+      const float usual = log_letters_ * length;
       const bool contradicted = is_misread(line_[i]) || (begins && begin.contradicts) || (ends && end.contradicts) ||
-                                evidence < kUsualShare * log_letters_ * length;
+                                evidence < kUsualShare * usual ||
+                                (evidence < kUsualShareOffGrid * usual && is_off_grid(frame, forth, from, to));
       const bool misread = any_misread && std::any_of(line_.begin() + from, line_.begin() + to + 1, is_misread);
       if (!contradicted && (!misread || evidence_against_slides(frame, from, to) >= evidence_min)) continue;
       // As far as it agrees: what ends it may have been read as one of the island.

@@ -161,6 +161,7 @@ class IslandJudge {
   void cut_slid(const Frame& frame, std::int32_t island);
   void cut_slid_along(const Frame& frame, std::int32_t island, const Piece& line);
   void cut_contradicted_lines(const Frame& frame);
+  [[nodiscard]] bool is_off_grid(const Frame& frame, Direction forth, int from, int to);
   void find_contradicted_lines(const Frame& frame, Direction forth, float evidence_min);
   [[nodiscard]] float evidence_against_slides(const Frame& frame, int from, int to);
   [[nodiscard]] bool fits_between(const Frame& frame, const Line& line, float evidence_min);
@@ -193,7 +194,7 @@ class IslandJudge {
   std::vector<Line> lines_;                    // contradicted ones
   std::vector<std::int32_t> holder_;           // of each cell: of the island that is looked at, or of all
   std::int32_t looked_at_ = -1;
-  std::vector<float> slips_;  // of a sample of links
+  std::vector<float> slips_;  // of a sample of links, or of those across a line
   float slip_max_ = 0;        // of links on one surface, cells
 };
 

@@ -261,6 +261,43 @@ TEST_F(IslandsAtAnEdge, LoseItWhereNothingTellsWhatDepthWouldMove) {
   EXPECT_EQ(kept(decode_with(1.8F, false)), 0);
 }
 
+/// Below a sheet some of a row, moved along its line, a third of whose symbols are anyone's guess.
+class IslandsAboveAShortRow : public Islands {
+ protected:
+  int kept(float away_px, float above_px = 0, bool knows_lines = true) {
+    grid_ = {}, shapes_.clear();
+    show_pattern(10, 10, 13, 41);
+    show_pattern(13, 10, 14, 16);
+    for (int column = 10; column < 16; ++column) {
+      grid_.nodes[grid_.node_at(13, column)].centre_px.x() += away_px;
+      grid_.nodes[grid_.node_at(12, column)].centre_px.x() += above_px;
+      if (column % 3 == 0) shapes_[grid_.node_at(13, column)] = read_as(0, 5, 0.2);
+    }
+    const auto claims = knows_lines ? decode(lines_through(2000, [](int) { return 0; })) : decode();
+    int count = 0;
+    for (int column = 10; column < 16; ++column) count += is_decoded(claims, 13, column);
+    return count;
+  }
+};
+
+TEST_F(IslandsAboveAShortRow, KeepItOnTheirGrid) {
+  EXPECT_GE(kept(0), 4);
+  EXPECT_GE(kept(0.1F), 4);
+}
+
+TEST_F(IslandsAboveAShortRow, LoseItOffTheirGrid) {
+  EXPECT_EQ(kept(0.4F), 0);
+  EXPECT_EQ(kept(-0.4F), 0);
+}
+
+TEST_F(IslandsAboveAShortRow, KeepItWhereTheyTurnAway) {
+  EXPECT_GE(kept(0.5F, 0.12F), 4);  // slips of 0.26 px and 0.12 px
+}
+
+TEST_F(IslandsAboveAShortRow, KeepItWhereNothingTellsWhatDepthWouldMove) {
+  EXPECT_GE(kept(0.4F, 0, false), 4);
+}
+
 /// How the last row of a sheet is anchored, which lies so far along its line from where the sheet would go on.
 class IslandsWithALastRow : public IslandsAtAnEdge {
  protected:
