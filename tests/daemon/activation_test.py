@@ -17,13 +17,20 @@ WRONG_CONFIGURATION = 78
 ACTIVATE = shutil.which("systemd-socket-activate")
 
 
+def listens(path):
+    """It is there as soon as it is bound, and refuses who comes before it listens."""
+    accepts = "00010000"  # among the flags of net/unix
+    with open("/proc/net/unix", encoding="utf-8") as sockets:
+        return any(line.split()[3] == accepts and line.split()[-1] == str(path) for line in sockets)
+
+
 class Activation(unittest.TestCase):
     def activate(self, service, at):
         """Listens, and starts the service at the first connection."""
         with open(service.log, "ab") as log:
             process = subprocess.Popen([ACTIVATE, "-l", str(at), BIN / "slsd", "--config", service.file], stderr=log)
         self.addCleanup(lambda: (process.kill(), process.wait()))
-        wait_until(at.exists, "the socket")
+        wait_until(lambda: listens(at), "the socket")
         return process
 
     def test_answers_who_connected_before_it_ran(self):
