@@ -38,6 +38,15 @@ std::optional<float> IslandJudge::slip_beyond(const Frame& frame, std::int32_t n
          pitch_px_;
 }
 
+/// The slip of a link of the island seen from where it leads to, against the next link further in; nothing where the
+/// node is not what lies beside that one, too.
+std::optional<float> IslandJudge::slip_from_within(const Frame& frame, std::int32_t node, Direction inwards) const {
+  if (links_[node][inwards] != Link::kAgrees) return std::nullopt;
+  const std::int32_t within = frame.beside[node][inwards];
+  if (frame.beside[within][opposite(inwards)] != node) return std::nullopt;
+  return slip_beyond(frame, within, opposite(inwards));
+}
+
 /// From which slip on a link leads to another surface: some times what is usual in the frame. Where epipolar lines are
 /// not known, none does.
 void IslandJudge::measure_slips(const Frame& frame) {
@@ -65,9 +74,7 @@ bool IslandJudge::is_anchored(const Frame& frame, std::int32_t node) const {
   std::array<bool, 2> leads{};  // along rows, along columns
   for (const Direction d : kDirections) {
     if (links_[node][d] == Link::kAgrees) {
-      const std::int32_t within = frame.beside[node][d];
-      const Direction back = opposite(d);
-      const auto slip = frame.beside[within][back] == node ? slip_beyond(frame, within, back) : std::nullopt;
+      const auto slip = slip_from_within(frame, node, d);
       if (slip && std::abs(*slip) > std::min(kOfSlipMax * slip_max_, kSlipMost)) return false;
       leads[d % 2] |= slip.has_value();
     } else if (frame.beside[node][d] >= 0 && is_of_another(frame, node, d) && !parts(frame, node, d)) {
@@ -122,17 +129,12 @@ bool IslandJudge::is_off_grid(const Frame& frame, Direction forth, int from, int
   constexpr float kGrowth = 3;
   if (std::isinf(slip_max_)) return false;
   for (const int side : {0, 1}) {
-    const Direction inwards = across(forth, side), back = opposite(inwards);
-    const auto leads = [&](std::int32_t node) {
-      return links_[node][inwards] == Link::kAgrees && frame.beside[frame.beside[node][inwards]][back] == node;
-    };
+    const Direction inwards = across(forth, side);
     slips_.clear();
     for (int i = from; i <= to; ++i) {
-      if (!leads(line_[i])) continue;
-      const std::int32_t within = frame.beside[line_[i]][inwards];
-      const auto slip = slip_beyond(frame, within, back);
+      const auto slip = slip_from_within(frame, line_[i], inwards);
       if (!slip) continue;
-      const auto next = leads(within) ? slip_beyond(frame, frame.beside[within][inwards], back) : std::nullopt;
+      const auto next = slip_from_within(frame, frame.beside[line_[i]][inwards], inwards);
       const float grown = next ? kGrowth * *next : 0;
       slips_.push_back(*slip > 0 ? std::max(0.F, *slip - std::max(0.F, grown))
                                  : std::min(0.F, *slip - std::min(0.F, grown)));

@@ -150,6 +150,7 @@ class IslandJudge {
     return shown(row, column) && holder_[index_of(row, column)] >= 0;
   }
   [[nodiscard]] std::optional<float> slip_beyond(const Frame& frame, std::int32_t node, Direction d) const;
+  [[nodiscard]] std::optional<float> slip_from_within(const Frame& frame, std::int32_t node, Direction inwards) const;
   void measure_slips(const Frame& frame);
   [[nodiscard]] bool is_anchored(const Frame& frame, std::int32_t node) const;
   /// Whether a link leads to what is not on one surface with the node.
