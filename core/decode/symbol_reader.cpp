@@ -98,6 +98,7 @@ void SymbolReader::classify(Executor& executor) {
       if (options_.classify == Method::kDefault) {
         seen_.shapes[i] = look_->expected.classify(shape_features(moments, expected.inverse, size));
       }
+      node.torn = seen_.shapes[i].is_torn();
       if (seen_.shapes[i].letter >= 0)
         node.centre_px -= node.frame * look_->as_expected[seen_.shapes[i].letter].centroid_px;
     }

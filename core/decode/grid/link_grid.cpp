@@ -177,9 +177,12 @@ void GridLinker::measure_changed_frames(std::vector<GridNode>& nodes) {
 bool GridLinker::is_inconsistent(const std::vector<GridNode>& nodes, std::size_t from, Direction d) const {
   const Eigen::Vector2f own = link_vector(nodes, from, d);
   const Eigen::Matrix2f cells_from_camera = nodes[from].frame.inverse() / options_.pitch_px;
+  const auto is_torn = [&](std::size_t node) { return nodes[node].torn || nodes[nodes[node].links[d]].torn; };
+  const bool own_torn = is_torn(from);
   int count = 0, against = 0;
   const auto ask = [&](std::int32_t other) {
     if (other < 0 || nodes[other].links[d] < 0) return;
+    if (!own_torn && is_torn(static_cast<std::size_t>(other))) return;
     const Eigen::Vector2f difference = own - link_vector(nodes, static_cast<std::size_t>(other), d);
     ++count;
     against += (cells_from_camera * difference).squaredNorm() > options_.deviation_max * options_.deviation_max;

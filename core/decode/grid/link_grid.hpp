@@ -20,6 +20,7 @@ struct GridNode {
   LatticeFrame frame;         ///< in: as expected; out: as measured from the neighbours, where there are some
   std::array<std::int32_t, 4> links{-1, -1, -1, -1};  ///< by Direction
   std::array<bool, 4> broken{};
+  bool torn = false;                            ///< in: its links say nothing of those beside them
   bool measured_u = false, measured_v = false;  ///< which steps of the frame come from neighbours
 };
 

@@ -18,6 +18,12 @@ struct Classification {
   float distance = 0;       ///< from the nearest prototype, in standard deviations
   float likelihood = 0;     ///< of the features if it is the likeliest letter, up to a factor common to all classifiers
   std::int8_t letter = -1;  ///< the likeliest, or -1: like none of them
+
+  /// Its centre lies anywhere.
+  [[nodiscard]] bool is_torn() const {
+    constexpr float kTorn = 6;  // standard deviations
+    return distance >= kTorn;
+  }
 };
 
 /// Compares features with prototypes, all letters at once.

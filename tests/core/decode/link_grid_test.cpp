@@ -137,6 +137,25 @@ TEST(LinkGrid, BreaksEveryLinkAcrossAStraightEdge) {
   }
 }
 
+TEST(LinkGrid, KeepsALinkBetweenTornSymbols) {
+  for (const bool told : {false, true}) {
+    const Homography map = tilted(0);
+    SimulatedGrid grid = grid_of(map, 0);
+    // Those before and behind two whole ones have lost a part each.
+    const Eigen::Vector2f moved = 0.25F * SimulatedGrid::kPitchPx * expected_frame(map).col(0);
+    const int left = kColumns / 2;
+    for (const int column : {left - 1, left + 2}) {
+      GridNode& node = grid.nodes[grid.node_at(10, column)];
+      node.centre_px += moved;
+      node.torn = told;
+    }
+    GridLinker({}).link(grid.nodes, alone);
+    const GridNode& node = grid.nodes[grid.node_at(10, left)];
+    EXPECT_EQ(node.links[kRight] >= 0 && !node.broken[kRight], told);
+    EXPECT_TRUE(node.links[kLeft] < 0 || node.broken[kLeft]);
+  }
+}
+
 TEST(LinkGrid, MeasuresTheFramesOfATiltedPlane) {
   const Homography map = tilted(0.3F);
   SimulatedGrid grid = grid_of(map, 0);
