@@ -101,6 +101,11 @@ class Surroundings {
   [[nodiscard]] bool is_beside_others(std::int32_t node, Direction d) const {
     return contradicts(node, d) || misread(beside(node, d));
   }
+  /// Damaged, or moved off its line as print does it.
+  [[nodiscard]] bool is_worn(std::int32_t node) const {
+    const RegionStatus status = claims_[node].status;
+    return status == RegionStatus::kDamagedShape || status == RegionStatus::kOffEpipolarLine;
+  }
   /// Its letter is another than its cell's.
   [[nodiscard]] bool misread(std::int32_t node) const {
     return node >= 0 && claims_[node].status == RegionStatus::kClassDisagrees;
@@ -143,7 +148,7 @@ class Surroundings {
   }
 
   /// The same, seen from the row within: its links lead on where those of a row that an edge runs through are broken.
-  /// What is damaged counts half: the symbols at a limb are, too.
+  /// What is worn counts half: the symbols at a limb are, too.
   [[nodiscard]] bool is_lone_at_rim(std::int32_t node, Direction outwards) const {
     const std::int32_t within = beside(node, opposite(outwards));
     if (!stands(node, within) || stands(node, beside(node, outwards))) return false;
@@ -160,7 +165,7 @@ class Surroundings {
         if (stands(node, other) && !nodes_[at].broken[outwards]) {
           standing += 2;
         } else {
-          refused += claims_[other].status == RegionStatus::kDamagedShape ? 1 : 2;
+          refused += is_worn(other) ? 1 : 2;
         }
       }
     }
@@ -231,7 +236,7 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, Executor& e
     std::swap(rim_, next_rim_);
     return any;
   };
-  refuse([&](std::int32_t node) { return !claims[node].anchored && around.leave_alone(node); });
+  refuse([&](std::int32_t node) { return claims[node].grid_fit != GridFit::kTight && around.leave_alone(node); });
   refuse([&](std::int32_t node) { return around.is_corner(node); });
   while (refuse([&](std::int32_t node) {
     return !around.is_inside(node) &&

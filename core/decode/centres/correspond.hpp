@@ -28,7 +28,8 @@ class Correspondence {
 
   /// Refuses symbols at a rim most of whose neighbours along their row, or their column, were refused: the edge that
   /// cut those runs through them as well, and what is left of two symbols can look like a whole one. Between decoded
-  /// ones on both sides it takes that all of them were. Not those that are anchored: no edge runs there.
+  /// ones on both sides it takes that all of them were. Not those that fit their island's grid tightly: no edge runs
+  /// there.
   void refuse_lone(const std::vector<GridNode>& nodes, Executor& executor, std::vector<CellClaim>& claims);
 
   /// The duplicates alone, where there is no calibration.

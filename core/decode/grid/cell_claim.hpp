@@ -8,6 +8,10 @@
 
 namespace slsd {
 
+/// How near a symbol lies to where its island's steps lead: off it, as near as on one surface, or so near that another
+/// surface hardly ever is.
+enum class GridFit : std::uint8_t { kNone, kLoose, kTight };
+
 /// A cell of the pattern that a node was found to be, and how well its surroundings speak for it.
 struct CellClaim {
   std::int16_t row = -1, column = -1;
@@ -15,7 +19,7 @@ struct CellClaim {
                        ///< weighed where another claims the cell too
   RegionStatus status = RegionStatus::kNoNeighbour;  ///< kDecoded, or why not
   std::int32_t island = -1;                          ///< that it is part of: see IslandJudge
-  bool anchored = false;                             ///< at a rim: it lies where the island's steps lead, both ways
+  GridFit grid_fit = GridFit::kTight;                ///< of one at a rim; inside all are
 
   struct Cell {
     int row, column;

@@ -20,8 +20,9 @@ class CellGate {
   CellGate(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px)
       : cells_(cells), segments_(segments), tolerance_px_(tolerance_px) {}
 
-  [[nodiscard]] bool admits(std::int32_t node, int row, int column) const {
-    return segments_.empty() || segments_[node].passes(cells_.ray(row, column).direction, tolerance_px_);
+  /// @param astray_px  how much farther from its line than others the node may lie
+  [[nodiscard]] bool admits(std::int32_t node, int row, int column, double astray_px = 0) const {
+    return segments_.empty() || segments_[node].passes(cells_.ray(row, column).direction, tolerance_px_ + astray_px);
   }
   /// Whether the cell lies on the node's epipolar line, at whatever depth.
   [[nodiscard]] bool on_line(std::int32_t node, int row, int column) const {

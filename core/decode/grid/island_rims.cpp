@@ -31,6 +31,7 @@ std::optional<float> IslandJudge::slip_beyond(const Frame& frame, std::int32_t n
   const std::int32_t after = frame.beside[node][d];
   if (after < 0 || links_[node][back] != Link::kAgrees) return std::nullopt;
   const std::int32_t before = frame.beside[node][back];
+  if (!own_[node].on_line || !own_[before].on_line) return std::nullopt;
   const Eigen::Vector2f bend_px =
       frame.nodes[after].centre_px - 2 * frame.nodes[node].centre_px + frame.nodes[before].centre_px;
   const CellClaim& claim = frame.claims[node];
@@ -66,22 +67,28 @@ void IslandJudge::measure_slips(const Frame& frame) {
   slip_max_ = std::max(kOfMedian * *middle, kLeast);
 }
 
-/// Whether a node at a rim lies where its island's steps lead, along rows and along columns, and nothing on the grid
-/// beside it is of other light. Another surface lies there in one of sixty cases at most.
-bool IslandJudge::is_anchored(const Frame& frame, std::int32_t node) const {
-  constexpr float kOfSlipMax = 0.5F, kSlipMost = 0.008F;
-  if (std::isinf(slip_max_)) return false;
-  std::array<bool, 2> leads{};  // along rows, along columns
+/// How a node at a rim fits where its island's steps lead. Another surface lies there in one of sixty cases at most
+/// where the fit is tight, and in one of five where it is loose. What was put in the pattern's place lies on its grid,
+/// too.
+GridFit IslandJudge::grid_fit(const Frame& frame, std::int32_t node) const {
+  constexpr float kLooseMost = 0.1F, kTightOfLoose = 0.5F, kTightMost = 0.008F;
+  constexpr int kTightLinks = 2;
+  if (std::isinf(slip_max_)) return GridFit::kNone;
+  int count = 0;
+  float most = 0;
+  bool beside_another = false;
   for (const Direction d : kDirections) {
     if (links_[node][d] == Link::kAgrees) {
       const auto slip = slip_from_within(frame, node, d);
-      if (slip && std::abs(*slip) > std::min(kOfSlipMax * slip_max_, kSlipMost)) return false;
-      leads[d % 2] |= slip.has_value();
-    } else if (frame.beside[node][d] >= 0 && is_of_another(frame, node, d) && !parts(frame, node, d)) {
-      return false;
+      if (slip) most = std::max(most, std::abs(*slip)), ++count;
+    } else if (frame.beside[node][d] >= 0) {
+      beside_another |= is_of_another(frame, node, d) && !parts(frame, node, d);
     }
   }
-  return leads[0] && leads[1];
+  const float loose = std::min(slip_max_, kLooseMost);
+  if (count == 0 || most > loose) return GridFit::kNone;
+  const bool tight = count >= kTightLinks && !beside_another && most <= std::min(kTightOfLoose * loose, kTightMost);
+  return tight ? GridFit::kTight : GridFit::kLoose;
 }
 
 /// Nodes that too little holds, in so many rounds as a row of symbols is long that chance could not add.
@@ -147,6 +154,24 @@ bool IslandJudge::is_off_grid(const Frame& frame, Direction forth, int from, int
   return false;
 }
 
+/// What the places of a part of line_ say for it, apart from its letters: where all of them lie on the grid of those on
+/// both sides, another surface hardly ever does. Once, however many they are, as it lies at one depth.
+float IslandJudge::evidence_of_places(const Frame& frame, Direction forth, int from, int to) const {
+  constexpr float kOfSlipMax = 0.5F, kSlipMost = 0.008F;
+  const float on_grid = std::min(kOfSlipMax * slip_max_, kSlipMost);
+  if (std::isinf(slip_max_)) return 0;
+  bool any = false;
+  for (const int side : {0, 1}) {
+    for (int i = from; i <= to; ++i) {
+      const auto slip = slip_from_within(frame, line_[i], across(forth, side));
+      if (!slip) continue;
+      if (std::abs(*slip) > on_grid) return 0;
+      any = true;
+    }
+  }
+  return any ? -std::log(2 * kSlipMost) : 0;
+}
+
 /// Keeps for every node the evidence of the line of nodes through it, as far as it agrees and so far around it, where
 /// something contradicts it.
 void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, float evidence_min) {
@@ -192,6 +217,7 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
                                 (evidence < kUsualShareOffGrid * usual && is_off_grid(frame, forth, from, to));
       const bool misread = any_misread && std::any_of(line_.begin() + from, line_.begin() + to + 1, is_misread);
       if (!contradicted && (!misread || evidence_against_slides(frame, from, to) >= evidence_min)) continue;
+      if (evidence > 0 && evidence < evidence_min) evidence += evidence_of_places(frame, forth, from, to);
       // As far as it agrees: what ends it may have been read as one of the island.
       int begun = i, last = i;
       while (begun > from && own_ratio(line_[begun - 1]) > 0) --begun;
@@ -360,12 +386,15 @@ void IslandJudge::cut_contradicted_lines(const Frame& frame) {
 /// of its differs from the next by up to three times what that does from the one after it.
 float IslandJudge::bend_of(const Frame& frame, std::int32_t node, Direction d) const {
   constexpr float kGrowth = 3;
-  const auto goes_on = [&](std::int32_t from) { return links_[from][d] == Link::kAgrees; };
+  // The place of one that is off its line says nothing.
+  const auto goes_on = [&](std::int32_t from) {
+    return links_[from][d] == Link::kAgrees && own_[from].on_line && own_[frame.beside[from][d]].on_line;
+  };
   const auto way = [&](std::int32_t from) -> Eigen::Vector2f {
     return frame.nodes[frame.beside[from][d]].centre_px - frame.nodes[from].centre_px;
   };
   const std::int32_t other = frame.beside[node][d];
-  if (!goes_on(other)) return 0;
+  if (!goes_on(node) || !goes_on(other)) return 0;
   const std::int32_t next = frame.beside[other][d];
   const Eigen::Vector2f behind = way(other), bend = way(node) - behind;
   const float before = goes_on(next) ? bend.normalized().dot(behind - way(next)) : 0;
@@ -395,12 +424,11 @@ bool IslandJudge::is_held(const Piece& piece, Direction d) const {
 }
 
 IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, Direction d) const {
-  constexpr float kTorn = 6;  // standard deviations: from there on a centre lies anywhere
   Side side;
   any_along(piece, d, [&](std::int32_t node) {
     if (links_[node][d] == Link::kAgrees) side.bend += bend_of(frame, node, d), ++side.held_by;
     const auto cell = frame.claims[node].beyond(d);
-    if (parts(frame, node, d) && frame.shapes[frame.beside[node][d]].distance < kTorn) {
+    if (parts(frame, node, d) && !frame.shapes[frame.beside[node][d]].is_torn()) {
       side.broken |= is_of_another(frame, node, d);
     } else if (shown(cell.row, cell.column)) {
       side.contradicted |= is_of_another(frame, node, d);
@@ -588,7 +616,7 @@ void IslandJudge::cut_rims(const Frame& frame) {
            std::ranges::any_of(frame.beside[node], [&](std::int32_t other) { return links_[other] != kAllAgree; });
   };
   for (const std::int32_t node : members_)
-    if (may_come_to_rim(node)) frame.claims[node].anchored = is_anchored(frame, node);
+    if (may_come_to_rim(node)) frame.claims[node].grid_fit = grid_fit(frame, node);
   for (std::size_t id = 0; id < islands_.size(); ++id) cut_slid(frame, static_cast<std::int32_t>(id));
   cut_contradicted_lines(frame);
   cut_back(frame);

@@ -34,11 +34,16 @@ float IslandJudge::ratio(const Frame& frame, std::int32_t node, int row, int col
   return shape.letter < 0 ? 0 : shape.log_probability[array_.at(row, column)] + log_letters_;
 }
 
-/// The best of the cells that a node's neighbours put it on, if it is better than the next.
+/// The best of the cells that a node's neighbours put it on, if it is better than the next. One that print has moved
+/// off its line, and that shows the letter, is its island's even so: left out, it would part those around it.
 bool IslandJudge::adopt(const Frame& frame, std::int32_t node, CellClaim& adopted) const {
   struct Candidate {
     int row, column, links;
     float ratio;
+  };
+  constexpr float kAstray = 0.2F;  // of the pitch
+  const auto may_be = [&](std::int32_t at, int row, int column) {
+    return frame.gate.admits(at, row, column, is_well_seen(frame, at) ? 0 : kAstray * pitch_px_);
   };
   std::array<Candidate, 4> candidates;
   int count = 0;
@@ -55,9 +60,11 @@ bool IslandJudge::adopt(const Frame& frame, std::int32_t node, CellClaim& adopte
       ++known->links;
       continue;
     }
-    const bool strays = !frame.gate.admits(other, frame.claims[other].row, frame.claims[other].column);
-    if (!strays && !frame.gate.admits(node, cell.row, cell.column)) continue;
-    candidates[count++] = {cell.row, cell.column, 1, ratio(frame, node, cell.row, cell.column)};
+    const float speaks = ratio(frame, node, cell.row, cell.column);
+    const bool strays = !may_be(other, frame.claims[other].row, frame.claims[other].column);
+    const bool admitted = frame.gate.admits(node, cell.row, cell.column);
+    if (!strays && !admitted && !(speaks > 0 && may_be(node, cell.row, cell.column))) continue;
+    candidates[count++] = {cell.row, cell.column, 1, speaks};
   }
   const Candidate* best = nullptr;
   float best_score = 0, second_score = 0;

@@ -152,7 +152,7 @@ class IslandJudge {
   [[nodiscard]] std::optional<float> slip_beyond(const Frame& frame, std::int32_t node, Direction d) const;
   [[nodiscard]] std::optional<float> slip_from_within(const Frame& frame, std::int32_t node, Direction inwards) const;
   void measure_slips(const Frame& frame);
-  [[nodiscard]] bool is_anchored(const Frame& frame, std::int32_t node) const;
+  [[nodiscard]] GridFit grid_fit(const Frame& frame, std::int32_t node) const;
   /// Whether a link leads to what is not on one surface with the node.
   [[nodiscard]] bool parts(const Frame& frame, std::int32_t node, Direction d) const {
     if (std::isinf(slip_max_)) return false;
@@ -163,6 +163,7 @@ class IslandJudge {
   void cut_slid_along(const Frame& frame, std::int32_t island, const Piece& line);
   void cut_contradicted_lines(const Frame& frame);
   [[nodiscard]] bool is_off_grid(const Frame& frame, Direction forth, int from, int to);
+  [[nodiscard]] float evidence_of_places(const Frame& frame, Direction forth, int from, int to) const;
   void find_contradicted_lines(const Frame& frame, Direction forth, float evidence_min);
   [[nodiscard]] float evidence_against_slides(const Frame& frame, int from, int to);
   [[nodiscard]] bool fits_between(const Frame& frame, const Line& line, float evidence_min);

@@ -120,7 +120,7 @@ struct RimSheet {
       for (int column = 0; column < 9; ++column) {
         grid.add(row, column, {0, 0}, LatticeFrame::Identity());
         claims.push_back({static_cast<std::int16_t>(row), static_cast<std::int16_t>(row < 6 ? column : column + 20), 0,
-                          kDecoded, row < 6 ? 0 : 1});
+                          kDecoded, row < 6 ? 0 : 1, GridFit::kLoose});
       }
     }
     grid.link_truly();
@@ -137,13 +137,13 @@ TEST(RefuseLone, RefusesWhatStandsBetweenRefusedOnesAtARim) {
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(4, column).status, kDecoded);
 }
 
-TEST(RefuseLone, LeavesWhatIsAnchored) {
-  for (const bool anchored : {false, true}) {
+TEST(RefuseLone, LeavesWhatFitsTheGridTightly) {
+  for (const GridFit fit : {GridFit::kNone, GridFit::kLoose, GridFit::kTight}) {
     RimSheet sheet;
     for (const int row : {1, 2, 3}) sheet.at(row, 8).status = RegionStatus::kClassDisagrees;
-    sheet.at(4, 8).anchored = sheet.at(5, 8).anchored = anchored;
+    sheet.at(4, 8).grid_fit = sheet.at(5, 8).grid_fit = fit;
     Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
-    EXPECT_EQ(sheet.at(4, 8).status, anchored ? kDecoded : RegionStatus::kNeighboursDisagree);
+    EXPECT_EQ(sheet.at(4, 8).status, fit == GridFit::kTight ? kDecoded : RegionStatus::kNeighboursDisagree);
   }
 }
 

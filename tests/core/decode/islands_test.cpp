@@ -298,41 +298,77 @@ TEST_F(IslandsAboveAShortRow, KeepItWhereNothingTellsWhatDepthWouldMove) {
   EXPECT_GE(kept(0.4F, 0, false), 4);
 }
 
-/// How the last row of a sheet is anchored, which lies so far along its line from where the sheet would go on.
+/// What becomes of a symbol in a sheet's midst whose letter nothing says, so far off its line and from its letter.
+class IslandsWithAWornSymbol : public Islands {
+ protected:
+  CellClaim claim_of(double off_px, float distance) {
+    grid_ = {}, shapes_.clear();
+    show_pattern(10, 10, 20, 30);
+    const std::int32_t node = grid_.node_at(15, 20);
+    shapes_[node].log_probability.fill(-std::log(5.F) + 0.01F);
+    shapes_[node].letter = static_cast<std::int8_t>((shapes_[node].letter + 1) % 5);  // so no window names it
+    shapes_[node].distance = distance;
+    auto segments = lines_through(2000, [](int) { return 0; });
+    const Calibration rig = paper_rig();
+    const RigidTransform& to_projector = rig.cameras[0].projector_from_camera;
+    const Eigen::Vector2d pixel = cells_.pixel(15, 20) + Eigen::Vector2d(0, off_px);
+    const Eigen::Vector3d point = 2000 * rig.projector.undistort(pixel).homogeneous();
+    segments[node] =
+        EpipolarGate(rig.cameras[0], rig.projector, 350, 3200)
+            .prepare((to_projector.rotation.transpose() * (point - to_projector.translation)).hnormalized());
+    return decode(segments)[node];
+  }
+};
+
+TEST_F(IslandsWithAWornSymbol, HoldItBesideItsLine) {
+  const CellClaim claim = claim_of(3, 4);
+  EXPECT_TRUE(claim.same_cell(15, 20));
+  EXPECT_EQ(claim.status, RegionStatus::kOffEpipolarLine);  // its own point would be wrong
+}
+
+TEST_F(IslandsWithAWornSymbol, DoNotHoldItFarFromItsLine) {
+  EXPECT_FALSE(claim_of(6, 4).named());
+}
+
+TEST_F(IslandsWithAWornSymbol, DoNotHoldAWholeOneThatIsOffItsLine) {
+  EXPECT_FALSE(claim_of(3, 1).named());
+}
+
+/// How the last row of a sheet fits it, which lies so far along its line from where the sheet would go on.
 class IslandsWithALastRow : public IslandsAtAnEdge {
  protected:
-  bool anchored(float away_px, float below_px = 1.8F, bool knows_lines = true) {
+  GridFit fit_of(float away_px, float below_px = 1.8F, bool knows_lines = true) {
     grid_ = {}, shapes_.clear();
     show_pattern(10, 10, 14, 41);
     for (int column = 10; column < 41; ++column) grid_.nodes[grid_.node_at(13, column)].centre_px.x() += away_px;
     show(14, 30, (pattern_.array.at(14, 30) + 1) % 5);
     grid_.nodes.back().centre_px.x() += away_px + below_px;
     const auto claims = knows_lines ? decode(lines_through(2000, [](int) { return 0; })) : decode();
-    return claims[grid_.node_at(13, 30)].anchored;
+    return claims[grid_.node_at(13, 30)].grid_fit;
   }
 };
 
-TEST_F(IslandsWithALastRow, AnchorItWhereTheyLeadToIt) {
-  EXPECT_TRUE(anchored(0));
-  EXPECT_TRUE(anchored(0.05F));
+TEST_F(IslandsWithALastRow, FitTightlyWhereTheyLeadToIt) {
+  EXPECT_EQ(fit_of(0), GridFit::kTight);
+  EXPECT_EQ(fit_of(0.05F), GridFit::kTight);
 }
 
-TEST_F(IslandsWithALastRow, DoNotAnchorItAtAnotherDepth) {
-  EXPECT_FALSE(anchored(0.1F));
-  EXPECT_FALSE(anchored(-0.1F));
+TEST_F(IslandsWithALastRow, FitLooselyUpToTheSlipOfASurface) {
+  EXPECT_EQ(fit_of(0.1F), GridFit::kLoose);
+  EXPECT_EQ(fit_of(-0.1F), GridFit::kLoose);
 }
 
-TEST_F(IslandsWithALastRow, DoNotAnchorItBesideOtherLightOnTheGrid) {
-  EXPECT_FALSE(anchored(0, 0));
+TEST_F(IslandsWithALastRow, DoNotFitAtAnotherDepth) {
+  EXPECT_EQ(fit_of(0.2F), GridFit::kNone);
+  EXPECT_EQ(fit_of(-0.2F), GridFit::kNone);
 }
 
-TEST_F(IslandsWithALastRow, DoNotAnchorItWhereNothingTellsWhatDepthWouldMove) {
-  EXPECT_FALSE(anchored(0, 1.8F, false));
+TEST_F(IslandsWithALastRow, FitLooselyBesideOtherLightOnTheGrid) {
+  EXPECT_EQ(fit_of(0, 0), GridFit::kLoose);
 }
 
-TEST_F(IslandsWithALastRow, AnchorNothingThatIsOneNodeWide) {
-  show_pattern(10, 10, 30, 11);
-  for (const CellClaim& claim : decode(lines_through(2000, [](int) { return 0; }))) EXPECT_FALSE(claim.anchored);
+TEST_F(IslandsWithALastRow, DoNotFitWhereNothingTellsWhatDepthWouldMove) {
+  EXPECT_EQ(fit_of(0, 1.8F, false), GridFit::kNone);
 }
 
 /// A surface whose last columns come closer together, each by so much, up to where its links break.
