@@ -58,9 +58,36 @@ SymbolReview::SymbolReview(const Pattern& pattern, ReviewOptions options)
       pitch_px_(static_cast<float>(pattern.pitch_px())),
       options_(options) {}
 
+/// Mean of the frames of a symbol and of the whole ones around it, up to two links away.
+std::optional<LatticeFrame> SymbolReview::frame_around(const Sightings& seen, std::size_t node) const {
+  LatticeFrame sum = seen.nodes[node].frame;
+  float count = 1;
+  const auto add = [&](std::int32_t other) {
+    if (other < 0 || decoded_[other] == 0 || seen.claims[other].island != seen.claims[node].island) return false;
+    if (seen.nodes[other].measured_u && seen.nodes[other].measured_v) sum += seen.nodes[other].frame, ++count;
+    return true;
+  };
+  for (const Direction d : kDirections) {
+    const std::int32_t other = neighbour(seen.nodes, static_cast<std::int32_t>(node), d);
+    if (!add(other)) continue;
+    add(neighbour(seen.nodes, other, d));
+    add(neighbour(seen.nodes, other, static_cast<Direction>((d + 1) % 4)));
+  }
+  if (count == 1) return std::nullopt;
+  return sum / count;
+}
+
+/// Centres that print has moved make a symbol's own frame worse than the mean of those around it. Off the grid it is
+/// another surface that has, and the distance shows it.
 float SymbolReview::distance_from_letter(const Sightings& seen, std::size_t node, const GreyMoments& moments) const {
   const Prototype& prototype = prototype_of(seen.claims[node]);
-  return std::sqrt(prototype.squared_distance(shape_features(moments, seen.nodes[node].frame.inverse(), size_px_)));
+  const auto distance_in = [&](const LatticeFrame& lattice_frame) {
+    return std::sqrt(prototype.squared_distance(shape_features(moments, lattice_frame.inverse(), size_px_)));
+  };
+  const float own = distance_in(seen.nodes[node].frame);
+  if (own < options_.doubtful_distance || seen.claims[node].grid_fit == GridFit::kNone) return own;
+  const auto around = frame_around(seen, node);
+  return around ? std::min(own, distance_in(*around)) : own;
 }
 
 bool SymbolReview::is_inside(const Sightings& seen, std::size_t node) const {
@@ -85,11 +112,11 @@ void SymbolReview::measure_around_distrusted(const GridLinker& linker, Sightings
 void SymbolReview::trust_whole_symbols(const GridLinker& linker, Executor& executor, Sightings& seen) {
   trusted_.resize(seen.size());
   seen.misfits.resize(seen.size());
+  for (std::size_t i = 0; i < seen.size(); ++i) trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
+  decoded_ = trusted_;
   executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
-    for (std::size_t i = first; i < last; ++i) {
-      trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
+    for (std::size_t i = first; i < last; ++i)
       if (trusted_[i] != 0) seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
-    }
   });
   distrusted_.clear();
   for (std::size_t i = 0; i < seen.size(); ++i)
@@ -160,7 +187,9 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
     const Eigen::Vector2f from_steady = lattice_frame * (prototype.centroid_px - prototype.steady_centroid_px);
     moments.x = moments.steady_x + from_steady.x(), moments.y = moments.steady_y + from_steady.y();
   }
-  if (distance > options_.damaged_distance_held || (distance > options_.damaged_distance && !is_inside(seen, node)))
+  const float at_rim =
+      seen.claims[node].grid_fit == GridFit::kTight ? options_.damaged_distance_on_grid : options_.damaged_distance;
+  if (distance > options_.damaged_distance_held || (distance > at_rim && !is_inside(seen, node)))
     seen.claims[node].status = RegionStatus::kDamagedShape;
 }
 

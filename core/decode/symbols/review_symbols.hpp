@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -23,6 +24,8 @@ struct ReviewOptions {
   /// The same beyond which a symbol at the edge of what is decoded may be cut by an edge or a shadow: it is damaged,
   /// but for one that its island holds.
   float damaged_distance = 2.5F;
+  /// The same for one on the grid of its island: it may have been printed on.
+  float damaged_distance_on_grid = 4;
   /// The same for a symbol among named neighbours on all sides, and for one that two of its island hold: print and
   /// relief disturb a shape, its cell is certain, and its sigma says by how much they may move its centre.
   float damaged_distance_held = 8;
@@ -52,6 +55,7 @@ class SymbolReview {
   void measure_light_changes(const Sightings& seen, Executor& executor);
   [[nodiscard]] Eigen::Vector2f light_change_around(const Sightings& seen, std::size_t node) const;
   [[nodiscard]] bool is_inside(const Sightings& seen, std::size_t node) const;
+  [[nodiscard]] std::optional<LatticeFrame> frame_around(const Sightings& seen, std::size_t node) const;
   [[nodiscard]] float distance_from_letter(const Sightings& seen, std::size_t node, const GreyMoments& moments) const;
   [[nodiscard]] const Prototype& prototype_of(const CellClaim& claim) const {
     return (*prototypes_)[array_.at(claim.row, claim.column)];
@@ -64,7 +68,7 @@ class SymbolReview {
   const std::vector<Prototype>* prototypes_ = nullptr;  // of this review
   float size_px_, pitch_px_;
   ReviewOptions options_;
-  std::vector<std::uint8_t> trusted_;
+  std::vector<std::uint8_t> trusted_, decoded_;
   std::vector<std::int32_t> distrusted_, held_;
   std::vector<Eigen::Vector2f> light_changes_;  // from cell to cell along u and v, relative
 };

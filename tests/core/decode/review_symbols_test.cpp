@@ -127,6 +127,20 @@ TEST_F(ReviewSymbols, RejectsASymbolThatIsCut) {
   EXPECT_EQ(count(RegionStatus::kDecoded), kCells * kCells - 1);
 }
 
+TEST_F(ReviewSymbols, TakesTheFramesAroundForOneThatIsOffOnTheGridAlone) {
+  for (const GridFit fit : {GridFit::kNone, GridFit::kLoose, GridFit::kTight}) {
+    seen_ = {};
+    look();
+    const std::size_t at_rim = sighting_at(0, 5);
+    seen_.claims[at_rim].grid_fit = fit;
+    // Print has moved the centre of the one below.
+    seen_.nodes[sighting_at(1, 5)].centre_px.y() += 0.2F * kPitchPx;
+    linker_.measure_frame(seen_.nodes, std::vector<std::uint8_t>(seen_.size(), 1), at_rim);
+    review();
+    EXPECT_EQ(seen_.claims[at_rim].status == RegionStatus::kDecoded, fit != GridFit::kNone);
+  }
+}
+
 /// Damaged symbols, so far from their letters, with some of those beside them refused.
 class DamagedSymbols : public ReviewSymbols {
  protected:
