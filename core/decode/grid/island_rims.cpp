@@ -129,12 +129,14 @@ void IslandJudge::cut_back(const Frame& frame) {
   }
 }
 
-/// Whether a part of line_ is off the grid of what holds it on one side: most of the links across slip the same way. A
-/// surface that turns away slips there, too, by up to three times what the links further in do.
+/// Whether a part of line_ is off the grid of what holds it on one side: most of the links across slip the same way, by
+/// half of what tells another surface where it is one link. A surface that turns away slips there, too, by up to three
+/// times what the links further in do.
 bool IslandJudge::is_off_grid(const Frame& frame, Direction forth, int from, int to) {
   constexpr std::size_t kSlipsMin = 4;  // fewer may be torn, all of them
-  constexpr float kGrowth = 3;
+  constexpr float kGrowth = 3, kOfSlipMax = 0.5F;
   if (std::isinf(slip_max_)) return false;
+  const float most = kOfSlipMax * slip_max_;
   for (const int side : {0, 1}) {
     const Direction inwards = across(forth, side);
     slips_.clear();
@@ -149,7 +151,7 @@ bool IslandJudge::is_off_grid(const Frame& frame, Direction forth, int from, int
     if (slips_.size() < kSlipsMin) continue;
     std::ranges::sort(slips_);
     const std::size_t few = slips_.size() / 4;
-    if (slips_[few] > slip_max_ || slips_[slips_.size() - 1 - few] < -slip_max_) return true;
+    if (slips_[few] > most || slips_[slips_.size() - 1 - few] < -most) return true;
   }
   return false;
 }

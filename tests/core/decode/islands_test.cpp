@@ -282,7 +282,7 @@ class IslandsAboveAShortRow : public Islands {
 
 TEST_F(IslandsAboveAShortRow, KeepItOnTheirGrid) {
   EXPECT_GE(kept(0), 4);
-  EXPECT_GE(kept(0.1F), 4);
+  EXPECT_GE(kept(0.05F), 4);
 }
 
 TEST_F(IslandsAboveAShortRow, LoseItOffTheirGrid) {
