@@ -52,26 +52,27 @@ std::optional<float> IslandJudge::slip_from_within(const Frame& frame, std::int3
 /// not known, none does.
 void IslandJudge::measure_slips(const Frame& frame) {
   constexpr std::size_t kSamples = 400, kSamplesMin = 20;
-  constexpr float kOfMedian = 8, kLeast = 0.008F;
+  constexpr float kOfMedian = 8, kLeast = 0.008F, kMost = 0.1F;
   slip_max_ = std::numeric_limits<float>::infinity();
   if (!frame.gate.knows_lines()) return;
   slips_.clear();
   const std::size_t stride = std::max<std::size_t>(1, members_.size() / kSamples);
   for (std::size_t i = 0; i < members_.size(); i += stride) {
     if (links_[members_[i]] != kAllAgree) continue;
-    for (const Direction d : {kRight, kDown}) slips_.push_back(std::abs(*slip_beyond(frame, members_[i], d)));
+    for (const Direction d : {kRight, kDown})
+      if (const auto slip = slip_beyond(frame, members_[i], d)) slips_.push_back(std::abs(*slip));
   }
   if (slips_.size() < kSamplesMin) return;
   const auto middle = slips_.begin() + static_cast<std::ptrdiff_t>(slips_.size() / 2);
   std::ranges::nth_element(slips_, middle);
-  slip_max_ = std::max(kOfMedian * *middle, kLeast);
+  slip_max_ = std::clamp(kOfMedian * *middle, kLeast, kMost);
 }
 
 /// How a node at a rim fits where its island's steps lead. Another surface lies there in one of sixty cases at most
 /// where the fit is tight, and in one of five where it is loose. What was put in the pattern's place lies on its grid,
 /// too.
 GridFit IslandJudge::grid_fit(const Frame& frame, std::int32_t node) const {
-  constexpr float kLooseMost = 0.1F, kTightOfLoose = 0.5F, kTightMost = 0.008F;
+  constexpr float kTightOfLoose = 0.5F, kTightMost = 0.008F;
   constexpr int kTightLinks = 2;
   if (std::isinf(slip_max_)) return GridFit::kNone;
   int count = 0;
@@ -85,9 +86,8 @@ GridFit IslandJudge::grid_fit(const Frame& frame, std::int32_t node) const {
       beside_another |= is_of_another(frame, node, d) && !parts(frame, node, d);
     }
   }
-  const float loose = std::min(slip_max_, kLooseMost);
-  if (count == 0 || most > loose) return GridFit::kNone;
-  const bool tight = count >= kTightLinks && !beside_another && most <= std::min(kTightOfLoose * loose, kTightMost);
+  if (count == 0 || most > slip_max_) return GridFit::kNone;
+  const bool tight = count >= kTightLinks && !beside_another && most <= std::min(kTightOfLoose * slip_max_, kTightMost);
   return tight ? GridFit::kTight : GridFit::kLoose;
 }
 
