@@ -58,7 +58,7 @@ SymbolReview::SymbolReview(const Pattern& pattern, ReviewOptions options)
       pitch_px_(static_cast<float>(pattern.pitch_px())),
       options_(options) {}
 
-/// Mean of the frames of a symbol and of the whole ones around it, up to two links away.
+/// Mean of the frames of a symbol and of those of its island around it, up to two links away.
 std::optional<LatticeFrame> SymbolReview::frame_around(const Sightings& seen, std::size_t node) const {
   LatticeFrame sum = seen.nodes[node].frame;
   float count = 1;
@@ -99,14 +99,16 @@ bool SymbolReview::is_inside(const Sightings& seen, std::size_t node) const {
 
 /// Frames, and with them distances, are measured anew around those symbols that are no longer trusted.
 void SymbolReview::measure_around_distrusted(const GridLinker& linker, Sightings& seen) {
-  for (const std::int32_t node : distrusted_) {
-    visit_measured_with(seen.nodes, node, [&](std::int32_t other) {
-      const auto i = static_cast<std::size_t>(other);
-      linker.measure_frame(seen.nodes, trusted_, i);
-      if (seen.claims[i].status == RegionStatus::kDecoded)
-        seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
-    });
-  }
+  const auto visit = [&](auto&& each) {
+    for (const std::int32_t node : distrusted_)
+      visit_measured_with(seen.nodes, node, [&](std::int32_t other) { each(static_cast<std::size_t>(other)); });
+  };
+  visit([&](std::size_t i) { linker.measure_frame(seen.nodes, trusted_, i); });
+  // All frames first: a distance may be measured in those around.
+  visit([&](std::size_t i) {
+    if (seen.claims[i].status == RegionStatus::kDecoded)
+      seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
+  });
 }
 
 void SymbolReview::trust_whole_symbols(const GridLinker& linker, Executor& executor, Sightings& seen) {

@@ -68,7 +68,8 @@ class SymbolReview {
   const std::vector<Prototype>* prototypes_ = nullptr;  // of this review
   float size_px_, pitch_px_;
   ReviewOptions options_;
-  std::vector<std::uint8_t> trusted_, decoded_;
+  std::vector<std::uint8_t> trusted_;
+  std::vector<std::uint8_t> decoded_;  // of each node, when the review began
   std::vector<std::int32_t> distrusted_, held_;
   std::vector<Eigen::Vector2f> light_changes_;  // from cell to cell along u and v, relative
 };
