@@ -72,7 +72,6 @@ void IslandJudge::measure_slips(const Frame& frame) {
 /// where the fit is tight, and in one of five where it is loose. What was put in the pattern's place lies on its grid,
 /// too.
 GridFit IslandJudge::grid_fit(const Frame& frame, std::int32_t node) const {
-  constexpr float kTightOfLoose = 0.5F, kTightMost = 0.008F;
   constexpr int kTightLinks = 2;
   if (std::isinf(slip_max_)) return GridFit::kNone;
   int count = 0;
@@ -87,7 +86,7 @@ GridFit IslandJudge::grid_fit(const Frame& frame, std::int32_t node) const {
     }
   }
   if (count == 0 || most > slip_max_) return GridFit::kNone;
-  const bool tight = count >= kTightLinks && !beside_another && most <= std::min(kTightOfLoose * slip_max_, kTightMost);
+  const bool tight = count >= kTightLinks && !beside_another && most <= tight_slip();
   return tight ? GridFit::kTight : GridFit::kLoose;
 }
 
@@ -159,19 +158,17 @@ bool IslandJudge::is_off_grid(const Frame& frame, Direction forth, int from, int
 /// What the places of a part of line_ say for it, apart from its letters: where all of them lie on the grid of those on
 /// both sides, another surface hardly ever does. Once, however many they are, as it lies at one depth.
 float IslandJudge::evidence_of_places(const Frame& frame, Direction forth, int from, int to) const {
-  constexpr float kOfSlipMax = 0.5F, kSlipMost = 0.008F;
-  const float on_grid = std::min(kOfSlipMax * slip_max_, kSlipMost);
   if (std::isinf(slip_max_)) return 0;
   bool any = false;
   for (const int side : {0, 1}) {
     for (int i = from; i <= to; ++i) {
       const auto slip = slip_from_within(frame, line_[i], across(forth, side));
       if (!slip) continue;
-      if (std::abs(*slip) > on_grid) return 0;
+      if (std::abs(*slip) > tight_slip()) return 0;
       any = true;
     }
   }
-  return any ? -std::log(2 * kSlipMost) : 0;
+  return any ? -std::log(2 * kTightMost) : 0;
 }
 
 /// Keeps for every node the evidence of the line of nodes through it, as far as it agrees and so far around it, where
