@@ -89,8 +89,18 @@ TEST(AdversaryFrames, NameNothingBesideWhatIsPutInThePatternsPlace) {
 // Half of a shelf's letters fit by chance, from edge to edge of it.
 TEST(AdversaryFrames, NameNoRowThatIsOffTheGrid) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);
-  coarse.expect_none_wrong(Kind::kShelves, 40470);
+  for (const int number : {40470, 71102, 220548}) coarse.expect_none_wrong(Kind::kShelves, number);
   fine.expect_none_wrong(Kind::kShelves, 41119);
+  fine.expect_none_wrong(Kind::kSlats1to2, 40675);
+}
+
+// What lies near a grid by chance, or beside one that is itself of two surfaces, is not on it.
+TEST(AdversaryFrames, NameNothingThatIsNearTheGridByChance) {
+  Bench fine = Bench::of(8), coarse = Bench::of(16);
+  coarse.expect_none_wrong(Kind::kSlats1, 20404);
+  coarse.expect_none_wrong(Kind::kSlats1to2, 20102);
+  for (const int number : {20095, 220567}) fine.expect_none_wrong(Kind::kShelves, number);
+  for (const int number : {60334, 180356}) coarse.expect_none_wrong(Kind::kPickets, number);
 }
 
 // Letters of another surface that fit because they come again some columns on.
