@@ -22,6 +22,10 @@ using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
 constexpr auto kPatience = 30s;
+constexpr int kFirstDisplay = 1000;  // servers that look for a number themselves take the lowest that is free
+constexpr int kDisplays = 50000;
+constexpr int kDisplaysOfAProcess = 16;
+constexpr int kTrials = 3;
 constexpr const char* kXorg = "/usr/lib/xorg/Xorg";  // the program itself: the one in PATH may insist on a console
 
 constexpr const char* kDummyConfiguration = R"(
@@ -58,6 +62,12 @@ EndSection
 std::string make_folder() {
   std::string name = (std::filesystem::temp_directory_path() / "slsd-x11-XXXXXX").string();
   return ::mkdtemp(name.data()) != nullptr ? name : std::string();
+}
+
+// One that no other server takes while this one is about to be started again.
+std::string own_display() {
+  static int taken = 0;
+  return ":" + std::to_string(kFirstDisplay + (kDisplaysOfAProcess * ::getpid() + taken++) % kDisplays);
 }
 
 [[noreturn]] void become(const std::vector<std::string>& command) {
@@ -105,9 +115,12 @@ std::unique_ptr<XServer> XServer::start_dummy() {
 }
 
 std::unique_ptr<XServer> XServer::started(std::unique_ptr<XServer> server) {
-  if (!server->start({})) return nullptr;
-  ::setenv("DISPLAY", server->display_.c_str(), 1);
-  return server;
+  for (int i = 0; i < kTrials; ++i) {
+    if (!server->start(own_display())) continue;
+    ::setenv("DISPLAY", server->display_.c_str(), 1);
+    return server;
+  }
+  return nullptr;
 }
 
 XServer::~XServer() {
@@ -122,7 +135,7 @@ bool XServer::start(const std::string& display) {
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) return false;
   std::vector<std::string> command = command_;
-  if (!display.empty()) command.insert(command.begin() + 1, display);
+  command.insert(command.begin() + 1, display);
   const int outlet = ::fcntl(ends[1], F_DUPFD, 3);  // without close-on-exec
   command.insert(command.end(), {"-displayfd", std::to_string(outlet)});
   process_ = ::fork();

@@ -10,7 +10,7 @@
 
 namespace slsd::test {
 
-/// A real X server without hardware, on a display number that is free. DISPLAY names it from its start on.
+/// A real X server without hardware, on a display number of its own. DISPLAY names it from its start on.
 /// @thread thread-bound
 class XServer {
  public:

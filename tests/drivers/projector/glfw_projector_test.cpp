@@ -181,6 +181,16 @@ TEST_F(OnXvfb, OutlivesTheServerAndReturnsWithIt) {
   }
 }
 
+TEST_F(OnXvfb, KeepsItsNumberWhileOthersStart) {
+  START_XVFB(640, 360);
+  const std::string display = server_->display();
+  server_->kill();
+  const auto other = XServer::start_virtual(640, 360);
+  ASSERT_TRUE(other && server_->restart());
+  EXPECT_EQ(server_->display(), display);
+  EXPECT_NE(other->display(), display);
+}
+
 MonotonicTime in(std::chrono::nanoseconds time) {
   return steady_clock::now() + time;
 }
