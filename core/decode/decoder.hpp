@@ -10,11 +10,11 @@
 
 #include "core/cloud/shade_points.hpp"
 #include "core/code/codebook.hpp"
-#include "core/decode/centres/frame_noise.hpp"
 #include "core/decode/decoding.hpp"
 #include "core/decode/lattice.hpp"
 #include "core/decode/options.hpp"
 #include "core/executor.hpp"
+#include "core/exposure/frame_noise.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/geometry/pixel_ray.hpp"
 #include "core/image.hpp"

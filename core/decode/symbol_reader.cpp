@@ -64,7 +64,7 @@ const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarVi
   decode_windows(view, executor), done(Stage::kDecodeWindows);
   review(sharp, executor), done(Stage::kReview);
   correspond(view, executor);
-  fit_lattice(frame, full, sharp, view, executor), done(Stage::kCorrespond);
+  fit_lattice(frame, full, view, executor), done(Stage::kCorrespond);
   return lattice_;
 }
 
@@ -155,9 +155,7 @@ void SymbolReader::correspond(const EpipolarView* view, Executor& executor) {
   }
 }
 
-/// @param sharp  what the symbols were measured in
-void SymbolReader::fit_lattice(const GreyView& frame, double full, const GreyView& sharp, const EpipolarView* view,
-                               Executor& executor) {
+void SymbolReader::fit_lattice(const GreyView& frame, double full, const EpipolarView* view, Executor& executor) {
   centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, pattern().array, executor, lattice_,
                              seen_.misfits);
   if (options_.centre == Method::kPaper) {
@@ -166,7 +164,7 @@ void SymbolReader::fit_lattice(const GreyView& frame, double full, const GreyVie
       symbol.centre_px = {moments.x, moments.y};
     }
   }
-  noise_ = measured_noise_ = measure_noise(sharp, 255.0 * finder_.frame_levels());
+  noise_ = finder_.noise();
   centre_judge_.judge(noise_, view, cells(), executor, lattice_);
   refuse_cut();
   const float scale = static_cast<float>(full / 255) / finder_.frame_levels();
@@ -221,7 +219,7 @@ void SymbolReader::list_off_line(std::vector<SymbolMatch>& matches) const {
     const GreyMoments& m = seen_.moments[i];
     matches.push_back({{m.x, m.y},
                        cells().pixel(claim.row, claim.column),
-                       noise_of_centre_px(m.weight, m.background, m.peak - m.background, measured_noise_)});
+                       noise_of_centre_px(m.weight, m.background, m.peak - m.background, finder_.noise())});
   }
 }
 

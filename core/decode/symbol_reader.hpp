@@ -10,7 +10,6 @@
 #include "core/decode/centres/centre_sigma.hpp"
 #include "core/decode/centres/correspond.hpp"
 #include "core/decode/centres/curvature.hpp"
-#include "core/decode/centres/frame_noise.hpp"
 #include "core/decode/centres/symbol_match.hpp"
 #include "core/decode/decoding.hpp"
 #include "core/decode/grid/decode_windows.hpp"
@@ -24,6 +23,7 @@
 #include "core/decode/regions/shape_finder.hpp"
 #include "core/decode/symbols/appearance.hpp"
 #include "core/decode/symbols/review_symbols.hpp"
+#include "core/exposure/frame_noise.hpp"
 
 namespace slsd {
 
@@ -83,8 +83,7 @@ class SymbolReader {
   void review(const GreyView& frame, Executor& executor);
   void correspond(const EpipolarView* view, Executor& executor);
   void refuse_cut();
-  void fit_lattice(const GreyView& frame, double full, const GreyView& sharp, const EpipolarView* view,
-                   Executor& executor);
+  void fit_lattice(const GreyView& frame, double full, const EpipolarView* view, Executor& executor);
 
   DecodeOptions options_;
   std::shared_ptr<const Fixed> fixed_;
@@ -104,7 +103,7 @@ class SymbolReader {
   std::vector<std::int32_t> kept_;  // of the lattice's symbols: where they are then
   Sightings seen_;
   Lattice lattice_;
-  FrameNoise noise_, measured_noise_;  // of the frame, and of what the symbols were measured in
+  FrameNoise noise_;  // of the frame, though it may have been sharpened
 };
 
 }  // namespace slsd

@@ -11,8 +11,8 @@
 #include <Eigen/Core>
 
 #include "core/align/align_eight.hpp"
-#include "core/decode/centres/frame_noise.hpp"
 #include "core/executor.hpp"
+#include "core/exposure/frame_noise.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/geometry/ray_table.hpp"
 #include "core/image.hpp"

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/exposure/frame_noise.hpp"
 #include "core/exposure/light_levels.hpp"
-#include "core/exposure/pixel_noise.hpp"
 #include "core/image_size.hpp"
 
 namespace slsd {
@@ -124,8 +124,8 @@ Result<> check_sizes(const GreyView& pattern, const GreyView& white, const std::
 
 /// What light is trusted, in levels of the white image.
 float faint_light(const GreyView& white) {
-  return std::max(
-      {kFaintLevels, kFaintShare * brightest(white), kFaintSigma * pixel_noise(white, guess_full_level(white))});
+  return std::max({kFaintLevels, kFaintShare * brightest(white),
+                   kFaintSigma * measure_noise(white, guess_full_level(white)).at(0)});
 }
 
 /// Exact where the light is more than faint; below that the less, the fainter it is.

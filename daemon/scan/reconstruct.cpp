@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "core/cloud/shade_points.hpp"
-#include "core/decode/centres/frame_noise.hpp"
 #include "core/decode/decoder.hpp"
+#include "core/exposure/frame_noise.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "core/geometry/robust.hpp"
 #include "core/utc_text.hpp"

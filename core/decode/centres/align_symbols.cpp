@@ -20,7 +20,7 @@ constexpr float kSupportWeak = 0.94F;
 constexpr float kSupportUsual = 0.95F, kSupportMin = 0.55F;
 /// What a patch's place is off by, fitted to rendered frames (docs/decoder.md): see AlignedSymbol::sigma_mm.
 constexpr float kSamplingPx = 0.002F;     // sampling of the pattern, projector px
-constexpr float kOfNoise = 1.1F;          // of the covariance
+constexpr float kOfCovariance = 1.1F;     // of the covariance
 constexpr float kOfScatter = 1.2F;        // of the disparities of the patch's parts
 constexpr float kOfDisagreement = 0.17F;  // with the neighbours' planes
 constexpr float kOfLack = 0.11F;          // px for all that disagrees with the pattern
@@ -203,9 +203,10 @@ AlignedSymbol SymbolAligner::point_of(const Lattice& lattice, std::size_t index,
   const auto square = [](float x) { return x * x; };
   const float lack = std::max(0.F, kSupportUsual - fit.support),
               shading = std::hypot(state.gain_x, state.gain_y) / state.gain;
-  const float sigma_px = std::sqrt(square(kSamplingPx) + square(kOfNoise) * noise + square(kOfScatter * fit.scatter) +
-                                   square(kOfDisagreement * disagreement_px(lattice, index)) + square(kOfLack * lack) +
-                                   square(kOfShading * shading));
+  const float sigma_px =
+      std::sqrt(square(kSamplingPx) + square(kOfCovariance) * noise + square(kOfScatter * fit.scatter) +
+                square(kOfDisagreement * disagreement_px(lattice, index)) + square(kOfLack * lack) +
+                square(kOfShading * shading));
   aligned.sigma_mm = static_cast<float>(map.inverse_depth_per_px / (inverse * inverse) * direction.norm() * sigma_px);
   return aligned;
 }

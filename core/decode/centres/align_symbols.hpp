@@ -12,9 +12,9 @@
 #include "core/align/align_patch.hpp"
 #include "core/align/pattern_field.hpp"
 #include "core/code/pattern.hpp"
-#include "core/decode/centres/frame_noise.hpp"
 #include "core/decode/grid/cell_rays.hpp"
 #include "core/decode/lattice.hpp"
+#include "core/exposure/frame_noise.hpp"
 #include "core/image.hpp"
 
 namespace slsd {

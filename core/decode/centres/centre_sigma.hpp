@@ -4,10 +4,10 @@
 
 #include <vector>
 
-#include "core/decode/centres/frame_noise.hpp"
 #include "core/decode/grid/cell_rays.hpp"
 #include "core/decode/grid/epipolar_view.hpp"
 #include "core/decode/lattice.hpp"
+#include "core/exposure/frame_noise.hpp"
 
 namespace slsd {
 

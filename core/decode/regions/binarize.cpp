@@ -10,7 +10,6 @@
 
 #include "core/clones.hpp"
 #include "core/decode/regions/slide.hpp"
-#include "core/exposure/pixel_noise.hpp"
 #include "core/lanes.hpp"
 
 namespace slsd {
@@ -146,8 +145,10 @@ void Binarizer::set_thresholds(float greatest) {
   for (int row = 1; row <= rows_; ++row) {
     for (int i = row * stride_ + 1; i <= row * stride_ + columns_; ++i) {
       const float contrast = high_[i] - low_[i];
-      const float nothing_lit = high_[i] + contrast_min_;
-      midway_[i] = contrast < contrast_min_ ? nothing_lit : low_[i] + options_.level * contrast;
+      const float midway = low_[i] + options_.level * contrast;
+      const float needed = contrast_min(midway);
+      const float nothing_lit = high_[i] + needed;
+      midway_[i] = contrast < needed ? nothing_lit : midway;
     }
   }
   combine_3x3(midway_, stride_, sum_of, across_, threshold_);
@@ -184,17 +185,15 @@ void Binarizer::binarize_as(const ImageView<T>& frame, double full, Mask& mask, 
   least_.assign(static_cast<std::size_t>(stride_) * (rows_ + 2), std::numeric_limits<float>::max());
   greatest_.assign(least_.size(), 0);
   if (buffers_.size() < static_cast<std::size_t>(executor.workers())) buffers_.resize(executor.workers());
-  float noise = 0;
   executor.run(1 + (rows_ + kTileRows - 1) / kTileRows, [&](int part, int worker) {
     if (part == 0) {
-      noise = pixel_noise(frame, full);
+      noise_ = measure_noise(frame, full);
       return;
     }
     for (int row = (part - 1) * kTileRows; row < std::min(part * kTileRows, rows_); ++row)
       find_extremes(frame, row, std::get<RowBuffers<T>>(buffers_[worker].rows));
   });
-  const auto floor = static_cast<int>(options_.contrast_min * full / 255);
-  contrast_min_ = static_cast<float>(std::max(floor, static_cast<int>(options_.contrast_min_sigma * noise)));
+  contrast_floor_ = static_cast<float>(options_.contrast_min * full / 255);
   set_thresholds(static_cast<float>(full));
   executor.run(1 + (frame.height + kRows - 1) / kRows, [&](int part, int worker) {
     Buffers& buffers = buffers_[worker];
@@ -218,8 +217,8 @@ float Binarizer::measure_edge_blur(const ImageView<T>& frame, std::vector<T>& st
                                    steepest.data());
     const int first = (y / tile + 1) * stride_ + 1;
     for (int column = 0; column < columns_; ++column) {
-      const float contrast = high_[first + column] - low_[first + column];
-      if (contrast >= 2 * contrast_min_ && contrast > 0)
+      const float low = low_[first + column], contrast = high_[first + column] - low;
+      if (contrast >= 2 * contrast_min(low + 0.5F * contrast) && contrast > 0)
         steepness_.push_back(0.5F * static_cast<float>(steepest[column * tile]) / contrast);
     }
   }

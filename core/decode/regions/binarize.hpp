@@ -2,12 +2,14 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <tuple>
 #include <vector>
 
 #include "core/decode/regions/mask.hpp"
 #include "core/executor.hpp"
+#include "core/exposure/frame_noise.hpp"
 #include "core/image.hpp"
 
 namespace slsd {
@@ -21,7 +23,8 @@ struct BinarizeOptions {
   float level = 0.5F;
   /// Smallest difference between light and dark that is taken for the pattern, of 255 levels.
   int contrast_min = 5;
-  /// The same in standard deviations of the frame's noise: the range that plain noise spans in a window, and some more.
+  /// The same in standard deviations of the noise that the frame has midway between them: the range that plain noise
+  /// spans in a window, and some more.
   float contrast_min_sigma = 9;
 };
 
@@ -37,8 +40,12 @@ class Binarizer {
   void binarize(const GreyView& frame, double full, Mask& mask, Executor& executor);
 
   [[nodiscard]] const BinarizeOptions& options() const { return options_; }
-  /// Between light and dark of what was taken for the pattern in the last frame, in its levels.
-  [[nodiscard]] float contrast_min() const { return contrast_min_; }
+  /// Between light and dark of what was taken for the pattern in the last frame where the grey level midway was that.
+  [[nodiscard]] float contrast_min(float level) const {
+    return std::max(contrast_floor_, options_.contrast_min_sigma * noise_.at(level));
+  }
+  /// Of the last frame.
+  [[nodiscard]] const FrameNoise& noise() const { return noise_; }
   /// One standard deviation of the blur at the sharpest edges of the last frame, from how steep they are between its
   /// tiles' least and greatest values; 0 where there are none.
   [[nodiscard]] float edge_blur_px() const { return edge_blur_px_; }
@@ -66,7 +73,8 @@ class Binarizer {
   void interpolate_row(int y, int width, Buffers& buffers, T* threshold) const;
 
   BinarizeOptions options_;
-  float contrast_min_ = 0, edge_blur_px_ = 0;
+  FrameNoise noise_;
+  float contrast_floor_ = 0, edge_blur_px_ = 0;
   int columns_ = 0, rows_ = 0;  // of tiles
   int stride_ = 0;              // of the tiles with a border of one all round
   std::vector<float> least_, greatest_, across_, low_, high_, midway_, threshold_;

@@ -47,22 +47,25 @@ GreyView ShapeFinder::binarize(const GreyView& frame, double full, Executor& exe
   frame_levels_ = static_cast<float>(full / 255);
   if (binarize_ == Method::kPaper) {
     mask_ = binarize_paper(frame);
+    noise_ = measure_noise(frame, full);
     return frame;
   }
   binarizer_.binarize(frame, full, mask_, executor);
   const float blur_px = binarizer_.edge_blur_px();
+  noise_ = binarizer_.noise();
   if (blur_px < kBlurMinPx) return frame;
   const float symbol_px = symbol_size_px_ * expected_.in_the_middle().scale;
   const GreyView sharp = sharpener_.sharpen(frame, std::min(kBlurUndone * blur_px, kBlurMax * symbol_px), full).view();
   frame_levels_ = kSharpenedFull / 255;
   binarizer_.binarize(sharp, kSharpenedFull, mask_, executor);
+  noise_ = binarizer_.noise();
   return sharp;
 }
 
 void ShapeFinder::find_regions(const GreyView& frame, Executor& executor) {
   region_finder_.find(mask_, regions_, executor);
   if (find_regions_ == Method::kPaper) return;
-  splitter_.split_all(frame, std::max(binarizer_.contrast_min(), kContrastMin * frame_levels_), regions_,
+  splitter_.split_all(frame, std::max(binarizer_.contrast_min(0), kContrastMin * frame_levels_), regions_,
                       [this](const Region& region) { return is_too_large(region); });
 }
 

@@ -48,6 +48,8 @@ class ShapeFinder {
   [[nodiscard]] std::span<GreyMomentMeter> meters() { return meters_; }
   /// Levels of the frame for one of 255.
   [[nodiscard]] float frame_levels() const { return frame_levels_; }
+  /// Of the frame that binarize() returned.
+  [[nodiscard]] const FrameNoise& noise() const { return noise_; }
 
  private:
   [[nodiscard]] bool is_too_large(const Region& region) const;
@@ -65,6 +67,7 @@ class ShapeFinder {
   Mask mask_;
   Regions regions_;
   std::vector<RegionStatus> status_;
+  FrameNoise noise_;
   float frame_levels_ = 1;
 };
 

@@ -188,6 +188,25 @@ TEST(Binarize, FindsFaintSquaresAboveTheNoise) {
   EXPECT_LT(wrong_pixels(binarize(frame.view())), 30);
 }
 
+// Light is noisier than the dark: what noise most of a frame has says nothing of its dim parts.
+TEST(Binarize, FindsDimSquaresBesideNoisyLight) {
+  Grey8 frame(720, 432);
+  std::mt19937 random(3);
+  std::normal_distribution<double> gauss(0, 1);
+  const auto is_dim = [&](int x) { return x >= 540; };
+  for (int y = 0; y < frame.height(); ++y) {
+    for (int x = 0; x < frame.width(); ++x) {
+      const double light = is_dim(x) ? 9 : 200, grey = (in_square(x, y) ? 1 : 0.2) * light + 2;
+      frame.at(x, y) = static_cast<std::uint8_t>(std::lround(grey + std::sqrt(0.1 + 0.03 * grey) * gauss(random)));
+    }
+  }
+  const Mask mask = binarize(frame.view());
+  int wrong = 0;
+  for (int y = 0; y < frame.height(); ++y)
+    for (int x = 600; x < frame.width(); ++x) wrong += mask.at(x, y) != in_square(x, y);
+  EXPECT_LT(wrong, 100);
+}
+
 TEST(Binarize, ReadsFramesSmallerThanATile) {
   Grey8 frame(3, 2, 10);
   frame.at(1, 1) = 200;

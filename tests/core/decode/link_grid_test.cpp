@@ -17,16 +17,16 @@ namespace {
 constexpr int kRows = 24, kColumns = 30;
 
 /// A tilted plane under a camera that is rolled: steps shrink by a third from side to side.
-Homography tilted(float roll_rad) {
-  Homography perspective;
+GridMap tilted(float roll_rad) {
+  GridMap perspective;
   perspective << 1.3F, 0.1F, 40, 0.05F, 1.25F, 30, 5e-4F, 2e-4F, 1;
-  Homography roll = Homography::Identity();
+  GridMap roll = GridMap::Identity();
   roll.topLeftCorner<2, 2>() = Eigen::Rotation2Df(roll_rad).toRotationMatrix();
   return roll * perspective;
 }
 
 /// The frame that a calibration expects: that of the middle of the grid, everywhere.
-LatticeFrame expected_frame(const Homography& map) {
+LatticeFrame expected_frame(const GridMap& map) {
   const Eigen::Vector2f middle = through(map, kRows / 2, kColumns / 2);
   LatticeFrame frame;
   frame.col(0) = (through(map, kRows / 2, kColumns / 2 + 1) - middle) / SimulatedGrid::kPitchPx;
@@ -34,7 +34,7 @@ LatticeFrame expected_frame(const Homography& map) {
   return frame;
 }
 
-SimulatedGrid grid_of(const Homography& map, double missing) {
+SimulatedGrid grid_of(const GridMap& map, double missing) {
   std::mt19937 random(6);
   std::uniform_real_distribution<double> uniform(0, 1);
   std::normal_distribution<float> noise(0, 0.1F);
@@ -105,7 +105,7 @@ TEST(LinkGrid, LinksAreMutual) {
 
 TEST(LinkGrid, BreaksALinkThatLeadsOntoARidge) {
   for (const float roll : kRolls) {
-    const Homography map = tilted(roll);
+    const GridMap map = tilted(roll);
     SimulatedGrid grid = grid_of(map, 0);
     // The right half of one row stands out and is seen a quarter of a step farther along.
     const Eigen::Vector2f jump = 0.25F * SimulatedGrid::kPitchPx * expected_frame(map).col(0);
@@ -119,7 +119,7 @@ TEST(LinkGrid, BreaksALinkThatLeadsOntoARidge) {
 
 TEST(LinkGrid, BreaksEveryLinkAcrossAStraightEdge) {
   for (const float roll : kRolls) {
-    const Homography map = tilted(roll);
+    const GridMap map = tilted(roll);
     SimulatedGrid grid = grid_of(map, 0);
     const Eigen::Vector2f jump = 0.25F * SimulatedGrid::kPitchPx * expected_frame(map).col(0);
     for (int row = 0; row < kRows; ++row) {
@@ -139,7 +139,7 @@ TEST(LinkGrid, BreaksEveryLinkAcrossAStraightEdge) {
 
 TEST(LinkGrid, KeepsALinkBetweenTornSymbols) {
   for (const bool told : {false, true}) {
-    const Homography map = tilted(0);
+    const GridMap map = tilted(0);
     SimulatedGrid grid = grid_of(map, 0);
     // Those before and behind two whole ones have lost a part each.
     const Eigen::Vector2f moved = 0.25F * SimulatedGrid::kPitchPx * expected_frame(map).col(0);
@@ -157,7 +157,7 @@ TEST(LinkGrid, KeepsALinkBetweenTornSymbols) {
 }
 
 TEST(LinkGrid, MeasuresTheFramesOfATiltedPlane) {
-  const Homography map = tilted(0.3F);
+  const GridMap map = tilted(0.3F);
   SimulatedGrid grid = grid_of(map, 0);
   GridLinker({}).link(grid.nodes, alone);
   double expected_error = 0, measured_error = 0;
@@ -175,7 +175,7 @@ TEST(LinkGrid, MeasuresTheFramesOfATiltedPlane) {
 }
 
 TEST(MeasureFrame, LeavesNodesOutThatAreNotTrusted) {
-  const Homography map = Homography::Identity();
+  const GridMap map = GridMap::Identity();
   SimulatedGrid grid = grid_of(map, 0);
   GridLinker linker({});
   linker.link(grid.nodes, alone);

@@ -16,7 +16,7 @@
 namespace slsd {
 
 /// How a camera sees the plane of the pattern: homogeneous, camera px from projector px.
-using Homography = Eigen::Matrix3f;
+using GridMap = Eigen::Matrix3f;
 
 /// Cells of a pattern as nodes of the grid, with known truth.
 struct SimulatedGrid {
@@ -61,7 +61,7 @@ constexpr int kWholeRows = 44, kWholeColumns = 71;
 /// The budget that the service ships with.
 constexpr double kWrongCellsMax = 0.001;
 
-inline Eigen::Vector2f through(const Homography& camera_from_pattern, int row, int column) {
+inline Eigen::Vector2f through(const GridMap& camera_from_pattern, int row, int column) {
   const Eigen::Vector3f cell(SimulatedGrid::kPitchPx * static_cast<float>(column),
                              SimulatedGrid::kPitchPx * static_cast<float>(row), 1);
   return (camera_from_pattern * cell).hnormalized();

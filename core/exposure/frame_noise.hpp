@@ -19,9 +19,9 @@ struct FrameNoise {
   }
 };
 
-/// Measures the noise of a frame from second differences along the rows of a sample of its pixels: what is straight
-/// drops out, and edges are a minority that the lower quartile passes over. Where a level is seen at edges alone, the
-/// levels that tell less noise stand.
+/// Measures the noise of a frame from second differences along the rows of a sample of its pixels, at those of each
+/// grey level that the rows above and below show to lie flattest: small symbols are hardly flat anywhere. Where a level
+/// is seen at edges alone, the levels that tell less noise stand.
 /// @param full  the level of a saturated pixel, which has no noise
 /// @thread reentrant
 [[nodiscard]] FrameNoise measure_noise(const GreyView& frame, double full);

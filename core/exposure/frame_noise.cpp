@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/exposure/frame_noise.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <limits>
+
+namespace slsd {
+namespace {
+
+constexpr int kStep = 11;  // from sample to sample
+constexpr int kGreys = 16;
+constexpr int kDifferences = 256;  // of a difference
+constexpr int kEnough = 60;        // samples of a level
+constexpr int kFlatShare = 8, kFlatMin = 24;
+/// The median of |a - 2 b + c|, each normal with variance 1: that of the sum is 6.
+constexpr float kOfSigma = 0.6745F * 2.4495F;
+
+using Histogram = std::array<int, kDifferences>;
+using Histograms = std::array<Histogram, kGreys>;
+
+/// The difference below which half of them lie, to fractions of a bin: 0 stands for 0 to 1/2, k for k -+ 1/2.
+float median(const Histogram& histogram, int count) {
+  float below = 0;
+  const float half = 0.5F * static_cast<float>(count);
+  for (int bin = 0; bin < kDifferences; ++bin) {
+    const auto here = static_cast<float>(histogram[bin]);
+    if (below + here >= half) {
+      const float share = (half - below) / here;
+      return bin == 0 ? 0.5F * share : static_cast<float>(bin) - 0.5F + share;
+    }
+    below += here;
+  }
+  return kDifferences;
+}
+
+/// Three pixels of each of three rows. How flat it is there is told by the outer rows, whose noise is none of the
+/// middle one's, which is measured.
+struct Sample {
+  int level, unevenness, difference;
+};
+
+/// Calls visit(sample) for a sample of a frame's pixels, but for those that are saturated.
+template <class T, class Visit>
+void visit_samples(const ImageView<T>& frame, double full, Visit&& visit) {
+  const auto levels_per_step = static_cast<float>(full / kGreys);
+  const int unit = std::max(1, static_cast<int>(full / 1024));
+  for (int y = kStep / 2; y + 1 < frame.height; y += kStep) {
+    for (int x = 1; x + 1 < frame.width; x += kStep) {
+      const T *above = frame.row(y - 1) + x, *here = frame.row(y) + x, *below = frame.row(y + 1) + x;
+      const auto bend = [](const T* at) { return at[-1] - 2 * at[0] + at[1]; };
+      const auto sum = [](const T* at) { return at[-1] + 2 * at[0] + at[1]; };
+      const auto rise = [](const T* at) { return at[1] - at[-1]; };
+      const auto greatest = [](const T* at) { return std::max({at[-1], at[0], at[1]}); };
+      if (std::max({greatest(above), greatest(here), greatest(below)}) >= full) continue;
+      const int uneven = std::abs(bend(above)) + std::abs(bend(below)) + std::abs(sum(above) - sum(below)) / 2 +
+                         std::abs(rise(above) + rise(below));
+      const float mean = static_cast<float>(sum(above) + sum(below)) / 8;
+      visit(Sample{std::min(static_cast<int>(mean / levels_per_step), kGreys - 1),
+                   std::min(uneven / unit, kDifferences - 1), std::min(std::abs(bend(here)) / unit, kDifferences - 1)});
+    }
+  }
+}
+
+template <class T>
+FrameNoise measure(const ImageView<T>& frame, double full) {
+  Histograms unevenness{}, differences{};
+  std::array<int, kGreys> counts{}, flattest{}, flat{};
+  visit_samples(frame, full, [&](const Sample& sample) {
+    ++unevenness[sample.level][sample.unevenness];
+    ++counts[sample.level];
+  });
+  for (int level = 0; level < kGreys; ++level) {
+    const int wanted = std::min(std::max(counts[level] / kFlatShare, kFlatMin), counts[level]);
+    for (int below = unevenness[level][0]; below < wanted; below += unevenness[level][++flattest[level]]) {
+    }
+  }
+  visit_samples(frame, full, [&](const Sample& sample) {
+    if (sample.unevenness > flattest[sample.level]) return;
+    ++differences[sample.level][sample.difference];
+    ++flat[sample.level];
+  });
+  constexpr float kOfRounding = 1 / 12.F;
+  const float step = static_cast<float>(full / kGreys),
+              unit = static_cast<float>(std::max(1, static_cast<int>(full / 1024)));
+  FrameNoise noise{.dark_variance = kOfRounding};
+  float darkest = -1, variance_there = 0, slope = std::numeric_limits<float>::max();
+  for (int level = 0; level < kGreys; ++level) {
+    if (counts[level] < kEnough) continue;
+    const float sigma = median(differences[level], flat[level]) * unit / kOfSigma;
+    const float grey = (static_cast<float>(level) + 0.5F) * step, variance = std::max(kOfRounding, sigma * sigma);
+    if (darkest < 0) {
+      darkest = grey, variance_there = variance;
+    } else {
+      slope = std::min(slope, (variance - variance_there) / (grey - darkest));
+    }
+  }
+  if (darkest < 0) return noise;
+  if (slope < std::numeric_limits<float>::max()) noise.variance_per_level = std::max(0.F, slope);
+  noise.dark_variance = std::max(kOfRounding, variance_there - noise.variance_per_level * darkest);
+  return noise;
+}
+
+}  // namespace
+
+FrameNoise measure_noise(const GreyView& frame, double full) {
+  return std::visit([&](const auto& view) { return measure(view, full); }, frame);
+}
+
+}  // namespace slsd
