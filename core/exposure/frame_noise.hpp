@@ -17,6 +17,10 @@ struct FrameNoise {
   [[nodiscard]] float at(float level) const {
     return std::sqrt(dark_variance + variance_per_level * (level > 0 ? level : 0));
   }
+  /// Of a frame with that many of its levels to one of this, and so much of the noise.
+  [[nodiscard]] FrameNoise scaled(float levels, float share = 1) const {
+    return {dark_variance * levels * levels * share * share, variance_per_level * levels * share * share};
+  }
 };
 
 /// Measures the noise of a frame from second differences along the rows of a sample of its pixels, at those of each

@@ -176,7 +176,8 @@ void Binarizer::compare_rows(const ImageView<T>& frame, int top, int bottom, Buf
 }
 
 template <class T>
-void Binarizer::binarize_as(const ImageView<T>& frame, double full, Mask& mask, Executor& executor) {
+void Binarizer::binarize_as(const ImageView<T>& frame, double full, std::optional<FrameNoise> noise, Mask& mask,
+                            Executor& executor) {
   constexpr int kTileRows = 8, kRows = 16 * kRowsAlike;  // at once
   if (mask.width() != frame.width || mask.height() != frame.height) mask = Mask(frame.width, frame.height);
   columns_ = (frame.width + options_.tile_px - 1) / options_.tile_px;
@@ -187,7 +188,7 @@ void Binarizer::binarize_as(const ImageView<T>& frame, double full, Mask& mask, 
   if (buffers_.size() < static_cast<std::size_t>(executor.workers())) buffers_.resize(executor.workers());
   executor.run(1 + (rows_ + kTileRows - 1) / kTileRows, [&](int part, int worker) {
     if (part == 0) {
-      noise_ = measure_noise(frame, full);
+      noise_ = noise ? *noise : measure_noise(frame, full);
       return;
     }
     for (int row = (part - 1) * kTileRows; row < std::min(part * kTileRows, rows_); ++row)
@@ -199,10 +200,24 @@ void Binarizer::binarize_as(const ImageView<T>& frame, double full, Mask& mask, 
     Buffers& buffers = buffers_[worker];
     if (part == 0) {
       edge_blur_px_ = measure_edge_blur(frame, std::get<RowBuffers<T>>(buffers.rows).greatest);
+      usual_contrast_sigma_ = measure_usual_contrast();
     } else {
       compare_rows(frame, (part - 1) * kRows, std::min(part * kRows, frame.height), buffers, mask);
     }
   });
+}
+
+float Binarizer::measure_usual_contrast() {
+  constexpr std::size_t kStep = 13;
+  contrasts_.clear();
+  for (std::size_t i = 0; i < low_.size(); i += kStep) {
+    const float contrast = high_[i] - low_[i], midway = low_[i] + 0.5F * contrast;
+    if (contrast >= contrast_min(midway)) contrasts_.push_back(contrast / noise_.at(midway));
+  }
+  if (contrasts_.empty()) return std::numeric_limits<float>::infinity();
+  const auto middle = contrasts_.begin() + static_cast<std::ptrdiff_t>(contrasts_.size() / 2);
+  std::ranges::nth_element(contrasts_, middle);
+  return *middle;
 }
 
 template <class T>
@@ -261,8 +276,9 @@ void Binarizer::interpolate_row(int y, int width, Buffers& buffers, T* threshold
     std::fill(threshold + last, threshold + width, static_cast<T>(at_centre.back() >> kFractionBits<T>));
 }
 
-void Binarizer::binarize(const GreyView& frame, double full, Mask& mask, Executor& executor) {
-  std::visit([&](const auto& view) { binarize_as(view, full, mask, executor); }, frame);
+void Binarizer::binarize(const GreyView& frame, double full, std::optional<FrameNoise> noise, Mask& mask,
+                         Executor& executor) {
+  std::visit([&](const auto& view) { binarize_as(view, full, noise, mask, executor); }, frame);
 }
 
 }  // namespace slsd

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <tuple>
 #include <vector>
 
@@ -37,7 +38,11 @@ class Binarizer {
 
   /// @param full  the level of a saturated pixel of the frame
   /// @param mask  becomes of the frame's size
-  void binarize(const GreyView& frame, double full, Mask& mask, Executor& executor);
+  void binarize(const GreyView& frame, double full, Mask& mask, Executor& executor) {
+    binarize(frame, full, std::nullopt, mask, executor);
+  }
+  /// @param noise  of the frame where it is known
+  void binarize(const GreyView& frame, double full, std::optional<FrameNoise> noise, Mask& mask, Executor& executor);
 
   [[nodiscard]] const BinarizeOptions& options() const { return options_; }
   /// Between light and dark of what was taken for the pattern in the last frame where the grey level midway was that.
@@ -49,6 +54,9 @@ class Binarizer {
   /// One standard deviation of the blur at the sharpest edges of the last frame, from how steep they are between its
   /// tiles' least and greatest values; 0 where there are none.
   [[nodiscard]] float edge_blur_px() const { return edge_blur_px_; }
+  /// Between light and dark of most of what was taken for the pattern in the last frame, in standard deviations of the
+  /// noise midway; infinity where there was none.
+  [[nodiscard]] float usual_contrast_sigma() const { return usual_contrast_sigma_; }
 
  private:
   template <class T>
@@ -61,10 +69,12 @@ class Binarizer {
     std::vector<int> at_centre, step;  // of a row of thresholds, binary fractions
   };
   template <class T>
-  void binarize_as(const ImageView<T>& frame, double full, Mask& mask, Executor& executor);
+  void binarize_as(const ImageView<T>& frame, double full, std::optional<FrameNoise> noise, Mask& mask,
+                   Executor& executor);
   template <class T>
   void find_extremes(const ImageView<T>& frame, int row, RowBuffers<T>& buffers);
   void set_thresholds(float greatest);
+  [[nodiscard]] float measure_usual_contrast();
   template <class T>
   [[nodiscard]] float measure_edge_blur(const ImageView<T>& frame, std::vector<T>& steepest);
   template <class T>
@@ -74,11 +84,11 @@ class Binarizer {
 
   BinarizeOptions options_;
   FrameNoise noise_;
-  float contrast_floor_ = 0, edge_blur_px_ = 0;
+  float contrast_floor_ = 0, edge_blur_px_ = 0, usual_contrast_sigma_ = 0;
   int columns_ = 0, rows_ = 0;  // of tiles
   int stride_ = 0;              // of the tiles with a border of one all round
   std::vector<float> least_, greatest_, across_, low_, high_, midway_, threshold_;
-  std::vector<float> steepness_;
+  std::vector<float> steepness_, contrasts_;
   std::vector<Buffers> buffers_;
 };
 

@@ -21,6 +21,8 @@ constexpr float kExtentMax = 1.5F;  // of a cell's side
 constexpr float kBlurMinPx = 1.9F;
 constexpr float kBlurUndone = 0.85F;
 constexpr float kBlurMax = 0.2F;
+/// Where the light mostly has a contrast of less, in standard deviations of the noise, a third of it drowns in it.
+constexpr float kFaintSigma = 27;
 /// Between a region's peak and its background, of 255 levels.
 constexpr float kContrastMin = static_cast<float>(BinarizeOptions().contrast_min);
 
@@ -53,7 +55,16 @@ GreyView ShapeFinder::binarize(const GreyView& frame, double full, Executor& exe
   binarizer_.binarize(frame, full, mask_, executor);
   const float blur_px = binarizer_.edge_blur_px();
   noise_ = binarizer_.noise();
-  if (blur_px < kBlurMinPx) return frame;
+  if (blur_px < kBlurMinPx) {
+    if (binarizer_.usual_contrast_sigma() >= kFaintSigma) return frame;
+    // What is left of the noise is not of single pixels: what sums up over a symbol has all of it.
+    const GreyView smooth = sharpener_.smooth(frame, full).view();
+    const float levels = kSharpenedFull / static_cast<float>(full);
+    frame_levels_ = kSharpenedFull / 255;
+    noise_ = noise_.scaled(levels);
+    binarizer_.binarize(smooth, kSharpenedFull, noise_.scaled(1, kSmoothedNoise), mask_, executor);
+    return smooth;
+  }
   const float symbol_px = symbol_size_px_ * expected_.in_the_middle().scale;
   const GreyView sharp = sharpener_.sharpen(frame, std::min(kBlurUndone * blur_px, kBlurMax * symbol_px), full).view();
   frame_levels_ = kSharpenedFull / 255;

@@ -88,4 +88,10 @@ const Grey16& Sharpener::sharpen(const GreyView& frame, float blur_px, double fu
   return sharpened_;
 }
 
+const Grey16& Sharpener::smooth(const GreyView& frame, double full) {
+  weights_ = {0.5F, 0.25F};
+  std::visit([&](const auto& view) { sharpen_as(view, kSharpenedFull / static_cast<float>(full)); }, frame);
+  return sharpened_;
+}
+
 }  // namespace slsd

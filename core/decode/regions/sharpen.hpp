@@ -8,6 +8,9 @@
 
 namespace slsd {
 
+/// What smoothing leaves of a pixel's noise.
+inline constexpr float kSmoothedNoise = 0.375F;
+
 /// Levels of a sharpened frame where the frame was saturated; above it is room for what its edges overshoot.
 inline constexpr float kSharpenedFull = 50000;
 
@@ -23,6 +26,9 @@ class Sharpener {
   /// @param full     the level of a saturated pixel of the frame
   /// @return         of the frame's size; stands until the next call
   const Grey16& sharpen(const GreyView& frame, float blur_px, double full);
+
+  /// The opposite, for light that is faint in the noise: the mean over three rows and columns, weighted 1, 2, 1.
+  const Grey16& smooth(const GreyView& frame, double full);
 
  private:
   template <class T>

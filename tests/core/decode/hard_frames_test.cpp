@@ -116,6 +116,22 @@ TEST(HardFrames, ReadsWhatIsFaintlyLit) {
   EXPECT_EQ(decode(decoder, wall.view()).points.size(), 0);
 }
 
+// Dark objects at a high gain: from pixel to pixel noise is as much as the light is.
+TEST(HardFrames, ReadsWhatIsFaintInNoise) {
+  const Pattern pattern = shipped_pattern("8px-6.toml");
+  Decoder decoder = decoder_of(pattern);
+  const std::size_t well_lit = decode(decoder, frame_of(pattern, test::kTilted).view()).points.size();
+  const auto faint = [](const Grey8& image, double lit) {
+    return simulate(image, paper_rig(), test::kTilted, {.dark = 15, .lit = lit, .noise_sigma = 5});
+  };
+  for (const double lit : {40., 60.}) {
+    const Decoding decoding = decode(decoder, faint(draw_pattern(pattern), lit).view());
+    EXPECT_GE(static_cast<double>(decoding.points.size()), 0.97 * static_cast<double>(well_lit)) << lit;
+    EXPECT_EQ(wrong_points(decoding, test::kTilted, 5), 0) << lit;
+  }
+  EXPECT_EQ(decode(decoder, faint(Grey8(1280, 800, 255), 40).view()).points.size(), 0);
+}
+
 // As far out of focus as three pixels of the camera: the gaps between symbols are nearly as bright as they are.
 TEST(HardFrames, ReadsAPlaneOutOfFocus) {
   const Pattern pattern = shipped_pattern("16px-5.toml");

@@ -89,5 +89,31 @@ TEST(Sharpener, LeavesWhatIsSymmetricWhereItIs) {
   }
 }
 
+TEST(Sharpener, SmoothsAsOpenCvDoes) {
+  cv::Mat frame(50, 70, CV_8U);
+  cv::randu(frame, 0, 256);
+  const cv::Mat weights = (cv::Mat_<float>(1, 3) << 0.25F, 0.5F, 0.25F);
+  cv::Mat smooth;
+  cv::sepFilter2D(frame, smooth, CV_32F, weights, weights, {-1, -1}, 0, cv::BORDER_REPLICATE);
+  Grey8 grey(70, 50);
+  for (int y = 0; y < 50; ++y) std::copy_n(frame.ptr(y), 70, grey.row(y));
+  Sharpener sharpener;
+  const Grey16& ours = sharpener.smooth(GreyView(grey.view()), 255);
+  for (int y = 0; y < 50; ++y)
+    for (int x = 0; x < 70; ++x) EXPECT_NEAR(ours.row(y)[x], kSharpenedFull / 255 * smooth.at<float>(y, x), 2);
+}
+
+TEST(Sharpener, SmoothingLeavesAsMuchNoiseAsItSays) {
+  cv::Mat noise(400, 400, CV_16U);
+  cv::randn(noise, 20000, 1000);
+  Grey16 frame(400, 400);
+  for (int y = 0; y < 400; ++y) std::copy_n(noise.ptr<std::uint16_t>(y), 400, frame.row(y));
+  Sharpener sharpener;
+  Grey16 smooth = sharpener.smooth(GreyView(frame.view()), kSharpenedFull);
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(cv::Mat(400, 400, CV_16U, smooth.data()), mean, deviation);
+  EXPECT_NEAR(deviation[0], kSmoothedNoise * 1000, 15);
+}
+
 }  // namespace
 }  // namespace slsd
