@@ -21,8 +21,8 @@ constexpr float kExtentMax = 1.5F;  // of a cell's side
 constexpr float kBlurMinPx = 1.9F;
 constexpr float kBlurUndone = 0.85F;
 constexpr float kBlurMax = 0.2F;
-/// Where the light mostly has a contrast of less, in standard deviations of the noise, a third of it drowns in it.
-constexpr float kFaintSigma = 27;
+/// Where the light mostly has a contrast of less, in standard deviations of the noise, half of it drowns.
+constexpr float kFaintSigma = 18;
 /// Between a region's peak and its background, of 255 levels.
 constexpr float kContrastMin = static_cast<float>(BinarizeOptions().contrast_min);
 
