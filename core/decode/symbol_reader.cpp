@@ -43,6 +43,7 @@ SymbolReader::SymbolReader(const IndexedPattern& indexed, const Lens& projector,
       linker_({.pitch_px = static_cast<float>(pattern().pitch_px())}),
       window_decoder_(pattern(), indexed.codebook(), options.wrong_cells_max),
       review_(pattern(), {}),
+      mender_(pattern()),
       correspondence_({}),
       centre_correction_(fixed_->appearances.usual().as_measured, static_cast<float>(pattern().pitch_px()),
                          static_cast<float>(pattern().options.symbol_size_px)) {}
@@ -63,7 +64,7 @@ const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarVi
   if (view != nullptr) view->look_at(seen_, executor);
   decode_windows(view, executor), done(Stage::kDecodeWindows);
   review(sharp, executor), done(Stage::kReview);
-  correspond(view, executor);
+  correspond(sharp, view, executor);
   fit_lattice(frame, full, view, executor), done(Stage::kCorrespond);
   return lattice_;
 }
@@ -130,10 +131,21 @@ void SymbolReader::classify_in_measured_frames(Executor& executor) {
 void SymbolReader::decode_windows(const EpipolarView* view, Executor& executor) {
   if (options_.decode_windows == Method::kPaper)
     return paper_->decode_windows(pattern().whole_rows(), pattern().whole_columns(), seen_);
-  const bool gated = view != nullptr && options_.correspond == Method::kDefault;
-  const CellGate gate(cells(), gated ? view->segments() : std::span<const EpipolarSegment>(),
-                      gated ? view->tolerance_px() : 0);
-  window_decoder_.decode(seen_.nodes, seen_.shapes, gate, executor, seen_.claims);
+  window_decoder_.decode(seen_.nodes, seen_.shapes, gate_of(view), executor, seen_.claims);
+}
+
+CellGate SymbolReader::gate_of(const EpipolarView* view) const {
+  if (view == nullptr || options_.correspond != Method::kDefault) return {cells(), {}, 0};
+  return {cells(), view->segments(), view->tolerance_px()};
+}
+
+/// Where epipolar lines are known, and all stages before go the default way.
+void SymbolReader::mend(const GreyView& frame, EpipolarView& view) {
+  if (options_.any_paper()) return;
+  const float blur_px = look_->blur_px.value_or(expected_scale()) / expected_scale();
+  mended_ = mender_.mend(frame, 255.0 * finder_.frame_levels(), finder_.noise(), blur_px, gate_of(&view),
+                         look_->as_measured, seen_);
+  for (const std::int32_t sighting : mended_) view.look_again_at(sighting, seen_);
 }
 
 void SymbolReader::review(const GreyView& frame, Executor& executor) {
@@ -143,9 +155,12 @@ void SymbolReader::review(const GreyView& frame, Executor& executor) {
     review_.review(frame, finder_.regions(), linker_, look_->as_measured, finder_.meters(), executor, seen_);
 }
 
-void SymbolReader::correspond(const EpipolarView* view, Executor& executor) {
+/// @param frame  what the symbols were measured in
+void SymbolReader::correspond(const GreyView& frame, EpipolarView* view, Executor& executor) {
+  mended_ = {};
   if (options_.decode_windows == Method::kDefault) {
     correspondence_.refuse_lone(seen_.nodes, executor, seen_.claims);
+    if (view != nullptr) mend(frame, *view);
     review_.take_back_held(seen_);
   }
   if (view == nullptr) {
@@ -158,6 +173,11 @@ void SymbolReader::correspond(const EpipolarView* view, Executor& executor) {
 void SymbolReader::fit_lattice(const GreyView& frame, double full, const EpipolarView* view, Executor& executor) {
   centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, pattern().array, executor, lattice_,
                              seen_.misfits);
+  // What was aligned needs no correction.
+  for (LatticeSymbol& symbol : lattice_.symbols) {
+    const GreyMoments& moments = seen_.moments[symbol.sighting];
+    if (std::ranges::binary_search(mended_, symbol.sighting)) symbol.centre_px = {moments.x, moments.y};
+  }
   if (options_.centre == Method::kPaper) {
     for (LatticeSymbol& symbol : lattice_.symbols) {
       const GreyMoments& moments = seen_.moments[symbol.sighting];

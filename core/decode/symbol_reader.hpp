@@ -10,6 +10,7 @@
 #include "core/decode/centres/centre_sigma.hpp"
 #include "core/decode/centres/correspond.hpp"
 #include "core/decode/centres/curvature.hpp"
+#include "core/decode/centres/mend_symbols.hpp"
 #include "core/decode/centres/symbol_match.hpp"
 #include "core/decode/decoding.hpp"
 #include "core/decode/grid/decode_windows.hpp"
@@ -81,7 +82,9 @@ class SymbolReader {
   void classify_in_measured_frames(Executor& executor);
   void decode_windows(const EpipolarView* view, Executor& executor);
   void review(const GreyView& frame, Executor& executor);
-  void correspond(const EpipolarView* view, Executor& executor);
+  [[nodiscard]] CellGate gate_of(const EpipolarView* view) const;
+  void mend(const GreyView& frame, EpipolarView& view);
+  void correspond(const GreyView& frame, EpipolarView* view, Executor& executor);
   void refuse_cut();
   void fit_lattice(const GreyView& frame, double full, const EpipolarView* view, Executor& executor);
 
@@ -92,6 +95,7 @@ class SymbolReader {
   GridLinker linker_;
   WindowDecoder window_decoder_;
   SymbolReview review_;
+  SymbolMender mender_;
   Correspondence correspondence_;
   CentreCorrection centre_correction_;
   CentreJudge centre_judge_;
@@ -100,7 +104,8 @@ class SymbolReader {
   const Appearance* look_ = nullptr;  // of this frame's symbols
   std::vector<ShapeFeatures> sample_;
   std::vector<float> damages_;
-  std::vector<std::int32_t> kept_;  // of the lattice's symbols: where they are then
+  std::span<const std::int32_t> mended_;  // sightings
+  std::vector<std::int32_t> kept_;        // of the lattice's symbols: where they are then
   Sightings seen_;
   Lattice lattice_;
   FrameNoise noise_;  // of the frame, though it may have been sharpened

@@ -33,12 +33,15 @@ class EpipolarView {
     pixels_.resize(seen.size());
     segments_.resize(seen.size());
     executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
-      for (std::size_t i = first; i < last; ++i) {
-        pixels_[i] = {seen.moments[i].x, seen.moments[i].y};
-        rays_[i] = camera_rays_.ray(pixels_[i].cast<double>());
-        segments_[i] = gate_.prepare(rays_[i].direction);
-      }
+      for (std::size_t i = first; i < last; ++i) look_again_at(static_cast<std::int32_t>(i), seen);
     });
+  }
+  /// At one that was found to lie elsewhere.
+  void look_again_at(std::int32_t sighting, const Sightings& seen) {
+    const GreyMoments& moments = seen.moments[sighting];
+    pixels_[sighting] = {moments.x, moments.y};
+    rays_[sighting] = camera_rays_.ray(pixels_[sighting].cast<double>());
+    segments_[sighting] = gate_.prepare(rays_[sighting].direction);
   }
   /// One to a sighting.
   [[nodiscard]] std::span<const EpipolarSegment> segments() const { return segments_; }

@@ -175,6 +175,23 @@ Grey8 printed(Grey8 frame) {
   return frame;
 }
 
+// What lines of ink have left of a symbol is where it was: its centroid is not.
+TEST(HardFrames, PlacesSymbolsThatLinesArePrintedOver) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  Decoder decoder = decoder_of(pattern);
+  Grey8 frame = frame_of(pattern, test::kTilted);
+  const std::size_t unprinted = decode(decoder, frame.view()).points.size();
+  for (int y = 0; y < frame.height(); ++y) {
+    for (int x = 0; x < frame.width(); ++x) {
+      const bool is_ink = (2 * x + y) % 200 < 12;
+      if (is_ink) frame.at(x, y) = static_cast<std::uint8_t>(std::lround(0.35 * frame.at(x, y)));
+    }
+  }
+  const Decoding decoding = decode(decoder, frame.view());
+  EXPECT_GE(static_cast<double>(decoding.points.size()), 0.945 * static_cast<double>(unprinted));
+  EXPECT_LT(wrong_points(decoding, test::kTilted, 0.5), 300);
+}
+
 TEST(DecodeInLight, ReadsWhatIsPrintedOver) {
   const Pattern pattern = shipped_pattern("16px-5.toml");
   const Grey8 plain = frame_of(pattern, test::kTilted);

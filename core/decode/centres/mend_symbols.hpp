@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/align/align_eight.hpp"
+#include "core/align/pattern_field.hpp"
+#include "core/code/pattern.hpp"
+#include "core/decode/grid/cell_gate.hpp"
+#include "core/decode/grid/sightings.hpp"
+#include "core/decode/symbols/prototypes.hpp"
+#include "core/exposure/frame_noise.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// The letters of a pattern, each dark all round, at some blurs.
+/// @thread reentrant
+class LetterFields {
+ public:
+  explicit LetterFields(const PatternOptions& pattern);
+  /// That of the nearest blur.
+  /// @param blur_px  standard deviation, projector px
+  [[nodiscard]] const PatternField& at(float blur_px) const;
+  /// Where in them the middle of a letter's square is.
+  [[nodiscard]] Eigen::Vector2f middle_px(int letter) const;
+
+ private:
+  static constexpr std::array kBlursPx{0.42F, 0.55F, 0.72F, 0.95F, 1.25F, 1.65F};
+  int symbol_size_px_, cell_px_;
+  std::vector<PatternField> fields_;
+};
+
+/// Finds the places of symbols whose cells are certain and whose shapes print, relief or an edge has spoilt: a centroid
+/// goes with what is missing, and off its epipolar line. What there is of them is aligned with their letter instead,
+/// from where at least two of their island put them, and what does not agree counts little.
+/// @thread thread-bound: keeps its buffers; the letters are shared with copies
+class SymbolMender {
+ public:
+  explicit SymbolMender(const Pattern& pattern);
+
+  /// @param full        the level of a saturated pixel
+  /// @param blur_px     of the pattern in the frame, standard deviation, projector px
+  /// @param gate        that knows the epipolar lines
+  /// @param prototypes  of the letters: where the points of their cells are
+  /// @param seen        in and out: what is mended is decoded, with another place, frame, light and misfit
+  /// @return            the sightings that are mended, in their order; stands until the next call
+  const std::vector<std::int32_t>& mend(const GreyView& frame, double full, const FrameNoise& noise, float blur_px,
+                                        const CellGate& gate, std::span<const Prototype> prototypes, Sightings& seen);
+
+ private:
+  struct Place {
+    Eigen::Vector2f centre_px;  // of the square, in the camera
+    LatticeFrame frame;
+    float background, peak;  // grey levels
+    int held_by;
+  };
+  [[nodiscard]] Place place_by_neighbours(const Sightings& seen, std::int32_t node) const;
+  void look_at(const GreyView& frame, const FrameNoise& noise, const CellGate& gate, const Sightings& seen,
+               std::int32_t node);
+  void align(const GreyView& frame, double full, const PatternField& field);
+  [[nodiscard]] Eigen::Vector2f centre_of(const PatchTask& task, int letter) const;
+  [[nodiscard]] bool shows_centre(const GreyView& frame, const PatternField& field, const PatchTask& task,
+                                  int letter) const;
+  [[nodiscard]] bool is_there(const PatchTask& task, const Sightings& seen, std::int32_t node) const;
+  void take_over(const PatchTask& task, const LatticeFrame& lattice_frame, std::span<const Prototype> prototypes,
+                 Sightings& seen, std::int32_t node) const;
+
+  CodeArray array_;
+  float pitch_px_;
+  std::shared_ptr<const LetterFields> letters_;
+  std::vector<std::int32_t> worn_, asked_, mended_;  // sightings; of those asked one place and task each
+  std::vector<Place> places_;
+  std::vector<PatchTask> tasks_;
+};
+
+}  // namespace slsd
