@@ -178,8 +178,11 @@ bool SymbolMender::shows_centre(const GreyView& frame, const PatternField& field
                                     across * state.across + task.map.origin_px.cast<float>();
       const float light = state.gain + state.gain_x * dx + state.gain_y * dy;
       const float expected = state.offset + light * field.at(pixel.x(), pixel.y()).value;
-      const float grey = std::visit([&](const auto& view) { return static_cast<float>(view.at(x, y)); }, frame);
-      agree += std::abs(grey - expected) <= limit;
+      agree += std::visit(
+          [&](const auto& view) {
+            return view.contains(x, y) && std::abs(static_cast<float>(view.at(x, y)) - expected) <= limit;
+          },
+          frame);
     }
   }
   return agree >= kAgreeMin;
@@ -190,8 +193,11 @@ bool SymbolMender::is_there(const PatchTask& task, const Sightings& seen, std::i
   if (std::abs(task.state.across) > kAcrossMaxPx || std::abs(task.state.disparity) > kMovedMax * pitch_px_)
     return false;
   const CellClaim& claim = seen.claims[node];
+  const Eigen::Vector2f centre = centre_of(task, array_.at(claim.row, claim.column));
+  // What is tilted out of all proportion lies anywhere.
+  if (!((centre - task.map.middle_px).norm() < 0.5F * pitch_px_)) return false;
   if (claim.status != RegionStatus::kDecoded) return true;
-  const Eigen::Vector2f moved_px = centre_of(task, array_.at(claim.row, claim.column)) - seen.nodes[node].centre_px;
+  const Eigen::Vector2f moved_px = centre - seen.nodes[node].centre_px;
   return task.support >= kSupportGood && (seen.nodes[node].frame.inverse() * moved_px).norm() < kNear * pitch_px_;
 }
 
