@@ -7,13 +7,6 @@
 #include <cmath>
 
 namespace slsd {
-namespace {
-
-Direction across(Direction d, int side) {
-  return static_cast<Direction>((d + (side == 0 ? 1 : 3)) % 4);
-}
-
-}  // namespace
 
 /// No branch for each of the four: most nodes have none.
 bool IslandJudge::any_against(const Links& links) {

@@ -36,6 +36,11 @@ struct LinkGridOptions {
   return static_cast<Direction>((d + 2) % 4);
 }
 
+/// One of the two ways across a link, by 0 or 1.
+[[nodiscard]] constexpr Direction across(Direction d, int side) {
+  return static_cast<Direction>((d + (side == 0 ? 1 : 3)) % 4);
+}
+
 /// One step of the pattern in a direction, in cells.
 [[nodiscard]] inline Eigen::Vector2f step(Direction d) {
   return {static_cast<float>((d == kRight) - (d == kLeft)), static_cast<float>((d == kDown) - (d == kUp))};
