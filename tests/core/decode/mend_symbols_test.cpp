@@ -119,6 +119,11 @@ TEST_F(MendOneOfMany, FollowsDepthAlongTheEpipolarLine) {
   EXPECT_THAT(mend(), testing::Optional(testing::Lt(0.06F)));
 }
 
+TEST_F(MendOneOfMany, LeavesWhatLiesFarAlongTheLine) {
+  for (int i = 0; i < kSide * kSide; ++i) seen_.nodes[i].centre_px.x() += 2.6F;
+  EXPECT_EQ(mend(), std::nullopt);
+}
+
 TEST_F(MendOneOfMany, LeavesWhatLiesAcrossTheLine) {
   for (int i = 0; i < kSide * kSide; ++i) seen_.nodes[i].centre_px.y() += 1.5F;
   EXPECT_EQ(mend(), std::nullopt);
