@@ -4,13 +4,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstdlib>
 #include <limits>
+#include <span>
 
 namespace slsd {
 namespace {
 
-constexpr int kStep = 11;  // from sample to sample
+constexpr int kStep = 11;  // from sample to sample, or more in a large frame
+constexpr int kSamplesMax = 20000;
 constexpr int kGreys = 16;
 constexpr int kDifferences = 256;  // of a difference
 constexpr int kEnough = 60;        // samples of a level
@@ -39,16 +42,21 @@ float median(const Histogram& histogram, int count) {
 /// Three pixels of each of three rows. How flat it is there is told by the outer rows, whose noise is none of the
 /// middle one's, which is measured.
 struct Sample {
-  int level, unevenness, difference;
+  std::uint8_t level, unevenness, difference;
 };
+using Samples = std::array<Sample, kSamplesMax>;
 
-/// Calls visit(sample) for a sample of a frame's pixels, but for those that are saturated.
-template <class T, class Visit>
-void visit_samples(const ImageView<T>& frame, double full, Visit&& visit) {
-  const auto levels_per_step = static_cast<float>(full / kGreys);
+/// A sample of a frame's pixels, but for those that are saturated.
+template <class T>
+std::size_t take_samples(const ImageView<T>& frame, double full, Samples& samples) {
+  const auto per_level = static_cast<float>(kGreys / full);
   const int unit = std::max(1, static_cast<int>(full / 1024));
-  for (int y = kStep / 2; y + 1 < frame.height; y += kStep) {
-    for (int x = 1; x + 1 < frame.width; x += kStep) {
+  int step = kStep;
+  const auto taken = [&] { return (frame.width / step + 1) * (frame.height / step + 1); };
+  while (taken() > kSamplesMax) ++step;
+  std::size_t count = 0;
+  for (int y = step / 2; y + 1 < frame.height; y += step) {
+    for (int x = 1; x + 1 < frame.width; x += step) {
       const T *above = frame.row(y - 1) + x, *here = frame.row(y) + x, *below = frame.row(y + 1) + x;
       const auto bend = [](const T* at) { return at[-1] - 2 * at[0] + at[1]; };
       const auto sum = [](const T* at) { return at[-1] + 2 * at[0] + at[1]; };
@@ -58,30 +66,31 @@ void visit_samples(const ImageView<T>& frame, double full, Visit&& visit) {
       const int uneven = std::abs(bend(above)) + std::abs(bend(below)) + std::abs(sum(above) - sum(below)) / 2 +
                          std::abs(rise(above) + rise(below));
       const float mean = static_cast<float>(sum(above) + sum(below)) / 8;
-      visit(Sample{std::min(static_cast<int>(mean / levels_per_step), kGreys - 1),
-                   std::min(uneven / unit, kDifferences - 1), std::min(std::abs(bend(here)) / unit, kDifferences - 1)});
+      const auto bin = [&](int difference) {
+        return static_cast<std::uint8_t>(std::min(difference / unit, kDifferences - 1));
+      };
+      samples[count++] = {static_cast<std::uint8_t>(std::min(static_cast<int>(mean * per_level), kGreys - 1)),
+                          bin(uneven), bin(std::abs(bend(here)))};
     }
   }
+  return count;
 }
 
 template <class T>
 FrameNoise measure(const ImageView<T>& frame, double full) {
+  Samples all;
+  const std::span samples = std::span(all).first(take_samples(frame, full, all));
   Histograms unevenness{}, differences{};
   std::array<int, kGreys> counts{}, flattest{}, flat{};
-  visit_samples(frame, full, [&](const Sample& sample) {
-    ++unevenness[sample.level][sample.unevenness];
-    ++counts[sample.level];
-  });
+  for (const Sample& sample : samples) ++unevenness[sample.level][sample.unevenness], ++counts[sample.level];
   for (int level = 0; level < kGreys; ++level) {
     const int wanted = std::min(std::max(counts[level] / kFlatShare, kFlatMin), counts[level]);
     for (int below = unevenness[level][0]; below < wanted; below += unevenness[level][++flattest[level]]) {
     }
   }
-  visit_samples(frame, full, [&](const Sample& sample) {
-    if (sample.unevenness > flattest[sample.level]) return;
-    ++differences[sample.level][sample.difference];
-    ++flat[sample.level];
-  });
+  for (const Sample& sample : samples)
+    if (sample.unevenness <= flattest[sample.level])
+      ++differences[sample.level][sample.difference], ++flat[sample.level];
   constexpr float kOfRounding = 1 / 12.F;
   const float step = static_cast<float>(full / kGreys),
               unit = static_cast<float>(std::max(1, static_cast<int>(full / 1024)));
