@@ -20,6 +20,10 @@ using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
 
 constexpr float kNotCounted = -1;  // of a patch's pixels: saturated, or outside
 
+Eigen::Vector2f across_of(const PatchMap& map) {
+  return {-map.along.y(), map.along.x()};
+}
+
 /// The coefficients of q in a window, by rows: q_k = constant + x + y + (xx + 2 xy + yy) / 2.
 struct Warp {
   float constant[3], x[3], y[3], xx[3], xy[3], yy[3];
@@ -217,7 +221,8 @@ Warp warp_of(const PatchMap& map, const PatchState& state) {
     warp.xx[k] = shift * state.bend_xx, warp.xy[k] = shift * state.bend_xy, warp.yy[k] = shift * state.bend_yy;
   }
   warp.along_u = map.along.x(), warp.along_v = map.along.y();
-  warp.across_u = -state.across * map.along.y(), warp.across_v = state.across * map.along.x();
+  const Eigen::Vector2f across = state.across * across_of(map);
+  warp.across_u = across.x(), warp.across_v = across.y();
   return warp;
 }
 
@@ -384,9 +389,18 @@ template PatchFit PatchAligner::align(const ImageView<std::uint8_t>&, double, fl
 template PatchFit PatchAligner::align(const ImageView<std::uint16_t>&, double, float, const PatternField&,
                                       const PatchMap&, const PatchWindow&, const PatchState&);
 
+Eigen::Vector2f projector_offset(const PatchMap& map, const PatchState& state, const Eigen::Vector2f& offset) {
+  const float bend = 0.5F * (state.bend_xx * offset.x() * offset.x() + state.bend_yy * offset.y() * offset.y()) +
+                     state.bend_xy * offset.x() * offset.y();
+  const Eigen::Vector3f q =
+      map.base * offset.homogeneous() +
+      map.shift * (state.disparity + state.slope_x * offset.x() + state.slope_y * offset.y() + bend);
+  return q.hnormalized() + state.across * across_of(map);
+}
+
 Eigen::Vector2f camera_offset(const PatchMap& map, const PatchState& state, const Eigen::Vector2f& pixel) {
   // The bend moves the pixel by some hundredths: three rounds of a fixed point are plenty.
-  const Eigen::Vector2f target = pixel - state.across * Eigen::Vector2f(-map.along.y(), map.along.x());
+  const Eigen::Vector2f target = pixel - state.across * across_of(map);
   Eigen::Vector2f offset = Eigen::Vector2f::Zero();
   for (int round = 0; round < 3; ++round) {
     Eigen::Matrix3f q = map.base + map.shift * Eigen::RowVector3f(state.slope_x, state.slope_y, state.disparity);

@@ -22,12 +22,12 @@ namespace slsd {
 ///
 /// disparity being the inverse depth in units that move p by one projector px in the middle, from the reference.
 struct PatchMap {
-  Eigen::Matrix3f base;                                  ///< columns: of x, of y, of 1; at the reference depth
-  Eigen::Vector3f shift;                                 ///< what a disparity of 1 adds to q
-  Eigen::Vector2f middle_px;                             ///< in the camera
-  Eigen::Vector2i origin_px;                             ///< p is taken from there: floats are exact enough near it
-  Eigen::Vector2f along;                                 ///< unit vector in which p moves with the disparity
-  double reference_inverse_depth, inverse_depth_per_px;  ///< 1/mm
+  Eigen::Matrix3f base;       ///< columns: of x, of y, of 1; at the reference depth
+  Eigen::Vector3f shift;      ///< what a disparity of 1 adds to q
+  Eigen::Vector2f middle_px;  ///< in the camera
+  Eigen::Vector2i origin_px;  ///< p is taken from there: floats are exact enough near it
+  Eigen::Vector2f along;      ///< unit vector in which p moves with the disparity
+  double reference_inverse_depth = 0, inverse_depth_per_px = 0;  ///< 1/mm
 };
 
 /// @param ray                 of the window's middle
@@ -119,5 +119,9 @@ struct PatchSums {
 
 /// The camera pixel, from the window's middle, that sees a projector pixel (from the map's origin) on the patch.
 [[nodiscard]] Eigen::Vector2f camera_offset(const PatchMap& map, const PatchState& state, const Eigen::Vector2f& pixel);
+/// The opposite: the projector pixel, from the map's origin, that lights what a camera pixel sees.
+/// @param offset  of the camera pixel from the window's middle
+[[nodiscard]] Eigen::Vector2f projector_offset(const PatchMap& map, const PatchState& state,
+                                               const Eigen::Vector2f& offset);
 
 }  // namespace slsd

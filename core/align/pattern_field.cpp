@@ -106,4 +106,14 @@ PatternField::Sample PatternField::at(float u, float v) const {
   return sample;
 }
 
+const PatternField& PatternFields::at(std::size_t blur) const {
+  std::call_once(made_[blur], [&] { fields_[blur].emplace(pattern_.view(), kBlursPx[blur]); });
+  return *fields_[blur];
+}
+
+const PatternField& PatternFields::nearest(float blur_px) const {
+  const auto off = [&](float known) { return std::abs(known - blur_px); };
+  return at(static_cast<std::size_t>(std::ranges::min_element(kBlursPx, {}, off) - kBlursPx.begin()));
+}
+
 }  // namespace slsd

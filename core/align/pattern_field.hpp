@@ -2,7 +2,11 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <mutex>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/image.hpp"
@@ -45,6 +49,22 @@ class PatternField {
   int width_, height_;
   float blur_sigma_px_, slope_unit_;
   std::vector<std::uint32_t> samples_;
+};
+
+/// The pattern at some blurs, each made when it is first asked for.
+/// @thread thread-safe
+class PatternFields {
+ public:
+  static constexpr std::array<float, 7> kBlursPx{0.42F, 0.55F, 0.72F, 0.95F, 1.25F, 1.65F, 2.15F};
+  explicit PatternFields(Grey8 pattern) : pattern_(std::move(pattern)) {}
+  [[nodiscard]] const PatternField& at(std::size_t blur) const;
+  /// That whose blur is the nearest, of a standard deviation in projector px.
+  [[nodiscard]] const PatternField& nearest(float blur_px) const;
+
+ private:
+  Grey8 pattern_;
+  mutable std::array<std::once_flag, kBlursPx.size()> made_;
+  mutable std::array<std::optional<PatternField>, kBlursPx.size()> fields_;
 };
 
 }  // namespace slsd

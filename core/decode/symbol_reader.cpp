@@ -173,16 +173,11 @@ void SymbolReader::correspond(const GreyView& frame, EpipolarView* view, Executo
 void SymbolReader::fit_lattice(const GreyView& frame, double full, const EpipolarView* view, Executor& executor) {
   centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, pattern().array, executor, lattice_,
                              seen_.misfits);
-  // What was aligned needs no correction.
+  // The paper knows no correction, and what was aligned needs none.
   for (LatticeSymbol& symbol : lattice_.symbols) {
+    if (options_.centre == Method::kDefault && !std::ranges::binary_search(mended_, symbol.sighting)) continue;
     const GreyMoments& moments = seen_.moments[symbol.sighting];
-    if (std::ranges::binary_search(mended_, symbol.sighting)) symbol.centre_px = {moments.x, moments.y};
-  }
-  if (options_.centre == Method::kPaper) {
-    for (LatticeSymbol& symbol : lattice_.symbols) {
-      const GreyMoments& moments = seen_.moments[symbol.sighting];
-      symbol.centre_px = {moments.x, moments.y};
-    }
+    symbol.centre_px = {moments.x, moments.y};
   }
   noise_ = finder_.noise();
   centre_judge_.judge(noise_, view, cells(), executor, lattice_);

@@ -16,14 +16,9 @@ namespace {
 constexpr float kBeyondCellPx = 1.5F;
 /// The share of a patch that agrees with the pattern, below which it is tried whether a neighbour's plane fits better.
 constexpr float kSupportWeak = 0.94F;
-/// The share that noise alone leaves, and that below which a symbol is not there as a whole.
-constexpr float kSupportUsual = 0.95F, kSupportMin = 0.55F;
-/// What a patch's place is off by, fitted to rendered frames (docs/decoder.md): see AlignedSymbol::sigma_mm.
+/// What else a patch's place is off by, fitted as aligned_sigma_px is: see AlignedSymbol::sigma_mm.
 constexpr float kSamplingPx = 0.002F;     // sampling of the pattern, projector px
-constexpr float kOfCovariance = 1.1F;     // of the covariance
-constexpr float kOfScatter = 1.2F;        // of the disparities of the patch's parts
 constexpr float kOfDisagreement = 0.17F;  // with the neighbours' planes
-constexpr float kOfLack = 0.11F;          // px for all that disagrees with the pattern
 constexpr float kOfShading = 0.5F;        // of the relative change of the light for one px
 
 /// How many symbols tell the frame's blur.
@@ -58,9 +53,13 @@ PatchState continued(const PatchMap& from_map, const PatchState& from, const Pat
 
 }  // namespace
 
-const PatternField& PatternFields::at(std::size_t blur) const {
-  std::call_once(made_[blur], [&] { fields_[blur].emplace(pattern_.view(), kBlursPx[blur]); });
-  return *fields_[blur];
+float aligned_sigma_px(float variance, float scatter, float support) {
+  constexpr float kOfVariance = 1.1F, kOfScatter = 1.2F;
+  constexpr float kOfLack = 0.11F;        // px for all that disagrees with the pattern
+  constexpr float kSupportUsual = 0.95F;  // noise alone leaves that
+  const auto square = [](float x) { return x * x; };
+  return std::sqrt(square(kOfVariance) * variance + square(kOfScatter * scatter) +
+                   square(kOfLack * std::max(0.F, kSupportUsual - support)));
 }
 
 SymbolAligner::SymbolAligner(const Pattern& pattern, const CalibratedCamera& camera, const Lens& projector)
@@ -201,12 +200,10 @@ AlignedSymbol SymbolAligner::point_of(const Lattice& lattice, std::size_t index,
   const Eigen::Vector3f by(1, off.x(), off.y());
   const float noise = by.dot(fit.covariance.topLeftCorner<3, 3>() * by) * fit.residual * fit.residual;
   const auto square = [](float x) { return x * x; };
-  const float lack = std::max(0.F, kSupportUsual - fit.support),
-              shading = std::hypot(state.gain_x, state.gain_y) / state.gain;
+  const float shading = std::hypot(state.gain_x, state.gain_y) / state.gain;
   const float sigma_px =
-      std::sqrt(square(kSamplingPx) + square(kOfCovariance) * noise + square(kOfScatter * fit.scatter) +
-                square(kOfDisagreement * disagreement_px(lattice, index)) + square(kOfLack * lack) +
-                square(kOfShading * shading));
+      std::sqrt(square(kSamplingPx) + square(aligned_sigma_px(noise, fit.scatter, fit.support)) +
+                square(kOfDisagreement * disagreement_px(lattice, index)) + square(kOfShading * shading));
   aligned.sigma_mm = static_cast<float>(map.inverse_depth_per_px / (inverse * inverse) * direction.norm() * sigma_px);
   return aligned;
 }

@@ -2,10 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
-#include <array>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -19,20 +16,6 @@
 
 namespace slsd {
 
-/// The pattern at some blurs, each made when it is first asked for.
-/// @thread thread-safe
-class PatternFields {
- public:
-  static constexpr std::array<float, 7> kBlursPx{0.42F, 0.55F, 0.72F, 0.95F, 1.25F, 1.65F, 2.15F};
-  explicit PatternFields(Grey8 pattern) : pattern_(std::move(pattern)) {}
-  [[nodiscard]] const PatternField& at(std::size_t blur) const;
-
- private:
-  Grey8 pattern_;
-  mutable std::array<std::once_flag, kBlursPx.size()> made_;
-  mutable std::array<std::optional<PatternField>, kBlursPx.size()> fields_;
-};
-
 /// A symbol's place after its patch was aligned with the pattern.
 struct AlignedSymbol {
   Eigen::Vector3d point_in_camera;  ///< mm: what the symbol's centroid in the projector lights
@@ -43,6 +26,15 @@ struct AlignedSymbol {
   float sigma_mm;
   bool whole;  ///< the pattern is there as it should be
 };
+
+/// What an aligned patch's place is off by for noise, for relief within it and for what of it is not there: one
+/// standard deviation, projector px. Fitted to rendered frames (docs/decoder.md).
+/// @param variance  of the disparity, from the residual that is left, px^2
+/// @param scatter   of the disparities of the patch's parts, px
+/// @param support   the share of the patch that agrees with the pattern
+[[nodiscard]] float aligned_sigma_px(float variance, float scatter, float support);
+/// The share below which a symbol is not there as a whole.
+inline constexpr float kSupportMin = 0.55F;
 
 /// Aligns each symbol of a lattice with the pattern: its depth, its tilt, how the light falls on it.
 /// @thread thread-bound: keeps its buffers; the pattern is shared with copies

@@ -17,10 +17,7 @@ class Surroundings {
 
   /// Those beside it stand, and their cells lie beside its own.
   [[nodiscard]] bool goes_on_all_around(std::int32_t node) const {
-    return std::ranges::all_of(kDirections, [&](Direction d) {
-      const std::int32_t other = beside(node, d);
-      return stands(node, other) && fits(node, other, d);
-    });
+    return std::ranges::all_of(kDirections, [&](Direction d) { return decoded_beside(nodes_, claims_, node, d) >= 0; });
   }
 
   [[nodiscard]] bool leave_alone(std::int32_t node) const {

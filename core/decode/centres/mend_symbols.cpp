@@ -9,6 +9,7 @@
 #include <Eigen/LU>
 
 #include "core/code/symbol.hpp"
+#include "core/decode/centres/align_symbols.hpp"
 #include "core/decode/grid/neighbourhood.hpp"
 
 namespace slsd {
@@ -17,24 +18,18 @@ namespace {
 constexpr AlignOptions kAlign;
 constexpr int kSteps = 5;
 constexpr float kSettledPx = 0.05F;
-/// The share of a patch that agrees with its letter, below which it is not there, and that which noise alone leaves.
-constexpr float kSupportMin = 0.55F, kSupportUsual = 0.95F;
 constexpr float kAcrossMaxPx = 0.4F;  // off the epipolar line, projector px
 constexpr float kMovedMax = 0.1F;     // from where the neighbours put it, of the pitch
 constexpr int kHeldBy = 2;
 /// From which misfit on what is decoded is aligned, too: whole symbols are nearer to their letters. Its centroid is
 /// given up where the patch agrees well and lies near it; farther off, what was seen is another part of the symbol.
 constexpr float kDoubtfulMisfit = 2.5F, kSupportGood = 0.65F, kNear = 0.08F;
-/// What the place is off by, projector px: as for every symbol that is aligned, see align_symbols.cpp.
-constexpr float kOfVariance = 1.1F, kOfLack = 0.11F, kOfScatter = 1.2F;
 /// A shape's misfit squared says that its centre is off by a hundredth of it, camera px: see CentreJudge.
 constexpr float kMisfitSquaredPerPx = 100;
 
 /// One standard deviation of an aligned letter's place, projector px.
 float sigma_px(const PatchTask& task) {
-  const auto square = [](float x) { return x * x; };
-  return std::sqrt(square(kOfVariance * task.residual) * task.variance +
-                   square(kOfLack * std::max(0.F, kSupportUsual - task.support)) + square(kOfScatter * task.scatter));
+  return aligned_sigma_px(task.residual * task.residual * task.variance, task.scatter, task.support);
 }
 
 bool is_worn(const Sightings& seen, std::int32_t node) {
@@ -44,40 +39,33 @@ bool is_worn(const Sightings& seen, std::int32_t node) {
          (claim.status == RegionStatus::kDecoded && seen.misfits[node] > kDoubtfulMisfit);
 }
 
-/// The neighbour along a direction, if it is decoded, of the same island and of the cell beside; -1 otherwise.
 std::int32_t holder(const Sightings& seen, std::int32_t node, Direction d) {
-  const std::int32_t other = neighbour(seen.nodes, node, d);
-  if (other < 0) return -1;
-  const CellClaim &claim = seen.claims[node], &held_by = seen.claims[other];
-  const bool holds =
-      held_by.status == RegionStatus::kDecoded && held_by.island == claim.island && claim.fits(held_by, d);
-  return holds ? other : -1;
+  return decoded_beside(seen.nodes, seen.claims, node, d);
+}
+
+/// Every letter in a square of twice its side.
+Grey8 draw_letters(const PatternOptions& pattern) {
+  const int size_px = pattern.symbol_size_px, cell_px = 2 * size_px, margin = size_px / 2;
+  const int letters = static_cast<int>(pattern.symbols.size());
+  Grey8 image(letters * cell_px, cell_px);
+  for (int letter = 0; letter < letters; ++letter) {
+    const Grey8 symbol = draw_symbol(pattern.symbols[letter], size_px);
+    for (int y = 0; y < size_px; ++y) {
+      std::uint8_t* row = image.row(margin + y) + letter * cell_px + margin;
+      for (int x = 0; x < size_px; ++x) row[x] = symbol.at(x, y) != 0 ? 255 : 0;
+    }
+  }
+  return image;
 }
 
 }  // namespace
 
 LetterFields::LetterFields(const PatternOptions& pattern)
-    : symbol_size_px_(pattern.symbol_size_px), cell_px_(2 * pattern.symbol_size_px) {
-  const int letters = static_cast<int>(pattern.symbols.size()), margin = symbol_size_px_ / 2;
-  Grey8 image(letters * cell_px_, cell_px_);
-  for (int letter = 0; letter < letters; ++letter) {
-    const Grey8 symbol = draw_symbol(pattern.symbols[letter], symbol_size_px_);
-    for (int y = 0; y < symbol_size_px_; ++y) {
-      std::uint8_t* row = image.row(margin + y) + letter * cell_px_ + margin;
-      for (int x = 0; x < symbol_size_px_; ++x) row[x] = symbol.at(x, y) != 0 ? 255 : 0;
-    }
-  }
-  for (const float blur_px : kBlursPx) fields_.emplace_back(image.view(), blur_px);
-}
-
-const PatternField& LetterFields::at(float blur_px) const {
-  const auto off = [&](float known) { return std::abs(known - blur_px); };
-  return fields_[static_cast<std::size_t>(std::ranges::min_element(kBlursPx, {}, off) - kBlursPx.begin())];
-}
+    : cell_px_(static_cast<float>(2 * pattern.symbol_size_px)), fields_(draw_letters(pattern)) {}
 
 Eigen::Vector2f LetterFields::middle_px(int letter) const {
-  const float middle = 0.5F * static_cast<float>(cell_px_ - 1);
-  return {static_cast<float>(letter * cell_px_) + middle, middle};
+  const float middle = 0.5F * (cell_px_ - 1);
+  return {static_cast<float>(letter) * cell_px_ + middle, middle};
 }
 
 SymbolMender::SymbolMender(const Pattern& pattern)
@@ -87,7 +75,7 @@ SymbolMender::SymbolMender(const Pattern& pattern)
 
 /// Between those on both sides of it, or one step on from two in a line; the mean.
 SymbolMender::Place SymbolMender::place_by_neighbours(const Sightings& seen, std::int32_t node) const {
-  Place place{Eigen::Vector2f::Zero(), LatticeFrame::Zero(), 0, 0, 0};
+  Place place;
   float count = 0;
   for (const Direction d : kDirections) {
     const std::int32_t beside = holder(seen, node, d);
@@ -103,7 +91,7 @@ SymbolMender::Place SymbolMender::place_by_neighbours(const Sightings& seen, std
       place.centre_px += 2 * centre - seen.nodes[next].centre_px, ++count;
     }
   }
-  if (count == 0) return {.held_by = 0};
+  if (count == 0) return {};
   const auto held_by = static_cast<float>(place.held_by);
   return {place.centre_px / count, place.frame / held_by, place.background / held_by, place.peak / held_by,
           place.held_by};
@@ -121,7 +109,9 @@ void SymbolMender::look_at(const GreyView& frame, const FrameNoise& noise, const
   if (x < reach || y < reach || x + reach >= width || y + reach >= height) return;
   const CellClaim& claim = seen.claims[node];
   const Eigen::Vector2f middle = letters_->middle_px(array_.at(claim.row, claim.column));
-  PatchTask task{.x = x, .y = y, .noise = noise.at(0.5F * (place.background + place.peak))};
+  PatchTask task;
+  task.x = x, task.y = y;
+  task.noise = noise.at(0.5F * (place.background + place.peak));
   // The light around it to begin with, so that what is printed there counts little from the first step on.
   task.state.gain = place.peak - place.background, task.state.offset = place.background;
   // The letter lies as the neighbours do; what depth moves it by is an offset along the epipolar line, which a tilt
@@ -135,7 +125,6 @@ void SymbolMender::look_at(const GreyView& frame, const FrameNoise& noise, const
   map.base.topLeftCorner<2, 2>() = place.frame.inverse();
   map.base.topRightCorner<2, 1>() =
       middle - map.origin_px.cast<float>() + map.base.topLeftCorner<2, 2>() * (map.middle_px - place.centre_px);
-  map.reference_inverse_depth = 0, map.inverse_depth_per_px = 1;
   asked_.push_back(node), places_.push_back(place), tasks_.push_back(task);
 }
 
@@ -168,24 +157,23 @@ bool SymbolMender::shows_centre(const GreyView& frame, const PatternField& field
   const PatchState& state = task.state;
   const float limit = kAlign.outlier_sigmas * std::hypot(task.noise, kAlign.misfit_share * state.gain);
   const Eigen::Vector2i at = centre_of(task, letter).array().round().matrix().cast<int>();
-  int agree = 0;
-  for (int y = at.y() - kReach; y <= at.y() + kReach; ++y) {
-    for (int x = at.x() - kReach; x <= at.x() + kReach; ++x) {
-      const float dx = static_cast<float>(x - task.x), dy = static_cast<float>(y - task.y);
-      const Eigen::Vector2f across(-task.map.along.y(), task.map.along.x());
-      const Eigen::Vector2f pixel = task.map.base.topRows<2>() * Eigen::Vector3f(dx, dy, 1) +
-                                    task.map.along * (state.disparity + state.slope_x * dx + state.slope_y * dy) +
-                                    across * state.across + task.map.origin_px.cast<float>();
-      const float light = state.gain + state.gain_x * dx + state.gain_y * dy;
-      const float expected = state.offset + light * field.at(pixel.x(), pixel.y()).value;
-      agree += std::visit(
-          [&](const auto& view) {
-            return view.contains(x, y) && std::abs(static_cast<float>(view.at(x, y)) - expected) <= limit;
-          },
-          frame);
+  const auto expected = [&](const Eigen::Vector2f& off) {
+    const Eigen::Vector2f pixel = projector_offset(task.map, state, off) + task.map.origin_px.cast<float>();
+    const float light = state.gain + state.gain_x * off.x() + state.gain_y * off.y();
+    return state.offset + light * field.at(pixel.x(), pixel.y()).value;
+  };
+  const auto count_agreeing = [&](const auto& view) {
+    int agree = 0;
+    for (int y = at.y() - kReach; y <= at.y() + kReach; ++y) {
+      for (int x = at.x() - kReach; x <= at.x() + kReach; ++x) {
+        if (!view.contains(x, y)) continue;
+        const Eigen::Vector2f off(static_cast<float>(x - task.x), static_cast<float>(y - task.y));
+        agree += std::abs(static_cast<float>(view.at(x, y)) - expected(off)) <= limit;
+      }
     }
-  }
-  return agree >= kAgreeMin;
+    return agree;
+  };
+  return std::visit(count_agreeing, frame) >= kAgreeMin;
 }
 
 bool SymbolMender::is_there(const PatchTask& task, const Sightings& seen, std::int32_t node) const {

@@ -2,7 +2,6 @@
 // Copyright the slsd authors
 #pragma once
 
-#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -19,20 +18,19 @@
 namespace slsd {
 
 /// The letters of a pattern, each dark all round, at some blurs.
-/// @thread reentrant
+/// @thread thread-safe
 class LetterFields {
  public:
   explicit LetterFields(const PatternOptions& pattern);
   /// That of the nearest blur.
   /// @param blur_px  standard deviation, projector px
-  [[nodiscard]] const PatternField& at(float blur_px) const;
+  [[nodiscard]] const PatternField& at(float blur_px) const { return fields_.nearest(blur_px); }
   /// Where in them the middle of a letter's square is.
   [[nodiscard]] Eigen::Vector2f middle_px(int letter) const;
 
  private:
-  static constexpr std::array kBlursPx{0.42F, 0.55F, 0.72F, 0.95F, 1.25F, 1.65F};
-  int symbol_size_px_, cell_px_;
-  std::vector<PatternField> fields_;
+  float cell_px_;
+  PatternFields fields_;
 };
 
 /// Finds the places of symbols whose cells are certain and whose shapes print, relief or an edge has spoilt: a centroid
@@ -54,10 +52,10 @@ class SymbolMender {
 
  private:
   struct Place {
-    Eigen::Vector2f centre_px;  // of the square, in the camera
-    LatticeFrame frame;
-    float background, peak;  // grey levels
-    int held_by;
+    Eigen::Vector2f centre_px = Eigen::Vector2f::Zero();  // of the square, in the camera
+    LatticeFrame frame = LatticeFrame::Zero();
+    float background = 0, peak = 0;  // grey levels
+    int held_by = 0;
   };
   [[nodiscard]] Place place_by_neighbours(const Sightings& seen, std::int32_t node) const;
   void look_at(const GreyView& frame, const FrameNoise& noise, const CellGate& gate, const Sightings& seen,

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/code/code_array.hpp"
+#include "core/decode/grid/cell_claim.hpp"
 #include "core/decode/grid/link_grid.hpp"
 
 namespace slsd {
@@ -19,6 +20,15 @@ using Neighbourhood = std::array<std::int32_t, kWindowCells>;
                                             Direction direction) {
   if (node < 0 || nodes[node].broken[direction]) return -1;
   return nodes[node].links[direction];
+}
+
+/// That neighbour, if it is decoded, of the same island and of the cell that lies there; -1 otherwise.
+[[nodiscard]] inline std::int32_t decoded_beside(const std::vector<GridNode>& nodes,
+                                                 const std::vector<CellClaim>& claims, std::int32_t node,
+                                                 Direction direction) {
+  const std::int32_t other = neighbour(nodes, node, direction);
+  if (other < 0 || claims[other].status != RegionStatus::kDecoded) return -1;
+  return claims[other].island == claims[node].island && claims[node].fits(claims[other], direction) ? other : -1;
 }
 
 /// A node's neighbours along links that are not broken, by Direction; -1 where there is none.

@@ -208,9 +208,10 @@ void Binarizer::binarize_as(const ImageView<T>& frame, double full, std::optiona
 }
 
 float Binarizer::measure_usual_contrast() {
-  constexpr std::size_t kStep = 13;
+  constexpr int kStep = 13;
   contrasts_.clear();
-  for (std::size_t i = 0; i < low_.size(); i += kStep) {
+  for (int tile = 0; tile < rows_ * columns_; tile += kStep) {
+    const int i = (tile / columns_ + 1) * stride_ + 1 + tile % columns_;
     const float contrast = high_[i] - low_[i], midway = low_[i] + 0.5F * contrast;
     if (contrast >= contrast_min(midway)) contrasts_.push_back(contrast / noise_.at(midway));
   }

@@ -53,24 +53,30 @@ GreyView ShapeFinder::binarize(const GreyView& frame, double full, Executor& exe
     return frame;
   }
   binarizer_.binarize(frame, full, mask_, executor);
-  const float blur_px = binarizer_.edge_blur_px();
   noise_ = binarizer_.noise();
-  if (blur_px < kBlurMinPx) {
-    if (binarizer_.usual_contrast_sigma() >= kFaintSigma) return frame;
-    // What is left of the noise is not of single pixels: what sums up over a symbol has all of it.
-    const GreyView smooth = sharpener_.smooth(frame, full).view();
-    const float levels = kSharpenedFull / static_cast<float>(full);
-    frame_levels_ = kSharpenedFull / 255;
-    noise_ = noise_.scaled(levels);
-    binarizer_.binarize(smooth, kSharpenedFull, noise_.scaled(1, kSmoothedNoise), mask_, executor);
-    return smooth;
-  }
+  if (binarizer_.edge_blur_px() >= kBlurMinPx) return binarize_blurred(frame, full, executor);
+  if (binarizer_.usual_contrast_sigma() < kFaintSigma) return binarize_faint(frame, full, executor);
+  return frame;
+}
+
+GreyView ShapeFinder::binarize_blurred(const GreyView& frame, double full, Executor& executor) {
   const float symbol_px = symbol_size_px_ * expected_.in_the_middle().scale;
-  const GreyView sharp = sharpener_.sharpen(frame, std::min(kBlurUndone * blur_px, kBlurMax * symbol_px), full).view();
+  const float undone_px = std::min(kBlurUndone * binarizer_.edge_blur_px(), kBlurMax * symbol_px);
+  const GreyView sharp = sharpener_.sharpen(frame, undone_px, full).view();
   frame_levels_ = kSharpenedFull / 255;
   binarizer_.binarize(sharp, kSharpenedFull, mask_, executor);
   noise_ = binarizer_.noise();
   return sharp;
+}
+
+/// What is left of the noise is not of single pixels: what sums up over a symbol has all of it, and the mask alone is
+/// told of less.
+GreyView ShapeFinder::binarize_faint(const GreyView& frame, double full, Executor& executor) {
+  const GreyView smooth = sharpener_.smooth(frame, full).view();
+  frame_levels_ = kSharpenedFull / 255;
+  noise_ = noise_.scaled(kSharpenedFull / static_cast<float>(full));
+  binarizer_.binarize(smooth, kSharpenedFull, noise_.scaled(1, kSmoothedNoise), mask_, executor);
+  return smooth;
 }
 
 void ShapeFinder::find_regions(const GreyView& frame, Executor& executor) {

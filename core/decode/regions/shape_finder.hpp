@@ -52,6 +52,8 @@ class ShapeFinder {
   [[nodiscard]] const FrameNoise& noise() const { return noise_; }
 
  private:
+  GreyView binarize_blurred(const GreyView& frame, double full, Executor& executor);
+  GreyView binarize_faint(const GreyView& frame, double full, Executor& executor);
   [[nodiscard]] bool is_too_large(const Region& region) const;
   [[nodiscard]] RegionStatus judge_size(const Region& region) const;
 

@@ -54,10 +54,10 @@ inline __attribute__((always_inline)) void add_rows(const float* above, const fl
 }  // namespace
 
 template <class T>
-void Sharpener::sharpen_as(const ImageView<T>& frame, float scale) {
+void Sharpener::filter(const ImageView<T>& frame, float scale) {
   const int width = frame.width, height = frame.height, reach = static_cast<int>(weights_.size()) - 1;
   const int kept = 2 * reach + 1;
-  if (sharpened_.width() != width || sharpened_.height() != height) sharpened_ = Grey16(width, height);
+  if (filtered_.width() != width || filtered_.height() != height) filtered_ = Grey16(width, height);
   padded_.resize(width + 2 * static_cast<std::size_t>(reach));
   rows_.resize(static_cast<std::size_t>(kept) * width);
   sum_.resize(width);
@@ -77,21 +77,21 @@ void Sharpener::sharpen_as(const ImageView<T>& frame, float scale) {
     std::transform(kept_row(y), kept_row(y) + width, sum_.begin(), [&](float value) { return weights_[0] * value; });
     for (int i = 1; i <= reach; ++i)
       Cloned<add_rows>::call(kept_row(y - i), kept_row(y + i), weights_[i], width, sum_.data());
-    std::uint16_t* out = sharpened_.row(y);
+    std::uint16_t* out = filtered_.row(y);
     for (int x = 0; x < width; ++x) out[x] = static_cast<std::uint16_t>(std::clamp(sum_[x], 0.F, kHighest));
   }
 }
 
 const Grey16& Sharpener::sharpen(const GreyView& frame, float blur_px, double full) {
   weights_ = wiener_weights(blur_px);
-  std::visit([&](const auto& view) { sharpen_as(view, kSharpenedFull / static_cast<float>(full)); }, frame);
-  return sharpened_;
+  std::visit([&](const auto& view) { filter(view, kSharpenedFull / static_cast<float>(full)); }, frame);
+  return filtered_;
 }
 
 const Grey16& Sharpener::smooth(const GreyView& frame, double full) {
   weights_ = {0.5F, 0.25F};
-  std::visit([&](const auto& view) { sharpen_as(view, kSharpenedFull / static_cast<float>(full)); }, frame);
-  return sharpened_;
+  std::visit([&](const auto& view) { filter(view, kSharpenedFull / static_cast<float>(full)); }, frame);
+  return filtered_;
 }
 
 }  // namespace slsd

@@ -32,11 +32,11 @@ class Sharpener {
 
  private:
   template <class T>
-  void sharpen_as(const ImageView<T>& frame, float scale);
+  void filter(const ImageView<T>& frame, float scale);
 
-  std::vector<float> weights_;  // from the middle outwards
+  std::vector<float> weights_;  // of the filter, from its middle outwards
   std::vector<float> padded_, rows_, sum_;
-  Grey16 sharpened_;
+  Grey16 filtered_;
 };
 
 }  // namespace slsd

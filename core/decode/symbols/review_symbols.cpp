@@ -219,11 +219,7 @@ void SymbolReview::take_back_held(Sightings& seen) {
     const CellClaim& claim = seen.claims[i];
     if (claim.status != RegionStatus::kDamagedShape || seen.misfits[i] > options_.damaged_distance_held) continue;
     const auto node = static_cast<std::int32_t>(i);
-    const auto holds = [&](Direction d) {
-      const std::int32_t other = neighbour(seen.nodes, node, d);
-      return other >= 0 && seen.claims[other].status == RegionStatus::kDecoded &&
-             seen.claims[other].island == claim.island && claim.fits(seen.claims[other], d);
-    };
+    const auto holds = [&](Direction d) { return decoded_beside(seen.nodes, seen.claims, node, d) >= 0; };
     if (std::ranges::count_if(kDirections, holds) >= kHeldBy) held_.push_back(node);
   }
   for (const std::int32_t node : held_) seen.claims[node].status = RegionStatus::kDecoded;

@@ -139,6 +139,18 @@ TEST(AlignPatch, MapIsThatOfBothLenses) {
   }
 }
 
+TEST(AlignPatch, GoesToTheProjectorAndBack) {
+  const PatchMap map = Scene(0.2).map();
+  PatchState state;
+  state.disparity = 1.5F, state.slope_x = 0.03F, state.slope_y = -0.02F, state.across = 0.4F;
+  state.bend_xx = 4e-4F, state.bend_xy = -3e-4F, state.bend_yy = 6e-4F;
+  for (const Eigen::Vector2f& off : {Eigen::Vector2f(0, 0), Eigen::Vector2f(11, -8), Eigen::Vector2f(-9, 12)}) {
+    const Eigen::Vector2f back = camera_offset(map, state, projector_offset(map, state, off));
+    EXPECT_NEAR(back.x(), off.x(), 2e-3);
+    EXPECT_NEAR(back.y(), off.y(), 2e-3);
+  }
+}
+
 TEST(AlignPatch, FindsThePlane) {
   for (const double distortion : {0.0, -0.25}) {
     const Scene scene(distortion);
