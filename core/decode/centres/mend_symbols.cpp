@@ -19,11 +19,15 @@ constexpr AlignOptions kAlign;
 constexpr int kSteps = 5;
 constexpr float kSettledPx = 0.05F;
 constexpr float kAcrossMaxPx = 0.4F;  // off the epipolar line, projector px
-constexpr float kMovedMax = 0.1F;     // from where the neighbours put it, of the pitch
+/// From where its neighbours put it, and from where it was decoded, of the pitch.
+constexpr float kMovedMax = 0.08F;
+/// How far its tilt from its neighbours' moves the middles of its cell's sides, projector px: parts of two surfaces
+/// look tilted more, and the place is then on neither.
+constexpr float kTiltMaxPx = 0.5F;
 constexpr int kHeldBy = 2;
 /// From which misfit on what is decoded is aligned, too: whole symbols are nearer to their letters. Its centroid is
 /// given up where the patch agrees well and lies near it; farther off, what was seen is another part of the symbol.
-constexpr float kDoubtfulMisfit = 2.5F, kSupportGood = 0.65F, kNear = 0.08F;
+constexpr float kDoubtfulMisfit = 2.5F, kSupportGood = 0.65F;
 /// A shape's misfit squared says that its centre is off by a hundredth of it, camera px: see CentreJudge.
 constexpr float kMisfitSquaredPerPx = 100;
 
@@ -176,17 +180,20 @@ bool SymbolMender::shows_centre(const GreyView& frame, const PatternField& field
   return std::visit(count_agreeing, frame) >= kAgreeMin;
 }
 
-bool SymbolMender::is_there(const PatchTask& task, const Sightings& seen, std::int32_t node) const {
+bool SymbolMender::is_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Sightings& seen,
+                            std::int32_t node) const {
   if (task.failed || task.support < kSupportMin || std::abs(task.moved) > kSettledPx) return false;
   if (std::abs(task.state.across) > kAcrossMaxPx || std::abs(task.state.disparity) > kMovedMax * pitch_px_)
     return false;
+  const Eigen::RowVector2f slopes(task.state.slope_x, task.state.slope_y);
+  if (0.5F * pitch_px_ * (slopes * lattice_frame).norm() > kTiltMaxPx) return false;
   const CellClaim& claim = seen.claims[node];
   const Eigen::Vector2f centre = centre_of(task, array_.at(claim.row, claim.column));
   // What is tilted out of all proportion lies anywhere.
   if (!((centre - task.map.middle_px).norm() < 0.5F * pitch_px_)) return false;
   if (claim.status != RegionStatus::kDecoded) return true;
   const Eigen::Vector2f moved_px = centre - seen.nodes[node].centre_px;
-  return task.support >= kSupportGood && (seen.nodes[node].frame.inverse() * moved_px).norm() < kNear * pitch_px_;
+  return task.support >= kSupportGood && (seen.nodes[node].frame.inverse() * moved_px).norm() < kMovedMax * pitch_px_;
 }
 
 void SymbolMender::take_over(const PatchTask& task, const LatticeFrame& lattice_frame,
@@ -221,7 +228,7 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
     const std::size_t before = mended_.size();
     for (std::size_t i = 0; i < asked_.size(); ++i) {
       const CellClaim& claim = seen.claims[asked_[i]];
-      if (!is_there(tasks_[i], seen, asked_[i]) ||
+      if (!is_there(tasks_[i], places_[i].frame, seen, asked_[i]) ||
           !shows_centre(frame, field, tasks_[i], array_.at(claim.row, claim.column)))
         continue;
       take_over(tasks_[i], places_[i].frame, prototypes, seen, asked_[i]);

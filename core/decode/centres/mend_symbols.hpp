@@ -64,7 +64,8 @@ class SymbolMender {
   [[nodiscard]] Eigen::Vector2f centre_of(const PatchTask& task, int letter) const;
   [[nodiscard]] bool shows_centre(const GreyView& frame, const PatternField& field, const PatchTask& task,
                                   int letter) const;
-  [[nodiscard]] bool is_there(const PatchTask& task, const Sightings& seen, std::int32_t node) const;
+  [[nodiscard]] bool is_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Sightings& seen,
+                              std::int32_t node) const;
   void take_over(const PatchTask& task, const LatticeFrame& lattice_frame, std::span<const Prototype> prototypes,
                  Sightings& seen, std::int32_t node) const;
 

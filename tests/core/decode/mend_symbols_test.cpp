@@ -120,7 +120,21 @@ TEST_F(MendOneOfMany, FollowsDepthAlongTheEpipolarLine) {
 }
 
 TEST_F(MendOneOfMany, LeavesWhatLiesFarAlongTheLine) {
-  for (int i = 0; i < kSide * kSide; ++i) seen_.nodes[i].centre_px.x() += 2.6F;
+  // From farther off it would not be found at all.
+  for (int i = 0; i < kSide * kSide; ++i) seen_.nodes[i].centre_px.x() += 2.2F;
+  EXPECT_EQ(mend(), std::nullopt);
+}
+
+TEST_F(MendOneOfMany, LeavesWhatLiesOnTwoSurfaces) {
+  const Grey8 nearer = simulate(draw_pattern(pattern_), rig_, plane({0, 0, 1992}, {0.4, 0.15, -1}),
+                                {.dark = 12, .lit = 170, .noise_sigma = 1});
+  const Eigen::Vector2f centre = true_centre(kSide / 2, kSide / 2);
+  for (int y = -14; y <= 14; ++y) {
+    for (int x = 0; x <= 14; ++x) {
+      const int u = static_cast<int>(std::lround(centre.x())) + x, v = static_cast<int>(std::lround(centre.y())) + y;
+      frame_.at(u, v) = nearer.at(u, v);
+    }
+  }
   EXPECT_EQ(mend(), std::nullopt);
 }
 
