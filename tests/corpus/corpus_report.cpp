@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <span>
@@ -88,8 +89,12 @@ std::string reasons(const Decoding& decoding) {
 }
 
 /// Scenes that are not in the corpus, and their mean.
-/// @param texture  their images white/frame.png are divided out, where they have any
-Result<> print_folders(std::span<char*> folders, bool texture) {
+struct FolderOptions {
+  DecodeOptions decode;
+  bool texture = false;  ///< their images white/frame.png are divided out, where they have any
+};
+
+Result<> print_folders(std::span<char*> folders, const FolderOptions& options) {
   std::puts(
       "| scene | resolvable | decoded % | inliers % | wrong | depth RMS mm | bias mm | worst mm | regions rejected |\n"
       "|---|---|---|---|---|---|---|---|---|");
@@ -98,12 +103,12 @@ Result<> print_folders(std::span<char*> folders, bool texture) {
   for (const char* folder : folders) {
     const auto scene = read_scene(std::filesystem::absolute(folder).native());
     if (!scene) return tl::unexpected(scene.error());
-    auto decoder = Decoder::create(scene->pattern, scene->calibration, 0, {});
+    auto decoder = Decoder::create(scene->pattern, scene->calibration, 0, options.decode);
     if (!decoder) return tl::unexpected(decoder.error());
     SceneLight light;
     light.full = guess_full_level(view(scene->frame));
     const auto white = read_image(std::filesystem::path(folder) / "white" / "frame.png");
-    if (texture && white) light.white = view(*white);
+    if (options.texture && white) light.white = view(*white);
     const auto decoding = decode_in_light(*decoder, view(scene->frame), light);
     if (!decoding) return tl::unexpected(decoding.error());
     const Score scored = score(*scene, (*decoding)->points);
@@ -120,12 +125,16 @@ Result<> print_folders(std::span<char*> folders, bool texture) {
 }  // namespace
 }  // namespace slsd
 
-/// Without arguments the corpus; else folders with the files of a scene of it, after --texture in white light too.
+/// Without arguments the corpus; else folders with the files of a scene of it. Before them --texture, for white light
+/// too, and --depth-max MM, for scenes beyond the usual working depth.
 int main(int argc, char** argv) {
   std::span<char*> folders(argv + 1, argv + argc);
-  const bool texture = !folders.empty() && std::string_view(folders.front()) == "--texture";
-  if (texture) folders = folders.subspan(1);
-  const auto done = folders.empty() ? slsd::print_report() : slsd::print_folders(folders, texture);
+  slsd::FolderOptions options;
+  const auto is_next = [&](std::string_view option) { return !folders.empty() && folders.front() == option; };
+  if (is_next("--texture")) options.texture = true, folders = folders.subspan(1);
+  if (is_next("--depth-max") && folders.size() > 1)
+    options.decode.depth_max_mm = std::strtod(folders[1], nullptr), folders = folders.subspan(2);
+  const auto done = folders.empty() ? slsd::print_report() : slsd::print_folders(folders, options);
   if (!done) std::fprintf(stderr, "corpus-report: %s\n", slsd::to_string(done.error()).c_str());
   return done ? 0 : 1;
 }
