@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "core/align/pattern_field.hpp"
 #include "core/code/pattern.hpp"
-#include "core/decode/centres/align_symbols.hpp"
 #include "core/decode/decoder.hpp"
 #include "core/dense/clean_map.hpp"
 #include "core/dense/dense_map.hpp"

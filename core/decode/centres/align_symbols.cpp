@@ -196,7 +196,7 @@ AlignedSymbol SymbolAligner::point_of(const Lattice& lattice, std::size_t index,
   AlignedSymbol aligned;
   aligned.point_in_camera = direction / inverse;
   aligned.centre_px = map.middle_px + off;
-  aligned.whole = fit.solved && fit.support > kSupportMin;
+  aligned.whole = fit.solved && fit.support > kWholeSupportMin;
   const Eigen::Vector3f by(1, off.x(), off.y());
   const float noise = by.dot(fit.covariance.topLeftCorner<3, 3>() * by) * fit.residual * fit.residual;
   const auto square = [](float x) { return x * x; };

@@ -34,7 +34,7 @@ struct AlignedSymbol {
 /// @param support   the share of the patch that agrees with the pattern
 [[nodiscard]] float aligned_sigma_px(float variance, float scatter, float support);
 /// The share below which a symbol is not there as a whole.
-inline constexpr float kSupportMin = 0.55F;
+inline constexpr float kWholeSupportMin = 0.55F;
 
 /// Aligns each symbol of a lattice with the pattern: its depth, its tilt, how the light falls on it.
 /// @thread thread-bound: keeps its buffers; the pattern is shared with copies

@@ -182,7 +182,7 @@ bool SymbolMender::shows_centre(const GreyView& frame, const PatternField& field
 
 bool SymbolMender::is_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Sightings& seen,
                             std::int32_t node) const {
-  if (task.failed || task.support < kSupportMin || std::abs(task.moved) > kSettledPx) return false;
+  if (task.failed || task.support < kWholeSupportMin || std::abs(task.moved) > kSettledPx) return false;
   if (std::abs(task.state.across) > kAcrossMaxPx || std::abs(task.state.disparity) > kMovedMax * pitch_px_)
     return false;
   const Eigen::RowVector2f slopes(task.state.slope_x, task.state.slope_y);
