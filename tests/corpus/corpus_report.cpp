@@ -2,7 +2,6 @@
 // Copyright the slsd authors
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <span>
@@ -10,6 +9,8 @@
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "core/decode/decoder.hpp"
 #include "core/exposure/light_levels.hpp"
@@ -94,13 +95,13 @@ struct FolderOptions {
   bool texture = false;  ///< their images white/frame.png are divided out, where they have any
 };
 
-Result<> print_folders(std::span<char*> folders, const FolderOptions& options) {
+Result<> print_folders(std::span<const std::string> folders, const FolderOptions& options) {
   std::puts(
       "| scene | resolvable | decoded % | inliers % | wrong | depth RMS mm | bias mm | worst mm | regions rejected |\n"
       "|---|---|---|---|---|---|---|---|---|");
   double decoded = 0;
   std::size_t wrong = 0;
-  for (const char* folder : folders) {
+  for (const std::string& folder : folders) {
     const auto scene = read_scene(std::filesystem::absolute(folder).native());
     if (!scene) return tl::unexpected(scene.error());
     auto decoder = Decoder::create(scene->pattern, scene->calibration, 0, options.decode);
@@ -125,15 +126,16 @@ Result<> print_folders(std::span<char*> folders, const FolderOptions& options) {
 }  // namespace
 }  // namespace slsd
 
-/// Without arguments the corpus; else folders with the files of a scene of it. Before them --texture, for white light
-/// too, and --depth-max MM, for scenes beyond the usual working depth.
 int main(int argc, char** argv) {
-  std::span<char*> folders(argv + 1, argv + argc);
+  std::vector<std::string> folders;
   slsd::FolderOptions options;
-  const auto is_next = [&](std::string_view option) { return !folders.empty() && folders.front() == option; };
-  if (is_next("--texture")) options.texture = true, folders = folders.subspan(1);
-  if (is_next("--depth-max") && folders.size() > 1)
-    options.decode.depth_max_mm = std::strtod(folders[1], nullptr), folders = folders.subspan(2);
+  CLI::App app("Decodes scenes and prints what is decoded, what is wrong and how exact it is.");
+  auto* const folders_given =
+      app.add_option("folders", folders, "each with the files of a scene; without any the corpus");
+  app.add_flag("--texture", options.texture, "divide out their white/frame.png")->needs(folders_given);
+  app.add_option("--depth-max", options.decode.depth_max_mm, "mm, for scenes beyond the usual working depth")
+      ->needs(folders_given);
+  CLI11_PARSE(app, argc, argv);
   const auto done = folders.empty() ? slsd::print_report() : slsd::print_folders(folders, options);
   if (!done) std::fprintf(stderr, "corpus-report: %s\n", slsd::to_string(done.error()).c_str());
   return done ? 0 : 1;
