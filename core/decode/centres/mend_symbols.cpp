@@ -43,10 +43,6 @@ bool is_worn(const Sightings& seen, std::int32_t node) {
          (claim.status == RegionStatus::kDecoded && seen.misfits[node] > kDoubtfulMisfit);
 }
 
-std::int32_t holder(const Sightings& seen, std::int32_t node, Direction d) {
-  return decoded_beside(seen.nodes, seen.claims, node, d);
-}
-
 /// Every letter in a square of twice its side.
 Grey8 draw_letters(const PatternOptions& pattern) {
   const int size_px = pattern.symbol_size_px, cell_px = 2 * size_px, margin = size_px / 2;
@@ -79,16 +75,17 @@ SymbolMender::SymbolMender(const Pattern& pattern)
 
 /// Between those on both sides of it, or one step on from two in a line; the mean.
 SymbolMender::Place SymbolMender::place_by_neighbours(const Sightings& seen, std::int32_t node) const {
+  const auto holder = [&](std::int32_t of, Direction d) { return decoded_beside(seen.nodes, seen.claims, of, d); };
   Place place;
   float count = 0;
   for (const Direction d : kDirections) {
-    const std::int32_t beside = holder(seen, node, d);
+    const std::int32_t beside = holder(node, d);
     if (beside < 0) continue;
     ++place.held_by;
     const GreyMoments& light = seen.moments[beside];
     place.frame += seen.nodes[beside].frame, place.background += light.background, place.peak += light.peak;
     const Eigen::Vector2f& centre = seen.nodes[beside].centre_px;
-    const std::int32_t behind = holder(seen, node, opposite(d)), next = holder(seen, beside, d);
+    const std::int32_t behind = holder(node, opposite(d)), next = holder(beside, d);
     if (behind >= 0) {
       place.centre_px += 0.5F * (centre + seen.nodes[behind].centre_px), ++count;
     } else if (next >= 0) {

@@ -45,6 +45,15 @@ RC_GTEST_PROP(PatternField, SlopesAreThoseOfItsSamples, ()) {
   RC_ASSERT(std::abs(sample.slope_v - (light(u, v + kStep) - light(u, v - kStep)) / (2 * kStep)) < 2e-3);
 }
 
+TEST(PatternFields, FindsTheNearestBlur) {
+  const PatternFields fields(blocks());
+  EXPECT_EQ(fields.nearest(0).blur_sigma_px(), PatternFields::kBlursPx.front());
+  EXPECT_EQ(fields.nearest(9).blur_sigma_px(), PatternFields::kBlursPx.back());
+  EXPECT_EQ(fields.nearest(0.8F).blur_sigma_px(), 0.72F);
+  EXPECT_EQ(fields.nearest(0.9F).blur_sigma_px(), 0.95F);
+  EXPECT_EQ(&fields.nearest(0.9F), &fields.at(3)) << "made once";
+}
+
 TEST(PatternField, IsDarkFarOutside) {
   Grey8 lit(20, 20, 255);
   const PatternField field(lit.view(), 1.F);
