@@ -174,9 +174,9 @@ void GridLinker::measure_changed_frames(std::vector<GridNode>& nodes) {
 
 /// Whether the same step behind and before a link, or most of those behind, before and on both sides, disagree with it.
 /// Along a straight edge in depth the links on both sides agree with it; those behind and before do not.
-bool GridLinker::is_inconsistent(const std::vector<GridNode>& nodes, std::size_t from, Direction d) const {
+bool GridLinker::is_inconsistent(const std::vector<GridNode>& nodes, std::size_t from, Direction d,
+                                 const Eigen::Matrix2f& cells_from_camera) const {
   const Eigen::Vector2f own = link_vector(nodes, from, d);
-  const Eigen::Matrix2f cells_from_camera = nodes[from].frame.inverse() / options_.pitch_px;
   const auto is_torn = [&](std::size_t node) { return nodes[node].torn || nodes[nodes[node].links[d]].torn; };
   const bool own_torn = is_torn(from);
   int count = 0, against = 0;
@@ -200,9 +200,11 @@ void GridLinker::break_inconsistent(std::vector<GridNode>& nodes, Executor& exec
   // Each link is asked about once, as links are mutual, and by one of its ends.
   executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
     for (std::size_t i = first; i < last; ++i) {
+      const Eigen::Matrix2f cells_from_camera = nodes[i].frame.inverse() / options_.pitch_px;
       for (const Direction d : {kRight, kDown}) {
         const std::int32_t other = nodes[i].links[d];
-        if (other >= 0 && is_inconsistent(nodes, i, d)) inconsistent_[i][d] = inconsistent_[other][opposite(d)] = true;
+        if (other >= 0 && is_inconsistent(nodes, i, d, cells_from_camera))
+          inconsistent_[i][d] = inconsistent_[other][opposite(d)] = true;
       }
     }
   });

@@ -95,7 +95,8 @@ class GridLinker {
   void choose(const std::vector<GridNode>& nodes, const Range& range, std::int32_t from, float radius);
   void find_mutual(std::vector<GridNode>& nodes, float radius, Executor& executor);
   void measure_changed_frames(std::vector<GridNode>& nodes);
-  [[nodiscard]] bool is_inconsistent(const std::vector<GridNode>& nodes, std::size_t from, Direction direction) const;
+  [[nodiscard]] bool is_inconsistent(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
+                                     const Eigen::Matrix2f& cells_from_camera) const;
   void break_inconsistent(std::vector<GridNode>& nodes, Executor& executor);
 
   LinkGridOptions options_;
