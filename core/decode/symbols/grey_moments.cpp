@@ -41,28 +41,103 @@ inline __attribute__((always_inline)) Words load_pixels(const std::uint8_t* pixe
                                                          16, 2, 16, 3, 16, 4, 16, 5, 16, 6, 16, 7, 16));
 }
 
+/// Writes eight pixels of a patch, and widens its range by those that are not kOutside.
+struct PatchWriter {
+  float* patch;
+  Lanes least = Lanes{} + PatchRange().least, greatest = Lanes{} + PatchRange().greatest;
+
+  __attribute__((always_inline)) void write(const Lanes& value) {
+    std::memcpy(patch, &value, sizeof value);
+    patch += kLanes;
+    least = value < least ? value : least;
+    greatest = value > greatest ? value : greatest;
+  }
+  __attribute__((always_inline)) void tell(PatchRange& range) const {
+    range = {};
+    for (int lane = 0; lane < kLanes; ++lane) {
+      range.least = std::min(range.least, least[lane]);
+      range.greatest = std::max(range.greatest, greatest[lane]);
+    }
+  }
+};
+
+template <class T>
+inline __attribute__((always_inline)) void widen_pixels(const T* pixels, Lanes& grey) {
+  grey = __builtin_convertvector(__builtin_convertvector(load_pixels(pixels), IntLanes), Lanes);
+}
+
 /// Grey values between before[y] and after[y] of each row, kOutside elsewhere; the patch lies in the frame, padding and
 /// all.
 template <class T>
 inline __attribute__((always_inline)) void copy_rows(const ImageView<T>& frame, const PatchPlace& place,
                                                      const PatchEdges& edges, float* patch, PatchRange& range) {
-  Lanes least = Lanes{} + range.least, greatest = Lanes{} + range.greatest;
+  PatchWriter writer{patch};
   for (int y = 0; y < place.height; ++y) {
     const T* row = frame.row(place.top + y) + place.left;
     const int before = edges.before[y], after = edges.after[y];
-    for (int x = 0; x < place.stride; x += kLanes, patch += kLanes) {
+    for (int x = 0; x < place.stride; x += kLanes) {
       const IntLanes at = kIntLane + x;
-      const Lanes grey = __builtin_convertvector(__builtin_convertvector(load_pixels(row + x), IntLanes), Lanes);
-      const Lanes value = ((at > before) & (at < after)) ? grey : Lanes{} + kOutside;
-      std::memcpy(patch, &value, sizeof value);
-      least = value < least ? value : least;
-      greatest = value > greatest ? value : greatest;
+      Lanes grey;
+      widen_pixels(row + x, grey);
+      writer.write(((at > before) & (at < after)) ? grey : Lanes{} + kOutside);
     }
   }
-  for (int lane = 0; lane < kLanes; ++lane) {
-    range.least = std::min(range.least, least[lane]);
-    range.greatest = std::max(range.greatest, greatest[lane]);
+  writer.tell(range);
+}
+
+/// A cell of the grid seen from a patch: its middle, from the first pixel, and the way from there in projector px.
+struct CellSquare {
+  float middle_x, middle_y, half_px;
+  Eigen::Matrix2f projector_from_camera;
+
+  [[nodiscard]] bool contains(int x, int y) const {
+    const Eigen::Vector2f from_middle(static_cast<float>(x) - middle_x, static_cast<float>(y) - middle_y);
+    return (projector_from_camera * from_middle).cwiseAbs().maxCoeff() <= half_px;
   }
+};
+
+/// As copy_rows, of the pixels in a cell.
+template <class T>
+inline __attribute__((always_inline)) void copy_square(const ImageView<T>& frame, const PatchPlace& place,
+                                                       const CellSquare& cell, float* patch, PatchRange& range) {
+  const Eigen::Matrix2f& way = cell.projector_from_camera;
+  const float half = cell.half_px;
+  PatchWriter writer{patch};
+  for (int y = 0; y < place.height; ++y) {
+    const T* row = frame.row(place.top + y) + place.left;
+    const float down = static_cast<float>(y) - cell.middle_y;
+    const Lanes u_of_row = Lanes{} + way(0, 1) * down, v_of_row = Lanes{} + way(1, 1) * down;
+    for (int x = 0; x < place.stride; x += kLanes) {
+      const Lanes right = kLane + (static_cast<float>(x) - cell.middle_x);
+      const Lanes u = right * way(0, 0) + u_of_row, v = right * way(1, 0) + v_of_row;
+      Lanes grey;
+      widen_pixels(row + x, grey);
+      writer.write(((u >= -half) & (u <= half) & (v >= -half) & (v <= half)) ? grey : Lanes{} + kOutside);
+    }
+  }
+  writer.tell(range);
+}
+
+/// Light that falls on a patch as 1 + x right + y down, camera px from its middle.
+struct Slope {
+  float middle_x, middle_y, x, y;
+};
+
+/// Divides the light out, of what is above the background.
+inline __attribute__((always_inline)) void level_rows(int stride, int rows, const Slope& light, float background,
+                                                      float* patch, PatchRange& range) {
+  PatchWriter writer{patch};
+  for (int y = 0; y < rows; ++y) {
+    const float of_row = 1 + light.y * (static_cast<float>(y) - light.middle_y);
+    for (int x = 0; x < stride; x += kLanes) {
+      Lanes here = of_row + light.x * (kLane + (static_cast<float>(x) - light.middle_x)), value;
+      here = here > kLeastLight ? here : Lanes{} + kLeastLight;
+      slsd::load(writer.patch, value);
+      value = background + (value - background) / here;
+      writer.write(value < 0 ? Lanes{} : value);  // kOutside is not below zero
+    }
+  }
+  writer.tell(range);
 }
 
 int padded(int width) {
@@ -133,8 +208,7 @@ void GreyMomentMeter::copy_patch(const ImageView<T>& frame, const Region& region
   height_ = region.height_px() + 2 * margin_px_;
   stride_ = padded(width_);
   const PatchEdges edges = follow_edge(region, runs);
-  range_ = {};
-  if (left_ >= 0 && top_ >= 0 && left_ + stride_ <= frame.width && top_ + height_ <= frame.height) {
+  if (lies_in(frame)) {
     patch_.resize(static_cast<std::size_t>(stride_) * height_);
     return Cloned<copy_rows<T>>::call(frame, {left_, top_, stride_, height_}, edges, patch_.data(), range_);
   }
@@ -158,15 +232,17 @@ void GreyMomentMeter::copy_cell(const ImageView<T>& frame, const Eigen::Vector2f
   width_ = static_cast<int>(std::ceil(2 * reach.x())) + 2;
   height_ = static_cast<int>(std::ceil(2 * reach.y())) + 2;
   stride_ = padded(width_);
-  const Eigen::Matrix2f inverse = lattice_frame.inverse();
+  const CellSquare cell{centre_px.x() - static_cast<float>(left_), centre_px.y() - static_cast<float>(top_), half_px,
+                        lattice_frame.inverse()};
+  if (lies_in(frame)) {
+    patch_.resize(static_cast<std::size_t>(stride_) * height_);
+    return Cloned<copy_square<T>>::call(frame, {left_, top_, stride_, height_}, cell, patch_.data(), range_);
+  }
   patch_.assign(static_cast<std::size_t>(stride_) * height_, kOutside);
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
-      if (!frame.contains(left_ + x, top_ + y)) continue;
-      const Eigen::Vector2f from_centre(static_cast<float>(left_ + x) - centre_px.x(),
-                                        static_cast<float>(top_ + y) - centre_px.y());
-      if ((inverse * from_centre).cwiseAbs().maxCoeff() > half_px) continue;
-      patch_[y * stride_ + x] = static_cast<float>(frame.at(left_ + x, top_ + y));
+      if (frame.contains(left_ + x, top_ + y) && cell.contains(x, y))
+        patch_[y * stride_ + x] = static_cast<float>(frame.at(left_ + x, top_ + y));
     }
   }
   range_ = range_of(patch_.data(), stride_ * height_);
@@ -175,16 +251,9 @@ void GreyMomentMeter::copy_cell(const ImageView<T>& frame, const Eigen::Vector2f
 void GreyMomentMeter::level_light(const Eigen::Vector2f& centre_px, const Eigen::Vector2f& shading) {
   PatchLevels levels;
   find_levels(patch_.data(), stride_ * height_, range_, levels);
-  for (int y = 0; y < height_; ++y) {
-    for (int x = 0; x < width_; ++x) {
-      float& value = patch_[y * stride_ + x];
-      if (std::isnan(value)) continue;
-      const float light = 1 + shading.x() * (static_cast<float>(left_ + x) - centre_px.x()) +
-                          shading.y() * (static_cast<float>(top_ + y) - centre_px.y());
-      value = std::max(0.F, levels.background + (value - levels.background) / std::max(light, kLeastLight));
-    }
-  }
-  range_ = range_of(patch_.data(), stride_ * height_);
+  const Slope light{centre_px.x() - static_cast<float>(left_), centre_px.y() - static_cast<float>(top_), shading.x(),
+                    shading.y()};
+  Cloned<level_rows>::call(stride_, height_, light, levels.background, patch_.data(), range_);
 }
 
 GreyMoments GreyMomentMeter::moments_of_patch() {

@@ -60,6 +60,11 @@ class GreyMomentMeter {
                                          const Eigen::Vector2f& shading);
 
  private:
+  /// Whether the patch does, padding and all.
+  template <class T>
+  [[nodiscard]] bool lies_in(const ImageView<T>& frame) const {
+    return left_ >= 0 && top_ >= 0 && left_ + stride_ <= frame.width && top_ + height_ <= frame.height;
+  }
   [[nodiscard]] PatchEdges follow_edge(const Region& region, std::span<const Run> runs);
   template <class T>
   void copy_patch(const ImageView<T>& frame, const Region& region, std::span<const Run> runs);

@@ -152,6 +152,27 @@ TEST_P(Clones, WeighPatchesAlike) {
   }
 }
 
+TEST_P(Clones, MeasureCellsAlike) {
+  const Grey8 frame = some_frame<std::uint8_t>(64, 60, 255);
+  const Grey16 wide = sixteen_bits(frame);
+  LatticeFrame lattice_frame;
+  lattice_frame << 1.3F, 0.2F, -0.1F, 1.1F;
+  const auto measured = [&] {
+    GreyMomentMeter meter(2);
+    const Eigen::Vector2f centre_px(30.3F, 28.6F), shading(0.02F, -0.03F);
+    return std::array{meter.measure_cell(frame.view(), centre_px, lattice_frame, 7.F, shading),
+                      meter.measure_cell(wide.view(), centre_px, lattice_frame, 7.F, shading)};
+  };
+  const auto here = with(GetParam(), measured), plain = with(Clone::kPlain, measured);
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    ASSERT_GT(plain[i].weight, 0);
+    expect_near(here[i].x, plain[i].x);
+    expect_near(here[i].y, plain[i].y);
+    expect_near(here[i].weight, plain[i].weight);
+    expect_near(here[i].m20, plain[i].m20);
+  }
+}
+
 TEST_P(Clones, ClassifyAlike) {
   std::mt19937 random(3);
   std::normal_distribution<float> normal;

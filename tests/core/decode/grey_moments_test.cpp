@@ -227,6 +227,22 @@ TEST(GreyMoments, InACellLeaveTheNeighboursOut) {
   EXPECT_EQ(beside.weight, alone.weight);
 }
 
+TEST(GreyMoments, InACellAreTheSameBesideTheBorder) {
+  const Grey8 frame = blurred_box({14.3, 12.8, 26, 23});
+  LatticeFrame lattice_frame;
+  lattice_frame << 1.1F, 0.15F, -0.1F, 1.05F;
+  const auto in_cell = [&](const ImageView<std::uint8_t>& view) {
+    return GreyMomentMeter(kMarginPx).measure_cell(view, {20.2F, 17.9F}, lattice_frame, 7.F, {0.02F, -0.01F});
+  };
+  // The cell fits, what fills the patch's rows up to whole registers does not.
+  const ImageView<std::uint8_t> narrow{frame.data(), 31, frame.height(), frame.width()};
+  const GreyMoments inside = in_cell(frame.view()), beside = in_cell(narrow);
+  EXPECT_NEAR(beside.x, inside.x, 1e-4);
+  EXPECT_NEAR(beside.y, inside.y, 1e-4);
+  EXPECT_NEAR(beside.weight, inside.weight, 1e-2);
+  EXPECT_EQ(beside.peak, inside.peak);
+}
+
 TEST(GreyMoments, InACellBeyondTheFrameWeighNothing) {
   const Grey8 frame = blurred_box({14, 12, 26, 23});
   const GreyMoments moments =
