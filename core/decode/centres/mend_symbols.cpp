@@ -25,9 +25,10 @@ constexpr float kMovedMax = 0.08F;
 /// look tilted more, and the place is then on neither.
 constexpr float kTiltMaxPx = 0.5F;
 constexpr int kHeldBy = 2;
-/// From which misfit on what is decoded is aligned, too: whole symbols are nearer to their letters. Its centroid is
-/// given up where the patch agrees well and lies near it; farther off, what was seen is another part of the symbol.
-constexpr float kDoubtfulMisfit = 2.5F, kSupportGood = 0.65F;
+/// From which misfit on, or how far off its line in projector px, what is decoded is aligned, too: whole symbols are
+/// nearer to their letters and to their lines. Its centroid is given up where the patch agrees well and lies near it;
+/// farther off, what was seen is another part of the symbol.
+constexpr float kDoubtfulMisfit = 2.5F, kDoubtfulAcrossPx = 0.25F, kSupportGood = 0.65F;
 /// A shape's misfit squared says that its centre is off by a hundredth of it, camera px: see CentreJudge.
 constexpr float kMisfitSquaredPerPx = 100;
 
@@ -36,11 +37,12 @@ float sigma_px(const PatchTask& task) {
   return aligned_sigma_px(task.residual * task.residual * task.variance, task.scatter, task.support);
 }
 
-bool is_worn(const Sightings& seen, std::int32_t node) {
+bool is_worn(const CellGate& gate, const Sightings& seen, std::int32_t node) {
   const CellClaim& claim = seen.claims[node];
   if (claim.island < 0) return false;
-  return claim.status == RegionStatus::kDamagedShape || claim.status == RegionStatus::kOffEpipolarLine ||
-         (claim.status == RegionStatus::kDecoded && seen.misfits[node] > kDoubtfulMisfit);
+  if (claim.status != RegionStatus::kDecoded)
+    return claim.status == RegionStatus::kDamagedShape || claim.status == RegionStatus::kOffEpipolarLine;
+  return seen.misfits[node] > kDoubtfulMisfit || gate.off_line_px(node, claim.row, claim.column) > kDoubtfulAcrossPx;
 }
 
 /// Every letter in a square of twice its side.
@@ -216,7 +218,7 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
   const PatternField& field = letters_->at(blur_px);
   mended_.clear(), worn_.clear();
   for (std::size_t i = 0; i < seen.size(); ++i)
-    if (const auto node = static_cast<std::int32_t>(i); is_worn(seen, node)) worn_.push_back(node);
+    if (const auto node = static_cast<std::int32_t>(i); is_worn(gate, seen, node)) worn_.push_back(node);
   // What is mended holds those beside it.
   while (!worn_.empty()) {
     asked_.clear(), places_.clear(), tasks_.clear();
@@ -234,7 +236,7 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
     worn_.clear();
     for (std::size_t i = before; i < mended_.size(); ++i) {
       for (const std::int32_t other : seen.nodes[mended_[i]].links)
-        if (other >= 0 && seen.claims[other].status != RegionStatus::kDecoded && is_worn(seen, other))
+        if (other >= 0 && seen.claims[other].status != RegionStatus::kDecoded && is_worn(gate, seen, other))
           worn_.push_back(other);
     }
     std::ranges::sort(worn_);
