@@ -44,7 +44,10 @@ SymbolReader::SymbolReader(const IndexedPattern& indexed, const Lens& projector,
       window_decoder_(pattern(), indexed.codebook(), options.wrong_cells_max),
       review_(pattern(), {}),
       mender_(pattern()),
-      correspondence_({}),
+      correspondence_({.pitch_px = static_cast<float>(pattern().pitch_px()),
+                       .symbol_size_px = static_cast<float>(pattern().options.symbol_size_px),
+                       .rows = pattern().whole_rows(),
+                       .columns = pattern().whole_columns()}),
       centre_correction_(fixed_->appearances.usual().as_measured, static_cast<float>(pattern().pitch_px()),
                          static_cast<float>(pattern().options.symbol_size_px)) {}
 
@@ -159,7 +162,9 @@ void SymbolReader::review(const GreyView& frame, Executor& executor) {
 void SymbolReader::correspond(const GreyView& frame, EpipolarView* view, Executor& executor) {
   mended_ = {};
   if (options_.decode_windows == Method::kDefault) {
-    correspondence_.refuse_lone(seen_.nodes, executor, seen_.claims);
+    const Eigen::Vector2f frame_px(static_cast<float>(finder_.mask().width()),
+                                   static_cast<float>(finder_.mask().height()));
+    correspondence_.refuse_lone(seen_.nodes, frame_px, executor, seen_.claims);
     if (view != nullptr) mend(frame, *view);
     review_.take_back_held(seen_);
   }

@@ -74,7 +74,8 @@ TEST(AdversaryFrames, NameNoPieceOfAnotherSurfaceAtARim) {
   for (const int number : {68, 82}) coarse.expect_none_wrong(Kind::kSwappedPatch, number);
   // Two halves, of a symbol of a shelf and of one beyond it, that look like one.
   for (const int number : {128, 166, 332, 334, 390, 566, 8350}) coarse.expect_none_wrong(Kind::kShelves, number);
-  for (const int number : {121, 289, 321, 479, 573, 861, 892, 1161}) fine.expect_none_wrong(Kind::kShelves, number);
+  for (const int number : {121, 289, 321, 479, 573, 861, 892, 1161, 180369})
+    fine.expect_none_wrong(Kind::kShelves, number);
 }
 
 // The corner of something put there agrees by chance, or what is beside it.
@@ -84,6 +85,13 @@ TEST(AdversaryFrames, NameNothingBesideWhatIsPutInThePatternsPlace) {
   coarse.expect_none_wrong(Kind::kSwappedPatch, 292);
   fine.expect_none_wrong(Kind::kSlidRows, 539);
   coarse.expect_none_wrong(Kind::kSlats1to2, 760);
+}
+
+// Symbols that the border cuts are not read, and contradict nothing.
+TEST(AdversaryFrames, NameNothingThatTheBorderOfTheFrameLeavesAlone) {
+  Bench fine = Bench::of(8), coarse = Bench::of(16);
+  coarse.expect_none_wrong(Kind::kSwappedPatch, 60418);
+  fine.expect_none_wrong(Kind::kPickets, 700333);
 }
 
 // Half of a shelf's letters fit by chance, from edge to edge of it.

@@ -12,8 +12,9 @@ namespace {
 /// What became of the nodes along a node's row and column.
 class Surroundings {
  public:
-  Surroundings(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims)
-      : nodes_(nodes), claims_(claims) {}
+  Surroundings(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims,
+               const CorrespondOptions& options, const Eigen::Vector2f& frame_px)
+      : nodes_(nodes), claims_(claims), options_(options), frame_px_(frame_px) {}
 
   /// Those beside it stand, and their cells lie beside its own.
   [[nodiscard]] bool goes_on_all_around(std::int32_t node) const {
@@ -50,8 +51,9 @@ class Surroundings {
   }
 
   /// Of the few that are left of a line, between as many refused ones and its end, with nothing of their island on one
-  /// side of them, and there something that is none of it.
+  /// side of them, and there, or among the refused ones, something that is none of it.
   [[nodiscard]] bool is_rest(std::int32_t node) const {
+    const bool off_grid = claims_[node].grid_fit != GridFit::kTight;
     return std::ranges::any_of(kDirections, [&](Direction aside) {
       if (stands(node, beside(node, aside))) return false;
       int length = 1, most_refused = 0;
@@ -64,7 +66,8 @@ class Surroundings {
           ++length;
         }
         int refused = 0;
-        for (; refused < kReach && other >= 0 && !stands(node, other); other = beside(other, along)) ++refused;
+        for (; refused < kReach && other >= 0 && !stands(node, other); other = beside(other, along), ++refused)
+          others |= off_grid && misread(other);
         if (refused < kReach && other >= 0) return false;
         most_refused = std::max(most_refused, refused);
       }
@@ -82,21 +85,35 @@ class Surroundings {
     return std::ranges::none_of(kDirections, [&](Direction d) { return stands(node, beside(node, d)); });
   }
 
-  /// At the corner of what was put there: on two sides that meet, and between them, it has been refused.
+  /// At the corner of what was put there: on two sides that meet, and between them, it has been refused; or on one of
+  /// them, and on the other the frame ends.
   [[nodiscard]] bool is_corner(std::int32_t node) const {
     return std::ranges::any_of(kDirections, [&](Direction one) {
       const auto two = static_cast<Direction>((one + 1) % 4);
       const std::int32_t first = beside(node, one), second = beside(node, two);
-      return misread(first) && misread(second) && !stands(node, beside(first, two)) &&
-             !stands(node, beside(second, one));
+      if (stands(node, beside(first, two)) || stands(node, beside(second, one))) return false;
+      return (misread(first) && misread(second)) || (is_unread(node, one) && is_refused(second)) ||
+             (is_unread(node, two) && is_refused(first));
     });
   }
 
  private:
   static constexpr int kReach = 3;
-  /// There lies what is none of its island, or what is misread.
+  /// There lies what is none of its island, what is misread, or what is not read.
   [[nodiscard]] bool is_beside_others(std::int32_t node, Direction d) const {
-    return contradicts(node, d) || misread(beside(node, d));
+    return contradicts(node, d) || misread(beside(node, d)) || is_unread(node, d);
+  }
+  /// The border of the frame cuts the symbol there, or hides it.
+  [[nodiscard]] bool is_unread(std::int32_t node, Direction d) const {
+    constexpr float kBorderPx = 3;  // blur widens what touches it
+    const GridNode& from = nodes_[node];
+    const CellClaim::Cell cell = claims_[node].beyond(d);
+    const bool shown = cell.row >= 0 && cell.column >= 0 && cell.row < options_.rows && cell.column < options_.columns;
+    if (from.links[d] >= 0 || !shown) return false;
+    const Eigen::Array2f there = from.centre_px + options_.pitch_px * (from.frame * step(d));
+    const Eigen::Array2f half = 0.5F * options_.symbol_size_px * from.frame.cwiseAbs().rowwise().sum();
+    const Eigen::Array2f reach = half + kBorderPx;
+    return (there < reach).any() || (there > frame_px_.array() - 1 - reach).any();
   }
   /// Damaged, or moved off its line as print does it.
   [[nodiscard]] bool is_worn(std::int32_t node) const {
@@ -106,6 +123,11 @@ class Surroundings {
   /// Its letter is another than its cell's.
   [[nodiscard]] bool misread(std::int32_t node) const {
     return node >= 0 && claims_[node].status == RegionStatus::kClassDisagrees;
+  }
+
+  /// It may be of something else.
+  [[nodiscard]] bool is_refused(std::int32_t node) const {
+    return node >= 0 && (misread(node) || claims_[node].status == RegionStatus::kNeighboursDisagree);
   }
 
   [[nodiscard]] bool stands(std::int32_t node, std::int32_t other) const {
@@ -171,6 +193,8 @@ class Surroundings {
 
   const std::vector<GridNode>& nodes_;
   const std::vector<CellClaim>& claims_;
+  const CorrespondOptions& options_;
+  const Eigen::Vector2f frame_px_;
 };
 
 }  // namespace
@@ -194,9 +218,9 @@ void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellCl
   }
 }
 
-void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, Executor& executor,
-                                 std::vector<CellClaim>& claims) {
-  const Surroundings around(nodes, claims);
+void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, const Eigen::Vector2f& frame_px,
+                                 Executor& executor, std::vector<CellClaim>& claims) {
+  const Surroundings around(nodes, claims, options_, frame_px);
   // Most are surrounded by their own, and then none of the following can be.
   at_rim_.resize(nodes.size());
   executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {

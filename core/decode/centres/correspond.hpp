@@ -11,6 +11,8 @@ namespace slsd {
 
 struct CorrespondOptions {
   float evidence_margin = 2;  ///< by how much the better of two claims on one cell has to be better to stand
+  float pitch_px = 18, symbol_size_px = 16;  ///< of the pattern, projector px
+  int rows = 44, columns = 71;               ///< of it that are shown whole
 };
 
 /// Makes correspondences of claims: each cell belongs to one node at most, on its epipolar line and within the working
@@ -29,8 +31,10 @@ class Correspondence {
   /// Refuses symbols at a rim most of whose neighbours along their row, or their column, were refused: the edge that
   /// cut those runs through them as well, and what is left of two symbols can look like a whole one. Between decoded
   /// ones on both sides it takes that all of them were. Not those that fit their island's grid tightly: no edge runs
-  /// there.
-  void refuse_lone(const std::vector<GridNode>& nodes, Executor& executor, std::vector<CellClaim>& claims);
+  /// there. Then corners and rests of something else that agree by chance.
+  /// @param frame_px  width and height: symbols that the frame's border cuts are not read, and may be anything
+  void refuse_lone(const std::vector<GridNode>& nodes, const Eigen::Vector2f& frame_px, Executor& executor,
+                   std::vector<CellClaim>& claims);
 
   /// The duplicates alone, where there is no calibration.
   void settle_duplicates(const CellRays& cells, std::vector<CellClaim>& claims);

@@ -110,15 +110,17 @@ TEST_F(Correspond, LeavesEarlierReasonsAlone) {
   EXPECT_THAT(statuses(), testing::ElementsAre(RegionStatus::kClassDisagrees));
 }
 
-/// A sheet of 6 rows of 9 nodes, all decoded; below it a row of another surface.
+/// A sheet of 6 rows of 9 nodes, all decoded; below it a row of another surface. The frame goes on all around it.
 struct RimSheet {
   SimulatedGrid grid;
   std::vector<CellClaim> claims;
+  Eigen::Vector2f frame_px{400, 400};
 
   RimSheet() {
     for (int row = 0; row < 7; ++row) {
       for (int column = 0; column < 9; ++column) {
-        grid.add(row, column, {0, 0}, LatticeFrame::Identity());
+        grid.add(row, column, through(Eigen::Affine2f(Eigen::Translation2f(100, 100)).matrix(), row, column),
+                 LatticeFrame::Identity());
         claims.push_back({static_cast<std::int16_t>(row), static_cast<std::int16_t>(row < 6 ? column : column + 20), 0,
                           kDecoded, row < 6 ? 0 : 1, GridFit::kLoose});
       }
@@ -126,12 +128,13 @@ struct RimSheet {
     grid.link_truly();
   }
   CellClaim& at(int row, int column) { return claims[grid.node_at(row, column)]; }
+  void refuse_lone() { Correspondence({}).refuse_lone(grid.nodes, frame_px, alone, claims); }
 };
 
 TEST(RefuseLone, RefusesWhatStandsBetweenRefusedOnesAtARim) {
   RimSheet sheet;
   for (const int column : {0, 1, 2, 3, 5, 6, 8}) sheet.at(5, column).status = RegionStatus::kDamagedShape;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+  sheet.refuse_lone();
   EXPECT_EQ(sheet.at(5, 4).status, RegionStatus::kNeighboursDisagree);
   EXPECT_EQ(sheet.at(5, 7).status, RegionStatus::kNeighboursDisagree);
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(4, column).status, kDecoded);
@@ -142,7 +145,7 @@ TEST(RefuseLone, LeavesWhatFitsTheGridTightly) {
     RimSheet sheet;
     for (const int row : {1, 2, 3}) sheet.at(row, 8).status = RegionStatus::kClassDisagrees;
     sheet.at(4, 8).grid_fit = sheet.at(5, 8).grid_fit = fit;
-    Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+    sheet.refuse_lone();
     EXPECT_EQ(sheet.at(4, 8).status, fit == GridFit::kTight ? kDecoded : RegionStatus::kNeighboursDisagree);
   }
 }
@@ -150,7 +153,7 @@ TEST(RefuseLone, LeavesWhatFitsTheGridTightly) {
 TEST(RefuseLone, RefusesTheLastOfARefusedRow) {
   RimSheet sheet;
   for (const int column : {0, 4, 5, 6, 7, 8}) sheet.at(5, column).status = RegionStatus::kClassDisagrees;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+  sheet.refuse_lone();
   for (const int column : {1, 2, 3}) EXPECT_EQ(sheet.at(5, column).status, RegionStatus::kNeighboursDisagree) << column;
 }
 
@@ -159,7 +162,7 @@ TEST(RefuseLone, RefusesAllThatIsLeftOfARow) {
   RimSheet sheet;
   for (const int column : {1, 2, 3, 5, 6, 8}) sheet.at(2, column).status = RegionStatus::kDamagedShape;
   sheet.at(1, 7) = sheet.at(6, 7);
-  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+  sheet.refuse_lone();
   EXPECT_EQ(sheet.at(2, 7).status, RegionStatus::kNeighboursDisagree);
   EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
 }
@@ -170,7 +173,7 @@ TEST(RefuseLone, RefusesTheFewThatAreLeftOfAMisreadRow) {
   for (int column = 0; column < 7; ++column) sheet.at(1, column).status = RegionStatus::kClassDisagrees;
   sheet.at(2, 2).status = RegionStatus::kDamagedShape;
   for (const int column : {4, 5, 6}) sheet.at(2, column).status = RegionStatus::kClassDisagrees;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+  sheet.refuse_lone();
   for (const int column : {0, 1, 3}) EXPECT_EQ(sheet.at(2, column).status, RegionStatus::kNeighboursDisagree) << column;
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(3, column).status, kDecoded) << column;
 }
@@ -185,7 +188,7 @@ TEST(RefuseLone, RefusesTheFewThatAreLeftOfABrokenRow) {
   }
   sheet.grid.nodes[sheet.grid.node_at(2, 5)].broken[kLeft] = true;
   sheet.grid.nodes[sheet.grid.node_at(2, 7)].links[kUp] = -1;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+  sheet.refuse_lone();
   for (const int column : {7, 8}) EXPECT_EQ(sheet.at(2, column).status, RegionStatus::kNeighboursDisagree) << column;
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(3, column).status, kDecoded) << column;
 }
@@ -195,14 +198,14 @@ TEST(RefuseLone, RefusesABridgeOverARefusedRow) {
   RimSheet sheet;
   for (const int column : {0, 1, 2, 3, 5, 6, 7, 8}) sheet.at(2, column).status = RegionStatus::kNoCodeword;
   sheet.grid.nodes[sheet.grid.node_at(2, 5)].broken[kRight] = true;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+  sheet.refuse_lone();
   EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
 }
 
 TEST(RefuseLone, RefusesWhatHasNothingStandingBesideIt) {
   RimSheet sheet;
   sheet.at(0, 1).status = sheet.at(1, 0).status = RegionStatus::kDamagedShape;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+  sheet.refuse_lone();
   EXPECT_EQ(sheet.at(0, 0).status, RegionStatus::kNeighboursDisagree);
   EXPECT_EQ(sheet.at(1, 1).status, kDecoded);
 }
@@ -212,11 +215,60 @@ TEST(RefuseLone, RefusesTheCornerOfWhatIsMisread) {
   RimSheet sheet;
   for (const auto& [row, column] : {std::pair(2, 5), std::pair(3, 4)})
     sheet.at(row, column).status = RegionStatus::kClassDisagrees;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+  sheet.refuse_lone();
   EXPECT_EQ(sheet.at(2, 4).status, kDecoded) << "what lies between the two stands";
   sheet.at(3, 5).status = RegionStatus::kNoCodeword;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+  sheet.refuse_lone();
   EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
+}
+
+// The border of the frame cuts what is beyond, and nobody knows what it is.
+TEST(RefuseLone, RefusesTheCornerWhereTheFrameEnds) {
+  const float beyond_last = 100 + 8 * SimulatedGrid::kPitchPx + 12;  // less than the next one needs
+  RimSheet sheet;
+  sheet.frame_px.x() = beyond_last;
+  sheet.refuse_lone();
+  EXPECT_EQ(sheet.at(3, 8).status, kDecoded) << "the rim goes on";
+  EXPECT_EQ(sheet.at(0, 8).status, kDecoded) << "nothing was refused";
+  sheet.at(2, 8).status = RegionStatus::kDamagedShape;
+  sheet.refuse_lone();
+  EXPECT_EQ(sheet.at(3, 8).status, kDecoded) << "what is damaged is not of something else";
+  sheet.at(2, 8).status = RegionStatus::kClassDisagrees;
+  const std::vector<CellClaim> misread = sheet.claims;
+  sheet.refuse_lone();
+  EXPECT_EQ(sheet.at(3, 8).status, RegionStatus::kNeighboursDisagree);
+  sheet.claims = misread;
+  for (CellClaim& claim : sheet.claims) claim.column = static_cast<std::int16_t>(claim.column + 62);
+  sheet.refuse_lone();
+  EXPECT_EQ(sheet.at(3, 8).status, kDecoded) << "the pattern ends there";
+}
+
+/// The third row is its first, and of that two symbols are left, beside three that are damaged.
+RimSheet two_left_at_a_rim() {
+  RimSheet sheet;
+  for (int column = 0; column < 9; ++column) sheet.grid.nodes[sheet.grid.node_at(2, column)].links[kUp] = -1;
+  for (const int column : {2, 3, 4}) {
+    sheet.at(2, column).status = RegionStatus::kDamagedShape;
+    sheet.grid.nodes[sheet.grid.node_at(3, column)].links[kUp] = -1;
+  }
+  return sheet;
+}
+
+TEST(RefuseLone, RefusesTheFewThatAreLeftBesideAMisreadOne) {
+  RimSheet sheet = two_left_at_a_rim();
+  sheet.refuse_lone();
+  for (const int column : {0, 1}) EXPECT_EQ(sheet.at(2, column).status, kDecoded) << column;
+  sheet.at(2, 3).status = RegionStatus::kClassDisagrees;
+  sheet.refuse_lone();
+  for (const int column : {0, 1}) EXPECT_EQ(sheet.at(2, column).status, RegionStatus::kNeighboursDisagree) << column;
+}
+
+TEST(RefuseLone, RefusesTheFewThatAreLeftWhereTheFrameEnds) {
+  RimSheet sheet = two_left_at_a_rim();
+  for (GridNode& node : sheet.grid.nodes) node.centre_px.y() -= 100 + 2 * SimulatedGrid::kPitchPx - 12;
+  sheet.refuse_lone();
+  for (const int column : {0, 1}) EXPECT_EQ(sheet.at(2, column).status, RegionStatus::kNeighboursDisagree) << column;
+  for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(3, column).status, kDecoded) << column;
 }
 
 // An edge that runs through a row breaks its links: what is beside a symbol then shows from the row within alone.
@@ -227,11 +279,11 @@ TEST(RefuseLone, LooksAlongTheRowWithinWhereTheRowIsBroken) {
     sheet.grid.nodes[node].broken[kRight] = sheet.grid.nodes[node].broken[kLeft] = true;
     if (column != 4) sheet.claims[node].status = RegionStatus::kClassDisagrees;
   }
-  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+  sheet.refuse_lone();
   EXPECT_EQ(sheet.at(5, 4).status, RegionStatus::kNeighboursDisagree);
   for (const int column : {1, 2}) sheet.at(5, column).status = kDecoded;
   sheet.at(5, 5).status = sheet.at(5, 6).status = sheet.at(5, 4).status = kDecoded;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+  sheet.refuse_lone();
   EXPECT_EQ(sheet.at(5, 4).status, kDecoded);
 }
 
@@ -240,7 +292,7 @@ TEST(RefuseLone, KeepsWhatIsWholeAtARimAndInside) {
   for (const int column : {2, 6}) sheet.at(5, column).status = RegionStatus::kDamagedShape;
   for (const int column : {0, 1, 2, 3, 5, 6}) sheet.at(2, column).status = RegionStatus::kDamagedShape;
   const std::vector<CellClaim> before = sheet.claims;
-  Correspondence({}).refuse_lone(sheet.grid.nodes, alone, sheet.claims);
+  sheet.refuse_lone();
   for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(sheet.claims[i].status, before[i].status) << i;
 }
 
