@@ -25,6 +25,8 @@ constexpr float kMovedMax = 0.08F;
 /// look tilted more, and the place is then on neither.
 constexpr float kTiltMaxPx = 0.5F;
 constexpr int kHeldBy = 2;
+/// From where on what lies off a node's grid is of another surface, cells.
+constexpr float kOffGrid = 0.1F;
 /// From which misfit on, or how far off its line in projector px, what is decoded is aligned, too: whole symbols are
 /// nearer to their letters and to their lines. Its centroid is given up where the patch agrees well and lies near it;
 /// farther off, what was seen is another part of the symbol.
@@ -43,6 +45,20 @@ bool is_worn(const CellGate& gate, const Sightings& seen, std::int32_t node) {
   if (claim.status != RegionStatus::kDecoded)
     return claim.status == RegionStatus::kDamagedShape || claim.status == RegionStatus::kOffEpipolarLine;
   return seen.misfits[node] > kDoubtfulMisfit || gate.off_line_px(node, claim.row, claim.column) > kDoubtfulAcrossPx;
+}
+
+/// Whether it is well seen, and none of an island: its letter is another, or it has none of its cells.
+bool contradicts(const Sightings& seen, std::int32_t node, std::int32_t island) {
+  constexpr float kWellSeen = 3;  // standard deviations
+  const CellClaim& claim = seen.claims[node];
+  const bool of_island = claim.named() && claim.island == island && claim.status != RegionStatus::kClassDisagrees;
+  return !of_island && seen.shapes[node].letter >= 0 && seen.shapes[node].distance < kWellSeen;
+}
+
+bool is_off_grid(const Sightings& seen, std::int32_t from, std::int32_t to, Direction d, float pitch_px) {
+  const GridNode& node = seen.nodes[from];
+  const Eigen::Vector2f way_px = seen.nodes[to].centre_px - node.centre_px;
+  return (node.frame.inverse() * way_px / pitch_px - step(d)).norm() > kOffGrid;
 }
 
 /// Every letter in a square of twice its side.
@@ -74,6 +90,31 @@ SymbolMender::SymbolMender(const Pattern& pattern)
     : array_(pattern.array),
       pitch_px_(static_cast<float>(pattern.pitch_px())),
       letters_(std::make_shared<const LetterFields>(pattern.options)) {}
+
+/// Whether what its surroundings have refused may be looked at again: around it, as far as it could have come with
+/// them, nothing on the grid contradicts.
+bool SymbolMender::may_return(const Sightings& seen, std::int32_t node) {
+  constexpr int kReach = 3;
+  const CellClaim& claim = seen.claims[node];
+  if (claim.status != RegionStatus::kNeighboursDisagree || !claim.named()) return false;
+  around_.assign(1, node);
+  std::size_t next = 0;
+  for (int links = 0; links < kReach; ++links) {
+    for (const std::size_t end = around_.size(); next < end; ++next) {
+      const std::int32_t from = around_[next];
+      for (const Direction d : kDirections) {
+        const std::int32_t other = neighbour(seen.nodes, from, d);
+        if (other < 0 || std::ranges::find(around_, other) != around_.end()) continue;
+        const CellClaim& there = seen.claims[other];
+        if (there.status == RegionStatus::kDecoded && there.island == claim.island) continue;
+        if (is_off_grid(seen, from, other, d, pitch_px_)) continue;
+        if (contradicts(seen, other, claim.island)) return false;
+        around_.push_back(other);
+      }
+    }
+  }
+  return true;
+}
 
 /// Between those on both sides of it, or one step on from two in a line; the mean.
 SymbolMender::Place SymbolMender::place_by_neighbours(const Sightings& seen, std::int32_t node) const {
@@ -190,6 +231,8 @@ bool SymbolMender::is_there(const PatchTask& task, const LatticeFrame& lattice_f
   const Eigen::Vector2f centre = centre_of(task, array_.at(claim.row, claim.column));
   // What is tilted out of all proportion lies anywhere.
   if (!((centre - task.map.middle_px).norm() < 0.5F * pitch_px_)) return false;
+  if (claim.status == RegionStatus::kNeighboursDisagree)
+    return std::abs(task.state.disparity) <= kTightSlip * pitch_px_;
   if (claim.status != RegionStatus::kDecoded) return true;
   const Eigen::Vector2f moved_px = centre - seen.nodes[node].centre_px;
   return task.support >= kSupportGood && (seen.nodes[node].frame.inverse() * moved_px).norm() < kMovedMax * pitch_px_;
@@ -217,8 +260,9 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
                                                     std::span<const Prototype> prototypes, Sightings& seen) {
   const PatternField& field = letters_->at(blur_px);
   mended_.clear(), worn_.clear();
+  const auto is_asked = [&](std::int32_t node) { return is_worn(gate, seen, node) || may_return(seen, node); };
   for (std::size_t i = 0; i < seen.size(); ++i)
-    if (const auto node = static_cast<std::int32_t>(i); is_worn(gate, seen, node)) worn_.push_back(node);
+    if (const auto node = static_cast<std::int32_t>(i); is_asked(node)) worn_.push_back(node);
   // What is mended holds those beside it.
   while (!worn_.empty()) {
     asked_.clear(), places_.clear(), tasks_.clear();
@@ -236,7 +280,7 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
     worn_.clear();
     for (std::size_t i = before; i < mended_.size(); ++i) {
       for (const std::int32_t other : seen.nodes[mended_[i]].links)
-        if (other >= 0 && seen.claims[other].status != RegionStatus::kDecoded && is_worn(gate, seen, other))
+        if (other >= 0 && seen.claims[other].status != RegionStatus::kDecoded && is_asked(other))
           worn_.push_back(other);
     }
     std::ranges::sort(worn_);

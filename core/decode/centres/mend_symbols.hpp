@@ -57,6 +57,7 @@ class SymbolMender {
     float background = 0, peak = 0;  // grey levels
     int held_by = 0;
   };
+  [[nodiscard]] bool may_return(const Sightings& seen, std::int32_t node);
   [[nodiscard]] Place place_by_neighbours(const Sightings& seen, std::int32_t node) const;
   void look_at(const GreyView& frame, const FrameNoise& noise, const CellGate& gate, const Sightings& seen,
                std::int32_t node);
@@ -73,6 +74,7 @@ class SymbolMender {
   float pitch_px_;
   std::shared_ptr<const LetterFields> letters_;
   std::vector<std::int32_t> worn_, asked_, mended_;  // sightings; of those asked one place and task each
+  std::vector<std::int32_t> around_;                 // one that may return
   std::vector<Place> places_;
   std::vector<PatchTask> tasks_;
 };

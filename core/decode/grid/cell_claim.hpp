@@ -12,6 +12,9 @@ namespace slsd {
 /// surface hardly ever is.
 enum class GridFit : std::uint8_t { kNone, kLoose, kTight };
 
+/// How far from there, in cells along the epipolar line, another surface lies in one of sixty cases at most.
+inline constexpr float kTightSlip = 0.008F;
+
 /// A cell of the pattern that a node was found to be, and how well its surroundings speak for it.
 struct CellClaim {
   std::int16_t row = -1, column = -1;

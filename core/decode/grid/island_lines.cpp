@@ -50,7 +50,7 @@ float IslandJudge::evidence_of_places(const Frame& frame, Direction forth, int f
       any = true;
     }
   }
-  return any ? -std::log(2 * kTightMost) : 0;
+  return any ? -std::log(2 * kTightSlip) : 0;
 }
 
 /// Keeps for every node the evidence of the line of nodes through it, as far as it agrees and so far around it, where

@@ -56,7 +56,6 @@ class IslandJudge {
   using Links = std::array<Link, 4>;
   /// A shape speaks against a cell where it is so much likelier to be chance; a damaged one says nothing.
   static constexpr float kSpeaksAgainst = -1.5F;
-  static constexpr float kTightMost = 0.008F;  // cells
   static constexpr Links kAllAgree{Link::kAgrees, Link::kAgrees, Link::kAgrees, Link::kAgrees};
   [[nodiscard]] static bool any_against(const Links& links);
   struct Island {
@@ -155,8 +154,8 @@ class IslandJudge {
   [[nodiscard]] std::optional<float> slip_from_within(const Frame& frame, std::int32_t node, Direction inwards) const;
   void measure_slips(const Frame& frame);
   [[nodiscard]] GridFit grid_fit(const Frame& frame, std::int32_t node) const;
-  /// Up to which slip a link fits the grid tightly: where another surface lies in one of sixty cases at most.
-  [[nodiscard]] float tight_slip() const { return std::min(0.5F * slip_max_, kTightMost); }
+  /// Up to which slip a link fits the grid tightly.
+  [[nodiscard]] float tight_slip() const { return std::min(0.5F * slip_max_, kTightSlip); }
   /// Whether a link leads to what is not on one surface with the node.
   [[nodiscard]] bool parts(const Frame& frame, std::int32_t node, Direction d) const {
     if (std::isinf(slip_max_)) return false;

@@ -79,11 +79,15 @@ class MendOneOfMany : public testing::Test {
     }
   }
 
-  /// How far off the symbol is then, camera px; nothing where it is not mended.
-  std::optional<float> mend() {
+  std::vector<std::int32_t> mend_all() {
     SymbolMender mender(pattern_);
     const CellGate gate(cells_, segments_, 1.5);
-    const auto& mended = mender.mend(frame_.view(), 255, {.dark_variance = 1}, 0.7F, gate, prototypes_, seen_);
+    return mender.mend(frame_.view(), 255, {.dark_variance = 1}, 0.7F, gate, prototypes_, seen_);
+  }
+
+  /// How far off the symbol is then, camera px; nothing where it is not mended.
+  std::optional<float> mend() {
+    const std::vector<std::int32_t> mended = mend_all();
     if (mended.empty()) return std::nullopt;
     EXPECT_THAT(mended, testing::ElementsAre(static_cast<std::int32_t>(kWorn)));
     EXPECT_EQ(seen_.claims[kWorn].status, RegionStatus::kDecoded);
@@ -152,7 +156,7 @@ TEST_F(MendOneOfMany, LeavesAnotherLetter) {
       seen_.claims[i].row = static_cast<std::int16_t>(kRow + i / kSide - kSide / 2);
       seen_.claims[i].column = static_cast<std::int16_t>(column + i % kSide - kSide / 2);
     }
-    EXPECT_EQ(mend(), std::nullopt) << column;
+    EXPECT_THAT(mend_all(), testing::Not(testing::Contains(static_cast<std::int32_t>(kWorn)))) << column;
   }
 }
 
@@ -168,6 +172,44 @@ TEST_F(MendOneOfMany, LeavesWhatOneAloneHolds) {
   for (int i = 0; i < kSide * kSide; ++i)
     if (i % kSide >= kSide / 2 && i != kWorn && i != kWorn + 1 && i != kWorn + 2) seen_.claims[i].island = 1;
   seen_.claims[kWorn - 1].island = 1;
+  EXPECT_EQ(mend(), std::nullopt);
+}
+
+TEST_F(MendOneOfMany, AlignsWhatIsDecodedFarOffItsLine) {
+  seen_.claims[kWorn].status = RegionStatus::kDecoded;
+  seen_.nodes[kWorn].centre_px = true_centre(kSide / 2, kSide / 2) + Eigen::Vector2f(0, 0.8F);
+  EXPECT_EQ(mend(), std::nullopt) << "its line is said to pass through it";
+  const EpipolarGate gate(rig_.cameras[0], rig_.projector, 400, 3200);
+  const Eigen::Vector2d seen_px = seen_.nodes[kWorn].centre_px.cast<double>();
+  segments_[kWorn] = gate.prepare(pixel_ray(rig_.cameras[0].lens, seen_px).direction);
+  EXPECT_THAT(mend(), testing::Optional(testing::Lt(0.3F)));
+}
+
+TEST_F(MendOneOfMany, TakesBackWhatItsSurroundingsRefused) {
+  seen_.claims[kWorn].status = RegionStatus::kNeighboursDisagree;
+  EXPECT_THAT(mend(), testing::Optional(testing::Lt(0.06F)));
+}
+
+// Refused symbols lead from the worn one to something at the rim.
+TEST_F(MendOneOfMany, LeavesWhatOtherLightLiesNear) {
+  constexpr int kBetween = kWorn + 1, kAtRim = kWorn + 2;
+  const auto mended_beside = [&](float distance, float off_grid_px) {
+    seen_.claims[kWorn].status = RegionStatus::kNeighboursDisagree;
+    seen_.nodes[kWorn].centre_px = true_centre(kSide / 2, kSide / 2);
+    seen_.claims[kBetween].status = RegionStatus::kClassDisagrees;
+    seen_.claims[kAtRim] = {.status = RegionStatus::kNoCodeword};
+    seen_.shapes[kAtRim].letter = 0, seen_.shapes[kAtRim].distance = distance;
+    seen_.nodes[kAtRim].centre_px = true_centre(kSide / 2, kSide / 2 + 2) + Eigen::Vector2f(off_grid_px, 0);
+    return mend().has_value();
+  };
+  EXPECT_FALSE(mended_beside(1, 0));
+  EXPECT_TRUE(mended_beside(4, 0)) << "what is worn itself says nothing";
+  EXPECT_TRUE(mended_beside(1, 5)) << "another surface";
+}
+
+TEST_F(MendOneOfMany, LeavesWhatWasRefusedAndLiesOffTheGrid) {
+  seen_.claims[kWorn].status = RegionStatus::kNeighboursDisagree;
+  for (int i = 0; i < kSide * kSide; ++i) seen_.nodes[i].centre_px.x() += 0.5F;
   EXPECT_EQ(mend(), std::nullopt);
 }
 
