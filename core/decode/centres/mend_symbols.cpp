@@ -114,6 +114,7 @@ bool SymbolMender::may_hang_on_one(const PatchTask& task, std::span<const Protot
 bool SymbolMender::is_uncontradicted(const Sightings& seen, std::int32_t node) {
   constexpr int kReach = 3;
   const CellClaim& claim = seen.claims[node];
+  const bool in_place = claim.status == RegionStatus::kNeighboursDisagree;  // what is worn may lie beside its place
   around_.assign(1, node);
   std::size_t next = 0;
   for (int links = 0; links < kReach; ++links) {
@@ -124,7 +125,7 @@ bool SymbolMender::is_uncontradicted(const Sightings& seen, std::int32_t node) {
         if (other < 0 || std::ranges::find(around_, other) != around_.end()) continue;
         const CellClaim& there = seen.claims[other];
         if (there.status == RegionStatus::kDecoded && there.island == claim.island) continue;
-        if (is_off_grid(seen, from, other, d, pitch_px_)) continue;
+        if ((from != node || in_place) && is_off_grid(seen, from, other, d, pitch_px_)) continue;
         if (contradicts(seen, other, claim.island)) return false;
         around_.push_back(other);
       }
