@@ -180,7 +180,7 @@ void SymbolReader::fit_lattice(const GreyView& frame, double full, const Epipola
                              seen_.misfits);
   // The paper knows no correction, and what was aligned needs none.
   for (LatticeSymbol& symbol : lattice_.symbols) {
-    if (options_.centre == Method::kDefault && !is_mended(symbol)) continue;
+    if (options_.centre == Method::kDefault && !std::ranges::binary_search(mended_, symbol.sighting)) continue;
     const GreyMoments& moments = seen_.moments[symbol.sighting];
     symbol.centre_px = {moments.x, moments.y};
   }
@@ -195,7 +195,7 @@ void SymbolReader::fit_lattice(const GreyView& frame, double full, const Epipola
 }
 
 /// What is left of a symbol that an edge cuts may still look like it, but its centre lies elsewhere: at a rim what is
-/// an order less certain than most goes. Not so what was aligned, which left out what the edge has taken.
+/// an order less certain than most goes.
 void SymbolReader::refuse_cut() {
   constexpr float kOfMedian = 13;
   std::vector<LatticeSymbol>& symbols = lattice_.symbols;
@@ -208,8 +208,7 @@ void SymbolReader::refuse_cut() {
   kept_.clear();
   std::int32_t count = 0;
   for (const LatticeSymbol& symbol : symbols) {
-    const bool is_cut = symbol.damage_px > limit && !is_mended(symbol) &&
-                        std::ranges::find(symbol.neighbours, -1) != symbol.neighbours.end();
+    const bool is_cut = symbol.damage_px > limit && std::ranges::find(symbol.neighbours, -1) != symbol.neighbours.end();
     kept_.push_back(is_cut ? -1 : count++);
     if (is_cut) reject(symbol, RegionStatus::kDamagedShape);
   }

@@ -2,7 +2,6 @@
 // Copyright the slsd authors
 #pragma once
 
-#include <algorithm>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -85,9 +84,6 @@ class SymbolReader {
   void review(const GreyView& frame, Executor& executor);
   [[nodiscard]] CellGate gate_of(const EpipolarView* view) const;
   void mend(const GreyView& frame, EpipolarView& view);
-  [[nodiscard]] bool is_mended(const LatticeSymbol& symbol) const {
-    return std::ranges::binary_search(mended_, symbol.sighting);
-  }
   void correspond(const GreyView& frame, EpipolarView* view, Executor& executor);
   void refuse_cut();
   void fit_lattice(const GreyView& frame, double full, const EpipolarView* view, Executor& executor);
