@@ -24,9 +24,7 @@ constexpr float kMovedMax = 0.08F;
 /// How far its tilt from its neighbours' moves the middles of its cell's sides, projector px: parts of two surfaces
 /// look tilted more, and the place is then on neither.
 constexpr float kTiltMaxPx = 0.5F;
-/// Of its island, but where it is plain enough to need one alone: its letter is read, and so much of it is there.
 constexpr int kHeldBy = 2;
-constexpr float kPlainArea = 0.8F;
 /// From where on what lies off a node's grid is of another surface, cells.
 constexpr float kOffGrid = 0.1F;
 /// From which misfit on, or how far off its line in projector px, what is decoded is aligned, too: whole symbols are
@@ -91,30 +89,14 @@ Eigen::Vector2f LetterFields::middle_px(int letter) const {
 SymbolMender::SymbolMender(const Pattern& pattern)
     : array_(pattern.array),
       pitch_px_(static_cast<float>(pattern.pitch_px())),
-      size_px_(static_cast<float>(pattern.options.symbol_size_px)),
       letters_(std::make_shared<const LetterFields>(pattern.options)) {}
 
-/// What its surroundings have refused may be looked at again.
+/// Whether what its surroundings have refused may be looked at again: around it, as far as it could have come with
+/// them, nothing on the grid contradicts.
 bool SymbolMender::may_return(const Sightings& seen, std::int32_t node) {
-  const CellClaim& claim = seen.claims[node];
-  return claim.status == RegionStatus::kNeighboursDisagree && claim.named() && is_uncontradicted(seen, node);
-}
-
-/// One holds what is worn if it is plain, lies tightly on the grid, and nothing contradicts.
-bool SymbolMender::may_hang_on_one(const PatchTask& task, std::span<const Prototype> prototypes, const Sightings& seen,
-                                   std::int32_t node) {
-  const CellClaim& claim = seen.claims[node];
-  const int letter = array_.at(claim.row, claim.column);
-  if (seen.shapes[node].letter != letter || std::abs(task.state.disparity) > kTightSlip * pitch_px_) return false;
-  const float area = shape_features(seen.moments[node], seen.nodes[node].frame.inverse(), size_px_)[0];
-  return area > kPlainArea * prototypes[letter].mean[0] && is_uncontradicted(seen, node);
-}
-
-/// Whether around a node, as far as it could have come with what does not stand there, nothing on the grid contradicts.
-bool SymbolMender::is_uncontradicted(const Sightings& seen, std::int32_t node) {
   constexpr int kReach = 3;
   const CellClaim& claim = seen.claims[node];
-  const bool in_place = claim.status == RegionStatus::kNeighboursDisagree;  // what is worn may lie beside its place
+  if (claim.status != RegionStatus::kNeighboursDisagree || !claim.named()) return false;
   around_.assign(1, node);
   std::size_t next = 0;
   for (int links = 0; links < kReach; ++links) {
@@ -125,7 +107,7 @@ bool SymbolMender::is_uncontradicted(const Sightings& seen, std::int32_t node) {
         if (other < 0 || std::ranges::find(around_, other) != around_.end()) continue;
         const CellClaim& there = seen.claims[other];
         if (there.status == RegionStatus::kDecoded && there.island == claim.island) continue;
-        if ((from != node || in_place) && is_off_grid(seen, from, other, d, pitch_px_)) continue;
+        if (is_off_grid(seen, from, other, d, pitch_px_)) continue;
         if (contradicts(seen, other, claim.island)) return false;
         around_.push_back(other);
       }
@@ -163,9 +145,7 @@ SymbolMender::Place SymbolMender::place_by_neighbours(const Sightings& seen, std
 void SymbolMender::look_at(const GreyView& frame, const FrameNoise& noise, const CellGate& gate, const Sightings& seen,
                            std::int32_t node) {
   const Place place = place_by_neighbours(seen, node);
-  const RegionStatus status = seen.claims[node].status;
-  const bool worn = status == RegionStatus::kDamagedShape || status == RegionStatus::kOffEpipolarLine;
-  if (place.held_by < (worn ? 1 : kHeldBy)) return;
+  if (place.held_by < kHeldBy) return;
   const auto [width, height] = std::visit([](const auto& view) { return std::pair(view.width, view.height); }, frame);
   const int x = static_cast<int>(std::lround(place.centre_px.x())),
             y = static_cast<int>(std::lround(place.centre_px.y())),
@@ -291,7 +271,6 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
     const std::size_t before = mended_.size();
     for (std::size_t i = 0; i < asked_.size(); ++i) {
       const CellClaim& claim = seen.claims[asked_[i]];
-      if (places_[i].held_by < kHeldBy && !may_hang_on_one(tasks_[i], prototypes, seen, asked_[i])) continue;
       if (!is_there(tasks_[i], places_[i].frame, seen, asked_[i]) ||
           !shows_centre(frame, field, tasks_[i], array_.at(claim.row, claim.column)))
         continue;

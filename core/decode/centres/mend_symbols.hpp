@@ -35,7 +35,7 @@ class LetterFields {
 
 /// Finds the places of symbols whose cells are certain and whose shapes print, relief or an edge has spoilt: a centroid
 /// goes with what is missing, and off its epipolar line. What there is of them is aligned with their letter instead,
-/// from where those of their island that hold them put them, and what does not agree counts little.
+/// from where at least two of their island put them, and what does not agree counts little.
 /// @thread thread-bound: keeps its buffers; the letters are shared with copies
 class SymbolMender {
  public:
@@ -58,9 +58,6 @@ class SymbolMender {
     int held_by = 0;
   };
   [[nodiscard]] bool may_return(const Sightings& seen, std::int32_t node);
-  [[nodiscard]] bool may_hang_on_one(const PatchTask& task, std::span<const Prototype> prototypes,
-                                     const Sightings& seen, std::int32_t node);
-  [[nodiscard]] bool is_uncontradicted(const Sightings& seen, std::int32_t node);
   [[nodiscard]] Place place_by_neighbours(const Sightings& seen, std::int32_t node) const;
   void look_at(const GreyView& frame, const FrameNoise& noise, const CellGate& gate, const Sightings& seen,
                std::int32_t node);
@@ -74,7 +71,7 @@ class SymbolMender {
                  Sightings& seen, std::int32_t node) const;
 
   CodeArray array_;
-  float pitch_px_, size_px_;
+  float pitch_px_;
   std::shared_ptr<const LetterFields> letters_;
   std::vector<std::int32_t> worn_, asked_, mended_;  // sightings; of those asked one place and task each
   std::vector<std::int32_t> around_;                 // one that may return

@@ -175,26 +175,6 @@ TEST_F(MendOneOfMany, LeavesWhatOneAloneHolds) {
   EXPECT_EQ(mend(), std::nullopt);
 }
 
-TEST_F(MendOneOfMany, HangsAPlainOneOnOneAlone) {
-  const int letter = pattern_.array.at(kRow + kSide / 2, kColumn + kSide / 2);
-  for (int i = 0; i < kSide * kSide; ++i)
-    if (i % kSide >= kSide / 2 && i != kWorn && i != kWorn + 1 && i != kWorn + 2) seen_.claims[i].island = 1;
-  seen_.claims[kWorn - 1].island = 1;
-  const auto is_mended = [&](int read, float lit, float moved_px) {
-    seen_.claims[kWorn].status = RegionStatus::kDamagedShape;
-    seen_.shapes[kWorn].letter = static_cast<std::int8_t>(read);
-    const float camera_px2 = std::abs(seen_.nodes[kWorn].frame.determinant()) * 16 * 16;
-    prototypes_[letter].mean[0] = 0.5F, seen_.moments[kWorn].weight = 0.5F * lit * camera_px2;
-    for (const int i : {kWorn + 1, kWorn + 2})
-      seen_.nodes[i].centre_px = true_centre(i / kSide, i % kSide) + Eigen::Vector2f(moved_px, 0);
-    return mend().has_value();
-  };
-  EXPECT_TRUE(is_mended(letter, 0.9F, 0));
-  EXPECT_FALSE(is_mended(letter == 0 ? 1 : 0, 0.9F, 0)) << "another letter was read";
-  EXPECT_FALSE(is_mended(letter, 0.7F, 0)) << "too little of it is there";
-  EXPECT_FALSE(is_mended(letter, 0.9F, 0.5F)) << "off the grid";
-}
-
 TEST_F(MendOneOfMany, AlignsWhatIsDecodedFarOffItsLine) {
   seen_.claims[kWorn].status = RegionStatus::kDecoded;
   seen_.nodes[kWorn].centre_px = true_centre(kSide / 2, kSide / 2) + Eigen::Vector2f(0, 0.8F);
