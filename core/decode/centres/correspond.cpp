@@ -53,7 +53,7 @@ class Surroundings {
   /// Of the few that are left of a line, between as many refused ones and its end, with nothing of their island on one
   /// side of them, and there, or among the refused ones, something that is none of it.
   [[nodiscard]] bool is_rest(std::int32_t node) const {
-    const bool off_grid = claims_[node].grid_fit != GridFit::kTight;
+    const bool may_be_apart = claims_[node].grid_fit != GridFit::kTight;
     return std::ranges::any_of(kDirections, [&](Direction aside) {
       if (stands(node, beside(node, aside))) return false;
       int length = 1, most_refused = 0;
@@ -67,7 +67,7 @@ class Surroundings {
         }
         int refused = 0;
         for (; refused < kReach && other >= 0 && !stands(node, other); other = beside(other, along), ++refused)
-          others |= off_grid && misread(other);
+          others |= may_be_apart && misread(other);
         if (refused < kReach && other >= 0) return false;
         most_refused = std::max(most_refused, refused);
       }

@@ -25,8 +25,6 @@ constexpr float kMovedMax = 0.08F;
 /// look tilted more, and the place is then on neither.
 constexpr float kTiltMaxPx = 0.5F;
 constexpr int kHeldBy = 2;
-/// From where on what lies off a node's grid is of another surface, cells.
-constexpr float kOffGrid = 0.1F;
 /// From which misfit on, or how far off its line in projector px, what is decoded is aligned, too: whole symbols are
 /// nearer to their letters and to their lines. Its centroid is given up where the patch agrees well and lies near it;
 /// farther off, what was seen is another part of the symbol.
@@ -49,16 +47,15 @@ bool is_worn(const CellGate& gate, const Sightings& seen, std::int32_t node) {
 
 /// Whether it is well seen, and none of an island: its letter is another, or it has none of its cells.
 bool contradicts(const Sightings& seen, std::int32_t node, std::int32_t island) {
-  constexpr float kWellSeen = 3;  // standard deviations
   const CellClaim& claim = seen.claims[node];
   const bool of_island = claim.named() && claim.island == island && claim.status != RegionStatus::kClassDisagrees;
-  return !of_island && seen.shapes[node].letter >= 0 && seen.shapes[node].distance < kWellSeen;
+  return !of_island && seen.shapes[node].is_well_seen();
 }
 
 bool is_off_grid(const Sightings& seen, std::int32_t from, std::int32_t to, Direction d, float pitch_px) {
   const GridNode& node = seen.nodes[from];
   const Eigen::Vector2f way_px = seen.nodes[to].centre_px - node.centre_px;
-  return (node.frame.inverse() * way_px / pitch_px - step(d)).norm() > kOffGrid;
+  return (node.frame.inverse() * way_px / pitch_px - step(d)).norm() > kOffGridSlip;
 }
 
 /// Every letter in a square of twice its side.
@@ -259,14 +256,14 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
                                                     float blur_px, const CellGate& gate,
                                                     std::span<const Prototype> prototypes, Sightings& seen) {
   const PatternField& field = letters_->at(blur_px);
-  mended_.clear(), worn_.clear();
+  mended_.clear(), to_ask_.clear();
   const auto is_asked = [&](std::int32_t node) { return is_worn(gate, seen, node) || may_return(seen, node); };
   for (std::size_t i = 0; i < seen.size(); ++i)
-    if (const auto node = static_cast<std::int32_t>(i); is_asked(node)) worn_.push_back(node);
+    if (const auto node = static_cast<std::int32_t>(i); is_asked(node)) to_ask_.push_back(node);
   // What is mended holds those beside it.
-  while (!worn_.empty()) {
+  while (!to_ask_.empty()) {
     asked_.clear(), places_.clear(), tasks_.clear();
-    for (const std::int32_t node : worn_) look_at(frame, noise, gate, seen, node);
+    for (const std::int32_t node : to_ask_) look_at(frame, noise, gate, seen, node);
     align(frame, full, field);
     const std::size_t before = mended_.size();
     for (std::size_t i = 0; i < asked_.size(); ++i) {
@@ -277,14 +274,14 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
       take_over(tasks_[i], places_[i].frame, prototypes, seen, asked_[i]);
       mended_.push_back(asked_[i]);
     }
-    worn_.clear();
+    to_ask_.clear();
     for (std::size_t i = before; i < mended_.size(); ++i) {
       for (const std::int32_t other : seen.nodes[mended_[i]].links)
         if (other >= 0 && seen.claims[other].status != RegionStatus::kDecoded && is_asked(other))
-          worn_.push_back(other);
+          to_ask_.push_back(other);
     }
-    std::ranges::sort(worn_);
-    worn_.erase(std::unique(worn_.begin(), worn_.end()), worn_.end());
+    std::ranges::sort(to_ask_);
+    to_ask_.erase(std::unique(to_ask_.begin(), to_ask_.end()), to_ask_.end());
   }
   std::ranges::sort(mended_);
   return mended_;

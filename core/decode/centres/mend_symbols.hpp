@@ -73,8 +73,8 @@ class SymbolMender {
   CodeArray array_;
   float pitch_px_;
   std::shared_ptr<const LetterFields> letters_;
-  std::vector<std::int32_t> worn_, asked_, mended_;  // sightings; of those asked one place and task each
-  std::vector<std::int32_t> around_;                 // one that may return
+  std::vector<std::int32_t> to_ask_, asked_, mended_;  // sightings; of those asked one place and task each
+  std::vector<std::int32_t> around_;                   // one that may return
   std::vector<Place> places_;
   std::vector<PatchTask> tasks_;
 };

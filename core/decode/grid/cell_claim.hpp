@@ -14,6 +14,8 @@ enum class GridFit : std::uint8_t { kNone, kLoose, kTight };
 
 /// How far from there, in cells along the epipolar line, another surface lies in one of sixty cases at most.
 inline constexpr float kTightSlip = 0.008F;
+/// And from where on what is there is of another surface, however much the frame's own surfaces bend.
+inline constexpr float kOffGridSlip = 0.1F;
 
 /// A cell of the pattern that a node was found to be, and how well its surroundings speak for it.
 struct CellClaim {

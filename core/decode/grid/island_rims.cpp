@@ -52,7 +52,7 @@ std::optional<float> IslandJudge::slip_from_within(const Frame& frame, std::int3
 /// not known, none does.
 void IslandJudge::measure_slips(const Frame& frame) {
   constexpr std::size_t kSamples = 400, kSamplesMin = 20;
-  constexpr float kOfMedian = 8, kLeast = 0.008F, kMost = 0.1F;
+  constexpr float kOfMedian = 8, kLeast = 0.008F;
   slip_max_ = std::numeric_limits<float>::infinity();
   if (!frame.gate.knows_lines()) return;
   slips_.clear();
@@ -65,7 +65,7 @@ void IslandJudge::measure_slips(const Frame& frame) {
   if (slips_.size() < kSamplesMin) return;
   const auto middle = slips_.begin() + static_cast<std::ptrdiff_t>(slips_.size() / 2);
   std::ranges::nth_element(slips_, middle);
-  slip_max_ = std::clamp(kOfMedian * *middle, kLeast, kMost);
+  slip_max_ = std::clamp(kOfMedian * *middle, kLeast, kOffGridSlip);
 }
 
 /// How a node at a rim fits where its island's steps lead. Another surface lies there in one of sixty cases at most
@@ -105,7 +105,8 @@ void IslandJudge::cut_back(const Frame& frame) {
         if (link == Link::kAgrees) ++held_[node];
         // What is well seen and contradicts is other light, which seldom is a symbol wide.
         if (link == Link::kAgainst && !runs_along_edge(frame, node, d) && !parts(frame, node, d))
-          held_[node] = static_cast<std::int8_t>(held_[node] - (is_well_seen(frame, frame.beside[node][d]) ? 2 : 1));
+          held_[node] =
+              static_cast<std::int8_t>(held_[node] - (frame.shapes[frame.beside[node][d]].is_well_seen() ? 2 : 1));
       }
     }
     if (cut_[node] != 0) queue_.push_back(node);
@@ -150,7 +151,7 @@ float IslandJudge::bend_of(const Frame& frame, std::int32_t node, Direction d) c
 /// Whether a link leads to what is none of the island: its letter contradicts, or is well seen and has been refused.
 bool IslandJudge::is_of_another(const Frame& frame, std::int32_t node, Direction d) const {
   if (links_[node][d] != Link::kNeutral) return links_[node][d] == Link::kAgainst;
-  return !continues(frame, node, d) && is_well_seen(frame, frame.beside[node][d]);
+  return !continues(frame, node, d) && frame.shapes[frame.beside[node][d]].is_well_seen();
 }
 
 /// Calls visit(node) for those of a piece along one of its sides, until it returns true.

@@ -36,7 +36,7 @@ bool IslandJudge::adopt(const Frame& frame, std::int32_t node, CellClaim& adopte
   };
   constexpr float kAstray = 0.2F;  // of the pitch
   const auto may_be = [&](std::int32_t at, int row, int column) {
-    return frame.gate.admits(at, row, column, is_well_seen(frame, at) ? 0 : kAstray * pitch_px_);
+    return frame.gate.admits(at, row, column, frame.shapes[at].is_well_seen() ? 0 : kAstray * pitch_px_);
   };
   std::array<Candidate, 4> candidates;
   int count = 0;

@@ -125,10 +125,6 @@ class IslandJudge {
   void cut_pieces_through(const Frame& frame, std::int32_t node, float evidence_min);
   void cut_piece(const Frame& frame, const Piece& piece, float missing);
   [[nodiscard]] bool may_be_apart(const Frame& frame, const Piece& piece) const;
-  [[nodiscard]] static bool is_well_seen(const Frame& frame, std::int32_t node) {
-    constexpr float kWellSeen = 3;  // standard deviations
-    return frame.shapes[node].letter >= 0 && frame.shapes[node].distance < kWellSeen;
-  }
   [[nodiscard]] bool is_of_another(const Frame& frame, std::int32_t node, Direction d) const;
   template <class Visit>
   bool any_along(const Piece& piece, Direction d, Visit&& visit) const;

@@ -19,6 +19,11 @@ struct Classification {
   float likelihood = 0;     ///< of the features if it is the likeliest letter, up to a factor common to all classifiers
   std::int8_t letter = -1;  ///< the likeliest, or -1: like none of them
 
+  /// Whole, or nearly: what it shows counts.
+  [[nodiscard]] bool is_well_seen() const {
+    constexpr float kWellSeen = 3;  // standard deviations
+    return letter >= 0 && distance < kWellSeen;
+  }
   /// Its centre lies anywhere.
   [[nodiscard]] bool is_torn() const {
     constexpr float kTorn = 6;  // standard deviations
