@@ -11,6 +11,9 @@
 
 namespace slsd {
 
+/// How far from a letter's prototype, in standard deviations, a shape is torn: its centre lies anywhere.
+inline constexpr float kTornDistance = 6;
+
 /// What a shape is likely to be.
 struct Classification {
   std::array<float, kMaxLetters>
@@ -24,11 +27,7 @@ struct Classification {
     constexpr float kWellSeen = 3;  // standard deviations
     return letter >= 0 && distance < kWellSeen;
   }
-  /// Its centre lies anywhere.
-  [[nodiscard]] bool is_torn() const {
-    constexpr float kTorn = 6;  // standard deviations
-    return distance >= kTorn;
-  }
+  [[nodiscard]] bool is_torn() const { return distance >= kTornDistance; }
 };
 
 /// Compares features with prototypes, all letters at once.

@@ -28,7 +28,7 @@ struct ReviewOptions {
   float damaged_distance_on_grid = 4;
   /// The same for a symbol among named neighbours on all sides, and for one that two of its island hold: print and
   /// relief disturb a shape, its cell is certain, and its sigma says by how much they may move its centre.
-  float damaged_distance_held = 8;
+  float damaged_distance_held = kTornDistance;
 };
 
 /// Looks again at every symbol whose cell is known: with the frame that its whole neighbours show, with the light

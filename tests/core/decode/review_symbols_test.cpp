@@ -162,7 +162,7 @@ class DamagedSymbols : public ReviewSymbols {
 
 TEST_F(DamagedSymbols, AreTakenBackWhereTwoOfTheirIslandHoldThem) {
   EXPECT_EQ(after(5, {kUp, kLeft}), RegionStatus::kDecoded);
-  EXPECT_EQ(after(7.9F, {}), RegionStatus::kDecoded);
+  EXPECT_EQ(after(5.9F, {}), RegionStatus::kDecoded);
 }
 
 TEST_F(DamagedSymbols, AreNotTakenBackWhereOneHoldsThem) {
@@ -174,7 +174,7 @@ TEST_F(DamagedSymbols, AreNotTakenBackByAnotherIsland) {
 }
 
 TEST_F(DamagedSymbols, AreNotTakenBackWhereTooLittleIsLeft) {
-  EXPECT_EQ(after(8.1F, {}), RegionStatus::kDamagedShape);
+  EXPECT_EQ(after(6.1F, {}), RegionStatus::kDamagedShape);
 }
 
 TEST_F(ReviewSymbols, LevelsTheLight) {
