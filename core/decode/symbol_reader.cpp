@@ -164,7 +164,7 @@ void SymbolReader::correspond(const GreyView& frame, EpipolarView* view, Executo
   if (options_.decode_windows == Method::kDefault) {
     const Eigen::Vector2f frame_px(static_cast<float>(finder_.mask().width()),
                                    static_cast<float>(finder_.mask().height()));
-    correspondence_.refuse_lone(seen_.nodes, frame_px, executor, seen_.claims);
+    correspondence_.refuse_lone(seen_.nodes, seen_.shapes, frame_px, executor, seen_.claims);
     if (view != nullptr) mend(frame, *view);
     review_.take_back_held(seen_);
   }

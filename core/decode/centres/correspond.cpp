@@ -12,9 +12,9 @@ namespace {
 /// What became of the nodes along a node's row and column.
 class Surroundings {
  public:
-  Surroundings(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims,
-               const CorrespondOptions& options, const Eigen::Vector2f& frame_px)
-      : nodes_(nodes), claims_(claims), options_(options), frame_px_(frame_px) {}
+  Surroundings(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes,
+               const std::vector<CellClaim>& claims, const CorrespondOptions& options, const Eigen::Vector2f& frame_px)
+      : nodes_(nodes), shapes_(shapes), claims_(claims), options_(options), frame_px_(frame_px) {}
 
   /// Those beside it stand, and their cells lie beside its own.
   [[nodiscard]] bool goes_on_all_around(std::int32_t node) const {
@@ -50,8 +50,9 @@ class Surroundings {
     });
   }
 
-  /// Of the few that are left of a line, between as many refused ones and its end, with nothing of their island on one
-  /// side of them, and there, or among the refused ones, something that is none of it.
+  /// Of the few that are left of a line, with nothing of their island on one side of them, and there, or among the
+  /// refused ones, something that is none of it. The line ends with as many refused ones, with none, or with a torn
+  /// one: an edge along the line tears those whose halves are of other letters.
   [[nodiscard]] bool is_rest(std::int32_t node) const {
     const bool may_be_apart = claims_[node].grid_fit != GridFit::kTight;
     return std::ranges::any_of(kDirections, [&](Direction aside) {
@@ -66,8 +67,10 @@ class Surroundings {
           ++length;
         }
         int refused = 0;
-        for (; refused < kReach && other >= 0 && !stands(node, other); other = beside(other, along), ++refused)
+        for (; refused < kReach && other >= 0 && !stands(node, other); other = beside(other, along)) {
           others |= may_be_apart && misread(other);
+          refused = shapes_[other].is_torn() ? kReach : refused + 1;
+        }
         if (refused < kReach && other >= 0) return false;
         most_refused = std::max(most_refused, refused);
       }
@@ -135,6 +138,11 @@ class Surroundings {
            claims_[other].island == claims_[node].island;
   }
   [[nodiscard]] std::int32_t beside(std::int32_t node, Direction d) const { return neighbour(nodes_, node, d); }
+  /// The same, or what is torn: an edge through it moves its centre, and breaks its links.
+  [[nodiscard]] std::int32_t beside_or_torn(std::int32_t node, Direction d) const {
+    const std::int32_t other = nodes_[node].links[d];
+    return other >= 0 && nodes_[node].broken[d] && !shapes_[other].is_torn() ? -1 : other;
+  }
 
   /// Whether a node's cell lies beside another's as the nodes do.
   [[nodiscard]] bool fits(std::int32_t node, std::int32_t other, Direction d) const {
@@ -156,9 +164,9 @@ class Surroundings {
   [[nodiscard]] bool is_lone(std::int32_t node, Direction forth) const {
     int standing = 0, refused = 0, next_refused = 0;
     for (const Direction d : {forth, opposite(forth)}) {
-      std::int32_t other = beside(node, d);
+      std::int32_t other = beside_or_torn(node, d);
       next_refused += other >= 0 && !stands(node, other);
-      for (int i = 0; i < kReach && other >= 0; ++i, other = beside(other, d))
+      for (int i = 0; i < kReach && other >= 0; ++i, other = beside_or_torn(other, d))
         ++(stands(node, other) ? standing : refused);
     }
     const auto aside = static_cast<Direction>((forth + 1) % 4);
@@ -192,6 +200,7 @@ class Surroundings {
   }
 
   const std::vector<GridNode>& nodes_;
+  const std::vector<Classification>& shapes_;
   const std::vector<CellClaim>& claims_;
   const CorrespondOptions& options_;
   const Eigen::Vector2f frame_px_;
@@ -218,9 +227,9 @@ void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellCl
   }
 }
 
-void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, const Eigen::Vector2f& frame_px,
-                                 Executor& executor, std::vector<CellClaim>& claims) {
-  const Surroundings around(nodes, claims, options_, frame_px);
+void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes,
+                                 const Eigen::Vector2f& frame_px, Executor& executor, std::vector<CellClaim>& claims) {
+  const Surroundings around(nodes, shapes, claims, options_, frame_px);
   // Most are surrounded by their own, and then none of the following can be.
   at_rim_.resize(nodes.size());
   executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/decode/grid/decode_windows.hpp"
+#include "core/decode/symbols/classify.hpp"
 
 namespace slsd {
 
@@ -32,9 +33,10 @@ class Correspondence {
   /// cut those runs through them as well, and what is left of two symbols can look like a whole one. Between decoded
   /// ones on both sides it takes that all of them were. Not those that fit their island's grid tightly: no edge runs
   /// there. Then corners and rests of something else that agree by chance.
+  /// @param shapes    one to a node, as its claim
   /// @param frame_px  width and height: symbols that the frame's border cuts are not read, and may be anything
-  void refuse_lone(const std::vector<GridNode>& nodes, const Eigen::Vector2f& frame_px, Executor& executor,
-                   std::vector<CellClaim>& claims);
+  void refuse_lone(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes,
+                   const Eigen::Vector2f& frame_px, Executor& executor, std::vector<CellClaim>& claims);
 
   /// The duplicates alone, where there is no calibration.
   void settle_duplicates(const CellRays& cells, std::vector<CellClaim>& claims);

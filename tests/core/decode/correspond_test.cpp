@@ -114,6 +114,7 @@ TEST_F(Correspond, LeavesEarlierReasonsAlone) {
 struct RimSheet {
   SimulatedGrid grid;
   std::vector<CellClaim> claims;
+  std::vector<Classification> shapes;  // whole
   Eigen::Vector2f frame_px{400, 400};
 
   RimSheet() {
@@ -126,9 +127,14 @@ struct RimSheet {
       }
     }
     grid.link_truly();
+    shapes.resize(claims.size());
+  }
+  void tear(int row, int column) {
+    shapes[grid.node_at(row, column)].distance = 7;
+    at(row, column).status = RegionStatus::kDamagedShape;
   }
   CellClaim& at(int row, int column) { return claims[grid.node_at(row, column)]; }
-  void refuse_lone() { Correspondence({}).refuse_lone(grid.nodes, frame_px, alone, claims); }
+  void refuse_lone() { Correspondence({}).refuse_lone(grid.nodes, shapes, frame_px, alone, claims); }
 };
 
 TEST(RefuseLone, RefusesWhatStandsBetweenRefusedOnesAtARim) {
@@ -176,6 +182,36 @@ TEST(RefuseLone, RefusesTheFewThatAreLeftOfAMisreadRow) {
   sheet.refuse_lone();
   for (const int column : {0, 1, 3}) EXPECT_EQ(sheet.at(2, column).status, RegionStatus::kNeighboursDisagree) << column;
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(3, column).status, kDecoded) << column;
+}
+
+// An edge along the row tears what has other letters above it than below; what has the same looks whole.
+TEST(RefuseLone, RefusesTheFewBetweenTornOnes) {
+  for (const bool is_torn : {false, true}) {
+    RimSheet sheet;
+    for (int column = 0; column < 9; ++column) sheet.at(1, column).status = RegionStatus::kClassDisagrees;
+    for (const int column : {0, 5, 8}) {
+      sheet.tear(2, column);
+      if (!is_torn) sheet.shapes[sheet.grid.node_at(2, column)].distance = 5;
+    }
+    sheet.refuse_lone();
+    for (const int column : {1, 2, 3, 4}) EXPECT_EQ(sheet.at(2, column).status, kDecoded) << column;
+    for (const int column : {6, 7}) EXPECT_EQ(sheet.at(2, column).status == kDecoded, !is_torn) << column;
+  }
+}
+
+TEST(RefuseLone, RefusesWhatStandsBetweenTornOnesWhoseLinksAreBroken) {
+  for (const bool is_torn : {false, true}) {
+    RimSheet sheet;
+    for (int column = 0; column < 9; ++column) {
+      if (column == 4) continue;
+      sheet.tear(2, column);
+      if (!is_torn) sheet.shapes[sheet.grid.node_at(2, column)].distance = 5;
+    }
+    GridNode& node = sheet.grid.nodes[sheet.grid.node_at(2, 4)];
+    node.broken[kLeft] = node.broken[kRight] = true;
+    sheet.refuse_lone();
+    EXPECT_EQ(sheet.at(2, 4).status == kDecoded, !is_torn);
+  }
 }
 
 // One of them has nothing above it, and a broken link ends what was refused.
