@@ -87,6 +87,14 @@ TEST(AdversaryFrames, NameNothingBesideWhatIsPutInThePatternsPlace) {
   coarse.expect_none_wrong(Kind::kSlats1to2, 760);
 }
 
+// Along a torn row the symbols look whole whose letters are the same on both surfaces.
+TEST(AdversaryFrames, NameNothingInARowThatAnEdgeRunsAlong) {
+  Bench fine = Bench::of(8), coarse = Bench::of(16);
+  for (const int number : {60069, 900587, 1100289, 1300307, 1400177, 1600381})
+    fine.expect_none_wrong(Kind::kShelves, number);
+  for (const int number : {1300398, 1500070}) coarse.expect_none_wrong(Kind::kShelves, number);
+}
+
 // Symbols that the border cuts are not read, and contradict nothing.
 TEST(AdversaryFrames, NameNothingThatTheBorderOfTheFrameLeavesAlone) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);
@@ -116,6 +124,7 @@ TEST(AdversaryFrames, NameNoRowThatIsAnotherOneSlid) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);
   for (const int number : {2329, 2365, 3333, 3363, 4521}) fine.expect_none_wrong(Kind::kShelves, number);
   for (const int number : {3020, 3312, 4088, 9276}) coarse.expect_none_wrong(Kind::kShelves, number);
+  fine.expect_none_wrong(Kind::kShelves, 2000201);
   fine.expect_none_wrong(Kind::kSlats1, 1555);
   coarse.expect_none_wrong(Kind::kSlats1to2, 4272);
   coarse.expect_none_wrong(Kind::kSlats2, 3068);

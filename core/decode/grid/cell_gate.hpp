@@ -24,9 +24,12 @@ class CellGate {
   [[nodiscard]] bool admits(std::int32_t node, int row, int column, double astray_px = 0) const {
     return segments_.empty() || segments_[node].passes(cells_.ray(row, column).direction, tolerance_px_ + astray_px);
   }
-  /// How far the cell lies off the node's epipolar line, projector px; 0 where lines are not known.
+  /// How far the cell lies off the node's epipolar line and to which side, projector px; 0 where lines are not known.
+  [[nodiscard]] double residual_px(std::int32_t node, int row, int column) const {
+    return segments_.empty() ? 0 : segments_[node].residual_px(cells_.ray(row, column).direction);
+  }
   [[nodiscard]] double off_line_px(std::int32_t node, int row, int column) const {
-    return segments_.empty() ? 0 : std::abs(segments_[node].residual_px(cells_.ray(row, column).direction));
+    return std::abs(residual_px(node, row, column));
   }
   /// Whether the cell lies on the node's epipolar line, at whatever depth.
   [[nodiscard]] bool on_line(std::int32_t node, int row, int column) const {

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/decode/grid/islands.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 
@@ -51,6 +52,23 @@ float IslandJudge::evidence_of_places(const Frame& frame, Direction forth, int f
     }
   }
   return any ? -std::log(2 * kTightSlip) : 0;
+}
+
+/// Whether most of a part of line_ lie equally far off their epipolar lines: no depth moves a surface there, so what
+/// their letters name is another place.
+bool IslandJudge::are_off_line(const Frame& frame, int from, int to) {
+  constexpr int kFewest = 5;
+  constexpr float kAlike = 0.125F, kLeastPx = 0.25F;
+  if (to - from + 1 < kFewest) return false;
+  off_lines_px_.clear();
+  for (int i = from; i <= to; ++i) off_lines_px_.push_back(off_line_px(frame, line_[i]));
+  const float middle = median_in_place(off_lines_px_);
+  if (std::abs(middle) <= std::max(off_line_max_px_, kLeastPx)) return false;
+  const auto is_alike = [&](std::int32_t node) {
+    return frame.shapes[node].is_well_seen() && std::abs(off_line_px(frame, node) - middle) < kAlike * std::abs(middle);
+  };
+  const auto alike = std::count_if(line_.begin() + from, line_.begin() + to + 1, is_alike);
+  return 2 * alike > to - from + 1;
 }
 
 /// Keeps for every node the evidence of the line of nodes through it, as far as it agrees and so far around it, where
@@ -98,6 +116,10 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
                                 evidence < kUsualShare * usual ||
                                 (evidence < kUsualShareOffGrid * usual && is_off_grid(frame, forth, from, to));
       const bool misread = any_misread && std::any_of(line_.begin() + from, line_.begin() + to + 1, is_misread);
+      if (is_off_line(frame, line_[i]) && are_off_line(frame, from, to)) {
+        lines_.push_back({line_[i], line_[i], line_[i], 0, 0});
+        continue;
+      }
       if (!contradicted && (!misread || evidence_against_slides(frame, from, to) >= evidence_min)) continue;
       if (evidence > 0 && evidence < evidence_min) evidence += evidence_of_places(frame, forth, from, to);
       // As far as it agrees: what ends it may have been read as one of the island.

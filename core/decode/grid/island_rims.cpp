@@ -9,6 +9,7 @@
 #include <Eigen/LU>
 
 #include "core/decode/grid/islands.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 
@@ -52,25 +53,25 @@ std::optional<float> IslandJudge::slip_from_within(const Frame& frame, std::int3
 /// not known, none does.
 void IslandJudge::measure_slips(const Frame& frame) {
   constexpr std::size_t kSamples = 400, kSamplesMin = 20;
-  constexpr float kOfMedian = 8, kLeast = 0.008F;
-  slip_max_ = std::numeric_limits<float>::infinity();
+  constexpr float kOfMedian = 8, kLeast = 0.008F, kOffLineOfMedian = 10, kOffLineLeastPx = 0.1F;
+  slip_max_ = off_line_max_px_ = std::numeric_limits<float>::infinity();
   if (!frame.gate.knows_lines()) return;
-  slips_.clear();
+  slips_.clear(), off_lines_px_.clear();
   const std::size_t stride = std::max<std::size_t>(1, members_.size() / kSamples);
   for (std::size_t i = 0; i < members_.size(); i += stride) {
     if (links_[members_[i]] != kAllAgree) continue;
+    off_lines_px_.push_back(std::abs(off_line_px(frame, members_[i])));
     for (const Direction d : {kRight, kDown})
       if (const auto slip = slip_beyond(frame, members_[i], d)) slips_.push_back(std::abs(*slip));
   }
   if (slips_.size() < kSamplesMin) return;
-  const auto middle = slips_.begin() + static_cast<std::ptrdiff_t>(slips_.size() / 2);
-  std::ranges::nth_element(slips_, middle);
-  slip_max_ = std::clamp(kOfMedian * *middle, kLeast, kOffGridSlip);
+  slip_max_ = std::clamp(kOfMedian * median_in_place(slips_), kLeast, kOffGridSlip);
+  off_line_max_px_ = std::max(kOffLineOfMedian * median_in_place(off_lines_px_), kOffLineLeastPx);
 }
 
 /// How a node at a rim fits where its island's steps lead. Another surface lies there in one of sixty cases at most
 /// where the fit is tight, and in one of five where it is loose. What was put in the pattern's place lies on its grid,
-/// too.
+/// too. What is left of two symbols has its centre off its line.
 GridFit IslandJudge::grid_fit(const Frame& frame, std::int32_t node) const {
   constexpr int kTightLinks = 2;
   if (std::isinf(slip_max_)) return GridFit::kNone;
@@ -86,7 +87,7 @@ GridFit IslandJudge::grid_fit(const Frame& frame, std::int32_t node) const {
     }
   }
   if (count == 0 || most > slip_max_) return GridFit::kNone;
-  const bool tight = count >= kTightLinks && !beside_another && most <= tight_slip();
+  const bool tight = count >= kTightLinks && !beside_another && most <= tight_slip() && !is_off_line(frame, node);
   return tight ? GridFit::kTight : GridFit::kLoose;
 }
 

@@ -149,6 +149,15 @@ class IslandJudge {
   [[nodiscard]] std::optional<float> slip_beyond(const Frame& frame, std::int32_t node, Direction d) const;
   [[nodiscard]] std::optional<float> slip_from_within(const Frame& frame, std::int32_t node, Direction inwards) const;
   void measure_slips(const Frame& frame);
+  /// To which side of its epipolar line a node lies, and how far, projector px.
+  [[nodiscard]] static float off_line_px(const Frame& frame, std::int32_t node) {
+    return static_cast<float>(frame.gate.residual_px(node, frame.claims[node].row, frame.claims[node].column));
+  }
+  /// Whether it is farther than whole symbols are.
+  [[nodiscard]] bool is_off_line(const Frame& frame, std::int32_t node) const {
+    return std::abs(off_line_px(frame, node)) > off_line_max_px_;
+  }
+  [[nodiscard]] bool are_off_line(const Frame& frame, int from, int to);
   [[nodiscard]] GridFit grid_fit(const Frame& frame, std::int32_t node) const;
   /// Up to which slip a link fits the grid tightly.
   [[nodiscard]] float tight_slip() const { return std::min(0.5F * slip_max_, kTightSlip); }
@@ -195,8 +204,10 @@ class IslandJudge {
   std::vector<Line> lines_;                    // contradicted ones
   std::vector<std::int32_t> holder_;           // of each cell: of the island that is looked at, or of all
   std::int32_t looked_at_ = -1;
-  std::vector<float> slips_;  // of a sample of links, or of those across a line
-  float slip_max_ = 0;        // of links on one surface, cells
+  std::vector<float> slips_;         // of a sample of links, or of those across a line
+  float slip_max_ = 0;               // of links on one surface, cells
+  std::vector<float> off_lines_px_;  // of a sample of nodes
+  float off_line_max_px_ = 0;        // of whole symbols
 };
 
 }  // namespace slsd

@@ -58,6 +58,15 @@ class Islands : public testing::Test {
     }
     return segments;
   }
+  /// The line of what is seen so far below a cell's middle, projector px.
+  EpipolarSegment line_below(int row, int column, double off_px) const {
+    const Calibration rig = paper_rig();
+    const RigidTransform& to_projector = rig.cameras[0].projector_from_camera;
+    const Eigen::Vector2d pixel = cells_.pixel(row, column) + Eigen::Vector2d(0, off_px);
+    const Eigen::Vector3d point = 2000 * rig.projector.undistort(pixel).homogeneous();
+    return EpipolarGate(rig.cameras[0], rig.projector, 350, 3200)
+        .prepare((to_projector.rotation.transpose() * (point - to_projector.translation)).hnormalized());
+  }
   std::vector<CellClaim> decode(std::span<const EpipolarSegment> segments = {}) {
     grid_.link_truly();
     WindowDecoder decoder(pattern_, std::make_shared<const Codebook>(pattern_.array, kWholeRows, kWholeColumns),
@@ -313,13 +322,7 @@ class IslandsWithAWornSymbol : public Islands {
     shapes_[node].letter = static_cast<std::int8_t>((shapes_[node].letter + 1) % 5);  // so no window names it
     shapes_[node].distance = distance;
     auto segments = lines_through(2000, [](int) { return 0; });
-    const Calibration rig = paper_rig();
-    const RigidTransform& to_projector = rig.cameras[0].projector_from_camera;
-    const Eigen::Vector2d pixel = cells_.pixel(15, 20) + Eigen::Vector2d(0, off_px);
-    const Eigen::Vector3d point = 2000 * rig.projector.undistort(pixel).homogeneous();
-    segments[node] =
-        EpipolarGate(rig.cameras[0], rig.projector, 350, 3200)
-            .prepare((to_projector.rotation.transpose() * (point - to_projector.translation)).hnormalized());
+    segments[node] = line_below(15, 20, off_px);
     return decode(segments)[node];
   }
 };
@@ -342,13 +345,26 @@ TEST_F(IslandsWithAWornSymbol, DoNotHoldAWholeOneThatIsOffItsLine) {
 class IslandsWithALastRow : public IslandsAtAnEdge {
  protected:
   GridFit fit_of(float away_px, float below_px = 1.8F, bool knows_lines = true) {
+    show_last_row(away_px, below_px);
+    const auto claims = knows_lines ? decode(lines_through(2000, [](int) { return 0; })) : decode();
+    return claims[grid_.node_at(13, 30)].grid_fit;
+  }
+  /// The same of one so far off its line, among others that are so far off theirs.
+  GridFit fit_off_line(double off_px, double others_px) {
+    show_last_row(0, 1.8F);
+    std::vector<EpipolarSegment> segments;
+    for (const auto& [row, column] : grid_.cells) segments.push_back(line_below(row, column, others_px));
+    segments[grid_.node_at(13, 30)] = line_below(13, 30, off_px);
+    return decode(segments)[grid_.node_at(13, 30)].grid_fit;
+  }
+
+ private:
+  void show_last_row(float away_px, float below_px) {
     grid_ = {}, shapes_.clear();
     show_pattern(10, 10, 14, 41);
     for (int column = 10; column < 41; ++column) grid_.nodes[grid_.node_at(13, column)].centre_px.x() += away_px;
     show(14, 30, (pattern_.array.at(14, 30) + 1) % 5);
     grid_.nodes.back().centre_px.x() += away_px + below_px;
-    const auto claims = knows_lines ? decode(lines_through(2000, [](int) { return 0; })) : decode();
-    return claims[grid_.node_at(13, 30)].grid_fit;
   }
 };
 
@@ -371,8 +387,53 @@ TEST_F(IslandsWithALastRow, FitLooselyBesideOtherLightOnTheGrid) {
   EXPECT_EQ(fit_of(0, 0), GridFit::kLoose);
 }
 
+// What is left of two symbols has its centre anywhere.
+TEST_F(IslandsWithALastRow, FitLooselyFarOffItsLine) {
+  EXPECT_EQ(fit_off_line(0.09, 0), GridFit::kTight);
+  EXPECT_EQ(fit_off_line(0.11, 0), GridFit::kLoose);
+  EXPECT_EQ(fit_off_line(0.45, 0.05), GridFit::kTight);
+  EXPECT_EQ(fit_off_line(0.55, 0.05), GridFit::kLoose);
+}
+
 TEST_F(IslandsWithALastRow, DoNotFitWhereNothingTellsWhatDepthWouldMove) {
   EXPECT_EQ(fit_of(0, 1.8F, false), GridFit::kNone);
+}
+
+/// What becomes of a row in a sheet's midst whose letters are right and lie so far off their lines.
+class IslandsWithARowOffItsLines : public Islands {
+ protected:
+  int kept(const std::function<double(int)>& off_px, float distance = 1) {
+    grid_ = {}, shapes_.clear();
+    show_pattern(10, 10, 20, 40);
+    std::vector<EpipolarSegment> segments;
+    for (const auto& [row, column] : grid_.cells)
+      segments.push_back(line_below(row, column, row == 15 ? off_px(column) : 0));
+    for (int column = 10; column < 40; ++column) shapes_[grid_.node_at(15, column)].distance = distance;
+    const auto claims = decode(segments);
+    int count = 0;
+    for (int column = 10; column < 40; ++column) count += is_decoded(claims, 15, column);
+    EXPECT_GE(decoded(claims), 265);  // of 270 in the other rows
+    return count;
+  }
+};
+
+// The row of another surface, some columns on, whose letters come again: no depth puts it off its lines.
+TEST_F(IslandsWithARowOffItsLines, LoseItWhereAllOfItIs) {
+  EXPECT_EQ(kept([](int) { return 0.8; }), 0);
+  EXPECT_EQ(kept([](int column) { return -0.8 + (column % 2 == 0 ? 0.05 : -0.05); }), 0);
+}
+
+TEST_F(IslandsWithARowOffItsLines, KeepWhatIsLittleOff) {
+  EXPECT_EQ(kept([](int) { return 0.24; }), 30);
+}
+
+// An edge that cuts the row moves each letter as it is.
+TEST_F(IslandsWithARowOffItsLines, KeepWhatIsUnevenlyOff) {
+  EXPECT_GE(kept([](int column) { return 0.4 + 0.25 * (column % 4); }), 28);
+}
+
+TEST_F(IslandsWithARowOffItsLines, KeepWhatIsNotWellSeen) {
+  EXPECT_GE(kept([](int) { return 0.8; }, 4), 28);
 }
 
 /// A surface whose last columns come closer together, each by so much, up to where its links break.
