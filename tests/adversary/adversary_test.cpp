@@ -102,6 +102,11 @@ TEST(AdversaryFrames, NameNothingThatTheBorderOfTheFrameLeavesAlone) {
   fine.expect_none_wrong(Kind::kPickets, 700333);
 }
 
+// The neighbours of one that an edge cuts put it on the next.
+TEST(AdversaryFrames, NameNothingWhereAnotherSymbolIs) {
+  Bench::of(8).expect_none_wrong(Kind::kPickets, 2400263);
+}
+
 // Half of a shelf's letters fit by chance, from edge to edge of it.
 TEST(AdversaryFrames, NameNoRowThatIsOffTheGrid) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);

@@ -181,7 +181,10 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
     const Eigen::Vector2f own_centre = centroid - lattice_frame * prototype_of(seen.claims[node]).centroid_px;
     const Eigen::Vector2f centre = centre_from_neighbours(seen.nodes, node).value_or(own_centre);
     const float half_px = 0.25F * (size_px_ + pitch_px_);
-    adopt_if_better(meter.measure_cell(frame, centre, lattice_frame, half_px, shading()), 0);
+    const GreyMoments again = meter.measure_cell(frame, centre, lattice_frame, half_px, shading());
+    // Beside an edge the neighbours may put it where another symbol is.
+    const Eigen::Vector2f moved_px = Eigen::Vector2f(again.x, again.y) - centroid;
+    if ((lattice_frame.inverse() * moved_px).norm() < options_.moved_max * pitch_px_) adopt_if_better(again, 0);
   }
   if (change > options_.uneven_light) {
     if (!has_steady_centre) moments = meter.measure(frame, region, regions.runs_of(region), SteadyCentre::kMeasured);

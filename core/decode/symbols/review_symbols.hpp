@@ -21,6 +21,8 @@ struct ReviewOptions {
   /// Standard deviations from its letter's prototype from which on a symbol is measured again where its neighbours put
   /// it.
   float doubtful_distance = 1.5F;
+  /// How far from its region it may be found there, of the pitch.
+  float moved_max = 0.25F;
   /// The same beyond which a symbol at the edge of what is decoded may be cut by an edge or a shadow: it is damaged,
   /// but for one that its island holds.
   float damaged_distance = 2.5F;

@@ -127,6 +127,26 @@ TEST_F(ReviewSymbols, RejectsASymbolThatIsCut) {
   EXPECT_EQ(count(RegionStatus::kDecoded), kCells * kCells - 1);
 }
 
+// Its neighbours put it where the next one is, which is whole and has the same letter.
+TEST_F(ReviewSymbols, FindsNoSymbolWhereAnotherIs) {
+  int row = 3, column = 3;
+  while (pattern_.array.at(row, column) != pattern_.array.at(row, column + 1))
+    if (++column == kCells - 4) ++row, column = 3;
+  ASSERT_LT(row, kCells - 3);
+  light_(cv::Rect(column * kPitchPx, row * kPitchPx, kPitchPx / 3, kPitchPx)) = 0;
+  look();
+  const std::size_t cut = sighting_at(row, column);
+  for (const Direction d : kDirections) {
+    auto node = static_cast<std::int32_t>(cut);
+    for (int links = 0; links < 3; ++links) node = seen_.nodes[node].links[d];
+    seen_.nodes[node].centre_px.x() += kPitchPx;
+  }
+  const float before = seen_.moments[cut].x;
+  review();
+  EXPECT_NEAR(seen_.moments[cut].x, before, 0.25 * kPitchPx);
+  EXPECT_EQ(seen_.claims[cut].status, RegionStatus::kDamagedShape);
+}
+
 TEST_F(ReviewSymbols, TakesTheFramesAroundForOneThatIsOffOnTheGridAlone) {
   for (const GridFit fit : {GridFit::kNone, GridFit::kLoose, GridFit::kTight}) {
     seen_ = {};
