@@ -31,10 +31,8 @@ class CellGate {
   [[nodiscard]] double off_line_px(std::int32_t node, int row, int column) const {
     return std::abs(residual_px(node, row, column));
   }
-  /// Whether the cell lies on the node's epipolar line, at whatever depth.
-  [[nodiscard]] bool on_line(std::int32_t node, int row, int column) const {
-    return off_line_px(node, row, column) <= tolerance_px_;
-  }
+  /// Whether what is so far off lies on its epipolar line, at whatever depth.
+  [[nodiscard]] bool on_line(double residual_px) const { return std::abs(residual_px) <= tolerance_px_; }
   /// Which way a node's epipolar line leads past a cell: cells to the right and down, of length one.
   [[nodiscard]] Eigen::Vector2f way_of_line(std::int32_t node, int row, int column) const {
     const auto off_line = [&](int r, int c) { return segments_[node].residual_px(cells_.ray(r, c).direction); };

@@ -61,11 +61,11 @@ bool IslandJudge::are_off_line(const Frame& frame, int from, int to) {
   constexpr float kAlike = 0.125F, kLeastPx = 0.25F;
   if (to - from + 1 < kFewest) return false;
   off_lines_px_.clear();
-  for (int i = from; i <= to; ++i) off_lines_px_.push_back(off_line_px(frame, line_[i]));
+  for (int i = from; i <= to; ++i) off_lines_px_.push_back(own_[line_[i]].off_line_px);
   const float middle = median_in_place(off_lines_px_);
   if (std::abs(middle) <= std::max(off_line_max_px_, kLeastPx)) return false;
   const auto is_alike = [&](std::int32_t node) {
-    return frame.shapes[node].is_well_seen() && std::abs(off_line_px(frame, node) - middle) < kAlike * std::abs(middle);
+    return frame.shapes[node].is_well_seen() && std::abs(own_[node].off_line_px - middle) < kAlike * std::abs(middle);
   };
   const auto alike = std::count_if(line_.begin() + from, line_.begin() + to + 1, is_alike);
   return 2 * alike > to - from + 1;
@@ -116,7 +116,7 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
                                 evidence < kUsualShare * usual ||
                                 (evidence < kUsualShareOffGrid * usual && is_off_grid(frame, forth, from, to));
       const bool misread = any_misread && std::any_of(line_.begin() + from, line_.begin() + to + 1, is_misread);
-      if (is_off_line(frame, line_[i]) && are_off_line(frame, from, to)) {
+      if (is_off_line(line_[i]) && are_off_line(frame, from, to)) {
         lines_.push_back({line_[i], line_[i], line_[i], 0, 0});
         continue;
       }

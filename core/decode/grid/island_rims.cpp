@@ -60,7 +60,7 @@ void IslandJudge::measure_slips(const Frame& frame) {
   const std::size_t stride = std::max<std::size_t>(1, members_.size() / kSamples);
   for (std::size_t i = 0; i < members_.size(); i += stride) {
     if (links_[members_[i]] != kAllAgree) continue;
-    off_lines_px_.push_back(std::abs(off_line_px(frame, members_[i])));
+    off_lines_px_.push_back(std::abs(own_[members_[i]].off_line_px));
     for (const Direction d : {kRight, kDown})
       if (const auto slip = slip_beyond(frame, members_[i], d)) slips_.push_back(std::abs(*slip));
   }
@@ -87,7 +87,7 @@ GridFit IslandJudge::grid_fit(const Frame& frame, std::int32_t node) const {
     }
   }
   if (count == 0 || most > slip_max_) return GridFit::kNone;
-  const bool tight = count >= kTightLinks && !beside_another && most <= tight_slip() && !is_off_line(frame, node);
+  const bool tight = count >= kTightLinks && !beside_another && most <= tight_slip() && !is_off_line(node);
   return tight ? GridFit::kTight : GridFit::kLoose;
 }
 

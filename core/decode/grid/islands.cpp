@@ -113,8 +113,10 @@ void IslandJudge::look_at_own_cells(const Frame& frame, std::size_t first, std::
       own_[i] = {};
       continue;
     }
+    const double off_line_px = frame.gate.residual_px(node, claim.row, claim.column);
     own_[i] = {ratio(frame, node, claim.row, claim.column),
-               frame.gate.on_line(node, claim.row, claim.column),
+               static_cast<float>(off_line_px),
+               frame.gate.on_line(off_line_px),
                frame.gate.admits(node, claim.row, claim.column),
                {}};
     for (const Direction d : kDirections) {

@@ -149,13 +149,9 @@ class IslandJudge {
   [[nodiscard]] std::optional<float> slip_beyond(const Frame& frame, std::int32_t node, Direction d) const;
   [[nodiscard]] std::optional<float> slip_from_within(const Frame& frame, std::int32_t node, Direction inwards) const;
   void measure_slips(const Frame& frame);
-  /// To which side of its epipolar line a node lies, and how far, projector px.
-  [[nodiscard]] static float off_line_px(const Frame& frame, std::int32_t node) {
-    return static_cast<float>(frame.gate.residual_px(node, frame.claims[node].row, frame.claims[node].column));
-  }
-  /// Whether it is farther than whole symbols are.
-  [[nodiscard]] bool is_off_line(const Frame& frame, std::int32_t node) const {
-    return std::abs(off_line_px(frame, node)) > off_line_max_px_;
+  /// Whether a node is farther off its epipolar line than whole symbols are.
+  [[nodiscard]] bool is_off_line(std::int32_t node) const {
+    return std::abs(own_[node].off_line_px) > off_line_max_px_;
   }
   [[nodiscard]] bool are_off_line(const Frame& frame, int from, int to);
   [[nodiscard]] GridFit grid_fit(const Frame& frame, std::int32_t node) const;
@@ -182,7 +178,8 @@ class IslandJudge {
   float log_letters_, link_weight_, pitch_px_;
   /// What a node's own cell is to it, once all have one.
   struct Own {
-    float ratio;  // as above; 0 without a cell
+    float ratio;        // as above; 0 without a cell
+    float off_line_px;  // to which side of its epipolar line it lies, and how far, projector px
     bool on_line, admitted;
     std::array<bool, 4> fits;  // whether the neighbour's cell lies beside it as the neighbour does
   };
@@ -206,7 +203,7 @@ class IslandJudge {
   std::int32_t looked_at_ = -1;
   std::vector<float> slips_;         // of a sample of links, or of those across a line
   float slip_max_ = 0;               // of links on one surface, cells
-  std::vector<float> off_lines_px_;  // of a sample of nodes
+  std::vector<float> off_lines_px_;  // of a sample of nodes, or of those of a line
   float off_line_max_px_ = 0;        // of whole symbols
 };
 

@@ -129,8 +129,9 @@ struct RimSheet {
     grid.link_truly();
     shapes.resize(claims.size());
   }
-  void tear(int row, int column) {
-    shapes[grid.node_at(row, column)].distance = 7;
+  /// @param distance  from its letter, standard deviations
+  void damage(int row, int column, float distance) {
+    shapes[grid.node_at(row, column)].distance = distance;
     at(row, column).status = RegionStatus::kDamagedShape;
   }
   CellClaim& at(int row, int column) { return claims[grid.node_at(row, column)]; }
@@ -189,10 +190,7 @@ TEST(RefuseLone, RefusesTheFewBetweenTornOnes) {
   for (const bool is_torn : {false, true}) {
     RimSheet sheet;
     for (int column = 0; column < 9; ++column) sheet.at(1, column).status = RegionStatus::kClassDisagrees;
-    for (const int column : {0, 5, 8}) {
-      sheet.tear(2, column);
-      if (!is_torn) sheet.shapes[sheet.grid.node_at(2, column)].distance = 5;
-    }
+    for (const int column : {0, 5, 8}) sheet.damage(2, column, is_torn ? 6.1F : 5.9F);
     sheet.refuse_lone();
     for (const int column : {1, 2, 3, 4}) EXPECT_EQ(sheet.at(2, column).status, kDecoded) << column;
     for (const int column : {6, 7}) EXPECT_EQ(sheet.at(2, column).status == kDecoded, !is_torn) << column;
@@ -202,11 +200,7 @@ TEST(RefuseLone, RefusesTheFewBetweenTornOnes) {
 TEST(RefuseLone, RefusesWhatStandsBetweenTornOnesWhoseLinksAreBroken) {
   for (const bool is_torn : {false, true}) {
     RimSheet sheet;
-    for (int column = 0; column < 9; ++column) {
-      if (column == 4) continue;
-      sheet.tear(2, column);
-      if (!is_torn) sheet.shapes[sheet.grid.node_at(2, column)].distance = 5;
-    }
+    for (const int column : {0, 1, 2, 3, 5, 6, 7, 8}) sheet.damage(2, column, is_torn ? 6.1F : 5.9F);
     GridNode& node = sheet.grid.nodes[sheet.grid.node_at(2, 4)];
     node.broken[kLeft] = node.broken[kRight] = true;
     sheet.refuse_lone();
