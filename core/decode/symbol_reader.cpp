@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 
 #include "core/decode/centres/centre_sigma.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 namespace {
@@ -199,12 +200,7 @@ void SymbolReader::fit_lattice(const GreyView& frame, double full, const Epipola
 void SymbolReader::refuse_cut() {
   constexpr float kOfMedian = 13;
   std::vector<LatticeSymbol>& symbols = lattice_.symbols;
-  if (symbols.empty()) return;
-  damages_.clear();
-  for (const LatticeSymbol& symbol : symbols) damages_.push_back(symbol.damage_px);
-  const auto middle = damages_.begin() + static_cast<std::ptrdiff_t>(damages_.size() / 2);
-  std::ranges::nth_element(damages_, middle);
-  const float limit = kOfMedian * *middle;
+  const float limit = kOfMedian * usual_of(symbols.size(), [&](std::size_t i) { return symbols[i].damage_px; });
   kept_.clear();
   std::int32_t count = 0;
   for (const LatticeSymbol& symbol : symbols) {

@@ -103,7 +103,6 @@ class SymbolReader {
   bool is_there_ = true;
   const Appearance* look_ = nullptr;  // of this frame's symbols
   std::vector<ShapeFeatures> sample_;
-  std::vector<float> damages_;
   std::span<const std::int32_t> mended_;  // sightings
   std::vector<std::int32_t> kept_;        // of the lattice's symbols: where they are then
   Sightings seen_;

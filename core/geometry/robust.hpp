@@ -3,7 +3,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <ranges>
+#include <span>
 #include <vector>
 
 namespace slsd {
@@ -13,12 +16,30 @@ namespace slsd {
 template <std::ranges::random_access_range Values>
 [[nodiscard]] auto median_in_place(Values&& values) -> std::ranges::range_value_t<Values> {
   if (std::ranges::empty(values)) return 0;
+  constexpr int kFew = 16;  // sorted by insertion
   const auto middle = std::ranges::begin(values) + std::ranges::ssize(values) / 2;
-  std::ranges::nth_element(values, middle);
+  if (std::ranges::ssize(values) <= kFew) {
+    std::ranges::sort(values);
+  } else {
+    std::ranges::nth_element(values, middle);
+  }
   return *middle;
 }
 [[nodiscard]] inline double median_of(std::vector<double> values) {
   return median_in_place(values);
+}
+
+/// What is usual among many values: the median of a thousand of them at the most, evenly taken.
+/// @param value_at  from a place, 0 to count - 1, to its value
+/// @thread reentrant
+template <class ValueAt>
+[[nodiscard]] float usual_of(std::size_t count, ValueAt&& value_at) {
+  constexpr std::size_t kSamples = 1000;
+  std::array<float, kSamples> sample;
+  const std::size_t stride = (count + kSamples - 1) / kSamples;
+  std::size_t taken = 0;
+  for (std::size_t place = 0; place < count; place += stride) sample[taken++] = value_at(place);
+  return median_in_place(std::span(sample).first(taken));
 }
 
 /// A normal distribution's standard deviation over the median of its absolute values.

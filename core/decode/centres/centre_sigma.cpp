@@ -88,8 +88,7 @@ void CentreJudge::measure_across(const EpipolarView& view, const CellRays& cells
       disparities_px_[i] = static_cast<float>(view.disparity_px(symbol.sighting, symbol.centre_px, cell));
     }
   });
-  sorted_ = across_px_;
-  const float usual_px = median_in_place(sorted_);
+  const float usual_px = usual_of(symbols.size(), [&](std::size_t i) { return across_px_[i]; });
   for (std::size_t i = 0; i < symbols.size(); ++i)
     across_px_[i] = std::abs(across_px_[i] - usual_px) * std::sqrt(std::abs(symbols[i].frame.determinant()));
 }
@@ -119,9 +118,7 @@ void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const
     each->assign(symbols.size(), 0);
   if (symbols.empty()) return;
   if (view != nullptr) measure_across(*view, cells, executor, symbols), measure_unevenness(symbols, executor);
-  sorted_.clear();
-  for (const LatticeSymbol& symbol : symbols) sorted_.push_back(square(symbol.misfit));
-  const float usual_misfit_squared = median_in_place(sorted_);
+  const float usual_misfit_squared = usual_of(symbols.size(), [&](std::size_t i) { return square(symbols[i].misfit); });
   const auto judge_one = [&](std::size_t i) {
     LatticeSymbol& symbol = symbols[i];
     const float noise_px = noise_of_centre_px(symbol.weight, symbol.background, symbol.gain, noise);

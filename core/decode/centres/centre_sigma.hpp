@@ -47,7 +47,7 @@ class CentreJudge {
                       const std::vector<LatticeSymbol>& symbols);
   void measure_unevenness(const std::vector<LatticeSymbol>& symbols, Executor& executor);
 
-  std::vector<float> across_px_, disparities_px_, beyond_px_, uneven_px_, sorted_;
+  std::vector<float> across_px_, disparities_px_, beyond_px_, uneven_px_;
 };
 
 }  // namespace slsd
