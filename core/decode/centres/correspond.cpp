@@ -89,14 +89,15 @@ class Surroundings {
   }
 
   /// At the corner of what was put there: on two sides that meet, and between them, it has been refused; or on one of
-  /// them, and on the other the frame ends.
+  /// them something else lies or it has been refused, and on the other the frame ends.
   [[nodiscard]] bool is_corner(std::int32_t node) const {
     return std::ranges::any_of(kDirections, [&](Direction one) {
       const auto two = static_cast<Direction>((one + 1) % 4);
       const std::int32_t first = beside(node, one), second = beside(node, two);
       if (stands(node, beside(first, two)) || stands(node, beside(second, one))) return false;
-      return (misread(first) && misread(second)) || (is_unread(node, one) && is_refused(second)) ||
-             (is_unread(node, two) && is_refused(first));
+      const auto may_be_other = [&](std::int32_t other, Direction d) { return is_refused(other) || contradicts(node, d); };
+      return (misread(first) && misread(second)) || (is_unread(node, one) && may_be_other(second, two)) ||
+             (is_unread(node, two) && may_be_other(first, one));
     });
   }
 

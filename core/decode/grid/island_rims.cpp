@@ -192,7 +192,7 @@ IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, D
 /// holds the piece on one side or on two that meet. Something else lies beside it, or breaks off beside it while what
 /// holds the piece is bent.
 bool IslandJudge::may_be_apart(const Frame& frame, const Piece& piece) const {
-  constexpr float kBent = 0.06F;  // surfaces bend by a third of it and less
+  constexpr float kBent = 0.06F, kBentAway = 0.15F;  // surfaces bend by a third of the first and less
   // Asked first, as most pieces are held on both sides.
   const auto held = [&](Direction d) { return is_held(piece, d); };
   if ((held(kLeft) && held(kRight)) || (held(kUp) && held(kDown))) return false;
@@ -206,7 +206,7 @@ bool IslandJudge::may_be_apart(const Frame& frame, const Piece& piece) const {
     broken |= side.broken && side.held_by == 0;
     if (side.held_by == 0) beyond += side.beyond;
   }
-  return contradicted || beyond < kSpeaksAgainst || (broken && bend > kBent * links);
+  return contradicted || beyond < kSpeaksAgainst || bend > (broken ? kBent : kBentAway) * links;
 }
 
 /// How often the edge of an island turns at the corner above and to the left of a cell.
@@ -288,7 +288,8 @@ void IslandJudge::cut_pieces(const Frame& frame) {
     if (links_[node] == kAllAgree) continue;
     const auto ends = std::ranges::count_if(
         kDirections, [&](Direction d) { return frame.nodes[node].broken[d] || is_of_another(frame, node, d); });
-    if (ends > 0 || std::ranges::count(links_[node], Link::kNeutral) > 0) queue_.push_back(node);
+    const bool off_grid = frame.claims[node].grid_fit == GridFit::kNone;
+    if (ends > 0 || off_grid || std::ranges::count(links_[node], Link::kNeutral) > 0) queue_.push_back(node);
     rim += ends;
   }
   const auto evidence_min = static_cast<float>(std::log(static_cast<double>(rim) / options_.wrong_cells_max));
