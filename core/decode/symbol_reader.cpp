@@ -45,6 +45,7 @@ SymbolReader::SymbolReader(const IndexedPattern& indexed, const Lens& projector,
       window_decoder_(pattern(), indexed.codebook(), options.wrong_cells_max),
       review_(pattern(), {}),
       mender_(pattern()),
+      border_reader_(pattern(), mender_.letters()),
       correspondence_({.pitch_px = static_cast<float>(pattern().pitch_px()),
                        .symbol_size_px = static_cast<float>(pattern().options.symbol_size_px),
                        .rows = pattern().whole_rows(),
@@ -143,11 +144,14 @@ CellGate SymbolReader::gate_of(const EpipolarView* view) const {
   return {cells(), view->segments(), view->tolerance_px()};
 }
 
+float SymbolReader::blur_px() const {
+  return look_->blur_px.value_or(expected_scale()) / expected_scale();
+}
+
 /// Where epipolar lines are known, and all stages before go the default way.
 void SymbolReader::mend(const GreyView& frame, EpipolarView& view) {
   if (options_.any_paper()) return;
-  const float blur_px = look_->blur_px.value_or(expected_scale()) / expected_scale();
-  mended_ = mender_.mend(frame, 255.0 * finder_.frame_levels(), finder_.noise(), blur_px, gate_of(&view),
+  mended_ = mender_.mend(frame, 255.0 * finder_.frame_levels(), finder_.noise(), blur_px(), gate_of(&view),
                          look_->as_measured, seen_);
   for (const std::int32_t sighting : mended_) view.look_again_at(sighting, seen_);
 }
@@ -168,6 +172,7 @@ void SymbolReader::correspond(const GreyView& frame, EpipolarView* view, Executo
     correspondence_.refuse_lone(seen_.nodes, seen_.shapes, frame_px, executor, seen_.claims);
     if (view != nullptr) mend(frame, *view);
     review_.take_back_held(seen_);
+    if (!options_.any_paper()) border_reader_.refuse(frame, blur_px(), seen_);
   }
   if (view == nullptr) {
     correspondence_.settle_duplicates(cells(), seen_.claims);

@@ -11,6 +11,7 @@
 #include "core/decode/centres/correspond.hpp"
 #include "core/decode/centres/curvature.hpp"
 #include "core/decode/centres/mend_symbols.hpp"
+#include "core/decode/centres/read_border.hpp"
 #include "core/decode/centres/symbol_match.hpp"
 #include "core/decode/decoding.hpp"
 #include "core/decode/grid/decode_windows.hpp"
@@ -83,6 +84,8 @@ class SymbolReader {
   void decode_windows(const EpipolarView* view, Executor& executor);
   void review(const GreyView& frame, Executor& executor);
   [[nodiscard]] CellGate gate_of(const EpipolarView* view) const;
+  /// Of the pattern in this frame, standard deviation, projector px.
+  [[nodiscard]] float blur_px() const;
   void mend(const GreyView& frame, EpipolarView& view);
   void correspond(const GreyView& frame, EpipolarView* view, Executor& executor);
   void refuse_cut();
@@ -96,6 +99,7 @@ class SymbolReader {
   WindowDecoder window_decoder_;
   SymbolReview review_;
   SymbolMender mender_;
+  BorderReader border_reader_;
   Correspondence correspondence_;
   CentreCorrection centre_correction_;
   CentreJudge centre_judge_;

@@ -67,6 +67,7 @@ TEST(AdversaryFrames, NameNoPieceOfAnotherSurfaceAtARim) {
   for (const auto& [kind, number] : {std::pair(Kind::kShelves, 1),
                                      {Kind::kShelves, 67},
                                      {Kind::kPickets, 87},
+                                     {Kind::kPickets, 2700313},
                                      {Kind::kSwappedPatch, 37},
                                      {Kind::kSwappedPatch, 43},
                                      {Kind::kSwappedPatch, 55}})
@@ -95,10 +96,11 @@ TEST(AdversaryFrames, NameNothingInARowThatAnEdgeRunsAlong) {
   for (const int number : {1300398, 1500070}) coarse.expect_none_wrong(Kind::kShelves, number);
 }
 
-// Symbols that the border cuts are not read, and contradict nothing.
+// Symbols that the border cuts have no letter, and link with nothing.
 TEST(AdversaryFrames, NameNothingThatTheBorderOfTheFrameLeavesAlone) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);
-  coarse.expect_none_wrong(Kind::kSwappedPatch, 60418);
+  for (const int number : {60418, 600342, 1700472, 5100456, 5201686, 5301614, 5302142})
+    coarse.expect_none_wrong(Kind::kSwappedPatch, number);
   fine.expect_none_wrong(Kind::kPickets, 700333);
 }
 

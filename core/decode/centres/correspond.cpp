@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/decode/centres/read_border.hpp"
+
 namespace slsd {
 namespace {
 
@@ -95,7 +97,9 @@ class Surroundings {
       const auto two = static_cast<Direction>((one + 1) % 4);
       const std::int32_t first = beside(node, one), second = beside(node, two);
       if (stands(node, beside(first, two)) || stands(node, beside(second, one))) return false;
-      const auto may_be_other = [&](std::int32_t other, Direction d) { return is_refused(other) || contradicts(node, d); };
+      const auto may_be_other = [&](std::int32_t other, Direction d) {
+        return is_refused(other) || contradicts(node, d);
+      };
       return (misread(first) && misread(second)) || (is_unread(node, one) && may_be_other(second, two)) ||
              (is_unread(node, two) && may_be_other(first, one));
     });
@@ -109,15 +113,12 @@ class Surroundings {
   }
   /// The border of the frame cuts the symbol there, or hides it.
   [[nodiscard]] bool is_unread(std::int32_t node, Direction d) const {
-    constexpr float kBorderPx = 3;  // blur widens what touches it
     const GridNode& from = nodes_[node];
     const CellClaim::Cell cell = claims_[node].beyond(d);
     const bool shown = cell.row >= 0 && cell.column >= 0 && cell.row < options_.rows && cell.column < options_.columns;
     if (from.links[d] >= 0 || !shown) return false;
-    const Eigen::Array2f there = from.centre_px + options_.pitch_px * (from.frame * step(d));
-    const Eigen::Array2f half = 0.5F * options_.symbol_size_px * from.frame.cwiseAbs().rowwise().sum();
-    const Eigen::Array2f reach = half + kBorderPx;
-    return (there < reach).any() || (there > frame_px_.array() - 1 - reach).any();
+    const Eigen::Vector2f there = from.centre_px + options_.pitch_px * (from.frame * step(d));
+    return is_at_border(there, from.frame, options_.symbol_size_px, frame_px_);
   }
   /// Damaged, or moved off its line as print does it.
   [[nodiscard]] bool is_worn(std::int32_t node) const {

@@ -41,6 +41,8 @@ class SymbolMender {
  public:
   explicit SymbolMender(const Pattern& pattern);
 
+  [[nodiscard]] const std::shared_ptr<const LetterFields>& letters() const { return letters_; }
+
   /// @param full        the level of a saturated pixel
   /// @param blur_px     of the pattern in the frame, standard deviation, projector px
   /// @param gate        that knows the epipolar lines

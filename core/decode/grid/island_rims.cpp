@@ -176,37 +176,33 @@ IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, D
   any_along(piece, d, [&](std::int32_t node) {
     if (links_[node][d] == Link::kAgrees) side.bend += bend_of(frame, node, d), ++side.held_by;
     const auto cell = frame.claims[node].beyond(d);
-    if (parts(frame, node, d) && !frame.shapes[frame.beside[node][d]].is_torn()) {
-      side.broken |= is_of_another(frame, node, d);
-    } else if (shown(cell.row, cell.column)) {
-      side.contradicted |= is_of_another(frame, node, d);
-      if (links_[node][d] == Link::kNeutral) side.beyond += ratio(frame, frame.beside[node][d], cell.row, cell.column);
-    }
-    side.broken |= frame.nodes[node].broken[d];
+    const bool is_edge = parts(frame, node, d) && !frame.shapes[frame.beside[node][d]].is_torn();
+    if (is_edge || !shown(cell.row, cell.column)) return false;
+    side.contradicted |= is_of_another(frame, node, d);
+    if (links_[node][d] == Link::kNeutral) side.beyond += ratio(frame, frame.beside[node][d], cell.row, cell.column);
     return false;
   });
   return side;
 }
 
 /// Whether a piece of an island may be of another surface: one whose rim is straight, or turns once, so that the island
-/// holds the piece on one side or on two that meet. Something else lies beside it, or breaks off beside it while what
-/// holds the piece is bent.
+/// holds the piece on one side or on two that meet. Something else lies beside it, or what holds it bends as surfaces
+/// do not.
 bool IslandJudge::may_be_apart(const Frame& frame, const Piece& piece) const {
-  constexpr float kBent = 0.06F, kBentAway = 0.15F;  // surfaces bend by a third of the first and less
+  constexpr float kBentAway = 0.15F;  // in the mean of its links
   // Asked first, as most pieces are held on both sides.
   const auto held = [&](Direction d) { return is_held(piece, d); };
   if ((held(kLeft) && held(kRight)) || (held(kUp) && held(kDown))) return false;
   std::array<Side, 4> sides;
   for (const Direction d : kDirections) sides[d] = side_of(frame, piece, d);
   float bend = 0, links = 0, beyond = 0;
-  bool contradicted = false, broken = false;
+  bool contradicted = false;
   for (const Side& side : sides) {
     bend += side.bend, links += static_cast<float>(side.held_by);
     contradicted |= side.contradicted && side.held_by == 0;
-    broken |= side.broken && side.held_by == 0;
     if (side.held_by == 0) beyond += side.beyond;
   }
-  return contradicted || beyond < kSpeaksAgainst || bend > (broken ? kBent : kBentAway) * links;
+  return contradicted || beyond < kSpeaksAgainst || bend > kBentAway * links;
 }
 
 /// How often the edge of an island turns at the corner above and to the left of a cell.

@@ -79,7 +79,7 @@ class IslandJudge {
     int held_by = 0;   // links of the island's
     float bend = 0;    // their sum
     float beyond = 0;  // what doubtful shapes there say for being the island's
-    bool contradicted = false, broken = false;
+    bool contradicted = false;
   };
 
   struct Frame {

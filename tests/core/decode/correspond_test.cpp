@@ -256,6 +256,8 @@ TEST(RefuseLone, RefusesTheCornerOfWhatIsMisread) {
 TEST(RefuseLone, RefusesTheCornerWhereTheFrameEnds) {
   const float beyond_last = 100 + 8 * SimulatedGrid::kPitchPx + 12;  // less than the next one needs
   RimSheet sheet;
+  for (int column = 0; column < 9; ++column)
+    sheet.at(6, column).column = static_cast<std::int16_t>(column), sheet.at(6, column).island = 0;
   sheet.frame_px.x() = beyond_last;
   sheet.refuse_lone();
   EXPECT_EQ(sheet.at(3, 8).status, kDecoded) << "the rim goes on";
@@ -267,6 +269,10 @@ TEST(RefuseLone, RefusesTheCornerWhereTheFrameEnds) {
   const std::vector<CellClaim> misread = sheet.claims;
   sheet.refuse_lone();
   EXPECT_EQ(sheet.at(3, 8).status, RegionStatus::kNeighboursDisagree);
+  sheet.claims = misread;
+  sheet.at(2, 8) = {};
+  sheet.refuse_lone();
+  EXPECT_EQ(sheet.at(3, 8).status, RegionStatus::kNeighboursDisagree) << "what has none of the cells is something else";
   sheet.claims = misread;
   for (CellClaim& claim : sheet.claims) claim.column = static_cast<std::int16_t>(claim.column + 62);
   sheet.refuse_lone();

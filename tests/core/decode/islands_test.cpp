@@ -439,7 +439,7 @@ TEST_F(IslandsWithARowOffItsLines, KeepWhatIsNotWellSeen) {
 /// A surface whose last columns come closer together, each by so much, up to where its links break.
 class IslandsThatTurnAway : public Islands {
  protected:
-  int kept(std::initializer_list<float> closer) {
+  int kept(std::initializer_list<float> closer, bool breaks_off = true) {
     constexpr int kTop = 10, kBottom = 14, kRim = 40;
     show_pattern(kTop, 10, kBottom, kRim + 1);
     for (int row = kBottom; row < 20; ++row)
@@ -447,7 +447,7 @@ class IslandsThatTurnAway : public Islands {
     for (int row = kTop; row < kBottom; ++row) {
       int column = kRim;
       for (const float steps : closer) grid_.nodes[grid_.node_at(row, column--)].centre_px.x() -= 18 * steps;
-      grid_.nodes[grid_.node_at(row, kRim)].broken[kRight] = true;
+      grid_.nodes[grid_.node_at(row, kRim)].broken[kRight] = breaks_off;
     }
     const auto claims = decode();
     int count = 0;
@@ -461,11 +461,17 @@ TEST_F(IslandsThatTurnAway, KeepTheirLimb) {
 }
 
 TEST_F(IslandsThatTurnAway, LoseWhatBendsFasterThanALimb) {
-  EXPECT_EQ(kept({0.22F, 0.04F, 0.01F}), 0);  // bends of 0.15, 0.02 and 0.01
+  EXPECT_EQ(kept({0.31F, 0.04F, 0.01F}), 0);  // bends of 0.24, 0.02 and 0.01
 }
 
 TEST_F(IslandsThatTurnAway, LoseWhatBendsAtOnce) {
-  EXPECT_EQ(kept({0.11F}), 0);
+  EXPECT_EQ(kept({0.12F}), 4);
+  EXPECT_EQ(kept({0.18F}), 0);
+}
+
+TEST_F(IslandsThatTurnAway, LoseWhatBendsAtOnceWhereNothingLiesBesideIt) {
+  EXPECT_EQ(kept({0.12F}, false), 4);
+  EXPECT_EQ(kept({0.18F}, false), 0);
 }
 
 // What lies across the epipolar lines is no other depth: of the island's own surface, whatever moved it.

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/centres/read_border.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "core/decode/grid/neighbourhood.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr int kSide = 11, kSamples = kSide * kSide;  // over a symbol's square
+constexpr int kVisibleMin = kSamples * 2 / 5;
+
+/// What is seen of a symbol, and where in its square, projector px from the middle.
+struct Visible {
+  std::array<float, kSamples> grey;
+  std::array<Eigen::Vector2f, kSamples> at_px;
+  int count = 0;
+};
+
+template <class T>
+float grey_at(const ImageView<T>& image, const Eigen::Vector2f& at) {
+  const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
+  const float right = at.x() - static_cast<float>(x), down = at.y() - static_cast<float>(y);
+  const auto row = [&](int v) {
+    const T* pixels = image.row(v) + x;
+    return (1 - right) * static_cast<float>(pixels[0]) + right * static_cast<float>(pixels[1]);
+  };
+  return (1 - down) * row(y) + down * row(y + 1);
+}
+
+Visible look_at(const GreyView& frame, const Eigen::Vector2f& centre_px, const LatticeFrame& lattice_frame,
+                float size_px) {
+  Visible visible;
+  const auto look = [&](const auto& image) {
+    for (int i = 0; i < kSamples; ++i) {
+      const Eigen::Vector2f in_square(static_cast<float>(i % kSide), static_cast<float>(i / kSide));
+      const Eigen::Vector2f at_px = size_px * ((in_square.array() + 0.5F) / kSide - 0.5F).matrix();
+      const Eigen::Vector2f there = centre_px + lattice_frame * at_px;
+      if (!(there.x() >= 0 && there.y() >= 0)) continue;
+      if (!(there.x() < static_cast<float>(image.width - 1) && there.y() < static_cast<float>(image.height - 1)))
+        continue;
+      visible.grey[visible.count] = grey_at(image, there);
+      visible.at_px[visible.count++] = at_px;
+    }
+  };
+  std::visit(look, frame);
+  return visible;
+}
+
+/// Correlation of what is seen with a letter, which is that of its light and its background whatever they are.
+/// @param middle_px  of the letter's square
+float likeness(const Visible& visible, const PatternField& letters, const Eigen::Vector2f& middle_px) {
+  float grey = 0, light = 0, grey_squared = 0, light_squared = 0, product = 0;
+  for (int i = 0; i < visible.count; ++i) {
+    const Eigen::Vector2f at = middle_px + visible.at_px[i];
+    const float expected = letters.at(at.x(), at.y()).value, seen = visible.grey[i];
+    grey += seen, light += expected;
+    grey_squared += seen * seen, light_squared += expected * expected, product += seen * expected;
+  }
+  const auto count = static_cast<float>(visible.count);
+  const float variances = (count * grey_squared - grey * grey) * (count * light_squared - light * light);
+  return variances > 0 ? (count * product - grey * light) / std::sqrt(variances) : 0;
+}
+
+}  // namespace
+
+bool is_at_border(const Eigen::Vector2f& centre_px, const LatticeFrame& frame, float symbol_size_px,
+                  const Eigen::Vector2f& frame_px) {
+  constexpr float kBorderPx = 3;  // blur widens what touches it
+  const Eigen::Array2f reach = 0.5F * symbol_size_px * frame.cwiseAbs().rowwise().sum().array() + kBorderPx;
+  return (centre_px.array() < reach).any() || (centre_px.array() > frame_px.array() - 1 - reach).any();
+}
+
+BorderReader::BorderReader(const Pattern& pattern, std::shared_ptr<const LetterFields> letters)
+    : array_(pattern.array),
+      rows_(pattern.whole_rows()),
+      columns_(pattern.whole_columns()),
+      pitch_px_(static_cast<float>(pattern.pitch_px())),
+      size_px_(static_cast<float>(pattern.options.symbol_size_px)),
+      letter_count_(static_cast<int>(pattern.options.symbols.size())),
+      letters_(std::move(letters)) {}
+
+/// Whether another letter is much more like what is there than the one that is asked for.
+bool BorderReader::shows_another(const GreyView& frame, const PatternField& letters, const Eigen::Vector2f& centre_px,
+                                 const LatticeFrame& lattice_frame, int letter) const {
+  constexpr float kLike = 0.85F, kLead = 0.25F;
+  const Visible visible = look_at(frame, centre_px, lattice_frame, size_px_);
+  if (visible.count < kVisibleMin) return false;
+  const float own = likeness(visible, letters, letters_->middle_px(letter));
+  if (own + kLead > 1) return false;
+  float most = 0;
+  for (int other = 0; other < letter_count_; ++other)
+    most = std::max(most, likeness(visible, letters, letters_->middle_px(other)));
+  return most >= kLike && most - own >= kLead;
+}
+
+void BorderReader::refuse(const GreyView& frame, float blur_px, Sightings& seen) {
+  refused_.clear();
+  const PatternField& letters = letters_->at(blur_px);
+  const auto frame_px = std::visit(
+      [](const auto& view) { return Eigen::Vector2f(Eigen::Vector2i(view.width, view.height).cast<float>()); }, frame);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const auto node = static_cast<std::int32_t>(i);
+    const CellClaim& claim = seen.claims[i];
+    if (claim.status != RegionStatus::kDecoded) continue;
+    const GridNode& from = seen.nodes[i];
+    for (const Direction d : kDirections) {
+      const CellClaim::Cell cell = claim.beyond(d);
+      if (from.links[d] >= 0 || cell.row < 0 || cell.column < 0 || cell.row >= rows_ || cell.column >= columns_)
+        continue;
+      const std::int32_t behind = decoded_beside(seen.nodes, seen.claims, node, opposite(d));
+      const Eigen::Vector2f step_px = behind >= 0 ? (from.centre_px - seen.nodes[behind].centre_px).eval()
+                                                  : (pitch_px_ * (from.frame * step(d))).eval();
+      const Eigen::Vector2f there_px = from.centre_px + step_px;
+      if (!is_at_border(there_px, from.frame, size_px_, frame_px)) continue;
+      if (shows_another(frame, letters, there_px, from.frame, array_.at(cell.row, cell.column)))
+        refused_.push_back(node);
+    }
+  }
+  for (const std::int32_t node : refused_) seen.claims[node].status = RegionStatus::kNeighboursDisagree;
+}
+
+}  // namespace slsd
