@@ -75,7 +75,7 @@ bool IslandJudge::are_off_line(const Frame& frame, int from, int to) {
 /// something contradicts it.
 void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, float evidence_min) {
   constexpr int kReach = 10, kBeyond = 3;
-  constexpr float kUsualShare = 0.5F, kUsualShareOffGrid = 0.8F, kClean = 0.8F;
+  constexpr float kUsualShare = 0.3F, kUsualShareOffGrid = 0.8F, kClean = 0.8F;
   const Direction back = opposite(forth);
   const auto leads = [&](std::int32_t node, Direction d) {
     return continues(frame, node, d) && frame.beside[frame.beside[node][d]][opposite(d)] == node;
