@@ -77,10 +77,7 @@ double black_share(const std::vector<Pixel>& pixels, const Eigen::Vector3d& whit
 double level_at(const Image<float>& light, const Eigen::Vector2d& at) {
   const int x = std::clamp(static_cast<int>(at.x()), 0, light.width() - 2);
   const int y = std::clamp(static_cast<int>(at.y()), 0, light.height() - 2);
-  const double right = at.x() - x;
-  const double low = at.y() - y;
-  return (light.at(x, y) * (1 - right) + light.at(x + 1, y) * right) * (1 - low) +
-         (light.at(x, y + 1) * (1 - right) + light.at(x + 1, y + 1) * right) * low;
+  return level_between(light.view(), x, y, at.x() - x, at.y() - y);
 }
 
 // From the steepest slope along each ray: a step of height 1 blurred by s has 1 / (s sqrt(2 pi)).

@@ -37,10 +37,7 @@ std::optional<double> level_at(const Image<float>& light, const Eigen::Vector2d&
   const int x = static_cast<int>(std::floor(at.x()));
   const int y = static_cast<int>(std::floor(at.y()));
   if (!light.view().contains(x, y) || !light.view().contains(x + 1, y + 1)) return std::nullopt;
-  const double right = at.x() - x;
-  const double low = at.y() - y;
-  return (light.at(x, y) * (1 - right) + light.at(x + 1, y) * right) * (1 - low) +
-         (light.at(x, y + 1) * (1 - right) + light.at(x + 1, y + 1) * right) * low;
+  return level_between(light.view(), x, y, at.x() - x, at.y() - y);
 }
 
 // The centroid of the slope from black to white along a line through `at`.

@@ -22,17 +22,6 @@ struct Visible {
   int count = 0;
 };
 
-template <class T>
-float grey_at(const ImageView<T>& image, const Eigen::Vector2f& at) {
-  const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
-  const float right = at.x() - static_cast<float>(x), down = at.y() - static_cast<float>(y);
-  const auto row = [&](int v) {
-    const T* pixels = image.row(v) + x;
-    return (1 - right) * static_cast<float>(pixels[0]) + right * static_cast<float>(pixels[1]);
-  };
-  return (1 - down) * row(y) + down * row(y + 1);
-}
-
 Visible look_at(const GreyView& frame, const Eigen::Vector2f& centre_px, const LatticeFrame& lattice_frame,
                 float size_px) {
   Visible visible;
@@ -44,7 +33,10 @@ Visible look_at(const GreyView& frame, const Eigen::Vector2f& centre_px, const L
       if (!(there.x() >= 0 && there.y() >= 0)) continue;
       if (!(there.x() < static_cast<float>(image.width - 1) && there.y() < static_cast<float>(image.height - 1)))
         continue;
-      visible.grey[visible.count] = grey_at(image, there);
+      const int x = static_cast<int>(there.x()), y = static_cast<int>(there.y());
+      const double level =
+          level_between(image, x, y, there.x() - static_cast<float>(x), there.y() - static_cast<float>(y));
+      visible.grey[visible.count] = static_cast<float>(level);
       visible.at_px[visible.count++] = at_px;
     }
   };
@@ -58,7 +50,8 @@ float likeness(const Visible& visible, const PatternField& letters, const Eigen:
   float grey = 0, light = 0, grey_squared = 0, light_squared = 0, product = 0;
   for (int i = 0; i < visible.count; ++i) {
     const Eigen::Vector2f at = middle_px + visible.at_px[i];
-    const float expected = letters.at(at.x(), at.y()).value, seen = visible.grey[i];
+    // From a level of its own on: squares of high ones would drown what is between them.
+    const float expected = letters.at(at.x(), at.y()).value, seen = visible.grey[i] - visible.grey[0];
     grey += seen, light += expected;
     grey_squared += seen * seen, light_squared += expected * expected, product += seen * expected;
   }
@@ -118,8 +111,9 @@ void BorderReader::refuse(const GreyView& frame, float blur_px, Sightings& seen)
                                                   : (pitch_px_ * (from.frame * step(d))).eval();
       const Eigen::Vector2f there_px = from.centre_px + step_px;
       if (!is_at_border(there_px, from.frame, size_px_, frame_px)) continue;
-      if (shows_another(frame, letters, there_px, from.frame, array_.at(cell.row, cell.column)))
-        refused_.push_back(node);
+      if (!shows_another(frame, letters, there_px, from.frame, array_.at(cell.row, cell.column))) continue;
+      refused_.push_back(node);
+      break;
     }
   }
   for (const std::int32_t node : refused_) seen.claims[node].status = RegionStatus::kNeighboursDisagree;

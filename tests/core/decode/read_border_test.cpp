@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include "core/decode/centres/read_border.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -49,7 +50,8 @@ class SymbolAtTheBorder : public testing::Test {
     return frame;
   }
 
-  RegionStatus status_beside(const Grey8& frame) {
+  template <class T>
+  RegionStatus status_beside(const Image<T>& frame) {
     seen_.claims[0].status = RegionStatus::kDecoded;
     BorderReader(pattern_, letters_).refuse(frame.view(), 0.7F, seen_);
     return seen_.claims[0].status;
@@ -75,7 +77,29 @@ TEST_F(SymbolAtTheBorder, IsRefusedBesideAnyOther) {
 }
 
 TEST_F(SymbolAtTheBorder, StandsBesideNothing) {
-  EXPECT_EQ(status_beside(Grey8(200, 120)), RegionStatus::kDecoded);
+  for (int level = 0; level <= 255; ++level) {
+    Grey8 frame(200, 120);
+    for (int y = 0; y < frame.height(); ++y) std::fill_n(frame.row(y), frame.width(), static_cast<std::uint8_t>(level));
+    EXPECT_EQ(status_beside(frame), RegionStatus::kDecoded) << level;
+  }
+}
+
+TEST_F(SymbolAtTheBorder, StandsBesideNothingInADeepFrame) {
+  for (int level = 0; level < 65536; level += 257 * 3 + 1) {
+    Image<std::uint16_t> frame(200, 120);
+    for (int y = 0; y < frame.height(); ++y)
+      std::fill_n(frame.row(y), frame.width(), static_cast<std::uint16_t>(level));
+    EXPECT_EQ(status_beside(frame), RegionStatus::kDecoded) << level;
+  }
+}
+
+TEST_F(SymbolAtTheBorder, IsRefusedBesideAnotherInADeepAndBrightFrame) {
+  const int other = (letter_of_its_cell() + 1) % static_cast<int>(pattern_.options.symbols.size());
+  const Grey8 shallow = frame_with(other);
+  Image<std::uint16_t> frame(shallow.width(), shallow.height());
+  for (int y = 0; y < frame.height(); ++y)
+    for (int x = 0; x < frame.width(); ++x) frame.row(y)[x] = static_cast<std::uint16_t>(60000 + shallow.at(x, y) / 8);
+  EXPECT_EQ(status_beside(frame), RegionStatus::kNeighboursDisagree);
 }
 
 TEST_F(SymbolAtTheBorder, StandsWhereNoiseIsAllThatIsThere) {
