@@ -91,9 +91,13 @@ TEST(AdversaryFrames, NameNothingBesideWhatIsPutInThePatternsPlace) {
 // Along a torn row the symbols look whole whose letters are the same on both surfaces.
 TEST(AdversaryFrames, NameNothingInARowThatAnEdgeRunsAlong) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);
-  for (const int number : {60069, 900587, 1100289, 1300307, 1400177, 1600381, 5100343})
+  for (const int number : {60069, 900587, 1100289, 1300307, 1400177, 1500209, 1600381, 2100143, 5100343, 5102303,
+                           7100359, 8001469, 8301385})
     fine.expect_none_wrong(Kind::kShelves, number);
-  for (const int number : {1300398, 1500070}) coarse.expect_none_wrong(Kind::kShelves, number);
+  for (const int number : {1300398, 1500070, 5201382, 8002136, 8002224})
+    coarse.expect_none_wrong(Kind::kShelves, number);
+  fine.expect_none_wrong(Kind::kSlats3to6, 5201859);
+  coarse.expect_none_wrong(Kind::kSlats3to6, 8000836);
 }
 
 // Symbols that the border cuts have no letter, and link with nothing.

@@ -23,9 +23,37 @@ class Surroundings {
     return std::ranges::all_of(kDirections, [&](Direction d) { return decoded_beside(nodes_, claims_, node, d) >= 0; });
   }
 
-  [[nodiscard]] bool leave_alone(std::int32_t node) const {
-    return is_lone(node, kRight) || is_lone(node, kDown) ||
-           std::ranges::any_of(kDirections, [&](Direction d) { return is_lone_at_rim(node, d); });
+  /// At a rim, beside more that was refused than stands, seen from the row within: its links lead on where those of a
+  /// row that an edge runs through are broken. Not what fits the grid tightly: no edge runs there.
+  [[nodiscard]] bool is_lone(std::int32_t node) const {
+    return claims_[node].grid_fit != GridFit::kTight &&
+           std::ranges::any_of(kDirections, [&](Direction outwards) { return is_lone_from_within(node, outwards); });
+  }
+
+  /// At a rim, on a line of which more are torn or misread than stand and are well seen: an edge runs along it. What
+  /// such an edge leaves whole are those whose letters are the same on both sides of it, which tells nothing of the
+  /// side. Print tears, too, so what has its cell's letter none the less counts half. What fits the grid tightly lies
+  /// on its island's side.
+  [[nodiscard]] bool is_on_torn_line(std::int32_t node) const {
+    constexpr int kFar = 8, kTornMin = 4;
+    if (claims_[node].grid_fit == GridFit::kTight) return false;
+    return std::ranges::any_of(kDirections, [&](Direction aside) {
+      if (stands(node, beside(node, aside))) return false;
+      const Line line = look_along(node, static_cast<Direction>((aside + 1) % 4), kFar);
+      const int halves = 2 * line.torn - line.worn;
+      return halves >= 2 * kTornMin && halves > 2 * (line.well_seen + shapes_[node].is_well_seen());
+    });
+  }
+
+  /// The one that is left of such a line, though what is above and below stands.
+  [[nodiscard]] bool is_bridge(std::int32_t node) const {
+    constexpr int kFar = 4, kTornMin = 4, kTornMinOffGrid = 3;
+    const GridFit fit = claims_[node].grid_fit;
+    if (fit == GridFit::kTight) return false;
+    return std::ranges::any_of(std::array{kRight, kDown}, [&](Direction forth) {
+      const Line line = look_along(node, forth, kFar);
+      return line.standing == 0 && line.torn >= (fit == GridFit::kNone ? kTornMinOffGrid : kTornMin);
+    });
   }
 
   /// The last of a line that has been refused, beside what is none of its island or has been refused, too.
@@ -156,31 +184,32 @@ class Surroundings {
     return other >= 0 && !fits(node, other, d);
   }
 
-  /// Whether the island goes on there, refused or not, or no node is there that could be of another surface. What was
-  /// refused by its surroundings could.
-  [[nodiscard]] bool continues(std::int32_t node, Direction d) const {
-    const std::int32_t other = beside(node, d);
-    return other < 0 || (claims_[other].status != RegionStatus::kNeighboursDisagree && fits(node, other, d));
-  }
-
-  [[nodiscard]] bool is_lone(std::int32_t node, Direction forth) const {
-    int standing = 0, refused = 0, next_refused = 0;
+  /// What a line shows to both sides of a node.
+  struct Line {
+    int standing = 0, well_seen = 0;  // of what stands
+    int torn = 0, worn = 0;           // torn or misread; of these, those of their cells' letters
+  };
+  [[nodiscard]] Line look_along(std::int32_t node, Direction forth, int far) const {
+    Line line;
     for (const Direction d : {forth, opposite(forth)}) {
-      std::int32_t other = beside_or_torn(node, d);
-      next_refused += other >= 0 && !stands(node, other);
-      for (int i = 0; i < kReach && other >= 0; ++i, other = beside_or_torn(other, d))
-        ++(stands(node, other) ? standing : refused);
+      std::int32_t at = beside_or_torn(node, d);
+      for (int i = 0; i < far && at >= 0; ++i, at = beside_or_torn(at, d)) {
+        if (stands(node, at)) {
+          ++line.standing, line.well_seen += shapes_[at].is_well_seen();
+        } else {
+          const bool torn = shapes_[at].is_torn();
+          line.torn += torn || misread(at) || !claims_[at].named(), line.worn += torn && is_worn(at);
+        }
+      }
     }
-    const auto aside = static_cast<Direction>((forth + 1) % 4);
-    const bool inside = continues(node, aside) && continues(node, opposite(aside));
-    return inside ? standing == 0 && refused > kReach : refused > standing || next_refused == 2;
+    return line;
   }
 
-  /// The same, seen from the row within: its links lead on where those of a row that an edge runs through are broken.
-  /// What is worn counts half: the symbols at a limb are, too.
-  [[nodiscard]] bool is_lone_at_rim(std::int32_t node, Direction outwards) const {
+  /// What is worn counts half, as the symbols at a limb are, too; beside what fits the grid loosely it says nothing.
+  [[nodiscard]] bool is_lone_from_within(std::int32_t node, Direction outwards) const {
     const std::int32_t within = beside(node, opposite(outwards));
     if (!stands(node, within) || stands(node, beside(node, outwards))) return false;
+    const int if_worn = claims_[node].grid_fit == GridFit::kLoose ? 0 : 1;
     int standing = 0, refused = 0;
     for (const int turn : {1, 3}) {
       const auto along = static_cast<Direction>((outwards + turn) % 4);
@@ -194,7 +223,7 @@ class Surroundings {
         if (stands(node, other) && !nodes_[at].broken[outwards]) {
           standing += 2;
         } else {
-          refused += is_worn(other) ? 1 : 2;
+          refused += is_worn(other) ? if_worn : 2;
         }
       }
     }
@@ -268,11 +297,11 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, const std::
     std::swap(rim_, next_rim_);
     return any;
   };
-  refuse([&](std::int32_t node) { return claims[node].grid_fit != GridFit::kTight && around.leave_alone(node); });
+  refuse([&](std::int32_t node) { return around.is_lone(node); });
   refuse([&](std::int32_t node) { return around.is_corner(node); });
   while (refuse([&](std::int32_t node) {
-    return !around.is_inside(node) &&
-           (around.is_alone(node) || around.is_last(node) || around.is_left(node) || around.is_rest(node));
+    return !around.is_inside(node) && (around.is_alone(node) || around.is_last(node) || around.is_left(node) ||
+                                       around.is_rest(node) || around.is_on_torn_line(node) || around.is_bridge(node));
   }))
     continue;
 }

@@ -29,10 +29,10 @@ class Correspondence {
   void correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,
                   Executor& executor, std::vector<CellClaim>& claims);
 
-  /// Refuses symbols at a rim most of whose neighbours along their row, or their column, were refused: the edge that
-  /// cut those runs through them as well, and what is left of two symbols can look like a whole one. Between decoded
-  /// ones on both sides it takes that all of them were. Not those that fit their island's grid tightly: no edge runs
-  /// there. Then corners and rests of something else that agree by chance.
+  /// Refuses what an edge may have torn: symbols at a rim most of whose neighbours, seen from the row within, were
+  /// refused, and those on a line of which more are torn than whole, as what is left of two symbols can look like one.
+  /// Not those that fit their island's grid tightly: no edge runs there. Then corners and rests of something else that
+  /// agree by chance.
   /// @param shapes    one to a node, as its claim
   /// @param frame_px  width and height: symbols that the frame's border cuts are not read, and may be anything
   void refuse_lone(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes,

@@ -2,6 +2,10 @@
 // Copyright the slsd authors
 #include "core/decode/centres/correspond.hpp"
 
+#include <algorithm>
+#include <initializer_list>
+#include <string>
+
 #include <gmock/gmock.h>
 
 #include "tests/core/decode/alone.hpp"
@@ -110,16 +114,16 @@ TEST_F(Correspond, LeavesEarlierReasonsAlone) {
   EXPECT_THAT(statuses(), testing::ElementsAre(RegionStatus::kClassDisagrees));
 }
 
-/// A sheet of 6 rows of 9 nodes, all decoded; below it a row of another surface. The frame goes on all around it.
+/// A sheet of 6 rows of nodes, all decoded; below it a row of another surface. The frame goes on all around it.
 struct RimSheet {
   SimulatedGrid grid;
   std::vector<CellClaim> claims;
   std::vector<Classification> shapes;  // whole
   Eigen::Vector2f frame_px{400, 400};
 
-  RimSheet() {
+  explicit RimSheet(int columns = 9) {
     for (int row = 0; row < 7; ++row) {
-      for (int column = 0; column < 9; ++column) {
+      for (int column = 0; column < columns; ++column) {
         grid.add(row, column, through(Eigen::Affine2f(Eigen::Translation2f(100, 100)).matrix(), row, column),
                  LatticeFrame::Identity());
         claims.push_back({static_cast<std::int16_t>(row), static_cast<std::int16_t>(row < 6 ? column : column + 20), 0,
@@ -127,7 +131,9 @@ struct RimSheet {
       }
     }
     grid.link_truly();
-    shapes.resize(claims.size());
+    Classification whole;
+    whole.letter = 0;
+    shapes.assign(claims.size(), whole);
   }
   /// @param distance  from its letter, standard deviations
   void damage(int row, int column, float distance) {
@@ -223,6 +229,55 @@ TEST(RefuseLone, RefusesTheFewThatAreLeftOfABrokenRow) {
   for (int column = 0; column < 9; ++column) EXPECT_EQ(sheet.at(3, column).status, kDecoded) << column;
 }
 
+/// What is left of a sheet's first row: its symbols, from the left, are whole (w), torn (t), damaged but no more (d),
+/// misread (m) or of no cell (n); a bar parts two lines.
+std::string left_of(const std::string& first_row, GridFit fit = GridFit::kLoose) {
+  const int columns = static_cast<int>(first_row.size() - std::ranges::count(first_row, '|'));
+  RimSheet sheet(columns);
+  int column = 0;
+  for (const char symbol : first_row) {
+    if (symbol == '|') {
+      sheet.grid.nodes[sheet.grid.node_at(0, column - 1)].links[kRight] = -1;
+      sheet.grid.nodes[sheet.grid.node_at(0, column)].links[kLeft] = -1;
+      continue;
+    }
+    sheet.at(0, column).grid_fit = fit;
+    if (symbol == 't') sheet.damage(0, column, 6.1F);
+    if (symbol == 'd') sheet.damage(0, column, 5.9F);
+    if (symbol == 'm') sheet.at(0, column).status = RegionStatus::kClassDisagrees;
+    if (symbol == 'n') sheet.at(0, column) = {};
+    ++column;
+  }
+  sheet.refuse_lone();
+  std::string left;
+  for (column = 0; column < columns; ++column) {
+    left += sheet.at(0, column).status == kDecoded ? 'w' : '.';
+    EXPECT_EQ(sheet.at(1, column).status, kDecoded) << first_row << ", " << column;
+  }
+  return left;
+}
+
+// What an edge along the row leaves whole has the same letter on both sides of it, whichever of them is the island's.
+TEST(RefuseLone, RefusesWhatAnEdgeAlongItsRowLeavesWhole) {
+  EXPECT_EQ(left_of("nnwwwwnnn"), ".........");
+  EXPECT_EQ(left_of("mmwwwwmmm"), ".........");
+  EXPECT_EQ(left_of("ddwwwwddd"), "..wwww...") << "what is damaged is of no other surface";
+  EXPECT_EQ(left_of("nnwwwwwnn"), "..wwwww..") << "fewer are torn than are whole";
+  EXPECT_EQ(left_of("nnwwwwnnn", GridFit::kTight), "..wwww...");
+  EXPECT_EQ(left_of("nnnww|wwww"), "...wwwwww") << "three are too few";
+  EXPECT_EQ(left_of("nnnnww|www"), "......www");
+}
+
+TEST(RefuseLone, CountsHalfWhatIsTornButOfItsCellsLetter) {
+  EXPECT_EQ(left_of("ttttwwttt"), "....ww...");
+  EXPECT_EQ(left_of("ttttwwtttt"), "..........");
+  EXPECT_EQ(left_of("ttttwwwwtttt"), "....wwww....");
+}
+
+TEST(RefuseLone, LooksEightSymbolsAlongATornRow) {
+  EXPECT_EQ(left_of("wwddddnnnn"), "w.........") << "from the first three are seen";
+}
+
 // One symbol of a row of another surface, which joins the rows above to those below.
 TEST(RefuseLone, RefusesABridgeOverARefusedRow) {
   RimSheet sheet;
@@ -230,6 +285,24 @@ TEST(RefuseLone, RefusesABridgeOverARefusedRow) {
   sheet.grid.nodes[sheet.grid.node_at(2, 5)].broken[kRight] = true;
   sheet.refuse_lone();
   EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
+}
+
+TEST(RefuseLone, RefusesABridgeOverATornRow) {
+  const auto stands = [](std::initializer_list<int> torn, GridFit fit) {
+    RimSheet sheet(10);
+    for (const int column : {0, 1, 2, 3, 5, 6, 7, 8, 9})
+      sheet.damage(2, column, std::ranges::find(torn, column) == torn.end() ? 5.9F : 6.1F);
+    GridNode& node = sheet.grid.nodes[sheet.grid.node_at(2, 4)];
+    node.broken[kLeft] = node.broken[kRight] = true;
+    sheet.at(2, 4).grid_fit = fit;
+    sheet.refuse_lone();
+    return sheet.at(2, 4).status == kDecoded;
+  };
+  EXPECT_TRUE(stands({3, 5}, GridFit::kNone));
+  EXPECT_FALSE(stands({2, 3, 5}, GridFit::kNone));
+  EXPECT_TRUE(stands({2, 3, 5, 9}, GridFit::kLoose)) << "four to each side are asked";
+  EXPECT_FALSE(stands({0, 2, 3, 5}, GridFit::kLoose));
+  EXPECT_TRUE(stands({0, 1, 2, 3, 5, 6, 7, 8}, GridFit::kTight));
 }
 
 TEST(RefuseLone, RefusesWhatHasNothingStandingBesideIt) {
@@ -321,6 +394,12 @@ TEST(RefuseLone, LooksAlongTheRowWithinWhereTheRowIsBroken) {
   sheet.at(5, 5).status = sheet.at(5, 6).status = sheet.at(5, 4).status = kDecoded;
   sheet.refuse_lone();
   EXPECT_EQ(sheet.at(5, 4).status, kDecoded);
+}
+
+TEST(RefuseLone, CountsHalfWhatIsDamagedBesideWhatIsOffTheGrid) {
+  EXPECT_EQ(left_of("ddwwd", GridFit::kNone), ".....");
+  EXPECT_EQ(left_of("dwwd", GridFit::kNone), ".ww.");
+  EXPECT_EQ(left_of("ddwwd"), "..ww.") << "beside what fits the grid it says nothing";
 }
 
 TEST(RefuseLone, KeepsWhatIsWholeAtARimAndInside) {

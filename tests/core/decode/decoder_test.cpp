@@ -312,7 +312,7 @@ TEST(AnotherDecoder, OutlivesTheFirst) {
 TEST(CreateDecoder, TakesLessForASmallerBudgetOfWrongCells) {
   const Pattern pattern = shipped_pattern("16px-5.toml");
   const Surface strips = [](const Ray& ray) {
-    const int strip = static_cast<int>(std::floor(ray.direction.x() * 24));
+    const int strip = static_cast<int>(std::floor(ray.direction.x() * 32));
     return plane({0, 0, strip % 2 == 0 ? 2000. : 1900.}, {0, 0, 1})(ray);
   };
   const Grey8 frame = frame_of(pattern, strips);
