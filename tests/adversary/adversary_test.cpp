@@ -96,6 +96,7 @@ TEST(AdversaryFrames, NameNothingInARowThatAnEdgeRunsAlong) {
     fine.expect_none_wrong(Kind::kShelves, number);
   for (const int number : {1300398, 1500070, 5201382, 8002136, 8002224})
     coarse.expect_none_wrong(Kind::kShelves, number);
+  fine.expect_none_wrong(Kind::kSlats1to2, 8500353);
   fine.expect_none_wrong(Kind::kSlats3to6, 5201859);
   coarse.expect_none_wrong(Kind::kSlats3to6, 8000836);
 }

@@ -205,11 +205,16 @@ class Surroundings {
     return line;
   }
 
-  /// What is worn counts half, as the symbols at a limb are, too; beside what fits the grid loosely it says nothing.
+  /// What is worn counts half, as the symbols at a limb are, too; beside what fits the grid loosely only where it is
+  /// torn.
   [[nodiscard]] bool is_lone_from_within(std::int32_t node, Direction outwards) const {
     const std::int32_t within = beside(node, opposite(outwards));
     if (!stands(node, within) || stands(node, beside(node, outwards))) return false;
-    const int if_worn = claims_[node].grid_fit == GridFit::kLoose ? 0 : 1;
+    const bool is_off_grid = claims_[node].grid_fit == GridFit::kNone;
+    const auto weight_of = [&](std::int32_t other) {
+      if (!is_worn(other)) return 2;
+      return is_off_grid || shapes_[other].is_torn() ? 1 : 0;
+    };
     int standing = 0, refused = 0;
     for (const int turn : {1, 3}) {
       const auto along = static_cast<Direction>((outwards + turn) % 4);
@@ -223,7 +228,7 @@ class Surroundings {
         if (stands(node, other) && !nodes_[at].broken[outwards]) {
           standing += 2;
         } else {
-          refused += is_worn(other) ? if_worn : 2;
+          refused += weight_of(other);
         }
       }
     }

@@ -269,8 +269,8 @@ TEST(RefuseLone, RefusesWhatAnEdgeAlongItsRowLeavesWhole) {
 }
 
 TEST(RefuseLone, CountsHalfWhatIsTornButOfItsCellsLetter) {
-  EXPECT_EQ(left_of("ttttwwttt"), "....ww...");
-  EXPECT_EQ(left_of("ttttwwtttt"), "..........");
+  EXPECT_EQ(left_of("ttttwwwttt"), "....www...");
+  EXPECT_EQ(left_of("ttttwwwtttt"), "...........");
   EXPECT_EQ(left_of("ttttwwwwtttt"), "....wwww....");
 }
 
@@ -400,6 +400,7 @@ TEST(RefuseLone, CountsHalfWhatIsDamagedBesideWhatIsOffTheGrid) {
   EXPECT_EQ(left_of("ddwwd", GridFit::kNone), ".....");
   EXPECT_EQ(left_of("dwwd", GridFit::kNone), ".ww.");
   EXPECT_EQ(left_of("ddwwd"), "..ww.") << "beside what fits the grid it says nothing";
+  EXPECT_EQ(left_of("ttwwt"), ".....") << "but where it is torn";
 }
 
 TEST(RefuseLone, KeepsWhatIsWholeAtARimAndInside) {
