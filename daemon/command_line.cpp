@@ -118,6 +118,16 @@ void add_options(CLI::App& app, CommandLine& line) {
       ->excludes("--extrinsics");
 }
 
+/// `--pattern --help` lacks its value, and would write a picture of that name.
+void refuse_options_as_values(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    if (option->get_items_expected_min() == 0) continue;
+    option->check([&app](const std::string& value) {
+      return app.get_option_no_throw(value) == nullptr ? std::string() : "a value is missing before " + value;
+    });
+  }
+}
+
 /// --from, --board and --ruler belong to several commands.
 void check_commands(const CLI::App& app, const CommandLine& line) {
   if (line.verify && app.count("--ruler") > 0 && app.count("--board") == 0) {
@@ -140,6 +150,7 @@ tl::expected<CommandLine, int> parse_command_line(int argc, char** argv) {
   CLI::App app("The service of a single-shot structured-light scanner. Without an option it serves in the foreground.");
   CommandLine line;
   add_options(app, line);
+  refuse_options_as_values(app);
   try {
     app.parse(argc, argv);
     check_commands(app, line);

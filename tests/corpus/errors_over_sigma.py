@@ -63,13 +63,15 @@ def decode(program, pattern, folder, fine):
 
 def line(name, errors, sigma):
     known = np.isfinite(errors)
+    unknown = np.sum(~known)  # where the truth has no surface
     errors, sigma = errors[known], sigma[known]
     ratio = errors / sigma
     within = np.abs(errors) <= GROSS_MM
-    gross = np.sum(~within & (sigma < 1)) + np.sum(~known)
+    gross = np.sum(~within & (sigma < 1))
     print(f'| {name} | {known.size} | {ratio.std():.2f} | {1.4826 * np.median(np.abs(ratio)):.2f} '
           f'| {100 * np.mean(np.abs(ratio) > 3):.2f} | {np.sqrt(np.mean(errors[within] ** 2)):.3f} '
-          f'| {np.median(np.abs(errors)):.3f} | {np.mean(errors[within]):+.3f} | {np.sum(~within)} | {gross} |')
+          f'| {np.median(np.abs(errors)):.3f} | {np.mean(errors[within]):+.3f} | {np.sum(~within)} | {gross} '
+          f'| {unknown} |')
     return ratio.std()
 
 
@@ -86,7 +88,7 @@ def main():
     if not folders:
         sys.exit('no depth.npy in ' + ' '.join(map(str, options.frames)))
     print('| scene | points | error / sigma: std | robust std | beyond 3, % | RMS mm | median mm | bias mm '
-          f'| off > {GROSS_MM:.0f} mm | of these sigma < 1 mm |\n|---|---|---|---|---|---|---|---|---|---|')
+          f'| off > {GROSS_MM:.0f} mm | of these sigma < 1 mm | where nothing is |\n' + 11 * '|---' + '|')
     everything, deviations = [], []
     for folder in folders:
         cloud = decode(options.program, options.pattern, folder, options.fine)

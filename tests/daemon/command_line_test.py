@@ -37,6 +37,14 @@ class Slsd(unittest.TestCase):
         self.assertEqual(header[:4], b"\x89PNG")
         self.assertEqual((int.from_bytes(header[16:20], "big"), int.from_bytes(header[20:24], "big")), (1280, 800))
 
+    def test_takes_no_option_for_a_value(self):
+        for option in ("--pattern", "--config", "--print-board"):
+            with self.subTest(option=option):
+                result = slsd(option, "--help", cwd=self.folder)
+                self.assertEqual(result.returncode, 2)
+                self.assertIn("a value is missing before --help", result.stderr)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
     def test_pattern_follows_the_configuration(self):
         self.file.write_text("[projector]\ndriver = 'glfw'\nwidth_px = 640\nheight_px = 360\n", encoding="utf-8")
         image = self.folder / "pattern.png"
