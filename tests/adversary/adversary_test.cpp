@@ -109,6 +109,13 @@ TEST(AdversaryFrames, NameNothingThatTheBorderOfTheFrameLeavesAlone) {
   fine.expect_none_wrong(Kind::kPickets, 700333);
 }
 
+// Links along a picket are broken but between two of its symbols.
+TEST(AdversaryFrames, NameNoTwoOfAPicket) {
+  Bench fine = Bench::of(8), coarse = Bench::of(16);
+  for (const int number : {8002127, 8300029}) fine.expect_none_wrong(Kind::kPickets, number);
+  coarse.expect_none_wrong(Kind::kSlats1to2, 8700356);
+}
+
 // The neighbours of one that an edge cuts put it on the next.
 TEST(AdversaryFrames, NameNothingWhereAnotherSymbolIs) {
   Bench::of(8).expect_none_wrong(Kind::kPickets, 2400263);

@@ -168,10 +168,12 @@ class Surroundings {
            claims_[other].island == claims_[node].island;
   }
   [[nodiscard]] std::int32_t beside(std::int32_t node, Direction d) const { return neighbour(nodes_, node, d); }
-  /// The same, or what is torn: an edge through it moves its centre, and breaks its links.
-  [[nodiscard]] std::int32_t beside_or_torn(std::int32_t node, Direction d) const {
+  /// The next of a line; beyond a broken link, too, where it is torn, or, for what is off the grid, has no cell: an
+  /// edge breaks the links of what it tears, and along a picket those to the rest of it.
+  [[nodiscard]] std::int32_t next_along(std::int32_t node, Direction d, bool is_off_grid) const {
     const std::int32_t other = nodes_[node].links[d];
-    return other >= 0 && nodes_[node].broken[d] && !shapes_[other].is_torn() ? -1 : other;
+    if (other < 0 || !nodes_[node].broken[d]) return other;
+    return shapes_[other].is_torn() || (is_off_grid && !claims_[other].named()) ? other : -1;
   }
 
   /// Whether a node's cell lies beside another's as the nodes do.
@@ -190,10 +192,11 @@ class Surroundings {
     int torn = 0, worn = 0;           // torn or misread; of these, those of their cells' letters
   };
   [[nodiscard]] Line look_along(std::int32_t node, Direction forth, int far) const {
+    const bool is_off_grid = claims_[node].grid_fit == GridFit::kNone;
     Line line;
     for (const Direction d : {forth, opposite(forth)}) {
-      std::int32_t at = beside_or_torn(node, d);
-      for (int i = 0; i < far && at >= 0; ++i, at = beside_or_torn(at, d)) {
+      std::int32_t at = next_along(node, d, is_off_grid);
+      for (int i = 0; i < far && at >= 0; ++i, at = next_along(at, d, is_off_grid)) {
         if (stands(node, at)) {
           ++line.standing, line.well_seen += shapes_[at].is_well_seen();
         } else {

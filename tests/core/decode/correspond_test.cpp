@@ -230,15 +230,17 @@ TEST(RefuseLone, RefusesTheFewThatAreLeftOfABrokenRow) {
 }
 
 /// What is left of a sheet's first row: its symbols, from the left, are whole (w), torn (t), damaged but no more (d),
-/// misread (m) or of no cell (n); a bar parts two lines.
+/// misread (m) or of no cell (n); a bar parts two lines, a stroke breaks a link.
 std::string left_of(const std::string& first_row, GridFit fit = GridFit::kLoose) {
-  const int columns = static_cast<int>(first_row.size() - std::ranges::count(first_row, '|'));
+  const auto columns = static_cast<int>(std::ranges::count_if(first_row, [](char c) { return c != '|' && c != '/'; }));
   RimSheet sheet(columns);
   int column = 0;
   for (const char symbol : first_row) {
-    if (symbol == '|') {
-      sheet.grid.nodes[sheet.grid.node_at(0, column - 1)].links[kRight] = -1;
-      sheet.grid.nodes[sheet.grid.node_at(0, column)].links[kLeft] = -1;
+    if (symbol == '|' || symbol == '/') {
+      GridNode &before = sheet.grid.nodes[sheet.grid.node_at(0, column - 1)],
+               &after = sheet.grid.nodes[sheet.grid.node_at(0, column)];
+      if (symbol == '|') before.links[kRight] = after.links[kLeft] = -1;
+      before.broken[kRight] = after.broken[kLeft] = symbol == '/';
       continue;
     }
     sheet.at(0, column).grid_fit = fit;
@@ -266,6 +268,13 @@ TEST(RefuseLone, RefusesWhatAnEdgeAlongItsRowLeavesWhole) {
   EXPECT_EQ(left_of("nnwwwwnnn", GridFit::kTight), "..wwww...");
   EXPECT_EQ(left_of("nnnww|wwww"), "...wwwwww") << "three are too few";
   EXPECT_EQ(left_of("nnnnww|www"), "......www");
+}
+
+TEST(RefuseLone, LooksBeyondBrokenLinksAtWhatIsTornOrHasNoCell) {
+  EXPECT_EQ(left_of("nnn/wwww/nnn", GridFit::kNone), "..........");
+  EXPECT_EQ(left_of("mmm/wwww/mmm", GridFit::kNone), "...wwww...");
+  EXPECT_EQ(left_of("nnn/wwww/nnn"), "...wwww...");
+  EXPECT_EQ(left_of("ttttt/wwww/ttttt"), "..............");
 }
 
 TEST(RefuseLone, CountsHalfWhatIsTornButOfItsCellsLetter) {
