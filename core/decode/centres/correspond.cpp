@@ -189,7 +189,7 @@ class Surroundings {
   /// What a line shows to both sides of a node.
   struct Line {
     int standing = 0, well_seen = 0;  // of what stands
-    int torn = 0, worn = 0;           // torn or misread; of these, those of their cells' letters
+    int torn = 0, worn = 0;           // torn, misread or of no cell; of these, those of their cells' letters
   };
   [[nodiscard]] Line look_along(std::int32_t node, Direction forth, int far) const {
     const bool is_off_grid = claims_[node].grid_fit == GridFit::kNone;
