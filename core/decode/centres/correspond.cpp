@@ -37,9 +37,10 @@ class Surroundings {
   [[nodiscard]] bool is_on_torn_line(std::int32_t node) const {
     constexpr int kFar = 8, kTornMin = 4;
     if (claims_[node].grid_fit == GridFit::kTight) return false;
-    return std::ranges::any_of(kDirections, [&](Direction aside) {
-      if (stands(node, beside(node, aside))) return false;
-      const Line line = look_along(node, static_cast<Direction>((aside + 1) % 4), kFar);
+    return std::ranges::any_of(std::array{kRight, kDown}, [&](Direction forth) {
+      const auto aside = static_cast<Direction>((forth + 1) % 4);
+      if (stands(node, beside(node, aside)) && stands(node, beside(node, opposite(aside)))) return false;
+      const Line line = look_along(node, forth, kFar);
       const int halves = 2 * line.torn - line.worn;
       return halves >= 2 * kTornMin && halves > 2 * (line.well_seen + shapes_[node].is_well_seen());
     });
