@@ -18,14 +18,14 @@ namespace {
 
 constexpr float kOfNoise = 0.55F;
 constexpr float kLeastPx = 0.01F;  // what is left of sampling and blur
-constexpr float kOfAcross = 0.35F, kOfRoughness = 1;
-constexpr float kOfOwnUnevenness = 0.35F, kOfUnevenness = 0.5F;
+constexpr float kOfAcross = 0.4F, kOfUneven = 0.4F;
+constexpr float kOfRoughness = 0.25F, kOfUnevenness = 0.25F;
 constexpr float kOfMisfitSquared = 0.01F;  // px
 /// What lies across, and what is uneven, on the smoothest of surfaces, besides noise.
 constexpr float kSmoothAcrossPx = 0.03F, kSmoothUnevenPx = 0.02F;
 constexpr float kUnknownBendPx = 0.015F;
 /// Of a shape that is cut, not only worn.
-constexpr float kDamageOfMisfitSquared = 0.018F;  // px
+constexpr float kDamageOfAcross = 0.35F, kDamageOfMisfitSquared = 0.018F;  // of the latter px
 /// Beyond this a neighbour's residual is a fault of its own.
 constexpr float kAroundMaxPx = 0.3F;
 
@@ -127,13 +127,14 @@ void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const
     const float unevenness = std::max(
         0.F, mean_square_around(uneven_px_, symbol, uneven_px_[i]) - 2 * square(noise_px) - square(kSmoothUnevenPx));
     const float misfit = std::max(0.F, square(symbol.misfit) - usual_misfit_squared);
-    const float across = square(kOfAcross * across_px_[i]) + square(kOfRoughness) * roughness;
     const float unbent = has_bend(symbol) ? 0 : square(kUnknownBendPx);
-    symbol.sigma_px = std::sqrt(square(kOfNoise * noise_px) + square(kLeastPx) + across + unbent +
-                                square(kOfOwnUnevenness * uneven_px_[i]) + square(kOfUnevenness) * unevenness +
-                                square(kOfMisfitSquared * misfit));
-    symbol.damage_px = std::sqrt(square(noise_px) + square(kLeastPx) + across + unbent +
-                                 square(kDamageOfMisfitSquared * square(symbol.misfit)));
+    symbol.sigma_px = std::sqrt(square(kOfNoise * noise_px) + square(kLeastPx) + unbent +
+                                square(kOfAcross * across_px_[i]) + square(kOfUneven * uneven_px_[i]) +
+                                square(kOfRoughness) * roughness + square(kOfUnevenness) * unevenness +
+                                std::sqrt(roughness * unevenness) + square(kOfMisfitSquared * misfit));
+    symbol.damage_px =
+        std::sqrt(square(noise_px) + square(kLeastPx) + unbent + square(kDamageOfAcross * across_px_[i]) + roughness +
+                  square(kDamageOfMisfitSquared * square(symbol.misfit)));
   };
   executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
     for (std::size_t i = first; i < last; ++i) judge_one(i);

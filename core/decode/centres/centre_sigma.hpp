@@ -27,14 +27,15 @@ namespace slsd {
 /// those around, as no surface that symbols can follow has; and in the symbol's shape. So, all in camera px and added
 /// in squares,
 ///
-///     0.55 noise,  0.01,  0.35 across,  roughness,  0.35 uneven,  0.5 unevenness,  0.01 misfit^2,
-///     0.015 where no neighbours tell of its bend
+///     0.55 noise,  0.01,  0.4 across,  0.4 uneven,  0.25 roughness,  0.25 unevenness,
+///     sqrt(roughness unevenness),  0.01 misfit^2,  0.015 where no neighbours tell of its bend
 ///
 /// across: the residual less the frame's median (that is the calibration's); roughness: the root mean square of the
 /// symbol's and its neighbours', beyond noise and the 0.03 px of smooth surfaces; uneven: the disparity beyond that of
 /// the neighbours to both sides, less the same of the neighbours, which a surface's own curvature has; unevenness: its
 /// root mean square with theirs, beyond noise and 0.02 px; misfit^2: of the shape, in standard deviations, beyond the
-/// frame's median. The factors are fitted to rendered frames (docs/decoder.md).
+/// frame's median. What disturbs centres makes them rough and uneven, so both together count most: a surface near the
+/// devices that symbols can follow is uneven alone. The factors are fitted to rendered frames (docs/decoder.md).
 /// @thread thread-bound: keeps its buffers
 class CentreJudge {
  public:

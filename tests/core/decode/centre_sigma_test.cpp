@@ -65,7 +65,7 @@ Truth truth_of(Precision precision, double noise, const Surface& surface) {
   simulation.noise_sigma = noise;
   const Grey8 frame = simulate(draw_pattern(pattern), paper_rig(), surface, simulation);
   const Decoding decoding = test::decode(decoder, frame.view());
-  EXPECT_GT(decoding.points.size(), 2000U);
+  EXPECT_GT(decoding.points.size(), 1000U);
   double squares = 0, in_sigma = 0;
   const Lens lens = paper_rig().cameras[0].lens;
   for (const CloudPoint& point : decoding.points) {
@@ -97,14 +97,14 @@ TEST(Sigma, WithoutNoiseIsNotTooSmall) {
     EXPECT_LT(truth_of(precision, 0, test::kTilted).over_sigma, 1.5);
 }
 
-/// A plate of waves at 2 m.
-Surface waves(double period_mm, double height_mm) {
+/// A plate of waves.
+Surface waves(double period_mm, double height_mm, double at_mm = 2000) {
   return [=](const Ray& ray) -> std::optional<double> {
-    double depth_mm = 2000;
+    double depth_mm = at_mm;
     for (int i = 0; i < 4; ++i) {
       const Eigen::Vector3d at = ray.origin + (depth_mm - ray.origin.z()) / ray.direction.z() * ray.direction;
       const double per_mm = 2 * std::numbers::pi / period_mm;
-      depth_mm = 2000 + 0.5 * height_mm * std::sin(per_mm * at.x()) * std::sin(per_mm * at.y());
+      depth_mm = at_mm + 0.5 * height_mm * std::sin(per_mm * at.x()) * std::sin(per_mm * at.y());
     }
     return (depth_mm - ray.origin.z()) / ray.direction.z();
   };
@@ -115,6 +115,12 @@ TEST(Sigma, OfCentresFollowsReliefBelowTheSymbols) {
   const Truth truth = truth_of(Precision::kStandard, 2, waves(34, 4));
   EXPECT_GT(truth.over_sigma, 0.55);
   EXPECT_LT(truth.over_sigma, 1.3);
+}
+
+// Near the devices the same relief is larger in disparity, but symbols follow it: with twice the factor of unevenness
+// alone the errors would be 0.54 sigma.
+TEST(Sigma, OfCentresIsNotForReliefThatSymbolsFollow) {
+  EXPECT_GT(truth_of(Precision::kStandard, 2, waves(80, 8, 500)).over_sigma, 0.6);
 }
 
 // Relief that a patch cannot follow scatters within it, and sigma knows two thirds of what that does. With twice the
