@@ -25,6 +25,8 @@ constexpr float kMovedMax = 0.08F;
 /// look tilted more, and the place is then on neither.
 constexpr float kTiltMaxPx = 0.5F;
 constexpr int kHeldBy = 2;
+/// Where so much of its middle is brighter than the letter's light, something lies before it.
+constexpr float kHidden = 0.5F;
 /// From which misfit on, or how far off its line in projector px, what is decoded is aligned, too: whole symbols are
 /// nearer to their letters and to their lines. Its centroid is given up where the patch agrees well and lies near it;
 /// farther off, what was seen is another part of the symbol.
@@ -190,44 +192,49 @@ Eigen::Vector2f SymbolMender::centre_of(const PatchTask& task, int letter) const
   return task.map.middle_px + camera_offset(task.map, task.state, middle);
 }
 
-/// Whether the pixels around the centre agree with the letter: where another surface hides it, the camera does not see
-/// the point.
-bool SymbolMender::shows_centre(const GreyView& frame, const PatternField& field, const PatchTask& task,
-                                int letter) const {
-  constexpr int kReach = 2, kAgreeMin = 17;  // of 25
+SymbolMender::Middle SymbolMender::look_at_middle(const GreyView& frame, const PatternField& field,
+                                                  const PatchTask& task, const Eigen::Vector2f& centre) const {
+  constexpr int kReach = 2;
   const PatchState& state = task.state;
   const float limit = kAlign.outlier_sigmas * std::hypot(task.noise, kAlign.misfit_share * state.gain);
-  const Eigen::Vector2i at = centre_of(task, letter).array().round().matrix().cast<int>();
+  const Eigen::Vector2i at = centre.array().round().matrix().cast<int>();
   const auto expected = [&](const Eigen::Vector2f& off) {
     const Eigen::Vector2f pixel = projector_offset(task.map, state, off) + task.map.origin_px.cast<float>();
     const float light = state.gain + state.gain_x * off.x() + state.gain_y * off.y();
     return state.offset + light * field.at(pixel.x(), pixel.y()).value;
   };
-  const auto count_agreeing = [&](const auto& view) {
-    int agree = 0;
+  const auto look = [&](const auto& view) {
+    int agree = 0, brighter = 0;
     for (int y = at.y() - kReach; y <= at.y() + kReach; ++y) {
       for (int x = at.x() - kReach; x <= at.x() + kReach; ++x) {
         if (!view.contains(x, y)) continue;
         const Eigen::Vector2f off(static_cast<float>(x - task.x), static_cast<float>(y - task.y));
-        agree += std::abs(static_cast<float>(view.at(x, y)) - expected(off)) <= limit;
+        const auto level = static_cast<float>(view.at(x, y));
+        agree += std::abs(level - expected(off)) <= limit;
+        brighter += level - state.offset - state.gain > limit;
       }
     }
-    return agree;
+    constexpr float kPixels = (2 * kReach + 1) * (2 * kReach + 1);
+    return Middle{static_cast<float>(agree) / kPixels, static_cast<float>(brighter) / kPixels};
   };
-  return std::visit(count_agreeing, frame) >= kAgreeMin;
+  return std::visit(look, frame);
 }
 
-bool SymbolMender::is_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Sightings& seen,
-                            std::int32_t node) const {
-  if (task.failed || task.support < kWholeSupportMin || std::abs(task.moved) > kSettledPx) return false;
+/// Where another surface hides the centre, the camera does not see the point. At a corner of what is decoded, where a
+/// surface is likelier to end, the more of the middle has to be seen the less of the patch is.
+bool SymbolMender::shows_centre(const PatchTask& task, const Middle& middle, int held_by) {
+  constexpr float kAgreesMin = 0.67F, kBothAtCornersMin = 1.45F;
+  return middle.agrees >= kAgreesMin && (held_by > kHeldBy || task.support + middle.agrees >= kBothAtCornersMin);
+}
+
+bool SymbolMender::is_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Eigen::Vector2f& centre,
+                            const Sightings& seen, std::int32_t node) const {
+  if (task.support < kWholeSupportMin || std::abs(task.moved) > kSettledPx) return false;
   if (std::abs(task.state.across) > kAcrossMaxPx || std::abs(task.state.disparity) > kMovedMax * pitch_px_)
     return false;
   const Eigen::RowVector2f slopes(task.state.slope_x, task.state.slope_y);
   if (0.5F * pitch_px_ * (slopes * lattice_frame).norm() > kTiltMaxPx) return false;
   const CellClaim& claim = seen.claims[node];
-  const Eigen::Vector2f centre = centre_of(task, array_.at(claim.row, claim.column));
-  // What is tilted out of all proportion lies anywhere.
-  if (!((centre - task.map.middle_px).norm() < 0.5F * pitch_px_)) return false;
   if (claim.status == RegionStatus::kNeighboursDisagree)
     return std::abs(task.state.disparity) <= kTightSlip * pitch_px_;
   if (claim.status != RegionStatus::kDecoded) return true;
@@ -267,12 +274,20 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
     align(frame, full, field);
     const std::size_t before = mended_.size();
     for (std::size_t i = 0; i < asked_.size(); ++i) {
-      const CellClaim& claim = seen.claims[asked_[i]];
-      if (!is_there(tasks_[i], places_[i].frame, seen, asked_[i]) ||
-          !shows_centre(frame, field, tasks_[i], array_.at(claim.row, claim.column)))
-        continue;
-      take_over(tasks_[i], places_[i].frame, prototypes, seen, asked_[i]);
-      mended_.push_back(asked_[i]);
+      const std::int32_t node = asked_[i];
+      const CellClaim& claim = seen.claims[node];
+      const PatchTask& task = tasks_[i];
+      if (task.failed) continue;
+      const Eigen::Vector2f centre = centre_of(task, array_.at(claim.row, claim.column));
+      // What is tilted out of all proportion lies anywhere.
+      if (!((centre - task.map.middle_px).norm() < 0.5F * pitch_px_)) continue;
+      const Middle middle = look_at_middle(frame, field, task, centre);
+      if (is_there(task, places_[i].frame, centre, seen, node) && shows_centre(task, middle, places_[i].held_by)) {
+        take_over(task, places_[i].frame, prototypes, seen, node);
+        mended_.push_back(node);
+      } else if (claim.status == RegionStatus::kDamagedShape && middle.is_brighter > kHidden) {
+        seen.misfits[node] = std::numeric_limits<float>::infinity();
+      }
     }
     to_ask_.clear();
     for (std::size_t i = before; i < mended_.size(); ++i) {

@@ -47,7 +47,8 @@ class SymbolMender {
   /// @param blur_px     of the pattern in the frame, standard deviation, projector px
   /// @param gate        that knows the epipolar lines
   /// @param prototypes  of the letters: where the points of their cells are
-  /// @param seen        in and out: what is mended is decoded, with another place, frame, light and misfit
+  /// @param seen        in and out: what is mended is decoded, with another place, frame, light and misfit, and what is
+  ///                    damaged and hidden in its middle has a misfit without bounds
   /// @return            the sightings that are mended, in their order; stands until the next call
   const std::vector<std::int32_t>& mend(const GreyView& frame, double full, const FrameNoise& noise, float blur_px,
                                         const CellGate& gate, std::span<const Prototype> prototypes, Sightings& seen);
@@ -65,10 +66,15 @@ class SymbolMender {
                std::int32_t node);
   void align(const GreyView& frame, double full, const PatternField& field);
   [[nodiscard]] Eigen::Vector2f centre_of(const PatchTask& task, int letter) const;
-  [[nodiscard]] bool shows_centre(const GreyView& frame, const PatternField& field, const PatchTask& task,
-                                  int letter) const;
-  [[nodiscard]] bool is_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Sightings& seen,
-                              std::int32_t node) const;
+  /// Of the pixels around the centre, the shares that agree with the letter and that are brighter than its light.
+  struct Middle {
+    float agrees, is_brighter;
+  };
+  [[nodiscard]] Middle look_at_middle(const GreyView& frame, const PatternField& field, const PatchTask& task,
+                                      const Eigen::Vector2f& centre) const;
+  [[nodiscard]] static bool shows_centre(const PatchTask& task, const Middle& middle, int held_by);
+  [[nodiscard]] bool is_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Eigen::Vector2f& centre,
+                              const Sightings& seen, std::int32_t node) const;
   void take_over(const PatchTask& task, const LatticeFrame& lattice_frame, std::span<const Prototype> prototypes,
                  Sightings& seen, std::int32_t node) const;
 

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <optional>
 
 #include <gmock/gmock.h>
@@ -167,6 +168,50 @@ TEST_F(MendOneOfMany, LeavesWhatIsHiddenInItsMiddle) {
     for (int x = -2; x <= 2; ++x)
       frame_.at(static_cast<int>(std::lround(centre.x())) + x, static_cast<int>(std::lround(centre.y())) + y) = 90;
   EXPECT_EQ(mend(), std::nullopt);
+}
+
+// Seven of the 25 pixels around its middle are hidden, and a third of its cell: enough is left where three hold it.
+TEST_F(MendOneOfMany, ShowsMoreWhereTwoAloneHoldIt) {
+  const Eigen::Vector2f centre = true_centre(kSide / 2, kSide / 2);
+  const int u = static_cast<int>(std::lround(centre.x())), v = static_cast<int>(std::lround(centre.y()));
+  const auto hide = [&](int x, int y) {
+    std::uint8_t& level = frame_.at(u + x, v + y);
+    level = level > 90 ? 30 : 150;
+  };
+  for (int y = -2; y <= 2; ++y) hide(2, y);
+  hide(1, 1), hide(1, 2);
+  const Sightings all = seen_;
+  const auto is_mended_without = [&](std::initializer_list<int> others) {
+    seen_ = all;
+    for (const int other : others) seen_.claims[other].island = 1;
+    return mend().has_value();
+  };
+  EXPECT_TRUE(is_mended_without({kWorn + 1, kWorn + kSide})) << "most of the rest is seen";
+  for (int y = -13; y <= 13; ++y)
+    for (int x = -13; x <= -5; ++x) hide(x, y);
+  EXPECT_TRUE(is_mended_without({}));
+  EXPECT_TRUE(is_mended_without({kWorn + 1}));
+  EXPECT_FALSE(is_mended_without({kWorn + 1, kWorn + kSide}));
+}
+
+// A bright edge before it is another surface; where light is missing it may be print.
+TEST_F(MendOneOfMany, KnowsNoMisfitOfWhatSomethingBrighterHides) {
+  const Eigen::Vector2f centre = true_centre(kSide / 2, kSide / 2);
+  const Grey8 whole = frame_;
+  const auto misfit_beneath = [&](RegionStatus status, int width_px, std::uint8_t level) {
+    frame_ = whole;
+    for (int y = -3; y <= 3; ++y)
+      for (int x = -2; x < width_px - 2; ++x)
+        frame_.at(static_cast<int>(std::lround(centre.x())) + x, static_cast<int>(std::lround(centre.y())) + y) = level;
+    seen_.claims[kWorn].status = status;
+    seen_.misfits[kWorn] = 3;
+    EXPECT_EQ(mend(), std::nullopt);
+    return seen_.misfits[kWorn];
+  };
+  EXPECT_EQ(misfit_beneath(RegionStatus::kDamagedShape, 5, 250), std::numeric_limits<float>::infinity());
+  EXPECT_EQ(misfit_beneath(RegionStatus::kDamagedShape, 2, 250), 3);
+  EXPECT_EQ(misfit_beneath(RegionStatus::kDamagedShape, 5, 90), 3);
+  EXPECT_EQ(misfit_beneath(RegionStatus::kDecoded, 5, 250), 3);
 }
 
 TEST_F(MendOneOfMany, LeavesWhatOneAloneHolds) {
