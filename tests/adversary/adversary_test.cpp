@@ -92,9 +92,9 @@ TEST(AdversaryFrames, NameNothingBesideWhatIsPutInThePatternsPlace) {
 TEST(AdversaryFrames, NameNothingInARowThatAnEdgeRunsAlong) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);
   for (const int number : {60069, 900587, 1100289, 1300307, 1400177, 1500209, 1600381, 2100143, 5100343, 5102303,
-                           7100359, 8001469, 8301385})
+                           7100359, 8000705, 8001469, 8301385, 10002347, 10101983})
     fine.expect_none_wrong(Kind::kShelves, number);
-  for (const int number : {1300398, 1500070, 5201382, 8002136, 8002224})
+  for (const int number : {1300398, 1500070, 5201382, 8002136, 8002224, 9600128})
     coarse.expect_none_wrong(Kind::kShelves, number);
   fine.expect_none_wrong(Kind::kSlats1to2, 8500353);
   fine.expect_none_wrong(Kind::kSlats3to6, 5201859);
@@ -112,7 +112,7 @@ TEST(AdversaryFrames, NameNothingThatTheBorderOfTheFrameLeavesAlone) {
 // Links along a picket are broken but between two of its symbols.
 TEST(AdversaryFrames, NameNoTwoOfAPicket) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);
-  for (const int number : {8002127, 8300029}) fine.expect_none_wrong(Kind::kPickets, number);
+  for (const int number : {6300309, 8002127, 8300029, 9200549}) fine.expect_none_wrong(Kind::kPickets, number);
   coarse.expect_none_wrong(Kind::kSlats1to2, 8700356);
 }
 

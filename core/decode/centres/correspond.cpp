@@ -30,19 +30,18 @@ class Surroundings {
            std::ranges::any_of(kDirections, [&](Direction outwards) { return is_lone_from_within(node, outwards); });
   }
 
-  /// At a rim, on a line of which more are torn or misread than stand and are well seen: an edge runs along it. What
-  /// such an edge leaves whole are those whose letters are the same on both sides of it, which tells nothing of the
-  /// side. Print tears, too, so what has its cell's letter none the less counts half. What fits the grid tightly lies
-  /// on its island's side.
+  /// At a rim, on a torn line: an edge runs along it, unless it lies between two that stand and are on none. What such
+  /// an edge leaves whole are those whose letters are the same on both sides of it, which tells nothing of the side.
+  /// What fits the grid tightly lies on its island's side.
   [[nodiscard]] bool is_on_torn_line(std::int32_t node) const {
-    constexpr int kFar = 8, kTornMin = 4;
     if (claims_[node].grid_fit == GridFit::kTight) return false;
     return std::ranges::any_of(std::array{kRight, kDown}, [&](Direction forth) {
+      const auto is_sound = [&](Direction d) {
+        const std::int32_t other = beside(node, d);
+        return stands(node, other) && (claims_[other].grid_fit == GridFit::kTight || !is_torn_along(other, forth));
+      };
       const auto aside = static_cast<Direction>((forth + 1) % 4);
-      if (stands(node, beside(node, aside)) && stands(node, beside(node, opposite(aside)))) return false;
-      const Line line = look_along(node, forth, kFar);
-      const int halves = 2 * line.torn - line.worn;
-      return halves >= 2 * kTornMin && halves > 2 * (line.well_seen + shapes_[node].is_well_seen());
+      return is_torn_along(node, forth) && !(is_sound(aside) && is_sound(opposite(aside)));
     });
   }
 
@@ -119,6 +118,13 @@ class Surroundings {
     return std::ranges::none_of(kDirections, [&](Direction d) { return stands(node, beside(node, d)); });
   }
 
+  /// With one other that stands, which has nothing else beside it either. Not where one fits the grid tightly.
+  [[nodiscard]] bool is_of_pair(std::int32_t node) const {
+    const std::int32_t other = only_one_beside(node);
+    return other >= 0 && only_one_beside(other) == node && claims_[node].grid_fit != GridFit::kTight &&
+           claims_[other].grid_fit != GridFit::kTight;
+  }
+
   /// At the corner of what was put there: on two sides that meet, and between them, it has been refused; or on one of
   /// them something else lies or it has been refused, and on the other the frame ends.
   [[nodiscard]] bool is_corner(std::int32_t node) const {
@@ -187,6 +193,18 @@ class Surroundings {
     return other >= 0 && !fits(node, other, d);
   }
 
+  /// The one beside it that stands, or -1 where none does, or more do.
+  [[nodiscard]] std::int32_t only_one_beside(std::int32_t node) const {
+    std::int32_t found = -1;
+    for (const Direction d : kDirections) {
+      const std::int32_t other = beside(node, d);
+      if (!stands(node, other)) continue;
+      if (found >= 0) return -1;
+      found = other;
+    }
+    return found;
+  }
+
   /// What a line shows to both sides of a node.
   struct Line {
     int standing = 0, well_seen = 0;  // of what stands
@@ -207,6 +225,15 @@ class Surroundings {
       }
     }
     return line;
+  }
+
+  /// More of its line are torn or misread than stand and are well seen. Print tears, too, so what has its cell's letter
+  /// none the less counts half.
+  [[nodiscard]] bool is_torn_along(std::int32_t node, Direction forth) const {
+    constexpr int kFar = 8, kTornMin = 4;
+    const Line line = look_along(node, forth, kFar);
+    const int halves = 2 * line.torn - line.worn;
+    return halves >= 2 * kTornMin && halves > 2 * (line.well_seen + shapes_[node].is_well_seen());
   }
 
   /// What is worn counts half, as the symbols at a limb are, too; beside what fits the grid loosely only where it is
@@ -309,8 +336,9 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, const std::
   refuse([&](std::int32_t node) { return around.is_lone(node); });
   refuse([&](std::int32_t node) { return around.is_corner(node); });
   while (refuse([&](std::int32_t node) {
-    return !around.is_inside(node) && (around.is_alone(node) || around.is_last(node) || around.is_left(node) ||
-                                       around.is_rest(node) || around.is_on_torn_line(node) || around.is_bridge(node));
+    return !around.is_inside(node) &&
+           (around.is_alone(node) || around.is_last(node) || around.is_left(node) || around.is_rest(node) ||
+            around.is_on_torn_line(node) || around.is_bridge(node) || around.is_of_pair(node));
   }))
     continue;
 }

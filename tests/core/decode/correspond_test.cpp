@@ -270,6 +270,24 @@ TEST(RefuseLone, RefusesWhatAnEdgeAlongItsRowLeavesWhole) {
   EXPECT_EQ(left_of("nnnnww|www"), "......www");
 }
 
+// Two beside each other stand in both of two torn rows; each has one that stands above it and below.
+TEST(RefuseLone, RefusesABlockOverTwoTornRows) {
+  const auto standing = [](bool both_torn, GridFit fit_of_upper) {
+    RimSheet sheet(10);
+    for (const int row : {2, 3})
+      for (const int column : {0, 1, 2, 3, 6, 7, 8, 9})
+        if (row == 2 || both_torn) sheet.at(row, column) = {};
+    for (const int column : {4, 5}) sheet.at(2, column).grid_fit = fit_of_upper;
+    sheet.refuse_lone();
+    std::string rows;
+    for (const int row : {2, 3}) rows += sheet.at(row, 4).status == kDecoded ? 'w' : '.';
+    return rows;
+  };
+  EXPECT_EQ(standing(true, GridFit::kLoose), "..");
+  EXPECT_EQ(standing(true, GridFit::kTight), "ww");
+  EXPECT_EQ(standing(false, GridFit::kLoose), "ww") << "one row may be print";
+}
+
 TEST(RefuseLone, LooksBeyondBrokenLinksAtWhatIsTornOrHasNoCell) {
   EXPECT_EQ(left_of("nnn/wwww/nnn", GridFit::kNone), "..........");
   EXPECT_EQ(left_of("mmm/wwww/mmm", GridFit::kNone), "...wwww...");
@@ -320,6 +338,23 @@ TEST(RefuseLone, RefusesWhatHasNothingStandingBesideIt) {
   sheet.refuse_lone();
   EXPECT_EQ(sheet.at(0, 0).status, RegionStatus::kNeighboursDisagree);
   EXPECT_EQ(sheet.at(1, 1).status, kDecoded);
+}
+
+TEST(RefuseLone, RefusesTwoThatHaveNothingElseStandingBesideThem) {
+  const auto standing = [](int left, GridFit fit_of_one) {
+    RimSheet sheet;
+    for (int column = 0; column < 9; ++column) sheet.at(1, column).status = RegionStatus::kDamagedShape;
+    for (int column = left; column < 9; ++column) sheet.at(0, column).status = RegionStatus::kDamagedShape;
+    sheet.at(0, 1).grid_fit = fit_of_one;
+    sheet.refuse_lone();
+    int count = 0;
+    for (int column = 0; column < left; ++column) count += sheet.at(0, column).status == kDecoded;
+    return count;
+  };
+  EXPECT_EQ(standing(2, GridFit::kLoose), 0);
+  EXPECT_EQ(standing(2, GridFit::kNone), 0);
+  EXPECT_EQ(standing(2, GridFit::kTight), 2);
+  EXPECT_EQ(standing(3, GridFit::kLoose), 3);
 }
 
 // The corner of something that was put there agrees by chance.
