@@ -20,7 +20,7 @@ inline constexpr Expectation kRendered[] = {{"16px-5-plane_0", 99.8, 99.8, 0.11}
                                             {"16px-5-cylinder", 99.1, 94.4, 0.47},
                                             {"16px-5-bust", 98.4, 97.8, 0.3},
                                             {"16px-5-step", 91.5, 86.9, 0.32},
-                                            {"16px-5-textured", 52, 45.6, 1.75},
+                                            {"16px-5-textured", 52.3, 45.5, 1.58},
                                             {"16px-5-falling_light", 91.9, 90.3, 0.28},
                                             {"8px-6-plane_0", 99.8, 99.8, 0.12},
                                             {"8px-6-cylinder", 97.6, 95.7, 0.24},

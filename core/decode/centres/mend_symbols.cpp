@@ -192,39 +192,57 @@ Eigen::Vector2f SymbolMender::centre_of(const PatchTask& task, int letter) const
   return task.map.middle_px + camera_offset(task.map, task.state, middle);
 }
 
-SymbolMender::Middle SymbolMender::look_at_middle(const GreyView& frame, const PatternField& field,
-                                                  const PatchTask& task, const Eigen::Vector2f& centre) const {
-  constexpr int kReach = 2;
-  const PatchState& state = task.state;
-  const float limit = kAlign.outlier_sigmas * std::hypot(task.noise, kAlign.misfit_share * state.gain);
-  const Eigen::Vector2i at = centre.array().round().matrix().cast<int>();
-  const auto expected = [&](const Eigen::Vector2f& off) {
-    const Eigen::Vector2f pixel = projector_offset(task.map, state, off) + task.map.origin_px.cast<float>();
-    const float light = state.gain + state.gain_x * off.x() + state.gain_y * off.y();
-    return state.offset + light * field.at(pixel.x(), pixel.y()).value;
-  };
-  const auto look = [&](const auto& view) {
-    int agree = 0, brighter = 0;
-    for (int y = at.y() - kReach; y <= at.y() + kReach; ++y) {
-      for (int x = at.x() - kReach; x <= at.x() + kReach; ++x) {
-        if (!view.contains(x, y)) continue;
-        const Eigen::Vector2f off(static_cast<float>(x - task.x), static_cast<float>(y - task.y));
-        const auto level = static_cast<float>(view.at(x, y));
-        agree += std::abs(level - expected(off)) <= limit;
-        brighter += level - state.offset - state.gain > limit;
-      }
-    }
-    constexpr float kPixels = (2 * kReach + 1) * (2 * kReach + 1);
-    return Middle{static_cast<float>(agree) / kPixels, static_cast<float>(brighter) / kPixels};
-  };
-  return std::visit(look, frame);
+/// Of those that print leaves as they are; of none too few to tell.
+float SymbolMender::Shares::agree_beside_print() const {
+  return agree / std::max(1 - darkened, 0.4F);
 }
 
-/// Where another surface hides the centre, the camera does not see the point. At a corner of what is decoded, where a
-/// surface is likelier to end, the more of the middle has to be seen the less of the patch is.
-bool SymbolMender::shows_centre(const PatchTask& task, const Middle& middle, int held_by) {
-  constexpr float kAgreesMin = 0.67F, kBothAtCornersMin = 1.45F;
-  return middle.agrees >= kAgreesMin && (held_by > kHeldBy || task.support + middle.agrees >= kBothAtCornersMin);
+/// @param reach  px from the middle to the square's sides
+SymbolMender::Shares SymbolMender::shares_of_square(const GreyView& frame, const PatternField& field,
+                                                    const PatchTask& task, const Eigen::Vector2f& middle_px,
+                                                    int reach) {
+  constexpr float kInk = 0.2F;  // of the light of what is not printed on, at least
+  const PatchState& state = task.state;
+  const float limit = kAlign.outlier_sigmas * std::hypot(task.noise, kAlign.misfit_share * state.gain);
+  const Eigen::Vector2i middle = middle_px.array().round().matrix().cast<int>();
+  const auto light_at = [&](const Eigen::Vector2f& off) {
+    const Eigen::Vector2f pixel = projector_offset(task.map, state, off) + task.map.origin_px.cast<float>();
+    return (state.gain + state.gain_x * off.x() + state.gain_y * off.y()) * field.at(pixel.x(), pixel.y()).value;
+  };
+  const auto count = [&](const auto& view) {
+    int agree = 0, brighter = 0, darkened = 0;
+    for (int y = middle.y() - reach; y <= middle.y() + reach; ++y) {
+      for (int x = middle.x() - reach; x <= middle.x() + reach; ++x) {
+        if (!view.contains(x, y)) continue;
+        const float expected = light_at({static_cast<float>(x - task.x), static_cast<float>(y - task.y)});
+        const float light = static_cast<float>(view.at(x, y)) - state.offset;
+        agree += std::abs(light - expected) <= limit;
+        brighter += light - state.gain > limit;
+        darkened += expected - light > limit && light > std::max(limit, kInk * expected);
+      }
+    }
+    const auto share = [pixels = (2 * reach + 1) * (2 * reach + 1)](int of_them) {
+      return static_cast<float>(of_them) / static_cast<float>(pixels);
+    };
+    return Shares{share(agree), share(brighter), share(darkened)};
+  };
+  return std::visit(count, frame);
+}
+
+/// Where another surface hides the centre, the camera does not see the point. At a corner of what is decoded a surface
+/// is likelier to end: the more of the middle has to be seen the less of the patch is. Elsewhere what print darkens
+/// does not count.
+/// @param task  in and out: its support is then of what print leaves
+bool SymbolMender::shows_centre(const GreyView& frame, const PatternField& field, const Place& place,
+                                const Shares& middle, PatchTask& task) const {
+  constexpr float kMiddleMin = 0.67F, kBothAtCornersMin = 1.45F;
+  if (place.held_by == kHeldBy) return middle.agree >= kMiddleMin && task.support + middle.agree >= kBothAtCornersMin;
+  if (middle.agree_beside_print() < kMiddleMin) return false;
+  if (task.support >= kSupportGood) return true;
+  const int reach = static_cast<int>(0.5F * pitch_px_ * place.frame.colwise().norm().minCoeff());
+  const Shares patch = shares_of_square(frame, field, task, task.map.middle_px, reach);
+  task.support = std::max(task.support, patch.agree_beside_print());
+  return true;
 }
 
 bool SymbolMender::is_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Eigen::Vector2f& centre,
@@ -276,16 +294,17 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
     for (std::size_t i = 0; i < asked_.size(); ++i) {
       const std::int32_t node = asked_[i];
       const CellClaim& claim = seen.claims[node];
-      const PatchTask& task = tasks_[i];
+      const Place& place = places_[i];
+      PatchTask& task = tasks_[i];
       if (task.failed) continue;
       const Eigen::Vector2f centre = centre_of(task, array_.at(claim.row, claim.column));
       // What is tilted out of all proportion lies anywhere.
       if (!((centre - task.map.middle_px).norm() < 0.5F * pitch_px_)) continue;
-      const Middle middle = look_at_middle(frame, field, task, centre);
-      if (is_there(task, places_[i].frame, centre, seen, node) && shows_centre(task, middle, places_[i].held_by)) {
-        take_over(task, places_[i].frame, prototypes, seen, node);
+      const Shares middle = shares_of_square(frame, field, task, centre, 2);
+      if (shows_centre(frame, field, place, middle, task) && is_there(task, place.frame, centre, seen, node)) {
+        take_over(task, place.frame, prototypes, seen, node);
         mended_.push_back(node);
-      } else if (claim.status == RegionStatus::kDamagedShape && middle.is_brighter > kHidden) {
+      } else if (claim.status == RegionStatus::kDamagedShape && middle.brighter > kHidden) {
         seen.misfits[node] = std::numeric_limits<float>::infinity();
       }
     }

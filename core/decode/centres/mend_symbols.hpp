@@ -66,13 +66,16 @@ class SymbolMender {
                std::int32_t node);
   void align(const GreyView& frame, double full, const PatternField& field);
   [[nodiscard]] Eigen::Vector2f centre_of(const PatchTask& task, int letter) const;
-  /// Of the pixels around the centre, the shares that agree with the letter and that are brighter than its light.
-  struct Middle {
-    float agrees, is_brighter;
+  /// Of the pixels in a square, those that agree with the letter, those that are brighter than its light, and those
+  /// that it lights less than others, as on print.
+  struct Shares {
+    float agree, brighter, darkened;
+    [[nodiscard]] float agree_beside_print() const;
   };
-  [[nodiscard]] Middle look_at_middle(const GreyView& frame, const PatternField& field, const PatchTask& task,
-                                      const Eigen::Vector2f& centre) const;
-  [[nodiscard]] static bool shows_centre(const PatchTask& task, const Middle& middle, int held_by);
+  [[nodiscard]] static Shares shares_of_square(const GreyView& frame, const PatternField& field, const PatchTask& task,
+                                               const Eigen::Vector2f& middle_px, int reach);
+  [[nodiscard]] bool shows_centre(const GreyView& frame, const PatternField& field, const Place& place,
+                                  const Shares& middle, PatchTask& task) const;
   [[nodiscard]] bool is_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Eigen::Vector2f& centre,
                               const Sightings& seen, std::int32_t node) const;
   void take_over(const PatchTask& task, const LatticeFrame& lattice_frame, std::span<const Prototype> prototypes,

@@ -114,6 +114,22 @@ TEST_F(MendOneOfMany, PlacesItByWhatInkHasLeft) {
   EXPECT_GT(seen_.misfits[kWorn], 1) << "less certain than a whole one";
 }
 
+// Ink takes light, and gives none: of what it darkens most is left, where another surface would leave none.
+TEST_F(MendOneOfMany, PlacesItBesideWhatPrintDarkens) {
+  const Grey8 whole = frame_;
+  const Sightings all = seen_;
+  const auto mended_under = [&](double ink, std::initializer_list<int> without) {
+    frame_ = whole, seen_ = all;
+    for (const int other : without) seen_.claims[other].island = 1;
+    print([&](double x, double y) { return std::abs(x - 2) < 2 ? ink : 1; });
+    return mend();
+  };
+  EXPECT_THAT(mended_under(0.5, {}), testing::Optional(testing::Lt(0.3F)));
+  EXPECT_THAT(mended_under(0.5, {kWorn - 1}), testing::Optional(testing::Lt(0.3F)));
+  EXPECT_EQ(mended_under(0.5, {kWorn - 1, kWorn + kSide}), std::nullopt) << "a corner shows its middle";
+  EXPECT_EQ(mended_under(0.1, {}), std::nullopt);
+}
+
 TEST_F(MendOneOfMany, FollowsDepthAlongTheEpipolarLine) {
   // As if those around lay a pixel farther along it, which runs nearly along the rows.
   for (int i = 0; i < kSide * kSide; ++i) seen_.nodes[i].centre_px.x() += 1;
