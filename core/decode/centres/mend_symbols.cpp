@@ -25,6 +25,7 @@ constexpr float kMovedMax = 0.08F;
 /// look tilted more, and the place is then on neither.
 constexpr float kTiltMaxPx = 0.5F;
 constexpr int kHeldBy = 2;
+constexpr int kMiddleReachPx = 2;  // of the square around its centre
 /// Where so much of its middle is brighter than the letter's light, something lies before it.
 constexpr float kHidden = 0.5F;
 /// From which misfit on, or how far off its line in projector px, what is decoded is aligned, too: whole symbols are
@@ -232,32 +233,34 @@ SymbolMender::Shares SymbolMender::shares_of_square(const GreyView& frame, const
 /// Where another surface hides the centre, the camera does not see the point. At a corner of what is decoded a surface
 /// is likelier to end: the more of the middle has to be seen the less of the patch is. Elsewhere what print darkens
 /// does not count.
-/// @param task  in and out: its support is then of what print leaves
-bool SymbolMender::shows_centre(const GreyView& frame, const PatternField& field, const Place& place,
-                                const Shares& middle, PatchTask& task) const {
+bool SymbolMender::shows_centre(const PatchTask& task, const Shares& middle, int held_by) {
   constexpr float kMiddleMin = 0.67F, kBothAtCornersMin = 1.45F;
-  if (place.held_by == kHeldBy) return middle.agree >= kMiddleMin && task.support + middle.agree >= kBothAtCornersMin;
-  if (middle.agree_beside_print() < kMiddleMin) return false;
-  if (task.support >= kSupportGood) return true;
-  const int reach = static_cast<int>(0.5F * pitch_px_ * place.frame.colwise().norm().minCoeff());
-  const Shares patch = shares_of_square(frame, field, task, task.map.middle_px, reach);
-  task.support = std::max(task.support, patch.agree_beside_print());
-  return true;
+  if (held_by > kHeldBy) return middle.agree_beside_print() >= kMiddleMin;
+  return middle.agree >= kMiddleMin && task.support + middle.agree >= kBothAtCornersMin;
 }
 
-bool SymbolMender::is_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Eigen::Vector2f& centre,
-                            const Sightings& seen, std::int32_t node) const {
-  if (task.support < kWholeSupportMin || std::abs(task.moved) > kSettledPx) return false;
+float SymbolMender::support_beside_print(const GreyView& frame, const PatternField& field, const PatchTask& task,
+                                         const LatticeFrame& lattice_frame) const {
+  const int reach = static_cast<int>(0.5F * pitch_px_ * lattice_frame.colwise().norm().minCoeff());
+  const Shares patch = shares_of_square(frame, field, task, task.map.middle_px, reach);
+  return std::max(task.support, patch.agree_beside_print());
+}
+
+/// Whether it settled near where it was looked for, on its line and tilted as its neighbours are.
+bool SymbolMender::lies_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Eigen::Vector2f& centre,
+                              const Sightings& seen, std::int32_t node) const {
+  if (task.failed || std::abs(task.moved) > kSettledPx) return false;
   if (std::abs(task.state.across) > kAcrossMaxPx || std::abs(task.state.disparity) > kMovedMax * pitch_px_)
     return false;
   const Eigen::RowVector2f slopes(task.state.slope_x, task.state.slope_y);
   if (0.5F * pitch_px_ * (slopes * lattice_frame).norm() > kTiltMaxPx) return false;
-  const CellClaim& claim = seen.claims[node];
-  if (claim.status == RegionStatus::kNeighboursDisagree)
-    return std::abs(task.state.disparity) <= kTightSlip * pitch_px_;
-  if (claim.status != RegionStatus::kDecoded) return true;
+  // What is tilted out of all proportion lies anywhere.
+  if (!((centre - task.map.middle_px).norm() < 0.5F * pitch_px_)) return false;
+  const RegionStatus status = seen.claims[node].status;
+  if (status == RegionStatus::kNeighboursDisagree) return std::abs(task.state.disparity) <= kTightSlip * pitch_px_;
+  if (status != RegionStatus::kDecoded) return true;
   const Eigen::Vector2f moved_px = centre - seen.nodes[node].centre_px;
-  return task.support >= kSupportGood && (seen.nodes[node].frame.inverse() * moved_px).norm() < kMovedMax * pitch_px_;
+  return (seen.nodes[node].frame.inverse() * moved_px).norm() < kMovedMax * pitch_px_;
 }
 
 void SymbolMender::take_over(const PatchTask& task, const LatticeFrame& lattice_frame,
@@ -296,12 +299,13 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
       const CellClaim& claim = seen.claims[node];
       const Place& place = places_[i];
       PatchTask& task = tasks_[i];
-      if (task.failed) continue;
       const Eigen::Vector2f centre = centre_of(task, array_.at(claim.row, claim.column));
-      // What is tilted out of all proportion lies anywhere.
-      if (!((centre - task.map.middle_px).norm() < 0.5F * pitch_px_)) continue;
-      const Shares middle = shares_of_square(frame, field, task, centre, 2);
-      if (shows_centre(frame, field, place, middle, task) && is_there(task, place.frame, centre, seen, node)) {
+      if (!lies_there(task, place.frame, centre, seen, node)) continue;
+      const Shares middle = shares_of_square(frame, field, task, centre, kMiddleReachPx);
+      const bool shown = shows_centre(task, middle, place.held_by);
+      if (shown && place.held_by > kHeldBy && task.support < kSupportGood)
+        task.support = support_beside_print(frame, field, task, place.frame);
+      if (shown && task.support >= (claim.status == RegionStatus::kDecoded ? kSupportGood : kWholeSupportMin)) {
         take_over(task, place.frame, prototypes, seen, node);
         mended_.push_back(node);
       } else if (claim.status == RegionStatus::kDamagedShape && middle.brighter > kHidden) {

@@ -66,18 +66,19 @@ class SymbolMender {
                std::int32_t node);
   void align(const GreyView& frame, double full, const PatternField& field);
   [[nodiscard]] Eigen::Vector2f centre_of(const PatchTask& task, int letter) const;
+  [[nodiscard]] bool lies_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Eigen::Vector2f& centre,
+                                const Sightings& seen, std::int32_t node) const;
   /// Of the pixels in a square, those that agree with the letter, those that are brighter than its light, and those
-  /// that it lights less than others, as on print.
+  /// that it lights, but less than it should, as on print.
   struct Shares {
     float agree, brighter, darkened;
     [[nodiscard]] float agree_beside_print() const;
   };
   [[nodiscard]] static Shares shares_of_square(const GreyView& frame, const PatternField& field, const PatchTask& task,
                                                const Eigen::Vector2f& middle_px, int reach);
-  [[nodiscard]] bool shows_centre(const GreyView& frame, const PatternField& field, const Place& place,
-                                  const Shares& middle, PatchTask& task) const;
-  [[nodiscard]] bool is_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Eigen::Vector2f& centre,
-                              const Sightings& seen, std::int32_t node) const;
+  [[nodiscard]] static bool shows_centre(const PatchTask& task, const Shares& middle, int held_by);
+  [[nodiscard]] float support_beside_print(const GreyView& frame, const PatternField& field, const PatchTask& task,
+                                           const LatticeFrame& lattice_frame) const;
   void take_over(const PatchTask& task, const LatticeFrame& lattice_frame, std::span<const Prototype> prototypes,
                  Sightings& seen, std::int32_t node) const;
 

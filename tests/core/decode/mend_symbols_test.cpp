@@ -121,7 +121,7 @@ TEST_F(MendOneOfMany, PlacesItBesideWhatPrintDarkens) {
   const auto mended_under = [&](double ink, std::initializer_list<int> without) {
     frame_ = whole, seen_ = all;
     for (const int other : without) seen_.claims[other].island = 1;
-    print([&](double x, double y) { return std::abs(x - 2) < 2 ? ink : 1; });
+    print([&](double x, double) { return std::abs(x - 2) < 2 ? ink : 1; });
     return mend();
   };
   EXPECT_THAT(mended_under(0.5, {}), testing::Optional(testing::Lt(0.3F)));
