@@ -25,7 +25,8 @@ constexpr float kOfMisfitSquared = 0.01F;  // px
 constexpr float kSmoothAcrossPx = 0.03F, kSmoothUnevenPx = 0.02F;
 constexpr float kUnknownBendPx = 0.015F;
 /// Of a shape that is cut, not only worn.
-constexpr float kDamageOfAcross = 0.35F, kDamageOfMisfitSquared = 0.018F;  // of the latter px
+constexpr float kDamageOfAcross = 0.35F;
+constexpr float kDamageOfMisfitSquared = 0.018F;  // px
 /// Beyond this a neighbour's residual is a fault of its own.
 constexpr float kAroundMaxPx = 0.3F;
 

@@ -193,7 +193,7 @@ Eigen::Vector2f SymbolMender::centre_of(const PatchTask& task, int letter) const
   return task.map.middle_px + camera_offset(task.map, task.state, middle);
 }
 
-/// Of those that print leaves as they are; of none too few to tell.
+/// Of those that print leaves as they are, counted as two fifths at least: fewer tell too little.
 float SymbolMender::Shares::agree_beside_print() const {
   return agree / std::max(1 - darkened, 0.4F);
 }
@@ -263,11 +263,11 @@ bool SymbolMender::lies_there(const PatchTask& task, const LatticeFrame& lattice
   return (seen.nodes[node].frame.inverse() * moved_px).norm() < kMovedMax * pitch_px_;
 }
 
-void SymbolMender::take_over(const PatchTask& task, const LatticeFrame& lattice_frame,
+void SymbolMender::take_over(const PatchTask& task, const Eigen::Vector2f& centre_px, const LatticeFrame& lattice_frame,
                              std::span<const Prototype> prototypes, Sightings& seen, std::int32_t node) const {
   CellClaim& claim = seen.claims[node];
   const int letter = array_.at(claim.row, claim.column);
-  seen.nodes[node].centre_px = centre_of(task, letter);
+  seen.nodes[node].centre_px = centre_px;
   seen.nodes[node].frame = lattice_frame;
   const Eigen::Vector2f centroid =
       letters_->middle_px(letter) + prototypes[letter].centroid_px - task.map.origin_px.cast<float>();
@@ -306,7 +306,7 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
       if (shown && place.held_by > kHeldBy && task.support < kSupportGood)
         task.support = support_beside_print(frame, field, task, place.frame);
       if (shown && task.support >= (claim.status == RegionStatus::kDecoded ? kSupportGood : kWholeSupportMin)) {
-        take_over(task, place.frame, prototypes, seen, node);
+        take_over(task, centre, place.frame, prototypes, seen, node);
         mended_.push_back(node);
       } else if (claim.status == RegionStatus::kDamagedShape && middle.brighter > kHidden) {
         seen.misfits[node] = std::numeric_limits<float>::infinity();

@@ -79,8 +79,8 @@ class SymbolMender {
   [[nodiscard]] static bool shows_centre(const PatchTask& task, const Shares& middle, int held_by);
   [[nodiscard]] float support_beside_print(const GreyView& frame, const PatternField& field, const PatchTask& task,
                                            const LatticeFrame& lattice_frame) const;
-  void take_over(const PatchTask& task, const LatticeFrame& lattice_frame, std::span<const Prototype> prototypes,
-                 Sightings& seen, std::int32_t node) const;
+  void take_over(const PatchTask& task, const Eigen::Vector2f& centre_px, const LatticeFrame& lattice_frame,
+                 std::span<const Prototype> prototypes, Sightings& seen, std::int32_t node) const;
 
   CodeArray array_;
   float pitch_px_;

@@ -128,6 +128,10 @@ TEST_F(MendOneOfMany, PlacesItBesideWhatPrintDarkens) {
   EXPECT_THAT(mended_under(0.5, {kWorn - 1}), testing::Optional(testing::Lt(0.3F)));
   EXPECT_EQ(mended_under(0.5, {kWorn - 1, kWorn + kSide}), std::nullopt) << "a corner shows its middle";
   EXPECT_EQ(mended_under(0.1, {}), std::nullopt);
+  // Of the middle one column of five is as it was: too little to tell.
+  frame_ = whole, seen_ = all;
+  print([](double x, double) { return std::abs(x - 1) < 2 ? 0.5 : 1; });
+  EXPECT_EQ(mend(), std::nullopt);
 }
 
 TEST_F(MendOneOfMany, FollowsDepthAlongTheEpipolarLine) {
