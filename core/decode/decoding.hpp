@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 #include <vector>
@@ -54,7 +55,30 @@ inline constexpr int kStageCount = 10;
 
 /// Directions of the grid's links, along the pattern's axes: u to the right, v down.
 enum Direction : std::uint8_t { kRight, kDown, kLeft, kUp };
-inline constexpr std::array kDirections{kRight, kDown, kLeft, kUp};
+
+/// All four. Counted, not kept in memory: so a loop's body is made for each of them.
+struct Directions {
+  class Iterator {
+   public:
+    using difference_type = std::ptrdiff_t;
+    using value_type = Direction;
+    constexpr Iterator() = default;
+    constexpr explicit Iterator(int count) : count_(count) {}
+    constexpr Direction operator*() const { return static_cast<Direction>(count_); }
+    constexpr Iterator& operator++() {
+      ++count_;
+      return *this;
+    }
+    constexpr Iterator operator++(int) { return Iterator(count_++); }
+    constexpr bool operator==(const Iterator&) const = default;
+
+   private:
+    int count_ = 0;
+  };
+  [[nodiscard]] static constexpr Iterator begin() { return Iterator(kRight); }
+  [[nodiscard]] static constexpr Iterator end() { return Iterator(kUp + 1); }
+};
+inline constexpr Directions kDirections;
 
 /// One region of the frame, whatever became of it. The trace from which pictures are drawn.
 struct RegionSeen {
