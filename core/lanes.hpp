@@ -2,7 +2,11 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <array>
+#include <bit>
+#include <cstdint>
 #include <cstring>
+#include <limits>
 
 namespace slsd {
 
@@ -13,6 +17,29 @@ using IntLanes [[gnu::vector_size(32)]] = int;
 /// Each lane's number.
 inline constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
 inline constexpr IntLanes kIntLane = {0, 1, 2, 3, 4, 5, 6, 7};
+
+/// Four: a register of every processor, for what has four directions.
+using FourLanes [[gnu::vector_size(16)]] = float;
+using FourIntLanes [[gnu::vector_size(16)]] = int;
+
+/// A bit to each of the lanes of a comparison that holds.
+static inline __attribute__((always_inline)) unsigned bits_of(const FourIntLanes& holds) {
+  constexpr FourIntLanes kBits = {1, 2, 4, 8};
+  const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(holds & kBits);
+  const std::uint64_t both = halves[0] | halves[1];
+  return static_cast<unsigned>(both | both >> 32U);
+}
+
+/// The same for eight.
+static inline __attribute__((always_inline)) unsigned bits_of(const IntLanes& holds) {
+  constexpr IntLanes kBits = {1, 2, 4, 8, 16, 32, 64, 128};
+  const IntLanes bits = holds & kBits;
+  const FourIntLanes four =
+      __builtin_shufflevector(bits, bits, 0, 1, 2, 3) | __builtin_shufflevector(bits, bits, 4, 5, 6, 7);
+  const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(four);
+  const std::uint64_t both = halves[0] | halves[1];
+  return static_cast<unsigned>(both | both >> 32U);
+}
 
 // Never passed by value between functions that are not inlined: how that is done depends on the processor.
 static inline __attribute__((always_inline)) void load(const float* from, Lanes& to) {
@@ -26,6 +53,17 @@ static inline __attribute__((always_inline)) void load(const T* from, Lanes& to)
   Numbers numbers;
   std::memcpy(&numbers, from, sizeof numbers);
   to = __builtin_convertvector(numbers, Lanes);
+}
+
+/// The least of them; the greatest float where none is a number.
+static inline __attribute__((always_inline)) float least_of(const Lanes& lanes) {
+  using Half [[gnu::vector_size(16)]] = float;
+  const Lanes most = Lanes{} + std::numeric_limits<float>::max();
+  const Lanes numbers = lanes < most ? lanes : most;
+  const Half a = __builtin_shufflevector(numbers, numbers, 0, 1, 2, 3),
+             b = __builtin_shufflevector(numbers, numbers, 4, 5, 6, 7), half = a < b ? a : b;
+  const Half c = __builtin_shufflevector(half, half, 2, 3, 0, 1), quarter = half < c ? half : c;
+  return quarter[0] < quarter[1] ? quarter[0] : quarter[1];
 }
 
 static inline __attribute__((always_inline)) float sum_of(const Lanes& lanes) {

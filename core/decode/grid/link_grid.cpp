@@ -4,15 +4,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include <Eigen/LU>
+
+#include "core/lanes.hpp"
 
 namespace slsd {
 namespace {
 
 /// How much a measured step may differ from the expected one before it is taken for a wrong link.
 constexpr float kFrameChangeMax = 0.5F;
+/// Of the pitch: what is so near to where the frame puts a neighbour is the neighbour, as no other can be nearer.
+constexpr float kEvident = 0.15F;
 
 /// From a node to its neighbour, camera px.
 Eigen::Vector2f link_vector(const std::vector<GridNode>& nodes, std::size_t from, Direction direction) {
@@ -37,14 +42,6 @@ std::optional<Eigen::Vector2f> measured_step(const std::vector<GridNode>& nodes,
   const Eigen::Vector2f step =
       leads(next, inwards) ? (1.5F * first - 0.5F * link_vector(nodes, next, inwards)).eval() : first;
   return inwards == forth ? step : (-step).eval();
-}
-
-/// Whether a node is so near to where the frame puts the neighbour that no other can be nearer.
-bool is_evident(const std::vector<GridNode>& nodes, std::int32_t from, std::int32_t other, Direction direction,
-                const Eigen::Matrix2f& cells_from_camera) {
-  constexpr float kEvident = 0.15F;
-  const Eigen::Vector2f there = nodes[other].centre_px - nodes[from].centre_px;
-  return (cells_from_camera * there - step(direction)).squaredNorm() < kEvident * kEvident;
 }
 
 }  // namespace
@@ -95,36 +92,67 @@ std::int32_t GridLinker::nearest(const std::vector<GridNode>& nodes, std::size_t
     for (std::int32_t i = first_of_bucket_[row * columns_ + left]; i < end; ++i) {
       const auto& [centre_px, other] = in_buckets_[i];
       const float squared = (cells_from_camera * (centre_px - target)).squaredNorm();
-      if (squared < best_squared && other != static_cast<std::int32_t>(from)) best_squared = squared, best = other;
+      if (squared >= best_squared || other == static_cast<std::int32_t>(from)) continue;
+      if (squared < kEvident * kEvident) return other;
+      best_squared = squared, best = other;
     }
   }
   return best;
 }
 
-/// A node that is likely to be the neighbour: the one linked before, or the one that the links beside lead to.
-std::int32_t GridLinker::likely(const Range& range, std::int32_t from, Direction direction) const {
-  if (hints_[from][direction] >= 0) return hints_[from][direction];
-  const Direction aside = direction == kDown ? kLeft : kUp;
-  const std::int32_t beside = chosen_[from][aside];
-  const std::int32_t corner = range.contains(beside) ? chosen_[beside][direction] : -1;
-  return range.contains(corner) ? chosen_[corner][opposite(aside)] : -1;
+/// Nodes that are likely to be the neighbours: those linked before, or those that the links beside lead to; -1 where
+/// none is.
+GridLinker::Links GridLinker::likely(const Range& range, std::int32_t from) const {
+  Links likely = hints_[from];
+  for (const Direction d : {kLeft, kRight, kDown}) {
+    if (likely[d] >= 0) continue;
+    const Direction aside = d == kDown ? kLeft : kUp;
+    const std::int32_t beside = likely[aside];
+    const std::int32_t corner = range.contains(beside) ? chosen_[beside][d] : -1;
+    if (range.contains(corner)) likely[d] = chosen_[corner][opposite(aside)];
+  }
+  return likely;
+}
+
+/// Which of the nodes are so near to where the frame puts the neighbours that no others can be nearer: bits by
+/// Direction.
+unsigned GridLinker::find_evident(const std::vector<GridNode>& nodes, std::int32_t from, const Links& others,
+                                  const Eigen::Matrix2f& cells_from_camera) {
+  constexpr FourLanes kStepX = {1, 0, -1, 0}, kStepY = {0, 1, 0, -1};
+  const auto centre_of = [&](Direction d) -> const Eigen::Vector2f& {
+    return nodes[others[d] < 0 ? from : others[d]].centre_px;
+  };
+  const Eigen::Vector2f &one = centre_of(kRight), &two = centre_of(kDown), &three = centre_of(kLeft),
+                        &four = centre_of(kUp), &own = nodes[from].centre_px;
+  const FourLanes x = FourLanes{one.x(), two.x(), three.x(), four.x()} - own.x(),
+                  y = FourLanes{one.y(), two.y(), three.y(), four.y()} - own.y();
+  const FourLanes right = cells_from_camera(0, 0) * x + cells_from_camera(0, 1) * y - kStepX,
+                  down = cells_from_camera(1, 0) * x + cells_from_camera(1, 1) * y - kStepY;
+  return bits_of(right * right + down * down < kEvident * kEvident);
 }
 
 void GridLinker::choose(const std::vector<GridNode>& nodes, const Range& range, std::int32_t from, float radius) {
   const Eigen::Matrix2f cells_from_camera = nodes[from].frame.inverse() / options_.pitch_px;
-  for (const Direction d : {kUp, kLeft, kRight, kDown}) {
-    std::int32_t other = likely(range, from, d);
-    if (other < 0 || !is_evident(nodes, from, other, d, cells_from_camera))
-      other = nearest(nodes, from, d, cells_from_camera, radius);
-    chosen_[from][d] = other;
-    if (range.contains(other) && hints_[other][opposite(d)] < 0) hints_[other][opposite(d)] = from;
+  Links chosen = likely(range, from);
+  const unsigned evident = find_evident(nodes, from, chosen, cells_from_camera);
+  bool changed = false;
+  for (const Direction d : kDirections) {
+    if ((evident >> static_cast<unsigned>(d) & 1U) == 0) chosen[d] = nearest(nodes, from, d, cells_from_camera, radius);
+    changed |= chosen[d] != nodes[from].links[d];
+    if (range.contains(chosen[d])) {
+      std::int32_t& hint = hints_[chosen[d]][opposite(d)];
+      if (hint < 0) hint = from;
+    }
   }
+  chosen_[from] = chosen;
+  changed_[from] = static_cast<std::uint8_t>(changed);
 }
 
 void GridLinker::find_mutual(std::vector<GridNode>& nodes, float radius, Executor& executor) {
   constexpr std::size_t kRange = 768;  // some rows of symbols: a row's help the next
   chosen_.assign(nodes.size(), {-1, -1, -1, -1});
   hints_.resize(nodes.size());
+  changed_.resize(nodes.size());
   relinked_.resize(nodes.size());
   executor.run_ranges(
       nodes.size(),
@@ -134,17 +162,19 @@ void GridLinker::find_mutual(std::vector<GridNode>& nodes, float radius, Executo
         for (std::int32_t i = range.first; i < range.last; ++i) choose(nodes, range, i, radius);
       },
       kRange);
+  const auto has_changed = [&](std::int32_t node) { return node >= 0 && changed_[node] != 0; };
   executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
     for (std::size_t i = first; i < last; ++i) {
-      bool relinked = false;
+      relinked_[i] = 0;
+      // What was linked with each other and has chosen each other again still is.
+      if (changed_[i] == 0 && std::ranges::none_of(chosen_[i], has_changed)) continue;
       for (const Direction d : kDirections) {
         const std::int32_t other = chosen_[i][d];
         const std::int32_t link =
             other >= 0 && chosen_[other][opposite(d)] == static_cast<std::int32_t>(i) ? other : -1;
-        relinked |= nodes[i].links[d] != link;
+        relinked_[i] |= static_cast<std::uint8_t>(nodes[i].links[d] != link);
         nodes[i].links[d] = link;
       }
-      relinked_[i] = relinked ? 1 : 0;
     }
   });
 }
@@ -172,39 +202,68 @@ void GridLinker::measure_changed_frames(std::vector<GridNode>& nodes) {
   }
 }
 
+void GridLinker::measure_steps(const std::vector<GridNode>& nodes, Executor& executor) {
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  steps_.resize(nodes.size() + 1);
+  steps_.back().fill(kNone);
+  sound_steps_ = steps_;
+  executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      for (const Direction d : {kRight, kDown}) {
+        const std::int32_t other = nodes[i].links[d];
+        const std::size_t x = 2 * static_cast<std::size_t>(d), y = x + 1;
+        const Eigen::Vector2f step_px = other < 0 ? Eigen::Vector2f(kNone, kNone) : link_vector(nodes, i, d);
+        const bool torn = nodes[i].torn || (other >= 0 && nodes[other].torn);
+        steps_[i][x] = step_px.x(), steps_[i][y] = step_px.y();
+        sound_steps_[i][x] = torn ? kNone : step_px.x(), sound_steps_[i][y] = torn ? kNone : step_px.y();
+      }
+    }
+  });
+}
+
 /// Whether the same step behind and before a link, or most of those behind, before and on both sides, disagree with it.
-/// Along a straight edge in depth the links on both sides agree with it; those behind and before do not.
-bool GridLinker::is_inconsistent(const std::vector<GridNode>& nodes, std::size_t from, Direction d,
-                                 const Eigen::Matrix2f& cells_from_camera) const {
-  const Eigen::Vector2f own = link_vector(nodes, from, d);
-  const auto is_torn = [&](std::size_t node) { return nodes[node].torn || nodes[nodes[node].links[d]].torn; };
-  const bool own_torn = is_torn(from);
-  int count = 0, against = 0;
-  const auto ask = [&](std::int32_t other) {
-    if (other < 0 || nodes[other].links[d] < 0) return;
-    if (!own_torn && is_torn(static_cast<std::size_t>(other))) return;
-    const Eigen::Vector2f difference = own - link_vector(nodes, static_cast<std::size_t>(other), d);
-    ++count;
-    against += (cells_from_camera * difference).squaredNorm() > options_.deviation_max * options_.deviation_max;
+/// Along a straight edge in depth the links on both sides agree with it; those behind and before do not. Those of what
+/// is torn are asked about what is torn alone.
+/// @return a bit for the link to the right, and one for that down
+unsigned GridLinker::find_inconsistent(const GridNode& node, std::size_t index) const {
+  const auto load = [](const std::vector<std::array<float, 4>>& from, std::size_t at) {
+    return std::bit_cast<FourLanes>(from[at]);
   };
-  ask(nodes[from].links[opposite(d)]);
-  ask(nodes[from].links[d]);
-  if (against == 2) return true;
-  ask(nodes[from].links[(d + 1) % 4]);
-  ask(nodes[from].links[(d + 3) % 4]);
-  return 2 * against > count;
+  const FourLanes own = load(steps_, index), own_sound = load(sound_steps_, index);
+  const FourIntLanes is_torn = own_sound != own_sound;
+  const Eigen::Matrix2f cells_from_camera = node.frame.inverse() / options_.pitch_px;
+  const float xx = cells_from_camera(0, 0), xy = cells_from_camera(0, 1), yx = cells_from_camera(1, 0),
+              yy = cells_from_camera(1, 1);
+  const FourLanes from_x = {xx, yx, xx, yx}, from_y = {xy, yy, xy, yy};
+  FourIntLanes count{};  // negative, as all that follow: a comparison that holds is -1
+  const auto find_against = [&](Direction d) -> FourIntLanes {
+    const std::size_t other = node.links[d] < 0 ? steps_.size() - 1 : static_cast<std::size_t>(node.links[d]);
+    const FourLanes difference = own - (is_torn ? load(steps_, other) : load(sound_steps_, other));
+    const FourLanes cells = from_x * __builtin_shufflevector(difference, difference, 0, 0, 2, 2) +
+                            from_y * __builtin_shufflevector(difference, difference, 1, 1, 3, 3);
+    const FourLanes squared = cells * cells;
+    count += difference == difference;
+    return squared + __builtin_shufflevector(squared, squared, 1, 0, 3, 2) >
+           options_.deviation_max * options_.deviation_max;
+  };
+  const FourIntLanes right_or_left = find_against(kRight) + find_against(kLeft),
+                     down_or_up = find_against(kDown) + find_against(kUp);
+  const FourIntLanes along = __builtin_shufflevector(right_or_left, down_or_up, 0, 1, 6, 7);
+  const unsigned bits = bits_of((along == -2) | (2 * (right_or_left + down_or_up) < count));
+  return (bits & 1U) | (bits >> 1U & 2U);
 }
 
 void GridLinker::break_inconsistent(std::vector<GridNode>& nodes, Executor& executor) {
+  measure_steps(nodes, executor);
   inconsistent_.assign(nodes.size(), {});
   // Each link is asked about once, as links are mutual, and by one of its ends.
   executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
     for (std::size_t i = first; i < last; ++i) {
-      const Eigen::Matrix2f cells_from_camera = nodes[i].frame.inverse() / options_.pitch_px;
+      const unsigned inconsistent = find_inconsistent(nodes[i], i);
+      if (inconsistent == 0) continue;
       for (const Direction d : {kRight, kDown}) {
-        const std::int32_t other = nodes[i].links[d];
-        if (other >= 0 && is_inconsistent(nodes, i, d, cells_from_camera))
-          inconsistent_[i][d] = inconsistent_[other][opposite(d)] = true;
+        if ((inconsistent >> static_cast<unsigned>(d) & 1U) != 0)
+          inconsistent_[i][d] = inconsistent_[nodes[i].links[d]][opposite(d)] = true;
       }
     }
   });

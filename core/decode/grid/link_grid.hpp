@@ -91,12 +91,15 @@ class GridLinker {
     std::int32_t first, last;
     [[nodiscard]] bool contains(std::int32_t node) const { return node >= first && node < last; }
   };
-  [[nodiscard]] std::int32_t likely(const Range& range, std::int32_t from, Direction direction) const;
+  using Links = std::array<std::int32_t, 4>;  // by Direction
+  [[nodiscard]] Links likely(const Range& range, std::int32_t from) const;
+  [[nodiscard]] static unsigned find_evident(const std::vector<GridNode>& nodes, std::int32_t from, const Links& others,
+                                             const Eigen::Matrix2f& cells_from_camera);
   void choose(const std::vector<GridNode>& nodes, const Range& range, std::int32_t from, float radius);
   void find_mutual(std::vector<GridNode>& nodes, float radius, Executor& executor);
   void measure_changed_frames(std::vector<GridNode>& nodes);
-  [[nodiscard]] bool is_inconsistent(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
-                                     const Eigen::Matrix2f& cells_from_camera) const;
+  void measure_steps(const std::vector<GridNode>& nodes, Executor& executor);
+  [[nodiscard]] unsigned find_inconsistent(const GridNode& node, std::size_t index) const;
   void break_inconsistent(std::vector<GridNode>& nodes, Executor& executor);
 
   LinkGridOptions options_;
@@ -109,7 +112,11 @@ class GridLinker {
   };
   std::vector<std::int32_t> first_of_bucket_;
   std::vector<Place> in_buckets_;
-  std::vector<std::array<std::int32_t, 4>> chosen_, hints_;
+  std::vector<Links> chosen_, hints_;
+  std::vector<std::uint8_t> changed_;  // of each node: whether it chose others than it was linked with
+  // The step right and the step down from each node, x, y, x, y, camera px, and one that is none: not a number where
+  // no link leads on; and where one does to or from what is torn.
+  std::vector<std::array<float, 4>> steps_, sound_steps_;
   std::vector<std::array<bool, 4>> inconsistent_;
   std::vector<std::uint8_t> relinked_;  // of each node: whether the last search changed its links
   std::vector<std::uint8_t> all_trusted_;

@@ -3,8 +3,8 @@
 #include "core/decode/symbols/classify.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <limits>
 
 #include "core/clones.hpp"
 #include "core/lanes.hpp"
@@ -24,7 +24,9 @@ constexpr float kDoubtMin = 0.01F, kDoubtMax = 0.5F;
 constexpr float kDoubtFrom = 2, kDoubtSlope = 0.12F;
 
 struct Verdict {
-  Lanes squared_distance, likelihood, log_probability;
+  Lanes log_probability;
+  float nearest, best;  // squared distance from the nearest prototype, and the greatest likelihood
+  unsigned likeliest;   // a bit to each letter that has it
 };
 
 /// Natural logarithms of positive numbers to 1e-6: the exponent's, and the mantissa's, which lies within a root of two
@@ -40,6 +42,22 @@ inline __attribute__((always_inline)) void take_logarithms(const Lanes& of, Lane
                2 * s * (1 + ss * (1 / 3.F + ss * (1 / 5.F + ss * (1 / 7.F + ss * (1 / 9.F)))));
 }
 
+/// Of the whitened features from one on. The triangle's rows have no one length, so none is a loop.
+template <int kRow>
+inline __attribute__((always_inline)) void add_squares(const Classifier::Table& table, const Lanes* deviation,
+                                                       Lanes& squared_distance) {
+  if constexpr (kRow < kFeatureCount) {
+    Lanes whitened{};
+    for (int j = 0; j <= kRow; ++j) {
+      Lanes weight;
+      load(table.whitening[kRow][j], weight);
+      whitened += weight * deviation[j];
+    }
+    squared_distance += whitened * whitened;
+    add_squares<kRow + 1>(table, deviation, squared_distance);
+  }
+}
+
 inline __attribute__((always_inline)) void judge(const Classifier::Table& table, const float* features,
                                                  Verdict& verdict) {
   const Lanes zero{};
@@ -52,28 +70,19 @@ inline __attribute__((always_inline)) void judge(const Classifier::Table& table,
   Lanes squared_distance, density;
   load(table.absent, squared_distance);
   load(table.density, density);
-  const float(*weights)[kMaxLetters] = table.whitening;
-  for (int i = 0; i < kFeatureCount; ++i) {
-    Lanes whitened{};
-    for (int j = 0; j <= i; ++j, ++weights) {
-      Lanes weight;
-      load(*weights, weight);
-      whitened += weight * deviation[j];
-    }
-    squared_distance += whitened * whitened;
-  }
+  add_squares<0>(table, deviation, squared_distance);
   // Student's t in eight dimensions: (1 + d^2 / nu)^(-(nu + 8) / 2), nu = 4.
   const Lanes farthest = zero + kFarthestSquared;
   const Lanes squared = squared_distance < farthest ? squared_distance : farthest;
   const Lanes t = 1 + squared / kDegreesOfFreedom, cubed = t * t * t;
   const Lanes likelihood = density / (cubed * cubed);
-  float nearest = squared_distance[0];
-  for (int i = 1; i < kMaxLetters; ++i) nearest = squared_distance[i] < nearest ? squared_distance[i] : nearest;
+  const float nearest = least_of(squared_distance);
   const float doubt = std::clamp(kDoubtMin + kDoubtSlope * (std::sqrt(nearest) - kDoubtFrom), kDoubtMin, kDoubtMax);
   const Lanes probability = likelihood * ((1 - doubt) / sum_of(likelihood)) + doubt * table.share;
   take_logarithms(probability, verdict.log_probability);
-  verdict.squared_distance = squared_distance;
-  verdict.likelihood = likelihood;
+  verdict.nearest = nearest;
+  verdict.best = -least_of(-likelihood);
+  verdict.likeliest = bits_of(likelihood == verdict.best);
 }
 
 }  // namespace
@@ -86,10 +95,9 @@ Classifier::Classifier(const std::vector<Prototype>& prototypes, float distance_
     const Prototype& prototype = prototypes[letter];
     table_.absent[letter] = 0;
     table_.density[letter] = prototype.density;
-    int at = 0;
     for (int i = 0; i < kFeatureCount; ++i) {
       table_.mean[i][letter] = prototype.mean[i];
-      for (int j = 0; j <= i; ++j) table_.whitening[at++][letter] = prototype.whitening(i, j);
+      for (int j = 0; j <= i; ++j) table_.whitening[i][j][letter] = prototype.whitening(i, j);
     }
   }
 }
@@ -99,15 +107,10 @@ Classification Classifier::classify(const ShapeFeatures& features) const {
   Cloned<judge>::call(table_, features.data(), verdict);
   Classification result;
   std::memcpy(result.log_probability.data(), &verdict.log_probability, sizeof verdict.log_probability);
-  float nearest = std::numeric_limits<float>::max(), best = 0;
-  int letter = -1;
-  for (int i = 0; i < kMaxLetters; ++i) {
-    if (verdict.squared_distance[i] < nearest) nearest = verdict.squared_distance[i];
-    if (verdict.likelihood[i] > best) best = verdict.likelihood[i], letter = i;
-  }
-  result.distance = std::sqrt(nearest);
-  result.likelihood = best;
-  if (result.distance <= distance_max_) result.letter = static_cast<std::int8_t>(letter);
+  result.distance = std::sqrt(verdict.nearest);
+  result.likelihood = verdict.best;
+  if (verdict.best > 0 && result.distance <= distance_max_)
+    result.letter = static_cast<std::int8_t>(std::countr_zero(verdict.likeliest));
   return result;
 }
 

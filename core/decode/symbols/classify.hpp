@@ -46,7 +46,7 @@ class Classifier {
   /// The prototypes' numbers, each with a place for every letter.
   struct Table {
     alignas(32) float mean[kFeatureCount][kMaxLetters];
-    alignas(32) float whitening[kFeatureCount * (kFeatureCount + 1) / 2][kMaxLetters];  ///< lower triangle, by rows
+    alignas(32) float whitening[kFeatureCount][kFeatureCount][kMaxLetters];  ///< lower triangular
     alignas(32) float density[kMaxLetters];
     alignas(32) float absent[kMaxLetters];  ///< squared distance that a place without a letter has more
     float share;                            ///< of one letter among all
