@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <limits>
 #include <span>
+#include <type_traits>
 
 namespace slsd {
 namespace {
@@ -46,11 +47,17 @@ struct Sample {
 };
 using Samples = std::array<Sample, kSamplesMax>;
 
+/// Grey levels to a bin of differences.
+template <class T>
+int unit_of(double full) {
+  return std::is_same_v<T, std::uint8_t> ? 1 : std::max(1, static_cast<int>(full / 1024));
+}
+
 /// A sample of a frame's pixels, but for those that are saturated.
 template <class T>
 std::size_t take_samples(const ImageView<T>& frame, double full, Samples& samples) {
   const auto per_level = static_cast<float>(kGreys / full);
-  const int unit = std::max(1, static_cast<int>(full / 1024));
+  const int unit = unit_of<T>(full);
   int step = kStep;
   const auto taken = [&] { return (frame.width / step + 1) * (frame.height / step + 1); };
   while (taken() > kSamplesMax) ++step;
@@ -92,8 +99,7 @@ FrameNoise measure(const ImageView<T>& frame, double full) {
     if (sample.unevenness <= flattest[sample.level])
       ++differences[sample.level][sample.difference], ++flat[sample.level];
   constexpr float kOfRounding = 1 / 12.F;
-  const float step = static_cast<float>(full / kGreys),
-              unit = static_cast<float>(std::max(1, static_cast<int>(full / 1024)));
+  const float step = static_cast<float>(full / kGreys), unit = static_cast<float>(unit_of<T>(full));
   FrameNoise noise{.dark_variance = kOfRounding};
   float darkest = -1, variance_there = 0, slope = std::numeric_limits<float>::max();
   for (int level = 0; level < kGreys; ++level) {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <span>
+#include <limits>
 #include <utility>
 
 #include <Eigen/LU>
@@ -60,6 +60,24 @@ float off_neighbours(const std::vector<LatticeSymbol>& symbols, const std::vecto
   return count > 0 ? sum / count : 0;
 }
 
+/// By how much a symbol's value is beyond the middle of its neighbours', the upper one of two; 0 of none.
+float off_those_around(const std::vector<float>& values, const std::array<std::int32_t, 4>& neighbours, std::size_t i) {
+  // Nothing here branches, as no processor foretells how values lie: those that are missing lie far below and far above
+  // by turns, and of four the middle is the second greatest.
+  float missing = -std::numeric_limits<float>::infinity();
+  std::array<float, 4> around;
+  bool any = false;
+  for (std::size_t k = 0; k < around.size(); ++k) {
+    const bool there = neighbours[k] >= 0;
+    around[k] = there ? values[static_cast<std::size_t>(neighbours[k])] : missing;
+    missing = there ? missing : -missing;
+    any |= there;
+  }
+  const auto [a, b, c, d] = around;
+  const float middle = std::max(std::min(std::max(a, b), std::max(c, d)), std::max(std::min(a, b), std::min(c, d)));
+  return any ? values[i] - middle : 0;
+}
+
 /// Mean square over a symbol and its neighbours. Of these one that is far off has a fault of its own.
 float mean_square_around(const std::vector<float>& off_px, const LatticeSymbol& symbol, float own_px) {
   float sum = square(own_px), count = 1;
@@ -101,14 +119,7 @@ void CentreJudge::measure_unevenness(const std::vector<LatticeSymbol>& symbols, 
     }
   });
   executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
-    for (std::size_t i = first; i < last; ++i) {
-      std::array<float, 4> around;
-      std::size_t count = 0;
-      for (const std::int32_t other : symbols[i].neighbours) {
-        if (other >= 0) around[count++] = beyond_px_[static_cast<std::size_t>(other)];
-      }
-      uneven_px_[i] = count > 0 ? beyond_px_[i] - median_in_place(std::span(around.data(), count)) : 0;
-    }
+    for (std::size_t i = first; i < last; ++i) uneven_px_[i] = off_those_around(beyond_px_, symbols[i].neighbours, i);
   });
 }
 

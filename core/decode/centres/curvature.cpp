@@ -12,6 +12,10 @@
 namespace slsd {
 namespace {
 
+/// From a cell's number to that of the one below: more than any pattern has columns, so that none lies beside the end
+/// of another row.
+constexpr std::int32_t kRowStep = 1 << 16;
+
 /// Bend over a symbol's size that moves its centre by a tenth of that: about as much as noise does.
 constexpr float kSlightPx = 0.12F;
 
@@ -42,11 +46,16 @@ CentreCorrection::CentreCorrection(const std::vector<Prototype>& prototypes, flo
   }
 }
 
-std::int32_t CentreCorrection::named_neighbour(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims,
-                                               std::int32_t node, Direction direction) const {
-  const std::int32_t other = neighbour(nodes, node, direction);
-  if (other < 0 || claims[other].status != RegionStatus::kDecoded) return -1;
-  return claims[node].fits(claims[other], direction) ? other : -1;
+/// Where a node's neighbours are that are decoded, and as such agree with it.
+std::array<std::int32_t, 4> CentreCorrection::find_named(const GridNode& node, std::size_t index) const {
+  constexpr std::array<std::int32_t, 4> kBeyond{1, kRowStep, -1, -kRowStep};  // by Direction
+  std::array<std::int32_t, 4> named{-1, -1, -1, -1};
+  if (cells_[index] < 0) return named;
+  for (const Direction d : kDirections) {
+    const std::int32_t other = node.broken[d] ? -1 : node.links[d];
+    if (other >= 0 && cells_[other] == cells_[index] + kBeyond[d]) named[d] = other;
+  }
+  return named;
 }
 
 void CentreCorrection::measure_bends(std::int32_t node) {
@@ -161,9 +170,13 @@ void CentreCorrection::correct(const std::vector<GridNode>& nodes, const std::ve
   named_.resize(nodes.size());
   derivatives_.resize(nodes.size());
   symbol_of_.resize(nodes.size());
+  cells_.resize(nodes.size());
   std::int32_t symbols = 0;
-  for (std::size_t i = 0; i < nodes.size(); ++i)
-    symbol_of_[i] = claims[i].status == RegionStatus::kDecoded ? symbols++ : -1;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const bool decoded = claims[i].status == RegionStatus::kDecoded;
+    symbol_of_[i] = decoded ? symbols++ : -1;
+    cells_[i] = decoded ? claims[i].row * kRowStep + claims[i].column : -1;
+  }
   const auto for_each_node = [&](auto&& work) {
     executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
       for (std::size_t i = first; i < last; ++i) work(i);
@@ -172,9 +185,7 @@ void CentreCorrection::correct(const std::vector<GridNode>& nodes, const std::ve
   for_each_node([&](std::size_t i) {
     centres_[i] = {moments[i].x, moments[i].y};
     if (claims[i].named()) centres_[i] -= nodes[i].frame * centroids_px_[array.at(claims[i].row, claims[i].column)];
-    for (const Direction d : kDirections) {
-      named_[i][d] = symbol_of_[i] < 0 ? -1 : named_neighbour(nodes, claims, static_cast<std::int32_t>(i), d);
-    }
+    named_[i] = find_named(nodes[i], i);
   });
   for_each_node([&](std::size_t i) { measure_bends(static_cast<std::int32_t>(i)); });
   lattice.symbols.resize(static_cast<std::size_t>(symbols));

@@ -54,8 +54,7 @@ class CentreCorrection {
                                               bool Derivatives::*has, Part part) const;
   [[nodiscard]] Bend slight_bend_around(std::int32_t node) const;
   [[nodiscard]] Bend bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const;
-  [[nodiscard]] std::int32_t named_neighbour(const std::vector<GridNode>& nodes, const std::vector<CellClaim>& claims,
-                                             std::int32_t node, Direction direction) const;
+  [[nodiscard]] std::array<std::int32_t, 4> find_named(const GridNode& node, std::size_t index) const;
 
   std::vector<Prototype> prototypes_;
   float size_px_;
@@ -65,6 +64,7 @@ class CentreCorrection {
   std::vector<Eigen::Matrix2f> second_moments_px2_;
   std::vector<Eigen::Vector2f> centres_;            // of the squares
   std::vector<std::int32_t> symbol_of_;             // in the lattice
+  std::vector<std::int32_t> cells_;                 // of each node that is decoded, numbered by rows; -1 of others
   std::vector<std::array<std::int32_t, 4>> named_;  // by Direction: neighbours that are decoded, and as such agree
   std::vector<Derivatives> derivatives_;
 };

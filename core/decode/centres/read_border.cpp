@@ -102,6 +102,7 @@ void BorderReader::refuse(const GreyView& frame, float blur_px, Sightings& seen)
     const CellClaim& claim = seen.claims[i];
     if (claim.status != RegionStatus::kDecoded) continue;
     const GridNode& from = seen.nodes[i];
+    if (std::ranges::none_of(from.links, [](std::int32_t other) { return other < 0; })) continue;
     for (const Direction d : kDirections) {
       const CellClaim::Cell cell = claim.beyond(d);
       if (from.links[d] >= 0 || cell.row < 0 || cell.column < 0 || cell.row >= rows_ || cell.column >= columns_)

@@ -76,6 +76,7 @@ bool IslandJudge::are_off_line(const Frame& frame, int from, int to) {
 void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, float evidence_min) {
   constexpr int kReach = 10, kBeyond = 3;
   constexpr float kUsualShare = 0.3F, kUsualShareOffGrid = 0.8F, kClean = 0.8F;
+  constexpr double kUnnoticed = 0.19;  // less than what the greatest of these shares leaves
   const Direction back = opposite(forth);
   const auto leads = [&](std::int32_t node, Direction d) {
     return continues(frame, node, d) && frame.beside[frame.beside[node][d]][opposite(d)] == node;
@@ -103,6 +104,13 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
     const int count = static_cast<int>(line_.size());
     const auto is_misread = [&](std::int32_t node) { return own_ratio(node) < kSpeaksAgainst; };
     const bool any_misread = std::ranges::any_of(line_, is_misread);  // of most lines none is
+    // Of most, what all of it lacks is too little to make any part of it doubtful.
+    const double lacking = log_letters_ * static_cast<double>(count) - line_ratios_.back();
+    const int shortest = std::min(count, kReach + 1);
+    if (!any_misread && !begin.contradicts && !end.contradicts && begin.doubtful == 0 && end.doubtful == 0 &&
+        lacking < kUnnoticed * log_letters_ * shortest &&
+        std::ranges::none_of(line_, [&](std::int32_t node) { return is_off_line(node); }))
+      continue;
     slides_.clear(), slid_ratios_.clear();
     for (int i = 0; i < count; ++i) {
       const int from = std::max(i - kReach, 0), to = std::min(i + kReach, count - 1);
