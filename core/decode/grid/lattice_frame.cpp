@@ -2,7 +2,6 @@
 // Copyright the slsd authors
 #include "core/decode/grid/lattice_frame.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -10,12 +9,6 @@
 
 namespace slsd {
 namespace {
-
-constexpr int kSpacingPx = 64;
-
-int spaces(int length_px) {
-  return (length_px + kSpacingPx - 1) / kSpacingPx;
-}
 
 /// Projector pixel that lights what the camera sees at a pixel, on a plane z = depth of the camera.
 Eigen::Vector2d projector_pixel(const CalibratedCamera& camera, const Lens& projector, double x, double y,
@@ -45,22 +38,16 @@ void ExpectedFrames::differentiate(const ProjectorPixelAt& projector_pixel_at) {
 }
 
 ExpectedFrames::ExpectedFrames(const CalibratedCamera& camera, const Lens& projector, double depth_mm)
-    : columns_(spaces(camera.lens.width_px)), rows_(spaces(camera.lens.height_px)) {
+    : columns_(frames_along(camera.lens.width_px)), rows_(frames_along(camera.lens.height_px)) {
   differentiate([&](double x, double y) { return projector_pixel(camera, projector, x, y, depth_mm); });
 }
 
 ExpectedFrames::ExpectedFrames(const Eigen::Matrix3d& camera_from_projector, int camera_width_px, int camera_height_px)
-    : columns_(spaces(camera_width_px)), rows_(spaces(camera_height_px)) {
+    : columns_(frames_along(camera_width_px)), rows_(frames_along(camera_height_px)) {
   const Eigen::Matrix3d projector_from_camera = camera_from_projector.inverse();
   differentiate([&](double x, double y) -> Eigen::Vector2d {
     return (projector_from_camera * Eigen::Vector3d(x, y, 1)).hnormalized();
   });
-}
-
-const ExpectedFrame& ExpectedFrames::at(float x, float y) const {
-  const int column = std::clamp(static_cast<int>(x) / kSpacingPx, 0, columns_ - 1);
-  const int row = std::clamp(static_cast<int>(y) / kSpacingPx, 0, rows_ - 1);
-  return frames_[static_cast<std::size_t>(row) * columns_ + column];
 }
 
 }  // namespace slsd

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -34,12 +35,18 @@ class ExpectedFrames {
   ExpectedFrames(const Eigen::Matrix3d& camera_from_projector, int camera_width_px, int camera_height_px);
 
   /// @param camera_px  inside the camera's image
-  [[nodiscard]] const ExpectedFrame& at(float x, float y) const;
+  [[nodiscard]] const ExpectedFrame& at(float x, float y) const {
+    const int column = std::clamp(static_cast<int>(x / kSpacingPx), 0, columns_ - 1),
+              row = std::clamp(static_cast<int>(y / kSpacingPx), 0, rows_ - 1);
+    return frames_[static_cast<std::size_t>(row) * columns_ + column];
+  }
   [[nodiscard]] const ExpectedFrame& in_the_middle() const {
     return frames_[static_cast<std::size_t>(rows_ / 2) * columns_ + columns_ / 2];
   }
 
  private:
+  static constexpr int kSpacingPx = 64;
+  static constexpr int frames_along(int length_px) { return (length_px + kSpacingPx - 1) / kSpacingPx; }
   template <class ProjectorPixelAt>
   void differentiate(const ProjectorPixelAt& projector_pixel_at);
 

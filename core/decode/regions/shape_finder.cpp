@@ -83,12 +83,16 @@ void ShapeFinder::find_regions(const GreyView& frame, Executor& executor) {
   region_finder_.find(mask_, regions_, executor);
   if (find_regions_ == Method::kPaper) return;
   splitter_.split_all(frame, std::max(binarizer_.contrast_min(0), kContrastMin * frame_levels_), regions_,
-                      [this](const Region& region) { return is_too_large(region); });
+                      [this](const Region& region) { return is_too_large(region, scale_at(region)); });
 }
 
-bool ShapeFinder::is_too_large(const Region& region) const {
+float ShapeFinder::scale_at(const Region& region) const {
   const Eigen::Vector2f middle = region.middle_px();
-  const float pitch_px = pitch_px_ * expected_.at(middle.x(), middle.y()).scale;
+  return expected_.at(middle.x(), middle.y()).scale;
+}
+
+bool ShapeFinder::is_too_large(const Region& region, float scale) const {
+  const float pitch_px = pitch_px_ * scale;
   const float extent = static_cast<float>(std::max(region.width_px(), region.height_px()));
   return static_cast<float>(region.area_px) > kAreaMax * pitch_px * pitch_px || extent > kExtentMax * pitch_px;
 }
@@ -97,12 +101,11 @@ RegionStatus ShapeFinder::judge_size(const Region& region) const {
   if (region.left == 0 || region.top == 0 || region.right == mask_.width() - 1 || region.bottom == mask_.height() - 1) {
     return RegionStatus::kTouchesBorder;
   }
-  const Eigen::Vector2f middle = region.middle_px();
-  const float symbol_px = symbol_size_px_ * expected_.at(middle.x(), middle.y()).scale;
+  const float scale = scale_at(region), symbol_px = symbol_size_px_ * scale;
   if (region.area_px < kAreaMinPx || static_cast<float>(region.area_px) < kAreaMin * symbol_px * symbol_px) {
     return RegionStatus::kTooSmall;
   }
-  return is_too_large(region) ? RegionStatus::kTooLarge : RegionStatus::kNoNeighbour;
+  return is_too_large(region, scale) ? RegionStatus::kTooLarge : RegionStatus::kNoNeighbour;
 }
 
 void ShapeFinder::describe(const GreyView& frame, Executor& executor, Sightings& seen) {

@@ -54,7 +54,8 @@ class ShapeFinder {
  private:
   GreyView binarize_blurred(const GreyView& frame, double full, Executor& executor);
   GreyView binarize_faint(const GreyView& frame, double full, Executor& executor);
-  [[nodiscard]] bool is_too_large(const Region& region) const;
+  [[nodiscard]] float scale_at(const Region& region) const;
+  [[nodiscard]] bool is_too_large(const Region& region, float scale) const;
   [[nodiscard]] RegionStatus judge_size(const Region& region) const;
 
   float symbol_size_px_, pitch_px_;
