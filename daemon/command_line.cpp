@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/options_as_values.hpp"
 
 namespace slsd {
 namespace {
@@ -116,16 +117,6 @@ void add_options(CLI::App& app, CommandLine& line) {
       ->excludes(check_configuration)
       ->excludes(list)
       ->excludes("--extrinsics");
-}
-
-/// `--pattern --help` lacks its value, and would write a picture of that name.
-void refuse_options_as_values(CLI::App& app) {
-  for (CLI::Option* option : app.get_options()) {
-    if (option->get_items_expected_min() == 0) continue;
-    option->check([&app](const std::string& value) {
-      return app.get_option_no_throw(value) == nullptr ? std::string() : "a value is missing before " + value;
-    });
-  }
 }
 
 /// --from, --board and --ruler belong to several commands.

@@ -7,6 +7,7 @@
 #include "core/shown_picture.hpp"
 #include "daemon/client/client_commands.hpp"
 #include "daemon/client/client_options.hpp"
+#include "daemon/options_as_values.hpp"
 
 namespace {
 
@@ -176,6 +177,7 @@ int main(int argc, char** argv) {
   add_watch(app, options);
   add_set(app, options);
   add_view(app, options);
+  slsd::refuse_options_as_values(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -43,6 +43,12 @@ class Slsd(unittest.TestCase):
                 result = slsd(option, "--help", cwd=self.folder)
                 self.assertEqual(result.returncode, 2)
                 self.assertIn("a value is missing before --help", result.stderr)
+        for command in (["frame", "--output", "--json"], ["scan", "--picture", "--normals"], ["--socket", "--json", "status"],
+                        ["calibrate", "--board", "--resume"]):
+            with self.subTest(command=command):
+                result = slsctl(*command, cwd=self.folder)
+                self.assertEqual(result.returncode, 2)
+                self.assertRegex(result.stderr, "a value is missing before --(json|normals|resume)")
         self.assertEqual(list(self.folder.iterdir()), [])
 
     def test_pattern_follows_the_configuration(self):
