@@ -151,13 +151,23 @@ void IslandJudge::find_islands(const Frame& frame) {
   }
 }
 
-IslandJudge::Link IslandJudge::read_link(const Frame& frame, std::int32_t node, Direction direction) const {
-  const std::int32_t other = frame.beside[node][direction];
-  if (other < 0) return Link::kNone;
-  if (continues(frame, node, direction)) {
-    const float speaks = own_ratio(other);
-    return speaks > 0 ? Link::kAgrees : speaks < kSpeaksAgainst ? Link::kAgainst : Link::kNeutral;
+void IslandJudge::read_links_of(const Frame& frame, std::int32_t node) {
+  for (const Direction d : kDirections) {
+    const std::int32_t other = frame.beside[node][d];
+    if (other < 0) {
+      links_[node][d] = Link::kNone;
+    } else if (continues(frame, node, d)) {
+      const float speaks = own_ratio(other);
+      links_[node][d] = speaks > 0 ? Link::kAgrees : speaks < kSpeaksAgainst ? Link::kAgainst : Link::kNeutral;
+    } else {
+      links_[node][d] = read_link_out(frame, node, d);
+    }
   }
+}
+
+/// One that leads to what is none of the node's island, or not as its cell lies.
+IslandJudge::Link IslandJudge::read_link_out(const Frame& frame, std::int32_t node, Direction direction) const {
+  const std::int32_t other = frame.beside[node][direction];
   const auto cell = frame.claims[node].beyond(direction);
   if (!shown(cell.row, cell.column)) return Link::kAgainst;
   const float speaks = ratio(frame, other, cell.row, cell.column);

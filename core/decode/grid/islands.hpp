@@ -102,9 +102,7 @@ class IslandJudge {
   void look_at_own_cells(const Frame& frame, std::size_t first, std::size_t last);
   void find_islands(const Frame& frame);
   void read_links(const Frame& frame, Executor& executor);
-  void read_links_of(const Frame& frame, std::int32_t node) {
-    for (const Direction d : kDirections) links_[node][d] = read_link(frame, node, d);
-  }
+  void read_links_of(const Frame& frame, std::int32_t node);
   void read_links_around(const Frame& frame, const std::vector<std::int32_t>& gone);
   /// Whether a link leads to the node of the same island whose cell lies there.
   [[nodiscard]] bool continues(const Frame& frame, std::int32_t node, Direction direction) const {
@@ -112,7 +110,7 @@ class IslandJudge {
   }
   void drop_rejected(const Frame& frame);
   void part_islands(const Frame& frame, Executor& executor);
-  [[nodiscard]] Link read_link(const Frame& frame, std::int32_t node, Direction direction) const;
+  [[nodiscard]] Link read_link_out(const Frame& frame, std::int32_t node, Direction direction) const;
   [[nodiscard]] bool runs_along_edge(const Frame& frame, std::int32_t node, Direction direction) const;
   void weigh(const Frame& frame, Island& island) const;
   [[nodiscard]] double cost_of_rim(const Frame& frame, const Island& island) const;
