@@ -25,6 +25,8 @@ constexpr float kMovedMax = 0.08F;
 /// look tilted more, and the place is then on neither.
 constexpr float kTiltMaxPx = 0.5F;
 constexpr int kHeldBy = 2;
+/// What one alone holds lies nearer to its line, is tilted less, and is seen better: projector px, and of the patch.
+constexpr float kLoneAcrossMaxPx = 0.2F, kLoneTiltMaxPx = 0.25F, kLoneSupportMin = 0.85F;
 constexpr int kMiddleReachPx = 2;  // of the square around its centre
 /// Where so much of its middle is brighter than the letter's light, something lies before it.
 constexpr float kHidden = 0.5F;
@@ -116,6 +118,27 @@ bool SymbolMender::may_return(const Sightings& seen, std::int32_t node) {
   return true;
 }
 
+/// Whether one is enough to hold it: it fits the grid tightly, or it is worn and has one of the others where its cell
+/// is beside. What its surroundings have refused may be whole, and of another surface.
+bool SymbolMender::stands_with_one(const Sightings& seen, std::int32_t node, std::span<const std::int32_t> others) {
+  const CellClaim& claim = seen.claims[node];
+  if (claim.status == RegionStatus::kDecoded) return false;
+  if (claim.grid_fit == GridFit::kTight) return true;
+  if (claim.status == RegionStatus::kNeighboursDisagree) return false;
+  return std::ranges::any_of(kDirections, [&](Direction d) {
+    const std::int32_t other = neighbour(seen.nodes, node, d);
+    return other >= 0 && claim.fits(seen.claims[other], d) && std::ranges::binary_search(others, other);
+  });
+}
+
+/// Whether what was just mended may help to hold one beside it. What one alone holds is not certain enough for what was
+/// refused and does not fit the grid tightly: so another surface would come in from symbol to symbol.
+bool SymbolMender::may_hold(const Sightings& seen, bool lone, std::int32_t other) {
+  const CellClaim& claim = seen.claims[other];
+  if (claim.status == RegionStatus::kDecoded) return false;
+  return !lone || claim.status != RegionStatus::kNeighboursDisagree || claim.grid_fit == GridFit::kTight;
+}
+
 /// Between those on both sides of it, or one step on from two in a line; the mean.
 SymbolMender::Place SymbolMender::place_by_neighbours(const Sightings& seen, std::int32_t node) const {
   const auto holder = [&](std::int32_t of, Direction d) { return decoded_beside(seen.nodes, seen.claims, of, d); };
@@ -141,11 +164,12 @@ SymbolMender::Place SymbolMender::place_by_neighbours(const Sightings& seen, std
           place.held_by};
 }
 
-/// Sets up the task of a node that enough hold; its window lies within the frame.
+/// Sets up the task of a node that enough hold, or one that may be enough; its window lies within the frame.
 void SymbolMender::look_at(const GreyView& frame, const FrameNoise& noise, const CellGate& gate, const Sightings& seen,
                            std::int32_t node) {
   const Place place = place_by_neighbours(seen, node);
-  if (place.held_by < kHeldBy) return;
+  if (place.held_by == 0) return;
+  if (place.held_by < kHeldBy && !stands_with_one(seen, node, to_ask_)) return;
   const auto [width, height] = std::visit([](const auto& view) { return std::pair(view.width, view.height); }, frame);
   const int x = static_cast<int>(std::lround(place.centre_px.x())),
             y = static_cast<int>(std::lround(place.centre_px.y())),
@@ -247,27 +271,29 @@ float SymbolMender::support_beside_print(const GreyView& frame, const PatternFie
 }
 
 /// Whether it settled near where it was looked for, on its line and tilted as its neighbours are.
-bool SymbolMender::lies_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Eigen::Vector2f& centre,
+bool SymbolMender::lies_there(const PatchTask& task, const Place& place, const Eigen::Vector2f& centre,
                               const Sightings& seen, std::int32_t node) const {
+  const bool lone = place.held_by < kHeldBy;
   if (task.failed || std::abs(task.moved) > kSettledPx) return false;
-  if (std::abs(task.state.across) > kAcrossMaxPx || std::abs(task.state.disparity) > kMovedMax * pitch_px_)
-    return false;
+  if (std::abs(task.state.across) > (lone ? kLoneAcrossMaxPx : kAcrossMaxPx)) return false;
+  if (std::abs(task.state.disparity) > kMovedMax * pitch_px_) return false;
   const Eigen::RowVector2f slopes(task.state.slope_x, task.state.slope_y);
-  if (0.5F * pitch_px_ * (slopes * lattice_frame).norm() > kTiltMaxPx) return false;
+  if (0.5F * pitch_px_ * (slopes * place.frame).norm() > (lone ? kLoneTiltMaxPx : kTiltMaxPx)) return false;
   // What is tilted out of all proportion lies anywhere.
   if (!((centre - task.map.middle_px).norm() < 0.5F * pitch_px_)) return false;
   const RegionStatus status = seen.claims[node].status;
-  if (status == RegionStatus::kNeighboursDisagree) return std::abs(task.state.disparity) <= kTightSlip * pitch_px_;
+  if (lone || status == RegionStatus::kNeighboursDisagree)
+    return std::abs(task.state.disparity) <= kTightSlip * pitch_px_;
   if (status != RegionStatus::kDecoded) return true;
   const Eigen::Vector2f moved_px = centre - seen.nodes[node].centre_px;
   return (seen.nodes[node].frame.inverse() * moved_px).norm() < kMovedMax * pitch_px_;
 }
 
-void SymbolMender::take_over(const PatchTask& task, const Eigen::Vector2f& centre_px, const LatticeFrame& lattice_frame,
+void SymbolMender::take_over(const PatchTask& task, const LatticeFrame& lattice_frame,
                              std::span<const Prototype> prototypes, Sightings& seen, std::int32_t node) const {
   CellClaim& claim = seen.claims[node];
   const int letter = array_.at(claim.row, claim.column);
-  seen.nodes[node].centre_px = centre_px;
+  seen.nodes[node].centre_px = centre_of(task, letter);
   seen.nodes[node].frame = lattice_frame;
   const Eigen::Vector2f centroid =
       letters_->middle_px(letter) + prototypes[letter].centroid_px - task.map.origin_px.cast<float>();
@@ -293,30 +319,40 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
     asked_.clear(), places_.clear(), tasks_.clear();
     for (const std::int32_t node : to_ask_) look_at(frame, noise, gate, seen, node);
     align(frame, full, field);
-    const std::size_t before = mended_.size();
+    agreeing_.clear(), lone_.clear();
     for (std::size_t i = 0; i < asked_.size(); ++i) {
       const std::int32_t node = asked_[i];
       const CellClaim& claim = seen.claims[node];
       const Place& place = places_[i];
       PatchTask& task = tasks_[i];
       const Eigen::Vector2f centre = centre_of(task, array_.at(claim.row, claim.column));
-      if (!lies_there(task, place.frame, centre, seen, node)) continue;
+      if (!lies_there(task, place, centre, seen, node)) continue;
       const Shares middle = shares_of_square(frame, field, task, centre, kMiddleReachPx);
-      const bool shown = shows_centre(task, middle, place.held_by);
-      if (shown && place.held_by > kHeldBy && task.support < kSupportGood)
+      const bool shown = shows_centre(task, middle, place.held_by), lone = place.held_by < kHeldBy;
+      if (shown && (lone || (place.held_by > kHeldBy && task.support < kSupportGood)))
         task.support = support_beside_print(frame, field, task, place.frame);
-      if (shown && task.support >= (claim.status == RegionStatus::kDecoded ? kSupportGood : kWholeSupportMin)) {
-        take_over(task, centre, place.frame, prototypes, seen, node);
-        mended_.push_back(node);
+      const float support_min = lone                                     ? kLoneSupportMin
+                                : claim.status == RegionStatus::kDecoded ? kSupportGood
+                                                                         : kWholeSupportMin;
+      if (shown && task.support >= support_min) {
+        agreeing_.push_back(i);
+        if (lone) lone_.push_back(node);
       } else if (claim.status == RegionStatus::kDamagedShape && middle.brighter > kHidden) {
         seen.misfits[node] = std::numeric_limits<float>::infinity();
       }
     }
+    const std::size_t before = mended_.size();
+    for (const std::size_t i : agreeing_) {
+      const std::int32_t node = asked_[i];
+      if (places_[i].held_by < kHeldBy && !stands_with_one(seen, node, lone_)) continue;
+      take_over(tasks_[i], places_[i].frame, prototypes, seen, node);
+      mended_.push_back(node);
+    }
     to_ask_.clear();
     for (std::size_t i = before; i < mended_.size(); ++i) {
+      const bool lone = std::ranges::binary_search(lone_, mended_[i]);
       for (const std::int32_t other : seen.nodes[mended_[i]].links)
-        if (other >= 0 && seen.claims[other].status != RegionStatus::kDecoded && is_asked(other))
-          to_ask_.push_back(other);
+        if (other >= 0 && may_hold(seen, lone, other) && is_asked(other)) to_ask_.push_back(other);
     }
     std::ranges::sort(to_ask_);
     to_ask_.erase(std::unique(to_ask_.begin(), to_ask_.end()), to_ask_.end());

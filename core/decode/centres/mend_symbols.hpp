@@ -35,7 +35,9 @@ class LetterFields {
 
 /// Finds the places of symbols whose cells are certain and whose shapes print, relief or an edge has spoilt: a centroid
 /// goes with what is missing, and off its epipolar line. What there is of them is aligned with their letter instead,
-/// from where at least two of their island put them, and what does not agree counts little.
+/// from where at least two of their island put them, and what does not agree counts little. One is enough where they
+/// fit the grid tightly, or two that are worn lie beside each other, as along a line of print: these have to agree
+/// well.
 /// @thread thread-bound: keeps its buffers; the letters are shared with copies
 class SymbolMender {
  public:
@@ -61,12 +63,15 @@ class SymbolMender {
     int held_by = 0;
   };
   [[nodiscard]] bool may_return(const Sightings& seen, std::int32_t node);
+  [[nodiscard]] static bool stands_with_one(const Sightings& seen, std::int32_t node,
+                                            std::span<const std::int32_t> others);
+  [[nodiscard]] static bool may_hold(const Sightings& seen, bool lone, std::int32_t other);
   [[nodiscard]] Place place_by_neighbours(const Sightings& seen, std::int32_t node) const;
   void look_at(const GreyView& frame, const FrameNoise& noise, const CellGate& gate, const Sightings& seen,
                std::int32_t node);
   void align(const GreyView& frame, double full, const PatternField& field);
   [[nodiscard]] Eigen::Vector2f centre_of(const PatchTask& task, int letter) const;
-  [[nodiscard]] bool lies_there(const PatchTask& task, const LatticeFrame& lattice_frame, const Eigen::Vector2f& centre,
+  [[nodiscard]] bool lies_there(const PatchTask& task, const Place& place, const Eigen::Vector2f& centre,
                                 const Sightings& seen, std::int32_t node) const;
   /// Of the pixels in a square, those that agree with the letter, those that are brighter than its light, and those
   /// that it lights, but less than it should, as on print.
@@ -79,14 +84,16 @@ class SymbolMender {
   [[nodiscard]] static bool shows_centre(const PatchTask& task, const Shares& middle, int held_by);
   [[nodiscard]] float support_beside_print(const GreyView& frame, const PatternField& field, const PatchTask& task,
                                            const LatticeFrame& lattice_frame) const;
-  void take_over(const PatchTask& task, const Eigen::Vector2f& centre_px, const LatticeFrame& lattice_frame,
-                 std::span<const Prototype> prototypes, Sightings& seen, std::int32_t node) const;
+  void take_over(const PatchTask& task, const LatticeFrame& lattice_frame, std::span<const Prototype> prototypes,
+                 Sightings& seen, std::int32_t node) const;
 
   CodeArray array_;
   float pitch_px_;
   std::shared_ptr<const LetterFields> letters_;
   std::vector<std::int32_t> to_ask_, asked_, mended_;  // sightings; of those asked one place and task each
   std::vector<std::int32_t> around_;                   // one that may return
+  std::vector<std::size_t> agreeing_;                  // tasks that show their letters where they should be
+  std::vector<std::int32_t> lone_;                     // sightings of these that one alone holds
   std::vector<Place> places_;
   std::vector<PatchTask> tasks_;
 };

@@ -234,11 +234,129 @@ TEST_F(MendOneOfMany, KnowsNoMisfitOfWhatSomethingBrighterHides) {
   EXPECT_EQ(misfit_beneath(RegionStatus::kDecoded, 5, 250), 3);
 }
 
-TEST_F(MendOneOfMany, LeavesWhatOneAloneHolds) {
-  for (int i = 0; i < kSide * kSide; ++i)
-    if (i % kSide >= kSide / 2 && i != kWorn && i != kWorn + 1 && i != kWorn + 2) seen_.claims[i].island = 1;
-  seen_.claims[kWorn - 1].island = 1;
+/// Those of the worn one's row that lie to the right of it alone hold it, and those below alone another one there.
+class MendWhatOneHolds : public MendOneOfMany {
+ protected:
+  static constexpr int kBelow = kWorn + kSide;
+  MendWhatOneHolds() {
+    for (int i = 0; i < kSide * kSide; ++i)
+      if (i % kSide < kSide / 2 || (i / kSide != kSide / 2 && i / kSide != kSide / 2 + 1)) seen_.claims[i].island = 1;
+    seen_.claims[kWorn].grid_fit = seen_.claims[kBelow].grid_fit = GridFit::kNone;
+    seen_.claims[kBelow].status = RegionStatus::kNoCodeword, seen_.claims[kBelow].island = 1;
+  }
+  /// As one that is worn, too.
+  void wear_the_one_below() {
+    seen_.claims[kBelow].status = RegionStatus::kDamagedShape, seen_.claims[kBelow].island = 0;
+    seen_.nodes[kBelow].centre_px += Eigen::Vector2f(2, -3);
+  }
+  [[nodiscard]] std::vector<std::int32_t> mend_all() {
+    SymbolMender mender(pattern_);
+    return mender.mend(frame_.view(), 255, {.dark_variance = 1}, 0.7F, CellGate(cells_, segments_, 1.5), prototypes_,
+                       seen_);
+  }
+};
+
+TEST_F(MendWhatOneHolds, LeavesItWhereNothingElseSpeaksForIt) {
   EXPECT_EQ(mend(), std::nullopt);
+}
+
+TEST_F(MendWhatOneHolds, TakesItWhereItFitsTheGridTightly) {
+  seen_.claims[kWorn].grid_fit = GridFit::kTight;
+  EXPECT_THAT(mend(), testing::Optional(testing::Lt(0.06F)));
+}
+
+TEST_F(MendWhatOneHolds, LeavesWhatIsDecodedAsItIs) {
+  seen_.claims[kWorn].grid_fit = GridFit::kTight;
+  seen_.claims[kWorn].status = RegionStatus::kDecoded, seen_.misfits[kWorn] = 5;
+  EXPECT_EQ(mend(), std::nullopt);
+}
+
+TEST_F(MendWhatOneHolds, TakesTwoBesideEachOther) {
+  wear_the_one_below();
+  EXPECT_THAT(mend_all(), testing::ElementsAre(kWorn, kBelow));
+  const GreyMoments& below = seen_.moments[kBelow];
+  EXPECT_LT((Eigen::Vector2f(below.x, below.y) - true_centre(kSide / 2 + 1, kSide / 2)).norm(), 0.06F);
+}
+
+TEST_F(MendWhatOneHolds, LeavesTwoOfWhichOneIsAnother) {
+  wear_the_one_below();
+  const Sightings all = seen_;
+  print([](double, double) { return 0; });
+  EXPECT_THAT(mend_all(), testing::IsEmpty()) << "one is all dark";
+  frame_ = simulate(draw_pattern(pattern_), rig_, kTilted, {.dark = 12, .lit = 170, .noise_sigma = 1});
+  seen_ = all;
+  seen_.nodes[kWorn].broken[kDown] = seen_.nodes[kBelow].broken[kUp] = true;
+  EXPECT_THAT(mend_all(), testing::IsEmpty()) << "no link leads from one to the other";
+  seen_ = all;
+  for (int column = kSide / 2; column < kSide; ++column) ++seen_.claims[(kSide / 2 + 1) * kSide + column].column;
+  EXPECT_THAT(mend_all(), testing::IsEmpty()) << "their cells do not lie beside each other";
+}
+
+TEST_F(MendWhatOneHolds, LeavesWhatWasRefusedUnlessItFitsTheGridTightly) {
+  wear_the_one_below();
+  seen_.claims[kWorn].status = RegionStatus::kNeighboursDisagree;
+  const Sightings all = seen_;
+  EXPECT_THAT(mend_all(), testing::IsEmpty()) << "two that are worn hold each other";
+  seen_ = all;
+  seen_.claims[kWorn].grid_fit = GridFit::kTight;
+  EXPECT_THAT(mend_all(), testing::ElementsAre(kWorn, kBelow));
+}
+
+// From such a one on another surface could come in, symbol by symbol.
+TEST_F(MendWhatOneHolds, HoldsNothingThatWasRefused) {
+  constexpr int kLeft = kWorn - 1;
+  wear_the_one_below();
+  for (const int above : {kLeft - kSide, kLeft - 2 * kSide}) seen_.claims[above].island = 0;
+  seen_.claims[kLeft].island = 0, seen_.claims[kLeft].grid_fit = GridFit::kNone;
+  const Sightings all = seen_;
+  const auto mended_with = [&](RegionStatus status) {
+    seen_ = all;
+    seen_.claims[kLeft].status = status;
+    return mend_all();
+  };
+  EXPECT_THAT(mended_with(RegionStatus::kNeighboursDisagree), testing::ElementsAre(kWorn, kBelow));
+  EXPECT_THAT(mended_with(RegionStatus::kDamagedShape), testing::ElementsAre(kLeft, kWorn, kBelow));
+}
+
+// What two hold may be disturbed more: the limits of one are narrower, each by itself.
+TEST_F(MendWhatOneHolds, AsksForMoreThanWhereTwoHoldIt) {
+  const Grey8 whole = frame_;
+  const Sightings all = seen_;
+  const auto is_mended = [&](int holders, const std::function<void()>& disturb) {
+    frame_ = whole, seen_ = all;
+    seen_.claims[kWorn].grid_fit = GridFit::kTight;
+    if (holders == 2) {
+      for (const int above : {kWorn - kSide, kWorn - 2 * kSide}) seen_.claims[above].island = 0;
+    }
+    disturb();
+    return mend().has_value();
+  };
+  const auto move_all = [&](float x, float y) {
+    for (GridNode& node : seen_.nodes) node.centre_px += Eigen::Vector2f(x, y);
+  };
+  const auto turn_all = [&](float share) {
+    for (GridNode& node : seen_.nodes) node.frame.col(0) *= share;
+  };
+  const auto hide_sixth = [&] {
+    const Eigen::Vector2f centre = true_centre(kSide / 2, kSide / 2);
+    for (int y = -13; y <= 13; ++y) {
+      for (int x = -13; x <= -8; ++x) {
+        std::uint8_t& level =
+            frame_.at(static_cast<int>(std::lround(centre.x())) + x, static_cast<int>(std::lround(centre.y())) + y);
+        level = level > 90 ? 15 : 165;
+      }
+    }
+  };
+  const std::vector<std::pair<const char*, std::function<void()>>> disturbances{
+      {"along its line", [&] { move_all(0.4F, 0); }},
+      {"across its line", [&] { move_all(0, 0.4F); }},
+      {"turned", [&] { turn_all(1.04F); }},
+      {"hidden", hide_sixth}};
+  for (const int holders : {1, 2}) EXPECT_TRUE(is_mended(holders, [] {})) << holders;
+  for (const auto& [what, disturb] : disturbances) {
+    EXPECT_TRUE(is_mended(2, disturb)) << what;
+    EXPECT_FALSE(is_mended(1, disturb)) << what;
+  }
 }
 
 TEST_F(MendOneOfMany, AlignsWhatIsDecodedFarOffItsLine) {
