@@ -131,14 +131,6 @@ bool SymbolMender::stands_with_one(const Sightings& seen, std::int32_t node, std
   });
 }
 
-/// Whether what was just mended may help to hold one beside it. What one alone holds is not certain enough for what was
-/// refused and does not fit the grid tightly: so another surface would come in from symbol to symbol.
-bool SymbolMender::may_hold(const Sightings& seen, bool lone, std::int32_t other) {
-  const CellClaim& claim = seen.claims[other];
-  if (claim.status == RegionStatus::kDecoded) return false;
-  return !lone || claim.status != RegionStatus::kNeighboursDisagree || claim.grid_fit == GridFit::kTight;
-}
-
 /// Between those on both sides of it, or one step on from two in a line; the mean.
 SymbolMender::Place SymbolMender::place_by_neighbours(const Sightings& seen, std::int32_t node) const {
   const auto holder = [&](std::int32_t of, Direction d) { return decoded_beside(seen.nodes, seen.claims, of, d); };
@@ -165,12 +157,14 @@ SymbolMender::Place SymbolMender::place_by_neighbours(const Sightings& seen, std
 }
 
 /// Sets up the task of a node that enough hold, or one that may be enough; its window lies within the frame.
-void SymbolMender::look_at(const GreyView& frame, const FrameNoise& noise, const CellGate& gate, const Sightings& seen,
-                           std::int32_t node) {
+void SymbolMender::look_at(const Scene& scene, Held held, std::int32_t node) {
+  const Sightings& seen = scene.seen;
   const Place place = place_by_neighbours(seen, node);
-  if (place.held_by == 0) return;
-  if (place.held_by < kHeldBy && !stands_with_one(seen, node, to_ask_)) return;
-  const auto [width, height] = std::visit([](const auto& view) { return std::pair(view.width, view.height); }, frame);
+  const bool enough =
+      held == Held::kByTwo ? place.held_by >= kHeldBy : place.held_by == 1 && stands_with_one(seen, node, to_ask_);
+  if (!enough) return;
+  const auto [width, height] =
+      std::visit([](const auto& view) { return std::pair(view.width, view.height); }, scene.frame);
   const int x = static_cast<int>(std::lround(place.centre_px.x())),
             y = static_cast<int>(std::lround(place.centre_px.y())),
             reach = static_cast<int>(std::ceil(0.5F * pitch_px_ * place.frame.colwise().norm().maxCoeff()));
@@ -179,7 +173,7 @@ void SymbolMender::look_at(const GreyView& frame, const FrameNoise& noise, const
   const Eigen::Vector2f middle = letters_->middle_px(array_.at(claim.row, claim.column));
   PatchTask task;
   task.x = x, task.y = y;
-  task.noise = noise.at(0.5F * (place.background + place.peak));
+  task.noise = scene.noise.at(0.5F * (place.background + place.peak));
   // The light around it to begin with, so that what is printed there counts little from the first step on.
   task.state.gain = place.peak - place.background, task.state.offset = place.background;
   // The letter lies as the neighbours do; what depth moves it by is an offset along the epipolar line, which a tilt
@@ -187,7 +181,7 @@ void SymbolMender::look_at(const GreyView& frame, const FrameNoise& noise, const
   PatchMap& map = task.map;
   map.middle_px = {static_cast<float>(x), static_cast<float>(y)};
   map.origin_px = middle.cast<int>();
-  map.along = gate.way_of_line(node, claim.row, claim.column);
+  map.along = scene.gate.way_of_line(node, claim.row, claim.column);
   map.shift = {map.along.x(), map.along.y(), 0};
   map.base.setIdentity();
   map.base.topLeftCorner<2, 2>() = place.frame.inverse();
@@ -306,56 +300,89 @@ void SymbolMender::take_over(const PatchTask& task, const LatticeFrame& lattice_
   claim.status = RegionStatus::kDecoded;
 }
 
+bool SymbolMender::is_asked(const Scene& scene, std::int32_t node) {
+  return is_worn(scene.gate, scene.seen, node) || may_return(scene.seen, node);
+}
+
+void SymbolMender::ask_all(const Scene& scene) {
+  to_ask_.clear();
+  for (std::size_t i = 0; i < scene.seen.size(); ++i)
+    if (const auto node = static_cast<std::int32_t>(i); is_asked(scene, node)) to_ask_.push_back(node);
+}
+
+/// Those beside what was mended, from one on. What one alone holds is not certain enough to hold what was refused and
+/// does not fit the grid tightly: so another surface would come in from symbol to symbol.
+void SymbolMender::ask_beside(const Scene& scene, std::size_t first, Held held) {
+  const auto may_be_held = [&](const CellClaim& claim) {
+    if (claim.status == RegionStatus::kDecoded) return false;
+    return held == Held::kByTwo || claim.status != RegionStatus::kNeighboursDisagree ||
+           claim.grid_fit == GridFit::kTight;
+  };
+  to_ask_.clear();
+  for (std::size_t i = first; i < mended_.size(); ++i) {
+    for (const std::int32_t other : scene.seen.nodes[mended_[i]].links)
+      if (other >= 0 && may_be_held(scene.seen.claims[other]) && is_asked(scene, other)) to_ask_.push_back(other);
+  }
+  std::ranges::sort(to_ask_);
+  to_ask_.erase(std::unique(to_ask_.begin(), to_ask_.end()), to_ask_.end());
+}
+
+/// @param held  by how many at least, and with one by no more
+void SymbolMender::mend_asked(const Scene& scene, Held held) {
+  Sightings& seen = scene.seen;
+  const bool lone = held == Held::kByOne;
+  asked_.clear(), places_.clear(), tasks_.clear();
+  for (const std::int32_t node : to_ask_) look_at(scene, held, node);
+  align(scene.frame, scene.full, scene.field);
+  agreeing_.clear(), lone_.clear();
+  for (std::size_t i = 0; i < asked_.size(); ++i) {
+    const std::int32_t node = asked_[i];
+    const CellClaim& claim = seen.claims[node];
+    const Place& place = places_[i];
+    PatchTask& task = tasks_[i];
+    const Eigen::Vector2f centre = centre_of(task, array_.at(claim.row, claim.column));
+    if (!lies_there(task, place, centre, seen, node)) continue;
+    const Shares middle = shares_of_square(scene.frame, scene.field, task, centre, kMiddleReachPx);
+    const bool shown = shows_centre(task, middle, place.held_by);
+    if (shown && (lone || (place.held_by > kHeldBy && task.support < kSupportGood)))
+      task.support = support_beside_print(scene.frame, scene.field, task, place.frame);
+    const float of_two = claim.status == RegionStatus::kDecoded ? kSupportGood : kWholeSupportMin;
+    if (shown && task.support >= (lone ? kLoneSupportMin : of_two)) {
+      agreeing_.push_back(i);
+      if (lone) lone_.push_back(node);
+    } else if (claim.status == RegionStatus::kDamagedShape && middle.brighter > kHidden) {
+      seen.misfits[node] = std::numeric_limits<float>::infinity();
+    }
+  }
+  for (const std::size_t i : agreeing_) {
+    if (lone && !stands_with_one(seen, asked_[i], lone_)) continue;
+    take_over(tasks_[i], places_[i].frame, scene.prototypes, seen, asked_[i]);
+    mended_.push_back(asked_[i]);
+  }
+}
+
 const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, double full, const FrameNoise& noise,
                                                     float blur_px, const CellGate& gate,
                                                     std::span<const Prototype> prototypes, Sightings& seen) {
-  const PatternField& field = letters_->at(blur_px);
-  mended_.clear(), to_ask_.clear();
-  const auto is_asked = [&](std::int32_t node) { return is_worn(gate, seen, node) || may_return(seen, node); };
-  for (std::size_t i = 0; i < seen.size(); ++i)
-    if (const auto node = static_cast<std::int32_t>(i); is_asked(node)) to_ask_.push_back(node);
-  // What is mended holds those beside it.
-  while (!to_ask_.empty()) {
-    asked_.clear(), places_.clear(), tasks_.clear();
-    for (const std::int32_t node : to_ask_) look_at(frame, noise, gate, seen, node);
-    align(frame, full, field);
-    agreeing_.clear(), lone_.clear();
-    for (std::size_t i = 0; i < asked_.size(); ++i) {
-      const std::int32_t node = asked_[i];
-      const CellClaim& claim = seen.claims[node];
-      const Place& place = places_[i];
-      PatchTask& task = tasks_[i];
-      const Eigen::Vector2f centre = centre_of(task, array_.at(claim.row, claim.column));
-      if (!lies_there(task, place, centre, seen, node)) continue;
-      const Shares middle = shares_of_square(frame, field, task, centre, kMiddleReachPx);
-      const bool shown = shows_centre(task, middle, place.held_by), lone = place.held_by < kHeldBy;
-      if (shown && (lone || (place.held_by > kHeldBy && task.support < kSupportGood)))
-        task.support = support_beside_print(frame, field, task, place.frame);
-      const float support_min = lone                                     ? kLoneSupportMin
-                                : claim.status == RegionStatus::kDecoded ? kSupportGood
-                                                                         : kWholeSupportMin;
-      if (shown && task.support >= support_min) {
-        agreeing_.push_back(i);
-        if (lone) lone_.push_back(node);
-      } else if (claim.status == RegionStatus::kDamagedShape && middle.brighter > kHidden) {
-        seen.misfits[node] = std::numeric_limits<float>::infinity();
-      }
+  const Scene scene{frame, full, noise, letters_->at(blur_px), gate, prototypes, seen};
+  mended_.clear();
+  ask_all(scene);
+  std::size_t since = 0;
+  for (bool first = true; first || mended_.size() > since; first = false) {
+    // What is mended holds those beside it.
+    while (!to_ask_.empty()) {
+      const std::size_t before = mended_.size();
+      mend_asked(scene, Held::kByTwo);
+      ask_beside(scene, before, Held::kByTwo);
     }
-    const std::size_t before = mended_.size();
-    for (const std::size_t i : agreeing_) {
-      const std::int32_t node = asked_[i];
-      if (places_[i].held_by < kHeldBy && !stands_with_one(seen, node, lone_)) continue;
-      take_over(tasks_[i], places_[i].frame, prototypes, seen, node);
-      mended_.push_back(node);
+    if (first) {
+      ask_all(scene);
+    } else {
+      ask_beside(scene, since, Held::kByTwo);
     }
-    to_ask_.clear();
-    for (std::size_t i = before; i < mended_.size(); ++i) {
-      const bool lone = std::ranges::binary_search(lone_, mended_[i]);
-      for (const std::int32_t other : seen.nodes[mended_[i]].links)
-        if (other >= 0 && may_hold(seen, lone, other) && is_asked(other)) to_ask_.push_back(other);
-    }
-    std::ranges::sort(to_ask_);
-    to_ask_.erase(std::unique(to_ask_.begin(), to_ask_.end()), to_ask_.end());
+    since = mended_.size();
+    mend_asked(scene, Held::kByOne);
+    ask_beside(scene, since, Held::kByOne);
   }
   std::ranges::sort(mended_);
   return mended_;

@@ -62,13 +62,25 @@ class SymbolMender {
     float background = 0, peak = 0;  // grey levels
     int held_by = 0;
   };
+  struct Scene {
+    const GreyView& frame;
+    double full;
+    const FrameNoise& noise;
+    const PatternField& field;
+    const CellGate& gate;
+    std::span<const Prototype> prototypes;
+    Sightings& seen;
+  };
+  enum class Held : std::uint8_t { kByOne, kByTwo };
+  [[nodiscard]] bool is_asked(const Scene& scene, std::int32_t node);
+  void ask_all(const Scene& scene);
+  void ask_beside(const Scene& scene, std::size_t first, Held held);
+  void mend_asked(const Scene& scene, Held held);
   [[nodiscard]] bool may_return(const Sightings& seen, std::int32_t node);
   [[nodiscard]] static bool stands_with_one(const Sightings& seen, std::int32_t node,
                                             std::span<const std::int32_t> others);
-  [[nodiscard]] static bool may_hold(const Sightings& seen, bool lone, std::int32_t other);
   [[nodiscard]] Place place_by_neighbours(const Sightings& seen, std::int32_t node) const;
-  void look_at(const GreyView& frame, const FrameNoise& noise, const CellGate& gate, const Sightings& seen,
-               std::int32_t node);
+  void look_at(const Scene& scene, Held held, std::int32_t node);
   void align(const GreyView& frame, double full, const PatternField& field);
   [[nodiscard]] Eigen::Vector2f centre_of(const PatchTask& task, int letter) const;
   [[nodiscard]] bool lies_there(const PatchTask& task, const Place& place, const Eigen::Vector2f& centre,
