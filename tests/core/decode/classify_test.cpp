@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -47,6 +48,18 @@ TEST(Classify, RejectsWhatIsLikeNone) {
   const Classification shape = Classifier(prototypes, kDistanceMax).classify(odd);
   EXPECT_EQ(shape.letter, -1);
   EXPECT_GT(shape.distance, kDistanceMax);
+}
+
+TEST(Classify, TakesWhatIsNoNumberForTorn) {
+  const auto prototypes = three_letters();
+  for (int i = 0; i < kFeatureCount; ++i) {
+    ShapeFeatures unknown = prototypes[0].mean;
+    unknown[i] = std::numeric_limits<float>::quiet_NaN();
+    const Classification shape = Classifier(prototypes, kDistanceMax).classify(unknown);
+    EXPECT_EQ(shape.letter, -1) << i;
+    EXPECT_LT(shape.likelihood, 1e-20F) << i;
+    EXPECT_TRUE(shape.is_torn()) << i;
+  }
 }
 
 TEST(Classify, MeasuresTheDistanceInStandardDeviations) {
