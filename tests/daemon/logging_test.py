@@ -66,12 +66,15 @@ class Journaled(Service):
                 [*PRIVATE_RUN, run, BIN / "slsd", "--config", self.file], stderr=log,
                 env={**self.environment, "JOURNAL_STREAM": f"{about.st_dev}:{about.st_ino}"})
 
-    def entry(self, text):
-        """The fields of the next line that has the text in it."""
-        while True:
+    def entries(self, *patterns):
+        """The fields of the next line for each of the patterns, which it begins with, in whatever order they come."""
+        found = {}
+        while len(found) < len(patterns):
             fields = dict(line.split("=", 1) for line in self.journal.recv(65536).decode().splitlines())
-            if text in fields["MESSAGE"]:
-                return fields
+            for pattern in patterns:
+                if pattern not in found and re.match(pattern, fields["MESSAGE"]):
+                    found[pattern] = fields
+        return [found[pattern] for pattern in patterns]
 
 
 def refuse_reloads(client, count):
@@ -150,14 +153,15 @@ class Log(unittest.TestCase):
             if subprocess.run([*PRIVATE_RUN, empty, "true"], stderr=subprocess.DEVNULL, check=False).returncode:
                 self.skipTest("this machine gives no mount namespace")
         with Journaled(camera='faults = ["disconnect@2"]') as service, service.client() as client, service.journal:
-            self.assertEqual(service.entry("starts with")["SYSLOG_IDENTIFIER"], "slsd")
-            self.assertEqual(service.entry("ready at")["PRIORITY"], "6")
+            (starts,) = service.entries("slsd .* starts with ")
+            self.assertEqual(starts["SYSLOG_IDENTIFIER"], "slsd")
+            (ready,) = service.entries(".*ready at ")
+            self.assertEqual(ready["PRIORITY"], "6")
             client.call("scan")
             with self.assertRaises(RpcError):
                 client.call("scan")
-            lost = service.entry("camera camera: ")
+            lost, failed = service.entries("camera camera: ", r"scan \S+ failed \(disconnected\)")  # of two threads
             self.assertEqual((lost["SLSD_CAMERA"], lost["SLSD_ERROR"], lost["PRIORITY"]), ("camera", "disconnected", "4"))
-            failed = service.entry("failed (disconnected)")
             self.assertEqual(failed["SLSD_ERROR"], "disconnected")
             self.assertEqual((lost["MESSAGE_ID"], failed["MESSAGE_ID"]), (DEVICE_LOST, SCAN_FAILED))
             self.assertTrue(failed["MESSAGE"].startswith(f"scan {failed['SLSD_SCAN']} failed"))
