@@ -119,12 +119,13 @@ bool SymbolMender::may_return(const Sightings& seen, std::int32_t node) {
 }
 
 /// Whether one is enough to hold it: it fits the grid tightly, or it is worn and has one of the others where its cell
-/// is beside. What its surroundings have refused may be whole, and of another surface.
+/// is beside. What its surroundings have refused may be of another surface, whole, or torn between both.
 bool SymbolMender::stands_with_one(const Sightings& seen, std::int32_t node, std::span<const std::int32_t> others) {
   const CellClaim& claim = seen.claims[node];
   if (claim.status == RegionStatus::kDecoded) return false;
-  if (claim.grid_fit == GridFit::kTight) return true;
-  if (claim.status == RegionStatus::kNeighboursDisagree) return false;
+  const bool tight = claim.grid_fit == GridFit::kTight;
+  if (claim.status == RegionStatus::kNeighboursDisagree) return tight && !seen.shapes[node].is_torn();
+  if (tight) return true;
   return std::ranges::any_of(kDirections, [&](Direction d) {
     const std::int32_t other = neighbour(seen.nodes, node, d);
     return other >= 0 && claim.fits(seen.claims[other], d) && std::ranges::binary_search(others, other);

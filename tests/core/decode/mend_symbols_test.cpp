@@ -300,6 +300,9 @@ TEST_F(MendWhatOneHolds, LeavesWhatWasRefusedUnlessItFitsTheGridTightly) {
   seen_ = all;
   seen_.claims[kWorn].grid_fit = GridFit::kTight;
   EXPECT_THAT(mend_all(), testing::ElementsAre(kWorn, kBelow));
+  seen_ = all;
+  seen_.claims[kWorn].grid_fit = GridFit::kTight, seen_.shapes[kWorn].distance = 7;
+  EXPECT_THAT(mend_all(), testing::IsEmpty()) << "torn";
 }
 
 // From such a one on another surface could come in, symbol by symbol.
