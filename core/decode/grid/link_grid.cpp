@@ -3,6 +3,7 @@
 #include "core/decode/grid/link_grid.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
