@@ -22,23 +22,21 @@ inline constexpr IntLanes kIntLane = {0, 1, 2, 3, 4, 5, 6, 7};
 using FourLanes [[gnu::vector_size(16)]] = float;
 using FourIntLanes [[gnu::vector_size(16)]] = int;
 
-/// A bit to each of the lanes of a comparison that holds.
-static inline __attribute__((always_inline)) unsigned bits_of(const FourIntLanes& holds) {
-  constexpr FourIntLanes kBits = {1, 2, 4, 8};
-  const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(holds & kBits);
+/// The bits of all lanes together.
+static inline __attribute__((always_inline)) unsigned united(const FourIntLanes& lanes) {
+  const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(lanes);
   const std::uint64_t both = halves[0] | halves[1];
   return static_cast<unsigned>(both | both >> 32U);
 }
-
-/// The same for eight.
+/// A bit to each of the lanes of a comparison that holds.
+static inline __attribute__((always_inline)) unsigned bits_of(const FourIntLanes& holds) {
+  constexpr FourIntLanes kBits = {1, 2, 4, 8};
+  return united(holds & kBits);
+}
 static inline __attribute__((always_inline)) unsigned bits_of(const IntLanes& holds) {
   constexpr IntLanes kBits = {1, 2, 4, 8, 16, 32, 64, 128};
   const IntLanes bits = holds & kBits;
-  const FourIntLanes four =
-      __builtin_shufflevector(bits, bits, 0, 1, 2, 3) | __builtin_shufflevector(bits, bits, 4, 5, 6, 7);
-  const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(four);
-  const std::uint64_t both = halves[0] | halves[1];
-  return static_cast<unsigned>(both | both >> 32U);
+  return united(__builtin_shufflevector(bits, bits, 0, 1, 2, 3) | __builtin_shufflevector(bits, bits, 4, 5, 6, 7));
 }
 
 // Never passed by value between functions that are not inlined: how that is done depends on the processor.
