@@ -40,37 +40,43 @@ struct EightWindows {
   float slope_unit;
 };
 
-/// Of a row; those of g and the residual by the window's thirds, for the ninths.
-enum RowSum {
-  kGG,      // by thirds
-  kGR = 3,  // by thirds
-  kGP = 6,  // by thirds
-  kG = 9,   // by thirds
-  kGGX = 12,
-  kGGXX,
-  kGPX,
-  kGPXX,
-  kPP,
-  kPPX,
-  kPPXX,
-  kGX,
-  kP,
-  kPX,
-  kGC,
-  kGCX,
-  kPC,
-  kPCX,
-  kGRX,
-  kPR,
-  kPRX,
-  kW,
-  kC,
-  kCC,
-  kCR,
-  kR,
-  kRR,
-  kPixels,
-  kRowSums
+/// What pixels of a row show, found and summed up step by step, so that each step's numbers stay in registers.
+struct RowPixels {
+  static constexpr int kMost = 32;
+  Lanes level[kMost];
+  BitLanes sample[kMost];              // of the field, the nearest
+  Lanes from_u[kMost], from_v[kMost];  // from there, in samples
+  Lanes p[kMost], g[kMost], c[kMost];  // the pattern; its slopes along and across the epipolar line
+  Lanes r[kMost], w[kMost];            // the residual and its weight
+  Lanes wg[kMost], wp[kMost];
+};
+
+/// Of pixels beside each other, each factor by its name above; x is the column.
+struct NinthSums {
+  Lanes gg, gp, g, gr;
+};
+struct AlongSums {
+  Lanes ggx, ggxx, gpx, gpxx, pp, ppx, ppxx, gx, p, px;
+};
+struct AcrossSums {
+  Lanes gc, gcx, pc, pcx, c, cc, cr;
+};
+struct RestSums {
+  Lanes w, grx, pr, prx, r, rr;
+};
+struct RowSums {
+  NinthSums thirds[3];
+  AlongSums along;
+  AcrossSums across;
+  RestSums rest;
+};
+
+/// Where the pixels of a row are, and how the light falls on them.
+template <class T>
+struct Row {
+  const T* pixels[kLanes];  // in the middle column
+  Lanes constant[3];        // of q
+  Lanes gain;
 };
 
 inline __attribute__((always_inline)) void clamp_to(IntLanes& lanes, int last) {
@@ -79,105 +85,166 @@ inline __attribute__((always_inline)) void clamp_to(IntLanes& lanes, int last) {
   lanes = lanes > zero ? lanes : zero;
 }
 
+/// Where the pixels lie in the pattern.
+template <class T>
+inline __attribute__((always_inline)) void look_up(const Row<T>& row, int first, int count, const EightWindows& of,
+                                                   const Eight& e, RowPixels& seen) {
+  constexpr float kScale = PatternField::kSamplesPerPx;
+  constexpr int kFar = 4096;  // samples: keeps what is rounded positive
+  const Lanes one = Lanes{} + 1;
+  for (int k = 0; k < count; ++k) {
+    const auto x = static_cast<float>(first + k);
+    IntLanes level;
+    for (int lane = 0; lane < kLanes; ++lane) level[lane] = row.pixels[lane][first + k];
+    seen.level[k] = __builtin_convertvector(level, Lanes);
+    const Lanes per_q2 = one / (row.constant[2] + x * e.x[2]);
+    const Lanes u = ((row.constant[0] + x * e.x[0]) * per_q2 + e.across_u) * kScale,
+                v = ((row.constant[1] + x * e.x[1]) * per_q2 + e.across_v) * kScale;
+    const IntLanes to_u = __builtin_convertvector(u + (kFar + 0.5F), IntLanes) - kFar,
+                   to_v = __builtin_convertvector(v + (kFar + 0.5F), IntLanes) - kFar;
+    seen.from_u[k] = u - __builtin_convertvector(to_u, Lanes);
+    seen.from_v[k] = v - __builtin_convertvector(to_v, Lanes);
+    IntLanes at_u = to_u + e.origin_u, at_v = to_v + e.origin_v;
+    clamp_to(at_u, of.field_width - 1), clamp_to(at_v, of.field_height - 1);
+    const IntLanes at = at_v * of.field_width + at_u;
+    BitLanes sample;
+    for (int lane = 0; lane < kLanes; ++lane) sample[lane] = of.samples[at[lane]];
+    seen.sample[k] = sample;
+  }
+}
+
+/// @param counted  how many pixels count, added to
+template <class T>
+inline __attribute__((always_inline)) void compare(const Row<T>& row, int first, int count, const EightWindows& of,
+                                                   const Eight& e, RowPixels& seen, Lanes& counted) {
+  constexpr float kScale = PatternField::kSamplesPerPx;
+  constexpr int kBits = PatternField::kSlopeBits;
+  const Lanes zero{}, one = zero + 1;
+  for (int k = 0; k < count; ++k) {
+    const auto x = static_cast<float>(first + k);
+    const BitLanes sample = seen.sample[k];
+    const Lanes value = __builtin_convertvector(reinterpret_cast<IntLanes>(sample >> (2 * kBits)), Lanes);
+    const Lanes slope_u =
+        __builtin_convertvector(reinterpret_cast<IntLanes>(sample << (32 - 2 * kBits)) >> (32 - kBits), Lanes) *
+        of.slope_unit;
+    const Lanes slope_v =
+        __builtin_convertvector(reinterpret_cast<IntLanes>(sample << (32 - kBits)) >> (32 - kBits), Lanes) *
+        of.slope_unit;
+    const Lanes p =
+        value * PatternField::kValueUnit + (slope_u * seen.from_u[k] + slope_v * seen.from_v[k]) * (1 / kScale);
+    const Lanes g = slope_u * e.along_u + slope_v * e.along_v, c = slope_v * e.along_u - slope_u * e.along_v;
+    const Lanes r = seen.level[k] - e.offset - p * (row.gain + x * e.gain_x);
+    const Lanes off = r * e.per_scale;
+    const Lanes weight = one / (one + off * off);
+    const Lanes counts = seen.level[k] < of.full ? one : zero;
+    const Lanes w = counts * weight * weight;
+    seen.p[k] = p, seen.g[k] = g, seen.c[k] = c, seen.r[k] = r, seen.w[k] = w;
+    seen.wg[k] = w * g, seen.wp[k] = w * p;
+    counted += counts;
+  }
+}
+
+/// @param third_px  from the middle to where the middle third ends
+inline __attribute__((always_inline)) void sum_up(const RowPixels& seen, int first, int count, int third_px,
+                                                  RowSums& sums) {
+  const int ends[4] = {0, std::clamp(-third_px - first, 0, count), std::clamp(third_px + 1 - first, 0, count), count};
+  for (int third = 0; third < 3; ++third) {
+    NinthSums sum{};
+    for (int k = ends[third]; k < ends[third + 1]; ++k) {
+      const Lanes& wg = seen.wg[k];
+      sum.gg += wg * seen.g[k], sum.gp += wg * seen.p[k], sum.g += wg, sum.gr += wg * seen.r[k];
+    }
+    sums.thirds[third] = sum;
+  }
+  const Lanes start = Lanes{} + static_cast<float>(first);
+  AlongSums along{};
+  Lanes x = start;
+  for (int k = 0; k < count; ++k, x += 1) {
+    const Lanes &wp = seen.wp[k], &p = seen.p[k];
+    const Lanes wgx = seen.wg[k] * x, wpx = wp * x, ggx = wgx * seen.g[k], gpx = wgx * p, ppx = wpx * p;
+    along.ggx += ggx, along.ggxx += ggx * x, along.gpx += gpx, along.gpxx += gpx * x;
+    along.pp += wp * p, along.ppx += ppx, along.ppxx += ppx * x;
+    along.gx += wgx, along.p += wp, along.px += wpx;
+  }
+  sums.along = along;
+  AcrossSums across{};
+  x = start;
+  for (int k = 0; k < count; ++k, x += 1) {
+    const Lanes &c = seen.c[k], wc = seen.w[k] * c, gc = seen.wg[k] * c, pc = seen.wp[k] * c;
+    across.gc += gc, across.gcx += gc * x, across.pc += pc, across.pcx += pc * x;
+    across.c += wc, across.cc += wc * c, across.cr += wc * seen.r[k];
+  }
+  sums.across = across;
+  RestSums rest{};
+  x = start;
+  for (int k = 0; k < count; ++k, x += 1) {
+    const Lanes &r = seen.r[k], wr = seen.w[k] * r, pr = seen.wp[k] * r;
+    rest.w += seen.w[k], rest.grx += seen.wg[k] * r * x, rest.pr += pr, rest.prx += pr * x;
+    rest.r += wr, rest.rr += wr * r;
+  }
+  sums.rest = rest;
+}
+
 /// One step of Gauss and Newton, with what the model leaves as the right side, so that nothing large cancels.
 template <class T>
 inline __attribute__((always_inline)) void step_eight(const T* const* pixels, const EightWindows& of, Eight& e) {
-  constexpr float kScale = PatternField::kSamplesPerPx;
-  constexpr int kBits = PatternField::kSlopeBits;
-  constexpr int kFar = 4096;  // samples: keeps what is rounded positive
   const Lanes zero{}, one = zero + 1;
-  Lanes ninths[3][12];
-  for (auto& row : ninths)
-    for (Lanes& sum : row) sum = zero;
+  NinthSums ninths[3][3]{};
   Lanes normal[kFitted][kFitted], right[kFitted];
   for (int i = 0; i < kFitted; ++i) {
     right[i] = zero;
     for (Lanes& entry : normal[i]) entry = zero;
   }
-  Lanes squares = zero, counted_pixels = zero;
+  Lanes squares = zero, counted = zero;
   const int half = of.side / 2, thirds = (of.side - 1) / 6;
-  for (int row = -half; row <= half; ++row) {
-    const auto y = static_cast<float>(row);
-    Lanes constant[3];
-    for (int k = 0; k < 3; ++k) constant[k] = e.constant[k] + y * e.y[k];
-    const Lanes gain = e.gain + y * e.gain_y;
-    Lanes sum[kRowSums];
-    for (Lanes& part : sum) part = zero;
-    const T* at_pixel[kLanes];
-    for (int lane = 0; lane < kLanes; ++lane) at_pixel[lane] = pixels[lane] + row * of.stride;
-    for (int column = -half; column <= half; ++column) {
-      const auto x = static_cast<float>(column);
-      const int third = column < -thirds ? 0 : column > thirds ? 2 : 1;
-      IntLanes level;
-      for (int lane = 0; lane < kLanes; ++lane) level[lane] = at_pixel[lane][column];
-      const Lanes i = __builtin_convertvector(level, Lanes);
-      const Lanes counted = i < of.full ? one : zero;
-      const Lanes per_q2 = one / (constant[2] + x * e.x[2]);
-      const Lanes u = ((constant[0] + x * e.x[0]) * per_q2 + e.across_u) * kScale,
-                  v = ((constant[1] + x * e.x[1]) * per_q2 + e.across_v) * kScale;
-      // The nearest sample.
-      const IntLanes to_u = __builtin_convertvector(u + (kFar + 0.5F), IntLanes) - kFar,
-                     to_v = __builtin_convertvector(v + (kFar + 0.5F), IntLanes) - kFar;
-      const Lanes from_u = u - __builtin_convertvector(to_u, Lanes), from_v = v - __builtin_convertvector(to_v, Lanes);
-      IntLanes at_u = to_u + e.origin_u, at_v = to_v + e.origin_v;
-      clamp_to(at_u, of.field_width - 1), clamp_to(at_v, of.field_height - 1);
-      const IntLanes at = at_v * of.field_width + at_u;
-      BitLanes bits;
-      for (int lane = 0; lane < kLanes; ++lane) bits[lane] = of.samples[at[lane]];
-      const Lanes value = __builtin_convertvector(reinterpret_cast<IntLanes>(bits >> (2 * kBits)), Lanes);
-      const Lanes slope_u =
-          __builtin_convertvector(reinterpret_cast<IntLanes>(bits << (32 - 2 * kBits)) >> (32 - kBits), Lanes) *
-          of.slope_unit;
-      const Lanes slope_v =
-          __builtin_convertvector(reinterpret_cast<IntLanes>(bits << (32 - kBits)) >> (32 - kBits), Lanes) *
-          of.slope_unit;
-      const Lanes p = value * PatternField::kValueUnit + (slope_u * from_u + slope_v * from_v) * (1 / kScale);
-      const Lanes g = slope_u * e.along_u + slope_v * e.along_v, c = slope_v * e.along_u - slope_u * e.along_v;
-      const Lanes r = i - e.offset - p * (gain + x * e.gain_x);
-      const Lanes off = r * e.per_scale;
-      const Lanes weight = one / (one + off * off);
-      const Lanes w = counted * weight * weight;
-      const Lanes wg = w * g, wp = w * p, wc = w * c, wr = w * r;
-      const Lanes gg = wg * g, gp = wg * p, pp = wp * p, gr = wg * r, pr = wp * r, gc = wg * c, pc = wp * c;
-      const Lanes ggx = gg * x, gpx = gp * x, ppx = pp * x;
-      sum[kGG + third] += gg, sum[kGR + third] += gr, sum[kGP + third] += gp, sum[kG + third] += wg;
-      sum[kGGX] += ggx, sum[kGGXX] += ggx * x;
-      sum[kGPX] += gpx, sum[kGPXX] += gpx * x;
-      sum[kPP] += pp, sum[kPPX] += ppx, sum[kPPXX] += ppx * x;
-      sum[kGX] += wg * x, sum[kP] += wp, sum[kPX] += wp * x;
-      sum[kGC] += gc, sum[kGCX] += gc * x, sum[kPC] += pc, sum[kPCX] += pc * x;
-      sum[kGRX] += gr * x, sum[kPR] += pr, sum[kPRX] += pr * x;
-      sum[kW] += w, sum[kC] += wc, sum[kCC] += wc * c, sum[kCR] += wc * r;
-      sum[kR] += wr, sum[kRR] += wr * r, sum[kPixels] += counted;
+  RowPixels seen;
+  for (int down = -half; down <= half; ++down) {
+    const auto y = static_cast<float>(down);
+    Row<T> row;
+    for (int k = 0; k < 3; ++k) row.constant[k] = e.constant[k] + y * e.y[k];
+    row.gain = e.gain + y * e.gain_y;
+    for (int lane = 0; lane < kLanes; ++lane) row.pixels[lane] = pixels[lane] + down * of.stride;
+    for (int first = -half; first <= half; first += RowPixels::kMost) {
+      const int count = std::min(RowPixels::kMost, half + 1 - first);
+      look_up(row, first, count, of, e, seen);
+      compare(row, first, count, of, e, seen, counted);
+      RowSums sum;
+      sum_up(seen, first, count, thirds, sum);
+      NinthSums* const ninth = ninths[down < -thirds ? 0 : down > thirds ? 2 : 1];
+      for (int third = 0; third < 3; ++third) {
+        const NinthSums& part = sum.thirds[third];
+        ninth[third].gg += part.gg, ninth[third].gp += part.gp;
+        ninth[third].g += part.g, ninth[third].gr += part.gr;
+      }
+      const NinthSums &l = sum.thirds[0], &m = sum.thirds[1], &n = sum.thirds[2];
+      const Lanes gg = l.gg + m.gg + n.gg, gp = l.gp + m.gp + n.gp, g = l.g + m.g + n.g, gr = l.gr + m.gr + n.gr;
+      const auto& [ggx, ggxx, gpx, gpxx, pp, ppx, ppxx, gx, p, px] = sum.along;
+      const auto& [gc, gcx, pc, pcx, c, cc, cr] = sum.across;
+      const auto& [w, grx, pr, prx, r, rr] = sum.rest;
+      const float yy = y * y;
+      normal[kDisparity][kDisparity] += gg, normal[kDisparity][kSlopeX] += ggx;
+      normal[kDisparity][kSlopeY] += y * gg, normal[kSlopeX][kSlopeX] += ggxx;
+      normal[kSlopeY][kSlopeX] += y * ggx, normal[kSlopeY][kSlopeY] += yy * gg;
+      normal[kDisparity][kGain] += gp, normal[kDisparity][kGainX] += gpx, normal[kDisparity][kGainY] += y * gp;
+      normal[kSlopeX][kGainX] += gpxx, normal[kSlopeX][kGainY] += y * gpx;
+      normal[kSlopeY][kGainY] += yy * gp;
+      normal[kGain][kGain] += pp, normal[kGainX][kGain] += ppx, normal[kGainY][kGain] += y * pp;
+      normal[kGainX][kGainX] += ppxx, normal[kGainY][kGainX] += y * ppx;
+      normal[kGainY][kGainY] += yy * pp;
+      normal[kDisparity][kOffset] += g, normal[kSlopeX][kOffset] += gx, normal[kSlopeY][kOffset] += y * g;
+      normal[kGain][kOffset] += p, normal[kGainX][kOffset] += px, normal[kGainY][kOffset] += y * p;
+      normal[kDisparity][kAcross] += gc, normal[kSlopeX][kAcross] += gcx, normal[kSlopeY][kAcross] += y * gc;
+      normal[kAcross][kGain] += pc, normal[kAcross][kGainX] += pcx, normal[kAcross][kGainY] += y * pc;
+      normal[kAcross][kAcross] += cc, normal[kAcross][kOffset] += c, normal[kOffset][kOffset] += w;
+      right[kDisparity] += gr, right[kSlopeX] += grx, right[kSlopeY] += y * gr;
+      right[kGain] += pr, right[kGainX] += prx, right[kGainY] += y * pr;
+      right[kAcross] += cr, right[kOffset] += r;
+      squares += rr;
     }
-    Lanes* const ninth = ninths[row < -thirds ? 0 : row > thirds ? 2 : 1];
-    for (int k = 0; k < 12; ++k) ninth[k] += sum[k];
-    const Lanes gg = sum[kGG] + sum[kGG + 1] + sum[kGG + 2], gr = sum[kGR] + sum[kGR + 1] + sum[kGR + 2];
-    const Lanes gp = sum[kGP] + sum[kGP + 1] + sum[kGP + 2], g = sum[kG] + sum[kG + 1] + sum[kG + 2];
-    const float yy = y * y;
-    normal[kDisparity][kDisparity] += gg, normal[kDisparity][kSlopeX] += sum[kGGX];
-    normal[kDisparity][kSlopeY] += y * gg, normal[kSlopeX][kSlopeX] += sum[kGGXX];
-    normal[kSlopeY][kSlopeX] += y * sum[kGGX], normal[kSlopeY][kSlopeY] += yy * gg;
-    normal[kDisparity][kGain] += gp, normal[kDisparity][kGainX] += sum[kGPX], normal[kDisparity][kGainY] += y * gp;
-    normal[kSlopeX][kGainX] += sum[kGPXX], normal[kSlopeX][kGainY] += y * sum[kGPX];
-    normal[kSlopeY][kGainY] += yy * gp;
-    normal[kGain][kGain] += sum[kPP], normal[kGainX][kGain] += sum[kPPX], normal[kGainY][kGain] += y * sum[kPP];
-    normal[kGainX][kGainX] += sum[kPPXX], normal[kGainY][kGainX] += y * sum[kPPX];
-    normal[kGainY][kGainY] += yy * sum[kPP];
-    normal[kDisparity][kOffset] += g, normal[kSlopeX][kOffset] += sum[kGX], normal[kSlopeY][kOffset] += y * g;
-    normal[kGain][kOffset] += sum[kP], normal[kGainX][kOffset] += sum[kPX], normal[kGainY][kOffset] += y * sum[kP];
-    normal[kDisparity][kAcross] += sum[kGC], normal[kSlopeX][kAcross] += sum[kGCX];
-    normal[kSlopeY][kAcross] += y * sum[kGC];
-    normal[kAcross][kGain] += sum[kPC], normal[kAcross][kGainX] += sum[kPCX], normal[kAcross][kGainY] += y * sum[kPC];
-    normal[kAcross][kAcross] += sum[kCC], normal[kAcross][kOffset] += sum[kC], normal[kOffset][kOffset] += sum[kW];
-    right[kDisparity] += gr, right[kSlopeX] += sum[kGRX], right[kSlopeY] += y * gr;
-    right[kGain] += sum[kPR], right[kGainX] += sum[kPRX], right[kGainY] += y * sum[kPR];
-    right[kAcross] += sum[kCR], right[kOffset] += sum[kR];
-    squares += sum[kRR], counted_pixels += sum[kPixels];
   }
   normal[kSlopeX][kGain] = normal[kDisparity][kGainX], normal[kSlopeY][kGain] = normal[kDisparity][kGainY];
   normal[kSlopeY][kGainX] = normal[kSlopeX][kGainY];
-  e.weights = normal[kOffset][kOffset], e.pixels = counted_pixels;
+  e.weights = normal[kOffset][kOffset], e.pixels = counted;
 
   // What is known beforehand, see PatchAligner.
   normal[kAcross][kAcross] += e.across_weight, right[kAcross] -= e.across_weight * e.gain * e.across;
@@ -222,11 +289,10 @@ inline __attribute__((always_inline)) void step_eight(const T* const* pixels, co
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
       const float x = static_cast<float>(column - 1) * away, y = static_cast<float>(row - 1) * away;
-      const Lanes gg = ninths[row][kGG + column];
-      const Lanes gr = ninths[row][kGR + column] -
-                       gg * (e.step[kDisparity] + x * e.step[kSlopeX] + y * e.step[kSlopeY]) -
-                       ninths[row][kGP + column] * (e.step[kGain] + x * e.step[kGainX] + y * e.step[kGainY]) -
-                       ninths[row][kG + column] * e.step[kOffset];
+      const NinthSums& ninth = ninths[row][column];
+      const Lanes& gg = ninth.gg;
+      const Lanes gr = ninth.gr - gg * (e.step[kDisparity] + x * e.step[kSlopeX] + y * e.step[kSlopeY]) -
+                       ninth.gp * (e.step[kGain] + x * e.step[kGainX] + y * e.step[kGainY]) - ninth.g * e.step[kOffset];
       const Lanes any = gg > zero ? one : zero;
       of_ninths += any * gr * gr / (gg + 1e-20F), expected += any * noise, weight += gg;
     }

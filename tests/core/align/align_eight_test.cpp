@@ -62,10 +62,10 @@ AlignOptions options() {
 }
 
 template <std::size_t kCount>
-void align(const GreyView& frame, double full, std::array<PatchTask, kCount>& tasks) {
+void align(const GreyView& frame, double full, std::array<PatchTask, kCount>& tasks, int side = kSide) {
   std::vector<PatchTask*> all;
   for (PatchTask& task : tasks) all.push_back(&task);
-  align_eight(frame, full, blurred_field(), options(), kSide, all);
+  align_eight(frame, full, blurred_field(), options(), side, all);
 }
 
 void expect_same(const PatchTask& task, const PatchFit& fit, float grey = 1) {
@@ -87,11 +87,11 @@ void expect_same(const PatchTask& task, const PatchFit& fit, float grey = 1) {
   EXPECT_NEAR(task.slope_variance, of_slopes, 0.01F * of_slopes);
 }
 
-PatchFit one_step(const GreyView& frame, double full, const PatchTask& start) {
+PatchFit one_step(const GreyView& frame, double full, const PatchTask& start, int side = kSide) {
   AlignOptions of_one = options();
   of_one.steps = 1;
   PatchAligner aligner(of_one);
-  const PatchWindow window{start.x - kSide / 2, start.y - kSide / 2, kSide, kSide};
+  const PatchWindow window{start.x - side / 2, start.y - side / 2, side, side};
   return std::visit(
       [&](const auto& pixels) {
         return aligner.align(pixels, full, start.noise, blurred_field(), start.map, window, start.state);
@@ -104,6 +104,21 @@ TEST(AlignEight, IsAStepOfTheAlignerOfSymbols) {
   std::array<PatchTask, kEight> tasks = starts;
   align(seen().frame.view(), 255, tasks);
   for (int i = 0; i < kEight; ++i) expect_same(tasks[i], one_step(seen().frame.view(), 255, starts[i]));
+}
+
+// Rows are summed up in parts of 32 pixels; 97 are four, and the thirds end within the second and the third.
+TEST(AlignEight, WindowsMayBeOfAnySize) {
+  const std::array<PatchTask, kEight> starts = seen().tasks();
+  for (const int side : {11, 31, 33, 65, 97}) {
+    std::array<PatchTask, kEight> tasks = starts;
+    align(seen().frame.view(), 255, tasks, side);
+    for (int i = 0; i < kEight; ++i) {
+      const PatchFit fit = one_step(seen().frame.view(), 255, starts[i], side);
+      SCOPED_TRACE(testing::Message() << side << " px, task " << i);
+      ASSERT_NE(tasks[i].failed, fit.solved);
+      if (fit.solved) expect_same(tasks[i], fit);
+    }
+  }
 }
 
 TEST(AlignEight, ComesToRestWhereTheSurfaceIs) {
