@@ -21,10 +21,10 @@ constexpr float kSettledPx = 0.05F;
 constexpr float kAcrossMaxPx = 0.4F;  // off the epipolar line, projector px
 /// From where its neighbours put it, and from where it was decoded, of the pitch.
 constexpr float kMovedMax = 0.08F;
-/// How far its tilt from its neighbours' moves the middles of its cell's sides, projector px: parts of two surfaces
-/// look tilted more, and the place is then on neither.
-constexpr float kTiltMaxPx = 0.5F;
 constexpr int kHeldBy = 2;
+/// How far its tilt from its neighbours' moves the middles of its cell's sides, projector px: parts of two surfaces
+/// look tilted more, and the place is then on neither. At a corner of what is decoded the surface may turn away.
+constexpr float kTiltMaxPx = 0.5F, kTiltAtCornersMaxPx = 1;
 /// What one alone holds lies nearer to its line, is tilted less, and is seen better: projector px, and of the patch.
 constexpr float kLoneAcrossMaxPx = 0.2F, kLoneTiltMaxPx = 0.25F, kLoneSupportMin = 0.85F;
 constexpr int kMiddleReachPx = 2;  // of the square around its centre
@@ -119,16 +119,33 @@ bool SymbolMender::may_return(const Sightings& seen, std::int32_t node) {
 }
 
 /// Whether one is enough to hold it: it fits the grid tightly, or it is worn and has one of the others where its cell
-/// is beside. What its surroundings have refused may be of another surface, whole, or torn between both.
+/// is beside. What its surroundings have refused may be of another surface, whole, or torn between both: not where it
+/// is torn, or what lies beside it along the edge that would be there.
 bool SymbolMender::stands_with_one(const Sightings& seen, std::int32_t node, std::span<const std::int32_t> others) {
   const CellClaim& claim = seen.claims[node];
   if (claim.status == RegionStatus::kDecoded) return false;
   const bool tight = claim.grid_fit == GridFit::kTight;
-  if (claim.status == RegionStatus::kNeighboursDisagree) return tight && !seen.shapes[node].is_torn();
+  if (claim.status == RegionStatus::kNeighboursDisagree)
+    return tight && !seen.shapes[node].is_torn() && !is_beside_torn(seen, node);
   if (tight) return true;
   return std::ranges::any_of(kDirections, [&](Direction d) {
     const std::int32_t other = neighbour(seen.nodes, node, d);
     return other >= 0 && claim.fits(seen.claims[other], d) && std::ranges::binary_search(others, other);
+  });
+}
+
+/// Whether one of the two to each side of it is torn, across the way to what holds it.
+bool SymbolMender::is_beside_torn(const Sightings& seen, std::int32_t node) {
+  constexpr int kFar = 2;
+  return std::ranges::any_of(kDirections, [&](Direction held_from) {
+    if (decoded_beside(seen.nodes, seen.claims, node, held_from) < 0) return false;
+    for (const int side : {0, 1}) {
+      const Direction along = across(held_from, side);
+      std::int32_t other = seen.nodes[node].links[along];
+      for (int i = 0; i < kFar && other >= 0; ++i, other = seen.nodes[other].links[along])
+        if (seen.shapes[other].is_torn()) return true;
+    }
+    return false;
   });
 }
 
@@ -161,9 +178,18 @@ SymbolMender::Place SymbolMender::place_by_neighbours(const Sightings& seen, std
 void SymbolMender::look_at(const Scene& scene, Held held, std::int32_t node) {
   const Sightings& seen = scene.seen;
   const Place place = place_by_neighbours(seen, node);
-  const bool enough =
-      held == Held::kByTwo ? place.held_by >= kHeldBy : place.held_by == 1 && stands_with_one(seen, node, to_ask_);
-  if (!enough) return;
+  const auto is_enough = [&] {
+    switch (held) {
+      case Held::kByOne:
+        return place.held_by == 1 && stands_with_one(seen, node, to_ask_);
+      case Held::kByTwo:
+        return place.held_by >= kHeldBy;
+      case Held::kAtCorner:
+        break;
+    }
+    return place.held_by == kHeldBy;
+  };
+  if (!is_enough()) return;
   const auto [width, height] =
       std::visit([](const auto& view) { return std::pair(view.width, view.height); }, scene.frame);
   const int x = static_cast<int>(std::lround(place.centre_px.x())),
@@ -265,20 +291,22 @@ float SymbolMender::support_beside_print(const GreyView& frame, const PatternFie
   return std::max(task.support, patch.agree_beside_print());
 }
 
-/// Whether it settled near where it was looked for, on its line and tilted as its neighbours are.
+float SymbolMender::tilt_px(const PatchTask& task, const Place& place) const {
+  const Eigen::RowVector2f slopes(task.state.slope_x, task.state.slope_y);
+  return 0.5F * pitch_px_ * (slopes * place.frame).norm();
+}
+
+/// Whether it settled near where it was looked for, and on its line.
 bool SymbolMender::lies_there(const PatchTask& task, const Place& place, const Eigen::Vector2f& centre,
                               const Sightings& seen, std::int32_t node) const {
-  const bool lone = place.held_by < kHeldBy;
+  const RegionStatus status = seen.claims[node].status;
+  const bool lone = place.held_by < kHeldBy, refused = status == RegionStatus::kNeighboursDisagree;
   if (task.failed || std::abs(task.moved) > kSettledPx) return false;
   if (std::abs(task.state.across) > (lone ? kLoneAcrossMaxPx : kAcrossMaxPx)) return false;
   if (std::abs(task.state.disparity) > kMovedMax * pitch_px_) return false;
-  const Eigen::RowVector2f slopes(task.state.slope_x, task.state.slope_y);
-  if (0.5F * pitch_px_ * (slopes * place.frame).norm() > (lone ? kLoneTiltMaxPx : kTiltMaxPx)) return false;
   // What is tilted out of all proportion lies anywhere.
   if (!((centre - task.map.middle_px).norm() < 0.5F * pitch_px_)) return false;
-  const RegionStatus status = seen.claims[node].status;
-  if (lone || status == RegionStatus::kNeighboursDisagree)
-    return std::abs(task.state.disparity) <= kTightSlip * pitch_px_;
+  if (lone || refused) return std::abs(task.state.disparity) <= kTightSlip * pitch_px_;
   if (status != RegionStatus::kDecoded) return true;
   const Eigen::Vector2f moved_px = centre - seen.nodes[node].centre_px;
   return (seen.nodes[node].frame.inverse() * moved_px).norm() < kMovedMax * pitch_px_;
@@ -324,14 +352,20 @@ void SymbolMender::ask_beside(const Scene& scene, std::size_t first, Held held) 
     for (const std::int32_t other : scene.seen.nodes[mended_[i]].links)
       if (other >= 0 && may_be_held(scene.seen.claims[other]) && is_asked(scene, other)) to_ask_.push_back(other);
   }
+  sort_asked();
+}
+
+/// Each once.
+void SymbolMender::sort_asked() {
   std::ranges::sort(to_ask_);
   to_ask_.erase(std::unique(to_ask_.begin(), to_ask_.end()), to_ask_.end());
 }
 
-/// @param held  by how many at least, and with one by no more
+/// @param held  by how many at least; by one, and at a corner, by no more
 void SymbolMender::mend_asked(const Scene& scene, Held held) {
   Sightings& seen = scene.seen;
   const bool lone = held == Held::kByOne;
+  const float tilt_max_px = lone ? kLoneTiltMaxPx : held == Held::kByTwo ? kTiltMaxPx : kTiltAtCornersMaxPx;
   asked_.clear(), places_.clear(), tasks_.clear();
   for (const std::int32_t node : to_ask_) look_at(scene, held, node);
   align(scene.frame, scene.full, scene.field);
@@ -343,6 +377,11 @@ void SymbolMender::mend_asked(const Scene& scene, Held held) {
     PatchTask& task = tasks_[i];
     const Eigen::Vector2f centre = centre_of(task, array_.at(claim.row, claim.column));
     if (!lies_there(task, place, centre, seen, node)) continue;
+    if (tilt_px(task, place) > tilt_max_px) {
+      const bool at_corner = place.held_by == kHeldBy && claim.status != RegionStatus::kNeighboursDisagree;
+      if (at_corner && held == Held::kByTwo) turned_.push_back(node);
+      continue;
+    }
     const Shares middle = shares_of_square(scene.frame, scene.field, task, centre, kMiddleReachPx);
     const bool shown = shows_centre(task, middle, place.held_by);
     if (shown && (lone || (place.held_by > kHeldBy && task.support < kSupportGood)))
@@ -366,7 +405,7 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
                                                     float blur_px, const CellGate& gate,
                                                     std::span<const Prototype> prototypes, Sightings& seen) {
   const Scene scene{frame, full, noise, letters_->at(blur_px), gate, prototypes, seen};
-  mended_.clear();
+  mended_.clear(), turned_.clear();
   ask_all(scene);
   std::size_t since = 0;
   for (bool first = true; first || mended_.size() > since; first = false) {
@@ -385,6 +424,12 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
     mend_asked(scene, Held::kByOne);
     ask_beside(scene, since, Held::kByOne);
   }
+  // They may be of another surface, and hold nothing.
+  to_ask_.clear();
+  for (const std::int32_t node : turned_)
+    if (std::ranges::find(mended_, node) == mended_.end()) to_ask_.push_back(node);
+  sort_asked();
+  mend_asked(scene, Held::kAtCorner);
   std::ranges::sort(mended_);
   return mended_;
 }

@@ -71,18 +71,22 @@ class SymbolMender {
     std::span<const Prototype> prototypes;
     Sightings& seen;
   };
-  enum class Held : std::uint8_t { kByOne, kByTwo };
+  enum class Held : std::uint8_t { kByOne, kByTwo, kAtCorner };
   [[nodiscard]] bool is_asked(const Scene& scene, std::int32_t node);
   void ask_all(const Scene& scene);
   void ask_beside(const Scene& scene, std::size_t first, Held held);
+  void sort_asked();
   void mend_asked(const Scene& scene, Held held);
   [[nodiscard]] bool may_return(const Sightings& seen, std::int32_t node);
   [[nodiscard]] static bool stands_with_one(const Sightings& seen, std::int32_t node,
                                             std::span<const std::int32_t> others);
+  [[nodiscard]] static bool is_beside_torn(const Sightings& seen, std::int32_t node);
   [[nodiscard]] Place place_by_neighbours(const Sightings& seen, std::int32_t node) const;
   void look_at(const Scene& scene, Held held, std::int32_t node);
   void align(const GreyView& frame, double full, const PatternField& field);
   [[nodiscard]] Eigen::Vector2f centre_of(const PatchTask& task, int letter) const;
+  /// How far its tilt from its neighbours' moves the middles of its cell's sides, projector px.
+  [[nodiscard]] float tilt_px(const PatchTask& task, const Place& place) const;
   [[nodiscard]] bool lies_there(const PatchTask& task, const Place& place, const Eigen::Vector2f& centre,
                                 const Sightings& seen, std::int32_t node) const;
   /// Of the pixels in a square, those that agree with the letter, those that are brighter than its light, and those
@@ -103,6 +107,7 @@ class SymbolMender {
   float pitch_px_;
   std::shared_ptr<const LetterFields> letters_;
   std::vector<std::int32_t> to_ask_, asked_, mended_;  // sightings; of those asked one place and task each
+  std::vector<std::int32_t> turned_;                   // sightings at corners, tilted more than others may be
   std::vector<std::int32_t> around_;                   // one that may return
   std::vector<std::size_t> agreeing_;                  // tasks that show their letters where they should be
   std::vector<std::int32_t> lone_;                     // sightings of these that one alone holds

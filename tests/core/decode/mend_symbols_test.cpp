@@ -159,6 +159,47 @@ TEST_F(MendOneOfMany, LeavesWhatLiesOnTwoSurfaces) {
   EXPECT_EQ(mend(), std::nullopt);
 }
 
+// A surface may turn away at a corner of what is decoded. Between those on both sides of it, it cannot.
+TEST_F(MendOneOfMany, IsTiltedMoreAtACorner) {
+  const Sightings all = seen_;
+  const auto is_mended = [&](float share, std::initializer_list<int> without,
+                             RegionStatus status = RegionStatus::kOffEpipolarLine) {
+    seen_ = all;
+    seen_.claims[kWorn].status = status;
+    for (const int other : without) seen_.claims[other].island = 1;
+    for (GridNode& node : seen_.nodes) node.frame.col(0) *= share;
+    return mend().has_value();
+  };
+  constexpr float kByLess = 1.04F, kByMore = 1.08F, kByMost = 1.13F;  // .4, .7 and 1.2 px at the middles of its sides
+  for (const float share : {kByLess, 1 / kByLess}) EXPECT_TRUE(is_mended(share, {})) << share;
+  for (const float share : {kByMore, 1 / kByMore}) {
+    EXPECT_FALSE(is_mended(share, {})) << share;
+    EXPECT_FALSE(is_mended(share, {kWorn - 1})) << share;
+    EXPECT_TRUE(is_mended(share, {kWorn - 1, kWorn + kSide})) << share;
+  }
+  for (const float share : {kByMost, 1 / kByMost}) EXPECT_FALSE(is_mended(share, {kWorn - 1, kWorn + kSide})) << share;
+  for (const float share : {kByLess, kByMore}) {
+    const bool is_taken_back = is_mended(share, {kWorn - 1, kWorn + kSide}, RegionStatus::kNeighboursDisagree);
+    EXPECT_EQ(is_taken_back, share < kByMore) << "what was refused may be of another surface";
+  }
+}
+
+// To the left of it, and below, is nothing decoded; what is worn there is held by the one above, and by it.
+TEST_F(MendOneOfMany, HoldsNothingThatIsTiltedMore) {
+  constexpr int kLeft = kWorn - 1;
+  for (const int other : {kWorn + kSide, kLeft + kSide, kLeft - 1}) seen_.claims[other].island = 1;
+  seen_.claims[kLeft].status = RegionStatus::kDamagedShape;
+  const Sightings all = seen_;
+  const auto mended_at = [&](float share) {
+    seen_ = all;
+    for (GridNode& node : seen_.nodes) node.frame.col(0) *= share;
+    return SymbolMender(pattern_).mend(frame_.view(), 255, {.dark_variance = 1}, 0.7F, CellGate(cells_, segments_, 1.5),
+                                       prototypes_, seen_);
+  };
+  EXPECT_THAT(mended_at(1.04F), testing::ElementsAre(kLeft, kWorn));
+  EXPECT_THAT(mended_at(1.08F), testing::ElementsAre(kWorn));
+}
+
 TEST_F(MendOneOfMany, LeavesWhatLiesAcrossTheLine) {
   for (int i = 0; i < kSide * kSide; ++i) seen_.nodes[i].centre_px.y() += 1.5F;
   EXPECT_EQ(mend(), std::nullopt);
@@ -303,6 +344,20 @@ TEST_F(MendWhatOneHolds, LeavesWhatWasRefusedUnlessItFitsTheGridTightly) {
   seen_ = all;
   seen_.claims[kWorn].grid_fit = GridFit::kTight, seen_.shapes[kWorn].distance = 7;
   EXPECT_THAT(mend_all(), testing::IsEmpty()) << "torn";
+}
+
+// Along an edge that runs up and down through it.
+TEST_F(MendWhatOneHolds, LeavesWhatWasRefusedBesideWhatIsTorn) {
+  seen_.claims[kWorn].status = RegionStatus::kNeighboursDisagree, seen_.claims[kWorn].grid_fit = GridFit::kTight;
+  const Sightings all = seen_;
+  const auto is_mended_beside = [&](int torn) {
+    seen_ = all;
+    seen_.shapes[torn].distance = 7;
+    return mend().has_value();
+  };
+  for (const int beside : {-2, -1, 1, 2}) EXPECT_FALSE(is_mended_beside(kWorn + beside * kSide)) << beside;
+  EXPECT_TRUE(is_mended_beside(kWorn - 1)) << "across the edge that would be there";
+  EXPECT_TRUE(is_mended_beside(kWorn - kSide - 1));
 }
 
 // From such a one on another surface could come in, symbol by symbol.
