@@ -45,7 +45,7 @@ struct AlignPriors {
 }
 
 /// One step of PatchAligner for up to eight windows of the same size: the same equations, a patch to each lane. Eight
-/// are some four times as fast as one after the other, as none of it goes across lanes, and the eight systems of
+/// are several times as fast as one after the other, as none of it goes across lanes, and the eight systems of
 /// equations are solved at once.
 /// @param full       the level of a saturated pixel, which does not count
 /// @param window_px  odd: the windows' side
