@@ -87,16 +87,20 @@ void expect_same(const PatchTask& task, const PatchFit& fit, float grey = 1) {
   EXPECT_NEAR(task.slope_variance, of_slopes, 0.01F * of_slopes);
 }
 
-PatchFit one_step(const GreyView& frame, double full, const PatchTask& start, int side = kSide) {
-  AlignOptions of_one = options();
-  of_one.steps = 1;
-  PatchAligner aligner(of_one);
+PatchFit fit(const GreyView& frame, double full, const PatchTask& start, int side, int steps) {
+  AlignOptions of_steps = options();
+  of_steps.steps = steps;
+  PatchAligner aligner(of_steps);
   const PatchWindow window{start.x - side / 2, start.y - side / 2, side, side};
   return std::visit(
       [&](const auto& pixels) {
         return aligner.align(pixels, full, start.noise, blurred_field(), start.map, window, start.state);
       },
       frame);
+}
+
+PatchFit one_step(const GreyView& frame, double full, const PatchTask& start, int side = kSide) {
+  return fit(frame, full, start, side, 1);
 }
 
 TEST(AlignEight, IsAStepOfTheAlignerOfSymbols) {
@@ -106,7 +110,7 @@ TEST(AlignEight, IsAStepOfTheAlignerOfSymbols) {
   for (int i = 0; i < kEight; ++i) expect_same(tasks[i], one_step(seen().frame.view(), 255, starts[i]));
 }
 
-// Rows are summed up in parts of 32 pixels; 97 are four, and the thirds end within the second and the third.
+// Rows are summed up in parts of 32 pixels; 65 are three, and the thirds end within the first and the second.
 TEST(AlignEight, WindowsMayBeOfAnySize) {
   const std::array<PatchTask, kEight> starts = seen().tasks();
   for (const int side : {11, 31, 33, 65, 97}) {
@@ -118,6 +122,21 @@ TEST(AlignEight, WindowsMayBeOfAnySize) {
       ASSERT_NE(tasks[i].failed, fit.solved);
       if (fit.solved) expect_same(tasks[i], fit);
     }
+  }
+}
+
+// On what is bent the ninths lie off the plane, once it has come to rest: the thirds of a row are summed up apart.
+TEST(AlignEight, ScattersAsTheAlignerOfSymbolsDoes) {
+  constexpr int kSteps = 6;
+  const Seen bent{.surface = cylinder({0, 0, 2150}, {0.2, 1, 0}, 150)};
+  for (const int side : {45, 65}) {
+    PatchTask start = bent.task(785, 600, 0);
+    std::array<PatchTask, 1> tasks{start};
+    for (int step = 0; step < kSteps; ++step) align(bent.frame.view(), 255, tasks, side);
+    const PatchFit plain = fit(bent.frame.view(), 255, start, side, kSteps);
+    ASSERT_TRUE(plain.solved);
+    EXPECT_GT(plain.scatter, 0) << side;
+    EXPECT_NEAR(tasks[0].scatter, plain.scatter, 0.02F * plain.scatter) << side;
   }
 }
 
