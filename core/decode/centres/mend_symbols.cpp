@@ -424,10 +424,11 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
     mend_asked(scene, Held::kByOne);
     ask_beside(scene, since, Held::kByOne);
   }
-  // They may be of another surface, and hold nothing.
+  // Last, so that nothing is mended by them: they may be of another surface.
+  std::ranges::sort(mended_);
   to_ask_.clear();
   for (const std::int32_t node : turned_)
-    if (std::ranges::find(mended_, node) == mended_.end()) to_ask_.push_back(node);
+    if (!std::ranges::binary_search(mended_, node)) to_ask_.push_back(node);
   sort_asked();
   mend_asked(scene, Held::kAtCorner);
   std::ranges::sort(mended_);
