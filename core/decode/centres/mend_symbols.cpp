@@ -17,17 +17,13 @@ namespace {
 
 constexpr AlignOptions kAlign;
 constexpr int kSteps = 5;
-constexpr float kSettledPx = 0.05F;
 constexpr float kAcrossMaxPx = 0.4F;  // off the epipolar line, projector px
 /// From where its neighbours put it, and from where it was decoded, of the pitch.
 constexpr float kMovedMax = 0.08F;
-constexpr int kHeldBy = 2;
-/// How far its tilt from its neighbours' moves the middles of its cell's sides, projector px: parts of two surfaces
-/// look tilted more, and the place is then on neither. At a corner of what is decoded the surface may turn away.
-constexpr float kTiltMaxPx = 0.5F, kTiltAtCornersMaxPx = 1;
+/// Against kTiltMaxPx: at a corner of what is decoded the surface may turn away.
+constexpr float kTiltAtCornersMaxPx = 1;
 /// What one alone holds lies nearer to its line, is tilted less, and is seen better: projector px, and of the patch.
 constexpr float kLoneAcrossMaxPx = 0.2F, kLoneTiltMaxPx = 0.25F, kLoneSupportMin = 0.85F;
-constexpr int kMiddleReachPx = 2;  // of the square around its centre
 /// Where so much of its middle is brighter than the letter's light, something lies before it.
 constexpr float kHidden = 0.5F;
 /// From which misfit on, or how far off its line in projector px, what is decoded is aligned, too: whole symbols are
@@ -48,19 +44,6 @@ bool is_worn(const CellGate& gate, const Sightings& seen, std::int32_t node) {
   if (claim.status != RegionStatus::kDecoded)
     return claim.status == RegionStatus::kDamagedShape || claim.status == RegionStatus::kOffEpipolarLine;
   return seen.misfits[node] > kDoubtfulMisfit || gate.off_line_px(node, claim.row, claim.column) > kDoubtfulAcrossPx;
-}
-
-/// Whether it is well seen, and none of an island: its letter is another, or it has none of its cells.
-bool contradicts(const Sightings& seen, std::int32_t node, std::int32_t island) {
-  const CellClaim& claim = seen.claims[node];
-  const bool of_island = claim.named() && claim.island == island && claim.status != RegionStatus::kClassDisagrees;
-  return !of_island && seen.shapes[node].is_well_seen();
-}
-
-bool is_off_grid(const Sightings& seen, std::int32_t from, std::int32_t to, Direction d, float pitch_px) {
-  const GridNode& node = seen.nodes[from];
-  const Eigen::Vector2f way_px = seen.nodes[to].centre_px - node.centre_px;
-  return (node.frame.inverse() * way_px / pitch_px - step(d)).norm() > kOffGridSlip;
 }
 
 /// Every letter in a square of twice its side.
@@ -91,32 +74,8 @@ Eigen::Vector2f LetterFields::middle_px(int letter) const {
 SymbolMender::SymbolMender(const Pattern& pattern)
     : array_(pattern.array),
       pitch_px_(static_cast<float>(pattern.pitch_px())),
+      size_px_(static_cast<float>(pattern.options.symbol_size_px)),
       letters_(std::make_shared<const LetterFields>(pattern.options)) {}
-
-/// Whether what its surroundings have refused may be looked at again: around it, as far as it could have come with
-/// them, nothing on the grid contradicts.
-bool SymbolMender::may_return(const Sightings& seen, std::int32_t node) {
-  constexpr int kReach = 3;
-  const CellClaim& claim = seen.claims[node];
-  if (claim.status != RegionStatus::kNeighboursDisagree || !claim.named()) return false;
-  around_.assign(1, node);
-  std::size_t next = 0;
-  for (int links = 0; links < kReach; ++links) {
-    for (const std::size_t end = around_.size(); next < end; ++next) {
-      const std::int32_t from = around_[next];
-      for (const Direction d : kDirections) {
-        const std::int32_t other = neighbour(seen.nodes, from, d);
-        if (other < 0 || std::ranges::find(around_, other) != around_.end()) continue;
-        const CellClaim& there = seen.claims[other];
-        if (there.status == RegionStatus::kDecoded && there.island == claim.island) continue;
-        if (is_off_grid(seen, from, other, d, pitch_px_)) continue;
-        if (contradicts(seen, other, claim.island)) return false;
-        around_.push_back(other);
-      }
-    }
-  }
-  return true;
-}
 
 /// Whether one is enough to hold it: it fits the grid tightly, or it is worn and has one of the others where its cell
 /// is beside. What its surroundings have refused may be of another surface, whole, or torn between both: not where it
@@ -174,7 +133,7 @@ SymbolMender::Place SymbolMender::place_by_neighbours(const Sightings& seen, std
           place.held_by};
 }
 
-/// Sets up the task of a node that enough hold, or one that may be enough; its window lies within the frame.
+/// Sets up the task of a node that enough hold, or one that may be enough.
 void SymbolMender::look_at(const Scene& scene, Held held, std::int32_t node) {
   const Sightings& seen = scene.seen;
   const Place place = place_by_neighbours(seen, node);
@@ -189,7 +148,12 @@ void SymbolMender::look_at(const Scene& scene, Held held, std::int32_t node) {
     }
     return place.held_by == kHeldBy;
   };
-  if (!is_enough()) return;
+  if (is_enough()) set_up(scene, place, node);
+}
+
+/// Unless its window reaches beyond the frame.
+void SymbolMender::set_up(const Scene& scene, const Place& place, std::int32_t node) {
+  const Sightings& seen = scene.seen;
   const auto [width, height] =
       std::visit([](const auto& view) { return std::pair(view.width, view.height); }, scene.frame);
   const int x = static_cast<int>(std::lround(place.centre_px.x())),
@@ -197,7 +161,7 @@ void SymbolMender::look_at(const Scene& scene, Held held, std::int32_t node) {
             reach = static_cast<int>(std::ceil(0.5F * pitch_px_ * place.frame.colwise().norm().maxCoeff()));
   if (x < reach || y < reach || x + reach >= width || y + reach >= height) return;
   const CellClaim& claim = seen.claims[node];
-  const Eigen::Vector2f middle = letters_->middle_px(array_.at(claim.row, claim.column));
+  const Eigen::Vector2f middle = letters_->middle_px(letter_of(claim));
   PatchTask task;
   task.x = x, task.y = y;
   task.noise = scene.noise.at(0.5F * (place.background + place.peak));
@@ -256,7 +220,7 @@ SymbolMender::Shares SymbolMender::shares_of_square(const GreyView& frame, const
     return (state.gain + state.gain_x * off.x() + state.gain_y * off.y()) * field.at(pixel.x(), pixel.y()).value;
   };
   const auto count = [&](const auto& view) {
-    int agree = 0, brighter = 0, darkened = 0;
+    int agree = 0, brighter = 0, brighter_there = 0, darkened = 0;
     for (int y = middle.y() - reach; y <= middle.y() + reach; ++y) {
       for (int x = middle.x() - reach; x <= middle.x() + reach; ++x) {
         if (!view.contains(x, y)) continue;
@@ -264,13 +228,14 @@ SymbolMender::Shares SymbolMender::shares_of_square(const GreyView& frame, const
         const float light = static_cast<float>(view.at(x, y)) - state.offset;
         agree += std::abs(light - expected) <= limit;
         brighter += light - state.gain > limit;
+        brighter_there += light - expected > limit;
         darkened += expected - light > limit && light > std::max(limit, kInk * expected);
       }
     }
     const auto share = [pixels = (2 * reach + 1) * (2 * reach + 1)](int of_them) {
       return static_cast<float>(of_them) / static_cast<float>(pixels);
     };
-    return Shares{share(agree), share(brighter), share(darkened)};
+    return Shares{share(agree), share(brighter), share(brighter_there), share(darkened)};
   };
   return std::visit(count, frame);
 }
@@ -284,11 +249,15 @@ bool SymbolMender::shows_centre(const PatchTask& task, const Shares& middle, int
   return middle.agree >= kMiddleMin && task.support + middle.agree >= kBothAtCornersMin;
 }
 
-float SymbolMender::support_beside_print(const GreyView& frame, const PatternField& field, const PatchTask& task,
-                                         const LatticeFrame& lattice_frame) const {
+SymbolMender::Shares SymbolMender::shares_of_cell(const Scene& scene, const PatchTask& task,
+                                                  const LatticeFrame& lattice_frame) const {
   const int reach = static_cast<int>(0.5F * pitch_px_ * lattice_frame.colwise().norm().minCoeff());
-  const Shares patch = shares_of_square(frame, field, task, task.map.middle_px, reach);
-  return std::max(task.support, patch.agree_beside_print());
+  return shares_of_square(scene.frame, scene.field, task, task.map.middle_px, reach);
+}
+
+float SymbolMender::support_beside_print(const Scene& scene, const PatchTask& task,
+                                         const LatticeFrame& lattice_frame) const {
+  return std::max(task.support, shares_of_cell(scene, task, lattice_frame).agree_beside_print());
 }
 
 float SymbolMender::tilt_px(const PatchTask& task, const Place& place) const {
@@ -315,7 +284,7 @@ bool SymbolMender::lies_there(const PatchTask& task, const Place& place, const E
 void SymbolMender::take_over(const PatchTask& task, const LatticeFrame& lattice_frame,
                              std::span<const Prototype> prototypes, Sightings& seen, std::int32_t node) const {
   CellClaim& claim = seen.claims[node];
-  const int letter = array_.at(claim.row, claim.column);
+  const int letter = letter_of(claim);
   seen.nodes[node].centre_px = centre_of(task, letter);
   seen.nodes[node].frame = lattice_frame;
   const Eigen::Vector2f centroid =
@@ -375,7 +344,7 @@ void SymbolMender::mend_asked(const Scene& scene, Held held) {
     const CellClaim& claim = seen.claims[node];
     const Place& place = places_[i];
     PatchTask& task = tasks_[i];
-    const Eigen::Vector2f centre = centre_of(task, array_.at(claim.row, claim.column));
+    const Eigen::Vector2f centre = centre_of(task, letter_of(claim));
     if (!lies_there(task, place, centre, seen, node)) continue;
     if (tilt_px(task, place) > tilt_max_px) {
       const bool at_corner = place.held_by == kHeldBy && claim.status != RegionStatus::kNeighboursDisagree;
@@ -385,7 +354,7 @@ void SymbolMender::mend_asked(const Scene& scene, Held held) {
     const Shares middle = shares_of_square(scene.frame, scene.field, task, centre, kMiddleReachPx);
     const bool shown = shows_centre(task, middle, place.held_by);
     if (shown && (lone || (place.held_by > kHeldBy && task.support < kSupportGood)))
-      task.support = support_beside_print(scene.frame, scene.field, task, place.frame);
+      task.support = support_beside_print(scene, task, place.frame);
     const float of_two = claim.status == RegionStatus::kDecoded ? kSupportGood : kWholeSupportMin;
     if (shown && task.support >= (lone ? kLoneSupportMin : of_two)) {
       agreeing_.push_back(i);
@@ -408,7 +377,8 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
   mended_.clear(), turned_.clear();
   ask_all(scene);
   std::size_t since = 0;
-  for (bool first = true; first || mended_.size() > since; first = false) {
+  bool any = true;
+  for (bool first = true; any; first = false) {
     // What is mended holds those beside it.
     while (!to_ask_.empty()) {
       const std::size_t before = mended_.size();
@@ -422,7 +392,10 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
     }
     since = mended_.size();
     mend_asked(scene, Held::kByOne);
-    ask_beside(scene, since, Held::kByOne);
+    const bool any_by_one = mended_.size() > since;
+    if (!any_by_one) mend_groups(scene);
+    ask_beside(scene, since, any_by_one ? Held::kByOne : Held::kByTwo);
+    any = mended_.size() > since;
   }
   // Last, so that nothing is mended by them: they may be of another surface.
   std::ranges::sort(mended_);

@@ -9,97 +9,14 @@
 
 #include <gmock/gmock.h>
 
-#include "core/decode/grid/cell_rays.hpp"
-#include "core/geometry/epipolar_gate.hpp"
-#include "tests/core/decode/decoded_scene.hpp"
-#include "tests/core/decode/shipped_pattern.hpp"
+#include "tests/core/decode/mended_plane.hpp"
 
 namespace slsd {
 namespace {
 
 using test::kTilted;
 
-/// A plane that is seen whole: five symbols by five, each known but for the one in their middle, which is worn.
-class MendOneOfMany : public testing::Test {
- protected:
-  static constexpr int kSide = 5, kRow = 20, kColumn = 30, kWorn = kSide * kSide / 2;
-  MendOneOfMany()
-      : pattern_(shipped_pattern("16px-5.toml")),
-        rig_(paper_rig()),
-        frame_(simulate(draw_pattern(pattern_), rig_, kTilted, {.dark = 12, .lit = 170, .noise_sigma = 1})),
-        prototypes_(pattern_.options.symbols.size()),
-        cells_(pattern_, prototypes_, rig_.projector) {
-    const EpipolarGate gate(rig_.cameras[0], rig_.projector, 400, 3200);
-    for (int row = 0; row < kSide; ++row) {
-      for (int column = 0; column < kSide; ++column) {
-        const Eigen::Vector2f centre = true_centre(row, column);
-        GridNode node;
-        node.centre_px = centre;
-        node.frame.col(0) = (true_centre(row, column + 1) - centre) / pattern_.pitch_px();
-        node.frame.col(1) = (true_centre(row + 1, column) - centre) / pattern_.pitch_px();
-        const int at = row * kSide + column;
-        node.links = {column + 1 < kSide ? at + 1 : -1, row + 1 < kSide ? at + kSide : -1, column > 0 ? at - 1 : -1,
-                      row > 0 ? at - kSide : -1};
-        seen_.nodes.push_back(node);
-        seen_.region.push_back(at);
-        GreyMoments moments{};
-        moments.x = centre.x(), moments.y = centre.y(), moments.background = 12, moments.peak = 170;
-        seen_.moments.push_back(moments);
-        seen_.shapes.emplace_back();
-        seen_.misfits.push_back(1);
-        seen_.claims.push_back({.row = static_cast<std::int16_t>(kRow + row),
-                                .column = static_cast<std::int16_t>(kColumn + column),
-                                .status = RegionStatus::kDecoded,
-                                .island = 0});
-        segments_.push_back(gate.prepare(pixel_ray(rig_.cameras[0].lens, centre.cast<double>()).direction));
-      }
-    }
-    // A centroid that has gone with what is missing.
-    seen_.claims[kWorn].status = RegionStatus::kOffEpipolarLine;
-    seen_.moments[kWorn].x += 2, seen_.moments[kWorn].y -= 3;
-    seen_.nodes[kWorn].centre_px += Eigen::Vector2f(2, -3);
-  }
-
-  [[nodiscard]] Eigen::Vector2f true_centre(int row, int column) const {
-    const Eigen::Vector2d square(pattern_.symbol_centre_u_px(kColumn + column),
-                                 pattern_.symbol_centre_v_px(kRow + row));
-    return camera_from_projector(square, rig_, kTilted)->cast<float>();
-  }
-
-  /// Multiplies the grey values of the worn symbol's cell by share(x, y), projector px from the middle of its square.
-  void print(const std::function<double(double, double)>& share) {
-    const Eigen::Vector2f centre = true_centre(kSide / 2, kSide / 2);
-    const Eigen::Matrix2f inverse = seen_.nodes[kWorn].frame.inverse();
-    for (int y = -14; y <= 14; ++y) {
-      for (int x = -14; x <= 14; ++x) {
-        const int u = static_cast<int>(std::lround(centre.x())) + x, v = static_cast<int>(std::lround(centre.y())) + y;
-        const Eigen::Vector2f at = inverse * (Eigen::Vector2f(u, v) - centre);
-        if (at.cwiseAbs().maxCoeff() > 9) continue;
-        frame_.at(u, v) = static_cast<std::uint8_t>(std::lround(share(at.x(), at.y()) * frame_.at(u, v)));
-      }
-    }
-  }
-
-  /// How far off the symbol is then, camera px; nothing where it is not mended.
-  std::optional<float> mend() {
-    SymbolMender mender(pattern_);
-    const CellGate gate(cells_, segments_, 1.5);
-    const auto& mended = mender.mend(frame_.view(), 255, {.dark_variance = 1}, 0.7F, gate, prototypes_, seen_);
-    if (mended.empty()) return std::nullopt;
-    EXPECT_THAT(mended, testing::ElementsAre(static_cast<std::int32_t>(kWorn)));
-    EXPECT_EQ(seen_.claims[kWorn].status, RegionStatus::kDecoded);
-    const GreyMoments& moments = seen_.moments[kWorn];
-    return (Eigen::Vector2f(moments.x, moments.y) - true_centre(kSide / 2, kSide / 2)).norm();
-  }
-
-  Pattern pattern_;
-  Calibration rig_;
-  Grey8 frame_;
-  std::vector<Prototype> prototypes_;  // centroids in the middle of the square
-  CellRays cells_;
-  std::vector<EpipolarSegment> segments_;
-  Sightings seen_;
-};
+class MendOneOfMany : public test::MendedPlane {};
 
 TEST_F(MendOneOfMany, PlacesItWhereItIs) {
   EXPECT_THAT(mend(), testing::Optional(testing::Lt(0.06F)));

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/decode/centres/mend_symbols.hpp"
+#include "tests/core/decode/mended_plane.hpp"
+
+namespace slsd {
+namespace {
+
+using test::kTilted;
+
+/// None of the plane stands: each is damaged, and its centroid has gone across its line, as beneath lines of print.
+class MendGroups : public test::MendedPlane {
+ protected:
+  static constexpr int kCount = kSide * kSide;
+  MendGroups() {
+    for (int i = 0; i < kCount; ++i) {
+      seen_.claims[i].status = RegionStatus::kDamagedShape;
+      see(i, true_centre(i / kSide, i % kSide) + Eigen::Vector2f(0, 1.2F + 0.2F * static_cast<float>(i % 3)));
+    }
+  }
+
+  /// Where its centroid is then.
+  void see(int node, const Eigen::Vector2f& centre_px) {
+    const EpipolarGate gate(rig_.cameras[0], rig_.projector, 400, 3200);
+    seen_.nodes[node].centre_px = centre_px;
+    seen_.moments[node].x = centre_px.x(), seen_.moments[node].y = centre_px.y();
+    segments_[node] = gate.prepare(pixel_ray(rig_.cameras[0].lens, centre_px.cast<double>()).direction);
+  }
+  /// Leaves no light in all cells but these.
+  void darken_all_but(std::initializer_list<int> lit) {
+    const Grey8 whole = frame_;
+    frame_ = Grey8(whole.width(), whole.height());
+    std::fill_n(frame_.data(), static_cast<std::size_t>(whole.width()) * whole.height(), std::uint8_t{12});
+    for (const int node : lit) {
+      const Eigen::Vector2f centre = true_centre(node / kSide, node % kSide);
+      const int u = static_cast<int>(std::lround(centre.x())), v = static_cast<int>(std::lround(centre.y()));
+      for (int y = v - 9; y <= v + 9; ++y)
+        for (int x = u - 9; x <= u + 9; ++x) frame_.at(x, y) = whole.at(x, y);
+    }
+  }
+  /// One that is well seen, and of nothing that is known.
+  void put_other_light_at(int node) {
+    seen_.claims[node] = {.status = RegionStatus::kNoCodeword};
+    seen_.shapes[node].letter = 0, seen_.shapes[node].distance = 1;
+  }
+  [[nodiscard]] std::vector<std::int32_t> mend_all() {
+    SymbolMender mender(pattern_);
+    return mender.mend(frame_.view(), 255, {.dark_variance = 1}, 0.7F, CellGate(cells_, segments_, 1.5), prototypes_,
+                       seen_);
+  }
+  [[nodiscard]] float off_px(int node) const {
+    const GreyMoments& moments = seen_.moments[node];
+    return (Eigen::Vector2f(moments.x, moments.y) - true_centre(node / kSide, node % kSide)).norm();
+  }
+};
+
+TEST_F(MendGroups, HoldEachOther) {
+  const auto mended = mend_all();
+  EXPECT_EQ(mended.size(), kCount);
+  for (const std::int32_t node : mended) {
+    EXPECT_LT(off_px(node), 0.1F) << node;
+    EXPECT_EQ(seen_.claims[node].status, RegionStatus::kDecoded);
+  }
+}
+
+TEST_F(MendGroups, AreFoundBeneathLinesOfPrint) {
+  for (int node = 0; node < kCount; ++node) {
+    const Eigen::Vector2f centre = true_centre(node / kSide, node % kSide);
+    for (int y = -1; y <= 2; ++y) {
+      for (int x = -10; x <= 10; ++x) {
+        std::uint8_t& level =
+            frame_.at(static_cast<int>(std::lround(centre.x())) + x, static_cast<int>(std::lround(centre.y())) + y);
+        level = static_cast<std::uint8_t>(std::lround(0.5 * level));
+      }
+    }
+  }
+  const auto mended = mend_all();
+  EXPECT_EQ(mended.size(), kCount);
+  for (const std::int32_t node : mended) EXPECT_LT(off_px(node), 0.3F) << node;
+}
+
+TEST_F(MendGroups, AreOfThreeAtLeast) {
+  const Grey8 whole = frame_;
+  const Sightings all = seen_;
+  const auto mended_of = [&](std::initializer_list<int> lit) {
+    frame_ = whole, seen_ = all;
+    darken_all_but(lit);
+    return mend_all();
+  };
+  EXPECT_THAT(mended_of({11, 12, 13}), testing::ElementsAre(11, 12, 13));
+  EXPECT_THAT(mended_of({11, 12, 17}), testing::ElementsAre(11, 12, 17));
+  EXPECT_THAT(mended_of({11, 12}), testing::IsEmpty());
+  EXPECT_THAT(mended_of({11, 12, 14}), testing::IsEmpty()) << "the third lies apart";
+}
+
+// What is refused comes back with them, too.
+TEST_F(MendGroups, AreOfAllThatHaveACell) {
+  const Sightings all = seen_;
+  for (const RegionStatus status : {RegionStatus::kNeighboursDisagree, RegionStatus::kOffEpipolarLine}) {
+    seen_ = all;
+    seen_.claims[kWorn].status = status;
+    EXPECT_THAT(mend_all(), testing::Contains(static_cast<std::int32_t>(kWorn))) << static_cast<int>(status);
+  }
+  for (const RegionStatus status : {RegionStatus::kClassDisagrees, RegionStatus::kOutOfDepthRange}) {
+    seen_ = all;
+    seen_.claims[kWorn].status = status;
+    EXPECT_THAT(mend_all(), testing::Not(testing::Contains(static_cast<std::int32_t>(kWorn))));
+  }
+}
+
+TEST_F(MendGroups, LieBesideNoOtherLight) {
+  const Sightings all = seen_;
+  put_other_light_at(0);
+  EXPECT_THAT(mend_all(), testing::IsEmpty()) << "eight links lead from one corner to the other";
+  seen_ = all;
+  put_other_light_at(0);
+  seen_.shapes[0].distance = 4;
+  EXPECT_EQ(mend_all().size(), kCount - 1) << "what is worn itself says nothing";
+}
+
+// Behind those that stand is no way for what is not of their surface.
+TEST_F(MendGroups, MayHaveOtherLightBehindWhatStands) {
+  put_other_light_at(0);
+  for (const int node : {1, kSide}) {
+    seen_.claims[node].status = RegionStatus::kDecoded;
+    see(node, true_centre(node / kSide, node % kSide));
+  }
+  EXPECT_EQ(mend_all().size(), kCount - 3);
+}
+
+TEST_F(MendGroups, LieBesideNoBorder) {
+  const Sightings all = seen_;
+  const Grey8 whole = frame_;
+  const Eigen::Vector2f last = true_centre(0, kSide - 1);
+  const auto mended_before = [&](int columns_px) {
+    seen_ = all;
+    frame_ = Grey8(static_cast<int>(last.x()) + columns_px, whole.height());
+    for (int y = 0; y < whole.height(); ++y) std::copy_n(whole.row(y), frame_.width(), frame_.row(y));
+    return mend_all().size();
+  };
+  const float pitch_px = seen_.nodes[kWorn].frame.col(0).norm() * static_cast<float>(pattern_.pitch_px());
+  EXPECT_EQ(mended_before(static_cast<int>(1.3F * pitch_px)), 0) << "the border cuts what lies beside the last";
+  EXPECT_EQ(mended_before(static_cast<int>(2.5F * pitch_px)), kCount);
+}
+
+// The light of another projector is off its lines, all of it.
+TEST_F(MendGroups, LieOnTheirLinesHereAndThere) {
+  const Sightings all = seen_;
+  for (CellClaim& claim : seen_.claims) claim.status = RegionStatus::kOffEpipolarLine;
+  EXPECT_THAT(mend_all(), testing::IsEmpty());
+  seen_ = all;
+  for (CellClaim& claim : seen_.claims) claim.status = RegionStatus::kOffEpipolarLine;
+  seen_.claims[3].status = RegionStatus::kDamagedShape;
+  EXPECT_EQ(mend_all().size(), kCount);
+}
+
+TEST_F(MendGroups, AreLeftWherePrintCouldNotHaveMovedThem) {
+  constexpr std::int32_t kFar = 7;
+  see(kFar, true_centre(kFar / kSide, kFar % kSide) + Eigen::Vector2f(0, 3));
+  EXPECT_THAT(mend_all(), testing::Contains(kFar));
+  see(kFar, true_centre(kFar / kSide, kFar % kSide) + Eigen::Vector2f(0, 5));
+  seen_.claims[kFar].status = RegionStatus::kOffEpipolarLine;
+  for (int i = 0; i < kCount; ++i)
+    if (i != kFar) seen_.claims[i].status = RegionStatus::kDamagedShape;
+  EXPECT_THAT(mend_all(), testing::Not(testing::Contains(kFar)));
+}
+
+// What their lines are said to be is half a pixel from where the pattern lies.
+TEST_F(MendGroups, LieOnTheirLines) {
+  const EpipolarGate gate(rig_.cameras[0], rig_.projector, 400, 3200);
+  const auto mended_beside_lines = [&](float off_px) {
+    for (int i = 0; i < kCount; ++i) {
+      const Eigen::Vector2f seen_px = seen_.nodes[i].centre_px + Eigen::Vector2f(0, off_px);
+      segments_[i] = gate.prepare(pixel_ray(rig_.cameras[0].lens, seen_px.cast<double>()).direction);
+      seen_.claims[i].status = RegionStatus::kDamagedShape;
+    }
+    return mend_all().size();
+  };
+  const Sightings all = seen_;
+  EXPECT_EQ(mended_beside_lines(0.6F), 0);
+  seen_ = all;
+  EXPECT_EQ(mended_beside_lines(0.2F), kCount);
+}
+
+TEST_F(MendGroups, ShowTheirMiddlesAndMostOfTheirLetters) {
+  const Grey8 whole = frame_;
+  const Sightings all = seen_;
+  const auto is_mended_under = [&](double ink, double to_the_left, double to_the_right) {
+    frame_ = whole, seen_ = all;
+    // Once upon a symbol where the others hold it as they are.
+    print([&](double x, double) { return x > to_the_left && x < to_the_right ? ink : 1; });
+    return std::ranges::count(mend_all(), kWorn) == 1;
+  };
+  EXPECT_TRUE(is_mended_under(1, 0, 0));
+  EXPECT_TRUE(is_mended_under(0.5, -4, 4)) << "print darkens its middle";
+  EXPECT_FALSE(is_mended_under(0.05, -4, 4)) << "something hides its middle";
+}
+
+TEST_F(MendGroups, AreNotOfAnotherLetter) {
+  const Sightings all = seen_;
+  // Each is said to be the cell one row on.
+  for (CellClaim& claim : seen_.claims) ++claim.row;
+  EXPECT_THAT(mend_all(), testing::IsEmpty());
+}
+
+// An edge along the row leaves whole those whose halves are of one letter. The rest is dark: it would hold them.
+TEST_F(MendGroups, AreNotWhatIsLeftOfATornLine) {
+  constexpr int kRowOf = kSide / 2;
+  darken_all_but({10, 11, 12, 13, 14});
+  const Grey8 whole = frame_;
+  const Sightings all = seen_;
+  const auto mended_with_torn = [&](int torn, RegionStatus status) {
+    frame_ = whole, seen_ = all;
+    for (int column = 0; column < kSide; ++column) seen_.claims[kRowOf * kSide + column].status = status;
+    for (int column = 0; column < torn; ++column) {
+      const Eigen::Vector2f centre = true_centre(kRowOf, column);
+      for (int y = 1; y <= 9; ++y) {
+        for (int x = -9; x <= 9; ++x) {
+          std::uint8_t& level =
+              frame_.at(static_cast<int>(std::lround(centre.x())) + x, static_cast<int>(std::lround(centre.y())) + y);
+          level = level > 90 ? 12 : 170;
+        }
+      }
+    }
+    return mend_all().size();
+  };
+  EXPECT_EQ(mended_with_torn(1, RegionStatus::kNeighboursDisagree), kSide - 1);
+  EXPECT_EQ(mended_with_torn(2, RegionStatus::kNeighboursDisagree), 0);
+  EXPECT_EQ(mended_with_torn(2, RegionStatus::kDamagedShape), kSide - 2) << "these were not refused for their line";
+}
+
+}  // namespace
+}  // namespace slsd
