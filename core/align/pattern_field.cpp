@@ -89,23 +89,6 @@ PatternField::PatternField(const ImageView<std::uint8_t>& pattern, float blur_si
   }
 }
 
-PatternField::Sample PatternField::at(float u, float v) const {
-  const auto place = [](float px, int count) {
-    return std::clamp((px + kBorderPx) * kSamplesPerPx, 0.F, static_cast<float>(count - 1));
-  };
-  const float i = place(u, width_), j = place(v, height_);
-  const int column = static_cast<int>(i + 0.5F), row = static_cast<int>(j + 0.5F);
-  const std::uint32_t bits = samples_[static_cast<std::size_t>(row) * width_ + column];
-  const auto slope_of = [&](int left) {
-    return static_cast<float>(static_cast<std::int32_t>(bits << left) >> (32 - kSlopeBits)) * slope_unit_;
-  };
-  Sample sample{static_cast<float>(bits >> (2 * kSlopeBits)) * kValueUnit, slope_of(32 - 2 * kSlopeBits),
-                slope_of(32 - kSlopeBits)};
-  sample.value += (sample.slope_u * (i - static_cast<float>(column)) + sample.slope_v * (j - static_cast<float>(row))) /
-                  kSamplesPerPx;
-  return sample;
-}
-
 const PatternField& PatternFields::at(std::size_t blur) const {
   std::call_once(made_[blur], [&] { fields_[blur].emplace(pattern_.view(), kBlursPx[blur]); });
   return *fields_[blur];

@@ -209,7 +209,8 @@ bool SymbolMender::agrees_in_group(const Scene& scene, std::size_t asked) const 
   if (std::abs(task.state.disparity) > kMovedMax * pitch_px_ || !(tilt_px(task, place) <= kTiltMaxPx)) return false;
   const Eigen::Vector2f centre = centre_of(task, letter_of(scene.seen.claims[asked_[asked]]));
   const Shares middle = shares_of_square(scene.frame, scene.field, task, centre, kMiddleReachPx);
-  return middle.agree + middle.darkened >= kMiddleMin && support_beside_print(scene, task, place.frame) >= kSupportMin;
+  if (middle.agree + middle.darkened < kMiddleMin) return false;
+  return task.support >= kSupportMin || support_beside_print(scene, task, place.frame) >= kSupportMin;
 }
 
 /// Of the tasks that agree leaves out those that had been refused where too many of their row or column show light that

@@ -215,8 +215,13 @@ SymbolMender::Shares SymbolMender::shares_of_square(const GreyView& frame, const
   const PatchState& state = task.state;
   const float limit = kAlign.outlier_sigmas * std::hypot(task.noise, kAlign.misfit_share * state.gain);
   const Eigen::Vector2i middle = middle_px.array().round().matrix().cast<int>();
+  // The letter lies in a plane, as the grid around it does.
+  const Eigen::Vector2f from = projector_offset(task.map, state, {0, 0}),
+                        right = projector_offset(task.map, state, {1, 0}) - from,
+                        down = projector_offset(task.map, state, {0, 1}) - from,
+                        origin = from + task.map.origin_px.cast<float>();
   const auto light_at = [&](const Eigen::Vector2f& off) {
-    const Eigen::Vector2f pixel = projector_offset(task.map, state, off) + task.map.origin_px.cast<float>();
+    const Eigen::Vector2f pixel = origin + off.x() * right + off.y() * down;
     return (state.gain + state.gain_x * off.x() + state.gain_y * off.y()) * field.at(pixel.x(), pixel.y()).value;
   };
   const auto count = [&](const auto& view) {
