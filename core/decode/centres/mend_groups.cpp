@@ -47,7 +47,8 @@ std::int32_t member_beside(const Sightings& seen, std::int32_t node, Direction d
 }  // namespace
 
 /// Whether what links on the grid lead to, through what does not stand, may all be of a node's island: nothing there
-/// contradicts, and none is an end that the caller knows of. Leaves what it has come to in around_.
+/// contradicts, and neither it nor any of them is an end that the caller knows of. Leaves what it has come to in
+/// around_.
 template <class IsEnd>
 bool SymbolMender::is_undisputed(const Sightings& seen, std::int32_t node, int reach, const IsEnd& is_end) {
   is_around_.resize(seen.size());
@@ -67,7 +68,7 @@ bool SymbolMender::is_undisputed(const Sightings& seen, std::int32_t node, int r
     }
     return true;
   };
-  bool undisputed = true;
+  bool undisputed = !is_end(node);
   std::size_t next = 0;
   for (int links = 0; links < reach && next < around_.size() && undisputed; ++links)
     for (const std::size_t end = around_.size(); next < end && undisputed; ++next) undisputed = look_on(around_[next]);
@@ -120,8 +121,7 @@ void SymbolMender::ask_groups(const Scene& scene) {
       const auto is_end = [&](std::int32_t other) {
         return (seen.claims[other].island == island && verdicts_[other] == kDisputed) || is_beside_border(other);
       };
-      const bool undisputed =
-          !is_beside_border(node) && is_undisputed(seen, node, std::numeric_limits<int>::max(), is_end);
+      const bool undisputed = is_undisputed(seen, node, std::numeric_limits<int>::max(), is_end);
       verdicts_[node] = undisputed ? kUndisputed : kDisputed;
       for (const std::int32_t other : around_)
         if (seen.claims[other].island == island) verdicts_[other] = verdicts_[node];
@@ -148,7 +148,7 @@ Eigen::Vector2f SymbolMender::onto_line(const Scene& scene, std::int32_t node, c
 SymbolMender::Place SymbolMender::place_in_group(const Scene& scene, std::int32_t node) {
   constexpr int kReach = 3;  // links
   constexpr std::size_t kFewest = 4;
-  constexpr float kStanding = 4, kSpreadMin = 1e-3F;
+  constexpr float kStanding = 4, kSpreadMin = 1e-3F, kFlattestMin = 0.01F;
   const Sightings& seen = scene.seen;
   const CellClaim& claim = seen.claims[node];
   Place place;
@@ -193,6 +193,7 @@ SymbolMender::Place SymbolMender::place_in_group(const Scene& scene, std::int32_
   place.background /= held_by, place.peak /= held_by;
   const Eigen::Matrix<float, 3, 2> plane = normal.ldlt().solve(right);
   place.frame = plane.bottomRows<2>().transpose() / pitch_px_;
+  if (!(std::abs(place.frame.determinant()) > kFlattestMin * place.frame.squaredNorm())) return {};
   place.centre_px = onto_line(scene, node, plane.row(0).transpose(), place.frame);
   return place;
 }

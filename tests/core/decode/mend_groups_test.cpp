@@ -147,6 +147,17 @@ TEST_F(MendGroups, LieBesideNoBorder) {
   EXPECT_EQ(mended_before(static_cast<int>(2.5F * pitch_px)), kCount);
 }
 
+TEST_F(MendGroups, AreThereThoughOthersLieBesideTheBorder) {
+  for (int row = 0; row < kSide; ++row) {
+    seen_.nodes[row * kSide + kSide - 2].links[kRight] = -1;
+    seen_.nodes[row * kSide + kSide - 1].links[kLeft] = -1;
+  }
+  const Grey8 whole = frame_;
+  frame_ = Grey8(static_cast<int>(true_centre(0, kSide - 1).x()) + 20, whole.height());
+  for (int y = 0; y < whole.height(); ++y) std::copy_n(whole.row(y), frame_.width(), frame_.row(y));
+  EXPECT_EQ(mend_all().size(), kCount - kSide);
+}
+
 // The light of another projector is off its lines, all of it.
 TEST_F(MendGroups, LieOnTheirLinesHereAndThere) {
   const Sightings all = seen_;
