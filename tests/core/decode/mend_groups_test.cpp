@@ -170,15 +170,47 @@ TEST_F(MendGroups, LieOnTheirLinesHereAndThere) {
   EXPECT_EQ(mend_all().size(), kCount);
 }
 
-TEST_F(MendGroups, AreLeftWherePrintCouldNotHaveMovedThem) {
-  constexpr std::int32_t kFar = 7;
-  see(kFar, true_centre(kFar / kSide, kFar % kSide) + Eigen::Vector2f(0, 3));
-  EXPECT_THAT(mend_all(), testing::Contains(kFar));
-  see(kFar, true_centre(kFar / kSide, kFar % kSide) + Eigen::Vector2f(0, 5));
-  seen_.claims[kFar].status = RegionStatus::kOffEpipolarLine;
-  for (int i = 0; i < kCount; ++i)
-    if (i != kFar) seen_.claims[i].status = RegionStatus::kDamagedShape;
-  EXPECT_THAT(mend_all(), testing::Not(testing::Contains(kFar)));
+// The rest is dark, and holds nothing.
+TEST_F(MendGroups, AreNoFartherOffTheirLinesThanPrintMovesThem) {
+  darken_all_but({11, 12, 13});
+  const Sightings all = seen_;
+  const auto mended_at = [&](float off_px) {
+    seen_ = all;
+    see(12, true_centre(2, 2) + Eigen::Vector2f(0, off_px));
+    return mend_all().size();
+  };
+  EXPECT_EQ(mended_at(3), 3);
+  EXPECT_EQ(mended_at(6), 0);
+}
+
+TEST_F(MendGroups, LieWhereTheOthersHaveThem) {
+  darken_all_but({11, 12, 13});
+  const Sightings all = seen_;
+  const auto mended_beside = [&](float along_px) {
+    seen_ = all;
+    for (int i = 0; i < kCount; ++i) seen_.nodes[i].centre_px.x() += along_px, seen_.moments[i].x += along_px;
+    return mend_all().size();
+  };
+  EXPECT_EQ(mended_beside(0.4F), 3);
+  EXPECT_EQ(mended_beside(1.6F), 0);
+}
+
+// As where the surface turns away beneath them.
+TEST_F(MendGroups, AreTiltedAsTheOthersAre) {
+  darken_all_but({12, 11, 13});
+  const Sightings all = seen_;
+  const auto mended_in = [&](float share) {
+    seen_ = all;
+    const Eigen::Vector2f middle = true_centre(2, 2);
+    for (int i = 0; i < kCount; ++i) {
+      float& x = seen_.nodes[i].centre_px.x();
+      x = middle.x() + share * (x - middle.x());
+      seen_.moments[i].x = x;
+    }
+    return mend_all().size();
+  };
+  EXPECT_EQ(mended_in(1.01F), 3);
+  EXPECT_EQ(mended_in(1.09F), 0);
 }
 
 // What their lines are said to be is half a pixel from where the pattern lies.
@@ -199,17 +231,21 @@ TEST_F(MendGroups, LieOnTheirLines) {
 }
 
 TEST_F(MendGroups, ShowTheirMiddlesAndMostOfTheirLetters) {
+  darken_all_but({11, 12, 13});
   const Grey8 whole = frame_;
   const Sightings all = seen_;
-  const auto is_mended_under = [&](double ink, double to_the_left, double to_the_right) {
+  const auto mended_under = [&](auto&& share) {
     frame_ = whole, seen_ = all;
-    // Once upon a symbol where the others hold it as they are.
-    print([&](double x, double) { return x > to_the_left && x < to_the_right ? ink : 1; });
-    return std::ranges::count(mend_all(), kWorn) == 1;
+    print(share);
+    return mend_all().size();
   };
-  EXPECT_TRUE(is_mended_under(1, 0, 0));
-  EXPECT_TRUE(is_mended_under(0.5, -4, 4)) << "print darkens its middle";
-  EXPECT_FALSE(is_mended_under(0.05, -4, 4)) << "something hides its middle";
+  const auto strip = [](double ink, double half_px) {
+    return [=](double x, double) { return std::abs(x) < half_px ? ink : 1; };
+  };
+  EXPECT_EQ(mended_under(strip(1, 0)), 3);
+  EXPECT_EQ(mended_under(strip(0.5, 3)), 3) << "print darkens its middle";
+  EXPECT_EQ(mended_under(strip(0.05, 3)), 0) << "something hides its middle";
+  EXPECT_EQ(mended_under([](double, double y) { return y > 1 ? 0.05 : 1; }), 0) << "half of it is missing";
 }
 
 TEST_F(MendGroups, AreNotOfAnotherLetter) {
