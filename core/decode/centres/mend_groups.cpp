@@ -227,7 +227,7 @@ void SymbolMender::refuse_torn_lines(const Scene& scene) {
   for (const std::size_t i : agreeing_) votes_[i] = kAgrees;
   task_of_.assign(seen.size(), -1);
   for (std::size_t i = 0; i < asked_.size(); ++i) task_of_[asked_[i]] = static_cast<std::int32_t>(i);
-  // What is misread shows something else, too; what cannot be aligned shows nothing.
+  // What is misread, or was not asked, speaks against its line, too; what cannot be aligned says nothing.
   const auto vote_of = [&](std::int32_t node) -> std::uint8_t {
     if (seen.claims[node].status == RegionStatus::kDecoded) return kAgrees;
     if (task_of_[node] < 0) return kAgainst;

@@ -2,15 +2,12 @@
 // Copyright the slsd authors
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "core/decode/centres/mend_symbols.hpp"
 #include "tests/core/decode/mended_plane.hpp"
 
 namespace slsd {
 namespace {
-
-using test::kTilted;
 
 /// None of the plane stands: each is damaged, and its centroid has gone across its line, as beneath lines of print.
 class MendGroups : public test::MendedPlane {
