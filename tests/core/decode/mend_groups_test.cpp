@@ -39,15 +39,16 @@ class MendGroups : public test::MendedPlane {
         for (int x = u - 9; x <= u + 9; ++x) frame_.at(x, y) = whole.at(x, y);
     }
   }
+  /// Ends the frame so many columns to the right of the last of the first row.
+  void cut_beyond(int columns_px) {
+    const Grey8 whole = frame_;
+    frame_ = Grey8(static_cast<int>(true_centre(0, kSide - 1).x()) + columns_px, whole.height());
+    for (int y = 0; y < whole.height(); ++y) std::copy_n(whole.row(y), frame_.width(), frame_.row(y));
+  }
   /// One that is well seen, and of nothing that is known.
   void put_other_light_at(int node) {
     seen_.claims[node] = {.status = RegionStatus::kNoCodeword};
     seen_.shapes[node].letter = 0, seen_.shapes[node].distance = 1;
-  }
-  [[nodiscard]] std::vector<std::int32_t> mend_all() {
-    SymbolMender mender(pattern_);
-    return mender.mend(frame_.view(), 255, {.dark_variance = 1}, 0.7F, CellGate(cells_, segments_, 1.5), prototypes_,
-                       seen_);
   }
   [[nodiscard]] float off_px(int node) const {
     const GreyMoments& moments = seen_.moments[node];
@@ -132,11 +133,10 @@ TEST_F(MendGroups, MayHaveOtherLightBehindWhatStands) {
 TEST_F(MendGroups, LieBesideNoBorder) {
   const Sightings all = seen_;
   const Grey8 whole = frame_;
-  const Eigen::Vector2f last = true_centre(0, kSide - 1);
   const auto mended_before = [&](int columns_px) {
     seen_ = all;
-    frame_ = Grey8(static_cast<int>(last.x()) + columns_px, whole.height());
-    for (int y = 0; y < whole.height(); ++y) std::copy_n(whole.row(y), frame_.width(), frame_.row(y));
+    frame_ = whole;
+    cut_beyond(columns_px);
     return mend_all().size();
   };
   const float pitch_px = seen_.nodes[kWorn].frame.col(0).norm() * static_cast<float>(pattern_.pitch_px());
@@ -150,9 +150,7 @@ TEST_F(MendGroups, AreThereThoughOthersLieBesideTheBorder) {
     seen_.nodes[row * kSide + kSide - 1].links[kLeft] = -1;
   }
   darken_all_but({5, 6, 7, 8, 9});
-  const Grey8 whole = frame_;
-  frame_ = Grey8(static_cast<int>(true_centre(0, kSide - 1).x()) + 20, whole.height());
-  for (int y = 0; y < whole.height(); ++y) std::copy_n(whole.row(y), frame_.width(), frame_.row(y));
+  cut_beyond(20);
   EXPECT_THAT(mend_all(), testing::ElementsAre(5, 6, 7, 8));
 }
 

@@ -207,11 +207,6 @@ class MendWhatOneHolds : public MendOneOfMany {
     seen_.claims[kBelow].status = RegionStatus::kDamagedShape, seen_.claims[kBelow].island = 0;
     seen_.nodes[kBelow].centre_px += Eigen::Vector2f(2, -3);
   }
-  [[nodiscard]] std::vector<std::int32_t> mend_all() {
-    SymbolMender mender(pattern_);
-    return mender.mend(frame_.view(), 255, {.dark_variance = 1}, 0.7F, CellGate(cells_, segments_, 1.5), prototypes_,
-                       seen_);
-  }
 };
 
 TEST_F(MendWhatOneHolds, LeavesItWhereNothingElseSpeaksForIt) {

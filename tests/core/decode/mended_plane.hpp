@@ -78,11 +78,14 @@ class MendedPlane : public testing::Test {
     }
   }
 
+  [[nodiscard]] std::vector<std::int32_t> mend_all() {
+    SymbolMender mender(pattern_);
+    return mender.mend(frame_.view(), 255, {.dark_variance = 1}, 0.7F, CellGate(cells_, segments_, 1.5), prototypes_,
+                       seen_);
+  }
   /// How far off the symbol is then, camera px; nothing where it is not mended.
   std::optional<float> mend() {
-    SymbolMender mender(pattern_);
-    const CellGate gate(cells_, segments_, 1.5);
-    const auto& mended = mender.mend(frame_.view(), 255, {.dark_variance = 1}, 0.7F, gate, prototypes_, seen_);
+    const auto mended = mend_all();
     if (mended.empty()) return std::nullopt;
     EXPECT_THAT(mended, testing::ElementsAre(static_cast<std::int32_t>(kWorn)));
     EXPECT_EQ(seen_.claims[kWorn].status, RegionStatus::kDecoded);
