@@ -68,4 +68,9 @@ using ColourImage = Image<Rgb>;
 /// The grey image that the decoder reads: 8 or 16 bits a pixel, borrowed.
 using GreyView = std::variant<ImageView<std::uint8_t>, ImageView<std::uint16_t>>;
 
+/// Width and height.
+[[nodiscard]] inline std::pair<int, int> size_of(const GreyView& image) {
+  return std::visit([](const auto& view) { return std::pair(view.width, view.height); }, image);
+}
+
 }  // namespace slsd

@@ -95,7 +95,7 @@ std::uint8_t Decoder::camera_index() const {
 }
 
 Result<> Decoder::check_size(const GreyView& frame) const {
-  const auto [width, height] = std::visit([](const auto& view) { return std::pair(view.width, view.height); }, frame);
+  const auto [width, height] = size_of(frame);
   const Lens& lens = parts_->camera.lens;
   if (width == lens.width_px && height == lens.height_px) return {};
   return fail(ErrorCode::kMismatch, "the frame has " + size_text(width, height) +

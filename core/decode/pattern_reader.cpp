@@ -39,10 +39,6 @@ Lens any_lens(const PatternOptions& options) {
           .fy = static_cast<double>(options.projector_width_px)};
 }
 
-std::pair<int, int> size_of(const GreyView& frame) {
-  return std::visit([](const auto& view) { return std::pair(view.width, view.height); }, frame);
-}
-
 /// 1, 1/step, step, 1/step^2, ...
 std::vector<double> scales_to_try() {
   std::vector<double> scales{1};

@@ -225,9 +225,8 @@ std::shared_ptr<const FollowedFrame> GridFollower::follow(const DenseFrame& fram
     const std::lock_guard lock(shared_->mutex);
     from = shared_->frame;
   }
-  const std::size_t pixels = std::visit(
-      [](const auto& view) { return static_cast<std::size_t>(view.width) * static_cast<std::size_t>(view.height); },
-      frame.pixels);
+  const auto [width, height] = size_of(frame.pixels);
+  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   if (!from || from->pixels.size() != pixels || from->nodes.size() != grid.nodes().size() || from->full != frame.full)
     return nullptr;
   columns_.resize(std::max(columns_.size(), static_cast<std::size_t>(executor.workers())));

@@ -21,10 +21,6 @@ namespace {
 /// What light is trusted: of the brightest of the white image, and in standard deviations of its noise.
 constexpr float kFaintShare = 0.02F, kFaintSigma = 4, kFaintLevels = 2;
 
-std::pair<int, int> size_of(const GreyView& image) {
-  return std::visit([](const auto& view) { return std::pair(view.width, view.height); }, image);
-}
-
 float full_of(const GreyView& image) {
   return image.index() == 0 ? std::numeric_limits<std::uint8_t>::max() : std::numeric_limits<std::uint16_t>::max();
 }

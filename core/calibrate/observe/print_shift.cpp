@@ -109,9 +109,6 @@ std::vector<Edge> edges_of(const Image<float>& light, const Board& board, const 
 
 PrintShift find_print_shift(const GreyView& white, const GreyView& pattern, const Board& board,
                             const BoardSighting& sighting) {
-  const auto size_of = [](const GreyView& picture) {
-    return std::visit([](const auto& view) { return std::pair(view.width, view.height); }, picture);
-  };
   if (size_of(white) != size_of(pattern)) return {};
   const std::vector<Edge> edges = edges_of(log_light(white), board, sighting);
   if (edges.size() < kEdgesMin) return {};

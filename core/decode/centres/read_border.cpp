@@ -95,8 +95,8 @@ bool BorderReader::shows_another(const GreyView& frame, const PatternField& lett
 void BorderReader::refuse(const GreyView& frame, float blur_px, Sightings& seen) {
   refused_.clear();
   const PatternField& letters = letters_->at(blur_px);
-  const auto frame_px = std::visit(
-      [](const auto& view) { return Eigen::Vector2f(Eigen::Vector2i(view.width, view.height).cast<float>()); }, frame);
+  const auto [width, height] = size_of(frame);
+  const Eigen::Vector2f frame_px(static_cast<float>(width), static_cast<float>(height));
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const auto node = static_cast<std::int32_t>(i);
     const CellClaim& claim = seen.claims[i];
