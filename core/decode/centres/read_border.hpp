@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/code/pattern.hpp"
-#include "core/decode/centres/mend_symbols.hpp"
+#include "core/decode/centres/align_letters.hpp"
 #include "core/decode/grid/link_grid.hpp"
 #include "core/decode/grid/sightings.hpp"
 #include "core/image.hpp"

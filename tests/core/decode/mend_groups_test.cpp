@@ -120,6 +120,40 @@ TEST_F(MendGroups, LieBesideNoOtherLight) {
   EXPECT_EQ(mend_all().size(), kCount - 1) << "what is worn itself says nothing";
 }
 
+// A symbol that no island has named is of their surface where its letter is the pattern's there, another island's where
+// its cell is.
+TEST_F(MendGroups, LieBesideTheirOwnLight) {
+  const Sightings all = seen_;
+  const int letter = pattern_.array.at(kRow, kColumn);
+  const auto mended_beside = [&](const CellClaim& claim, int shown) {
+    seen_ = all;
+    put_other_light_at(0);
+    seen_.claims[0] = claim, seen_.shapes[0].letter = static_cast<std::int8_t>(shown);
+    return mend_all().size();
+  };
+  const int other_letter = (letter + 1) % static_cast<int>(pattern_.options.symbols.size());
+  const CellClaim unnamed{.status = RegionStatus::kNoCodeword};
+  EXPECT_EQ(mended_beside(unnamed, letter), kCount - 1);
+  EXPECT_EQ(mended_beside(unnamed, other_letter), 0);
+  CellClaim named{.row = kRow, .column = kColumn, .status = RegionStatus::kDamagedShape, .island = 1};
+  EXPECT_EQ(mended_beside(named, letter), kCount) << "of another island, and where the pattern has it";
+  named.column += 7;
+  EXPECT_EQ(mended_beside(named, letter), 0) << "the same letter, elsewhere";
+}
+
+// One beside it tells of its light; where it is, all those around it.
+TEST_F(MendGroups, HaveOneBesideThem) {
+  darken_all_but({11, 12, 13});
+  const Sightings all = seen_;
+  const auto cut = [&](int node, Direction d, int other) {
+    seen_.nodes[node].links[d] = -1, seen_.nodes[other].links[opposite(d)] = -1;
+  };
+  cut(11, kUp, 6), cut(11, kDown, 16), cut(11, kLeft, 10);
+  EXPECT_THAT(mend_all(), testing::ElementsAre(11, 12, 13));
+  cut(11, kRight, 12);
+  EXPECT_THAT(mend_all(), testing::IsEmpty());
+}
+
 // Behind those that stand is no way for what is not of their surface.
 TEST_F(MendGroups, MayHaveOtherLightBehindWhatStands) {
   put_other_light_at(0);
@@ -186,8 +220,8 @@ TEST_F(MendGroups, LieWhereTheOthersHaveThem) {
     for (int i = 0; i < kCount; ++i) seen_.nodes[i].centre_px.x() += along_px, seen_.moments[i].x += along_px;
     return mend_all().size();
   };
-  EXPECT_EQ(mended_beside(0.4F), 3);
-  EXPECT_EQ(mended_beside(1.25F), 0);
+  EXPECT_EQ(mended_beside(1), 3);
+  EXPECT_EQ(mended_beside(1.4F), 0);
 }
 
 // As where the surface turns away beneath them: their column is where it was.
@@ -253,6 +287,20 @@ TEST_F(MendGroups, AreNotOfAnotherLetter) {
   // Each is said to be the cell one row on.
   for (CellClaim& claim : seen_.claims) ++claim.row;
   EXPECT_THAT(mend_all(), testing::IsEmpty());
+}
+
+// Beyond the edge of the pattern no letter is right.
+TEST_F(MendGroups, EndWithThePattern) {
+  for (CellClaim& claim : seen_.claims) claim.row = static_cast<std::int16_t>(claim.row - kRow - 1);
+  for (int column = 0; column < kSide; ++column) seen_.claims[column] = {.status = RegionStatus::kNoCodeword};
+  Surroundings surroundings(pattern_);
+  EXPECT_TRUE(surroundings.are_undisputed(seen_, kWorn, kCount));
+  seen_.shapes[2].distance = 1;
+  for (std::size_t letter = 0; letter < pattern_.options.symbols.size(); ++letter) {
+    seen_.shapes[2].letter = static_cast<std::int8_t>(letter);
+    EXPECT_FALSE(surroundings.are_undisputed(seen_, kWorn, kCount));
+  }
+  EXPECT_TRUE(surroundings.are_undisputed(seen_, kWorn, 1)) << "it is two links away";
 }
 
 // An edge along the row leaves whole those whose halves are of one letter. The rest is dark: it would hold them.

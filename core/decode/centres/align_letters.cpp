@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/centres/align_letters.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/LU>
+
+#include "core/code/symbol.hpp"
+#include "core/decode/centres/align_symbols.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr AlignOptions kAlign;
+constexpr int kSteps = 5;
+/// A shape's misfit squared says that its centre is off by a hundredth of it, camera px: see CentreJudge.
+constexpr float kMisfitSquaredPerPx = 100;
+
+/// One standard deviation of an aligned letter's place, projector px.
+float sigma_px(const PatchTask& task) {
+  return aligned_sigma_px(task.residual * task.residual * task.variance, task.scatter, task.support);
+}
+
+/// Every letter in a square of twice its side.
+Grey8 draw_letters(const PatternOptions& pattern) {
+  const int size_px = pattern.symbol_size_px, cell_px = 2 * size_px, margin = size_px / 2;
+  const int letters = static_cast<int>(pattern.symbols.size());
+  Grey8 image(letters * cell_px, cell_px);
+  for (int letter = 0; letter < letters; ++letter) {
+    const Grey8 symbol = draw_symbol(pattern.symbols[letter], size_px);
+    for (int y = 0; y < size_px; ++y) {
+      std::uint8_t* row = image.row(margin + y) + letter * cell_px + margin;
+      for (int x = 0; x < size_px; ++x) row[x] = symbol.at(x, y) != 0 ? 255 : 0;
+    }
+  }
+  return image;
+}
+
+/// @param reach  px from the middle to the square's sides
+LightShares shares_of_square(const LetterScene& scene, const PatchTask& task, const Eigen::Vector2f& middle_px,
+                             int reach) {
+  constexpr float kInk = 0.2F;  // of the light of what is not printed on, at least
+  const PatchState& state = task.state;
+  const float limit = kAlign.outlier_sigmas * std::hypot(task.noise, kAlign.misfit_share * state.gain);
+  const Eigen::Vector2i middle = middle_px.array().round().matrix().cast<int>();
+  // The letter lies in a plane, as the grid around it does.
+  const Eigen::Vector2f from = projector_offset(task.map, state, {0, 0}),
+                        right = projector_offset(task.map, state, {1, 0}) - from,
+                        down = projector_offset(task.map, state, {0, 1}) - from,
+                        origin = from + task.map.origin_px.cast<float>();
+  const auto light_at = [&](const Eigen::Vector2f& off) {
+    const Eigen::Vector2f pixel = origin + off.x() * right + off.y() * down;
+    return (state.gain + state.gain_x * off.x() + state.gain_y * off.y()) *
+           scene.letters.at(pixel.x(), pixel.y()).value;
+  };
+  const auto count = [&](const auto& view) {
+    int agree = 0, brighter = 0, brighter_there = 0, darkened = 0;
+    for (int y = middle.y() - reach; y <= middle.y() + reach; ++y) {
+      for (int x = middle.x() - reach; x <= middle.x() + reach; ++x) {
+        if (!view.contains(x, y)) continue;
+        const float expected = light_at({static_cast<float>(x - task.x), static_cast<float>(y - task.y)});
+        const float light = static_cast<float>(view.at(x, y)) - state.offset;
+        agree += std::abs(light - expected) <= limit;
+        brighter += light - state.gain > limit;
+        brighter_there += light - expected > limit;
+        darkened += expected - light > limit && light > std::max(limit, kInk * expected);
+      }
+    }
+    const auto share = [pixels = (2 * reach + 1) * (2 * reach + 1)](int of_them) {
+      return static_cast<float>(of_them) / static_cast<float>(pixels);
+    };
+    return LightShares{share(agree), share(brighter), share(brighter_there), share(darkened)};
+  };
+  return std::visit(count, scene.frame);
+}
+
+}  // namespace
+
+LetterFields::LetterFields(const PatternOptions& pattern)
+    : cell_px_(static_cast<float>(2 * pattern.symbol_size_px)), fields_(draw_letters(pattern)) {}
+
+Eigen::Vector2f LetterFields::middle_px(int letter) const {
+  const float middle = 0.5F * (cell_px_ - 1);
+  return {static_cast<float>(letter) * cell_px_ + middle, middle};
+}
+
+float LightShares::agree_beside_print() const {
+  return agree / std::max(1 - darkened, 0.4F);
+}
+
+LetterAligner::LetterAligner(const Pattern& pattern, std::shared_ptr<const LetterFields> letters)
+    : array_(pattern.array), pitch_px_(static_cast<float>(pattern.pitch_px())), letters_(std::move(letters)) {}
+
+void LetterAligner::ask(const LetterScene& scene, std::int32_t node, const LetterPlace& place) {
+  const auto [width, height] = size_of(scene.frame);
+  const int x = static_cast<int>(std::lround(place.centre_px.x())),
+            y = static_cast<int>(std::lround(place.centre_px.y())),
+            reach = static_cast<int>(std::ceil(0.5F * pitch_px_ * place.frame.colwise().norm().maxCoeff()));
+  if (x < reach || y < reach || x + reach >= width || y + reach >= height) return;
+  const CellClaim& claim = scene.seen.claims[node];
+  const Eigen::Vector2f middle = letters_->middle_px(letter_of(claim));
+  PatchTask task;
+  task.x = x, task.y = y;
+  task.noise = scene.noise.at(0.5F * (place.background + place.peak));
+  // The light around it to begin with, so that what is printed there counts little from the first step on.
+  task.state.gain = place.peak - place.background, task.state.offset = place.background;
+  // The letter lies as the place does; what depth moves it by is an offset along the epipolar line, which a tilt makes
+  // another from pixel to pixel.
+  PatchMap& map = task.map;
+  map.middle_px = {static_cast<float>(x), static_cast<float>(y)};
+  map.origin_px = middle.cast<int>();
+  map.along = scene.gate.way_of_line(node, claim.row, claim.column);
+  map.shift = {map.along.x(), map.along.y(), 0};
+  map.base.setIdentity();
+  map.base.topLeftCorner<2, 2>() = place.frame.inverse();
+  map.base.topRightCorner<2, 1>() =
+      middle - map.origin_px.cast<float>() + map.base.topLeftCorner<2, 2>() * (map.middle_px - place.centre_px);
+  asked_.push_back({.node = node, .place = place, .task = task});
+}
+
+/// In windows that lie within their cells: beyond is what neighbours light.
+void LetterAligner::align(const LetterScene& scene) {
+  std::array<PatchTask*, kEight> eight;
+  for (std::size_t first = 0; first < asked_.size(); first += kEight) {
+    const std::size_t count = std::min<std::size_t>(kEight, asked_.size() - first);
+    float side_px = std::numeric_limits<float>::max();
+    for (std::size_t i = 0; i < count; ++i) {
+      eight[i] = &asked_[first + i].task;
+      side_px = std::min(side_px, pitch_px_ * asked_[first + i].place.frame.colwise().norm().minCoeff());
+    }
+    const int window_px = 2 * static_cast<int>(0.5F * side_px) + 1;
+    for (int step = 0; step < kSteps; ++step)
+      align_eight(scene.frame, scene.full, scene.letters, kAlign, window_px, {eight.data(), count});
+  }
+  for (AskedLetter& asked : asked_) {
+    const PatchTask& task = asked.task;
+    const int letter = letter_of(scene.seen.claims[asked.node]);
+    const Eigen::Vector2f middle = letters_->middle_px(letter) - task.map.origin_px.cast<float>();
+    const auto seen_at = [&](const Eigen::Vector2f& off) -> Eigen::Vector2f {
+      return task.map.middle_px + camera_offset(task.map, task.state, off);
+    };
+    asked.centre_px = seen_at(middle);
+    asked.centroid_px = seen_at(middle + scene.prototypes[letter].centroid_px);
+    const Eigen::RowVector2f slopes(task.state.slope_x, task.state.slope_y);
+    asked.tilt_px = 0.5F * pitch_px_ * (slopes * asked.place.frame).norm();
+  }
+}
+
+LightShares LetterAligner::shares_of_middle(const LetterScene& scene, const AskedLetter& asked) const {
+  constexpr int kReachPx = 2;
+  return shares_of_square(scene, asked.task, asked.centre_px, kReachPx);
+}
+
+LightShares LetterAligner::shares_of_cell(const LetterScene& scene, const AskedLetter& asked) const {
+  const int reach = static_cast<int>(0.5F * pitch_px_ * asked.place.frame.colwise().norm().minCoeff());
+  return shares_of_square(scene, asked.task, asked.task.map.middle_px, reach);
+}
+
+float LetterAligner::support_beside_print(const LetterScene& scene, const AskedLetter& asked) const {
+  return std::max(asked.task.support, shares_of_cell(scene, asked).agree_beside_print());
+}
+
+void LetterAligner::take_over(const LetterScene& scene, const AskedLetter& asked) const {
+  const auto& [node, place, task, centre_px, centroid_px, tilt_px] = asked;
+  Sightings& seen = scene.seen;
+  seen.nodes[node].centre_px = centre_px;
+  seen.nodes[node].frame = place.frame;
+  GreyMoments& moments = seen.moments[node];
+  moments.x = centroid_px.x(), moments.y = centroid_px.y();
+  moments.background = task.state.offset, moments.peak = task.state.offset + task.state.gain;
+  const float camera_px = std::sqrt(std::abs(place.frame.determinant()));
+  seen.misfits[node] = std::sqrt(kMisfitSquaredPerPx * sigma_px(task) * camera_px);
+  seen.claims[node].status = RegionStatus::kDecoded;
+}
+
+}  // namespace slsd

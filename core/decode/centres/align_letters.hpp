@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/align/align_eight.hpp"
+#include "core/align/pattern_field.hpp"
+#include "core/code/pattern.hpp"
+#include "core/decode/grid/cell_gate.hpp"
+#include "core/decode/grid/sightings.hpp"
+#include "core/decode/symbols/prototypes.hpp"
+#include "core/exposure/frame_noise.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+/// The letters of a pattern, each dark all round, at some blurs.
+/// @thread thread-safe
+class LetterFields {
+ public:
+  explicit LetterFields(const PatternOptions& pattern);
+  /// That of the nearest blur.
+  /// @param blur_px  standard deviation, projector px
+  [[nodiscard]] const PatternField& at(float blur_px) const { return fields_.nearest(blur_px); }
+  /// Where in them the middle of a letter's square is.
+  [[nodiscard]] Eigen::Vector2f middle_px(int letter) const;
+
+ private:
+  float cell_px_;
+  PatternFields fields_;
+};
+
+/// A frame, and what is known of it when letters are aligned.
+struct LetterScene {
+  const GreyView& frame;
+  double full;  ///< the level of a saturated pixel
+  const FrameNoise& noise;
+  const PatternField& letters;  ///< as blurred as the pattern is in the frame
+  const CellGate& gate;         ///< that knows the epipolar lines
+  std::span<const Prototype> prototypes;
+  Sightings& seen;
+};
+
+/// Where a symbol is looked for, and in what light.
+struct LetterPlace {
+  Eigen::Vector2f centre_px = Eigen::Vector2f::Zero();  ///< of its square, in the camera
+  LatticeFrame frame = LatticeFrame::Zero();
+  float background = 0, peak = 0;  ///< grey levels
+  int held_by = 0;                 ///< neighbours; none: there is no place
+};
+
+/// One letter in its cell, and what aligning has found.
+struct AskedLetter {
+  std::int32_t node;  ///< in Sightings
+  LetterPlace place;
+  PatchTask task;
+  /// Where the middle of its square and its centroid are seen, camera px.
+  Eigen::Vector2f centre_px = Eigen::Vector2f::Zero(), centroid_px = Eigen::Vector2f::Zero();
+  float tilt_px = 0;  ///< how far its tilt from its place's moves the middles of its cell's sides, projector px
+};
+
+/// Of the pixels in a square, those that agree with the letter, those that are brighter than its light or than it is
+/// there, and those that it lights, but less than it should, as on print.
+struct LightShares {
+  float agree, brighter, brighter_there, darkened;
+  /// Of those that print leaves as they are, counted as two fifths at least: fewer tell too little.
+  [[nodiscard]] float agree_beside_print() const;
+};
+
+/// Aligns letters, whose cells are known, with what there is of them in a frame: the equations of precision = "fine",
+/// eight at a time.
+/// @thread thread-bound: keeps its buffers; the letters are shared with copies
+class LetterAligner {
+ public:
+  LetterAligner(const Pattern& pattern, std::shared_ptr<const LetterFields> letters);
+
+  void clear() { asked_.clear(); }
+  /// Looks for a symbol at a place, unless its cell reaches beyond the frame there.
+  void ask(const LetterScene& scene, std::int32_t node, const LetterPlace& place);
+  void align(const LetterScene& scene);
+  /// In the order in which they were asked.
+  [[nodiscard]] std::vector<AskedLetter>& asked() { return asked_; }
+  [[nodiscard]] const std::vector<AskedLetter>& asked() const { return asked_; }
+
+  [[nodiscard]] int letter_of(const CellClaim& claim) const { return array_.at(claim.row, claim.column); }
+  [[nodiscard]] LightShares shares_of_middle(const LetterScene& scene, const AskedLetter& asked) const;
+  [[nodiscard]] LightShares shares_of_cell(const LetterScene& scene, const AskedLetter& asked) const;
+  /// How much of the window agrees, or of the cell, where print does not count.
+  [[nodiscard]] float support_beside_print(const LetterScene& scene, const AskedLetter& asked) const;
+  /// Decodes the sighting with what was found.
+  void take_over(const LetterScene& scene, const AskedLetter& asked) const;
+
+ private:
+  CodeArray array_;
+  float pitch_px_;
+  std::shared_ptr<const LetterFields> letters_;
+  std::vector<AskedLetter> asked_;
+};
+
+/// Off its epipolar line, projector px, and by the last step along it: what is farther off, or moves on, lies there by
+/// chance.
+inline constexpr float kAlignedAcrossMaxPx = 0.4F, kAlignedSettledPx = 0.05F;
+/// Parts of two surfaces look tilted more, and the place is then on neither.
+inline constexpr float kAlignedTiltMaxPx = 0.5F;
+
+}  // namespace slsd

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/code/pattern.hpp"
+#include "core/decode/centres/align_letters.hpp"
+#include "core/decode/grid/neighbourhood.hpp"
+#include "core/decode/grid/sightings.hpp"
+
+namespace slsd {
+
+/// Tells whether what lies around a symbol that does not stand may all be of its surface.
+/// @thread thread-bound: keeps its buffers
+class Surroundings {
+ public:
+  explicit Surroundings(const Pattern& pattern);
+
+  /// Whether nothing disputes a node's cell that links on the grid lead to through what does not stand: nothing is well
+  /// seen and has another cell, or another letter than the pattern has there.
+  /// @param reach   links
+  /// @param is_end  (node, whether it has the cell that the links lead to) -> bool: what else disputes it
+  template <class IsEnd>
+  [[nodiscard]] bool are_undisputed(const Sightings& seen, std::int32_t node, int reach, const IsEnd& is_end);
+  [[nodiscard]] bool are_undisputed(const Sightings& seen, std::int32_t node, int reach);
+  /// Those that the last look has come to and that have the cell that the links lead to.
+  [[nodiscard]] const std::vector<std::int32_t>& of_surface() const { return of_surface_; }
+
+ private:
+  CodeArray array_;
+  float pitch_px_;
+  LinkWalk walk_;
+  std::vector<std::int32_t> of_surface_;
+};
+
+/// Finds the places of symbols where nothing beside them stands that could hold them: those beside each other hold each
+/// other. A plane of the grid is laid through what is known of them, and three and more that show their letters where
+/// it has them are decoded. See docs/decoder.md, "Where nothing stands".
+/// @thread thread-bound: keeps its buffers; the letters are shared with copies
+class GroupMender {
+ public:
+  GroupMender(const Pattern& pattern, std::shared_ptr<const LetterFields> letters);
+
+  /// @return  the sightings that are decoded now; stands until the next call
+  const std::vector<std::int32_t>& mend(const LetterScene& scene);
+
+ private:
+  void find_members(const LetterScene& scene);
+  [[nodiscard]] LetterPlace place_of(const LetterScene& scene, std::int32_t node);
+  [[nodiscard]] bool shows_letter(const LetterScene& scene, const AskedLetter& asked) const;
+  void refuse_torn_lines(const LetterScene& scene);
+  void keep_groups(const Sightings& seen);
+
+  float pitch_px_, size_px_;
+  LetterAligner aligner_;
+  Surroundings surroundings_;
+  LinkWalk walk_;
+  std::vector<std::uint8_t> is_on_line_;        // of each island, whether any of it is
+  std::vector<std::uint8_t> verdicts_, votes_;  // of each sighting; of each that was asked
+  std::vector<std::int32_t> members_;           // sightings
+  std::vector<std::int32_t> asked_of_;          // of each sighting, or -1
+  std::vector<std::size_t> agreeing_;           // of those asked
+  std::vector<std::uint8_t> agrees_;            // of each sighting; none is between calls
+  std::vector<std::int32_t> mended_;
+};
+
+}  // namespace slsd
