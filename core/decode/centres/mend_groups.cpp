@@ -109,7 +109,7 @@ void GroupMender::find_members(const LetterScene& scene) {
   };
   enum : std::uint8_t { kUnknown, kUndisputed, kDisputed };
   verdicts_.assign(seen.size(), kUnknown);
-  members_.clear();
+  to_ask_.clear();
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const auto node = static_cast<std::int32_t>(i);
     if (!may_hold(node)) continue;
@@ -123,7 +123,7 @@ void GroupMender::find_members(const LetterScene& scene) {
       for (const std::int32_t other : surroundings_.of_surface())
         verdicts_[other] = undisputed ? kUndisputed : kDisputed;
     }
-    if (verdicts_[node] == kUndisputed) members_.push_back(node);
+    if (verdicts_[node] == kUndisputed) to_ask_.push_back(node);
   }
 }
 
@@ -195,24 +195,20 @@ void GroupMender::refuse_torn_lines(const LetterScene& scene) {
   constexpr int kAgreeingToOne = 3;
   constexpr float kOtherLight = 0.1F;  // of a cell
   const Sightings& seen = scene.seen;
-  const std::vector<AskedLetter>& asked = aligner_.asked();
-  enum Vote : std::uint8_t { kUnknown, kAgrees, kAgainst, kNone };
-  votes_.assign(asked.size(), kUnknown);
-  for (const std::size_t i : agreeing_) votes_[i] = kAgrees;
-  asked_of_.assign(seen.size(), -1);
-  for (std::size_t i = 0; i < asked.size(); ++i) asked_of_[asked[i].node] = static_cast<std::int32_t>(i);
+  enum class Vote : std::uint8_t { kAgrees, kAgainst, kNone };
   // What is misread, or was not asked, speaks against its line, too; what cannot be aligned says nothing.
-  const auto vote_of = [&](std::int32_t node) -> std::uint8_t {
-    if (seen.claims[node].status == RegionStatus::kDecoded) return kAgrees;
-    if (asked_of_[node] < 0) return kAgainst;
-    const AskedLetter& letter = asked[asked_of_[node]];
-    std::uint8_t& vote = votes_[asked_of_[node]];
-    if (vote != kUnknown) return vote;
-    const bool against = !letter.task.failed && aligner_.shares_of_cell(scene, letter).brighter_there >= kOtherLight;
-    return vote = against ? kAgainst : kNone;
+  const auto vote_of = [&](std::int32_t node) {
+    if (seen.claims[node].status == RegionStatus::kDecoded) return Vote::kAgrees;
+    if (asked_of_[node] < 0) return Vote::kAgainst;
+    Member& member = known_[asked_of_[node]];
+    if (member.shows_letter) return Vote::kAgrees;
+    if (!member.shows_other_light)
+      member.shows_other_light =
+          !member.letter.task.failed && aligner_.shares_of_cell(scene, member.letter).brighter_there >= kOtherLight;
+    return *member.shows_other_light ? Vote::kAgainst : Vote::kNone;
   };
-  const auto is_on_torn_line = [&](std::size_t i) {
-    const std::int32_t node = asked[i].node;
+  const auto is_on_torn_line = [&](std::int32_t i) {
+    const std::int32_t node = known_[i].letter.node;
     if (seen.claims[node].status != RegionStatus::kNeighboursDisagree) return false;
     return std::ranges::any_of(std::array{kRight, kDown}, [&](Direction forth) {
       int agreeing = 0, against = 0;
@@ -221,8 +217,8 @@ void GroupMender::refuse_torn_lines(const LetterScene& scene) {
         for (int link = 0; link < kFar && other >= 0; ++link, other = seen.nodes[other].links[d]) {
           const CellClaim& claim = seen.claims[other];
           if (!claim.named() || claim.island != seen.claims[node].island) continue;
-          const std::uint8_t vote = vote_of(other);
-          agreeing += vote == kAgrees, against += vote == kAgainst;
+          const Vote vote = vote_of(other);
+          agreeing += vote == Vote::kAgrees, against += vote == Vote::kAgainst;
         }
       }
       return agreeing < kAgreeingToOne * against;
@@ -235,9 +231,9 @@ void GroupMender::refuse_torn_lines(const LetterScene& scene) {
 void GroupMender::keep_groups(const Sightings& seen) {
   enum : std::uint8_t { kNo, kAgrees, kInGroup };
   agrees_.assign(seen.size(), kNo);
-  const auto node_of = [&](std::size_t i) { return aligner_.asked()[i].node; };
-  for (const std::size_t i : agreeing_) agrees_[node_of(i)] = kAgrees;
-  for (const std::size_t i : agreeing_) {
+  const auto node_of = [&](std::int32_t i) { return known_[i].letter.node; };
+  for (const std::int32_t i : agreeing_) agrees_[node_of(i)] = kAgrees;
+  for (const std::int32_t i : agreeing_) {
     if (agrees_[node_of(i)] != kAgrees) continue;
     const auto look = [&](const LinkWalk::Stop& from, const LinkWalk::Stop& to, Direction d) {
       return agrees_[to.node] != kNo && member_beside(seen, from.node, d) >= 0 ? LinkWalk::Go::kOn
@@ -247,25 +243,54 @@ void GroupMender::keep_groups(const Sightings& seen) {
         walk_.walk(seen.nodes, node_of(i), std::numeric_limits<int>::max(), look);
     for (const LinkWalk::Stop& stop : group) agrees_[stop.node] = group.size() >= kFewestBeside ? kInGroup : kNo;
   }
-  std::erase_if(agreeing_, [&](std::size_t i) { return agrees_[node_of(i)] != kInGroup; });
+  std::erase_if(agreeing_, [&](std::int32_t i) { return agrees_[node_of(i)] != kInGroup; });
+}
+
+/// Those that are still where they were in an earlier round are as they were then.
+void GroupMender::align_members(const LetterScene& scene) {
+  aligner_.clear();
+  asked_of_.assign(scene.seen.size(), -1);
+  for (const std::int32_t node : to_ask_) {
+    const LetterPlace place = place_of(scene, node);
+    if (place.held_by == 0) continue;
+    const std::int32_t known = known_of_[node];
+    if (known >= 0 && known_[known].letter.place == place) {
+      asked_of_[node] = known;
+    } else {
+      aligner_.ask(scene, node, place);
+    }
+  }
+  aligner_.align(scene);
+  for (const AskedLetter& letter : aligner_.asked()) {
+    const Member member{.letter = letter, .shows_letter = shows_letter(scene, letter)};
+    std::int32_t& known = known_of_[letter.node];
+    if (known < 0) {
+      known = static_cast<std::int32_t>(known_.size());
+      known_.push_back(member);
+    } else {
+      known_[known] = member;
+    }
+    asked_of_[letter.node] = known;
+  }
+}
+
+void GroupMender::start(const Sightings& seen) {
+  known_.clear();
+  known_of_.assign(seen.size(), -1);
 }
 
 const std::vector<std::int32_t>& GroupMender::mend(const LetterScene& scene) {
   find_members(scene);
-  aligner_.clear();
-  for (const std::int32_t node : members_)
-    if (const LetterPlace place = place_of(scene, node); place.held_by > 0) aligner_.ask(scene, node, place);
-  aligner_.align(scene);
-  const std::vector<AskedLetter>& asked = aligner_.asked();
+  align_members(scene);
   agreeing_.clear();
-  for (std::size_t i = 0; i < asked.size(); ++i)
-    if (shows_letter(scene, asked[i])) agreeing_.push_back(i);
+  for (const std::int32_t node : to_ask_)
+    if (const std::int32_t i = asked_of_[node]; i >= 0 && known_[i].shows_letter) agreeing_.push_back(i);
   refuse_torn_lines(scene);
   keep_groups(scene.seen);
   mended_.clear();
-  for (const std::size_t i : agreeing_) {
-    aligner_.take_over(scene, asked[i]);
-    mended_.push_back(asked[i].node);
+  for (const std::int32_t i : agreeing_) {
+    aligner_.take_over(scene, known_[i].letter);
+    mended_.push_back(known_[i].letter.node);
   }
   return mended_;
 }

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/code/pattern.hpp"
@@ -44,11 +45,20 @@ class GroupMender {
  public:
   GroupMender(const Pattern& pattern, std::shared_ptr<const LetterFields> letters);
 
+  /// To be called before the first of a frame's rounds.
+  void start(const Sightings& seen);
+  /// One round: what is decoded between two of them may hold more.
   /// @return  the sightings that are decoded now; stands until the next call
   const std::vector<std::int32_t>& mend(const LetterScene& scene);
 
  private:
+  struct Member {
+    AskedLetter letter;
+    bool shows_letter;
+    std::optional<bool> shows_other_light = std::nullopt;  // where it was asked for
+  };
   void find_members(const LetterScene& scene);
+  void align_members(const LetterScene& scene);
   [[nodiscard]] LetterPlace place_of(const LetterScene& scene, std::int32_t node);
   [[nodiscard]] bool shows_letter(const LetterScene& scene, const AskedLetter& asked) const;
   void refuse_torn_lines(const LetterScene& scene);
@@ -58,12 +68,14 @@ class GroupMender {
   LetterAligner aligner_;
   Surroundings surroundings_;
   LinkWalk walk_;
-  std::vector<std::uint8_t> is_on_line_;        // of each island, whether any of it is
-  std::vector<std::uint8_t> verdicts_, votes_;  // of each sighting; of each that was asked
-  std::vector<std::int32_t> members_;           // sightings
-  std::vector<std::int32_t> asked_of_;          // of each sighting, or -1
-  std::vector<std::size_t> agreeing_;           // of those asked
-  std::vector<std::uint8_t> agrees_;            // of each sighting; none is between calls
+  std::vector<std::uint8_t> is_on_line_;  // of each island, whether any of it is
+  std::vector<std::uint8_t> verdicts_;    // of each sighting
+  std::vector<std::int32_t> to_ask_;      // sightings
+  std::vector<Member> known_;             // of the frame, each as it was aligned last
+  std::vector<std::int32_t> known_of_;    // of each sighting, or -1
+  std::vector<std::int32_t> asked_of_;    // of each sighting, those that take part in this round
+  std::vector<std::int32_t> agreeing_;    // of known_
+  std::vector<std::uint8_t> agrees_;      // of each sighting
   std::vector<std::int32_t> mended_;
 };
 

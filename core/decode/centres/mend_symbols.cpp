@@ -223,6 +223,7 @@ const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, doubl
                                                     std::span<const Prototype> prototypes, Sightings& seen) {
   const LetterScene scene{frame, full, noise, letters_->at(blur_px), gate, prototypes, seen};
   mended_.clear(), turned_.clear();
+  groups_.start(seen);
   ask_all(scene);
   std::size_t since = 0;
   for (bool first = true;; first = false) {
