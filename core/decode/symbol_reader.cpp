@@ -44,8 +44,10 @@ SymbolReader::SymbolReader(const IndexedPattern& indexed, const Lens& projector,
       linker_({.pitch_px = static_cast<float>(pattern().pitch_px())}),
       window_decoder_(pattern(), indexed.codebook(), options.wrong_cells_max),
       review_(pattern(), {}),
-      mender_(pattern()),
-      border_reader_(pattern(), mender_.letters()),
+      letters_(std::make_shared<const LetterFields>(pattern().options)),
+      mender_(pattern(), letters_),
+      torn_lines_(pattern(), letters_),
+      border_reader_(pattern(), letters_),
       correspondence_({.pitch_px = static_cast<float>(pattern().pitch_px()),
                        .symbol_size_px = static_cast<float>(pattern().options.symbol_size_px),
                        .rows = pattern().whole_rows(),
@@ -151,8 +153,11 @@ float SymbolReader::blur_px() const {
 /// Where epipolar lines are known, and all stages before go the default way.
 void SymbolReader::mend(const GreyView& frame, EpipolarView& view) {
   if (options_.any_paper()) return;
-  mended_ = mender_.mend(frame, 255.0 * finder_.frame_levels(), finder_.noise(), blur_px(), gate_of(&view),
-                         look_->as_measured, seen_);
+  const CellGate gate = gate_of(&view);
+  const LetterScene scene{
+      frame, 255.0 * finder_.frame_levels(), finder_.noise(), letters_->at(blur_px()), gate, look_->as_measured, seen_};
+  mended_ = mender_.mend(scene);
+  torn_lines_.refuse(scene);
   for (const std::int32_t sighting : mended_) view.look_again_at(sighting, seen_);
 }
 

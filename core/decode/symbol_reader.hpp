@@ -13,6 +13,7 @@
 #include "core/decode/centres/mend_symbols.hpp"
 #include "core/decode/centres/read_border.hpp"
 #include "core/decode/centres/symbol_match.hpp"
+#include "core/decode/centres/torn_lines.hpp"
 #include "core/decode/decoding.hpp"
 #include "core/decode/grid/decode_windows.hpp"
 #include "core/decode/grid/epipolar_view.hpp"
@@ -98,7 +99,9 @@ class SymbolReader {
   GridLinker linker_;
   WindowDecoder window_decoder_;
   SymbolReview review_;
+  std::shared_ptr<const LetterFields> letters_;
   SymbolMender mender_;
+  TornLines torn_lines_;
   BorderReader border_reader_;
   Correspondence correspondence_;
   CentreCorrection centre_correction_;

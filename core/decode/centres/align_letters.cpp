@@ -41,39 +41,43 @@ Grey8 draw_letters(const PatternOptions& pattern) {
 }
 
 /// @param reach  px from the middle to the square's sides
-LightShares shares_of_square(const LetterScene& scene, const PatchTask& task, const Eigen::Vector2f& middle_px,
+LightShares shares_of_square(const LetterScene& scene, const AskedLetter& asked, const Eigen::Vector2f& middle_px,
                              int reach) {
-  constexpr float kInk = 0.2F;  // of the light of what is not printed on, at least
+  constexpr float kInk = 0.2F;                // of the light of what is not printed on, at least
+  constexpr float kDark = 0.4F, kLit = 0.3F;  // of the letter's light; of that around it
+  const PatchTask& task = asked.task;
   const PatchState& state = task.state;
   const float limit = kAlign.outlier_sigmas * std::hypot(task.noise, kAlign.misfit_share * state.gain);
+  const float usual_gain = asked.place.peak - asked.place.background;
   const Eigen::Vector2i middle = middle_px.array().round().matrix().cast<int>();
   // The letter lies in a plane, as the grid around it does.
   const Eigen::Vector2f from = projector_offset(task.map, state, {0, 0}),
                         right = projector_offset(task.map, state, {1, 0}) - from,
                         down = projector_offset(task.map, state, {0, 1}) - from,
                         origin = from + task.map.origin_px.cast<float>();
-  const auto light_at = [&](const Eigen::Vector2f& off) {
+  const auto letter_at = [&](const Eigen::Vector2f& off) {
     const Eigen::Vector2f pixel = origin + off.x() * right + off.y() * down;
-    return (state.gain + state.gain_x * off.x() + state.gain_y * off.y()) *
-           scene.letters.at(pixel.x(), pixel.y()).value;
+    return scene.letters.at(pixel.x(), pixel.y()).value;
   };
   const auto count = [&](const auto& view) {
-    int agree = 0, brighter = 0, brighter_there = 0, darkened = 0;
+    int agree = 0, brighter = 0, beside = 0, darkened = 0;
     for (int y = middle.y() - reach; y <= middle.y() + reach; ++y) {
       for (int x = middle.x() - reach; x <= middle.x() + reach; ++x) {
         if (!view.contains(x, y)) continue;
-        const float expected = light_at({static_cast<float>(x - task.x), static_cast<float>(y - task.y)});
+        const Eigen::Vector2f off(static_cast<float>(x - task.x), static_cast<float>(y - task.y));
+        const float letter = letter_at(off);
+        const float expected = (state.gain + state.gain_x * off.x() + state.gain_y * off.y()) * letter;
         const float light = static_cast<float>(view.at(x, y)) - state.offset;
         agree += std::abs(light - expected) <= limit;
         brighter += light - state.gain > limit;
-        brighter_there += light - expected > limit;
+        beside += light - expected > limit && letter < kDark && light > kLit * usual_gain;
         darkened += expected - light > limit && light > std::max(limit, kInk * expected);
       }
     }
     const auto share = [pixels = (2 * reach + 1) * (2 * reach + 1)](int of_them) {
       return static_cast<float>(of_them) / static_cast<float>(pixels);
     };
-    return LightShares{share(agree), share(brighter), share(brighter_there), share(darkened)};
+    return LightShares{share(agree), share(brighter), share(beside), share(darkened)};
   };
   return std::visit(count, scene.frame);
 }
@@ -152,12 +156,17 @@ void LetterAligner::align(const LetterScene& scene) {
 
 LightShares LetterAligner::shares_of_middle(const LetterScene& scene, const AskedLetter& asked) const {
   constexpr int kReachPx = 2;
-  return shares_of_square(scene, asked.task, asked.centre_px, kReachPx);
+  return shares_of_square(scene, asked, asked.centre_px, kReachPx);
 }
 
 LightShares LetterAligner::shares_of_cell(const LetterScene& scene, const AskedLetter& asked) const {
   const int reach = static_cast<int>(0.5F * pitch_px_ * asked.place.frame.colwise().norm().minCoeff());
-  return shares_of_square(scene, asked.task, asked.task.map.middle_px, reach);
+  return shares_of_square(scene, asked, asked.task.map.middle_px, reach);
+}
+
+bool LetterAligner::shows_other_light(const LetterScene& scene, const AskedLetter& asked) const {
+  constexpr float kOfCell = 0.06F;
+  return !asked.task.failed && shares_of_cell(scene, asked).beside >= kOfCell;
 }
 
 float LetterAligner::support_beside_print(const LetterScene& scene, const AskedLetter& asked) const {

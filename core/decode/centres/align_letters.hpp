@@ -65,10 +65,10 @@ struct AskedLetter {
   float tilt_px = 0;  ///< how far its tilt from its place's moves the middles of its cell's sides, projector px
 };
 
-/// Of the pixels in a square, those that agree with the letter, those that are brighter than its light or than it is
-/// there, and those that it lights, but less than it should, as on print.
+/// Of the pixels in a square, those that agree with the letter, those that are brighter than its light, those that are
+/// lit beside it, where it is dark, and those that it lights, but less than it should, as on print.
 struct LightShares {
-  float agree, brighter, brighter_there, darkened;
+  float agree, brighter, beside, darkened;
   /// Of those that print leaves as they are, counted as two fifths at least: fewer tell too little.
   [[nodiscard]] float agree_beside_print() const;
 };
@@ -91,6 +91,8 @@ class LetterAligner {
   [[nodiscard]] int letter_of(const CellClaim& claim) const { return array_.at(claim.row, claim.column); }
   [[nodiscard]] LightShares shares_of_middle(const LetterScene& scene, const AskedLetter& asked) const;
   [[nodiscard]] LightShares shares_of_cell(const LetterScene& scene, const AskedLetter& asked) const;
+  /// Whether there is light in its cell where its letter has none, as where two surfaces share it: print gives none.
+  [[nodiscard]] bool shows_other_light(const LetterScene& scene, const AskedLetter& asked) const;
   /// How much of the window agrees, or of the cell, where print does not count.
   [[nodiscard]] float support_beside_print(const LetterScene& scene, const AskedLetter& asked) const;
   /// Decodes the sighting with what was found.
@@ -108,5 +110,7 @@ class LetterAligner {
 inline constexpr float kAlignedAcrossMaxPx = 0.4F, kAlignedSettledPx = 0.05F;
 /// Parts of two surfaces look tilted more, and the place is then on neither.
 inline constexpr float kAlignedTiltMaxPx = 0.5F;
+/// What has one alone beside it lies nearer to its line, and is seen better, where print does not count.
+inline constexpr float kLoneAcrossMaxPx = 0.2F, kLoneSupportMin = 0.85F;
 
 }  // namespace slsd

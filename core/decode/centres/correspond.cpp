@@ -149,7 +149,7 @@ class Surroundings {
   /// The border of the frame cuts the symbol there, or hides it.
   [[nodiscard]] bool is_unread(std::int32_t node, Direction d) const {
     const GridNode& from = nodes_[node];
-    const CellClaim::Cell cell = claims_[node].beyond(d);
+    const CellClaim::Cell cell = claims_[node].cell().beyond(d);
     const bool shown = cell.row >= 0 && cell.column >= 0 && cell.row < options_.rows && cell.column < options_.columns;
     if (from.links[d] >= 0 || !shown) return false;
     const Eigen::Vector2f there = from.centre_px + options_.pitch_px * (from.frame * step(d));

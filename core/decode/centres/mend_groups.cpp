@@ -51,11 +51,10 @@ Eigen::Vector2f onto_line(const LetterScene& scene, std::int32_t node, int lette
 
 }  // namespace
 
-Surroundings::Surroundings(const Pattern& pattern)
-    : array_(pattern.array), pitch_px_(static_cast<float>(pattern.pitch_px())) {}
+Disputes::Disputes(const Pattern& pattern) : array_(pattern.array), pitch_px_(static_cast<float>(pattern.pitch_px())) {}
 
 template <class IsEnd>
-bool Surroundings::are_undisputed(const Sightings& seen, std::int32_t node, int reach, const IsEnd& is_end) {
+bool Disputes::none_around(const Sightings& seen, std::int32_t node, int reach, const IsEnd& is_end) {
   const CellClaim& claim = seen.claims[node];
   bool undisputed = !is_end(node, true);
   of_surface_.assign(1, node);
@@ -63,7 +62,8 @@ bool Surroundings::are_undisputed(const Sightings& seen, std::int32_t node, int 
     const CellClaim& there = seen.claims[to.node];
     const int row = claim.row + to.rows, column = claim.column + to.columns;
     const bool has_cell = there.same_cell(row, column);
-    if (has_cell && there.status == RegionStatus::kDecoded) return LinkWalk::Go::kPast;
+    const bool stands = there.status == RegionStatus::kDecoded && there.island == claim.island;
+    if (stands && has_cell) return LinkWalk::Go::kPast;
     if (is_off_grid(seen, from.node, to.node, d, pitch_px_)) return LinkWalk::Go::kPast;
     const Classification& shape = seen.shapes[to.node];
     const bool on_array = row >= 0 && column >= 0 && row < array_.rows && column < array_.columns;
@@ -77,15 +77,15 @@ bool Surroundings::are_undisputed(const Sightings& seen, std::int32_t node, int 
   return undisputed;
 }
 
-bool Surroundings::are_undisputed(const Sightings& seen, std::int32_t node, int reach) {
-  return are_undisputed(seen, node, reach, [](std::int32_t, bool) { return false; });
+bool Disputes::none_around(const Sightings& seen, std::int32_t node, int reach) {
+  return none_around(seen, node, reach, [](std::int32_t, bool) { return false; });
 }
 
 GroupMender::GroupMender(const Pattern& pattern, std::shared_ptr<const LetterFields> letters)
     : pitch_px_(static_cast<float>(pattern.pitch_px())),
       size_px_(static_cast<float>(pattern.options.symbol_size_px)),
       aligner_(pattern, std::move(letters)),
-      surroundings_(pattern) {}
+      disputes_(pattern) {}
 
 /// Those that may hold each other: nothing disputes what is around them, as far as nothing stands, and the border of
 /// the frame, beyond which something might, is not there. Another projector's islands lie beside their lines, all that
@@ -119,9 +119,8 @@ void GroupMender::find_members(const LetterScene& scene) {
         return (has_cell && verdicts_[other] == kDisputed) ||
                is_at_border(there.centre_px, there.frame, size_px_ + 2 * pitch_px_, frame_px);
       };
-      const bool undisputed = surroundings_.are_undisputed(seen, node, std::numeric_limits<int>::max(), is_end);
-      for (const std::int32_t other : surroundings_.of_surface())
-        verdicts_[other] = undisputed ? kUndisputed : kDisputed;
+      const bool undisputed = disputes_.none_around(seen, node, std::numeric_limits<int>::max(), is_end);
+      for (const std::int32_t other : disputes_.of_surface()) verdicts_[other] = undisputed ? kUndisputed : kDisputed;
     }
     if (verdicts_[node] == kUndisputed) to_ask_.push_back(node);
   }
@@ -174,17 +173,19 @@ LetterPlace GroupMender::place_of(const LetterScene& scene, std::int32_t node) {
 }
 
 /// Whether its letter is seen where the others have it, tilted as they are. What print darkens does not count: but what
-/// is seen in its middle may be nothing else.
+/// is seen in its middle may be nothing else. With one beside it, it may lie beyond the edge of their surface.
 bool GroupMender::shows_letter(const LetterScene& scene, const AskedLetter& asked) const {
   constexpr float kMovedMax = 0.06F;  // of the pitch
   constexpr float kMiddleMin = 0.6F, kSupportMin = 0.75F;
   const PatchTask& task = asked.task;
   if (task.failed || std::abs(task.moved) > kAlignedSettledPx) return false;
-  if (std::abs(task.state.across) > kAlignedAcrossMaxPx || !(asked.tilt_px <= kAlignedTiltMaxPx)) return false;
-  if (std::abs(task.state.disparity) > kMovedMax * pitch_px_) return false;
+  const bool lone = asked.place.held_by == 1;
+  if (std::abs(task.state.across) > (lone ? kLoneAcrossMaxPx : kAlignedAcrossMaxPx)) return false;
+  if (std::abs(task.state.disparity) > kMovedMax * pitch_px_ || !(asked.tilt_px <= kAlignedTiltMaxPx)) return false;
   const LightShares middle = aligner_.shares_of_middle(scene, asked);
   if (middle.agree + middle.darkened < kMiddleMin) return false;
-  return task.support >= kSupportMin || aligner_.support_beside_print(scene, asked) >= kSupportMin;
+  const float support_min = lone ? kLoneSupportMin : kSupportMin;
+  return task.support >= support_min || aligner_.support_beside_print(scene, asked) >= support_min;
 }
 
 /// Of those that agree leaves out those that had been refused where too many of their row or column show light that
@@ -192,8 +193,7 @@ bool GroupMender::shows_letter(const LetterScene& scene, const AskedLetter& aske
 /// has parted. Those whose halves are of one letter are whole there, too.
 void GroupMender::refuse_torn_lines(const LetterScene& scene) {
   constexpr int kFar = 8;
-  constexpr int kAgreeingToOne = 3;
-  constexpr float kOtherLight = 0.1F;  // of a cell
+  constexpr int kAgreeingToOne = 2;
   const Sightings& seen = scene.seen;
   enum class Vote : std::uint8_t { kAgrees, kAgainst, kNone };
   // What is misread, or was not asked, speaks against its line, too; what cannot be aligned says nothing.
@@ -202,9 +202,7 @@ void GroupMender::refuse_torn_lines(const LetterScene& scene) {
     if (asked_of_[node] < 0) return Vote::kAgainst;
     Member& member = known_[asked_of_[node]];
     if (member.shows_letter) return Vote::kAgrees;
-    if (!member.shows_other_light)
-      member.shows_other_light =
-          !member.letter.task.failed && aligner_.shares_of_cell(scene, member.letter).brighter_there >= kOtherLight;
+    if (!member.shows_other_light) member.shows_other_light = aligner_.shows_other_light(scene, member.letter);
     return *member.shows_other_light ? Vote::kAgainst : Vote::kNone;
   };
   const auto is_on_torn_line = [&](std::int32_t i) {

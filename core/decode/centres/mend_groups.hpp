@@ -14,19 +14,19 @@
 
 namespace slsd {
 
-/// Tells whether what lies around a symbol that does not stand may all be of its surface.
+/// What lies around a symbol that does not stand and speaks against its cell.
 /// @thread thread-bound: keeps its buffers
-class Surroundings {
+class Disputes {
  public:
-  explicit Surroundings(const Pattern& pattern);
+  explicit Disputes(const Pattern& pattern);
 
   /// Whether nothing disputes a node's cell that links on the grid lead to through what does not stand: nothing is well
   /// seen and has another cell, or another letter than the pattern has there.
   /// @param reach   links
   /// @param is_end  (node, whether it has the cell that the links lead to) -> bool: what else disputes it
   template <class IsEnd>
-  [[nodiscard]] bool are_undisputed(const Sightings& seen, std::int32_t node, int reach, const IsEnd& is_end);
-  [[nodiscard]] bool are_undisputed(const Sightings& seen, std::int32_t node, int reach);
+  [[nodiscard]] bool none_around(const Sightings& seen, std::int32_t node, int reach, const IsEnd& is_end);
+  [[nodiscard]] bool none_around(const Sightings& seen, std::int32_t node, int reach);
   /// Those that the last look has come to and that have the cell that the links lead to.
   [[nodiscard]] const std::vector<std::int32_t>& of_surface() const { return of_surface_; }
 
@@ -66,7 +66,7 @@ class GroupMender {
 
   float pitch_px_, size_px_;
   LetterAligner aligner_;
-  Surroundings surroundings_;
+  Disputes disputes_;
   LinkWalk walk_;
   std::vector<std::uint8_t> is_on_line_;  // of each island, whether any of it is
   std::vector<std::uint8_t> verdicts_;    // of each sighting

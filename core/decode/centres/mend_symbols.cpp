@@ -19,8 +19,8 @@ constexpr int kHeldBy = 2;
 constexpr float kMovedMax = 0.08F;
 /// Against kAlignedTiltMaxPx: at a corner of what is decoded the surface may turn away.
 constexpr float kTiltAtCornersMaxPx = 1;
-/// What one alone holds lies nearer to its line, is tilted less, and is seen better: projector px, and of the patch.
-constexpr float kLoneAcrossMaxPx = 0.2F, kLoneTiltMaxPx = 0.25F, kLoneSupportMin = 0.85F;
+/// What one alone holds is tilted less.
+constexpr float kLoneTiltMaxPx = 0.25F;
 /// Where so much of its middle is brighter than the letter's light, something lies before it.
 constexpr float kHidden = 0.5F;
 /// From which misfit on, or how far off its line in projector px, what is decoded is aligned, too: whole symbols are
@@ -103,12 +103,11 @@ bool shows_centre(const AskedLetter& asked, const LightShares& middle) {
 
 }  // namespace
 
-SymbolMender::SymbolMender(const Pattern& pattern)
+SymbolMender::SymbolMender(const Pattern& pattern, const std::shared_ptr<const LetterFields>& letters)
     : pitch_px_(static_cast<float>(pattern.pitch_px())),
-      letters_(std::make_shared<const LetterFields>(pattern.options)),
-      aligner_(pattern, letters_),
-      groups_(pattern, letters_),
-      surroundings_(pattern) {}
+      aligner_(pattern, letters),
+      groups_(pattern, letters),
+      disputes_(pattern) {}
 
 /// What is worn, and what its surroundings have refused, where as far as it could have come with them nothing disputes
 /// it.
@@ -116,7 +115,7 @@ bool SymbolMender::is_asked(const LetterScene& scene, std::int32_t node) {
   constexpr int kReach = 3;
   const CellClaim& claim = scene.seen.claims[node];
   if (claim.status == RegionStatus::kNeighboursDisagree)
-    return claim.named() && surroundings_.are_undisputed(scene.seen, node, kReach);
+    return claim.named() && disputes_.none_around(scene.seen, node, kReach);
   return is_worn(scene.gate, scene.seen, node);
 }
 
@@ -218,12 +217,9 @@ void SymbolMender::mend_asked(const LetterScene& scene, Held held) {
   }
 }
 
-const std::vector<std::int32_t>& SymbolMender::mend(const GreyView& frame, double full, const FrameNoise& noise,
-                                                    float blur_px, const CellGate& gate,
-                                                    std::span<const Prototype> prototypes, Sightings& seen) {
-  const LetterScene scene{frame, full, noise, letters_->at(blur_px), gate, prototypes, seen};
+const std::vector<std::int32_t>& SymbolMender::mend(const LetterScene& scene) {
   mended_.clear(), turned_.clear();
-  groups_.start(seen);
+  groups_.start(scene.seen);
   ask_all(scene);
   std::size_t since = 0;
   for (bool first = true;; first = false) {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <memory>
-#include <span>
 #include <vector>
 
 #include "core/decode/centres/align_letters.hpp"
@@ -19,19 +18,12 @@ namespace slsd {
 /// @thread thread-bound: keeps its buffers; the letters are shared with copies
 class SymbolMender {
  public:
-  explicit SymbolMender(const Pattern& pattern);
+  SymbolMender(const Pattern& pattern, const std::shared_ptr<const LetterFields>& letters);
 
-  [[nodiscard]] const std::shared_ptr<const LetterFields>& letters() const { return letters_; }
-
-  /// @param full        the level of a saturated pixel
-  /// @param blur_px     of the pattern in the frame, standard deviation, projector px
-  /// @param gate        that knows the epipolar lines
-  /// @param prototypes  of the letters: where the points of their cells are
-  /// @param seen        in and out: what is mended is decoded, with another place, frame, light and misfit, and what is
-  ///                    damaged and hidden in its middle has a misfit without bounds
-  /// @return            the sightings that are mended, in their order; stands until the next call
-  const std::vector<std::int32_t>& mend(const GreyView& frame, double full, const FrameNoise& noise, float blur_px,
-                                        const CellGate& gate, std::span<const Prototype> prototypes, Sightings& seen);
+  /// What is mended is decoded, with another place, frame, light and misfit, and what is damaged and hidden in its
+  /// middle has a misfit without bounds.
+  /// @return  the sightings that are mended, in their order; stands until the next call
+  const std::vector<std::int32_t>& mend(const LetterScene& scene);
 
  private:
   enum class Held : std::uint8_t { kByOne, kByTwo, kAtCorner };
@@ -44,10 +36,9 @@ class SymbolMender {
   [[nodiscard]] bool lies_there(const Sightings& seen, const AskedLetter& asked) const;
 
   float pitch_px_;
-  std::shared_ptr<const LetterFields> letters_;
   LetterAligner aligner_;
   GroupMender groups_;
-  Surroundings surroundings_;
+  Disputes disputes_;
   std::vector<std::int32_t> to_ask_, mended_;  // sightings
   std::vector<std::int32_t> turned_;           // sightings at corners, tilted more than others may be
   std::vector<std::size_t> agreeing_;          // of those asked, that show their letters where they should be

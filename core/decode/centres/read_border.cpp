@@ -104,7 +104,7 @@ void BorderReader::refuse(const GreyView& frame, float blur_px, Sightings& seen)
     const GridNode& from = seen.nodes[i];
     if (std::ranges::none_of(from.links, [](std::int32_t other) { return other < 0; })) continue;
     for (const Direction d : kDirections) {
-      const CellClaim::Cell cell = claim.beyond(d);
+      const CellClaim::Cell cell = claim.cell().beyond(d);
       if (from.links[d] >= 0 || cell.row < 0 || cell.column < 0 || cell.row >= rows_ || cell.column >= columns_)
         continue;
       const std::int32_t behind = decoded_beside(seen.nodes, seen.claims, node, opposite(d));

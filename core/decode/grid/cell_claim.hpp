@@ -28,20 +28,21 @@ struct CellClaim {
 
   struct Cell {
     int row, column;
+    /// The one beside it, one step on.
+    [[nodiscard]] Cell beyond(Direction d) const {
+      return {row + (d == kDown) - (d == kUp), column + (d == kRight) - (d == kLeft)};
+    }
   };
 
   [[nodiscard]] bool named() const { return row >= 0; }
   [[nodiscard]] bool same_cell(int other_row, int other_column) const {
     return row == other_row && column == other_column;
   }
-  /// The cell beside its own, one step on.
-  [[nodiscard]] Cell beyond(Direction d) const {
-    return {row + (d == kDown) - (d == kUp), column + (d == kRight) - (d == kLeft)};
-  }
+  [[nodiscard]] Cell cell() const { return {row, column}; }
   /// Whether a neighbour's cell lies beside its own as the neighbour does.
   [[nodiscard]] bool fits(const CellClaim& neighbour, Direction d) const {
-    const Cell cell = beyond(d);
-    return neighbour.same_cell(cell.row, cell.column);
+    const Cell there = cell().beyond(d);
+    return neighbour.same_cell(there.row, there.column);
   }
 };
 

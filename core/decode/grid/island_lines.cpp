@@ -193,7 +193,7 @@ void IslandJudge::cut_slid(const Frame& frame, std::int32_t island) {
   for (const std::int32_t node : members) {
     if (links_[node] == kAllAgree) continue;
     for (const Direction d : kDirections) {
-      const auto cell = frame.claims[node].beyond(d);
+      const auto cell = frame.claims[node].cell().beyond(d);
       const std::int32_t other = frame.beside[node][d];
       if (other >= 0 && !continues(frame, node, d)) place(cell.row, cell.column, other);
     }
@@ -252,7 +252,7 @@ void IslandJudge::cut_slid_along(const Frame& frame, std::int32_t island, const 
 
 /// How many nodes on from the end of a line, of so many, may be its own and say nothing for it.
 float IslandJudge::count_doubtful(const Frame& frame, std::int32_t node, Direction d, int most) const {
-  const auto first = frame.claims[node].beyond(d);
+  const auto first = frame.claims[node].cell().beyond(d);
   const int down = first.row - frame.claims[node].row, right = first.column - frame.claims[node].column;
   int row = first.row, column = first.column, count = 0;
   for (std::int32_t at = frame.beside[node][d]; at >= 0 && count < most; at = frame.beside[at][d]) {

@@ -175,7 +175,7 @@ IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, D
   Side side;
   any_along(piece, d, [&](std::int32_t node) {
     if (links_[node][d] == Link::kAgrees) side.bend += bend_of(frame, node, d), ++side.held_by;
-    const auto cell = frame.claims[node].beyond(d);
+    const auto cell = frame.claims[node].cell().beyond(d);
     const bool is_edge = parts(frame, node, d) && !frame.shapes[frame.beside[node][d]].is_torn();
     if (is_edge || !shown(cell.row, cell.column)) return false;
     side.contradicted |= is_of_another(frame, node, d);

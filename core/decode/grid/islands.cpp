@@ -43,7 +43,7 @@ bool IslandJudge::adopt(const Frame& frame, std::int32_t node, CellClaim& adopte
   for (const Direction d : kDirections) {
     const std::int32_t other = frame.beside[node][d];
     if (other < 0 || !frame.claims[other].named()) continue;
-    const auto cell = frame.claims[other].beyond(opposite(d));
+    const auto cell = frame.claims[other].cell().beyond(opposite(d));
     if (!shown(cell.row, cell.column)) continue;
     const auto end = candidates.begin() + count;
     const auto known = std::find_if(candidates.begin(), end, [&](const Candidate& candidate) {
@@ -168,7 +168,7 @@ void IslandJudge::read_links_of(const Frame& frame, std::int32_t node) {
 /// One that leads to what is none of the node's island, or not as its cell lies.
 IslandJudge::Link IslandJudge::read_link_out(const Frame& frame, std::int32_t node, Direction direction) const {
   const std::int32_t other = frame.beside[node][direction];
-  const auto cell = frame.claims[node].beyond(direction);
+  const auto cell = frame.claims[node].cell().beyond(direction);
   if (!shown(cell.row, cell.column)) return Link::kAgainst;
   const float speaks = ratio(frame, other, cell.row, cell.column);
   // A node of another island has a surface of its own, though its letter may fit here too.

@@ -293,14 +293,14 @@ TEST_F(MendGroups, AreNotOfAnotherLetter) {
 TEST_F(MendGroups, EndWithThePattern) {
   for (CellClaim& claim : seen_.claims) claim.row = static_cast<std::int16_t>(claim.row - kRow - 1);
   for (int column = 0; column < kSide; ++column) seen_.claims[column] = {.status = RegionStatus::kNoCodeword};
-  Surroundings surroundings(pattern_);
-  EXPECT_TRUE(surroundings.are_undisputed(seen_, kWorn, kCount));
+  Disputes disputes(pattern_);
+  EXPECT_TRUE(disputes.none_around(seen_, kWorn, kCount));
   seen_.shapes[2].distance = 1;
   for (std::size_t letter = 0; letter < pattern_.options.symbols.size(); ++letter) {
     seen_.shapes[2].letter = static_cast<std::int8_t>(letter);
-    EXPECT_FALSE(surroundings.are_undisputed(seen_, kWorn, kCount));
+    EXPECT_FALSE(disputes.none_around(seen_, kWorn, kCount));
   }
-  EXPECT_TRUE(surroundings.are_undisputed(seen_, kWorn, 1)) << "it is two links away";
+  EXPECT_TRUE(disputes.none_around(seen_, kWorn, 1)) << "it is two links away";
 }
 
 // An edge along the row leaves whole those whose halves are of one letter. The rest is dark: it would hold them.

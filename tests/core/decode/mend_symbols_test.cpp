@@ -110,8 +110,7 @@ TEST_F(MendOneOfMany, HoldsNothingThatIsTiltedMore) {
   const auto mended_at = [&](float share) {
     seen_ = all;
     for (GridNode& node : seen_.nodes) node.frame.col(0) *= share;
-    return SymbolMender(pattern_).mend(frame_.view(), 255, {.dark_variance = 1}, 0.7F, CellGate(cells_, segments_, 1.5),
-                                       prototypes_, seen_);
+    return mend_all();
   };
   EXPECT_THAT(mended_at(1.04F), testing::ElementsAre(kLeft, kWorn));
   EXPECT_THAT(mended_at(1.08F), testing::ElementsAre(kWorn));

@@ -78,10 +78,18 @@ class MendedPlane : public testing::Test {
     }
   }
 
+  /// What look(scene) makes of all that is seen.
+  template <class Look>
+  auto look(const Look& look) {
+    const GreyView view = frame_.view();
+    const FrameNoise noise{.dark_variance = 1};
+    const CellGate gate(cells_, segments_, 1.5);
+    return look(LetterScene{view, 255, noise, letters_->at(0.7F), gate, prototypes_, seen_});
+  }
   [[nodiscard]] std::vector<std::int32_t> mend_all() {
-    SymbolMender mender(pattern_);
-    return mender.mend(frame_.view(), 255, {.dark_variance = 1}, 0.7F, CellGate(cells_, segments_, 1.5), prototypes_,
-                       seen_);
+    return look([&](const LetterScene& scene) -> std::vector<std::int32_t> {
+      return SymbolMender(pattern_, letters_).mend(scene);
+    });
   }
   /// How far off the symbol is then, camera px; nothing where it is not mended.
   std::optional<float> mend() {
@@ -94,6 +102,7 @@ class MendedPlane : public testing::Test {
   }
 
   Pattern pattern_;
+  std::shared_ptr<const LetterFields> letters_ = std::make_shared<const LetterFields>(pattern_.options);
   Calibration rig_;
   Grey8 frame_;
   std::vector<Prototype> prototypes_;  // centroids in the middle of the square
