@@ -154,6 +154,19 @@ TEST_F(MendGroups, HaveOneBesideThem) {
   EXPECT_THAT(mend_all(), testing::IsEmpty());
 }
 
+TEST_F(MendGroups, AskForMoreOfWhatHasOneBesideIt) {
+  darken_all_but({12, 13, 14});
+  const Sightings all = seen_;
+  print([](double, double y) { return y > 3 ? 0.05 : 1; });
+  EXPECT_EQ(mend_all().size(), 3);
+  seen_ = all;
+  for (const Direction d : {kUp, kDown, kLeft}) {
+    seen_.nodes[seen_.nodes[kWorn].links[d]].links[opposite(d)] = -1;
+    seen_.nodes[kWorn].links[d] = -1;
+  }
+  EXPECT_THAT(mend_all(), testing::IsEmpty());
+}
+
 // Behind those that stand is no way for what is not of their surface.
 TEST_F(MendGroups, MayHaveOtherLightBehindWhatStands) {
   put_other_light_at(0);
