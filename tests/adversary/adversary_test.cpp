@@ -102,6 +102,27 @@ TEST(AdversaryFrames, NameNothingInARowThatAnEdgeRunsAlong) {
   for (const int number : {8000836, 13400308}) coarse.expect_none_wrong(Kind::kSlats3to6, number);
 }
 
+// What an edge along the row tears shows light beside its letters; what it leaves whole tells nothing.
+TEST(AdversaryFrames, NameNothingWhoseLineShowsOtherLight) {
+  Bench fine = Bench::of(8), coarse = Bench::of(16);
+  for (const int number : {15002303, 15100339, 15100981, 15300619, 15501327})
+    fine.expect_none_wrong(Kind::kShelves, number);
+  for (const int number : {14000702, 14001734, 14600478, 15201376, 15300300, 18000450, 19200474, 19601000})
+    coarse.expect_none_wrong(Kind::kShelves, number);
+  fine.expect_none_wrong(Kind::kSlats1, 18100161);
+  coarse.expect_none_wrong(Kind::kSlats1, 16100150);
+}
+
+// What lies around them is looked at beyond the symbols of other islands.
+TEST(AdversaryFrames, NameNoneThatHoldEachOtherOnAnotherSurface) {
+  Bench fine = Bench::of(8), coarse = Bench::of(16);
+  for (const int number : {19400035, 19500109}) fine.expect_none_wrong(Kind::kSlats1to2, number);
+  for (const int number : {19400939, 19701005}) fine.expect_none_wrong(Kind::kSlats2, number);
+  coarse.expect_none_wrong(Kind::kSlats2, 19501014);
+  fine.expect_none_wrong(Kind::kShelves, 19400373);
+  fine.expect_none_wrong(Kind::kPickets, 19500821);
+}
+
 // Symbols that the border cuts have no letter, and link with nothing.
 TEST(AdversaryFrames, NameNothingThatTheBorderOfTheFrameLeavesAlone) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);
