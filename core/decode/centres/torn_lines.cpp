@@ -3,7 +3,6 @@
 #include "core/decode/centres/torn_lines.hpp"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 
 #include "core/decode/grid/neighbourhood.hpp"
@@ -91,7 +90,7 @@ void TornLines::ask(const LetterScene& scene, std::int32_t node) {
                1};
     });
   }
-  aligner_.ask(scene, node, place);
+  if (place.held_by > 0) aligner_.ask(scene, node, place);
 }
 
 void TornLines::refuse(const LetterScene& scene) {

@@ -44,7 +44,7 @@ class LinkWalk {
   /// @param reach  links
   /// @param look   (from, to, direction) -> Go, asked of links to what has not been reached: whether to go on there, to
   ///               leave it out, or to end the walk
-  /// @return       what was reached, the node itself first; stands until the next walk, also as stops()
+  /// @return       what was reached, the node itself first; stands until the next walk
   template <class Look>
   const std::vector<Stop>& walk(const std::vector<GridNode>& nodes, std::int32_t node, int reach, const Look& look) {
     is_reached_.resize(nodes.size());
@@ -57,7 +57,6 @@ class LinkWalk {
     for (const Stop& stop : stops_) is_reached_[stop.node] = 0;
     return stops_;
   }
-  [[nodiscard]] const std::vector<Stop>& stops() const { return stops_; }
 
  private:
   template <class Look>

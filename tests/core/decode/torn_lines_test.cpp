@@ -121,5 +121,13 @@ TEST_F(OnTornLine, IsFollowedOverBrokenLinksAndGaps) {
   EXPECT_EQ(row(), "..x..");
 }
 
+// What no link leads back from cannot be looked for, and says nothing.
+TEST_F(OnTornLine, StaysWhereNoLinkLeadsBack) {
+  tear({0, 1, 3, 4});
+  for (const int column : {0, 1, 4}) seen_.nodes[kMiddle * kSide + column].links = {-1, -1, -1, -1};
+  refuse();
+  EXPECT_EQ(row(), "..w..");
+}
+
 }  // namespace
 }  // namespace slsd
