@@ -32,7 +32,7 @@ struct Decoder::Parts {
 
   const Lattice* lattice_read = nullptr;  // of this frame
 
-  [[nodiscard]] TriangulatedPoint solve(const LatticeSymbol& symbol) const;
+  void solve(const std::vector<LatticeSymbol>& symbols, Executor& executor);
   void place_symbols();
   void triangulate(const Lattice& lattice, double full, Executor& executor);
   void add_point(const LatticeSymbol& symbol, const Eigen::Vector2f& centre_px, const TriangulatedPoint& solved,
@@ -125,9 +125,20 @@ Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<dou
   return &parts_->decoding;
 }
 
-TriangulatedPoint Decoder::Parts::solve(const LatticeSymbol& symbol) const {
-  return triangulator.triangulate(view.ray_near(symbol.sighting, symbol.centre_px),
-                                  reader.cells().ray(symbol.row, symbol.column), symbol.sigma_px);
+void Decoder::Parts::solve(const std::vector<LatticeSymbol>& symbols, Executor& executor) {
+  solutions.resize(symbols.size());
+  executor.run_ranges(
+      symbols.size(),
+      [&](std::size_t first, std::size_t last, int) {
+        RayMatches matches;
+        for (std::size_t i = first; i < last; ++i) {
+          const LatticeSymbol& symbol = symbols[i];
+          matches.set(i - first, view.ray_near(symbol.sighting, symbol.centre_px),
+                      reader.cells().ray(symbol.row, symbol.column).direction, symbol.sigma_px);
+        }
+        triangulator.triangulate(matches, last - first, &solutions[first]);
+      },
+      PixelRays::kMost);
 }
 
 DecodedSymbols Decoder::symbols() {
@@ -139,22 +150,24 @@ DecodedSymbols Decoder::symbols() {
 
 void Decoder::Parts::place_symbols() {
   rays.clear(), depths_mm.clear();
-  for (const LatticeSymbol& symbol : lattice_read->symbols) {
+  SerialExecutor alone;
+  solve(lattice_read->symbols, alone);
+  for (const LatticeSymbol& symbol : lattice_read->symbols)
     rays.push_back(view.ray_near(symbol.sighting, symbol.centre_px));
-    const double depth = solve(symbol).point_in_camera.z();
+  for (const TriangulatedPoint& solved : solutions) {
+    const double depth = solved.point_in_camera.z();
     depths_mm.push_back(depth > 0 ? depth : options.depth_max_mm);
   }
 }
 
 void Decoder::Parts::triangulate(const Lattice& lattice, double full, Executor& executor) {
   const bool gated = options.correspond == Method::kDefault;
-  solutions.resize(lattice.symbols.size());
-  executor.run_ranges(solutions.size(), [&](std::size_t first, std::size_t last, int) {
-    for (std::size_t i = first; i < last; ++i) {
-      solutions[i] = aligner ? TriangulatedPoint{(*aligned)[i].point_in_camera, (*aligned)[i].sigma_mm}
-                             : solve(lattice.symbols[i]);
-    }
-  });
+  if (aligner) {
+    solutions.clear();
+    for (const AlignedSymbol& symbol : *aligned) solutions.push_back({symbol.point_in_camera, symbol.sigma_mm});
+  } else {
+    solve(lattice.symbols, executor);
+  }
   decoding.points.clear();
   for (std::size_t i = 0; i < lattice.symbols.size(); ++i) {
     const LatticeSymbol& symbol = lattice.symbols[i];

@@ -2,9 +2,11 @@
 // Copyright the slsd authors
 #include "core/geometry/epipolar_gate.hpp"
 
-#include <algorithm>
+#include <cmath>
 
 #include <Eigen/Geometry>
+
+#include "core/clones.hpp"
 
 namespace slsd {
 namespace {
@@ -12,66 +14,115 @@ namespace {
 // A point nearer than this to the projector's plane is taken for behind it.
 constexpr double kMinProjectorDepthMm = 1.0;
 
+/// x -> translation cross x
+Eigen::Matrix3d cross_with(const Eigen::Vector3d& t) {
+  Eigen::Matrix3d cross;
+  cross << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
+  return cross;
+}
+
+/// The numbers of many segments.
+struct Segments {
+  PixelRays::Column line_x, line_y, offset, axis_x, axis_y, least, most;
+};
+
+inline __attribute__((always_inline)) void find_segments(const EpipolarRig& rig, const PixelRays& rays,
+                                                         std::size_t count, Segments& to) {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  const auto& [rotation, start] = rig.projector_from_camera;
+  const Eigen::Matrix3d e = rig.line_from_camera, r = rotation;
+  const double start_x = start.x(), start_y = start.y(), start_z = start.z();
+  const double per_fx = rig.per_focal_px.x(), per_fy = rig.per_focal_px.y(), fx = rig.focal_px.x(),
+               fy = rig.focal_px.y();
+  const double depth_min = rig.depth_min_mm, depth_max = rig.depth_max_mm;
+#pragma omp simd
+  for (std::size_t i = 0; i < count; ++i) {
+    const double x = rays.x[i], y = rays.y[i];
+    const double line_x = e(0, 0) * x + e(0, 1) * y + e(0, 2), line_y = e(1, 0) * x + e(1, 1) * y + e(1, 2),
+                 line_z = e(2, 0) * x + e(2, 1) * y + e(2, 2);
+    const double normal_x = line_x * per_fx, normal_y = line_y * per_fy;
+    const double length = std::sqrt(normal_x * normal_x + normal_y * normal_y);
+    const double per_length = 1 / length;
+    const double axis_x = -normal_y * per_length * fx, axis_y = normal_x * per_length * fy;
+    // The ray in the projector's frame: start + depth * slope.
+    const double slope_x = r(0, 0) * x + r(0, 1) * y + r(0, 2), slope_y = r(1, 0) * x + r(1, 1) * y + r(1, 2),
+                 slope_z = r(2, 0) * x + r(2, 1) * y + r(2, 2);
+    const double crossing = (kMinProjectorDepthMm - start_z) / slope_z;
+    const bool rises = (slope_z > 0) & (crossing > depth_min), falls = (slope_z < 0) & (crossing < depth_max);
+    const double nearest = rises ? crossing : depth_min, farthest = falls ? crossing : depth_max;
+    const double near_z = start_z + nearest * slope_z, far_z = start_z + farthest * slope_z;
+    // Along the line at a depth: the axis' part of the point over its depth in the projector's frame.
+    const double along_start = axis_x * start_x + axis_y * start_y, along_slope = axis_x * slope_x + axis_y * slope_y;
+    const double near_px = (along_start + nearest * along_slope) / near_z,
+                 far_px = (along_start + farthest * along_slope) / far_z;
+    const bool is_line = length > 0, in_front = (nearest <= farthest) & (near_z > 0) & is_line;
+    to.line_x[i] = is_line ? line_x * per_length : 0, to.line_y[i] = is_line ? line_y * per_length : 0;
+    to.offset[i] = is_line ? line_z * per_length : kFar;
+    to.axis_x[i] = is_line ? axis_x : 0, to.axis_y[i] = is_line ? axis_y : 0;
+    to.least[i] = in_front ? (near_px < far_px ? near_px : far_px) : 1;
+    to.most[i] = in_front ? (near_px < far_px ? far_px : near_px) : -1;
+  }
+}
+
+inline __attribute__((always_inline)) void compare_rays(const EpipolarRig& rig, const RayPairs& rays, std::size_t count,
+                                                        float* residuals_px, float* disparities) {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  const auto& [rotation, start] = rig.projector_from_camera;
+  const Eigen::Matrix3d e = rig.line_from_camera, r = rotation;
+  const double baseline_mm = start.norm(), start_x = start.x(), start_y = start.y(), start_z = start.z();
+  const double per_fx = rig.per_focal_px.x(), per_fy = rig.per_focal_px.y();
+#pragma omp simd
+  for (std::size_t i = 0; i < count; ++i) {
+    const double x = rays.camera_x[i], y = rays.camera_y[i], u = rays.projector_x[i], v = rays.projector_y[i];
+    const double line_x = e(0, 0) * x + e(0, 1) * y + e(0, 2), line_y = e(1, 0) * x + e(1, 1) * y + e(1, 2),
+                 line_z = e(2, 0) * x + e(2, 1) * y + e(2, 2);
+    const double normal_x = line_x * per_fx, normal_y = line_y * per_fy;
+    const double length = std::sqrt(normal_x * normal_x + normal_y * normal_y);
+    residuals_px[i] = static_cast<float>(length > 0 ? (line_x * u + line_y * v + line_z) / length : kFar);
+    // The ray in the projector's frame, and what lies along the line in both.
+    const double slope_x = r(0, 0) * x + r(0, 1) * y + r(0, 2), slope_y = r(1, 0) * x + r(1, 1) * y + r(1, 2),
+                 slope_z = r(2, 0) * x + r(2, 1) * y + r(2, 2);
+    const double there = line_x * v - line_y * u;
+    const double over = line_x * start_y - line_y * start_x - there * start_z;
+    const double along = there * slope_z - (line_x * slope_y - line_y * slope_x);
+    disparities[i] = static_cast<float>(over != 0 ? baseline_mm * along / over : 0);
+  }
+}
+
 }  // namespace
 
 EpipolarGate::EpipolarGate(const CalibratedCamera& camera, const Lens& projector, double depth_min_mm,
                            double depth_max_mm)
-    : projector_from_camera_(camera.projector_from_camera),
-      focal_px_(projector.fx, projector.fy),
-      per_focal_px_(1 / focal_px_),
-      depth_min_mm_(depth_min_mm),
-      depth_max_mm_(depth_max_mm) {}
+    : rig_{.projector_from_camera = camera.projector_from_camera,
+           .line_from_camera =
+               cross_with(camera.projector_from_camera.translation) * camera.projector_from_camera.rotation,
+           .focal_px = {projector.fx, projector.fy},
+           .per_focal_px = {1 / projector.fx, 1 / projector.fy},
+           .depth_min_mm = depth_min_mm,
+           .depth_max_mm = depth_max_mm} {}
+
+void EpipolarGate::prepare(const PixelRays& rays, std::size_t count, EpipolarSegment* segments) const {
+  Segments found;
+  Cloned<find_segments>::call(rig_, rays, count, found);
+  for (std::size_t i = 0; i < count; ++i) {
+    EpipolarSegment& segment = segments[i];
+    segment.line_ = {found.line_x[i], found.line_y[i]};
+    segment.axis_ = {found.axis_x[i], found.axis_y[i]};
+    segment.line_offset_px_ = found.offset[i];
+    segment.along_min_px_ = found.least[i], segment.along_max_px_ = found.most[i];
+  }
+}
 
 EpipolarSegment EpipolarGate::prepare(const Eigen::Vector2d& camera_direction) const {
-  // The ray in the projector's frame: start + depth * slope.
-  const Eigen::Vector3d slope = projector_from_camera_.rotation * camera_direction.homogeneous();
-  const Eigen::Vector3d& start = projector_from_camera_.translation;
-  const Eigen::Vector3d line = start.cross(slope);
-  const Eigen::Array2d normal = line.head<2>().array() * per_focal_px_;
-  const double length = normal.matrix().norm();
+  PixelRays one;
+  one.x[0] = camera_direction.x(), one.y[0] = camera_direction.y();
   EpipolarSegment segment;
-  if (!(length > 0)) return segment;
-
-  const double per_length = 1 / length;
-  segment.line_ = line.head<2>() * per_length;
-  segment.line_offset_px_ = line.z() * per_length;
-  segment.axis_ = (Eigen::Array2d(-normal.y(), normal.x()) * per_length * focal_px_).matrix();
-
-  double nearest = depth_min_mm_, farthest = depth_max_mm_;
-  const auto in_front = [&](double depth_mm) { return start.z() + depth_mm * slope.z() >= kMinProjectorDepthMm; };
-  if (!in_front(nearest) || !in_front(farthest)) {
-    const double crossing = (kMinProjectorDepthMm - start.z()) / slope.z();
-    if (slope.z() > 0) nearest = std::max(nearest, crossing);
-    if (slope.z() < 0) farthest = std::min(farthest, crossing);
-    if (!(nearest <= farthest) || !(start.z() + nearest * slope.z() > 0)) return segment;
-  }
-  // Along the line at a depth: the axis' part of the point over its depth in the projector's frame.
-  const double along_start = segment.axis_.dot(start.head<2>()), along_slope = segment.axis_.dot(slope.head<2>());
-  const double near_px = (along_start + nearest * along_slope) / (start.z() + nearest * slope.z()),
-               far_px = (along_start + farthest * along_slope) / (start.z() + farthest * slope.z());
-  segment.along_min_px_ = std::min(near_px, far_px);
-  segment.along_max_px_ = std::max(near_px, far_px);
+  prepare(one, 1, &segment);
   return segment;
 }
 
-double EpipolarGate::residual_px(const Eigen::Vector2d& camera_direction,
-                                 const Eigen::Vector2d& projector_direction) const {
-  const Eigen::Vector3d line =
-      projector_from_camera_.translation.cross(projector_from_camera_.rotation * camera_direction.homogeneous());
-  const double length = (line.head<2>().array() * per_focal_px_).matrix().norm();
-  if (!(length > 0)) return std::numeric_limits<double>::infinity();
-  return (line.head<2>().dot(projector_direction) + line.z()) / length;
-}
-
-double EpipolarGate::disparity(const Eigen::Vector2d& camera_direction,
-                               const Eigen::Vector2d& projector_direction) const {
-  const Eigen::Vector3d slope = projector_from_camera_.rotation * camera_direction.homogeneous();
-  const Eigen::Vector3d& start = projector_from_camera_.translation;
-  const Eigen::Vector3d line = start.cross(slope);
-  const Eigen::Vector2d along(-line.y(), line.x());
-  const double there = along.dot(projector_direction), over = along.dot(start.head<2>()) - there * start.z();
-  if (over == 0) return 0;
-  return start.norm() * (there * slope.z() - along.dot(slope.head<2>())) / over;
+void EpipolarGate::compare(const RayPairs& rays, std::size_t count, float* residuals_px, float* disparities) const {
+  Cloned<compare_rays>::call(rig_, rays, count, residuals_px, disparities);
 }
 
 }  // namespace slsd

@@ -2,11 +2,13 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstddef>
 #include <limits>
 
 #include <Eigen/Core>
 
 #include "core/geometry/calibration.hpp"
+#include "core/geometry/pixel_ray.hpp"
 
 namespace slsd {
 
@@ -44,6 +46,19 @@ class EpipolarSegment {
   double along_min_px_ = 1, along_max_px_ = -1;
 };
 
+/// Many rays of a camera and of the projector, undistorted and normalised: the numbers of each in a row.
+struct RayPairs {
+  PixelRays::Column camera_x, camera_y, projector_x, projector_y;
+};
+
+/// What segments are made from.
+struct EpipolarRig {
+  RigidTransform projector_from_camera;
+  Eigen::Matrix3d line_from_camera;  ///< the essential matrix
+  Eigen::Array2d focal_px, per_focal_px;
+  double depth_min_mm, depth_max_mm;
+};
+
 /// Makes the segment of any camera ray.
 /// @thread reentrant
 class EpipolarGate {
@@ -53,20 +68,16 @@ class EpipolarGate {
 
   /// @param camera_direction  undistorted, normalised
   [[nodiscard]] EpipolarSegment prepare(const Eigen::Vector2d& camera_direction) const;
-  /// prepare(camera_direction).residual_px(projector_direction), in less than half the time.
-  [[nodiscard]] double residual_px(const Eigen::Vector2d& camera_direction,
-                                   const Eigen::Vector2d& projector_direction) const;
-  /// The baseline over the depth where both rays meet, seen along the epipolar line alone: what lies across it has no
-  /// part. Times a focal length it is a disparity. 0 where there is no such line.
-  [[nodiscard]] double disparity(const Eigen::Vector2d& camera_direction,
-                                 const Eigen::Vector2d& projector_direction) const;
+  /// Of the first of many rays.
+  void prepare(const PixelRays& rays, std::size_t count, EpipolarSegment* segments) const;
+  /// Of each of the first pairs of many:
+  /// @param residuals_px  prepare(camera's).residual_px(projector's)
+  /// @param disparities   the baseline over the depth where both meet, seen along the epipolar line alone: what lies
+  ///                      across it has no part. Times a focal length it is a disparity. 0 where there is no such line
+  void compare(const RayPairs& rays, std::size_t count, float* residuals_px, float* disparities) const;
 
  private:
-  RigidTransform projector_from_camera_;
-  Eigen::Array2d focal_px_;
-  Eigen::Array2d per_focal_px_;
-  double depth_min_mm_;
-  double depth_max_mm_;
+  EpipolarRig rig_;
 };
 
 }  // namespace slsd

@@ -37,24 +37,14 @@ Eigen::Vector2d Lens::project(const Eigen::Vector3d& point) const {
 }
 
 Eigen::Vector2d Lens::distort(const Eigen::Vector2d& normalised) const {
-  const auto& [k1, k2, p1, p2, k3] = distortion;
-  const double x = normalised.x(), y = normalised.y();
-  const double r2 = x * x + y * y;
-  const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
-  return {fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx,
-          fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy};
+  const View seen = view(normalised.x(), normalised.y());
+  return {seen.u, seen.v};
 }
 
 Eigen::Matrix2d Lens::distort_jacobian(const Eigen::Vector2d& normalised) const {
-  const auto& [k1, k2, p1, p2, k3] = distortion;
-  const double x = normalised.x(), y = normalised.y();
-  const double r2 = x * x + y * y;
-  const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
-  const double slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3));
-  const double cross = x * y * slope + 2 * p1 * x + 2 * p2 * y;
+  const View seen = view(normalised.x(), normalised.y());
   Eigen::Matrix2d jacobian;
-  jacobian << fx * (radial + x * x * slope + 2 * p1 * y + 6 * p2 * x), fx * cross,  //
-      fy * cross, fy * (radial + y * y * slope + 6 * p1 * y + 2 * p2 * x);
+  jacobian << seen.u_x, seen.u_y, seen.v_x, seen.v_y;
   return jacobian;
 }
 

@@ -2,6 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <array>
+#include <cstddef>
+
 #include <Eigen/Core>
 #include <Eigen/LU>
 
@@ -13,6 +16,25 @@ namespace slsd {
 struct PixelRay {
   Eigen::Vector2d direction;  ///< normalised: (x/z, y/z) in the device's frame
   Eigen::Matrix2d turn;       ///< change of the direction per (distorted) px: inverse of Lens::distort_jacobian
+};
+
+/// Rays of many pixels, the numbers of each in a row, so that several are reckoned with at once.
+struct PixelRays {
+  static constexpr std::size_t kMost = 64;
+  using Column = std::array<double, kMost>;
+  Column u, v;            ///< pixels
+  Column x, y;            ///< directions
+  Column xx, xy, yx, yy;  ///< how they turn
+
+  [[nodiscard]] PixelRay at(std::size_t i) const {
+    Eigen::Matrix2d turn;
+    turn << xx[i], xy[i], yx[i], yy[i];
+    return {{x[i], y[i]}, turn};
+  }
+  void set(std::size_t i, const PixelRay& ray) {
+    x[i] = ray.direction.x(), y[i] = ray.direction.y();
+    xx[i] = ray.turn(0, 0), xy[i] = ray.turn(0, 1), yx[i] = ray.turn(1, 0), yy[i] = ray.turn(1, 1);
+  }
 };
 
 /// @param pixel  distorted, as seen

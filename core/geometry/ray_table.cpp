@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "core/clones.hpp"
+
 namespace slsd {
 namespace {
 
@@ -17,6 +19,22 @@ int nodes_across(int size_px) {
 
 double nodes_per_px(int size_px) {
   return (nodes_across(size_px) - 1) / std::max(size_px - 1.0, 1.0);
+}
+
+/// A step of Newton's method.
+inline __attribute__((always_inline)) void refine_all(const Lens& of, PixelRays& rays, std::size_t count) {
+  const Lens lens = of;
+#pragma omp simd
+  for (std::size_t i = 0; i < count; ++i) {
+    const Lens::View seen = lens.view(rays.x[i], rays.y[i]);
+    const double per_area = 1 / (seen.u_x * seen.v_y - seen.u_y * seen.v_x);
+    const double xx = seen.v_y * per_area, xy = -seen.u_y * per_area, yx = -seen.v_x * per_area,
+                 yy = seen.u_x * per_area;
+    const double off_u = seen.u - rays.u[i], off_v = seen.v - rays.v[i];
+    rays.x[i] -= xx * off_u + xy * off_v;
+    rays.y[i] -= yx * off_u + yy * off_v;
+    rays.xx[i] = xx, rays.xy[i] = xy, rays.yx[i] = yx, rays.yy[i] = yy;
+  }
 }
 
 }  // namespace
@@ -47,8 +65,8 @@ double RayTable::error_between_nodes() const {
   return error;
 }
 
-Eigen::Vector2d RayTable::estimate(const Eigen::Vector2d& pixel) const {
-  const double x = pixel.x() * nodes_per_px_.x(), y = pixel.y() * nodes_per_px_.y();
+Eigen::Vector2d RayTable::estimate(double u, double v) const {
+  const double x = u * nodes_per_px_.x(), y = v * nodes_per_px_.y();
   const int column = static_cast<int>(std::clamp(x, 0.0, columns_ - 2.0));
   const int row = static_cast<int>(std::clamp(y, 0.0, rows_ - 2.0));
   const Eigen::Vector2d* node = &nodes_[static_cast<std::size_t>(row) * columns_ + column];
@@ -58,10 +76,19 @@ Eigen::Vector2d RayTable::estimate(const Eigen::Vector2d& pixel) const {
 }
 
 PixelRay RayTable::ray(const Eigen::Vector2d& pixel) const {
-  Eigen::Vector2d near = estimate(pixel);
+  Eigen::Vector2d near = estimate(pixel.x(), pixel.y());
   if (refines_) near = lens_.refine(near, pixel);
   const Eigen::Matrix2d turn = lens_.distort_jacobian(near).inverse();
   return {near - turn * (lens_.distort(near) - pixel), turn};
+}
+
+void RayTable::look_up(PixelRays& rays, std::size_t count) const {
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector2d near = estimate(rays.u[i], rays.v[i]);
+    rays.x[i] = near.x(), rays.y[i] = near.y();
+  }
+  if (refines_) Cloned<refine_all>::call(lens_, rays, count);
+  Cloned<refine_all>::call(lens_, rays, count);
 }
 
 }  // namespace slsd

@@ -18,9 +18,11 @@ class RayTable {
 
   /// @param pixel  distorted; outside the image the border's cells are continued
   [[nodiscard]] PixelRay ray(const Eigen::Vector2d& pixel) const;
+  /// The rays of the first pixels of many.
+  void look_up(PixelRays& rays, std::size_t count) const;
 
  private:
-  [[nodiscard]] Eigen::Vector2d estimate(const Eigen::Vector2d& pixel) const;
+  [[nodiscard]] Eigen::Vector2d estimate(double u, double v) const;
   [[nodiscard]] double error_between_nodes() const;
 
   Lens lens_;

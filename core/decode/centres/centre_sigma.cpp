@@ -6,10 +6,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include <Eigen/LU>
 
+#include "core/clones.hpp"
 #include "core/decode/symbols/weigh_patch.hpp"
 #include "core/geometry/robust.hpp"
 
@@ -78,34 +80,69 @@ float off_those_around(const std::vector<float>& values, const std::array<std::i
   return any ? values[i] - middle : 0;
 }
 
-/// Mean square over a symbol and its neighbours. Of these one that is far off has a fault of its own.
-float mean_square_around(const std::vector<float>& off_px, const LatticeSymbol& symbol, float own_px) {
-  float sum = square(own_px), count = 1;
-  for (const std::int32_t other : symbol.neighbours) {
-    if (other < 0) continue;
-    sum += square(std::min(std::abs(off_px[static_cast<std::size_t>(other)]), kAroundMaxPx));
-    ++count;
+/// What is known of many symbols at once, the numbers of each in a row.
+constexpr std::size_t kAtOnce = 64;
+struct Columns {
+  using Column = std::array<float, kAtOnce>;
+  Column weight, background, gain, misfit;
+  Column unbent;                                 // px^2
+  Column across, uneven;                         // px
+  Column across_squares, uneven_squares, count;  // sums over a symbol and so many neighbours, and how many with itself
+  Column sigma_px, damage_px;                    // what comes of it
+};
+
+/// Sums up the squares of a symbol's neighbours. One that is far off has a fault of its own.
+void sum_around(const std::vector<float>& across_px, const std::vector<float>& uneven_px,
+                const std::array<std::int32_t, 4>& neighbours, std::size_t i, Columns& columns) {
+  float across = 0, uneven = 0, count = 1;
+  for (const std::int32_t other : neighbours) {
+    const auto at = static_cast<std::size_t>(std::max(other, 0));
+    const float counts = other < 0 ? 0 : 1;
+    across += counts * square(std::min(std::abs(across_px[at]), kAroundMaxPx));
+    uneven += counts * square(std::min(std::abs(uneven_px[at]), kAroundMaxPx));
+    count += counts;
   }
-  return sum / count;
+  columns.across_squares[i] = across, columns.uneven_squares[i] = uneven, columns.count[i] = count;
 }
 
-}  // namespace
-
-float noise_of_centre_px(float weight, float background, float gain, const FrameNoise& noise) {
+inline __attribute__((always_inline)) float noise_of(float weight, float background, float gain,
+                                                     const FrameNoise& noise) {
   constexpr float kRamp = kCentreRampEnd - kCentreRampStart;
   const float relative = noise.at(background + 0.5F * gain) / (kRamp * gain);
   return relative / std::sqrt(std::sqrt(weight));
 }
 
+inline __attribute__((always_inline)) void judge_all(const FrameNoise& noise, float usual_misfit_squared, Columns& c) {
+#pragma omp simd
+  for (std::size_t i = 0; i < kAtOnce; ++i) {
+    const float noise_squared = square(noise_of(c.weight[i], c.background[i], c.gain[i], noise));
+    const float across_squared = square(c.across[i]), uneven_squared = square(c.uneven[i]);
+    const float rough = (across_squared + c.across_squares[i]) / c.count[i] - noise_squared - square(kSmoothAcrossPx),
+                uneven =
+                    (uneven_squared + c.uneven_squares[i]) / c.count[i] - 2 * noise_squared - square(kSmoothUnevenPx);
+    const float roughness = rough > 0 ? rough : 0, unevenness = uneven > 0 ? uneven : 0;
+    const float misfit_squared = square(c.misfit[i]), beyond = misfit_squared - usual_misfit_squared;
+    const float misfit = beyond > 0 ? beyond : 0;
+    const float least = square(kLeastPx) + c.unbent[i];
+    c.sigma_px[i] = std::sqrt(square(kOfNoise) * noise_squared + least + square(kOfAcross) * across_squared +
+                              square(kOfUneven) * uneven_squared + square(kOfRoughness) * roughness +
+                              square(kOfUnevenness) * unevenness + std::sqrt(roughness * unevenness) +
+                              square(kOfMisfitSquared * misfit));
+    c.damage_px[i] = std::sqrt(noise_squared + least + square(kDamageOfAcross) * across_squared + roughness +
+                               square(kDamageOfMisfitSquared * misfit_squared));
+  }
+}
+
+}  // namespace
+
+float noise_of_centre_px(float weight, float background, float gain, const FrameNoise& noise) {
+  return noise_of(weight, background, gain, noise);
+}
+
 void CentreJudge::measure_across(const EpipolarView& view, const CellRays& cells, Executor& executor,
                                  const std::vector<LatticeSymbol>& symbols) {
   executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
-    for (std::size_t i = first; i < last; ++i) {
-      const LatticeSymbol& symbol = symbols[i];
-      const PixelRay cell = cells.ray(symbol.row, symbol.column);
-      across_px_[i] = static_cast<float>(view.residual_px(symbol.sighting, symbol.centre_px, cell));
-      disparities_px_[i] = static_cast<float>(view.disparity_px(symbol.sighting, symbol.centre_px, cell));
-    }
+    view.compare(std::span(symbols).subspan(first, last - first), cells, &across_px_[first], &disparities_px_[first]);
   });
   const float usual_px = usual_of(symbols.size(), [&](std::size_t i) { return across_px_[i]; });
   for (std::size_t i = 0; i < symbols.size(); ++i)
@@ -131,26 +168,26 @@ void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const
   if (symbols.empty()) return;
   if (view != nullptr) measure_across(*view, cells, executor, symbols), measure_unevenness(symbols, executor);
   const float usual_misfit_squared = usual_of(symbols.size(), [&](std::size_t i) { return square(symbols[i].misfit); });
-  const auto judge_one = [&](std::size_t i) {
-    LatticeSymbol& symbol = symbols[i];
-    const float noise_px = noise_of_centre_px(symbol.weight, symbol.background, symbol.gain, noise);
-    const float roughness = std::max(
-        0.F, mean_square_around(across_px_, symbol, across_px_[i]) - square(noise_px) - square(kSmoothAcrossPx));
-    const float unevenness = std::max(
-        0.F, mean_square_around(uneven_px_, symbol, uneven_px_[i]) - 2 * square(noise_px) - square(kSmoothUnevenPx));
-    const float misfit = std::max(0.F, square(symbol.misfit) - usual_misfit_squared);
-    const float unbent = has_bend(symbol) ? 0 : square(kUnknownBendPx);
-    symbol.sigma_px = std::sqrt(square(kOfNoise * noise_px) + square(kLeastPx) + unbent +
-                                square(kOfAcross * across_px_[i]) + square(kOfUneven * uneven_px_[i]) +
-                                square(kOfRoughness) * roughness + square(kOfUnevenness) * unevenness +
-                                std::sqrt(roughness * unevenness) + square(kOfMisfitSquared * misfit));
-    symbol.damage_px =
-        std::sqrt(square(noise_px) + square(kLeastPx) + unbent + square(kDamageOfAcross * across_px_[i]) + roughness +
-                  square(kDamageOfMisfitSquared * square(symbol.misfit)));
-  };
-  executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
-    for (std::size_t i = first; i < last; ++i) judge_one(i);
-  });
+  executor.run_ranges(
+      symbols.size(),
+      [&](std::size_t first, std::size_t last, int) {
+        Columns columns{};
+        columns.count.fill(1);
+        for (std::size_t i = first; i < last; ++i) {
+          const LatticeSymbol& symbol = symbols[i];
+          const std::size_t at = i - first;
+          columns.weight[at] = symbol.weight;
+          columns.background[at] = symbol.background, columns.gain[at] = symbol.gain;
+          columns.misfit[at] = symbol.misfit;
+          columns.unbent[at] = has_bend(symbol) ? 0 : square(kUnknownBendPx);
+          columns.across[at] = across_px_[i], columns.uneven[at] = uneven_px_[i];
+          sum_around(across_px_, uneven_px_, symbol.neighbours, at, columns);
+        }
+        Cloned<judge_all>::call(noise, usual_misfit_squared, columns);
+        for (std::size_t i = first; i < last; ++i)
+          symbols[i].sigma_px = columns.sigma_px[i - first], symbols[i].damage_px = columns.damage_px[i - first];
+      },
+      kAtOnce);
 }
 
 }  // namespace slsd

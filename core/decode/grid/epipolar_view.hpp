@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -9,6 +10,7 @@
 
 #include "core/decode/grid/cell_rays.hpp"
 #include "core/decode/grid/sightings.hpp"
+#include "core/decode/lattice.hpp"
 #include "core/executor.hpp"
 #include "core/geometry/epipolar_gate.hpp"
 #include "core/geometry/ray_table.hpp"
@@ -24,7 +26,7 @@ class EpipolarView {
   EpipolarView(const CalibratedCamera& camera, const Lens& projector, double depth_min_mm, double depth_max_mm,
                double tolerance_px)
       : camera_rays_(camera.lens),
-        focal_px_(std::sqrt(camera.lens.fx * camera.lens.fy)),
+        focal_px_(static_cast<float>(std::sqrt(camera.lens.fx * camera.lens.fy))),
         gate_(camera, projector, depth_min_mm, depth_max_mm),
         tolerance_px_(tolerance_px) {}
 
@@ -32,9 +34,19 @@ class EpipolarView {
     rays_.resize(seen.size());
     pixels_.resize(seen.size());
     segments_.resize(seen.size());
-    executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
-      for (std::size_t i = first; i < last; ++i) look_again_at(static_cast<std::int32_t>(i), seen);
-    });
+    executor.run_ranges(
+        seen.size(),
+        [&](std::size_t first, std::size_t last, int) {
+          PixelRays rays;
+          for (std::size_t i = first; i < last; ++i) {
+            pixels_[i] = {seen.moments[i].x, seen.moments[i].y};
+            rays.u[i - first] = pixels_[i].x(), rays.v[i - first] = pixels_[i].y();
+          }
+          camera_rays_.look_up(rays, last - first);
+          for (std::size_t i = first; i < last; ++i) rays_[i] = rays.at(i - first);
+          gate_.prepare(rays, last - first, &segments_[first]);
+        },
+        PixelRays::kMost);
   }
   /// At one that was found to lie elsewhere.
   void look_again_at(std::int32_t sighting, const Sightings& seen) {
@@ -52,23 +64,29 @@ class EpipolarView {
     ray.direction += ray.turn * (camera_px - pixels_[sighting]).cast<double>();
     return ray;
   }
-  /// How far a cell lies off the epipolar line of a pixel near a sighting's, projector px, signed.
-  [[nodiscard]] double residual_px(std::int32_t sighting, const Eigen::Vector2f& camera_px,
-                                   const PixelRay& cell) const {
-    const bool moved = camera_px != pixels_[sighting];
-    return moved ? gate_.residual_px(ray_near(sighting, camera_px).direction, cell.direction)
-                 : segments_[sighting].residual_px(cell.direction);
-  }
-
-  /// Disparity of a cell that is seen at a pixel near a sighting's, camera px.
-  [[nodiscard]] double disparity_px(std::int32_t sighting, const Eigen::Vector2f& camera_px,
-                                    const PixelRay& cell) const {
-    return focal_px_ * gate_.disparity(ray_near(sighting, camera_px).direction, cell.direction);
+  /// Of symbols whose centres lie near their sightings:
+  /// @param residuals_px    how far each cell lies off the epipolar line of its centre, projector px, signed
+  /// @param disparities_px  camera px
+  void compare(std::span<const LatticeSymbol> symbols, const CellRays& cells, float* residuals_px,
+               float* disparities_px) const {
+    RayPairs rays;
+    for (std::size_t first = 0; first < symbols.size(); first += PixelRays::kMost) {
+      const std::size_t count = std::min(PixelRays::kMost, symbols.size() - first);
+      for (std::size_t i = 0; i < count; ++i) {
+        const LatticeSymbol& symbol = symbols[first + i];
+        const Eigen::Vector2d seen = ray_near(symbol.sighting, symbol.centre_px).direction,
+                              lit = cells.ray(symbol.row, symbol.column).direction;
+        rays.camera_x[i] = seen.x(), rays.camera_y[i] = seen.y();
+        rays.projector_x[i] = lit.x(), rays.projector_y[i] = lit.y();
+      }
+      gate_.compare(rays, count, residuals_px + first, disparities_px + first);
+    }
+    for (std::size_t i = 0; i < symbols.size(); ++i) disparities_px[i] *= focal_px_;
   }
 
  private:
   RayTable camera_rays_;
-  double focal_px_;
+  float focal_px_;
   EpipolarGate gate_;
   double tolerance_px_;
   std::vector<PixelRay> rays_;
