@@ -97,15 +97,23 @@ void SymbolReader::classify(Executor& executor) {
   seen_.nodes.assign(seen_.size(), {});
   if (options_.classify == Method::kPaper) paper_->classify(size * expected_scale(), seen_);
   executor.run_ranges(seen_.size(), [&](std::size_t first, std::size_t last, int) {
+    EightMoments eight;
+    EightShapes shapes;
     for (std::size_t i = first; i < last; ++i) {
       const GreyMoments& moments = seen_.moments[i];
       GridNode& node = seen_.nodes[i];
       const ExpectedFrame& expected = finder_.expected().at(moments.x, moments.y);
       node.frame = expected.frame;
       node.centre_px = {moments.x, moments.y};
-      if (options_.classify == Method::kDefault) {
-        seen_.shapes[i] = look_->expected.classify(shape_features(moments, expected.inverse, size));
+      const std::size_t lane = (i - first) % kLanes;
+      eight.set(static_cast<int>(lane), moments, expected.inverse);
+      if (options_.classify == Method::kDefault && (lane + 1 == kLanes || i + 1 == last)) {
+        find_features(eight, size, shapes);
+        look_->expected.classify(shapes, std::span(seen_.shapes).subspan(i - lane, lane + 1));
       }
+    }
+    for (std::size_t i = first; i < last; ++i) {
+      GridNode& node = seen_.nodes[i];
       node.torn = seen_.shapes[i].is_torn();
       if (seen_.shapes[i].letter >= 0)
         node.centre_px -= node.frame * look_->as_expected[seen_.shapes[i].letter].centroid_px;
@@ -165,7 +173,8 @@ void SymbolReader::review(const GreyView& frame, Executor& executor) {
   const bool paper_before = options_.classify == Method::kPaper || options_.centre == Method::kPaper ||
                             options_.decode_windows == Method::kPaper;
   if (!paper_before)
-    review_.review(frame, finder_.regions(), linker_, look_->as_measured, finder_.meters(), executor, seen_);
+    review_.review(frame, finder_.regions(), linker_, {look_->as_measured, look_->measured}, finder_.meters(), executor,
+                   seen_);
 }
 
 /// @param frame  what the symbols were measured in

@@ -55,16 +55,21 @@ const Appearance& Appearances::at(std::size_t blur) const {
 const Appearance& Appearances::likeliest(std::span<const ShapeFeatures> shapes) const {
   constexpr std::size_t kTelling = 12;
   if (shapes.size() < kTelling) return usual_;
+  std::array<EightShapes, kShapesMax / kLanes> eights;
   std::array<float, kShapesMax> buffer;
   shapes = shapes.first(std::min(shapes.size(), kShapesMax));
+  for (std::size_t i = 0; i < shapes.size(); ++i) eights[i / kLanes].set(static_cast<int>(i % kLanes), shapes[i]);
   const std::span likelihoods = std::span(buffer).first(shapes.size());
   const auto middle = likelihoods.begin() + static_cast<std::ptrdiff_t>(likelihoods.size() / 2);
   std::size_t best = 0;
   float best_median = -1;
   for (std::size_t blur = 0; blur < kBlursPx.size(); ++blur) {
     const Classifier& classifier = at(blur).measured;
-    std::ranges::transform(shapes, likelihoods.begin(),
-                           [&](const ShapeFeatures& shape) { return classifier.classify(shape).likelihood; });
+    std::array<Classification, kLanes> looks;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      if (i % kLanes == 0) classifier.classify(eights[i / kLanes], looks);
+      likelihoods[i] = looks[i % kLanes].likelihood;
+    }
     std::ranges::nth_element(likelihoods, middle);
     if (*middle > best_median) best = blur, best_median = *middle;
   }

@@ -3,8 +3,9 @@
 #include "core/decode/symbols/classify.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
+#include <cstring>
+#include <limits>
 
 #include "core/clones.hpp"
 #include "core/lanes.hpp"
@@ -12,10 +13,8 @@
 namespace slsd {
 namespace {
 
-static_assert(kMaxLetters == kLanes && kFeatureCount == 8);
 constexpr float kDegreesOfFreedom = 4;
 constexpr float kFarthestSquared = 1e5F;  // farther than that all are equally unlikely, and a float's range ends
-constexpr float kAbsent = 1e12F;
 
 /// How often a shape is another letter than the likeliest for what the prototypes do not know: cut at an edge, torn,
 /// run together, printed on. It grows with the distance from the nearest prototype. Measured on drawn and rendered
@@ -23,10 +22,11 @@ constexpr float kAbsent = 1e12F;
 constexpr float kDoubtMin = 0.01F, kDoubtMax = 0.5F;
 constexpr float kDoubtFrom = 2, kDoubtSlope = 0.12F;
 
-struct Verdict {
-  Lanes log_probability;
-  float nearest, best;  // squared distance from the nearest prototype, and the greatest likelihood
-  unsigned likeliest;   // a bit to each letter that has it
+/// Of eight shapes.
+struct Verdicts {
+  Lanes log_probability[kMaxLetters];
+  Lanes distance, best;  // from the nearest prototype, and the greatest likelihood
+  IntLanes likeliest;    // the letter that has it; -1 where none is likely at all
 };
 
 /// Natural logarithms of positive numbers to 1e-6: the exponent's, and the mantissa's, which lies within a root of two
@@ -42,76 +42,105 @@ inline __attribute__((always_inline)) void take_logarithms(const Lanes& of, Lane
                2 * s * (1 + ss * (1 / 3.F + ss * (1 / 5.F + ss * (1 / 7.F + ss * (1 / 9.F)))));
 }
 
+inline __attribute__((always_inline)) void take_roots(const Lanes& of, Lanes& roots) {
+  alignas(Lanes) float numbers[kLanes];
+  std::memcpy(numbers, &of, sizeof of);
+  for (float& number : numbers) number = std::sqrt(number);
+  slsd::load(numbers, roots);
+}
+
 /// Of the whitened features from one on. The triangle's rows have no one length, so none is a loop.
 template <int kRow>
-inline __attribute__((always_inline)) void add_squares(const Classifier::Table& table, const Lanes* deviation,
+inline __attribute__((always_inline)) void add_squares(const Classifier::Letter& letter, const Lanes* deviation,
                                                        Lanes& squared_distance) {
   if constexpr (kRow < kFeatureCount) {
     Lanes whitened{};
-    for (int j = 0; j <= kRow; ++j) {
-      Lanes weight;
-      load(table.whitening[kRow][j], weight);
-      whitened += weight * deviation[j];
-    }
+    for (int j = 0; j <= kRow; ++j) whitened += letter.whitening[kRow][j] * deviation[j];
     squared_distance += whitened * whitened;
-    add_squares<kRow + 1>(table, deviation, squared_distance);
+    add_squares<kRow + 1>(letter, deviation, squared_distance);
   }
 }
 
-inline __attribute__((always_inline)) void judge(const Classifier::Table& table, const float* features,
-                                                 Verdict& verdict) {
-  const Lanes zero{};
+inline __attribute__((always_inline)) void find_squared_distance(const Classifier::Letter& letter,
+                                                                 const EightShapes& shapes, Lanes& squared_distance) {
   Lanes deviation[kFeatureCount];
-  for (int i = 0; i < kFeatureCount; ++i) {
-    Lanes mean;
-    load(table.mean[i], mean);
-    deviation[i] = features[i] - mean;
+  for (int i = 0; i < kFeatureCount; ++i) deviation[i] = shapes.of[i] - letter.mean[i];
+  squared_distance = Lanes{};
+  add_squares<0>(letter, deviation, squared_distance);
+}
+
+inline __attribute__((always_inline)) void judge(std::span<const Classifier::Letter> letters, float share,
+                                                 const EightShapes& shapes, Verdicts& verdicts) {
+  const Lanes zero{}, farthest = zero + kFarthestSquared;
+  Lanes nearest = zero + std::numeric_limits<float>::max(), best{}, sum{}, likelihoods[kMaxLetters];
+  IntLanes likeliest = IntLanes{} - 1;
+  for (std::size_t i = 0; i < letters.size(); ++i) {
+    Lanes squared_distance;
+    find_squared_distance(letters[i], shapes, squared_distance);
+    nearest = squared_distance < nearest ? squared_distance : nearest;
+    // Student's t in eight dimensions: (1 + d^2 / nu)^(-(nu + 8) / 2), nu = 4.
+    const Lanes squared = squared_distance < farthest ? squared_distance : farthest;
+    const Lanes t = 1 + squared / kDegreesOfFreedom, cubed = t * t * t;
+    const Lanes likelihood = letters[i].density / (cubed * cubed);
+    likeliest = likelihood > best ? IntLanes{} + static_cast<int>(i) : likeliest;
+    best = likelihood > best ? likelihood : best;
+    sum += likelihood;
+    likelihoods[i] = likelihood;
   }
-  Lanes squared_distance, density;
-  load(table.absent, squared_distance);
-  load(table.density, density);
-  add_squares<0>(table, deviation, squared_distance);
-  // Student's t in eight dimensions: (1 + d^2 / nu)^(-(nu + 8) / 2), nu = 4.
-  const Lanes farthest = zero + kFarthestSquared;
-  const Lanes squared = squared_distance < farthest ? squared_distance : farthest;
-  const Lanes t = 1 + squared / kDegreesOfFreedom, cubed = t * t * t;
-  const Lanes likelihood = density / (cubed * cubed);
-  const float nearest = least_of(squared_distance);
-  const float doubt = std::clamp(kDoubtMin + kDoubtSlope * (std::sqrt(nearest) - kDoubtFrom), kDoubtMin, kDoubtMax);
-  const Lanes probability = likelihood * ((1 - doubt) / sum_of(likelihood)) + doubt * table.share;
-  take_logarithms(probability, verdict.log_probability);
-  verdict.nearest = nearest;
-  verdict.best = -least_of(-likelihood);
-  verdict.likeliest = bits_of(likelihood == verdict.best);
+  take_roots(nearest, verdicts.distance);
+  Lanes doubt = kDoubtMin + kDoubtSlope * (verdicts.distance - kDoubtFrom);
+  doubt = doubt < kDoubtMin ? zero + kDoubtMin : doubt;
+  doubt = doubt > kDoubtMax ? zero + kDoubtMax : doubt;
+  const Lanes scale = (1 - doubt) / sum, any = doubt * share;
+  for (std::size_t i = 0; i < letters.size(); ++i)
+    take_logarithms(likelihoods[i] * scale + any, verdicts.log_probability[i]);
+  verdicts.best = best, verdicts.likeliest = likeliest;
+}
+
+inline __attribute__((always_inline)) void find_squared_distances(std::span<const Classifier::Letter> letters,
+                                                                  const EightShapes& shapes,
+                                                                  Classifier::EightDistances& squared) {
+  for (std::size_t i = 0; i < letters.size(); ++i) find_squared_distance(letters[i], shapes, squared.of[i]);
 }
 
 }  // namespace
 
 Classifier::Classifier(const std::vector<Prototype>& prototypes, float distance_max)
-    : table_{}, distance_max_(distance_max) {
-  table_.share = 1 / static_cast<float>(prototypes.size());
-  for (float& absent : table_.absent) absent = kAbsent;
-  for (std::size_t letter = 0; letter < prototypes.size(); ++letter) {
-    const Prototype& prototype = prototypes[letter];
-    table_.absent[letter] = 0;
-    table_.density[letter] = prototype.density;
+    : share_(1 / static_cast<float>(prototypes.size())), distance_max_(distance_max) {
+  for (const Prototype& prototype : prototypes) {
+    Letter& letter = letters_.emplace_back();
+    letter.density = prototype.density;
     for (int i = 0; i < kFeatureCount; ++i) {
-      table_.mean[i][letter] = prototype.mean[i];
-      for (int j = 0; j <= i; ++j) table_.whitening[i][j][letter] = prototype.whitening(i, j);
+      letter.mean[i] = prototype.mean[i];
+      for (int j = 0; j <= i; ++j) letter.whitening[i][j] = prototype.whitening(i, j);
     }
   }
 }
 
+void Classifier::classify(const EightShapes& shapes, std::span<Classification> to) const {
+  Verdicts verdicts{};
+  Cloned<judge>::call(letters_, share_, shapes, verdicts);
+  verdicts.likeliest = verdicts.distance <= distance_max_ ? verdicts.likeliest : IntLanes{} - 1;
+  for (std::size_t lane = 0; lane < to.size(); ++lane) {
+    Classification result;
+    for (int i = 0; i < kMaxLetters; ++i) result.log_probability[i] = verdicts.log_probability[i][lane];
+    result.distance = verdicts.distance[lane];
+    result.likelihood = verdicts.best[lane];
+    result.letter = static_cast<std::int8_t>(verdicts.likeliest[lane]);
+    to[lane] = result;
+  }
+}
+
 Classification Classifier::classify(const ShapeFeatures& features) const {
-  Verdict verdict;
-  Cloned<judge>::call(table_, features.data(), verdict);
+  EightShapes one;
+  one.set(0, features);
   Classification result;
-  std::memcpy(result.log_probability.data(), &verdict.log_probability, sizeof verdict.log_probability);
-  result.distance = std::sqrt(verdict.nearest);
-  result.likelihood = verdict.best;
-  if (verdict.best > 0 && result.distance <= distance_max_)
-    result.letter = static_cast<std::int8_t>(std::countr_zero(verdict.likeliest));
+  classify(one, std::span(&result, 1));
   return result;
+}
+
+void Classifier::find_squared_distances(const EightShapes& shapes, EightDistances& squared) const {
+  Cloned<slsd::find_squared_distances>::call(letters_, shapes, squared);
 }
 
 }  // namespace slsd

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/code/code_array.hpp"
@@ -30,7 +31,7 @@ struct Classification {
   [[nodiscard]] bool is_torn() const { return distance >= kTornDistance; }
 };
 
-/// Compares features with prototypes, all letters at once.
+/// Compares features with prototypes, those of eight shapes at once.
 ///
 /// The likelihood is Student's t with few degrees of freedom rather than Gaussian: what real surfaces add to the
 /// simulated spread must not make one odd symbol outweigh eight good ones.
@@ -42,18 +43,24 @@ class Classifier {
   Classifier(const std::vector<Prototype>& prototypes, float distance_max);
 
   [[nodiscard]] Classification classify(const ShapeFeatures& features) const;
+  /// @param to  of the first of eight, as many as it holds
+  void classify(const EightShapes& shapes, std::span<Classification> to) const;
 
-  /// The prototypes' numbers, each with a place for every letter.
-  struct Table {
-    alignas(32) float mean[kFeatureCount][kMaxLetters];
-    alignas(32) float whitening[kFeatureCount][kFeatureCount][kMaxLetters];  ///< lower triangular
-    alignas(32) float density[kMaxLetters];
-    alignas(32) float absent[kMaxLetters];  ///< squared distance that a place without a letter has more
-    float share;                            ///< of one letter among all
+  /// Of eight shapes from each letter's prototype, standard deviations squared.
+  struct EightDistances {
+    Lanes of[kMaxLetters];
+  };
+  void find_squared_distances(const EightShapes& shapes, EightDistances& squared) const;
+
+  /// A prototype's numbers.
+  struct Letter {
+    float mean[kFeatureCount], whitening[kFeatureCount][kFeatureCount];  ///< lower triangular
+    float density;
   };
 
  private:
-  Table table_;
+  std::vector<Letter> letters_;
+  float share_;  // of one letter among all
   float distance_max_;
 };
 

@@ -3,6 +3,7 @@
 #include "core/decode/symbols/review_symbols.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -77,17 +78,51 @@ std::optional<LatticeFrame> SymbolReview::frame_around(const Sightings& seen, st
   return sum / count;
 }
 
+float SymbolReview::distance_in(const Sightings& seen, std::size_t node, const GreyMoments& moments,
+                                const LatticeFrame& lattice_frame) const {
+  return std::sqrt(
+      prototype_of(seen.claims[node]).squared_distance(shape_features(moments, lattice_frame.inverse(), size_px_)));
+}
+
+float SymbolReview::distance_from_letter(const Sightings& seen, std::size_t node, const GreyMoments& moments) const {
+  return nearer_around(seen, node, moments, distance_in(seen, node, moments, seen.nodes[node].frame));
+}
+
 /// Centres that print has moved make a symbol's own frame worse than the mean of those around it. Off the grid it is
 /// another surface that has, and the distance shows it.
-float SymbolReview::distance_from_letter(const Sightings& seen, std::size_t node, const GreyMoments& moments) const {
-  const Prototype& prototype = prototype_of(seen.claims[node]);
-  const auto distance_in = [&](const LatticeFrame& lattice_frame) {
-    return std::sqrt(prototype.squared_distance(shape_features(moments, lattice_frame.inverse(), size_px_)));
-  };
-  const float own = distance_in(seen.nodes[node].frame);
+/// @param own  the distance in the symbol's own frame
+float SymbolReview::nearer_around(const Sightings& seen, std::size_t node, const GreyMoments& moments,
+                                  float own) const {
   if (own < options_.doubtful_distance || seen.claims[node].grid_fit == GridFit::kNone) return own;
   const auto around = frame_around(seen, node);
-  return around ? std::min(own, distance_in(*around)) : own;
+  return around ? std::min(own, distance_in(seen, node, moments, *around)) : own;
+}
+
+/// distance_from_letter() of all that are trusted.
+void SymbolReview::measure_distances(const Classifier& letters, Executor& executor, Sightings& seen) {
+  executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
+    std::array<std::size_t, kLanes> asked;
+    std::size_t count = 0;
+    EightMoments eight;
+    EightShapes shapes;
+    Classifier::EightDistances squared;
+    for (std::size_t i = first; i < last; ++i) {
+      if (trusted_[i] != 0) {
+        eight.set(static_cast<int>(count), seen.moments[i], seen.nodes[i].frame.inverse());
+        asked[count++] = i;
+      }
+      if (count < kLanes && (count == 0 || i + 1 < last)) continue;
+      find_features(eight, size_px_, shapes);
+      letters.find_squared_distances(shapes, squared);
+      for (std::size_t lane = 0; lane < count; ++lane) {
+        const std::size_t node = asked[lane];
+        const CellClaim& claim = seen.claims[node];
+        const float own = std::sqrt(squared.of[array_.at(claim.row, claim.column)][lane]);
+        seen.misfits[node] = nearer_around(seen, node, seen.moments[node], own);
+      }
+      count = 0;
+    }
+  });
 }
 
 bool SymbolReview::is_inside(const Sightings& seen, std::size_t node) const {
@@ -111,15 +146,13 @@ void SymbolReview::measure_around_distrusted(const GridLinker& linker, Sightings
   });
 }
 
-void SymbolReview::trust_whole_symbols(const GridLinker& linker, Executor& executor, Sightings& seen) {
+void SymbolReview::trust_whole_symbols(const GridLinker& linker, const Classifier& letters, Executor& executor,
+                                       Sightings& seen) {
   trusted_.resize(seen.size());
   seen.misfits.resize(seen.size());
   for (std::size_t i = 0; i < seen.size(); ++i) trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
   decoded_ = trusted_;
-  executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
-    for (std::size_t i = first; i < last; ++i)
-      if (trusted_[i] != 0) seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
-  });
+  measure_distances(letters, executor, seen);
   distrusted_.clear();
   for (std::size_t i = 0; i < seen.size(); ++i)
     if (trusted_[i] == 0) distrusted_.push_back(static_cast<std::int32_t>(i));
@@ -198,11 +231,10 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
     seen.claims[node].status = RegionStatus::kDamagedShape;
 }
 
-void SymbolReview::review(const GreyView& frame, const Regions& regions, const GridLinker& linker,
-                          const std::vector<Prototype>& prototypes, std::span<GreyMomentMeter> meters,
-                          Executor& executor, Sightings& seen) {
-  prototypes_ = &prototypes;
-  trust_whole_symbols(linker, executor, seen);
+void SymbolReview::review(const GreyView& frame, const Regions& regions, const GridLinker& linker, const Look& look,
+                          std::span<GreyMomentMeter> meters, Executor& executor, Sightings& seen) {
+  prototypes_ = &look.prototypes;
+  trust_whole_symbols(linker, look.classifier, executor, seen);
   measure_light_changes(seen, executor);
   std::visit(
       [&](const auto& view) {

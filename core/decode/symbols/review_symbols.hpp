@@ -41,24 +41,32 @@ class SymbolReview {
  public:
   SymbolReview(const Pattern& pattern, ReviewOptions options);
 
-  /// @param prototypes  of the letters in measured frames
-  /// @param meters      one to a worker
-  /// @param seen        in and out: moments, frames and claims change
-  void review(const GreyView& frame, const Regions& regions, const GridLinker& linker,
-              const std::vector<Prototype>& prototypes, std::span<GreyMomentMeter> meters, Executor& executor,
-              Sightings& seen);
+  /// How the letters look in measured frames.
+  struct Look {
+    const std::vector<Prototype>& prototypes;
+    const Classifier& classifier;  ///< of these
+  };
+  /// @param meters  one to a worker
+  /// @param seen    in and out: moments, frames and claims change
+  void review(const GreyView& frame, const Regions& regions, const GridLinker& linker, const Look& look,
+              std::span<GreyMomentMeter> meters, Executor& executor, Sightings& seen);
 
   /// Takes back what was damaged and two symbols of its island hold, once none is left that its surroundings refuse.
   void take_back_held(Sightings& seen);
 
  private:
   void measure_around_distrusted(const GridLinker& linker, Sightings& seen);
-  void trust_whole_symbols(const GridLinker& linker, Executor& executor, Sightings& seen);
+  void trust_whole_symbols(const GridLinker& linker, const Classifier& letters, Executor& executor, Sightings& seen);
+  void measure_distances(const Classifier& letters, Executor& executor, Sightings& seen);
   void measure_light_changes(const Sightings& seen, Executor& executor);
   [[nodiscard]] Eigen::Vector2f light_change_around(const Sightings& seen, std::size_t node) const;
   [[nodiscard]] bool is_inside(const Sightings& seen, std::size_t node) const;
   [[nodiscard]] std::optional<LatticeFrame> frame_around(const Sightings& seen, std::size_t node) const;
+  [[nodiscard]] float distance_in(const Sightings& seen, std::size_t node, const GreyMoments& moments,
+                                  const LatticeFrame& lattice_frame) const;
   [[nodiscard]] float distance_from_letter(const Sightings& seen, std::size_t node, const GreyMoments& moments) const;
+  [[nodiscard]] float nearer_around(const Sightings& seen, std::size_t node, const GreyMoments& moments,
+                                    float own) const;
   [[nodiscard]] const Prototype& prototype_of(const CellClaim& claim) const {
     return (*prototypes_)[array_.at(claim.row, claim.column)];
   }

@@ -6,6 +6,7 @@
 
 #include "core/decode/grid/lattice_frame.hpp"
 #include "core/decode/symbols/grey_moments.hpp"
+#include "core/lanes.hpp"
 
 namespace slsd {
 
@@ -20,5 +21,21 @@ using ShapeFeatures = Eigen::Matrix<float, kFeatureCount, 1>;
 /// @param pattern_from_camera  projector pixels for one camera pixel, the inverse of the lattice frame
 [[nodiscard]] ShapeFeatures shape_features(const GreyMoments& moments, const Eigen::Matrix2f& pattern_from_camera,
                                            float symbol_size_px);
+
+/// The same of eight regions at once, a lane to each.
+struct EightShapes {
+  Lanes of[kFeatureCount]{};
+
+  void set(int lane, const ShapeFeatures& features) {
+    for (int i = 0; i < kFeatureCount; ++i) of[i][lane] = features[i];
+  }
+};
+struct EightMoments {
+  Lanes of[kFeatureCount]{};  // weight, m20, m11, m02, m30, m21, m12, m03
+  Lanes map[4]{};             // projector px for a camera px: u by x, by y, v by x, by y
+
+  void set(int lane, const GreyMoments& moments, const Eigen::Matrix2f& pattern_from_camera);
+};
+void find_features(const EightMoments& moments, float symbol_size_px, EightShapes& shapes);
 
 }  // namespace slsd

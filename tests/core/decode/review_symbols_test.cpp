@@ -67,7 +67,8 @@ class ReviewSymbols : public testing::Test {
 
   void review() {
     SymbolReview(pattern_, {})
-        .review(frame_.view(), regions_, linker_, prototypes_, std::span(&meter_, 1), alone, seen_);
+        .review(frame_.view(), regions_, linker_, {prototypes_, Classifier(prototypes_, 20)}, std::span(&meter_, 1),
+                alone, seen_);
   }
 
   [[nodiscard]] std::size_t sighting_at(int row, int column) const {
