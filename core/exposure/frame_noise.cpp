@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
@@ -59,7 +58,6 @@ template <class T>
 std::size_t take_samples(const ImageView<T>& frame, double full, Samples& samples) {
   const auto per_level = static_cast<float>(kGreys / full);
   const int unit = unit_of<T>(full);
-  const auto saturated = static_cast<int>(std::ceil(full));
   int step = kStep;
   const auto taken = [&] { return (frame.width / step + 1) * (frame.height / step + 1); };
   while (taken() > kSamplesMax) ++step;
@@ -70,8 +68,8 @@ std::size_t take_samples(const ImageView<T>& frame, double full, Samples& sample
       const auto bend = [](const T* at) { return at[-1] - 2 * at[0] + at[1]; };
       const auto sum = [](const T* at) { return at[-1] + 2 * at[0] + at[1]; };
       const auto rise = [](const T* at) { return at[1] - at[-1]; };
-      const auto greatest = [](const T* at) { return std::max<int>(std::max(at[-1], at[0]), at[1]); };
-      if (std::max(std::max(greatest(above), greatest(here)), greatest(below)) >= saturated) continue;
+      const auto greatest = [](const T* at) { return std::max({at[-1], at[0], at[1]}); };
+      if (std::max({greatest(above), greatest(here), greatest(below)}) >= full) continue;
       const int uneven = std::abs(bend(above)) + std::abs(bend(below)) + std::abs(sum(above) - sum(below)) / 2 +
                          std::abs(rise(above) + rise(below));
       const float mean = static_cast<float>(sum(above) + sum(below)) / 8;

@@ -22,14 +22,16 @@ WindowDecoder::WindowDecoder(const Pattern& pattern, std::shared_ptr<const Codeb
       judge_(pattern,
              {.rows = codebook_->rows(), .columns = codebook_->columns(), .wrong_cells_max = wrong_cells_max}) {}
 
-std::optional<std::uint32_t> WindowDecoder::key_of(const Neighbourhood& around,
-                                                   const std::vector<Classification>& shapes) const {
+/// Of the nine letters around a node; Codebook::kNoKey where one is not known.
+std::uint32_t WindowDecoder::key_of(const Neighbourhood& around) const {
   std::uint32_t key = 0;
+  int all = 0;  // below zero once one is
   for (const std::int32_t node : around) {
-    if (node < 0 || shapes[node].letter < 0) return std::nullopt;
-    key = codebook_->append(key, static_cast<std::uint8_t>(shapes[node].letter));
+    const std::int8_t letter = letters_[node + 1];
+    all |= letter;
+    key = codebook_->append(key, static_cast<std::uint8_t>(letter));
   }
-  return key;
+  return all < 0 ? Codebook::kNoKey : key;
 }
 
 /// Where the window above, or the one to the left, was found, this one lies beside it: one comparison instead of a
@@ -71,15 +73,14 @@ WindowDecoder::Hit WindowDecoder::look_up(std::int32_t node, std::uint32_t key, 
 }
 
 /// Of a range of nodes.
-void WindowDecoder::look_up_windows(std::int32_t first, std::int32_t last, const std::vector<Classification>& shapes,
-                                    const CellGate& gate) {
+void WindowDecoder::look_up_windows(std::int32_t first, std::int32_t last, const CellGate& gate) {
   for (std::int32_t node = first; node < last; ++node) {
     Hit& hit = hits_[node] = {};
-    const auto key = key_of(around_[node], shapes);
-    if (!key) continue;
-    hit = continued(node, *key, first);
+    const std::uint32_t key = key_of(around_[node]);
+    if (key == Codebook::kNoKey) continue;
+    hit = continued(node, key, first);
     if (hit.weight == 0) {
-      hit = look_up(node, *key, gate);
+      hit = look_up(node, key, gate);
     } else {
       hit.strays = !gate.admits(node, hit.row, hit.column);
     }
@@ -189,12 +190,14 @@ void WindowDecoder::decode(const std::vector<GridNode>& nodes, const std::vector
   hits_.resize(nodes.size());
   claims.resize(nodes.size());
   find_beside(nodes, beside_);
+  letters_.assign(1, -1);
+  for (const Classification& shape : shapes) letters_.push_back(shape.letter);
   constexpr std::size_t kRange = 768;  // some rows of windows: most continue one of their range
   executor.run_ranges(
       nodes.size(),
       [&](std::size_t first, std::size_t last, int) {
         for (std::size_t i = first; i < last; ++i) around_[i] = neighbourhood(beside_, static_cast<std::int32_t>(i));
-        look_up_windows(static_cast<std::int32_t>(first), static_cast<std::int32_t>(last), shapes, gate);
+        look_up_windows(static_cast<std::int32_t>(first), static_cast<std::int32_t>(last), gate);
       },
       kRange);
   executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "core/code/codebook.hpp"
@@ -52,10 +51,8 @@ class WindowDecoder {
     int count = 0;
   };
 
-  void look_up_windows(std::int32_t first, std::int32_t last, const std::vector<Classification>& shapes,
-                       const CellGate& gate);
-  [[nodiscard]] std::optional<std::uint32_t> key_of(const Neighbourhood& around,
-                                                    const std::vector<Classification>& shapes) const;
+  void look_up_windows(std::int32_t first, std::int32_t last, const CellGate& gate);
+  [[nodiscard]] std::uint32_t key_of(const Neighbourhood& around) const;
   [[nodiscard]] Hit continued(std::int32_t node, std::uint32_t key, std::int32_t first) const;
   [[nodiscard]] Hit look_up(std::int32_t node, std::uint32_t key, const CellGate& gate) const;
   [[nodiscard]] Ballot collect_votes(std::int32_t node, const CellGate& gate) const;
@@ -72,6 +69,7 @@ class WindowDecoder {
   bool unique_, corrects_;                    // no two windows alike; none alike but for two letters
   float log_letters_;
   std::vector<Beside> beside_;
+  std::vector<std::int8_t> letters_;  // of each node, from the second on; the first is that of no node
   std::vector<Neighbourhood> around_;
   std::vector<Hit> hits_;
   std::vector<std::uint8_t> claimed_;  // of each cell: whether once, or more often

@@ -176,15 +176,20 @@ float IslandJudge::evidence_against_slides(const Frame& frame, int from, int to)
 /// Refuses what another surface explains better: stretches of a row or a column of the island, with what lies right
 /// beside it, whose shapes fit the cells at another place on their epipolar lines, all of them moved by the same step.
 void IslandJudge::cut_slid(const Frame& frame, std::int32_t island) {
+  constexpr float kUnlikely = -0.3F;
   const auto members = std::span(members_).subspan(islands_[island].first, islands_[island].size);
   if (!frame.gate.knows_lines() ||
       std::ranges::all_of(members, [&](std::int32_t node) { return links_[node] == kAllAgree; }))
     return;
   Piece all{options_.rows, options_.columns, 0, 0};
+  unlikely_rows_.assign(static_cast<std::size_t>(options_.rows), 0);
+  unlikely_columns_.assign(static_cast<std::size_t>(options_.columns), 0);
   const auto place = [&](int row, int column, std::int32_t node) {
     if (!shown(row, column)) return;
     std::int32_t& there = around_[index_of(row, column)];
-    if (there < 0) there = node, placed_.push_back(static_cast<std::int32_t>(index_of(row, column)));
+    if (there >= 0) return;
+    there = node, placed_.push_back(static_cast<std::int32_t>(index_of(row, column)));
+    if (ratio(frame, node, row, column) <= kUnlikely) unlikely_rows_[row] = unlikely_columns_[column] = 1;
     all.row = std::min(all.row, row), all.column = std::min(all.column, column);
     all.rows = std::max(all.rows, row + 1), all.columns = std::max(all.columns, column + 1);
   };
@@ -198,29 +203,27 @@ void IslandJudge::cut_slid(const Frame& frame, std::int32_t island) {
       if (other >= 0 && !continues(frame, node, d)) place(cell.row, cell.column, other);
     }
   }
+  // What another surface explains better holds something that its own cell does not.
   for (int row = all.row; row < all.rows; ++row)
-    cut_slid_along(frame, island, {row, all.column, 1, all.columns - all.column});
+    if (unlikely_rows_[row] != 0) cut_slid_along(frame, island, {row, all.column, 1, all.columns - all.column});
   for (int column = all.column; column < all.columns; ++column)
-    cut_slid_along(frame, island, {all.row, column, all.rows - all.row, 1});
+    if (unlikely_columns_[column] != 0) cut_slid_along(frame, island, {all.row, column, all.rows - all.row, 1});
   for (const std::int32_t at : placed_) around_[at] = -1;
 }
 
 /// @param line  one cell wide or high
 void IslandJudge::cut_slid_along(const Frame& frame, std::int32_t island, const Piece& line) {
-  constexpr float kUnlikely = -0.3F;
   constexpr int kGapMax = 3;
   const int down = line.columns == 1, right = 1 - down, count = line.rows * line.columns;
   line_.clear(), own_ratios_.clear();
   std::int32_t probe = -1;
-  float least = 0;
   for (int i = 0; i < count; ++i) {
     const int row = line.row + i * down, column = line.column + i * right;
     const std::int32_t node = line_.emplace_back(around_[index_of(row, column)]);
     own_ratios_.push_back(node < 0 ? 0 : ratio(frame, node, row, column));
-    least = std::min(least, own_ratios_.back());
     if (node >= 0 && island_of_[node] == island) probe = node;
   }
-  if (least > kUnlikely || probe < 0) return;
+  if (probe < 0) return;
   const CellClaim& claim = frame.claims[probe];
   slides_.clear();
   frame.gate.visit_line(probe, claim.row, claim.column, [&](int r, int c) {

@@ -194,10 +194,11 @@ class IslandJudge {
   std::vector<float> own_ratios_;              // of line_
   std::vector<std::optional<float>> beyond_;   // evidence of slices of pieces
   std::vector<std::int32_t> around_, placed_;  // the node of each cell of an island and beside it; where one is
-  std::vector<std::array<int, 2>> slides_;     // rows and columns of each step along the epipolar lines
-  std::vector<float> slid_ratios_;             // of line_ after each of them, summed up as line_ratios_
-  std::vector<Line> lines_;                    // contradicted ones
-  std::vector<std::int32_t> holder_;           // of each cell: of the island that is looked at, or of all
+  std::vector<std::uint8_t> unlikely_rows_, unlikely_columns_;  // which hold what is hardly its cell's letter
+  std::vector<std::array<int, 2>> slides_;  // rows and columns of each step along the epipolar lines
+  std::vector<float> slid_ratios_;          // of line_ after each of them, summed up as line_ratios_
+  std::vector<Line> lines_;                 // contradicted ones
+  std::vector<std::int32_t> holder_;        // of each cell: of the island that is looked at, or of all
   std::int32_t looked_at_ = -1;
   std::vector<float> slips_;         // of a sample of links, or of those across a line
   float slip_max_ = 0;               // of links on one surface, cells

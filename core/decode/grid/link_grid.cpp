@@ -56,13 +56,13 @@ void GridLinker::sort_into_buckets(const std::vector<GridNode>& nodes) {
     step_px = std::max({step_px, node.frame.col(0).norm(), node.frame.col(1).norm()});
   }
   // A bucket as wide as a cell: what is near a place is in two by two of them at the most.
-  bucket_px_ = std::max(4.F, options_.pitch_px * step_px);
+  per_bucket_px_ = 1 / std::max(4.F, options_.pitch_px * step_px);
   origin_px_ = low;
-  columns_ = static_cast<int>((high.x() - low.x()) / bucket_px_) + 1;
-  rows_ = static_cast<int>((high.y() - low.y()) / bucket_px_) + 1;
+  columns_ = static_cast<int>((high.x() - low.x()) * per_bucket_px_) + 1;
+  rows_ = static_cast<int>((high.y() - low.y()) * per_bucket_px_) + 1;
   first_of_bucket_.assign(static_cast<std::size_t>(columns_) * rows_ + 1, 0);
   const auto bucket = [&](const GridNode& node) {
-    const Eigen::Vector2f at = (node.centre_px - origin_px_) / bucket_px_;
+    const Eigen::Vector2f at = (node.centre_px - origin_px_) * per_bucket_px_;
     return static_cast<int>(at.y()) * columns_ + static_cast<int>(at.x());
   };
   for (const GridNode& node : nodes) ++first_of_bucket_[bucket(node) + 1];
@@ -80,10 +80,22 @@ std::int32_t GridLinker::nearest(const std::vector<GridNode>& nodes, std::size_t
                                  const Eigen::Matrix2f& cells_from_camera, float radius) const {
   const GridNode& node = nodes[from];
   const Eigen::Vector2f target = node.centre_px + node.frame * (options_.pitch_px * step(direction));
+  const auto squared_cells = [&](const Eigen::Vector2f& centre_px) {
+    return (cells_from_camera * (centre_px - target)).squaredNorm();
+  };
+  // Most lie where they are expected.
+  const Eigen::Array2f at = (target - origin_px_) * per_bucket_px_;
+  if (at.x() >= 0 && at.y() >= 0 && at.x() < static_cast<float>(columns_) && at.y() < static_cast<float>(rows_)) {
+    const int bucket = static_cast<int>(at.y()) * columns_ + static_cast<int>(at.x());
+    for (std::int32_t i = first_of_bucket_[bucket]; i < first_of_bucket_[bucket + 1]; ++i) {
+      const auto& [centre_px, other] = in_buckets_[i];
+      if (other != static_cast<std::int32_t>(from) && squared_cells(centre_px) < kEvident * kEvident) return other;
+    }
+  }
   // An ellipse in the image; the frame's columns bound its box.
   const Eigen::Vector2f reach = radius * options_.pitch_px * node.frame.rowwise().norm();
-  const Eigen::Array2f low = (target - reach - origin_px_) / bucket_px_,
-                       high = (target + reach - origin_px_) / bucket_px_;
+  const Eigen::Array2f low = (target - reach - origin_px_) * per_bucket_px_,
+                       high = (target + reach - origin_px_) * per_bucket_px_;
   const int left = std::max(static_cast<int>(low.x()), 0), right = std::min(static_cast<int>(high.x()), columns_ - 1);
   const int bottom = std::min(static_cast<int>(high.y()), rows_ - 1);
   std::int32_t best = -1;
@@ -92,7 +104,7 @@ std::int32_t GridLinker::nearest(const std::vector<GridNode>& nodes, std::size_t
     const std::int32_t end = first_of_bucket_[row * columns_ + right + 1];
     for (std::int32_t i = first_of_bucket_[row * columns_ + left]; i < end; ++i) {
       const auto& [centre_px, other] = in_buckets_[i];
-      const float squared = (cells_from_camera * (centre_px - target)).squaredNorm();
+      const float squared = squared_cells(centre_px);
       if (squared >= best_squared || other == static_cast<std::int32_t>(from)) continue;
       if (squared < kEvident * kEvident) return other;
       best_squared = squared, best = other;

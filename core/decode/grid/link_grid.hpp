@@ -103,7 +103,7 @@ class GridLinker {
   void break_inconsistent(std::vector<GridNode>& nodes, Executor& executor);
 
   LinkGridOptions options_;
-  float bucket_px_ = 1;
+  float per_bucket_px_ = 1;
   Eigen::Vector2f origin_px_{0, 0};
   int columns_ = 0, rows_ = 0;
   struct Place {

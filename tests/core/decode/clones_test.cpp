@@ -3,8 +3,10 @@
 #include "core/clones.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
+#include <span>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -173,8 +175,7 @@ TEST_P(Clones, MeasureCellsAlike) {
   }
 }
 
-TEST_P(Clones, ClassifyAlike) {
-  std::mt19937 random(3);
+std::vector<Prototype> any_prototypes(std::mt19937& random) {
   std::normal_distribution<float> normal;
   std::vector<Prototype> prototypes(5);
   for (Prototype& prototype : prototypes) {
@@ -184,6 +185,62 @@ TEST_P(Clones, ClassifyAlike) {
       for (int j = 0; j < kFeatureCount; ++j) prototype.whitening(i, j) = j <= i ? normal(random) : 0;
     }
   }
+  return prototypes;
+}
+
+TEST_P(Clones, LookAtEightShapesAsAtEach) {
+  constexpr float kNear = 1e-4F, kSizePx = 16;
+  std::mt19937 random(7);
+  std::normal_distribution<float> normal;
+  const auto prototypes = any_prototypes(random);
+  const Classifier classifier(prototypes, 20);
+  EightMoments moments;
+  std::array<ShapeFeatures, kLanes> each;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    GreyMoments one;
+    one.weight = 100 + normal(random);
+    for (float* moment : {&one.m20, &one.m11, &one.m02}) *moment = 100 * normal(random);
+    for (float* moment : {&one.m30, &one.m21, &one.m12, &one.m03}) *moment = 1000 * normal(random);
+    const Eigen::Matrix2f map = Eigen::Matrix2f::NullaryExpr([&] { return normal(random); });
+    moments.set(lane, one, map);
+    each[lane] = shape_features(one, map, kSizePx);
+  }
+  const auto look = [&] {
+    EightShapes shapes;
+    find_features(moments, kSizePx, shapes);
+    return shapes;
+  };
+  const EightShapes shapes = with(GetParam(), look);
+  for (int lane = 0; lane < kLanes; ++lane)
+    for (int i = 0; i < kFeatureCount; ++i)
+      EXPECT_NEAR(shapes.of[i][lane], each[lane][i], kNear * (1 + each[lane].norm()));
+  for (const std::size_t count : {kLanes, 5}) {
+    std::array<Classification, kLanes> classified;
+    Classifier::EightDistances squared;
+    with(GetParam(), [&] {
+      classifier.classify(shapes, std::span(classified).first(count));
+      classifier.find_squared_distances(shapes, squared);
+      return true;
+    });
+    for (std::size_t lane = 0; lane < count; ++lane) {
+      const Classification plain = with(Clone::kPlain, [&] { return classifier.classify(each[lane]); });
+      EXPECT_EQ(classified[lane].letter, plain.letter);
+      EXPECT_NEAR(classified[lane].distance, plain.distance, kNear * plain.distance);
+      for (std::size_t letter = 0; letter < prototypes.size(); ++letter) {
+        EXPECT_NEAR(classified[lane].log_probability[letter], plain.log_probability[letter], 1e-2);
+        const float distance = prototypes[letter].squared_distance(each[lane]);
+        EXPECT_NEAR(squared.of[letter][lane], distance, 10 * kNear * distance);
+      }
+    }
+    EXPECT_EQ(std::ranges::count_if(classified, [](const Classification& shape) { return shape.likelihood > 0; }),
+              static_cast<std::ptrdiff_t>(count));
+  }
+}
+
+TEST_P(Clones, ClassifyAlike) {
+  std::mt19937 random(3);
+  std::normal_distribution<float> normal;
+  const auto prototypes = any_prototypes(random);
   const Classifier classifier(prototypes, 20);
   for (int n = 0; n < 50; ++n) {
     ShapeFeatures features;
