@@ -119,11 +119,12 @@ void ShapeFinder::describe(const GreyView& frame, Executor& executor, Sightings&
   while (meters_.size() < workers) meters_.push_back(meters_.front().another());
   seen.moments.resize(seen.region.size());
   executor.run_ranges(seen.region.size(), [&](std::size_t first, std::size_t last, int worker) {
-    for (std::size_t i = first; i < last; ++i) {
-      const Region& region = regions_.regions[seen.region[i]];
-      seen.moments[i] = std::visit(
-          [&](const auto& view) { return meters_[worker].measure(view, region, regions_.runs_of(region)); }, frame);
-    }
+    const auto of_these = [&](auto& all) { return std::span(all).subspan(first, last - first); };
+    std::visit(
+        [&](const auto& view) {
+          meters_[worker].measure_all(view, regions_, of_these(seen.region), of_these(seen.moments));
+        },
+        frame);
   });
   std::size_t kept = 0;
   for (std::size_t i = 0; i < seen.region.size(); ++i) {

@@ -3,6 +3,7 @@
 #include "core/decode/symbols/grey_moments.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -173,6 +174,11 @@ GreyMoments central(const RawMoments& raw, const PatchLevels& levels, double mid
   return g;
 }
 
+GreyMoments moments_of(const WeighedRegion& weighed) {
+  const Eigen::Vector2f middle = weighed.region->middle_px();
+  return central(weighed.moments, weighed.levels, middle.x(), middle.y());
+}
+
 }  // namespace
 
 GreyMomentMeter::GreyMomentMeter(int margin_px, float patch_px) : margin_px_(margin_px), patch_px_(patch_px) {
@@ -275,15 +281,38 @@ template <class T>
 GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
                                      SteadyCentre steady) {
   if constexpr (std::is_same_v<T, std::uint8_t>) {
-    PatchLevels levels;
-    RawMoments raw;
-    if (weigh_region(frame, region, runs, margin_px_, steady, levels, raw)) {
-      const Eigen::Vector2f middle = region.middle_px();
-      return central(raw, levels, middle.x(), middle.y());
+    if (can_be_weighed(frame, region, margin_px_)) {
+      WeighedRegion weighed{&region, runs.data()};
+      weigh_regions(frame, margin_px_, steady, std::span(&weighed, 1));
+      return moments_of(weighed);
     }
   }
   copy_patch(frame, region, runs);
   return moments_of_patch();
+}
+
+template <class T>
+void GreyMomentMeter::measure_all(const ImageView<T>& frame, const Regions& regions,
+                                  std::span<const std::int32_t> which, std::span<GreyMoments> moments) {
+  std::array<WeighedRegion, WeighedRegion::kMost> weighed;
+  std::array<std::size_t, WeighedRegion::kMost> place;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < which.size(); ++i) {
+    const Region& region = regions.regions[which[i]];
+    bool waits = false;
+    if constexpr (std::is_same_v<T, std::uint8_t>) waits = can_be_weighed(frame, region, margin_px_);
+    if (waits) {
+      weighed[count] = {&region, regions.runs_of(region).data()};
+      place[count++] = i;
+    } else {
+      moments[i] = measure(frame, region, regions.runs_of(region));
+    }
+    if (count < weighed.size() && (count == 0 || i + 1 < which.size())) continue;
+    if constexpr (std::is_same_v<T, std::uint8_t>)
+      weigh_regions(frame, margin_px_, SteadyCentre::kLeftOut, std::span(weighed).first(count));
+    for (std::size_t k = 0; k < count; ++k) moments[place[k]] = moments_of(weighed[k]);
+    count = 0;
+  }
 }
 
 template <class T>
@@ -307,6 +336,10 @@ using View8 = ImageView<std::uint8_t>;
 using View16 = ImageView<std::uint16_t>;
 template GreyMoments GreyMomentMeter::measure(const View8&, const Region&, std::span<const Run>, SteadyCentre);
 template GreyMoments GreyMomentMeter::measure(const View16&, const Region&, std::span<const Run>, SteadyCentre);
+template void GreyMomentMeter::measure_all(const View8&, const Regions&, std::span<const std::int32_t>,
+                                           std::span<GreyMoments>);
+template void GreyMomentMeter::measure_all(const View16&, const Regions&, std::span<const std::int32_t>,
+                                           std::span<GreyMoments>);
 template GreyMoments GreyMomentMeter::measure_levelled(const View8&, const Region&, std::span<const Run>,
                                                        const Eigen::Vector2f&);
 template GreyMoments GreyMomentMeter::measure_levelled(const View16&, const Region&, std::span<const Run>,

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -44,6 +45,11 @@ class GreyMomentMeter {
   template <class T>
   [[nodiscard]] GreyMoments measure(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
                                     SteadyCentre steady = SteadyCentre::kLeftOut);
+  /// Some of a frame's regions, several at once: sooner than one by one.
+  /// @param moments  one to each of them, in their order
+  template <class T>
+  void measure_all(const ImageView<T>& frame, const Regions& regions, std::span<const std::int32_t> which,
+                   std::span<GreyMoments> moments);
   /// With the steady centre.
   /// @param shading  relative change of the light for one camera px, levelled out about the middle of the region's box
   template <class T>

@@ -132,7 +132,7 @@ constexpr int kShortLanes = 16;
 using Shorts [[gnu::vector_size(2 * kShortLanes)]] = std::int16_t;
 using WideShorts [[gnu::vector_size(4 * kShortLanes)]] = int;
 /// Registers of a patch, which holds a symbol of 40 px: sums of as many grey values stay within 15 bits.
-constexpr int kShortsMax = 128;
+constexpr int kShortsMax = 128, kPatchLanesMax = kShortsMax * kShortLanes;
 constexpr int kPatchRowsMax = kShortsMax, kEdgeRows = kPatchRowsMax + 2 * kShortLanes;
 /// Of patches of an odd number of rows, whose middle is that of a row, and of an even number.
 constexpr auto kRowPowers = [] {
@@ -186,44 +186,61 @@ struct ShortRange {
 
 struct ShortPatch {
   int left, top, width, height, margin;
+
+  ShortPatch(const Region& region, int margin_px)
+      : left(region.left - margin_px),
+        top(region.top - margin_px),
+        width(region.width_px() + 2 * margin_px),
+        height(region.height_px() + 2 * margin_px),
+        margin(margin_px) {}
   [[nodiscard]] int blocks() const { return (width + kShortLanes - 1) / kShortLanes; }
+  [[nodiscard]] int lanes() const { return blocks() * height * kShortLanes; }
 };
 
-/// Where a region's rows begin and end, and those within the margin above and below: as follow_edge does it.
-inline __attribute__((always_inline)) void find_edges(const ShortPatch& place, const Region& region, const Run* runs,
-                                                      std::int16_t* before, std::int16_t* after) {
+/// Where the rows of a patch begin and end; with as many more as a register may reach beyond them.
+struct ShortEdges {
+  std::int16_t before[kEdgeRows], after[kEdgeRows];
+};
+
+/// Those of the region itself, 2 margins down.
+inline __attribute__((always_inline)) void mark_edges(const ShortPatch& place, const Region& region, const Run* runs,
+                                                      ShortEdges& edges) {
   const int reach = 2 * place.margin;
   const Shorts none_before = Shorts{} + std::numeric_limits<std::int16_t>::max(),
                none_after = Shorts{} + std::numeric_limits<std::int16_t>::min();
   for (int y = 0; y < place.height + reach; y += kShortLanes) {
-    std::memcpy(before + y, &none_before, sizeof none_before);
-    std::memcpy(after + y, &none_after, sizeof none_after);
+    std::memcpy(edges.before + y, &none_before, sizeof none_before);
+    std::memcpy(edges.after + y, &none_after, sizeof none_after);
   }
-  int row = -1;
   for (const Run* run = runs; run < runs + region.run_count; ++run) {
     const int y = run->row - region.top + reach;
-    if (run->row != row) before[y] = static_cast<std::int16_t>(run->left - region.left - 1);
-    after[y] = static_cast<std::int16_t>(run->right - region.left + reach);
-    row = run->row;
+    const auto before = static_cast<std::int16_t>(run->left - region.left - 1);
+    edges.before[y] = before < edges.before[y] ? before : edges.before[y];
+    edges.after[y] = static_cast<std::int16_t>(run->right - region.left + reach);
   }
+}
+
+/// With those within the margin above and below: as follow_edge does it.
+inline __attribute__((always_inline)) void widen_edges(const ShortPatch& place, ShortEdges& edges) {
+  const int reach = 2 * place.margin;
   for (int y = 0; y < place.height; y += kShortLanes) {
     Shorts least, greatest;
-    load(before + y, least), load(after + y, greatest);
+    load(edges.before + y, least), load(edges.after + y, greatest);
     for (int i = 1; i <= reach; ++i) {
-      Shorts b, a;
-      load(before + y + i, b), load(after + y + i, a);
-      least = b < least ? b : least;
-      greatest = a > greatest ? a : greatest;
+      Shorts before, after;
+      load(edges.before + y + i, before), load(edges.after + y + i, after);
+      least = before < least ? before : least;
+      greatest = after > greatest ? after : greatest;
     }
-    std::memcpy(before + y, &least, sizeof least);
-    std::memcpy(after + y, &greatest, sizeof greatest);
+    std::memcpy(edges.before + y, &least, sizeof least);
+    std::memcpy(edges.after + y, &greatest, sizeof greatest);
   }
 }
 
 /// As copy_rows; what is outside becomes 0.
 inline __attribute__((always_inline)) void copy_shorts(const ImageView<std::uint8_t>& frame, const ShortPatch& place,
-                                                       const std::int16_t* before, const std::int16_t* after,
-                                                       std::int16_t* patch, ShortRange& range) {
+                                                       const ShortEdges& edges, std::int16_t* patch,
+                                                       ShortRange& range) {
   constexpr Shorts kAt = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   const int blocks = place.blocks();
   const Shorts most = Shorts{} + std::numeric_limits<std::int16_t>::max();
@@ -231,8 +248,8 @@ inline __attribute__((always_inline)) void copy_shorts(const ImageView<std::uint
   range.outside = blocks * kShortLanes * place.height;
   const std::uint8_t* row = frame.row(place.top) + place.left;
   for (int y = 0; y < place.height; ++y, row += frame.stride) {
-    const Shorts after_first = Shorts{} + before[y], before_last = Shorts{} + after[y];
-    range.outside -= after[y] - before[y] - 1;
+    const Shorts after_first = Shorts{} + edges.before[y], before_last = Shorts{} + edges.after[y];
+    range.outside -= edges.after[y] - edges.before[y] - 1;
     for (int block = 0; block < blocks; ++block, patch += kShortLanes) {
       const Shorts at = kAt + static_cast<std::int16_t>(block * kShortLanes);
       const Shorts inside = (at > after_first) & (at < before_last);
@@ -273,18 +290,34 @@ inline __attribute__((always_inline)) void find_short_levels(const std::int16_t*
   levels.peak = static_cast<float>(total_of(high_sum)) / static_cast<float>(highs);
 }
 
+/// Step by step: what one region waits for, the others do meanwhile.
 template <bool kSteady>
-inline __attribute__((always_inline)) void weigh_region_of(const ImageView<std::uint8_t>& frame,
-                                                           const ShortPatch& place, const Region& region,
-                                                           const Run* runs, PatchLevels& levels, RawMoments& moments) {
-  std::int16_t before[kEdgeRows], after[kEdgeRows], patch[kShortsMax * kShortLanes];
-  ShortRange range;
-  find_edges(place, region, runs, before, after);
-  copy_shorts(frame, place, before, after, patch, range);
-  find_short_levels(patch, place.blocks() * place.height * kShortLanes, range, levels);
-  if (!(levels.peak > levels.background)) return;
-  sum_moments_of<std::int16_t, kSteady>(patch, place.blocks() * kShortLanes, place.width, powers_of_rows(place.height),
-                                        0.5F * static_cast<float>(place.width - 1), levels, moments);
+inline __attribute__((always_inline)) void weigh_regions_of(const ImageView<std::uint8_t>& frame, int margin_px,
+                                                            std::span<WeighedRegion> regions) {
+  ShortEdges edges[WeighedRegion::kMost];
+  std::int16_t patches[WeighedRegion::kMost * kPatchLanesMax];
+  for (std::size_t i = 0; i < regions.size(); ++i)
+    mark_edges({*regions[i].region, margin_px}, *regions[i].region, regions[i].runs, edges[i]);
+  std::int16_t* patch = patches;
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    const ShortPatch place(*regions[i].region, margin_px);
+    ShortRange range;
+    widen_edges(place, edges[i]);
+    copy_shorts(frame, place, edges[i], patch, range);
+    find_short_levels(patch, place.lanes(), range, regions[i].levels);
+    patch += place.lanes();
+  }
+  patch = patches;
+  for (WeighedRegion& weighed : regions) {
+    const ShortPatch place(*weighed.region, margin_px);
+    weighed.moments = {};
+    if (weighed.levels.peak > weighed.levels.background) {
+      sum_moments_of<std::int16_t, kSteady>(patch, place.blocks() * kShortLanes, place.width,
+                                            powers_of_rows(place.height), 0.5F * static_cast<float>(place.width - 1),
+                                            weighed.levels, weighed.moments);
+    }
+    patch += place.lanes();
+  }
 }
 
 }  // namespace
@@ -307,19 +340,20 @@ void sum_moments(const float* patch, int stride, std::span<const RowPowers> rows
   Cloned<sum_moments_of<float, true>>::call(patch, stride, stride, rows, middle_x, levels, moments);
 }
 
-bool weigh_region(const ImageView<std::uint8_t>& frame, const Region& region, std::span<const Run> runs, int margin_px,
-                  SteadyCentre steady, PatchLevels& levels, RawMoments& moments) {
-  const ShortPatch place{region.left - margin_px, region.top - margin_px, region.width_px() + 2 * margin_px,
-                         region.height_px() + 2 * margin_px, margin_px};
+bool can_be_weighed(const ImageView<std::uint8_t>& frame, const Region& region, int margin_px) {
+  const ShortPatch place(region, margin_px);
   const int right = place.left + place.blocks() * kShortLanes, bottom = place.top + place.height;
   if (place.left < 0 || place.top < 0 || right > frame.width || bottom > frame.height) return false;
-  if (place.blocks() * place.height > kShortsMax || 2 * margin_px > kShortLanes) return false;
+  return place.lanes() <= kPatchLanesMax && 2 * margin_px <= kShortLanes;
+}
+
+void weigh_regions(const ImageView<std::uint8_t>& frame, int margin_px, SteadyCentre steady,
+                   std::span<WeighedRegion> regions) {
   if (steady == SteadyCentre::kMeasured) {
-    Cloned<weigh_region_of<true>>::call(frame, place, region, runs.data(), levels, moments);
+    Cloned<weigh_regions_of<true>>::call(frame, margin_px, regions);
   } else {
-    Cloned<weigh_region_of<false>>::call(frame, place, region, runs.data(), levels, moments);
+    Cloned<weigh_regions_of<false>>::call(frame, margin_px, regions);
   }
-  return true;
 }
 
 }  // namespace slsd

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -66,13 +67,22 @@ struct RowPowers {
 void sum_moments(const float* patch, int stride, std::span<const RowPowers> rows, float middle_x,
                  const PatchLevels& levels, RawMoments& moments);
 
-/// All of it at once for a region of an 8-bit frame, in 16 bits a pixel: half the memory, and twice the pixels to a
-/// register.
-/// @param margin_px  how far beyond the region's pixels the patch reaches
-/// @param moments    about the middle of the region's box; none where the peak is not above the background
-/// @return           false, and nothing done, where the patch is too large or reaches beyond the frame
+/// A region of an 8-bit frame, and what it weighs.
+struct WeighedRegion {
+  static constexpr std::size_t kMost = 8;  ///< at once
+  const Region* region;
+  const Run* runs;
+  PatchLevels levels{};
+  RawMoments moments{};  ///< about the middle of the region's box; none where the peak is not above the background
+};
+/// Whether a region's patch is small enough, and lies in the frame.
 /// @thread reentrant
-[[nodiscard]] bool weigh_region(const ImageView<std::uint8_t>& frame, const Region& region, std::span<const Run> runs,
-                                int margin_px, SteadyCentre steady, PatchLevels& levels, RawMoments& moments);
+[[nodiscard]] bool can_be_weighed(const ImageView<std::uint8_t>& frame, const Region& region, int margin_px);
+/// All of it at once for some regions that can be weighed, in 16 bits a pixel: half the memory, and twice the pixels to
+/// a register.
+/// @param margin_px  how far beyond a region's pixels its patch reaches
+/// @thread reentrant
+void weigh_regions(const ImageView<std::uint8_t>& frame, int margin_px, SteadyCentre steady,
+                   std::span<WeighedRegion> regions);
 
 }  // namespace slsd
