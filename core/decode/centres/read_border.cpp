@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "core/decode/grid/neighbourhood.hpp"
@@ -15,10 +16,16 @@ namespace {
 constexpr int kSide = 11, kSamples = kSide * kSide;  // over a symbol's square
 constexpr int kVisibleMin = kSamples * 2 / 5;
 
-/// What is seen of a symbol, and where in its square, projector px from the middle.
+/// Where a sample lies in the square, projector px from the middle.
+Eigen::Vector2f place_of(int sample, float size_px) {
+  const Eigen::Vector2f in_square(static_cast<float>(sample % kSide), static_cast<float>(sample / kSide));
+  return size_px * ((in_square.array() + 0.5F) / kSide - 0.5F).matrix();
+}
+
+/// What is seen of a symbol, and at which samples.
 struct Visible {
   std::array<float, kSamples> grey;
-  std::array<Eigen::Vector2f, kSamples> at_px;
+  std::array<int, kSamples> sample;
   int count = 0;
 };
 
@@ -27,9 +34,7 @@ Visible look_at(const GreyView& frame, const Eigen::Vector2f& centre_px, const L
   Visible visible;
   const auto look = [&](const auto& image) {
     for (int i = 0; i < kSamples; ++i) {
-      const Eigen::Vector2f in_square(static_cast<float>(i % kSide), static_cast<float>(i / kSide));
-      const Eigen::Vector2f at_px = size_px * ((in_square.array() + 0.5F) / kSide - 0.5F).matrix();
-      const Eigen::Vector2f there = centre_px + lattice_frame * at_px;
+      const Eigen::Vector2f there = centre_px + lattice_frame * place_of(i, size_px);
       if (!(there.x() >= 0 && there.y() >= 0)) continue;
       if (!(there.x() < static_cast<float>(image.width - 1) && there.y() < static_cast<float>(image.height - 1)))
         continue;
@@ -37,7 +42,7 @@ Visible look_at(const GreyView& frame, const Eigen::Vector2f& centre_px, const L
       const double level =
           level_between(image, x, y, there.x() - static_cast<float>(x), there.y() - static_cast<float>(y));
       visible.grey[visible.count] = static_cast<float>(level);
-      visible.at_px[visible.count++] = at_px;
+      visible.sample[visible.count++] = i;
     }
   };
   std::visit(look, frame);
@@ -45,15 +50,14 @@ Visible look_at(const GreyView& frame, const Eigen::Vector2f& centre_px, const L
 }
 
 /// Correlation of what is seen with a letter, which is that of its light and its background whatever they are.
-/// @param middle_px  of the letter's square
-float likeness(const Visible& visible, const PatternField& letters, const Eigen::Vector2f& middle_px) {
+/// @param expected  the letter's, one to a sample
+float likeness(const Visible& visible, std::span<const float> expected) {
   float grey = 0, light = 0, grey_squared = 0, light_squared = 0, product = 0;
   for (int i = 0; i < visible.count; ++i) {
-    const Eigen::Vector2f at = middle_px + visible.at_px[i];
     // From a level of its own on: squares of high ones would drown what is between them.
-    const float expected = letters.at(at.x(), at.y()).value, seen = visible.grey[i] - visible.grey[0];
-    grey += seen, light += expected;
-    grey_squared += seen * seen, light_squared += expected * expected, product += seen * expected;
+    const float lit = expected[visible.sample[i]], seen = visible.grey[i] - visible.grey[0];
+    grey += seen, light += lit;
+    grey_squared += seen * seen, light_squared += lit * lit, product += seen * lit;
   }
   const auto count = static_cast<float>(visible.count);
   const float variances = (count * grey_squared - grey * grey) * (count * light_squared - light * light);
@@ -79,22 +83,35 @@ BorderReader::BorderReader(const Pattern& pattern, std::shared_ptr<const LetterF
       letters_(std::move(letters)) {}
 
 /// Whether another letter is much more like what is there than the one that is asked for.
-bool BorderReader::shows_another(const GreyView& frame, const PatternField& letters, const Eigen::Vector2f& centre_px,
+bool BorderReader::shows_another(const GreyView& frame, const Eigen::Vector2f& centre_px,
                                  const LatticeFrame& lattice_frame, int letter) const {
   constexpr float kLike = 0.85F, kLead = 0.25F;
   const Visible visible = look_at(frame, centre_px, lattice_frame, size_px_);
   if (visible.count < kVisibleMin) return false;
-  const float own = likeness(visible, letters, letters_->middle_px(letter));
+  const auto likeness_of = [&](int other) {
+    return likeness(visible, std::span(expected_).subspan(static_cast<std::size_t>(other) * kSamples, kSamples));
+  };
+  const float own = likeness_of(letter);
   if (own + kLead > 1) return false;
   float most = 0;
-  for (int other = 0; other < letter_count_; ++other)
-    most = std::max(most, likeness(visible, letters, letters_->middle_px(other)));
+  for (int other = 0; other < letter_count_; ++other) most = std::max(most, likeness_of(other));
   return most >= kLike && most - own >= kLead;
+}
+
+void BorderReader::sample_letters(float blur_px) {
+  const PatternField& letters = letters_->at(blur_px);
+  expected_.clear();
+  for (int letter = 0; letter < letter_count_; ++letter) {
+    for (int sample = 0; sample < kSamples; ++sample) {
+      const Eigen::Vector2f at = letters_->middle_px(letter) + place_of(sample, size_px_);
+      expected_.push_back(letters.at(at.x(), at.y()).value);
+    }
+  }
 }
 
 void BorderReader::refuse(const GreyView& frame, float blur_px, Sightings& seen) {
   refused_.clear();
-  const PatternField& letters = letters_->at(blur_px);
+  sample_letters(blur_px);
   const auto [width, height] = size_of(frame);
   const Eigen::Vector2f frame_px(static_cast<float>(width), static_cast<float>(height));
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -112,7 +129,7 @@ void BorderReader::refuse(const GreyView& frame, float blur_px, Sightings& seen)
                                                   : (pitch_px_ * (from.frame * step(d))).eval();
       const Eigen::Vector2f there_px = from.centre_px + step_px;
       if (!is_at_border(there_px, from.frame, size_px_, frame_px)) continue;
-      if (!shows_another(frame, letters, there_px, from.frame, array_.at(cell.row, cell.column))) continue;
+      if (!shows_another(frame, there_px, from.frame, array_.at(cell.row, cell.column))) continue;
       refused_.push_back(node);
       break;
     }

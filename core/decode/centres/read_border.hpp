@@ -32,7 +32,8 @@ class BorderReader {
   void refuse(const GreyView& frame, float blur_px, Sightings& seen);
 
  private:
-  [[nodiscard]] bool shows_another(const GreyView& frame, const PatternField& letters, const Eigen::Vector2f& centre_px,
+  void sample_letters(float blur_px);
+  [[nodiscard]] bool shows_another(const GreyView& frame, const Eigen::Vector2f& centre_px,
                                    const LatticeFrame& lattice_frame, int letter) const;
 
   CodeArray array_;
@@ -40,6 +41,7 @@ class BorderReader {
   float pitch_px_, size_px_;
   int letter_count_;
   std::shared_ptr<const LetterFields> letters_;
+  std::vector<float> expected_;  // how the letters look in this frame, sample by sample
   std::vector<std::int32_t> refused_;
 };
 
