@@ -23,8 +23,8 @@ enum class Clone : std::uint8_t {
 extern std::atomic<Clone> clone_in_use;
 
 /// A loop that is there once for each clone: Cloned<body>::call(...) calls that in use.
-/// @param kBody  an always_inline function, which each clone takes into itself. Its parameters are numbers, pointers
-///               and references: how vectors are passed differs from clone to clone
+/// @param kBody  an always_inline function, which each clone takes into itself. Its parameters are numbers, pointers,
+///               references and spans: how vectors are passed differs from clone to clone
 template <auto kBody>
 struct Cloned;
 

@@ -6,7 +6,6 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 
 namespace slsd {
 
@@ -33,11 +32,6 @@ static inline __attribute__((always_inline)) unsigned bits_of(const FourIntLanes
   constexpr FourIntLanes kBits = {1, 2, 4, 8};
   return united(holds & kBits);
 }
-static inline __attribute__((always_inline)) unsigned bits_of(const IntLanes& holds) {
-  constexpr IntLanes kBits = {1, 2, 4, 8, 16, 32, 64, 128};
-  const IntLanes bits = holds & kBits;
-  return united(__builtin_shufflevector(bits, bits, 0, 1, 2, 3) | __builtin_shufflevector(bits, bits, 4, 5, 6, 7));
-}
 
 // Never passed by value between functions that are not inlined: how that is done depends on the processor.
 static inline __attribute__((always_inline)) void load(const float* from, Lanes& to) {
@@ -51,17 +45,6 @@ static inline __attribute__((always_inline)) void load(const T* from, Lanes& to)
   Numbers numbers;
   std::memcpy(&numbers, from, sizeof numbers);
   to = __builtin_convertvector(numbers, Lanes);
-}
-
-/// The least of them; the greatest float where none is a number.
-static inline __attribute__((always_inline)) float least_of(const Lanes& lanes) {
-  using Half [[gnu::vector_size(16)]] = float;
-  const Lanes most = Lanes{} + std::numeric_limits<float>::max();
-  const Lanes numbers = lanes < most ? lanes : most;
-  const Half a = __builtin_shufflevector(numbers, numbers, 0, 1, 2, 3),
-             b = __builtin_shufflevector(numbers, numbers, 4, 5, 6, 7), half = a < b ? a : b;
-  const Half c = __builtin_shufflevector(half, half, 2, 3, 0, 1), quarter = half < c ? half : c;
-  return quarter[0] < quarter[1] ? quarter[0] : quarter[1];
 }
 
 static inline __attribute__((always_inline)) float sum_of(const Lanes& lanes) {

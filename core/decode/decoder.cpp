@@ -3,6 +3,7 @@
 #include "core/decode/decoder.hpp"
 
 #include <algorithm>
+#include <span>
 
 #include "core/decode/centres/align_symbols.hpp"
 #include "core/decode/symbol_reader.hpp"
@@ -33,7 +34,7 @@ struct Decoder::Parts {
   const Lattice* lattice_read = nullptr;  // of this frame
 
   void solve(const std::vector<LatticeSymbol>& symbols, Executor& executor);
-  void place_symbols();
+  void place_symbols(Executor& executor);
   void triangulate(const Lattice& lattice, double full, Executor& executor);
   void add_point(const LatticeSymbol& symbol, const Eigen::Vector2f& centre_px, const TriangulatedPoint& solved,
                  double full);
@@ -113,7 +114,7 @@ Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<dou
   const Lattice& lattice = parts_->reader.read(frame, level, &parts_->view, shared, observer);
   parts_->lattice_read = &lattice;
   if (parts_->aligner) {
-    parts_->place_symbols();
+    parts_->place_symbols(shared);
     parts_->aligned = &parts_->aligner->align(frame, level, parts_->reader.noise(), lattice, parts_->rays,
                                               parts_->depths_mm, parts_->reader.cells());
     if (observer != nullptr) observer->stage_done(Stage::kAlign);
@@ -136,22 +137,22 @@ void Decoder::Parts::solve(const std::vector<LatticeSymbol>& symbols, Executor& 
           matches.set(i - first, view.ray_near(symbol.sighting, symbol.centre_px),
                       reader.cells().ray(symbol.row, symbol.column).direction, symbol.sigma_px);
         }
-        triangulator.triangulate(matches, last - first, &solutions[first]);
+        triangulator.triangulate(matches, std::span(solutions).subspan(first, last - first));
       },
-      PixelRays::kMost);
+      PixelRays::kAtOnce);
 }
 
 DecodedSymbols Decoder::symbols() {
   static const Lattice kNone;
   if (parts_->lattice_read == nullptr) return {&kNone, {}, {}, {}};
-  parts_->place_symbols();
+  SerialExecutor alone;
+  parts_->place_symbols(alone);
   return {parts_->lattice_read, parts_->rays, parts_->depths_mm, parts_->reader.noise()};
 }
 
-void Decoder::Parts::place_symbols() {
+void Decoder::Parts::place_symbols(Executor& executor) {
   rays.clear(), depths_mm.clear();
-  SerialExecutor alone;
-  solve(lattice_read->symbols, alone);
+  solve(lattice_read->symbols, executor);
   for (const LatticeSymbol& symbol : lattice_read->symbols)
     rays.push_back(view.ray_near(symbol.sighting, symbol.centre_px));
   for (const TriangulatedPoint& solved : solutions) {

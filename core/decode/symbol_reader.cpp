@@ -3,11 +3,13 @@
 #include "core/decode/symbol_reader.hpp"
 
 #include <algorithm>
+#include <span>
 
 #include <Eigen/LU>
 
 #include "core/decode/centres/centre_sigma.hpp"
 #include "core/geometry/robust.hpp"
+#include "core/lanes.hpp"
 
 namespace slsd {
 namespace {
@@ -105,9 +107,10 @@ void SymbolReader::classify(Executor& executor) {
       const ExpectedFrame& expected = finder_.expected().at(moments.x, moments.y);
       node.frame = expected.frame;
       node.centre_px = {moments.x, moments.y};
+      if (options_.classify != Method::kDefault) continue;
       const std::size_t lane = (i - first) % kLanes;
       eight.set(static_cast<int>(lane), moments, expected.inverse);
-      if (options_.classify == Method::kDefault && (lane + 1 == kLanes || i + 1 == last)) {
+      if (lane + 1 == kLanes || i + 1 == last) {
         find_features(eight, size, shapes);
         look_->expected.classify(shapes, std::span(seen_.shapes).subspan(i - lane, lane + 1));
       }

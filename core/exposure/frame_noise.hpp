@@ -14,7 +14,7 @@ struct FrameNoise {
   float variance_per_level = 0;  ///< grey levels
 
   /// One standard deviation of a pixel, grey levels.
-  [[nodiscard]] float at(float level) const {
+  [[nodiscard]] __attribute__((always_inline)) float at(float level) const {
     return std::sqrt(dark_variance + variance_per_level * (level > 0 ? level : 0));
   }
   /// Of a frame with that many of its levels to one of this, and so much of the noise.

@@ -3,6 +3,7 @@
 #include "core/geometry/epipolar_gate.hpp"
 
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Geometry>
 
@@ -13,13 +14,6 @@ namespace {
 
 // A point nearer than this to the projector's plane is taken for behind it.
 constexpr double kMinProjectorDepthMm = 1.0;
-
-/// x -> translation cross x
-Eigen::Matrix3d cross_with(const Eigen::Vector3d& t) {
-  Eigen::Matrix3d cross;
-  cross << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
-  return cross;
-}
 
 /// The numbers of many segments.
 struct Segments {
@@ -95,16 +89,16 @@ EpipolarGate::EpipolarGate(const CalibratedCamera& camera, const Lens& projector
                            double depth_max_mm)
     : rig_{.projector_from_camera = camera.projector_from_camera,
            .line_from_camera =
-               cross_with(camera.projector_from_camera.translation) * camera.projector_from_camera.rotation,
+               -camera.projector_from_camera.rotation.colwise().cross(camera.projector_from_camera.translation),
            .focal_px = {projector.fx, projector.fy},
            .per_focal_px = {1 / projector.fx, 1 / projector.fy},
            .depth_min_mm = depth_min_mm,
            .depth_max_mm = depth_max_mm} {}
 
-void EpipolarGate::prepare(const PixelRays& rays, std::size_t count, EpipolarSegment* segments) const {
+void EpipolarGate::prepare(const PixelRays& rays, std::span<EpipolarSegment> segments) const {
   Segments found;
-  Cloned<find_segments>::call(rig_, rays, count, found);
-  for (std::size_t i = 0; i < count; ++i) {
+  Cloned<find_segments>::call(rig_, rays, segments.size(), found);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
     EpipolarSegment& segment = segments[i];
     segment.line_ = {found.line_x[i], found.line_y[i]};
     segment.axis_ = {found.axis_x[i], found.axis_y[i]};
@@ -117,12 +111,12 @@ EpipolarSegment EpipolarGate::prepare(const Eigen::Vector2d& camera_direction) c
   PixelRays one;
   one.x[0] = camera_direction.x(), one.y[0] = camera_direction.y();
   EpipolarSegment segment;
-  prepare(one, 1, &segment);
+  prepare(one, std::span(&segment, 1));
   return segment;
 }
 
-void EpipolarGate::compare(const RayPairs& rays, std::size_t count, float* residuals_px, float* disparities) const {
-  Cloned<compare_rays>::call(rig_, rays, count, residuals_px, disparities);
+void EpipolarGate::compare(const RayPairs& rays, std::span<float> residuals_px, std::span<float> disparities) const {
+  Cloned<compare_rays>::call(rig_, rays, residuals_px.size(), residuals_px.data(), disparities.data());
 }
 
 }  // namespace slsd

@@ -2,8 +2,8 @@
 // Copyright the slsd authors
 #pragma once
 
-#include <cstddef>
 #include <limits>
+#include <span>
 
 #include <Eigen/Core>
 
@@ -46,7 +46,7 @@ class EpipolarSegment {
   double along_min_px_ = 1, along_max_px_ = -1;
 };
 
-/// Many rays of a camera and of the projector, undistorted and normalised: the numbers of each in a row.
+/// Directions of up to PixelRays::kAtOnce pairs of rays, undistorted and normalised, each number in a column.
 struct RayPairs {
   PixelRays::Column camera_x, camera_y, projector_x, projector_y;
 };
@@ -68,13 +68,15 @@ class EpipolarGate {
 
   /// @param camera_direction  undistorted, normalised
   [[nodiscard]] EpipolarSegment prepare(const Eigen::Vector2d& camera_direction) const;
-  /// Of the first of many rays.
-  void prepare(const PixelRays& rays, std::size_t count, EpipolarSegment* segments) const;
-  /// Of each of the first pairs of many:
+  /// The same for many.
+  /// @param rays      their directions are read
+  /// @param segments  becomes one to a ray, for as many as it holds
+  void prepare(const PixelRays& rays, std::span<EpipolarSegment> segments) const;
+  /// Compares as many pairs as there are places for what comes of it, the same number in both.
   /// @param residuals_px  prepare(camera's).residual_px(projector's)
   /// @param disparities   the baseline over the depth where both meet, seen along the epipolar line alone: what lies
   ///                      across it has no part. Times a focal length it is a disparity. 0 where there is no such line
-  void compare(const RayPairs& rays, std::size_t count, float* residuals_px, float* disparities) const;
+  void compare(const RayPairs& rays, std::span<float> residuals_px, std::span<float> disparities) const;
 
  private:
   EpipolarRig rig_;

@@ -22,7 +22,7 @@ struct Lens {
   struct View {
     double u, v, u_x, u_y, v_x, v_y;
   };
-  [[nodiscard]] View view(double x, double y) const {
+  [[nodiscard]] __attribute__((always_inline)) View view(double x, double y) const {
     const auto& [k1, k2, p1, p2, k3] = distortion;
     const double r2 = x * x + y * y;
     const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));

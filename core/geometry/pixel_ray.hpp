@@ -18,10 +18,10 @@ struct PixelRay {
   Eigen::Matrix2d turn;       ///< change of the direction per (distorted) px: inverse of Lens::distort_jacobian
 };
 
-/// Rays of many pixels, the numbers of each in a row, so that several are reckoned with at once.
+/// Rays of up to kAtOnce pixels, each of their numbers in a column, so that several are reckoned with at once.
 struct PixelRays {
-  static constexpr std::size_t kMost = 64;
-  using Column = std::array<double, kMost>;
+  static constexpr std::size_t kAtOnce = 64;
+  using Column = std::array<double, kAtOnce>;
   Column u, v;            ///< pixels
   Column x, y;            ///< directions
   Column xx, xy, yx, yy;  ///< how they turn

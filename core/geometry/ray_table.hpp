@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "core/geometry/pixel_ray.hpp"
@@ -18,7 +19,7 @@ class RayTable {
 
   /// @param pixel  distorted; outside the image the border's cells are continued
   [[nodiscard]] PixelRay ray(const Eigen::Vector2d& pixel) const;
-  /// The rays of the first pixels of many.
+  /// The same for many: reads `u` and `v` of the first `count`, and fills in the rest.
   void look_up(PixelRays& rays, std::size_t count) const;
 
  private:

@@ -31,7 +31,7 @@ inline __attribute__((always_inline)) void solve(const TriangulationRig& rig, co
   const Eigen::Matrix3d r = rotation;
   const double t_x = translation.x(), t_y = translation.y(), t_z = translation.z();
   const double fx = rig.camera_focal_px.x(), fy = rig.camera_focal_px.y();
-  const double per_fx = rig.per_camera_focal.x(), per_fy = rig.per_camera_focal.y();
+  const double per_fx = rig.per_camera_focal_px.x(), per_fy = rig.per_camera_focal_px.y();
   const double gx = rig.projector_focal_px.x(), gy = rig.projector_focal_px.y();
 #pragma omp simd
   for (std::size_t i = 0; i < count; ++i) {
@@ -75,22 +75,14 @@ inline __attribute__((always_inline)) void solve(const TriangulationRig& rig, co
 Triangulator::Triangulator(const CalibratedCamera& camera, const Lens& projector)
     : rig_{.projector_from_camera = camera.projector_from_camera,
            .camera_focal_px = {camera.lens.fx, camera.lens.fy},
-           .per_camera_focal = {1 / camera.lens.fx, 1 / camera.lens.fy},
+           .per_camera_focal_px = {1 / camera.lens.fx, 1 / camera.lens.fy},
            .projector_focal_px = {projector.fx, projector.fy}} {}
 
-void Triangulator::triangulate(const RayMatches& matches, std::size_t count, TriangulatedPoint* points) const {
+void Triangulator::triangulate(const RayMatches& matches, std::span<TriangulatedPoint> points) const {
   Points solved;
-  Cloned<solve>::call(rig_, matches, count, solved);
-  for (std::size_t i = 0; i < count; ++i) points[i] = {{solved.x[i], solved.y[i], solved.z[i]}, solved.sigma_mm[i]};
-}
-
-TriangulatedPoint Triangulator::triangulate(const PixelRay& camera_ray, const PixelRay& projector_ray,
-                                            double camera_sigma_px) const {
-  RayMatches one;
-  one.set(0, camera_ray, projector_ray.direction, camera_sigma_px);
-  TriangulatedPoint point;
-  triangulate(one, 1, &point);
-  return point;
+  Cloned<solve>::call(rig_, matches, points.size(), solved);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    points[i] = {{solved.x[i], solved.y[i], solved.z[i]}, solved.sigma_mm[i]};
 }
 
 }  // namespace slsd

@@ -2,17 +2,21 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstddef>
+#include <span>
+
 #include "core/geometry/pixel_ray.hpp"
 #include "core/geometry/triangulate.hpp"
 
 namespace slsd {
 
+/// What points are made from.
 struct TriangulationRig {
   RigidTransform projector_from_camera;
-  Eigen::Array2d camera_focal_px, per_camera_focal, projector_focal_px;
+  Eigen::Array2d camera_focal_px, per_camera_focal_px, projector_focal_px;
 };
 
-/// Many camera rays, and what each meets: the numbers of each in a row.
+/// Up to PixelRays::kAtOnce camera rays and what each meets, each number in a column.
 struct RayMatches {
   PixelRays camera;                            ///< the pixels have no part
   PixelRays::Column projector_x, projector_y;  ///< directions
@@ -32,14 +36,9 @@ class Triangulator {
  public:
   Triangulator(const CalibratedCamera& camera, const Lens& projector);
 
-  /// Of the first of many matches.
-  void triangulate(const RayMatches& matches, std::size_t count, TriangulatedPoint* points) const;
-  /// @param camera_ray       of the camera's pixel: RayTable::ray() or pixel_ray()
-  /// @param projector_ray    of the projector's pixel
-  /// @param camera_sigma_px  one standard deviation of the camera's pixel in x and in y
-  /// @return                 what triangulate() gives
-  [[nodiscard]] TriangulatedPoint triangulate(const PixelRay& camera_ray, const PixelRay& projector_ray,
-                                              double camera_sigma_px) const;
+  /// @param points  becomes what triangulate() gives for each match, for as many as it holds: camera frame, mm; not a
+  ///                number behind the projector
+  void triangulate(const RayMatches& matches, std::span<TriangulatedPoint> points) const;
 
  private:
   TriangulationRig rig_;

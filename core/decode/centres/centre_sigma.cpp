@@ -80,7 +80,7 @@ float off_those_around(const std::vector<float>& values, const std::array<std::i
   return any ? values[i] - middle : 0;
 }
 
-/// What is known of many symbols at once, the numbers of each in a row.
+/// What is known of many symbols at once, each number in a column.
 constexpr std::size_t kAtOnce = 64;
 struct Columns {
   using Column = std::array<float, kAtOnce>;
@@ -92,11 +92,12 @@ struct Columns {
 };
 
 /// Sums up the squares of a symbol's neighbours. One that is far off has a fault of its own.
+/// @param own  the symbol
 void sum_around(const std::vector<float>& across_px, const std::vector<float>& uneven_px,
-                const std::array<std::int32_t, 4>& neighbours, std::size_t i, Columns& columns) {
+                const std::array<std::int32_t, 4>& neighbours, std::size_t own, std::size_t i, Columns& columns) {
   float across = 0, uneven = 0, count = 1;
   for (const std::int32_t other : neighbours) {
-    const auto at = static_cast<std::size_t>(std::max(other, 0));
+    const std::size_t at = other < 0 ? own : static_cast<std::size_t>(other);
     const float counts = other < 0 ? 0 : 1;
     across += counts * square(std::min(std::abs(across_px[at]), kAroundMaxPx));
     uneven += counts * square(std::min(std::abs(uneven_px[at]), kAroundMaxPx));
@@ -142,7 +143,8 @@ float noise_of_centre_px(float weight, float background, float gain, const Frame
 void CentreJudge::measure_across(const EpipolarView& view, const CellRays& cells, Executor& executor,
                                  const std::vector<LatticeSymbol>& symbols) {
   executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
-    view.compare(std::span(symbols).subspan(first, last - first), cells, &across_px_[first], &disparities_px_[first]);
+    const auto of_these = [&](auto& all) { return std::span(all).subspan(first, last - first); };
+    view.compare(of_these(symbols), cells, of_these(across_px_), of_these(disparities_px_));
   });
   const float usual_px = usual_of(symbols.size(), [&](std::size_t i) { return across_px_[i]; });
   for (std::size_t i = 0; i < symbols.size(); ++i)
@@ -181,7 +183,7 @@ void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const
           columns.misfit[at] = symbol.misfit;
           columns.unbent[at] = has_bend(symbol) ? 0 : square(kUnknownBendPx);
           columns.across[at] = across_px_[i], columns.uneven[at] = uneven_px_[i];
-          sum_around(across_px_, uneven_px_, symbol.neighbours, at, columns);
+          sum_around(across_px_, uneven_px_, symbol.neighbours, i, at, columns);
         }
         Cloned<judge_all>::call(noise, usual_misfit_squared, columns);
         for (std::size_t i = first; i < last; ++i)

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -44,9 +45,9 @@ class EpipolarView {
           }
           camera_rays_.look_up(rays, last - first);
           for (std::size_t i = first; i < last; ++i) rays_[i] = rays.at(i - first);
-          gate_.prepare(rays, last - first, &segments_[first]);
+          gate_.prepare(rays, std::span(segments_).subspan(first, last - first));
         },
-        PixelRays::kMost);
+        PixelRays::kAtOnce);
   }
   /// At one that was found to lie elsewhere.
   void look_again_at(std::int32_t sighting, const Sightings& seen) {
@@ -67,11 +68,11 @@ class EpipolarView {
   /// Of symbols whose centres lie near their sightings:
   /// @param residuals_px    how far each cell lies off the epipolar line of its centre, projector px, signed
   /// @param disparities_px  camera px
-  void compare(std::span<const LatticeSymbol> symbols, const CellRays& cells, float* residuals_px,
-               float* disparities_px) const {
+  void compare(std::span<const LatticeSymbol> symbols, const CellRays& cells, std::span<float> residuals_px,
+               std::span<float> disparities_px) const {
     RayPairs rays;
-    for (std::size_t first = 0; first < symbols.size(); first += PixelRays::kMost) {
-      const std::size_t count = std::min(PixelRays::kMost, symbols.size() - first);
+    for (std::size_t first = 0; first < symbols.size(); first += PixelRays::kAtOnce) {
+      const std::size_t count = std::min(PixelRays::kAtOnce, symbols.size() - first);
       for (std::size_t i = 0; i < count; ++i) {
         const LatticeSymbol& symbol = symbols[first + i];
         const Eigen::Vector2d seen = ray_near(symbol.sighting, symbol.centre_px).direction,
@@ -79,9 +80,9 @@ class EpipolarView {
         rays.camera_x[i] = seen.x(), rays.camera_y[i] = seen.y();
         rays.projector_x[i] = lit.x(), rays.projector_y[i] = lit.y();
       }
-      gate_.compare(rays, count, residuals_px + first, disparities_px + first);
+      gate_.compare(rays, residuals_px.subspan(first, count), disparities_px.subspan(first, count));
     }
-    for (std::size_t i = 0; i < symbols.size(); ++i) disparities_px[i] *= focal_px_;
+    for (float& disparity : disparities_px) disparity *= focal_px_;
   }
 
  private:

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/lanes.hpp"
+
 namespace slsd {
 namespace {
 
@@ -55,6 +57,7 @@ const Appearance& Appearances::at(std::size_t blur) const {
 const Appearance& Appearances::likeliest(std::span<const ShapeFeatures> shapes) const {
   constexpr std::size_t kTelling = 12;
   if (shapes.size() < kTelling) return usual_;
+  static_assert(kShapesMax % kLanes == 0);
   std::array<EightShapes, kShapesMax / kLanes> eights;
   std::array<float, kShapesMax> buffer;
   shapes = shapes.first(std::min(shapes.size(), kShapesMax));

@@ -2,7 +2,6 @@
 // Copyright the slsd authors
 #include "core/decode/symbols/classify.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -13,6 +12,7 @@
 namespace slsd {
 namespace {
 
+static_assert(kFeatureCount == 8);  // the powers of Student's t
 constexpr float kDegreesOfFreedom = 4;
 constexpr float kFarthestSquared = 1e5F;  // farther than that all are equally unlikely, and a float's range ends
 
@@ -42,6 +42,7 @@ inline __attribute__((always_inline)) void take_logarithms(const Lanes& of, Lane
                2 * s * (1 + ss * (1 / 3.F + ss * (1 / 5.F + ss * (1 / 7.F + ss * (1 / 9.F)))));
 }
 
+/// Vectors have none of their own; of such a loop the compiler makes it.
 inline __attribute__((always_inline)) void take_roots(const Lanes& of, Lanes& roots) {
   alignas(Lanes) float numbers[kLanes];
   std::memcpy(numbers, &of, sizeof of);

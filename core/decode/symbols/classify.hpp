@@ -18,7 +18,7 @@ inline constexpr float kTornDistance = 6;
 /// What a shape is likely to be.
 struct Classification {
   std::array<float, kMaxLetters>
-      log_probability{};    ///< of each letter, given that it is one of them; natural logarithm
+      log_probability{};    ///< of each letter, given that it is one of them; natural logarithm; 0 beyond the last
   float distance = 0;       ///< from the nearest prototype, in standard deviations
   float likelihood = 0;     ///< of the features if it is the likeliest letter, up to a factor common to all classifiers
   std::int8_t letter = -1;  ///< the likeliest, or -1: like none of them

@@ -294,9 +294,15 @@ GreyMoments GreyMomentMeter::measure(const ImageView<T>& frame, const Region& re
 template <class T>
 void GreyMomentMeter::measure_all(const ImageView<T>& frame, const Regions& regions,
                                   std::span<const std::int32_t> which, std::span<GreyMoments> moments) {
-  std::array<WeighedRegion, WeighedRegion::kMost> weighed;
-  std::array<std::size_t, WeighedRegion::kMost> place;
+  std::array<WeighedRegion, WeighedRegion::kAtOnce> weighed;
+  std::array<std::size_t, WeighedRegion::kAtOnce> place;
   std::size_t count = 0;
+  const auto weigh = [&] {
+    if constexpr (std::is_same_v<T, std::uint8_t>)
+      weigh_regions(frame, margin_px_, SteadyCentre::kLeftOut, std::span(weighed).first(count));
+    for (std::size_t k = 0; k < count; ++k) moments[place[k]] = moments_of(weighed[k]);
+    count = 0;
+  };
   for (std::size_t i = 0; i < which.size(); ++i) {
     const Region& region = regions.regions[which[i]];
     bool waits = false;
@@ -307,12 +313,9 @@ void GreyMomentMeter::measure_all(const ImageView<T>& frame, const Regions& regi
     } else {
       moments[i] = measure(frame, region, regions.runs_of(region));
     }
-    if (count < weighed.size() && (count == 0 || i + 1 < which.size())) continue;
-    if constexpr (std::is_same_v<T, std::uint8_t>)
-      weigh_regions(frame, margin_px_, SteadyCentre::kLeftOut, std::span(weighed).first(count));
-    for (std::size_t k = 0; k < count; ++k) moments[place[k]] = moments_of(weighed[k]);
-    count = 0;
+    if (count == weighed.size()) weigh();
   }
+  weigh();
 }
 
 template <class T>

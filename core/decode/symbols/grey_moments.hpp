@@ -32,7 +32,7 @@ struct PatchEdges {
   const std::int16_t *before, *after;
 };
 
-/// Measures regions one by one.
+/// Measures regions.
 /// @thread thread-bound: keeps its buffers
 class GreyMomentMeter {
  public:

@@ -9,6 +9,8 @@
 
 #include <Eigen/LU>
 
+#include "core/lanes.hpp"
+
 namespace slsd {
 namespace {
 
@@ -111,7 +113,8 @@ void SymbolReview::measure_distances(const Classifier& letters, Executor& execut
         eight.set(static_cast<int>(count), seen.moments[i], seen.nodes[i].frame.inverse());
         asked[count++] = i;
       }
-      if (count < kLanes && (count == 0 || i + 1 < last)) continue;
+      const bool is_last = i + 1 == last;
+      if (count < kLanes && !(is_last && count > 0)) continue;
       find_features(eight, size_px_, shapes);
       letters.find_squared_distances(shapes, squared);
       for (std::size_t lane = 0; lane < count; ++lane) {

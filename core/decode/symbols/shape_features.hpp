@@ -36,6 +36,7 @@ struct EightMoments {
 
   void set(int lane, const GreyMoments& moments, const Eigen::Matrix2f& pattern_from_camera);
 };
+/// @thread reentrant
 void find_features(const EightMoments& moments, float symbol_size_px, EightShapes& shapes);
 
 }  // namespace slsd

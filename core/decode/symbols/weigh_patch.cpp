@@ -294,8 +294,8 @@ inline __attribute__((always_inline)) void find_short_levels(const std::int16_t*
 template <bool kSteady>
 inline __attribute__((always_inline)) void weigh_regions_of(const ImageView<std::uint8_t>& frame, int margin_px,
                                                             std::span<WeighedRegion> regions) {
-  ShortEdges edges[WeighedRegion::kMost];
-  std::int16_t patches[WeighedRegion::kMost * kPatchLanesMax];
+  ShortEdges edges[WeighedRegion::kAtOnce];
+  std::int16_t patches[WeighedRegion::kAtOnce * kPatchLanesMax];
   for (std::size_t i = 0; i < regions.size(); ++i)
     mark_edges({*regions[i].region, margin_px}, *regions[i].region, regions[i].runs, edges[i]);
   std::int16_t* patch = patches;

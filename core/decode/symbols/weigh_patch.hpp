@@ -69,7 +69,7 @@ void sum_moments(const float* patch, int stride, std::span<const RowPowers> rows
 
 /// A region of an 8-bit frame, and what it weighs.
 struct WeighedRegion {
-  static constexpr std::size_t kMost = 8;  ///< at once
+  static constexpr std::size_t kAtOnce = 8;
   const Region* region;
   const Run* runs;
   PatchLevels levels{};
@@ -81,6 +81,7 @@ struct WeighedRegion {
 /// All of it at once for some regions that can be weighed, in 16 bits a pixel: half the memory, and twice the pixels to
 /// a register.
 /// @param margin_px  how far beyond a region's pixels its patch reaches
+/// @param regions    WeighedRegion::kAtOnce at the most
 /// @thread reentrant
 void weigh_regions(const ImageView<std::uint8_t>& frame, int margin_px, SteadyCentre steady,
                    std::span<WeighedRegion> regions);

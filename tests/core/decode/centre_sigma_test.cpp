@@ -39,6 +39,28 @@ float judged(const std::vector<LatticeSymbol>& symbols) {
   return lattice.symbols.back().sigma_px;
 }
 
+TEST(CentreJudge, KnowsEachOfMany) {
+  const Pattern pattern = shipped_pattern("16px-5.toml");
+  const CellRays cells(pattern, std::vector<Prototype>(5), paper_rig().projector);
+  const FrameNoise noise{.dark_variance = 9, .variance_per_level = 0.02F};
+  for (const int count : {1, 64, 65, 200}) {
+    Lattice lattice;
+    for (int i = 0; i < count; ++i) {
+      LatticeSymbol& symbol =
+          lattice.symbols.emplace_back(symbol_of(90 + static_cast<float>(i), 60 + static_cast<float>(i % 7)));
+      symbol.misfit = i % 5 == 4 ? 3 : 1;
+      if (i % 3 == 0) symbol.neighbours = {i, i, -1, -1};
+    }
+    CentreJudge().judge(noise, nullptr, cells, alone, lattice);
+    for (const LatticeSymbol& symbol : lattice.symbols) {
+      const double noise_px = noise_of_centre_px(symbol.weight, symbol.background, symbol.gain, noise),
+                   unbent_px = symbol.neighbours[2] < 0 ? 0.015 : 0, misfit = symbol.misfit * symbol.misfit - 1;
+      EXPECT_NEAR(symbol.sigma_px, std::hypot(std::hypot(0.55 * noise_px, 0.01), std::hypot(unbent_px, 0.01 * misfit)),
+                  1e-6);
+    }
+  }
+}
+
 TEST(CentreJudge, GrowsWithTheMisfitOfTheShapeAndWhereNothingTellsOfItsBend) {
   LatticeSymbol symbol = symbol_of(144, 100);
   symbol.misfit = 1;

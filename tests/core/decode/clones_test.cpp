@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <random>
 #include <span>
 #include <vector>
@@ -151,6 +152,28 @@ TEST_P(Clones, WeighPatchesAlike) {
     const RawMoments sums = with(GetParam(), moments), plain_sums = with(Clone::kPlain, moments);
     for (int p = 0; p <= 3; ++p)
       for (int q = 0; p + q <= 3; ++q) expect_near(sums.m[p][q], plain_sums.m[p][q], plain_sums.m[0][0] * 400);
+  }
+}
+
+TEST_P(Clones, WeighRegionsAlike) {
+  const Grey8 frame = some_frame<std::uint8_t>(700, 90, 255);
+  Regions regions;
+  RegionFinder().find(binarized(frame, 255, 6), regions);
+  std::vector<std::int32_t> all(regions.regions.size());
+  std::iota(all.begin(), all.end(), 0);
+  ASSERT_GT(all.size(), 20);
+  const auto measured = [&] {
+    std::vector<GreyMoments> moments(all.size());
+    GreyMomentMeter(2).measure_all(frame.view(), regions, all, moments);
+    return moments;
+  };
+  const auto here = with(GetParam(), measured), plain = with(Clone::kPlain, measured);
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    EXPECT_EQ(here[i].background, plain[i].background);
+    EXPECT_EQ(here[i].peak, plain[i].peak);
+    expect_near(here[i].weight, plain[i].weight);
+    expect_near(here[i].x, plain[i].x);
+    expect_near(here[i].m02, plain[i].m02);
   }
 }
 

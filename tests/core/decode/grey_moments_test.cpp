@@ -250,5 +250,46 @@ TEST(GreyMoments, InACellBeyondTheFrameWeighNothing) {
   EXPECT_EQ(moments.weight, 0);
 }
 
+/// Boxes of many sizes, some at the border, one as large as no symbol is.
+Grey8 some_boxes() {
+  Grey8 frame(640, 400);
+  std::mt19937 random(3);
+  for (std::size_t i = 0; i < frame.size(); ++i) frame.data()[i] = static_cast<std::uint8_t>(20 + random() % 5);
+  const auto fill = [&](int left, int top, int width, int height) {
+    for (int y = top; y < top + height; ++y)
+      for (int x = left; x < left + width; ++x) frame.at(x, y) = static_cast<std::uint8_t>(150 + random() % 60);
+  };
+  for (int row = 0; row < 5; ++row)
+    for (int column = 0; column < 16; ++column)
+      fill(column * 40, row * 50, 3 + static_cast<int>(random() % 30), 3 + static_cast<int>(random() % 40));
+  fill(10, 270, 500, 120);
+  return frame;
+}
+
+template <class T>
+void expect_all_as_each(const Image<T>& frame, const Regions& regions) {
+  std::vector<std::int32_t> which;
+  for (std::size_t i = 0; i < regions.regions.size(); i += 1 + i % 2) which.push_back(static_cast<std::int32_t>(i));
+  ASSERT_GT(which.size(), 30);
+  std::vector<GreyMoments> all(which.size());
+  GreyMomentMeter meter(kMarginPx);
+  meter.measure_all(frame.view(), regions, which, all);
+  for (std::size_t i = 0; i < which.size(); ++i) {
+    const Region& region = regions.regions[which[i]];
+    const GreyMoments each = meter.measure(frame.view(), region, regions.runs_of(region));
+    EXPECT_GT(each.weight, 0);
+    for (const auto part : {&GreyMoments::x, &GreyMoments::y, &GreyMoments::weight, &GreyMoments::m20,
+                            &GreyMoments::m03, &GreyMoments::background, &GreyMoments::peak})
+      EXPECT_EQ(all[i].*part, each.*part) << i;
+  }
+}
+
+TEST(GreyMoments, OfManyRegionsAreThoseOfEach) {
+  const Grey8 frame = some_boxes();
+  const Regions regions = regions_above(frame);
+  expect_all_as_each(frame, regions);
+  expect_all_as_each(sixteen_bits(frame), regions);
+}
+
 }  // namespace
 }  // namespace slsd

@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #include "core/geometry/epipolar_gate.hpp"
 
+#include <span>
+
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -26,7 +28,7 @@ Compared compare(const EpipolarGate& gate, const Eigen::Vector2d& seen, const Ei
   one.camera_x[0] = seen.x(), one.camera_y[0] = seen.y();
   one.projector_x[0] = lit.x(), one.projector_y[0] = lit.y();
   Compared compared{};
-  gate.compare(one, 1, &compared.residual_px, &compared.disparity);
+  gate.compare(one, std::span(&compared.residual_px, 1), std::span(&compared.disparity, 1));
   return compared;
 }
 

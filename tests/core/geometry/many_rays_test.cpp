@@ -2,10 +2,12 @@
 // Copyright the slsd authors
 #include <array>
 #include <cmath>
-#include <utility>
+#include <cstddef>
+#include <span>
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+#include <Eigen/Geometry>
 
 #include "core/clones.hpp"
 #include "core/geometry/epipolar_gate.hpp"
@@ -19,16 +21,18 @@ namespace {
 /// Runs each clone that this machine has.
 template <class Check>
 void for_each_clone(Check&& check) {
-  const Clone usual = clone_in_use;
+  struct Restore {
+    Clone usual = clone_in_use;
+    ~Restore() { clone_in_use = usual; }
+  } const restore;
   for (const Clone clone : clones_here()) {
     clone_in_use = clone;
     check();
   }
-  clone_in_use = usual;
 }
 
 std::size_t any_count() {
-  return *rc::gen::inRange<std::size_t>(1, PixelRays::kMost + 1);
+  return *rc::gen::inRange<std::size_t>(1, PixelRays::kAtOnce + 1);
 }
 
 RC_GTEST_PROP(ManyRays, AreThoseOfEachPixel, ()) {
@@ -64,10 +68,10 @@ RC_GTEST_PROP(ManyRays, HaveTheSegmentsAndResidualsOfEach, ()) {
   }
   const auto& [rotation, translation] = rig.cameras[0].projector_from_camera;
   for_each_clone([&] {
-    std::array<EpipolarSegment, PixelRays::kMost> segments;
-    std::array<float, PixelRays::kMost> residuals_px{}, disparities{};
-    gate.prepare(rays, count, segments.data());
-    gate.compare(pairs, count, residuals_px.data(), disparities.data());
+    std::array<EpipolarSegment, PixelRays::kAtOnce> segments;
+    std::array<float, PixelRays::kAtOnce> residuals_px{}, disparities{};
+    gate.prepare(rays, std::span(segments).first(count));
+    gate.compare(pairs, std::span(residuals_px).first(count), std::span(disparities).first(count));
     for (std::size_t i = 0; i < count; ++i) {
       const Eigen::Vector2d lit(pairs.projector_x[i], pairs.projector_y[i]);
       const Eigen::Vector3d slope = rotation * Eigen::Vector3d(rays.x[i], rays.y[i], 1),
@@ -93,7 +97,7 @@ RC_GTEST_PROP(ManyRays, MeetWhereEachDoes, ()) {
   const Triangulator triangulator(camera, rig.projector);
   const std::size_t count = any_count();
   RayMatches matches;
-  std::array<TriangulatedPoint, PixelRays::kMost> plain;
+  std::array<TriangulatedPoint, PixelRays::kAtOnce> plain;
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector3d point = any_point(camera.lens, 400, 2500);
     const Match match{camera.lens.project(point) + Eigen::Vector2d(uniform(-2, 2), uniform(-2, 2)),
@@ -102,8 +106,8 @@ RC_GTEST_PROP(ManyRays, MeetWhereEachDoes, ()) {
     plain[i] = triangulate(match, camera, rig.projector, 0.07);
   }
   for_each_clone([&] {
-    std::array<TriangulatedPoint, PixelRays::kMost> points;
-    triangulator.triangulate(matches, count, points.data());
+    std::array<TriangulatedPoint, PixelRays::kAtOnce> points;
+    triangulator.triangulate(matches, std::span(points).first(count));
     for (std::size_t i = 0; i < count; ++i) {
       RC_ASSERT((plain[i].point_in_camera - points[i].point_in_camera).norm() < 1e-4);
       RC_ASSERT(std::abs(plain[i].sigma_mm - points[i].sigma_mm) < 1e-4 * plain[i].sigma_mm);
