@@ -12,7 +12,7 @@ namespace slsd {
 namespace {
 
 /// Ends of runs that are written at once, whether there are as many or not: what lies beyond is written over.
-constexpr int kEndsAtOnce = 8;
+constexpr int kEndsAtOnce = 6;
 
 /// Writes where the runs of a row begin and end, in turn; the caller has room for an end at every pixel and some more.
 /// @return the number of runs
