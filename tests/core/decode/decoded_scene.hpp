@@ -45,6 +45,4 @@ inline int wrong_points(const Decoding& decoding, const Surface& surface, double
   return wrong;
 }
 
-/// Cells whose middle the camera sees, a symbol's size inside its frame.
-
 }  // namespace slsd::test
