@@ -66,7 +66,8 @@ RC_GTEST_PROP(ManyRays, HaveTheSegmentsAndResidualsOfEach, ()) {
     rays.x[i] = pairs.camera_x[i] = seen.x(), rays.y[i] = pairs.camera_y[i] = seen.y();
     pairs.projector_x[i] = lit.x(), pairs.projector_y[i] = lit.y();
   }
-  const auto& [rotation, translation] = rig.cameras[0].projector_from_camera;
+  const Eigen::Matrix3d& rotation = rig.cameras[0].projector_from_camera.rotation;
+  const Eigen::Vector3d& translation = rig.cameras[0].projector_from_camera.translation;
   for_each_clone([&] {
     std::array<EpipolarSegment, PixelRays::kAtOnce> segments;
     std::array<float, PixelRays::kAtOnce> residuals_px{}, disparities{};
