@@ -21,19 +21,27 @@ double nodes_per_px(int size_px) {
   return (nodes_across(size_px) - 1) / std::max(size_px - 1.0, 1.0);
 }
 
-/// A step of Newton's method.
+/// A direction, and how it turns with the pixel.
+struct Turning {
+  double x, y, xx, xy, yx, yy;
+};
+
+/// A step of Newton's method from a direction near that of the pixel.
+inline __attribute__((always_inline)) Turning refined(const Lens& lens, double x, double y, double u, double v) {
+  const Lens::View seen = lens.view(x, y);
+  const double per_area = 1 / (seen.u_x * seen.v_y - seen.u_y * seen.v_x);
+  const double xx = seen.v_y * per_area, xy = -seen.u_y * per_area, yx = -seen.v_x * per_area, yy = seen.u_x * per_area;
+  const double off_u = seen.u - u, off_v = seen.v - v;
+  return {x - (xx * off_u + xy * off_v), y - (yx * off_u + yy * off_v), xx, xy, yx, yy};
+}
+
 inline __attribute__((always_inline)) void refine_all(const Lens& of, PixelRays& rays, std::size_t count) {
   const Lens lens = of;
 #pragma omp simd
   for (std::size_t i = 0; i < count; ++i) {
-    const Lens::View seen = lens.view(rays.x[i], rays.y[i]);
-    const double per_area = 1 / (seen.u_x * seen.v_y - seen.u_y * seen.v_x);
-    const double xx = seen.v_y * per_area, xy = -seen.u_y * per_area, yx = -seen.v_x * per_area,
-                 yy = seen.u_x * per_area;
-    const double off_u = seen.u - rays.u[i], off_v = seen.v - rays.v[i];
-    rays.x[i] -= xx * off_u + xy * off_v;
-    rays.y[i] -= yx * off_u + yy * off_v;
-    rays.xx[i] = xx, rays.xy[i] = xy, rays.yx[i] = yx, rays.yy[i] = yy;
+    const Turning to = refined(lens, rays.x[i], rays.y[i], rays.u[i], rays.v[i]);
+    rays.x[i] = to.x, rays.y[i] = to.y;
+    rays.xx[i] = to.xx, rays.xy[i] = to.xy, rays.yx[i] = to.yx, rays.yy[i] = to.yy;
   }
 }
 
@@ -76,10 +84,12 @@ Eigen::Vector2d RayTable::estimate(double u, double v) const {
 }
 
 PixelRay RayTable::ray(const Eigen::Vector2d& pixel) const {
-  Eigen::Vector2d near = estimate(pixel.x(), pixel.y());
-  if (refines_) near = lens_.refine(near, pixel);
-  const Eigen::Matrix2d turn = lens_.distort_jacobian(near).inverse();
-  return {near - turn * (lens_.distort(near) - pixel), turn};
+  const Eigen::Vector2d near = estimate(pixel.x(), pixel.y());
+  Turning to = refined(lens_, near.x(), near.y(), pixel.x(), pixel.y());
+  if (refines_) to = refined(lens_, to.x, to.y, pixel.x(), pixel.y());
+  Eigen::Matrix2d turn;
+  turn << to.xx, to.xy, to.yx, to.yy;
+  return {{to.x, to.y}, turn};
 }
 
 void RayTable::look_up(PixelRays& rays, std::size_t count) const {
