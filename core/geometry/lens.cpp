@@ -25,6 +25,11 @@ bool unfolded(const Lens& lens, const Eigen::Vector2d& normalised) {
   return true;
 }
 
+/// One step of Newton's method from an estimate of lens.undistort(pixel).
+Eigen::Vector2d refine(const Lens& lens, const Eigen::Vector2d& estimate, const Eigen::Vector2d& pixel) {
+  return estimate - lens.distort_jacobian(estimate).inverse() * (lens.distort(estimate) - pixel);
+}
+
 bool invertible_at(const Lens& lens, const Eigen::Vector2d& pixel) {
   const Eigen::Vector2d normalised = lens.undistort(pixel);
   return (lens.distort(normalised) - pixel).norm() < 1e-6 && unfolded(lens, normalised);
@@ -48,15 +53,11 @@ Eigen::Matrix2d Lens::distort_jacobian(const Eigen::Vector2d& normalised) const 
   return jacobian;
 }
 
-Eigen::Vector2d Lens::refine(const Eigen::Vector2d& estimate, const Eigen::Vector2d& pixel) const {
-  return estimate - distort_jacobian(estimate).inverse() * (distort(estimate) - pixel);
-}
-
 Eigen::Vector2d Lens::undistort(const Eigen::Vector2d& pixel) const {
   Eigen::Vector2d estimate((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
   double error = (distort(estimate) - pixel).norm();
   for (int step = 0; step < kMaxSteps; ++step) {
-    Eigen::Vector2d next = refine(estimate, pixel);
+    Eigen::Vector2d next = refine(*this, estimate, pixel);
     double next_error = (distort(next) - pixel).norm();
     for (int i = 0; i < kMaxHalvings && !(next_error <= error); ++i) {
       next = 0.5 * (next + estimate);

@@ -44,8 +44,6 @@ struct Lens {
   [[nodiscard]] Eigen::Matrix2d distort_jacobian(const Eigen::Vector2d& normalised) const;
   /// Normalised, undistorted direction of a pixel: Newton's method to 1e-12.
   [[nodiscard]] Eigen::Vector2d undistort(const Eigen::Vector2d& pixel) const;
-  /// One step of Newton's method from an estimate of undistort(pixel).
-  [[nodiscard]] Eigen::Vector2d refine(const Eigen::Vector2d& estimate, const Eigen::Vector2d& pixel) const;
   /// Whether the distortion can be inverted everywhere in the image.
   [[nodiscard]] bool invertible() const;
 
