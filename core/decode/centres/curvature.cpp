@@ -9,6 +9,8 @@
 
 #include <Eigen/LU>
 
+#include "core/decode/grid/neighbourhood.hpp"
+
 namespace slsd {
 namespace {
 
@@ -46,29 +48,30 @@ CentreCorrection::CentreCorrection(const std::vector<Prototype>& prototypes, flo
   }
 }
 
-/// Where a node's neighbours are that are decoded, and as such agree with it.
-std::array<std::int32_t, 4> CentreCorrection::find_named(const GridNode& node, std::size_t index) const {
+/// Where its neighbours are that are decoded, and as such agree with it.
+CentreCorrection::Neighbours CentreCorrection::find_neighbours(const std::vector<GridNode>& nodes,
+                                                               std::int32_t node) const {
   constexpr std::array<std::int32_t, 4> kBeyond{1, kRowStep, -1, -kRowStep};  // by Direction
-  std::array<std::int32_t, 4> named{-1, -1, -1, -1};
-  if (cells_[index] < 0) return named;
+  Neighbours found{-1, -1, -1, -1};
   for (const Direction d : kDirections) {
-    const std::int32_t other = node.broken[d] ? -1 : node.links[d];
-    if (other >= 0 && cells_[other] == cells_[index] + kBeyond[d]) named[d] = other;
+    const std::int32_t other = neighbour(nodes, node, d);
+    if (other >= 0 && cells_[other] == cells_[node] + kBeyond[d]) found[d] = symbol_of_[other];
   }
-  return named;
+  return found;
 }
 
-void CentreCorrection::measure_bends(std::int32_t node) {
-  const auto next = [&](std::int32_t from, Direction d) { return from < 0 ? -1 : named_[from][d]; };
+void CentreCorrection::measure_bends(std::int32_t symbol) {
+  const auto next = [&](std::int32_t from, Direction d) { return from < 0 ? -1 : neighbours_[from][d]; };
   const float per_squared_px = 1 / (pitch_px_ * pitch_px_);
-  const auto [right, down, left, up] = named_[node];
-  Derivatives& at = derivatives_[node] = {};
+  const auto [right, down, left, up] = neighbours_[symbol];
+  const Eigen::Vector2f twice_here = 2 * centres_[symbol];
+  Derivatives& at = derivatives_[symbol] = {};
   if (right >= 0 && left >= 0) {
-    at.bend.uu = (centres_[right] + centres_[left] - 2 * centres_[node]) * per_squared_px;
+    at.bend.uu = (centres_[right] + centres_[left] - twice_here) * per_squared_px;
     at.has_uu = true;
   }
   if (up >= 0 && down >= 0) {
-    at.bend.vv = (centres_[up] + centres_[down] - 2 * centres_[node]) * per_squared_px;
+    at.bend.vv = (centres_[up] + centres_[down] - twice_here) * per_squared_px;
     at.has_vv = true;
   }
   const std::int32_t up_left = next(up, kLeft), up_right = next(up, kRight), down_left = next(down, kLeft),
@@ -85,14 +88,14 @@ void CentreCorrection::measure_bends(std::int32_t node) {
   if (!at.is_slight) return;
   const auto over_two = [&](std::int32_t last, std::int32_t first, const Eigen::Vector2f& over_one) -> Eigen::Vector2f {
     if (last < 0 || first < 0) return over_one;
-    return (centres_[last] + centres_[first] - 2 * centres_[node]) * (0.25F * per_squared_px);
+    return (centres_[last] + centres_[first] - twice_here) * (0.25F * per_squared_px);
   };
   at.over_two = {over_two(next(right, kRight), next(left, kLeft), at.bend.uu), at.bend.uv,
                  over_two(next(down, kDown), next(up, kUp), at.bend.vv)};
 }
 
 template <class Part>
-Eigen::Vector2f CentreCorrection::median_around(const std::vector<GridNode>& nodes, std::int32_t node,
+Eigen::Vector2f CentreCorrection::median_around(const std::vector<GridNode>& nodes, std::int32_t symbol,
                                                 bool Derivatives::*has, Part part) const {
   std::array<float, 5> x, y;
   int count = 0;
@@ -102,8 +105,11 @@ Eigen::Vector2f CentreCorrection::median_around(const std::vector<GridNode>& nod
     x[count] = value.x(), y[count] = value.y();
     ++count;
   };
-  add(node);
-  for (const Direction d : kDirections) add(neighbour(nodes, node, d));
+  add(symbol);
+  for (const Direction d : kDirections) {
+    const std::int32_t other = neighbour(nodes, sightings_[symbol], d);
+    if (other >= 0) add(symbol_of_[other]);
+  }
   if (count == 0) return {0, 0};
   const auto median = [count](std::array<float, 5>& values) {
     for (int i = 1; i < count; ++i) {
@@ -115,10 +121,10 @@ Eigen::Vector2f CentreCorrection::median_around(const std::vector<GridNode>& nod
 }
 
 /// The mean with the neighbours that hardly bend either: less noise than the bend itself.
-Bend CentreCorrection::slight_bend_around(std::int32_t node) const {
-  Bend sum = derivatives_[node].over_two;
+Bend CentreCorrection::slight_bend_around(std::int32_t symbol) const {
+  Bend sum = derivatives_[symbol].over_two;
   float count = 1;
-  for (const std::int32_t other : named_[node]) {
+  for (const std::int32_t other : neighbours_[symbol]) {
     if (other < 0 || !derivatives_[other].is_slight) continue;
     const Bend& bend = derivatives_[other].over_two;
     sum.uu += bend.uu, sum.uv += bend.uv, sum.vv += bend.vv, ++count;
@@ -126,74 +132,66 @@ Bend CentreCorrection::slight_bend_around(std::int32_t node) const {
   return {sum.uu / count, sum.uv / count, sum.vv / count};
 }
 
-Bend CentreCorrection::bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const {
-  if (derivatives_[node].is_slight) return slight_bend_around(node);
+Bend CentreCorrection::bend_of(const std::vector<GridNode>& nodes, std::int32_t symbol) const {
+  if (derivatives_[symbol].is_slight) return slight_bend_around(symbol);
   // The median with the neighbours: less noise, a value where none could be measured, and none from across an edge in
   // depth.
-  return {median_around(nodes, node, &Derivatives::has_uu, &Bend::uu),
-          median_around(nodes, node, &Derivatives::has_uv, &Bend::uv),
-          median_around(nodes, node, &Derivatives::has_vv, &Bend::vv)};
-}
-
-/// @param letter  of its cell
-LatticeSymbol CentreCorrection::symbol_of(const std::vector<GridNode>& nodes, const GreyMoments& seen,
-                                          const CellClaim& claim, std::int32_t node, std::size_t letter,
-                                          std::optional<float> misfit) const {
-  LatticeSymbol symbol{.sighting = node,
-                       .row = claim.row,
-                       .column = claim.column,
-                       .centre_px = {seen.x, seen.y},
-                       .frame = nodes[node].frame,
-                       .bend = {},
-                       .background = seen.background,
-                       .gain = seen.peak - seen.background,
-                       .misfit = 0,
-                       .weight = seen.weight,
-                       .sigma_px = 0,
-                       .damage_px = 0,
-                       .neighbours = {-1, -1, -1, -1}};
-  symbol.misfit =
-      misfit ? *misfit
-             : std::sqrt(prototypes_[letter].squared_distance(shape_features(seen, symbol.frame.inverse(), size_px_)));
-  for (const Direction d : kDirections) {
-    if (named_[node][d] >= 0) symbol.neighbours[d] = symbol_of_[named_[node][d]];
-  }
-  symbol.bend = bend_of(nodes, node);
-  symbol.centre_px -= pull_of(symbol.bend, symbol.frame, second_moments_px2_[letter]);
-  return symbol;
+  return {median_around(nodes, symbol, &Derivatives::has_uu, &Bend::uu),
+          median_around(nodes, symbol, &Derivatives::has_uv, &Bend::uv),
+          median_around(nodes, symbol, &Derivatives::has_vv, &Bend::vv)};
 }
 
 void CentreCorrection::correct(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
                                const std::vector<CellClaim>& claims, const CodeArray& array, Executor& executor,
                                Lattice& lattice, std::span<const float> misfits) {
-  centres_.resize(nodes.size());
-  named_.resize(nodes.size());
-  derivatives_.resize(nodes.size());
-  symbol_of_.resize(nodes.size());
-  cells_.resize(nodes.size());
-  std::int32_t symbols = 0;
+  cells_.resize(nodes.size()), symbol_of_.resize(nodes.size());
+  sightings_.clear();
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const bool decoded = claims[i].status == RegionStatus::kDecoded;
-    symbol_of_[i] = decoded ? symbols++ : -1;
-    cells_[i] = decoded ? claims[i].row * kRowStep + claims[i].column : -1;
+    const CellClaim& claim = claims[i];
+    cells_[i] = symbol_of_[i] = -1;
+    if (claim.status != RegionStatus::kDecoded) continue;
+    cells_[i] = claim.row * kRowStep + claim.column;
+    symbol_of_[i] = static_cast<std::int32_t>(sightings_.size());
+    sightings_.push_back(static_cast<std::int32_t>(i));
   }
-  const auto for_each_node = [&](auto&& work) {
-    executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
-      for (std::size_t i = first; i < last; ++i) work(i);
+  const std::size_t count = sightings_.size();
+  centres_.resize(count), neighbours_.resize(count), derivatives_.resize(count), lattice.symbols.resize(count);
+  // work(its number, its node, the letter of its cell)
+  const auto for_each_symbol = [&](auto&& work) {
+    executor.run_ranges(count, [&](std::size_t first, std::size_t last, int) {
+      for (auto i = static_cast<std::int32_t>(first); i < static_cast<std::int32_t>(last); ++i) {
+        const CellClaim& claim = claims[sightings_[i]];
+        work(i, sightings_[i], array.at(claim.row, claim.column));
+      }
     });
   };
-  for_each_node([&](std::size_t i) {
-    centres_[i] = {moments[i].x, moments[i].y};
-    if (claims[i].named()) centres_[i] -= nodes[i].frame * centroids_px_[array.at(claims[i].row, claims[i].column)];
-    named_[i] = find_named(nodes[i], i);
+  for_each_symbol([&](std::int32_t symbol, std::int32_t node, std::size_t letter) {
+    centres_[symbol] = Eigen::Vector2f(moments[node].x, moments[node].y) - nodes[node].frame * centroids_px_[letter];
+    neighbours_[symbol] = find_neighbours(nodes, node);
   });
-  for_each_node([&](std::size_t i) { measure_bends(static_cast<std::int32_t>(i)); });
-  lattice.symbols.resize(static_cast<std::size_t>(symbols));
-  for_each_node([&](std::size_t i) {
-    if (symbol_of_[i] < 0) return;
-    const auto misfit = misfits.empty() ? std::nullopt : std::optional<float>(misfits[i]);
-    lattice.symbols[static_cast<std::size_t>(symbol_of_[i])] = symbol_of(
-        nodes, moments[i], claims[i], static_cast<std::int32_t>(i), array.at(claims[i].row, claims[i].column), misfit);
+  for_each_symbol([&](std::int32_t symbol, std::int32_t, std::size_t) { measure_bends(symbol); });
+  for_each_symbol([&](std::int32_t symbol, std::int32_t node, std::size_t letter) {
+    const GreyMoments& seen = moments[node];
+    const LatticeFrame& frame = nodes[node].frame;
+    const float misfit =
+        misfits.empty()
+            ? std::sqrt(prototypes_[letter].squared_distance(shape_features(seen, frame.inverse(), size_px_)))
+            : misfits[node];
+    const Bend bend = bend_of(nodes, symbol);
+    lattice.symbols[symbol] = {
+        .sighting = node,
+        .row = claims[node].row,
+        .column = claims[node].column,
+        .centre_px = Eigen::Vector2f(seen.x, seen.y) - pull_of(bend, frame, second_moments_px2_[letter]),
+        .frame = frame,
+        .bend = bend,
+        .background = seen.background,
+        .gain = seen.peak - seen.background,
+        .misfit = misfit,
+        .weight = seen.weight,
+        .sigma_px = 0,
+        .damage_px = 0,
+        .neighbours = neighbours_[symbol]};
   });
 }
 

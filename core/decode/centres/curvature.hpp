@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -45,16 +44,14 @@ class CentreCorrection {
     bool is_slight = false;
     Bend over_two;  // where slight, from twice as far: a quarter of the noise
   };
-  void measure_bends(std::int32_t node);
-  [[nodiscard]] LatticeSymbol symbol_of(const std::vector<GridNode>& nodes, const GreyMoments& seen,
-                                        const CellClaim& claim, std::int32_t node, std::size_t letter,
-                                        std::optional<float> misfit) const;
+  using Neighbours = std::array<std::int32_t, 4>;  // symbols by Direction, or -1
+  [[nodiscard]] Neighbours find_neighbours(const std::vector<GridNode>& nodes, std::int32_t node) const;
+  void measure_bends(std::int32_t symbol);
   template <class Part>
-  [[nodiscard]] Eigen::Vector2f median_around(const std::vector<GridNode>& nodes, std::int32_t node,
+  [[nodiscard]] Eigen::Vector2f median_around(const std::vector<GridNode>& nodes, std::int32_t symbol,
                                               bool Derivatives::*has, Part part) const;
-  [[nodiscard]] Bend slight_bend_around(std::int32_t node) const;
-  [[nodiscard]] Bend bend_of(const std::vector<GridNode>& nodes, std::int32_t node) const;
-  [[nodiscard]] std::array<std::int32_t, 4> find_named(const GridNode& node, std::size_t index) const;
+  [[nodiscard]] Bend slight_bend_around(std::int32_t symbol) const;
+  [[nodiscard]] Bend bend_of(const std::vector<GridNode>& nodes, std::int32_t symbol) const;
 
   std::vector<Prototype> prototypes_;
   float size_px_;
@@ -62,11 +59,12 @@ class CentreCorrection {
   float slight_bend_;
   std::vector<Eigen::Vector2f> centroids_px_;
   std::vector<Eigen::Matrix2f> second_moments_px2_;
-  std::vector<Eigen::Vector2f> centres_;            // of the squares
-  std::vector<std::int32_t> symbol_of_;             // in the lattice
-  std::vector<std::int32_t> cells_;                 // of each node that is decoded, numbered by rows; -1 of others
-  std::vector<std::array<std::int32_t, 4>> named_;  // by Direction: neighbours that are decoded, and as such agree
-  std::vector<Derivatives> derivatives_;
+  std::vector<std::int32_t> cells_;       // of each node that is decoded, numbered by rows; -1 of others
+  std::vector<std::int32_t> symbol_of_;   // of each node, or -1
+  std::vector<std::int32_t> sightings_;   // of each symbol: its node
+  std::vector<Eigen::Vector2f> centres_;  // of each symbol's square
+  std::vector<Neighbours> neighbours_;    // of each symbol
+  std::vector<Derivatives> derivatives_;  // of each symbol
 };
 
 }  // namespace slsd
