@@ -16,6 +16,8 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PASSES = ROOT / "tests" / "mutate_passes.txt"
@@ -111,7 +113,7 @@ def chosen(folder, count, seed):
 
 
 def test_targets(folder):
-    """The programs that test a room: those of its folder under tests/, and the corpus for the decoder."""
+    """The programs that test a room: those of its folder under tests/, and for the decoder rendered and misleading frames."""
     targets = []
     for part in [pathlib.Path(folder), *pathlib.Path(folder).parents]:
         lists = ROOT / "tests" / part / "CMakeLists.txt"
@@ -119,16 +121,43 @@ def test_targets(folder):
             targets += [name + "_tests" for name in re.findall(r"slsd_add_tests\((\w+)", lists.read_text())]
             break
     if "decode" in folder:
-        targets.append("corpus_tests")
+        targets += ["corpus_tests", "adversary_tests"]
     return targets
 
 
-def run(command, folder, seconds=None):
+def run(command, folder):
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr
+
+
+def failed_test(program, folder, seconds):
+    """Runs a test program in as many shards as there are processors. None where all pass, else what failed first."""
+    shards = os.cpu_count() or 1
+    running, logs = [], []
+    for shard in range(shards):
+        logs.append(tempfile.TemporaryFile("w+"))
+        running.append(subprocess.Popen(
+            [str(program), "--gtest_brief=1", "--gtest_fail_fast"], cwd=folder, stdout=logs[-1],
+            stderr=subprocess.STDOUT, env=os.environ | {"GTEST_TOTAL_SHARDS": str(shards), "GTEST_SHARD_INDEX": str(shard)}))
     try:
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=seconds)
-        return done.returncode, done.stdout + done.stderr
-    except subprocess.TimeoutExpired:
-        return 124, ""
+        deadline = time.monotonic() + seconds
+        while True:
+            states = [process.poll() for process in running]
+            for state, log in zip(states, logs):
+                if state:
+                    log.seek(0)
+                    failed = re.search(r"\[  FAILED  \] ([\w/.]+)", log.read())
+                    return failed.group(1) if failed else f"{program.name}: ended by status {state}"
+            if None not in states:
+                return None
+            if time.monotonic() > deadline:
+                return f"{program.name}: no end in {seconds} s"
+            time.sleep(0.1)
+    finally:
+        for process, log in zip(running, logs):
+            process.kill()
+            process.wait()
+            log.close()
 
 
 def copy_checkout(copy):
@@ -152,13 +181,9 @@ def verdict(copy, targets, seconds):
     if status != 0:
         return "the compiler" if "error:" in text else "the build"
     for target in targets:
-        program = copy / "build" / "release" / "bin" / target
-        status, text = run([str(program), "--gtest_brief=1", "--gtest_fail_fast"], copy, seconds)
-        if status == 124:
-            return f"{target}: no end in {seconds} s"
-        if status != 0:
-            failed = re.search(r"\[  FAILED  \] ([\w/.]+)", text)
-            return failed.group(1) if failed else f"{target}: ended by status {status}"
+        failed = failed_test(copy / "build" / "release" / "bin" / target, copy, seconds)
+        if failed is not None:
+            return failed
     return None
 
 
