@@ -150,7 +150,8 @@ class CaptureReader {
       if (most != counts.end()) cameras[camera].size = {most->first.first, most->first.second};
     }
     for (const auto& [look, own] : sizes_) {
-      const auto& [name, camera] = look;
+      const std::string& name = look.first;
+      const std::size_t camera = look.second;
       if (own == cameras[camera].size) continue;
       const std::string reason = fmt::format(
           "its pictures have {} pixels, those of the other poses {}: all have to come from one camera in one mode",

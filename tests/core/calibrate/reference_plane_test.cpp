@@ -15,6 +15,7 @@
 namespace slsd {
 namespace {
 
+using test::report_of;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
