@@ -2,12 +2,16 @@
 // Copyright the slsd authors
 #include "core/decode/centres/centre_sigma.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>
 
+#include "core/decode/centres/align_symbols.hpp"
 #include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/decoded_scene.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
@@ -71,6 +75,139 @@ TEST(CentreJudge, GrowsWithTheMisfitOfTheShapeAndWhereNothingTellsOfItsBend) {
   symbol.misfit = 1;
   symbol.neighbours = {0, 0, -1, -1};
   EXPECT_NEAR(judged({usual, usual, symbol}), std::hypot(0.01, 0.015), 1e-6);
+}
+
+/// A block of cells on a plane, each seen a little beside where it is, and a few far beside.
+class JudgedBlock {
+ public:
+  static constexpr int kSide = 7;
+
+  JudgedBlock() : pattern_(shipped_pattern("16px-5.toml")), cells_(pattern_, flat_prototypes(), rig_.projector) {
+    std::mt19937 random(8);
+    std::normal_distribution<float> slight(0, 0.08F);
+    for (int i = 0; i < kSide * kSide; ++i) {
+      const int row = i / kSide, column = i % kSide;
+      LatticeSymbol symbol = symbol_of(140 + static_cast<float>(i), 90 + static_cast<float>(i % 11));
+      symbol.sighting = i;
+      symbol.row = static_cast<std::int16_t>(20 + row), symbol.column = static_cast<std::int16_t>(30 + column);
+      symbol.frame *= 1.2F;
+      symbol.misfit = 0.5F + 0.15F * static_cast<float>(i * i % 13);
+      symbol.centre_px =
+          camera_from_projector(cells_.pixel(symbol.row, symbol.column), rig_, plane({0, 0, 2000}, {0, 0, 1}))
+              .value()
+              .cast<float>();
+      symbol.centre_px += Eigen::Vector2f(slight(random), slight(random)) * (i % 9 == 4 ? 6 : 1);
+      symbol.neighbours = {column + 1 < kSide ? i + 1 : -1, row + 1 < kSide ? i + kSide : -1, column > 0 ? i - 1 : -1,
+                           row > 0 ? i - kSide : -1};
+      lattice_.symbols.push_back(symbol);
+      GreyMoments& moments = seen_.moments.emplace_back();
+      moments.x = symbol.centre_px.x(), moments.y = symbol.centre_px.y();
+      seen_.region.push_back(i);
+    }
+    view_.look_at(seen_, alone);
+    across_px_.resize(lattice_.symbols.size()), disparities_px_.resize(lattice_.symbols.size());
+    view_.compare(lattice_.symbols, cells_, across_px_, disparities_px_);
+    std::vector<float> sorted = across_px_;
+    std::ranges::sort(sorted);
+    for (float& across : across_px_) across = 1.2F * std::abs(across - sorted[sorted.size() / 2]);
+  }
+
+  const std::vector<LatticeSymbol>& judged(const FrameNoise& noise) {
+    CentreJudge().judge(noise, &view_, cells_, alone, lattice_);
+    return lattice_.symbols;
+  }
+  /// How far off its epipolar line.
+  [[nodiscard]] double across_px(int i) const { return across_px_[i]; }
+  /// How far its disparity is beyond those to both sides, more than its neighbours' is.
+  [[nodiscard]] double uneven_px(int i) const {
+    std::vector<double> around;
+    for (const std::int32_t other : neighbours(i)) around.push_back(beyond_px(other));
+    std::ranges::sort(around);
+    return beyond_px(i) - around[around.size() / 2];
+  }
+  [[nodiscard]] std::vector<std::int32_t> neighbours(int i) const {
+    std::vector<std::int32_t> there;
+    for (const std::int32_t other : lattice_.symbols[i].neighbours)
+      if (other >= 0) there.push_back(other);
+    return there;
+  }
+  [[nodiscard]] double usual_misfit_squared() const {
+    std::vector<float> misfits;
+    for (const LatticeSymbol& symbol : lattice_.symbols) misfits.push_back(symbol.misfit * symbol.misfit);
+    std::ranges::sort(misfits);
+    return misfits[misfits.size() / 2];
+  }
+
+ private:
+  static std::vector<Prototype> flat_prototypes() {
+    std::vector<Prototype> prototypes(5);
+    for (Prototype& prototype : prototypes) prototype.centroid_px = {0, 0};
+    return prototypes;
+  }
+  [[nodiscard]] double beyond_px(int i) const {
+    double sum = 0, count = 0;
+    const auto& next = lattice_.symbols[i].neighbours;
+    for (const auto& [one, other] : {std::pair(next[kLeft], next[kRight]), std::pair(next[kUp], next[kDown])}) {
+      if (one < 0 || other < 0) continue;
+      const Eigen::Vector2d from = lattice_.symbols[one].centre_px.cast<double>(),
+                            to = lattice_.symbols[other].centre_px.cast<double>(),
+                            here = lattice_.symbols[i].centre_px.cast<double>();
+      const double share = (here - from).dot(to - from) / (to - from).squaredNorm();
+      sum += disparities_px_[i] - (1 - share) * disparities_px_[one] - share * disparities_px_[other], ++count;
+    }
+    return count > 0 ? sum / count : 0;
+  }
+
+  Calibration rig_ = paper_rig();
+  Pattern pattern_;
+  CellRays cells_;
+  EpipolarView view_{rig_.cameras[0], rig_.projector, 400, 3200, 1.5};
+  Sightings seen_;
+  Lattice lattice_;
+  std::vector<float> across_px_, disparities_px_;
+};
+
+// docs/decoder.md derives it; here it is written down once more, term by term.
+TEST(CentreJudge, FollowsThePlainFormula) {
+  JudgedBlock block;
+  const FrameNoise noise{.dark_variance = 4, .variance_per_level = 0.02F};
+  const std::vector<LatticeSymbol>& symbols = block.judged(noise);
+  const auto square = [](double x) { return x * x; };
+  const auto clipped = [&](double px) { return square(std::min(std::abs(px), 0.3)); };
+  int rough = 0, uneven = 0;
+  for (int i = 0; i < static_cast<int>(symbols.size()); ++i) {
+    const LatticeSymbol& symbol = symbols[i];
+    const double noise_squared = square(noise_of_centre_px(symbol.weight, symbol.background, symbol.gain, noise));
+    double across_squares = square(block.across_px(i)), uneven_squares = square(block.uneven_px(i)), count = 1;
+    for (const std::int32_t other : block.neighbours(i))
+      across_squares += clipped(block.across_px(other)), uneven_squares += clipped(block.uneven_px(other)), ++count;
+    const double roughness = std::max(0., across_squares / count - noise_squared - square(0.03)),
+                 unevenness = std::max(0., uneven_squares / count - 2 * noise_squared - square(0.02)),
+                 misfit_squared = square(symbol.misfit),
+                 beyond = std::max(0., misfit_squared - block.usual_misfit_squared()),
+                 least = square(0.01) + (block.neighbours(i).size() == 2 ? square(0.015) : 0);
+    rough += roughness > 0, uneven += unevenness > 0;
+    EXPECT_NEAR(square(symbol.sigma_px),
+                square(0.55) * noise_squared + least + square(0.4 * block.across_px(i)) +
+                    square(0.4 * block.uneven_px(i)) + square(0.25) * roughness + square(0.25) * unevenness +
+                    std::sqrt(roughness * unevenness) + square(0.01 * beyond),
+                1e-5)
+        << i;
+    EXPECT_NEAR(square(symbol.damage_px),
+                noise_squared + least + square(0.35 * block.across_px(i)) + roughness + square(0.018 * misfit_squared),
+                1e-5)
+        << i;
+  }
+  EXPECT_GT(rough, 5);
+  EXPECT_GT(uneven, 5);
+}
+
+TEST(AlignedSigma, IsOfNoiseOfScatterAndOfWhatDisagrees) {
+  EXPECT_FLOAT_EQ(aligned_sigma_px(0.04F * 0.04F, 0, 1), 1.1F * 0.04F);
+  EXPECT_FLOAT_EQ(aligned_sigma_px(0, 0.05F, 1), 1.2F * 0.05F);
+  EXPECT_NEAR(aligned_sigma_px(0, 0, 0.75F), 0.11 * 0.2, 1e-6);
+  EXPECT_EQ(aligned_sigma_px(0, 0, 0.96F), 0) << "noise alone leaves that";
+  EXPECT_NEAR(aligned_sigma_px(0.04F * 0.04F, 0.05F, 0.75F), std::hypot(std::hypot(0.044, 0.06), 0.022), 1e-6);
 }
 
 /// Standard deviation of errors over sigma, and the root mean square of the errors, on a plane whose place is known.

@@ -88,8 +88,12 @@ TEST_F(Correspond, GivesACellToTheClearlyBetterClaim) {
 
 TEST_F(Correspond, GivesACellToNeitherOfTwoClaimsAlikeGood) {
   add(20, 30, 20, 30, 20);
-  add(20, 30, 20, 30, 19);
-  EXPECT_THAT(statuses(), testing::Each(kDuplicate));
+  add(20, 30, 20, 30, 18.5F);
+  EXPECT_THAT(statuses(), testing::Each(kDuplicate)) << "less than two apart";
+  claims_.clear(), segments_.clear();
+  add(20, 30, 20, 30, 20);
+  add(20, 30, 20, 30, 17.5F);
+  EXPECT_THAT(statuses(), testing::ElementsAre(kDecoded, kDuplicate));
 }
 
 TEST_F(Correspond, SettlesThreeClaimsInAnyOrder) {

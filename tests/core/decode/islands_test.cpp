@@ -523,6 +523,29 @@ TEST_F(Islands, LoseTheNodesThatOneLinkAloneHolds) {
   EXPECT_EQ(claims[grid_.node_at(12, 19)].status, RegionStatus::kNeighboursDisagree);
 }
 
+// Two above a sheet hold each other, until what is beside them is plainly of something else.
+TEST_F(Islands, LoseWhatLiesBesideAPlainContradiction) {
+  const auto keep_beside = [&](double ratio) {
+    grid_ = {}, shapes_.clear();
+    show_pattern(10, 10, 20, 30);
+    show_pattern(9, 20, 10, 22);
+    show(9, 19, (pattern_.array.at(9, 19) + 1) % 5);
+    const double own = std::exp(ratio) / 5, others = (1 - own - 0.9 * (1 - own)) / 3;
+    for (int letter = 0; letter < 5; ++letter) {
+      float& log_probability = shapes_.back().log_probability[letter];
+      if (letter == pattern_.array.at(9, 19)) {
+        log_probability = static_cast<float>(std::log(own));
+      } else if (letter != shapes_.back().letter) {
+        log_probability = static_cast<float>(std::log(others));
+      }
+    }
+    const auto claims = decode();
+    return is_decoded(claims, 9, 20) && is_decoded(claims, 9, 21);
+  };
+  EXPECT_TRUE(keep_beside(-1.4));
+  EXPECT_FALSE(keep_beside(-1.6));
+}
+
 TEST_F(Islands, AreTheSameInWhateverOrderNodesStand) {
   std::mt19937 random(6);
   show_pattern(10, 10, 25, 40);
