@@ -39,6 +39,7 @@ class PatternField {
       return std::clamp((px + kBorderPx) * kSamplesPerPx, 0.F, static_cast<float>(count - 1));
     };
     const float i = place(u, width_), j = place(v, height_);
+    // Neither is negative. NOLINTNEXTLINE(bugprone-incorrect-roundings)
     const int column = static_cast<int>(i + 0.5F), row = static_cast<int>(j + 0.5F);
     const std::uint32_t bits = samples_[static_cast<std::size_t>(row) * width_ + column];
     const auto slope_of = [&](int left) {

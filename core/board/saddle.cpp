@@ -85,10 +85,10 @@ double model(const Vector& p, const Eigen::Vector2d& at, Vector& gradient) {
 /// What the model leaves of each sample, by the root of its weight: as Ceres' small solver asks for it.
 struct Residuals {
   using Scalar = double;
-  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = kParameters };
+  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = kParameters };  // NOLINT: Ceres' names
   const std::vector<Sample>& samples;
 
-  [[nodiscard]] int NumResiduals() const { return static_cast<int>(samples.size()); }
+  [[nodiscard]] int NumResiduals() const { return static_cast<int>(samples.size()); }  // NOLINT: Ceres' name
   bool operator()(const double* parameters, double* residuals, double* jacobian) const {
     Vector p(parameters), gradient;
     p[kBlur] = std::max(p[kBlur], kLeastBlur_px);  // a sharper picture looks the same

@@ -44,7 +44,7 @@ Result<double> print_scale(std::string_view ruler, std::string_view option) {
 }
 
 Result<Board> as_printed(std::string_view text, std::string_view ruler, std::string_view option) {
-  const auto board = parse_board(text);
+  auto board = parse_board(text);
   if (!board || ruler.empty()) return board;
   const auto scale = print_scale(ruler, option);
   if (!scale) return tl::unexpected(scale.error());

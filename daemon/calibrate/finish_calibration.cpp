@@ -45,7 +45,7 @@ Result<path> checked(path file, const std::string& named_by) {
 
 Result<> write_report(const path& file, const CalibrationOutcome& outcome) {
   const path report = report_of(file);
-  const auto written = write_file_atomically(report, report_html(outcome));
+  auto written = write_file_atomically(report, report_html(outcome));
   if (written) std::cout << "report: " << report.string() << "\n";
   return written;
 }

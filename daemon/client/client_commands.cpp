@@ -167,7 +167,7 @@ int scan_command(const ClientOptions& options) {
   if (options.texture) params["texture"] = true;
   if (options.ambient) params["ambient"] = true;
   if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;
-  const auto answered = ask(options, "scan", std::move(params));
+  const auto answered = ask(options, "scan", params);
   if (!answered) return report(options, answered.error());
   const bool of_pixels = answered->reply.message["result"].value("density", "") == "pixels";
   if (auto written = write_files(options, *answered, as_ply, of_pixels); !written)
@@ -191,7 +191,7 @@ int watch_command(const ClientOptions& options) {
   json params{{"format", "ply"}};
   if (!options.density.empty()) params["density"] = options.density;
   if (options.rate_hz) params["rate_hz"] = *options.rate_hz;
-  const auto answered = ask(*connection, "subscribe", std::move(params));
+  const auto answered = ask(*connection, "subscribe", params);
   if (!answered) return report(options, answered.error());
   std::uint64_t clouds = 0;
   while (options.count == 0 || clouds < options.count) {
@@ -207,7 +207,7 @@ int image_command(const ClientOptions& options, const std::string& method) {
   json params = json::object();
   if (options.timeout_ms && method != "pattern") params["timeout_ms"] = *options.timeout_ms;
   if (options.as_shown) params["as_shown"] = true;
-  const auto answered = ask(options, method, std::move(params));
+  const auto answered = ask(options, method, params);
   if (!answered) return report(options, answered.error());
   if (auto written = write(options.image, answered->reply.bytes); !written) return report(options, written.error());
   const json& result = answered->reply.message["result"];
@@ -231,7 +231,7 @@ int set_command(const ClientOptions& options) {
       params[table][key] = std::move(value);
     }
   }
-  const auto answered = ask(options, "set", std::move(params));
+  const auto answered = ask(options, "set", params);
   if (!answered) return report(options, answered.error());
   const json& result = answered->reply.message["result"];
   if (options.json) std::cout << to_line(result);
@@ -283,7 +283,7 @@ int project_command(const ClientOptions& options) {
     params = {{"picture", "image"}, {"png", to_base64(*image)}};
   }
   if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;
-  const auto answered = ask(options, "project", std::move(params));
+  const auto answered = ask(options, "project", params);
   if (!answered) return report(options, answered.error());
   if (options.json) std::cout << to_line(answered->reply.message["result"]);
   return kDone;

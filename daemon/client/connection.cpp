@@ -60,12 +60,12 @@ client::Connection::Deadline Connection::deadline() const {
   return std::chrono::steady_clock::now() + *patience_;
 }
 
-Result<Answered> Connection::call(std::string_view method, nlohmann::json params) {
-  if (auto sent = request(method, std::move(params)); !sent) return tl::unexpected(sent.error());
+Result<Answered> Connection::call(std::string_view method, const nlohmann::json& params) {
+  if (auto sent = request(method, params); !sent) return tl::unexpected(sent.error());
   return reply();
 }
 
-Result<> Connection::request(std::string_view method, nlohmann::json params) {
+Result<> Connection::request(std::string_view method, const nlohmann::json& params) {
   const auto text = params.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   return without_throwing([&] { socket_.send(method, text, deadline()); });
 }

@@ -48,10 +48,10 @@ class Connection {
 
   /// Sends a request and waits for its reply, which may be a JSON-RPC error.
   /// @errors kDisconnected: the daemon hung up; kMalformed: it is no slsd; kIo
-  [[nodiscard]] Result<Answered> call(std::string_view method, nlohmann::json params);
+  [[nodiscard]] Result<Answered> call(std::string_view method, const nlohmann::json& params);
 
   /// Sends a request and does not wait; reply() does. @errors as call()
-  [[nodiscard]] Result<> request(std::string_view method, nlohmann::json params);
+  [[nodiscard]] Result<> request(std::string_view method, const nlohmann::json& params);
   /// Waits for the reply to the oldest request that has none. @errors as call()
   [[nodiscard]] Result<Answered> reply();
 

@@ -29,7 +29,7 @@ struct Look {
 tl::expected<Answered, Failure> ask_for_frame(Connection& connection, const ClientOptions& options) {
   json params{{"format", "raw"}, {"camera", options.camera}};
   if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;
-  return ask(connection, "frame", std::move(params));
+  return ask(connection, "frame", params);
 }
 
 // The first camera, where none is named, as the daemon has it.

@@ -87,7 +87,7 @@ class Recorder {
   [[nodiscard]] std::optional<Failure> ask_for_scan() {
     json params{{"format", "ply"}, {"frames", "raw"}};
     if (options_.timeout_ms) params["timeout_ms"] = *options_.timeout_ms;
-    if (auto sent = connection_.request("scan", std::move(params)); !sent) return failure(sent.error());
+    if (auto sent = connection_.request("scan", params); !sent) return failure(sent.error());
     return std::nullopt;
   }
 

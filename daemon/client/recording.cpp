@@ -134,7 +134,7 @@ void Recording::remove_scan() const {
 Result<> Recording::add(const Answered& scan) {
   json line = scan.reply.message["result"];
   for (const char* key : {"bytes", "format"}) line.erase(key);
-  const Result<> written = write_scan(scan, line);
+  Result<> written = write_scan(scan, line);
   if (written) {
     ++scans_;
   } else {

@@ -111,14 +111,14 @@ tl::expected<Answered, Failure> judge(Result<Answered> answered) {
   return std::move(*answered);
 }
 
-tl::expected<Answered, Failure> ask(Connection& connection, std::string_view method, json params) {
-  return judge(connection.call(method, std::move(params)));
+tl::expected<Answered, Failure> ask(Connection& connection, std::string_view method, const json& params) {
+  return judge(connection.call(method, params));
 }
 
-tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_view method, json params) {
+tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_view method, const json& params) {
   auto connection = Connection::open(options.socket);
   if (!connection) return tl::unexpected(failure(connection.error()));
-  return ask(*connection, method, std::move(params));
+  return ask(*connection, method, params);
 }
 
 int report(const ClientOptions& options, const Failure& failure) {

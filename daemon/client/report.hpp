@@ -27,11 +27,11 @@ struct Failure {
 
 /// One call; a JSON-RPC error is a failure.
 [[nodiscard]] tl::expected<Answered, Failure> ask(Connection& connection, std::string_view method,
-                                                  nlohmann::json params);
+                                                  const nlohmann::json& params);
 
 /// One call on a connection of its own.
 [[nodiscard]] tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_view method,
-                                                  nlohmann::json params);
+                                                  const nlohmann::json& params);
 
 /// Says what went wrong, as text on standard error or, with --json, as an object on standard output.
 /// @return the exit status

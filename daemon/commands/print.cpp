@@ -43,7 +43,7 @@ Result<> print_board(const PrintRequest& request) {
   if (!sheet) return tl::unexpected(sheet.error());
   const auto bytes = sheet_bytes(*sheet, request);
   if (!bytes) return tl::unexpected(bytes.error());
-  const auto written = write_file_atomically(request.file, *bytes);
+  auto written = write_file_atomically(request.file, *bytes);
   if (!written) return written;
   std::cout << "board: " << to_string(sheet->board) << "\npaper: " << sheet->paper.name
             << "\nprint it at 100 %, not fit to page, and hold a rule to both rulers on it\n";

@@ -210,7 +210,7 @@ class LatencyMeter {
     }
     std::ranges::sort(whole);
     const auto quantile = [&](double share) {
-      const auto index = static_cast<std::size_t>(share * static_cast<double>(whole.size() - 1) + 0.5);
+      const auto index = static_cast<std::size_t>(std::lround(share * static_cast<double>(whole.size() - 1)));
       return std::chrono::ceil<microseconds>(whole[index]);
     };
     CameraLatency latency;

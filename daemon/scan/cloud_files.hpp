@@ -34,7 +34,8 @@ struct CloudForm {
   bool normals = false;
 
   CloudForm() = default;
-  CloudForm(CloudFormat of_format, Density of_density = Density::kSymbols, bool with_normals = false)
+  CloudForm(CloudFormat of_format, Density of_density = Density::kSymbols,  // NOLINT: a format is a form
+            bool with_normals = false)
       : format(of_format), density(of_density), normals(with_normals) {}
   [[nodiscard]] bool dense() const { return density == Density::kPixels; }
 

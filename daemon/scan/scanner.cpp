@@ -298,7 +298,7 @@ void Scanner::project(ProjectRequest request, Answer<void> answer) {
             if (request.picture == Picture::kIdle) return task->end(rig_->release(patience));
             heartbeat_.promise(kWorkPromise);
             auto drawn = draw_projected(request.picture, request.png, *adopted_, request.deadline);
-            task->end(drawn ? rig_->hold(std::move(*drawn), patience) : tl::unexpected(drawn.error()));
+            task->end(drawn ? rig_->hold(*drawn, patience) : tl::unexpected(drawn.error()));
           }},
          gone);
 }
@@ -324,6 +324,7 @@ void Scanner::refuse_chores() {
 
 void Scanner::submit_chore(Chore chore) {
   if (!chores_.try_push(std::move(chore))) {
+    // It is as it was. NOLINTNEXTLINE(bugprone-use-after-move)
     return chore(fail(ErrorCode::kBusy, std::to_string(kMaxChores) + " such requests wait already: ask again later"));
   }
   if (chores_thread_.get_stop_token().stop_requested()) refuse_chores();  // its thread may have ended before

@@ -115,9 +115,7 @@ Service::Service(Configuration configuration, const std::filesystem::path& file,
   server_ = std::make_unique<Server>(events_, state_.configuration.server, handler, demand_changed);
   state_.server = server_.get();
   state_.log_lines_dropped = log_lines_dropped;
-  state_.reload = [this](nlohmann::json settings, Respond answered) {
-    reload(std::move(settings), std::move(answered));
-  };
+  state_.reload = [this](const nlohmann::json& settings, Respond answered) { reload(settings, std::move(answered)); };
   state_.calibration = std::make_unique<CalibrationRun>(events_, [this](bool made) { calibrated(state_, made); });
   state_.bundle = [this](Scanner::Answer<std::string> answer) { bundle(nullptr, std::move(answer)); };
   state_.bundles_written = [this] { return bundles_.written(); };
@@ -206,7 +204,7 @@ void Service::await_end(std::chrono::steady_clock::time_point began) {
 }
 
 // Of two that set something at once the later would know nothing of the other's.
-void Service::reload(nlohmann::json settings, Respond answered) {
+void Service::reload(const nlohmann::json& settings, Respond answered) {
   const bool sets = settings != state_.settings;
   if (setting_ || (sets && reloads_ > 0)) {
     const Error busy{ErrorCode::kBusy, "another change of the settings is under way: ask again", {}};

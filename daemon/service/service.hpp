@@ -63,7 +63,7 @@ class Service {
   void on_signal(int number);
   void stop();
   void await_end(std::chrono::steady_clock::time_point began);
-  void reload(nlohmann::json settings, Respond answered);
+  void reload(const nlohmann::json& settings, Respond answered);
   void on_reloaded(const Result<Configuration>& configuration, nlohmann::json settings, const Respond& answered);
   void bundle(nlohmann::json reason, Scanner::Answer<std::string> answer);
   void on_failure(const std::string& scan_id, const Error& error);

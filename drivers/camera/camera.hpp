@@ -52,7 +52,7 @@ class Camera {
 
   /// Called by open() as soon as something of the camera's name answers, before it is configured. Set before the first
   /// open(); a backend that opens at once need not call it.
-  virtual void set_found(std::function<void()> /*found*/) {}
+  virtual void set_found(std::function<void()> /*found*/) {}  // NOLINT: those that keep it take it over
 
   /// Opens the device, again after a fault; configures everything anew and starts the sequence numbers at 0.
   /// @errors kNotFound, kPermissionDenied, kMalformed, kUnsupported, kDisconnected: the device's supervisor retries;

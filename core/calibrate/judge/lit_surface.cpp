@@ -78,7 +78,7 @@ LitSurface measure_lit_surface(const PoseObservation& pose, const RigModel& rig,
   Eigen::MatrixXd terms(rows, 6);
   Eigen::VectorXd z(rows);
   for (Eigen::Index i = 0; i < rows; ++i) {
-    const Eigen::Vector3d p = points[static_cast<std::size_t>(i)];
+    const Eigen::Vector3d& p = points[static_cast<std::size_t>(i)];
     const double x = (p.x() - middle.x()) / scale, y = (p.y() - middle.y()) / scale;
     terms.row(i) << 1, x, y, x * x, x * y, y * y;
     z(i) = p.z();

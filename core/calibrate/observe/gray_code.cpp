@@ -42,9 +42,8 @@ cv::Mat to_mat(const GreyView& view, double full) {
   return std::visit(
       [full](const auto& image) {
         using Pixel = std::remove_cvref_t<decltype(*image.pixels)>;
-        const cv::Mat borrowed(image.height, image.width, sizeof(Pixel) == 1 ? CV_8U : CV_16U,
-                               const_cast<Pixel*>(image.pixels),
-                               static_cast<std::size_t>(image.stride) * sizeof(Pixel));
+        cv::Mat borrowed(image.height, image.width, sizeof(Pixel) == 1 ? CV_8U : CV_16U,
+                         const_cast<Pixel*>(image.pixels), static_cast<std::size_t>(image.stride) * sizeof(Pixel));
         if (sizeof(Pixel) == 1 && full == 255) return borrowed;
         cv::Mat copy;
         borrowed.convertTo(copy, CV_8U, 255 / full);

@@ -330,7 +330,7 @@ Result<Resection> resect_most(const std::vector<std::vector<SpacePoint>>& poses)
     }
     return resect(points);
   };
-  const auto of_all = resect_but(poses, {});
+  auto of_all = resect_but(poses, {});
   if (of_all && std::ranges::max(errors_px(poses, *of_all)) <= kNoBoardPx) return of_all;
   auto few = poses;
   for (auto& points : few) {

@@ -78,7 +78,7 @@ void compare(const Reduced& pose, const Eigen::MatrixXd& normal, HeldOut& held_o
 Result<Eigen::MatrixXd> invert(const Eigen::MatrixXd& normal, const std::vector<SharedParameter>& names) {
   const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * normal * scale.asDiagonal());
-  const Eigen::VectorXd values = solver.eigenvalues();
+  const Eigen::VectorXd& values = solver.eigenvalues();
   if (!(values(0) > kInvertTolerance * values(values.size() - 1))) {
     Eigen::Index worst = 0;
     solver.eigenvectors().col(0).cwiseAbs().maxCoeff(&worst);

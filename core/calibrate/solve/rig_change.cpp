@@ -91,7 +91,7 @@ RigModel split_at(const RigModel& rig, std::size_t first_pose) {
 /// Adjusts until the symbols' noise is that which the model leaves.
 Model adjusted(const Observations& seen, BundleOptions options, RigModel rig, int rounds = 2) {
   constexpr double kSigmaOfDistance = 1 / 1.1774;  // of the median distance in a plane
-  Model model{std::move(rig), options};
+  Model model{std::move(rig), std::move(options)};
   for (int round = 0; round < rounds; ++round) {
     const auto adjusted = adjust(seen, model.options, model.rig);
     if (!adjusted) return {std::move(model.rig), model.options};

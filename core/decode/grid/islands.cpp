@@ -265,8 +265,7 @@ void IslandJudge::weigh(const Frame& frame, Island& island) const {
 void IslandJudge::refuse_doubles(const Frame& frame) {
   if (islands_.size() < 2) return;
   holder_.assign(static_cast<std::size_t>(options_.rows) * options_.columns, -1);
-  for (std::size_t id = 0; id < islands_.size(); ++id) {
-    Island& island = islands_[id];
+  for (const Island& island : islands_) {
     if (island.status != RegionStatus::kDecoded) continue;
     const auto members = std::span(members_).subspan(island.first, island.size);
     for (const std::int32_t node : members) {

@@ -42,8 +42,8 @@ Result<std::unique_ptr<SocketSource>> SocketSource::create(const std::filesystem
   return source;
 }
 
-Result<Received> SocketSource::ask(std::string_view method, json params) {
-  auto answered = connection_.call(method, std::move(params));
+Result<Received> SocketSource::ask(std::string_view method, const json& params) {
+  auto answered = connection_.call(method, params);
   if (!answered) return tl::unexpected(answered.error());
   const json& message = answered->reply.message;
   if (message.contains("error")) return tl::unexpected(error_of(message["error"]));
@@ -88,7 +88,7 @@ Result<> SocketSource::show_now() {
     if (!png) return tl::unexpected(png.error());
     params["png"] = to_base64(*png);
   }
-  const auto shown = ask("project", std::move(params));
+  const auto shown = ask("project", params);
   if (!shown) return tl::unexpected(shown.error());
   shown_ = true;
   std::this_thread::sleep_for(kLatency);

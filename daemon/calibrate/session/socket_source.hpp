@@ -35,7 +35,7 @@ class SocketSource final : public PoseSource {
 
  private:
   explicit SocketSource(Connection connection) : connection_(std::move(connection)) {}
-  [[nodiscard]] Result<Received> ask(std::string_view method, nlohmann::json params);
+  [[nodiscard]] Result<Received> ask(std::string_view method, const nlohmann::json& params);
   [[nodiscard]] Result<> learn();
   [[nodiscard]] Result<> show_now();
 

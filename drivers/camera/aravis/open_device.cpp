@@ -109,7 +109,7 @@ Result<OpenedDevice> control(GObjectPtr<ArvDevice> device, std::string name, std
 std::string controller_that_stays(const GigeDevice& device) {
   const auto end = steady_clock::now() + kRelease;
   for (;;) {
-    const std::string controller = gige_controller(device, kProbe / 2).value_or("");
+    std::string controller = gige_controller(device, kProbe / 2).value_or("");
     if (controller.empty() || steady_clock::now() >= end) return controller;
     std::this_thread::sleep_for(kReleasePoll);
   }

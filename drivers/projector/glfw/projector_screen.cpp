@@ -83,7 +83,7 @@ Result<> ProjectorScreen::find_output() {
   if (!output) return tl::unexpected(output.error());
   const bool can_switch =
       output->native_width_px == options_.width_px && output->native_height_px == options_.height_px;
-  const auto fits = check_fit(*output, options_.width_px, options_.height_px);
+  auto fits = check_fit(*output, options_.width_px, options_.height_px);
   if (!fits && !can_switch) return fits;
   output_ = std::move(*output);
   return {};

@@ -100,7 +100,7 @@ std::optional<RefreshClock::Refresh> RefreshClock::refresh_at(std::uint64_t coun
 }
 
 Result<MonotonicTime> RefreshClock::wait_refresh() {
-  const auto begin = wait_begin();
+  auto begin = wait_begin();
   if (!begin) return begin;
   std::this_thread::sleep_until(*begin + period_);
   return *begin + period_;
