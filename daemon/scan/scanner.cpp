@@ -324,7 +324,7 @@ void Scanner::refuse_chores() {
 
 void Scanner::submit_chore(Chore chore) {
   if (!chores_.try_push(std::move(chore))) {
-    // It is as it was. NOLINTNEXTLINE(bugprone-use-after-move)
+    // What found no room was not moved. NOLINTNEXTLINE(bugprone-use-after-move)
     return chore(fail(ErrorCode::kBusy, std::to_string(kMaxChores) + " such requests wait already: ask again later"));
   }
   if (chores_thread_.get_stop_token().stop_requested()) refuse_chores();  // its thread may have ended before
