@@ -95,6 +95,31 @@ TEST_F(Islands, NeedEvidenceForTheBudgetWhereTheyMayLieAnywhere) {
   EXPECT_EQ(decoded(decode()), 20);
 }
 
+// The sum in docs/decoder.md. A strip is as sure of its letters as just makes it an island, beneath some other letters.
+TEST_F(Islands, NeedTheEvidenceThatTheirRimCosts) {
+  constexpr int kRows = 3, kColumns = 20;
+  const auto is_accepted = [&](int contradicted, double evidence) {
+    grid_ = {}, shapes_.clear();
+    show_pattern(10, 10, 10 + kRows, 10 + kColumns);
+    const double sure = std::exp(evidence / shapes_.size()) / 5;
+    for (Classification& shape : shapes_) shape = read_as(shape.letter, 5, sure);
+    for (int column = 10; column < 10 + contradicted; ++column)
+      show(9, column, (pattern_.array.at(9, column) + 1 + column % 3) % 5);
+    return decode()[grid_.node_at(11, 20)].status != RegionStatus::kNoCodeword;
+  };
+  for (const int contradicted : {0, 1, 6}) {
+    double too_little = 10, enough = 60;
+    while (enough - too_little > 0.01) {
+      const double between = 0.5 * (enough + too_little);
+      (is_accepted(contradicted, between) ? enough : too_little) = between;
+    }
+    const double rim = contradicted == 0 ? 0 : 3 + 0.1 * (contradicted - 1);
+    const double needed = std::log(kRows * kColumns + contradicted) + rim + std::log(kWholeRows * kWholeColumns) +
+                          std::log(kRows * kColumns / kWrongCellsMax);
+    EXPECT_NEAR(enough, needed, 0.1) << contradicted;
+  }
+}
+
 TEST_F(Islands, AreNoLargerForNodesThatChanceAddsAtTheirRim) {
   show_pattern(10, 10, 20, 30);
   std::mt19937 random(4);
