@@ -326,10 +326,16 @@ TEST_F(IslandsAboveAShortRow, KeepItOnTheirGrid) {
 TEST_F(IslandsAboveAShortRow, LoseItOffTheirGrid) {
   EXPECT_EQ(kept(0.4F), 0);
   EXPECT_EQ(kept(-0.4F), 0);
+  EXPECT_EQ(kept(0.1F), 0);
 }
 
 TEST_F(IslandsAboveAShortRow, KeepItWhereTheyTurnAway) {
   EXPECT_GE(kept(0.5F, 0.12F), 4);  // slips of 0.26 px and 0.12 px
+}
+
+TEST_F(IslandsAboveAShortRow, LoseItWhereTheyTurnAwayTooFast) {
+  EXPECT_GE(kept(0.6F, 0.12F), 4);   // slips of 0.36 px and 0.12 px
+  EXPECT_EQ(kept(0.84F, 0.12F), 0);  // and of 0.6 px
 }
 
 TEST_F(IslandsAboveAShortRow, KeepItWhereNothingTellsWhatDepthWouldMove) {
