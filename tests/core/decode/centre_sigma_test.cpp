@@ -15,6 +15,7 @@
 #include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/decoded_scene.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
+#include "tests/core/decode/simulated_grid.hpp"
 
 namespace slsd {
 namespace {
@@ -139,11 +140,6 @@ class JudgedBlock {
   }
 
  private:
-  static std::vector<Prototype> flat_prototypes() {
-    std::vector<Prototype> prototypes(5);
-    for (Prototype& prototype : prototypes) prototype.centroid_px = {0, 0};
-    return prototypes;
-  }
   [[nodiscard]] double beyond_px(int i) const {
     double sum = 0, count = 0;
     const auto& next = lattice_.symbols[i].neighbours;

@@ -24,14 +24,8 @@ class Correspond : public testing::Test {
   Correspond()
       : rig_(paper_rig()),
         pattern_(shipped_pattern("16px-5.toml")),
-        cells_(pattern_, std::vector<Prototype>(5, flat_prototype()), rig_.projector),
+        cells_(pattern_, flat_prototypes(), rig_.projector),
         gate_(rig_.cameras[0], rig_.projector, 1500, 2500) {}
-
-  static Prototype flat_prototype() {
-    Prototype prototype;
-    prototype.centroid_px = {0, 0};
-    return prototype;
-  }
 
   /// A claim on a cell by what the camera sees of `lit` on a plane.
   void add(int lit_row, int lit_column, int row, int column, float evidence = 20, double depth_mm = 2000) {

@@ -50,14 +50,7 @@ Sheet sheet_of(const CodeArray& array, const Damage& damage) {
 class DecodeWindows : public testing::Test {
  protected:
   DecodeWindows()
-      : pattern_(shipped_pattern("16px-5.toml")),
-        cells_(pattern_, std::vector<Prototype>(5, flat_prototype()), paper_rig().projector) {}
-
-  static Prototype flat_prototype() {
-    Prototype prototype;
-    prototype.centroid_px = {0, 0};
-    return prototype;
-  }
+      : pattern_(shipped_pattern("16px-5.toml")), cells_(pattern_, flat_prototypes(), paper_rig().projector) {}
 
   std::vector<CellClaim> decode(const Sheet& sheet, std::span<const EpipolarSegment> segments = {}) {
     WindowDecoder decoder(pattern_, std::make_shared<const Codebook>(pattern_.array, kWholeRows, kWholeColumns),

@@ -12,6 +12,7 @@
 
 #include "core/decode/grid/link_grid.hpp"
 #include "core/decode/symbols/classify.hpp"
+#include "core/decode/symbols/prototypes.hpp"
 
 namespace slsd {
 
@@ -54,6 +55,13 @@ inline Classification read_as(int letter, int letters, double sure) {
     shape.log_probability[i] = static_cast<float>(std::log(i == letter ? sure : (1 - sure) / (letters - 1)));
   shape.letter = static_cast<std::int8_t>(letter);
   return shape;
+}
+
+/// Letters whose centroids are in the middles of their squares: as many as the shipped pattern of 16 px has.
+inline std::vector<Prototype> flat_prototypes() {
+  Prototype prototype;
+  prototype.centroid_px = {0, 0};
+  return std::vector<Prototype>(5, prototype);
 }
 
 /// Of the shipped pattern of 16 px: the cells that it shows whole.
