@@ -113,7 +113,8 @@ def chosen(folder, count, seed):
 
 
 def test_targets(folder):
-    """The programs that test a room: those of its folder under tests/, and for the decoder rendered and misleading frames."""
+    """The programs that test a room: those of its folder under tests/, for the decoder with rendered and misleading
+    frames."""
     targets = []
     for part in [pathlib.Path(folder), *pathlib.Path(folder).parents]:
         lists = ROOT / "tests" / part / "CMakeLists.txt"
@@ -136,9 +137,9 @@ def failed_test(program, folder, seconds):
     running, logs = [], []
     for shard in range(shards):
         logs.append(tempfile.TemporaryFile("w+"))
-        running.append(subprocess.Popen(
-            [str(program), "--gtest_brief=1", "--gtest_fail_fast"], cwd=folder, stdout=logs[-1],
-            stderr=subprocess.STDOUT, env=os.environ | {"GTEST_TOTAL_SHARDS": str(shards), "GTEST_SHARD_INDEX": str(shard)}))
+        part = {"GTEST_TOTAL_SHARDS": str(shards), "GTEST_SHARD_INDEX": str(shard)}
+        running.append(subprocess.Popen([str(program), "--gtest_brief=1", "--gtest_fail_fast"], cwd=folder,
+                                        stdout=logs[-1], stderr=subprocess.STDOUT, env=os.environ | part))
     try:
         deadline = time.monotonic() + seconds
         while True:
