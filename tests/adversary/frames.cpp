@@ -267,8 +267,8 @@ void FrameMaker::lay_surfaces(Kind kind, Random& random, Frame& frame) const {
       for (int y = 0; y < kHeight; ++y) frame.surface.at(x, y) = id;
     }
   } else {
-    const Eigen::Vector3d normal =
-        Eigen::Vector3d(uniform(random, -0.35, 0.35), uniform(random, -0.25, 0.25), 1).normalized();
+    const double down = uniform(random, -0.25, 0.25), right = uniform(random, -0.35, 0.35);  // drawn in this order
+    const Eigen::Vector3d normal = Eigen::Vector3d(right, down, 1).normalized();
     seen.push_back(seen_on_plane(normal, uniform(random, 1650, 2250) * normal.z()));
   }
 }
