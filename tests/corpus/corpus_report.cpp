@@ -21,13 +21,6 @@
 namespace slsd {
 namespace {
 
-DecodeOptions papers_way() {
-  DecodeOptions options;
-  options.binarize = options.find_regions = options.classify = options.centre = Method::kPaper;
-  options.link_grid = options.decode_windows = options.correspond = Method::kPaper;
-  return options;
-}
-
 void print_score(const Score& score) {
   std::printf(" %.2f | %.2f | %zu | ", score.decoded_percent(), score.inlier_percent(), score.wrong.size());
   if (score.measured == 0) return static_cast<void>(std::printf("- | - | - |"));

@@ -88,6 +88,13 @@ Score score(const Scene& scene, const std::vector<CloudPoint>& points) {
   return score;
 }
 
+DecodeOptions papers_way() {
+  DecodeOptions options;
+  options.binarize = options.find_regions = options.classify = options.centre = Method::kPaper;
+  options.link_grid = options.decode_windows = options.correspond = Method::kPaper;
+  return options;
+}
+
 Result<Score> decode_and_score(const Scene& scene, const DecodeOptions& options) {
   auto decoder = Decoder::create(scene.pattern, scene.calibration, 0, options);
   if (!decoder) return tl::unexpected(decoder.error());

@@ -29,6 +29,9 @@ struct Score {
 /// do not widen it, or 0.5 mm at 2 m, whichever is more.
 [[nodiscard]] double inlier_limit_mm(double deviation_median_mm, double depth_median_mm);
 
+/// Every stage as the paper has it.
+[[nodiscard]] DecodeOptions papers_way();
+
 /// Decodes a scene's frame and compares with what the renderer knows. @errors as Decoder::create() and decode()
 [[nodiscard]] Result<Score> decode_and_score(const Scene& scene, const DecodeOptions& options);
 
