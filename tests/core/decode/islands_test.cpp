@@ -93,7 +93,7 @@ TEST_F(Islands, NeedTheEvidenceThatTheirRimCosts) {
   const auto is_accepted = [&](int contradicted, double evidence) {
     grid_ = {}, shapes_.clear();
     show_pattern(10, 10, 10 + kRows, 10 + kColumns);
-    const double sure = std::exp(evidence / shapes_.size()) / 5;
+    const double sure = std::exp(evidence / static_cast<double>(shapes_.size())) / 5;
     for (Classification& shape : shapes_) shape = read_as(shape.letter, 5, sure);
     for (int column = 10; column < 10 + contradicted; ++column)
       show(9, column, (pattern_.array.at(9, column) + 1 + column % 3) % 5);
@@ -169,6 +169,26 @@ TEST_F(Islands, NameNothingThatARowSlidAlongItsLineExplainsBetter) {
   const auto claims = decode(lines_through(2000, slid));
   for (int column = 10; column < 50; ++column) EXPECT_FALSE(is_decoded(claims, 20, column)) << column;
   EXPECT_GT(decoded(claims), 690);
+}
+
+// Symbols hard to tell, most of which look like those some columns on. Where one of them is unlikely to be its own
+// cell's letter, that explains the row better, and those between them that are right fall with it.
+TEST_F(Islands, LookForARowSlidWhereALetterIsUnlikely) {
+  constexpr int kSlid = 3, kFirst = 24, kLast = 36;
+  const auto letter = [&](int column) { return pattern_.array.at(20, column); };
+  const auto right_of = [&](double log_ratio) {
+    grid_ = {}, shapes_.clear();
+    show_pattern(10, 10, 30, 50);
+    const double own = std::exp(log_ratio) / 5;
+    for (int column = kFirst; column < kLast; ++column)
+      shapes_[grid_.node_at(20, column)] = read_as(letter(column + kSlid), 5, 1 - 4 * own);
+    const auto claims = decode(lines_through(2000, [](int) { return 0; }));
+    int right = 0;
+    for (int column = kFirst; column < kLast; ++column) right += is_decoded(claims, 20, column);
+    return right;
+  };
+  EXPECT_GT(right_of(-0.25), 0);
+  EXPECT_EQ(right_of(-0.35), 0);
 }
 
 // Ten letters that come again three columns on fit one depth as well as the other.
@@ -453,6 +473,13 @@ TEST_F(IslandsWithARowOffItsLines, KeepWhatIsLittleOff) {
 // An edge that cuts the row moves each letter as it is.
 TEST_F(IslandsWithARowOffItsLines, KeepWhatIsUnevenlyOff) {
   EXPECT_GE(kept([](int column) { return 0.4 + 0.25 * (column % 4); }), 28);
+}
+
+// A third of them lie at the median, the others to both sides of it.
+TEST_F(IslandsWithARowOffItsLines, TakeWhatIsAnEighthOffTheMedianForAlike) {
+  const auto spread = [](double share) { return [share](int column) { return 0.8 * (1 + share * (column % 3 - 1)); }; };
+  EXPECT_EQ(kept(spread(0.11)), 0);
+  EXPECT_GE(kept(spread(0.14)), 28);
 }
 
 TEST_F(IslandsWithARowOffItsLines, KeepWhatIsNotWellSeen) {

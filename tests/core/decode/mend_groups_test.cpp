@@ -237,6 +237,21 @@ TEST_F(MendGroups, LieWhereTheOthersHaveThem) {
   EXPECT_EQ(mended_beside(1.4F), 0);
 }
 
+// Out of focus they are found from far off: not all that is found is where the others have it.
+TEST_F(MendGroups, LieWhereTheOthersHaveThemOutOfFocusToo) {
+  frame_ = simulate(draw_pattern(pattern_), rig_, test::kTilted,
+                    {.dark = 12, .lit = 170, .blur_sigma_px = 2.4, .noise_sigma = 1});
+  blur_px_ = 1.7F;
+  const Sightings all = seen_;
+  const auto mended_beside = [&](float along_px) {
+    seen_ = all;
+    for (int i = 0; i < kCount; ++i) seen_.nodes[i].centre_px.x() += along_px, seen_.moments[i].x += along_px;
+    return mend_all().size();
+  };
+  EXPECT_EQ(mended_beside(1.3F), kCount);
+  EXPECT_EQ(mended_beside(1.8F), 0);
+}
+
 // As where the surface turns away beneath them: their column is where it was.
 TEST_F(MendGroups, AreTiltedAsTheOthersAre) {
   darken_all_but({7, 12, 17});

@@ -84,7 +84,7 @@ class MendedPlane : public testing::Test {
     const GreyView view = frame_.view();
     const FrameNoise noise{.dark_variance = 1};
     const CellGate gate(cells_, segments_, 1.5);
-    return look(LetterScene{view, 255, noise, letters_->at(0.7F), gate, prototypes_, seen_});
+    return look(LetterScene{view, 255, noise, letters_->at(blur_px_), gate, prototypes_, seen_});
   }
   [[nodiscard]] std::vector<std::int32_t> mend_all() {
     return look([&](const LetterScene& scene) -> std::vector<std::int32_t> {
@@ -104,6 +104,7 @@ class MendedPlane : public testing::Test {
   Pattern pattern_;
   std::shared_ptr<const LetterFields> letters_ = std::make_shared<const LetterFields>(pattern_.options);
   Calibration rig_;
+  float blur_px_ = 0.7F;  // projector px, of the frame
   Grey8 frame_;
   std::vector<Prototype> prototypes_;  // centroids in the middle of the square
   CellRays cells_;

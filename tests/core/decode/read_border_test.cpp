@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -62,6 +63,24 @@ class SymbolAtTheBorder : public testing::Test {
   Eigen::Vector2f beside_px_;
   Sightings seen_;
 };
+
+// A symbol reaches 12 px to each side; turned by 45 degrees, the square root of two as far.
+TEST(IsAtBorder, KeepsThreePixelsFromIt) {
+  constexpr float kSymbolPx = 16;
+  const Eigen::Vector2f frame_px(200, 120), middle(100, 60);
+  LatticeFrame straight = kScale * LatticeFrame::Identity(), turned = straight;
+  turned << 1, -1, 1, 1;
+  turned *= kScale * std::sqrt(0.5F);
+  for (const auto& [frame, reach] : {std::pair(straight, 12.F), {turned, 12 * std::sqrt(2.F)}}) {
+    for (const auto& [off_px, at_border] : {std::pair(-0.1F, true), {0.1F, false}}) {
+      const float from = reach + 3 + off_px;
+      for (const Eigen::Vector2f& centre :
+           {Eigen::Vector2f(from, 60), {199 - from, 60}, {100, from}, {100, 119 - from}})
+        EXPECT_EQ(is_at_border(centre, frame, kSymbolPx, frame_px), at_border) << centre.transpose();
+    }
+    EXPECT_FALSE(is_at_border(middle, frame, kSymbolPx, frame_px));
+  }
+}
 
 TEST_F(SymbolAtTheBorder, StandsBesideItsOwnNeighbour) {
   EXPECT_EQ(status_beside(frame_with(letter_of_its_cell())), RegionStatus::kDecoded);

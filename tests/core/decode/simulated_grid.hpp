@@ -59,7 +59,7 @@ inline Classification read_as(int letter, int letters, double sure) {
 
 /// Letters whose centroids are in the middles of their squares: as many as the shipped pattern of 16 px has.
 inline std::vector<Prototype> flat_prototypes() {
-  Prototype prototype;
+  Prototype prototype{};
   prototype.centroid_px = {0, 0};
   return std::vector<Prototype>(5, prototype);
 }
