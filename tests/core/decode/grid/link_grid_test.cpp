@@ -9,7 +9,7 @@
 #include <Eigen/Geometry>
 
 #include "tests/core/decode/alone.hpp"
-#include "tests/core/decode/simulated_grid.hpp"
+#include "tests/core/decode/grid/simulated_grid.hpp"
 
 namespace slsd {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tests/core/decode/mended_plane.hpp"
+#include "tests/core/decode/centres/mended_plane.hpp"
 
 namespace slsd {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "tests/core/decode/simulated_grid.hpp"
+#include "tests/core/decode/grid/simulated_grid.hpp"
 
 namespace slsd {
 namespace {

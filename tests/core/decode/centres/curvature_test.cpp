@@ -9,7 +9,7 @@
 
 #include "core/code/symbol.hpp"
 #include "tests/core/decode/alone.hpp"
-#include "tests/core/decode/simulated_grid.hpp"
+#include "tests/core/decode/grid/simulated_grid.hpp"
 #include "tests/simulator/simulator.hpp"
 
 namespace slsd {

@@ -9,7 +9,7 @@
 
 #include <gmock/gmock.h>
 
-#include "tests/core/decode/mended_plane.hpp"
+#include "tests/core/decode/centres/mended_plane.hpp"
 
 namespace slsd {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/decode/centres/mend_symbols.hpp"
-#include "tests/core/decode/mended_plane.hpp"
+#include "tests/core/decode/centres/mended_plane.hpp"
 
 namespace slsd {
 namespace {

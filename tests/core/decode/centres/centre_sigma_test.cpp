@@ -14,8 +14,8 @@
 #include "core/decode/centres/align_symbols.hpp"
 #include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/decoded_scene.hpp"
+#include "tests/core/decode/grid/simulated_grid.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
-#include "tests/core/decode/simulated_grid.hpp"
 
 namespace slsd {
 namespace {

@@ -9,8 +9,8 @@
 #include <gmock/gmock.h>
 
 #include "tests/core/decode/alone.hpp"
+#include "tests/core/decode/grid/simulated_grid.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
-#include "tests/core/decode/simulated_grid.hpp"
 #include "tests/simulator/simulator.hpp"
 
 namespace slsd {
