@@ -122,7 +122,7 @@ def test_targets(folder):
             targets += [name + "_tests" for name in re.findall(r"slsd_add_tests\((\w+)", lists.read_text())]
             break
     if "decode" in folder:
-        targets += ["recorded_tests", "corpus_tests", "adversary_tests"]
+        targets = ["recorded_tests", *targets, "corpus_tests", "adversary_tests"]  # what notices soonest comes first
     return targets
 
 

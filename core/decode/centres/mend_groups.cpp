@@ -131,7 +131,7 @@ void GroupMender::find_members(const LetterScene& scene) {
 LetterPlace GroupMender::place_of(const LetterScene& scene, std::int32_t node) {
   constexpr int kReach = 3;  // links
   constexpr std::size_t kFewest = 4;
-  constexpr float kStanding = 4, kSpreadMin = 1e-3F, kFlattestMin = 0.01F;
+  constexpr float kStanding = 4, kFlattestMin = 0.01F;
   const Sightings& seen = scene.seen;
   LetterPlace place;
   for (const Direction d : kDirections) {
@@ -162,9 +162,7 @@ LetterPlace GroupMender::place_of(const LetterScene& scene, std::int32_t node) {
     normal += weight * cell * cell.transpose();
     right += weight * cell * centre_px.transpose();
   }
-  const bool spread = normal.determinant() > kSpreadMin * normal.diagonal().prod();
-  if (!spread) return {};
-  const Eigen::Matrix<float, 3, 2> plane = normal.ldlt().solve(right);
+  const Eigen::Matrix<float, 3, 2> plane = normal.ldlt().solve(right);  // flat where all are in a row
   place.frame = plane.bottomRows<2>().transpose() / pitch_px_;
   if (!(std::abs(place.frame.determinant()) > kFlattestMin * place.frame.squaredNorm())) return {};
   place.centre_px =

@@ -154,6 +154,12 @@ TEST_F(MendGroups, HaveOneBesideThem) {
   EXPECT_THAT(mend_all(), testing::IsEmpty());
 }
 
+// Those of a row alone do not tell how the grid goes on across it.
+TEST_F(MendGroups, LieInNoSingleRow) {
+  for (std::int32_t node = 0; node < kCount; ++node) seen_.nodes[node].links[kUp] = seen_.nodes[node].links[kDown] = -1;
+  EXPECT_THAT(mend_all(), testing::IsEmpty());
+}
+
 TEST_F(MendGroups, AskForMoreOfWhatHasOneBesideIt) {
   darken_all_but({12, 13, 14});
   const Sightings all = seen_;
