@@ -3,10 +3,12 @@
 #include "core/decode/symbols/separability.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/LU>
 
 #include "core/code/pattern.hpp"
 #include "core/decode/symbols/prototypes.hpp"
@@ -54,6 +56,31 @@ TEST(AssessSeparability, FindsDiscAndSquareRiskyAtEightPixels) {
   EXPECT_EQ(separability.risky_pairs().front().first, 1);
   EXPECT_EQ(separability.risky_pairs().front().second, 7);
   EXPECT_THAT(separability_warnings(separability, 8).front(), HasSubstr("1 (disc) and 7 (square) look alike at 8 px"));
+}
+
+// Along the line on which the two differ most, a boundary is as many standard deviations from one as from the other.
+TEST(AssessSeparability, CountsDeviationsToTheBoundaryBetweenTwo) {
+  const LookOptions options;
+  const auto spreads = spread_of_symbols({.symbols = {5, 12},
+                                          .symbol_size_px = options.symbol_size_px,
+                                          .spacing_px = options.spacing_px,
+                                          .frame_error = static_cast<float>(options.frame_error),
+                                          .samples = options.looks,
+                                          .blur_px = static_cast<float>(options.blur_px),
+                                          .noise = static_cast<float>(options.noise)});
+  const auto &one = spreads.at(0), &other = spreads.at(1);
+  const FeatureCovariance both = one.covariance + other.covariance;
+  const Eigen::VectorXd along = both.fullPivLu().solve(other.mean - one.mean);
+  const auto deviation = [&](const SymbolSpread& spread) {
+    double variance = 0;
+    for (int i = 0; i < along.size(); ++i)
+      for (int j = 0; j < along.size(); ++j) variance += along[i] * spread.covariance(i, j) * along[j];
+    return std::sqrt(variance);
+  };
+  const double distance = assess({5, 12}, options).smallest_distance();
+  const double boundary = along.dot(one.mean) + distance * deviation(one);
+  EXPECT_GT(distance, 3);
+  EXPECT_NEAR((along.dot(other.mean) - boundary) / deviation(other), distance, 1e-6 * distance);
 }
 
 TEST(AssessSeparability, SeesThatBlurBringsSymbolsTogether) {
