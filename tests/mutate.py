@@ -22,31 +22,30 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PASSES = ROOT / "tests" / "mutate_passes.txt"
 
-NUMBER = r"(?<![\w.])(\d+\.\d+(?:[eE][-+]?\d+)?|\d+[eE][-+]?\d+|\d+)(F?)(?![\w.])"
+NUMBER = r"(\d+\.\d+(?:[eE][-+]?\d+)?|\d+[eE][-+]?\d+|\d+)(F?)(?![\w.])"
 
 
 def scaled(match, factor):
-    text = match.group(1)
+    text = match.group(2)
     if re.fullmatch(r"\d+", text):
         value = str(round(int(text) * factor))
     else:
         value = repr(float(text) * factor)
-    return value + match.group(2)
+    return value + match.group(3)
 
 
 def numbers(line):
-    """A named limit, or a default of an option, doubled and halved."""
+    """A named limit, or a default of an option, doubled and halved: each of a line."""
     if not re.search(r"\bconstexpr\b.*=|^\s+[\w:<>]+ \w+ = [\d.]+F?;", line):
         return
-    head, equals, tail = line.partition("=")
-    for match in re.finditer(NUMBER, tail):
-        if float(match.group(1)) == 0:
-            return
-        for factor, name in ((2, "doubled"), (0.5, "halved")):
+    for match in re.finditer(r"(\w+) = -?" + NUMBER, line):
+        name, number = match.group(1), match.group(2) + match.group(3)
+        if float(match.group(2)) == 0:
+            continue
+        for factor, how in ((2, "doubled"), (0.5, "halved")):
             changed = scaled(match, factor)
-            if changed != match.group(0):
-                yield f"{match.group(0)} {name}", head + equals + tail[:match.start()] + changed + tail[match.end():]
-        return
+            if changed != number:
+                yield f"{name} {how}", line[:match.start(2)] + changed + line[match.end():]
 
 
 def conditions(line):

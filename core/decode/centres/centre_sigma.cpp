@@ -167,7 +167,6 @@ void CentreJudge::judge(const FrameNoise& noise, const EpipolarView* view, const
   std::vector<LatticeSymbol>& symbols = lattice.symbols;
   for (std::vector<float>* each : {&across_px_, &disparities_px_, &beyond_px_, &uneven_px_})
     each->assign(symbols.size(), 0);
-  if (symbols.empty()) return;
   if (view != nullptr) measure_across(*view, cells, executor, symbols), measure_unevenness(symbols, executor);
   const float usual_misfit_squared = usual_of(symbols.size(), [&](std::size_t i) { return square(symbols[i].misfit); });
   executor.run_ranges(
