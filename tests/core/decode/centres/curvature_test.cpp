@@ -9,6 +9,7 @@
 
 #include "core/code/symbol.hpp"
 #include "tests/core/decode/alone.hpp"
+#include "tests/core/decode/decoded_scene.hpp"
 #include "tests/core/decode/grid/simulated_grid.hpp"
 #include "tests/simulator/simulator.hpp"
 
@@ -111,8 +112,6 @@ class Block {
   std::vector<Eigen::Vector2d> truth_;
 };
 
-const Surface kCylinder = cylinder({0, 0, 2000}, {0, 1, 0}, 150);
-
 /// Projector pixel that lights a place on the front of the cylinder.
 Eigen::Vector2d lighting(double x_mm) {
   const Calibration rig = paper_rig();
@@ -122,7 +121,7 @@ Eigen::Vector2d lighting(double x_mm) {
 
 TEST(CentreCorrection, HalvesTheErrorOnACylinder) {
   for (const int symbol : {7, 25, 22, 5}) {
-    const Errors errors = Block(symbol, kCylinder).errors_around(lighting(20));
+    const Errors errors = Block(symbol, test::kCylinder).errors_around(lighting(20));
     EXPECT_GT(errors.before, 0.02) << symbol;
     EXPECT_LT(errors.after, 0.5 * errors.before) << symbol;
     EXPECT_LT(errors.after, 0.02) << symbol;
@@ -130,7 +129,7 @@ TEST(CentreCorrection, HalvesTheErrorOnACylinder) {
 }
 
 TEST(CentreCorrection, ReducesTheErrorTowardsTheLimb) {
-  const Errors errors = Block(7, kCylinder).errors_around(lighting(70));
+  const Errors errors = Block(7, test::kCylinder).errors_around(lighting(70));
   EXPECT_GT(errors.before, 0.03);
   EXPECT_LT(errors.after, 0.5 * errors.before);
 }

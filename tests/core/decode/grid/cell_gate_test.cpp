@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/grid/cell_gate.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <Eigen/Geometry>
+
+#include "tests/core/decode/grid/simulated_grid.hpp"
+#include "tests/core/decode/shipped_pattern.hpp"
+#include "tests/simulator/simulator.hpp"
+
+namespace slsd {
+namespace {
+
+using Cell = std::pair<int, int>;
+
+/// A camera beside the projector in a direction of its own: so its epipolar lines are tilted in the pattern.
+class CellGateOfATiltedLine : public testing::TestWithParam<int> {
+ protected:
+  CellGateOfATiltedLine()
+      : pattern_(shipped_pattern("16px-5.toml")), cells_(pattern_, flat_prototypes(), paper_rig().projector) {
+    const double angle = GetParam() * std::numbers::pi / 180;
+    rig_.cameras[0].projector_from_camera.rotation.setIdentity();
+    rig_.cameras[0].projector_from_camera.translation = 180 * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+  }
+
+  [[nodiscard]] std::vector<EpipolarSegment> line_of(const Cell& cell) const {
+    const RigidTransform& to_projector = rig_.cameras[0].projector_from_camera;
+    const Eigen::Vector3d point = 2000 * cells_.ray(cell.first, cell.second).direction.homogeneous();
+    return {EpipolarGate(rig_.cameras[0], rig_.projector, 350, 3200)
+                .prepare((to_projector.rotation.transpose() * (point - to_projector.translation)).hnormalized())};
+  }
+
+  Pattern pattern_;
+  CellRays cells_;
+  Calibration rig_ = paper_rig();
+};
+
+// Followed from a cell, as found by looking at all of them.
+TEST_P(CellGateOfATiltedLine, VisitsAllCellsOnIt) {
+  constexpr double kTolerancePx = 1.5;
+  std::size_t all = 0;
+  for (const Cell& from : {Cell(22, 35), {0, 0}, {43, 70}, {5, 66}, {40, 12}}) {
+    const auto segments = line_of(from);
+    const CellGate gate(cells_, segments, kTolerancePx);
+    std::vector<Cell> followed, admitted;
+    gate.visit_line(0, from.first, from.second, [&](int row, int column) { followed.emplace_back(row, column); });
+    gate.visit(0, false, [&](int row, int column) {
+      if (Cell(row, column) != from) admitted.emplace_back(row, column);
+    });
+    EXPECT_THAT(followed, testing::UnorderedElementsAreArray(admitted)) << from.first << ", " << from.second;
+    all += admitted.size();
+  }
+  EXPECT_GT(all, 5U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Degrees, CellGateOfATiltedLine, testing::Values(0, 7, 30, 44, 46, 80, 90, 100, 135, 170, 180));
+
+}  // namespace
+}  // namespace slsd
