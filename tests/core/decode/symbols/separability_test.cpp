@@ -101,7 +101,14 @@ TEST(AssessSeparability, RefusesWhatIsOutOfRange) {
   EXPECT_FALSE(assess_separability({7, 7}, {}));
   EXPECT_FALSE(assess_separability({7, 26}, {}));
   EXPECT_FALSE(assess_separability({7, 22}, {.symbol_size_px = 9}));
+  EXPECT_FALSE(assess_separability({7, 0}, {}));
   EXPECT_FALSE(assess_separability({7, 22}, {.camera_px_per_projector_px = 0}));
+  EXPECT_FALSE(assess_separability({7, 22}, {.camera_px_per_projector_px = 11}));
+  EXPECT_FALSE(assess_separability({7, 22}, {.spacing_px = 0}));
+  EXPECT_FALSE(assess_separability({7, 22}, {.spacing_px = 17}));
+  EXPECT_FALSE(assess_separability({7, 22}, {.blur_px = 21}));
+  EXPECT_FALSE(assess_separability({7, 22}, {.looks = 9}));
+  EXPECT_FALSE(assess_separability({7, 22}, {.looks = 100001}));
   EXPECT_FALSE(assess_separability({7, 22}, {.blur_px = std::numeric_limits<double>::quiet_NaN()}));
 }
 
