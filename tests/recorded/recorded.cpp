@@ -36,16 +36,16 @@ std::string line_of(std::string_view frame, const Decoding& decoding) {
     broken += static_cast<int>(std::ranges::count(region.broken, true));
   }
   std::uint32_t cells = 0;
-  double depth_mm = 0, sigma_mm = 0;
+  double depth_mm = 0, sigma_mm = 0, intensity = 0;
   for (const CloudPoint& point : decoding.points) {
     cells = (cells + point.row * 1009U + point.column * 31U) % 99991U;
-    depth_mm += point.z, sigma_mm += point.sigma_mm;
+    depth_mm += point.z, sigma_mm += point.sigma_mm, intensity += point.intensity;
   }
   line += fmt::format(" | links {} broken {} off line {}", links, broken, decoding.off_line.size());
   if (decoding.points.empty()) return line;
   const auto count = static_cast<double>(decoding.points.size());
-  return line + fmt::format(" | points {} cells {} at {:.2f} mm sigma {:.4f} mm", count, cells, depth_mm / count,
-                            sigma_mm / count);
+  return line + fmt::format(" | points {} cells {} at {:.2f} mm sigma {:.4f} mm lit {:.1f}", count, cells,
+                            depth_mm / count, sigma_mm / count, intensity / count);
 }
 
 Result<std::vector<std::string>> record_scene(const FrameGroup& group) {

@@ -150,15 +150,18 @@ TEST(HardFrames, ReadsAPlaneOutOfFocus) {
 
 // Levels are told as those of the frame, not of what was made of it.
 TEST(HardFrames, IntensitiesOutOfFocusAreTheFrames) {
+  constexpr double kLit = 150;
   const Pattern pattern = shipped_pattern("16px-5.toml");
   Decoder decoder = decoder_of(pattern);
   const auto middle = [&](double blur_px) {
-    const Grey8 frame = simulate(draw_pattern(pattern), paper_rig(), test::kPlane, {.blur_sigma_px = blur_px});
+    const Grey8 frame =
+        simulate(draw_pattern(pattern), paper_rig(), test::kPlane, {.dark = 20, .lit = kLit, .blur_sigma_px = blur_px});
     std::vector<int> intensities;
     for (const CloudPoint& point : decode(decoder, frame.view()).points) intensities.push_back(point.intensity);
     std::ranges::nth_element(intensities, intensities.begin() + static_cast<std::ptrdiff_t>(intensities.size() / 2));
     return intensities.empty() ? 0 : intensities[intensities.size() / 2];
   };
+  EXPECT_NEAR(middle(1), kLit, 10);  // narrow strokes are blurred
   EXPECT_NEAR(middle(3), middle(1), 20);
 }
 
