@@ -50,6 +50,14 @@ class MendGroups : public test::MendedPlane {
     seen_.claims[node] = {.status = RegionStatus::kNoCodeword};
     seen_.shapes[node].letter = 0, seen_.shapes[node].distance = 1;
   }
+  /// How many are mended where all are seen so far along their lines from where they are.
+  std::size_t mended_from(float along_px) {
+    const Sightings all = seen_;
+    for (int i = 0; i < kCount; ++i) seen_.nodes[i].centre_px.x() += along_px, seen_.moments[i].x += along_px;
+    const std::size_t mended = mend_all().size();
+    seen_ = all;
+    return mended;
+  }
   [[nodiscard]] float off_px(int node) const {
     const GreyMoments& moments = seen_.moments[node];
     return (Eigen::Vector2f(moments.x, moments.y) - true_centre(node / kSide, node % kSide)).norm();
@@ -233,14 +241,8 @@ TEST_F(MendGroups, AreNoFartherOffTheirLinesThanPrintMovesThem) {
 
 TEST_F(MendGroups, LieWhereTheOthersHaveThem) {
   darken_all_but({11, 12, 13});
-  const Sightings all = seen_;
-  const auto mended_beside = [&](float along_px) {
-    seen_ = all;
-    for (int i = 0; i < kCount; ++i) seen_.nodes[i].centre_px.x() += along_px, seen_.moments[i].x += along_px;
-    return mend_all().size();
-  };
-  EXPECT_EQ(mended_beside(1), 3);
-  EXPECT_EQ(mended_beside(1.4F), 0);
+  EXPECT_EQ(mended_from(1), 3);
+  EXPECT_EQ(mended_from(1.4F), 0);
 }
 
 // Out of focus they are found from far off: not all that is found is where the others have it.
@@ -248,14 +250,8 @@ TEST_F(MendGroups, LieWhereTheOthersHaveThemOutOfFocusToo) {
   frame_ = simulate(draw_pattern(pattern_), rig_, test::kTilted,
                     {.dark = 12, .lit = 170, .blur_sigma_px = 2.4, .noise_sigma = 1});
   blur_px_ = 1.7F;
-  const Sightings all = seen_;
-  const auto mended_beside = [&](float along_px) {
-    seen_ = all;
-    for (int i = 0; i < kCount; ++i) seen_.nodes[i].centre_px.x() += along_px, seen_.moments[i].x += along_px;
-    return mend_all().size();
-  };
-  EXPECT_EQ(mended_beside(1.3F), kCount);
-  EXPECT_EQ(mended_beside(1.8F), 0);
+  EXPECT_EQ(mended_from(1.3F), kCount);
+  EXPECT_EQ(mended_from(1.8F), 0);
 }
 
 // As where the surface turns away beneath them: their column is where it was.
