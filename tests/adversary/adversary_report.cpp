@@ -4,43 +4,20 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <memory>
-#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
-#include "core/decode/decoder.hpp"
-#include "tests/adversary/frames.hpp"
+#include "tests/adversary/misled.hpp"
 
 namespace slsd::adversary {
 namespace {
 
-constexpr std::pair<double, double> kRangesMm[] = {{350, 3200}, {400, 2500}, {1500, 2500}};
 constexpr double kTolerancePx = 1.5;
 
 struct Row {
   int frames = 0, frames_wrong = 0, wrong = 0, undecidable = 0, right = 0, visible = 0;
 };
-
-struct Reader {
-  std::unique_ptr<FrameMaker> maker;
-  std::vector<Decoder> decoders;  // one to a range
-};
-
-Result<Reader> reader_of(PatternOptions options) {
-  auto pattern = make_pattern(options);
-  if (!pattern) return tl::unexpected(pattern.error());
-  options.seed += 1;
-  auto foreign = make_pattern(options);
-  if (!foreign) return tl::unexpected(foreign.error());
-  Reader reader{std::make_unique<FrameMaker>(*pattern, foreign->array), {}};
-  for (const auto& [nearest, farthest] : kRangesMm) {
-    auto decoder =
-        Decoder::create(*pattern, reader.maker->calibration(), 0, {.depth_min_mm = nearest, .depth_max_mm = farthest});
-    if (!decoder) return tl::unexpected(decoder.error());
-    reader.decoders.push_back(std::move(*decoder));
-  }
-  return reader;
-}
 
 void write_pgm(const Grey8& image, const std::string& path) {
   std::FILE* const file = std::fopen(path.c_str(), "wb");
@@ -57,10 +34,9 @@ void print(const char* name, const Row& row) {
 
 /// @param first  number of each kind's first frame: those of another number are other frames
 Result<int> report(int frames, int first, int only_kind, bool single, const char* picture) {
-  std::vector<Reader> readers;
-  for (const PatternOptions& options :
-       {PatternOptions{.symbol_size_px = 16, .spacing_px = 2}, PatternOptions{.symbol_size_px = 8, .spacing_px = 2}}) {
-    auto reader = reader_of(options);
+  std::vector<Misled> readers;
+  for (const int symbol_size_px : {16, 8}) {
+    auto reader = Misled::of(symbol_size_px);
     if (!reader) return tl::unexpected(reader.error());
     readers.push_back(std::move(*reader));
   }
@@ -73,11 +49,11 @@ Result<int> report(int frames, int first, int only_kind, bool single, const char
     const Kind kind = static_cast<Kind>(k);
     Row row;
     for (int n = first; n < first + (frames + kKinds - 1) / kKinds; ++n) {
-      Reader& reader = readers[n % 2];
-      const Frame frame = reader.maker->make(kind, static_cast<std::uint32_t>(n));
+      Misled& reader = readers[n % 2];
+      const Frame frame = reader.maker.make(kind, static_cast<std::uint32_t>(n));
       const auto decoding = reader.decoders[n / 2 % 3].decode(frame.image.view(), 255);
       if (!decoding) return tl::unexpected(decoding.error());
-      const Verdict verdict = reader.maker->judge(frame, (*decoding)->points, kTolerancePx);
+      const Verdict verdict = reader.maker.judge(frame, (*decoding)->points, kTolerancePx);
       ++row.frames, row.frames_wrong += verdict.wrong > 0;
       row.wrong += verdict.wrong, row.undecidable += verdict.undecidable;
       row.right += verdict.right, row.visible += verdict.visible;

@@ -7,8 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/decode/decoder.hpp"
-#include "tests/adversary/frames.hpp"
+#include "tests/adversary/misled.hpp"
 
 namespace slsd::adversary {
 
@@ -24,31 +23,17 @@ int frames_of_a_kind() {
   return asked == nullptr ? 4 : std::atoi(asked);
 }
 
-/// A reader of one pattern, and the frames that would mislead it.
 struct Bench {
-  static Bench of(int size_px) {
-    PatternOptions options{.symbol_size_px = size_px, .spacing_px = 2};
-    const Pattern pattern = make_pattern(options).value();
-    options.seed = 2;
-    FrameMaker maker(pattern, make_pattern(options).value().array);
-    std::vector<Decoder> decoders;
-    for (const auto& [nearest, farthest] : {std::pair(350., 3200.), {400., 2500.}, {1500., 2500.}}) {
-      decoders.push_back(
-          Decoder::create(pattern, maker.calibration(), 0, {.depth_min_mm = nearest, .depth_max_mm = farthest})
-              .value());
-    }
-    return {std::move(maker), std::move(decoders)};
-  }
+  static Bench of(int symbol_size_px) { return {Misled::of(symbol_size_px).value()}; }
 
   void expect_none_wrong(Kind kind, int number) {
-    const Frame frame = maker.make(kind, static_cast<std::uint32_t>(number));
-    const auto decoding = decoders[number / 2 % 3].decode(frame.image.view(), 255);  // as in ./run adversary
+    const Frame frame = misled.maker.make(kind, static_cast<std::uint32_t>(number));
+    const auto decoding = misled.decoders[number / 2 % 3].decode(frame.image.view(), 255);  // as in ./run adversary
     ASSERT_TRUE(decoding);
-    EXPECT_EQ(maker.judge(frame, (*decoding)->points, 1.5).wrong, 0) << to_string(kind) << ", frame " << number;
+    EXPECT_EQ(misled.maker.judge(frame, (*decoding)->points, 1.5).wrong, 0) << to_string(kind) << ", frame " << number;
   }
 
-  FrameMaker maker;
-  std::vector<Decoder> decoders;  // one to a range of depths
+  Misled misled;
 };
 
 class Adversary : public testing::TestWithParam<Kind> {};

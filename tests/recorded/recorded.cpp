@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/decode/decoder.hpp"
+#include "tests/adversary/misled.hpp"
 #include "tests/corpus/score.hpp"
 
 namespace slsd {
@@ -19,7 +20,6 @@ using adversary::Kind;
 namespace {
 
 constexpr int kFramesOfAKind = 6;  // two to each working depth
-constexpr std::pair<double, double> kDepthsMm[] = {{350, 3200}, {400, 2500}, {1500, 2500}};
 constexpr std::string_view kScenes[] = {"16px-5-bust",     "16px-5-cylinder",      "16px-5-plane_30", "16px-5-step",
                                         "16px-5-textured", "16px-5-falling_light", "8px-6-bust",      "8px-6-cylinder",
                                         "8px-6-plane_0",   "paper-1-bust",         "paper-2-bust"};
@@ -64,25 +64,13 @@ Result<std::vector<std::string>> record_scene(const FrameGroup& group) {
 }
 
 Result<std::vector<std::string>> record_misleading(const FrameGroup& group) {
-  PatternOptions options{.symbol_size_px = group.symbol_size_px, .spacing_px = 2};
-  const auto pattern = make_pattern(options);
-  if (!pattern) return tl::unexpected(pattern.error());
-  options.seed += 1;
-  const auto foreign = make_pattern(options);
-  if (!foreign) return tl::unexpected(foreign.error());
-  adversary::FrameMaker maker(*pattern, foreign->array);
-  const IndexedPattern indexed(*pattern);
-  std::vector<Decoder> decoders;
-  for (const auto& [nearest, farthest] : kDepthsMm) {
-    auto decoder =
-        Decoder::create(indexed, maker.calibration(), 0, {.depth_min_mm = nearest, .depth_max_mm = farthest});
-    if (!decoder) return tl::unexpected(decoder.error());
-    decoders.push_back(std::move(*decoder));
-  }
+  auto misled = adversary::Misled::of(group.symbol_size_px);
+  if (!misled) return tl::unexpected(misled.error());
   std::vector<std::string> lines;
   for (int number = 0; number < kFramesOfAKind; ++number) {
-    const adversary::Frame frame = maker.make(group.kind, static_cast<std::uint32_t>(number));
-    const auto decoding = decoders[static_cast<std::size_t>(number) % decoders.size()].decode(frame.image.view(), 255);
+    const adversary::Frame frame = misled->maker.make(group.kind, static_cast<std::uint32_t>(number));
+    const auto decoding =
+        misled->decoders[static_cast<std::size_t>(number) % misled->decoders.size()].decode(frame.image.view(), 255);
     if (!decoding) return tl::unexpected(decoding.error());
     lines.push_back(line_of(fmt::format("{} {}", group.name(), number), **decoding));
   }

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <vector>
+
+#include "core/decode/decoder.hpp"
+#include "core/result.hpp"
+#include "tests/adversary/frames.hpp"
+
+namespace slsd::adversary {
+
+/// Decoders of one pattern, and the frames that would mislead them.
+struct Misled {
+  FrameMaker maker;
+  std::vector<Decoder> decoders;  ///< one to each of three working depths
+
+  /// @errors as make_pattern() and Decoder::create()
+  [[nodiscard]] static Result<Misled> of(int symbol_size_px);
+};
+
+}  // namespace slsd::adversary
