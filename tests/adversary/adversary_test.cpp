@@ -101,7 +101,7 @@ TEST(AdversaryFrames, NameNothingWhoseLineShowsOtherLight) {
 // What lies around them is looked at beyond the symbols of other islands.
 TEST(AdversaryFrames, NameNoneThatHoldEachOtherOnAnotherSurface) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);
-  for (const int number : {19400035, 19500109}) fine.expect_none_wrong(Kind::kSlats1to2, number);
+  for (const int number : {19400035, 19500109, 25000239}) fine.expect_none_wrong(Kind::kSlats1to2, number);
   for (const int number : {19400939, 19701005}) fine.expect_none_wrong(Kind::kSlats2, number);
   coarse.expect_none_wrong(Kind::kSlats2, 19501014);
   fine.expect_none_wrong(Kind::kShelves, 19400373);

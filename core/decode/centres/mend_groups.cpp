@@ -36,6 +36,20 @@ std::int32_t member_beside(const Sightings& seen, std::int32_t node, Direction d
   return other >= 0 && is_member(seen.claims[other]) && seen.claims[node].fits(seen.claims[other], d) ? other : -1;
 }
 
+/// Whether nothing of the line that runs past the one member beside it has a cell: all of that line may be of another
+/// surface, and this one of its letters be the right one by chance.
+bool is_alone_on_line(const Sightings& seen, std::int32_t node) {
+  const Direction held_from =
+      *std::ranges::find_if(kDirections, [&](Direction d) { return member_beside(seen, node, d) >= 0; });
+  bool linked = false;
+  for (const int side : {0, 1}) {
+    const std::int32_t other = seen.nodes[node].links[across(held_from, side)];
+    if (other >= 0 && seen.claims[other].named()) return false;
+    linked |= other >= 0;
+  }
+  return linked;
+}
+
 /// A symbol's square, moved across its epipolar line until it is on it.
 /// @param node  that was seen near it
 Eigen::Vector2f onto_line(const LetterScene& scene, std::int32_t node, int letter, const Eigen::Vector2f& centre_px,
@@ -171,13 +185,17 @@ LetterPlace GroupMender::place_of(const LetterScene& scene, std::int32_t node) {
 }
 
 /// Whether its letter is seen where the others have it, tilted as they are. What print darkens does not count: but what
-/// is seen in its middle may be nothing else. With one beside it, it may lie beyond the edge of their surface.
+/// is seen in its middle may be nothing else. With one beside it, it may lie beyond the edge of their surface; what had
+/// been refused for its surroundings then has others of its line beside it that are named.
 bool GroupMender::shows_letter(const LetterScene& scene, const AskedLetter& asked) const {
   constexpr float kMovedMax = 0.06F;  // of the pitch
   constexpr float kMiddleMin = 0.6F, kSupportMin = 0.75F;
   const PatchTask& task = asked.task;
   if (task.failed || std::abs(task.moved) > kAlignedSettledPx) return false;
   const bool lone = asked.place.held_by == 1;
+  if (lone && scene.seen.claims[asked.node].status == RegionStatus::kNeighboursDisagree &&
+      is_alone_on_line(scene.seen, asked.node))
+    return false;
   if (std::abs(task.state.across) > (lone ? kLoneAcrossMaxPx : kAlignedAcrossMaxPx)) return false;
   if (std::abs(task.state.disparity) > kMovedMax * pitch_px_ || !(asked.tilt_px <= kAlignedTiltMaxPx)) return false;
   const LightShares middle = aligner_.shares_of_middle(scene, asked);
