@@ -67,8 +67,8 @@ TEST(AdversaryFrames, NameNoPieceOfAnotherSurfaceAtARim) {
 // The corner of something put there agrees by chance, or what is beside it.
 TEST(AdversaryFrames, NameNothingBesideWhatIsPutInThePatternsPlace) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);
-  for (const int number : {279, 533}) fine.expect_none_wrong(Kind::kSwappedPatch, number);
-  coarse.expect_none_wrong(Kind::kSwappedPatch, 292);
+  for (const int number : {279, 533, 17200447, 25000111}) fine.expect_none_wrong(Kind::kSwappedPatch, number);
+  for (const int number : {292, 25000936}) coarse.expect_none_wrong(Kind::kSwappedPatch, number);
   fine.expect_none_wrong(Kind::kSlidRows, 539);
   coarse.expect_none_wrong(Kind::kSlats1to2, 760);
 }
@@ -90,7 +90,7 @@ TEST(AdversaryFrames, NameNothingInARowThatAnEdgeRunsAlong) {
 // What an edge along the row tears shows light beside its letters; what it leaves whole tells nothing.
 TEST(AdversaryFrames, NameNothingWhoseLineShowsOtherLight) {
   Bench fine = Bench::of(8), coarse = Bench::of(16);
-  for (const int number : {15002303, 15100339, 15100981, 15300619, 15501327})
+  for (const int number : {15002303, 15100339, 15100981, 15300619, 15501327, 25001409, 26002063})
     fine.expect_none_wrong(Kind::kShelves, number);
   for (const int number : {14000702, 14001734, 14600478, 15201376, 15300300, 18000450, 19200474, 19601000})
     coarse.expect_none_wrong(Kind::kShelves, number);

@@ -12,11 +12,10 @@ namespace {
 
 constexpr int kFar = 8;  // links to each side
 
-/// Its cell is known, and it is torn or misread.
+/// Its cell is known, and it is torn or misread, though it may have been mended.
 bool is_doubtful(const Sightings& seen, std::int32_t node) {
   const CellClaim& claim = seen.claims[node];
-  if (claim.status == RegionStatus::kDecoded || !claim.named()) return false;
-  return seen.shapes[node].is_torn() || claim.status == RegionStatus::kClassDisagrees;
+  return claim.named() && (seen.shapes[node].is_torn() || claim.status == RegionStatus::kClassDisagrees);
 }
 
 /// Calls visit(other, cells) for those that links lead to one way, also broken ones, as an edge breaks them, and whose
@@ -49,8 +48,8 @@ bool TornLines::is_outvoted(const Sightings& seen, const Suspect& suspect, const
   int standing = 1, against = 0;
   for (const Direction d : {suspect.forth, opposite(suspect.forth)}) {
     visit_along(seen, suspect.node, d, [&](std::int32_t other, float) {
-      standing += stands(seen, other);
-      against += is_doubtful(seen, other) && votes(other);
+      const bool speaks_against = is_doubtful(seen, other) && votes(other);
+      against += speaks_against, standing += !speaks_against && stands(seen, other);
     });
   }
   return against >= standing;
@@ -93,18 +92,19 @@ void TornLines::ask(const LetterScene& scene, std::int32_t node) {
   if (place.held_by > 0) aligner_.ask(scene, node, place);
 }
 
-void TornLines::refuse(const LetterScene& scene) {
+/// @return  whether there are any
+bool TornLines::refuse_outvoted(const LetterScene& scene) {
   Sightings& seen = scene.seen;
   find_suspects(seen);
-  if (suspects_.empty()) return;
-  is_asked_.assign(seen.size(), 0), shows_other_light_.assign(seen.size(), 0);
   aligner_.clear();
   for (const Suspect& suspect : suspects_) {
     for (const Direction d : {suspect.forth, opposite(suspect.forth)}) {
       visit_along(seen, suspect.node, d, [&](std::int32_t other, float) {
         if (!is_doubtful(seen, other) || is_asked_[other] != 0) return;
         is_asked_[other] = 1;
-        ask(scene, other);
+        // What is well seen as another letter needs no second look.
+        shows_other_light_[other] = seen.shapes[other].is_well_seen();
+        if (shows_other_light_[other] == 0) ask(scene, other);
       });
     }
   }
@@ -116,6 +116,14 @@ void TornLines::refuse(const LetterScene& scene) {
     return !is_outvoted(seen, suspect, [&](std::int32_t other) { return shows_other_light_[other] != 0; });
   });
   for (const Suspect& suspect : suspects_) seen.claims[suspect.node].status = RegionStatus::kNeighboursDisagree;
+  return !suspects_.empty();
+}
+
+void TornLines::refuse(const LetterScene& scene) {
+  is_asked_.assign(scene.seen.size(), 0), shows_other_light_.assign(scene.seen.size(), 0);
+  // What is refused stands for the others no longer.
+  while (refuse_outvoted(scene)) {
+  }
 }
 
 }  // namespace slsd

@@ -29,6 +29,7 @@ class TornLines {
   };
   void find_suspects(const Sightings& seen);
   void ask(const LetterScene& scene, std::int32_t node);
+  bool refuse_outvoted(const LetterScene& scene);
   template <class Votes>
   [[nodiscard]] static bool is_outvoted(const Sightings& seen, const Suspect& suspect, const Votes& votes);
 

@@ -325,7 +325,7 @@ void IslandJudge::cut_notches(const Frame& frame, std::int32_t island) {
 }
 
 /// Symbols of queue_ that the island holds on two sides that meet, from which too few that agree, and were cut, lead on
-/// to a contradiction: any of them may be the first of something else.
+/// to a contradiction: any of them may be the first of something else, as may what comes before those that are cut so.
 void IslandJudge::cut_steps(const Frame& frame) {
   constexpr float kFewAgree = 3.5F;
   const auto is_cut = [&](std::int32_t node, Direction d) {
@@ -334,20 +334,25 @@ void IslandJudge::cut_steps(const Frame& frame) {
   const auto held = [&](std::int32_t node, Direction d) {
     return links_[node][d] == Link::kAgrees && cut_[frame.beside[node][d]] == 0;
   };
-  next_queue_.clear();
-  for (const std::int32_t node : queue_) {
-    if (cut_[node] != 0) continue;
-    if ((held(node, kLeft) && held(node, kRight)) || (held(node, kUp) && held(node, kDown))) continue;
-    for (const Direction d : kDirections) {
-      if (!is_cut(node, d)) continue;
-      float evidence = own_ratio(node);
-      std::int32_t last = node;
-      while (is_cut(last, d)) last = frame.beside[last][d], evidence += own_ratio(last);
-      const bool ends = links_[last][d] != Link::kAgrees && is_of_another(frame, last, d) && !parts(frame, last, d);
-      if (ends && evidence < kFewAgree * log_letters_) next_queue_.push_back(node);
+  for (std::size_t asked = 0; asked < queue_.size();) {
+    next_queue_.clear();
+    for (const std::size_t end = queue_.size(); asked < end; ++asked) {
+      const std::int32_t node = queue_[asked];
+      if (cut_[node] != 0) continue;
+      if ((held(node, kLeft) && held(node, kRight)) || (held(node, kUp) && held(node, kDown))) continue;
+      for (const Direction d : kDirections) {
+        if (!is_cut(node, d)) continue;
+        float evidence = own_ratio(node);
+        std::int32_t last = node;
+        while (is_cut(last, d)) last = frame.beside[last][d], evidence += own_ratio(last);
+        const bool ends = links_[last][d] != Link::kAgrees && is_of_another(frame, last, d) && !parts(frame, last, d);
+        if (!ends || evidence >= kFewAgree * log_letters_) continue;
+        next_queue_.push_back(node);
+        if (held(node, opposite(d))) queue_.push_back(frame.beside[node][opposite(d)]);
+      }
     }
+    for (const std::int32_t node : next_queue_) cut_[node] = 1;
   }
-  for (const std::int32_t node : next_queue_) cut_[node] = 1;
 }
 
 void IslandJudge::cut_rims(const Frame& frame) {

@@ -109,6 +109,36 @@ TEST_F(OnTornLine, LooksAtWhatIsTornOrMisread) {
   EXPECT_EQ(row(), "..w..") << "of another row";
 }
 
+// Of a torn one that was mended half may be of its letter. Without those that it refuses it is outvoted itself.
+TEST_F(OnTornLine, IsRefusedWithWhatWasMendedOnIt) {
+  tear({0, 1, 4});
+  seen_.claims[kMiddle * kSide + 1].status = RegionStatus::kDecoded;
+  refuse();
+  EXPECT_EQ(row(), ".xxx.");
+}
+
+TEST_F(OnTornLine, StaysWithWhatWasMendedBeneathPrint) {
+  tear({0, 4});
+  damage(kMiddle, 1, true, print);
+  seen_.claims[kMiddle * kSide + 1].status = RegionStatus::kDecoded;
+  refuse();
+  EXPECT_EQ(row(), ".www.");
+}
+
+// Whatever its light: print makes no letters.
+TEST_F(OnTornLine, IsRefusedBesideOtherLettersThatAreWellSeen) {
+  for (const int column : {0, 1, 3, 4}) {
+    const int node = kMiddle * kSide + column;
+    seen_.claims[node].status = RegionStatus::kClassDisagrees;
+    seen_.shapes[node].letter = 0, seen_.shapes[node].distance = 3.1F;
+  }
+  refuse();
+  EXPECT_EQ(row(), "..w..");
+  for (const int column : {0, 1, 3, 4}) seen_.shapes[kMiddle * kSide + column].distance = 2.9F;
+  refuse();
+  EXPECT_EQ(row(), "..x..");
+}
+
 // An edge breaks the links of what it tears, and some of them lead past one that is not seen at all.
 TEST_F(OnTornLine, IsFollowedOverBrokenLinksAndGaps) {
   tear({0, 1, 4});

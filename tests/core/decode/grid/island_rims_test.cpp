@@ -71,6 +71,17 @@ TEST_F(PatchedIslands, GiveUpTheCornerOfThePatchThatAgreesByChance) {
   EXPECT_FALSE(is_decoded(decode(), 18, 24));
 }
 
+// As may what comes before one that is cut, up to where they would be too many for chance.
+TEST_F(PatchedIslands, GiveUpAllFromTheCornerOfThePatchThatAgreeByChance) {
+  for (int row = 16; row < 19; ++row)
+    for (int column = 20; column < 25; ++column) put(row, column, row < 18 && column > 21 ? 1 : 0);
+  put(16, 22, 0);
+  shapes_[grid_.node_at(17, 20)] = read_as(0, 5, 0.2);
+  const auto claims = decode();
+  for (int column = 20; column < 23; ++column) EXPECT_FALSE(is_decoded(claims, 16, column)) << column;
+  EXPECT_TRUE(is_decoded(claims, 16, 19));
+}
+
 TEST_F(PatchedIslands, GiveUpWhatIsBesideAWellSeenContradiction) {
   put(25, 30, 1);
   const auto claims = decode();
