@@ -96,6 +96,7 @@ TEST(AdversaryFrames, NameNothingWhoseLineShowsOtherLight) {
     coarse.expect_none_wrong(Kind::kShelves, number);
   fine.expect_none_wrong(Kind::kSlats1, 18100161);
   coarse.expect_none_wrong(Kind::kSlats1, 16100150);
+  coarse.expect_none_wrong(Kind::kSlats1to2, 27000020);
 }
 
 // What lies around them is looked at beyond the symbols of other islands.

@@ -122,7 +122,22 @@ bool TornLines::refuse_outvoted(const LetterScene& scene) {
 void TornLines::refuse(const LetterScene& scene) {
   is_asked_.assign(scene.seen.size(), 0), shows_other_light_.assign(scene.seen.size(), 0);
   // What is refused stands for the others no longer.
+  refused_.clear();
   while (refuse_outvoted(scene)) {
+    for (const Suspect& suspect : suspects_) refused_.push_back(suspect.node);
+  }
+  refuse_left_alone(scene.seen);
+}
+
+/// What nothing stands beside any longer.
+void TornLines::refuse_left_alone(Sightings& seen) const {
+  for (const std::int32_t node : refused_) {
+    for (const std::int32_t other : seen.nodes[node].links) {
+      if (other < 0 || !stands(seen, other)) continue;
+      const bool alone = std::ranges::all_of(
+          kDirections, [&](Direction d) { return decoded_beside(seen.nodes, seen.claims, other, d) < 0; });
+      if (alone) seen.claims[other].status = RegionStatus::kNeighboursDisagree;
+    }
   }
 }
 

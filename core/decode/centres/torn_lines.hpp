@@ -30,6 +30,7 @@ class TornLines {
   void find_suspects(const Sightings& seen);
   void ask(const LetterScene& scene, std::int32_t node);
   bool refuse_outvoted(const LetterScene& scene);
+  void refuse_left_alone(Sightings& seen) const;
   template <class Votes>
   [[nodiscard]] static bool is_outvoted(const Sightings& seen, const Suspect& suspect, const Votes& votes);
 
@@ -37,6 +38,7 @@ class TornLines {
   LetterAligner aligner_;
   std::vector<std::uint8_t> is_suspect_;  // of each sighting, a bit to each of its two lines
   std::vector<Suspect> suspects_;
+  std::vector<std::int32_t> refused_;
   std::vector<std::uint8_t> is_asked_, shows_other_light_;  // of each sighting
 };
 

@@ -125,6 +125,26 @@ TEST_F(OnTornLine, StaysWithWhatWasMendedBeneathPrint) {
   EXPECT_EQ(row(), ".www.");
 }
 
+TEST_F(OnTornLine, TakesWithItWhatItLeavesAlone) {
+  const int below = (kMiddle + 1) * kSide + 2;
+  for (int column = 0; column < kSide; ++column) {
+    seen_.claims[kMiddle * kSide + column].status = RegionStatus::kDamagedShape;
+    seen_.claims[(kMiddle + 1) * kSide + column].status = RegionStatus::kDamagedShape;
+    seen_.claims[(kMiddle + 2) * kSide + column].status = RegionStatus::kDamagedShape;
+  }
+  tear({0, 4});
+  seen_.claims[kWorn].status = seen_.claims[below].status = RegionStatus::kDecoded;
+  const Sightings all = seen_;
+  refuse();
+  EXPECT_EQ(row(), "..x..");
+  EXPECT_EQ(seen_.claims[below].status, RegionStatus::kNeighboursDisagree);
+  seen_ = all;
+  seen_.claims[below + 1].status = RegionStatus::kDecoded;
+  refuse();
+  EXPECT_EQ(row(), "..x..");
+  EXPECT_EQ(seen_.claims[below].status, RegionStatus::kDecoded) << "another stands beside it";
+}
+
 // Whatever its light: print makes no letters.
 TEST_F(OnTornLine, IsRefusedBesideOtherLettersThatAreWellSeen) {
   for (const int column : {0, 1, 3, 4}) {
