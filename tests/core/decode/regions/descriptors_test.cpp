@@ -248,6 +248,10 @@ TEST(ConvexHull, OfAnLCutsItsNotch) {
   EXPECT_NEAR(polygon_area(hull), 7, kExact);
 }
 
+TEST(ConvexHull, OfNothingIsNothing) {
+  EXPECT_TRUE(convex_hull(Grey8(3, 3).view()).empty());
+}
+
 TEST(LeastRectangleArea, FitsASquareThatStandsOnItsTip) {
   EXPECT_NEAR(least_rectangle_area({{0, -2}, {2, 0}, {0, 2}, {-2, 0}}), 8, kExact);
 }

@@ -3,6 +3,7 @@
 #include "core/decode/symbols/grey_moments.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -241,6 +242,30 @@ TEST(GreyMoments, InACellAreTheSameBesideTheBorder) {
   EXPECT_NEAR(beside.y, inside.y, 1e-4);
   EXPECT_NEAR(beside.weight, inside.weight, 1e-2);
   EXPECT_EQ(beside.peak, inside.peak);
+}
+
+// Bright as what lies beyond the border may be, in memory.
+TEST(GreyMoments, InACellLeaveOutWhatIsBeyondTheBorder) {
+  const Grey8 frame = blurred_box({14.3, 12.8, 26, 23});
+  LatticeFrame lattice_frame;
+  lattice_frame << 1.1F, 0.15F, -0.1F, 1.05F;
+  const auto in_cell = [&](const ImageView<std::uint8_t>& view, const Eigen::Vector2f& centre_px) {
+    return GreyMomentMeter(kMarginPx).measure_cell(view, centre_px, lattice_frame, 9.F, {0, 0});
+  };
+  const Eigen::Vector2f centre_px(20.2F, 17.9F);
+  const GreyMoments whole = in_cell(frame.view(), centre_px);
+  const int width = frame.width(), height = frame.height();
+  for (const auto& [left, top, right, bottom] :
+       {std::array{11, 0, width, height}, {0, 9, width, height}, {0, 0, 30, height}, {0, 0, width, 27}}) {
+    Grey8 beside(width, height, 255);
+    for (int y = top; y < bottom; ++y) std::copy_n(frame.view().row(y) + left, right - left, &beside.at(left, y));
+    const ImageView<std::uint8_t> cut{&beside.at(left, top), right - left, bottom - top, width};
+    const GreyMoments seen = in_cell(cut, centre_px - Eigen::Vector2f(left, top));
+    EXPECT_NEAR(seen.x + static_cast<float>(left), whole.x, 1e-3);
+    EXPECT_NEAR(seen.y + static_cast<float>(top), whole.y, 1e-3);
+    EXPECT_NEAR(seen.weight, whole.weight, 1e-2);
+    EXPECT_EQ(seen.peak, whole.peak);
+  }
 }
 
 TEST(GreyMoments, InACellBeyondTheFrameWeighNothing) {
