@@ -10,7 +10,7 @@
 namespace slsd {
 namespace {
 
-constexpr float kScale = 1.4F;
+constexpr float kCameraScale = 1.4F;
 
 PatternOptions options() {
   PatternOptions options;
@@ -18,7 +18,7 @@ PatternOptions options() {
   return options;
 }
 
-std::vector<ShapeFeatures> shapes_at(float blur_px, float scale = kScale) {
+std::vector<ShapeFeatures> shapes_at(float blur_px, float scale = kCameraScale) {
   std::vector<ShapeFeatures> shapes;
   for (const Prototype& prototype : make_prototypes({.symbols = options().symbols,
                                     .symbol_size_px = options().symbol_size_px,
@@ -31,7 +31,7 @@ std::vector<ShapeFeatures> shapes_at(float blur_px, float scale = kScale) {
   return shapes;
 }
 
-std::vector<ShapeFeatures> many_shapes_at(float blur_px, float scale = kScale) {
+std::vector<ShapeFeatures> many_shapes_at(float blur_px, float scale = kCameraScale) {
   const std::vector<ShapeFeatures> few = shapes_at(blur_px, scale);
   std::vector<ShapeFeatures> many;
   for (int i = 0; i < 5; ++i) many.insert(many.end(), few.begin(), few.end());
@@ -42,14 +42,14 @@ class Blurs : public testing::TestWithParam<float> {};
 
 // Each appearance is of blurs to a third, so that those beside it know the same shapes.
 TEST_P(Blurs, AreToldByTheShapesToOneStep) {
-  const Appearances appearances(options(), kScale);
+  const Appearances appearances(options(), kCameraScale);
   EXPECT_NEAR(std::log(*appearances.likeliest(many_shapes_at(GetParam())).blur_px / GetParam()), 0, std::log(1.6));
 }
 
 INSTANTIATE_TEST_SUITE_P(Appearances, Blurs, testing::Values(0.7F, 1.0F, 1.4F, 2.0F));
 
 TEST(Appearances, OfFewShapesIsTheUsual) {
-  const Appearances appearances(options(), kScale);
+  const Appearances appearances(options(), kCameraScale);
   EXPECT_EQ(&appearances.likeliest({}), &appearances.usual());
   EXPECT_EQ(&appearances.likeliest(shapes_at(1)), &appearances.usual());
   EXPECT_FALSE(appearances.usual().blur_px);
@@ -57,7 +57,7 @@ TEST(Appearances, OfFewShapesIsTheUsual) {
 
 // One object that lies before all else must not decide.
 TEST(Appearances, OfAFrameAreThoseOfMostShapes) {
-  const Appearances appearances(options(), kScale);
+  const Appearances appearances(options(), kCameraScale);
   std::vector<ShapeFeatures> shapes = many_shapes_at(0.7F);
   for (int i = 0; i < 2; ++i)
     for (const ShapeFeatures& blurred : shapes_at(2)) shapes.push_back(blurred);
@@ -67,13 +67,13 @@ TEST(Appearances, OfAFrameAreThoseOfMostShapes) {
 // In a camera of twice the pixels symbols are larger, and so is their blur.
 TEST(Appearances, OfLargerSymbolsAreOfLargerBlurs) {
   constexpr float kBlurPx = 3.7F;
-  const Appearances appearances(options(), 2 * kScale);
-  EXPECT_NEAR(std::log(*appearances.likeliest(many_shapes_at(kBlurPx, 2 * kScale)).blur_px / kBlurPx), 0,
+  const Appearances appearances(options(), 2 * kCameraScale);
+  EXPECT_NEAR(std::log(*appearances.likeliest(many_shapes_at(kBlurPx, 2 * kCameraScale)).blur_px / kBlurPx), 0,
               std::log(1.2));
 }
 
 TEST(Appearances, AreMadeOnce) {
-  const Appearances appearances(options(), kScale);
+  const Appearances appearances(options(), kCameraScale);
   const auto shapes = many_shapes_at(1);
   EXPECT_EQ(&appearances.likeliest(shapes), &appearances.likeliest(shapes));
 }

@@ -263,7 +263,7 @@ TEST(GreyMoments, InACellLeaveOutWhatIsBeyondTheBorder) {
     const GreyMoments seen = in_cell(cut, centre_px - Eigen::Vector2f(left, top));
     EXPECT_NEAR(seen.x + static_cast<float>(left), whole.x, 1e-3);
     EXPECT_NEAR(seen.y + static_cast<float>(top), whole.y, 1e-3);
-    EXPECT_NEAR(seen.weight, whole.weight, 1e-2);
+    EXPECT_NEAR(seen.weight, whole.weight, 1);  // there is less of the dark to tell its level by
     EXPECT_EQ(seen.peak, whole.peak);
   }
 }
