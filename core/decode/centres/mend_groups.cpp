@@ -36,8 +36,8 @@ std::int32_t member_beside(const Sightings& seen, std::int32_t node, Direction d
   return other >= 0 && is_member(seen.claims[other]) && seen.claims[node].fits(seen.claims[other], d) ? other : -1;
 }
 
-/// Whether nothing of the line that runs past the one member beside it has a cell: all of that line may be of another
-/// surface, and this one of its letters be the right one by chance.
+/// Of a node that one member holds: whether links lead on along the line across, and to nothing there that has a cell.
+/// All of that line may be of another surface, and this one of its letters be the right one by chance.
 bool is_alone_on_line(const Sightings& seen, std::int32_t node) {
   const Direction held_from =
       *std::ranges::find_if(kDirections, [&](Direction d) { return member_beside(seen, node, d) >= 0; });
@@ -186,7 +186,7 @@ LetterPlace GroupMender::place_of(const LetterScene& scene, std::int32_t node) {
 
 /// Whether its letter is seen where the others have it, tilted as they are. What print darkens does not count: but what
 /// is seen in its middle may be nothing else. With one beside it, it may lie beyond the edge of their surface; what had
-/// been refused for its surroundings then has others of its line beside it that are named.
+/// been refused for its surroundings is not alone on its line then.
 bool GroupMender::shows_letter(const LetterScene& scene, const AskedLetter& asked) const {
   constexpr float kMovedMax = 0.06F;  // of the pitch
   constexpr float kMiddleMin = 0.6F, kSupportMin = 0.75F;

@@ -92,7 +92,8 @@ void TornLines::ask(const LetterScene& scene, std::int32_t node) {
   if (place.held_by > 0) aligner_.ask(scene, node, place);
 }
 
-/// @return  whether there are any
+/// One round of it.
+/// @return  whether anything was refused
 bool TornLines::refuse_outvoted(const LetterScene& scene) {
   Sightings& seen = scene.seen;
   find_suspects(seen);
@@ -121,15 +122,15 @@ bool TornLines::refuse_outvoted(const LetterScene& scene) {
 
 void TornLines::refuse(const LetterScene& scene) {
   is_asked_.assign(scene.seen.size(), 0), shows_other_light_.assign(scene.seen.size(), 0);
-  // What is refused stands for the others no longer.
   refused_.clear();
+  // What is refused stands for the others no longer.
   while (refuse_outvoted(scene)) {
     for (const Suspect& suspect : suspects_) refused_.push_back(suspect.node);
   }
   refuse_left_alone(scene.seen);
 }
 
-/// What nothing stands beside any longer.
+/// What stood beside them, and has nothing left that does.
 void TornLines::refuse_left_alone(Sightings& seen) const {
   for (const std::int32_t node : refused_) {
     for (const std::int32_t other : seen.nodes[node].links) {

@@ -19,7 +19,8 @@ class TornLines {
  public:
   TornLines(const Pattern& pattern, std::shared_ptr<const LetterFields> letters);
 
-  /// Refuses what is decoded on a line where as many show other light as are decoded.
+  /// Refuses what is decoded on a line where as many show other light as are decoded, until nothing more goes, and what
+  /// that leaves alone.
   void refuse(const LetterScene& scene);
 
  private:

@@ -334,6 +334,14 @@ void IslandJudge::cut_steps(const Frame& frame) {
   const auto held = [&](std::int32_t node, Direction d) {
     return links_[node][d] == Link::kAgrees && cut_[frame.beside[node][d]] == 0;
   };
+  const auto leads_to_another = [&](std::int32_t node, Direction d) {
+    if (!is_cut(node, d)) return false;
+    float evidence = own_ratio(node);
+    std::int32_t last = node;
+    while (is_cut(last, d)) last = frame.beside[last][d], evidence += own_ratio(last);
+    return evidence < kFewAgree * log_letters_ && links_[last][d] != Link::kAgrees && is_of_another(frame, last, d) &&
+           !parts(frame, last, d);
+  };
   for (std::size_t asked = 0; asked < queue_.size();) {
     next_queue_.clear();
     for (const std::size_t end = queue_.size(); asked < end; ++asked) {
@@ -341,12 +349,7 @@ void IslandJudge::cut_steps(const Frame& frame) {
       if (cut_[node] != 0) continue;
       if ((held(node, kLeft) && held(node, kRight)) || (held(node, kUp) && held(node, kDown))) continue;
       for (const Direction d : kDirections) {
-        if (!is_cut(node, d)) continue;
-        float evidence = own_ratio(node);
-        std::int32_t last = node;
-        while (is_cut(last, d)) last = frame.beside[last][d], evidence += own_ratio(last);
-        const bool ends = links_[last][d] != Link::kAgrees && is_of_another(frame, last, d) && !parts(frame, last, d);
-        if (!ends || evidence >= kFewAgree * log_letters_) continue;
+        if (!leads_to_another(node, d)) continue;
         next_queue_.push_back(node);
         if (held(node, opposite(d))) queue_.push_back(frame.beside[node][opposite(d)]);
       }

@@ -40,12 +40,12 @@ class OnTornLine : public test::MendedPlane {
   void refuse() {
     look([&](const LetterScene& scene) { TornLines(pattern_, letters_).refuse(scene); });
   }
-  /// Of the middle row: w stands, and x has been refused; a dot is damaged.
+  /// Of the middle row: w stands, and r has been refused; a dot is damaged.
   [[nodiscard]] std::string row() const {
     std::string text;
     for (int column = 0; column < kSide; ++column) {
       const RegionStatus status = seen_.claims[kMiddle * kSide + column].status;
-      text += status == RegionStatus::kDecoded ? 'w' : status == RegionStatus::kNeighboursDisagree ? 'x' : '.';
+      text += status == RegionStatus::kDecoded ? 'w' : status == RegionStatus::kNeighboursDisagree ? 'r' : '.';
     }
     return text;
   }
@@ -58,7 +58,7 @@ TEST_F(OnTornLine, IsRefusedWhereAsManyShowOtherLightAsStand) {
   tear({0, 4});
   seen_.claims[kMiddle * kSide + 3].status = RegionStatus::kDamagedShape;
   refuse();
-  EXPECT_EQ(row(), ".xx..");
+  EXPECT_EQ(row(), ".rr..");
   EXPECT_EQ(refused(), 2) << "none beside the row";
 }
 
@@ -72,7 +72,7 @@ TEST_F(OnTornLine, StaysWhereMoreStand) {
 TEST_F(OnTornLine, IsRefusedAlongAColumn) {
   for (const int other : {0, 1, 3, 4}) damage(other, kMiddle, false, other_letter);
   refuse();
-  EXPECT_EQ(row(), "wwxww");
+  EXPECT_EQ(row(), "wwrww");
   EXPECT_EQ(refused(), 1);
 }
 
@@ -102,7 +102,7 @@ TEST_F(OnTornLine, LooksAtWhatIsTornOrMisread) {
   EXPECT_EQ(row(), "..w..") << "hardly damaged";
   for (const int column : {0, 1, 3, 4}) seen_.claims[kMiddle * kSide + column].status = RegionStatus::kClassDisagrees;
   refuse();
-  EXPECT_EQ(row(), "..x..") << "misread";
+  EXPECT_EQ(row(), "..r..") << "misread";
   seen_ = torn;
   for (const int column : {0, 1, 3, 4}) seen_.claims[kMiddle * kSide + column].row = kRow;
   refuse();
@@ -114,7 +114,7 @@ TEST_F(OnTornLine, IsRefusedWithWhatWasMendedOnIt) {
   tear({0, 1, 4});
   seen_.claims[kMiddle * kSide + 1].status = RegionStatus::kDecoded;
   refuse();
-  EXPECT_EQ(row(), ".xxx.");
+  EXPECT_EQ(row(), ".rrr.");
 }
 
 TEST_F(OnTornLine, StaysWithWhatWasMendedBeneathPrint) {
@@ -136,12 +136,12 @@ TEST_F(OnTornLine, TakesWithItWhatItLeavesAlone) {
   seen_.claims[kWorn].status = seen_.claims[below].status = RegionStatus::kDecoded;
   const Sightings all = seen_;
   refuse();
-  EXPECT_EQ(row(), "..x..");
+  EXPECT_EQ(row(), "..r..");
   EXPECT_EQ(seen_.claims[below].status, RegionStatus::kNeighboursDisagree);
   seen_ = all;
   seen_.claims[below + 1].status = RegionStatus::kDecoded;
   refuse();
-  EXPECT_EQ(row(), "..x..");
+  EXPECT_EQ(row(), "..r..");
   EXPECT_EQ(seen_.claims[below].status, RegionStatus::kDecoded) << "another stands beside it";
 }
 
@@ -156,7 +156,7 @@ TEST_F(OnTornLine, IsRefusedBesideOtherLettersThatAreWellSeen) {
   EXPECT_EQ(row(), "..w..");
   for (const int column : {0, 1, 3, 4}) seen_.shapes[kMiddle * kSide + column].distance = 2.9F;
   refuse();
-  EXPECT_EQ(row(), "..x..");
+  EXPECT_EQ(row(), "..r..");
 }
 
 // An edge breaks the links of what it tears, and some of them lead past one that is not seen at all.
@@ -168,7 +168,7 @@ TEST_F(OnTornLine, IsFollowedOverBrokenLinksAndGaps) {
   seen_.nodes[from].links[kRight] = from + 2, seen_.nodes[from + 2].links[kLeft] = from;
   seen_.claims[from + 3].status = RegionStatus::kDamagedShape;
   refuse();
-  EXPECT_EQ(row(), "..x..");
+  EXPECT_EQ(row(), "..r..");
 }
 
 // What no link leads back from cannot be looked for, and says nothing.
