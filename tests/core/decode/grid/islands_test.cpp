@@ -22,10 +22,10 @@ TEST_F(Islands, NeedEvidenceForTheBudgetWhereTheyMayLieAnywhere) {
 
 // The sum in docs/decoder.md. A strip is as sure of its letters as just makes it an island, beneath some other letters.
 TEST_F(Islands, NeedTheEvidenceThatTheirRimCosts) {
-  constexpr int kRows = 3, kColumns = 20;
+  constexpr int kHigh = 3, kWide = 20;
   const auto is_accepted = [&](int contradicted, double evidence) {
     grid_ = {}, shapes_.clear();
-    show_pattern(10, 10, 10 + kRows, 10 + kColumns);
+    show_pattern(10, 10, 10 + kHigh, 10 + kWide);
     const double sure = std::exp(evidence / static_cast<double>(shapes_.size())) / 5;
     for (Classification& shape : shapes_) shape = read_as(shape.letter, 5, sure);
     for (int column = 10; column < 10 + contradicted; ++column)
@@ -39,8 +39,8 @@ TEST_F(Islands, NeedTheEvidenceThatTheirRimCosts) {
       (is_accepted(contradicted, between) ? enough : too_little) = between;
     }
     const double rim = contradicted == 0 ? 0 : 3 + 0.1 * (contradicted - 1);
-    const double needed = std::log(kRows * kColumns + contradicted) + rim + std::log(kWholeRows * kWholeColumns) +
-                          std::log(kRows * kColumns / kWrongCellsMax);
+    const double needed = std::log(kHigh * kWide + contradicted) + rim + std::log(kWholeRows * kWholeColumns) +
+                          std::log(kHigh * kWide / kWrongCellsMax);
     EXPECT_NEAR(enough, needed, 0.1) << contradicted;
   }
 }

@@ -60,7 +60,8 @@ inline Classification read_as(int letter, int letters, double sure) {
 /// Letters whose centroids are in the middles of their squares: as many as the shipped pattern of 16 px has.
 inline std::vector<Prototype> flat_prototypes() {
   Prototype prototype{};
-  prototype.centroid_px = {0, 0};
+  prototype.mean.setZero(), prototype.whitening.setZero();
+  prototype.centroid_px.setZero(), prototype.steady_centroid_px.setZero();
   return std::vector<Prototype>(5, prototype);
 }
 
