@@ -3,13 +3,20 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
+#include <string_view>
 
 namespace slsd {
 
-/// "2026-01-31T12:00:00Z": ISO 8601, UTC, in whole seconds. @thread reentrant
+/// "2026-01-31T12:00:00Z": ISO 8601 in UTC, whatever the machine's time zone. @thread reentrant
 [[nodiscard]] std::string utc_text(std::chrono::system_clock::time_point time);
 /// The same with milliseconds: "2026-01-31T12:00:00.250Z". @thread reentrant
 [[nodiscard]] std::string utc_text_ms(std::chrono::system_clock::time_point time);
+
+/// Reads what the functions above write, and up to nine decimals.
+/// @return nothing if the text is no such time: no Z, another zone, a day that does not exist
+/// @thread reentrant
+[[nodiscard]] std::optional<std::chrono::system_clock::time_point> time_from_utc(std::string_view text);
 
 }  // namespace slsd

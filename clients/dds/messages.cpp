@@ -4,13 +4,12 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <cstdio>
 #include <cstring>
-#include <ctime>
 #include <iterator>
 
 #include <Eigen/Geometry>
+
+#include "core/utc_text.hpp"
 
 namespace slsd::dds {
 namespace {
@@ -18,6 +17,12 @@ namespace {
 // idlc's C strings are not const; nobody writes to them.
 char* text(const std::string& text) {
   return const_cast<char*>(text.c_str());
+}
+
+builtin_interfaces_msg_dds__Time_ stamp(std::chrono::system_clock::time_point time) {
+  const auto seconds = std::chrono::floor<std::chrono::seconds>(time);
+  return {static_cast<std::int32_t>(seconds.time_since_epoch().count()),
+          static_cast<std::uint32_t>(std::chrono::nanoseconds(time - seconds).count())};
 }
 
 }  // namespace
@@ -39,26 +44,12 @@ void set_points(sensor_msgs_msg_dds__PointCloud2_& message, sensor_msgs_msg_dds_
 }
 
 builtin_interfaces_msg_dds__Time_ stamp_now() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(now);
-  return {static_cast<std::int32_t>(seconds.count()),
-          static_cast<std::uint32_t>(std::chrono::nanoseconds(now - seconds).count())};
+  return stamp(std::chrono::system_clock::now());
 }
 
 builtin_interfaces_msg_dds__Time_ stamp_of(std::string_view utc) {
-  std::tm parts{};
-  double second = 0;
-  if (std::sscanf(std::string(utc).c_str(), "%d-%d-%dT%d:%d:%lfZ", &parts.tm_year, &parts.tm_mon, &parts.tm_mday,
-                  &parts.tm_hour, &parts.tm_min, &second) != 6 ||
-      !(second >= 0 && second < 61)) {
-    return stamp_now();
-  }
-  parts.tm_year -= 1900;
-  parts.tm_mon -= 1;
-  const double whole = std::floor(second);
-  const double nanoseconds = std::min(std::round((second - whole) * 1e9), 999'999'999.0);
-  return {static_cast<std::int32_t>(::timegm(&parts) + static_cast<std::time_t>(whole)),
-          static_cast<std::uint32_t>(nanoseconds)};
+  const auto time = time_from_utc(utc);
+  return time ? stamp(*time) : stamp_now();
 }
 
 const sensor_msgs_msg_dds__PointCloud2_& CloudMessage::of(const client::Cloud& cloud, const std::string& frame_id,

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <iostream>
 #include <set>
 
@@ -15,6 +14,7 @@
 
 #include "core/board/find_board.hpp"
 #include "core/calibrate/solve/place_scanners.hpp"
+#include "core/utc_text.hpp"
 #include "daemon/calibrate/board_request.hpp"
 #include "drivers/files/file.hpp"
 
@@ -118,15 +118,6 @@ Result<CloudLook> look(Scanner& scanner, const Board& board) {
   return look_in_cloud(points, *sighting, board, scanner.calibrated.lens);
 }
 
-std::string now_utc() {
-  const std::time_t now = std::time(nullptr);
-  std::tm parts{};
-  ::gmtime_r(&now, &parts);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
-  return text;
-}
-
 std::string quoted(const std::string& text) {
   return json(text).dump(-1, ' ', false, json::error_handler_t::replace);  // TOML's basic strings are JSON's
 }
@@ -135,7 +126,7 @@ std::string file_text(const ExtrinsicsRequest& request, const std::vector<Scanne
                       const PlacedScanners& placed) {
   std::string text = fmt::format(
       "# Where scanners stand, measured by slsd --extrinsics. Lengths in mm.\nparent = {}\ndate = {}\nboard = {}\n",
-      quoted(request.parent), quoted(now_utc()), quoted(to_string(board)));
+      quoted(request.parent), quoted(utc_text(std::chrono::system_clock::now())), quoted(to_string(board)));
   for (std::size_t i = 0; i < scanners.size(); ++i) {
     const PlacedScanner& one = placed.scanners[i];
     const Eigen::Matrix3d& r = one.first_from_scanner.rotation;

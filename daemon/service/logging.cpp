@@ -16,12 +16,12 @@
 #include <thread>
 #include <utility>
 
-#include <fmt/chrono.h>
 #include <spdlog/spdlog.h>
 #define SD_JOURNAL_SUPPRESS_LOCATION
 #include <systemd/sd-journal.h>
 
 #include "core/printable.hpp"
+#include "core/utc_text.hpp"
 #include "daemon/scan/log_field.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "drivers/system/thread_name.hpp"
@@ -46,11 +46,8 @@ std::string_view journal_prefix(level_enum level) {
 }
 
 std::string time_and_level(const log_msg& message) {
-  const auto time = std::chrono::floor<std::chrono::seconds>(message.time);
-  const auto ms = std::chrono::floor<std::chrono::milliseconds>(message.time - time);
-  const std::tm local = fmt::localtime(std::chrono::system_clock::to_time_t(time));
   const auto level = spdlog::level::to_string_view(message.level);
-  return fmt::format("{:%F %T}.{:03} {:<7} ", local, ms.count(), std::string_view(level.data(), level.size()));
+  return fmt::format("{} {:<7} ", utc_text_ms(message.time), std::string_view(level.data(), level.size()));
 }
 
 /// Whether systemd reads standard error, as systemd.exec(5) says of JOURNAL_STREAM: another program's may be inherited.

@@ -135,7 +135,7 @@ class Log(unittest.TestCase):
     def test_another_programs_journal_is_not_taken_for_ours(self):
         with Service(environment={"JOURNAL_STREAM": "1:1"}) as service:
             wait_until(lambda: "ready at" in service.log_text(), "the line")
-            self.assertRegex(service.log_text(), r"(?m)^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3} info    slsd ")
+            self.assertRegex(service.log_text(), r"(?m)^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z info    slsd ")
 
     def test_priorities_are_told_where_the_journal_reads(self):
         service = Service()
