@@ -34,7 +34,8 @@ constexpr std::chrono::seconds kConnectMax{5};
 
 [[noreturn]] void no_connection(int number, const std::string& path) {
   if (number == ENOENT || number == ECONNREFUSED || number == ENOTDIR) {
-    throw NoService("no daemon answers there: start slsd, or name its socket with --socket", "not_found", path);
+    throw NoService("no daemon answers there: start slsd (systemctl start slsd), or name its socket by SLSD_SOCKET",
+                    "not_found", path);
   }
   if (number == EACCES || number == EPERM) {
     throw PermissionDenied("not allowed: join the group that owns the socket", "permission_denied", path);
@@ -69,7 +70,7 @@ Bytes::Bytes(std::string own) {
   memory_ = std::move(kept);
 }
 
-Connection::Connection(const std::string& socket) : path_(socket) {
+Connection::Connection(const std::string& socket) : path_(socket), process_(::getpid()) {
   sockaddr_un address{};
   if (path_.size() >= sizeof address.sun_path) {
     throw ConnectionLost("a socket's path has at most 107 bytes", "invalid_argument", path_);
@@ -97,7 +98,8 @@ Connection::Connection(Connection&& other) noexcept
       socket_(std::exchange(other.socket_, -1)),
       buffer_(std::move(other.buffer_)),
       descriptors_(std::exchange(other.descriptors_, {})),
-      last_id_(other.last_id_) {}
+      last_id_(other.last_id_),
+      process_(other.process_) {}
 
 Connection& Connection::operator=(Connection&& other) noexcept {
   if (this == &other) return *this;
@@ -107,13 +109,27 @@ Connection& Connection::operator=(Connection&& other) noexcept {
   buffer_ = std::move(other.buffer_);
   descriptors_ = std::exchange(other.descriptors_, {});
   last_id_ = other.last_id_;
+  process_ = other.process_;
   return *this;
 }
 
 void Connection::close() noexcept {
   for (const int descriptor : descriptors_) ::close(descriptor);
   descriptors_.clear();
-  if (socket_ >= 0) ::close(std::exchange(socket_, -1));
+  if (socket_ < 0) return;
+  if (is_own()) ::shutdown(socket_, SHUT_RDWR);  // a child made by fork may hold a copy
+  ::close(std::exchange(socket_, -1));
+}
+
+bool Connection::is_own() const {
+  return process_ == ::getpid();
+}
+
+void Connection::refuse_others() const {
+  if (socket_ < 0) hung_up(path_);
+  if (!is_own()) {
+    throw ConnectionLost("this connection is the parent process's: open one in this process", "disconnected", path_);
+  }
 }
 
 void Connection::wait(short events, const Deadline& deadline) const {
@@ -132,7 +148,7 @@ void Connection::wait(short events, const Deadline& deadline) const {
 }
 
 std::int64_t Connection::send(std::string_view method, std::string_view params, Deadline deadline) {
-  if (socket_ < 0) hung_up(path_);
+  refuse_others();
   const std::string line = "{\"jsonrpc\":\"2.0\",\"id\":" + std::to_string(++last_id_) +
                            ",\"method\":" + json(method).dump(-1, ' ', false, json::error_handler_t::replace) +
                            ",\"params\":" + std::string(params) + "}\n";
@@ -223,7 +239,7 @@ Bytes Connection::map_descriptor(std::size_t size) {
 }
 
 Message Connection::receive(Deadline deadline) {
-  if (socket_ < 0) hung_up(path_);
+  refuse_others();
   Message message{receive_line(deadline), {}};
   bool deep = false;
   const auto shallow = [&](int depth, json::parse_event_t, const json&) {

@@ -2,6 +2,9 @@
 // Copyright the slsd authors
 #include "slsd/scanner.hpp"
 
+#include <unistd.h>
+
+#include <atomic>
 #include <cstdlib>
 #include <mutex>
 #include <utility>
@@ -104,19 +107,61 @@ json camera_params(const std::string& camera, milliseconds timeout) {
 
 }  // namespace
 
-struct Scanner::State {
-  std::string path;
+namespace {
+
+// What one process has: nobody else's lock, which a thread of the parent may hold, and nobody else's connection.
+struct Own {
+  pid_t process = ::getpid();
   std::mutex mutex;
   std::optional<Connection> connection;
+};
+
+// Ends what a child has of its parent. If a thread of the parent was at work with it, nobody knows in what state it is:
+// then it stays.
+void leave(Own* inherited) {
+  if (!inherited || !inherited->mutex.try_lock()) return;
+  inherited->mutex.unlock();
+  delete inherited;
+}
+
+}  // namespace
+
+struct Scanner::State {
+  explicit State(std::string socket) : path(std::move(socket)) {}
+  ~State() {
+    Own* const last = own.load();
+    last->process == ::getpid() ? delete last : leave(last);
+  }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
+  std::string path;
+  std::atomic<Own*> own{new Own};
+
+  Own& here() {
+    Own* known = own.load();
+    if (known->process == ::getpid()) return *known;
+    auto made = std::make_unique<Own>();
+    if (!own.compare_exchange_strong(known, made.get())) return *known;  // another thread of the child was first
+    leave(known);
+    return *made.release();
+  }
+
+  void connect() {
+    Own& mine = here();
+    const std::lock_guard lock(mine.mutex);
+    if (!mine.connection) mine.connection.emplace(path);
+  }
 
   Answer call(const std::string& method, const std::string& params, milliseconds timeout) {
-    const std::lock_guard lock(mutex);
-    if (!connection) connection.emplace(path);
+    Own& mine = here();
+    const std::lock_guard lock(mine.mutex);
+    if (!mine.connection) mine.connection.emplace(path);
     Answer answer;
     try {
-      answer = ask(*connection, method, params, timeout);
+      answer = ask(*mine.connection, method, params, timeout);
     } catch (...) {
-      connection.reset();
+      mine.connection.reset();
       throw;
     }
     if (answer.result.contains("error")) throw_answered(answer.result["error"]);
@@ -125,13 +170,13 @@ struct Scanner::State {
   }
 };
 
-Scanner::Scanner(std::string socket) : state_(std::make_unique<State>()) {
+Scanner::Scanner(std::string socket) {
   if (socket.empty()) {
     const char* named = std::getenv("SLSD_SOCKET");
     socket = named && *named ? named : "/run/slsd/slsd.sock";
   }
-  state_->path = std::move(socket);
-  state_->connection.emplace(state_->path);
+  state_ = std::make_unique<State>(std::move(socket));
+  state_->connect();
 }
 
 Scanner::~Scanner() = default;
@@ -157,20 +202,30 @@ Cloud Scanner::scan(const ScanOptions& options) {
 }
 
 Stream Scanner::stream(const StreamOptions& options) const {
-  return {Connection(state_->path), options};
+  return {state_->path, options};
 }
 
-Stream::Stream(Connection connection, const StreamOptions& options)
-    : connection_(std::move(connection)), idle_(options.idle) {
+Stream::Stream(std::string socket, const StreamOptions& options)
+    : socket_(std::move(socket)), connection_(socket_), idle_(options.idle) {
   json params{{"format", "ply"}};
   if (options.rate_hz) params["rate_hz"] = *options.rate_hz;
   if (!options.density.empty()) params["density"] = options.density;
   if (options.normals) params["normals"] = true;
   if (options.shared) params["transport"] = "memfd";
-  id_ = connection_.send("subscribe", text_of(params), Clock::now() + kGrace);
+  params_ = text_of(params);
+  subscribe();
+}
+
+void Stream::subscribe() {
+  id_ = connection_.send("subscribe", params_, Clock::now() + kGrace);
+  answered_ = false;
 }
 
 Cloud Stream::next() {
+  if (!connection_.is_own()) {
+    connection_ = Connection(socket_);
+    subscribe();
+  }
   Connection::Deadline deadline;
   if (idle_ || !answered_) deadline = Clock::now() + idle_.value_or(2 * kGrace);
   while (true) {

@@ -5,6 +5,7 @@
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -284,6 +285,80 @@ TEST(AScanner, ConnectsAnewAfterItWasHungUpOn) {
   EXPECT_EQ(scanner.role(), "scan");
   EXPECT_THROW((void)scanner.role(), ConnectionLost);
   EXPECT_EQ(scanner.role(), "scan");
+}
+
+// Whether a function gave true in a child made by fork.
+bool in_a_child(const std::function<bool()>& function) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::alarm(60);
+    bool fine = false;
+    try {
+      fine = function();
+    } catch (...) {
+    }
+    ::_exit(fine ? 0 : 1);
+  }
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+TEST(AChild, HasAConnectionOfItsOwn) {
+  const Impostor service(result("\"role\":\"scan\""), -1, /*hangs_up=*/false);
+  Scanner scanner(service.path());
+  EXPECT_EQ(scanner.role(), "scan");
+  EXPECT_TRUE(in_a_child([&] { return scanner.role() == "scan"; }));  // to the first request of each peer it answers
+}
+
+TEST(AChild, LeavesItsParentsConnectionOpen) {
+  const Impostor service(result(""), -1, /*hangs_up=*/false);
+  std::optional<Connection> connection(service.path());
+  EXPECT_TRUE(in_a_child([&] {
+    connection.reset();
+    return true;
+  }));
+  EXPECT_EQ(connection->send("status", "{}"), 1);
+  EXPECT_THAT(connection->receive(std::chrono::steady_clock::now() + 10s).json, HasSubstr("result"));
+}
+
+TEST(AChild, IsNotStoppedByALockOfTheParent) {
+  const Impostor silent("", -1, /*hangs_up=*/false), service(result("\"role\":\"scan\""), -1, /*hangs_up=*/false);
+  const std::string moved = silent.path() + ".silent";
+  Scanner scanner(silent.path());
+  std::thread waits([&] { EXPECT_THROW((void)scanner.call("status", "{}", 1ms), TimedOut); });
+  std::this_thread::sleep_for(100ms);  // longer, and the test proves nothing, but fails for nothing
+  std::filesystem::rename(silent.path(), moved);
+  std::filesystem::rename(service.path(), silent.path());
+  EXPECT_TRUE(in_a_child([&] { return scanner.role() == "scan"; }));
+  waits.join();
+}
+
+TEST(AChild, ReadsAStreamOverAConnectionOfItsOwn) {
+  const std::string file = ply(3);
+  const Impostor service(result("") + R"({"jsonrpc":"2.0","method":"cloud","params":{"bytes":)" +
+                             std::to_string(file.size()) + "}}\n" + file,
+                         -1, /*hangs_up=*/false);
+  StreamOptions options;
+  options.idle = 10s;
+  Stream stream = Scanner(service.path()).stream(options);
+  EXPECT_TRUE(in_a_child([&] { return stream.next().size() == 3; }));
+  EXPECT_EQ(stream.next().size(), 3U);
+}
+
+TEST(AChild, IsRefusedItsParentsConnection) {
+  const Impostor service(result(""), -1, /*hangs_up=*/false);
+  Connection connection(service.path());
+  EXPECT_TRUE(in_a_child([&] {
+    try {
+      (void)connection.send("status", "{}");
+    } catch (const ConnectionLost& error) {
+      return error.name() == "disconnected";
+    }
+    return false;
+  }));
+  EXPECT_EQ(connection.send("status", "{}"), 1);
+  EXPECT_THAT(connection.receive(std::chrono::steady_clock::now() + 10s).json, HasSubstr("result"));
 }
 
 }  // namespace

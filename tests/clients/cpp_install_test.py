@@ -79,6 +79,22 @@ class Installed(unittest.TestCase):
         self.assertEqual(status, 1)
         self.assertIn("not_found: no daemon answers", error)
 
+    def test_the_first_program_of_its_readme_works_word_for_word(self):
+        readme = (HERE.parents[1] / "clients/cpp/README.md").read_text(encoding="utf-8")
+        source, program = self.root / "robot.cpp", self.root / "robot"
+        source.write_text(readme.split("```cpp\n")[1].split("```")[0], encoding="utf-8")
+        command = next(line.strip() for line in readme.splitlines() if line.strip().startswith("c++ "))
+        done = subprocess.run(["sh", "-c", f"{command} -o robot"], cwd=self.root, capture_output=True, text=True, timeout=300, check=False,
+                              env={**os.environ, "PKG_CONFIG_PATH": str(next(self.prefix.rglob("slsd.pc")).parent)})
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        status, out, error = run(program, **self.environment)
+        self.assertEqual((status, error), (0, ""))
+        with slsd.Scanner(self.service.socket) as scanner:
+            self.assertEqual(len(out.splitlines()), len(scanner.scan()))
+        status, out, error = run(program, SLSD_SOCKET="/nonexistent/slsd.sock")
+        self.assertEqual((status, out), (1, ""))
+        self.assertRegex(error, r"^/nonexistent/slsd.sock: no daemon answers there: start slsd .*\n$")
+
 
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1], verbosity=2)

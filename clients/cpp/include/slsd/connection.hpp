@@ -41,7 +41,8 @@ struct Message {
 };
 
 /// The protocol without its meaning, for what Scanner has no method for: lines of JSON, the bytes behind them, memfds.
-/// Any error leaves it unusable: what comes later would be taken for the answer to the next request.
+/// Any error leaves it unusable: what comes later would be taken for the answer to the next request. A child made by
+/// fork shares the parent's connection: there send() and receive() throw, and its end leaves the parent's open.
 /// @thread thread-bound
 class Connection {
  public:
@@ -63,7 +64,11 @@ class Connection {
   /// @throws ConnectionLost, TimedOut, ProtocolError
   [[nodiscard]] Message receive(Deadline deadline = {});
 
+  /// Whether this process opened it, not a parent.
+  [[nodiscard]] bool is_own() const;
+
  private:
+  void refuse_others() const;
   void wait(short events, const Deadline& deadline) const;
   void receive_more(const Deadline& deadline);
   [[nodiscard]] std::string receive_line(const Deadline& deadline);
@@ -76,6 +81,7 @@ class Connection {
   std::string buffer_;
   std::vector<int> descriptors_;  ///< that came and are not mapped yet
   std::int64_t last_id_ = 0;
+  int process_ = 0;  ///< that opened it
 };
 
 }  // namespace slsd::client

@@ -34,7 +34,8 @@ struct StreamOptions {
   std::optional<std::chrono::milliseconds> idle;  ///< next() throws TimedOut where no cloud came for so long
 };
 
-/// Clouds as they come, the newest first, over a connection of its own.
+/// Clouds as they come, the newest first, over a connection of its own. In a child made by fork it goes on over
+/// another.
 /// @thread thread-bound
 class Stream {
  public:
@@ -58,16 +59,20 @@ class Stream {
 
  private:
   friend class Scanner;
-  Stream(Connection connection, const StreamOptions& options);
+  Stream(std::string socket, const StreamOptions& options);
+  void subscribe();
 
+  std::string socket_;
+  std::string params_;
   Connection connection_;
   std::optional<std::chrono::milliseconds> idle_;
   std::int64_t id_ = 0;
   bool answered_ = false;
 };
 
-/// A scanner, as slsd serves it. Requests are answered one after the other. Where the connection breaks the request
-/// that waits throws ConnectionLost, and the next one connects anew. Every method throws ScannerError's classes.
+/// A scanner, as slsd serves it. Requests are answered one after the other. If the connection breaks, the request that
+/// waits throws ConnectionLost, and the next one connects anew. After a fork, parent and child have a connection each.
+/// Every method throws ScannerError's classes.
 /// @thread thread-safe
 class Scanner {
  public:
