@@ -9,9 +9,11 @@
 from .cloud import Cloud, read_ply
 from .errors import (Busy, Cancelled, ConnectionLost, DeviceError, FrameError, InvalidRequest, NotFound,
                      PermissionDenied, ProtocolError, ScannerError, TimedOut)
-from .scanner import DEFAULT_SOCKET, Frame, Scanner
+from .options import CalibrationSettings, CameraSettings, DecodeSettings, PatternSettings
+from .scanner import DEFAULT_SOCKET, Exposure, Frame, Scanner
 
 __all__ = [
-    "Busy", "Cancelled", "Cloud", "ConnectionLost", "DEFAULT_SOCKET", "DeviceError", "Frame", "FrameError",
-    "InvalidRequest", "NotFound", "PermissionDenied", "ProtocolError", "Scanner", "ScannerError", "TimedOut", "read_ply",
+    "Busy", "CalibrationSettings", "CameraSettings", "Cancelled", "Cloud", "ConnectionLost", "DEFAULT_SOCKET",
+    "DecodeSettings", "DeviceError", "Exposure", "Frame", "FrameError", "InvalidRequest", "NotFound", "PatternSettings",
+    "PermissionDenied", "ProtocolError", "Scanner", "ScannerError", "TimedOut", "read_ply",
 ]

@@ -3,17 +3,29 @@
 """Clouds: the points of a scan as a structured array."""
 from __future__ import annotations
 
-from typing import Any, Mapping, Union
+import mmap
+import os
+import pathlib
+import secrets
+from typing import TYPE_CHECKING, Any, Mapping, Union
 
 import numpy as np
+import numpy.typing as npt
 
 from .errors import ProtocolError
+
+if TYPE_CHECKING:
+    from .scanner import Frame
 
 _TYPES = {"char": "<i1", "uchar": "<u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "uint": "<u4", "float": "<f4",
           "double": "<f8"}
 _HEADER_MAX = 1 << 16
 
-Buffer = Union[bytes, bytearray, memoryview]
+_NAMES = {kind: name for name, kind in _TYPES.items()}
+_BEGIN = "ply\nformat binary_little_endian 1.0\n"
+_END = "end_header\n"
+
+Buffer = Union[bytes, bytearray, memoryview, mmap.mmap]
 
 
 class Cloud:
@@ -24,16 +36,19 @@ class Cloud:
     description  what the reply says of the scan: its id, times, counts of regions, ...
     comments     of the file's header
     lost         clouds that a subscriber lost since the one before, because it read too slowly
-    pictures, frames   what was asked for with it
+    picture, frames   what was asked for with it
+
+    Points of `shared` scans lie in the service's memory, which is given back when the cloud and all views of its points
+    are gone, in children made by fork as well. A pickled cloud is a copy.
     """
 
-    def __init__(self, points: np.ndarray, comments: Mapping[str, str], description: Mapping[str, Any]):
+    def __init__(self, points: npt.NDArray[Any], comments: Mapping[str, str], description: Mapping[str, Any]):
         self.points = points
         self.comments = dict(comments)
         self.description = dict(description)
         self.lost = int(self.description.get("lost", 0))
         self.picture: bytes | None = None
-        self.frames: list[Any] = []
+        self.frames: list[Frame] = []
 
     def __len__(self) -> int:
         return len(self.points)
@@ -42,17 +57,17 @@ class Cloud:
         return f"<slsd.Cloud {self.description.get('scan', '')}: {len(self)} points>"
 
     @property
-    def xyz(self) -> np.ndarray:
+    def xyz(self) -> npt.NDArray[np.float32]:
         """The coordinates, mm, as an array of N x 3 float32: a copy."""
         return np.stack([self.points[axis] for axis in "xyz"], axis=1)
 
     @property
-    def normals(self) -> np.ndarray | None:
-        """The unit normals towards the camera, N x 3, where they were asked for."""
-        names = self.points.dtype.names or ()
-        if "nx" not in names:
+    def normals(self) -> npt.NDArray[np.float32] | None:
+        """The unit normals towards the camera, N x 3, if they were asked for."""
+        if "nx" not in (self.points.dtype.names or ()):
             return None
-        return np.stack([self.points[name] for name in ("nx", "ny", "nz")], axis=1)
+        normals: npt.NDArray[np.float32] = np.stack([self.points[name] for name in ("nx", "ny", "nz")], axis=1)
+        return normals
 
     @property
     def sigma_calibration_mm(self) -> float | None:
@@ -60,16 +75,40 @@ class Cloud:
         value = self.description.get("sigma_calibration_mm", self.comments.get("sigma_calibration_mm"))
         return None if value is None else float(value)
 
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Writes the points, as they are now, as a binary PLY file, which appears whole or not at all.
+
+        `Scanner.save` takes a scan into the other formats, PCD and TIFF.
+        """
+        target = pathlib.Path(file)
+        if target.suffix.lower() != ".ply":
+            raise ValueError(f"{target}: a cloud's file ends in .ply; Scanner.save takes a scan into .pcd or .tiff")
+        kinds = {name: self.points.dtype[name].newbyteorder("<") for name in self.points.dtype.names or ()}
+        for name, kind in kinds.items():
+            if kind.str.replace("|", "<") not in _NAMES:
+                raise ValueError(f"{target}: PLY has no type for the field {name!r} ({kind})")
+        header = [_BEGIN, *(f"comment {name} {text}\n" for name, text in self.comments.items()),
+                  f"element vertex {len(self.points)}\n",
+                  *(f"property {_NAMES[kind.str.replace('|', '<')]} {name}\n" for name, kind in kinds.items()), _END]
+        packed = self.points.astype(list(kinds.items()), copy=False)
+        part = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+        try:
+            part.write_bytes("".join(header).encode() + packed.tobytes())
+            os.replace(part, target)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+
 
 def read_ply(data: Buffer, description: Mapping[str, Any] | None = None) -> Cloud:
     """The cloud in the bytes of a binary PLY file. The points are a view of them: nothing is copied.
 
-    Raises ProtocolError where the header promises what is not there.
+    Raises ProtocolError if the header promises what is not there.
     """
     view = memoryview(data)
     head = bytes(view[:_HEADER_MAX])
-    end = head.find(b"end_header\n")
-    if not head.startswith(b"ply\nformat binary_little_endian 1.0\n") or end < 0:
+    end = head.find(_END.encode())
+    if not head.startswith(_BEGIN.encode()) or end < 0:
         raise ProtocolError("the cloud is no binary little-endian PLY")
     comments: dict[str, str] = {}
     fields: list[tuple[str, str]] = []
@@ -86,7 +125,7 @@ def read_ply(data: Buffer, description: Mapping[str, Any] | None = None) -> Clou
             raise ProtocolError(f"the cloud's header has a line that is none of slsd's: {line[:80]!r}")
     if count is None or not fields or len({name for name, _ in fields}) != len(fields):
         raise ProtocolError("the cloud's header names no points")
-    body = view[end + len(b"end_header\n"):]
+    body = view[end + len(_END):]
     record = np.dtype(fields)
     if count * record.itemsize != len(body):
         raise ProtocolError(f"the cloud has {len(body)} bytes where its header says {count} points of "

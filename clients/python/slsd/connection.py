@@ -10,22 +10,41 @@ import mmap
 import os
 import socket
 import time
+import weakref
 from typing import Any
 
-from .errors import ConnectionLost, PermissionDenied, ProtocolError, TimedOut
+import numpy as np
+
+from .errors import ConnectionLost, InvalidRequest, PermissionDenied, ProtocolError, TimedOut
 
 _LINE_MAX = 1 << 20
 _BYTES_MAX = 1 << 32
 _SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_WRITE  # one that may still shrink would end this process later
 
+Process = tuple[int, int]
+_forks = 0
+
+
+def this_process() -> Process:
+    """Tells this process from its parents and children: a number may come back, after so many forks it is another."""
+    return os.getpid(), _forks
+
 
 class Connection:
+    """One connection, which belongs to the process that opened it.
+
+    A child made by fork shares the parent's socket: what it reads is missing there. So its copy is closed at once, and
+    using it raises ConnectionLost.
+    """
+
     def __init__(self, path: str | os.PathLike[str]):
         self.path = os.fspath(path)
+        self._process = this_process()
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._buffer = bytearray()
         self._descriptors: list[int] = []
         self._last_id = 0
+        _open.add(self)
         try:
             self._socket.settimeout(5)
             self._socket.connect(self.path)
@@ -41,15 +60,31 @@ class Connection:
             raise ConnectionLost(f"{self.path}: {error.strerror}; is slsd running? systemctl status slsd",
                                  where=self.path) from error
 
+    @property
+    def is_own(self) -> bool:
+        """Whether this process opened it."""
+        return self._process == this_process()
+
     def close(self) -> None:
+        """Hangs up. In a child made by fork the parent's connection stays open."""
+        if self.is_own:
+            try:
+                self._socket.shutdown(socket.SHUT_RDWR)  # also where a child still holds a copy, or a thread waits
+            except OSError:
+                pass
         self._socket.close()
         while self._descriptors:
             os.close(self._descriptors.pop())
 
     def send(self, method: str, params: dict[str, Any]) -> int:
         """Sends a request. Returns its id."""
+        self._refuse_others()
         self._last_id += 1
-        line = json.dumps({"jsonrpc": "2.0", "id": self._last_id, "method": method, "params": params})
+        request = {"jsonrpc": "2.0", "id": self._last_id, "method": method, "params": params}
+        try:
+            line = json.dumps(request, allow_nan=False, default=_plain)
+        except (TypeError, ValueError) as error:
+            raise InvalidRequest(f"{method}: a parameter is no value of JSON: {error}", "invalid_params") from error
         try:
             self._socket.settimeout(10)
             self._socket.sendall(line.encode() + b"\n")
@@ -62,6 +97,7 @@ class Connection:
 
         deadline: of time.monotonic(); None waits for ever.
         """
+        self._refuse_others()
         while (end := self._buffer.find(b"\n")) < 0:
             if len(self._buffer) > _LINE_MAX:
                 raise ProtocolError("what came is no message of slsd: a line of more than 1 MiB")
@@ -83,6 +119,11 @@ class Connection:
             return message, self._bytes(_size(body["bytes"]), deadline)
         return message, None
 
+    def _refuse_others(self) -> None:
+        if not self.is_own:
+            raise ConnectionLost(f"{self.path}: this connection is the parent process's; open one in this process",
+                                 "disconnected", self.path)
+
     def _lost(self, error: OSError) -> Exception:
         if isinstance(error, TimeoutError):
             return TimedOut(f"{self.path}: the service does not answer", "timeout", self.path)
@@ -98,9 +139,9 @@ class Connection:
         self._socket.settimeout(left)
 
     def _more(self, deadline: float | None) -> None:
-        self._wait(deadline)
         space = socket.CMSG_SPACE(4 * array.array("i").itemsize)
         try:
+            self._wait(deadline)
             chunk, control, _, _ = self._socket.recvmsg(1 << 16, space, socket.MSG_CMSG_CLOEXEC)
         except OSError as error:
             raise self._lost(error) from error
@@ -120,8 +161,8 @@ class Connection:
         del self._buffer[:have]
         rest = memoryview(data)[have:]
         while rest:
-            self._wait(deadline)
             try:
+                self._wait(deadline)
                 count = self._socket.recv_into(rest)
             except OSError as error:
                 raise self._lost(error) from error
@@ -139,9 +180,36 @@ class Connection:
                 raise ProtocolError("the memfd is not of the size that the service said")
             if not _sealed(descriptor):
                 raise ProtocolError("the memfd is not sealed")
-            return mmap.mmap(descriptor, size, prot=mmap.PROT_READ)
+            memory = mmap.mmap(descriptor, size, prot=mmap.PROT_READ)
         finally:
             os.close(descriptor)
+        _lent.add(memory)
+        return memory
+
+
+_open: weakref.WeakSet[Connection] = weakref.WeakSet()
+_lent: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
+
+
+def clouds_held() -> int:
+    """How many clouds this process holds in memory that is shared with the service."""
+    return len(_lent)
+
+
+def _leave_to_parent() -> None:
+    global _forks
+    _forks += 1
+    for connection in list(_open):
+        connection.close()
+
+
+os.register_at_fork(after_in_child=_leave_to_parent)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} {value!r:.80}")
 
 
 def _sealed(descriptor: int) -> bool:

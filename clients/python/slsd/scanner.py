@@ -4,44 +4,61 @@
 from __future__ import annotations
 
 import base64
-import mmap
 import os
-import threading
+import pathlib
+import secrets
 import time
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Iterator
+from typing import Any, Callable, Generator, Literal, Mapping
 
 import numpy as np
+import numpy.typing as npt
 
+from .channel import GRACE_S, Answer, Body, Channel, subscribed
 from .cloud import Cloud, read_ply
-from .connection import Connection
-from .errors import ProtocolError, error_of
+from .errors import InvalidRequest, NotFound, ProtocolError, ScannerError
+from .options import CalibrationSettings, CameraSettings, Code, DecodeSettings, Density, PatternSettings, Picture
 
 DEFAULT_SOCKET = "/run/slsd/slsd.sock"
-_GRACE_S = 5.0  # beyond the timeout that the service keeps by itself
+_TIMEOUT_MAX_S = 600.0  # of the protocol
+_RELOAD_MAX_S = 60.0
+_LOOK_EVERY_S = 0.2
+_FILES = {".ply": "ply", ".pcd": "pcd", ".tiff": "tiff", ".tif": "tiff"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """What a camera saw: height x width, uint8 or uint16; and what the service says of it."""
 
-    image: np.ndarray
+    image: npt.NDArray[Any]
     description: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """How a camera is configured to expose; None is what the configuration leaves to the camera."""
+
+    camera: str
+    exposure_us: float | None
+    gain_db: float | None
 
 
 class Scanner:
     """A connection to slsd. Requests are answered one after the other; threads may share it.
 
-    Where the connection breaks the request that waits raises ConnectionLost, and the next one connects anew.
+    After a fork, parent and child have a connection each; a pickled scanner connects where it is unpickled.
+    If the connection breaks, the request that waits raises ConnectionLost, and the next one connects anew.
 
     path  its socket; SLSD_SOCKET in the environment, or the usual place
+
+    `timeout_s` of a method is how long the service may wait for its devices and frames: 0.001 to 600 seconds, or None
+    for the time that its configuration says.
     """
 
     def __init__(self, path: str | os.PathLike[str] | None = None):
-        self._path = path or os.environ.get("SLSD_SOCKET", DEFAULT_SOCKET)
-        self._connection: Connection | None = Connection(self._path)
-        self._lock = threading.Lock()
+        self._channel = Channel(os.fspath(path) if path else os.environ.get("SLSD_SOCKET", DEFAULT_SOCKET))
+        self._channel.connect()
 
     def __enter__(self) -> Scanner:
         return self
@@ -50,99 +67,213 @@ class Scanner:
                  traceback: TracebackType | None) -> None:
         self.close()
 
+    def __getstate__(self) -> str:
+        return os.path.abspath(self._channel.path)
+
+    def __setstate__(self, path: str) -> None:
+        self._channel = Channel(path)
+
     def close(self) -> None:
         """Hangs up. The service gives up what was waited for."""
-        connection, self._connection = self._connection, None
-        if connection is not None:
-            connection.close()
+        self._channel.close()
 
-    def scan(self, *, timeout_s: float = 5.0, texture: bool = False, ambient: bool = False, picture: bool = False,
-             frames: bool = False, **more: Any) -> Cloud:
-        """Takes one scan. The points lie in memory that is shared with the service: nothing is copied.
+    def scan(self, *, timeout_s: float | None = 5.0, density: Density | None = None, normals: bool = False,
+             texture: bool = False, ambient: bool = False, picture: bool = False, camera: str | None = None,
+             frames: bool = False, shared: bool = True) -> Cloud:
+        """Takes one scan.
 
+        density  a point for each "symbols" of the pattern or for each of the camera's "pixels"; None: as configured
+        normals  with pixels, the normal of each point
         texture  the intensity of each point, by a second frame under white light
         ambient  less the light of the room, by a third
         picture  the frame with what was decoded drawn in, as PNG, in `picture`
+        camera   whose picture; None: the first
         frames   the frames themselves, in `frames`
-        more     other parameters of the protocol's `scan`, by their names
+        shared   the points lie in memory that is shared with the service until the cloud is released: nothing is
+                 copied. The service lends a few dense clouds at once; False copies
         """
-        params = {"format": "ply", "transport": "memfd", "timeout_ms": _milliseconds(timeout_s), **more}
-        params |= {key: True for key, value in (("texture", texture), ("ambient", ambient), ("picture", picture))
-                   if value}
-        if frames:
-            params["frames"] = "raw"
-        result, body, events = self._call("scan", params, timeout_s)
-        cloud = read_ply(_need(body, "the cloud"), result)
-        for event, data in events:
+        params = _params(format="ply", transport="memfd" if shared else "inline", timeout_ms=_milliseconds(timeout_s),
+                         density=density, normals=normals, texture=texture, ambient=ambient, picture=picture,
+                         camera=camera, frames="raw" if frames else None)
+        answer = self._call("scan", params, timeout_s)
+        cloud = read_ply(_need(answer, "the cloud"), answer.result)
+        for event, data in answer.events:
             if event["method"] == "picture":
-                cloud.picture = bytes(_need(data, "the picture"))
+                cloud.picture = bytes(_body(data, "the picture"))
             elif event["method"] == "frame":
-                cloud.frames.append(_frame(event["params"], _need(data, "the frame")))
+                cloud.frames.append(_frame(event["params"], _body(data, "the frame")))
         return cloud
 
-    def stream(self, *, rate_hz: float | None = None, idle_s: float | None = None, **more: Any) -> Iterator[Cloud]:
+    def save(self, file: str | os.PathLike[str], *, timeout_s: float | None = 5.0, density: Density | None = None,
+             normals: bool = False, texture: bool = False, ambient: bool = False) -> dict[str, Any]:
+        """Takes one scan into a file, in the format of its name: .ply, .pcd, or with pixels .tiff (a depth map).
+
+        file  appears whole or not at all
+        The other options are those of `scan`. Returns the scan's description.
+        `Cloud.save` writes a cloud that was scanned before.
+        """
+        target = pathlib.Path(file)
+        kind = _FILES.get(target.suffix.lower())
+        if kind is None:
+            raise ValueError(f"{target}: a cloud's file ends in {', '.join(_FILES)}")
+        params = _params(format=kind, timeout_ms=_milliseconds(timeout_s), density=density, normals=normals,
+                         texture=texture, ambient=ambient)
+        part = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+        with open(part, "wb") as out:  # a place that cannot be written is told before the scan
+            try:
+                answer = self._call("scan", params, timeout_s)
+                out.write(_need(answer, "the cloud"))
+                out.flush()
+                os.replace(part, target)
+            except BaseException:
+                part.unlink(missing_ok=True)
+                raise
+        return answer.result
+
+    def stream(self, *, rate_hz: float | None = None, density: Density | None = None, normals: bool = False,
+               shared: bool = False, idle_s: float | None = None) -> Generator[Cloud, None, None]:
         """Clouds as they come, the newest first: what this reader was too slow for is counted in `lost`.
 
-        Runs over a connection of its own until the iterator is closed. A scan that failed is raised where the service
+        Runs over a connection of its own until the iterator is closed. A scan that failed is raised if the service
         gives up; those that it repeats are passed over.
 
-        idle_s  raise TimedOut where no cloud came for so long; None waits for ever
+        rate_hz  at most so many a second, 0.001 to 1000; None: every frame
+        density, normals   as in `scan`
+        shared   in memory that is shared with the service, without a copy; while two clouds are kept, others are lost
+        idle_s   raise TimedOut if no cloud came for so long, more than 0; None waits for ever
         """
-        params = {"format": "ply", **more}
-        if rate_hz is not None:
-            params["rate_hz"] = rate_hz
-        connection = Connection(self._path)
-        try:
-            ident = connection.send("subscribe", params)
-            answered = False
-            while True:
-                deadline = None if idle_s is None and answered else time.monotonic() + (idle_s or 2 * _GRACE_S)
-                message, body = connection.receive(deadline)
-                if message.get("method") == "cloud":
-                    yield read_ply(_need(body, "the cloud"), message["params"])
-                elif "method" not in message and message.get("id") == ident:
-                    if "error" in message:
-                        raise error_of(message["error"])
-                    answered = True
-        finally:
-            connection.close()
+        if idle_s is not None and not idle_s > 0:
+            raise InvalidRequest(f"idle_s must be more than 0 seconds, or None to wait for ever; it is {idle_s!r}",
+                                 "invalid_params", "idle_s")
+        return self._clouds(_params(format="ply", rate_hz=rate_hz, density=density, normals=normals,
+                                    transport="memfd" if shared else None), idle_s)
 
-    def frame(self, camera: str | None = None, *, as_shown: bool = False, timeout_s: float = 5.0) -> Frame:
-        """A camera's frame, under the pattern; with `as_shown` under what the projector shows by now."""
-        params: dict[str, Any] = {"format": "raw", "timeout_ms": _milliseconds(timeout_s), "as_shown": as_shown}
-        if camera is not None:
-            params["camera"] = camera
-        result, body, _ = self._call("frame", params, timeout_s)
-        return _frame(result, _need(body, "the frame"))
+    def frame(self, camera: str | None = None, *, as_shown: bool = False, timeout_s: float | None = 5.0) -> Frame:
+        """A camera's frame, under the pattern.
 
-    def preview(self, camera: str | None = None, *, timeout_s: float = 5.0) -> bytes:
-        """A frame with what was decoded drawn in, as PNG."""
-        params: dict[str, Any] = {"timeout_ms": _milliseconds(timeout_s)}
-        if camera is not None:
-            params["camera"] = camera
-        return bytes(_need(self._call("preview", params, timeout_s)[1], "the picture"))
-
-    def project(self, picture: str, png: bytes | None = None, *, timeout_s: float = 5.0) -> None:
-        """Shows "pattern", "idle", "black", "white", "focus", "grid", or an "image" of the projector's size.
-
-        Returns when it is visible.
+        camera    its name; None: the first
+        as_shown  under what the projector shows by now
         """
-        params: dict[str, Any] = {"picture": picture, "timeout_ms": _milliseconds(timeout_s)}
-        if png is not None:
-            params["png"] = base64.b64encode(png).decode()
-        self._call("project", params, timeout_s)
+        params = _params(format="raw", timeout_ms=_milliseconds(timeout_s), as_shown=as_shown, camera=camera)
+        answer = self._call("frame", params, timeout_s)
+        return _frame(answer.result, _need(answer, "the frame"))
+
+    def preview(self, camera: str | None = None, *, timeout_s: float | None = 5.0) -> bytes:
+        """A frame with what was decoded drawn in, as PNG.
+
+        camera  its name; None: the first
+        """
+        params = _params(timeout_ms=_milliseconds(timeout_s), camera=camera)
+        return bytes(_need(self._call("preview", params, timeout_s), "the picture"))
+
+    def project(self, picture: Picture, png: bytes | None = None, *, timeout_s: float | None = 5.0) -> None:
+        """Shows a picture, and returns when it is visible.
+
+        picture  "pattern", "idle", "black", "white", "focus", "grid", or an "image" of the projector's size
+        png      with "image" alone: its PNG file
+        """
+        self._call("project", _params(picture=picture, timeout_ms=_milliseconds(timeout_s),
+                                      png=None if png is None else base64.b64encode(png).decode()), timeout_s)
 
     def pattern(self) -> bytes:
         """The pattern's image, as PNG."""
-        return bytes(_need(self._call("pattern", {}, _GRACE_S)[1], "the pattern"))
+        return bytes(_need(self._call("pattern", {}, GRACE_S), "the pattern"))
 
     def status(self) -> dict[str, Any]:
         """The service, its devices, and what all scans came to."""
-        return self._call("status", {}, _GRACE_S)[0]
+        return self._call("status", {}, GRACE_S).result
+
+    def metrics(self) -> str:
+        """What the service counts, as OpenMetrics text."""
+        return bytes(_need(self._call("metrics", {}, GRACE_S), "the metrics")).decode()
+
+    def bundle(self) -> bytes:
+        """The last scans with their frames, as the tar archive that `slsd --replay` decodes again."""
+        return bytes(_need(self._call("bundle", {}, _RELOAD_MAX_S), "the bundle"))
 
     def settings(self) -> dict[str, Any]:
         """What clouds depend on: pattern, calibration, projector, cameras, configuration."""
-        return self._call("settings", {}, _GRACE_S)[0]
+        return self._call("settings", {}, GRACE_S).result
+
+    def set(self, *, decode: DecodeSettings | None = None, calibration: CalibrationSettings | None = None,
+            pattern: PatternSettings | None = None, camera: Mapping[str, CameraSettings] | None = None
+            ) -> dict[str, Any]:
+        """Puts settings in force at once and keeps them over restarts; a value of None takes one back.
+
+        decode, calibration, pattern   keys of these tables of the configuration
+        camera   by a camera's name, its exposure and gain
+
+        Returns `set` (all that is set now), `not_kept` (None, or why a restart forgets it) and `needs_restart`.
+        If anything is refused, everything stays as it was.
+        """
+        return self._call("set", _params(decode=decode, calibration=calibration, pattern=pattern, camera=camera),
+                          _RELOAD_MAX_S).result
+
+    def exposure(self, camera: str | None = None, *, exposure_us: float | None = None, gain_db: float | None = None
+                 ) -> Exposure:
+        """How a camera exposes, after setting what is given. `slsctl exposure` measures the light and gives advice.
+
+        camera       its name; None: the first
+        exposure_us  how long it exposes, in microseconds
+        gain_db      its gain above the camera's least
+        """
+        cameras: list[dict[str, Any]] = self.settings().get("cameras", [])
+        about = next((each for each in cameras if camera in (None, each.get("name"))), None)
+        if about is None:
+            known = ", ".join(str(each.get("name")) for each in cameras) or "none is configured"
+            raise NotFound(f"no such camera: {camera!r} (there are: {known})", "not_found", camera or "camera")
+        wanted: CameraSettings = {}
+        if exposure_us is not None:
+            wanted["exposure_us"] = exposure_us
+        if gain_db is not None:
+            wanted["gain_db"] = gain_db
+        if wanted:
+            self.set(camera={about["name"]: wanted})
+            return self.exposure(about["name"])
+        return Exposure(about["name"], about.get("exposure_us"), about.get("gain_db"))
+
+    def calibrate(self, *, board: str | None = None, ruler: str | None = None, code: Code = "pattern",
+                  poses: int = 12, resume: bool = False, told: Callable[[dict[str, Any]], None] | None = None
+                  ) -> dict[str, Any]:
+        """Calibrates with a board that somebody moves, and returns when the calibration is in force.
+
+        board, ruler   as `slsd --calibrate` has them; None: its defaults
+        code     what is projected onto the board
+        poses    how many, 3 to 99
+        resume   the pictures of the last session count
+        told     called with what the session is at whenever that changed: its `progress` and `log`
+
+        Returns the same, with `outcome` (grade, reasons, errors in pixels). Raises ScannerError if it came to nothing.
+        An exception in the meantime (Ctrl-C, or one of `told`) cancels the session.
+        """
+        params = _params(action="begin", board=board, ruler=ruler, code=code, poses=poses, resume=resume)
+        state = self._call("calibrate", params, GRACE_S).result
+        number = None
+        try:
+            while True:
+                if told is not None and state.get("number") != number:
+                    told(state)
+                number = state.get("number")
+                if not state.get("under_way"):
+                    break
+                time.sleep(_LOOK_EVERY_S)
+                state = self.calibration()
+        except BaseException:
+            try:
+                self.calibration("cancel")
+            except ScannerError:
+                pass  # the reason is the first exception
+            raise
+        if state.get("error") is not None:
+            raise ScannerError(str(state["error"]), "impossible")
+        return state
+
+    def calibration(self, action: Literal["look", "end", "cancel"] = "look") -> dict[str, Any]:
+        """What the calibration is at.
+
+        action  "end" it with the poses that are there, "cancel" it, or only "look"
+        """
+        return self._call("calibrate", {"action": action}, GRACE_S).result
 
     @property
     def role(self) -> str:
@@ -154,54 +285,45 @@ class Scanner:
 
     def reload(self) -> list[str]:
         """Reads the configuration anew. Returns the tables that need a restart."""
-        return list(self._call("reload", {}, 60.0)[0].get("needs_restart", []))
+        return list(self._call("reload", {}, _RELOAD_MAX_S).result.get("needs_restart", []))
 
-    def _call(self, method: str, params: dict[str, Any], timeout_s: float
-              ) -> tuple[dict[str, Any], bytearray | mmap.mmap | None,
-                         list[tuple[dict[str, Any], bytearray | mmap.mmap | None]]]:
-        with self._lock:
-            connection = self._connection = self._connection or Connection(self._path)
-            try:
-                answer = _answer(connection, method, params, time.monotonic() + timeout_s + _GRACE_S)
-            except BaseException:
-                self.close()  # what comes later would be taken for the answer to the next request
-                raise
-        if "error" in answer.message:
-            raise error_of(answer.message["error"])
-        return answer.message["result"], answer.body, answer.events
+    def _call(self, method: str, params: dict[str, Any], timeout_s: float | None) -> Answer:
+        return self._channel.call(method, params, _TIMEOUT_MAX_S if timeout_s is None else timeout_s)
+
+    def _clouds(self, params: dict[str, Any], idle_s: float | None) -> Generator[Cloud, None, None]:
+        events = subscribed(self._channel.path, params, idle_s)
+        try:
+            for event, data in events:
+                if event["method"] == "cloud":
+                    yield read_ply(_body(data, "the cloud"), event["params"])
+        finally:
+            events.close()
 
 
-@dataclass(frozen=True)
-class _Answer:
-    message: dict[str, Any]
-    body: bytearray | mmap.mmap | None
-    events: list[tuple[dict[str, Any], bytearray | mmap.mmap | None]]
+def _params(**values: Any) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if value is not None and value is not False}
 
 
-def _answer(connection: Connection, method: str, params: dict[str, Any], deadline: float) -> _Answer:
-    ident = connection.send(method, params)
-    events = []
-    while True:
-        message, body = connection.receive(deadline)
-        if "method" in message:
-            events.append((message, body))
-        elif "error" in message or (message.get("id") == ident and isinstance(message.get("result"), dict)):
-            return _Answer(message, body, events)
-        else:
-            raise ProtocolError(f"what came is no answer to {method}")
+def _milliseconds(seconds: float | None) -> int | None:
+    if seconds is None:
+        return None
+    if not 0.001 <= seconds <= _TIMEOUT_MAX_S:
+        raise InvalidRequest(f"timeout_s must be 0.001 to {_TIMEOUT_MAX_S:g} seconds, or None for the time that the "
+                             f"service's configuration says; it is {seconds!r}", "invalid_params", "timeout_s")
+    return round(1000 * float(seconds))
 
 
-def _milliseconds(seconds: float) -> int:
-    return max(1, round(1000 * seconds))
+def _need(answer: Answer, what: str) -> Any:
+    return _body(answer.body, what)
 
 
-def _need(body: bytearray | mmap.mmap | None, what: str) -> bytearray | mmap.mmap:
+def _body(body: Body, what: str) -> Any:
     if body is None:
         raise ProtocolError(f"{what} did not come with the answer")
     return body
 
 
-def _frame(description: dict[str, Any], body: bytearray | mmap.mmap) -> Frame:
+def _frame(description: dict[str, Any], body: Any) -> Frame:
     try:
         width, height, bits = (int(description[key]) for key in ("width_px", "height_px", "bits"))
     except (KeyError, TypeError, ValueError) as error:

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""Types of the options, by which a type checker finds a misspelled one."""
+from __future__ import annotations
+
+from typing import List, Literal, Optional, TypedDict
+
+Density = Literal["symbols", "pixels"]
+"""A point for each symbol of the pattern, or for each camera pixel."""
+
+Picture = Literal["pattern", "idle", "black", "white", "focus", "grid", "image"]
+"""What the projector can show."""
+
+Code = Literal["pattern", "gray"]
+"""What a calibration projects onto the board."""
+
+_Method = Optional[Literal["default", "paper"]]
+
+
+class DecodeSettings(TypedDict, total=False):
+    """Keys of the table [decode]; None takes a value back that was set. slsd.toml(5) explains each."""
+
+    depth_min_mm: Optional[float]
+    depth_max_mm: Optional[float]
+    wrong_cells_max: Optional[float]
+    precision: Optional[Literal["standard", "fine"]]
+    density: Optional[Density]
+    dense_stride_px: Optional[int]
+    dense_prune_px: Optional[float]
+    binarize: _Method
+    find_regions: _Method
+    classify: _Method
+    centre: _Method
+    link_grid: _Method
+    decode_windows: _Method
+    correspond: _Method
+
+
+class CalibrationSettings(TypedDict, total=False):
+    """Keys of the table [calibration]. The file lies on the scanner, and the service reads it with its own rights."""
+
+    file: Optional[str]
+    other_hardware: Optional[Literal["error", "warn"]]
+
+
+class PatternSettings(TypedDict, total=False):
+    """Keys of the table [pattern], which belong together: they replace the whole table."""
+
+    file: Optional[str]
+    symbol_size_px: Optional[int]
+    spacing_px: Optional[int]
+    symbols: Optional[List[int]]
+    seed: Optional[int]
+    method: Optional[Literal["constructive", "paper"]]
+    minimum_distance: Optional[int]
+    half_turn_unique: Optional[bool]
+
+
+class CameraSettings(TypedDict, total=False):
+    """What can be set of a camera: how long it exposes, and its gain in dB or in its own steps."""
+
+    exposure_us: Optional[float]
+    gain_db: Optional[float]
+    gain_steps: Optional[int]
