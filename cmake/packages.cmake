@@ -2,6 +2,7 @@
 # Copyright the slsd authors
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED)
+find_package(Boost 1.74 REQUIRED)  # Asio and Beast, which are headers alone
 find_package(Eigen3 REQUIRED NO_MODULE)
 find_package(tl-expected REQUIRED)
 find_package(nlohmann_json REQUIRED)
@@ -17,7 +18,6 @@ pkg_check_modules(aravis REQUIRED IMPORTED_TARGET aravis-0.8>=0.8.26)
 pkg_check_modules(cairo REQUIRED IMPORTED_TARGET cairo>=1.16 cairo-pdf cairo-svg)
 pkg_check_modules(gles REQUIRED IMPORTED_TARGET egl>=1.5 glesv2)
 pkg_check_modules(glfw REQUIRED IMPORTED_TARGET glfw3>=3.3)
-pkg_check_modules(httplib REQUIRED IMPORTED_TARGET cpp-httplib>=0.11)
 pkg_check_modules(x11 REQUIRED IMPORTED_TARGET x11>=1.7 xext xrandr xcb xcb-present)
 pkg_check_modules(systemd REQUIRED IMPORTED_TARGET libsystemd)
 pkg_check_modules(v4l REQUIRED IMPORTED_TARGET libv4l2 libv4lconvert)

@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
+#include <utility>
 
 namespace slsd::web {
 namespace {
 
-constexpr std::string_view kCookie = "slsd_session=";
+constexpr std::string_view kBearer = "Bearer ";
 
 /// In a time that does not tell where they differ.
 bool same(std::string_view a, std::string_view b) {
@@ -22,9 +24,10 @@ bool same(std::string_view a, std::string_view b) {
   return difference == 0 && !b.empty();
 }
 
-std::string random_id() {
-  std::array<unsigned char, 16> bytes{};
-  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) return {};
+std::string random_text() {
+  std::array<unsigned char, 24> bytes{};
+  // So few bytes come whole or, on a kernel without random numbers, never: then nobody may be let in.
+  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) std::abort();
   std::string text;
   for (const unsigned char byte : bytes) {
     text += "0123456789abcdef"[byte >> 4U];
@@ -33,74 +36,111 @@ std::string random_id() {
   return text;
 }
 
+std::string lower(std::string_view text) {
+  std::string result(text);
+  std::ranges::transform(result, result.begin(),
+                         [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+  return result;
+}
+
 std::string without_port(std::string_view host) {
   const std::size_t bracket = host.rfind(']'), colon = host.rfind(':');
   if (colon != std::string_view::npos && (bracket == std::string_view::npos || colon > bracket))
     host = host.substr(0, colon);
-  std::string name(host);
-  std::ranges::transform(name, name.begin(),
-                         [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
-  return name;
+  return lower(host);
+}
+
+/// "scanner:80" is "scanner" over HTTP, "scanner:443" over HTTPS.
+std::string without_usual_port(std::string_view host, std::string_view scheme) {
+  const std::string_view usual = scheme == "https" ? ":443" : ":80";
+  return lower(host.ends_with(usual) ? host.substr(0, host.size() - usual.size()) : host);
+}
+
+bool is_of_this_origin(const Request& request) {
+  if (!request.site.empty() && request.site != "same-origin") return false;
+  if (request.origin.empty()) return true;
+  const std::size_t end = request.origin.find("://");
+  if (end == std::string::npos) return false;
+  const std::string_view origin = request.origin, scheme = origin.substr(0, end);
+  return without_usual_port(origin.substr(end + 3), scheme) == without_usual_port(request.host, scheme);
 }
 
 }  // namespace
 
-std::optional<Refusal> Gate::check_host(const Asker& asker) const {
-  if (std::ranges::find(names_, without_port(asker.host)) != names_.end()) return std::nullopt;
+Token random_token() {
+  return {random_text(), /*chosen=*/false};
+}
+
+std::optional<Refusal> Gate::check_host(const Request& request) const {
+  const std::string name = without_port(request.host);
+  const bool address = name == request.local_address || name == "[" + request.local_address + "]";
+  if (address || std::ranges::find(names_, name) != names_.end()) return std::nullopt;
   return Refusal{403, "unknown_host",
                  "the page is not served under this name: ask for it by the address that it listens at, or start "
                  "slsd-web with --name"};
 }
 
-std::optional<Refusal> Gate::check(const Asker& asker, bool open, Clock::time_point now) {
-  if (auto refused = check_host(asker)) return refused;
-  const std::size_t scheme = asker.origin.find("://");
-  const bool other_origin =
-      !asker.origin.empty() &&
-      (scheme == std::string::npos || without_port(asker.origin.substr(scheme + 3)) != without_port(asker.host));
-  const bool other_site = !asker.site.empty() && asker.site != "same-origin";
-  if (other_origin || other_site || !asker.from_page)
-    return Refusal{403, "not_from_the_page", "only the page itself may ask for this (header X-Slsd-Page)"};
-  if (open || token_.empty()) return std::nullopt;
-  const std::lock_guard lock(mutex_);
-  if (knows(asker.cookie, now)) return std::nullopt;
-  return Refusal{401, "no_token", "enter the token of this scanner"};
+std::optional<Refusal> Gate::check_origin(const Request& request) const {
+  if (auto refused = check_host(request)) return refused;
+  if (is_of_this_origin(request)) return std::nullopt;
+  return Refusal{
+      403, "not_from_the_page",
+      "only the page itself may ask for this; behind a proxy, let that pass on the header Host with its port"};
 }
 
-bool Gate::knows(std::string_view cookie, Clock::time_point now) {
-  std::erase_if(sessions_, [&](const Session& session) { return now - session.used > kSession; });
-  const std::size_t at = cookie.find(kCookie);
-  if (at == std::string_view::npos) return false;
-  std::string_view id = cookie.substr(at + kCookie.size());
-  id = id.substr(0, id.find(';'));
-  for (Session& session : sessions_) {
-    if (!same(session.id, id)) continue;
-    session.used = now;
-    return true;
+std::optional<Refusal> Gate::check(const Request& request, Clock::time_point now) {
+  if (auto refused = check_origin(request)) return refused;
+  const std::lock_guard lock(mutex_);
+  const std::string_view authorization = request.authorization;
+  if (authorization.starts_with(kBearer))
+    return check_token(request.address, authorization.substr(kBearer.size()), now);
+  if (knows(request, now)) return std::nullopt;
+  return Refusal{401, "no_token",
+                 "open the address that slsd-web printed when it started, or enter the token of this scanner"};
+}
+
+// All cookies of the name count: of two scanners below one name, a browser may send both.
+bool Gate::knows(const Request& request, Clock::time_point now) {
+  std::erase_if(sessions_, [&](const Known& session) { return now - session.used > kSession; });
+  std::string_view rest = request.cookie;
+  while (!rest.empty()) {
+    std::string_view pair = rest.substr(0, rest.find(';'));
+    rest.remove_prefix(std::min(rest.size(), pair.size() + 1));
+    pair.remove_prefix(std::min(pair.size(), pair.find_first_not_of(' ')));
+    if (!pair.starts_with(cookie_name_ + "=")) continue;
+    const std::string_view id = pair.substr(cookie_name_.size() + 1);
+    for (Known& session : sessions_) {
+      if (!same(session.id, id) || !same(session.key, request.page_key)) continue;
+      session.used = now;
+      return true;
+    }
   }
   return false;
 }
 
-std::optional<std::string> Gate::log_in(const std::string& address, std::string_view token, Refusal& refusal,
-                                        Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
+std::optional<Refusal> Gate::check_token(const std::string& address, std::string_view token, Clock::time_point now) {
   std::erase_if(wrong_, [&](const auto& each) { return now - each.second.back() > kWait; });
   const auto before = wrong_.find(address);
-  if (before != wrong_.end() && before->second.size() >= kWrongMax) {
-    refusal = {429, "too_many_tokens", "too many wrong tokens: wait half a minute"};
+  if (before != wrong_.end() && before->second.size() >= kWrongMax)
+    return Refusal{429, "too_many_tokens", "too many wrong tokens: wait half a minute"};
+  if (same(token, token_.text)) {
+    if (before != wrong_.end()) wrong_.erase(before);
     return std::nullopt;
   }
-  if (!same(token, token_)) {
-    if (before != wrong_.end() || wrong_.size() < kAddressesMax) wrong_[address].push_back(now);
-    refusal = {401, "wrong_token", "that is not the token of this scanner"};
-    return std::nullopt;
-  }
-  wrong_.erase(address);
+  if (token_.chosen && (before != wrong_.end() || wrong_.size() < kAddressesMax)) wrong_[address].push_back(now);
+  return Refusal{401, "wrong_token",
+                 token_.chosen ? "that is not the token of this scanner"
+                               : "that is not the token of this scanner; slsd-web makes a new one whenever it starts"};
+}
+
+tl::expected<Session, Refusal> Gate::log_in(const std::string& address, std::string_view token, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  if (auto refused = check_token(address, token, now)) return tl::unexpected(std::move(*refused));
   if (sessions_.size() >= kSessionsMax) {
-    sessions_.erase(std::ranges::min_element(sessions_, {}, [](const Session& session) { return session.used; }));
+    sessions_.erase(std::ranges::min_element(sessions_, {}, [](const Known& session) { return session.used; }));
   }
-  sessions_.push_back({random_id(), now});
-  return std::string(kCookie) + sessions_.back().id + "; HttpOnly; SameSite=Strict; Path=/; Max-Age=1209600";
+  const Known& made = sessions_.emplace_back(Known{random_text(), random_text(), now});
+  return Session{cookie_name_ + "=" + made.id + "; HttpOnly; SameSite=Strict; Max-Age=1209600", made.key};
 }
 
 }  // namespace slsd::web

@@ -11,60 +11,65 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/web/request.hpp"
+
 namespace slsd::web {
 
-/// Why a request is not answered.
-struct Refusal {
-  int status;  ///< of HTTP
-  std::string name;
-  std::string message;  ///< what to do
+/// The secret that lets browsers and scripts in.
+struct Token {
+  std::string text;
+  bool chosen = false;  ///< by a person: it might be guessed, and outlives this run
 };
 
-/// What of a request says who sent it.
-struct Asker {
-  std::string address;  ///< where it came from
-  std::string host;     ///< header Host
-  std::string origin;   ///< header Origin; empty: none
-  std::string site;     ///< header Sec-Fetch-Site; empty: none
-  std::string cookie;   ///< header Cookie
-  bool from_page = false;
+/// A token of this run, from the kernel's random numbers: 192 bits.
+[[nodiscard]] Token random_token();
+
+/// What a browser keeps after it has shown the token. Both halves are needed: browsers send the cookie to every port of
+/// this machine's name, the key only by a script of this very origin.
+struct Session {
+  std::string cookie;  ///< value of the header Set-Cookie; its path is that of the page, wherever a proxy puts it
+  std::string key;     ///< value of the header X-Slsd-Page
 };
 
-/// Who is let in. The page is asked for by its own names alone, so that no name which somebody else's server answers
-/// for leads here; everything else is asked for by the page alone, which says so in a header that no other site's
-/// script can send; and where there is a token, after it was shown once.
+/// Decides who is let in. The page is served under its own names only, so that no name of somebody else's domain leads
+/// here. Everything else needs a secret: the token, or a session that was given for it.
 /// @thread thread-safe
 class Gate {
  public:
   using Clock = std::chrono::steady_clock;
-  static constexpr int kWrongMax = 5;  ///< tokens of one address, before it has to wait
+  static constexpr int kWrongMax = 5;  ///< wrong tokens of one address, before it has to wait; of chosen tokens
   static constexpr std::chrono::seconds kWait{30};
   static constexpr std::chrono::hours kSession{24 * 14};  ///< since it was last used
   static constexpr std::size_t kSessionsMax = 64, kAddressesMax = 1024;
 
-  /// @param names  by which the page may be asked for, without ports
-  /// @param token  empty: none is wanted
-  Gate(std::vector<std::string> names, std::string token) : names_(std::move(names)), token_(std::move(token)) {}
+  /// @param names        by which the page may be asked for, without ports; an address at which it listens may always
+  /// @param cookie_name  another for each port: browsers do not keep the cookies of ports apart
+  Gate(std::vector<std::string> names, Token token, std::string cookie_name)
+      : names_(std::move(names)), token_(std::move(token)), cookie_name_(std::move(cookie_name)) {}
 
-  [[nodiscard]] std::optional<Refusal> check_host(const Asker& asker) const;
-  /// Of a request that only the page sends. @param open  also before a token was shown
-  [[nodiscard]] std::optional<Refusal> check(const Asker& asker, bool open, Clock::time_point now = Clock::now());
-  /// @return a session's cookie for the right token
-  [[nodiscard]] std::optional<std::string> log_in(const std::string& address, std::string_view token, Refusal& refusal,
-                                                  Clock::time_point now = Clock::now());
-  [[nodiscard]] bool wants_token() const { return !token_.empty(); }
+  [[nodiscard]] std::optional<Refusal> check_host(const Request& request) const;
+  /// Of a request that shows data or acts.
+  [[nodiscard]] std::optional<Refusal> check(const Request& request, Clock::time_point now = Clock::now());
+  /// Of a request that brings a token: whether another origin sent it.
+  [[nodiscard]] std::optional<Refusal> check_origin(const Request& request) const;
+  /// @return a session for the right token
+  [[nodiscard]] tl::expected<Session, Refusal> log_in(const std::string& address, std::string_view token,
+                                                      Clock::time_point now = Clock::now());
 
  private:
-  struct Session {
-    std::string id;
+  struct Known {
+    std::string id, key;
     Clock::time_point used;
   };
-  [[nodiscard]] bool knows(std::string_view cookie, Clock::time_point now);
+  [[nodiscard]] std::optional<Refusal> check_token(const std::string& address, std::string_view token,
+                                                   Clock::time_point now);
+  [[nodiscard]] bool knows(const Request& request, Clock::time_point now);
 
   std::vector<std::string> names_;
-  std::string token_;
+  Token token_;
+  std::string cookie_name_;
   std::mutex mutex_;
-  std::deque<Session> sessions_;
+  std::deque<Known> sessions_;
   std::map<std::string, std::deque<Clock::time_point>> wrong_;  ///< tokens of late, by address
 };
 

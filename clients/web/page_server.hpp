@@ -5,7 +5,11 @@
 #include <chrono>
 #include <deque>
 #include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,12 +17,8 @@
 
 #include "clients/web/cloud_feed.hpp"
 #include "clients/web/gate.hpp"
-
-namespace httplib {
-class Server;
-struct Request;
-struct Response;
-}  // namespace httplib
+#include "clients/web/http_server.hpp"
+#include "clients/web/pages.hpp"
 
 namespace slsd::web {
 
@@ -27,39 +27,63 @@ struct PageOptions {
   std::string listen = "127.0.0.1";
   int port = 8384;
   std::vector<std::string> names = {};                          ///< by which the page is asked for, besides the address
-  std::filesystem::path token_file = {};                        ///< empty: no token, which is for loopback alone
+  std::filesystem::path token_file = {};                        ///< empty: a token of this run
   std::filesystem::path three = "/usr/share/javascript/three";  ///< Debian's libjs-three
 };
+
+/// Whether only this machine reaches an address.
+[[nodiscard]] bool is_loopback(const std::string& address);
 
 /// A scan that the page asked for.
 struct PastScan {
   nlohmann::json about;
-  client::Bytes ply;  ///< empty: none, or given up for newer ones
+  client::Bytes cloud;  ///< empty: none, or given up for newer ones
 };
 
 /// The page and what it asks for, each as one request to the service's socket.
-/// @thread the handlers run on the HTTP library's threads
+/// @thread the handlers run on the server's workers
 class PageServer {
  public:
-  PageServer(PageOptions options, std::string token);
+  PageServer(PageOptions options, Token token);
 
-  /// Serves until a signal ends the program. @errors kIo: cannot listen there
-  [[nodiscard]] Result<> run();
+  /// Listens. @errors those of HttpServer::open()
+  [[nodiscard]] Result<> open();
+  [[nodiscard]] int port() const { return server_->port(); }
+  /// Serves until a signal ends the program. @param at_end  is called before
+  void run(const std::function<void()>& at_end) { server_->run(at_end); }
 
  private:
-  void add_pages(httplib::Server& server);
-  void add_requests(httplib::Server& server);
-  [[nodiscard]] bool admits(const httplib::Request& request, httplib::Response& response, bool open = false);
-  [[nodiscard]] tl::expected<Answered, Failure> call(const char* method, nlohmann::json params) const;
-  void tell_status(httplib::Response& response);
-  void send_image(const httplib::Request& request, httplib::Response& response, const char* method) const;
-  void send_cloud(const httplib::Request& request, httplib::Response& response);
-  void scan(const nlohmann::json& body, httplib::Response& response);
-  void send_past(const httplib::Request& request, httplib::Response& response);
+  /// How one address is served.
+  struct Route {
+    std::string method;  ///< GET, which is HEAD too, or POST
+    bool open;           ///< to those without a secret: it shows no data and does nothing
+    std::function<Answer(const Request&)> answer;
+  };
+  using Handle = std::function<Answer(const Request&)>;
+  using HandleBody = std::function<Answer(const Request&, const nlohmann::json& body)>;
+
+  void add_pages();
+  void add_requests();
+  void get(const char* path, Handle handle) { routes_[path] = {"GET", false, std::move(handle)}; }
+  void post(const char* path, bool open, HandleBody handle);
+  void pass_on(const char* path, const char* method);
+  [[nodiscard]] std::optional<Answer> refuse(const Request& request);
+  [[nodiscard]] tl::expected<Answered, Failure> call(const char* method, nlohmann::json params,
+                                                     std::chrono::seconds patience) const;
+  [[nodiscard]] Answer index(const Page& page, const Request& request);
+  [[nodiscard]] Answer log_in(const Request& request, const nlohmann::json& body);
+  [[nodiscard]] Answer status();
+  [[nodiscard]] Answer image(const Request& request, const char* method) const;
+  [[nodiscard]] Answer cloud(const Request& request);
+  [[nodiscard]] Answer scan(const nlohmann::json& body);
+  [[nodiscard]] Answer past(const Request& request);
   void keep(PastScan scan);
 
   PageOptions options_;
-  Gate gate_;
+  Token token_;
+  std::unique_ptr<Gate> gate_;  ///< after open(): its cookie has the port's number
+  std::unique_ptr<HttpServer> server_;
+  std::map<std::string, Route, std::less<>> routes_;
   CloudFeed symbols_;
   CloudFeed pixels_;
   std::mutex mutex_;

@@ -7,46 +7,92 @@
 
 #include <CLI/CLI.hpp>
 
+#include "clients/web/announcement.hpp"
 #include "clients/web/page_server.hpp"
 #include "drivers/files/file.hpp"
 
 namespace {
 
+using slsd::web::PageOptions;
+using slsd::web::Token;
+
 constexpr int kOwnPagesBytes = 256 << 10;
 constexpr std::size_t kTokenBytesMin = 16, kTokenBytesMax = 1024;
 
 /// @errors kInvalidArgument: none where one is needed, or too short a one; those of read_file()
-slsd::Result<std::string> read_token(const slsd::web::PageOptions& options) {
-  const bool loopback = options.listen == "127.0.0.1" || options.listen == "::1";
+slsd::Result<Token> read_token(const PageOptions& options) {
   if (options.token_file.empty()) {
-    if (loopback) return std::string();
+    if (slsd::web::is_loopback(options.listen)) return slsd::web::random_token();
     return slsd::fail(slsd::ErrorCode::kInvalidArgument,
                       "beyond loopback whoever knows the address could scan: name a file with a token of 16 characters "
                       "or more with --token-file",
                       options.listen);
   }
-  auto token = slsd::read_file(options.token_file, kTokenBytesMax);
-  if (!token) return token;
-  while (!token->empty() && std::isspace(static_cast<unsigned char>(token->back())) != 0) token->pop_back();
-  if (token->size() >= kTokenBytesMin) return token;
+  auto text = slsd::read_file(options.token_file, kTokenBytesMax);
+  if (!text) return tl::unexpected(text.error());
+  while (!text->empty() && std::isspace(static_cast<unsigned char>(text->back())) != 0) text->pop_back();
+  if (text->size() >= kTokenBytesMin) return Token{std::move(*text), /*chosen=*/true};
   return slsd::fail(slsd::ErrorCode::kInvalidArgument, "a token has 16 characters or more",
                     options.token_file.string());
+}
+
+std::string address_of(const PageOptions& options, int port) {
+  const bool any = options.listen == "0.0.0.0" || options.listen == "::";
+  const std::string host = !any ? options.listen : options.names.empty() ? "127.0.0.1" : options.names.front();
+  const bool brackets = host.find(':') != std::string::npos;
+  return "http://" + (brackets ? "[" + host + "]" : host) + ":" + std::to_string(port) + "/";
+}
+
+/// Tells the user what to open. A token that somebody chose is not printed: that person knows it.
+/// @return the address with the token of this run
+std::string announce(const PageOptions& options, const Token& token, int port) {
+  const std::string query = token.chosen ? "" : "?token=" + token.text, address = address_of(options, port) + query;
+  std::cout << "slsd-web: open " << address
+            << (token.chosen ? " and enter the token of " + options.token_file.string() : "") << "\n";
+  if (!token.chosen && !options.names.empty())
+    std::cout << "slsd-web: behind a proxy, put " << query << " after the page's address there\n";
+  std::cout << std::flush;
+  return address;
+}
+
+slsd::Result<> serve(const PageOptions& options) {
+  const auto token = read_token(options);
+  if (!token) return tl::unexpected(token.error());
+  slsd::web::PageServer server(options, *token);
+  if (auto opened = server.open(); !opened) return opened;
+  auto announcement = slsd::web::Announcement::write(server.port(), announce(options, *token, server.port()));
+  if (!announcement) std::cerr << "slsd-web: " << to_string(announcement.error()) << std::endl;
+  server.run([&] {
+    if (announcement) announcement->remove();
+  });
+  return {};
+}
+
+slsd::Result<> print_addresses() {
+  const auto addresses = slsd::web::announced_addresses();
+  if (!addresses) return tl::unexpected(addresses.error());
+  for (const std::string& address : *addresses) std::cout << address << "\n";
+  return {};
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app("The page of a structured-light scanner: a client of slsd's socket that browsers can talk to.");
-  slsd::web::PageOptions options;
+  PageOptions options;
+  bool only_address = false;
   app.set_version_flag("--version", "slsd-web " SLSD_VERSION);
-  app.add_option("--socket", options.socket, "the service's socket")->capture_default_str();
+  app.add_option("--socket", options.socket, "the service's socket")->envname("SLSD_SOCKET")->capture_default_str();
   app.add_option("--listen", options.listen, "the address to listen at; beyond loopback it takes a token")
       ->capture_default_str();
-  app.add_option("--port", options.port)->check(CLI::Range(1, 65535))->capture_default_str();
+  app.add_option("--port", options.port, "the port to listen at; 0: any that is free")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
   app.add_option("--name", options.names, "a name by which browsers ask for the page, besides the address");
-  app.add_option("--token-file", options.token_file, "a file with the token that the page asks for");
+  app.add_option("--token-file", options.token_file, "a file with the token to enter; without, each run has its own");
   app.add_option("--three", options.three, "the folder of three.js, as Debian's libjs-three has it")
       ->capture_default_str();
+  app.add_flag("--address", only_address, "print the address of the page that is running, with its token, and exit");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -56,10 +102,8 @@ int main(int argc, char** argv) {
   // Clouds are large: what one took goes back to the system with it, whichever of many threads had it.
   ::mallopt(M_MMAP_THRESHOLD, kOwnPagesBytes);
   ::mallopt(M_ARENA_MAX, 2);
-  const auto token = read_token(options);
-  slsd::Result<> served = token ? slsd::Result<>() : tl::unexpected(token.error());
-  if (token) served = slsd::web::PageServer(options, *token).run();
-  if (served) return 0;
-  std::cerr << "slsd-web: " << to_string(served.error()) << "\n";
+  const slsd::Result<> done = only_address ? print_addresses() : serve(options);
+  if (done) return 0;
+  std::cerr << "slsd-web: " << to_string(done.error()) << "\n";
   return 1;
 }

@@ -28,12 +28,12 @@ def free_port():
 
 
 class Browser:
-    def __init__(self, downloads=None):
+    def __init__(self, downloads=None, arguments=()):
         self.port = free_port()
         self.profile = tempfile.mkdtemp(prefix="slsd-test-chromium-")
         self.driver = subprocess.Popen(["chromedriver", f"--port={self.port}"], stdout=subprocess.DEVNULL,
                                        stderr=subprocess.DEVNULL)
-        options = {"binary": shutil.which("chromium"), "args": [*ARGUMENTS, f"--user-data-dir={self.profile}"],
+        options = {"binary": shutil.which("chromium"), "args": [*ARGUMENTS, *arguments, f"--user-data-dir={self.profile}"],
                    "prefs": {"download.default_directory": str(downloads or self.profile)}}
         end = time.monotonic() + PATIENCE_S
         while True:
@@ -78,15 +78,23 @@ class Browser:
         element = self.ask("POST", self.session + "/element", {"using": "css selector", "value": selector})
         self.ask("POST", f"{self.session}/element/{next(iter(element.values()))}/click", {})
 
+    def devtools(self, command, **parameters):
+        return self.ask("POST", self.session + "/goog/cdp/execute", {"cmd": command, "params": parameters})
+
+    def close_others(self):
+        """Windows that pages opened; the first goes on."""
+        first, *others = self.ask("GET", self.session + "/window/handles")
+        for handle in (*others, first):
+            self.ask("POST", self.session + "/window", {"handle": handle})
+            if handle != first:
+                self.ask("DELETE", self.session + "/window")
+
     def resize(self, width, height):
         # A headless window is never narrower than 500 px; what a narrow one shows is asked of the engine itself.
-        self.ask("POST", self.session + "/goog/cdp/execute", {
-            "cmd": "Emulation.setDeviceMetricsOverride",
-            "params": {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}})
+        self.devtools("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
 
     def picture(self, file):
-        shot = self.ask("POST", self.session + "/goog/cdp/execute", {
-            "cmd": "Page.captureScreenshot", "params": {"format": "png", "captureBeyondViewport": True}})
+        shot = self.devtools("Page.captureScreenshot", format="png", captureBeyondViewport=True)
         file.write_bytes(base64.b64decode(shot["data"]))
 
     def complaints(self):

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <tl/expected.hpp>
+
+namespace slsd::web {
+
+inline constexpr std::size_t kHeadBytesMax = 16 << 10;
+inline constexpr std::size_t kRequestLineBytesMax = 8 << 10;
+
+/// Why a request is not answered.
+struct Refusal {
+  int status;  ///< of HTTP
+  std::string name;
+  std::string message;  ///< what to do
+};
+
+/// A request whose framing has one meaning only.
+struct Request {
+  std::string method;
+  std::string path;  ///< as it was sent, without the query; begins with '/'
+  std::map<std::string, std::string> query;
+  std::string host, origin, cookie, authorization;  ///< headers; empty: none
+  std::string site, destination;                    ///< headers Sec-Fetch-Site and Sec-Fetch-Dest
+  std::string page_key;                             ///< header X-Slsd-Page
+  bool by_https = false;                            ///< a proxy says so
+  bool keep_alive = false;
+  bool expects_continue = false;
+  std::size_t body_bytes = 0;
+  std::string body;
+  std::string address;        ///< who asks
+  std::string local_address;  ///< by which of this machine's addresses
+};
+
+/// Where a head ends, or why it cannot become one.
+struct HeadEnd {
+  std::size_t bytes = 0;  ///< with the empty line; 0: more is to come
+  std::optional<Refusal> refusal;
+};
+
+/// Looks for the end of a head in what has come so far. Control characters, line ends other than CR LF, folded lines
+/// and too long a head are refused as soon as they are seen.
+/// @thread reentrant
+[[nodiscard]] HeadEnd find_head_end(std::string_view received);
+
+/// Reads a request line and its headers. Whatever two programs could read in two ways is refused: one Host, at most one
+/// Content-Length of one number, no Transfer-Encoding, no body where the method has none (RFC 9112, 6.3 and 11.2).
+/// @param head  of the length that find_head_end() gave
+/// @thread reentrant
+[[nodiscard]] tl::expected<Request, Refusal> read_head(std::string_view head);
+
+}  // namespace slsd::web
