@@ -13,7 +13,9 @@ import sys
 import threading
 import time
 
-from page_test import Browser, Service, Web
+from browser import Browser
+from page_service import Web
+from service import Service
 
 TURN = """
 const done = arguments[arguments.length - 1], begin = performance.now(), before = view.drawn;
@@ -56,7 +58,7 @@ def browse(options):
         times = []
         for _ in range(5):
             begin = time.monotonic()
-            browser.open(f"http://127.0.0.1:{web.port}/")
+            browser.open(web.address)
             browser.wait("document.getElementById('picture').dataset.frames", "no picture")
             times.append(time.monotonic() - begin)
         print(f"first picture after opening: {statistics.median(times):.2f} s (of 5; longest {max(times):.2f} s)")
@@ -76,7 +78,7 @@ def browse(options):
             const head = new TextEncoder().encode(header), whole = new Uint8Array(head.length + records.length);
             whole.set(head);
             whole.set(records, head.length);
-            view.show(whole.buffer);""", options.points)
+            view.show(readCloud(whole.buffer));""", options.points)
         used_s = processor_s(browser.driver.pid)
         browser.run("view.draw();")
         drawn, seconds = browser.ask("POST", browser.session + "/execute/async", {"script": TURN, "args": []})

@@ -9,7 +9,8 @@ import threading
 import time
 
 from page_figures import resident_mib, watch
-from page_test import Service, Web
+from page_service import Web
+from service import Service
 
 
 def main():

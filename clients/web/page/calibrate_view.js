@@ -101,7 +101,7 @@ function showSession(told) {
 }
 
 async function calibrate(body) {
-  showSession(await (await ask("/api/calibrate", body)).json());
+  showSession(await (await ask("api/calibrate", body)).json());
 }
 
 async function followCalibration() {
@@ -109,16 +109,17 @@ async function followCalibration() {
   for (;; await pause(wasUnderWay ? kLookPause : kIdlePause)) {
     if (document.hidden || !(isShown("calibrate") || wasUnderWay) || !mayAdminister) continue;
     try {
-      const told = await (await ask("/api/calibration")).json();
+      const told = await (await ask("api/calibration")).json();
       if (told.number !== number) showSession(told);
       number = told.number;
       wasUnderWay = told.under_way;
+      say("calibration", null);
       if (!told.under_way || !told.progress.cameras) continue;
       const moves = ["taken", "again"].includes(told.progress.state);  // the board, away from where it was
       for (const camera of told.progress.cameras) await drawCamera(camera, moves);
       drawProjector(told.progress.projector.coverage);
     } catch (error) {
-      say(error);
+      say("calibration", error);
       await pause(kRetryPause);
     }
   }

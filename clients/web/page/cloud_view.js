@@ -2,27 +2,6 @@
 // Copyright the slsd authors
 "use strict";
 
-const kSizes = {float: 4, uchar: 1, double: 8, int: 4, uint: 4, short: 2, ushort: 2, char: 1};
-
-// A binary little-endian PLY as slsd writes it: a header, and one record a point.
-function readPly(buffer) {
-  const bytes = new Uint8Array(buffer);
-  const head = new TextDecoder("latin1").decode(bytes.subarray(0, 4096));
-  const end = head.indexOf("end_header\n");
-  if (end < 0) throw new Error("the cloud is no PLY");
-  const header = head.slice(0, end);
-  const count = Number(/^element vertex (\d+)$/m.exec(header)[1]);
-  const fields = {};
-  let record = 0;
-  for (const [, type, name] of header.matchAll(/^property (\w+) (\w+)$/gm)) {
-    fields[name] = {type, offset: record};
-    record += kSizes[type];
-  }
-  const begin = end + "end_header\n".length;
-  if (buffer.byteLength < begin + count * record) throw new Error("the cloud is cut off");
-  return {buffer, begin, count, record, fields};
-}
-
 // Points are drawn in this order of records: each beginning of it is spread over the whole cloud, so that a part can be
 // drawn while it turns.
 const kSpread = [0, 16, 8, 24, 4, 20, 12, 28, 2, 18, 10, 26, 6, 22, 14, 30, 1, 17, 9, 25, 5, 21, 13, 29, 3, 19, 11, 27, 7, 23, 15, 31];
@@ -56,18 +35,6 @@ function positions(ply) {
     }
   }
   return values;
-}
-
-// The same records under another header; the names of normals are those that readers of PCD expect.
-function pcdOf(ply) {
-  const names = Object.keys(ply.fields).map((name) => ({nx: "normal_x", ny: "normal_y", nz: "normal_z"})[name] || name);
-  const fields = Object.values(ply.fields);
-  const header = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS " + names.join(" ") +
-    "\nSIZE " + fields.map((field) => kSizes[field.type]).join(" ") +
-    "\nTYPE " + fields.map((field) => (field.type === "float" ? "F" : "U")).join(" ") +
-    "\nCOUNT " + fields.map(() => 1).join(" ") + "\nWIDTH " + ply.count + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " +
-    ply.count + "\nDATA binary\n";
-  return new Blob([header, new Uint8Array(ply.buffer, ply.begin, ply.count * ply.record)]);
 }
 
 // Where most of the values are: from so small a part of them to so large a one.
@@ -113,22 +80,17 @@ void main() {
 }`;
 const kFragmentShader = "varying vec3 tint; void main() { gl_FragColor = vec4(tint, 1.0); }";
 
+const kBackground = 0x16181c;
 const kTurn = 1500, kSlowest = 110, kAim = 80, kFastest = 50, kRest = 300, kPace = 500;  // ms between two frames
 const kFew = 50000;  // points that are always drawn
 
 class CloudView {
-  constructor(place) {
+  // onLost(true) when the browser takes the graphics away, onLost(false) when it draws again.
+  constructor(place, onLost) {
     this.place = place;
-    this.renderer = new THREE.WebGLRenderer({antialias: false, preserveDrawingBuffer: false});
-    this.renderer.setClearColor(0x16181c);
-    place.append(this.renderer.domElement);
+    this.onLost = onLost;
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(40, 4 / 3, 1, 100000);
-    this.controls = new THREE.OrbitControls(this.camera, this.renderer.domElement);
-    this.controls.addEventListener("change", () => this.draw());
-    this.material = new THREE.ShaderMaterial({
-      uniforms: {size: {value: 2}},
-      vertexShader: kVertexShader, fragmentShader: kFragmentShader});
     this.marks = new THREE.Group();
     this.scene.add(this.marks);
     this.picked = [];
@@ -140,8 +102,52 @@ class CloudView {
     this.part = 1;  // of the points, what is drawn while it turns
     this.drawnAt = -Infinity;
     [this.paceBegin, this.paceFrames] = [0, 0];
+    this.makeCanvas();
     new ResizeObserver(() => this.resize()).observe(place);
     this.resize();
+  }
+
+  // With a material of its own: three.js keeps the state of a renderer in it.
+  makeCanvas() {
+    this.lost = false;
+    this.material = new THREE.ShaderMaterial({
+      uniforms: {size: {value: 2}},
+      vertexShader: kVertexShader, fragmentShader: kFragmentShader});
+    this.renderer = new THREE.WebGLRenderer({antialias: false, preserveDrawingBuffer: false});
+    const canvas = this.renderer.domElement;
+    this.place.replaceChildren(canvas);
+    const target = this.controls ? this.controls.target : new THREE.Vector3();
+    if (this.controls) this.controls.dispose();
+    this.controls = new THREE.OrbitControls(this.camera, canvas);
+    this.controls.target.copy(target);
+    this.controls.update();  // the constructor turned the camera to the origin
+    this.controls.addEventListener("change", () => this.draw());
+    this.renderer.setClearColor(kBackground);
+    canvas.addEventListener("webglcontextlost", () => this.lose());
+    canvas.addEventListener("webglcontextrestored", () => this.recover());
+  }
+
+  lose() {
+    this.lost = true;
+    this.renderer.domElement.hidden = true;  // a browser draws a sign of its own there
+    this.onLost(true);
+  }
+
+  // three.js makes its own state anew, without the colour of the background.
+  recover() {
+    this.lost = false;
+    this.renderer.domElement.hidden = false;
+    this.renderer.setClearColor(kBackground);
+    this.onLost(false);
+    this.resize();
+  }
+
+  // On a canvas of its own: browsers that ran short of graphics do not give back those that they took.
+  drawAgain() {
+    this.renderer.dispose();
+    this.makeCanvas();
+    this.recover();
+    if (this.ply) this.show(this.ply);
   }
 
   resize() {
@@ -155,8 +161,7 @@ class CloudView {
     this.draw();
   }
 
-  show(buffer) {
-    const ply = readPly(buffer);
+  show(ply) {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(positions(ply), 3));
     if (this.points) {
@@ -210,7 +215,7 @@ class CloudView {
     this.waiting = true;
     requestAnimationFrame((now) => {
       this.waiting = false;
-      this.render(now);
+      if (!this.lost) this.render(now);
     });
   }
 

@@ -4,7 +4,7 @@
 
 const $ = (id) => document.getElementById(id);
 const countOf = (n, what) => `${n} ${what}${n === 1 ? "" : "s"}`;
-const kStatusPause = 1000, kRetryPause = 1500;
+const kStatusPause = 1000, kRetryPause = 1500, kStatusPatience = 6000, kPatience = 100000;
 
 // ---- what is asked for ----
 
@@ -16,28 +16,62 @@ class Refused extends Error {
   }
 }
 
-async function ask(path, body) {
-  let response;
+// The half of the session that no other port of this machine is sent; of several scanners below one name, each has its own.
+const kKeyName = "slsd_key " + location.pathname;
+let keyOfThisTab = "";
+
+function keepKey(key) {
+  keyOfThisTab = key;
   try {
-    response = await fetch(path, {
-      method: body === undefined ? "GET" : "POST", headers: {"X-Slsd-Page": "1"}, credentials: "same-origin",
-      cache: "no-store", body: body === undefined ? undefined : JSON.stringify(body)});
+    localStorage.setItem(kKeyName, key);
   } catch (error) {
-    throw new Refused(0, {name: "no_page_service", message: "slsd-web does not answer: look whether it is running"});
+    // Storage is forbidden here: this tab alone keeps it.
   }
-  if (response.ok) return response;
-  const told = await response.json().catch(() => ({}));
-  const refused = new Refused(response.status, told.error || {name: "error", message: "HTTP " + response.status});
-  if (refused.status === 401 && refused.name === "no_token") $("login").open || $("login").showModal();
-  throw refused;
+}
+
+function sessionKey() {
+  try {
+    return localStorage.getItem(kKeyName) || keyOfThisTab;
+  } catch (error) {
+    return keyOfThisTab;
+  }
+}
+
+const noAnswer = () => new Refused(0, {name: "no_page_service", message: "slsd-web does not answer: look whether it is running"});
+
+// Names are relative: the page may lie below any path of a proxy.
+async function ask(path, body, patience = kPatience) {
+  const ends = new AbortController(), timer = setTimeout(() => ends.abort(), patience);
+  try {
+    const response = await fetch(path, {
+      method: body === undefined ? "GET" : "POST", headers: {"X-Slsd-Page": sessionKey()}, credentials: "same-origin",
+      cache: "no-store", signal: ends.signal, body: body === undefined ? undefined : JSON.stringify(body)})
+      .catch(() => { throw noAnswer(); });
+    if (response.ok) return response;
+    const told = await response.json().catch(() => ({}));
+    const refused = new Refused(response.status, told.error || {name: "error", message: "HTTP " + response.status});
+    if (refused.name === "no_token" && !$("login").open) $("login").showModal();
+    throw refused;
+  } finally {
+    clearTimeout(timer);
+  }
 }
 
 const aboutOf = (response) => JSON.parse(response.headers.get("X-Slsd-About") || "{}");
 const pause = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
 
-function say(error) {
-  $("message").hidden = !error;
-  if (error) $("message").textContent = error.message;
+// What went wrong, by who asked: it is shown until the same one succeeds. The dialog speaks for a missing token.
+const complaints = new Map();
+
+function say(who, error) {
+  complaints.delete(who);
+  if (error && error.name !== "no_token") complaints.set(who, error.message);
+  showComplaints();
+}
+
+function showComplaints() {
+  $("message").hidden = complaints.size === 0;
+  $("message").textContent = [...new Set(complaints.values())].join(" ");
 }
 
 // Runs what a button asks for; its error is shown, and the button waits meanwhile.
@@ -46,9 +80,9 @@ function onClick(button, action) {
     button.disabled = true;
     try {
       await action();
-      say(null);
+      say("button", null);
     } catch (error) {
-      say(error);
+      say("button", error);
     }
     button.disabled = false;
   });
@@ -105,7 +139,10 @@ let densityChosen = false;
 function showStatus(told) {
   const {status} = told;
   mayAdminister = status.role === "administer";
-  if (!densityChosen) $("density").value = told.density;
+  if (!densityChosen && $("density").value !== told.density) {
+    $("density").value = told.density;
+    offerColours();
+  }
   $("calibrate-begin").disabled = !mayAdminister;
   if (!mayAdminister) $("calibrate-next").textContent =
     "slsd-web may not administer this scanner: docs/page.md says how it is allowed to.";
@@ -135,7 +172,9 @@ async function followStatus() {
   for (;; await pause(kStatusPause)) {
     if (document.hidden) continue;
     try {
-      showStatus(await (await ask("/api/status")).json());
+      showStatus(await (await ask("api/status", undefined, kStatusPatience)).json());
+      if ($("login").open) welcome();  // let in by another tab
+      else if (complaints.has("camera") && !$("camera-live").checked) showPicture();  // it failed by itself, and is tried again
     } catch (error) {
       $("state").className = "bad";
       $("state").textContent = error.message;
@@ -153,16 +192,22 @@ async function takePicture() {
                                 : `; sharpness ${figures.sharpness.toFixed(2)} (1: edges within two pixels)`);
 }
 
+// @return whether there was one; why not is told
+async function showPicture() {
+  try {
+    await takePicture();
+    say("camera", null);
+    return true;
+  } catch (error) {
+    say("camera", error);
+    return false;
+  }
+}
+
 async function followCamera() {
   for (;; await pause(50)) {
     if (!$("camera-live").checked || document.hidden) continue;
-    try {
-      await takePicture();
-      say(null);
-    } catch (error) {
-      say(error);
-      await pause(kRetryPause);
-    }
+    if (!await showPicture()) await pause(kRetryPause);
   }
 }
 
@@ -175,7 +220,7 @@ function takeExposure(camera, {present, proposed}) {
   onClick(button, async () => {
     const set = {exposure_us: Math.round(proposed.exposure_us)};
     if (Math.abs(proposed.gain_db - present.gain_db) > 0.05) set.gain_db = Math.round(10 * proposed.gain_db) / 10;
-    const told = await (await ask("/api/set", {camera: {[camera]: set}})).json();
+    const told = await (await ask("api/set", {camera: {[camera]: set}})).json();
     $("exposure").replaceChildren(element("p", `Taken: ${Object.entries(set).map(([key, value]) => `${key} = ${value}`).join(", ")}.` +
       (told.not_kept ? ` The next start will not know it: ${told.not_kept}` : ""), "good"));
     await takePicture();
@@ -187,7 +232,7 @@ async function proposeExposure() {
   $("exposure").replaceChildren(element("p", "looks at two frames…"));
   try {
     const camera = $("which-camera").value;
-    const told = await (await ask("/api/exposure?camera=" + encodeURIComponent(camera))).json();
+    const told = await (await ask("api/exposure?camera=" + encodeURIComponent(camera))).json();
     const lines = [];
     lines.push(element("p", told.patterned_share === 0 ? "No pattern is seen in the frame." :
       `Symbols reach ${Math.round(told.lit)} of ${told.full}; the pattern covers ${Math.round(100 * told.patterned_share)} % ` +
@@ -216,14 +261,29 @@ function showCloud(buffer, about) {
   const changed = shownScan && shownScan.density !== about.density;
   shownScan = about;
   if (changed || (view.ply && view.ply.count === 0)) view.framed = false;
-  view.show(buffer);
+  view.show(readCloud(buffer));
+  offerColours();
   showScale();
   $("distance").textContent = "";
   $("cloud-figures").textContent = `${about.points.toLocaleString("en")} points of scan ${about.scan}, ${about.time}` +
     (about.decode_ms !== undefined ? `; decoded in ${about.decode_ms.toFixed(0)} ms` : "") +
     (about.sigma_calibration_mm !== undefined ?
       `; the calibration may put all of it off by ${about.sigma_calibration_mm.toFixed(2)} mm (one standard deviation)` : "");
-  $("save-ply").disabled = $("save-pcd").disabled = false;
+  $("save-ply").disabled = false;
+  $("save-pcd").disabled = !view.ply.pcd;
+  $("save-hint").hidden = Boolean(view.ply.pcd);
+}
+
+// A cloud of pixels has no symbols; before there is a cloud, what would be scanned counts.
+function offerColours() {
+  const none = view && view.ply ? !view.ply.fields.symbol : $("density").value === "pixels";
+  const colour = $("colour");
+  colour.querySelector("[value=symbol]").disabled = none;
+  if (!none || colour.value !== "symbol") return;
+  colour.value = "z";
+  if (!view) return;
+  view.colour = "z";
+  view.paint();
 }
 
 const kColours = {z: "mm of depth", intensity: "of 255", sigma_mm: "mm of sigma", symbol: "number of the symbol"};
@@ -237,7 +297,7 @@ function showScale() {
 }
 
 async function scan() {
-  const response = await ask("/api/scan", {density: $("density").value});
+  const response = await ask("api/scan", {density: $("density").value});
   showCloud(await response.arrayBuffer(), aboutOf(response));
 }
 
@@ -250,16 +310,16 @@ async function followCloud() {
     }
     if (density !== $("density").value) [density, after] = [$("density").value, 0];
     try {
-      const response = await ask(`/api/cloud?density=${density}&after=${after}`);
+      const response = await ask(`api/cloud?density=${density}&after=${after}`);
       if (response.status === 204) continue;
       const buffer = await response.arrayBuffer();
       const about = aboutOf(response);
       after = about.number;
       if ($("cloud-live").checked && $("density").value === density) showCloud(buffer, about);
-      say(null);
+      say("cloud", null);
       await new Promise((done) => requestAnimationFrame(done));
     } catch (error) {
-      say(error);
+      say("cloud", error);
       await pause(kRetryPause);
     }
   }
@@ -299,7 +359,7 @@ function showPast(past) {
     if (scan.kept) {
       const button = element("button", "Show");
       onClick(button, async () => {
-        const response = await ask("/api/past?scan=" + encodeURIComponent(scan.scan));
+        const response = await ask("api/past?scan=" + encodeURIComponent(scan.scan));
         $("cloud-live").checked = false;
         showCloud(await response.arrayBuffer(), scan);
         choose("cloud");
@@ -320,23 +380,45 @@ function choose(name) {
   for (const section of document.querySelectorAll("main section")) section.classList.toggle("chosen", section.id === name);
 }
 
+// The token was right: what was refused without it is no news any more.
+function welcome() {
+  $("login").close();
+  $("token").value = $("login-message").textContent = "";
+  complaints.clear();
+  showComplaints();
+  showPicture();
+}
+
+// The address that slsd-web printed leads here by way of a key; a token that is still there was not accepted.
+function readAddress() {
+  const key = /^#key=([0-9a-f]+)$/.exec(location.hash);
+  if (key) keepKey(key[1]);
+  if (/[?&]token=/.test(location.search))
+    $("login-message").textContent = "The token of this address is not that of the scanner. slsd-web makes a new one " +
+      "whenever it starts, unless it has a token file.";
+  if (key || location.search) history.replaceState(null, "", location.pathname);
+}
+
 function begin() {
+  readAddress();
   for (const button of document.querySelectorAll("nav button"))
     button.addEventListener("click", () => choose(button.dataset.view));
   choose("devices");
   for (const button of document.querySelectorAll("[data-project]")) {
     onClick(button, async () => {
-      await ask("/api/project", {picture: button.dataset.project});
+      await ask("api/project", {picture: button.dataset.project});
       await takePicture();
     });
   }
   onClick($("propose"), proposeExposure);
   onClick($("scan"), scan);
+  onClick($("draw-again"), async () => view.drawAgain());
   onClick($("whole"), async () => view && view.frameAll());
   onClick($("save-ply"), async () => save(new Blob([view.ply.buffer]), "ply"));
-  onClick($("save-pcd"), async () => save(pcdOf(view.ply), "pcd"));
+  onClick($("save-pcd"), async () => save(new Blob(view.ply.pcd()), "pcd"));
   $("save-ply").disabled = $("save-pcd").disabled = true;
-  for (const id of ["show-clipping", "show-sharpness"]) $(id).addEventListener("change", () => takePicture().catch(say));
+  for (const id of ["show-clipping", "show-sharpness"]) $(id).addEventListener("change", showPicture);
+  $("cloud-live").addEventListener("change", () => say("cloud", null));
   $("colour").addEventListener("change", () => {
     if (view) view.colour = $("colour").value;
     if (view && view.paint()) showScale();
@@ -350,16 +432,18 @@ function begin() {
   $("login-form").addEventListener("submit", async (event) => {
     event.preventDefault();
     try {
-      await ask("/api/login", {token: $("token").value});
-      $("login").close();
-      $("token").value = $("login-message").textContent = "";
+      keepKey((await (await ask("api/login", {token: $("token").value})).json()).key);
+      welcome();
     } catch (error) {
       $("login-message").textContent = error.message;
     }
   });
-  $("density").addEventListener("change", () => { densityChosen = true; });
+  $("density").addEventListener("change", () => {
+    densityChosen = true;
+    offerColours();
+  });
   $("scan").disabled = $("cloud-live").disabled = true;  // until there is something to draw clouds with
-  const pictured = takePicture().catch(say);
+  const pictured = showPicture();
   followStatus();
   followCamera();
   beginCalibrating();
@@ -378,9 +462,9 @@ function load(script) {
 // After the rest, as it is large: the picture and the states do not wait for it.
 async function prepareCloud() {
   try {
-    await load("/three.js");
-    await load("/orbit_controls.js");
-    view = new CloudView($("space"));
+    await load("three.js");
+    await load("orbit_controls.js");
+    view = new CloudView($("space"), (lost) => { $("lost").hidden = !lost; });
     $("scan").disabled = $("cloud-live").disabled = false;
     followCloud();
   } catch (error) {
