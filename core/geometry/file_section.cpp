@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace slsd {
 namespace {
 
-constexpr std::size_t kMaxElements = 9;
+constexpr std::size_t kMaxElements = 14;  // of the longest distortion that OpenCV has
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 using Kind = FileNode::Kind;
 
@@ -73,11 +75,13 @@ std::vector<double> FileSection::elements(const char* key, int& rows, int& colum
   FileSection matrix(*node, path_ + key + ".", where_);
   rows = matrix.whole("rows", 1, kMaxElements);
   columns = matrix.whole("cols", 1, kMaxElements);
-  const std::vector<double>& values = data->numbers;
-  if (matrix.error() || values.size() != static_cast<std::size_t>(rows) * columns || values.size() > kMaxElements) {
-    refuse(key, "must have rows x cols numbers, at most 9");
+  const std::vector<FileNode>& items = data->items;
+  if (matrix.error() || items.size() != static_cast<std::size_t>(rows) * columns) {
+    refuse(key, "must have rows x cols numbers, at most " + std::to_string(kMaxElements));
     return {};
   }
+  std::vector<double> values;
+  for (const FileNode& item : items) values.push_back(item.kind == Kind::kNumber ? item.number : kNone);
   if (!std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); })) {
     refuse(key, "holds something that is not a finite number");
   }
@@ -92,11 +96,12 @@ Eigen::Matrix3d FileSection::matrix3(const char* key) {
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(values.data());
 }
 
-Eigen::VectorXd FileSection::vector(const char* key, int count) {
+Eigen::VectorXd FileSection::vector(const char* key, int count, const std::string& hint) {
   int rows = 0, columns = 0;
   const std::vector<double> values = elements(key, rows, columns);
   if (std::min(rows, columns) != 1 || std::max(rows, columns) != count) {
-    refuse(key, "must be 1x" + std::to_string(count) + " or " + std::to_string(count) + "x1");
+    const std::string shape = "must be 1x" + std::to_string(count) + " or " + std::to_string(count) + "x1";
+    refuse(key, shape + (hint.empty() ? "" : ": " + hint));
   }
   if (error_) return Eigen::VectorXd::Zero(count);
   return Eigen::Map<const Eigen::VectorXd>(values.data(), count);

@@ -32,7 +32,8 @@ class FileSection {
   [[nodiscard]] std::string text(const char* key);
   [[nodiscard]] Eigen::Matrix3d matrix3(const char* key);
   /// `count` numbers in a row or in a column; count at most 9.
-  [[nodiscard]] Eigen::VectorXd vector(const char* key, int count);
+  /// @param hint  follows in the message if there are more or fewer
+  [[nodiscard]] Eigen::VectorXd vector(const char* key, int count, const std::string& hint = {});
 
   /// Notes that this key is wrong, unless an earlier one was.
   void refuse(const std::string& key, const std::string& problem);

@@ -2,9 +2,13 @@
 // Copyright the slsd authors
 #include "core/geometry/file_tree.hpp"
 
+#include <yaml.h>
+
 #include <algorithm>
 #include <charconv>
 #include <limits>
+#include <map>
+#include <memory>
 #include <optional>
 
 namespace slsd {
@@ -12,12 +16,9 @@ namespace {
 
 using Kind = FileNode::Kind;
 
+constexpr int kMaxDepth = 16;
+constexpr std::size_t kMaxNodes = 50'000;
 constexpr std::size_t kMaxKeys = 256;
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t begin = std::min(text.find_first_not_of(' '), text.size());
-  return text.substr(begin, text.find_last_not_of(" \r") + 1 - begin);
-}
 
 std::optional<double> number_in(std::string_view text) {
   const bool minus = text.starts_with('-');
@@ -32,142 +33,159 @@ std::optional<double> number_in(std::string_view text) {
   return minus ? -value : value;
 }
 
-// One line that says something, without its comment.
-struct Line {
-  int number;
-  std::size_t indent;
-  std::string_view text;
+/// The text with its %YAML line made a comment: OpenCV's is none of YAML's directives, and no version matters here.
+std::string without_version(std::string_view text) {
+  constexpr std::string_view kMark = "\xef\xbb\xbf", kDirective = "%YAML";
+  std::string plain(text.substr(text.starts_with(kMark) ? kMark.size() : 0));
+  for (std::size_t line = 0; line < plain.size() && plain.compare(line, 3, "---") != 0;) {
+    if (plain.compare(line, kDirective.size(), kDirective) == 0) {
+      plain[line] = '#';
+      break;
+    }
+    const std::size_t end = plain.find('\n', line);
+    line = end == plain.npos ? plain.size() : end + 1;
+  }
+  return plain;
+}
+
+struct DeleteEvent {
+  void operator()(yaml_event_t* event) const {
+    yaml_event_delete(event);
+    delete event;
+  }
 };
+using Event = std::unique_ptr<yaml_event_t, DeleteEvent>;
 
-std::string_view without_comment(std::string_view line) {
-  bool quoted = false;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    if (quoted && line[i] == '\\')
-      ++i;
-    else if (line[i] == '"')
-      quoted = !quoted;
-    else if (line[i] == '#' && !quoted)
-      return line.substr(0, i);
-  }
-  return line;
+std::string_view text_of(const yaml_char_t* text, std::size_t length) {
+  return {reinterpret_cast<const char*>(text), length};
 }
 
-std::vector<Line> lines_of(std::string_view text) {
-  std::vector<Line> lines;
-  bool begun = false;
-  for (int number = 1; !text.empty(); ++number) {
-    const std::string_view whole = text.substr(0, text.find('\n'));
-    text.remove_prefix(std::min(whole.size() + 1, text.size()));
-    const std::string_view line = without_comment(whole);
-    const std::string_view words = trimmed(line);
-    if (begun && !words.empty()) lines.push_back({number, line.find_first_not_of(' '), words});
-    begun = begun || words.starts_with("---");
-  }
-  return lines;
+std::string name_of(const yaml_char_t* name) {
+  return name == nullptr ? std::string() : reinterpret_cast<const char*>(name);
 }
 
-// Goes from line to line; what is below a line stands further in.
+/// Builds the tree from libyaml's events. The first problem ends it: no event comes after that.
 class TreeReader {
  public:
-  explicit TreeReader(std::vector<Line> lines) : lines_(std::move(lines)) {}
+  explicit TreeReader(std::string_view text) : text_(without_version(text)) {
+    yaml_parser_initialize(&parser_);
+    yaml_parser_set_input_string(&parser_, reinterpret_cast<const unsigned char*>(text_.data()), text_.size());
+  }
+  TreeReader(const TreeReader&) = delete;
+  TreeReader& operator=(const TreeReader&) = delete;
+  ~TreeReader() { yaml_parser_delete(&parser_); }
 
   tl::expected<FileNode, SyntaxProblem> read() {
     FileNode root;
-    if (!lines_.empty()) root = block(lines_[0].indent);
-    if (!ends() && !problem_) refuse("is indented too far, or too little");
+    for (Event event = next(); event && event->type != YAML_STREAM_END_EVENT; event = next()) {
+      if (event->type != YAML_DOCUMENT_START_EVENT) continue;
+      if (std::exchange(begun_, true)) {
+        refuse(*event, "begins another document: a calibration file has one");
+        break;
+      }
+      if (const Event first = next()) root = node(*first, 0);
+    }
     if (problem_) return tl::unexpected(*problem_);
     return root;
   }
 
  private:
-  [[nodiscard]] bool ends() const { return problem_ || at_ == lines_.size(); }
-  [[nodiscard]] Line& line() { return lines_[at_]; }
-  [[nodiscard]] static bool is_item(const Line& line) { return line.text == "-" || line.text.starts_with("- "); }
-  void refuse(const std::string& what) {
-    if (!problem_) problem_ = SyntaxProblem{lines_[std::min(at_, lines_.size() - 1)].number, what};
+  void refuse_at(const yaml_mark_t& mark, const std::string& what) {
+    if (!problem_) problem_ = SyntaxProblem{static_cast<int>(mark.line) + 1, what};
   }
+  void refuse(const yaml_event_t& event, const std::string& what) { refuse_at(event.start_mark, what); }
 
-  // Recursive, but each level stands at least one further in, and syntax_problem() bounds that.
-  FileNode block(std::size_t indent) {
-    if (is_item(line())) return sequence(indent);
-    if (line().text.starts_with('[')) return list(line().text);
-    return map(indent);
-  }
-
-  FileNode sequence(std::size_t indent) {
-    FileNode node{.kind = Kind::kSequence};
-    while (!ends() && line().indent == indent && is_item(line())) {
-      Line& item = line();
-      const std::string_view rest = trimmed(item.text.substr(1));
-      if (!rest.empty()) {  // its first key stands on the same line
-        item.indent += static_cast<std::size_t>(rest.data() - item.text.data());
-        item.text = rest;
-        node.items.push_back(block(item.indent));
-        continue;
-      }
-      ++at_;
-      node.items.push_back(below(indent, false));
+  /// The next event; null if there is none any more.
+  Event next() {
+    if (problem_) return nullptr;
+    auto made = std::make_unique<yaml_event_t>();
+    if (yaml_parser_parse(&parser_, made.get()) != 0) return Event(made.release());
+    const std::string what =
+        "is no YAML: " + std::string(parser_.problem != nullptr ? parser_.problem : "out of memory");
+    if (parser_.error == YAML_READER_ERROR) {  // it has no mark
+      const auto bad = static_cast<std::ptrdiff_t>(std::min(parser_.problem_offset, text_.size()));
+      problem_ = SyntaxProblem{static_cast<int>(std::count(text_.begin(), text_.begin() + bad, '\n')) + 1, what};
+    } else {
+      const bool ends = parser_.problem_mark.index >= text_.size();
+      refuse_at(parser_.problem_mark, what + (ends ? "; is the file cut short?" : ""));
     }
-    return node;
+    return nullptr;
   }
 
-  FileNode map(std::size_t indent) {
-    FileNode node{.kind = Kind::kMap};
-    while (!ends() && line().indent == indent && !is_item(line())) {
-      const std::size_t colon = line().text.find(':');
-      if (colon == line().text.npos) return refuse("is not a key with a value"), node;
-      const std::string key(line().text.substr(0, colon));
-      if (node.find(key) != nullptr) return refuse(key + " is there twice"), node;
-      if (node.entries.size() == kMaxKeys) return refuse("there are too many keys"), node;
-      node.entries.emplace_back(key, value(trimmed(line().text.substr(colon + 1)), indent));
+  FileNode node(const yaml_event_t& event, int depth) {
+    if (++nodes_ > kMaxNodes) refuse(event, "holds too many values for a calibration");
+    if (depth > kMaxDepth) refuse(event, "is nested too deeply for a calibration");
+    if (problem_) return {};
+    switch (event.type) {
+      case YAML_SCALAR_EVENT:
+        return keep(event.data.scalar.anchor, scalar(event));
+      case YAML_SEQUENCE_START_EVENT:
+        return keep(event.data.sequence_start.anchor, sequence(depth));
+      case YAML_MAPPING_START_EVENT:
+        return keep(event.data.mapping_start.anchor, map(depth));
+      case YAML_ALIAS_EVENT:
+        return repeated(event);
+      default:
+        return {};
     }
-    return node;
   }
 
-  // Whatever stands further in than the line before; the items of a key's sequence may stand as far in as the key.
-  FileNode below(std::size_t indent, bool of_key) {
-    if (ends() || line().indent < indent || (line().indent == indent && !(of_key && is_item(line())))) return {};
-    return block(line().indent);
-  }
-
-  FileNode value(std::string_view text, std::size_t indent) {
-    if (text.starts_with('[')) return list(text);
-    ++at_;
-    if (text.empty() || text == "!!opencv-matrix") return below(indent, true);
-    if (text.starts_with('"')) return quoted(text);
-    if (const auto number = number_in(text)) return {.kind = Kind::kNumber, .number = *number};
-    return {.kind = Kind::kText, .text = std::string(text)};
-  }
-
-  static FileNode quoted(std::string_view text) {
-    FileNode node{.kind = Kind::kText};
-    for (std::size_t i = 1; i < text.size() && text[i] != '"'; ++i) {
-      if (text[i] == '\\' && i + 1 < text.size()) ++i;
-      node.text += text[i];
+  static FileNode scalar(const yaml_event_t& event) {
+    const std::string_view value = text_of(event.data.scalar.value, event.data.scalar.length);
+    if (event.data.scalar.style == YAML_PLAIN_SCALAR_STYLE) {
+      if (value.empty() || value == "~" || value == "null") return {};
+      if (const auto number = number_in(value)) return {.kind = Kind::kNumber, .number = *number};
     }
-    return node;
+    return {.kind = Kind::kText, .text = std::string(value)};
   }
 
-  FileNode list(std::string_view text) {
-    std::string all(text);
-    bool open = all.find(']') == all.npos;
-    while (++at_ < lines_.size() && open) {
-      open = line().text.find(']') == std::string_view::npos;
-      (all += ' ') += line().text;
+  FileNode sequence(int depth) {
+    FileNode result{.kind = Kind::kSequence};
+    for (Event event = next(); event && event->type != YAML_SEQUENCE_END_EVENT; event = next()) {
+      result.items.push_back(node(*event, depth + 1));
     }
-    FileNode node{.kind = Kind::kNumbers};
-    std::string_view rest = std::string_view(all).substr(1, all.find(']') - 1);
-    while (!trimmed(rest).empty()) {
-      const std::size_t comma = std::min(rest.find(','), rest.size());
-      node.numbers.push_back(
-          number_in(trimmed(rest.substr(0, comma))).value_or(std::numeric_limits<double>::quiet_NaN()));
-      rest.remove_prefix(std::min(comma + 1, rest.size()));
-    }
-    return node;
+    return result;
   }
 
-  std::vector<Line> lines_;
-  std::size_t at_ = 0;
+  FileNode map(int depth) {
+    FileNode result{.kind = Kind::kMap};
+    for (Event event = next(); event && event->type != YAML_MAPPING_END_EVENT; event = next()) {
+      if (event->type != YAML_SCALAR_EVENT) return refuse(*event, "has a key that is no text"), result;
+      const std::string key(text_of(event->data.scalar.value, event->data.scalar.length));
+      const bool twice = std::ranges::any_of(result.entries, [&](const auto& entry) { return entry.first == key; });
+      if (twice) refuse(*event, key + " is there twice");
+      if (result.entries.size() == kMaxKeys) refuse(*event, "there are too many keys");
+      if (const Event value = next()) result.entries.emplace_back(key, node(*value, depth + 1));
+    }
+    return result;
+  }
+
+  /// Keeps what has a name, for those who repeat it.
+  FileNode keep(const yaml_char_t* anchor, FileNode made) {
+    if (anchor != nullptr) named_.insert_or_assign(name_of(anchor), std::pair(made, size_of(made)));
+    return made;
+  }
+
+  FileNode repeated(const yaml_event_t& event) {
+    const auto found = named_.find(name_of(event.data.alias.anchor));
+    if (found == named_.end()) return refuse(event, "repeats a name that is not there"), FileNode{};
+    const auto& [value, size] = found->second;
+    if (nodes_ += size; nodes_ > kMaxNodes) return refuse(event, "holds too many values for a calibration"), FileNode{};
+    return value;
+  }
+
+  static std::size_t size_of(const FileNode& made) {
+    std::size_t size = 1;
+    for (const FileNode& item : made.items) size += size_of(item);
+    for (const auto& [key, value] : made.entries) size += size_of(value);
+    return size;
+  }
+
+  const std::string text_;
+  yaml_parser_t parser_{};
+  bool begun_ = false;
+  std::size_t nodes_ = 0;
+  std::map<std::string, std::pair<FileNode, std::size_t>> named_;
   std::optional<SyntaxProblem> problem_;
 };
 
@@ -179,8 +197,7 @@ const FileNode* FileNode::find(std::string_view key) const {
 }
 
 tl::expected<FileNode, SyntaxProblem> read_file_tree(std::string_view text) {
-  if (const auto problem = syntax_problem(text)) return tl::unexpected(*problem);
-  return TreeReader(lines_of(text)).read();
+  return TreeReader(text).read();
 }
 
 }  // namespace slsd

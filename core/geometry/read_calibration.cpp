@@ -22,7 +22,7 @@ constexpr double kRotationTolerance = 1e-4;
 void read_pinhole(FileSection& section, const char* key, Lens& lens) {
   const Eigen::Matrix3d matrix = section.matrix3(key);
   if (!(matrix(0, 0) > 0 && matrix(1, 1) > 0 && matrix(0, 0) < kMaxLength && matrix(1, 1) < kMaxLength)) {
-    section.refuse(key, "must have positive focal lengths, in pixels");
+    section.refuse(key, "must have positive focal lengths, in pixels: x points to the right, y down and z forward");
   }
   if (matrix(0, 1) != 0 || matrix(1, 0) != 0) section.refuse(key, "must have no skew");
   if (matrix.row(2) != Eigen::RowVector3d(0, 0, 1)) section.refuse(key, "must have 0 0 1 as its last row");
@@ -51,7 +51,10 @@ Lens read_lens(FileSection& section, const LensKeys& keys) {
                                     " pixels; have the camera bin or crop its images, and calibrate with those");
   }
   read_pinhole(section, keys.matrix, lens);
-  Eigen::Map<Eigen::Matrix<double, 5, 1>>(lens.distortion.data()) = section.vector(keys.distortion, 5);
+  Eigen::Map<Eigen::Matrix<double, 5, 1>>(lens.distortion.data()) =
+      section.vector(keys.distortion, 5,
+                     "slsd takes OpenCV's k1 k2 p1 p2 k3, and no fisheye, rational, thin prism or tilted model; slsd "
+                     "--calibrate makes such a calibration");
   if (!section.error() && !lens.invertible()) {
     section.refuse(keys.distortion,
                    "cannot be inverted over the whole image; calibrate again, with views in the corners");
@@ -63,7 +66,9 @@ RigidTransform read_motion(FileSection& section, const char* rotation_key, const
   RigidTransform motion{section.matrix3(rotation_key), section.vector(translation_key, 3)};
   const Eigen::Matrix3d defect = motion.rotation * motion.rotation.transpose() - Eigen::Matrix3d::Identity();
   if (!(defect.cwiseAbs().maxCoeff() < kRotationTolerance && motion.rotation.determinant() > 0)) {
-    section.refuse(rotation_key, "is not a rotation");
+    const bool mirrors = motion.rotation.determinant() < 0;
+    section.refuse(rotation_key, mirrors ? "is not a rotation but mirrors: one of its axes has the wrong sign"
+                                         : "is not a rotation: its columns must be unit vectors at right angles");
   }
   if (!(motion.translation.cwiseAbs().maxCoeff() < kMaxLength)) section.refuse(translation_key, "is out of range");
   return motion;
@@ -152,7 +157,36 @@ std::optional<Error> read_cameras(const std::vector<FileNode>& items, std::strin
   return std::nullopt;
 }
 
+/// Of which other kind of calibration the file is, and what to do; empty: of none that is known.
+std::string other_kind(const FileNode& root) {
+  constexpr const char* kWanted =
+      ": slsd takes one calibration of camera and projector together, in OpenCV's YAML with k1 k2 p1 p2 k3, which slsd "
+      "--calibrate makes";
+  const bool is_ours = root.find("projector_width") != nullptr || root.find("cameras") != nullptr;
+  if (is_ours) return {};
+  if (root.kind != FileNode::Kind::kMap) return std::string("is no calibration file") + kWanted;
+  const auto has = [&](const char* key) { return root.find(key) != nullptr; };
+  if (has("cam0") || has("cam1")) return std::string("is a calibration of Kalibr") + kWanted;
+  if (has("image_width") && (has("distortion_model") || has("camera_name") || has("projection_matrix"))) {
+    return std::string("is a camera_info file of ROS, of a camera alone") + kWanted;
+  }
+  const bool of_opencv = has("camera_matrix") || has("cameraMatrix") || has("K") || has("M1") || has("K1") ||
+                         has("distortion_coefficients") || has("distCoeffs") || has("D1");
+  return of_opencv ? std::string("is a calibration of cameras alone") + kWanted : std::string();
+}
+
+/// What the file holds that is not read as YAML, by its first character; null if it may be YAML.
+const char* other_syntax(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(" \t\r\n\xef\xbb\xbf");
+  if (first == text.npos) return "nothing";
+  if (text[first] == '<') return "XML";
+  return text[first] == '{' || text[first] == '[' ? "JSON" : nullptr;
+}
+
 Result<Calibration> read_root(const FileNode& root, std::string_view name) {
+  if (const std::string kind = other_kind(root); !kind.empty()) {
+    return fail(ErrorCode::kMalformed, kind, std::string(name));
+  }
   FileSection section(root, {}, std::string(name));
   Calibration calibration;
   calibration.projector = read_lens(section, kProjectorKeys);
@@ -172,6 +206,10 @@ Result<Calibration> read_root(const FileNode& root, std::string_view name) {
 Result<Calibration> read_calibration(std::string_view text, std::string_view name) {
   const std::string where(name);
   if (text.size() > kMaxFileSize) return fail(ErrorCode::kMalformed, "is no calibration file: above 1 MiB", where);
+  if (const char* const what = other_syntax(text)) {
+    return fail(ErrorCode::kMalformed,
+                std::string("holds ") + what + ": slsd takes OpenCV's YAML, which slsd --calibrate makes", where);
+  }
   const auto root = read_file_tree(text);
   if (!root) return fail(ErrorCode::kMalformed, root.error().message, where + ":" + std::to_string(root.error().line));
   return read_root(*root, name);
