@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/calibrate/doubt/rig_outlook.hpp"
+#include "core/geometry/triangulate.hpp"
+
+namespace slsd {
+
+/// What makes a calibration implausible within a range of depths, a sentence for each fault, with what to change.
+/// Empty for any rig that somebody would build. A rig and its mirror image are alike here: only symbols tell them
+/// apart, see symbol_doubt().
+/// @thread reentrant
+[[nodiscard]] std::vector<std::string> calibration_doubts(const Calibration& calibration, const DepthRange& range);
+
+/// Compares a camera's calibration with symbols that were read without it.
+/// @param matches  at least kSymbolsForDoubt; a few of them may be wrong
+/// @param gate_px  how far off their epipolar lines symbols are accepted
+/// @return a sentence that says why they give no points, with what to change; empty if the calibration explains most
+/// @thread reentrant
+[[nodiscard]] std::string symbol_doubt(std::span<const Match> matches, const CameraRig& rig, const DepthRange& range,
+                                       double gate_px);
+inline constexpr std::size_t kSymbolsForDoubt = 24;
+
+}  // namespace slsd

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include "core/calibrate/doubt/misreading.hpp"
+
+namespace slsd {
+
+/// Depths along the camera's z axis between which something may be measured, mm.
+struct DepthRange {
+  double min_mm, max_mm;
+
+  [[nodiscard]] bool holds(double depth_mm) const { return depth_mm >= min_mm && depth_mm <= max_mm; }
+  [[nodiscard]] double middle_mm() const;  ///< by ratio
+};
+
+/// What a rig as calibrated could measure within a range of depths.
+struct RigOutlook {
+  double lit_share;       ///< of the camera's picture, or of the projector's, what the other reaches; at the best depth
+  double baseline_mm;     ///< between the two, across the camera's line of sight
+  double baseline_share;  ///< of the depth in the middle of the range
+  double parallax_px;     ///< from the nearest to the farthest depth, in the projector
+  double sigma_mm;        ///< of a depth in the middle of the range, for a tenth of a pixel of error
+
+  /// How likely such a rig is, as a natural logarithm; 0: as likely as any.
+  [[nodiscard]] double log_likelihood() const;
+};
+
+/// @thread reentrant
+[[nodiscard]] RigOutlook look_at_rig(const CameraRig& rig, const DepthRange& range);
+
+/// How likely the numbers of a lens are, as natural logarithms; 0: as likely as any.
+struct LensLikelihood {
+  double principal_point;
+  double focal_length;
+
+  [[nodiscard]] double sum() const { return principal_point + focal_length; }
+};
+[[nodiscard]] LensLikelihood camera_likelihood(const Lens& lens);
+/// A projector's picture may be shifted up or down by its lens.
+[[nodiscard]] LensLikelihood projector_likelihood(const Lens& lens);
+
+}  // namespace slsd
