@@ -103,7 +103,11 @@ int carry_out(const slsd::CommandLine& line) {
   if (line.list) return slsd::exit_status(slsd::list_devices(line.configuration, line.as_json));
   if (line.check_configuration) return check_configuration(line);
   if (line.check) return slsd::check_everything(line.configuration) ? slsd::kDone : slsd::kFailed;
-  return serve(line.configuration.value_or(slsd::kConfigurationFile));
+  // Of one name for good: a reload compares the paths in it with those of the start.
+  std::error_code ignored;
+  const std::filesystem::path file = line.configuration.value_or(slsd::kConfigurationFile);
+  const auto absolute = std::filesystem::absolute(file, ignored);
+  return serve(absolute.empty() ? file : absolute);
 }
 
 }  // namespace

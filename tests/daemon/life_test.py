@@ -7,13 +7,14 @@ import os
 import resource
 import signal
 import socket
+import subprocess
 import tempfile
 import threading
 import time
 import unittest
 
 from client import Client, RpcError
-from service import Service, slsd, wait_until
+from service import BIN, SCENE, Service, slsd, wait_until
 
 
 class Life(unittest.TestCase):
@@ -159,6 +160,20 @@ class Life(unittest.TestCase):
             service.file.write_text(changed + "clients_max = 7\n[decode]\ndepth_max_mm = 600.0\n", encoding="utf-8")
             self.assertEqual(client.call("reload")[0], {"needs_restart": ["server", "scan"]})
             self.assertEqual(client.call("scan")[0]["points"], 0)
+
+    def test_reload_of_a_relative_file_finds_nothing_changed(self):
+        service = Service()
+        (service.folder / "frames").symlink_to(SCENE)
+        text = service.file.read_text(encoding="utf-8").replace(f"{SCENE}/", "frames/")
+        service.file.write_text(text, encoding="utf-8")
+        with open(service.log, "ab") as log:
+            service.process = subprocess.Popen([BIN / "slsd", "--config", "slsd.toml"], cwd=service.folder, stderr=log)
+        wait_until(lambda: service.socket.exists() or service.process.poll() is not None, "the socket")
+        try:
+            with service.client() as client:
+                self.assertEqual(client.call("reload")[0], {"needs_restart": []})
+        finally:
+            service.stop()
 
     def test_sighup_reloads(self):
         with Service() as service, service.client() as client:
