@@ -76,6 +76,15 @@ std::string unseen_text(const CameraOptions& camera) {
   return text.str();
 }
 
+/// A configuration without the table means a default, which is not a projector that anybody sees.
+std::string projector_text(const Configuration& configuration) {
+  if (!configuration.given.contains("projector"))
+    return "no projector is configured: name its monitor in [projector]\n";
+  const ProjectorOptions& projector = configuration.projector;
+  return "configured projector: driver " + std::string(to_string(projector.driver)) + ", " +
+         size_text(projector.width_px, projector.height_px) + " px\n";
+}
+
 json format_json(const ListedFormat& format) {
   json sizes = json::array();
   for (const auto& [width, height] : format.sizes_px) sizes.push_back({{"width_px", width}, {"height_px", height}});
@@ -203,10 +212,7 @@ Result<> list_devices(const std::optional<std::filesystem::path>& configuration_
     std::cout << devices.dump(2) << "\n";
     return {};
   }
-  const ProjectorOptions& projector = configuration->projector;
-  std::cout << "projector: driver " << to_string(projector.driver) << ", " << projector.width_px << "x"
-            << projector.height_px << " px\n"
-            << monitors.text() << cameras.text();
+  std::cout << projector_text(*configuration) << monitors.text() << cameras.text();
   return {};
 }
 

@@ -253,6 +253,12 @@ class Slsd(unittest.TestCase):
         self.assertEqual(result.returncode, 0)
         self.assertIn('configured camera "camera", driver file: replays', result.stdout)
 
+    def test_list_invents_no_projector(self):
+        for text, first in (("", "no projector is configured"),
+                            ("[projector]\ndriver = 'glfw'\nwidth_px = 640\nheight_px = 480\n", "configured projector: driver glfw, 640x480 px")):
+            self.file.write_text(text, encoding="utf-8")
+            self.assertTrue(slsd("--list", "--config", self.file).stdout.startswith(first))
+
     def test_lists_devices_as_json(self):
         service = Service()
         result = slsd("--list", "--json", "--config", service.file)
