@@ -77,8 +77,10 @@ Result<path> file_to_keep(const CalibrateRequest& request, const Configuration& 
   if (!configuration.calibration_file.empty()) {
     return checked(configuration.calibration_file, "[calibration] file " + configuration.calibration_file.string());
   }
-  return fail(ErrorCode::kInvalidArgument,
-              "nowhere to keep the calibration: name a file by --output, or in [calibration] of the configuration");
+  return fail(
+      ErrorCode::kInvalidArgument,
+      "nowhere to keep the calibration: run slsctl calibrate while the service runs, which keeps it and takes it "
+      "into force; or name a file by --output, or in [calibration] of the configuration");
 }
 
 CalibrateOptions calibrate_options(const Configuration& configuration) {
