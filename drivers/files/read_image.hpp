@@ -19,9 +19,10 @@ struct ReadImageOptions {
   std::size_t limit_decoded_bytes = 1u << 28;  ///< 256 MiB of pixels, as the file's header declares them
 };
 
-/// Turns the bytes of a PNG, TIFF, PGM, PPM or BMP file into grey. Colour becomes 0.299 R + 0.587 G + 0.114 B (ITU-R
-/// BT.601), transparency is ignored, the values are not scaled: 10 bits in a 16-bit file stay below 1024. A file that
-/// ends early is an error and never a half-grey image.
+/// Turns the bytes of a PNG, TIFF, PGM, PPM, BMP or JPEG file into grey. Colour becomes 0.299 R + 0.587 G + 0.114 B
+/// (ITU-R BT.601), transparency is ignored. Values are kept, so that 10 bits in a 16-bit file stay below 1024; PGM and
+/// PPM name their greatest value, and are scaled to the whole range. A file that ends early is an error and never a
+/// half-grey image.
 /// @param name  what the error calls the bytes
 /// @errors kMalformed (empty, cut short, damaged), kUnsupported (another format, or a rare variant of one of these),
 ///         kInvalidArgument (larger than the limits)

@@ -125,10 +125,12 @@ TEST(DecodeImage, SpreadsFewBitsOverAByte) {
 }
 
 TEST(DecodeImage, KeepsTheValuesOfTenBits) {
+  const Samples samples{2, 1, 1, 16, {1023, 5}};
   Grey16 image(2, 1);
   image.at(0, 0) = 1023;
   image.at(1, 0) = 5;
-  EXPECT_EQ(decode_image(std::string("P5 2 1 1023\n\x03\xff\x00\x05", 16), "file"), GreyImage(image));
+  for (const std::string& file : {test::png_bytes(samples), test::tiff_bytes(samples, true), test::pnm_bytes(samples)})
+    EXPECT_EQ(decode_image(file, "file"), GreyImage(image));
 }
 
 TEST(DecodeImage, TurnsMosaicsIntoGreyButNotColours) {
