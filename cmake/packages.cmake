@@ -21,7 +21,7 @@ pkg_check_modules(glfw REQUIRED IMPORTED_TARGET glfw3>=3.3)
 pkg_check_modules(x11 REQUIRED IMPORTED_TARGET x11>=1.7 xext xrandr xcb xcb-present)
 pkg_check_modules(systemd REQUIRED IMPORTED_TARGET libsystemd)
 pkg_check_modules(yaml REQUIRED IMPORTED_TARGET yaml-0.1>=0.2.5)
-pkg_check_modules(v4l REQUIRED IMPORTED_TARGET libv4l2 libv4lconvert)
+pkg_check_modules(v4l REQUIRED IMPORTED_TARGET libv4l2)
 
 # Debian ships OpenCV's CMake package only with all of OpenCV; these are the parts that slsd uses.
 find_path(OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)

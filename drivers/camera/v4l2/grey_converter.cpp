@@ -2,13 +2,12 @@
 // Copyright the slsd authors
 #include "drivers/camera/v4l2/grey_converter.hpp"
 
-#include <libv4lconvert.h>
-#include <linux/videodev2.h>
-
+#include <string>
+#include <utility>
 #include <variant>
 
 #include "drivers/files/bayer.hpp"
-#include "drivers/files/image_formats.hpp"
+#include "drivers/files/jpeg_decoder.hpp"
 
 namespace slsd {
 namespace {
@@ -19,21 +18,14 @@ ImageView<T> view_as(std::span<const std::byte> bytes, const FrameLayout& layout
           static_cast<std::ptrdiff_t>(layout.stride_bytes / sizeof(T))};
 }
 
-v4l2_format format_of(const FrameMode& mode, std::uint32_t fourcc) {
-  v4l2_format format{};
-  format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  format.fmt.pix.width = static_cast<__u32>(mode.width_px);
-  format.fmt.pix.height = static_cast<__u32>(mode.height_px);
-  format.fmt.pix.pixelformat = fourcc;
-  v4lconvert_fixup_fmt(&format);
-  return format;
+std::string size_text(int width_px, int height_px) {
+  return std::to_string(width_px) + "x" + std::to_string(height_px);
 }
 
-// Devices pad what follows the end marker with zeros.
-bool ends_whole(std::span<const std::byte> jpeg) {
-  std::size_t end = jpeg.size();
-  while (end > 0 && jpeg[end - 1] == std::byte{0}) --end;
-  return end >= 4 && jpeg[end - 1] == std::byte{0xd9} && jpeg[end - 2] == std::byte{0xff};
+// What is wrong with one frame may be right with the next.
+tl::unexpected<Error> as_torn(Error error) {
+  if (error.code == ErrorCode::kMalformed) error = {ErrorCode::kFrameTorn, error.message + "; scan again", {}};
+  return tl::unexpected(std::move(error));
 }
 
 GreyImage make_grey(const FrameMode& mode) {
@@ -43,16 +35,8 @@ GreyImage make_grey(const FrameMode& mode) {
 
 }  // namespace
 
-void GreyConverter::Destroy::operator()(v4lconvert_data* convert) const {
-  v4lconvert_destroy(convert);
-}
-
-GreyConverter::GreyConverter(const V4l2Device& device, const FrameLayout& layout)
-    : layout_(layout), grey_(make_grey(layout.mode)), columns_(static_cast<std::size_t>(layout.mode.width_px)) {
-  if (layout.mode.format.layout != GreyLayout::kJpeg) return;
-  colours_.resize(format_of(layout.mode, V4L2_PIX_FMT_RGB24).fmt.pix.sizeimage);
-  convert_.reset(v4lconvert_create(device.descriptor()));
-}
+GreyConverter::GreyConverter(const FrameLayout& layout)
+    : layout_(layout), grey_(make_grey(layout.mode)), columns_(static_cast<std::size_t>(layout.mode.width_px)) {}
 
 Result<GreyView> GreyConverter::convert(std::span<std::byte> bytes) {
   switch (layout_.mode.format.layout) {
@@ -83,22 +67,17 @@ GreyView GreyConverter::take_luma(std::span<const std::byte> bytes, std::size_t 
   return view(grey_);
 }
 
-// By way of colour: libv4lconvert makes YUV 4:2:0 only of heights that 16 divides, which 1080 is not.
-Result<GreyView> GreyConverter::convert_jpeg(std::span<std::byte> bytes) {
-  if (!ends_whole(bytes)) return fail(ErrorCode::kFrameTorn, "a JPEG image was cut short; scan again");
-  const v4l2_format from = format_of(layout_.mode, layout_.mode.format.fourcc);
-  const v4l2_format to = format_of(layout_.mode, V4L2_PIX_FMT_RGB24);
-  const int made =
-      convert_ == nullptr
-          ? -1
-          : v4lconvert_convert(convert_.get(), &from, &to, reinterpret_cast<unsigned char*>(bytes.data()),
-                               static_cast<int>(bytes.size()), colours_.data(), static_cast<int>(colours_.size()));
-  if (made != static_cast<int>(colours_.size())) {
-    return fail(ErrorCode::kFrameTorn, "a JPEG image is damaged; scan again, or choose another format");
-  }
+Result<GreyView> GreyConverter::convert_jpeg(std::span<const std::byte> bytes) {
   auto& grey = std::get<Grey8>(grey_);
-  for (int y = 0; y < grey.height(); ++y)
-    grey_row(colours_.data() + std::size_t{3} * y * grey.width(), 3, grey.row(y), grey.width());
+  JpegDecoder decoder({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  if (auto header = decoder.read_header(); !header) return as_torn(std::move(header.error()));
+  if (decoder.width_px() != grey.width() || decoder.height_px() != grey.height()) {
+    return fail(ErrorCode::kFrameTorn, "a JPEG image of " + size_text(decoder.width_px(), decoder.height_px()) +
+                                           " pixels came, but the camera's format is " +
+                                           size_text(grey.width(), grey.height()) +
+                                           "; choose another size or format if this comes again");
+  }
+  if (auto read = decoder.read_grey(grey); !read) return as_torn(std::move(read.error()));
   return view(grey_);
 }
 

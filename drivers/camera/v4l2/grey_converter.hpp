@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -13,35 +12,27 @@
 #include "drivers/camera/v4l2/frame_layout.hpp"
 #include "drivers/files/grey_image.hpp"
 
-struct v4lconvert_data;
-
 namespace slsd {
 
-/// Turns buffers that are no grey image into one: luma of YUYV and UYVY, Bayer as the file camera does it, MJPG by
-/// libv4lconvert. Allocates nothing after it was made, but for what libv4lconvert does.
+/// Turns buffers that are no grey image into one: luma of YUYV and UYVY, Bayer and MJPG as the file camera does it.
+/// Allocates nothing after it was made, but for MJPG.
 /// @thread thread-bound
 class GreyConverter {
  public:
-  GreyConverter(const V4l2Device& device, const FrameLayout& layout);
+  explicit GreyConverter(const FrameLayout& layout);
 
   /// The frame's grey, valid until the next call.
   /// @param bytes  of a whole frame
-  /// @errors kFrameTorn: a JPEG image that is damaged or cut short
+  /// @errors kFrameTorn: a JPEG image that is damaged, cut short or of another size; kUnsupported: of a rare kind
   [[nodiscard]] Result<GreyView> convert(std::span<std::byte> bytes);
 
  private:
-  [[nodiscard]] Result<GreyView> convert_jpeg(std::span<std::byte> bytes);
+  [[nodiscard]] Result<GreyView> convert_jpeg(std::span<const std::byte> bytes);
   [[nodiscard]] GreyView take_luma(std::span<const std::byte> bytes, std::size_t first);
-
-  struct Destroy {
-    void operator()(v4lconvert_data* convert) const;
-  };
 
   FrameLayout layout_;
   GreyImage grey_;
   std::vector<std::uint32_t> columns_;
-  std::vector<unsigned char> colours_;
-  std::unique_ptr<v4lconvert_data, Destroy> convert_;
 };
 
 /// A view of a buffer that holds a grey image. @param bytes  aligned to two

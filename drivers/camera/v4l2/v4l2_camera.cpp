@@ -71,7 +71,7 @@ Result<> V4l2Camera::configure(V4l2Device device) {
   if (!zero_copy) {
     pool_.emplace(FrameFormat{mode->width_px, mode->height_px, bytes_per_pixel(mode->format.layout)},
                   options_.frames_held_max);
-    converter_.emplace(device, layout_);
+    converter_.emplace(layout_);
   }
   auto stream = V4l2Stream::start(std::move(device), kBuffersBesideHeld + (zero_copy ? options_.frames_held_max : 1));
   if (!stream) return tl::unexpected(stream.error());

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <csetjmp>
+#include <cstdio>  // before jpeglib.h, which needs it
+#include <string_view>
+
+#include <jpeglib.h>
+
+#include "core/image.hpp"
+#include "core/result.hpp"
+
+namespace slsd {
+
+/// Decodes one JPEG image into grey, from a file or a camera, by libjpeg. A picture that lacks any of its data, or has
+/// blocks out of their place, is an error. These are none: bytes after the end marker, bytes before a marker that are
+/// no blocks, Huffman tables left out as in MJPG (the standard's are taken), oddities of headers.
+///
+/// The errors end without a remedy, which the caller knows.
+/// @thread thread-bound
+class JpegDecoder {
+ public:
+  /// @param bytes  outlive this
+  explicit JpegDecoder(std::string_view bytes);
+  JpegDecoder(const JpegDecoder&) = delete;
+  JpegDecoder& operator=(const JpegDecoder&) = delete;
+  ~JpegDecoder();
+
+  /// @errors kMalformed, kUnsupported (a rare kind, with its remedy)
+  [[nodiscard]] Result<> read_header();
+  /// Of the image, after its header was read.
+  [[nodiscard]] int width_px() const { return static_cast<int>(info_.image_width); }
+  [[nodiscard]] int height_px() const { return static_cast<int>(info_.image_height); }
+  [[nodiscard]] bool colour() const { return info_.num_components > 1; }
+  /// Luma, after the header was read.
+  /// @param grey  of the image's size
+  /// @errors kMalformed, kUnsupported
+  [[nodiscard]] Result<> read_grey(Grey8& grey);
+
+ private:
+  /// libjpeg's own errors leave by a long jump.
+  struct Failure {
+    jpeg_error_mgr manager;
+    std::jmp_buf back;
+    int warning;  ///< the first that refuses the picture; 0: none
+    bool extraneous;
+  };
+
+  [[noreturn]] static void leave(j_common_ptr info);
+  static void note(j_common_ptr info, int level);
+  bool parse_header();
+  bool start();
+  bool read_rows(Grey8& grey);
+  [[nodiscard]] Result<> fail_as_told() const;
+
+  std::string_view bytes_;
+  std::string_view scan_;  ///< what follows the header of the first scan
+  Failure failure_{};
+  jpeg_decompress_struct info_{};
+};
+
+}  // namespace slsd
