@@ -8,6 +8,7 @@
 
 #include "daemon/scan/log_field.hpp"
 #include "daemon/scan/message_ids.hpp"
+#include "drivers/camera/file_camera.hpp"
 #include "drivers/system/thread_name.hpp"
 
 namespace slsd {
@@ -23,7 +24,10 @@ constexpr auto kPausePromise = 10s;
 }  // namespace
 
 CameraRunner::CameraRunner(std::unique_ptr<Camera> camera, const ScanOptions& options)
-    : name_(camera->description().name), backoff_(options), camera_(std::move(camera)) {
+    : name_(camera->description().name),
+      replays_(camera->description().driver == FileCameraOptions::kDriver),
+      backoff_(options),
+      camera_(std::move(camera)) {
   const CameraDescription& description = camera_->description();
   status_.name = description.name;
   status_.driver = description.driver;

@@ -71,6 +71,8 @@ class CameraRunner {
   /// How many times it was opened.
   [[nodiscard]] std::uint64_t openings() const;
   [[nodiscard]] const Heartbeat& heartbeat() const { return heartbeat_; }
+  /// Whether it replays recorded images.
+  [[nodiscard]] bool replays() const { return replays_; }
   /// Of a camera that runs freely; 0: of any other.
   [[nodiscard]] double rate_hz() const { return rate_hz_; }
 
@@ -127,6 +129,7 @@ class CameraRunner {
   [[nodiscard]] tl::unexpected<Error> fail_not_ready() const;
 
   std::string name_;
+  bool replays_;
   Backoff backoff_;
   Heartbeat heartbeat_;
   std::atomic<double> rate_hz_{0};

@@ -149,6 +149,10 @@ Result<std::vector<Frame>> Rig::take_set(const Shot& shot) {
   return frames;
 }
 
+bool Rig::only_replays() const {
+  return std::ranges::all_of(cameras_, [](const auto& camera) { return camera->replays() && camera->rate_hz() <= 0; });
+}
+
 Result<FrameSet> Rig::capture(const Patience& patience, Exposure exposure, LightFrames light) {
   const auto begin = steady_clock::now();
   FrameSet set;

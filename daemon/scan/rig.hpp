@@ -42,6 +42,9 @@ class Rig {
   /// When supervise() will have something to do, unless a device is lost; the end of time where it will not.
   [[nodiscard]] MonotonicTime next_change() const { return projection_.next_change(); }
 
+  /// All cameras replay images at the trigger: nothing but the processor limits how often.
+  [[nodiscard]] bool only_replays() const;
+
   /// One frame of each camera. Of cameras that run freely those whose exposures are nearest to one another. Where the
   /// frames of one light are lost and patience says so, they are taken again.
   /// @param exposure  kNext: the frames need not have begun after the call, only after the pattern was visible, and

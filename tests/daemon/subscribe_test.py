@@ -71,6 +71,15 @@ class Subscription(unittest.TestCase):
                 client.receive()
             self.assertGreater(time.monotonic() - begin, 0.9)
 
+    def test_recorded_frames_leave_the_processor_time(self):
+        with Service() as service, service.client() as client:
+            client.call("subscribe")
+            times = [client.receive()[0]["params"]["received_monotonic_us"] for _ in range(8)]
+            self.assertGreater(times[-1] - times[0], 7e5 * 0.9)
+        with Service(camera="rate_hz = 1000") as service, service.client() as client:  # is paced by itself
+            client.call("subscribe")
+            client.receive()
+
     def test_tells_of_failed_scans(self):
         faults = [f"drop@{capture}" for capture in range(2, 200, 2)]  # one may be passed over for a newer cloud
         with Service(camera=f"faults = {faults}") as service, service.client() as client:
