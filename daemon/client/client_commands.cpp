@@ -24,7 +24,7 @@ int print_event(const ClientOptions& options, const json& event) {
   if (options.json) {
     std::cout << to_line(event) << std::flush;
   } else if (event.value("method", "") == "cloud") {
-    std::cout << scan_line(params) << ", " << params.value("lost", 0) << " lost\n" << std::flush;
+    std::cout << scan_line(params) << ", " << params.value("lost", 0) << " lost\n" << empty_line(params) << std::flush;
   } else if (params.contains("error")) {
     std::cout << "scan failed: " << printable(params["error"].value("message", "")) << "\n" << std::flush;
   }

@@ -59,6 +59,7 @@ std::string scans_lines(const json& scans) {
   }
   if (const auto skipped = scans.value("skipped", std::uint64_t{0})) text += fmt::format(", {} skipped", skipped);
   text += '\n';
+  text += empty_line(scans);
   if (scans.contains("last_error") && scans["last_error"].is_object()) {
     text += "last error  " + text_of(scans["last_error"], "message") + "\n";
   }
@@ -157,6 +158,12 @@ std::string scan_line(const json& scan) {
                   scan.value("decode_ms", 0.0), scan.value("latency_ms", 0.0));
   if (scan.contains("saturated")) line += fmt::format(", {} saturated", scan.value("saturated", 0));
   return line;
+}
+
+std::string empty_line(const json& scan) {
+  constexpr std::size_t kLongestReason = 1000;
+  if (!scan.contains("empty") || !scan["empty"].is_string()) return {};
+  return "no points: " + printable(scan["empty"].get<std::string>(), kLongestReason) + "\n";
 }
 
 }  // namespace slsd

@@ -43,4 +43,7 @@ struct Failure {
 /// A scan in one line: "scan 1a2b3c4d-7: 2345 points of 2390 regions, capture 4.2 ms, decode 51.0 ms".
 [[nodiscard]] std::string scan_line(const nlohmann::json& scan);
 
+/// Why a scan, or the last one of status's `scans`, gave no points, in a line; empty if it gave some.
+[[nodiscard]] std::string empty_line(const nlohmann::json& scan);
+
 }  // namespace slsd

@@ -147,7 +147,7 @@ int scan_command(const ClientOptions& options) {
   if (auto written = write_files(options, *answered, as_ply, of_pixels); !written)
     return report(options, written.error());
   const json& result = answered->reply.message["result"];
-  std::cout << (options.json ? to_line(result) : scan_line(result) + "\n");
+  std::cout << (options.json ? to_line(result) : scan_line(result) + "\n" + empty_line(result));
   return kDone;
 }
 

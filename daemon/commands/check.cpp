@@ -111,6 +111,11 @@ class LiveService {
       if (camera.value("name", "") == name) return camera;
     return json::object();
   }
+  /// Why its last scan gave no points; empty: it gave some.
+  [[nodiscard]] std::string why_empty() const {
+    const json empty = status_.value("scans", json::object()).value("empty", json());
+    return empty.is_string() ? printable(empty.get<std::string>(), kLongestProblem) : std::string();
+  }
   [[nodiscard]] std::uint64_t log_lines_dropped() const { return status_.value("log_lines_dropped", std::uint64_t{0}); }
 
  private:
@@ -150,18 +155,24 @@ class Check {
     const auto pattern = configured_pattern(configuration_);
     findings_.note(pattern, "pattern");
     if (pattern) {
+      pattern_ = *pattern;
       for (const std::string& warning :
            symbol_warnings(pattern->options, pattern_scale(calibration_, configuration_.decode)))
         findings_.warn(warning);
     }
-    if (findings_.note(calibration, "calibration") && !calibration_) {
+    if (calibration && !calibration_) {
       findings_.bad("no calibration: name its file as [calibration] file");
+    } else {
+      findings_.note(calibration, "calibration");
     }
     if (configuration_.cameras.empty()) findings_.bad("no camera: add a [[camera]] table to the configuration");
     for (const CameraOptions& camera : configuration_.cameras) check_camera(camera);
     for (const std::string& warning : exposure_warnings(configuration_)) findings_.warn(warning);
     if (pattern && calibration_) {
       const auto setup = ScanSetup::create(configuration_, 1);
+      if (setup) {
+        for (const std::string& doubt : setup->doubts) findings_.warn(doubt);
+      }
       if (findings_.note(setup, "decoder")) check_dense(*setup);
     }
     check_latency();
@@ -197,6 +208,8 @@ class Check {
       findings_.warn("service: " + std::to_string(dropped) +
                      " lines of its log were dropped: whoever reads it is too slow");
     }
+    if (const std::string why = live_->why_empty(); !why.empty())
+      findings_.warn("the last scan gave no points: " + why);
   }
 
   // As the service has it, or will have it when it starts.
@@ -274,6 +287,23 @@ class Check {
     findings_.good(name + " opens");
     const CameraDescription& seen = (*camera)->description();
     check_calibrated(name, options, seen.hardware, seen.width_px, seen.height_px);
+    if (options.replays()) check_symbols(name, options, **camera);
+  }
+
+  // Recorded frames show the pattern; what another camera sees now is up to the service.
+  void check_symbols(const std::string& name, const CameraOptions& options, Camera& camera) {
+    const CalibratedCamera* const known = calibration_ ? calibration_->camera(options.name()) : nullptr;
+    if (known == nullptr || !pattern_) return;
+    const auto frame = camera.capture(std::chrono::steady_clock::now() + kOpenTime);
+    if (!frame) return findings_.warn(name + ": no frame: " + to_string(frame.error()));
+    const auto index = static_cast<std::size_t>(known - calibration_->cameras.data());
+    const DecodeOptions& decode = configuration_.decode;
+    std::size_t read = 0;
+    const std::string doubt = doubt_by_frame(frame->image(), *pattern_, *calibration_, index,
+                                             {decode.depth_min_mm, decode.depth_max_mm}, read);
+    if (!doubt.empty()) return findings_.warn(doubt);
+    if (read >= kSymbolsForDoubt)
+      findings_.good(name + ": its calibration fits the symbols of its first frame, " + std::to_string(read));
   }
 
   [[nodiscard]] std::string advice_for(const Error& error, const CameraOptions& absent) const {
@@ -415,6 +445,7 @@ class Check {
   Configuration configuration_;
   const path& file_;
   Findings& findings_;
+  std::optional<Pattern> pattern_;
   std::optional<Calibration> calibration_;
   std::optional<LiveService> live_;  ///< with this configuration
   bool held_ = false;                ///< the devices, by a service that cannot be asked
@@ -434,10 +465,12 @@ Result<> check_configuration(const std::optional<path>& configuration_file) {
   for (const CameraOptions& options : configuration->cameras) {
     if (const auto camera = make_camera(options); !camera) return tl::unexpected(camera.error());
   }
-  if (const auto setup = ScanSetup::create(*configuration, 1); !setup) return tl::unexpected(setup.error());
+  const auto setup = ScanSetup::create(*configuration, 1);
+  if (!setup) return tl::unexpected(setup.error());
   Findings findings;
   findings.good("configuration " + file.string());
   for (const std::string& warning : exposure_warnings(*configuration)) findings.warn(warning);
+  for (const std::string& doubt : setup->doubts) findings.warn(doubt);
   return {};
 }
 

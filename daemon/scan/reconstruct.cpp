@@ -111,6 +111,16 @@ DenseView measure_pixels(const GreyView& frame, Decoder& decoder, ScanSetup& set
   return view;
 }
 
+// Half of the time that is left; a stream does not wait, as its next cloud has the answer.
+std::string why_empty(const FrameSet& set, const ScanSetup& setup, std::size_t lane, const ScanRequest& request,
+                      const ScanResult& result) {
+  const auto now = steady_clock::now();
+  const MonotonicTime until = request.of_stream || request.deadline < now ? now : now + (request.deadline - now) / 2;
+  std::vector<std::size_t> cameras;
+  for (const Decoder& decoder : setup.lanes[lane]) cameras.push_back(decoder.camera_index());
+  return setup.empty_clouds->explain(setup, set, cameras, result, until);
+}
+
 }  // namespace
 
 std::vector<CloudPoint> stray_symbols(const Decoding& decoding, std::uint8_t camera) {
@@ -166,6 +176,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     result.dense = std::move(dense);
   }
   result.stage_times = clock.times();
+  if (result.cloud.points.empty()) result.empty = why_empty(set, setup, lane, request, result);
   if (!result.cloud.points.empty()) {
     std::vector<double> depths_mm;
     for (const CloudPoint& point : result.cloud.points) depths_mm.push_back(point.z);

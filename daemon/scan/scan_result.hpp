@@ -90,6 +90,7 @@ struct ScanResult {
   Cloud cloud;
   std::shared_ptr<const DenseCloud> dense = {};  ///< a point for each pixel, where it was asked for; shared: as large
                                                  ///< as the frames
+  std::string empty = {};                        ///< why no symbol became a point, in words; empty: some did
   CloudFiles files = {};                         ///< the cloud's, in the formats that were asked for
   LostTries lost = {};
   std::vector<CloudPoint> strays;          ///< symbols that a knocked rig has elsewhere: see stray_symbols()

@@ -229,6 +229,7 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
   if (!setup.calibration) return setup;
   const auto cameras = calibrated_cameras(*setup.calibration, configuration);
   if (!cameras) return tl::unexpected(cameras.error());
+  setup.doubts = calibration_doubts(*setup.calibration, {setup.depth_min_mm, setup.depth_max_mm});
   auto first = make_lane(setup, *cameras, configuration.decode);
   if (!first) return tl::unexpected(first.error());
   for (std::size_t lane = 1; lane < lanes; ++lane) setup.lanes.push_back(another_lane(*first));

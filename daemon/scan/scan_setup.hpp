@@ -19,6 +19,7 @@
 #include "core/result.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/scan/crew.hpp"
+#include "daemon/scan/empty_cloud.hpp"
 #include "daemon/scan/scan_result.hpp"
 
 namespace slsd {
@@ -103,6 +104,8 @@ struct ScanSetup {
   DecodeOptions decode = {};
   std::unique_ptr<DenseMappers> dense = std::make_unique<DenseMappers>();
   std::unique_ptr<Crew> crew = std::make_unique<Crew>(Crew::helpers_here());  ///< helps the lanes
+  std::unique_ptr<EmptyClouds> empty_clouds = std::make_unique<EmptyClouds>();
+  std::vector<std::string> doubts = {};                ///< about the calibration, as calibration_doubts() has them
   double depth_min_mm = DecodeOptions{}.depth_min_mm;  ///< where along the cameras' axes there may be something
   double depth_max_mm = DecodeOptions{}.depth_max_mm;
 

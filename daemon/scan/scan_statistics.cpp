@@ -30,6 +30,7 @@ void ScanStatistics::note(const Result<ScanResult>& scan, std::uint64_t skipped)
   }
   ++totals_.succeeded;
   totals_.points = scan->cloud.points.size();
+  totals_.empty = scan->empty;
   totals_.all_points += totals_.points;
   totals_.lost_tries += scan->lost.count;
   totals_.regions_of_last = scan->regions;

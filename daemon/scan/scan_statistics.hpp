@@ -8,6 +8,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <string>
 
 #include "core/result.hpp"
 #include "daemon/scan/scan_result.hpp"
@@ -38,6 +39,7 @@ struct ScanTotals {
   std::map<ErrorCode, std::uint64_t> failed;
   std::optional<Error> last_error;
   std::uint64_t points = 0;      ///< of the last scan
+  std::string empty;             ///< why the last scan gave no point; empty: it gave some
   std::uint64_t all_points = 0;  ///< of symbols
   std::uint64_t lost_tries = 0;  ///< of the scans that succeeded
   std::array<std::uint64_t, kRegionStatusCount> regions{};

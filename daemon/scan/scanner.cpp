@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "daemon/configuration/settings_over.hpp"
@@ -27,6 +28,7 @@ constexpr auto kStepPromise = 7s;  // waiting goes by steps of a second
 constexpr auto kFreeScanTimeout = 5s;
 constexpr auto kPauseAfterFailure = 500ms;
 constexpr int kFailuresToPause = 2;
+constexpr double kReplayRateHz = 10;  // of recorded frames, if nobody says: else they take a whole processor
 constexpr auto kTryPauseFirst = 5ms;
 constexpr auto kTryPauseLongest = 200ms;
 
@@ -152,7 +154,8 @@ MonotonicTime Scanner::next_wake() const {
 
 void Scanner::scan_freely() {
   const MonotonicTime begin = steady_clock::now();
-  const double rate_hz = free_rate_hz_;
+  const double wanted_hz = free_rate_hz_;
+  const double rate_hz = std::isinf(wanted_hz) && rig_->only_replays() ? kReplayRateHz : wanted_hz;
   ScanRequest request;
   request.deadline = begin + kFreeScanTimeout, request.of_stream = true;
   const auto scan = make_scan(std::move(request), true, {});
@@ -419,6 +422,11 @@ void Scanner::log_outcome(const std::string& scan_id, const Result<ScanResult>& 
     spdlog::debug("scan {}: {} points, capture {:.1f} ms, decode {:.1f} ms, {} lost tries", scan_id,
                   result->cloud.points.size(), milliseconds(result->capture_time), milliseconds(result->decode_time),
                   result->lost.count);
+    if (result->empty.empty()) {
+      empty_told_ = false;
+    } else if (!empty_told_.exchange(true)) {
+      spdlog::warn("scan {}: no points: {}", scan_id, result->empty);
+    }
     if (failures_in_a_row_.exchange(0) == 0) return;
     const MessageId id(MessageId::kScansSucceedAgain);
     return spdlog::info("scan {}: scans succeed again", scan_id);

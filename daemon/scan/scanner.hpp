@@ -157,6 +157,7 @@ class Scanner {
   std::mutex concluding_;  ///< guards skipped_told_, and keeps the log's lines in the order of the totals
   std::uint64_t skipped_told_ = 0;
   std::atomic<int> failures_in_a_row_{0};
+  std::atomic<bool> empty_told_{false};  ///< why the scans give no points
   std::atomic<double> free_rate_hz_{0};  ///< 0: only when asked
   std::atomic<CloudFormats> free_formats_{};
   MonotonicTime next_free_scan_{};

@@ -55,6 +55,7 @@ json totals_json(const ScanTotals& totals) {
               {"decode_ms", duration_json(totals.decode)},
               {"latency_ms", duration_json(totals.latency)},
               {"stages_ms", std::move(stages)}};
+  result["empty"] = totals.empty.empty() ? json() : json(totals.empty);
   result["last_error"] = totals.last_error ? rpc_error(*totals.last_error).to_json() : json();
   return result;
 }
@@ -166,21 +167,18 @@ void add_pixels(const DenseCloud& dense, const ScanResult& scan, json& result) {
   }
   result["pixels"] = std::move(pixels);
   json epipolar = json::array();
-  std::size_t symbols = 0;
   double white_differs = 0;
   for (const DenseView& view : dense.views) {
     epipolar.push_back(rounded(view.epipolar_px));
-    symbols += view.symbols;
     white_differs = std::max(white_differs, view.white_differs);
   }
   result["epipolar_px"] = std::move(epipolar);
   if (scan.dense_saturated) result["white_differs"] = rounded(white_differs);
   if (dense.points() > 0) return;
-  result["empty"] =
-      symbols == 0 ? "no symbol of the pattern was decoded in any frame: look at a picture of one (slsctl preview), "
-                     "whether the projector shows this pattern (slsd --pattern) and the light and focus suffice"
-                   : "symbols were decoded, but around none the surface fits the pattern within the working range: "
-                     "\"pixels\" has the reasons; look at depth_min_mm, depth_max_mm and the calibration";
+  result["empty"] = !scan.empty.empty()
+                        ? scan.empty
+                        : "symbols were decoded, but around none the surface fits the pattern within the working "
+                          "range: \"pixels\" has the reasons; look at depth_min_mm, depth_max_mm and the calibration";
 }
 
 }  // namespace
@@ -202,7 +200,11 @@ json scan_json(const ScanResult& scan, Density density) {
               {"stages_ms", std::move(stages)}};
   if (scan.cloud.sigma_calibration_mm) result["sigma_calibration_mm"] = *scan.cloud.sigma_calibration_mm;
   if (scan.saturated) result["saturated"] = *scan.saturated;
-  if (density == Density::kPixels && scan.dense) add_pixels(*scan.dense, scan, result);
+  if (density == Density::kPixels && scan.dense) {
+    add_pixels(*scan.dense, scan, result);
+  } else if (!scan.empty.empty()) {
+    result["empty"] = scan.empty;
+  }
   result["tries"] = scan.lost.count + 1;
   if (scan.lost.count > 0) {
     json lost = json::array();

@@ -84,6 +84,7 @@ Result<std::unique_ptr<Service>> Service::create(Configuration configuration, co
   if (!setup) return tl::unexpected(setup.error());
   warn_of_symbols(setup->pattern.options, pattern_scale(setup->calibration, configuration.decode));
   for (const std::string& warning : exposure_warnings(configuration)) spdlog::warn("{}", warning);
+  for (const std::string& doubt : setup->doubts) spdlog::warn("{}", doubt);
   if (configuration.decode.density == Density::kPixels && setup->calibration)
     for (const std::string& warning : calibration_error_warnings(*setup->calibration)) spdlog::warn("{}", warning);
   auto rig = std::make_unique<Rig>(std::move(*projector), std::move(cameras), setup->image, configuration.scan);

@@ -75,7 +75,7 @@ class Subscription(unittest.TestCase):
         with Service() as service, service.client() as client:
             client.call("subscribe")
             times = [client.receive()[0]["params"]["received_monotonic_us"] for _ in range(8)]
-            self.assertGreater(times[-1] - times[0], 7e5 * 0.9)
+            self.assertGreater(times[-1] - times[0], 7e5 / 2)
         with Service(camera="rate_hz = 1000") as service, service.client() as client:  # is paced by itself
             client.call("subscribe")
             client.receive()
