@@ -105,7 +105,9 @@ Cloud Cloud::read_ply(Bytes ply, std::string told) {
   };
   const auto is_number = [](const nlohmann::json& value) { return value.is_number(); };
   const auto is_count = [](const nlohmann::json& value) { return value.is_number_unsigned(); };
-  if (of_type("scan", [](const nlohmann::json& value) { return value.is_string(); })) cloud.scan = about["scan"];
+  const auto is_text = [](const nlohmann::json& value) { return value.is_string(); };
+  if (of_type("scan", is_text)) cloud.scan = about["scan"];
+  if (of_type("empty", is_text)) cloud.why_empty = about["empty"];
   if (of_type("lost", is_count)) cloud.lost = about["lost"];
   if (of_type("sigma_calibration_mm", is_number)) cloud.sigma_calibration_mm = about["sigma_calibration_mm"];
   if (of_type("received_monotonic_us", is_count)) {

@@ -130,7 +130,8 @@ class Running : public Bridge {
       options.density = options_.density;
       const client::Cloud cloud = client::Scanner(options_.socket).scan(options);
       publish(cloud);
-      return {true, std::to_string(cloud.size()) + " points, scan " + cloud.scan};
+      const std::string why = cloud.why_empty.empty() ? "" : ": " + cloud.why_empty;
+      return {true, std::to_string(cloud.size()) + " points, scan " + cloud.scan + why};
     } catch (const client::ScannerError& error) {
       say(error.what());
       return {false, (error.name().empty() ? "" : error.name() + ": ") + error.what()};
@@ -158,6 +159,8 @@ class Running : public Bridge {
           state.worse(Level::kError, problem);
       }
       values.emplace_back("scans succeeded", status.value("scans", json::object()).value("succeeded", json(0)).dump());
+      if (const json why = status.value("scans", json::object()).value("empty", json()); why.is_string())
+        state.worse(Level::kWarn, "the last cloud is empty: " + why.get<std::string>());
       if (calibration_text_.empty()) state.worse(Level::kError, "not calibrated");
       if (stale_)
         state.worse(Level::kError, "extrinsics_stale: the scanner was calibrated anew since; measure where it stands");

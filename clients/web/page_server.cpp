@@ -87,7 +87,7 @@ Answer cloud_answer(client::Bytes bytes, const json& about) {
 json brief(const json& about) {
   json result = json::object();
   for (const char* key : {"scan", "time", "points", "density", "capture_ms", "decode_ms", "latency_ms", "lost", "tries",
-                          "saturated", "sigma_calibration_mm", "width_px", "height_px"}) {
+                          "saturated", "sigma_calibration_mm", "width_px", "height_px", "empty"}) {
     if (about.contains(key)) result[key] = about[key];
   }
   return result;

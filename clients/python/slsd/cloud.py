@@ -54,7 +54,14 @@ class Cloud:
         return len(self.points)
 
     def __repr__(self) -> str:
-        return f"<slsd.Cloud {self.description.get('scan', '')}: {len(self)} points>"
+        why = self.why_empty
+        return f"<slsd.Cloud {self.description.get('scan', '')}: {len(self)} points{f': {why}' if why else ''}>"
+
+    @property
+    def why_empty(self) -> str | None:
+        """Why a cloud without a point has none, in words; None if it has some."""
+        why = self.description.get("empty")
+        return None if why is None else str(why)
 
     @property
     def xyz(self) -> npt.NDArray[np.float32]:

@@ -268,7 +268,8 @@ function showCloud(buffer, about) {
   $("cloud-figures").textContent = `${about.points.toLocaleString("en")} points of scan ${about.scan}, ${about.time}` +
     (about.decode_ms !== undefined ? `; decoded in ${about.decode_ms.toFixed(0)} ms` : "") +
     (about.sigma_calibration_mm !== undefined ?
-      `; the calibration may put all of it off by ${about.sigma_calibration_mm.toFixed(2)} mm (one standard deviation)` : "");
+      `; the calibration may put all of it off by ${about.sigma_calibration_mm.toFixed(2)} mm (one standard deviation)` : "") +
+    (about.empty !== undefined ? `. No points: ${about.empty}` : "");
   $("save-ply").disabled = false;
   $("save-pcd").disabled = !view.ply.pcd;
   $("save-hint").hidden = Boolean(view.ply.pcd);

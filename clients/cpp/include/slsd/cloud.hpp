@@ -139,6 +139,7 @@ class Cloud {
 
   std::string description = "{}";  ///< what the service says of the scan, as JSON: docs/protocol.md
   std::string scan;                ///< its id
+  std::string why_empty;           ///< why a cloud without a point has none, in words
   std::uint64_t lost = 0;          ///< clouds that a stream lost since the one before, as it read too slowly
   std::optional<double>
       sigma_calibration_mm;  ///< of the depth, from the calibration alone: it moves all points together
