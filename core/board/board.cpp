@@ -93,4 +93,9 @@ double Board::height_mm() const {
   return (between ? rows + 1 : rows) * pitch_mm;
 }
 
+Eigen::AlignedBox2d Board::sheet_mm() const {
+  const Eigen::Vector2d border(pitch_mm, pitch_mm);
+  return {-border, Eigen::Vector2d(width_mm(), height_mm()) + border};
+}
+
 }  // namespace slsd

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "core/board/marker_family.hpp"
 #include "core/result.hpp"
@@ -51,6 +52,8 @@ struct Board {
   /// What is printed spans x from 0 to this, and y likewise; a white border of a square, at least, belongs around it.
   [[nodiscard]] double width_mm() const;
   [[nodiscard]] double height_mm() const;
+  /// The print with that border.
+  [[nodiscard]] Eigen::AlignedBox2d sheet_mm() const;
 
   friend bool operator==(const Board&, const Board&) = default;
 };

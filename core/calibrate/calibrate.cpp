@@ -65,9 +65,10 @@ Result<> settle(Adjustment& adjustment, Observations& observations, PoseList& po
   return {};
 }
 
-Result<Adjustment> solve(Observations& observations, PoseList& poses) {
+Result<Adjustment> solve(Observations& observations, PoseList& poses, const Eigen::AlignedBox2d& sheet_mm) {
   auto initial = estimate_cameras(observations);
   if (!initial) return tl::unexpected(initial.error());
+  initial->rig.shape.frame = {sheet_mm.center(), 0.5 * sheet_mm.sizes().maxCoeff()};
   for (auto faulty = initial->faulty.rbegin(); faulty != initial->faulty.rend(); ++faulty) {
     poses.leave_out(*faulty, observations, &initial->rig);
   }
@@ -176,6 +177,7 @@ std::vector<ParameterReport> report_parameters(const Adjustment& adjustment, con
   const auto& shared = adjustment.equations().shared;
   for (std::size_t i = 0; i < shared.size(); ++i) {
     const SharedParameter& parameter = shared[i];
+    if (parameter.kind == SharedParameter::Kind::kShape) continue;  // the board's report has it
     const std::string device =
         parameter.device < 0 ? "projector" : observations.cameras[static_cast<std::size_t>(parameter.device)].name;
     out.push_back(
@@ -213,7 +215,8 @@ CalibrationReport file_report(const CalibrationOutcome& outcome, const Adjustmen
 }
 
 CalibrationOutcome report(const Adjustment& adjustment, Observations observations, PoseList& poses,
-                          std::vector<PlaneCheck> planes, const CalibrateOptions& options) {
+                          std::vector<PlaneCheck> planes, const Eigen::AlignedBox2d& sheet_mm,
+                          const CalibrateOptions& options) {
   CalibrationOutcome outcome;
   outcome.planes = std::move(planes);
   outcome.rig = adjustment.rig();
@@ -228,7 +231,10 @@ CalibrationOutcome report(const Adjustment& adjustment, Observations observation
   outcome.depth = depth_uncertainty(
       outcome.rig, adjustment.equations().shared, adjustment.influence(), outcome.symbol_rms_px / std::sqrt(2.0),
       {options.depth_min_mm, std::sqrt(options.depth_min_mm * options.depth_max_mm), options.depth_max_mm});
+  outcome.board =
+      judge_board(outcome.observations, outcome.rig, adjustment.equations().shared, adjustment.influence(), sheet_mm);
   outcome.warnings = adjustment.warnings();
+  std::ranges::copy(board_warnings(outcome.board), std::back_inserter(outcome.warnings));
   if (poses.lacks(PoseSubject::kPlane)) {
     outcome.warnings.push_back("no look at the reference plane could be used, so that the poses alone were");
   }
@@ -249,7 +255,8 @@ Result<CalibrationOutcome> calibrate(Observations observations, const CalibrateO
   poses.leave_views_out(observations);
   std::vector<PoseObservation> planes = set_planes_aside(observations);
   if (auto enough = check_count(observations, poses); !enough) return tl::unexpected(enough.error());
-  auto adjustment = solve(observations, poses);
+  const Eigen::AlignedBox2d sheet_mm = options.sheet_mm.isEmpty() ? seen_of_board(observations) : options.sheet_mm;
+  auto adjustment = solve(observations, poses, sheet_mm);
   if (!adjustment) return tl::unexpected(adjustment.error());
   std::vector<PlaneCheck> checks;
   if (!planes.empty()) {
@@ -257,7 +264,7 @@ Result<CalibrationOutcome> calibrate(Observations observations, const CalibrateO
     if (!checked) return tl::unexpected(checked.error());
     checks = std::move(*checked);
   }
-  return report(*adjustment, std::move(observations), poses, std::move(checks), options);
+  return report(*adjustment, std::move(observations), poses, std::move(checks), sheet_mm, options);
 }
 
 }  // namespace slsd

@@ -6,6 +6,9 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
+
+#include "core/calibrate/judge/board_report.hpp"
 #include "core/calibrate/judge/depth_uncertainty.hpp"
 #include "core/calibrate/judge/pose_list.hpp"
 #include "core/calibrate/judge/reference_plane.hpp"
@@ -20,6 +23,7 @@ namespace slsd {
 struct CalibrateOptions {
   double depth_min_mm = 400;  ///< the working range, in which the depth's uncertainty is foretold
   double depth_max_mm = 2500;
+  Eigen::AlignedBox2d sheet_mm;  ///< the board with its white border, in the board's frame; empty: what is seen of it
 };
 
 struct ParameterReport {
@@ -42,7 +46,8 @@ struct CalibrationOutcome {
   double epipolar_rms_px = 0;                             ///< symbols off their epipolar line, in the projector
   double held_out_corner_px = 0, held_out_symbol_px = 0;  ///< of poses that were left out in turn, in the cameras
   std::vector<DepthUncertainty> depth;                    ///< near, middle, far
-  std::vector<PlaneCheck> planes;                         ///< one to a camera's look at the reference plane
+  BoardReport board;
+  std::vector<PlaneCheck> planes;  ///< one to a camera's look at the reference plane
   std::vector<std::string> warnings;
   Verdict verdict;
 };

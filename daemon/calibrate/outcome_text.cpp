@@ -81,6 +81,7 @@ std::string outcome_text(const CalibrationOutcome& outcome) {
   add_parameters(outcome, text);
   add_errors(outcome, text);
   add_planes(outcome, text);
+  text += "the board: " + board_text(outcome.board) + "\n";
   for (const std::string& warning : outcome.warnings) text += "warning: " + warning + "\n";
   text += fmt::format("verdict: {}\n", to_string(outcome.verdict.grade));
   for (const std::string& reason : outcome.verdict.reasons) text += "  because " + reason + "\n";

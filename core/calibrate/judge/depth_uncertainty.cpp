@@ -23,6 +23,8 @@ double* value_in(RigModel& rig, const SharedParameter& parameter) {
     case SharedParameter::Kind::kMotion:
     case SharedParameter::Kind::kMovedTo:
       return &device.device_from_rig[index];
+    case SharedParameter::Kind::kShape:
+      return &rig.shape.terms_mm[index];
     case SharedParameter::Kind::kScale:
       return &rig.board_scale;
     case SharedParameter::Kind::kStretch:
@@ -76,8 +78,9 @@ std::vector<DepthUncertainty> depth_uncertainty(const RigModel& rig, const std::
     double calibration = 0, noise = 0;
     for (const Match& match : matches) {
       const TriangulatedPoint point = depth_of(match, rig, symbol_sigma_px);
-      Eigen::VectorXd slope(static_cast<Eigen::Index>(shared.size()));
+      Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(shared.size()));
       for (std::size_t i = 0; i < shared.size(); ++i) {
+        if (shared[i].kind == SharedParameter::Kind::kShape) continue;  // it moves no depth by itself
         RigModel changed = rig;
         *value_in(changed, shared[i]) += step_of(shared[i]);
         const double moved = depth_of(match, changed, symbol_sigma_px).point_in_camera.z();

@@ -15,6 +15,12 @@
 namespace slsd {
 namespace {
 
+/// What all poses of the board have alike is no fault of one.
+Eigen::Vector3d off_shape(const Eigen::Vector3d& point, PoseSubject subject, const RigModel& rig) {
+  const double height_mm = subject == PoseSubject::kBoard ? rig.shape.height_mm(point.head<2>()) : 0;
+  return point - height_mm * Eigen::Vector3d::UnitZ();
+}
+
 std::vector<Eigen::Vector3d> points_on_board(const PoseObservation& pose, const RigModel& rig,
                                              const MotionVector& rig_from_board) {
   const RigidTransform board_from_rig = to_motion(rig_from_board).inverse();
@@ -28,7 +34,7 @@ std::vector<Eigen::Vector3d> points_on_board(const PoseObservation& pose, const 
     for (const ProjectedPoint& symbol : view.symbols) {
       const auto solved = triangulate({symbol.camera_px, symbol.projector_px}, camera, projector, 1);
       if (solved.point_in_camera.allFinite())
-        points.push_back(board_from_rig * (rig_from_camera * solved.point_in_camera));
+        points.push_back(off_shape(board_from_rig * (rig_from_camera * solved.point_in_camera), pose.subject, rig));
     }
   }
   return points;

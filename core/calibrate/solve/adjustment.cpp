@@ -53,6 +53,8 @@ bool tighten(const DeviceModel& device, DistortionPrior& prior) {
 }  // namespace
 
 double value_of(const SharedParameter& parameter, const RigModel& rig) {
+  if (parameter.kind == SharedParameter::Kind::kShape)
+    return rig.shape.terms_mm[static_cast<std::size_t>(parameter.index)];
   if (parameter.kind == SharedParameter::Kind::kScale) return rig.board_scale;
   if (parameter.kind == SharedParameter::Kind::kStretch) return rig.board_stretch;
   const DeviceModel& device =
@@ -137,6 +139,7 @@ Result<Adjustment> Adjustment::begin(Observations& observations, RigModel rig) {
     options.cameras.push_back(plausible_distortion(camera.size, camera.lens[0]));
   }
   options.with_symbols = false;
+  options.shape_sigma_mm = plausible_shape(adjustment.rig_.shape.frame);
   if (auto solved = adjust(observations, options, adjustment.rig_); !solved) return tl::unexpected(solved.error());
   if (auto tilted = check_tilts(adjustment.rig_); !tilted) return tl::unexpected(tilted.error());
   adjustment.measure_noise(observations);

@@ -28,6 +28,7 @@ class Problem {
     for (std::size_t i = 0; i < observations.poses.size(); ++i) add_pose(i);
     for (std::size_t i = 0; i < rig.cameras.size(); ++i) add_prior(rig.cameras[i], options.cameras[i]);
     add_prior(rig.projector, options.projector);
+    add_shape_prior();
     hold_constant();
   }
 
@@ -46,6 +47,9 @@ class Problem {
     if (device < 0) return moved ? rig_.moved->projector.data() : rig_.projector.device_from_rig.data();
     const auto camera = static_cast<std::size_t>(device);
     return moved ? rig_.moved->cameras[camera].data() : rig_.cameras[camera].device_from_rig.data();
+  }
+  double* shape_block(PoseSubject subject) {
+    return subject == PoseSubject::kBoard ? rig_.shape.terms_mm.data() : flat_.data();
   }
   double* lit_block(std::size_t pose) {
     const auto own = rig_.rig_from_lit.find(pose);
@@ -71,7 +75,9 @@ class Problem {
       for (MotionVector& camera : rig_.moved->cameras) add(camera.data(), ++group);
       add(rig_.moved->projector.data(), ++group);
     }
-    for (double* print : {&rig_.board_scale, &rig_.board_stretch, &true_scale_, &true_stretch_}) add(print, ++group);
+    for (double* print : {&rig_.board_scale, &rig_.board_stretch, &true_scale_, &true_stretch_,
+                          rig_.shape.terms_mm.data(), flat_.data()})
+      add(print, ++group);
     for (Shift& shift : shifts_) add(shift.data(), ++group);
     return ordering;
   }
@@ -99,6 +105,11 @@ class Problem {
     if (rig_.moved) {
       for (std::size_t i = 0; i < rig_.cameras.size(); ++i) add_moved(rig_.moved->cameras[i], static_cast<int>(i));
       add_moved(rig_.moved->projector, -1);
+    }
+    if (active(rig_.shape.terms_mm.data())) {
+      blocks.push_back(rig_.shape.terms_mm.data());
+      for (std::size_t i = 0; i < kShapeTerms; ++i)
+        parameters.push_back({SharedParameter::Kind::kShape, 0, static_cast<int>(i)});
     }
     const auto add_print = [&](double* block, SharedParameter::Kind kind) {
       if (!active(block)) return;
@@ -132,10 +143,10 @@ class Problem {
     double* const stretch = is_board ? &rig_.board_stretch : &true_stretch_;
     for (const BoardPoint& point : view.corners) {
       if (point.outlying) continue;
-      auto* cost = new CornerResidual(point.camera_px, point.board_mm, sigma_px);
+      auto* cost = new CornerResidual(point.camera_px, point.board_mm, sigma_px, rig_.shape.frame);
       blocks.push_back(problem_.AddResidualBlock(cost, &loss_, camera.lens.data(),
                                                  place_block(static_cast<int>(view.camera), pose), pose_block(pose),
-                                                 scale, stretch));
+                                                 scale, stretch, shape_block(subject)));
       sigmas_px_[pose].push_back(sigma_px);
     }
   }
@@ -147,10 +158,10 @@ class Problem {
       if (point.outlying) continue;
       if (shift == nullptr) shift = add_shift(pose);
       const double sigma_px = point.sigma_px * options_.symbol_sigma_factor * view.symbol_noise;
-      auto* cost = new SymbolResidual(point.camera_px, point.projector_px, sigma_px);
-      blocks.push_back(problem_.AddResidualBlock(cost, &loss_, camera.lens.data(),
-                                                 place_block(static_cast<int>(view.camera), pose),
-                                                 projector.lens.data(), place_block(-1, pose), lit_block(pose), shift));
+      auto* cost = new SymbolResidual(point.camera_px, point.projector_px, sigma_px, rig_.shape.frame);
+      blocks.push_back(problem_.AddResidualBlock(
+          cost, &loss_, camera.lens.data(), place_block(static_cast<int>(view.camera), pose), projector.lens.data(),
+          place_block(-1, pose), lit_block(pose), shift, shape_block(observations_.poses[pose].subject)));
       sigmas_px_[pose].push_back(sigma_px);
     }
   }
@@ -172,6 +183,16 @@ class Problem {
     problem_.AddResidualBlock(new ceres::NormalPrior(in_sigmas, ceres::Vector::Zero(9)), nullptr, device.lens.data());
   }
 
+  void add_shape_prior() {
+    double* const terms = rig_.shape.terms_mm.data();
+    if (!options_.shape_sigma_mm || !problem_.HasParameterBlock(terms)) return;
+    ceres::Matrix in_sigmas = ceres::Matrix::Zero(kShapeTerms, kShapeTerms);
+    for (std::size_t i = 0; i < kShapeTerms; ++i) {
+      in_sigmas(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)) = 1 / (*options_.shape_sigma_mm)[i];
+    }
+    problem_.AddResidualBlock(new ceres::NormalPrior(in_sigmas, ceres::Vector::Zero(kShapeTerms)), nullptr, terms);
+  }
+
   void hold_constant() {
     keep(rig_.cameras[0].device_from_rig.data());
     // Of symbols alone a board may lie anywhere on its plane.
@@ -182,6 +203,8 @@ class Problem {
     }
     if (!options_.scale) keep(&rig_.board_scale);
     if (!options_.stretch) keep(&rig_.board_stretch);
+    if (!options_.shape_sigma_mm) keep(rig_.shape.terms_mm.data());
+    keep(flat_.data());
     keep(&true_scale_);
     keep(&true_stretch_);
   }
@@ -200,6 +223,7 @@ class Problem {
   const BundleOptions& options_;
   RigModel& rig_;
   double true_scale_ = 0, true_stretch_ = 0;  // of the reference plane's print
+  ShapeVector flat_{};                        // of the reference plane
   ceres::HuberLoss loss_{kHuberSigmas};
   ceres::Problem problem_{keeps_loss()};
   std::vector<std::vector<ceres::ResidualBlockId>> residuals_;
@@ -246,6 +270,10 @@ BundleEquations linearise(const Observations& observations, const BundleOptions&
   for (Eigen::Index i = 0; i < columns; ++i) {
     const SharedParameter& parameter = equations.shared[static_cast<std::size_t>(i)];
     const auto index = static_cast<std::size_t>(parameter.index);
+    if (parameter.kind == SharedParameter::Kind::kShape) {
+      equations.prior_weight(i) = std::pow((*options.shape_sigma_mm)[index], -2);
+      equations.prior_pull(i) = rig.shape.terms_mm[index] * equations.prior_weight(i);
+    }
     if (parameter.kind != SharedParameter::Kind::kLens || index < kFirstTerm) continue;
     const auto device = static_cast<std::size_t>(parameter.device);
     const double sigma = (parameter.device < 0 ? options.projector : options.cameras[device])[index - kFirstTerm];

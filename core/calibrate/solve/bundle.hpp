@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -18,6 +19,9 @@ struct BundleOptions {
   bool with_symbols = true;  ///< otherwise the cameras and poses alone are adjusted
   bool scale = false;        ///< whether the board's scale is adjusted too, against that of the reference plane
   bool stretch = false;      ///< whether the board's aspect is adjusted too
+  /// How far the board may be bent before anything of it was seen: one standard deviation of each term of its shape;
+  /// nothing: the shape is held as it is.
+  std::optional<ShapeVector> shape_sigma_mm = {};
   int iterations_max = 60;
   double corner_sigma_px = 0.1;
   double plane_corner_sigma_px = 0.1;  ///< of the reference plane's corners
@@ -58,10 +62,10 @@ struct PoseEquations {
 
 /// One adjusted parameter that all poses share.
 struct SharedParameter {
-  enum class Kind { kLens, kMotion, kMovedTo, kScale, kStretch };
+  enum class Kind { kLens, kMotion, kMovedTo, kShape, kScale, kStretch };
   Kind kind;
   int device;  ///< index of the camera, or -1: the projector
-  int index;   ///< in LensVector or MotionVector
+  int index;   ///< in LensVector, MotionVector or ShapeVector
 };
 
 struct BundleEquations {

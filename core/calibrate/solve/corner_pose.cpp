@@ -21,7 +21,7 @@ RigidTransform refined(const PoseView& view, PoseSubject subject, const RigModel
   std::vector<cv::Point2d> image;
   for (const BoardPoint& corner : view.corners) {
     const Eigen::Vector3d printed = rig.printed_mm(corner.board_mm, subject);
-    board.emplace_back(printed.x(), printed.y(), 0);
+    board.emplace_back(printed.x(), printed.y(), printed.z());
     image.emplace_back(corner.camera_px.x(), corner.camera_px.y());
   }
   const MotionVector begin = to_vector(camera_from_board);

@@ -12,7 +12,6 @@
 #include <fmt/format.h>
 #include <opencv2/calib3d.hpp>
 
-#include "core/calibrate/solve/board_plane.hpp"
 #include "core/calibrate/solve/bundle.hpp"
 #include "core/calibrate/solve/point_residuals.hpp"
 #include "core/calibrate/solve/resection.hpp"
@@ -281,7 +280,8 @@ std::vector<SpacePoint> space_points(const PoseObservation& pose, const RigModel
   const RigidTransform rig_from_board = to_motion(place);
   for (const PoseView& view : pose.views) {
     for (const ProjectedPoint& symbol : view.symbols) {
-      points.push_back({meet_board(rig.cameras[view.camera], rig_from_board, symbol.camera_px), symbol.projector_px});
+      points.push_back(
+          {rig.meet(rig.cameras[view.camera], rig_from_board, symbol.camera_px, pose.subject), symbol.projector_px});
     }
   }
   return points;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/calibrate/solve/board_plane.hpp"
 #include "core/geometry/robust.hpp"
 
 namespace slsd {
@@ -23,9 +22,9 @@ ViewResiduals residuals_of(const PoseView& view, const RigModel& rig, const Moti
     out.corners_px.push_back(camera_lens.project(camera_from_rig * (rig_from_plane * on_board)) - corner.camera_px);
   }
   for (const ProjectedPoint& symbol : view.symbols) {
-    const Eigen::Vector3d lit = meet_board(rig.projector, rig_from_plane, symbol.projector_px);
+    const Eigen::Vector3d lit = rig.meet(rig.projector, rig_from_plane, symbol.projector_px, subject);
     out.symbols_px.push_back(camera_lens.project(camera_from_rig * lit) - symbol.camera_px);
-    const Eigen::Vector3d seen = meet_board(camera, rig_from_plane, symbol.camera_px);
+    const Eigen::Vector3d seen = rig.meet(camera, rig_from_plane, symbol.camera_px, subject);
     out.symbols_projector_px.push_back(projector_lens.project(projector_from_rig * seen) - symbol.projector_px);
   }
   return out;

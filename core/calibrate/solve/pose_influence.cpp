@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
@@ -99,6 +100,8 @@ ParameterNames names_of(const SharedParameter& parameter) {
                                            {"turn_z", "turn about z"},   {"place_x", "place along x"},
                                            {"place_y", "place along y"}, {"place_z", "place along z"}};
   switch (parameter.kind) {
+    case SharedParameter::Kind::kShape:
+      return {fmt::format("board_bend_{}", parameter.index + 1), fmt::format("bend ({})", parameter.index + 1)};
     case SharedParameter::Kind::kScale:
       return {"board_scale", "scale"};
     case SharedParameter::Kind::kStretch:
@@ -121,9 +124,11 @@ std::string short_name_of(const SharedParameter& parameter) {
 
 std::string name_of(const SharedParameter& parameter) {
   using Kind = SharedParameter::Kind;
-  const std::string device = parameter.kind == Kind::kScale || parameter.kind == Kind::kStretch ? "the board's "
-                             : parameter.device < 0                                             ? "the projector's "
-                                                    : "camera " + std::to_string(parameter.device) + "'s ";
+  const std::string device =
+      parameter.kind == Kind::kScale || parameter.kind == Kind::kStretch || parameter.kind == Kind::kShape
+          ? "the board's "
+      : parameter.device < 0 ? "the projector's "
+                             : "camera " + std::to_string(parameter.device) + "'s ";
   return device + names_of(parameter).full;
 }
 

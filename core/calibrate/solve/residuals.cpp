@@ -126,18 +126,21 @@ class Sight {
 bool CornerResidual::Evaluate(const double* const* blocks, double* residual, double** slopes) const {
   const double larger = 1 + blocks[3][0], longer = 1 + blocks[4][0];
   const Turn board(blocks[2]);
-  const Eigen::Vector3d turned =
-      board.matrix().leftCols<2>() * Eigen::Vector2d(board_mm_.x() * larger, board_mm_.y() * larger * longer);
+  const Eigen::Vector2d printed(board_mm_.x() * larger, board_mm_.y() * larger * longer);
+  const ShapeAt shape = shape_at(blocks[5], frame_, printed);
+  const Eigen::Vector3d turned = board.matrix() * Eigen::Vector3d(printed.x(), printed.y(), shape.height_mm);
   const Sight sight(blocks, turned + Eigen::Map<const Eigen::Vector3d>(blocks[2] + 3));
   sight.put_residual(camera_px_, sigma_px_, residual);
   if (slopes == nullptr) return true;
   const Slopes<3> by_point = sight.put_slopes(sigma_px_, slopes);
   Slopes<6> by_board;
   by_board << by_point * board.slopes_at(turned), by_point;
-  const Slopes<2> by_print = by_point * board.matrix().leftCols<2>();
+  const Slopes<1> by_height = by_point * board.matrix().col(2);
+  const Slopes<2> by_print = by_point * board.matrix().leftCols<2>() + by_height * shape.slope.transpose();
   put<6>(slopes, 2, by_board);
   put<1>(slopes, 3, by_print * Eigen::Vector2d(board_mm_.x(), board_mm_.y() * longer));
   put<1>(slopes, 4, by_print * Eigen::Vector2d(0, board_mm_.y() * larger));
+  put<static_cast<int>(kShapeTerms)>(slopes, 5, by_height * shape.by_term);
   return true;
 }
 
@@ -146,26 +149,31 @@ bool SymbolResidual::Evaluate(const double* const* blocks, double* residual, dou
   const Turn turn(blocks[3]), board(blocks[4]);
   const Eigen::Vector2d direction = projector.undistort(projector_px_);
   const Eigen::Vector3d eye = -turn.matrix().transpose() * Eigen::Map<const Eigen::Vector3d>(blocks[3] + 3),
-                        ray = turn.matrix().transpose() * direction.homogeneous(), normal = board.matrix().col(2),
+                        ray = turn.matrix().transpose() * direction.homogeneous(),
                         origin = Eigen::Map<const Eigen::Vector3d>(blocks[4] + 3);
-  const double towards = normal.dot(ray), along = normal.dot(origin - eye) / towards;
-  const Eigen::Vector3d point = eye + along * ray;
+  const Eigen::Matrix3d board_from_rig = board.matrix().transpose();
+  const Eigen::Vector3d on_board = meet_shape(blocks[6], frame_, board_from_rig * (eye - origin), board_from_rig * ray);
+  const Eigen::Vector3d turned = board.matrix() * on_board, point = origin + turned;
   const Sight sight(blocks, point);
   sight.put_residual(camera_px_ - Eigen::Map<const Eigen::Vector2d>(blocks[5]), sigma_px_, residual);
   if (slopes == nullptr) return true;
   const Slopes<3> by_point = sight.put_slopes(sigma_px_, slopes);
-  // Where the ray is shifted or turned the point stays on the plane; where the plane is, on the ray.
+  const ShapeAt shape = shape_at(blocks[6], frame_, on_board.head<2>());
+  const Eigen::Vector3d normal = board.matrix() * Eigen::Vector3d(-shape.slope.x(), -shape.slope.y(), 1);
+  const double towards = normal.dot(ray), along = ray.dot(point - eye) / ray.squaredNorm();
+  // Where the ray is shifted or turned the point stays on the surface; where the surface is, on the ray.
   const Slopes<3> by_shift = by_point - by_point * ray * (normal.transpose() / towards);
   const Slopes<1> by_step = by_point * ray / towards;
   const Slopes<2> by_direction = along * by_shift * turn.matrix().transpose().leftCols<2>();
   Slopes<6> by_place, by_board;
   by_place << by_shift * turn.slopes_back_at(point), -by_shift * turn.matrix().transpose();
-  by_board << by_step * ((origin - point).transpose() * board.slopes_at(normal)), by_step * normal.transpose();
+  by_board << by_step * (normal.transpose() * board.slopes_at(turned)), by_step * normal.transpose();
   put<9>(slopes, 2,
          -by_direction * projector.distort_jacobian(direction).inverse() * slopes_by_lens(projector, direction));
   put<6>(slopes, 3, by_place);
   put<6>(slopes, 4, by_board);
   put<2>(slopes, 5, Slopes<2>::Identity() / sigma_px_);
+  put<static_cast<int>(kShapeTerms)>(slopes, 6, by_step * shape.by_term);
   return true;
 }
 

@@ -5,34 +5,40 @@
 #include <ceres/sized_cost_function.h>
 #include <Eigen/Core>
 
+#include "core/calibrate/solve/board_shape.hpp"
+
 namespace slsd {
 
 /// A point of the board in the camera: where it is seen by the model, less where it was seen, in standard deviations.
 /// The print is larger than it should be by `scale`, and by `stretch` along y. Blocks: the camera's lens and place, the
-/// board's place, scale, stretch.
-class CornerResidual final : public ceres::SizedCostFunction<2, 9, 6, 6, 1, 1> {
+/// board's place, scale, stretch, shape.
+class CornerResidual final : public ceres::SizedCostFunction<2, 9, 6, 6, 1, 1, static_cast<int>(kShapeTerms)> {
  public:
-  CornerResidual(const Eigen::Vector2d& camera_px, const Eigen::Vector2d& board_mm, double sigma_px)
-      : camera_px_(camera_px), board_mm_(board_mm), sigma_px_(sigma_px) {}
+  CornerResidual(const Eigen::Vector2d& camera_px, const Eigen::Vector2d& board_mm, double sigma_px,
+                 const ShapeFrame& frame)
+      : camera_px_(camera_px), board_mm_(board_mm), sigma_px_(sigma_px), frame_(frame) {}
   bool Evaluate(const double* const* blocks, double* residual, double** slopes) const override;
 
  private:
   Eigen::Vector2d camera_px_, board_mm_;
   double sigma_px_;
+  ShapeFrame frame_;
 };
 
-/// A projector pixel in the camera: its ray meets the board's plane, and the camera sees that point. The pixel is
-/// exact; what measures is the camera. Blocks: the camera's lens and place, the projector's lens and place, the board's
-/// place, and by how much all symbols of the view are seen shifted (px of the camera).
-class SymbolResidual final : public ceres::SizedCostFunction<2, 9, 6, 9, 6, 6, 2> {
+/// A projector pixel in the camera: its ray meets the board, and the camera sees that point. The pixel is exact; what
+/// measures is the camera. Blocks: the camera's lens and place, the projector's lens and place, the board's place, by
+/// how much all symbols of the view are seen shifted (px of the camera), and the board's shape.
+class SymbolResidual final : public ceres::SizedCostFunction<2, 9, 6, 9, 6, 6, 2, static_cast<int>(kShapeTerms)> {
  public:
-  SymbolResidual(const Eigen::Vector2d& camera_px, const Eigen::Vector2d& projector_px, double sigma_px)
-      : camera_px_(camera_px), projector_px_(projector_px), sigma_px_(sigma_px) {}
+  SymbolResidual(const Eigen::Vector2d& camera_px, const Eigen::Vector2d& projector_px, double sigma_px,
+                 const ShapeFrame& frame)
+      : camera_px_(camera_px), projector_px_(projector_px), sigma_px_(sigma_px), frame_(frame) {}
   bool Evaluate(const double* const* blocks, double* residual, double** slopes) const override;
 
  private:
   Eigen::Vector2d camera_px_, projector_px_;
   double sigma_px_;
+  ShapeFrame frame_;
 };
 
 }  // namespace slsd

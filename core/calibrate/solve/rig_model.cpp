@@ -34,7 +34,18 @@ Lens to_lens(const LensVector& v, const ImageSize& size) {
 Eigen::Vector3d RigModel::printed_mm(const Eigen::Vector2d& nominal_mm, PoseSubject subject) const {
   if (subject == PoseSubject::kPlane) return {nominal_mm.x(), nominal_mm.y(), 0};
   const double scale = 1 + board_scale;
-  return {scale * nominal_mm.x(), scale * (1 + board_stretch) * nominal_mm.y(), 0};
+  const Eigen::Vector2d printed(scale * nominal_mm.x(), scale * (1 + board_stretch) * nominal_mm.y());
+  return {printed.x(), printed.y(), shape.height_mm(printed)};
+}
+
+Eigen::Vector3d RigModel::meet(const DeviceModel& device, const RigidTransform& rig_from_subject,
+                               const Eigen::Vector2d& pixel, PoseSubject subject) const {
+  const RigidTransform board_from_device =
+      rig_from_subject.inverse().after(to_motion(device.device_from_rig).inverse());
+  const Eigen::Vector3d ray =
+      board_from_device.rotation * to_lens(device.lens, device.size).undistort(pixel).homogeneous();
+  const ShapeVector terms_mm = subject == PoseSubject::kBoard ? shape.terms_mm : ShapeVector{};
+  return rig_from_subject * meet_shape(terms_mm.data(), shape.frame, board_from_device.translation, ray);
 }
 
 RigModel RigModel::as_of(std::size_t pose) const {

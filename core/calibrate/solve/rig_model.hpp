@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/calibrate/observe/observations.hpp"
+#include "core/calibrate/solve/board_shape.hpp"
 #include "core/geometry/calibration.hpp"
 
 namespace slsd {
@@ -45,13 +46,17 @@ struct RigModel {
   double board_stretch = 0;                  ///< by how much the print is longer along y than it should be against x
   double board_scale = 0;                    ///< by how much the board's print is larger than it should be, by the
                                              ///< reference plane's measure
+  BoardShape shape;                          ///< of the board; the reference plane is taken for flat
   std::optional<MovedDevices> moved;         ///< nothing: the session is one rig
   std::map<std::size_t, MotionVector>
       rig_from_lit;  ///< of poses whose symbols lie on a plane of their own, where it is
 
-  /// Where a point is on the print: on that of the board with its scale and stretch.
+  /// Where a point is on the print: on that of the board with its scale, stretch and shape.
   /// @param nominal_mm  where it should be
   [[nodiscard]] Eigen::Vector3d printed_mm(const Eigen::Vector2d& nominal_mm, PoseSubject subject) const;
+  /// Where a device's pixel meets what is shown, mm in the rig's frame.
+  [[nodiscard]] Eigen::Vector3d meet(const DeviceModel& device, const RigidTransform& rig_from_subject,
+                                     const Eigen::Vector2d& pixel, PoseSubject subject) const;
   /// The rig as it was at a pose.
   [[nodiscard]] RigModel as_of(std::size_t pose) const;
   [[nodiscard]] Calibration calibration(const std::vector<NamedCamera>& names) const;

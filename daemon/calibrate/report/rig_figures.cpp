@@ -19,6 +19,7 @@ constexpr double kRigPx = 460;
 constexpr double kAbovePx = -8;  // of a label's foot from its dot
 constexpr double kBelowPx = 16;
 constexpr double kNamePx = 60, kLinePx = 13;  // a device's name: about so wide, and so high
+constexpr double kFlatMm = 0.1;               // of a board, what is drawn in full colour
 constexpr double kDeviceMm = 120;             // how far before a device its image is drawn
 
 using Quad = std::array<Eigen::Vector3d, 4>;
@@ -137,6 +138,35 @@ std::string poses_from_above(const CalibrationOutcome& outcome) {
 
 std::string poses_from_the_right(const CalibrationOutcome& outcome) {
   return poses_figure(outcome, from_the_right(), "from its right side: the rig looks to the right");
+}
+
+std::string board_figure(const CalibrationOutcome& outcome) {
+  constexpr int kAcross = 28;
+  const BoardReport& board = outcome.board;
+  if (board.sheet_mm.isEmpty()) return {};
+  const int down = std::max(1, static_cast<int>(kAcross * board.sheet_mm.sizes().y() / board.sheet_mm.sizes().x()));
+  const Eigen::Vector2d cell = board.sheet_mm.sizes().cwiseQuotient(Eigen::Vector2d(kAcross, down));
+  const auto first_of = [&](int column, int row) -> Eigen::Vector2d {
+    return board.sheet_mm.min() + cell.cwiseProduct(Eigen::Vector2d(column, row));
+  };
+  std::vector<double> heights;
+  for (int i = 0; i < kAcross * down; ++i) {
+    heights.push_back(board.shape.height_mm(first_of(i % kAcross, i / kAcross) + 0.5 * cell));
+  }
+  const auto [lowest, highest] = std::ranges::minmax(heights);
+  const double middle = 0.5 * (lowest + highest), half = std::max(0.5 * (highest - lowest), kFlatMm);
+  SvgFigure figure(board.sheet_mm.min(), board.sheet_mm.max(), kRigPx);
+  for (int i = 0; i < kAcross * down; ++i) {
+    const double share = (heights[static_cast<std::size_t>(i)] - middle) / half;
+    const Eigen::Vector2d first = first_of(i % kAcross, i / kAcross);
+    figure.rectangle(first, first + cell,
+                     fmt::format("hsl({}, 70%, {:.0f}%)", share < 0 ? 215 : 10, 97 - 45 * std::abs(share)));
+  }
+  figure.frame();
+  return figure.str(fmt::format(
+      "The board's shape as seen from the front: blue lies {:.2f} mm nearer to the viewer than the middle of all "
+      "heights, red {:.2f} mm farther",
+      half, half));
 }
 
 std::string depth_figure(const CalibrationOutcome& outcome) {

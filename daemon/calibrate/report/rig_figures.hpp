@@ -13,6 +13,11 @@ namespace slsd {
 [[nodiscard]] std::string poses_from_above(const CalibrationOutcome& outcome);
 [[nodiscard]] std::string poses_from_the_right(const CalibrationOutcome& outcome);
 
+/// The board's shape: how far each place lies off the board's plane.
+/// @return empty where nothing of the board was seen
+/// @thread reentrant
+[[nodiscard]] std::string board_figure(const CalibrationOutcome& outcome);
+
 /// How far a depth may be off, over the working range.
 /// @return empty where it is not known
 /// @thread reentrant

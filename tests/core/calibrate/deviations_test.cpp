@@ -14,6 +14,7 @@
 
 #include "core/calibrate/calibrate.hpp"
 #include "core/geometry/triangulate.hpp"
+#include "tests/core/calibrate/some_rig.hpp"
 #include "tests/core/calibrate/synthetic_rig.hpp"
 
 namespace slsd {
@@ -28,32 +29,6 @@ struct Ratios {
   [[nodiscard]] double rms() const { return std::sqrt(squares / count); }
 };
 
-/// A rig unlike others: focal lengths, distortions and baseline of its own.
-RigModel some_rig(std::mt19937& random) {
-  const auto uniform = [&](double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random);
-  };
-  const auto lens = [&](double focal, double cx, double cy) {
-    const double k1 = uniform(-0.32, 0.08);
-    return LensVector{focal * uniform(0.8, 1.2),
-                      0,
-                      cx + uniform(-15, 15),
-                      cy + uniform(-15, 15),
-                      k1,
-                      -0.7 * k1 * uniform(0, 1.3),
-                      uniform(-0.0015, 0.0015),
-                      uniform(-0.0015, 0.0015),
-                      0.3 * k1 * uniform(0, 1)};
-  };
-  RigModel rig = true_rig();
-  rig.cameras[0].lens = lens(3300, 800, 600), rig.projector.lens = lens(2500, 640, 436);
-  rig.cameras[0].lens[1] = rig.cameras[0].lens[0] * uniform(0.999, 1.001);
-  rig.projector.lens[1] = rig.projector.lens[0] * uniform(0.999, 1.001);
-  const double share = uniform(0.6, 1.8);
-  rig.projector.device_from_rig[1] *= share, rig.projector.device_from_rig[3] *= share;
-  return rig;
-}
-
 void thin(Observations& observations, std::size_t corner_step, std::size_t symbol_step) {
   const auto keep = [](auto& points, std::size_t step) {
     std::size_t i = 0;
@@ -62,16 +37,6 @@ void thin(Observations& observations, std::size_t corner_step, std::size_t symbo
   for (PoseObservation& pose : observations.poses) {
     keep(pose.views[0].corners, corner_step), keep(pose.views[0].symbols, symbol_step);
   }
-}
-
-double truth_of(const ParameterReport& parameter, const RigModel& truth) {
-  const DeviceModel& device = parameter.device == "projector" ? truth.projector : truth.cameras[0];
-  for (std::size_t i = 0; i < device.lens.size(); ++i) {
-    if (kLensParameterNames[i] == parameter.name) return device.lens[i];
-  }
-  const std::map<std::string, std::size_t> motion{{"turn_x", 0},  {"turn_y", 1},  {"turn_z", 2},
-                                                  {"place_x", 3}, {"place_y", 4}, {"place_z", 5}};
-  return device.device_from_rig[motion.at(parameter.name)];
 }
 
 /// Where the calibration puts a point of the truth in the middle of the picture, in depths too much, mm.

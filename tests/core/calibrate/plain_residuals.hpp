@@ -49,16 +49,26 @@ void camera_residual(const T* lens, const T* camera_from_rig, const Eigen::Matri
   residual[1] = (pixel.y() - seen_px.y()) / sigma_px;
 }
 
-/// A point of the board in the camera. The print is larger than it should be by `scale`, and by `stretch` along y.
+template <class T>
+T height(const T* shape, const ShapeFrame& frame, const T& x, const T& y) {
+  const T u = (x - frame.middle_mm.x()) / frame.half_mm, v = (y - frame.middle_mm.y()) / frame.half_mm;
+  return shape[0] * u * u + shape[1] * u * v + shape[2] * v * v + shape[3] * u * u * u + shape[4] * u * u * v +
+         shape[5] * u * v * v + shape[6] * v * v * v + shape[7] * u * u * u * u + shape[8] * u * u * u * v +
+         shape[9] * u * u * v * v + shape[10] * u * v * v * v + shape[11] * v * v * v * v;
+}
+
+/// A point of the board in the camera. The print is larger than it should be by `scale`, and by `stretch` along y; the
+/// board is bent.
 struct CornerResidual {
   Eigen::Vector2d camera_px, board_mm;
   double sigma_px;
+  ShapeFrame frame;
 
   template <class T>
   bool operator()(const T* lens, const T* camera_from_rig, const T* rig_from_board, const T* scale, const T* stretch,
-                  T* residual) const {
+                  const T* shape, T* residual) const {
     const T x = board_mm.x() * (1.0 + scale[0]), y = board_mm.y() * (1.0 + scale[0]) * (1.0 + stretch[0]);
-    const Eigen::Matrix<T, 3, 1> on_board(x, y, T(0));
+    const Eigen::Matrix<T, 3, 1> on_board(x, y, height(shape, frame, x, y));
     camera_residual(lens, camera_from_rig, moved(rig_from_board, on_board), camera_px, sigma_px, residual);
     return true;
   }
@@ -85,22 +95,31 @@ Eigen::Matrix<T, 2, 1> undistort(const T* lens, const Eigen::Vector2d& pixel) {
   return direction.cast<T>() - step.cast<T>() * error;
 }
 
-/// A projector pixel in the camera: its ray meets the board's plane, and the camera sees that point. The pixel is
-/// exact; what measures is the camera, which sees all symbols of a view shifted.
+/// A projector pixel in the camera: its ray meets the bent board, and the camera sees that point. The pixel is exact;
+/// what measures is the camera, which sees all symbols of a view shifted.
 struct SymbolResidual {
   Eigen::Vector2d camera_px, projector_px;
   double sigma_px;
+  ShapeFrame frame;
 
   template <class T>
   bool operator()(const T* camera, const T* camera_from_rig, const T* projector, const T* projector_from_rig,
-                  const T* rig_from_board, const T* shift_px, T* residual) const {
+                  const T* rig_from_board, const T* shift_px, const T* shape, T* residual) const {
     using Vector = Eigen::Matrix<T, 3, 1>;
     const Eigen::Matrix<T, 2, 1> pixel = undistort(projector, projector_px);
     const Vector eye = moved_back(projector_from_rig, Vector(T(0), T(0), T(0)));
     const Vector ray = moved_back(projector_from_rig, Vector(pixel.x(), pixel.y(), T(1))) - eye;
-    const Vector origin = Eigen::Map<const Vector>(rig_from_board + 3);
-    const Vector normal = moved(rig_from_board, Vector(T(0), T(0), T(1))) - origin;
-    const T along = normal.dot(origin - eye) / normal.dot(ray);
+    const Vector from = moved_back(rig_from_board, eye), towards = moved_back(rig_from_board, Vector(eye + ray)) - from;
+    // Each round of the secant method brings the value nearer and carries the derivatives.
+    T before = -from.z() / towards.z(), along = before * 1.0001;
+    const auto off = [&](const T& at) {
+      const Vector point = from + at * towards;
+      return height(shape, frame, point.x(), point.y()) - point.z();
+    };
+    for (int round = 0; round < 12 && value_of(off(along)) != value_of(off(before)); ++round) {
+      const T next = along - off(along) * (along - before) / (off(along) - off(before));
+      before = along, along = next;
+    }
     camera_residual(camera, camera_from_rig, Vector(eye + along * ray), camera_px, sigma_px, residual);
     for (int i = 0; i < 2; ++i) residual[i] += shift_px[i] / sigma_px;
     return true;

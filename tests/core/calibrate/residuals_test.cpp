@@ -77,17 +77,22 @@ RC_GTEST_PROP(Residuals, HaveTheSlopesThatCeresFindsByItself, ()) {
   const double scale = between(-30, 30) / 1e3, stretch = between(-30, 30) / 1e3, sigma_px = between(1, 100) / 100.0;
   const std::array<double, 2> shift_px{between(-100, 100) / 1e3, between(-100, 100) / 1e3};
   const Eigen::Vector2d seen_px(between(100, 900), between(100, 700)), other(between(350, 650), between(250, 550));
-  const ceres::AutoDiffCostFunction<test::CornerResidual, 2, 9, 6, 6, 1, 1> corner(
-      new test::CornerResidual{seen_px, other, sigma_px});
-  const std::vector<const double*> of_corner{camera.data(), camera_place.data(), board.data(), &scale, &stretch};
-  RC_ASSERT(relative(evaluated(CornerResidual(seen_px, other, sigma_px), of_corner), evaluated(corner, of_corner)) <
-            1e-8);
-  const ceres::AutoDiffCostFunction<test::SymbolResidual, 2, 9, 6, 9, 6, 6, 2> symbol(
-      new test::SymbolResidual{seen_px, other, sigma_px});
-  const std::vector<const double*> of_symbol{camera.data(),          camera_place.data(), projector.data(),
-                                             projector_place.data(), board.data(),        shift_px.data()};
-  RC_ASSERT(relative(evaluated(SymbolResidual(seen_px, other, sigma_px), of_symbol), evaluated(symbol, of_symbol)) <
-            1e-7);
+  const ShapeFrame frame{{double(between(-50, 250)), double(between(-50, 150))}, double(between(80, 300))};
+  ShapeVector shape;
+  for (double& term : shape) term = between(-100, 100) / 1e2;
+  const ceres::AutoDiffCostFunction<test::CornerResidual, 2, 9, 6, 6, 1, 1, 12> corner(
+      new test::CornerResidual{seen_px, other, sigma_px, frame});
+  const std::vector<const double*> of_corner{camera.data(), camera_place.data(), board.data(), &scale,
+                                             &stretch,      shape.data()};
+  RC_ASSERT(relative(evaluated(CornerResidual(seen_px, other, sigma_px, frame), of_corner),
+                     evaluated(corner, of_corner)) < 1e-8);
+  const ceres::AutoDiffCostFunction<test::SymbolResidual, 2, 9, 6, 9, 6, 6, 2, 12> symbol(
+      new test::SymbolResidual{seen_px, other, sigma_px, frame});
+  const std::vector<const double*> of_symbol{
+      camera.data(), camera_place.data(), projector.data(), projector_place.data(),
+      board.data(),  shift_px.data(),     shape.data()};
+  RC_ASSERT(relative(evaluated(SymbolResidual(seen_px, other, sigma_px, frame), of_symbol),
+                     evaluated(symbol, of_symbol)) < 1e-7);
 }
 
 TEST(SymbolResidual, IsZeroForWhatTheRigSees) {
@@ -102,9 +107,10 @@ TEST(SymbolResidual, IsZeroForWhatTheRigSees) {
     for (const ProjectedPoint& symbol : seen.poses[i].views[0].symbols) {
       double residual[2];
       const double unshifted[2] = {0, 0};
-      test::SymbolResidual{symbol.camera_px, symbol.projector_px, 1}(
+      const ShapeVector flat{};
+      test::SymbolResidual{symbol.camera_px, symbol.projector_px, 1, {}}(
           rig.cameras[0].lens.data(), rig.cameras[0].device_from_rig.data(), rig.projector.lens.data(),
-          rig.projector.device_from_rig.data(), poses[i].data(), unshifted, residual);
+          rig.projector.device_from_rig.data(), poses[i].data(), unshifted, flat.data(), residual);
       EXPECT_LT(std::hypot(residual[0], residual[1]), 1e-9);
     }
   }
@@ -113,8 +119,10 @@ TEST(SymbolResidual, IsZeroForWhatTheRigSees) {
 TEST(Linearise, HasTheDerivativesOfFiniteDifferences) {
   RigModel rig = true_rig();
   rig.rig_from_board = true_poses(2);
+  rig.shape = {{{225, 150}, 225}, {1.5, -0.5, 0.8, 0.2, -0.1, 0.1, 0.2, -0.2, 0.1, 0.3, 0.1, 0.2}};
   const Observations seen = see(rig, rig.rig_from_board, {.seed = 3});
   BundleOptions options;
+  options.shape_sigma_mm = plausible_shape(rig.shape.frame);
   options.cameras.assign(1, kUsualDistortion);
   options.corner_sigma_px = 1, options.symbol_sigma_factor = 20;  // so wide that no residual is weighed down
   const BundleEquations equations = linearise(seen, options, rig);
@@ -124,8 +132,9 @@ TEST(Linearise, HasTheDerivativesOfFiniteDifferences) {
     DeviceModel& device = parameter.device < 0 ? changed.projector : changed.cameras[0];
     const auto index = static_cast<std::size_t>(parameter.index);
     const bool lens = parameter.kind == SharedParameter::Kind::kLens;
-    const double step = (lens && index < 4) || (!lens && index > 2) ? 1e-3 : lens ? 1e-5 : 1e-7;
-    (lens ? device.lens[index] : device.device_from_rig[index]) += step;
+    const bool shape = parameter.kind == SharedParameter::Kind::kShape;
+    const double step = shape ? 1e-3 : (lens && index < 4) || (!lens && index > 2) ? 1e-3 : lens ? 1e-5 : 1e-7;
+    (shape ? changed.shape.terms_mm[index] : lens ? device.lens[index] : device.device_from_rig[index]) += step;
     const BundleEquations moved = linearise(seen, options, changed);
     const Eigen::VectorXd difference = (moved.poses[0].residuals - equations.poses[0].residuals) / step;
     const Eigen::VectorXd slope = equations.poses[0].by_shared.col(static_cast<Eigen::Index>(i));

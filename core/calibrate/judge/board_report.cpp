@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/judge/board_report.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "core/calibrate/solve/point_residuals.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr double kBentSigmas = 5;
+constexpr double kBentShare = 3e-4;     // of the size: 0.1 mm of A4
+constexpr double kFarBentShare = 6e-3;  // beyond this a print is no longer a smooth surface
+constexpr double kToldShare = 1e-3;     // of the size: a deviation beyond this tells nothing
+constexpr double kUnevenTimes = 5, kUnevenShare = 3e-5;
+constexpr char kMount[] = "mount the print on glass or an aluminium composite plate";
+
+constexpr int kPlacesAcross = 8, kPlacesDown = 6;
+constexpr std::size_t kPosesOfPlace = 4;  // of fewer their scatter tells little
+
+/// Where a shape is lowest and highest.
+struct Extremes {
+  Eigen::Vector2d lowest, highest;
+};
+
+Extremes extremes_of(const BoardShape& shape, const Eigen::AlignedBox2d& sheet) {
+  constexpr int kSteps = 24;
+  Extremes extremes{sheet.min(), sheet.min()};
+  for (int i = 0; i <= kSteps; ++i) {
+    for (int j = 0; j <= kSteps; ++j) {
+      const Eigen::Vector2d at = sheet.min() + Eigen::Vector2d(i, j).cwiseProduct(sheet.sizes()) / kSteps;
+      if (shape.height_mm(at) < shape.height_mm(extremes.lowest)) extremes.lowest = at;
+      if (shape.height_mm(at) > shape.height_mm(extremes.highest)) extremes.highest = at;
+    }
+  }
+  return extremes;
+}
+
+/// Heights that one pose says of a place: their sum and that of their weights.
+struct Heights {
+  double sum = 0, weight = 0;
+};
+using HeightMap = std::array<Heights, kPlacesAcross * kPlacesDown>;
+
+/// A residual over how it changes as the board is raised: how much higher the board must be for the point to be where
+/// it was seen.
+void add_height(const Eigen::Vector2d& residual, const Eigen::Vector2d& raised, double sigma_px, Heights& heights) {
+  const Eigen::Vector2d slope = (raised - residual) / sigma_px;
+  heights.sum -= slope.dot(residual) / sigma_px;
+  heights.weight += slope.squaredNorm();
+}
+
+/// By how much each place of the board is seen off the shape.
+HeightMap heights_of(const PoseObservation& pose, const RigModel& rig, const MotionVector& rig_from_board,
+                     const Eigen::AlignedBox2d& sheet) {
+  const RigidTransform place = to_motion(rig_from_board);
+  RigidTransform raised = place;
+  raised.translation += place.rotation.col(2);  // by 1 mm
+  HeightMap map;
+  const auto at = [&](const Eigen::Vector2d& board_mm) -> Heights& {
+    const Eigen::Vector2d share = (board_mm - sheet.min()).cwiseQuotient(sheet.sizes());
+    const int column = std::clamp(static_cast<int>(share.x() * kPlacesAcross), 0, kPlacesAcross - 1);
+    const int row = std::clamp(static_cast<int>(share.y() * kPlacesDown), 0, kPlacesDown - 1);
+    return map[static_cast<std::size_t>(row * kPlacesAcross + column)];
+  };
+  for (const PoseView& view : pose.views) {
+    const ViewResiduals residuals = residuals_of(view, rig, rig_from_board, pose.subject),
+                        after = residuals_of(view, rig, to_vector(raised), pose.subject);
+    const double corner_sigma_px = std::max(rms_px(residuals.corners_px), 1e-3),
+                 symbol_sigma_px = std::max(rms_px(residuals.symbols_px), 1e-3);
+    for (std::size_t i = 0; i < view.corners.size(); ++i) {
+      if (view.corners[i].outlying) continue;
+      add_height(residuals.corners_px[i], after.corners_px[i], corner_sigma_px, at(view.corners[i].board_mm));
+    }
+    for (std::size_t i = 0; i < view.symbols.size(); ++i) {
+      if (view.symbols[i].outlying) continue;
+      const Eigen::Vector3d seen =
+          place.inverse() * rig.meet(rig.cameras[view.camera], place, view.symbols[i].camera_px, pose.subject);
+      add_height(residuals.symbols_px[i], after.symbols_px[i], symbol_sigma_px, at(seen.head<2>()));
+    }
+  }
+  return map;
+}
+
+/// What is left at each place in all poses alike: against how far the poses scatter there, which is the measure of
+/// chance whatever the noise is like.
+void judge_relief(const Observations& observations, const RigModel& rig, BoardReport& board) {
+  std::vector<HeightMap> poses;
+  for (std::size_t i = 0; i < observations.poses.size(); ++i) {
+    if (observations.poses[i].subject != PoseSubject::kBoard) continue;
+    poses.push_back(heights_of(observations.poses[i], rig, rig.rig_from_board[i], board.sheet_mm));
+  }
+  double squares = 0, chance = 0, places = 0;
+  for (std::size_t place = 0; place < HeightMap().size(); ++place) {
+    std::vector<double> heights;
+    for (const HeightMap& pose : poses) {
+      if (pose[place].weight > 0) heights.push_back(pose[place].sum / pose[place].weight);
+    }
+    if (heights.size() < kPosesOfPlace) continue;
+    const auto count = static_cast<double>(heights.size());
+    double mean = 0, scatter = 0;
+    for (const double height : heights) mean += height / count;
+    for (const double height : heights) scatter += (height - mean) * (height - mean) / (count - 1);
+    squares += mean * mean, chance += scatter / count, places += 1;
+  }
+  if (places < 1 || !(chance > 0)) return;
+  board.uneven_times = squares / chance;
+  board.uneven_mm = std::sqrt(std::max(squares - chance, 0.0) / places);
+}
+
+}  // namespace
+
+bool BoardReport::is_bent() const {
+  return bend_mm > std::max(kBentSigmas * bend_sigma_mm, kBentShare * size_mm());
+}
+
+bool BoardReport::is_told() const {
+  return bend_sigma_mm <= kToldShare * size_mm();
+}
+
+bool BoardReport::is_uneven() const {
+  return uneven_times > kUnevenTimes && uneven_mm > kUnevenShare * size_mm();
+}
+
+Eigen::AlignedBox2d seen_of_board(const Observations& observations) {
+  Eigen::AlignedBox2d box;
+  for (const PoseObservation& pose : observations.poses) {
+    if (pose.subject != PoseSubject::kBoard) continue;
+    for (const PoseView& view : pose.views) {
+      for (const BoardPoint& corner : view.corners) box.extend(corner.board_mm);
+    }
+  }
+  return box;
+}
+
+BoardReport judge_board(const Observations& observations, const RigModel& rig,
+                        const std::vector<SharedParameter>& shared, const PoseInfluence& influence,
+                        const Eigen::AlignedBox2d& sheet_mm) {
+  BoardReport board{.sheet_mm = sheet_mm, .shape = rig.shape};
+  if (sheet_mm.isEmpty()) return board;
+  const Extremes extremes = extremes_of(rig.shape, sheet_mm);
+  const ShapeAt lowest = shape_at(rig.shape.terms_mm.data(), rig.shape.frame, extremes.lowest),
+                highest = shape_at(rig.shape.terms_mm.data(), rig.shape.frame, extremes.highest);
+  board.bend_mm = highest.height_mm - lowest.height_mm;
+  const auto first = std::ranges::find(shared, SharedParameter::Kind::kShape, &SharedParameter::kind);
+  if (first != shared.end()) {
+    constexpr auto kTerms = static_cast<int>(kShapeTerms);
+    const Eigen::Index at = first - shared.begin();
+    const Eigen::Matrix<double, 1, kTerms> slope = highest.by_term - lowest.by_term;
+    board.bend_sigma_mm = std::sqrt((slope * influence.covariance.block<kTerms, kTerms>(at, at)).dot(slope));
+  }
+  judge_relief(observations, rig, board);
+  return board;
+}
+
+std::string bend_text(const BoardReport& board) {
+  return fmt::format("bent by {:.2f} +- {:.2f} mm over its {:.0f} mm", board.bend_mm, board.bend_sigma_mm,
+                     board.size_mm());
+}
+
+std::string board_text(const BoardReport& board) {
+  if (board.is_bent()) return bend_text(board) + " in all poses alike, which the calibration is corrected for";
+  return fmt::format("flat, as far as the poses tell: {}", bend_text(board));
+}
+
+std::vector<std::string> board_warnings(const BoardReport& board) {
+  std::vector<std::string> warnings;
+  if (!board.is_told()) {
+    warnings.push_back(
+        fmt::format("the poses do not tell whether the board is flat: it is {}. Tilt it by 20 to 40 degrees towards "
+                    "all sides, in more poses, or {}",
+                    bend_text(board), kMount));
+  } else if (board.is_bent() && board.bend_mm > kFarBentShare * board.size_mm()) {
+    warnings.push_back(
+        fmt::format("the board is {}. The calibration is corrected for it, but a print so far from flat "
+                    "may change its shape from pose to pose: {}",
+                    bend_text(board), kMount));
+  }
+  if (board.is_uneven()) {
+    warnings.push_back(
+        fmt::format("the board is uneven: it lies off a smooth surface by {:.2f} mm (RMS), in all poses "
+                    "alike, which moves the calibration: {}",
+                    board.uneven_mm, kMount));
+  }
+  return warnings;
+}
+
+}  // namespace slsd

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/calibrate/solve/board_shape.hpp"
+
+#include <cmath>
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kOrders = 5;
+
+/// Of u and v, in each term.
+struct Powers {
+  std::size_t u, v;
+};
+constexpr std::array<Powers, kShapeTerms> kPowers{
+    {{2, 0}, {1, 1}, {0, 2}, {3, 0}, {2, 1}, {1, 2}, {0, 3}, {4, 0}, {3, 1}, {2, 2}, {1, 3}, {0, 4}}};
+
+std::array<double, kOrders> powers_of(double base) {
+  std::array<double, kOrders> powers{1};
+  for (std::size_t i = 1; i < kOrders; ++i) powers[i] = powers[i - 1] * base;
+  return powers;
+}
+
+}  // namespace
+
+ShapeAt shape_at(const double* terms_mm, const ShapeFrame& frame, const Eigen::Vector2d& board_mm) {
+  const Eigen::Vector2d at = (board_mm - frame.middle_mm) / frame.half_mm;
+  const auto u = powers_of(at.x()), v = powers_of(at.y());
+  ShapeAt shape;
+  for (std::size_t i = 0; i < kShapeTerms; ++i) {
+    const Powers& power = kPowers[i];
+    const double term = u[power.u] * v[power.v];
+    shape.by_term(static_cast<Eigen::Index>(i)) = term;
+    shape.height_mm += terms_mm[i] * term;
+    if (power.u > 0) shape.slope.x() += terms_mm[i] * static_cast<double>(power.u) * u[power.u - 1] * v[power.v];
+    if (power.v > 0) shape.slope.y() += terms_mm[i] * static_cast<double>(power.v) * u[power.u] * v[power.v - 1];
+  }
+  shape.slope /= frame.half_mm;
+  return shape;
+}
+
+Eigen::Vector3d meet_shape(const double* terms_mm, const ShapeFrame& frame, const Eigen::Vector3d& eye,
+                           const Eigen::Vector3d& ray) {
+  constexpr int kRounds = 8;  // a board is nearly flat: three or four are enough
+  constexpr double kSettled = 1e-13;
+  double along = -eye.z() / ray.z();
+  for (int round = 0; round < kRounds; ++round) {
+    const Eigen::Vector3d at = eye + along * ray;
+    const ShapeAt shape = shape_at(terms_mm, frame, at.head<2>());
+    const double step = (shape.height_mm - at.z()) / (ray.z() - shape.slope.dot(ray.head<2>()));
+    along += step;
+    if (std::abs(step) < kSettled * std::abs(along)) break;
+  }
+  return eye + along * ray;
+}
+
+ShapeVector plausible_shape(const ShapeFrame& frame) {
+  constexpr double kSecondOrder = 0.01, kHigherOrders = 0.001;  // of half the longer side
+  ShapeVector sigmas_mm;
+  for (std::size_t i = 0; i < kShapeTerms; ++i) {
+    sigmas_mm[i] = (i < kSecondOrderTerms ? kSecondOrder : kHigherOrders) * frame.half_mm;
+  }
+  return sigmas_mm;
+}
+
+}  // namespace slsd

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace slsd {
+
+/// How a board that is not flat lies off its plane, alike in all poses: a polynomial of orders two to four, as a plane
+/// would be part of the pose. Each term is the height (mm) that it adds where its powers of u and v are one,
+///
+///     u = (x - middle_x) / half,  v = (y - middle_y) / half
+///
+/// u^2, u v, v^2, then the third and the fourth order. A block of the adjustment.
+inline constexpr std::size_t kShapeTerms = 12, kSecondOrderTerms = 3;
+using ShapeVector = std::array<double, kShapeTerms>;
+
+/// Where a shape has its middle, and how large it is.
+struct ShapeFrame {
+  Eigen::Vector2d middle_mm = Eigen::Vector2d::Zero();
+  double half_mm = 1;  ///< half of the longer side
+};
+
+/// A shape at one place of the board.
+struct ShapeAt {
+  double height_mm = 0;                                             ///< off the board's plane, along its z axis
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();                  ///< of the height along x and y
+  Eigen::Matrix<double, 1, static_cast<int>(kShapeTerms)> by_term;  ///< of the height by the terms
+};
+
+/// A print that is bent by 1.5 mm over 336 mm is 0.003 % shorter than a flat one: that is left out.
+/// @thread reentrant
+[[nodiscard]] ShapeAt shape_at(const double* terms_mm, const ShapeFrame& frame, const Eigen::Vector2d& board_mm);
+
+/// Where a ray meets a shape, in the board's frame: from the plane on, by Newton's method.
+/// @thread reentrant
+[[nodiscard]] Eigen::Vector3d meet_shape(const double* terms_mm, const ShapeFrame& frame, const Eigen::Vector3d& eye,
+                                         const Eigen::Vector3d& ray);
+
+struct BoardShape {
+  ShapeFrame frame;
+  ShapeVector terms_mm{};
+
+  [[nodiscard]] double height_mm(const Eigen::Vector2d& board_mm) const {
+    return shape_at(terms_mm.data(), frame, board_mm).height_mm;
+  }
+};
+
+/// How large each term may be before anything of it was seen: one standard deviation. Prints on foam board are bent by
+/// some mm; what is not of second order is a small part of that.
+[[nodiscard]] ShapeVector plausible_shape(const ShapeFrame& frame);
+
+}  // namespace slsd
