@@ -31,6 +31,8 @@ constexpr double kExplains = 3;
 constexpr double kBowShareMin = 0.4;
 /// Corners that are bent say a plane that is off by about the bend; a move without a bend shows none.
 constexpr double kBowOfShiftMin = 0.3;
+/// Symbols whose pattern was divided by a print that lay elsewhere scatter, the less the smaller the move.
+constexpr double kUnevenOfShiftMin = 0.3;
 /// Of half the board's size: root mean square off a plane beyond which it is no board.
 constexpr double kUnevenShareMax = 0.1;
 /// The print lies this much elsewhere under the pattern: the picture of the board tells nothing of it.
@@ -184,14 +186,13 @@ struct Explanation {
     return surface.bow_share > kBowShareMin && bow_factor > kExplains && surface.bow_mm > kBowOfShiftMin * shift_mm &&
            surface.bow_mm < believable_mm;
   }
-  /// Of any shape: the symbols lie on no plane.
+  /// Of any shape: the symbols lie on no plane, as far as the print that a move leaves in them does not explain.
   [[nodiscard]] bool is_uneven() const {
-    return flatness_factor > kExplains && surface.flatness_mm < kUnevenShareMax * believable_mm;
+    return flatness_factor > kExplains && surface.flatness_mm < kUnevenShareMax * believable_mm &&
+           surface.flatness_mm > kUnevenOfShiftMin * shift_mm;
   }
-  /// The symbols lie on a plane as those of other poses do, but not on that of the corners.
-  [[nodiscard]] bool is_moved() const {
-    return shift_factor > kExplains && flatness_factor <= kExplains && shift_mm < believable_mm;
-  }
+  /// The symbols lie on a plane, but not on that of the corners.
+  [[nodiscard]] bool is_moved() const { return shift_factor > kExplains && !is_uneven() && shift_mm < believable_mm; }
 };
 
 Explanation compare(std::size_t pose, const Observations& observations, const RigModel& rig) {

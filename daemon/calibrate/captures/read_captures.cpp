@@ -92,6 +92,7 @@ class CaptureReader {
   void compare() {
     take_usual_sizes();
     name_swapped();
+    name_copied();
     if (jpegs_ == 0) return;
     report_(
         fmt::format("warning: {} of the pictures are JPEG, whose compression moves edges a little, and "
@@ -102,8 +103,8 @@ class CaptureReader {
   ReadCaptures captures;
 
  private:
-  /// A look whose print does not show under its own pattern.
-  struct Doubt {
+  static constexpr std::size_t kDoubtsMax = 12;  // of more it is the light that hides the print
+  struct Look {
     std::string pose;
     std::size_t camera;
     PoseSubject subject;
@@ -119,7 +120,8 @@ class CaptureReader {
     jpegs_ += static_cast<std::size_t>(std::ranges::count_if(all, [](const auto& file) { return is_jpeg(file); }));
     sizes_[{pose.name, camera}] = size_of(pictures->white);
     auto view = observers_.of(pose.subject).observe(camera, pictures->views());
-    if (!gray_code_ && !(view && view->shift_px)) doubts_.push_back({pose.name, camera, pose.subject, &files});
+    if (!gray_code_) looks_.push_back({pose.name, camera, pose.subject, &files});
+    if (!gray_code_ && !(view && view->shift_px)) doubts_.push_back(looks_.back());
     return view;
   }
 
@@ -169,11 +171,10 @@ class CaptureReader {
 
   /// Whose pattern's picture shows the print where another pose's white one has it.
   void name_swapped() {
-    constexpr std::size_t kDoubtsMax = 12;  // of more it is the light that hides the print
     if (doubts_.size() < 2 || doubts_.size() > kDoubtsMax) return;
-    for (const Doubt& doubt : doubts_) {
+    for (const Look& doubt : doubts_) {
       const auto white = read_image(doubt.files->white);
-      for (const Doubt& other : doubts_) {
+      for (const Look& other : doubts_) {
         if (&other == &doubt || other.camera != doubt.camera || !white) continue;
         const auto pattern = read_image(other.files->pattern);
         if (!pattern) continue;
@@ -186,6 +187,31 @@ class CaptureReader {
     }
   }
 
+  /// Whose pattern's picture shows the print where another pose, with a pattern of its own, has it.
+  void name_copied() {
+    if (doubts_.size() > kDoubtsMax) return;
+    for (const Look& doubt : doubts_) {
+      if (is_explained(doubt.pose)) continue;
+      const auto pattern = read_image(doubt.files->pattern);
+      for (const Look& other : looks_) {
+        if (other.pose == doubt.pose || other.camera != doubt.camera || !pattern) continue;
+        const auto white = read_image(other.files->white);
+        if (!white || !observers_.of(doubt.subject).print_shift(view(*white), view(*pattern)).certain()) continue;
+        rule_out(doubt.pose, PoseFault::kSwapped,
+                 fmt::format("its pattern's picture is a copy of that of {}, or was taken with it: take the pose again",
+                             other.pose));
+        break;
+      }
+    }
+  }
+
+  /// Light that hides the pattern hides the print too.
+  [[nodiscard]] bool is_explained(const std::string& pose) const {
+    return std::ranges::any_of(captures.refused, [&](const PoseReport& report) {
+      return report.name == pose && (report.fault == PoseFault::kSwapped || report.reason.starts_with("clipped"));
+    });
+  }
+
   void tell(const std::string& who, const Result<PoseView>& view) const {
     report_(view ? fmt::format("{}: {} corners, {} symbols", who, view->corners.size(), view->symbols.size())
                  : fmt::format("{}: not used: {}", who, to_string(view.error())));
@@ -196,7 +222,8 @@ class CaptureReader {
   PoseObservers& observers_;
   const std::function<void(const std::string&)>& report_;
   std::map<std::pair<std::string, std::size_t>, ImageSize> sizes_;  // of each look
-  std::vector<Doubt> doubts_;
+  std::vector<Look> looks_;                                         // of a pattern
+  std::vector<Look> doubts_;  // those whose print does not show under their own pattern
   std::size_t jpegs_ = 0;
 };
 
