@@ -103,12 +103,14 @@ Result<> calibrate_from_files(const CalibrateRequest& request) {
                                 [](const std::string& line) { std::cout << line << std::endl; });
   if (!captures) return tl::unexpected(captures.error());
   if (captures->observations.count(PoseSubject::kBoard) == 0) {
-    return fail(ErrorCode::kNotFound, "no pose can be used:" + refusals(captures->refused), request.from.string());
+    return tl::unexpected(refused(
+        *file, {ErrorCode::kNotFound, "no pose can be used:" + refusals(captures->refused), request.from.string()},
+        captures->refused));
   }
   const Board& found = observers.board.board();
   if (!(found == *board)) std::cout << fmt::format("the board is {}: it was named rows by columns\n", to_string(found));
-  auto outcome = calibrate(std::move(captures->observations), calibrate_options(*configuration));
-  if (!outcome) return tl::unexpected(outcome.error());
+  auto outcome = calibrate(std::move(captures->observations), calibrate_options(*configuration, found));
+  if (!outcome) return tl::unexpected(refused(*file, outcome.error(), captures->refused));
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
   std::cout << fmt::format("calibrated in {:.1f} s, {:.2f} s a pose\n", spent.count(),
                            spent.count() / static_cast<double>(poses->size()));

@@ -43,31 +43,37 @@ Result<path> checked(path file, const std::string& named_by) {
   return file;
 }
 
-Result<> write_report(const path& file, const CalibrationOutcome& outcome) {
-  const path report = report_of(file);
-  auto written = write_file_atomically(report, report_html(outcome));
+Result<> write_report(const path& report, const std::string& html) {
+  auto written = write_file_atomically(report, html);
   if (written) std::cout << "report: " << report.string() << "\n";
   return written;
 }
 
+/// Beside the calibration in force, whose own report stays.
+path report_of_refused(const path& file) {
+  return file.parent_path() / (file.stem().string() + "-refused.html");
+}
+
 /// Whether a calibration may replace the one in force without being asked to.
-Result<> check_gain(const CalibrateRequest& request, const CalibrationOutcome& outcome, const path& file) {
-  const Grade grade = outcome.verdict.grade;
+Result<> check_gain(const CalibrateRequest& request, const CalibrationOutcome& outcome, const Board& board,
+                    const path& in_force) {
   const std::string nevertheless =
-      request.socket.empty() ? ", or keep it nevertheless by --output " + file.string() : std::string();
-  if (grade == Grade::kBad) {
+      request.socket.empty() ? ", or keep it nevertheless by --output " + in_force.string() : std::string();
+  if (outcome.verdict.grade == Grade::kBad) {
     return fail(ErrorCode::kImpossible,
                 "the calibration is bad and was not put in force; take the poses again as advised" + nevertheless,
-                file.string());
+                in_force.string());
   }
-  const auto in_force = grade_in_force(outcome.calibration, file);
-  if (!in_force || *in_force >= grade) return {};
-  return fail(
-      ErrorCode::kImpossible,
-      fmt::format("the calibration is {}, and the one in force is {}: that stays; take more poses, as advised{}, "
-                  "such as where the rig has changed since",
-                  to_string(grade), to_string(*in_force), nevertheless),
-      file.string());
+  const auto before = calibration_in_force(outcome.calibration, in_force);
+  if (!before) return {};
+  const auto changed = compare_with_force(outcome, board, *before, request.force);
+  if (!changed) {
+    const Error& error = changed.error();
+    return fail(error.code, error.message + (error.code == ErrorCode::kImpossible ? nevertheless : ""),
+                in_force.string());
+  }
+  if (!changed->empty()) std::cout << *changed << "\n";
+  return {};
 }
 
 }  // namespace
@@ -83,8 +89,14 @@ Result<path> file_to_keep(const CalibrateRequest& request, const Configuration& 
       "into force; or name a file by --output, or in [calibration] of the configuration");
 }
 
-CalibrateOptions calibrate_options(const Configuration& configuration) {
-  return {configuration.decode.depth_min_mm, configuration.decode.depth_max_mm};
+CalibrateOptions calibrate_options(const Configuration& configuration, const Board& board) {
+  return {configuration.decode.depth_min_mm, configuration.decode.depth_max_mm, board.sheet_mm()};
+}
+
+Error refused(const path& file, Error error, const std::vector<PoseReport>& poses) {
+  const auto reported = write_report(report_of_refused(file), refusal_html(error.message, poses));
+  if (!reported) std::cout << "no report: " << to_string(reported.error()) << "\n";
+  return error;
 }
 
 Result<> finish_calibration(const CalibrateRequest& request, const path& file, const path& in_force, const Board& board,
@@ -95,16 +107,13 @@ Result<> finish_calibration(const CalibrateRequest& request, const path& file, c
   outcome.calibration.report.date = utc_text(std::chrono::system_clock::now());
   std::cout << outcome_text(outcome) << std::flush;
   if (request.output.empty() || !request.socket.empty()) {
-    const std::string scale = request.force ? "" : other_scale(outcome, board, in_force);
-    if (!scale.empty()) {
-      return fail(
-          ErrorCode::kMismatch,
-          scale + ". Where the new one is right, replace that in force by --force, or keep it elsewhere by --output",
-          in_force.string());
+    if (auto gain = check_gain(request, outcome, board, in_force); !gain) {
+      if (auto reported = write_report(report_of_refused(file), report_html(outcome, gain.error().message)); !reported)
+        return reported;
+      return gain;
     }
-    if (auto gain = check_gain(request, outcome, in_force); !gain) return gain;
   }
-  if (auto reported = write_report(file, outcome); !reported) return reported;
+  if (auto reported = write_report(report_of(file), report_html(outcome)); !reported) return reported;
   const auto kept = keep_calibration(outcome, file);
   if (!kept) return tl::unexpected(kept.error());
   std::cout << *kept << "\n";

@@ -2,13 +2,12 @@
 // Copyright the slsd authors
 #include "daemon/calibrate/keep_calibration.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "core/calibrate/judge/verify.hpp"
-#include "core/geometry/epipolar_limit.hpp"
-#include "core/geometry/robust.hpp"
+#include "core/calibrate/judge/rig_comparison.hpp"
 #include "core/geometry/triangulate.hpp"
 #include "daemon/scan/hardware.hpp"
 #include "drivers/files/file.hpp"
@@ -19,6 +18,8 @@ namespace {
 using std::filesystem::path;
 
 constexpr std::size_t kMaxFileBytes = 1 << 20;
+/// More than a rig drifts, and less than a printer that fits to the page.
+constexpr double kScalePercent = 0.5, kScaleSigmas = 5;
 
 /// How far the points of the calibrated poses move from one calibration to the other, root mean square.
 std::string difference(const CalibrationOutcome& outcome, const Calibration& before) {
@@ -66,52 +67,58 @@ bool of_the_same_devices(const Calibration& one, const Calibration& other) {
   return true;
 }
 
-/// The calibration in a file, where it can be read and is of the same devices as a new one.
-std::optional<Calibration> in_force(const Calibration& calibration, const path& file) {
+std::string dated(const Calibration& calibration) {
+  return "the calibration in force" + (calibration.report.date ? " of " + *calibration.report.date : "");
+}
+
+/// In a rig that has not changed, the distances between the devices measure the board too.
+Result<> check_scale(const RigComparison& comparison, const Board& board, const Calibration& before) {
+  const double percent = 100 * (1 / (1 + comparison.longer_percent / 100) - 1);
+  if (std::abs(percent) < std::max(kScalePercent, kScaleSigmas * comparison.longer_sigma_percent)) return {};
+  return fail(
+      ErrorCode::kMismatch,
+      fmt::format("{} measures {:.2f} mm where the board is said to have {:.2f} mm, {:.1f} % {}, and nothing else of "
+                  "the rig has changed: hold a rule to the print's ruler, and give what it measures by --ruler. If the "
+                  "new one is right, replace that in force by --force, or keep it elsewhere by --output",
+                  dated(before), board.pitch_mm * (1 + percent / 100), board.pitch_mm, std::abs(percent),
+                  percent > 0 ? "more" : "less"));
+}
+
+}  // namespace
+
+std::optional<Calibration> calibration_in_force(const Calibration& calibration, const path& file) {
   const auto text = read_file(file, kMaxFileBytes);
   auto before = text ? read_calibration(*text, file.string()) : tl::unexpected(text.error());
   if (!before || !of_the_same_devices(calibration, *before)) return std::nullopt;
   return std::move(*before);
 }
 
-}  // namespace
-
-std::optional<Grade> grade_in_force(const Calibration& calibration, const path& file) {
-  const auto before = in_force(calibration, file);
-  return before && before->report.verdict ? parse_grade(*before->report.verdict) : std::nullopt;
-}
-
-std::string other_scale(const CalibrationOutcome& outcome, const Board& board, const path& file) {
-  constexpr double kNoticedPercent = 0.5;  // more than a rig drifts, and less than a printer that fits to the page
-  constexpr double kMeasuresNothingPx = 10;
-  const auto before = in_force(outcome.calibration, file);
-  if (!before) return {};
-  std::vector<double> percents, off_lines;
-  for (const PoseObservation& pose : outcome.observations.poses) {
-    if (pose.subject != PoseSubject::kBoard) continue;
-    for (const PoseView& view : pose.views) {
-      const CalibratedCamera* const camera = before->camera(outcome.calibration.cameras[view.camera].name);
-      const auto check = check_view(view, *camera, before->projector);
-      if (!check || !check->trueness) continue;
-      percents.push_back(check->trueness->scale_percent), off_lines.push_back(check->epipolar_rms_px);
-    }
-  }
-  const double percent = median_of(percents);
-  if (percents.empty() || std::abs(percent) < kNoticedPercent) return {};
-  const std::string dated = before->report.date ? " of " + *before->report.date : "";
-  if (const double off = median_of(off_lines); off > kMeasuresNothingPx) {
+Result<std::string> compare_with_force(const CalibrationOutcome& outcome, const Board& board, const Calibration& before,
+                                       bool force) {
+  const RigComparison comparison = compare_rigs(outcome, before);
+  if (!comparison.change.empty()) {
+    const bool other_length =
+        std::abs(comparison.longer_percent) > std::max(kScalePercent, kScaleSigmas * comparison.longer_sigma_percent);
     return fmt::format(
-        "the calibration in force{} does not fit these poses: their symbols lie {:.0f} px off its epipolar lines, as "
-        "where a device was moved or turned since. So it cannot tell whether the print is as large as it is said to "
-        "be: hold a rule to the print's ruler, and give what it measures by --ruler",
-        dated, off);
+        "the rig has changed since {}: {}. That one says nothing of the rig as it stands now{}", dated(before),
+        comparison.change,
+        other_length ? fmt::format(". Projector and camera are {:.1f} % {} each other; if they only turned, the print "
+                                   "is not as large as it is said to be: hold a rule to its ruler",
+                                   std::abs(comparison.longer_percent),
+                                   comparison.longer_percent > 0 ? "farther from" : "nearer to")
+                     : "");
   }
-  const bool moved = median_of(off_lines) > epipolar_limit_px(before->report.epipolar_error_px);
-  return fmt::format(
-      "the calibration in force{} measures {:.2f} mm where the board is said to have {:.2f} mm, {:.1f} % "
-      "{}: hold a rule to the print's ruler, and give what it measures by --ruler{}",
-      dated, board.pitch_mm * (1 + percent / 100), board.pitch_mm, std::abs(percent), percent > 0 ? "more" : "less",
-      moved ? ". The rig has moved since, which may have a part in it" : "");
+  if (!force) {
+    if (auto same = check_scale(comparison, board, before); !same) return tl::unexpected(same.error());
+  }
+  const auto grade = before.report.verdict ? parse_grade(*before.report.verdict) : std::nullopt;
+  if (grade && *grade < outcome.verdict.grade) {
+    return fail(ErrorCode::kImpossible,
+                fmt::format("the calibration is {}, and the one in force is {} and of the same rig: that stays; take "
+                            "more poses, as advised",
+                            to_string(outcome.verdict.grade), to_string(*grade)));
+  }
+  return std::string();
 }
 
 Result<std::string> keep_calibration(const CalibrationOutcome& outcome, const path& file) {

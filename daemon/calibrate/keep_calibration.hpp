@@ -12,15 +12,18 @@
 
 namespace slsd {
 
-/// The grade of the calibration in a file, where it is of the same cameras and projector as a new one: then a worse one
-/// is no gain. Nothing where there is no such file, where it cannot be read or does not tell, or is of other devices.
-[[nodiscard]] std::optional<Grade> grade_in_force(const Calibration& calibration, const std::filesystem::path& file);
+/// The calibration in a file that a new one would replace: nothing if there is no such file, if it cannot be read, or
+/// if it is of other cameras or another projector.
+[[nodiscard]] std::optional<Calibration> calibration_in_force(const Calibration& calibration,
+                                                              const std::filesystem::path& file);
 
-/// What the calibration in force measures of the board against what was said of it, where that is another scale.
-/// Nothing in the pictures themselves tells a print that is too large.
-/// @return for a person, with both numbers; empty where they agree, and where none is in force that measures it
-[[nodiscard]] std::string other_scale(const CalibrationOutcome& outcome, const Board& board,
-                                      const std::filesystem::path& file);
+/// What the calibration in force says against replacing it, and what has changed since.
+/// @param board       as it was said to be
+/// @errors kMismatch: the rig is the same, and the board is of another scale by the one in force, with both numbers;
+///         kImpossible: the rig is the same, and the one in force is better
+/// @return how the rig has changed, for a person; empty: it has not
+[[nodiscard]] Result<std::string> compare_with_force(const CalibrationOutcome& outcome, const Board& board,
+                                                     const Calibration& before, bool force);
 
 /// Writes a calibration, atomically; one that was there before is kept beside it as FILE.old.
 /// @return what was done, and how far the new one differs from the old one, for a person

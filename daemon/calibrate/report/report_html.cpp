@@ -46,9 +46,14 @@ std::string list_of(const std::vector<std::string>& lines) {
   return items.empty() ? items : "<ul>\n" + items + "</ul>\n";
 }
 
-std::string verdict_of(const CalibrationOutcome& outcome) {
+std::string refusal_of(const std::string& why) {
+  return "<p><span class='grade bad'>not put in force</span></p>\n<p>" + escaped(why) + "</p>\n";
+}
+
+std::string verdict_of(const CalibrationOutcome& outcome, const std::string& refused) {
   const auto grade = to_string(outcome.verdict.grade);
-  std::string html = fmt::format("<p><span class='grade {0}'>{0}</span></p>\n", grade);
+  std::string html = refused.empty() ? "" : refusal_of(refused);
+  html += fmt::format("<p><span class='grade {0}'>{0}</span></p>\n", grade);
   html += list_of(outcome.verdict.reasons);
   if (!outcome.warnings.empty()) html += "<h2>Warnings</h2>\n" + list_of(outcome.warnings);
   if (!outcome.verdict.advice.empty()) html += "<h2>What to shoot next</h2>\n" + list_of(outcome.verdict.advice);
@@ -108,14 +113,15 @@ std::string image_figures(const CalibrationOutcome& outcome) {
     residuals += camera_residual_figure(outcome, i);
   }
   return "<h2>What the poses cover</h2>\n" + coverage + projector_coverage_figure(outcome) +
-         "<h2>Residuals</h2>\n<p>By how much each point is off. Arrows should point anywhere: where neighbours agree, "
+         "<h2>Residuals</h2>\n<p>By how much each point is off. Arrows should point anywhere: if neighbours agree, "
          "the lens "
-         "is not described, or a board is bent.</p>\n" +
+         "is not described.</p>\n" +
          residuals + projector_residual_figure(outcome);
 }
 
 std::string rig_figures(const CalibrationOutcome& outcome) {
   std::string html = "<h2>Poses in space</h2>\n" + poses_from_above(outcome) + poses_from_the_right(outcome);
+  html += "<h2>The board</h2>\n<p>" + escaped(board_text(outcome.board)) + "</p>\n" + board_figure(outcome);
   const std::string depth = depth_figure(outcome);
   return depth.empty() ? html
                        : html +
@@ -192,15 +198,28 @@ std::string head_of(const CalibrationOutcome& outcome) {
                      escaped(report.board.value_or("not named")), devices, SLSD_VERSION);
 }
 
-}  // namespace
-
-std::string report_html(const CalibrationOutcome& outcome) {
+std::string page(const std::string& body) {
   return fmt::format(
       "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'><meta name='viewport' "
       "content='width=device-width, initial-scale=1'><title>Calibration</title><style>{}</style></head>"
-      "<body>\n<h1>Calibration</h1>\n{}{}{}{}{}{}{}{}</body></html>\n",
-      kStyle, head_of(outcome), verdict_of(outcome), errors_of(outcome), planes_of(outcome), image_figures(outcome),
-      rig_figures(outcome), poses_of(outcome), parameters_of(outcome));
+      "<body>\n<h1>Calibration</h1>\n{}</body></html>\n",
+      kStyle, body);
+}
+
+}  // namespace
+
+std::string report_html(const CalibrationOutcome& outcome, const std::string& refused) {
+  return page(head_of(outcome) + verdict_of(outcome, refused) + errors_of(outcome) + planes_of(outcome) +
+              image_figures(outcome) + rig_figures(outcome) + poses_of(outcome) + parameters_of(outcome));
+}
+
+std::string refusal_html(const std::string& why, const std::vector<PoseReport>& poses) {
+  std::string rows;
+  for (const PoseReport& pose : poses) {
+    if (pose.fault)
+      rows += "<tr class='out'><td>" + escaped(pose.name) + "</td>" + words_of("left out: " + pose.reason);
+  }
+  return page(refusal_of(why) + (rows.empty() ? rows : "<h2>Poses</h2>\n" + table_of(rows)));
 }
 
 }  // namespace slsd

@@ -138,11 +138,11 @@ Result<> calibrate_from(const CalibrateRequest& request, const Preparation& prep
                                                    resume_text(prepared.folder, poses)));
   }
   const auto begin = std::chrono::steady_clock::now();
-  auto outcome = calibrate(observations, calibrate_options(prepared.configuration));
+  auto outcome = calibrate(observations, calibrate_options(prepared.configuration, prepared.board));
   if (!outcome) {
     Error error = outcome.error();
     error.message += "; " + resume_text(prepared.folder, poses);
-    return tl::unexpected(std::move(error));
+    return tl::unexpected(slsd::refused(prepared.file, std::move(error), refused));
   }
   print(fmt::format("calibrated in {:.1f} s from {} poses, recorded in {}",
                     std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), poses,

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+
+#include "core/calibrate/calibrate.hpp"
+
+namespace slsd {
+
+/// A new calibration against an earlier one of the same devices.
+struct RigComparison {
+  /// How the rig has changed since, for a person: "the projector turned by 0.30 degrees". Empty: it has not, as far as
+  /// the deviations of both tell.
+  std::string change;
+  /// By how much the distances between the devices are longer now, per cent. In a rig that has not changed, what was
+  /// said of the board's size makes all of them longer by one factor, and nothing else does.
+  double longer_percent = 0;
+  double longer_sigma_percent = 0;
+};
+
+/// Compares what a knock changes (where the devices are), what a lens changes (focal lengths, principal points), and
+/// what a print of another size changes (distances alone), each within the deviations of both calibrations. An earlier
+/// one that does not tell its deviations counts as exact as the new one.
+/// @param before  of the same devices, by their names and sizes
+/// @thread reentrant
+[[nodiscard]] RigComparison compare_rigs(const CalibrationOutcome& outcome, const Calibration& before);
+
+}  // namespace slsd
