@@ -46,7 +46,7 @@ TEST(ReportHtml, HasEveryDevicePoseAndParameter) {
   const CalibrationOutcome& outcome = an_outcome();
   const std::string html = report_html(outcome);
   expect_balanced(html);
-  EXPECT_EQ(count_of(html, "<svg"), 9U);  // coverage and residuals of three devices, poses twice, depth
+  EXPECT_EQ(count_of(html, "<svg"), 10U);  // coverage and residuals of three devices, poses twice, board, depth
   EXPECT_THAT(html, HasSubstr("charuco:11x7:60:45"));
   EXPECT_THAT(html, HasSubstr("class='grade " + std::string(to_string(outcome.verdict.grade))));
   for (const PoseReport& pose : outcome.poses) EXPECT_THAT(html, HasSubstr("</span> " + pose.name + "</td>"));
@@ -54,6 +54,25 @@ TEST(ReportHtml, HasEveryDevicePoseAndParameter) {
   EXPECT_EQ(count_of(html, "<td>projector</td>"),
             std::ranges::count(outcome.parameters, "projector", &ParameterReport::device));
   EXPECT_LT(html.size(), 3'000'000U);
+}
+
+TEST(ReportHtml, SaysWhyASessionWasRefused) {
+  PoseReport pose;
+  pose.name = "pose_<3>", pose.fault = PoseFault::kBlurred, pose.reason = "blurred & dark";
+  const std::string html = refusal_html("the poses are all parallel", {pose});
+  expect_balanced(html);
+  EXPECT_THAT(html, HasSubstr("not put in force"));
+  EXPECT_THAT(html, HasSubstr("the poses are all parallel"));
+  EXPECT_THAT(html, HasSubstr("pose_&lt;3&gt;"));
+  EXPECT_THAT(html, HasSubstr("blurred &amp; dark"));
+  EXPECT_THAT(report_html(an_outcome(), "it is bad"), HasSubstr("it is bad"));
+}
+
+TEST(ReportHtml, ShowsTheBoardsShape) {
+  CalibrationOutcome outcome = an_outcome();
+  outcome.board.bend_mm = 0.52, outcome.board.bend_sigma_mm = 0.02;
+  EXPECT_THAT(report_html(outcome), HasSubstr("bent by 0.52 +- 0.02 mm over its"));
+  EXPECT_THAT(report_html(outcome), HasSubstr("The board's shape as seen from the front"));
 }
 
 TEST(ReportHtml, ShowsWhatTheReferencePlaneSays) {
