@@ -91,6 +91,12 @@ Result<> check_fit(const RandrOutput& output, int width_px, int height_px) {
   if (output.transformed) {
     return fail(ErrorCode::kMismatch, "its picture is scaled: run " + xrandr + " --scale 1x1 --transform none", where);
   }
+  if (output.pans()) {
+    return fail(ErrorCode::kMismatch,
+                "it pans over " + size_text(output.area.width_px, output.area.height_px) + " pixels with a mode of " +
+                    size_text(output.mode_width_px, output.mode_height_px) + ": run " + xrandr + " --panning 0x0",
+                where);
+  }
   if (output.area.width_px == width_px && output.area.height_px == height_px) return {};
   if (output.rotation_deg % 180 != 0 && output.area.width_px == height_px && output.area.height_px == width_px) {
     return fail(ErrorCode::kMismatch, "its picture is turned: run " + xrandr + " --rotate normal", where);
@@ -143,7 +149,8 @@ Result<MonitorReport> report_monitor(const std::string& wanted, int width_px, in
   auto output = choose_output(*outputs, wanted, {}, enable);
   if (!output) return tl::unexpected(output.error());
   const auto fits = check_fit(*output, width_px, height_px);
-  const bool will_fit = enable && !output->transformed && find_mode(*output, width_px, height_px, 0) != nullptr;
+  const bool will_fit =
+      enable && !output->transformed && !output->pans() && find_mode(*output, width_px, height_px, 0) != nullptr;
   if (!fits && !will_fit) return tl::unexpected(fits.error());
   if (!fits) {
     const std::string now = output->on ? "it has another size" : "it is off";

@@ -196,6 +196,13 @@ Result<std::vector<RandrOutput>> ask_for_outputs() {
 
 }  // namespace
 
+bool RandrOutput::pans() const {
+  if (!on || transformed || mode_width_px == 0) return false;
+  const bool turned = rotation_deg % 180 != 0;
+  return area.width_px > (turned ? mode_height_px : mode_width_px) ||
+         area.height_px > (turned ? mode_width_px : mode_height_px);
+}
+
 std::vector<RandrOutput> read_outputs(_XDisplay* display, Probe probe) {
   std::vector<RandrOutput> outputs;
   const Window root = DefaultRootWindow(display);

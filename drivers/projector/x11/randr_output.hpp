@@ -55,6 +55,9 @@ struct RandrOutput {
   bool gamma_active = false;
   std::string rgb_range;  ///< the property "Broadcast RGB"; empty: the driver does not say
   bool underscan = false;
+
+  /// It shows a window of a larger area, which follows the mouse.
+  [[nodiscard]] bool pans() const;
 };
 
 enum class Probe {

@@ -74,6 +74,21 @@ TEST(CheckFit, WantsTheSizePixelForPixel) {
   EXPECT_THAT(check_fit(turned, 1280, 800).error().message, HasSubstr("--rotate normal"));
 }
 
+TEST(CheckFit, NamesWhatEndsPanning) {
+  RandrOutput panning = kDesk[1];
+  panning.mode_width_px = 1280, panning.mode_height_px = 800;
+  panning.area.width_px = 1920, panning.area.height_px = 1080;
+  for (const auto& [width_px, height_px] : {std::pair{1280, 800}, std::pair{1920, 1080}}) {
+    EXPECT_THAT(check_fit(panning, width_px, height_px).error().message,
+                HasSubstr("it pans over 1920x1080 pixels with a mode of 1280x800: run xrandr --output " + panning.name +
+                          " --panning 0x0"));
+  }
+  RandrOutput turned = panning;
+  turned.rotation_deg = 90;
+  turned.area.width_px = 800, turned.area.height_px = 1280;
+  EXPECT_THAT(check_fit(turned, 1280, 800).error().message, HasSubstr("--rotate normal"));
+}
+
 TEST(OutputWarnings, SaysNothingOfAGoodMonitor) {
   EXPECT_THAT(output_warnings(kDesk[1], kDesk), IsEmpty());
 }
