@@ -26,7 +26,7 @@ std::string header(const Cloud& cloud) {
          (cloud.sigma_calibration_mm ? "\n# sigma_calibration_mm " + sigma_calibration_text(cloud) : "") +
          "\n# units mm, px\n# coordinate_frame rig: the first camera's, x right, y down, z forward\nVERSION 0.7\n" +
          line_of_fields("FIELDS", [](const PointField& field) { return std::string(field.name); }) +
-         line_of_fields("SIZE", [](const PointField& field) { return std::to_string(field.bytes); }) +
+         line_of_fields("SIZE", [](const PointField& field) { return std::to_string(field.pcd_bytes); }) +
          line_of_fields("TYPE", [](const PointField& field) { return std::string(1, field.pcd_type); }) +
          line_of_fields("COUNT", [](const PointField&) { return std::string("1"); }) + "WIDTH " + width + "\nHEIGHT " +
          height + "\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + points + "\nDATA binary\n";
@@ -66,8 +66,8 @@ std::vector<CloudPoint> organised(const Cloud& cloud) {
 std::string write_pcd(const Cloud& cloud) {
   std::string bytes = header(cloud);
   const std::vector<CloudPoint> cells = organised(cloud);
-  bytes.reserve(bytes.size() + cells.size() * kPointBytes);
-  for (const CloudPoint& cell : cells) append_point(cell, bytes);
+  bytes.reserve(bytes.size() + cells.size() * kPcdPointBytes);
+  for (const CloudPoint& cell : cells) append_pcd_point(cell, bytes);
   return bytes;
 }
 

@@ -15,12 +15,13 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the records are copied as they lie in memory");
 
-constexpr std::size_t field_bytes() {
+constexpr std::size_t field_bytes(int PointField::*bytes) {
   std::size_t sum = 0;
-  for (const PointField& field : kPointFields) sum += static_cast<std::size_t>(field.bytes);
+  for (const PointField& field : kPointFields) sum += static_cast<std::size_t>(field.*bytes);
   return sum;
 }
-static_assert(field_bytes() == kPointBytes);
+static_assert(field_bytes(&PointField::ply_bytes) == kPointBytes);
+static_assert(field_bytes(&PointField::pcd_bytes) == kPcdPointBytes);
 
 // Column and row are int in a file: not every reader knows PLY's ushort.
 struct Cell {
@@ -32,28 +33,37 @@ struct Cell {
 };
 
 // Calls visit with each field, in the order of kPointFields.
-template <class Point, class Cell, class Visit>
-void for_each_field(Point& point, Cell& cell, Visit visit) {
+template <class Point, class Intensity, class Cell, class Visit>
+void for_each_field(Point& point, Intensity& intensity, Cell& cell, Visit visit) {
   visit(point.x), visit(point.y), visit(point.z);
-  visit(point.intensity);
+  visit(intensity);
   visit(point.camera_u), visit(point.camera_v), visit(point.projector_u), visit(point.projector_v);
   visit(point.camera), visit(point.symbol);
   visit(point.sigma_mm);
   visit(cell.column), visit(cell.row);
 }
 
+template <class Intensity>
+void append(const CloudPoint& point, Intensity intensity, std::string& bytes) {
+  const Cell cell{point.column, point.row};
+  for_each_field(point, intensity, cell,
+                 [&bytes](const auto& field) { bytes.append(reinterpret_cast<const char*>(&field), sizeof field); });
+}
+
 }  // namespace
 
 void append_point(const CloudPoint& point, std::string& bytes) {
-  const Cell cell{point.column, point.row};
-  for_each_field(point, cell,
-                 [&bytes](const auto& field) { bytes.append(reinterpret_cast<const char*>(&field), sizeof field); });
+  append(point, point.intensity, bytes);
+}
+
+void append_pcd_point(const CloudPoint& point, std::string& bytes) {
+  append(point, static_cast<float>(point.intensity), bytes);
 }
 
 std::optional<CloudPoint> read_point(const char* bytes) {
   CloudPoint point;
   Cell cell{};
-  for_each_field(point, cell, [&bytes](auto& field) {
+  for_each_field(point, point.intensity, cell, [&bytes](auto& field) {
     std::memcpy(&field, bytes, sizeof field);
     bytes += sizeof field;
   });

@@ -16,31 +16,37 @@ namespace slsd {
 struct PointField {
   std::string_view name;
   std::string_view ply_type;
+  int ply_bytes;
   char pcd_type;  ///< F, U or I
-  int bytes;
+  int pcd_bytes;
 };
 
-inline constexpr std::array<PointField, 13> kPointFields{{{"x", "float", 'F', 4},
-                                                          {"y", "float", 'F', 4},
-                                                          {"z", "float", 'F', 4},
-                                                          {"intensity", "uchar", 'U', 1},
-                                                          {"camera_u", "float", 'F', 4},
-                                                          {"camera_v", "float", 'F', 4},
-                                                          {"projector_u", "float", 'F', 4},
-                                                          {"projector_v", "float", 'F', 4},
-                                                          {"camera", "uchar", 'U', 1},
-                                                          {"symbol", "uchar", 'U', 1},
-                                                          {"sigma_mm", "float", 'F', 4},
-                                                          {"column", "int", 'I', 4},
-                                                          {"row", "int", 'I', 4}}};
+inline constexpr std::array<PointField, 13> kPointFields{{{"x", "float", 4, 'F', 4},
+                                                          {"y", "float", 4, 'F', 4},
+                                                          {"z", "float", 4, 'F', 4},
+                                                          {"intensity", "uchar", 1, 'F', 4},
+                                                          {"camera_u", "float", 4, 'F', 4},
+                                                          {"camera_v", "float", 4, 'F', 4},
+                                                          {"projector_u", "float", 4, 'F', 4},
+                                                          {"projector_v", "float", 4, 'F', 4},
+                                                          {"camera", "uchar", 1, 'U', 1},
+                                                          {"symbol", "uchar", 1, 'U', 1},
+                                                          {"sigma_mm", "float", 4, 'F', 4},
+                                                          {"column", "int", 4, 'I', 4},
+                                                          {"row", "int", 4, 'I', 4}}};
 
-/// Bytes of one point: the fields in their order, little endian, nothing between them.
+/// Bytes of one point in a PLY: the fields in their order, little endian, nothing between them.
 inline constexpr std::size_t kPointBytes = 43;
+/// And in a PCD, where intensity is a float: PCL's PointXYZI takes no other.
+inline constexpr std::size_t kPcdPointBytes = 46;
 
 /// Appends the kPointBytes of a point.
 void append_point(const CloudPoint& point, std::string& bytes);
 
-/// The point that append_point() wrote; nothing where its cell is none.
+/// Appends the kPcdPointBytes of a point.
+void append_pcd_point(const CloudPoint& point, std::string& bytes);
+
+/// The point that append_point() wrote; nothing if its cell is none.
 /// @param bytes  at least kPointBytes
 [[nodiscard]] std::optional<CloudPoint> read_point(const char* bytes);
 

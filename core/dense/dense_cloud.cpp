@@ -20,7 +20,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the records are copied as they lie in memory");
 
-constexpr std::size_t kPointBytes = 18, kNormalBytes = 12;
+constexpr std::size_t kPlyBytes = 18, kPcdBytes = 21, kNormalBytes = 12;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 /// Of full: noise and the sensor's own unevenness keep some pixels below.
 constexpr double kSaturated = 0.985;
@@ -120,20 +120,27 @@ class RowPlaces {
   std::array<std::vector<float>, 3> places_;
 };
 
-/// @param row  of y
+template <class Value>
+void put(char*& to, Value value) {
+  std::memcpy(to, &value, sizeof value);
+  to += sizeof value;
+}
+
+/// @tparam Intensity  as the format stores it
+/// @param row         of y
+template <class Intensity>
 void put_point(char*& to, const DenseView& view, const RowPlaces& row, const ViewPoints& points, int x, int y,
                bool normals) {
   const std::size_t pixel = static_cast<std::size_t>(y) * view.map.width + x;
   put(to, row.at(x));
-  std::memcpy(to, &view.map.sigma_mm[pixel], 4);
-  to[4] = static_cast<char>(view.map.intensity[pixel]);
-  to[5] = static_cast<char>(view.camera);
-  to += 6;
+  put(to, view.map.sigma_mm[pixel]);
+  put(to, static_cast<Intensity>(view.map.intensity[pixel]));
+  put(to, view.camera);
   if (normals) put(to, points.normal(x, y));
 }
 
-std::size_t bytes_of_point(bool normals) {
-  return kPointBytes + (normals ? kNormalBytes : 0);
+std::size_t bytes_of_point(std::size_t record, bool normals) {
+  return record + (normals ? kNormalBytes : 0);
 }
 
 }  // namespace
@@ -196,18 +203,18 @@ std::string write_dense_ply(const DenseCloud& cloud, bool normals) {
                       "intensity\nproperty uchar camera\n";
   if (normals) bytes += "property float nx\nproperty float ny\nproperty float nz\n";
   bytes += "end_header\n";
-  bytes.reserve(bytes.size() + cloud.points() * bytes_of_point(normals));
+  bytes.reserve(bytes.size() + cloud.points() * bytes_of_point(kPlyBytes, normals));
   std::string row;
   for (const DenseView& view : cloud.views) {
     const ViewPoints points(view);
     RowPlaces places(view);
-    row.resize(static_cast<std::size_t>(view.map.width) * bytes_of_point(normals));
+    row.resize(static_cast<std::size_t>(view.map.width) * bytes_of_point(kPlyBytes, normals));
     for (int y = 0; y < view.map.height; ++y) {
       places.place(y);
       char* to = row.data();
       for (int x = 0; x < view.map.width; ++x)
         if (view.map.measured(static_cast<std::size_t>(y) * view.map.width + x))
-          put_point(to, view, places, points, x, y, normals);
+          put_point<std::uint8_t>(to, view, places, points, x, y, normals);
       bytes.append(row.data(), to);
     }
   }
@@ -223,12 +230,12 @@ std::string write_dense_pcd(const DenseCloud& cloud, bool normals) {
       "# .PCD v0.7 - Point Cloud Data file format\n# scan_id " + header_text(cloud.scan_id) + "\n# time " +
       header_text(cloud.time) + "\n# frame " + std::to_string(cloud.frame) +
       "\n# units mm\n# coordinate_frame rig: the first camera's, x right, y down, z forward\nVERSION 0.7\n";
-  bytes += normals ? "FIELDS x y z sigma_mm intensity camera normal_x normal_y normal_z\nSIZE 4 4 4 4 1 1 4 4 4\n"
-                     "TYPE F F F F U U F F F\nCOUNT 1 1 1 1 1 1 1 1 1\n"
-                   : "FIELDS x y z sigma_mm intensity camera\nSIZE 4 4 4 4 1 1\nTYPE F F F F U U\nCOUNT 1 1 1 1 1 1\n";
+  bytes += normals ? "FIELDS x y z sigma_mm intensity camera normal_x normal_y normal_z\nSIZE 4 4 4 4 4 1 4 4 4\n"
+                     "TYPE F F F F F U F F F\nCOUNT 1 1 1 1 1 1 1 1 1\n"
+                   : "FIELDS x y z sigma_mm intensity camera\nSIZE 4 4 4 4 4 1\nTYPE F F F F F U\nCOUNT 1 1 1 1 1 1\n";
   bytes += "WIDTH " + size + "\nHEIGHT " + rows + "\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + count + "\nDATA binary\n";
   const std::size_t begin = bytes.size();
-  bytes.resize(begin + static_cast<std::size_t>(width) * height * bytes_of_point(normals));
+  bytes.resize(begin + static_cast<std::size_t>(width) * height * bytes_of_point(kPcdBytes, normals));
   char* to = bytes.data() + begin;
   const Eigen::Vector3f none = Eigen::Vector3f::Constant(kNone);
   for (const DenseView& view : cloud.views) {
@@ -238,13 +245,13 @@ std::string write_dense_pcd(const DenseCloud& cloud, bool normals) {
       places.place(y);
       for (int x = 0; x < width; ++x) {
         if (x < view.map.width && view.map.measured(static_cast<std::size_t>(y) * view.map.width + x)) {
-          put_point(to, view, places, points, x, y, normals);
+          put_point<float>(to, view, places, points, x, y, normals);
           continue;
         }
         put(to, none);
-        std::memcpy(to, none.data(), 4);
-        to[4] = 0, to[5] = static_cast<char>(view.camera);
-        to += 6;
+        put(to, none.x());
+        put(to, 0.0F);
+        put(to, view.camera);
         if (normals) put(to, none);
       }
     }

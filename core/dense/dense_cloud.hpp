@@ -42,11 +42,12 @@ struct DenseCloud {
 /// @return how many of them were saturated
 std::size_t shade_view(DenseView& view, const SceneLight& light);
 
-// Binary, little-endian; 18 bytes a point, 30 with normals, which face the camera.
+// Binary, little-endian; 12 bytes a point more with normals, which face the camera.
 
-/// The measured points, row by row, one camera after the other.
+/// The measured points, row by row, one camera after the other: 18 bytes each.
 [[nodiscard]] std::string write_dense_ply(const DenseCloud& cloud, bool normals);
-/// Organised: a point for each pixel, NaN where nothing was measured; the cameras one below the other.
+/// Organised: a point for each pixel, NaN where nothing was measured; the cameras one below the other. 21 bytes each,
+/// as intensity is a float: PCL's PointXYZI takes no other.
 [[nodiscard]] std::string write_dense_pcd(const DenseCloud& cloud, bool normals);
 /// Two pages of floats for each camera: Z in its own frame, mm, and sigma_mm.
 [[nodiscard]] std::string write_dense_tiff(const DenseCloud& cloud);

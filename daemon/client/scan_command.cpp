@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <iostream>
@@ -22,8 +23,21 @@ using std::filesystem::path;
 // Every other pixel of an organised cloud, as the lattice that a picture is drawn of.
 constexpr int kPictureStep = 2;
 
+// A record of an organised cloud: x y z sigma_mm intensity as floats, camera as a byte, a normal.
+constexpr std::size_t kIntensityAt = 16, kCameraAt = 20;
+
+std::size_t record_bytes(bool normals) {
+  return normals ? 33 : 21;
+}
+
+float float_at(const char* bytes) {
+  float value;
+  std::memcpy(&value, bytes, sizeof value);
+  return value;
+}
+
 Result<Cloud> lattice_of_pixels(const json& result, std::string_view pcd, bool normals) {
-  const std::size_t data = pcd.find("\nDATA binary\n"), record = normals ? 30 : 18;
+  const std::size_t data = pcd.find("\nDATA binary\n"), record = record_bytes(normals);
   const auto field = [&](std::string_view key) {
     const std::size_t at = pcd.find(key);
     return at >= data ? 0 : std::atoi(pcd.data() + at + key.size());
@@ -40,32 +54,36 @@ Result<Cloud> lattice_of_pixels(const json& result, std::string_view pcd, bool n
     for (int x = 0; x < width; x += kPictureStep) {
       const char* from = pcd.data() + begin + record * (static_cast<std::size_t>(y) * width + x);
       CloudPoint point;
-      std::memcpy(&point.x, from, 4), std::memcpy(&point.y, from + 4, 4), std::memcpy(&point.z, from + 8, 4);
+      point.x = float_at(from), point.y = float_at(from + 4), point.z = float_at(from + 8);
       if (!(point.z > 0)) continue;
       point.column = static_cast<std::uint16_t>(x / kPictureStep);
       point.row = static_cast<std::uint16_t>(y / kPictureStep);
-      point.intensity = static_cast<std::uint8_t>(from[16]);
+      point.intensity = static_cast<std::uint8_t>(float_at(from + kIntensityAt));
       cloud.points.push_back(point);
     }
   }
   return cloud;
 }
 
-// The points of an organised cloud that are there, as a PLY: both have the same records.
+// The points of an organised cloud that are there, as a PLY, whose intensity is a byte.
 std::string dense_ply_of(const json& result, std::string_view pcd, bool normals) {
-  const std::size_t begin = pcd.find("\nDATA binary\n") + 13, record = normals ? 30 : 18;
+  const std::size_t begin = pcd.find("\nDATA binary\n") + 13, record = record_bytes(normals);
   std::string points;
+  std::size_t count = 0;
   for (std::size_t at = begin; at + record <= pcd.size(); at += record) {
-    float z;
-    std::memcpy(&z, pcd.data() + at + 8, 4);
-    if (z == z) points.append(pcd.substr(at, record));
+    const std::string_view from = pcd.substr(at, record);
+    if (std::isnan(float_at(from.data() + 8))) continue;
+    points.append(from.substr(0, kIntensityAt));
+    points += static_cast<char>(static_cast<std::uint8_t>(float_at(from.data() + kIntensityAt)));
+    points.append(from.substr(kCameraAt));
+    ++count;
   }
   std::string ply = "ply\nformat binary_little_endian 1.0\ncomment scan_id " + result.value("scan", "") +
                     "\ncomment time " + result.value("time", "") + "\ncomment frame " +
                     std::to_string(result.value("frame", std::uint64_t{0})) +
                     "\ncomment units mm\ncomment coordinate_frame rig: the first camera's, x right, y down, z forward\n"
                     "element vertex " +
-                    std::to_string(points.size() / record) +
+                    std::to_string(count) +
                     "\nproperty float x\nproperty float y\nproperty float z\nproperty float sigma_mm\nproperty uchar "
                     "intensity\nproperty uchar camera\n";
   if (normals) ply += "property float nx\nproperty float ny\nproperty float nz\n";

@@ -82,7 +82,8 @@ constexpr std::size_t kPictureBytes = 3;  // a pixel's: what was decoded is draw
 std::size_t expected_bytes(const ServiceState& state, const ScanRequest& request, CloudForm form = {}) {
   std::size_t bytes = request.picture ? picture_bytes(state, request.camera, kPictureBytes) : 0;
   if (form.dense()) {
-    const std::size_t a_pixel = form.format == CloudFormat::kTiff ? 8U : form.normals ? 30U : 18U;
+    const std::size_t record = form.format == CloudFormat::kPcd ? 21U : 18U;
+    const std::size_t a_pixel = form.format == CloudFormat::kTiff ? 8U : record + (form.normals ? 12U : 0U);
     for (const DeviceStatus& camera : state.scanner.rig().camera_statuses())
       bytes += static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px) * a_pixel;
   }

@@ -50,6 +50,12 @@ def pcd(bytes_):
     return fields, width, height, [body[i:i + size] for i in range(0, len(body), size)]
 
 
+def as_ply(record):
+    """A record of a PCD as a PLY has it, where intensity is a byte."""
+    intensity, = struct.unpack_from("<f", record, 16)
+    return record[:16] + bytes([int(intensity)]) + record[20:]
+
+
 def tiff_pages(bytes_):
     assert bytes_[:4] == b"II*\0"
     pages, at = [], struct.unpack_from("<I", bytes_, 4)[0]
@@ -68,7 +74,7 @@ def tiff_pages(bytes_):
 
 def assert_same_surface(test, cloud, single):
     """Where nothing moves, a stream measures from frame to frame: the same pixels, and to well within their sigma."""
-    one, other = (struct.iter_unpack("<4f2B", bytes_.split(b"DATA binary\n", 1)[1]) for bytes_ in (cloud, single))
+    one, other = (struct.iter_unpack("<5fB", bytes_.split(b"DATA binary\n", 1)[1]) for bytes_ in (cloud, single))
     both = either = far = 0
     for (_, _, z, _, _, _), (_, _, single_z, sigma_mm, _, _) in zip(one, other, strict=True):
         there, single_there = z == z, single_z == single_z  # NaN where nothing is
@@ -102,10 +108,12 @@ class Dense(unittest.TestCase):
         self.assertEqual(scan["pixels"]["measured"], scan["points"])
         self.assertEqual(sum(scan["pixels"].values()), width * height)
         self.assertGreater(scan["points"], 0.2 * width * height)
-        measured = [record for record in records if not math.isnan(struct.unpack_from("<f", record, 8)[0])]
+        self.assertEqual((fields["SIZE"], fields["TYPE"]), ("4 4 4 4 4 1", "F F F F F U"))  # PCL's intensity is a float
+        self.assertGreater(len({record[16:20] for record in records}), 10)
+        measured = [as_ply(record) for record in records if not math.isnan(struct.unpack_from("<f", record, 8)[0])]
         self.assertEqual(measured, points)
         self.assertEqual({record for record in records if math.isnan(struct.unpack_from("<f", record, 8)[0])},
-                         {4 * NO_POINT + b"\0\0"})
+                         {4 * NO_POINT + b"\0\0\0\0\0"})
         _, cloud = self.client.call("scan", density="pixels", timeout_ms=60_000, format="tiff")
         (width_z, height_z, depth), (_, _, sigma) = tiff_pages(cloud)
         self.assertEqual((width_z, height_z), (width, height))
@@ -122,7 +130,9 @@ class Dense(unittest.TestCase):
             self.assertAlmostEqual(nx * nx + ny * ny + nz * nz, 1, 4)
             self.assertLess(nx * x + ny * y + nz * z, 0)
         _, cloud = self.client.call("scan", density="pixels", timeout_ms=60_000, normals=True, format="pcd")
-        self.assertEqual(pcd(cloud)[0]["FIELDS"].split()[6:], ["normal_x", "normal_y", "normal_z"])
+        fields, _, _, records = pcd(cloud)
+        self.assertEqual(fields["FIELDS"].split()[6:], ["normal_x", "normal_y", "normal_z"])
+        self.assertEqual([as_ply(record) for record in records if record[8:12] != NO_POINT], points)
 
     def test_what_does_not_go_together_is_refused(self):
         for params in ({"format": "tiff"}, {"normals": True}, {"density": "symbols", "normals": True},
@@ -203,6 +213,7 @@ class Dense(unittest.TestCase):
             names, drawn_points = ply((out / "b.ply").read_bytes())
             self.assertEqual(names[6:], ["nx", "ny", "nz"])
             self.assertEqual([point[:18] for point in drawn_points], points)
+            self.assertEqual(drawn_points, ply(self.client.call("scan", normals=True, **PIXEL_SCAN)[1])[1])
             self.assertEqual(len(tiff_pages((out / "a.tiff").read_bytes())), 2)
             self.assertEqual(pcd((out / "a.pcd").read_bytes())[3], pcd(self.organised)[3])
             self.assertTrue((out / "b.png").read_bytes().startswith(b"\x89PNG"))
@@ -240,8 +251,8 @@ class DenseElsewhere(unittest.TestCase):
             self.assertEqual((width, height), (1600, 2400))
             self.assertEqual(len(scan["epipolar_px"]), 2)
             self.assertEqual(sum(scan["pixels"].values()), width * height)
-            self.assertEqual({record[17] for record in records[:width * height // 2]}, {0})
-            self.assertEqual({record[17] for record in records[width * height // 2:]}, {1})
+            self.assertEqual({record[20] for record in records[:width * height // 2]}, {0})
+            self.assertEqual({record[20] for record in records[width * height // 2:]}, {1})
             _, depth_maps = client.call("scan", format="tiff", **PIXEL_SCAN)
             self.assertEqual([page[:2] for page in tiff_pages(depth_maps)], 4 * [(1600, 1200)])
 

@@ -3,6 +3,7 @@
 #include "core/cloud/pcd.hpp"
 
 #include <cmath>
+#include <cstring>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,8 +16,13 @@ namespace {
 
 using ::testing::HasSubstr;
 
+// A record as a PLY has it, where intensity is a byte.
 CloudPoint cell(const std::string& pcd, std::size_t index) {
-  return read_point(pcd.data() + pcd.find("DATA binary\n") + 12 + index * kPointBytes).value();
+  std::string record = pcd.substr(pcd.find("DATA binary\n") + 12 + index * kPcdPointBytes, kPcdPointBytes);
+  float intensity = -1;
+  std::memcpy(&intensity, record.data() + 12, sizeof intensity);
+  record.replace(12, sizeof intensity, 1, static_cast<char>(static_cast<std::uint8_t>(intensity)));
+  return read_point(record.data()).value();
 }
 
 TEST(WritePcd, PutsEachPointInItsCellAndNanElsewhere) {
@@ -24,7 +30,7 @@ TEST(WritePcd, PutsEachPointInItsCellAndNanElsewhere) {
   const std::string pcd = write_pcd(cloud);
   EXPECT_THAT(pcd, HasSubstr("\nWIDTH 7\nHEIGHT 8\n"));
   EXPECT_THAT(pcd, HasSubstr("\nPOINTS 56\n"));
-  EXPECT_EQ(pcd.size(), pcd.find("DATA binary\n") + 12 + 56 * kPointBytes);
+  EXPECT_EQ(pcd.size(), pcd.find("DATA binary\n") + 12 + 56 * kPcdPointBytes);
   std::size_t next = 0;
   for (std::size_t i = 0; i < 56; ++i) {
     const CloudPoint found = cell(pcd, i);
@@ -37,6 +43,13 @@ TEST(WritePcd, PutsEachPointInItsCellAndNanElsewhere) {
     }
   }
   EXPECT_EQ(next, cloud.points.size());
+}
+
+TEST(WritePcd, StoresIntensityAsAFloat) {
+  EXPECT_THAT(write_pcd(any_cloud(5, 7, 4)), HasSubstr("\nFIELDS x y z intensity camera_u camera_v projector_u "
+                                                       "projector_v camera symbol sigma_mm column row\n"
+                                                       "SIZE 4 4 4 4 4 4 4 4 1 1 4 4 4\n"
+                                                       "TYPE F F F F F F F F U U F I I\n"));
 }
 
 TEST(WritePcd, LeavesOutWhatIsOutsideTheLattice) {

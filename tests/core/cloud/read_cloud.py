@@ -45,6 +45,8 @@ def read_pcd(path):
     width, height, count = (int(keys[key][0]) for key in ("WIDTH", "HEIGHT", "POINTS"))
     if width * height != count:
         sys.exit("WIDTH x HEIGHT is not POINTS")
+    if keys["TYPE"][keys["FIELDS"].index("intensity")] != "F":
+        sys.exit("intensity is no float, as PCL's PointXYZI has it")
     layout = "".join(PCD_TYPES[kind, int(size)] for kind, size in zip(keys["TYPE"], keys["SIZE"]))
     return width, height, records(layout, keys["FIELDS"], body, count)
 
