@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
+#include <optional>
 #include <sstream>
 #include <string_view>
 #include <utility>
@@ -65,11 +67,24 @@ Result<> merge_camera(json& before, const json& changes, const std::string& wher
   return merge_keys(before, changes, where);
 }
 
+// A whole number, however it is written: JSON has one kind of number, where TOML has two. As a key that takes any
+// number takes whole ones too, none is lost.
+std::optional<std::int64_t> whole_number(const json& value) {
+  if (value.is_number_integer()) return value.get<std::int64_t>();
+  constexpr double kExact = 9007199254740992.0;  // 2^53
+  const double number = value.is_number_float() ? value.get<double>() : 0.5;
+  if (std::trunc(number) != number || std::abs(number) > kExact) return std::nullopt;
+  return static_cast<std::int64_t>(number);
+}
+
 template <class Insert>
 void with_value(const json& value, Insert insert) {
   if (value.is_boolean()) insert(value.get<bool>());
-  if (value.is_number_integer()) insert(value.get<std::int64_t>());
-  if (value.is_number_float()) insert(value.get<double>());
+  if (const auto whole = whole_number(value)) {
+    insert(*whole);
+  } else if (value.is_number_float()) {
+    insert(value.get<double>());
+  }
   if (value.is_string()) insert(value.get<std::string>());
 }
 

@@ -52,6 +52,18 @@ class Decoding(unittest.TestCase):
             self.assertEqual(configured(client)["set"], {})
         self.assertEqual(json.loads((self.state / "settings-slsd.json").read_text(encoding="utf-8")), {})
 
+    def test_takes_a_whole_number_however_it_is_written(self):
+        with Service(environment=self.environment) as service, service.client() as client:
+            for decode in ({"dense_stride_px": 8.0, "depth_max_mm": 2400}, {"dense_stride_px": 8, "depth_max_mm": 2400.0}):
+                client.call("set", decode=decode)
+                self.assertEqual(configured(client)["configuration"]["decode"], decode)
+            for stride in (8.5, 1e300):
+                with self.assertRaisesRegex(RpcError, "dense_stride_px"):
+                    client.call("set", decode={"dense_stride_px": stride})
+            self.assertGreater(client.call("scan", timeout_ms=60000.0)[0]["points"], 2000)
+            client.call("set", pattern={"symbol_size_px": 16.0, "symbols": [11.0, 13, 14, 18, 19]})
+            self.assertEqual(configured(client)["configuration"]["pattern"]["symbol_size_px"], 16)
+
     def test_check_and_verify_take_what_was_set(self):
         other = self.state / "other.yml"
         shutil.copy(SCENE / "calibration.yml", other)

@@ -32,9 +32,18 @@ TEST(ParamReader, NamesTheNearestParameter) {
   EXPECT_THAT(reader.error()->message, HasSubstr("did you mean format?"));
 }
 
+TEST(ParamReader, TakesAnyNumberThatIsWhole) {
+  for (const char* text : {"5000", "5000.0", "5e3", "50000e-1", "5.000E+3"}) {
+    const json params{{"timeout_ms", json::parse(text)}};
+    ParamReader reader(params);
+    EXPECT_EQ(reader.integer("timeout_ms", 1, 1, 60000), 5000) << text;
+    EXPECT_FALSE(reader.error()) << text;
+  }
+}
+
 TEST(ParamReader, RefusesWrongTypesAndRanges) {
-  for (const json& value : {json(0), json(61), json(1.5), json("5"), json(), json::array(), json(1e300),
-                            json(18446744073709551615ULL), json(-9223372036854775807LL)}) {
+  for (const json& value : {json(0), json(61), json(1.5), json(59.999999999), json(61.0), json(0.0), json("5"), json(),
+                            json::array(), json(1e300), json(18446744073709551615ULL), json(-9223372036854775807LL)}) {
     const json params{{"timeout_ms", value}};
     ParamReader reader(params);
     EXPECT_EQ(reader.integer("timeout_ms", 5, 1, 60), 5);
