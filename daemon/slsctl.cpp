@@ -110,8 +110,10 @@ void add_image(CLI::App& app, ClientOptions& options, const std::string& name, c
 }
 
 void add_view(CLI::App& app, ClientOptions& options) {
-  CLI::App* metrics = app.add_subcommand("metrics", "what the service counts and measures, as OpenMetrics text");
+  CLI::App* metrics = app.add_subcommand("metrics", "what the service counts and measures, as text for Prometheus");
   metrics->add_option("-o,--output,FILE", options.output, "write it there, whole or not at all: for node_exporter");
+  metrics->add_option("--format", options.format, "printed: openmetrics; in a file: prometheus, the older text format")
+      ->check(CLI::IsMember({"openmetrics", "prometheus"}));
   CLI::App* bundle =
       app.add_subcommand("bundle", "write the last scans, with frames, settings and counters, to one file");
   bundle->add_option("-o,--output,FILE", options.output, "the file; without it slsd-TIME.tar, here");

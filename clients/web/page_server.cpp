@@ -229,9 +229,9 @@ void PageServer::add_requests() {
   get("/api/cloud", [this](const Request& request) { return cloud(request); });
   get("/api/past", [this](const Request& request) { return past(request); });
   get("/api/metrics", [this](const Request&) {
-    const auto answered = call("metrics", json::object(), kPatience);
+    const auto answered = call("metrics", {{"format", "prometheus"}}, kPatience);
     if (!answered) return refusal(answered.error());
-    return Answer{200, "text/plain; charset=utf-8", answered->reply.bytes, {}, {}};
+    return Answer{200, "text/plain; version=0.0.4; charset=utf-8", answered->reply.bytes, {}, {}};
   });
   get("/api/exposure", [this](const Request& request) {
     ClientOptions options;

@@ -18,6 +18,7 @@ inline constexpr int kNoDaemon = 3;
 struct ClientOptions {
   std::filesystem::path socket = "/run/slsd/slsd.sock";
   bool json = false;
+  std::string format;                     ///< metrics: "openmetrics" or "prometheus"; empty: by where it goes
   std::filesystem::path output;           ///< scan: the cloud, .ply or .pcd; empty: not kept
   std::filesystem::path picture;          ///< scan: the frame with what was decoded; project: what to show
   std::filesystem::path cloud_picture;    ///< scan: the cloud, drawn

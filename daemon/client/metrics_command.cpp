@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include <iostream>
+#include <string>
 
 #include "daemon/client/client_commands.hpp"
 #include "daemon/client/report.hpp"
@@ -10,7 +11,10 @@
 namespace slsd {
 
 int metrics_command(const ClientOptions& options) {
-  const auto answered = ask(options, "metrics", nlohmann::json::object());
+  const std::string format = !options.format.empty()  ? options.format
+                             : options.output.empty() ? "openmetrics"
+                                                      : "prometheus";
+  const auto answered = ask(options, "metrics", {{"format", format}});
   if (!answered) return report(options, answered.error());
   const std::string_view text = answered->reply.bytes;
   if (!options.output.empty()) {
@@ -19,7 +23,7 @@ int metrics_command(const ClientOptions& options) {
     if (options.json) std::cout << to_line(answered->reply.message["result"]);
     return kDone;
   }
-  std::cout << (options.json ? to_line({{"format", "openmetrics"}, {"text", text}}) : text) << std::flush;
+  std::cout << (options.json ? to_line({{"format", format}, {"text", text}}) : text) << std::flush;
   return std::cout ? kDone : kRequestFailed;
 }
 

@@ -235,9 +235,12 @@ void run_frame(ServiceState& state, const json& params, Session& session, Respon
 }
 
 void run_metrics(ServiceState& state, const json& params, Session&, Respond respond) {
-  const ParamReader reader(params);
+  ParamReader reader(params);
+  const std::string format = reader.choice("format", {"openmetrics", "prometheus"});
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
-  respond(bytes_reply(metrics_text(state), {{"format", "openmetrics"}}));
+  const bool older = format == "prometheus";
+  respond(bytes_reply(metrics_text(state, older ? MetricsFormat::kPrometheus : MetricsFormat::kOpenMetrics),
+                      {{"format", format}}));
 }
 
 constexpr std::size_t kBundleNotesBytes = 1 << 20;

@@ -28,13 +28,15 @@ std::string escaped(std::string_view value) {
 /// Writes metric families, each in one piece.
 class Exposition {
  public:
+  explicit Exposition(MetricsFormat format) : older_(format == MetricsFormat::kPrometheus) {}
+
   /// @param name  where it has a unit, that comes last, after "_"
   void family(std::string_view name, std::string_view type, std::string_view help, std::string_view unit = {}) {
     name_ = name;
     counter_ = type == "counter";
-    text_ += fmt::format("# TYPE {} {}\n", name, type);
-    if (!unit.empty()) text_ += fmt::format("# UNIT {} {}\n", name, unit);
-    text_ += fmt::format("# HELP {} {}\n", name, help);
+    const std::string of(older_ && counter_ ? fmt::format("{}_total", name) : std::string(name));
+    text_ += fmt::format("# HELP {} {}\n# TYPE {} {}\n", of, help, of, type);
+    if (!older_ && !unit.empty()) text_ += fmt::format("# UNIT {} {}\n", name, unit);
   }
 
   void sample(double value, Labels labels = {}) { line(counter_ ? "_total" : "", labels, value); }
@@ -61,7 +63,7 @@ class Exposition {
     labelled ? line("_sum", {{label, value}}, seconds) : line("_sum", {}, seconds);
   }
 
-  [[nodiscard]] std::string finish() && { return std::move(text_) + "# EOF\n"; }
+  [[nodiscard]] std::string finish() && { return std::move(text_) + (older_ ? "" : "# EOF\n"); }
 
  private:
   void line(std::string_view suffix, Labels labels, double value) {
@@ -77,6 +79,7 @@ class Exposition {
   std::string text_;
   std::string name_;
   bool counter_ = false;
+  bool older_ = false;
 };
 
 void tell_service(const ServiceState& state, Exposition& out) {
@@ -226,8 +229,8 @@ void tell_scans(const ServiceState& state, Exposition& out) {
 
 }  // namespace
 
-std::string metrics_text(const ServiceState& state) {
-  Exposition out;
+std::string metrics_text(const ServiceState& state, MetricsFormat format) {
+  Exposition out(format);
   tell_service(state, out);
   tell_scans(state, out);
   tell_projector(state, out);

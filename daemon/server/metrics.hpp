@@ -8,10 +8,12 @@
 
 namespace slsd {
 
-/// What `metrics` answers: the service, its devices, clients and scans as OpenMetrics text (openmetrics.io, 1.0), of
-/// counters, gauges and histograms alone, which Prometheus' older text format has, too: node_exporter reads that.
-/// docs/metrics.md lists them.
+/// OpenMetrics 1.0 (openmetrics.io), or the older text format of Prometheus (0.0.4), which node_exporter reads. There
+/// the type and the help of a counter are those of its name with "_total".
+enum class MetricsFormat { kOpenMetrics, kPrometheus };
+
+/// What `metrics` answers: the service, its devices, clients and scans. docs/metrics.md lists them.
 /// @thread thread-bound to the event loop's
-[[nodiscard]] std::string metrics_text(const ServiceState& state);
+[[nodiscard]] std::string metrics_text(const ServiceState& state, MetricsFormat format = MetricsFormat::kOpenMetrics);
 
 }  // namespace slsd

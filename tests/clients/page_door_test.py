@@ -31,6 +31,13 @@ class Door(unittest.TestCase):
             self.assertEqual(web.get("/../../etc/passwd")[0], 404)
             self.assertEqual(web.get("/page/../../../etc/passwd")[0], 404)
 
+    def test_metrics_are_scraped_in_the_older_format_that_they_are_said_to_have(self):
+        with Service() as service, Web(service) as web:
+            status, headers, body = web.get("/api/metrics")
+        self.assertEqual((status, headers["Content-Type"]), (200, "text/plain; version=0.0.4; charset=utf-8"))
+        self.assertIn(b"# TYPE slsd_scans_succeeded_total counter\n", body)
+        self.assertNotIn(b"# EOF", body)
+
     def test_only_the_page_itself_may_ask(self):
         with Service() as service, Web(service) as web:
             self.assertEqual(web.get("/api/status")[0], 200)

@@ -35,7 +35,8 @@ class Install(unittest.TestCase):
                      "usr/lib/sysusers.d/slsd.conf", "usr/lib/systemd/catalog/slsd.catalog", "usr/lib/udev/rules.d/60-slsd.rules",
                      "usr/share/bash-completion/completions/slsctl", "etc/slsd/slsd.toml",
                      "etc/slsd/patterns/16px-5.toml",
-                     "usr/share/slsd/boards/charuco-11x7-23mm-a4.pdf", "usr/share/man/man1/slsctl.1", "usr/share/man/man8/slsd-display.8", "usr/share/man/man5/slsd.toml.5",
+                     "usr/share/slsd/boards/charuco-11x7-23mm-a4.pdf", "usr/share/slsd/monitoring/slsd-alerts.yml",
+                     "usr/share/slsd/monitoring/slsd-dashboard.json", "usr/share/man/man1/slsctl.1", "usr/share/man/man8/slsd-display.8", "usr/share/man/man5/slsd.toml.5",
                      "usr/share/man/man8/slsd.8"):
             self.assertTrue((self.root / file).is_file(), file)
         for name in UNITS:

@@ -21,16 +21,16 @@ from prometheus_client.parser import text_string_to_metric_families as read_prom
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 
 
-class Metrics:
-    """One look, by both parsers: node_exporter's files have the older format."""
+def samples_of(families):
+    return {(sample.name, *sorted(sample.labels.items())): sample.value for family in families for sample in family.samples}
 
-    def __init__(self, text):
-        self.families = {family.name: family for family in read_openmetrics(text)}
-        self.samples = {(sample.name, *sorted(sample.labels.items())): sample.value
-                        for family in self.families.values() for sample in family.samples}
-        older = {(sample.name, *sorted(sample.labels.items())): sample.value
-                 for family in read_prometheus(text) for sample in family.samples}
-        assert self.samples == older
+
+class Metrics:
+    """One look, as OpenMetrics."""
+
+    def __init__(self, text, read=read_openmetrics):
+        self.families = {family.name: family for family in read(text)}
+        self.samples = samples_of(self.families.values())
 
     def value(self, name, **labels):
         return self.samples[(name, *sorted(labels.items()))]
@@ -131,6 +131,35 @@ class View(unittest.TestCase):
                 self.assertIn("frames/s", slsctl("--socket", service.socket, "top", "--count", 1).stdout)
 
 
+class OlderFormat(unittest.TestCase):
+    """Of Prometheus, 0.0.4, which node_exporter reads."""
+
+    def test_has_the_same_samples_with_type_and_help(self):
+        with Service() as service, service.client() as client:
+            service.wait_ready()
+            client.call("scan", timeout_ms=60000)
+            told, payload = client.call("metrics", format="prometheus")
+            newer = look(client)
+            with self.assertRaisesRegex(RpcError, "openmetrics"):
+                client.call("metrics", format="xml")
+        self.assertEqual(told["format"], "prometheus")
+        text = payload.decode()
+        older = Metrics(text, read_prometheus)
+        self.assertEqual(older.samples.keys(), newer.samples.keys())
+        self.assertEqual(older.value("slsd_scans_succeeded_total"), 1)
+        typed = dict(re.findall(r"^# TYPE (\S+) (\S+)$", text, re.M))
+        helped = dict(re.findall(r"^# HELP (\S+) (.+)$", text, re.M))
+        self.assertEqual(typed.keys(), helped.keys())
+        for name, *_ in older.samples:
+            whole = name if name in typed else re.sub(r"_(bucket|sum|count)$", "", name)
+            self.assertEqual(typed[whole], "counter" if name.endswith("_total") else "histogram" if whole != name else "gauge", name)
+        for name, family in newer.families.items():
+            self.assertEqual(helped[name + "_total" if family.type == "counter" else name], family.documentation)
+        self.assertNotIn("# UNIT", text)
+        self.assertNotIn("# EOF", text)
+        self.assertTrue(text.endswith("\n"))
+
+
 class Programs(unittest.TestCase):
     def test_slsctl_prints_them_and_writes_them_whole(self):
         with Service() as service, tempfile.TemporaryDirectory() as folder:
@@ -141,7 +170,12 @@ class Programs(unittest.TestCase):
             for _ in range(2):
                 written = slsctl("--socket", service.socket, "metrics", "--output", file)
                 self.assertEqual((written.returncode, written.stdout + written.stderr), (0, ""))
-                Metrics(file.read_text(encoding="utf-8"))
+                self.assertIn("# TYPE slsd_scans_succeeded_total counter\n", file.read_text(encoding="utf-8"))
+                Metrics(file.read_text(encoding="utf-8"), read_prometheus)
+            slsctl("--socket", service.socket, "metrics", "--output", file, "--format", "openmetrics")
+            Metrics(file.read_text(encoding="utf-8"))
+            older = slsctl("--socket", service.socket, "metrics", "--format", "prometheus").stdout
+            self.assertIn("# HELP slsd_scans_succeeded_total Scans that gave a cloud.\n", older)
             self.assertEqual([entry.name for entry in pathlib.Path(folder).iterdir()], ["slsd.prom"])
             refused = slsctl("--socket", service.socket, "metrics", "-o", pathlib.Path(folder, "no/where.prom"))
             self.assertEqual(refused.returncode, 1)
