@@ -171,7 +171,6 @@ def removed(machine):
     machine.run("dpkg", "--remove", *lifecycle.NAMES)
     require(not machine.is_active("slsd.service"), "removed, and still active")
     require(machine.exists(CALIBRATION), "a removal takes the calibration away")
-    machine.run("systemctl", "stop", "slsd@example.socket", "slsd@example.service", check=False)
     machine.run("dpkg", "--purge", *lifecycle.NAMES)
     for user in ("alice", "bob", "carol"):
         machine.run("userdel", user)

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """Installs, upgrades, downgrades, kills, removes and purges the packages in random order in a root folder, and compares the
-file system after each: lifecycle.py ROOT FOLDER_OF_PACKAGES [--rounds N] [--seed N]. As root; ROOT is a Debian with what
-the packages depend on, and with none of them."""
+file system after each; then lives with instances of the units in a container: lifecycle.py ROOT FOLDER_OF_PACKAGES [--rounds N]
+[--seed N]. As root; ROOT is a Debian with what the packages depend on, and with none of them."""
 import argparse
 import contextlib
 import hashlib
@@ -17,6 +17,9 @@ import stat
 import subprocess
 import sys
 import time
+
+import instances
+from machine import Container
 
 NAMES = ("slsd", "slsd-client", "slsd-calibrate", "slsd-display", "slsd-web", "slsd-dds", "libslsd-dev", "python3-slsd")
 # What dpkg, the loader and the tools of users keep for themselves, whatever is installed.
@@ -160,7 +163,7 @@ def loop(machine, rounds):
     """@return how often each was done"""
     done, version, state, mine = {}, None, None, False
     for number in range(rounds):
-        what = machine.random.choice(("install", "install", "upgrade", "kill", "calibrate", "edit", "remove", "purge"))
+        what = machine.random.choice(("install", "install", "upgrade", "kill", "calibrate", "edit", "enable", "remove", "purge"))
         done[what] = done.get(what, 0) + 1
         if what in ("install", "upgrade", "kill"):
             version = ("next" if version == "this" else "this") if what == "upgrade" else machine.random.choice(("this", "next"))
@@ -185,6 +188,8 @@ def loop(machine, rounds):
             mine = True
             with open(machine.root / CONFIGURATION, "a", encoding="utf-8") as file:
                 file.write(MINE)
+        elif what == "enable" and machine.is_there("usr/bin/slsd"):
+            machine.run("systemctl", "enable", *instances.ENABLED)  # links that a purge has to take away
         elif what == "remove":
             machine.dpkg("--remove", *reversed(NAMES))
             assert not machine.is_there("usr/bin/slsd")
@@ -235,14 +240,22 @@ def main():
     root = arguments.root.resolve()
     with contextlib.ExitStack() as stack:
         subprocess.run(["mount", "--bind", "/proc", root / "proc"], check=True)
-        stack.callback(subprocess.run, ["umount", root / "proc"], check=True)
+        stack.callback(subprocess.run, ["umount", "--lazy", root / "proc"], check=True)
         machine = Machine(root, arguments.packages)
         machine.random.seed(arguments.seed)
         scan_once(machine)
         begin = time.monotonic()
         done = loop(machine, arguments.rounds)
+    report(arguments.rounds, begin, done)
+    begin, rounds = time.monotonic(), max(3, arguments.rounds // 20)
+    with contextlib.closing(Container(root)) as container:
+        done = instances.live_with_instances(container, machine.random, rounds, machine.names)
+    report(rounds, begin, done, " with instances running")
+
+
+def report(rounds, begin, done, how=""):
     counts = ", ".join(f"{count} {what}" for what, count in sorted(done.items()))
-    print(f"{arguments.rounds} rounds in {time.monotonic() - begin:.0f} s ({counts}): nothing lost, nothing left")
+    print(f"{rounds} rounds{how} in {time.monotonic() - begin:.0f} s ({counts}): nothing lost, nothing left")
 
 
 if __name__ == "__main__":
