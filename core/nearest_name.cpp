@@ -11,6 +11,15 @@ namespace slsd {
 namespace {
 
 constexpr std::size_t kLongestWord = 64;  // what is longer is no misspelling of a key
+constexpr std::size_t kShortestBeginning = 3;
+
+const std::string* only_name_that_begins_with(std::string_view word, std::span<const std::string> names) {
+  if (word.size() < kShortestBeginning) return nullptr;
+  const auto begins = [&](const std::string& name) { return name.starts_with(word); };
+  const auto first = std::ranges::find_if(names, begins);
+  if (first == names.end() || std::any_of(first + 1, names.end(), begins)) return nullptr;
+  return &*first;
+}
 
 }  // namespace
 
@@ -39,6 +48,7 @@ std::optional<std::string> nearest_name(std::string_view word, std::span<const s
       nearest = &name;
     }
   }
+  if (nearest == nullptr) nearest = only_name_that_begins_with(word, names);
   return nearest == nullptr ? std::nullopt : std::optional(*nearest);
 }
 

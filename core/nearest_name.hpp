@@ -13,11 +13,12 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] int edit_distance(std::string_view a, std::string_view b);
 
-/// The name that a person most likely meant by a word; empty where none is within a third of its length.
+/// The name that a person most likely meant by a word: within a third of its length, else the only one that begins with
+/// it. Empty if there is none.
 /// @thread reentrant
 [[nodiscard]] std::optional<std::string> nearest_name(std::string_view word, std::span<const std::string> names);
 
-/// "; did you mean symbols?", or nothing where no name is near.
+/// "; did you mean symbols?", or nothing if no name is near.
 [[nodiscard]] std::string nearest_hint(std::string_view word, std::span<const std::string> names);
 
 }  // namespace slsd

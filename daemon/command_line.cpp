@@ -7,7 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/options_as_values.hpp"
+#include "daemon/usage.hpp"
 
 namespace slsd {
 namespace {
@@ -33,7 +33,7 @@ void add_calibration_options(CLI::App& app, CommandLine& line) {
       ->excludes(latency);
   app.add_option("--plane-ruler", request.plane_ruler, "as --ruler, of the reference plane's print")->needs("--plane");
   app.add_option("--planes", request.planes, "with --plane: how many looks at it a session takes")
-      ->check(CLI::Range(1, 99))
+      ->check(between(1, 99))
       ->needs("--plane");
   app.add_option("--use", request.use, "with --calibrate --from: FIRST:LAST, the poses of that part alone")
       ->needs(calibrate)
@@ -44,10 +44,10 @@ void add_calibration_options(CLI::App& app, CommandLine& line) {
   const auto choose_code = [&request](const std::string& code) { request.gray_code = code == "gray"; };
   app.add_option_function<std::string>("--code", choose_code,
                                        "what is projected: the pattern, or a Gray code that takes many pictures a pose")
-      ->check(CLI::IsMember({"pattern", "gray"}))
+      ->check(one_of({"pattern", "gray"}))
       ->needs(calibrate);
   app.add_option("--poses", request.poses, "with --calibrate: how many poses a session takes")
-      ->check(CLI::Range(3, 99))
+      ->check(between(3, 99))
       ->needs(calibrate);
   app.add_option("--record", request.record,
                  "with --calibrate: the folder that the captures go to; poses in it already are taken over")
@@ -75,7 +75,7 @@ void add_extrinsics_options(CLI::App& app, ExtrinsicsRequest& request) {
       ->needs(extrinsics);
   app.add_option("--parent", request.parent, "with --extrinsics: the name of that frame (cell)")->needs(extrinsics);
   app.add_option("--places", request.places, "with --extrinsics: places of the board (3)")
-      ->check(CLI::Range(1, 99))
+      ->check(between(1, 99))
       ->needs(extrinsics);
   for (const char* other : {"--calibrate", "--verify", "--pattern", "--check", "--check-config", "--list"})
     extrinsics->excludes(app.get_option(other));
@@ -85,7 +85,7 @@ void add_options(CLI::App& app, CommandLine& line) {
   app.set_version_flag("--version", "slsd " SLSD_VERSION);
   app.add_option("--config", line.configuration, "configuration file; without it " + std::string(kConfigurationFile));
   app.add_option("--log-level", line.level, "least level that is logged")
-      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "critical"}));
+      ->check(one_of({"trace", "debug", "info", "warning", "error", "critical"}));
   auto* pattern = app.add_option("--pattern", line.pattern_image, "write the image that the projector shows, as a PNG");
   auto* check = app.add_flag("--check", line.check, "look at everything that a scan needs, and say what to do");
   auto* check_configuration = app.add_flag("--check-config", line.check_configuration,
@@ -138,16 +138,12 @@ void check_commands(const CLI::App& app, const CommandLine& line) {
 }  // namespace
 
 tl::expected<CommandLine, int> parse_command_line(int argc, char** argv) {
-  CLI::App app("The service of a single-shot structured-light scanner. Without an option it serves in the foreground.");
+  CLI::App app("The service of a single-shot structured-light scanner. Without an option it serves in the foreground.",
+               "slsd");
   CommandLine line;
   add_options(app, line);
-  refuse_options_as_values(app);
-  try {
-    app.parse(argc, argv);
-    check_commands(app, line);
-  } catch (const CLI::ParseError& error) {
-    return tl::unexpected(app.exit(error) == 0 ? kDone : kWrongUsage);
-  }
+  const auto ended = parse_usage(app, argc, argv, [&] { check_commands(app, line); });
+  if (ended) return tl::unexpected(*ended);
   line.request.configuration_file = line.configuration;
   line.print.board = line.request.board;
   return line;

@@ -1,145 +1,222 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "core/shown_picture.hpp"
 #include "daemon/client/client_commands.hpp"
 #include "daemon/client/client_options.hpp"
-#include "daemon/options_as_values.hpp"
+#include "daemon/client/output.hpp"
+#include "daemon/usage.hpp"
+#include "drivers/files/file.hpp"
 
 namespace {
 
+using slsd::between;
 using slsd::ClientOptions;
+using slsd::one_of;
 
-const CLI::Validator kCloudFile(
-    [](const std::string& file) {
-      const auto extension = std::filesystem::path(file).extension();
-      for (const char* known : {".ply", ".pcd", ".tiff", ".tif"})
-        if (extension == known) return "";
-      return "a cloud's file ends in .ply or .pcd, a depth map's in .tiff";
-    },
-    "CLOUD.ply|CLOUD.pcd|DEPTH.tiff");
+constexpr double kManyTimes = 1e9;
+
+const char* const kMeasure = "Measure";
+const char* const kWatch = "Watch";
+const char* const kSetUp = "Set up";
+const char* const kDiagnose = "Diagnose";
+
+/// A command of a group of the help, with examples below its options.
+CLI::App* add_command(CLI::App& app, const char* group, const std::string& name, const std::string& what,
+                      const std::string& examples) {
+  CLI::App* command = app.add_subcommand(name, what);
+  command->group(group);
+  command->footer("Examples:\n" + examples + "\n--socket and --json are options of every command: see slsctl --help");
+  return command;
+}
+
+void add_camera(CLI::App* command, ClientOptions& options, const std::string& what) {
+  command->add_option("--camera", options.camera, what)->type_name("NAME");
+}
 
 void add_density(CLI::App* command, ClientOptions& options) {
   command->add_option("--density", options.density, "a point for each symbol, or for each camera pixel")
-      ->check(CLI::IsMember({"symbols", "pixels"}));
+      ->check(one_of({"symbols", "pixels"}));
 }
 
 void add_timeout(CLI::App* command, ClientOptions& options) {
-  command->add_option("--timeout-ms", options.timeout_ms, "how long to wait for devices and frames")
-      ->check(CLI::Range(1, 600'000));
+  command->add_option("--timeout-ms", options.timeout_ms, "how long to wait for devices and frames (5000)")
+      ->check(between(1, 600'000))
+      ->type_name("N");
+}
+
+void add_count(CLI::App* command, ClientOptions& options, const std::string& name, const std::string& what) {
+  command->add_option(name, options.count, what)->check(between(1, kManyTimes))->type_name("N");
 }
 
 void add_scan(CLI::App& app, ClientOptions& options) {
-  CLI::App* scan = app.add_subcommand("scan", "trigger one scan, wait, write the cloud");
-  scan->add_option("-o,--output,CLOUD", options.output, "write the cloud, as PLY or PCD, or as a depth map")
-      ->check(kCloudFile);
-  scan->add_option("--picture", options.picture, "write the frame with what was decoded, as a PNG");
-  scan->add_option("--cloud-picture", options.cloud_picture, "write a picture of the cloud, as a PNG");
+  CLI::App* scan = add_command(app, kMeasure, "scan", "take one scan and write its point cloud",
+                               "  slsctl scan cloud.ply\n"
+                               "  slsctl scan --density pixels depth.tiff\n"
+                               "  slsctl scan --format pcd -o - | my-program\n");
+  CLI::Option* output = scan->add_option("-o,--output,CLOUD", options.output,
+                                         "the file to write: .ply, .pcd or .tiff; - is standard output")
+                            ->type_name("FILE");
+  scan->add_option("--format", options.format, "the format, if the file's name does not tell it")
+      ->check(one_of({"ply", "pcd", "tiff"}))
+      ->needs(output);
   add_density(scan, options);
-  scan->add_flag("--normals", options.normals, "with --density pixels: the surface's normals too");
+  scan->add_flag("--normals", options.normals, "also write the surface's normals (of pixels)");
   scan->add_flag("--texture", options.texture, "also light the scene in white: intensities are those of the points");
   scan->add_flag("--ambient", options.ambient, "also take a frame without light, and subtract the light of the room");
+  scan->add_option("--picture", options.picture, "write the camera's frame with what was decoded in it")
+      ->type_name("FILE.png");
+  scan->add_option("--cloud-picture", options.cloud_picture, "write a picture of the cloud")->type_name("FILE.png");
+  add_camera(scan, options, "the camera of --picture (the first)");
   add_timeout(scan, options);
 }
 
-void add_watch(CLI::App& app, ClientOptions& options) {
-  CLI::App* watch = app.add_subcommand("watch", "a line for each cloud as it comes");
-  watch->add_option("--count", options.count, "end after so many clouds")->check(CLI::Range(1, 1'000'000'000));
-  add_density(watch, options);
-  watch->add_option("--rate", options.rate_hz, "at most so many a second")->check(CLI::Range(0.001, 1000.0));
-}
-
-void add_exposure(CLI::App& app, ClientOptions& options) {
-  CLI::App* exposure =
-      app.add_subcommand("exposure", "look at the scene, propose exposure and gain, say what else is wrong");
-  exposure->add_option("--camera", options.camera, "the camera's name; without it the first");
-  exposure->add_option("--exposure-max-us", options.exposure_max_us, "the longest exposure to propose (100000)")
-      ->check(CLI::Range(1.0, 1e7));
-  exposure->add_option("--gain-max-db", options.gain_max_db, "the highest gain to propose (24)")
-      ->check(CLI::Range(0.0, 60.0));
-  add_timeout(exposure, options);
-}
-
 void add_record(CLI::App& app, ClientOptions& options) {
-  CLI::App* record = app.add_subcommand("record", "scan on and on, and write the frames, to be replayed");
-  record->add_option("DIR", options.folder, "a folder that is not there yet, or empty")->required();
-  record->add_option("--frames", options.count, "end after so many scans")->check(CLI::Range(1, 1'000'000'000));
-  record->add_option("--seconds", options.seconds, "end after so long")->check(CLI::Range(0.001, 1e9));
-  record->add_flag("--clouds", options.clouds, "write the clouds too");
+  CLI::App* record = add_command(app, kMeasure, "record", "scan again and again, and keep the frames to replay them",
+                                 "  slsctl record session-1 --frames 100\n"
+                                 "  slsctl record session-2 --seconds 60 --clouds\n");
+  record->add_option("DIR", options.folder, "a new or an empty folder")->required()->type_name("FOLDER");
+  add_count(record, options, "--frames", "end after so many scans");
+  record->add_option("--seconds", options.seconds, "end after so long")->check(between(0.001, 1e9))->type_name("S");
+  record->add_flag("--clouds", options.clouds, "keep the clouds too");
   add_timeout(record, options);
+}
+
+void add_watching(CLI::App& app, ClientOptions& options) {
+  add_command(app, kWatch, "status", "show the state of service, devices and scans", "  slsctl status\n");
+  CLI::App* watch = add_command(app, kWatch, "watch", "print a line for each cloud; the service scans meanwhile",
+                                "  slsctl watch --rate 2\n  slsctl watch --count 1 --json\n");
+  add_count(watch, options, "--count", "end after so many clouds");
+  watch->add_option("--rate", options.rate_hz, "at most so many a second")
+      ->check(between(0.001, 1000.0))
+      ->type_name("HZ");
+  add_density(watch, options);
+  CLI::App* top = add_command(app, kWatch, "top", "show rates, times and states live",
+                              "  slsctl top\n  slsctl top --interval 10 --json\n");
+  top->add_option("--interval", options.interval_s, "seconds between two looks (1)")
+      ->check(between(0.1, 3600.0))
+      ->type_name("S");
+  add_count(top, options, "--count", "end after so many looks");
+  CLI::App* metrics = add_command(app, kWatch, "metrics", "print what the service counts, as text for Prometheus",
+                                  "  slsctl metrics\n  slsctl metrics -o /var/lib/node_exporter/slsd.prom\n");
+  metrics->add_option("-o,--output,FILE", options.output, "the file to write, whole or not at all")->type_name("FILE");
+  metrics
+      ->add_option("--format", options.metrics_format,
+                   "printed: openmetrics; in a file: prometheus, the older text format")
+      ->check(CLI::IsMember({"openmetrics", "prometheus"}));
+}
+
+void add_image(CLI::App& app, ClientOptions& options, const char* group, const std::string& name,
+               const std::string& what, const std::string& examples) {
+  CLI::App* command = add_command(app, group, name, what, examples);
+  command->add_option("-o,--output,FILE", options.image, "the PNG to write; - is standard output")
+      ->required()
+      ->type_name("FILE.png");
+  if (name == "pattern") return;
+  add_camera(command, options, "which camera (the first)");
+  add_timeout(command, options);
+  if (name == "frame") command->add_flag("--as-shown", options.as_shown, "leave what the projector shows");
 }
 
 const CLI::Validator kPicture(
     [](const std::string& picture) {
       const bool named = picture != "image" && picture != "held" && slsd::picture_named(picture);
-      return named || std::filesystem::path(picture).extension() == ".png" ? ""
-                                                                           : "no such picture; a file ends in .png";
+      if (named || slsd::lower_extension(picture) == ".png") return std::string();
+      return slsd::quoted(picture) +
+             " is neither pattern, idle, white, black, focus nor grid, nor a file that ends in .png";
     },
-    "pattern|idle|white|black|focus|grid|FILE.png");
+    "{pattern,idle,white,black,focus,grid} or FILE.png");
+
+const CLI::Validator kAssignment(
+    [](const std::string& text) {
+      const bool whole = text.find('=') != std::string::npos && text.find('.') < text.find('=');
+      return whole ? std::string()
+                   : slsd::quoted(text) + " is no setting: write TABLE.KEY=VALUE or camera.NAME.KEY=VALUE";
+    },
+    "");
 
 void add_calibrate(CLI::App& app, ClientOptions& options) {
-  CLI::App* calibrate = app.add_subcommand(
-      "calibrate",
-      "calibrate with the service's devices, and put the result in force; Ctrl-C ends it with the poses there are");
-  calibrate->add_option("ACTION", options.action, "begin one and follow it; look at, end or cancel the one under way")
-      ->check(CLI::IsMember({"begin", "look", "end", "cancel"}));
-  calibrate->add_option("--board", options.board, "the board, such as charuco:11x7:25:18.75:DICT_5X5_1000");
-  calibrate->add_option("--ruler", options.ruler, "NOMINAL:MEASURED in mm, of the ruler printed beside it");
+  CLI::App* calibrate = add_command(app, kSetUp, "calibrate", "calibrate with the service's devices, pose after pose",
+                                    "  slsctl calibrate --board charuco:11x7:23:17.25:DICT_5X5_1000\n"
+                                    "  slsctl calibrate --resume --poses 20\n"
+                                    "  slsctl calibrate cancel\n");
+  calibrate
+      ->add_option("ACTION", options.action,
+                   "begin one and follow it (begin), or look at, end or cancel the one under way")
+      ->check(one_of({"begin", "look", "end", "cancel"}));
+  calibrate->add_option("--board", options.board, "the board, as slsd --calibrate takes it");
+  calibrate->add_option("--ruler", options.ruler, "what the ruler on the print says and measures, in mm")
+      ->type_name("NOMINAL:MEASURED");
   calibrate->add_option("--code", options.code, "what is projected on it (pattern)")
-      ->check(CLI::IsMember({"pattern", "gray"}));
-  calibrate->add_option("--poses", options.poses, "how many poses to take (12)")->check(CLI::Range(3, 99));
+      ->check(one_of({"pattern", "gray"}));
+  calibrate->add_option("--poses", options.poses, "how many poses to take (12)")->check(between(3, 99))->type_name("N");
   calibrate->add_flag("--resume", options.resume, "go on with the pictures of the last session");
 }
 
+void add_exposure(CLI::App& app, ClientOptions& options) {
+  CLI::App* exposure = add_command(app, kSetUp, "exposure", "look at the scene and propose exposure and gain",
+                                   "  slsctl exposure\n  slsctl exposure --camera left --gain-max-db 6\n");
+  add_camera(exposure, options, "which camera (the first)");
+  exposure->add_option("--exposure-max-us", options.exposure_max_us, "the longest exposure to propose (100000)")
+      ->check(between(1.0, 1e7))
+      ->type_name("N");
+  exposure->add_option("--gain-max-db", options.gain_max_db, "the highest gain to propose (24)")
+      ->check(between(0.0, 60.0))
+      ->type_name("N");
+  add_timeout(exposure, options);
+}
+
 void add_project(CLI::App& app, ClientOptions& options) {
-  CLI::App* project = app.add_subcommand("project", "show a picture until the next scan");
-  project->add_option("PICTURE", options.picture, "what to show; a file's image has the projector's size")
+  CLI::App* project = add_command(app, kSetUp, "project", "show a picture until the next scan",
+                                  "  slsctl project focus\n  slsctl project chart.png\n  slsctl project idle\n");
+  project->add_option("PICTURE", options.shown, "what to show; an image has the projector's size")
       ->required()
       ->check(kPicture);
   add_timeout(project, options);
 }
 
-void add_image(CLI::App& app, ClientOptions& options, const std::string& name, const std::string& what) {
-  CLI::App* command = app.add_subcommand(name, what);
-  command->add_option("-o,--output,FILE", options.image, "the PNG to write")->required();
-  if (name != "pattern") add_timeout(command, options);
-  if (name == "frame") command->add_flag("--as-shown", options.as_shown, "leave what the projector shows");
-}
-
-void add_view(CLI::App& app, ClientOptions& options) {
-  CLI::App* metrics = app.add_subcommand("metrics", "what the service counts and measures, as text for Prometheus");
-  metrics->add_option("-o,--output,FILE", options.output, "write it there, whole or not at all: for node_exporter");
-  metrics->add_option("--format", options.format, "printed: openmetrics; in a file: prometheus, the older text format")
-      ->check(CLI::IsMember({"openmetrics", "prometheus"}));
-  CLI::App* bundle =
-      app.add_subcommand("bundle", "write the last scans, with frames, settings and counters, to one file");
-  bundle->add_option("-o,--output,FILE", options.output, "the file; without it slsd-TIME.tar, here");
-  CLI::App* top = app.add_subcommand("top", "rates, latencies and states, live in a terminal");
-  top->add_option("--interval", options.interval_s, "seconds between two looks (1)")->check(CLI::Range(0.1, 3600.0));
-  top->add_option("--count", options.count, "end after so many looks")->check(CLI::Range(1, 1'000'000'000));
-}
-
-const CLI::Validator kAssignment(
-    [](const std::string& text) {
-      const bool whole = text.find('=') != std::string::npos && text.find('.') < text.find('=');
-      return whole ? "" : "write TABLE.KEY=VALUE or camera.NAME.KEY=VALUE; the value \"default\" takes it back";
-    },
-    "TABLE.KEY=VALUE");
-
-void add_set(CLI::App& app, ClientOptions& options) {
-  app.add_subcommand("settings", "the settings that are given, and where each is from");
-  CLI::App* set =
-      app.add_subcommand("set", "set exposure, gain, pattern, calibration and decoder options without a restart");
-  set->add_option("SETTING", options.assignments, "decode.KEY=VALUE or camera.NAME.exposure_us=N")
+void add_settings(CLI::App& app, ClientOptions& options) {
+  CLI::App* set = add_command(app, kSetUp, "set", "change settings without a restart, and keep them",
+                              "  slsctl set camera.left.exposure_us=8000\n"
+                              "  slsctl set decode.density=pixels decode.depth_max_mm=1500\n"
+                              "  slsctl set decode.density=default\n");
+  set->add_option("SETTING", options.assignments,
+                  "decode.KEY=VALUE or camera.NAME.exposure_us=N; =default takes it back")
       ->required()
-      ->check(kAssignment);
+      ->check(kAssignment)
+      ->type_name("TABLE.KEY=VALUE");
+  add_command(app, kSetUp, "settings", "list the settings that are given, and where each is from",
+              "  slsctl settings\n");
 }
 
-int run(const CLI::App& app, const ClientOptions& options) {
-  const std::string command = app.get_subcommands().front()->get_name();
+void add_bundle(CLI::App& app, ClientOptions& options) {
+  CLI::App* bundle = add_command(app, kDiagnose, "bundle", "write the last scans with all that belongs to them",
+                                 "  slsctl bundle\n  slsctl bundle fault.tar\n");
+  bundle->add_option("-o,--output,FILE", options.output, "the file to write (slsd-TIME.tar); - is standard output")
+      ->type_name("FILE.tar");
+}
+
+void add_commands(CLI::App& app, ClientOptions& options) {
+  add_scan(app, options);
+  add_record(app, options);
+  add_watching(app, options);
+  add_calibrate(app, options);
+  add_exposure(app, options);
+  add_project(app, options);
+  add_image(app, options, kSetUp, "frame", "write what a camera sees", "  slsctl frame left.png --camera left\n");
+  add_settings(app, options);
+  add_image(app, options, kDiagnose, "preview", "scan, and write the frame with what was decoded in it",
+            "  slsctl preview decoded.png\n");
+  add_image(app, options, kDiagnose, "pattern", "write the pattern that the projector shows",
+            "  slsctl pattern pattern.png\n");
+  add_bundle(app, options);
+}
+
+int run(const std::string& command, const ClientOptions& options) {
   if (command == "scan") return slsd::scan_command(options);
   if (command == "status") return slsd::status_command(options);
   if (command == "watch") return slsd::watch_command(options);
@@ -155,35 +232,39 @@ int run(const CLI::App& app, const ClientOptions& options) {
   return slsd::image_command(options, command);
 }
 
+/// "help scan" is "scan --help".
+std::vector<const char*> without_help_command(int argc, char** argv) {
+  std::vector<const char*> arguments(argv, argv + argc);
+  if (argc < 2 || std::string_view(argv[1]) != "help") return arguments;
+  arguments.erase(arguments.begin() + 1);
+  arguments.push_back("--help");
+  return arguments;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app(
       "Talks to slsd, the service of a structured-light scanner.\n"
-      "Exit status: 0 done, 1 the request failed, 2 wrong usage, 3 no daemon.");
+      "Exit status: 0 done, 1 the request failed, 2 wrong usage, 3 no service answers.",
+      "slsctl");
   ClientOptions options;
   app.set_version_flag("--version", "slsctl " SLSD_VERSION);
-  app.add_option("--socket", options.socket, "the daemon's socket");
-  app.add_flag("--json", options.json, "print JSON, errors too");
+  app.add_option("--socket", options.socket,
+                 "the service's socket (SLSD_SOCKET in the environment, or /run/slsd/slsd.sock)")
+      ->type_name("PATH");
+  app.add_flag("--json", options.json, "print JSON, one object to a line, errors too");
   app.require_subcommand(1);
   app.fallthrough();
-  add_image(app, options, "frame", "write what the camera sees");
-  add_image(app, options, "pattern", "write the pattern that the projector shows");
-  add_image(app, options, "preview", "scan, and write the frame with what was decoded");
-  add_calibrate(app, options);
-  add_exposure(app, options);
-  add_project(app, options);
-  add_record(app, options);
-  add_scan(app, options);
-  app.add_subcommand("status", "the state of the service, and what its scans came to");
-  add_watch(app, options);
-  add_set(app, options);
-  add_view(app, options);
-  slsd::refuse_options_as_values(app);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? slsd::kDone : slsd::kWrongUsage;
-  }
-  return run(app, options);
+  app.footer("\"slsctl COMMAND --help\" shows the options of a command and examples.");
+  add_commands(app, options);
+  const auto arguments = without_help_command(argc, argv);
+  std::string command;
+  const auto check = [&] {
+    command = app.get_subcommands().front()->get_name();
+    if (const auto wrong = slsd::wrong_outputs(options, command); !wrong.empty()) throw CLI::ValidationError(wrong);
+  };
+  if (const auto ended = slsd::parse_usage(app, static_cast<int>(arguments.size()), arguments.data(), check))
+    return *ended;
+  return slsd::finish(options, run(command, options));
 }

@@ -3,6 +3,7 @@
 #include "slsd/connection.hpp"
 
 #include <fcntl.h>
+#include <grp.h>
 #include <poll.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
@@ -14,6 +15,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <utility>
 
@@ -32,20 +34,29 @@ constexpr std::size_t kMaxDescriptors = 16;
 constexpr int kMaxDepth = 64;
 constexpr std::chrono::seconds kConnectMax{5};
 
+// How its user becomes one who may: by the group of the socket, or of the folder that hides it.
+std::string way_in(std::string path) {
+  struct stat about {};
+  while (::stat(path.c_str(), &about) != 0 && path.find('/', 1) != std::string::npos) path.erase(path.rfind('/'));
+  const group* owner = ::getgrgid(about.st_gid);
+  const std::string name = owner ? owner->gr_name : std::to_string(about.st_gid);
+  return "join its group (sudo usermod -aG " + name + " $USER), then log in again";
+}
+
 [[noreturn]] void no_connection(int number, const std::string& path) {
   if (number == ENOENT || number == ECONNREFUSED || number == ENOTDIR) {
-    throw NoService("no daemon answers there: start slsd (systemctl start slsd), or name its socket by SLSD_SOCKET",
+    throw NoService("no service answers there: start slsd (systemctl start slsd), or name its socket by SLSD_SOCKET",
                     "not_found", path);
   }
   if (number == EACCES || number == EPERM) {
-    throw PermissionDenied("not allowed: join the group that owns the socket", "permission_denied", path);
+    throw PermissionDenied("you may not use this socket: " + way_in(path), "permission_denied", path);
   }
-  if (number == EAGAIN) throw TimedOut("the daemon accepts nobody: look at its log, or restart it", "timeout", path);
+  if (number == EAGAIN) throw TimedOut("the service accepts nobody: look at its log, or restart it", "timeout", path);
   throw ConnectionLost(std::strerror(number), "io", path);
 }
 
 [[noreturn]] void hung_up(const std::string& path, const char* when = "") {
-  throw ConnectionLost(std::string("the daemon hung up") + when, "disconnected", path);
+  throw ConnectionLost(std::string("the service hung up") + when, "disconnected", path);
 }
 
 std::size_t size_of(const json& value) {
@@ -68,6 +79,11 @@ Bytes::Bytes(std::string own) {
   auto kept = std::make_shared<const std::string>(std::move(own));
   view_ = *kept;
   memory_ = std::move(kept);
+}
+
+std::string default_socket() {
+  const char* named = std::getenv("SLSD_SOCKET");
+  return named && *named ? named : "/run/slsd/slsd.sock";
 }
 
 Connection::Connection(const std::string& socket) : path_(socket), process_(::getpid()) {
@@ -132,7 +148,7 @@ void Connection::refuse_others() const {
   }
 }
 
-void Connection::wait(short events, const Deadline& deadline) const {
+bool Connection::ready(short events, const Deadline& deadline) const {
   while (true) {
     int left_ms = -1;
     if (deadline) {
@@ -140,11 +156,19 @@ void Connection::wait(short events, const Deadline& deadline) const {
       left_ms = static_cast<int>(std::clamp<std::int64_t>(left.count(), 0, 1'000'000'000));
     }
     pollfd asked{socket_, events, 0};
-    const int ready = ::poll(&asked, 1, left_ms);
-    if (ready > 0) return;
-    if (ready == 0) throw TimedOut("the daemon does not answer: look at its log, or restart it", "timeout", path_);
+    const int polled = ::poll(&asked, 1, left_ms);
+    if (polled >= 0) return polled > 0;
     if (errno != EINTR) throw ConnectionLost(std::strerror(errno), "io", path_);
   }
+}
+
+void Connection::wait(short events, const Deadline& deadline) const {
+  if (!ready(events, deadline))
+    throw TimedOut("the service does not answer: look at its log, or restart it", "timeout", path_);
+}
+
+bool Connection::answers(Deadline deadline) const {
+  return !buffer_.empty() || socket_ < 0 || ready(POLLIN, deadline);
 }
 
 std::int64_t Connection::send(std::string_view method, std::string_view params, Deadline deadline) {

@@ -170,12 +170,8 @@ struct Scanner::State {
   }
 };
 
-Scanner::Scanner(std::string socket) {
-  if (socket.empty()) {
-    const char* named = std::getenv("SLSD_SOCKET");
-    socket = named && *named ? named : "/run/slsd/slsd.sock";
-  }
-  state_ = std::make_unique<State>(std::move(socket));
+Scanner::Scanner(std::string socket)
+    : state_(std::make_unique<State>(socket.empty() ? default_socket() : std::move(socket))) {
   state_->connect();
 }
 

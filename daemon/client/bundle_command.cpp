@@ -1,31 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include <chrono>
-#include <iostream>
+#include <ostream>
+#include <string>
 
 #include "core/utc_text.hpp"
 #include "daemon/client/client_commands.hpp"
+#include "daemon/client/output.hpp"
 #include "daemon/client/report.hpp"
 #include "daemon/rpc/message.hpp"
-#include "drivers/files/file.hpp"
 
 namespace slsd {
 
-int bundle_command(const ClientOptions& options) {
+namespace {
+
+std::string name_by_time() {
+  std::string time = utc_text(std::chrono::system_clock::now());
+  std::erase_if(time, [](char c) { return c == '-' || c == ':'; });
+  return "slsd-" + time + ".tar";
+}
+
+}  // namespace
+
+int bundle_command(const ClientOptions& asked) {
+  ClientOptions options = asked;
+  if (options.output.empty()) options.output = name_by_time();
+  if (auto writable = check_outputs(options); !writable) return report(options, writable.error());
   const auto answered = ask(options, "bundle", nlohmann::json::object());
   if (!answered) return report(options, answered.error());
-  std::filesystem::path file = options.output;
-  if (file.empty()) {
-    std::string time = utc_text(std::chrono::system_clock::now());
-    std::erase_if(time, [](char c) { return c == '-' || c == ':'; });
-    file = "slsd-" + time + ".tar";
-  }
-  if (auto written = write_file_atomically(file, answered->reply.bytes); !written)
-    return report(options, {kRequestFailed, rpc_error(written.error())});
+  if (auto written = write_output(options.output, answered->reply.bytes); !written)
+    return report(options, written.error());
   nlohmann::json result = answered->reply.message["result"];
-  result["file"] = file.string();
-  std::cout << (options.json ? to_line(result) : file.string() + "\n") << std::flush;
-  return std::cout ? kDone : kRequestFailed;
+  const std::string file = options.output.string();
+  result["file"] = file;
+  if (options.json || file != "-") words(options) << (options.json ? to_line(result) : file + "\n");
+  return kDone;
 }
 
 }  // namespace slsd

@@ -7,6 +7,7 @@
 #include "core/printable.hpp"
 #include "daemon/client/connection.hpp"
 #include "daemon/client/output.hpp"
+#include "daemon/client/progress.hpp"
 #include "daemon/client/report.hpp"
 #include "daemon/rpc/base64.hpp"
 #include "daemon/rpc/message.hpp"
@@ -60,15 +61,19 @@ int watch_command(const ClientOptions& options) {
 }
 
 int image_command(const ClientOptions& options, const std::string& method) {
+  if (auto writable = check_outputs(options); !writable) return report(options, writable.error());
+  auto connection = Connection::open(options.socket);
+  if (!connection) return report(options, failure(connection.error()));
   json params = json::object();
+  if (!options.camera.empty()) params["camera"] = options.camera;
   if (options.timeout_ms && method != "pattern") params["timeout_ms"] = *options.timeout_ms;
   if (options.as_shown) params["as_shown"] = true;
-  const auto answered = ask(options, method, params);
+  const Progress progress(options, *connection, method == "pattern" ? "drawing" : "scanning");
+  const auto answered = ask(*connection, method, params);
   if (!answered) return report(options, answered.error());
   if (auto written = write_output(options.image, answered->reply.bytes); !written)
     return report(options, written.error());
-  const json& result = answered->reply.message["result"];
-  if (options.json) std::cout << to_line(result);
+  if (options.json) words(options) << to_line(answered->reply.message["result"]);
   return kDone;
 }
 
@@ -133,14 +138,20 @@ int settings_command(const ClientOptions& options) {
 }
 
 int project_command(const ClientOptions& options) {
-  json params{{"picture", options.picture.string()}};
-  if (options.picture.extension() == ".png") {
-    const auto image = read_file(options.picture, kMaxImageBytes);
+  json params{{"picture", options.shown.string()}};
+  if (lower_extension(options.shown) == ".png") {
+    const auto image = read_file(options.shown, kMaxImageBytes);
     if (!image) return report(options, Failure{kRequestFailed, rpc_error(image.error())});
     params = {{"picture", "image"}, {"png", to_base64(*image)}};
   }
   if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;
-  const auto answered = ask(options, "project", params);
+  auto answered = ask(options, "project", params);
+  if (!answered && answered.error().error.name == "invalid_request" && params.contains("png")) {
+    answered.error().error.where = options.shown.string();
+    answered.error().error.message =
+        "the file is too long for one request: save it in grey, or set [server] request_bytes_max to more than " +
+        std::to_string(params.dump().size());
+  }
   if (!answered) return report(options, answered.error());
   if (options.json) std::cout << to_line(answered->reply.message["result"]);
   return kDone;

@@ -2,10 +2,13 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include <slsd/connection.hpp>
 
 namespace slsd {
 
@@ -14,15 +17,17 @@ inline constexpr int kRequestFailed = 1;
 inline constexpr int kWrongUsage = 2;
 inline constexpr int kNoDaemon = 3;
 
-/// slsctl's command line.
+/// slsctl's command line. Files to write are "-" for standard output.
 struct ClientOptions {
-  std::filesystem::path socket = "/run/slsd/slsd.sock";
+  std::filesystem::path socket = client::default_socket();
   bool json = false;
-  std::string format;                     ///< metrics: "openmetrics" or "prometheus"; empty: by where it goes
-  std::filesystem::path output;           ///< scan: the cloud, .ply or .pcd; empty: not kept
-  std::filesystem::path picture;          ///< scan: the frame with what was decoded; project: what to show
+  std::filesystem::path output;           ///< scan: the cloud; metrics, bundle: the file; empty: none
+  std::string format;                     ///< scan: the cloud's, "ply", "pcd" or "tiff"; empty: as its name ends
+  std::string metrics_format;             ///< metrics: "openmetrics" or "prometheus"; empty: by where it goes
+  std::filesystem::path picture;          ///< scan: the frame with what was decoded
   std::filesystem::path cloud_picture;    ///< scan: the cloud, drawn
   std::filesystem::path image;            ///< preview, frame, pattern: the PNG to write
+  std::filesystem::path shown;            ///< project: a picture's name, or a file
   std::string density;                    ///< scan, watch: "symbols" or "pixels"; empty: as configured
   bool normals = false;                   ///< scan: normals of pixels
   bool texture = false;                   ///< scan: intensities from a frame in white light
@@ -31,7 +36,7 @@ struct ClientOptions {
   std::filesystem::path folder;           ///< record: where to
   bool clouds = false;                    ///< record: the clouds too
   std::optional<double> seconds;          ///< record: ends after so long
-  std::string camera;                     ///< exposure: its name; empty: the first
+  std::string camera;                     ///< exposure, frame, preview, scan: its name; empty: the first
   std::optional<double> exposure_max_us;  ///< exposure: the longest that is proposed
   std::optional<double> gain_max_db;      ///< exposure: the highest that is proposed
   std::optional<int> timeout_ms;

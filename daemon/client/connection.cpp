@@ -9,6 +9,14 @@
 namespace slsd {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+constexpr auto kSilence = 10s;         // after which the service is asked whether it is there
+constexpr auto kProbePatience = 10s;   // for its answer: it answers between two scans, and while one is decoded
+constexpr auto kSendPatience = 60s;    // to take a request
+constexpr auto kBetweenCalls = 200ms;  // of what is called while an answer is awaited
+
 // The one place where what the library throws becomes a value.
 template <class Function>
 Result<std::invoke_result_t<Function>> without_throwing(const Function& function) {
@@ -24,7 +32,7 @@ Result<std::invoke_result_t<Function>> without_throwing(const Function& function
   } catch (const client::PermissionDenied& error) {
     return fail(ErrorCode::kPermissionDenied, error.what(), error.where());
   } catch (const client::TimedOut& error) {
-    return fail(ErrorCode::kTimeout, error.what());
+    return fail(ErrorCode::kTimeout, error.what(), error.where());
   } catch (const client::ProtocolError& error) {
     return fail(ErrorCode::kMalformed, error.what());
   } catch (const client::ScannerError& error) {
@@ -37,7 +45,7 @@ template <class T>
 Result<GreyView> view_of(std::string_view bytes, int width_px, int height_px) {
   const std::size_t pixels = static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
   if (width_px <= 0 || height_px <= 0 || bytes.size() != pixels * sizeof(T)) {
-    return fail(ErrorCode::kMalformed, "the daemon's frame has not as many bytes as its size asks for");
+    return fail(ErrorCode::kMalformed, "the service's frame has fewer or more bytes than its size asks for");
   }
   return ImageView<T>{reinterpret_cast<const T*>(bytes.data()), width_px, height_px, width_px};
 }
@@ -52,12 +60,44 @@ Result<GreyView> Received::image(const nlohmann::json& about) const {
 }
 
 Result<Connection> Connection::open(const std::filesystem::path& socket) {
-  return without_throwing([&] { return Connection(client::Connection(socket.string())); });
+  return without_throwing([&] { return Connection(client::Connection(socket.string()), socket); });
 }
 
 client::Connection::Deadline Connection::deadline() const {
   if (!patience_) return {};
-  return std::chrono::steady_clock::now() + *patience_;
+  return Clock::now() + *patience_;
+}
+
+namespace {
+
+// Only silence says that it hangs: one that refuses or is busy is there.
+Result<> check_alive(const std::filesystem::path& socket) {
+  auto probe = Connection::open(socket);
+  if (probe) {
+    probe->set_patience(kProbePatience);
+    const auto answered = probe->call("status", nlohmann::json::object());
+    if (!answered && answered.error().code == ErrorCode::kTimeout) return tl::unexpected(answered.error());
+  } else if (probe.error().code == ErrorCode::kTimeout) {
+    return tl::unexpected(probe.error());
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<> Connection::await_answer() const {
+  const auto begin = Clock::now();
+  auto probe_at = begin + kSilence;
+  while (true) {
+    const auto until = waiting_ ? std::min(probe_at, Clock::now() + kBetweenCalls) : probe_at;
+    const auto answers = without_throwing([&] { return socket_.answers(until); });
+    if (!answers) return tl::unexpected(answers.error());
+    if (*answers) return {};
+    if (waiting_) waiting_(Clock::now() - begin);
+    if (Clock::now() < probe_at) continue;
+    if (auto alive = check_alive(path_); !alive) return alive;
+    probe_at = Clock::now() + kSilence;
+  }
 }
 
 Result<Answered> Connection::call(std::string_view method, const nlohmann::json& params) {
@@ -67,10 +107,14 @@ Result<Answered> Connection::call(std::string_view method, const nlohmann::json&
 
 Result<> Connection::request(std::string_view method, const nlohmann::json& params) {
   const auto text = params.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  return without_throwing([&] { socket_.send(method, text, deadline()); });
+  const auto until = patience_ ? deadline() : Clock::now() + kSendPatience;
+  return without_throwing([&] { socket_.send(method, text, until); });
 }
 
 Result<Received> Connection::receive() {
+  if (!patience_) {
+    if (auto awaited = await_answer(); !awaited) return tl::unexpected(awaited.error());
+  }
   return without_throwing([&] {
     client::Message message = socket_.receive(deadline());
     return Received{nlohmann::json::parse(message.json), std::move(message.bytes)};

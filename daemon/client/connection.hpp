@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,7 +19,7 @@
 
 namespace slsd {
 
-/// A line from the daemon and the bytes that came with it.
+/// A line from the service and the bytes that came with it.
 struct Received {
   nlohmann::json message;
   client::Bytes bytes;
@@ -35,19 +36,24 @@ struct Answered {
   std::vector<Received> events;
 };
 
-/// The client library's connection for slsctl: JSON that is parsed, errors as values. Waits as long as the daemon
-/// works, unless told otherwise.
+/// The client library's connection for slsctl: JSON that is parsed, errors as values. Waits for as long as the service
+/// works, unless told otherwise: if no answer comes for a while it asks on a second connection whether anybody is
+/// there.
 /// @thread thread-bound
 class Connection {
  public:
-  /// @errors kNotFound: no daemon answers at this path; kPermissionDenied; kInvalidArgument: too long a path; kIo
+  using Waiting = std::function<void(std::chrono::steady_clock::duration)>;
+
+  /// @errors kNotFound: no service answers at this path; kPermissionDenied; kInvalidArgument: too long a path; kIo
   [[nodiscard]] static Result<Connection> open(const std::filesystem::path& socket);
 
   /// From now on at most so long for each message, to be sent or received; then kTimeout.
   void set_patience(std::chrono::seconds patience) { patience_ = patience; }
+  /// Calls this a few times a second while an answer is awaited, with the time since the waiting began.
+  void set_waiting(Waiting waiting) { waiting_ = std::move(waiting); }
 
   /// Sends a request and waits for its reply, which may be a JSON-RPC error.
-  /// @errors kDisconnected: the daemon hung up; kMalformed: it is no slsd; kIo
+  /// @errors kDisconnected: the service hung up; kTimeout: it hangs; kMalformed: it is no slsd; kIo
   [[nodiscard]] Result<Answered> call(std::string_view method, const nlohmann::json& params);
 
   /// Sends a request and does not wait; reply() does. @errors as call()
@@ -59,11 +65,15 @@ class Connection {
   [[nodiscard]] Result<Received> receive();
 
  private:
-  explicit Connection(client::Connection socket) : socket_(std::move(socket)) {}
+  Connection(client::Connection socket, std::filesystem::path path)
+      : socket_(std::move(socket)), path_(std::move(path)) {}
   [[nodiscard]] client::Connection::Deadline deadline() const;
+  [[nodiscard]] Result<> await_answer() const;
 
   client::Connection socket_;
+  std::filesystem::path path_;
   std::optional<std::chrono::seconds> patience_;
+  Waiting waiting_;
 };
 
 }  // namespace slsd

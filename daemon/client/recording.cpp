@@ -28,9 +28,9 @@ Result<> check_empty(const path& folder) {
   std::error_code error;
   if (!std::filesystem::exists(folder, error)) return {};
   const bool empty = std::filesystem::is_directory(folder, error) && std::filesystem::is_empty(folder, error);
-  if (error) return tl::unexpected(system_error(error.value(), "cannot look into it", folder));
+  if (error) return tl::unexpected(system_error(error.value(), "cannot read the folder", folder));
   if (empty) return {};
-  return fail(ErrorCode::kAlreadyExists, "is there already, and not an empty folder: name a new one", folder.string());
+  return fail(ErrorCode::kAlreadyExists, "exists and is not an empty folder: name a new one", folder.string());
 }
 
 Result<const Received*> find_frame(const Answered& scan, const std::string& camera) {
@@ -38,7 +38,7 @@ Result<const Received*> find_frame(const Answered& scan, const std::string& came
     const bool frame = event.message.value("method", "") == "frame" && event.message.contains("params");
     if (frame && event.message["params"].value("camera", "") == camera) return &event;
   }
-  return fail(ErrorCode::kMalformed, "the daemon sent no frame of camera \"" + camera + "\": it is older than slsctl");
+  return fail(ErrorCode::kMalformed, "the service sent no frame of camera \"" + camera + "\": it is older than slsctl");
 }
 
 }  // namespace

@@ -2,11 +2,14 @@
 // Copyright the slsd authors
 #include "daemon/client/report.hpp"
 
+#include <filesystem>
 #include <iostream>
+#include <system_error>
 
 #include <fmt/format.h>
 
 #include "core/printable.hpp"
+#include "daemon/client/output.hpp"
 #include "daemon/rpc/message.hpp"
 
 namespace slsd {
@@ -22,7 +25,7 @@ std::string text_of(const json& about, const char* key) {
 }
 
 Failure daemon_failure(const json& error) {
-  RpcError told{error.value("code", 0), "error", error.value("message", "the daemon gave no reason"), {}};
+  RpcError told{error.value("code", 0), "error", error.value("message", "the service gave no reason"), {}};
   const auto data = error.find("data");
   if (data != error.end() && data->is_object()) told.name = data->value("name", told.name);
   return {kRequestFailed, std::move(told)};
@@ -94,6 +97,19 @@ std::string regions_table(const json& scans) {
   return text;
 }
 
+/// How to find the service that does not answer: other sockets beside the one that was tried are those of instances.
+std::string way_to_service(const std::filesystem::path& socket) {
+  std::string others;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(socket.parent_path(), error)) {
+    if (!entry.is_socket(error) || entry.path() == socket) continue;
+    others += (others.empty() ? "" : ", ") + printable(entry.path().string(), 200);
+  }
+  return "no service answers there: start it (sudo systemctl start slsd), or name its socket with --socket or "
+         "SLSD_SOCKET" +
+         (others.empty() ? "" : "; there are " + others);
+}
+
 }  // namespace
 
 Failure failure(const Error& error) {
@@ -124,10 +140,12 @@ tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_vi
 
 int report(const ClientOptions& options, const Failure& failure) {
   if (options.json) {
-    std::cout << to_line({{"error", failure.error.to_json()}}) << std::flush;
+    words(options) << to_line({{"error", failure.error.to_json()}}) << std::flush;
   } else {
     const std::string where = failure.error.where.empty() ? "" : failure.error.where + ": ";
-    std::cerr << "slsctl: " << printable(where + failure.error.message, kLongestText) << "\n";
+    const bool none = failure.exit_status == kNoDaemon;
+    const std::string message = none ? way_to_service(options.socket) : failure.error.message;
+    std::cerr << "slsctl: " << printable(where + message, kLongestText) << "\n";
   }
   return failure.exit_status;
 }
@@ -141,7 +159,7 @@ std::string status_table(const json& status) {
   const std::string calibration = text_of(status, "calibration");
   text += "calibration " + (calibration.empty() ? "none" : calibration) + "\n";
   if (const auto dropped = status.value("log_lines_dropped", std::uint64_t{0})) {
-    text += fmt::format("log         {} lines were dropped, as nobody read them in time\n", dropped);
+    text += fmt::format("log         {} lines were dropped: nobody read them in time\n", dropped);
   }
   text += device_line(status.value("projector", json::object()));
   for (const json& camera : status.value("cameras", json::array())) text += device_line(camera);

@@ -3,12 +3,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
-#include <iostream>
+#include <ostream>
 
 #include "core/cloud/pcd.hpp"
 #include "core/cloud/ply.hpp"
 #include "daemon/client/client_commands.hpp"
 #include "daemon/client/output.hpp"
+#include "daemon/client/progress.hpp"
 #include "daemon/client/report.hpp"
 #include "daemon/rpc/message.hpp"
 #include "drivers/files/encode_png.hpp"
@@ -45,7 +46,7 @@ Result<Cloud> lattice_of_pixels(const json& result, std::string_view pcd, bool n
   const int width = field("\nWIDTH "), height = result.value("height_px", 0);
   const std::size_t begin = data + 13, needed = record * static_cast<std::size_t>(width) * height;
   if (data == std::string_view::npos || width <= 0 || height <= 0 || pcd.size() - begin < needed)
-    return fail(ErrorCode::kMalformed, "the daemon's cloud is not organised as its pixels are");
+    return fail(ErrorCode::kMalformed, "the service's cloud is not organised as its pixels are");
   Cloud cloud;
   cloud.lattice_columns = (width + kPictureStep - 1) / kPictureStep;
   cloud.lattice_rows = (height + kPictureStep - 1) / kPictureStep;
@@ -97,32 +98,31 @@ tl::expected<void, Failure> write_cloud_picture(const path& file, const Result<C
   return write_output(file, *png);
 }
 
-// The cloud's picture is drawn from a PLY; a PCD is then made of it here.
-tl::expected<void, Failure> write_cloud_file(const ClientOptions& options, std::string_view bytes, bool as_ply) {
+// A picture of a cloud is drawn here: of symbols from a PLY, of pixels from a PCD. The file is then made of that.
+std::string asked_format(const ClientOptions& options, bool dense) {
+  if (options.cloud_picture.empty()) return cloud_format(options);
+  return dense ? "pcd" : "ply";
+}
+
+tl::expected<void, Failure> write_cloud(const ClientOptions& options, const json& result, std::string_view bytes,
+                                        bool dense) {
   if (options.output.empty()) return {};
-  if (!as_ply || options.output.extension() == ".ply") return write_output(options.output, bytes);
-  const auto cloud = read_ply(bytes, "the daemon's cloud");
+  if (asked_format(options, dense) == cloud_format(options)) return write_output(options.output, bytes);
+  if (dense) return write_output(options.output, dense_ply_of(result, bytes, options.normals));
+  const auto cloud = read_ply(bytes, "the service's cloud");
   if (!cloud) return tl::unexpected(failure(cloud.error()));
   return write_output(options.output, write_pcd(*cloud));
 }
 
-tl::expected<void, Failure> write_files(const ClientOptions& options, const Answered& answered, bool as_ply,
-                                        bool dense) {
+tl::expected<void, Failure> write_files(const ClientOptions& options, const Answered& answered) {
   const json& result = answered.reply.message["result"];
   const std::string_view bytes = answered.reply.bytes;
-  const bool from_pcd = dense && !options.cloud_picture.empty();  // drawn, and made a PLY of here
-  tl::expected<void, Failure> written;
-  if (!dense) {
-    written = write_cloud_file(options, bytes, as_ply);
-  } else if (!options.output.empty()) {
-    const bool make_ply = from_pcd && options.output.extension() == ".ply";
-    written = make_ply ? write_output(options.output, dense_ply_of(result, bytes, options.normals))
-                       : write_output(options.output, bytes);
-  }
+  const bool dense = result.value("density", "") == "pixels";
+  auto written = write_cloud(options, result, bytes, dense);
   if (written && !options.cloud_picture.empty()) {
     written = write_cloud_picture(
         options.cloud_picture,
-        dense ? lattice_of_pixels(result, bytes, options.normals) : read_ply(bytes, "the daemon's cloud"),
+        dense ? lattice_of_pixels(result, bytes, options.normals) : read_ply(bytes, "the service's cloud"),
         result.value("points", std::size_t{0}));
   }
   for (const Received& event : answered.events) {
@@ -132,40 +132,46 @@ tl::expected<void, Failure> write_files(const ClientOptions& options, const Answ
   return written;
 }
 
-}  // namespace
+/// What to ask for; empty: as the service is configured. A picture's format depends on it.
+tl::expected<std::string, Failure> asked_density(const ClientOptions& options, Connection& connection) {
+  if (!options.density.empty()) return options.density;
+  if (options.normals || cloud_format(options) == "tiff") return "pixels";
+  if (options.cloud_picture.empty()) return "";
+  const auto settings = ask(connection, "settings", json::object());
+  if (!settings) return tl::unexpected(settings.error());
+  const json configured = settings->reply.message["result"].value("configuration", json::object());
+  return configured.value("decode", json::object()).value("density", "symbols");
+}
 
-int scan_command(const ClientOptions& options) {
-  const bool as_ply = options.output.extension() != ".pcd" || !options.cloud_picture.empty();
-  const std::string extension = options.output.extension();
-  std::string density = options.density;
-  const bool tiff = extension == ".tiff" || extension == ".tif", drawn = !options.cloud_picture.empty();
-  if (density.empty() && drawn) {  // which format is drawn from depends on it
-    const auto settings = ask(options, "settings", json::object());
-    if (!settings) return report(options, settings.error());
-    const json& configured = settings->reply.message["result"]["configuration"];
-    density = configured.value("decode", json::object()).value("density", "symbols");
-  }
-  const bool dense = density == "pixels";
-  if (dense && drawn && tiff) {
-    return report(
-        options,
-        {kRequestFailed,
-         rpc_error({ErrorCode::kInvalidArgument, "a picture is drawn of a cloud: write it as .ply or .pcd", {}})});
-  }
-  const bool as_pcd = dense ? drawn || extension == ".pcd" : !as_ply;
-  json params{{"format", tiff ? "tiff" : as_pcd ? "pcd" : "ply"}, {"picture", !options.picture.empty()}};
+json scan_parameters(const ClientOptions& options, const std::string& density) {
+  json params{{"format", asked_format(options, density == "pixels")}, {"picture", !options.picture.empty()}};
   if (!density.empty()) params["density"] = density;
+  if (!options.camera.empty()) params["camera"] = options.camera;
   if (options.normals) params["normals"] = true;
   if (options.texture) params["texture"] = true;
   if (options.ambient) params["ambient"] = true;
   if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;
-  const auto answered = ask(options, "scan", params);
+  return params;
+}
+
+tl::expected<Answered, Failure> scan(const ClientOptions& options) {
+  auto connection = Connection::open(options.socket);
+  if (!connection) return tl::unexpected(failure(connection.error()));
+  const auto density = asked_density(options, *connection);
+  if (!density) return tl::unexpected(density.error());
+  const Progress progress(options, *connection, *density == "pixels" ? "measuring every pixel" : "scanning");
+  return ask(*connection, "scan", scan_parameters(options, *density));
+}
+
+}  // namespace
+
+int scan_command(const ClientOptions& options) {
+  if (auto writable = check_outputs(options); !writable) return report(options, writable.error());
+  const auto answered = scan(options);
   if (!answered) return report(options, answered.error());
-  const bool of_pixels = answered->reply.message["result"].value("density", "") == "pixels";
-  if (auto written = write_files(options, *answered, as_ply, of_pixels); !written)
-    return report(options, written.error());
+  if (auto written = write_files(options, *answered); !written) return report(options, written.error());
   const json& result = answered->reply.message["result"];
-  std::cout << (options.json ? to_line(result) : scan_line(result) + "\n" + empty_line(result));
+  words(options) << (options.json ? to_line(result) : scan_line(result) + "\n" + empty_line(result));
   return kDone;
 }
 

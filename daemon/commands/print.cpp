@@ -21,7 +21,7 @@ Result<std::string> sheet_png(const Sheet& sheet, double dpi) {
 }
 
 Result<std::string> sheet_bytes(const Sheet& sheet, const PrintRequest& request) {
-  const auto extension = request.file.extension();
+  const std::string extension = lower_extension(request.file);
   if (extension == ".pdf") return sheet_pdf(sheet);
   if (extension == ".svg") return sheet_svg(sheet);
   if (extension == ".png") return sheet_png(sheet, request.dpi);

@@ -234,8 +234,8 @@ Error Scanner::overdue(const Task& task) const {
   for (const DeviceStatus& camera : rig.cameras) {
     if (holder == "camera " + camera.name) problem = camera.problem;
   }
-  std::string message = had_its_turn ? "its time is over: it waited for this"
-                                     : "its time is over: a request before it still waits for this";
+  std::string message = had_its_turn ? "the scan's time ran out here: allow more (timeout_ms)"
+                                     : "the scan's time ran out: a request before it still waits here";
   if (!problem.empty()) message += "; " + problem;
   return {ErrorCode::kTimeout, std::move(message), std::move(holder)};
 }

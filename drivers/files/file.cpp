@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <cerrno>
 #include <system_error>
 #include <utility>
@@ -19,6 +20,8 @@ namespace slsd {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::size_t kProbeBytes = 64 << 10;  // more than file systems keep inside their own records
 
 tl::unexpected<Error> fail_call(std::string_view doing, const fs::path& path) {
   return fail_system(errno, doing, path);
@@ -137,6 +140,13 @@ Result<> write_in_place(const fs::path& path, std::string_view bytes) {
 
 }  // namespace
 
+std::string lower_extension(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
 Result<std::string> read_file(const fs::path& path, std::size_t limit_bytes) {
   // Without O_NONBLOCK a pipe that nobody writes would hold us here.
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
@@ -155,7 +165,7 @@ Result<> check_writable(const fs::path& path) {
   const mode_t mode = mode_of(path);
   if (auto place = check_place(path, mode); !place || !S_ISREG(mode)) return place;
   const fs::path target = follow_links(path), temporary = temporary_beside(target);
-  Result<> done = write_temporary(temporary, target, mode, {});
+  Result<> done = write_temporary(temporary, target, mode, std::string(kProbeBytes, '\0'));
   ::unlink(temporary.c_str());
   return done;
 }

@@ -11,6 +11,10 @@
 
 namespace slsd {
 
+/// How a file's name ends, in lower case: ".ply" of "CLOUD.PLY".
+/// @thread reentrant
+[[nodiscard]] std::string lower_extension(const std::filesystem::path& file);
+
 /// Reads a whole regular file.
 /// @param limit_bytes  a longer file is refused before it is read
 /// @errors kNotFound, kPermissionDenied, kInvalidArgument (a folder, a device, too long), kIo
@@ -24,9 +28,9 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] Result<> write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
 
-/// Whether write_file_atomically() would find a place there now, for those who work long before they write. What is
-/// there stays as it is.
-/// @errors as write_file_atomically(), but for a disk that is full
+/// Whether write_file_atomically() would find a place there now, for those who work long before they write: it writes a
+/// temporary file of 64 KiB. What is there stays as it is.
+/// @errors as write_file_atomically(); a disk may still be too full for what is longer
 [[nodiscard]] Result<> check_writable(const std::filesystem::path& path);
 
 }  // namespace slsd

@@ -73,7 +73,7 @@ class Extrinsics(Folder):
 
     def test_name_what_is_wrong_with_the_command(self):
         one = {"left": self.services("board", ["left"])["left"]}
-        for more, reason in (([], "two scanners"), (["--scanner", "left=x"], "no daemon answers"),
+        for more, reason in (([], "two scanners"), (["--scanner", "left=x"], "no service answers"),
                              (["--scanner", "right"], "NAME=SOCKET"), (["--scanner", "a.b=x"], "NAME=SOCKET"),
                              (["--scanner", f"left={one['left'].socket}"], "named twice")):
             done = measure_extrinsics(one, self.folder / "cell.toml", 1, *more)

@@ -77,7 +77,7 @@ class Installed(unittest.TestCase):
         self.assertEqual(done[0], 0, done)
         status, _, error = run(program, SLSD_SOCKET="/nonexistent/slsd.sock")
         self.assertEqual(status, 1)
-        self.assertIn("not_found: no daemon answers", error)
+        self.assertIn("not_found: no service answers", error)
 
     def test_the_first_program_of_its_readme_works_word_for_word(self):
         readme = (HERE.parents[1] / "clients/cpp/README.md").read_text(encoding="utf-8")

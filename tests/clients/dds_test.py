@@ -401,7 +401,7 @@ class Vanishing(unittest.TestCase):
             wait_until(lambda: state()[0] == 0, "the scanner")
             service.stop(signal.SIGKILL)
             wait_until(lambda: state()[0] == 2, "an error")
-            self.assertIn("no daemon answers", state()[1])
+            self.assertIn("no service answers", state()[1])
             service.socket.unlink(missing_ok=True)
             service.start()
             wait_until(lambda: state()[0] == 0, "the scanner again")

@@ -5,6 +5,7 @@
 import json
 import os
 import pathlib
+import pty
 import re
 import shutil
 import signal
@@ -244,7 +245,7 @@ class Slsd(unittest.TestCase):
             result = slsd("--check", "--config", service.file)
             service.send_signal(signal.SIGCONT)
             self.assertEqual(result.returncode, 1, result.stdout)
-            self.assertIn("the daemon does not answer", result.stdout)
+            self.assertIn("the service does not answer", result.stdout)
             self.assertNotIn("opens", result.stdout)
 
     def test_lists_devices(self):
@@ -275,6 +276,83 @@ class Slsd(unittest.TestCase):
         result = slsd("--check", "--config", service.file)
         self.assertEqual(result.returncode, 1)
         self.assertRegex(result.stdout, "(?s)no-such-camera.*No such file.*of this driver (are|is) seen")
+
+
+COMMANDS = {"scan", "record", "status", "watch", "top", "metrics", "calibrate", "exposure", "project", "frame", "set", "settings",
+            "preview", "pattern", "bundle"}
+
+
+class Usage(unittest.TestCase):
+    """What needs no service: help, and what is wrong with a command line."""
+
+    def refused(self, *arguments, program=slsctl):
+        """What is said of a wrong usage, but for where help is."""
+        result = program(*arguments)
+        self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
+        problem, help_is_at = result.stderr.splitlines()
+        self.assertRegex(help_is_at, r'^"sls(ctl|d)[a-z ]* --help" says more$')
+        return problem
+
+    def test_lists_its_commands_when_called_alone(self):
+        result = slsctl()
+        self.assertEqual((result.returncode, result.stdout), (2, ""))
+        self.assertEqual(set(re.findall(r"(?m)^  ([a-z]+)  ", result.stderr)), COMMANDS)
+        self.assertTrue(result.stderr.endswith("slsctl: name one of these commands\n"))
+
+    def test_help_has_groups_and_each_command_examples(self):
+        text = slsctl("--help").stdout
+        groups = [text.index(f"\n{group}:\n") for group in ("Measure", "Watch", "Set up", "Diagnose")]
+        self.assertEqual(groups, sorted(groups))
+        self.assertIn("SLSD_SOCKET", text)
+        for command in COMMANDS:
+            with self.subTest(command=command):
+                result = slsctl(command, "--help")
+                self.assertEqual(result.returncode, 0)
+                self.assertIn(f"Examples:\n  slsctl {command}", result.stdout)
+                self.assertEqual(slsctl("help", command).stdout, result.stdout)
+
+    def test_examples_of_the_help_are_sound(self):
+        for command in COMMANDS:
+            for line in re.findall(r"(?m)^  slsctl (.*)", slsctl(command, "--help").stdout):
+                with self.subTest(line=line):
+                    words = line.split(" | ")[0].split()
+                    if "chart.png" not in words and words[0] not in ("bundle", "metrics"):
+                        self.assertEqual(slsctl("--socket", "/nonexistent/slsd.sock", *words).returncode, 3)
+
+    def test_names_the_nearest_command_option_and_value(self):
+        cases = {("sttaus",): 'slsctl: there is no command "sttaus"; did you mean status?',
+                 ("help", "recrod"): 'slsctl: there is no command "recrod"; did you mean record?',
+                 ("xyzzy",): 'slsctl: there is no command "xyzzy"',
+                 ("scan", "--densty", "pixels"): 'slsctl scan: there is no option "--densty"; did you mean --density?',
+                 ("scan", "--densty=pixels"): 'slsctl scan: there is no option "--densty"; did you mean --density?',
+                 ("frame", "f.png", "--as-show"): 'slsctl frame: there is no option "--as-show"; did you mean --as-shown?',
+                 ("frame", "--camra", "left"): 'slsctl frame: there is no option "--camra"; did you mean --camera?',
+                 ("status", "--sokcet", "x"): 'slsctl status: there is no option "--sokcet"; did you mean --socket?',
+                 ("-json", "status"): 'slsctl status: there is no option "-json"; did you mean --json?',
+                 ("watch", "--texture"): 'slsctl watch: there is no option "--texture" here: it is one of slsctl scan',
+                 ("scan", "--density", "pixel"): 'slsctl scan: --density: "pixel" is none of symbols, pixels; did you mean pixels?',
+                 ("scan", "--timeout-ms", "0"): 'slsctl scan: --timeout-ms: "0" is no number from 1 to 600000',
+                 ("watch", "--count", "1.5"): "slsctl watch: --count takes a whole number",
+                 ("watch", "--count"): "slsctl watch: --count lacks its value",
+                 ("status", "now"): 'slsctl status: it takes no argument "now"',
+                 ("frame",): "slsctl frame: FILE is missing: the PNG to write; - is standard output"}
+        for arguments, problem in cases.items():
+            with self.subTest(arguments=arguments):
+                self.assertEqual(self.refused(*arguments), problem)
+        self.assertIn("did you mean --calibrate?", self.refused("--calibrat", program=slsd))
+        self.assertRegex(self.refused("--calibrate", "--verify", program=slsd), "--[a-z]+ and --[a-z]+ do not go together")
+
+    def test_says_what_it_writes_before_it_asks_for_it(self):
+        cases = {("scan", "c.xyz"): ".ply or .pcd", ("scan", "cloud"): ".tiff", ("scan", "c.ply", "--format", "pcd"): "format pcd",
+                 ("frame", "f.jpg"): ".png", ("preview", "f.jpeg"): ".png", ("pattern", "p.svg"): ".png",
+                 ("scan", "--picture", "x.tif"): ".png", ("scan", "--cloud-picture", "x.bmp"): ".png",
+                 ("bundle", "b.zip"): ".tar", ("scan", "d.tiff", "--normals"): "no normals",
+                 ("scan", "d.tif", "--density", "symbols"): "--density pixels", ("scan", "-", "--picture", "-"): "one file only",
+                 ("scan", "d.TIFF", "--cloud-picture", "x.png"): "write the cloud as .ply"}
+        for arguments, expected in cases.items():
+            with self.subTest(arguments=arguments):
+                self.assertIn(expected, self.refused(*arguments))
+        self.assertIn(".png", slsd("--pattern", "p.jpg").stderr)
 
 
 class Slsctl(unittest.TestCase):
@@ -321,6 +399,140 @@ class Slsctl(unittest.TestCase):
         self.assertTrue(cloud.read_bytes().startswith(b"ply\n"))
         self.assertEqual(self.slsctl("scan", self.folder / "c.xyz").returncode, 2)
         self.assertEqual(self.slsctl("scan", cloud, "-o", cloud).returncode, 2)
+
+    def test_the_end_of_a_name_may_be_in_capitals(self):
+        for name, begin in (("C.PLY", b"ply\n"), ("c.Pcd", b"# .PCD")):
+            self.assertEqual(self.slsctl("scan", self.folder / name).returncode, 0)
+            self.assertTrue((self.folder / name).read_bytes().startswith(begin))
+        self.assertEqual(self.slsctl("frame", self.folder / "F.PNG").returncode, 0)
+        self.assertEqual(slsd("--pattern", self.folder / "P.PNG").returncode, 0)
+        self.assertEqual(slsd("--print-board", self.folder / "B.SVG").returncode, 0)
+        self.assertIn("projector", self.slsctl("project", self.folder / "F.PNG").stderr)  # of another size, but a PNG
+
+    def test_standard_output_has_the_bytes_and_nothing_else(self):
+        for command, begin in ((["scan", "-o", "-"], b"ply\n"), (["scan", "-", "--format", "pcd"], b"# .PCD"), (["frame", "-"], b"\x89PNG"),
+                               (["preview", "-o", "-", "--json"], b"\x89PNG"), (["pattern", "-"], b"\x89PNG"), (["bundle", "-"], b"bundle.json"),
+                               (["metrics", "-o", "-"], b"# "), (["scan", "--picture", "-"], b"\x89PNG")):
+            with self.subTest(command=command):
+                done = subprocess.run([BIN / "slsctl", "--socket", self.service.socket, *command], capture_output=True, check=True,
+                                      cwd=self.folder)
+                self.assertTrue(done.stdout.startswith(begin), done.stdout[:100])
+                self.assertNotIn(b" regions, capture ", done.stdout)
+                self.assertEqual(b" regions, capture " in done.stderr, command[0] == "scan")
+        self.assertEqual(list(self.folder.iterdir()), [])
+        failed = self.slsctl("scan", "-", "--camera", "none", "--picture", self.folder / "p.png", "--json")
+        self.assertEqual((failed.returncode, failed.stdout), (1, ""))
+        self.assertEqual(json.loads(failed.stderr)["error"]["data"]["name"], "not_found")
+
+    def on_terminal(self, *arguments):
+        """Its exit status and what a terminal shows."""
+        process, terminal = pty.fork()
+        if process == 0:
+            os.execv(BIN / "slsctl", ["slsctl", "--socket", str(self.service.socket), *arguments])
+        shown = b""
+        while True:
+            try:
+                shown += os.read(terminal, 4096)
+            except OSError:  # it ended
+                break
+        os.close(terminal)
+        return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]), shown.decode()
+
+    def test_no_bytes_for_a_terminal(self):
+        for command in (["scan", "-o", "-"], ["frame", "-"], ["bundle", "-"]):
+            status, shown = self.on_terminal(*command)
+            self.assertEqual(status, 2)
+            self.assertIn("standard output is a terminal", shown)
+        self.assertEqual(self.on_terminal("metrics", "-o", "-")[0], 0)
+
+    def test_a_terminal_shows_for_how_long_it_waits(self):
+        self.service.send_signal(signal.SIGSTOP)
+        process, terminal = pty.fork()
+        if process == 0:
+            os.execv(BIN / "slsctl", ["slsctl", "--socket", str(self.service.socket), "scan", "--density", "pixels", "--timeout-ms",
+                                      "600000"])
+        shown = b""
+        while b"measuring every pixel, " not in shown:
+            shown += os.read(terminal, 4096)
+        self.service.send_signal(signal.SIGCONT)
+        try:
+            while True:
+                shown += os.read(terminal, 4096)
+        except OSError:
+            pass
+        os.close(terminal)
+        self.assertEqual(os.waitpid(process, 0)[1], 0, shown)
+        self.assertRegex(shown.decode(), r"^\rmeasuring every pixel, \d+ s(.|\r)*\r +\rscan ")
+
+    def test_an_unwritable_place_is_noticed_before_a_scan(self):
+        scans = json.loads(self.slsctl("status", "--json").stdout)["scans"]["succeeded"]
+        (self.folder / "folder.ply").mkdir()
+        places = {self.folder / "missing" / "c.ply": "missing", self.folder / "folder.ply": "is a folder"}
+        for place, expected in places.items():
+            for command in (["scan", place], ["scan", "--picture", place.with_suffix(".png")], ["bundle", place.with_suffix(".tar")]):
+                if command[-1].parent.exists() and not command[-1].exists():
+                    continue
+                with self.subTest(command=command):
+                    result = self.slsctl(*command)
+                    self.assertEqual((result.returncode, result.stdout), (1, ""))
+                    self.assertIn(expected, result.stderr)
+        self.assertEqual(json.loads(self.slsctl("status", "--json").stdout)["scans"]["succeeded"], scans)
+
+    def test_a_scan_that_fails_leaves_the_old_file(self):
+        cloud = self.folder / "c.ply"
+        cloud.write_bytes(b"mine")
+        self.assertEqual(self.slsctl("scan", cloud, "--picture", self.folder / "p.png", "--camera", "none").returncode, 1)
+        self.assertEqual(cloud.read_bytes(), b"mine")
+        self.assertEqual(list(self.folder.iterdir()), [cloud])
+
+    def test_a_camera_is_named(self):
+        for command in ("frame", "preview"):
+            file = self.folder / (command + ".png")
+            self.assertEqual(self.slsctl(command, file, "--camera", "camera").returncode, 0)
+            result = self.slsctl(command, file, "--camera", "camra")
+            self.assertEqual(result.returncode, 1)
+            self.assertIn('no camera is called "camra"; there are: camera', result.stderr)
+
+    def test_a_depth_map_and_normals_are_of_pixels(self):
+        done = self.slsctl("scan", self.folder / "d.tiff", "--timeout-ms", "600000")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual((self.folder / "d.tiff").read_bytes()[:2], b"II")
+
+    def test_the_environment_names_the_socket(self):
+        for named, arguments, status in ((self.service.socket, [], 0), ("/nonexistent/slsd.sock", [], 3),
+                                         ("/nonexistent/slsd.sock", ["--socket", self.service.socket], 0),
+                                         (self.service.socket, ["--socket", "/nonexistent/slsd.sock"], 3)):
+            with self.subTest(named=named, arguments=arguments):
+                self.assertEqual(slsctl(*arguments, "status", env={**os.environ, "SLSD_SOCKET": str(named)}).returncode, status)
+
+    def test_where_no_service_answers_the_others_are_named(self):
+        result = slsctl("--socket", self.service.folder / "other.sock", "status")
+        self.assertEqual(result.returncode, 3)
+        self.assertIn(f"there are {self.service.socket}", result.stderr)
+        self.assertIn("--socket or SLSD_SOCKET", result.stderr)
+
+    def test_a_service_that_hangs_is_told(self):
+        with Service() as service:
+            service.send_signal(signal.SIGSTOP)
+            for command in (["status"], ["scan"], ["watch"]):
+                with self.subTest(command=command):
+                    result = slsctl("--socket", service.socket, *command)
+                    self.assertEqual(result.returncode, 1)
+                    self.assertIn("the service does not answer: look at its log, or restart it", result.stderr)
+            service.send_signal(signal.SIGCONT)
+
+    def test_a_reader_that_leaves_ends_it(self):
+        for command in ("watch", "top --interval 0.1", "--json watch", "metrics", "scan -o -"):
+            with self.subTest(command=command):
+                done = subprocess.run(["bash", "-c", f"'{BIN}/slsctl' --socket '{self.service.socket}' {command} | head -c 4"],
+                                      capture_output=True, timeout=120, check=False)
+                self.assertEqual(len(done.stdout), 4)
+        for command in ("status", "watch", "settings", "scan", "scan -o -", "--json status"):
+            with self.subTest(command=command):
+                done = subprocess.run(["bash", "-c", f"'{BIN}/slsctl' --socket '{self.service.socket}' {command} >/dev/full"],
+                                      capture_output=True, timeout=120, check=False, text=True)
+                self.assertEqual(done.returncode, 1)
+                self.assertRegex(done.stderr, "standard output.*(disk is full|No space left)")
 
     def test_json_works_everywhere(self):
         self.assertIn("points", json.loads(self.slsctl("--json", "scan").stdout))

@@ -224,7 +224,7 @@ class Record(unittest.TestCase):
         (self.recording / "mine").touch()
         result = self.record(self.one)
         self.assertEqual(result.returncode, 1)
-        self.assertIn("is there already", result.stderr)
+        self.assertIn("is not an empty folder", result.stderr)
         self.assertEqual(list(self.recording.iterdir()), [self.recording / "mine"])
         result = slsctl("--socket", self.one.socket, "record", self.recording / "mine" / "below", "--frames", "1")
         self.assertEqual(result.returncode, 1)
@@ -239,7 +239,7 @@ class Record(unittest.TestCase):
         self.assertIn("Permission denied", result.stderr)
 
     def test_usage(self):
-        for usage in (["record"], ["record", "x", "--frames", "0"], ["record", "x", "--seconds", "-1"]):
+        for usage in (["record"], ["record", "x", "--frames", "0"], ["record", "x", "--seconds", "-1"], ["record", "-"]):
             self.assertEqual(slsctl(*usage).returncode, 2)
         self.assertEqual(slsctl("--socket", self.folder / "none", "record", self.recording).returncode, 3)
         self.assertFalse(self.recording.exists())

@@ -40,6 +40,13 @@ TEST(NearestName, FindsWhatWasMeant) {
   EXPECT_EQ(nearest_hint("spacing_pix", names), "; did you mean spacing_px?");
 }
 
+TEST(NearestName, FindsTheOnlyNameThatBeginsWithAShortenedWord) {
+  const std::vector<std::string> names{"timeout-ms", "texture", "exposure-max-us", "exposure-min-us"};
+  EXPECT_EQ(nearest_name("time", names), "timeout-ms");
+  EXPECT_EQ(nearest_name("exposure", names), std::nullopt);
+  EXPECT_EQ(nearest_name("ti", names), std::nullopt);
+}
+
 TEST(NearestName, FindsNothingWhereNothingIsNear) {
   const std::vector<std::string> names{"symbols", "seed"};
   EXPECT_EQ(nearest_name("exposure_us", names), std::nullopt);

@@ -201,5 +201,22 @@ TEST(CheckWritable, AgreesWithWritingAndLeavesEverythingAsItWas) {
   }
 }
 
+TEST(CheckWritable, FindsAFullDisk) {
+  const TemporaryFolder folder;
+  Result<> checked;
+  {
+    const FileSizeLimit full(1000);
+    checked = check_writable(folder.path() / "new");
+  }
+  ASSERT_FALSE(checked);
+  EXPECT_EQ(checked.error().code, ErrorCode::kNoSpace);
+  EXPECT_EQ(entries(folder.path()), 0U);
+}
+
+TEST(LowerExtension, IsHowTheNameEnds) {
+  EXPECT_EQ(lower_extension("a/B.PLY"), ".ply");
+  EXPECT_EQ(lower_extension("a.b/c"), "");
+}
+
 }  // namespace
 }  // namespace slsd

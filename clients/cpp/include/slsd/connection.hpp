@@ -34,6 +34,10 @@ class Bytes {
   std::string_view view_;
 };
 
+/// The socket that clients connect to unless told otherwise: SLSD_SOCKET in the environment, else the usual place.
+/// @thread reentrant, while nobody changes the environment
+[[nodiscard]] std::string default_socket();
+
 /// One line of the protocol, and what came with it.
 struct Message {
   std::string json;
@@ -60,6 +64,10 @@ class Connection {
   /// @throws ConnectionLost, TimedOut
   std::int64_t send(std::string_view method, std::string_view params, Deadline deadline = {});
 
+  /// Waits until a part of the next message is there, at most until the deadline. @return whether it is
+  /// @throws ConnectionLost
+  [[nodiscard]] bool answers(Deadline deadline) const;
+
   /// Waits for the next message: a reply, which may be an error, or an event.
   /// @throws ConnectionLost, TimedOut, ProtocolError
   [[nodiscard]] Message receive(Deadline deadline = {});
@@ -69,6 +77,7 @@ class Connection {
 
  private:
   void refuse_others() const;
+  [[nodiscard]] bool ready(short events, const Deadline& deadline) const;
   void wait(short events, const Deadline& deadline) const;
   void receive_more(const Deadline& deadline);
   [[nodiscard]] std::string receive_line(const Deadline& deadline);
