@@ -63,7 +63,9 @@ void add_calibration_options(CLI::App& app, CommandLine& line) {
 
 CLI::Option* add_print_options(CLI::App& app, PrintRequest& request) {
   auto* print = app.add_option("--print-board", request.file, "write a board for calibrating: .pdf, .svg or .png");
-  app.add_option("--paper", request.paper, "A0 to A4, letter or WIDTHxHEIGHT in mm")->needs(print);
+  app.add_option("--paper", request.paper, "the paper to print on; a size is in mm")
+      ->type_name("{A0,A1,A2,A3,A4,letter} or WIDTHxHEIGHT")
+      ->needs(print);
   app.add_option("--dpi", request.dpi, "of a board that is a PNG")->needs(print);
   return print;
 }

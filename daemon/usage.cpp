@@ -23,7 +23,7 @@ class PlainHelp : public CLI::Formatter {
   PlainHelp() {
     label("Positionals", "Arguments");
     label("SUBCOMMAND", "COMMAND");
-    column_width(28);
+    column_width(32);
   }
   [[nodiscard]] std::string make_option(const CLI::Option* option, bool is_positional) const override {
     std::string opts = make_option_opts(option);

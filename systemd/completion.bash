@@ -7,20 +7,19 @@ _slsd() {
   for word in "${COMP_WORDS[@]:1:COMP_CWORD-1}"; do
     case $word in -* | */* | *.*) ;; *) if [[ $program == *slsctl && -z $command ]]; then command=$word; fi ;; esac
   done
-  case $previous in
-    --log-level) values='trace debug info warning error critical' ;;
-    --paper) values='A0 A1 A2 A3 A4 letter' ;;
-  esac
   help=$("$program" ${command:+"$command"} --help 2>/dev/null) || return 0
   if [[ $previous == --* ]]; then
-    values+=$(sed -nE "s/^  (-.,)?$previous \{([^}]*)\}.*/\2/p" <<<"$help" | tr ',' ' ')
-  elif [[ -n $command && $current != -* ]]; then
-    values+=$(sed -nE 's/^  [A-Z]+ \{([^}]*)\}.*/\1/p' <<<"$help" | tr ',' ' ')
+    values=$(sed -nE "s/^  (-.,)?$previous \{([^}]*)\}.*/\2/p" <<<"$help" | tr ',' ' ')
+    if [[ -z $values ]] && grep -qE -- "^  (-.,)?$previous [A-Za-z0-9]" <<<"$help"; then return 0; fi
+  fi
+  if [[ -n $values ]]; then
+    :
   elif [[ $current == -* ]]; then
     values=$(grep -oE -- '(^| |,)--?[a-z][a-z-]*' <<<"$help" | tr -d ' ,' | sort -u)
-  fi
-  if [[ $program == *slsctl && -z $command && $current != -* && $previous != --* ]]; then
+  elif [[ $program == *slsctl && -z $command ]]; then
     values=$(sed -n 's/^  \([a-z][a-z-]*\)  .*/\1/p' <<<"$help")
+  else
+    values=$(sed -nE 's/^  [A-Z]+ \{([^}]*)\}.*/\1/p' <<<"$help" | tr ',' ' ')
   fi
   mapfile -t COMPREPLY < <(compgen -W "$values" -- "$current")
 }

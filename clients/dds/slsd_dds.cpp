@@ -40,7 +40,7 @@ int main(int argc, char** argv) {
   slsd::dds::NetworkOptions network;
   app.set_version_flag("--version", "slsd-dds " SLSD_VERSION);
   auto* name = app.add_option("--name", options.name, "of the scanner: its topics begin with it (scanner; merged)");
-  app.add_option("--socket", options.socket, "of its service");
+  app.add_option("--socket", options.socket, "of its service; SLSD_SOCKET names it, too (/run/slsd/slsd.sock)");
   app.add_option("--rate", options.rate_hz, "at most so many clouds a second; 0: only those that are triggered")
       ->check(CLI::Range(0.0, 1000.0));
   app.add_option("--density", options.density, "a point for each symbol, or for each camera pixel")

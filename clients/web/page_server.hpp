@@ -15,6 +15,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include <slsd/connection.hpp>
+
 #include "clients/web/cloud_feed.hpp"
 #include "clients/web/gate.hpp"
 #include "clients/web/http_server.hpp"
@@ -23,7 +25,7 @@
 namespace slsd::web {
 
 struct PageOptions {
-  std::filesystem::path socket = "/run/slsd/slsd.sock";
+  std::filesystem::path socket = client::default_socket();
   std::string listen = "127.0.0.1";
   int port = 8384;
   std::vector<std::string> names = {};                          ///< by which the page is asked for, besides the address

@@ -82,7 +82,7 @@ int main(int argc, char** argv) {
   PageOptions options;
   bool only_address = false;
   app.set_version_flag("--version", "slsd-web " SLSD_VERSION);
-  app.add_option("--socket", options.socket, "the service's socket")->envname("SLSD_SOCKET")->capture_default_str();
+  app.add_option("--socket", options.socket, "the service's socket; SLSD_SOCKET names it, too")->capture_default_str();
   app.add_option("--listen", options.listen, "the address to listen at; beyond loopback it takes a token")
       ->capture_default_str();
   app.add_option("--port", options.port, "the port to listen at; 0: any that is free")

@@ -93,7 +93,7 @@ class Installed(unittest.TestCase):
             self.assertEqual(len(out.splitlines()), len(scanner.scan()))
         status, out, error = run(program, SLSD_SOCKET="/nonexistent/slsd.sock")
         self.assertEqual((status, out), (1, ""))
-        self.assertRegex(error, r"^/nonexistent/slsd.sock: no daemon answers there: start slsd .*\n$")
+        self.assertRegex(error, r"^/nonexistent/slsd.sock: no service answers there: start slsd .*\n$")
 
 
 if __name__ == "__main__":

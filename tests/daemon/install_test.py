@@ -2,12 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """What `cmake --install` puts where: install_test.py CMAKE BUILD_DIR."""
+import os
 import pathlib
+import pty
 import re
+import select
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 CMAKE, BUILD = sys.argv[1:3]
@@ -20,6 +25,53 @@ UNITS += DDS_UNITS
 def install(prefix, destination):
     subprocess.run([CMAKE, "--install", BUILD, "--prefix", prefix], check=True, capture_output=True,
                    env={"DESTDIR": destination, "PATH": "/usr/bin:/bin"})
+
+
+ZSHRC = """
+fpath=({root}/usr/share/zsh/vendor-completions {root}/usr/share/zsh/site-functions $fpath)
+compadd() {{ local -a found; builtin compadd -O found "$@"; print -rl -- $found >>{root}/found; builtin compadd "$@" }}
+answer() {{ autoload -Uz compinit; compinit -u -D; zle complete-word; BUFFER=; print -r -- END >>{root}/found }}
+zle -N answer
+bindkey '^X' answer
+print READY
+"""
+
+
+class ZshTerminal:
+    """An interactive zsh: it completes nowhere else."""
+
+    def __init__(self, root):
+        self.root = root
+
+    def __enter__(self):
+        (self.root / ".zshrc").write_text(ZSHRC.format(root=self.root), encoding="utf-8")
+        self.process, self.terminal = pty.fork()
+        if self.process == 0:
+            os.chdir(self.root)
+            os.execvpe("zsh", ["zsh", "-d", "-i"], {"PATH": f"{self.root}/usr/bin:/usr/bin:/bin", "ZDOTDIR": str(self.root), "HOME": str(self.root),
+                                              "TERM": "dumb", "PS1": "$ "})
+        self.wait_until(lambda shown: b"READY" in shown)
+        return self
+
+    def __exit__(self, *_):
+        os.kill(self.process, signal.SIGKILL)
+        os.waitpid(self.process, 0)
+        os.close(self.terminal)
+
+    def wait_until(self, condition, end_s=120):
+        shown, end = b"", time.monotonic() + end_s
+        while not condition(shown):
+            if time.monotonic() > end:
+                raise TimeoutError(shown)
+            if select.select([self.terminal], [], [], 0.05)[0]:
+                shown += os.read(self.terminal, 4096)
+
+    def complete(self, line):
+        found = self.root / "found"
+        found.write_text("", encoding="utf-8")
+        os.write(self.terminal, line.encode() + b"\x18")
+        self.wait_until(lambda _: found.read_text(encoding="utf-8").endswith("END\n"))
+        return sorted(set(found.read_text(encoding="utf-8").split()) - {"END"})
 
 
 class Install(unittest.TestCase):
@@ -106,39 +158,62 @@ class Install(unittest.TestCase):
         self.assertIn("/etc/slsd/slsd.toml", subprocess.run([self.root / "usr/local/bin/slsd", "--help"], check=True,
                                                             capture_output=True, text=True).stdout)
 
-    def test_completes_commands_and_options(self):
-        install("/usr", str(self.root))
-        script = self.root / "usr/share/bash-completion/completions/slsctl"
-        for line, expected in (("slsctl sta", "status"), ("slsctl scan --dens", "--density"), ("slsd --check-c", "--check-config"),
-                               ("slsctl scan --density p", "pixels"), ("slsd --log-level w", "warning")):
-            words = line.split()
-            code = (f"source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; "
-                    f"_slsd {words[0]} {words[-1]} {words[-2]}; echo \"${{COMPREPLY[*]}}\"")
-            completed = subprocess.run(["bash", "-c", code], env={"PATH": f"{self.root}/usr/bin:/usr/bin:/bin"}, check=True,
-                                       capture_output=True, text=True)
-            self.assertEqual(completed.stdout.strip(), expected, line)
+    def help_of(self, *command):
+        return subprocess.run([self.root / "usr/bin" / command[0], *command[1:], "--help"], check=True, capture_output=True, text=True).stdout
 
-    def test_completes_every_option_of_every_program(self):
+    def usages(self):
+        """Every program, and every command of slsctl."""
+        for program in sorted((self.root / "usr/bin").iterdir()):
+            yield (program.name,)
+            if program.name == "slsctl":
+                yield from ((program.name, command) for command in re.findall(r"(?m)^  ([a-z]+)  ", self.help_of(program.name)))
+
+    def by_bash(self, line):
+        words = line.split(" ")
+        script = self.root / "usr/share/bash-completion/completions" / words[0]
+        code = (f"source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; "
+                f"_slsd {words[0]} '{words[-1]}' '{words[-2]}'; echo \"${{COMPREPLY[*]}}\"")
+        return subprocess.run(["bash", "-c", code], env={"PATH": f"{self.root}/usr/bin:/usr/bin:/bin"}, check=True, cwd=self.root,
+                              capture_output=True, text=True).stdout.split()
+
+    def by_fish(self, line):
+        folder = self.root / "usr/share/fish/vendor_completions.d"
+        code = f"set fish_complete_path {folder}; complete -C '{line}'"
+        completed = subprocess.run(["fish", "--no-config", "-c", code], check=True, capture_output=True, text=True, cwd=self.root,
+                                   env={"PATH": f"{self.root}/usr/bin:/usr/bin:/bin", "HOME": str(self.root)}).stdout
+        return [each.split("\t")[0] for each in completed.splitlines()]
+
+    def check_completion(self, complete):
         install("/usr", str(self.root))
-        programs = self.root / "usr/bin"
-        for program in sorted(programs.iterdir()):
-            script = self.root / "usr/share/bash-completion/completions" / program.name
-            self.assertTrue(script.is_file(), f"{program.name} has no completion")
-            def help_of(*command):
-                return subprocess.run([program, *command, "--help"], check=True, capture_output=True, text=True).stdout
-            usages = [()]
-            if "Subcommands:" in help_of():
-                usages += [(command,) for command in re.findall(r"(?m)^  ([a-z]+) ", help_of().split("Subcommands:")[1])]
-            for usage in usages:
-                line = " ".join((program.name, *usage, "--"))
-                code = (f"source {script}; COMP_WORDS=({line}); COMP_CWORD={len(usage) + 1}; "
-                        f"_slsd {program.name} -- {(usage or (program.name,))[-1]}; echo \"${{COMPREPLY[*]}}\"")
-                if usage == ("project",):
-                    continue  # its picture comes first
-                completed = subprocess.run(["bash", "-c", code], env={"PATH": f"{programs}:/usr/bin:/bin"}, check=True,
-                                           capture_output=True, text=True).stdout.split()
-                options = set(re.findall(r"(?:^| |,)(--[a-z][a-z-]*)", help_of(*usage)))
-                self.assertEqual(set(completed), options, line)
+        for line, expected in (("slsctl sta", "status"), ("slsctl scan --dens", "--density"), ("slsd --check-c", "--check-config"),
+                               ("slsctl scan --density p", "pixels"), ("slsd --log-level w", "warning"), ("slsctl project foc", "focus"),
+                               ("slsctl calibrate --resume ca", "cancel"), ("slsctl --json scan --format t", "tiff")):
+            with self.subTest(line=line):
+                self.assertEqual(complete(line), [expected])
+        self.assertEqual(set(complete("slsctl ")), {usage[1] for usage in self.usages() if len(usage) == 2})
+        for usage in self.usages():
+            with self.subTest(usage=usage):
+                options = set(re.findall(r"(?:^| |,)(--[a-z][a-z-]*)", self.help_of(*usage)))
+                self.assertEqual(set(complete(" ".join((*usage, "--")))), options)
+
+    def test_bash_completes_what_the_help_lists(self):
+        self.check_completion(self.by_bash)
+
+    @unittest.skipUnless(shutil.which("fish"), "no fish here (package fish)")
+    def test_fish_completes_what_the_help_lists(self):
+        self.check_completion(self.by_fish)
+
+    @unittest.skipUnless(shutil.which("zsh"), "no zsh here (package zsh)")
+    def test_zsh_completes_what_the_help_lists(self):
+        with ZshTerminal(self.root) as zsh:
+            self.check_completion(zsh.complete)
+
+    def test_zsh_looks_where_its_completion_is(self):
+        install("/usr/local", str(self.root))
+        self.assertTrue((self.root / "usr/local/share/zsh/site-functions/_slsctl").is_file())
+        if pathlib.Path("/etc/debian_version").exists():
+            install("/usr", str(self.root))
+            self.assertTrue((self.root / "usr/share/zsh/vendor-completions/_slsctl").is_file())
 
     def test_leaves_the_administrators_configuration_alone(self):
         file = self.root / "etc/slsd/slsd.toml"
