@@ -57,7 +57,7 @@ class Scanner:
     """
 
     def __init__(self, path: str | os.PathLike[str] | None = None):
-        self._channel = Channel(os.fspath(path) if path else os.environ.get("SLSD_SOCKET", DEFAULT_SOCKET))
+        self._channel = Channel(os.fspath(path) if path else os.environ.get("SLSD_SOCKET") or DEFAULT_SOCKET)
         self._channel.connect()
 
     def __enter__(self) -> Scanner:
