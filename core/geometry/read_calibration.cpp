@@ -180,7 +180,7 @@ const char* other_syntax(std::string_view text) {
   const std::size_t first = text.find_first_not_of(" \t\r\n\xef\xbb\xbf");
   if (first == text.npos) return "nothing";
   if (text[first] == '<') return "XML";
-  return text[first] == '{' || text[first] == '[' ? "JSON" : nullptr;
+  return text[first] == '{' ? "JSON" : nullptr;
 }
 
 Result<Calibration> read_root(const FileNode& root, std::string_view name) {
