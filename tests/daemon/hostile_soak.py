@@ -26,7 +26,7 @@ from service import Service, wait_until
 
 GROWTH_MAX = 1.10
 GROWTH_KIB = 40 << 10  # what clients are being sent at this moment
-LOG_LINE = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3} (debug|info|warning|error|critical) ")
+LOG_LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z (debug|info|warning|error|critical) ")
 
 
 def scan(path, stop, result):

@@ -12,7 +12,7 @@ from client import RpcError
 from hostile_client import FLOODS, NASTY, line
 from service import Service, wait_until
 
-LOG_LINE = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3} (debug|info|warning|error|critical) ")
+LOG_LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z (debug|info|warning|error|critical) ")
 # Every text that a client can send: the parameters of every method that takes some.
 TEXTS = {"scan": ["format", "transport", "camera", "frames"], "preview": ["camera"], "frame": ["format", "camera"],
          "pattern": ["format"], "project": ["picture", "png"], "subscribe": ["format"], "status": [], "settings": [],

@@ -77,7 +77,7 @@ RC_GTEST_PROP(Residuals, HaveTheSlopesThatCeresFindsByItself, ()) {
   const double scale = between(-30, 30) / 1e3, stretch = between(-30, 30) / 1e3, sigma_px = between(1, 100) / 100.0;
   const std::array<double, 2> shift_px{between(-100, 100) / 1e3, between(-100, 100) / 1e3};
   const Eigen::Vector2d seen_px(between(100, 900), between(100, 700)), other(between(350, 650), between(250, 550));
-  const ShapeFrame frame{{double(between(-50, 250)), double(between(-50, 150))}, double(between(80, 300))};
+  const ShapeFrame frame{{double(between(-50, 250)), double(between(-50, 150))}, double(between(400, 800))};
   ShapeVector shape;
   for (double& term : shape) term = between(-100, 100) / 1e2;
   const ceres::AutoDiffCostFunction<test::CornerResidual, 2, 9, 6, 6, 1, 1, 12> corner(
