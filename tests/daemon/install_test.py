@@ -193,7 +193,7 @@ class Install(unittest.TestCase):
         self.assertEqual(set(complete("slsctl ")), {usage[1] for usage in self.usages() if len(usage) == 2})
         for usage in self.usages():
             with self.subTest(usage=usage):
-                options = set(re.findall(r"(?:^| |,)(--[a-z][a-z-]*)", self.help_of(*usage)))
+                options = set(re.findall(r"(?m)(?:^| |,)(--[a-z][a-z-]*)", self.help_of(*usage)))
                 self.assertEqual(set(complete(" ".join((*usage, "--")))), options)
 
     def test_bash_completes_what_the_help_lists(self):

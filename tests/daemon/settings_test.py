@@ -100,7 +100,7 @@ class Decoding(unittest.TestCase):
                                   ({"camera": {"camera": {"gain_db": 1.0}}}, "gain_db"),  # a replay has none
                                   ({"camera": {"camera": 3}}, "camera"),
                                   ({"calibration": {"file": "/nowhere/calibration.yml"}}, "/nowhere"),
-                                  ({"calibration": {"file": str(SCENE / "pattern.toml")}}, "no calibration file"),
+                                  ({"calibration": {"file": str(SCENE / "pattern.toml")}}, "is no YAML"),
                                   ({"calibration": {"file": "/dev/zero"}}, "regular file"),
                                   ({"pattern": {"symbol_size_px": 9}}, "symbol_size_px"),
                                   ({"pattern": {"symbols": [[1]]}}, "symbols"),
