@@ -148,7 +148,7 @@ void add_calibrate(CLI::App& app, ClientOptions& options) {
       ->add_option("ACTION", options.action,
                    "begin one and follow it (begin), or look at, end or cancel the one under way")
       ->check(one_of({"begin", "look", "end", "cancel"}));
-  calibrate->add_option("--board", options.board, "the board, as slsd --calibrate takes it");
+  calibrate->add_option("--board", options.board, "the board; the manual of slsd lists the kinds");
   calibrate->add_option("--ruler", options.ruler, "what the ruler on the print says and measures, in mm")
       ->type_name("NOMINAL:MEASURED");
   calibrate->add_option("--code", options.code, "what is projected on it (pattern)")
