@@ -107,7 +107,7 @@ void add_watching(CLI::App& app, ClientOptions& options) {
   metrics
       ->add_option("--format", options.metrics_format,
                    "printed: openmetrics; in a file: prometheus, the older text format")
-      ->check(CLI::IsMember({"openmetrics", "prometheus"}));
+      ->check(one_of({"openmetrics", "prometheus"}));
 }
 
 void add_image(CLI::App& app, ClientOptions& options, const char* group, const std::string& name,

@@ -352,7 +352,9 @@ class Usage(unittest.TestCase):
         for arguments, expected in cases.items():
             with self.subTest(arguments=arguments):
                 self.assertIn(expected, self.refused(*arguments))
-        self.assertIn(".png", slsd("--pattern", "p.jpg").stderr)
+        with tempfile.TemporaryDirectory(prefix="slsd-test-") as folder:
+            self.assertIn("as .png only", slsd("--pattern", "p.jpg", cwd=folder).stderr)
+            self.assertEqual(os.listdir(folder), [])
 
 
 class Slsctl(unittest.TestCase):
