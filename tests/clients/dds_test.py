@@ -315,7 +315,7 @@ class Stalling(unittest.TestCase):
 
     def test_of_nobody_loses_nothing_among_many(self):
         got = measure(scanners=4, seconds=3)
-        self.assertGreater(got["sent"], 20)
+        self.assertGreater(got["sent"], 60)
         self.assertEqual(got["lost"], 0)
 
 
