@@ -153,7 +153,7 @@ class Merged(Folder):
 
     def test_goes_on_without_one_that_vanished_and_says_so(self):
         scenes = self.services("scene")
-        with Bridge(scenes["left"], "--rate", "5", name="left"), self.merge(CELL / "truth.toml", "--max-age", "0.5"):
+        with Bridge(scenes["left"], "--rate", "5", name="left"), self.merge(CELL / "truth.toml", "--max-age", "2"):
             with Bridge(scenes["right"], "--rate", "5", name="right"):
                 self.wait_state("", "both")
                 self.assertEqual(self.sources(), {0, 1})
