@@ -21,7 +21,6 @@ struct DenseView {
   RigidTransform rig_from_camera;
   std::uint8_t camera = 0;  ///< index in the calibration
   std::string camera_name;
-  std::size_t symbols = 0;   ///< decoded in the frame: where there are none, nothing grows
   float epipolar_px = 0;     ///< how far off its epipolar lines the frame has the pattern, projector px
   double white_differs = 0;  ///< share of the points whose white frame is not as bright as the pattern's frame says
 };

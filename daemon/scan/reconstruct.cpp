@@ -102,7 +102,6 @@ DenseView measure_pixels(const GreyView& frame, Decoder& decoder, ScanSetup& set
                  calibrated.rig_from_camera,
                  decoder.camera_index(),
                  setup.camera_names[camera],
-                 symbols.lattice->symbols.size(),
                  mapper.epipolar_offset_px()};
   if (light.white || light.dark) {
     const std::size_t saturated = shade_view(view, light);
