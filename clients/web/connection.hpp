@@ -15,7 +15,7 @@
 
 namespace slsd::web {
 
-/// What the connections of a server share. @thread that of its io_context, but for the workers
+/// State that all connections of a server share. @thread that of its io_context, but for the workers
 struct Shared {
   Handlers handlers;
   boost::asio::io_context io{1};

@@ -24,7 +24,7 @@ struct Token {
 /// A token of this run, from the kernel's random numbers: 192 bits.
 [[nodiscard]] Token random_token();
 
-/// What a browser keeps after it has shown the token. Both halves are needed: browsers send the cookie to every port of
+/// The secret of a browser that has shown the token. Both halves are needed: browsers send the cookie to every port of
 /// this machine's name, the key only by a script of this very origin.
 struct Session {
   std::string cookie;  ///< value of the header Set-Cookie; its path is that of the page, wherever a proxy puts it

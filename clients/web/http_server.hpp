@@ -16,7 +16,7 @@
 
 namespace slsd::web {
 
-/// What goes back for a request.
+/// The reply to a request.
 struct Answer {
   int status = 200;
   std::string type;                                          ///< of the body; empty: no body
@@ -28,11 +28,11 @@ struct Answer {
 /// A refusal as the page reads it.
 [[nodiscard]] Answer answer_of(const Refusal& refusal);
 
-/// What the server asks of the page behind it.
+/// Callbacks by which the server asks the page behind it.
 struct Handlers {
-  /// Whether a request may send its body, and have an answer, by its head alone. @thread that of run()
+  /// Judges a request by its head alone, before its body is read. @return the refusal, if any. @thread that of run()
   std::function<std::optional<Answer>(const Request&)> refuse;
-  /// May take its time. @thread one of many
+  /// Answers an admitted request; may block. @thread one of many
   std::function<Answer(const Request&)> answer;
   std::vector<std::pair<std::string, std::string>> headers;  ///< of every answer
   std::size_t body_bytes_max;

@@ -33,7 +33,7 @@ struct PageOptions {
   std::filesystem::path three = "/usr/share/javascript/three";  ///< Debian's libjs-three
 };
 
-/// Whether only this machine reaches an address.
+/// Tells an address that only this machine reaches.
 [[nodiscard]] bool is_loopback(const std::string& address);
 
 /// A scan that the page asked for.
@@ -55,7 +55,7 @@ class PageServer {
   void run(const std::function<void()>& at_end) { server_->run(at_end); }
 
  private:
-  /// How one address is served.
+  /// One address: its method, its secret, its answer.
   struct Route {
     std::string method;  ///< GET, which is HEAD too, or POST
     bool open;           ///< to those without a secret: it shows no data and does nothing

@@ -72,7 +72,7 @@ class Connection {
   /// @throws ConnectionLost, TimedOut, ProtocolError
   [[nodiscard]] Message receive(Deadline deadline = {});
 
-  /// Whether this process opened it, not a parent.
+  /// Tells a connection of this process from one that a parent opened.
   [[nodiscard]] bool is_own() const;
 
  private:
