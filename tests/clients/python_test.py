@@ -73,6 +73,14 @@ class Scans(unittest.TestCase):
         self.assertFalse(owns)
         self.assertLess(allocated, 1_000_000)
 
+    def test_say_why_they_are_empty(self):
+        with slsd.Scanner(self.service.socket) as scanner:
+            self.assertIsNone(scanner.scan().why_empty)
+        with Service(camera_path=SCENE / "black.png") as dark, slsd.Scanner(dark.socket) as scanner:
+            cloud = scanner.scan()
+            self.assertIn("no symbol of the pattern was decoded", cloud.why_empty)
+            self.assertIn(cloud.why_empty, repr(cloud))
+
     def test_say_what_one_may(self):
         with slsd.Scanner(self.service.socket) as scanner:
             self.assertEqual(scanner.role, "administer")  # who runs the service
