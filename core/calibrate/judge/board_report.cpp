@@ -55,6 +55,14 @@ void add_height(const Eigen::Vector2d& residual, const Eigen::Vector2d& raised, 
   heights.weight += slope.squaredNorm();
 }
 
+/// Root mean square of a view's residuals, without outlying points.
+template <class Point>
+double rms_of(const std::vector<Point>& points, std::vector<Eigen::Vector2d> residuals) {
+  std::size_t i = 0;
+  std::erase_if(residuals, [&](const Eigen::Vector2d&) { return points[i++].outlying; });
+  return rms_px(residuals);
+}
+
 /// By how much each place of the board is seen off the shape.
 HeightMap heights_of(const PoseObservation& pose, const RigModel& rig, const MotionVector& rig_from_board,
                      const Eigen::AlignedBox2d& sheet) {
@@ -71,17 +79,18 @@ HeightMap heights_of(const PoseObservation& pose, const RigModel& rig, const Mot
   for (const PoseView& view : pose.views) {
     const ViewResiduals residuals = residuals_of(view, rig, rig_from_board, pose.subject),
                         after = residuals_of(view, rig, to_vector(raised), pose.subject);
-    const double corner_sigma_px = std::max(rms_px(residuals.corners_px), 1e-3),
-                 symbol_sigma_px = std::max(rms_px(residuals.symbols_px), 1e-3);
+    const double corner_sigma_px = std::max(rms_of(view.corners, residuals.corners_px), 1e-3),
+                 symbol_sigma_px = std::max(rms_of(view.symbols, residuals.symbols_px), 1e-3);
     for (std::size_t i = 0; i < view.corners.size(); ++i) {
       if (view.corners[i].outlying) continue;
       add_height(residuals.corners_px[i], after.corners_px[i], corner_sigma_px, at(view.corners[i].board_mm));
     }
     for (std::size_t i = 0; i < view.symbols.size(); ++i) {
       if (view.symbols[i].outlying) continue;
-      const Eigen::Vector3d seen =
-          place.inverse() * rig.meet(rig.cameras[view.camera], place, view.symbols[i].camera_px, pose.subject);
-      add_height(residuals.symbols_px[i], after.symbols_px[i], symbol_sigma_px, at(seen.head<2>()));
+      const auto seen = rig.meet(rig.cameras[view.camera], place, view.symbols[i].camera_px, pose.subject);
+      if (!seen || !after.symbols_px[i].allFinite()) continue;
+      add_height(residuals.symbols_px[i], after.symbols_px[i], symbol_sigma_px,
+                 at((place.inverse() * *seen).head<2>()));
     }
   }
   return map;

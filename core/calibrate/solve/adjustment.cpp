@@ -125,7 +125,9 @@ std::string Adjustment::unplaced_text(const Observations& observations) const {
 }
 
 Result<> Adjustment::find_influence_of(const Observations& observations) {
-  equations_ = linearise(observations, options_, rig_);
+  auto equations = linearise(observations, options_, rig_);
+  if (!equations) return tl::unexpected(equations.error());
+  equations_ = std::move(*equations);
   auto influence = find_influence(equations_);
   if (!influence) return fail(influence.error().code, influence.error().message + unplaced_text(observations));
   influence_ = std::move(*influence);

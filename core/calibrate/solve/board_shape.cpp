@@ -8,6 +8,8 @@ namespace slsd {
 namespace {
 
 constexpr std::size_t kOrders = 5;
+/// From the middle, in halves of the longer side: beyond it, a polynomial soon is higher than any board.
+constexpr double kReach = 2;
 
 /// Of u and v, in each term.
 struct Powers {
@@ -26,7 +28,8 @@ std::array<double, kOrders> powers_of(double base) {
 
 ShapeAt shape_at(const double* terms_mm, const ShapeFrame& frame, const Eigen::Vector2d& board_mm) {
   const Eigen::Vector2d at = (board_mm - frame.middle_mm) / frame.half_mm;
-  const auto u = powers_of(at.x()), v = powers_of(at.y());
+  const Eigen::Vector2d within = at.cwiseMax(-kReach).cwiseMin(kReach);
+  const auto u = powers_of(within.x()), v = powers_of(within.y());
   ShapeAt shape;
   for (std::size_t i = 0; i < kShapeTerms; ++i) {
     const Powers& power = kPowers[i];
@@ -36,23 +39,26 @@ ShapeAt shape_at(const double* terms_mm, const ShapeFrame& frame, const Eigen::V
     if (power.u > 0) shape.slope.x() += terms_mm[i] * static_cast<double>(power.u) * u[power.u - 1] * v[power.v];
     if (power.v > 0) shape.slope.y() += terms_mm[i] * static_cast<double>(power.v) * u[power.u] * v[power.v - 1];
   }
-  shape.slope /= frame.half_mm;
+  shape.slope = (within.array() == at.array()).select(shape.slope / frame.half_mm, 0);
   return shape;
 }
 
-Eigen::Vector3d meet_shape(const double* terms_mm, const ShapeFrame& frame, const Eigen::Vector3d& eye,
-                           const Eigen::Vector3d& ray) {
-  constexpr int kRounds = 8;  // a board is nearly flat: three or four are enough
+std::optional<Eigen::Vector3d> meet_shape(const double* terms_mm, const ShapeFrame& frame, const Eigen::Vector3d& eye,
+                                          const Eigen::Vector3d& ray) {
+  constexpr int kRounds = 12;  // a board is nearly flat: three or four are enough
   constexpr double kSettled = 1e-13;
+  constexpr double kGrazing = 1e-9;  // rad: where such a ray meets the shape is rounding
   double along = -eye.z() / ray.z();
   for (int round = 0; round < kRounds; ++round) {
     const Eigen::Vector3d at = eye + along * ray;
     const ShapeAt shape = shape_at(terms_mm, frame, at.head<2>());
-    const double step = (shape.height_mm - at.z()) / (ray.z() - shape.slope.dot(ray.head<2>()));
+    const double towards = ray.z() - shape.slope.dot(ray.head<2>());
+    if (!(std::abs(towards) > kGrazing * ray.norm())) return std::nullopt;
+    const double step = (shape.height_mm - at.z()) / towards;
     along += step;
-    if (std::abs(step) < kSettled * std::abs(along)) break;
+    if (std::abs(step) <= kSettled * std::abs(along)) return eye + along * ray;
   }
-  return eye + along * ray;
+  return std::nullopt;
 }
 
 ShapeVector plausible_shape(const ShapeFrame& frame) {

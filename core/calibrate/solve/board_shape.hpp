@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -32,14 +33,16 @@ struct ShapeAt {
   Eigen::Matrix<double, 1, static_cast<int>(kShapeTerms)> by_term;  ///< of the height by the terms
 };
 
+/// Beyond two halves of the longer side from its middle, a shape goes on level, so that rays to anywhere meet it.
 /// A print that is bent by 1.5 mm over 336 mm is 0.003 % shorter than a flat one: that is left out.
 /// @thread reentrant
 [[nodiscard]] ShapeAt shape_at(const double* terms_mm, const ShapeFrame& frame, const Eigen::Vector2d& board_mm);
 
-/// Where a ray meets a shape, in the board's frame: from the plane on, by Newton's method.
+/// Intersects a ray with a shape, in the board's frame, by Newton's method from the plane on.
+/// @return nothing if the ray misses the shape, as one along it does, or Newton's method does not settle
 /// @thread reentrant
-[[nodiscard]] Eigen::Vector3d meet_shape(const double* terms_mm, const ShapeFrame& frame, const Eigen::Vector3d& eye,
-                                         const Eigen::Vector3d& ray);
+[[nodiscard]] std::optional<Eigen::Vector3d> meet_shape(const double* terms_mm, const ShapeFrame& frame,
+                                                        const Eigen::Vector3d& eye, const Eigen::Vector3d& ray);
 
 struct BoardShape {
   ShapeFrame frame;

@@ -260,7 +260,7 @@ Result<Adjusted> adjust(const Observations& observations, const BundleOptions& o
   return Adjusted{summary.termination_type == ceres::CONVERGENCE, summary.final_cost};
 }
 
-BundleEquations linearise(const Observations& observations, const BundleOptions& options, RigModel rig) {
+Result<BundleEquations> linearise(const Observations& observations, const BundleOptions& options, RigModel rig) {
   Problem problem(observations, options, rig);
   BundleEquations equations;
   std::vector<double*> shared;
@@ -292,7 +292,11 @@ BundleEquations linearise(const Observations& observations, const BundleOptions&
     what.residual_blocks = problem.residuals_of(pose);
     std::vector<double> residuals;
     ceres::CRSMatrix jacobian;
-    problem.ceres().Evaluate(what, nullptr, &residuals, nullptr, &jacobian);
+    if (!problem.ceres().Evaluate(what, nullptr, &residuals, nullptr, &jacobian)) {
+      return fail(ErrorCode::kImpossible, "a symbol of " + observations.poses[pose].name +
+                                              " lies where the projector's light misses the board; take that pose "
+                                              "again, or leave it out");
+    }
     const Eigen::MatrixXd all = dense(jacobian);
     out.by_shared = all.leftCols(columns);
     out.by_pose = all.rightCols(all.cols() - columns);

@@ -75,6 +75,8 @@ struct BundleEquations {
   std::vector<PoseEquations> poses;
 };
 
-[[nodiscard]] BundleEquations linearise(const Observations& observations, const BundleOptions& options, RigModel rig);
+/// @errors kImpossible: a symbol's ray misses the board's shape
+[[nodiscard]] Result<BundleEquations> linearise(const Observations& observations, const BundleOptions& options,
+                                                RigModel rig);
 
 }  // namespace slsd

@@ -280,8 +280,8 @@ std::vector<SpacePoint> space_points(const PoseObservation& pose, const RigModel
   const RigidTransform rig_from_board = to_motion(place);
   for (const PoseView& view : pose.views) {
     for (const ProjectedPoint& symbol : view.symbols) {
-      points.push_back(
-          {rig.meet(rig.cameras[view.camera], rig_from_board, symbol.camera_px, pose.subject), symbol.projector_px});
+      const auto met = rig.meet(rig.cameras[view.camera], rig_from_board, symbol.camera_px, pose.subject);
+      if (met) points.push_back({*met, symbol.projector_px});
     }
   }
   return points;

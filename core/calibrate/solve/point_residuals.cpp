@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/geometry/robust.hpp"
 
@@ -16,16 +17,21 @@ ViewResiduals residuals_of(const PoseView& view, const RigModel& rig, const Moti
   const RigidTransform camera_from_rig = to_motion(camera.device_from_rig),
                        projector_from_rig = to_motion(rig.projector.device_from_rig),
                        rig_from_plane = to_motion(rig_from_board);
+  const Eigen::Vector2d missed = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
   ViewResiduals out;
   for (const BoardPoint& corner : view.corners) {
     const Eigen::Vector3d on_board = rig.printed_mm(corner.board_mm, subject);
     out.corners_px.push_back(camera_lens.project(camera_from_rig * (rig_from_plane * on_board)) - corner.camera_px);
   }
   for (const ProjectedPoint& symbol : view.symbols) {
-    const Eigen::Vector3d lit = rig.meet(rig.projector, rig_from_plane, symbol.projector_px, subject);
-    out.symbols_px.push_back(camera_lens.project(camera_from_rig * lit) - symbol.camera_px);
-    const Eigen::Vector3d seen = rig.meet(camera, rig_from_plane, symbol.camera_px, subject);
-    out.symbols_projector_px.push_back(projector_lens.project(projector_from_rig * seen) - symbol.projector_px);
+    const auto lit = rig.meet(rig.projector, rig_from_plane, symbol.projector_px, subject);
+    const auto seen = rig.meet(camera, rig_from_plane, symbol.camera_px, subject);
+    if (!lit || !seen) {
+      out.symbols_px.push_back(missed), out.symbols_projector_px.push_back(missed);
+      continue;
+    }
+    out.symbols_px.push_back(camera_lens.project(camera_from_rig * *lit) - symbol.camera_px);
+    out.symbols_projector_px.push_back(projector_lens.project(projector_from_rig * *seen) - symbol.projector_px);
   }
   return out;
 }

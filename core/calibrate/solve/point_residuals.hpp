@@ -11,7 +11,7 @@
 namespace slsd {
 
 /// Residuals of one view, camera px: where the model sees each point, less where the camera saw it. Outlying points
-/// too.
+/// too. Infinite for a symbol whose rays miss the board's shape.
 struct ViewResiduals {
   std::vector<Eigen::Vector2d> corners_px;
   std::vector<Eigen::Vector2d> symbols_px;

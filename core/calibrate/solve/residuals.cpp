@@ -152,13 +152,14 @@ bool SymbolResidual::Evaluate(const double* const* blocks, double* residual, dou
                         ray = turn.matrix().transpose() * direction.homogeneous(),
                         origin = Eigen::Map<const Eigen::Vector3d>(blocks[4] + 3);
   const Eigen::Matrix3d board_from_rig = board.matrix().transpose();
-  const Eigen::Vector3d on_board = meet_shape(blocks[6], frame_, board_from_rig * (eye - origin), board_from_rig * ray);
-  const Eigen::Vector3d turned = board.matrix() * on_board, point = origin + turned;
+  const auto on_board = meet_shape(blocks[6], frame_, board_from_rig * (eye - origin), board_from_rig * ray);
+  if (!on_board) return false;
+  const Eigen::Vector3d turned = board.matrix() * *on_board, point = origin + turned;
   const Sight sight(blocks, point);
   sight.put_residual(camera_px_ - Eigen::Map<const Eigen::Vector2d>(blocks[5]), sigma_px_, residual);
   if (slopes == nullptr) return true;
   const Slopes<3> by_point = sight.put_slopes(sigma_px_, slopes);
-  const ShapeAt shape = shape_at(blocks[6], frame_, on_board.head<2>());
+  const ShapeAt shape = shape_at(blocks[6], frame_, on_board->head<2>());
   const Eigen::Vector3d normal = board.matrix() * Eigen::Vector3d(-shape.slope.x(), -shape.slope.y(), 1);
   const double towards = normal.dot(ray), along = ray.dot(point - eye) / ray.squaredNorm();
   // Where the ray is shifted or turned the point stays on the surface; where the surface is, on the ray.

@@ -27,7 +27,8 @@ class CornerResidual final : public ceres::SizedCostFunction<2, 9, 6, 6, 1, 1, s
 
 /// A projector pixel in the camera: its ray meets the board, and the camera sees that point. The pixel is exact; what
 /// measures is the camera. Blocks: the camera's lens and place, the projector's lens and place, the board's place, by
-/// how much all symbols of the view are seen shifted (px of the camera), and the board's shape.
+/// how much all symbols of the view are seen shifted (px of the camera), and the board's shape. Evaluation fails if the
+/// ray misses the shape: Ceres then rejects the trial step.
 class SymbolResidual final : public ceres::SizedCostFunction<2, 9, 6, 9, 6, 6, 2, static_cast<int>(kShapeTerms)> {
  public:
   SymbolResidual(const Eigen::Vector2d& camera_px, const Eigen::Vector2d& projector_px, double sigma_px,

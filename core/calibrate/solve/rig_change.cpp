@@ -284,10 +284,11 @@ std::optional<RigChange> find_rig_change(const Observations& observations, const
       if (!adjust(seen, options, one_rig)) return std::nullopt;
       continue;
     }
-    const BundleEquations equations = linearise(seen, split.options, split.rig);
-    const auto influence = find_influence(equations);
+    const auto equations = linearise(seen, split.options, split.rig);
+    if (!equations) return std::nullopt;
+    const auto influence = find_influence(*equations);
     if (!influence) return std::nullopt;
-    const std::vector<Difference> all = differences(split, equations, *influence);
+    const std::vector<Difference> all = differences(split, *equations, *influence);
     const auto most = std::ranges::max_element(all, {}, [](const Difference& one) { return one.squared(); });
     if (most == all.end() || !(most->squared() > kDifferentMin)) return std::nullopt;
     if (moved_symbols_px(seen, split) < kNoticedPx || boards_explain_better(seen, split, one_rig)) return std::nullopt;

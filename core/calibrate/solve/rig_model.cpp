@@ -38,14 +38,16 @@ Eigen::Vector3d RigModel::printed_mm(const Eigen::Vector2d& nominal_mm, PoseSubj
   return {printed.x(), printed.y(), shape.height_mm(printed)};
 }
 
-Eigen::Vector3d RigModel::meet(const DeviceModel& device, const RigidTransform& rig_from_subject,
-                               const Eigen::Vector2d& pixel, PoseSubject subject) const {
+std::optional<Eigen::Vector3d> RigModel::meet(const DeviceModel& device, const RigidTransform& rig_from_subject,
+                                              const Eigen::Vector2d& pixel, PoseSubject subject) const {
   const RigidTransform board_from_device =
       rig_from_subject.inverse().after(to_motion(device.device_from_rig).inverse());
   const Eigen::Vector3d ray =
       board_from_device.rotation * to_lens(device.lens, device.size).undistort(pixel).homogeneous();
   const ShapeVector terms_mm = subject == PoseSubject::kBoard ? shape.terms_mm : ShapeVector{};
-  return rig_from_subject * meet_shape(terms_mm.data(), shape.frame, board_from_device.translation, ray);
+  const auto on_board = meet_shape(terms_mm.data(), shape.frame, board_from_device.translation, ray);
+  if (!on_board) return std::nullopt;
+  return rig_from_subject * *on_board;
 }
 
 RigModel RigModel::as_of(std::size_t pose) const {

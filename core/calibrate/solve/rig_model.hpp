@@ -54,9 +54,9 @@ struct RigModel {
   /// Where a point is on the print: on that of the board with its scale, stretch and shape.
   /// @param nominal_mm  where it should be
   [[nodiscard]] Eigen::Vector3d printed_mm(const Eigen::Vector2d& nominal_mm, PoseSubject subject) const;
-  /// Where a device's pixel meets what is shown, mm in the rig's frame.
-  [[nodiscard]] Eigen::Vector3d meet(const DeviceModel& device, const RigidTransform& rig_from_subject,
-                                     const Eigen::Vector2d& pixel, PoseSubject subject) const;
+  /// Where a device's pixel meets what is shown, mm in the rig's frame; nothing if it misses.
+  [[nodiscard]] std::optional<Eigen::Vector3d> meet(const DeviceModel& device, const RigidTransform& rig_from_subject,
+                                                    const Eigen::Vector2d& pixel, PoseSubject subject) const;
   /// The rig as it was at a pose.
   [[nodiscard]] RigModel as_of(std::size_t pose) const;
   [[nodiscard]] Calibration calibration(const std::vector<NamedCamera>& names) const;

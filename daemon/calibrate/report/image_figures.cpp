@@ -128,6 +128,7 @@ std::string residual_figure(const ImageSize& size, const Points& points, const s
       if (point.outlying != outlying) continue;
       const std::string colour = outlying ? kOutlying : pose_colour(point.pose);
       Eigen::Vector2d arrow = magnified * point.residual_px;
+      if (!arrow.allFinite()) arrow.setZero();  // its rays miss the board
       if (arrow.norm() > longest) arrow *= longest / arrow.norm();
       figure.dot(point.pixel, 1.2, colour);
       figure.line(point.pixel, point.pixel + arrow, colour, 0.7);

@@ -49,9 +49,24 @@ void camera_residual(const T* lens, const T* camera_from_rig, const Eigen::Matri
   residual[1] = (pixel.y() - seen_px.y()) / sigma_px;
 }
 
+inline double value_of(double x) {
+  return x;
+}
+template <class Jet>
+double value_of(const Jet& x) {
+  return x.a;
+}
+
+/// A shape goes on level beyond two halves of the board.
+template <class T>
+T within_reach(const T& at) {
+  return value_of(at) > 2 ? T(2) : value_of(at) < -2 ? T(-2) : at;
+}
+
 template <class T>
 T height(const T* shape, const ShapeFrame& frame, const T& x, const T& y) {
-  const T u = (x - frame.middle_mm.x()) / frame.half_mm, v = (y - frame.middle_mm.y()) / frame.half_mm;
+  const T u = within_reach(T((x - frame.middle_mm.x()) / frame.half_mm)),
+          v = within_reach(T((y - frame.middle_mm.y()) / frame.half_mm));
   return shape[0] * u * u + shape[1] * u * v + shape[2] * v * v + shape[3] * u * u * u + shape[4] * u * u * v +
          shape[5] * u * v * v + shape[6] * v * v * v + shape[7] * u * u * u * u + shape[8] * u * u * u * v +
          shape[9] * u * u * v * v + shape[10] * u * v * v * v + shape[11] * v * v * v * v;
@@ -73,14 +88,6 @@ struct CornerResidual {
     return true;
   }
 };
-
-inline double value_of(double x) {
-  return x;
-}
-template <class Jet>
-double value_of(const Jet& x) {
-  return x.a;
-}
 
 /// The direction of an exact pixel under a lens that changes. Found in plain numbers first; one step of Newton's method
 /// from there carries the derivatives.

@@ -108,6 +108,30 @@ RC_GTEST_PROP(Residuals, HaveTheSlopesThatCeresFindsByItself, ()) {
                      evaluated(symbol, of_symbol)) < 1e-7);
 }
 
+// However far from the board a ray meets its plane: misread symbols may lie anywhere.
+RC_GTEST_PROP(MeetShape, FindsAPointOfRayAndShape, ()) {
+  const ShapeFrame frame{{100, 60}, double(between(80, 300))};
+  const ShapeVector plausible = plausible_shape(frame);
+  ShapeVector shape;
+  for (std::size_t i = 0; i < kShapeTerms; ++i) shape[i] = 3 * plausible[i] * between(-100, 100) / 1e2;
+  const Eigen::Vector3d eye(between(-1500, 1500), between(-1500, 1500), -between(400, 2000)),
+      target(between(-20, 20) * frame.half_mm, between(-20, 20) * frame.half_mm, 0), ray = target - eye;
+  RC_PRE(ray.z() > 0.3 * ray.norm());
+  const auto met = meet_shape(shape.data(), frame, eye, ray);
+  RC_ASSERT(met.has_value());
+  RC_ASSERT(std::abs(shape_at(shape.data(), frame, met->head<2>()).height_mm - met->z()) < 1e-8);
+  RC_ASSERT((*met - eye).cross(ray).norm() / ray.norm() < 1e-8);
+}
+
+TEST(MeetShape, HasNoAnswerIfTheRayMissesTheShape) {
+  const ShapeFrame frame{{0, 0}, 100};
+  const ShapeVector hollow{50};
+  const Eigen::Vector3d eye(-1000, 0, -10), along(1, 0, 0), grazing(1, 0, 1e-12), towards(1, 0, 0.05);
+  EXPECT_FALSE(meet_shape(hollow.data(), frame, eye, along));
+  EXPECT_FALSE(meet_shape(hollow.data(), frame, eye, grazing));
+  EXPECT_TRUE(meet_shape(hollow.data(), frame, eye, towards));
+}
+
 TEST(SymbolResidual, IsZeroForWhatTheRigSees) {
   const RigModel rig = true_rig();
   const auto poses = true_poses(3);
@@ -138,7 +162,9 @@ TEST(Linearise, HasTheDerivativesOfFiniteDifferences) {
   options.shape_sigma_mm = plausible_shape(rig.shape.frame);
   options.cameras.assign(1, kUsualDistortion);
   options.corner_sigma_px = 1, options.symbol_sigma_factor = 20;  // so wide that no residual is weighed down
-  const BundleEquations equations = linearise(seen, options, rig);
+  const auto linear = linearise(seen, options, rig);
+  ASSERT_TRUE(linear) << linear.error().message;
+  const BundleEquations& equations = *linear;
   for (std::size_t i = 0; i < equations.shared.size(); ++i) {
     const SharedParameter& parameter = equations.shared[i];
     RigModel changed = rig;
@@ -148,11 +174,49 @@ TEST(Linearise, HasTheDerivativesOfFiniteDifferences) {
     const bool shape = parameter.kind == SharedParameter::Kind::kShape;
     const double step = shape ? 1e-3 : (lens && index < 4) || (!lens && index > 2) ? 1e-3 : lens ? 1e-5 : 1e-7;
     (shape ? changed.shape.terms_mm[index] : lens ? device.lens[index] : device.device_from_rig[index]) += step;
-    const BundleEquations moved = linearise(seen, options, changed);
-    const Eigen::VectorXd difference = (moved.poses[0].residuals - equations.poses[0].residuals) / step;
+    const auto moved = linearise(seen, options, changed);
+    ASSERT_TRUE(moved) << moved.error().message;
+    const Eigen::VectorXd difference = (moved->poses[0].residuals - equations.poses[0].residuals) / step;
     const Eigen::VectorXd slope = equations.poses[0].by_shared.col(static_cast<Eigen::Index>(i));
     EXPECT_LT((difference - slope).norm(), 1e-3 * slope.norm() + 1e-4) << name_of(parameter);
   }
+}
+
+/// A rig that sees boards, one of which is edge on to the projector: its symbols' rays never meet it.
+struct EdgeOn {
+  RigModel rig = true_rig();
+  Observations seen;
+  BundleOptions options;
+
+  EdgeOn() {
+    rig.rig_from_board = true_poses(4);
+    seen = see(rig, rig.rig_from_board);
+    options.cameras.assign(1, kUsualDistortion);
+    const RigidTransform rig_from_projector = to_motion(rig.projector.device_from_rig).inverse();
+    const Eigen::Vector2d pixel = seen.poses[1].views[0].symbols[0].projector_px;
+    const Eigen::Vector3d ray =
+        rig_from_projector.rotation * to_lens(rig.projector.lens, {}).undistort(pixel).homogeneous().normalized();
+    Eigen::Matrix3d edge_on;
+    edge_on << ray, ray.unitOrthogonal(), ray.cross(ray.unitOrthogonal());
+    rig.rig_from_board[1] = to_vector(RigidTransform{edge_on, {0, 0, 1800}});
+  }
+};
+
+TEST(Adjust, RefusesSymbolsWhoseRaysMissTheBoard) {
+  EdgeOn session;
+  const auto equations = linearise(session.seen, session.options, session.rig);
+  ASSERT_FALSE(equations);
+  EXPECT_NE(equations.error().message.find("pose_1"), std::string::npos);
+  EXPECT_FALSE(adjust(session.seen, session.options, session.rig));
+}
+
+TEST(ResidualsOf, AreInfiniteForSymbolsWhoseRaysMissTheBoard) {
+  const EdgeOn session;
+  const ViewResiduals residuals =
+      residuals_of(session.seen.poses[1].views[0], session.rig, session.rig.rig_from_board[1]);
+  EXPECT_TRUE(std::isinf(residuals.symbols_px[0].norm()));
+  EXPECT_TRUE(std::isinf(residuals.symbols_projector_px[0].norm()));
+  EXPECT_TRUE(residuals.corners_px[0].allFinite());
 }
 
 TEST(Adjust, SaysWhetherItSettled) {
@@ -180,7 +244,9 @@ TEST(FindInfluence, FindsTheNoiseInPosesHeldOut) {
   options.cameras.assign(1, kUsualDistortion);
   options.corner_sigma_px = 0.03, options.symbol_sigma_factor = 0.08 / 0.05;
   ASSERT_TRUE(adjust(seen, options, rig));
-  const auto influence = find_influence(linearise(seen, options, rig));
+  const auto equations = linearise(seen, options, rig);
+  ASSERT_TRUE(equations) << equations.error().message;
+  const auto influence = find_influence(*equations);
   ASSERT_TRUE(influence) << influence.error().message;
   EXPECT_NEAR(influence->held_out.back().corner_rms_px, 0.03 * std::sqrt(2), 0.015);
   EXPECT_NEAR(influence->held_out.back().symbol_rms_px, 0.08 * std::sqrt(2), 0.02);
@@ -200,7 +266,9 @@ TEST(FindInfluence, PassesPosesOverOfWhichTooLittleIsLeft) {
   BundleOptions options;
   options.cameras.assign(1, kUsualDistortion);
   options.corner_sigma_px = 0.03, options.symbol_sigma_factor = 0.08 / 0.05;
-  const auto influence = find_influence(linearise(seen, options, rig));
+  const auto equations = linearise(seen, options, rig);
+  ASSERT_TRUE(equations) << equations.error().message;
+  const auto influence = find_influence(*equations);
   ASSERT_TRUE(influence) << influence.error().message;
   for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(influence->held_out[i].placed, i == 0 || i > 4) << i;
   EXPECT_TRUE(influence->covariance.allFinite());
