@@ -25,7 +25,7 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 
-constexpr auto kDiscovery = 1500ms;  // until others of the same name are known
+constexpr auto kDiscovery = 2000ms;  // until others of the same name are known
 constexpr auto kRetry = 1s;
 constexpr std::size_t kExtrinsicsBytesMax = 1 << 20;
 
@@ -48,7 +48,7 @@ struct Camera {
   std::string name;  ///< as slsd has it
   std::string frame_id;
   std::optional<CalibratedCamera> calibrated;
-  dds_entity_t info = 0, image = 0;
+  Writer info, image, compressed, depth, depth_info;
 };
 
 class Running : public Bridge {
@@ -60,17 +60,11 @@ class Running : public Bridge {
         frame_id_(options.name + "_optical_frame") {}
 
   Result<> open() {
-    using Quality = Network::Quality;
+    network_.show_node(options_.name);
     Result<> opened;
-    const auto keep = [&](dds_entity_t& entity, Result<dds_entity_t> made) {
-      if (made) entity = *made;
-      if (!made && opened) opened = tl::unexpected(made.error());
-    };
-    keep(points_,
-         network_.writer(sensor_msgs_msg_dds__PointCloud2__desc, "rt/" + options_.name + "/points", Quality::kSensor));
-    keep(transforms_, network_.writer(tf2_msgs_msg_dds__TFMessage__desc, "rt/tf_static", Quality::kLatched));
-    keep(diagnostics_,
-         network_.writer(diagnostic_msgs_msg_dds__DiagnosticArray__desc, "rt/diagnostics", Quality::kService));
+    make(points_, ros::PointCloud2::kType, "rt/" + options_.name + "/points", Quality::kSensor, opened);
+    make(transforms_, ros::TFMessage::kType, "rt/tf_static", Quality::kLatched, opened);
+    make(diagnostics_, ros::DiagnosticArray::kType, "rt/diagnostics", Quality::kService, opened);
     auto trigger = Trigger::open(network_, options_.name);
     if (!trigger) return tl::unexpected(trigger.error());
     trigger_ = *trigger;
@@ -92,6 +86,12 @@ class Running : public Bridge {
   }
 
  private:
+  void make(Writer& writer, const ros::Type& type, const std::string& topic, Quality quality, Result<>& all) const {
+    const auto made = network_.writer(type, topic, quality);
+    if (made) writer = *made;
+    if (!made && all) all = tl::unexpected(made.error());
+  }
+
   // Waits for clouds until the service is gone.
   void stream() {
     try {
@@ -114,14 +114,32 @@ class Running : public Bridge {
                                                                                        : std::string());
     const std::lock_guard lock(mutex_);
     lost_ += cloud.lost;
-    const int written = dds_write(points_, &message_.of(cloud, frame_id_, stamp));
-    if (written < 0) say(std::string("a cloud was not published: ") + dds_strretcode(written));
-    if (written == 0) ++published_;
-    for (const Camera& camera : cameras_) {
-      if (!camera.calibrated) continue;
-      const auto info = camera_info(*camera.calibrated, camera.frame_id, stamp);
-      dds_write(camera.info, &info);
+    if (points_.write(point_cloud(cloud, {stamp, frame_id_}, calibrated_, options_.thinning))) {
+      ++published_;
+    } else {
+      say("a cloud was not published: the one before it has not left yet");
     }
+    std::uint8_t index = 0;
+    for (Camera& camera : cameras_) {
+      const std::uint8_t i = index++;
+      if (!camera.calibrated) continue;
+      const ros::Header header{stamp, camera.frame_id};
+      camera.info.write(camera_info(*camera.calibrated, header));
+      if (cloud.has("camera_u")) continue;  // one of symbols has no depth image, and announces none
+      if (auto shown = show_depth(camera); !shown) say(to_string(shown.error()));
+      if (!camera.depth.has_readers()) continue;
+      camera.depth.write(depth_image(cloud, header, *camera.calibrated, i, options_.thinning.stride));
+      camera.depth_info.write(camera_info(*camera.calibrated, header, options_.thinning.stride));
+    }
+  }
+
+  Result<> show_depth(Camera& camera) const {
+    Result<> made;
+    if (camera.depth) return made;
+    const std::string topic = "rt/" + options_.name + "/" + ros_name(camera.name) + "/depth";
+    make(camera.depth, ros::Image::kType, topic + "/image_raw", Quality::kSensor, made);
+    make(camera.depth_info, ros::CameraInfo::kType, topic + "/camera_info", Quality::kSensor, made);
+    return made;
   }
 
   std::pair<bool, std::string> scan() {
@@ -178,7 +196,7 @@ class Running : public Bridge {
     if (!calibration_date_.empty()) values.emplace_back(kCalibrationDate, calibration_date_);
     if (state.level == Level::kError && state.message != said_) say(said_ = state.message);
     if (state.level == Level::kOk) said_.clear();
-    write_diagnosis(diagnostics_, std::move(state), options_.name, options_.name + ": slsd");
+    write_diagnosis(diagnostics_, state, options_.name, options_.name + ": slsd");
     std::this_thread::sleep_for(options_.image_rate_hz > 1
                                     ? std::chrono::duration_cast<std::chrono::nanoseconds>(
                                           std::chrono::duration<double>(1 / options_.image_rate_hz))
@@ -199,18 +217,22 @@ class Running : public Bridge {
       auto known = std::find_if(cameras_.begin(), cameras_.end(), [&](const Camera& one) { return one.name == name; });
       if (known == cameras_.end()) {
         const std::string topic = "rt/" + options_.name + "/" + ros_name(name);
-        Camera camera{name, cameras_.empty() ? frame_id_ : options_.name + "_" + ros_name(name) + "_optical_frame", {}};
-        const auto info =
-            network_.writer(sensor_msgs_msg_dds__CameraInfo__desc, topic + "/camera_info", Network::Quality::kSensor);
-        const auto image =
-            network_.writer(sensor_msgs_msg_dds__Image__desc, topic + "/image_raw", Network::Quality::kSensor);
-        if (!info || !image) return tl::unexpected((info ? image : info).error());
-        camera.info = *info, camera.image = *image;
+        Camera camera;
+        camera.name = name;
+        camera.frame_id = cameras_.empty() ? frame_id_ : options_.name + "_" + ros_name(name) + "_optical_frame";
+        Result<> made;
+        make(camera.info, ros::CameraInfo::kType, topic + "/camera_info", Quality::kSensor, made);
+        if (options_.image_rate_hz > 0) {
+          make(camera.image, ros::Image::kType, topic + "/image_raw", Quality::kSensor, made);
+          make(camera.compressed, ros::CompressedImage::kType, topic + "/image_raw/compressed", Quality::kSensor, made);
+        }
+        if (!made) return made;
         known = cameras_.insert(cameras_.end(), camera);
       }
       const CalibratedCamera* calibrated = calibration ? calibration->camera(name) : nullptr;
       known->calibrated = calibrated ? std::optional(*calibrated) : std::nullopt;
     }
+    calibrated_ = calibration ? calibration->cameras : std::vector<CalibratedCamera>();
     calibration_date_ = calibration ? calibration->report.date.value_or("") : "";
     stale_ = extrinsics_ && calibration && !extrinsics_->calibration_date.empty() &&
              calibration->report.date.value_or("") != extrinsics_->calibration_date;
@@ -222,7 +244,7 @@ class Running : public Bridge {
   void publish_transforms() {
     const auto now = stamp_now();
     const std::string link = options_.name + "_link";
-    std::vector<geometry_msgs_msg_dds__TransformStamped_> all;
+    std::vector<ros::TransformStamped> all;
     if (!extrinsics_) all.push_back(transform(link, frame_id_, body_from_optical(), now));
     if (extrinsics_ && !stale_)
       all.push_back(transform(extrinsics_->parent, frame_id_, extrinsics_->parent_from_scanner, now));
@@ -230,21 +252,21 @@ class Running : public Bridge {
       if (camera.frame_id != frame_id_ && camera.calibrated)
         all.push_back(transform(frame_id_, camera.frame_id, camera.calibrated->rig_from_camera, now));
     }
-    const auto count = static_cast<std::uint32_t>(all.size());
-    const tf2_msgs_msg_dds__TFMessage_ message{{count, count, all.data(), false}};
-    dds_write(transforms_, &message);
+    transforms_.write(ros::TFMessage{std::move(all)});
   }
 
   void publish_images(client::Scanner& scanner) {
     if (options_.image_rate_hz <= 0) return;
     for (const Camera& camera : cameras_) {
+      const bool raw = camera.image.has_readers(), compressed = camera.compressed.has_readers();
+      if (!raw && !compressed) continue;
       const client::Frame frame = scanner.frame(camera.name);
-      const auto stamp = stamp_now();
-      const auto message = image(frame, camera.frame_id, stamp);
-      dds_write(camera.image, &message);
-      if (!camera.calibrated) continue;
-      const auto info = camera_info(*camera.calibrated, camera.frame_id, stamp);
-      dds_write(camera.info, &info);
+      const ros::Header header{stamp_now(), camera.frame_id};
+      if (raw) camera.image.write(image(frame, header));
+      if (compressed) {
+        if (const auto jpeg = compressed_image(frame, header)) camera.compressed.write(*jpeg);
+      }
+      if (camera.calibrated) camera.info.write(camera_info(*camera.calibrated, header));
     }
   }
 
@@ -256,11 +278,11 @@ class Running : public Bridge {
   Network network_;
   std::optional<Extrinsics> extrinsics_;
   std::string frame_id_;
-  dds_entity_t points_ = 0, transforms_ = 0, diagnostics_ = 0;
+  Writer points_, transforms_, diagnostics_;
   Trigger trigger_;
-  std::mutex mutex_;  ///< of what is below, up to the threads
-  CloudMessage message_;
-  std::list<Camera> cameras_;  ///< changed by the thread of the state alone
+  std::mutex mutex_;           ///< of what is below, up to the threads
+  std::list<Camera> cameras_;  ///< changed by the thread of the state alone, as is the next
+  std::vector<CalibratedCamera> calibrated_;
   std::string calibration_text_, calibration_date_, said_;
   bool stale_ = false;
   std::atomic<std::uint64_t> published_{0}, lost_{0};

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "messages.hpp"
 #include "network.hpp"
 
 namespace slsd::dds {
@@ -16,6 +17,7 @@ struct BridgeOptions {
   std::string socket;                ///< of its service; empty: the usual place
   std::optional<double> rate_hz;     ///< clouds; 0: only those that are triggered; nothing: every frame
   std::string density;               ///< "symbols" or "pixels"; empty: as configured
+  Thinning thinning;                 ///< of clouds, and of depth images
   double image_rate_hz = 0;          ///< images of every camera; 0: none
   std::filesystem::path extrinsics;  ///< where the scanner stands; empty: told by nobody
 };

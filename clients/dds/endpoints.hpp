@@ -16,19 +16,23 @@ namespace slsd::dds {
 /// Whether ROS takes it for a topic's name: letters, digits and _, a letter first.
 [[nodiscard]] bool is_ros_name(const std::string& name);
 
-/// std_msgs/Empty on NAME/trigger, and the service NAME/trigger (std_srvs/Trigger).
+/// std_msgs/Empty on NAME/trigger, and the service NAME/trigger (std_srvs/Trigger) for clients of any middleware: Fast
+/// DDS and others relate a reply to its request beside the data, rmw_cyclonedds in front of it.
 /// @thread thread-bound
 class Trigger {
  public:
   /// Scans; whether it went well, and what is to be said of it.
   using Scan = std::function<std::pair<bool, std::string>()>;
 
+  /// @param network  outlives it
   [[nodiscard]] static Result<Trigger> open(const Network& network, const std::string& name);
   /// Waits for a second, and scans for those who asked.
   void answer(const Scan& scan) const;
 
  private:
-  dds_entity_t topic_ = 0, requests_ = 0, replies_ = 0;
+  const Network* network_ = nullptr;
+  Reader topic_, requests_;
+  Writer replies_;
 };
 
 /// As ROS has them.
@@ -46,6 +50,7 @@ struct Diagnosis {
 };
 
 /// @param hardware  what is diagnosed, by its name in the network  @param of  "left: slsd"
-void write_diagnosis(dds_entity_t writer, Diagnosis diagnosis, std::string hardware, std::string of);
+void write_diagnosis(const Writer& writer, const Diagnosis& diagnosis, const std::string& hardware,
+                     const std::string& of);
 
 }  // namespace slsd::dds

@@ -3,7 +3,6 @@
 #include "merge.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <condition_variable>
@@ -25,60 +24,68 @@ namespace {
 
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
-using PointCloud2 = sensor_msgs_msg_dds__PointCloud2_;
+using ros::PointCloud2;
+using ros::PointField;
 
-constexpr auto kDiscovery = 1500ms;
+constexpr auto kDiscovery = 2000ms;
 constexpr auto kHearing = 3s;   // of diagnostics, that come each second
 constexpr auto kScanMax = 15s;  // a scanner that was triggered
 constexpr std::size_t kExtrinsicsBytesMax = 1 << 20;
 constexpr std::uint32_t kPointsMax = 100'000'000;
 
-double seconds_of(const builtin_interfaces_msg_dds__Time_& stamp) {
+double seconds_of(const ros::Time& stamp) {
   return stamp.sec + 1e-9 * stamp.nanosec;
 }
 
 /// Where a foreign cloud has what is merged.
 struct Layout {
   std::uint32_t x = 0, y = 0, z = 0;
-  std::optional<std::uint32_t> sigma, intensity, camera;
+  std::optional<std::uint32_t> sigma, intensity, byte_intensity, camera;
 };
+
+Result<Layout> malformed(const std::string& how) {
+  return fail(ErrorCode::kMalformed, "cloud_malformed: its cloud " + how);
+}
 
 // A message says itself where its fields are, and is believed nothing.
 Result<Layout> layout_of(const PointCloud2& cloud, const std::string& frame_id) {
-  const auto malformed = [](const std::string& how) {
-    return fail(ErrorCode::kMalformed, "cloud_malformed: its cloud " + how);
-  };
-  if (!cloud.header.frame_id || cloud.header.frame_id != frame_id) return malformed("is not in its frame, " + frame_id);
+  if (cloud.header.frame_id != frame_id) return malformed("is not in its frame, " + frame_id);
   if (cloud.is_bigendian) return malformed("is big-endian");
   const std::uint64_t row = std::uint64_t{cloud.width} * cloud.point_step;
   if (std::uint64_t{cloud.width} * cloud.height > kPointsMax || row > cloud.row_step ||
-      std::uint64_t{cloud.row_step} * cloud.height > cloud.data._length) {
+      std::uint64_t{cloud.row_step} * cloud.height > cloud.data.size()) {
     return malformed("has fewer bytes than its header says");
   }
   const auto offset = [&](const char* name, std::uint8_t type, std::uint32_t size) -> std::optional<std::uint32_t> {
-    for (std::uint32_t i = 0; i < cloud.fields._length; ++i) {
-      const auto& field = cloud.fields._buffer[i];
-      if (field.name && !std::strcmp(field.name, name) && field.datatype == type && field.count == 1 &&
+    for (const PointField& field : cloud.point_fields) {
+      if (field.name == name && field.datatype == type && field.count == 1 &&
           std::uint64_t{field.offset} + size <= cloud.point_step) {
         return field.offset;
       }
     }
     return std::nullopt;
   };
-  const auto x = offset("x", kFloat32, 4), y = offset("y", kFloat32, 4), z = offset("z", kFloat32, 4);
+  const auto x = offset("x", PointField::kFloat32, 4), y = offset("y", PointField::kFloat32, 4),
+             z = offset("z", PointField::kFloat32, 4);
   if (!x || !y || !z) return malformed("has no x, y, z within its points");
-  return Layout{*x, *y, *z, offset("sigma", kFloat32, 4), offset("intensity", kUint8, 1), offset("camera", kUint8, 1)};
+  return Layout{*x,
+                *y,
+                *z,
+                offset("sigma", PointField::kFloat32, 4),
+                offset("intensity", PointField::kFloat32, 4),
+                offset("intensity", PointField::kUint8, 1),
+                offset("camera", PointField::kUint8, 1)};
 }
 
 /// A scanner whose clouds are merged.
 struct Source {
   std::string name, frame_id;
-  dds_entity_t reader = 0;
+  Reader reader;
   Extrinsics extrinsics;
   std::optional<std::string> calibration_date;  ///< as its diagnostics tell; nothing: not heard yet
   std::string problem;                          ///< of the newest cloud; empty: none
   std::vector<std::uint8_t> points;             ///< in the frame of all, as they are published
-  builtin_interfaces_msg_dds__Time_ stamp{};
+  ros::Time stamp{};
   Clock::time_point arrived{};  ///< of the newest cloud, placed or not
   bool fresh = false;           ///< there is one that was not merged yet
   std::uint64_t clouds = 0;     ///< that could be placed
@@ -98,25 +105,21 @@ class Running : public Merge {
       : options_(std::move(options)), network_(std::move(network)), sources_(std::move(sources)) {}
 
   Result<> open() {
-    using Quality = Network::Quality;
+    network_.show_node(options_.name);
     for (Source& source : sources_) {
-      const auto reader =
-          network_.reader(sensor_msgs_msg_dds__PointCloud2__desc, "rt/" + source.name + "/points", Quality::kSensor);
-      const auto trigger =
-          network_.writer(std_msgs_msg_dds__Empty__desc, "rt/" + source.name + "/trigger", Quality::kService);
-      if (!reader || !trigger) return tl::unexpected((reader ? trigger : reader).error());
+      const auto reader = network_.reader(PointCloud2::kType, "rt/" + source.name + "/points", Quality::kSensor);
+      const auto trigger = network_.writer(ros::Empty::kType, "rt/" + source.name + "/trigger", Quality::kService);
+      if (!reader) return tl::unexpected(reader.error());
+      if (!trigger) return tl::unexpected(trigger.error());
       source.reader = *reader;
       triggers_of_.push_back(*trigger);
     }
-    const auto points =
-        network_.writer(sensor_msgs_msg_dds__PointCloud2__desc, "rt/" + options_.name + "/points", Quality::kSensor);
-    const auto diagnostics =
-        network_.writer(diagnostic_msgs_msg_dds__DiagnosticArray__desc, "rt/diagnostics", Quality::kService);
-    const auto heard =
-        network_.reader(diagnostic_msgs_msg_dds__DiagnosticArray__desc, "rt/diagnostics", Quality::kService);
-    for (const auto* made : {&points, &diagnostics, &heard}) {
-      if (!*made) return tl::unexpected(made->error());
-    }
+    const auto& diagnosis = ros::DiagnosticArray::kType;
+    const auto points = network_.writer(PointCloud2::kType, "rt/" + options_.name + "/points", Quality::kSensor);
+    const auto diagnostics = network_.writer(diagnosis, "rt/diagnostics", Quality::kService);
+    const auto heard = network_.reader(diagnosis, "rt/diagnostics", Quality::kService);
+    if (!points || !diagnostics) return tl::unexpected((points ? diagnostics : points).error());
+    if (!heard) return tl::unexpected(heard.error());
     points_ = *points, diagnostics_ = *diagnostics, heard_ = *heard;
     const auto trigger = Trigger::open(network_, options_.name);
     if (!trigger) return tl::unexpected(trigger.error());
@@ -140,9 +143,9 @@ class Running : public Merge {
 
  private:
   void read_and_merge() {
-    std::vector<dds_entity_t> readers{heard_};
+    std::vector<Reader> readers{heard_};
     for (const Source& source : sources_) readers.push_back(source.reader);
-    wait_for(readers, 100ms);
+    network_.wait_for(readers, 100ms);
     const std::lock_guard lock(mutex_);
     hear_diagnostics();
     for (Source& source : sources_) take_newest(source);
@@ -151,60 +154,45 @@ class Running : public Merge {
   }
 
   void hear_diagnostics() {
-    void* sample = nullptr;
-    dds_sample_info_t info;
-    while (dds_take(heard_, &sample, &info, 1, 1) > 0) {
-      const auto* array = static_cast<const diagnostic_msgs_msg_dds__DiagnosticArray_*>(sample);
-      for (std::uint32_t i = 0; info.valid_data && i < array->status._length; ++i) {
-        const auto& status = array->status._buffer[i];
+    while (const auto sample = heard_.take()) {
+      const auto array = decode<ros::DiagnosticArray>(sample->bytes);
+      if (!array) continue;
+      for (const auto& status : array->status) {
         for (Source& source : sources_) {
-          if (!status.name || source.name + ": slsd" != status.name) continue;
+          if (source.name + ": slsd" != status.name) continue;
           source.calibration_date.emplace();
-          for (std::uint32_t j = 0; j < status.values._length; ++j) {
-            const auto& value = status.values._buffer[j];
-            if (value.key && value.value && !std::strcmp(value.key, kCalibrationDate))
-              source.calibration_date = value.value;
+          for (const auto& [key, value] : status.values) {
+            if (key == kCalibrationDate) source.calibration_date = value;
           }
         }
       }
-      dds_return_loan(heard_, &sample, 1);
-      sample = nullptr;
     }
   }
 
   void take_newest(Source& source) {
-    constexpr std::size_t kMost = 5;
-    std::array<void*, kMost> samples{};
-    std::array<dds_sample_info_t, kMost> infos;
-    const int count = dds_take(source.reader, samples.data(), infos.data(), kMost, kMost);
-    if (count <= 0) return;
-    for (int i = count - 1; i >= 0; --i) {
-      if (!infos.at(static_cast<std::size_t>(i)).valid_data) continue;
-      take(source, *static_cast<const PointCloud2*>(samples.at(static_cast<std::size_t>(i))));
-      break;
-    }
-    dds_return_loan(source.reader, samples.data(), count);
+    std::optional<Sample> newest;
+    while (auto sample = source.reader.take()) newest = std::move(sample);
+    if (newest) take(source, newest->bytes);
   }
 
-  void take(Source& source, const PointCloud2& cloud) {
+  void take(Source& source, const Bytes& bytes) {
     source.arrived = Clock::now();
     source.fresh = false;
     source.problem.clear();
-    dds_subscription_matched_status_t writers{};
-    dds_get_subscription_matched_status(source.reader, &writers);
-    if (writers.current_count > 1) {
-      source.problem = "name_taken: " + std::to_string(writers.current_count) + " scanners publish under this name";
+    if (const int writers = source.reader.writer_count(); writers > 1) {
+      source.problem = "name_taken: " + std::to_string(writers) + " scanners publish under this name";
     } else {
       source.problem = source.why_not_placed();
     }
     if (!source.problem.empty()) return;
-    const auto layout = layout_of(cloud, source.frame_id);
+    const auto cloud = decode<PointCloud2>(bytes);
+    const auto layout = cloud ? layout_of(*cloud, source.frame_id) : malformed("is no PointCloud2");
     if (!layout) {
       source.problem = layout.error().message;
       return;
     }
-    place(source, cloud, *layout);
-    source.stamp = cloud.header.stamp;
+    place(source, *cloud, *layout);
+    source.stamp = cloud->header.stamp;
     source.fresh = true;
     ++source.clouds;
   }
@@ -217,7 +205,7 @@ class Running : public Merge {
     source.points.resize(std::size_t{kPointStep} * cloud.width * cloud.height);
     std::uint8_t* to = source.points.data();
     for (std::uint32_t v = 0; v < cloud.height; ++v) {
-      const std::uint8_t* from = cloud.data._buffer + std::size_t{cloud.row_step} * v;
+      const std::uint8_t* from = cloud.data.data() + std::size_t{cloud.row_step} * v;
       for (std::uint32_t u = 0; u < cloud.width; ++u, from += cloud.point_step) {
         Eigen::Vector3f point;
         std::memcpy(&point.x(), from + at.x, 4);
@@ -229,10 +217,12 @@ class Running : public Merge {
         if (at.sigma) std::memcpy(&sigma, from + *at.sigma, 4);
         std::memcpy(to, point.data(), 12);
         std::memcpy(to + 12, &sigma, 4);
-        to[16] = at.intensity ? from[*at.intensity] : 0;
-        to[17] = at.camera ? from[*at.camera] : 0;
-        to[18] = index;
-        to[19] = 0;
+        float intensity = at.byte_intensity ? from[*at.byte_intensity] : 0;
+        if (at.intensity) std::memcpy(&intensity, from + *at.intensity, 4);
+        std::memcpy(to + 16, &intensity, 4);
+        to[20] = at.camera ? from[*at.camera] : 0;
+        to[21] = index;
+        to[22] = to[23] = 0;
         to += kPointStep;
       }
     }
@@ -258,8 +248,8 @@ class Running : public Merge {
     for (const Source& source : sources_) {
       if (source.fresh) newest = std::max(newest, seconds_of(source.stamp));
     }
-    merged_.clear();
-    builtin_interfaces_msg_dds__Time_ oldest{};
+    std::vector<std::uint8_t> merged;
+    ros::Time oldest{};
     std::size_t parts = 0;
     for (Source& source : sources_) {
       if (!source.fresh) continue;
@@ -269,19 +259,19 @@ class Running : public Merge {
         continue;
       }
       if (parts == 0 || seconds_of(source.stamp) < seconds_of(oldest)) oldest = source.stamp;
-      merged_.insert(merged_.end(), source.points.begin(), source.points.end());
+      merged.insert(merged.end(), source.points.begin(), source.points.end());
       ++parts;
     }
-    static sensor_msgs_msg_dds__PointField_ fields[] = {field("x", 0, kFloat32),        field("y", 4, kFloat32),
-                                                        field("z", 8, kFloat32),        field("sigma", 12, kFloat32),
-                                                        field("intensity", 16, kUint8), field("camera", 17, kUint8),
-                                                        field("scanner", 18, kUint8)};
-    PointCloud2 message{};
-    message.header = {oldest, sources_.front().extrinsics.parent.data()};
-    set_points(message, fields, std::size(fields), merged_);
-    const int written = dds_write(points_, &message);
-    if (written < 0) say(std::string("a cloud was not published: ") + dds_strretcode(written));
-    if (written == 0) ++published_;
+    PointCloud2 message;
+    message.header = {oldest, sources_.front().extrinsics.parent};
+    message.point_fields = point_fields(true);
+    point_count_ = merged.size() / kPointStep;
+    set_points(message, std::move(merged));
+    if (points_.write(message)) {
+      ++published_;
+    } else {
+      say("a cloud was not published: the one before it has not left yet");
+    }
     return parts;
   }
 
@@ -297,8 +287,7 @@ class Running : public Merge {
     for (std::size_t i = 0; i < sources_.size(); ++i) {
       const Source& source = sources_[i];
       const auto asked = Clock::now();
-      const std_msgs_msg_dds__Empty_ empty{};
-      dds_write(triggers_of_[i], &empty);
+      triggers_of_[i].write(ros::Empty{});
       const bool came = changed_.wait_for(lock, kScanMax, [&] { return source.arrived > asked; });
       if (!came || !source.problem.empty())
         failed += (failed.empty() ? "" : "; ") + source.name + ": " + (came ? source.problem : "no cloud in 15 s");
@@ -307,7 +296,7 @@ class Running : public Merge {
     for (Source& source : sources_) source.fresh = false;
     triggered_ = false;
     if (!failed.empty()) return {false, failed};
-    return {true, std::to_string(merged_.size() / kPointStep) + " points of " + std::to_string(count) + " scanners"};
+    return {true, std::to_string(point_count_) + " points of " + std::to_string(count) + " scanners"};
   }
 
   // Where the file was written anew it is read anew; one that is broken leaves that in force which is.
@@ -362,7 +351,7 @@ class Running : public Merge {
       state.worse(Level::kError, "name_taken: another publishes as \"" + options_.name + "\"; rename one of them");
     if (state.level == Level::kError && state.message != said_) say(said_ = state.message);
     if (state.level == Level::kOk) said_.clear();
-    write_diagnosis(diagnostics_, std::move(state), options_.name, options_.name + ": slsd merge");
+    write_diagnosis(diagnostics_, state, options_.name, options_.name + ": slsd merge");
     std::this_thread::sleep_for(1s);
   }
 
@@ -372,15 +361,16 @@ class Running : public Merge {
 
   MergeOptions options_;
   Network network_;
-  dds_entity_t points_ = 0, diagnostics_ = 0, heard_ = 0;
-  std::vector<dds_entity_t> triggers_of_;  ///< one to a source
+  Writer points_, diagnostics_;
+  Reader heard_;
+  std::vector<Writer> triggers_of_;  ///< one to a source
   Trigger trigger_;
   std::filesystem::file_time_type extrinsics_written_;  ///< of the thread of the state alone, as are these two
   std::string extrinsics_problem_, said_;
   std::mutex mutex_;  ///< of what is below, up to the threads
   std::condition_variable changed_;
   std::vector<Source> sources_;
-  std::vector<std::uint8_t> merged_;
+  std::size_t point_count_ = 0;  ///< of the newest merged cloud
   bool triggered_ = false;
   std::uint64_t published_ = 0;
   std::jthread merging_, triggers_, state_;

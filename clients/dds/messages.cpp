@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstring>
-#include <iterator>
+#include <limits>
+#include <unordered_set>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -14,12 +17,40 @@
 namespace slsd::dds {
 namespace {
 
-// idlc's C strings are not const; nobody writes to them.
-char* text(const std::string& text) {
-  return const_cast<char*>(text.c_str());
+/// The pixel of a camera that a dense point lies on.
+struct Pixel {
+  int u = 0, v = 0;
+};
+
+Pixel pixel_of(const client::Point& point, const CalibratedCamera& camera) {
+  const Eigen::Vector3d at = camera.rig_from_camera.inverse() * Eigen::Vector3d(point.x, point.y, point.z);
+  const Eigen::Vector2d pixel = camera.lens.project(at);
+  return {static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))};
 }
 
-builtin_interfaces_msg_dds__Time_ stamp(std::chrono::system_clock::time_point time) {
+/// Takes the first point of each cube.
+class VoxelGrid {
+ public:
+  explicit VoxelGrid(double size_mm) : per_mm_(1 / size_mm) {}
+  bool take(const client::Point& point) {
+    const auto cell = [&](float value) {
+      return static_cast<std::uint64_t>(std::llround(std::floor(value * per_mm_))) & 0x1FFFFF;
+    };
+    return taken_.insert(cell(point.x) | cell(point.y) << 21 | cell(point.z) << 42).second;
+  }
+
+ private:
+  double per_mm_;
+  std::unordered_set<std::uint64_t> taken_;
+};
+
+bool on_stride(const client::Point& point, const std::vector<CalibratedCamera>& cameras, int stride) {
+  if (stride <= 1 || point.camera >= cameras.size()) return true;
+  const Pixel pixel = pixel_of(point, cameras[point.camera]);
+  return pixel.u % stride == 0 && pixel.v % stride == 0;
+}
+
+ros::Time stamp(std::chrono::system_clock::time_point time) {
   const auto seconds = std::chrono::floor<std::chrono::seconds>(time);
   return {static_cast<std::int32_t>(seconds.time_since_epoch().count()),
           static_cast<std::uint32_t>(std::chrono::nanoseconds(time - seconds).count())};
@@ -27,92 +58,116 @@ builtin_interfaces_msg_dds__Time_ stamp(std::chrono::system_clock::time_point ti
 
 }  // namespace
 
-sensor_msgs_msg_dds__PointField_ field(const char* name, std::uint32_t offset, std::uint8_t type) {
-  return {const_cast<char*>(name), offset, type, 1};
+std::vector<ros::PointField> point_fields(bool merged) {
+  using Kind = ros::PointField;
+  std::vector<ros::PointField> fields{{"x", 0, Kind::kFloat32},          {"y", 4, Kind::kFloat32},
+                                      {"z", 8, Kind::kFloat32},          {"sigma", 12, Kind::kFloat32},
+                                      {"intensity", 16, Kind::kFloat32}, {"camera", 20, Kind::kUint8}};
+  if (merged) fields.push_back({"scanner", 21, Kind::kUint8});
+  return fields;
 }
 
-void set_points(sensor_msgs_msg_dds__PointCloud2_& message, sensor_msgs_msg_dds__PointField_* fields,
-                std::uint32_t field_count, std::vector<std::uint8_t>& data) {
+void set_points(ros::PointCloud2& message, std::vector<std::uint8_t> data) {
   message.height = 1;
   message.width = static_cast<std::uint32_t>(data.size() / kPointStep);
-  message.fields = {field_count, field_count, fields, false};
-  message.is_bigendian = false;
   message.point_step = kPointStep;
   message.row_step = static_cast<std::uint32_t>(data.size());
-  message.data = {message.row_step, message.row_step, data.data(), false};
+  message.data = std::move(data);
   message.is_dense = true;
 }
 
-builtin_interfaces_msg_dds__Time_ stamp_now() {
+ros::Time stamp_now() {
   return stamp(std::chrono::system_clock::now());
 }
 
-builtin_interfaces_msg_dds__Time_ stamp_of(std::string_view utc) {
+ros::Time stamp_of(std::string_view utc) {
   const auto time = time_from_utc(utc);
   return time ? stamp(*time) : stamp_now();
 }
 
-const sensor_msgs_msg_dds__PointCloud2_& CloudMessage::of(const client::Cloud& cloud, const std::string& frame_id,
-                                                          builtin_interfaces_msg_dds__Time_ stamp) {
-  static sensor_msgs_msg_dds__PointField_ fields[] = {field("x", 0, kFloat32),        field("y", 4, kFloat32),
-                                                      field("z", 8, kFloat32),        field("sigma", 12, kFloat32),
-                                                      field("intensity", 16, kUint8), field("camera", 17, kUint8)};
-  data_.resize(kPointStep * cloud.size());
-  std::uint8_t* to = data_.data();
+ros::PointCloud2 point_cloud(const client::Cloud& cloud, const ros::Header& header,
+                             const std::vector<CalibratedCamera>& cameras, const Thinning& thinning) {
+  const bool dense = !cloud.has("camera_u");
+  const int stride = dense ? thinning.stride : 1;
+  std::optional<VoxelGrid> voxels;
+  if (thinning.voxel_mm > 0) voxels.emplace(thinning.voxel_mm);
+  std::vector<std::uint8_t> data(kPointStep * cloud.size());
+  std::uint8_t* to = data.data();
   for (const client::Point point : cloud) {
-    const float metres[] = {point.x / 1000, point.y / 1000, point.z / 1000, point.sigma_mm / 1000};
-    std::memcpy(to, metres, sizeof metres);
-    to[16] = point.intensity;
-    to[17] = point.camera;
-    to[18] = to[19] = 0;
+    if (!on_stride(point, cameras, stride) || (voxels && !voxels->take(point))) continue;
+    const float values[] = {point.x / 1000, point.y / 1000, point.z / 1000, point.sigma_mm / 1000,
+                            static_cast<float>(point.intensity)};
+    std::memcpy(to, values, sizeof values);
+    to[20] = point.camera;
     to += kPointStep;
   }
-  message_.header = {stamp, text(frame_id)};
-  set_points(message_, fields, std::size(fields), data_);
-  return message_;
+  data.resize(static_cast<std::size_t>(to - data.data()));
+  ros::PointCloud2 message;
+  message.header = header;
+  message.point_fields = point_fields(false);
+  set_points(message, std::move(data));
+  return message;
 }
 
-sensor_msgs_msg_dds__CameraInfo_ camera_info(const CalibratedCamera& camera, const std::string& frame_id,
-                                             builtin_interfaces_msg_dds__Time_ stamp) {
-  static std::string model = "plumb_bob";
-  const Lens& lens = camera.lens;
-  sensor_msgs_msg_dds__CameraInfo_ info{};
-  info.header = {stamp, text(frame_id)};
-  info.height = static_cast<std::uint32_t>(lens.height_px);
-  info.width = static_cast<std::uint32_t>(lens.width_px);
-  info.distortion_model = model.data();
-  info.d = {5, 5, const_cast<double*>(lens.distortion.data()), false};
-  const double k[] = {lens.fx, 0, lens.cx, 0, lens.fy, lens.cy, 0, 0, 1};
-  const double r[] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  const double p[] = {lens.fx, 0, lens.cx, 0, 0, lens.fy, lens.cy, 0, 0, 0, 1, 0};
-  std::copy(std::begin(k), std::end(k), info.k);
-  std::copy(std::begin(r), std::end(r), info.r);
-  std::copy(std::begin(p), std::end(p), info.p);
-  return info;
-}
-
-sensor_msgs_msg_dds__Image_ image(const client::Frame& frame, const std::string& frame_id,
-                                  builtin_interfaces_msg_dds__Time_ stamp) {
-  static std::string mono8 = "mono8", mono16 = "mono16";
-  const auto size = static_cast<std::uint32_t>(frame.pixels.size());
-  sensor_msgs_msg_dds__Image_ image{};
-  image.header = {stamp, text(frame_id)};
-  image.height = static_cast<std::uint32_t>(frame.height_px);
-  image.width = static_cast<std::uint32_t>(frame.width_px);
-  image.encoding = frame.bits > 8 ? mono16.data() : mono8.data();
-  image.step = image.width * (frame.bits > 8 ? 2U : 1U);
-  image.data = {size, size, reinterpret_cast<std::uint8_t*>(const_cast<char*>(frame.pixels.data())), false};
+ros::Image depth_image(const client::Cloud& cloud, const ros::Header& header, const CalibratedCamera& camera,
+                       std::uint8_t index, int stride) {
+  ros::Image image;
+  image.header = header;
+  image.width = static_cast<std::uint32_t>((camera.lens.width_px + stride - 1) / stride);
+  image.height = static_cast<std::uint32_t>((camera.lens.height_px + stride - 1) / stride);
+  image.encoding = "32FC1";
+  image.step = image.width * 4;
+  std::vector<float> depth(std::size_t{image.width} * image.height, std::numeric_limits<float>::quiet_NaN());
+  for (const client::Point point : cloud) {
+    if (point.camera != index) continue;
+    const Pixel pixel = pixel_of(point, camera);
+    if (pixel.u % stride != 0 || pixel.v % stride != 0 || pixel.u < 0 || pixel.v < 0 ||
+        pixel.u >= camera.lens.width_px || pixel.v >= camera.lens.height_px) {
+      continue;
+    }
+    const Eigen::Vector3d at = camera.rig_from_camera.inverse() * Eigen::Vector3d(point.x, point.y, point.z);
+    depth[static_cast<std::size_t>(pixel.v / stride) * image.width + static_cast<std::size_t>(pixel.u / stride)] =
+        static_cast<float>(at.z() / 1000);
+  }
+  image.data.resize(depth.size() * sizeof(float));
+  std::memcpy(image.data.data(), depth.data(), image.data.size());
   return image;
 }
 
-geometry_msgs_msg_dds__TransformStamped_ transform(const std::string& parent, const std::string& child,
-                                                   const RigidTransform& parent_from_child,
-                                                   builtin_interfaces_msg_dds__Time_ stamp) {
+ros::CameraInfo camera_info(const CalibratedCamera& camera, const ros::Header& header, int stride) {
+  const Lens& lens = camera.lens;
+  // The first pixel of both is the same, and pixel centres have integer coordinates.
+  const double fx = lens.fx / stride, fy = lens.fy / stride, cx = lens.cx / stride, cy = lens.cy / stride;
+  ros::CameraInfo info;
+  info.header = header;
+  info.height = static_cast<std::uint32_t>((lens.height_px + stride - 1) / stride);
+  info.width = static_cast<std::uint32_t>((lens.width_px + stride - 1) / stride);
+  info.distortion_model = "plumb_bob";
+  info.d.assign(lens.distortion.begin(), lens.distortion.end());
+  info.k = {fx, 0, cx, 0, fy, cy, 0, 0, 1};
+  info.r = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  info.p = {fx, 0, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0};
+  return info;
+}
+
+ros::Image image(const client::Frame& frame, const ros::Header& header) {
+  ros::Image image;
+  image.header = header;
+  image.height = static_cast<std::uint32_t>(frame.height_px);
+  image.width = static_cast<std::uint32_t>(frame.width_px);
+  image.encoding = frame.bits > 8 ? "mono16" : "mono8";
+  image.step = image.width * (frame.bits > 8 ? 2U : 1U);
+  const auto* begin = reinterpret_cast<const std::uint8_t*>(frame.pixels.data());
+  image.data.assign(begin, begin + frame.pixels.size());
+  return image;
+}
+
+ros::TransformStamped transform(const std::string& parent, const std::string& child,
+                                const RigidTransform& parent_from_child, ros::Time stamp) {
   const Eigen::Quaterniond turn(parent_from_child.rotation);
   const Eigen::Vector3d& at = parent_from_child.translation;
-  return {{stamp, text(parent)},
-          text(child),
-          {{at.x() / 1000, at.y() / 1000, at.z() / 1000}, {turn.x(), turn.y(), turn.z(), turn.w()}}};
+  return {
+      {stamp, parent}, child, {at.x() / 1000, at.y() / 1000, at.z() / 1000}, {turn.x(), turn.y(), turn.z(), turn.w()}};
 }
 
 }  // namespace slsd::dds

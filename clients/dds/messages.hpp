@@ -10,52 +10,55 @@
 #include <slsd/cloud.hpp>
 
 #include "core/geometry/calibration.hpp"
-#include "ros.h"
+#include "ros.hpp"
 
 namespace slsd::dds {
 
 /// By which of their values a scanner's diagnostics tell when it was calibrated.
 inline constexpr const char* kCalibrationDate = "calibration date";
 
-// ROS's messages as idlc's C structures. They point into what they are made of, which is to outlive them; nothing of
-// them is to be freed.
+/// The time that a description tells ("2026-01-31T12:00:00.250Z"); now if it tells none. @thread reentrant
+[[nodiscard]] ros::Time stamp_of(std::string_view utc);
+[[nodiscard]] ros::Time stamp_now();
 
-/// The time that a description tells ("2026-01-31T12:00:00.250Z"); now where it tells none. @thread reentrant
-[[nodiscard]] builtin_interfaces_msg_dds__Time_ stamp_of(std::string_view utc);
-[[nodiscard]] builtin_interfaces_msg_dds__Time_ stamp_now();
+/// The bytes of one of our points: x y z sigma intensity (float32), camera scanner (uint8), two of padding.
+inline constexpr std::uint32_t kPointStep = 24;
+/// Where they are; `scanner` is of merged clouds only.
+[[nodiscard]] std::vector<ros::PointField> point_fields(bool merged);
+/// Sets all but the header and the fields: points in one array, unorganised.
+void set_points(ros::PointCloud2& message, std::vector<std::uint8_t> data);
 
-/// sensor_msgs/PointField's types, and the bytes of a point of ours.
-inline constexpr std::uint8_t kUint8 = 2, kFloat32 = 7;
-inline constexpr std::uint32_t kPointStep = 20;
-[[nodiscard]] sensor_msgs_msg_dds__PointField_ field(const char* name, std::uint32_t offset, std::uint8_t type);
-/// The fields of points in one array, unorganised, into a message that has its header.
-void set_points(sensor_msgs_msg_dds__PointCloud2_& message, sensor_msgs_msg_dds__PointField_* fields,
-                std::uint32_t field_count, std::vector<std::uint8_t>& data);
-
-/// A cloud in metres, as x y z sigma (float32), intensity and camera (uint8), 20 bytes a point. Its axes are those of
-/// slsd's rig frame, which are those of ROS's optical frames: x right, y down, z forward.
-/// @thread thread-bound
-class CloudMessage {
- public:
-  [[nodiscard]] const sensor_msgs_msg_dds__PointCloud2_& of(const client::Cloud& cloud, const std::string& frame_id,
-                                                            builtin_interfaces_msg_dds__Time_ stamp);
-
- private:
-  std::vector<std::uint8_t> data_;  ///< kept from cloud to cloud
-  sensor_msgs_msg_dds__PointCloud2_ message_{};
+/// Which points of a cloud are published.
+struct Thinning {
+  int stride = 2;       ///< dense clouds: of every so many pixels of a row, and of every so many rows
+  double voxel_mm = 0;  ///< one point to each cube of this size; 0: all
 };
 
+/// A cloud in metres. Its axes are those of slsd's rig frame, which are those of ROS's optical frames: x right, y down,
+/// z forward.
+/// @param cameras  of the calibration; a stride needs them
+/// @thread reentrant
+[[nodiscard]] ros::PointCloud2 point_cloud(const client::Cloud& cloud, const ros::Header& header,
+                                           const std::vector<CalibratedCamera>& cameras, const Thinning& thinning);
+
+/// The depth (Z, metres) of a dense cloud in a camera's own picture, lens distortion included: "32FC1", NaN where
+/// nothing was measured.
+/// @param index   of the camera in the cloud
+/// @param stride  of every so many pixels and rows, as the camera info says by its size
+[[nodiscard]] ros::Image depth_image(const client::Cloud& cloud, const ros::Header& header,
+                                     const CalibratedCamera& camera, std::uint8_t index, int stride);
+
 /// A camera as its calibration has it: "plumb_bob", and P without rectifying.
-[[nodiscard]] sensor_msgs_msg_dds__CameraInfo_ camera_info(const CalibratedCamera& camera, const std::string& frame_id,
-                                                           builtin_interfaces_msg_dds__Time_ stamp);
+/// @param stride  of a picture that has every so many pixels and rows of the camera's
+[[nodiscard]] ros::CameraInfo camera_info(const CalibratedCamera& camera, const ros::Header& header, int stride = 1);
 
 /// "mono8" or "mono16".
-[[nodiscard]] sensor_msgs_msg_dds__Image_ image(const client::Frame& frame, const std::string& frame_id,
-                                                builtin_interfaces_msg_dds__Time_ stamp);
+[[nodiscard]] ros::Image image(const client::Frame& frame, const ros::Header& header);
+/// The same as JPEG, of 8 bits. @errors kIo: the frame has no pixels
+[[nodiscard]] Result<ros::CompressedImage> compressed_image(const client::Frame& frame, const ros::Header& header);
 
 /// Where the child stands in the parent, in millimetres, as ROS has it: metres and a quaternion.
-[[nodiscard]] geometry_msgs_msg_dds__TransformStamped_ transform(const std::string& parent, const std::string& child,
-                                                                 const RigidTransform& parent_from_child,
-                                                                 builtin_interfaces_msg_dds__Time_ stamp);
+[[nodiscard]] ros::TransformStamped transform(const std::string& parent, const std::string& child,
+                                              const RigidTransform& parent_from_child, ros::Time stamp);
 
 }  // namespace slsd::dds

@@ -2,82 +2,378 @@
 // Copyright the slsd authors
 #include "network.hpp"
 
-#include <sys/socket.h>
-
 #include <algorithm>
-#include <cstdlib>
+#include <atomic>
+#include <condition_variable>
 #include <cstring>
-#include <memory>
+#include <list>
+#include <map>
+#include <mutex>
+#include <set>
+#include <shared_mutex>
 #include <utility>
 
-#include "drivers/system/file_descriptor.hpp"
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/TopicDataType.hpp>
+
+#include "participant.hpp"
 
 namespace slsd::dds {
 namespace {
 
-using Qos = std::unique_ptr<dds_qos_t, decltype(&dds_delete_qos)>;
+namespace fast = eprosima::fastdds::dds;
+namespace rtps = eprosima::fastrtps::rtps;
+using namespace std::chrono_literals;
 
-// A cloud of 10 MB in 160 pieces, not in 7,400: a third of the time.
-constexpr const char* kLargePieces = "<MaxMessageSize>65500 B</MaxMessageSize><FragmentSize>64000 B</FragmentSize>";
-// A dense cloud comes faster than a busy reader is scheduled: its buffer is to hold it whole, as far as
-// net.core.rmem_max allows. What is lost all the same is asked for at once, not after the 100 ms that are usual, and
-// sent again in one go, not half a megabyte at a time.
-constexpr const char* kInternal =
-    "<Internal><SocketReceiveBufferSize max=\"64 MB\"/><NackDelay>5 ms</NackDelay><AckDelay>1 ms</AckDelay>"
-    "<HeartbeatInterval>20 ms</HeartbeatInterval>"
-    "<MaxQueuedRexmitBytes>32 MB</MaxQueuedRexmitBytes>"
-    "<MaxQueuedRexmitMessages>4000</MaxQueuedRexmitMessages></Internal>";
 constexpr int kDenseCloudBytes = 10 << 20;
-constexpr int kParticipantsMax = 120;  // of one host, found one by one where there is no multicast
+constexpr std::uint8_t kCycloneVendor[] = {0x01, 0x10};
+constexpr auto kHearing = 1s;     // until a client's reader of replies is known
+constexpr auto kBlockingMax = 5;  // seconds that a write waits for the one before it to leave
 
-bool plain(const std::string& text) {
-  return std::all_of(text.begin(), text.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || std::strchr(".:-_%", c);
-  });
-}
-
-std::string configuration(const NetworkOptions& options) {
-  std::string text = "<CycloneDDS><Domain id=\"any\"><General>" + std::string(kLargePieces);
-  if (!options.interface.empty())
-    text += "<Interfaces><NetworkInterface name=\"" + options.interface + "\"/></Interfaces>";
-  if (!options.peers.empty()) text += "<AllowMulticast>false</AllowMulticast>";
-  text += "</General>";
-  if (!options.peers.empty()) {
-    text += "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>" +
-            std::to_string(kParticipantsMax) + "</MaxAutoParticipantIndex><Peers>";
-    for (const std::string& peer : options.peers) text += "<Peer address=\"" + peer + "\"/>";
-    text += "</Peers></Discovery>";
+/// Samples of any type, as their bytes.
+class BytesType : public fast::TopicDataType {
+ public:
+  explicit BytesType(const char* name) {
+    setName(name);
+    m_typeSize = 4096;  // to begin with; it grows
+    auto_fill_type_object(false);
+    auto_fill_type_information(false);
   }
-  text += std::string(kInternal) + "</Domain></CycloneDDS>";
-  const char* users = std::getenv("CYCLONEDDS_URI");  // comes last: it has the last word
-  return users && *users ? text + "," + users : text;
+  bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
+    const Bytes& bytes = *static_cast<Bytes*>(data);
+    std::memcpy(payload->data, bytes.data(), bytes.size());
+    payload->length = static_cast<std::uint32_t>(bytes.size());
+    payload->encapsulation = CDR_LE;
+    return true;
+  }
+  bool deserialize(rtps::SerializedPayload_t* payload, void* data) override {
+    static_cast<Bytes*>(data)->assign(payload->data, payload->data + payload->length);
+    return true;
+  }
+  std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
+    return [data] { return static_cast<std::uint32_t>(static_cast<Bytes*>(data)->size()); };
+  }
+  void* createData() override { return new Bytes; }
+  void deleteData(void* data) override { delete static_cast<Bytes*>(data); }
+  bool getKey(void*, rtps::InstanceHandle_t*, bool) override { return false; }
+};
+
+template <typename Qos>
+void set_quality(Qos& qos, Quality quality, bool best_effort) {
+  const bool sensor = quality == Quality::kSensor, latched = quality == Quality::kLatched;
+  qos.reliability().kind = sensor && best_effort ? fast::BEST_EFFORT_RELIABILITY_QOS : fast::RELIABLE_RELIABILITY_QOS;
+  qos.reliability().max_blocking_time = {kBlockingMax, 0};
+  qos.durability().kind = latched ? fast::TRANSIENT_LOCAL_DURABILITY_QOS : fast::VOLATILE_DURABILITY_QOS;
+  qos.history().kind = fast::KEEP_LAST_HISTORY_QOS;
+  qos.history().depth = latched ? 1 : sensor ? 5 : 10;
+  qos.resource_limits().allocated_samples = qos.history().depth;
+  qos.data_sharing().off();
+  qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
 }
 
-Qos quality_of(Network::Quality quality, bool best_effort) {
-  Qos qos(dds_create_qos(), dds_delete_qos);
-  const bool sensor = quality == Network::Quality::kSensor, latched = quality == Network::Quality::kLatched;
-  dds_qset_reliability(qos.get(), sensor && best_effort ? DDS_RELIABILITY_BEST_EFFORT : DDS_RELIABILITY_RELIABLE, 0);
-  dds_qset_durability(qos.get(), latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
-  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, latched ? 1 : sensor ? 5 : 10);
+template <typename Qos>
+void set_type_hash(Qos& qos, const ros::Type& type) {
+  const std::string text = std::string("typehash=") + type.hash + ";";
+  qos.user_data().assign(text.begin(), text.end());
+}
+
+// What is lost is asked for at once and sent again at once, not after the seconds that are usual.
+fast::DataWriterQos writer_qos(const ros::Type& type, Quality quality, bool best_effort) {
+  fast::DataWriterQos qos;
+  set_quality(qos, quality, best_effort);
+  set_type_hash(qos, type);
+  auto& times = qos.reliable_writer_qos().times;
+  times.heartbeatPeriod = eprosima::fastrtps::Duration_t(0.02);
+  times.nackResponseDelay = eprosima::fastrtps::Duration_t(0.001);
+  if (quality == Quality::kSensor) {
+    qos.liveliness().kind = fast::MANUAL_BY_TOPIC_LIVELINESS_QOS;  // for heartbeats; the lease never ends
+    qos.publish_mode().kind = fast::ASYNCHRONOUS_PUBLISH_MODE;
+    qos.publish_mode().flow_controller_name = kPace;
+  }
   return qos;
 }
 
-Result<dds_entity_t> made(dds_entity_t entity, const std::string& what) {
-  if (entity > 0) return entity;
-  return fail(ErrorCode::kIo, "DDS: " + std::string(dds_strretcode(entity)), what);
+fast::DataReaderQos reader_qos(const ros::Type& type, Quality quality, bool best_effort) {
+  fast::DataReaderQos qos;
+  set_quality(qos, quality, best_effort);
+  set_type_hash(qos, type);
+  qos.reliable_reader_qos().times.heartbeatResponseDelay = eprosima::fastrtps::Duration_t(0.001);
+  return qos;
 }
 
-// Asked of a socket, as a unit may hide /proc/sys. The kernel doubles what it grants.
-int largest_receive_buffer() {
-  constexpr int kMost = 1 << 30;
-  const FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  int granted = 0;
-  socklen_t size = sizeof granted;
-  ::setsockopt(socket.number(), SOL_SOCKET, SO_RCVBUF, &kMost, sizeof kMost);
-  return ::getsockopt(socket.number(), SOL_SOCKET, SO_RCVBUF, &granted, &size) == 0 ? granted / 2 : kMost;
+std::array<std::uint8_t, 16> bytes_of(const rtps::GUID_t& guid) {
+  std::array<std::uint8_t, 16> bytes;
+  std::memcpy(bytes.data(), guid.guidPrefix.value, 12);
+  std::memcpy(bytes.data() + 12, guid.entityId.value, 4);
+  return bytes;
+}
+
+rtps::GUID_t guid_of(const std::array<std::uint8_t, 16>& bytes) {
+  rtps::GUID_t guid;
+  std::memcpy(guid.guidPrefix.value, bytes.data(), 12);
+  std::memcpy(guid.entityId.value, bytes.data() + 12, 4);
+  return guid;
 }
 
 }  // namespace
+
+/// What happens in the network, as its threads tell it. Nothing of DDS is called with `mutex` held.
+struct Events {
+  std::mutex mutex;
+  std::condition_variable changed;
+};
+
+struct Writer::State : fast::DataWriterListener {
+  State(Events& heard, std::shared_mutex& in_use, const bool& is_left) : events(heard), use(in_use), left(is_left) {}
+  void on_publication_matched(fast::DataWriter*, const fast::PublicationMatchedStatus& info) override {
+    const std::lock_guard lock(events.mutex);
+    const auto guid = bytes_of(rtps::iHandle2GUID(info.last_subscription_handle));
+    if (info.current_count_change > 0) readers.insert(guid);
+    if (info.current_count_change < 0) readers.erase(guid);
+    events.changed.notify_all();
+  }
+
+  Events& events;
+  std::shared_mutex& use;
+  const bool& left;
+  fast::DataWriter* writer = nullptr;
+  std::set<std::array<std::uint8_t, 16>> readers;
+};
+
+struct Reader::State : fast::DataReaderListener {
+  State(Events& heard, std::shared_mutex& in_use, const bool& is_left) : events(heard), use(in_use), left(is_left) {}
+  void on_data_available(fast::DataReader*) override {
+    const std::lock_guard lock(events.mutex);
+    arrived = true;
+    events.changed.notify_all();
+  }
+  void on_subscription_matched(fast::DataReader*, const fast::SubscriptionMatchedStatus& info) override {
+    writers = info.current_count;
+  }
+
+  Events& events;
+  std::shared_mutex& use;
+  const bool& left;
+  fast::DataReader* reader = nullptr;
+  std::atomic<bool> arrived{false};
+  std::atomic<int> writers{0};
+};
+
+struct Network::State : fast::DomainParticipantListener {
+  void on_publisher_discovery(fast::DomainParticipant*, rtps::WriterDiscoveryInfo&& info) override {
+    const std::lock_guard lock(events.mutex);
+    const rtps::GUID_t& guid = info.info.guid();
+    if (info.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER) {
+      others.erase(guid);
+    } else if (!participant || guid.guidPrefix != participant->guid().guidPrefix) {
+      others[guid] = info.info.topicName().to_string();
+    }
+  }
+  void on_participant_discovery(fast::DomainParticipant*, rtps::ParticipantDiscoveryInfo&& info) override {
+    if (info.status != rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT &&
+        info.status != rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT) {
+      return;
+    }
+    const std::lock_guard lock(events.mutex);
+    std::erase_if(others, [&](const auto& one) { return one.first.guidPrefix == info.info.m_guid.guidPrefix; });
+  }
+
+  fast::Topic* topic(const ros::Type& type, const std::string& name) {
+    fast::Topic*& known = topics[name];
+    if (known) return known;
+    participant->register_type(fast::TypeSupport(new BytesType(type.name)));
+    return known = participant->create_topic(name, type.name, fast::TOPIC_QOS_DEFAULT);
+  }
+
+  void tell_node() {
+    if (node.node_name.empty()) return;
+    const ros::ParticipantEntitiesInfo info{{bytes_of(participant->guid())}, {node}};
+    Bytes bytes = encode(info);
+    node_writer->write(&bytes);
+  }
+
+  void leave() {
+    const std::unique_lock lock(use);
+    if (std::exchange(left, true) || !participant) return;
+    participant->set_listener(nullptr);
+    participant->delete_contained_entities();
+    fast::DomainParticipantFactory::get_instance()->delete_participant(participant);
+  }
+
+  Events events;
+  std::shared_mutex use;  ///< held by all who call DDS; alone by the one who leaves
+  bool left = false;
+  bool best_effort = false;
+  std::mutex making;  ///< of endpoints: what is below, up to the others
+  std::map<std::string, fast::Topic*> topics;
+  std::list<Writer::State> writers;
+  std::list<Reader::State> readers;
+  ros::NodeEntitiesInfo node;  ///< without a name: not shown yet
+  fast::DataWriter* node_writer = nullptr;
+  fast::DomainParticipant* participant = nullptr;
+  fast::Publisher* publisher = nullptr;
+  fast::Subscriber* subscriber = nullptr;
+  std::map<rtps::GUID_t, std::string> others;  ///< topics of others' writers; of `events`
+};
+
+namespace {
+
+std::mutex networks_mutex;
+std::set<Network::State*> networks;
+
+Error not_made(const std::string& what) {
+  return fail(ErrorCode::kIo, "Fast DDS does not create it", what).value();
+}
+
+}  // namespace
+
+bool Writer::has_readers() const {
+  const std::lock_guard lock(state_->events.mutex);
+  return !state_->readers.empty();
+}
+
+bool Writer::write_bytes(const Bytes& bytes, const Requester* to) const {
+  if (to && !to->is_cyclone) {
+    std::unique_lock lock(state_->events.mutex);
+    state_->events.changed.wait_for(lock, kHearing, [&] { return state_->readers.contains(to->guid); });
+  }
+  const std::shared_lock lock(state_->use);
+  if (state_->left) return true;
+  rtps::WriteParams related;
+  if (to && !to->is_cyclone) {
+    related.related_sample_identity().writer_guid(guid_of(to->guid));
+    related.related_sample_identity().sequence_number(rtps::SequenceNumber_t(to->sequence_number));
+  }
+  // Sends a heartbeat first. Cyclone's readers pass over all that is older than the first one that they hear, and a
+  // large sample is still on its way when the next is due.
+  if (state_->writer->get_qos().liveliness().kind == fast::MANUAL_BY_TOPIC_LIVELINESS_QOS)
+    state_->writer->assert_liveliness();
+  return state_->writer->write(const_cast<Bytes*>(&bytes), related);
+}
+
+bool Reader::has_news() const {
+  return state_->arrived;
+}
+
+int Reader::writer_count() const {
+  return state_->writers;
+}
+
+std::optional<Sample> Reader::take() const {
+  const std::shared_lock lock(state_->use);
+  if (state_->left) return std::nullopt;
+  while (true) {
+    state_->arrived = false;  // before it is looked: what comes meanwhile is not missed
+    Sample sample;
+    fast::SampleInfo info;
+    if (state_->reader->take_next_sample(&sample.bytes, &info) != eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK)
+      return std::nullopt;
+    state_->arrived = true;
+    if (!info.valid_data) continue;
+    const rtps::GUID_t& writer = info.sample_identity.writer_guid();
+    const rtps::GUID_t& related = info.related_sample_identity.writer_guid();
+    sample.from.guid = bytes_of(related == rtps::GUID_t::unknown() ? writer : related);
+    sample.from.sequence_number = info.sample_identity.sequence_number().to64long();
+    sample.from.is_cyclone = std::memcmp(writer.guidPrefix.value, kCycloneVendor, sizeof kCycloneVendor) == 0;
+    return sample;
+  }
+}
+
+Network::Network(std::unique_ptr<State> state) : state_(std::move(state)) {
+  const std::lock_guard lock(networks_mutex);
+  networks.insert(state_.get());
+}
+
+Network::Network(Network&&) noexcept = default;
+
+Network::~Network() {
+  if (!state_) return;
+  {
+    const std::lock_guard lock(networks_mutex);
+    networks.erase(state_.get());
+  }
+  state_->leave();
+}
+
+void leave_networks() {
+  const std::lock_guard lock(networks_mutex);
+  for (Network::State* network : networks) network->leave();
+}
+
+Result<Network> Network::open(const NetworkOptions& options) {
+  auto* factory = fast::DomainParticipantFactory::get_instance();
+  factory->load_profiles();  // the user's own, by FASTRTPS_DEFAULT_PROFILES_FILE
+  const auto qos = participant_qos(factory->get_default_participant_qos(), options);
+  if (!qos) return tl::unexpected(qos.error());
+  auto state = std::make_unique<State>();
+  state->best_effort = options.best_effort;
+  const auto mask = fast::StatusMask::none();  // discovery alone; endpoints have their own listeners
+  state->participant = factory->create_participant(options.domain, *qos, state.get(), mask);
+  if (!state->participant) {
+    return fail(ErrorCode::kInvalidArgument, "DDS cannot be joined: look at --interface, --peer and ROS's environment",
+                "domain " + std::to_string(options.domain));
+  }
+  state->publisher = state->participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
+  state->subscriber = state->participant->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
+  if (!state->publisher || !state->subscriber) return tl::unexpected(not_made("participant"));
+  return Network(std::move(state));
+}
+
+void Network::show_node(const std::string& name_space) {
+  const std::lock_guard lock(state_->making);
+  const auto& type = ros::ParticipantEntitiesInfo::kType;
+  if (!state_->node_writer) {
+    state_->node_writer = state_->publisher->create_datawriter(state_->topic(type, "ros_discovery_info"),
+                                                               writer_qos(type, Quality::kLatched, false));
+  }
+  state_->node.node_namespace = "/" + name_space;
+  state_->node.node_name = "slsd";
+  if (state_->node_writer) state_->tell_node();
+}
+
+Result<Writer> Network::writer(const ros::Type& type, const std::string& topic, Quality quality) const {
+  const std::lock_guard lock(state_->making);
+  auto& made = state_->writers.emplace_back(state_->events, state_->use, state_->left);
+  made.writer = state_->publisher->create_datawriter(state_->topic(type, topic),
+                                                     writer_qos(type, quality, state_->best_effort), &made);
+  if (!made.writer) return tl::unexpected(not_made(topic));
+  state_->node.writer_gid_seq.push_back({bytes_of(made.writer->guid())});
+  state_->tell_node();
+  return Writer(&made);
+}
+
+Result<Reader> Network::reader(const ros::Type& type, const std::string& topic, Quality quality) const {
+  const std::lock_guard lock(state_->making);
+  auto& made = state_->readers.emplace_back(state_->events, state_->use, state_->left);
+  made.reader = state_->subscriber->create_datareader(state_->topic(type, topic),
+                                                      reader_qos(type, quality, state_->best_effort), &made);
+  if (!made.reader) return tl::unexpected(not_made(topic));
+  state_->node.reader_gid_seq.push_back({bytes_of(made.reader->guid())});
+  state_->tell_node();
+  return Reader(&made);
+}
+
+int Network::other_writers(const std::string& topic) const {
+  const std::lock_guard lock(state_->events.mutex);
+  return static_cast<int>(std::count_if(state_->others.begin(), state_->others.end(),
+                                        [&](const auto& one) { return one.second == topic; }));
+}
+
+bool Network::wait_for(const std::vector<Reader>& readers, std::chrono::milliseconds time) const {
+  std::unique_lock lock(state_->events.mutex);
+  return state_->events.changed.wait_for(lock, time, [&] {
+    return std::any_of(readers.begin(), readers.end(), [](const Reader& reader) { return reader.has_news(); });
+  });
+}
 
 std::string receive_buffer_warning() {
   const int largest = largest_receive_buffer();
@@ -85,89 +381,6 @@ std::string receive_buffer_warning() {
   return "net.core.rmem_max is " + std::to_string(largest) +
          ": of a dense cloud a reader on this host may lose a part, and get it late or never: "
          "echo net.core.rmem_max=67108864 >/etc/sysctl.d/60-clouds.conf, and run sysctl --system";
-}
-
-Result<Network> Network::open(const NetworkOptions& options) {
-  if (!plain(options.interface) || !std::all_of(options.peers.begin(), options.peers.end(), plain)) {
-    return fail(ErrorCode::kInvalidArgument, "an interface or peer is a name or an address");
-  }
-  const char* what_to_do = ": look at --interface, --peer and CYCLONEDDS_URI";
-  const dds_entity_t domain = dds_create_domain(options.domain, configuration(options).c_str());
-  if (domain < 0) {
-    return fail(ErrorCode::kInvalidArgument, std::string("DDS: ") + dds_strretcode(domain) + what_to_do,
-                "domain " + std::to_string(options.domain));
-  }
-  const dds_entity_t participant = dds_create_participant(options.domain, nullptr, nullptr);
-  if (participant < 0) {
-    dds_delete(domain);
-    return fail(ErrorCode::kInvalidArgument, std::string("DDS: ") + dds_strretcode(participant) + what_to_do,
-                "domain " + std::to_string(options.domain));
-  }
-  Network network(domain, participant, options.best_effort);
-  const auto publications =
-      made(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr), "discovery");
-  if (!publications) return tl::unexpected(publications.error());
-  network.publications_ = *publications;
-  return network;
-}
-
-Network::Network(Network&& other) noexcept
-    : domain_(std::exchange(other.domain_, 0)),
-      participant_(std::exchange(other.participant_, 0)),
-      publications_(other.publications_),
-      best_effort_(other.best_effort_) {}
-
-Network::~Network() {
-  if (domain_ > 0) dds_delete(domain_);  // and all in it
-}
-
-Result<dds_entity_t> Network::topic(const dds_topic_descriptor_t& type, const std::string& name) const {
-  return made(dds_create_topic(participant_, &type, name.c_str(), nullptr, nullptr), name);
-}
-
-Result<dds_entity_t> Network::writer(const dds_topic_descriptor_t& type, const std::string& name,
-                                     Quality quality) const {
-  const auto on = topic(type, name);
-  if (!on) return on;
-  return made(dds_create_writer(participant_, *on, quality_of(quality, best_effort_).get(), nullptr), name);
-}
-
-Result<dds_entity_t> Network::reader(const dds_topic_descriptor_t& type, const std::string& name,
-                                     Quality quality) const {
-  const auto on = topic(type, name);
-  if (!on) return on;
-  return made(dds_create_reader(participant_, *on, quality_of(quality, best_effort_).get(), nullptr), name);
-}
-
-int Network::other_writers(const std::string& name) const {
-  constexpr int kMost = 1024;
-  std::vector<void*> samples(kMost, nullptr);
-  std::vector<dds_sample_info_t> infos(kMost);
-  const int count = dds_read_mask(publications_, samples.data(), infos.data(), kMost, kMost,
-                                  DDS_ANY_SAMPLE_STATE | DDS_ANY_VIEW_STATE | DDS_ALIVE_INSTANCE_STATE);
-  dds_guid_t own{};
-  dds_get_guid(participant_, &own);
-  int others = 0;
-  for (std::size_t i = 0; static_cast<int>(i) < count; ++i) {
-    const auto* endpoint = static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
-    const bool foreign = std::memcmp(endpoint->participant_key.v, own.v, sizeof own.v) != 0;
-    if (infos[i].valid_data && foreign && endpoint->topic_name == name) ++others;
-  }
-  if (count > 0) dds_return_loan(publications_, samples.data(), count);
-  return others;
-}
-
-bool wait_for(const std::vector<dds_entity_t>& readers, std::chrono::milliseconds time) {
-  const dds_entity_t set = dds_create_waitset(dds_get_participant(readers.front()));
-  std::vector<dds_entity_t> conditions;
-  for (const dds_entity_t reader : readers) {
-    conditions.push_back(dds_create_readcondition(reader, DDS_NOT_READ_SAMPLE_STATE));
-    dds_waitset_attach(set, conditions.back(), 0);
-  }
-  const int ready = dds_waitset_wait(set, nullptr, 0, DDS_MSECS(time.count()));
-  dds_delete(set);
-  for (const dds_entity_t condition : conditions) dds_delete(condition);
-  return ready > 0;
 }
 
 }  // namespace slsd::dds

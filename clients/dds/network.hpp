@@ -2,65 +2,122 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include <dds/dds.h>
-
+#include "cdr.hpp"
 #include "core/result.hpp"
+#include "discovery.hpp"
+#include "ros.hpp"
 
 namespace slsd::dds {
 
 /// How to reach the others.
 struct NetworkOptions {
   std::uint32_t domain = 0;        ///< ROS_DOMAIN_ID
-  std::string interface;           ///< "eth0", "lo"; empty: the one that Cyclone DDS chooses
-  std::vector<std::string> peers;  ///< addresses of the others, without multicast; empty: found by multicast
+  std::string interface;           ///< "eth0", "lo", or an address; empty: all
+  std::vector<std::string> peers;  ///< addresses of the others, without multicast; empty: as `discovery` says
   bool best_effort = false;        ///< clouds and images that are lost on the way are not sent again
+  double rate_max_mb = 64;         ///< clouds and images leave at no more megabytes a second than this
+  Discovery discovery;             ///< of ROS's environment
 };
 
-/// A participant of a DDS domain with ROS 2's names and qualities of service. What it writes never waits for a reader:
-/// one that stalls loses what is older than the newest few.
+enum class Quality {
+  kSensor,   ///< clouds and images: the newest five; for readers of sensors' QoS, and for reliable ones
+  kService,  ///< requests, replies and diagnostics: reliable, the newest ten
+  kLatched,  ///< transforms: reliable, and for those who come later too
+};
+
+/// Who wrote a sample, and what a reply to it is related by.
+struct Requester {
+  std::array<std::uint8_t, 16> guid{};  ///< of the reader that waits for the reply, or of the writer
+  std::uint64_t sequence_number = 0;
+  bool is_cyclone = false;  ///< by the vendor in the writer's GUID
+};
+
+struct Sample {
+  Bytes bytes;
+  Requester from;
+};
+
+/// Writes to one topic, and waits for no reader. @thread thread-safe
+class Writer {
+ public:
+  template <Message Value>
+  bool write(const Value& message) const {
+    return write_bytes(encode(message), nullptr);
+  }
+  /// Answers a request: waits until the one who asked can hear it, at most a second.
+  template <Message Value>
+  bool reply(const Value& message, const Requester& to) const {
+    return write_bytes(encode(message), &to);
+  }
+  [[nodiscard]] bool has_readers() const;
+  explicit operator bool() const { return state_ != nullptr; }
+
+  struct State;
+  explicit Writer(State* state = nullptr) : state_(state) {}
+
+ private:
+  bool write_bytes(const Bytes& bytes, const Requester* to) const;
+  State* state_;  ///< of the network, which outlives it
+};
+
+/// Reads one topic. @thread thread-bound
+class Reader {
+ public:
+  /// The oldest sample that was not taken yet.
+  [[nodiscard]] std::optional<Sample> take() const;
+  [[nodiscard]] int writer_count() const;
+
+  struct State;
+  explicit Reader(State* state = nullptr) : state_(state) {}
+  [[nodiscard]] bool has_news() const;
+
+ private:
+  State* state_;  ///< of the network, which outlives it
+};
+
+/// A node of ROS 2: a participant of a DDS domain with ROS's names and qualities of service. What it writes never waits
+/// for a reader: one that stalls loses what is older than the newest few.
 /// @thread thread-safe
 class Network {
  public:
-  /// @errors kInvalidArgument: no such interface or peer, or wrong CYCLONEDDS_URI
+  /// @errors kInvalidArgument: no such interface or peer
   [[nodiscard]] static Result<Network> open(const NetworkOptions& options);
   ~Network();
   Network(Network&&) noexcept;
   Network& operator=(Network&&) = delete;
 
-  enum class Quality {
-    kSensor,   ///< clouds and images: the newest five; for readers of sensors' QoS, and for reliable ones
-    kService,  ///< requests, replies and diagnostics: reliable, the newest ten
-    kLatched,  ///< transforms: reliable, and for those who come later too
-  };
-  /// @param topic  without "rt/"  @errors kIo
-  [[nodiscard]] Result<dds_entity_t> writer(const dds_topic_descriptor_t& type, const std::string& topic,
-                                            Quality quality) const;
-  [[nodiscard]] Result<dds_entity_t> reader(const dds_topic_descriptor_t& type, const std::string& topic,
-                                            Quality quality) const;
+  /// Shows the node /NAMESPACE/slsd, with all endpoints that there are and will be.
+  void show_node(const std::string& name_space);
+
+  /// @param topic  with its prefix, as DDS has it  @errors kIo
+  [[nodiscard]] Result<Writer> writer(const ros::Type& type, const std::string& topic, Quality quality) const;
+  [[nodiscard]] Result<Reader> reader(const ros::Type& type, const std::string& topic, Quality quality) const;
 
   /// How many others write this topic by now.
-  /// @param topic  with its prefix, as DDS has it
   [[nodiscard]] int other_writers(const std::string& topic) const;
+  /// Waits until one of these readers has a sample that was not taken, or the time is over.
+  bool wait_for(const std::vector<Reader>& readers, std::chrono::milliseconds time) const;
+
+  struct State;
 
  private:
-  Network(dds_entity_t domain, dds_entity_t participant, bool best_effort)
-      : domain_(domain), participant_(participant), best_effort_(best_effort) {}
-  [[nodiscard]] Result<dds_entity_t> topic(const dds_topic_descriptor_t& type, const std::string& name) const;
-
-  dds_entity_t domain_, participant_;
-  dds_entity_t publications_ = 0;  ///< reader of what others write
-  bool best_effort_;
+  explicit Network(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
 };
+
+/// Tells the others that this process leaves: all of its networks. Whoever writes or reads afterwards does nothing.
+void leave_networks();
 
 /// What to do where this host's sockets cannot hold a dense cloud; empty: nothing. @thread reentrant
 [[nodiscard]] std::string receive_buffer_warning();
-
-/// Waits until one of these readers has a sample that was not read, or the time is over.
-bool wait_for(const std::vector<dds_entity_t>& readers, std::chrono::milliseconds time);
 
 }  // namespace slsd::dds

@@ -19,7 +19,7 @@ int failed(const slsd::Error& error) {
 
 void add_merge_options(CLI::App& app, bool& merges, slsd::dds::MergeOptions& merge) {
   auto* merging = app.add_flag("--merge", merges, "one cloud of several scanners, by --extrinsics");
-  for (const char* alone : {"--socket", "--rate", "--density", "--image-rate"})
+  for (const char* alone : {"--socket", "--rate", "--density", "--stride", "--voxel", "--image-rate"})
     merging->excludes(app.get_option(alone));
   app.add_option("--scanner", merge.scanners, "with --merge: a scanner to merge; without it all of the file")
       ->needs(merging);
@@ -45,12 +45,19 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0, 1000.0));
   app.add_option("--density", options.density, "a point for each symbol, or for each camera pixel")
       ->check(CLI::IsMember({"symbols", "pixels"}));
+  app.add_option("--stride", options.thinning.stride,
+                 "dense clouds and depth images have every so many pixels and rows of the camera's (2)")
+      ->check(CLI::Range(1, 16));
+  app.add_option("--voxel", options.thinning.voxel_mm, "millimetres: one point to each cube of this size; 0: all (0)")
+      ->check(CLI::Range(0.0, 1000.0));
   app.add_option("--image-rate", options.image_rate_hz, "images a second, 1 or more; 0: none (0)")
       ->check(CLI::Range(0.0, 100.0));
   app.add_option("--extrinsics", options.extrinsics, "where the scanners stand, as TOML");
   bool merges = false;
   slsd::dds::MergeOptions merge;
   add_merge_options(app, merges, merge);
+  app.add_option("--rate-max", network.rate_max_mb, "clouds and images leave at so many megabytes a second (64)")
+      ->check(CLI::Range(1.0, 2000.0));
   app.add_option("--domain", network.domain, "of DDS (0)")->envname("ROS_DOMAIN_ID")->check(CLI::Range(0, 232));
   app.add_option("--interface", network.interface, "of the network: eth0, lo");
   app.add_option("--peer", network.peers, "an address of others, where the network has no multicast; may be repeated");
@@ -66,8 +73,13 @@ int main(int argc, char** argv) {
   sigaddset(&ends, SIGINT);
   sigaddset(&ends, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);
-  const std::string warning = slsd::dds::receive_buffer_warning();
-  if (!warning.empty()) std::fprintf(stderr, "slsd-dds: %s\n", warning.c_str());
+  network.discovery = slsd::dds::read_discovery([](const char* variable) {
+    const char* value = std::getenv(variable);
+    return std::string(value ? value : "");
+  });
+  if (std::string warning = slsd::dds::receive_buffer_warning(); !warning.empty())
+    network.discovery.warnings.push_back(std::move(warning));
+  for (const std::string& warning : network.discovery.warnings) std::fprintf(stderr, "slsd-dds: %s\n", warning.c_str());
   auto joined = slsd::dds::Network::open(network);
   if (!joined) return failed(joined.error());
   slsd::Result<std::unique_ptr<slsd::dds::Bridge>> bridge;
@@ -83,6 +95,6 @@ int main(int argc, char** argv) {
   if (!merged) return failed(merged.error());
   int signal = 0;
   sigwait(&ends, &signal);
-  dds_delete(DDS_CYCLONEDDS_HANDLE);  // tells the others that it goes
-  std::_Exit(0);                      // its threads wait for the service
+  slsd::dds::leave_networks();
+  std::_Exit(0);  // its threads wait for the service
 }

@@ -20,10 +20,10 @@ if HAS_DDS:
     from dds_test import DOMAIN, Bridge, Listener, States
 
 SEAM_MM = 0.5  # at 2 m
-FIELDS = [("x", 0, 7, 1), ("y", 4, 7, 1), ("z", 8, 7, 1), ("sigma", 12, 7, 1), ("intensity", 16, 2, 1), ("camera", 17, 2, 1),
-          ("scanner", 18, 2, 1)]
-RECORD = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("sigma", "<f4"), ("intensity", "u1"), ("camera", "u1"),
-                   ("scanner", "u1"), ("padding", "u1")])
+FIELDS = [("x", 0, 7, 1), ("y", 4, 7, 1), ("z", 8, 7, 1), ("sigma", 12, 7, 1), ("intensity", 16, 7, 1), ("camera", 20, 2, 1),
+          ("scanner", 21, 2, 1)]
+RECORD = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("sigma", "<f4"), ("intensity", "<f4"), ("camera", "u1"),
+                   ("scanner", "u1"), ("padding", "u1", 2)])
 
 
 def xyz(points):
@@ -99,7 +99,7 @@ class Merged(Folder):
 
     def points(self, message):
         self.assertEqual([tuple(field) for field in message["fields"]], FIELDS)
-        self.assertEqual((message["header"]["frame_id"], message["point_step"], message["is_dense"]), ("cell", 20, 1))
+        self.assertEqual((message["header"]["frame_id"], message["point_step"], message["is_dense"]), ("cell", 24, 1))
         return np.frombuffer(message["data"], RECORD)
 
     def setUp(self):
@@ -133,8 +133,8 @@ class Merged(Folder):
                 clouds[name] = scanner.scan(density="pixels", timeout_s=60).points
         truth = read_extrinsics(CELL / "truth.toml", "right")
         expected = {"left": xyz(clouds["left"]), "right": placed(xyz(clouds["right"]), truth)}
-        with Bridge(scenes["left"], "--rate", "0", "--density", "pixels", name="left"), \
-                Bridge(scenes["right"], "--rate", "0", "--density", "pixels", name="right"), self.merge(file):
+        with Bridge(scenes["left"], "--rate", "0", "--density", "pixels", "--stride", "1", name="left"), \
+                Bridge(scenes["right"], "--rate", "0", "--density", "pixels", "--stride", "1", name="right"), self.merge(file):
             self.wait_state("no cloud yet", "the merging node")
             done = subprocess.run([BIN / "dds_probe", "--domain", str(DOMAIN), "--call", "merged"], capture_output=True, text=True,
                                   timeout=120, check=True)

@@ -7,21 +7,21 @@
 #include <cinttypes>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <map>
 #include <string>
 #include <vector>
 
+#include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
 #include <CLI/CLI.hpp>
 
-#include "network.hpp"
 #include "ros.h"
 
 namespace {
 
 using namespace std::chrono_literals;
-using slsd::dds::Network;
 
 const std::map<std::string, const dds_topic_descriptor_t*> kTypes{
     {"PointCloud2", &sensor_msgs_msg_dds__PointCloud2__desc},
@@ -31,6 +31,56 @@ const std::map<std::string, const dds_topic_descriptor_t*> kTypes{
     {"DiagnosticArray", &diagnostic_msgs_msg_dds__DiagnosticArray__desc}};
 
 std::atomic<bool> ended{false};
+
+enum class Quality { kSensor, kBestEffort, kService, kLatched };
+
+/// A participant on loopback, of another maker's DDS than slsd-dds.
+class Network {
+ public:
+  explicit Network(std::uint32_t domain) {
+    const char* loopback =
+        "<CycloneDDS><Domain id=\"any\"><General><MaxMessageSize>65500 B</MaxMessageSize><FragmentSize>64000 "
+        "B</FragmentSize>"
+        "<Interfaces><NetworkInterface name=\"lo\"/></Interfaces><AllowMulticast>false</AllowMulticast></General>"
+        "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>120</MaxAutoParticipantIndex>"
+        "<Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery><Internal><SocketReceiveBufferSize max=\"64 MB\"/>"
+        "<NackDelay>5 ms</NackDelay><AckDelay>1 ms</AckDelay></Internal></Domain></CycloneDDS>";
+    domain_ = dds_create_domain(domain, loopback);
+    participant_ = dds_create_participant(domain, nullptr, nullptr);
+  }
+  ~Network() { dds_delete(domain_); }
+  Network(const Network&) = delete;
+  Network& operator=(const Network&) = delete;
+
+  [[nodiscard]] dds_entity_t writer(const dds_topic_descriptor_t& type, const std::string& topic,
+                                    Quality quality) const {
+    return made(dds_create_writer, type, topic, quality);
+  }
+  [[nodiscard]] dds_entity_t reader(const dds_topic_descriptor_t& type, const std::string& topic,
+                                    Quality quality) const {
+    return made(dds_create_reader, type, topic, quality);
+  }
+
+ private:
+  template <typename Create>
+  dds_entity_t made(Create create, const dds_topic_descriptor_t& type, const std::string& topic,
+                    Quality quality) const {
+    const bool sensor = quality == Quality::kSensor || quality == Quality::kBestEffort;
+    const bool latched = quality == Quality::kLatched;
+    dds_qos_t* qos = dds_create_qos();
+    dds_qset_reliability(qos, quality == Quality::kBestEffort ? DDS_RELIABILITY_BEST_EFFORT : DDS_RELIABILITY_RELIABLE,
+                         0);
+    dds_qset_durability(qos, latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+    dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, latched ? 1 : sensor ? 5 : 10);
+    const dds_entity_t on = dds_create_topic(participant_, &type, topic.c_str(), nullptr, nullptr);
+    const dds_entity_t entity = create(participant_, on, qos, nullptr);
+    dds_delete_qos(qos);
+    if (entity < 0) std::fprintf(stderr, "%s: %s\n", topic.c_str(), dds_strretcode(entity)), std::exit(1);
+    return entity;
+  }
+
+  dds_entity_t domain_, participant_;
+};
 
 std::int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
@@ -50,26 +100,28 @@ std::string taken(dds_entity_t reader) {
 }
 
 int call(const Network& network, const std::string& name) {
-  const auto requests = network.writer(std_srvs_srv_dds__Trigger_Request__desc, "rq/" + name + "/triggerRequest",
-                                       Network::Quality::kService);
-  const auto replies = network.reader(std_srvs_srv_dds__Trigger_Response__desc, "rr/" + name + "/triggerReply",
-                                      Network::Quality::kService);
-  if (!requests || !replies) return 1;
+  const auto requests =
+      network.writer(std_srvs_srv_dds__Trigger_Request__desc, "rq/" + name + "/triggerRequest", Quality::kService);
+  const auto replies =
+      network.reader(std_srvs_srv_dds__Trigger_Response__desc, "rr/" + name + "/triggerReply", Quality::kService);
   const std_srvs_srv_dds__Trigger_Request_ request{0x1122334455667788, 42, 0};
   for (int tries = 0; tries < 20; ++tries) {  // the service is to know of both first
     dds_publication_matched_status_t matched{};
-    dds_get_publication_matched_status(*requests, &matched);
+    dds_get_publication_matched_status(requests, &matched);
     dds_subscription_matched_status_t heard{};
-    dds_get_subscription_matched_status(*replies, &heard);
+    dds_get_subscription_matched_status(replies, &heard);
     if (matched.current_count > 0 && heard.current_count > 0) break;
     ::usleep(250'000);
   }
   ::usleep(500'000);
-  dds_write(*requests, &request);
-  if (!slsd::dds::wait_for({*replies}, 20s)) return 1;
+  dds_write(requests, &request);
   void* sample = nullptr;
   dds_sample_info_t info;
-  if (dds_take(*replies, &sample, &info, 1, 1) != 1) return 1;
+  const auto end = std::chrono::steady_clock::now() + 20s;
+  while (dds_take(replies, &sample, &info, 1, 1) != 1) {
+    if (std::chrono::steady_clock::now() > end) return 1;
+    ::usleep(10'000);
+  }
   const auto* reply = static_cast<const std_srvs_srv_dds__Trigger_Response_*>(sample);
   std::printf("%" PRIx64 " %" PRId64 " %d %s\n", reply->client_guid, reply->sequence_number, reply->success,
               reply->message);
@@ -84,8 +136,7 @@ struct ForeignCloud {
 };
 
 int write_clouds(const Network& network, const std::string& topic, ForeignCloud cloud, double seconds) {
-  const auto writer = network.writer(sensor_msgs_msg_dds__PointCloud2__desc, "rt/" + topic, Network::Quality::kSensor);
-  if (!writer) return 1;
+  const auto writer = network.writer(sensor_msgs_msg_dds__PointCloud2__desc, "rt/" + topic, Quality::kSensor);
   std::string x = "x", y = "y", z = "z";
   sensor_msgs_msg_dds__PointField_ fields[] = {
       {x.data(), cloud.x_offset, 7, 1}, {y.data(), 4, 7, 1}, {z.data(), 8, 7, 1}};
@@ -101,7 +152,7 @@ int write_clouds(const Network& network, const std::string& topic, ForeignCloud 
     message.is_bigendian = cloud.is_bigendian;
     message.point_step = cloud.point_step, message.row_step = cloud.row_step;
     message.data = {cloud.bytes, cloud.bytes, data.data(), false};
-    dds_write(*writer, &message);
+    dds_write(writer, &message);
     ::usleep(100'000);
   }
   return 0;
@@ -112,13 +163,13 @@ int write_clouds(const Network& network, const std::string& topic, ForeignCloud 
 int main(int argc, char** argv) {
   CLI::App app(
       "Reads topics of ROS 2 on loopback: each sample's size (4 bytes) and bytes; or, with --stamps, a line for each.");
-  slsd::dds::NetworkOptions options{0, "lo", {"127.0.0.1"}, false};
+  std::uint32_t domain = 0;
   std::vector<std::string> topics;
   std::string type = "PointCloud2", service;
   std::uint64_t count = 1;
   double seconds = 20;
   bool stamps = false, sensor = false, latched = false;
-  app.add_option("--domain", options.domain)->required();
+  app.add_option("--domain", domain)->required();
   app.add_option("--topic", topics, "without rt/");
   app.add_option("--type", type);
   app.add_option("--count", count);
@@ -139,19 +190,13 @@ int main(int argc, char** argv) {
   app.add_flag("--best-effort", sensor, "ask for no more than sensors' QoS");
   app.add_flag("--latched", latched, "ask for what was said before");
   CLI11_PARSE(app, argc, argv);
-  options.best_effort = sensor;
   std::signal(SIGTERM, [](int) { ended = true; });  // the others are told then
-  const auto network = Network::open(options);
-  if (!network) return std::fprintf(stderr, "%s\n", to_string(network.error()).c_str()), 1;
-  if (!written.empty()) return write_clouds(*network, written, cloud, seconds);
-  if (!service.empty()) return call(*network, service);
+  const Network network(domain);
+  if (!written.empty()) return write_clouds(network, written, cloud, seconds);
+  if (!service.empty()) return call(network, service);
   std::vector<dds_entity_t> readers;
-  for (const std::string& topic : topics) {
-    const auto reader = network->reader(*kTypes.at(type), "rt/" + topic,
-                                        latched ? Network::Quality::kLatched : Network::Quality::kSensor);
-    if (!reader) return std::fprintf(stderr, "%s\n", to_string(reader.error()).c_str()), 1;
-    readers.push_back(*reader);
-  }
+  const Quality quality = latched ? Quality::kLatched : sensor ? Quality::kBestEffort : Quality::kSensor;
+  for (const std::string& topic : topics) readers.push_back(network.reader(*kTypes.at(type), "rt/" + topic, quality));
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
   const dds_entity_t set = dds_create_waitset(dds_get_participant(readers.at(0)));
   for (std::size_t i = 0; i < readers.size(); ++i)

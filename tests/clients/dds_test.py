@@ -6,6 +6,7 @@
 With SLSD_DDS_PYTHON, an interpreter that has Eclipse's package `cyclonedds` (pip install cyclonedds numpy), that reads the
 same once more.
 """
+import ipaddress
 import json
 import os
 import pathlib
@@ -149,10 +150,11 @@ class States(Listener):
 
 
 class Bridge:
-    def __init__(self, service, *more, name="left"):
+    def __init__(self, service, *more, name="left", network=LOOPBACK, **environment):
         self.log = tempfile.TemporaryFile("w+")
         socket = ["--socket", service.socket] if service else []
-        self.process = subprocess.Popen([BIN / "slsd-dds", *socket, "--name", name, *LOOPBACK, *more], stderr=self.log)
+        self.process = subprocess.Popen([BIN / "slsd-dds", *socket, "--name", name, *network, *more], stderr=self.log,
+                                        env={**os.environ, **environment})
 
     def said(self):
         self.log.seek(0)
@@ -171,9 +173,9 @@ class Bridge:
             self.log.close()
 
 
-FIELDS = [("x", 0, 7, 1), ("y", 4, 7, 1), ("z", 8, 7, 1), ("sigma", 12, 7, 1), ("intensity", 16, 2, 1), ("camera", 17, 2, 1)]
-RECORD = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("sigma", "<f4"), ("intensity", "u1"), ("camera", "u1"),
-                   ("padding", "u1", 2)])
+FIELDS = [("x", 0, 7, 1), ("y", 4, 7, 1), ("z", 8, 7, 1), ("sigma", 12, 7, 1), ("intensity", 16, 7, 1), ("camera", 20, 2, 1)]
+RECORD = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("sigma", "<f4"), ("intensity", "<f4"), ("camera", "u1"),
+                   ("padding", "u1", 3)])
 
 
 def matrix(calibration, key):
@@ -193,7 +195,7 @@ class Shown(unittest.TestCase):
     def same_cloud(self, message):
         expected = self.scanner.scan().points
         self.assertEqual([message["height"], message["width"], message["point_step"], message["row_step"]],
-                         [1, len(expected), 20, 20 * len(expected)])
+                         [1, len(expected), 24, 24 * len(expected)])
         self.assertEqual([message["is_bigendian"], message["is_dense"]], [0, 1])
         self.assertEqual([tuple(field) for field in message["fields"]], FIELDS)
         self.assertEqual(message["header"]["frame_id"], "left_optical_frame")
@@ -252,8 +254,7 @@ class Shown(unittest.TestCase):
     def test_another_of_the_same_name_is_told(self):
         probe("left/points", "PointCloud2")  # it is there
         with Bridge(self.service) as second:
-            self.assertEqual(second.process.wait(30), 1)
-            self.assertIn("name_taken", second.said())
+            wait_until(lambda: "name_taken" in second.said(), "that the name is taken")
 
     def test_buffers_too_small_for_a_dense_cloud_are_told(self):
         allowed = int(pathlib.Path("/proc/sys/net/core/rmem_max").read_text(encoding="utf-8"))
@@ -317,6 +318,57 @@ class Stalling(unittest.TestCase):
         got = measure(scanners=4, seconds=3)
         self.assertGreater(got["sent"], 60)
         self.assertEqual(got["lost"], 0)
+
+
+class Discovery(unittest.TestCase):
+    """What ROS's environment says of who is looked for."""
+
+    def listens(self, bridge):
+        """The addresses and ports of the sockets that it has."""
+        inodes = {os.readlink(link)[8:-1] for link in pathlib.Path(f"/proc/{bridge.process.pid}/fd").iterdir()
+                  if os.readlink(link).startswith("socket:[")}
+        lines = [line.split() for line in pathlib.Path("/proc/net/udp").read_text(encoding="utf-8").splitlines()[1:]]
+        local = [line[1].split(":") for line in lines if line[9] in inodes]
+        return {(str(ipaddress.IPv4Address(int(address, 16).to_bytes(4, "little"))), int(port, 16)) for address, port in local}
+
+    def started(self, service, **environment):
+        bridge = Bridge(service, "--rate", "5", name="found", network=["--domain", str(DOMAIN)], **environment)
+        self.addCleanup(bridge.__exit__)
+        wait_until(lambda: len(self.listens(bridge)) >= 3, "that it listens")
+        return bridge
+
+    MULTICAST = 7400 + 250 * DOMAIN
+
+    def test_of_this_host_alone_listens_on_loopback_alone(self):
+        with Service() as service:
+            for environment in ({"ROS_LOCALHOST_ONLY": "1"}, {"ROS_LOCALHOST_ONLY": "1", "ROS_STATIC_PEERS": "192.0.2.1"},
+                                {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
+                                {"ROS_AUTOMATIC_DISCOVERY_RANGE": "anything"}):
+                bridge = self.started(service, **environment)
+                self.assertEqual({address for address, _ in self.listens(bridge)}, {"127.0.0.1"}, environment)
+                self.assertNotIn(self.MULTICAST, {port for _, port in self.listens(bridge)})
+                self.assertEqual(len(probe("found/points", "PointCloud2")), 1)
+                bridge.__exit__()
+
+    def test_that_is_off_is_seen_by_nobody(self):
+        with Service() as service:
+            bridge = self.started(service, ROS_AUTOMATIC_DISCOVERY_RANGE="OFF")
+            self.assertEqual({address for address, _ in self.listens(bridge)}, {"127.0.0.1"})
+            self.assertEqual(probe("found/points", "PointCloud2", "--seconds", "6"), [])
+
+    def test_of_the_subnet_listens_to_multicast_and_static_peers_do_not_need_it(self):
+        with Service() as service:
+            ports = lambda bridge: {port for _, port in self.listens(bridge)}  # noqa: E731
+            self.assertIn(self.MULTICAST, ports(self.started(service)))
+            bridge = self.started(service, ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST", ROS_STATIC_PEERS="127.0.0.1;192.0.2.1")
+            self.assertNotIn(self.MULTICAST, ports(bridge))
+            self.assertIn("0.0.0.0", {address for address, _ in self.listens(bridge)})
+
+    def test_of_peers_that_are_no_hosts_is_refused(self):
+        done = subprocess.run([BIN / "slsd-dds"], env={**os.environ, "ROS_STATIC_PEERS": "no.such.host.invalid"},
+                              capture_output=True, text=True, timeout=60, check=False)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("no.such.host.invalid", done.stderr)
 
 
 class Strangers(unittest.TestCase):

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace slsd::dds {
+
+/// Who is looked for, as ROS 2's environment says it (Jazzy and later).
+struct Discovery {
+  enum class Range {
+    kSystemDefault,  ///< as Fast DDS is configured; peers are ignored
+    kSubnet,         ///< by multicast, and the peers
+    kLocalhost,      ///< this host, and the peers
+    kOff,            ///< nobody
+  };
+  Range range = Range::kSubnet;
+  std::vector<std::string> peers;  ///< addresses or names of hosts
+  std::vector<std::string> warnings;
+};
+
+/// Reads ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS (separated by ;) and ROS_LOCALHOST_ONLY, which has the last
+/// word. An unknown range is LOCALHOST, as in ROS: it never reaches further than was meant.
+/// @param variable  its value; empty: not set
+[[nodiscard]] Discovery read_discovery(const std::function<std::string(const char*)>& variable);
+
+}  // namespace slsd::dds

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
+
+#include "network.hpp"
+
+namespace slsd::dds {
+
+/// The flow controller of clouds and images.
+inline constexpr const char* kPace = "slsd pace";
+
+/// Bytes that a socket of this host may hold unread.
+[[nodiscard]] int largest_receive_buffer();
+
+/// A participant's settings: where it listens, whom it looks for, and how fast it sends.
+/// @errors kInvalidArgument: no such interface or peer
+[[nodiscard]] Result<eprosima::fastdds::dds::DomainParticipantQos> participant_qos(
+    eprosima::fastdds::dds::DomainParticipantQos qos, const NetworkOptions& options);
+
+}  // namespace slsd::dds

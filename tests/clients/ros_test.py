@@ -1,0 +1,104 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""slsd-dds as ROS 2 itself sees it: rclpy and rmw_fastrtps of the Python package index, on loopback.
+
+SLSD_ROS_PYTHON names an interpreter that has them; without it that of build/ros-venv, which ./run test fills. Any number
+of triggers by SLSD_ROS_CALLS (30).
+"""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import time
+import unittest
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daemon")]
+
+import numpy as np  # noqa: E402
+
+import slsd  # noqa: E402
+from dds_test import DOMAIN, FIELDS, RECORD, Bridge  # noqa: E402
+from service import Service  # noqa: E402
+
+# Nodes of ROS tell their host's addresses other than loopback's, so it listens to all.
+NETWORK = ["--domain", str(DOMAIN), "--peer", "127.0.0.1"]
+PYTHON = os.environ.get("SLSD_ROS_PYTHON", str(HERE.parents[1] / "build/ros-venv/bin/python"))
+CALLS = int(os.environ.get("SLSD_ROS_CALLS", "30"))
+CLOUD_HASH = "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5"
+
+
+def has_ros():
+    try:
+        return subprocess.run([PYTHON, "-c", "import rclpy, sensor_msgs.msg, std_srvs.srv, diagnostic_msgs.msg"],
+                              capture_output=True, timeout=60, check=False).returncode == 0
+    except OSError:
+        return False
+
+
+def node(*arguments):
+    """What a node of ROS says of scanner "left"."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "RMW_", "PYTHONPATH"))}
+    return subprocess.Popen([PYTHON, HERE / "ros_node.py", "left", "camera", *arguments], stdout=subprocess.PIPE, text=True,
+                            env={**environment, "ROS_DOMAIN_ID": str(DOMAIN), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
+
+
+def said(process):
+    out, _ = process.communicate(timeout=200)
+    return json.loads(out)
+
+
+@unittest.skipUnless(has_ros(), "no rclpy: the wheels of ROS 2 come from the network")
+class Ros(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.service = Service().start()
+        cls.addClassCleanup(cls.service.__exit__)
+
+    def test_reads_clouds_and_the_graph_and_triggers(self):
+        with Bridge(self.service, "--rate", "5", "--image-rate", "2", network=NETWORK), slsd.Scanner(self.service.socket) as scanner:
+            seen = said(node(str(CALLS), "30", "points", "camera_info", "image", "compressed"))
+            expected = scanner.scan().points
+        self.assertTrue(seen["found"])
+        self.assertEqual(len(seen["answers"]), CALLS)
+        for answer in seen["answers"]:
+            self.assertIsNotNone(answer, "a trigger had no answer")
+            self.assertTrue(answer[0], answer)
+            self.assertRegex(answer[1], rf"^{len(expected)} points, scan ")
+        print(f"{seen['rmw']}: {len(seen['answers'])} of {CALLS} triggers in {seen['seconds']:.1f} s, {seen['counts']}")
+        self.assertEqual(seen["nodes"].count(["slsd", "/left"]), 1)
+        self.assertIn(["/left/trigger", ["std_srvs/srv/Trigger"]], seen["services"])
+        for topic in ("/left/points", "/left/camera/camera_info", "/left/camera/image_raw", "/diagnostics"):
+            (endpoint,) = [one for one in seen["endpoints"] if one[0] == topic]
+            self.assertEqual(endpoint[1:3], ["/left", "slsd"])
+            self.assertRegex(endpoint[3], "RIHS01_[0-9a-f]{64}")
+        self.assertIn(CLOUD_HASH, next(one[3] for one in seen["endpoints"] if one[0] == "/left/points"))
+        cloud = seen["points"]
+        self.assertEqual([cloud["height"], cloud["width"], cloud["point_step"], cloud["row_step"], cloud["is_dense"]],
+                         [1, len(expected), 24, 24 * len(expected), True])
+        self.assertEqual([tuple(field) for field in cloud["fields"]], FIELDS)
+        self.assertEqual(cloud["frame_id"], "left_optical_frame")
+        self.assertLess(abs(cloud["stamp"] - time.time()), 60)
+        points = np.frombuffer(bytes.fromhex(cloud["data"]), RECORD)
+        for ours, theirs in (("x", "x"), ("y", "y"), ("z", "z"), ("sigma", "sigma_mm")):
+            np.testing.assert_array_equal(points[ours], expected[theirs] / np.float32(1000))
+        for name in ("intensity", "camera"):
+            np.testing.assert_array_equal(points[name], expected[name])
+        for key in ("points", "camera_info", "image", "compressed"):
+            self.assertGreater(seen["counts"][key], 2, key)
+        self.assertEqual(seen["compressed"][0], "mono8; jpeg compressed mono8")
+
+    def test_reads_dense_clouds_and_depth_images_by_best_effort(self):
+        with Bridge(self.service, "--rate", "1", "--density", "pixels", network=NETWORK):
+            seen = said(node("0", "40", "points", "depth", "depth_info"))
+        for key in ("points", "depth", "depth_info"):
+            self.assertGreater(seen["counts"][key], 2, key)
+        width, height, encoding, size = seen["pictures"]["depth"]
+        self.assertEqual([encoding, size], ["32FC1", 4 * width * height])
+        self.assertEqual(seen["infos"]["depth_info"][:2], [width, height])
+
+
+if __name__ == "__main__":
+    unittest.main()
