@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <slsd/scanner.hpp>
 
+#include "description.hpp"
 #include "drivers/files/file.hpp"
 #include "endpoints.hpp"
 #include "extrinsics.hpp"
@@ -27,20 +28,24 @@ using nlohmann::json;
 
 constexpr auto kDiscovery = 2000ms;  // until others of the same name are known
 constexpr auto kRetry = 1s;
-constexpr std::size_t kExtrinsicsBytesMax = 1 << 20;
+constexpr std::size_t kExtrinsicsBytesMax = 1 << 20, kCalibrationBytesMax = 1 << 24;
 
-// A camera may have any name.
-std::string ros_name(std::string name) {
-  std::replace_if(
-      name.begin(), name.end(), [](char c) { return !is_ros_name(std::string("a") + c); }, '_');
-  return is_ros_name(name) ? name : "camera_" + name;
+Result<> check_name(const BridgeOptions& options) {
+  if (is_ros_name(options.name)) return {};
+  return fail(ErrorCode::kInvalidArgument, "a name of ROS has letters, digits and _, and begins with a letter",
+              options.name);
 }
 
-// A body's axes (x forward, y left, z up; REP 103) from those of an optical frame.
-RigidTransform body_from_optical() {
-  RigidTransform turn;
-  turn.rotation << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  return turn;
+Result<std::string> calibration_in_force(const std::string& socket) {
+  try {
+    const std::string text = json::parse(client::Scanner(socket).settings()).value("calibration", "");
+    if (!text.empty()) return text;
+    return fail(ErrorCode::kNotFound, "not calibrated, so nobody knows where the projector is: run slsctl calibrate");
+  } catch (const client::ScannerError& error) {
+    return fail(ErrorCode::kIo, error.what());
+  } catch (const json::exception& error) {
+    return fail(ErrorCode::kIo, std::string("the service's settings are not slsd's: ") + error.what());
+  }
 }
 
 /// A camera of the scanner in the network.
@@ -57,13 +62,14 @@ class Running : public Bridge {
       : options_(options),
         network_(std::move(network)),
         extrinsics_(std::move(extrinsics)),
-        frame_id_(options.name + "_optical_frame") {}
+        frame_id_(rig_frame(options.name)) {}
 
   Result<> open() {
     network_.show_node(options_.name);
     Result<> opened;
     make(points_, ros::PointCloud2::kType, "rt/" + options_.name + "/points", Quality::kSensor, opened);
-    make(transforms_, ros::TFMessage::kType, "rt/tf_static", Quality::kLatched, opened);
+    if (options_.transforms) make(transforms_, ros::TFMessage::kType, "rt/tf_static", Quality::kLatched, opened);
+    make(description_, ros::String::kType, "rt/" + options_.name + "/robot_description", Quality::kLatched, opened);
     make(diagnostics_, ros::DiagnosticArray::kType, "rt/diagnostics", Quality::kService, opened);
     auto trigger = Trigger::open(network_, options_.name);
     if (!trigger) return tl::unexpected(trigger.error());
@@ -219,7 +225,7 @@ class Running : public Bridge {
         const std::string topic = "rt/" + options_.name + "/" + ros_name(name);
         Camera camera;
         camera.name = name;
-        camera.frame_id = cameras_.empty() ? frame_id_ : options_.name + "_" + ros_name(name) + "_optical_frame";
+        camera.frame_id = cameras_.empty() ? frame_id_ : camera_frame(options_.name, name);
         Result<> made;
         make(camera.info, ros::CameraInfo::kType, topic + "/camera_info", Quality::kSensor, made);
         if (options_.image_rate_hz > 0) {
@@ -236,21 +242,27 @@ class Running : public Bridge {
     calibration_date_ = calibration ? calibration->report.date.value_or("") : "";
     stale_ = extrinsics_ && calibration && !extrinsics_->calibration_date.empty() &&
              calibration->report.date.value_or("") != extrinsics_->calibration_date;
-    publish_transforms();
+    std::vector<Device> devices;
+    for (const Camera& camera : cameras_) {
+      if (camera.calibrated)
+        devices.push_back({Device::Kind::kCamera, camera.frame_id, camera.calibrated->rig_from_camera});
+    }
+    if (calibration) devices.push_back(projector(options_.name, *calibration));
+    if (options_.transforms) publish_transforms(devices);
+    description_.write(ros::String{robot_description(options_.name, devices, extrinsics_.has_value())});
     return {};
   }
 
   // With extrinsics that no longer hold the scanner stands nowhere: no place is better than a wrong one.
-  void publish_transforms() {
+  void publish_transforms(const std::vector<Device>& devices) const {
     const auto now = stamp_now();
-    const std::string link = options_.name + "_link";
     std::vector<ros::TransformStamped> all;
-    if (!extrinsics_) all.push_back(transform(link, frame_id_, body_from_optical(), now));
+    if (!extrinsics_) all.push_back(transform(body_frame(options_.name), frame_id_, body_from_rig(), now));
     if (extrinsics_ && !stale_)
       all.push_back(transform(extrinsics_->parent, frame_id_, extrinsics_->parent_from_scanner, now));
-    for (const Camera& camera : cameras_) {
-      if (camera.frame_id != frame_id_ && camera.calibrated)
-        all.push_back(transform(frame_id_, camera.frame_id, camera.calibrated->rig_from_camera, now));
+    for (const Device& device : devices) {
+      if (device.frame_id != frame_id_)
+        all.push_back(transform(frame_id_, device.frame_id, device.rig_from_device, now));
     }
     transforms_.write(ros::TFMessage{std::move(all)});
   }
@@ -278,7 +290,7 @@ class Running : public Bridge {
   Network network_;
   std::optional<Extrinsics> extrinsics_;
   std::string frame_id_;
-  Writer points_, transforms_, diagnostics_;
+  Writer points_, transforms_, description_, diagnostics_;
   Trigger trigger_;
   std::mutex mutex_;           ///< of what is below, up to the threads
   std::list<Camera> cameras_;  ///< changed by the thread of the state alone, as is the next
@@ -291,11 +303,17 @@ class Running : public Bridge {
 
 }  // namespace
 
+Result<std::string> describe(const BridgeOptions& options, const std::filesystem::path& file) {
+  if (auto named = check_name(options); !named) return tl::unexpected(named.error());
+  const auto text = file.empty() ? calibration_in_force(options.socket) : read_file(file, kCalibrationBytesMax);
+  if (!text) return tl::unexpected(text.error());
+  const auto calibration = read_calibration(*text, file.empty() ? "calibration" : file.string());
+  if (!calibration) return tl::unexpected(calibration.error());
+  return robot_description(options.name, devices(options.name, *calibration), !options.extrinsics.empty());
+}
+
 Result<std::unique_ptr<Bridge>> Bridge::start(const BridgeOptions& options, Network network) {
-  if (!is_ros_name(options.name)) {
-    return fail(ErrorCode::kInvalidArgument, "a name of ROS has letters, digits and _, and begins with a letter",
-                options.name);
-  }
+  if (auto named = check_name(options); !named) return tl::unexpected(named.error());
   std::optional<Extrinsics> extrinsics;
   if (!options.extrinsics.empty()) {
     const auto text = read_file(options.extrinsics, kExtrinsicsBytesMax);

@@ -19,8 +19,13 @@ struct BridgeOptions {
   std::string density;               ///< "symbols" or "pixels"; empty: as configured
   Thinning thinning;                 ///< of clouds, and of depth images
   double image_rate_hz = 0;          ///< images of every camera; 0: none
+  bool transforms = true;            ///< false: a robot's own description has the scanner's frames
   std::filesystem::path extrinsics;  ///< where the scanner stands; empty: told by nobody
 };
+
+/// The robot description (URDF) of a scanner: by the calibration in that file, or that of the service if it is empty.
+/// @errors kInvalidArgument: no name of ROS; kNotFound: no file, or not calibrated; kIo: no service; kMalformed
+[[nodiscard]] Result<std::string> describe(const BridgeOptions& options, const std::filesystem::path& file);
 
 /// One scanner in a ROS 2 network. Ends with the process.
 /// Threads: one waits for clouds, one for triggers, one asks for the state each second and for images.

@@ -35,6 +35,13 @@ struct Empty {
   static void fields(auto& m, auto&& each) { each(m.structure_needs_at_least_one_member); }
 };
 
+struct String {
+  static constexpr Type kType{"std_msgs::msg::dds_::String_",
+                              "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"};
+  std::string data;
+  static void fields(auto& m, auto&& each) { each(m.data); }
+};
+
 struct PointField {
   enum : std::uint8_t { kUint8 = 2, kFloat32 = 7 };
   std::string name;

@@ -3,6 +3,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -17,9 +18,16 @@ int failed(const slsd::Error& error) {
   return error.code == slsd::ErrorCode::kInvalidArgument ? 2 : 1;
 }
 
+int describe(const slsd::dds::BridgeOptions& options, const std::string& calibration) {
+  const auto text = slsd::dds::describe(options, calibration);
+  if (!text) return failed(text.error());
+  return std::fputs(text->c_str(), stdout) < 0 || std::fflush(stdout) != 0 ? 1 : 0;
+}
+
 void add_merge_options(CLI::App& app, bool& merges, slsd::dds::MergeOptions& merge) {
   auto* merging = app.add_flag("--merge", merges, "one cloud of several scanners, by --extrinsics");
-  for (const char* alone : {"--socket", "--rate", "--density", "--stride", "--voxel", "--image-rate"})
+  for (const char* alone :
+       {"--socket", "--rate", "--density", "--stride", "--voxel", "--image-rate", "--no-transforms", "--describe"})
     merging->excludes(app.get_option(alone));
   app.add_option("--scanner", merge.scanners, "with --merge: a scanner to merge; without it all of the file")
       ->needs(merging);
@@ -28,6 +36,15 @@ void add_merge_options(CLI::App& app, bool& merges, slsd::dds::MergeOptions& mer
          "with --merge: seconds by which a cloud may be older than the newest (1)")
       ->check(CLI::Range(0.01, 3600.0))
       ->needs(merging);
+}
+
+void add_network_options(CLI::App& app, slsd::dds::NetworkOptions& network) {
+  app.add_option("--rate-max", network.rate_max_mb, "clouds and images leave at so many megabytes a second (64)")
+      ->check(CLI::Range(1.0, 2000.0));
+  app.add_option("--domain", network.domain, "of DDS (0)")->envname("ROS_DOMAIN_ID")->check(CLI::Range(0, 232));
+  app.add_option("--interface", network.interface, "of the network: eth0, lo");
+  app.add_option("--peer", network.peers, "an address of others, where the network has no multicast; may be repeated");
+  app.add_flag("--best-effort", network.best_effort, "do not send again what is lost on the way");
 }
 
 }  // namespace
@@ -53,20 +70,24 @@ int main(int argc, char** argv) {
   app.add_option("--image-rate", options.image_rate_hz, "images a second, 1 or more; 0: none (0)")
       ->check(CLI::Range(0.0, 100.0));
   app.add_option("--extrinsics", options.extrinsics, "where the scanners stand, as TOML");
+  app.add_flag_callback(
+      "--no-transforms", [&options] { options.transforms = false; },
+      "leave /tf_static to a robot's description that has the frames");
+  std::optional<std::string> calibration;
+  app.add_option("--describe", calibration,
+                 "print the scanner as a robot description (URDF): by this calibration file, or that in force")
+      ->expected(0, 1)
+      ->default_str("");
   bool merges = false;
   slsd::dds::MergeOptions merge;
   add_merge_options(app, merges, merge);
-  app.add_option("--rate-max", network.rate_max_mb, "clouds and images leave at so many megabytes a second (64)")
-      ->check(CLI::Range(1.0, 2000.0));
-  app.add_option("--domain", network.domain, "of DDS (0)")->envname("ROS_DOMAIN_ID")->check(CLI::Range(0, 232));
-  app.add_option("--interface", network.interface, "of the network: eth0, lo");
-  app.add_option("--peer", network.peers, "an address of others, where the network has no multicast; may be repeated");
-  app.add_flag("--best-effort", network.best_effort, "do not send again what is lost on the way");
+  add_network_options(app, network);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
+  if (calibration) return describe(options, *calibration);
   // Before the first thread: they all leave these to the one who waits for them.
   sigset_t ends;
   sigemptyset(&ends);

@@ -27,6 +27,7 @@ const std::map<std::string, const dds_topic_descriptor_t*> kTypes{
     {"PointCloud2", &sensor_msgs_msg_dds__PointCloud2__desc},
     {"CameraInfo", &sensor_msgs_msg_dds__CameraInfo__desc},
     {"Image", &sensor_msgs_msg_dds__Image__desc},
+    {"String", &std_msgs_msg_dds__String__desc},
     {"TFMessage", &tf2_msgs_msg_dds__TFMessage__desc},
     {"DiagnosticArray", &diagnostic_msgs_msg_dds__DiagnosticArray__desc}};
 

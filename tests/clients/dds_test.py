@@ -104,6 +104,19 @@ def probe(topic, kind, *more):
     return samples
 
 
+def transforms():
+    """The newest of /tf_static, by their children."""
+    (sample,) = probe("tf_static", "TFMessage", "--latched")
+    return {transform["child"]: transform for transform in sample.transforms()}
+
+
+def turn(quaternion):
+    """The rotation that a unit quaternion (x, y, z, w) stands for."""
+    x, y, z, w = quaternion
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + 2 * w * cross + 2 * cross @ cross
+
+
 class Listener:
     """What is published on a topic, as it comes: the newest sample, and a reader of its own process."""
 
@@ -231,14 +244,28 @@ class Shown(unittest.TestCase):
         np.testing.assert_array_equal(np.frombuffer(message["data"], np.uint8).reshape(frame.shape), frame)
 
     def test_the_optical_frame_hangs_on_the_scanners_body(self):
-        (sample,) = probe("tf_static", "TFMessage", "--latched")
-        (transform,) = sample.transforms()
-        self.assertEqual((transform["header"]["frame_id"], transform["child"]), ("left_link", "left_optical_frame"))
+        transform = transforms()["left_optical_frame"]
+        self.assertEqual(transform["header"]["frame_id"], "left_link")
         self.assertEqual(transform["translation"], [0, 0, 0])
         x, y, z, w = np.array(transform["rotation"])
         forward = np.array([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)])  # of the optical z
         np.testing.assert_allclose(forward, [1, 0, 0], atol=1e-12)
         np.testing.assert_allclose(np.abs([x, y, z, w]), 0.5, atol=1e-12)
+
+    def test_the_projector_stands_where_the_calibration_has_it(self):
+        calibration = self.scanner.settings()["calibration"]
+        r, t = np.reshape(matrix(calibration, r"\bR"), (3, 3)), np.array(matrix(calibration, r"\bT"))
+        transform = transforms()["left_projector_optical_frame"]
+        self.assertEqual(transform["header"]["frame_id"], "left_optical_frame")
+        np.testing.assert_allclose(transform["translation"], -r.T @ t / 1000, atol=1e-12)
+        np.testing.assert_allclose(turn(transform["rotation"]), r.T, atol=1e-12)
+
+    def test_the_robot_description_is_that_which_it_prints(self):
+        (sample,) = probe("left/robot_description", "String", "--latched")
+        printed = subprocess.run([BIN / "slsd-dds", "--name", "left", "--socket", self.service.socket, "--describe"],
+                                 capture_output=True, text=True, timeout=60, check=True).stdout
+        self.assertIn("left_projector_optical_frame", printed)
+        self.assertEqual(sample.text(), printed)
 
     def test_diagnostics_tell_its_state(self):
         (status,) = probe("diagnostics", "DiagnosticArray")[0].diagnostics()["status"]
@@ -294,12 +321,12 @@ class Shown(unittest.TestCase):
         self.assertEqual((read["trigger"]["client_guid"], read["trigger"]["sequence_number"], read["trigger"]["success"]),
                          (0x1122334455667788, 7, True))
         self.assertRegex(read["trigger"]["message"], rf"^{len(self.scanner.scan())} points, scan ")
-        (expected,) = probe("tf_static", "TFMessage", "--latched")[0].transforms()
-        (transform,) = read["transforms"]["transforms"]
-        self.assertEqual(transform["child_frame_id"], expected["child"])
-        self.assertEqual(transform["header"]["frame_id"], expected["header"]["frame_id"])
-        self.assertEqual(list(transform["transform"]["rotation"].values()), expected["rotation"])
-        self.assertEqual(list(transform["transform"]["translation"].values()), expected["translation"])
+        self.assertEqual(len(read["transforms"]["transforms"]), len(transforms()))
+        for transform in read["transforms"]["transforms"]:
+            expected = transforms()[transform["child_frame_id"]]
+            self.assertEqual(transform["header"]["frame_id"], expected["header"]["frame_id"])
+            self.assertEqual(list(transform["transform"]["rotation"].values()), expected["rotation"])
+            self.assertEqual(list(transform["transform"]["translation"].values()), expected["translation"])
 
 
 class Twins(unittest.TestCase):
@@ -481,15 +508,15 @@ class ExtrinsicsFile(unittest.TestCase):
 
     def test_says_where_the_scanner_stands(self):
         with Service() as service, Bridge(service, "--extrinsics", self.write(self.GOOD), "--rate", "0"):
-            (transform,) = probe("tf_static", "TFMessage", "--latched")[0].transforms()
-            self.assertEqual((transform["header"]["frame_id"], transform["child"]), ("cell", "left_optical_frame"))
+            transform = transforms()["left_optical_frame"]
+            self.assertEqual(transform["header"]["frame_id"], "cell")
             np.testing.assert_allclose(transform["translation"], [0.1, 0, 0.05])
             np.testing.assert_allclose(transform["rotation"], [0, 0, 0.5**0.5, 0.5**0.5], atol=1e-12)
 
     def test_of_another_calibration_places_nothing(self):
         stale = self.write(self.GOOD + 'calibration_date = "2001-01-01T00:00:00Z"\n')
         with Service() as service, Bridge(service, "--extrinsics", stale, "--rate", "0"):
-            self.assertEqual(probe("tf_static", "TFMessage", "--latched")[0].transforms(), [])
+            self.assertEqual(list(transforms()), ["left_projector_optical_frame"])  # by the camera, not in the cell
             (status,) = probe("diagnostics", "DiagnosticArray")[0].diagnostics()["status"]
             self.assertEqual(status["level"], 2)
             self.assertIn("extrinsics_stale", status["message"])
