@@ -296,6 +296,8 @@ class LaunchFile(Seen):
         programs = read("name:=left", f"config:={service.file}", "rate:=5")["programs"]
         running = [subprocess.Popen(program["command"], env={**os.environ, **LOOPBACK, **environment}) for program in programs]
         try:
+            wait_until(service.socket.exists, "the socket")
+            service.wait_ready()
             yield service
         finally:
             for process in running:
@@ -336,7 +338,8 @@ class Ros2(Seen):
             launched = subprocess.Popen([*command, "name:=left", f"config:={service.file}", "rate:=5"], env=environment, stdout=log,
                                         stderr=subprocess.STDOUT)
             try:
-                wait_until(lambda: service.socket.exists() or launched.poll() is not None, "the socket")
+                wait_until(service.socket.exists, "the socket")
+                service.wait_ready()
                 self.shows("left", service)
             finally:
                 launched.send_signal(signal.SIGINT)
