@@ -16,6 +16,7 @@
 #include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
 
 #include "drivers/system/file_descriptor.hpp"
+#include "loopback.hpp"
 
 namespace slsd::dds {
 namespace {
@@ -105,15 +106,16 @@ Result<DomainParticipantQos> participant_qos(DomainParticipantQos qos, const Net
   auto udp = std::make_shared<UDPv4TransportDescriptor>();
   udp->maxInitialPeersRange = kParticipantsMax;
   udp->receiveBufferSize = static_cast<std::uint32_t>(std::min(largest_receive_buffer(), 64 << 20));
+  bool alone = range == Range::kOff || (range == Range::kLocalhost && peers.empty());
   if (!options.interface.empty()) {
     const auto address = address_of_interface(options.interface);
     if (!address) return tl::unexpected(address.error());
     udp->interfaceWhiteList.push_back(*address);
-  } else if (range == Range::kOff || (range == Range::kLocalhost && peers.empty())) {
-    udp->interfaceWhiteList.emplace_back(kLoopback);
+    alone = *address == kLoopback;
   }
   qos.transport().use_builtin_transports = false;  // shared memory is not that of other versions of Fast DDS
-  qos.transport().user_transports.push_back(udp);
+  if (alone) qos.transport().user_transports.push_back(loopback_transport(udp));
+  if (!alone) qos.transport().user_transports.push_back(udp);
 
   auto& builtin = qos.wire_protocol().builtin;
   if (range == Range::kLocalhost) peers.emplace_back(kLoopback);

@@ -23,8 +23,7 @@ import slsd  # noqa: E402
 from dds_test import DOMAIN, FIELDS, RECORD, Bridge  # noqa: E402
 from service import Service  # noqa: E402
 
-# Nodes of ROS tell their host's addresses other than loopback's, so it listens to all.
-NETWORK = ["--domain", str(DOMAIN), "--peer", "127.0.0.1"]
+LOCALHOST = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 PYTHON = os.environ.get("SLSD_ROS_PYTHON", str(HERE.parents[1] / "build/ros-venv/bin/python"))
 CALLS = int(os.environ.get("SLSD_ROS_CALLS", "30"))
 CLOUD_HASH = "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5"
@@ -38,16 +37,19 @@ def has_ros():
         return False
 
 
-def node(*arguments):
+def node(*arguments, **environment):
     """What a node of ROS says of scanner "left"."""
-    environment = {key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "RMW_", "PYTHONPATH"))}
-    return subprocess.Popen([PYTHON, HERE / "ros_node.py", "left", "camera", *arguments], stdout=subprocess.PIPE, text=True,
-                            env={**environment, "ROS_DOMAIN_ID": str(DOMAIN), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
+    mine = {key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "RMW_", "PYTHONPATH"))}
+    done = subprocess.run([PYTHON, HERE / "ros_node.py", "left", "camera", *arguments], capture_output=True, text=True, timeout=200,
+                          env={**mine, "ROS_DOMAIN_ID": str(DOMAIN), **(environment or LOCALHOST)}, check=False)
+    if done.returncode != 0:
+        raise RuntimeError(done.stderr)
+    return json.loads(done.stdout)
 
 
-def said(process):
-    out, _ = process.communicate(timeout=200)
-    return json.loads(out)
+def shown(service, *options, **environment):
+    """It finds nodes as ROS's own do: by the environment alone."""
+    return Bridge(service, *options, network=["--domain", str(DOMAIN)], **(environment or LOCALHOST))
 
 
 @unittest.skipUnless(has_ros(), "no rclpy: the wheels of ROS 2 come from the network")
@@ -58,8 +60,8 @@ class Ros(unittest.TestCase):
         cls.addClassCleanup(cls.service.__exit__)
 
     def test_reads_clouds_and_the_graph_and_triggers(self):
-        with Bridge(self.service, "--rate", "5", "--image-rate", "2", network=NETWORK), slsd.Scanner(self.service.socket) as scanner:
-            seen = said(node(str(CALLS), "30", "points", "camera_info", "image", "compressed"))
+        with shown(self.service, "--rate", "5", "--image-rate", "2"), slsd.Scanner(self.service.socket) as scanner:
+            seen = node("--calls", str(CALLS), "--topics", "points", "camera_info", "image", "compressed")
             expected = scanner.scan().points
         self.assertTrue(seen["found"])
         self.assertEqual(len(seen["answers"]), CALLS)
@@ -91,13 +93,27 @@ class Ros(unittest.TestCase):
         self.assertEqual(seen["compressed"][0], "mono8; jpeg compressed mono8")
 
     def test_reads_dense_clouds_and_depth_images_by_best_effort(self):
-        with Bridge(self.service, "--rate", "1", "--density", "pixels", network=NETWORK):
-            seen = said(node("0", "40", "points", "depth", "depth_info"))
+        with shown(self.service, "--rate", "1", "--density", "pixels"):
+            seen = node("--topics", "points", "depth", "depth_info")
         for key in ("points", "depth", "depth_info"):
             self.assertGreater(seen["counts"][key], 2, key)
         width, height, encoding, size = seen["pictures"]["depth"]
         self.assertEqual([encoding, size], ["32FC1", 4 * width * height])
         self.assertEqual(seen["infos"]["depth_info"][:2], [width, height])
+
+    def test_finds_it_however_both_are_restricted_to_this_host(self):
+        only, peers = {"ROS_LOCALHOST_ONLY": "1"}, {**LOCALHOST, "ROS_STATIC_PEERS": "127.0.0.1"}
+        for ours, theirs in ((only, only), (only, LOCALHOST), (LOCALHOST, only), (peers, LOCALHOST), (LOCALHOST, peers)):
+            with self.subTest(ours=ours, theirs=theirs), shown(self.service, "--rate", "5", **ours):
+                seen = node("--calls", "1", "--topics", "points", **theirs)
+                self.assertEqual([answer and answer[0] for answer in seen["answers"]], [True])
+                self.assertGreater(seen["counts"]["points"], 2)
+                self.assertEqual(seen["nodes"].count(["slsd", "/left"]), 1)
+
+    def test_finds_none_that_is_off(self):
+        with shown(self.service, "--rate", "5", ROS_AUTOMATIC_DISCOVERY_RANGE="OFF"):
+            seen = node()
+        self.assertEqual((seen["found"], seen["nodes"]), (False, [["reader", "/"]]))
 
 
 if __name__ == "__main__":
