@@ -13,6 +13,7 @@ endif()
 include(CTest)
 option(SLSD_BENCHMARKS "Build the benchmarks" ON)
 option(SLSD_UNITY "Compile the files of a library together: quicker from nothing, slower after a change of one of them" ON)
+option(SLSD_DEVICES "Build the drivers of cameras and projectors, calibrating and all clients; OFF: slsd and slsctl for recorded frames" ON)
 option(SLSD_FUZZERS "Build the libFuzzer targets (needs clang)" OFF)
 set(SLSD_SANITIZE "" CACHE STRING "Sanitizers to build with, as for -fsanitize=")
 
@@ -21,8 +22,12 @@ function(slsd_compile_apart)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
-# For libraries of which a small program, as slsd-picture, is linked with what it needs alone.
+# For libraries of which a small program, as slsd-picture, is linked with what it needs alone. Without devices the time to
+# build counts.
 function(slsd_link_by_file target)
+  if(NOT SLSD_DEVICES)
+    return()
+  endif()
   set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
 endfunction()
 

@@ -40,7 +40,7 @@ class AccessRules {
 
   /// Root, and who runs the service, may everything.
   [[nodiscard]] Role role_of(const Peer& peer) const;
-  /// "be in the group slsd-admin": what gives somebody the role.
+  /// "be in the group slsd-admin, and log in again: ...": what gives somebody the role.
   [[nodiscard]] const std::string& way_to(Role role) const { return ways_[static_cast<std::size_t>(role)]; }
 
  private:

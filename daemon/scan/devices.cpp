@@ -2,12 +2,12 @@
 // Copyright the slsd authors
 #include "daemon/scan/devices.hpp"
 
+#include "daemon/scan/headless_options.hpp"
 #include "drivers/camera/aravis/aravis_camera.hpp"
 #include "drivers/camera/faulty_camera.hpp"
 #include "drivers/camera/file_camera.hpp"
 #include "drivers/camera/v4l2/v4l2_camera.hpp"
 #include "drivers/projector/glfw/glfw_projector.hpp"
-#include "drivers/projector/headless_projector.hpp"
 #include "drivers/projector/x11/x_display.hpp"
 
 namespace slsd {
@@ -34,12 +34,7 @@ Result<std::unique_ptr<Projector>> make_projector(const ProjectorOptions& option
         .refresh_hz = options.refresh_hz,
     });
   }
-  HeadlessProjectorOptions headless;
-  headless.width_px = options.width_px;
-  headless.height_px = options.height_px;
-  headless.light = options.light;
-  if (options.refresh_hz > 0) headless.refresh_hz = options.refresh_hz;
-  return std::make_unique<HeadlessProjector>(std::move(headless));
+  return std::make_unique<HeadlessProjector>(headless_options(options));
 }
 
 }  // namespace slsd

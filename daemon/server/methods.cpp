@@ -429,8 +429,7 @@ RpcError not_for(Session& session, const RpcMethod& method) {
   return rpc_error({ErrorCode::kPermissionDenied,
                     "\"" + std::string(method.name) + "\" takes the role \"" + std::string(to_string(method.role)) +
                         "\", and user " + std::to_string(peer.user) + " has \"" +
-                        std::string(to_string(session.role())) + "\": " + session.way_to(method.role) +
-                        ", and connect again",
+                        std::string(to_string(session.role())) + "\": " + session.way_to(method.role),
                     {}});
 }
 

@@ -118,10 +118,10 @@ std::optional<Error> Server::refuses(const Peer& peer) const {
     return Error{ErrorCode::kBusy, std::to_string(places) + " clients are connected: try again later", {}};
   const Role role = room_->access.role_of(peer);
   if (role == Role::kNone) {
-    return Error{ErrorCode::kPermissionDenied,
-                 "user " + std::to_string(peer.user) +
-                     " may not use this scanner: " + room_->access.way_to(Role::kObserve) + ", and connect again",
-                 {}};
+    return Error{
+        ErrorCode::kPermissionDenied,
+        "user " + std::to_string(peer.user) + " may not use this scanner: " + room_->access.way_to(Role::kObserve),
+        {}};
   }
   const auto own = static_cast<std::size_t>(
       std::ranges::count_if(sessions_, [&](const auto& session) { return session->peer().user == peer.user; }));

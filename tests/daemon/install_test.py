@@ -16,6 +16,10 @@ import time
 import unittest
 
 CMAKE, BUILD = sys.argv[1:3]
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+# Whose messages, comments and pages of the manual a user reads.
+NAMING = ("core", "daemon", "drivers", "picture", "clients", "config", "man", "systemd")
+PAGE = re.compile(r"\bdocs/[a-z_-]+\.md\b")
 UNITS = ("slsd.service", "slsd.socket", "slsd@.service", "slsd@.socket", "slsd-display.service", "slsd-web.service",
          "slsd-metrics.service", "slsd-metrics.timer")
 DDS_UNITS = ("slsd-dds.service", "slsd-dds@.service") if (pathlib.Path(BUILD) / "bin/slsd-dds").exists() else ()
@@ -100,6 +104,18 @@ class Install(unittest.TestCase):
             dds = "ExecStart=/usr/bin/slsd-dds --name {} --socket /run/slsd/{}.sock\n"
             self.assertIn(dds.format("scanner", "slsd"), self.unit("slsd-dds.service"))
             self.assertIn(dds.format("%i", "%i"), self.unit("slsd-dds@.service"))
+
+    def test_brings_the_pages_that_texts_name(self):
+        install("/usr", str(self.root))
+        pages = self.root / "usr/share/doc/slsd"
+        named = {(file, page) for folder in NAMING for file in (SOURCE / folder).rglob("*") if file.is_file()
+                 for page in PAGE.findall(file.read_text(encoding="utf-8", errors="ignore"))}
+        self.assertTrue(named)
+        missing = [f"{file.relative_to(SOURCE)} names {page}" for file, page in named if not (pages / page).is_file()]
+        self.assertFalse(missing)
+        packaged = (SOURCE / "debian/slsd.install").read_text(encoding="utf-8").split()
+        self.assertIn("usr/share/doc/slsd", packaged)
+        self.assertRegex((SOURCE / "debian/rules").read_text(encoding="utf-8"), r"dh_compress -X\.md")
 
     def unit(self, name, prefix="usr"):
         return (self.root / prefix / "lib/systemd/system" / name).read_text(encoding="utf-8")

@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""Runs every block of README.md and docs/installing.md as it is written, in an empty Debian, as a user who has sudo:
+newcomer.py ROOT SOURCES [--quick]. As root. ROOT is a Debian with systemd and sudo; SOURCES a clone."""
+import argparse
+import contextlib
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import time
+
+from blocks import blocks_of, fits, session_of
+from machine import Container, require
+
+PAGES = ("README.md", "docs/installing.md")
+USER, HOME = "newcomer", "/home/newcomer"
+PATIENCE_S = 4 * 3600
+# What stands for the devices that the reader writes into the configuration.
+STAND_IN = "sed s#/run/slsd/example.sock#/run/slsd/slsd.sock# /etc/slsd/example.toml >/etc/slsd/slsd.toml"
+NEEDS_A_PERSON = "slsctl calibrate"  # waits for a board
+
+
+def lay_out(root, sources):
+    home = root / HOME[1:]
+    shutil.rmtree(home / "slsd", ignore_errors=True)
+    shutil.copytree(sources, home / "slsd", symlinks=True)
+    subprocess.run(["chroot", root, "chown", "-R", f"{USER}:", HOME], check=True)
+    shutil.copy("/etc/resolv.conf", root / "etc/resolv.conf")
+
+
+class Newcomer:
+    def __init__(self, machine, quick):
+        self.machine, self.quick = machine, quick
+
+    def login(self, script, environment=""):
+        """What a shell of a new login makes of it. @return its exit status and what it printed"""
+        self.machine.write(f"{HOME}/block", script)  # not by its standard input, which its programs may read
+        return self.machine.run("su", "-", USER, "-c", f"cd slsd && {environment} bash -e ~/block", check=False, patience_s=PATIENCE_S)
+
+    def run_shell(self, text):
+        if self.quick:
+            text = re.sub(r"(?m)^\./run test\b.*$", "true", text)
+        status, printed = self.login(text)
+        require(status == 0, f"status {status}:\n{printed[-3000:]}")
+
+    def run_python(self, text):
+        self.machine.write(f"{HOME}/program.py", text)
+        self.machine.run("systemctl", "start", "slsd@example.socket")
+        status, printed = self.login("python3 ~/program.py", "SLSD_SOCKET=/run/slsd/example.sock")
+        require(status == 0, f"status {status}:\n{printed[-3000:]}")
+
+    def run_session(self, text):
+        for command, expected in session_of(text):
+            if command.startswith(NEEDS_A_PERSON):
+                _, printed = self.login(f"timeout --signal INT 20 {command}")
+                require("board" in printed and "slsd-admin" not in printed, f"{command} prints:\n{printed}")
+                self.login("slsctl calibrate cancel")
+                continue
+            _, printed = self.login(command)
+            require(fits(expected, printed), f"{command} prints:\n{printed}instead of:\n" + "\n".join(expected))
+
+    def write_configuration(self, _):
+        self.machine.shell(STAND_IN)
+
+    def run(self, block):
+        """@return whether it ran as written"""
+        begin = time.monotonic()
+        ways = {"sh": self.run_shell, "python": self.run_python, "console": self.run_session, "toml": self.write_configuration}
+        first = block.text.splitlines()[0]
+        try:
+            require(block.language in ways, f"nobody knows how to run a block of '{block.language}'")
+            ways[block.language](block.text)
+        except (AssertionError, TimeoutError) as error:
+            print(f"FAILED  {block.place}: {first}\n{error}", flush=True)
+            return False
+        print(f"ok      {block.place}: {first} ({time.monotonic() - begin:.0f} s)", flush=True)
+        return True
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("root", type=pathlib.Path)
+    parser.add_argument("sources", type=pathlib.Path)
+    parser.add_argument("--quick", action="store_true", help="pass over ./run test")
+    arguments = parser.parse_args()
+    root = arguments.root.resolve()
+    lay_out(root, arguments.sources)
+    blocks = [block for page in PAGES for block in blocks_of(page, (arguments.sources / page).read_text(encoding="utf-8"))]
+    with contextlib.closing(Container(root)) as machine:
+        newcomer = Newcomer(machine, arguments.quick)
+        before = installed_on(machine)
+        failed = 0
+        for block in blocks:
+            failed += not newcomer.run(block)
+            if block is blocks[0]:
+                print(f"{installed_on(machine) - before} packages for the first block", flush=True)
+    print(f"{failed} of {len(blocks)} blocks failed", flush=True)
+    return 1 if failed else 0
+
+
+def installed_on(machine):
+    return int(machine.shell("dpkg-query -W -f '${db:Status-Status}\\n' | grep -c ^installed")[1])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
