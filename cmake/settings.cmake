@@ -22,12 +22,8 @@ function(slsd_compile_apart)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
-# For libraries of which a small program, as slsd-picture, is linked with what it needs alone. Without devices the time to
-# build counts.
+# For libraries of which a small program, as slsd-picture, is linked with what it needs alone.
 function(slsd_link_by_file target)
-  if(NOT SLSD_DEVICES)
-    return()
-  endif()
   set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
 endfunction()
 
