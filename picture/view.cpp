@@ -12,8 +12,8 @@
 namespace slsd {
 namespace {
 
-constexpr double kAzimuthRad = 0.56;
-constexpr double kElevationRad = 0.36;
+constexpr double kAzimuthRad = 0.3;
+constexpr double kElevationRad = 0.22;
 constexpr double kTrimmedOfAxis = 0.002;  // at either end of an axis
 constexpr double kMargin = 0.05;
 constexpr double kThinnest = 0.2;  // of the widest side
