@@ -9,6 +9,7 @@
 #include <mutex>
 #include <stop_token>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -120,11 +121,9 @@ class Running : public Bridge {
                                                                                        : std::string());
     const std::lock_guard lock(mutex_);
     lost_ += cloud.lost;
-    if (points_.write(point_cloud(cloud, {stamp, frame_id_}, calibrated_, options_.thinning))) {
-      ++published_;
-    } else {
-      say("a cloud was not published: the one before it has not left yet");
-    }
+    const bool written = points_.write(point_cloud(cloud, {stamp, frame_id_}, calibrated_, options_.thinning));
+    ++(written ? published_ : lost_);
+    if (!written && !std::exchange(overtaken_, true)) say(kOvertaken);
     std::uint8_t index = 0;
     for (Camera& camera : cameras_) {
       const std::uint8_t i = index++;
@@ -297,6 +296,7 @@ class Running : public Bridge {
   std::vector<CalibratedCamera> calibrated_;
   std::string calibration_text_, calibration_date_, said_;
   bool stale_ = false;
+  bool overtaken_ = false;  ///< a cloud was not published
   std::atomic<std::uint64_t> published_{0}, lost_{0};
   std::jthread clouds_, triggers_, state_;
 };

@@ -13,6 +13,11 @@ namespace slsd::dds {
 
 /// What a scanner and a merged cloud have in common in a ROS 2 network, beside their clouds.
 
+/// Said once when clouds come faster than they may leave.
+inline constexpr const char* kOvertaken =
+    "clouds come faster than they may leave, and some are not published: lower --rate, thin them by --stride or "
+    "--voxel, or raise --rate-max";
+
 /// Whether ROS takes it for a topic's name: letters, digits and _, a letter first.
 [[nodiscard]] bool is_ros_name(const std::string& name);
 

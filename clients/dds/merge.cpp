@@ -13,6 +13,7 @@
 #include <stop_token>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "drivers/files/file.hpp"
 #include "endpoints.hpp"
@@ -267,11 +268,9 @@ class Running : public Merge {
     message.point_fields = point_fields(true);
     point_count_ = merged.size() / kPointStep;
     set_points(message, std::move(merged));
-    if (points_.write(message)) {
-      ++published_;
-    } else {
-      say("a cloud was not published: the one before it has not left yet");
-    }
+    const bool written = points_.write(message);
+    if (written) ++published_;
+    if (!written && !std::exchange(overtaken_, true)) say(kOvertaken);
     return parts;
   }
 
@@ -372,6 +371,7 @@ class Running : public Merge {
   std::vector<Source> sources_;
   std::size_t point_count_ = 0;  ///< of the newest merged cloud
   bool triggered_ = false;
+  bool overtaken_ = false;  ///< a cloud was not published
   std::uint64_t published_ = 0;
   std::jthread merging_, triggers_, state_;
 };

@@ -38,6 +38,7 @@ constexpr int kDenseCloudBytes = 10 << 20;
 constexpr std::uint8_t kCycloneVendor[] = {0x01, 0x10};
 constexpr auto kHearing = 1s;     // until a client's reader of replies is known
 constexpr auto kBlockingMax = 5;  // seconds that a write waits for the one before it to leave
+constexpr auto kBacklogMax = 1s;  // until what was written before has left
 
 /// Samples of any type, as their bytes.
 class BytesType : public fast::TopicDataType {
@@ -132,8 +133,30 @@ struct Events {
   std::condition_variable changed;
 };
 
+/// When the clouds and images that were written have left.
+class Backlog {
+ public:
+  explicit Backlog(double bytes_per_s) : bytes_per_s_(bytes_per_s) {}
+  /// Whether there is room for so many bytes more. Without this check a writer that is too fast drops each sample that
+  /// it is about to finish.
+  bool take(std::size_t bytes) {
+    const std::lock_guard lock(mutex_);
+    const auto now = std::chrono::steady_clock::now();
+    if (until_ > now + kBacklogMax) return false;
+    const std::chrono::duration<double> takes(static_cast<double>(bytes) / bytes_per_s_);
+    until_ = std::max(until_, now) + std::chrono::duration_cast<std::chrono::nanoseconds>(takes);
+    return true;
+  }
+
+ private:
+  double bytes_per_s_;
+  std::mutex mutex_;
+  std::chrono::steady_clock::time_point until_;
+};
+
 struct Writer::State : fast::DataWriterListener {
-  State(Events& heard, std::shared_mutex& in_use, const bool& is_left) : events(heard), use(in_use), left(is_left) {}
+  State(Events& heard, std::shared_mutex& in_use, const bool& is_left, Backlog* waiting)
+      : events(heard), use(in_use), left(is_left), backlog(waiting) {}
   void on_publication_matched(fast::DataWriter*, const fast::PublicationMatchedStatus& info) override {
     const std::lock_guard lock(events.mutex);
     const auto guid = bytes_of(rtps::iHandle2GUID(info.last_subscription_handle));
@@ -145,6 +168,7 @@ struct Writer::State : fast::DataWriterListener {
   Events& events;
   std::shared_mutex& use;
   const bool& left;
+  Backlog* backlog;  ///< of a topic of sensors
   fast::DataWriter* writer = nullptr;
   std::set<std::array<std::uint8_t, 16>> readers;
 };
@@ -169,6 +193,8 @@ struct Reader::State : fast::DataReaderListener {
 };
 
 struct Network::State : fast::DomainParticipantListener {
+  explicit State(const NetworkOptions& options)
+      : best_effort(options.best_effort), backlog(options.rate_max_mb * 1e6) {}
   void on_publisher_discovery(fast::DomainParticipant*, rtps::WriterDiscoveryInfo&& info) override {
     const std::lock_guard lock(events.mutex);
     const rtps::GUID_t& guid = info.info.guid();
@@ -212,7 +238,8 @@ struct Network::State : fast::DomainParticipantListener {
   Events events;
   std::shared_mutex use;  ///< held by all who call DDS; alone by the one who leaves
   bool left = false;
-  bool best_effort = false;
+  bool best_effort;
+  Backlog backlog;
   std::mutex making;  ///< of endpoints: what is below, up to the others
   std::map<std::string, fast::Topic*> topics;
   std::list<Writer::State> writers;
@@ -253,10 +280,12 @@ bool Writer::write_bytes(const Bytes& bytes, const Requester* to) const {
     related.related_sample_identity().writer_guid(guid_of(to->guid));
     related.related_sample_identity().sequence_number(rtps::SequenceNumber_t(to->sequence_number));
   }
-  // Sends a heartbeat first. Cyclone's readers pass over all that is older than the first one that they hear, and a
-  // large sample is still on its way when the next is due.
-  if (state_->writer->get_qos().liveliness().kind == fast::MANUAL_BY_TOPIC_LIVELINESS_QOS)
+  if (state_->backlog) {
+    if (has_readers() && !state_->backlog->take(bytes.size())) return false;
+    // Sends a heartbeat first. Cyclone's readers pass over all that is older than the first one that they hear, and a
+    // large sample is still on its way when the next is due.
     state_->writer->assert_liveliness();
+  }
   return state_->writer->write(const_cast<Bytes*>(&bytes), related);
 }
 
@@ -314,8 +343,7 @@ Result<Network> Network::open(const NetworkOptions& options) {
   factory->load_profiles();  // the user's own, by FASTRTPS_DEFAULT_PROFILES_FILE
   const auto qos = participant_qos(factory->get_default_participant_qos(), options);
   if (!qos) return tl::unexpected(qos.error());
-  auto state = std::make_unique<State>();
-  state->best_effort = options.best_effort;
+  auto state = std::make_unique<State>(options);
   const auto mask = fast::StatusMask::none();  // discovery alone; endpoints have their own listeners
   state->participant = factory->create_participant(options.domain, *qos, state.get(), mask);
   if (!state->participant) {
@@ -342,7 +370,8 @@ void Network::show_node(const std::string& name_space) {
 
 Result<Writer> Network::writer(const ros::Type& type, const std::string& topic, Quality quality) const {
   const std::lock_guard lock(state_->making);
-  auto& made = state_->writers.emplace_back(state_->events, state_->use, state_->left);
+  auto& made = state_->writers.emplace_back(state_->events, state_->use, state_->left,
+                                            quality == Quality::kSensor ? &state_->backlog : nullptr);
   made.writer = state_->publisher->create_datawriter(state_->topic(type, topic),
                                                      writer_qos(type, quality, state_->best_effort), &made);
   if (!made.writer) return tl::unexpected(not_made(topic));

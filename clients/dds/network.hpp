@@ -24,7 +24,7 @@ struct NetworkOptions {
   std::string interface;           ///< "eth0", "lo", or an address; empty: all
   std::vector<std::string> peers;  ///< addresses of the others, without multicast; empty: as `discovery` says
   bool best_effort = false;        ///< clouds and images that are lost on the way are not sent again
-  double rate_max_mb = 64;         ///< clouds and images leave at no more megabytes a second than this
+  double rate_max_mb = 16;         ///< clouds and images leave at no more megabytes a second than this
   Discovery discovery;             ///< of ROS's environment
 };
 
@@ -49,6 +49,7 @@ struct Sample {
 /// Writes to one topic, and waits for no reader. @thread thread-safe
 class Writer {
  public:
+  /// False if what was written before will not leave within a second: clouds and images come too fast.
   template <Message Value>
   bool write(const Value& message) const {
     return write_bytes(encode(message), nullptr);

@@ -72,11 +72,10 @@ class Replay:
             time.sleep(max(0, due - time.monotonic()))
 
 
-def measure(scanners=1, points=2600, rate_hz=10.0, seconds=10.0, stalled=False, best_effort=False, environment=None):
+def measure(scanners=1, points=2600, rate_hz=10.0, seconds=10.0, stalled=False, best_effort=False, rate_max_mb=16.0):
     """@return sent, received, lost (of those after the first that arrived), delays_ms sorted, cpu_s"""
     domain = 120 + os.getpid() % 100
-    quiet = {**os.environ, **(environment or {})}
-    network = ["--domain", str(domain), "--interface", "lo", "--peer", "127.0.0.1"]
+    network = ["--domain", str(domain), "--interface", "lo", "--peer", "127.0.0.1", "--rate-max", str(rate_max_mb)]
     names = [f"s{i}" for i in range(scanners)]
     topics = [word for name in names for word in ("--topic", f"{name}/points")]
     read = [BIN / "dds_probe", "--domain", str(domain), *topics, "--stamps", "--count", "1000000000", "--seconds", "600"]
@@ -85,15 +84,14 @@ def measure(scanners=1, points=2600, rate_hz=10.0, seconds=10.0, stalled=False, 
         folder = files.enter_context(tempfile.TemporaryDirectory())
         services = {name: Replay(pathlib.Path(folder), name, points, rate_hz) for name in names}
         try:
-            other = subprocess.Popen(read, stdout=subprocess.DEVNULL, env=quiet) if stalled else None
+            other = subprocess.Popen(read, stdout=subprocess.DEVNULL) if stalled else None
             processes += [other] if other else []
             out = files.enter_context(tempfile.TemporaryFile("w+"))
-            reader = subprocess.Popen(read + (["--best-effort"] if best_effort else []), stdout=out, env=quiet)
+            reader = subprocess.Popen(read + (["--best-effort"] if best_effort else []), stdout=out)
             processes.append(reader)
             for name in names:
                 processes.append(subprocess.Popen(
-                    [BIN / "slsd-dds", "--name", name, "--socket", services[name].path, *network], env=quiet,
-                    stderr=subprocess.DEVNULL))
+                    [BIN / "slsd-dds", "--name", name, "--socket", services[name].path, *network], stderr=subprocess.DEVNULL))
             give_up = time.monotonic() + 60
             while not all(len(service.sent) > 5 for service in services.values()) and time.monotonic() < give_up:
                 time.sleep(0.1)
@@ -135,8 +133,9 @@ def main():
     parser.add_argument("--seconds", type=float, default=10)
     parser.add_argument("--stalled", action="store_true", help="a second reader of all is stopped meanwhile")
     parser.add_argument("--best-effort", action="store_true", help="the reader asks for sensors' QoS")
+    parser.add_argument("--rate-max", type=float, default=16, help="megabytes a second, as slsd-dds has it")
     given = parser.parse_args()
-    got = measure(given.scanners, given.points, given.rate, given.seconds, given.stalled, given.best_effort)
+    got = measure(given.scanners, given.points, given.rate, given.seconds, given.stalled, given.best_effort, given.rate_max)
     delays = got["delays_ms"] or [float("nan")]
     print(f"{given.scanners} scanners, {given.points} points, {given.rate:g}/s, {given.seconds:g} s"
           f"{', a second reader stalled' if given.stalled else ''}{', best effort' if given.best_effort else ''}: "

@@ -29,7 +29,7 @@ import numpy as np  # noqa: E402
 import slsd  # noqa: E402
 from dds_load import measure  # noqa: E402
 from python_test import Impostor, ply, result  # noqa: E402
-from service import BIN, Service, wait_until  # noqa: E402
+from service import BIN, SCENE, Service, wait_until  # noqa: E402
 
 DOMAIN = 20 + os.getpid() % 100
 LOOPBACK = ["--domain", str(DOMAIN), "--interface", "lo", "--peer", "127.0.0.1"]
@@ -281,7 +281,8 @@ class Shown(unittest.TestCase):
     def test_another_of_the_same_name_is_told(self):
         probe("left/points", "PointCloud2")  # it is there
         with Bridge(self.service) as second:
-            wait_until(lambda: "name_taken" in second.said(), "that the name is taken")
+            self.assertEqual(second.process.wait(30), 1)
+            self.assertIn("name_taken", second.said())
 
     def test_buffers_too_small_for_a_dense_cloud_are_told(self):
         allowed = int(pathlib.Path("/proc/sys/net/core/rmem_max").read_text(encoding="utf-8"))
@@ -327,6 +328,61 @@ class Shown(unittest.TestCase):
             self.assertEqual(transform["header"]["frame_id"], expected["header"]["frame_id"])
             self.assertEqual(list(transform["transform"]["rotation"].values()), expected["rotation"])
             self.assertEqual(list(transform["transform"]["translation"].values()), expected["translation"])
+
+
+class Thinned(unittest.TestCase):
+    def shown(self, density, *more):
+        """What is published of a scan, and the whole of it in metres."""
+        with Service() as service, slsd.Scanner(service.socket) as scanner:
+            whole = scanner.scan(density=density, timeout_s=60).points
+            with Bridge(service, "--rate", "2", "--density", density, *more):
+                message = probe("left/points", "PointCloud2")[0].point_cloud()
+        return np.frombuffer(message["data"], RECORD), whole
+
+    def test_by_voxels_has_the_first_point_of_each(self):
+        points, whole = self.shown("symbols", "--voxel", "50")
+        cells = np.floor(np.stack([whole[axis] for axis in "xyz"], axis=1).astype(float) / 50)
+        _, first = np.unique(cells, axis=0, return_index=True)
+        self.assertLess(len(first), len(whole) / 2)
+        for axis in "xyz":
+            np.testing.assert_array_equal(points[axis], whole[axis][np.sort(first)] / np.float32(1000))
+
+    def test_by_stride_has_every_third_pixel_of_every_third_row(self):
+        points, whole = self.shown("pixels", "--stride", "3")
+        self.assertAlmostEqual(len(points) / len(whole), 1 / 9, delta=0.01)
+        every = {tuple(point) for point in np.stack([whole[axis] / np.float32(1000) for axis in "xyz"], axis=1).tolist()}
+        self.assertTrue(every.issuperset(map(tuple, np.stack([points[axis] for axis in "xyz"], axis=1).tolist())))
+
+    def test_to_what_may_leave_says_so_and_counts_the_rest(self):
+        with Service() as service, Bridge(service, "--density", "pixels", "--rate-max", "1") as bridge, \
+                States() as states, Listener("left/points", "PointCloud2") as clouds:
+            clouds.next()
+            clouds.next()
+            wait_until(lambda: int(states.samples.get("left: slsd", {"values": {"clouds lost before publishing": "0"}})["values"]
+                                   ["clouds lost before publishing"]) > 2, "that clouds are lost")
+            self.assertEqual(bridge.said().count("clouds come faster than they may leave"), 1)
+
+
+class Empty(unittest.TestCase):
+    def test_clouds_say_why(self):
+        with Service(camera_path=SCENE / "black.png") as dark, Bridge(dark, "--rate", "5"), States() as states:
+            done = subprocess.run([BIN / "dds_probe", "--domain", str(DOMAIN), "--call", "left"], capture_output=True, text=True,
+                                  timeout=120, check=True)
+            self.assertRegex(done.stdout, r" 1 0 points, scan \S+: no symbol of the pattern was decoded")
+            wait_until(lambda: states.samples.get("left: slsd", {}).get("message", "").startswith(
+                "the last cloud is empty: no symbol of the pattern was decoded"), "why it is empty")
+            self.assertEqual(states.samples["left: slsd"]["level"], 1)
+
+
+class Usage(unittest.TestCase):
+    def test_that_is_misspelt_is_answered_with_the_nearest(self):
+        for words, hint in ((["--intefrace", "lo"], "did you mean --interface?"), (["--density", "pixel"], "did you mean pixels?"),
+                            (["--stride", "0"], '"0" is no number from 1 to 16'),
+                            (["--name", "--rate"], "a value is missing before --rate"),
+                            (["--scanner", "left"], "--scanner needs --merge"), (["left"], 'no argument "left"')):
+            done = subprocess.run([BIN / "slsd-dds", *words], capture_output=True, text=True, timeout=60, check=False)
+            self.assertEqual((done.returncode, done.stdout), (2, ""))
+            self.assertIn(hint, done.stderr)
 
 
 class Twins(unittest.TestCase):

@@ -21,7 +21,7 @@ import numpy as np  # noqa: E402
 
 import slsd  # noqa: E402
 from dds_test import DOMAIN, FIELDS, RECORD, Bridge  # noqa: E402
-from service import Service  # noqa: E402
+from service import BIN, Service  # noqa: E402
 
 LOCALHOST = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 PYTHON = os.environ.get("SLSD_ROS_PYTHON", str(HERE.parents[1] / "build/ros-venv/bin/python"))
@@ -100,6 +100,16 @@ class Ros(unittest.TestCase):
         width, height, encoding, size = seen["pictures"]["depth"]
         self.assertEqual([encoding, size], ["32FC1", 4 * width * height])
         self.assertEqual(seen["infos"]["depth_info"][:2], [width, height])
+
+    def test_is_answered_beside_a_client_of_another_middleware(self):
+        call = [BIN / "dds_probe", "--domain", str(DOMAIN), "--call", "left"]  # as rmw_cyclonedds does
+        with shown(self.service, "--rate", "0"):
+            others = [subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) for _ in range(3)]
+            seen = node("--calls", str(CALLS))
+            for other in others:
+                out, _ = other.communicate(timeout=60)
+                self.assertRegex(out, r"^1122334455667788 42 1 \d+ points, scan ")
+        self.assertEqual([answer and answer[0] for answer in seen["answers"]], [True] * CALLS)
 
     def test_finds_it_however_both_are_restricted_to_this_host(self):
         only, peers = {"ROS_LOCALHOST_ONLY": "1"}, {**LOCALHOST, "ROS_STATIC_PEERS": "127.0.0.1"}
