@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "bridge.hpp"
+#include "daemon/usage.hpp"
 #include "merge.hpp"
 
 namespace {
@@ -34,14 +35,14 @@ void add_merge_options(CLI::App& app, bool& merges, slsd::dds::MergeOptions& mer
   app.add_option_function<double>(
          "--max-age", [&merge](double seconds) { merge.max_age = std::chrono::duration<double>(seconds); },
          "with --merge: seconds by which a cloud may be older than the newest (1)")
-      ->check(CLI::Range(0.01, 3600.0))
+      ->check(slsd::between(0.01, 3600.0))
       ->needs(merging);
 }
 
 void add_network_options(CLI::App& app, slsd::dds::NetworkOptions& network) {
-  app.add_option("--rate-max", network.rate_max_mb, "clouds and images leave at so many megabytes a second (64)")
-      ->check(CLI::Range(1.0, 2000.0));
-  app.add_option("--domain", network.domain, "of DDS (0)")->envname("ROS_DOMAIN_ID")->check(CLI::Range(0, 232));
+  app.add_option("--rate-max", network.rate_max_mb, "clouds and images leave at so many megabytes a second (16)")
+      ->check(slsd::between(1.0, 2000.0));
+  app.add_option("--domain", network.domain, "of DDS (0)")->envname("ROS_DOMAIN_ID")->check(slsd::between(0, 232));
   app.add_option("--interface", network.interface, "of the network: eth0, lo");
   app.add_option("--peer", network.peers, "an address of others, where the network has no multicast; may be repeated");
   app.add_flag("--best-effort", network.best_effort, "do not send again what is lost on the way");
@@ -52,23 +53,24 @@ void add_network_options(CLI::App& app, slsd::dds::NetworkOptions& network) {
 int main(int argc, char** argv) {
   CLI::App app(
       "Shows a scanner of slsd to a ROS 2 network: clouds, images, diagnostics, where it stands, and a trigger.\n"
-      "Exit status: 0 done, 1 it cannot be shown, 2 wrong usage.");
+      "Exit status: 0 done, 1 it cannot be shown, 2 wrong usage.",
+      "slsd-dds");
   slsd::dds::BridgeOptions options;
   slsd::dds::NetworkOptions network;
   app.set_version_flag("--version", "slsd-dds " SLSD_VERSION);
   auto* name = app.add_option("--name", options.name, "of the scanner: its topics begin with it (scanner; merged)");
   app.add_option("--socket", options.socket, "of its service; SLSD_SOCKET names it, too (/run/slsd/slsd.sock)");
   app.add_option("--rate", options.rate_hz, "at most so many clouds a second; 0: only those that are triggered")
-      ->check(CLI::Range(0.0, 1000.0));
+      ->check(slsd::between(0.0, 1000.0));
   app.add_option("--density", options.density, "a point for each symbol, or for each camera pixel")
-      ->check(CLI::IsMember({"symbols", "pixels"}));
+      ->check(slsd::one_of({"symbols", "pixels"}));
   app.add_option("--stride", options.thinning.stride,
                  "dense clouds and depth images have every so many pixels and rows of the camera's (2)")
-      ->check(CLI::Range(1, 16));
+      ->check(slsd::between(1, 16));
   app.add_option("--voxel", options.thinning.voxel_mm, "millimetres: one point to each cube of this size; 0: all (0)")
-      ->check(CLI::Range(0.0, 1000.0));
+      ->check(slsd::between(0.0, 1000.0));
   app.add_option("--image-rate", options.image_rate_hz, "images a second, 1 or more; 0: none (0)")
-      ->check(CLI::Range(0.0, 100.0));
+      ->check(slsd::between(0.0, 100.0));
   app.add_option("--extrinsics", options.extrinsics, "where the scanners stand, as TOML");
   app.add_flag_callback(
       "--no-transforms", [&options] { options.transforms = false; },
@@ -82,11 +84,7 @@ int main(int argc, char** argv) {
   slsd::dds::MergeOptions merge;
   add_merge_options(app, merges, merge);
   add_network_options(app, network);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
+  if (const auto ended = slsd::parse_usage(app, argc, argv)) return *ended;
   if (calibration) return describe(options, *calibration);
   // Before the first thread: they all leave these to the one who waits for them.
   sigset_t ends;
