@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """Runs every block of README.md and docs/installing.md as it is written, in an empty Debian, as a user who has sudo:
-newcomer.py ROOT SOURCES [--quick]. As root. ROOT is a Debian with systemd and sudo; SOURCES a clone."""
+newcomer.py ROOT SOURCES [--quick] [--from PLACE] [--packages DIR]. As root. ROOT is a Debian with systemd and sudo; SOURCES a clone."""
 import argparse
 import contextlib
 import pathlib
@@ -23,17 +23,19 @@ STAND_IN = "sed s#/run/slsd/example.sock#/run/slsd/slsd.sock# /etc/slsd/example.
 NEEDS_A_PERSON = "slsctl calibrate"  # waits for a board
 
 
-def lay_out(root, sources):
+def lay_out(root, sources, packages):
     home = root / HOME[1:]
     shutil.rmtree(home / "slsd", ignore_errors=True)
     shutil.copytree(sources, home / "slsd", symlinks=True)
+    if packages:
+        shutil.copytree(packages, home / "slsd/out/package")
     subprocess.run(["chroot", root, "chown", "-R", f"{USER}:", HOME], check=True)
     shutil.copy("/etc/resolv.conf", root / "etc/resolv.conf")
 
 
 class Newcomer:
-    def __init__(self, machine, quick):
-        self.machine, self.quick = machine, quick
+    def __init__(self, machine, passed_over):
+        self.machine, self.passed_over = machine, passed_over
 
     def login(self, script, environment=""):
         """What a shell of a new login makes of it. @return its exit status and what it printed"""
@@ -41,8 +43,8 @@ class Newcomer:
         return self.machine.run("su", "-", USER, "-c", f"cd slsd && {environment} bash -e ~/block", check=False, patience_s=PATIENCE_S)
 
     def run_shell(self, text):
-        if self.quick:
-            text = re.sub(r"(?m)^\./run test\b.*$", "true", text)
+        for command in self.passed_over:
+            text = re.sub(rf"(?m)^\./run {command}\b.*$", "true", text)
         status, printed = self.login(text)
         require(status == 0, f"status {status}:\n{printed[-3000:]}")
 
@@ -85,12 +87,18 @@ def main():
     parser.add_argument("root", type=pathlib.Path)
     parser.add_argument("sources", type=pathlib.Path)
     parser.add_argument("--quick", action="store_true", help="pass over ./run test")
+    parser.add_argument("--from", dest="first", metavar="PLACE", help="begin at this block, such as README.md:21")
+    parser.add_argument("--packages", type=pathlib.Path, metavar="DIR", help="take these packages and pass over ./run package")
     arguments = parser.parse_args()
     root = arguments.root.resolve()
-    lay_out(root, arguments.sources)
+    lay_out(root, arguments.sources, arguments.packages)
     blocks = [block for page in PAGES for block in blocks_of(page, (arguments.sources / page).read_text(encoding="utf-8"))]
+    places = [block.place for block in blocks]
+    require(arguments.first is None or arguments.first in places, f"no block {arguments.first}; there are: {' '.join(places)}")
+    blocks = blocks[places.index(arguments.first):] if arguments.first else blocks
+    passed_over = ["test"] * arguments.quick + ["package"] * bool(arguments.packages)
     with contextlib.closing(Container(root)) as machine:
-        newcomer = Newcomer(machine, arguments.quick)
+        newcomer = Newcomer(machine, passed_over)
         before = installed_on(machine)
         failed = 0
         for block in blocks:
