@@ -20,15 +20,6 @@
 namespace slsd {
 namespace {
 
-/// Errors in reported deviations.
-struct Ratios {
-  double squares = 0, worst = 0;
-  int count = 0;
-
-  void add(double ratio) { squares += ratio * ratio, worst = std::max(worst, std::abs(ratio)), ++count; }
-  [[nodiscard]] double rms() const { return std::sqrt(squares / count); }
-};
-
 void thin(Observations& observations, std::size_t corner_step, std::size_t symbol_step) {
   const auto keep = [](auto& points, std::size_t step) {
     std::size_t i = 0;

@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <random>
 #include <string>
@@ -47,5 +49,14 @@ inline double truth_of(const ParameterReport& parameter, const RigModel& truth) 
                                                   {"place_x", 3}, {"place_y", 4}, {"place_z", 5}};
   return device.device_from_rig[motion.at(parameter.name)];
 }
+
+/// Errors in reported deviations.
+struct Ratios {
+  double squares = 0, worst = 0;
+  int count = 0;
+
+  void add(double ratio) { squares += ratio * ratio, worst = std::max(worst, std::abs(ratio)), ++count; }
+  [[nodiscard]] double rms() const { return std::sqrt(squares / count); }
+};
 
 }  // namespace slsd
