@@ -117,11 +117,17 @@ PatternReader::Shrunk PatternReader::frame_for(double scale, const GreyView& fra
   return {std::visit([](const auto& image) { return GreyView(image.view()); }, shrunk), factor};
 }
 
+std::optional<FrameNoise> PatternReader::noise_of(const Shrunk& frame) const {
+  if (!noise_) return std::nullopt;
+  return noise_->scaled(1, 1 / static_cast<float>(frame.factor));
+}
+
 std::vector<SymbolMatch> PatternReader::attempt(const Homography& camera_from_projector, const GreyView& whole,
                                                 bool is_there) {
   const auto [whole_width, whole_height] = size_of(whole);
-  const auto [frame, factor] =
+  const Shrunk shrunk =
       frame_for(ExpectedFrames(camera_from_projector.matrix, whole_width, whole_height).in_the_middle().scale, whole);
+  const auto& [frame, factor] = shrunk;
   const auto [width, height] = size_of(frame);
   Eigen::Matrix3d shrinking = Eigen::Matrix3d::Identity();
   const double middle = 0.5 * (factor - 1);  // of a square of pixels, from the first of them
@@ -138,7 +144,7 @@ std::vector<SymbolMatch> PatternReader::attempt(const Homography& camera_from_pr
   } else {
     (*at)->reader.expect(std::move(frames));
   }
-  std::vector<SymbolMatch> matches = (*at)->reader.read_anywhere(frame, full_, is_there);
+  std::vector<SymbolMatch> matches = (*at)->reader.read_anywhere(frame, full_, noise_of(shrunk), is_there);
   for (SymbolMatch& match : matches) {
     match.camera_px = factor * match.camera_px.array() + middle;
     match.sigma_px *= factor;
@@ -155,12 +161,13 @@ std::vector<double> PatternReader::likely_scales(const GreyView& whole) {
   std::vector<std::size_t> shapes;
   Sightings seen;
   for (const double scale : scales) {
-    const auto [frame, factor] = frame_for(scale, whole);
+    const Shrunk shrunk = frame_for(scale, whole);
+    const auto& [frame, factor] = shrunk;
     const auto [width, height] = size_of(frame);
     ShapeFinder finder(pattern().options, ExpectedFrames(turned_and_scaled(0, scale / factor).matrix, width, height),
                        Method::kDefault, Method::kDefault);
     SerialExecutor alone;
-    const GreyView sharp = finder.binarize(frame, full_, alone);
+    const GreyView sharp = finder.binarize(frame, full_, alone, noise_of(shrunk));
     finder.find_regions(sharp, alone);
     finder.describe(sharp, alone, seen);
     shapes.push_back(seen.size());
@@ -209,11 +216,11 @@ std::vector<SymbolMatch> PatternReader::refine(std::vector<SymbolMatch> found, c
   return found;
 }
 
-Result<std::vector<SymbolMatch>> PatternReader::read(const GreyView& frame) {
+Result<std::vector<SymbolMatch>> PatternReader::read(const GreyView& frame, const std::optional<FrameNoise>& noise) {
   const auto [width, height] = size_of(frame);
   if (auto fits = check_image_size(width, height); !fits) return tl::unexpected(fits.error());
   std::vector<SymbolMatch> found;
-  shapes_ = 0;
+  shapes_ = 0, noise_ = noise;
   full_ = full_level_.of(frame);
   shrunk_.clear();
   if (last_) found = attempt(*last_, frame, true);

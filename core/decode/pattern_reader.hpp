@@ -13,6 +13,7 @@
 
 #include "core/code/codebook.hpp"
 #include "core/decode/centres/symbol_match.hpp"
+#include "core/exposure/frame_noise.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "core/geometry/homography.hpp"
 #include "core/image.hpp"
@@ -32,9 +33,11 @@ class PatternReader {
   ~PatternReader();
 
   /// @param frame  best with the light of the surface divided out
+  /// @param noise  of the frame if it is known better than it can be measured, as it is no matter of the grey level
   /// @return empty where the pattern is not seen
   /// @errors kUnsupported: the frame is too large
-  [[nodiscard]] Result<std::vector<SymbolMatch>> read(const GreyView& frame);
+  [[nodiscard]] Result<std::vector<SymbolMatch>> read(const GreyView& frame,
+                                                      const std::optional<FrameNoise>& noise = std::nullopt);
 
   [[nodiscard]] const Pattern& pattern() const { return pattern_.pattern(); }
   /// How many shapes of a symbol's size the last frame had: many, and none read, is another pattern.
@@ -49,6 +52,8 @@ class PatternReader {
   };
   /// The frame in which symbols of a scale have a size that is quick to read, and no larger than needed to be exact.
   [[nodiscard]] Shrunk frame_for(double scale, const GreyView& frame);
+  /// Of a shrunk frame, as far as it is known.
+  [[nodiscard]] std::optional<FrameNoise> noise_of(const Shrunk& frame) const;
   [[nodiscard]] std::vector<SymbolMatch> attempt(const Homography& camera_from_projector, const GreyView& frame,
                                                  bool is_there);
   [[nodiscard]] std::vector<double> likely_scales(const GreyView& frame);
@@ -60,7 +65,8 @@ class PatternReader {
   std::optional<Homography> last_;                                                 // camera from projector
   std::map<int, std::variant<Image<std::uint8_t>, Image<std::uint16_t>>> shrunk_;  // of this frame, by their factors
   HeldFullLevel full_level_;
-  double full_ = 255;  // of the frame that is read
+  double full_ = 255;                // of the frame that is read
+  std::optional<FrameNoise> noise_;  // the same
   std::size_t shapes_ = 0;
 };
 

@@ -62,7 +62,7 @@ const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarVi
   const auto done = [&](Stage stage) {
     if (observer != nullptr) observer->stage_done(stage);
   };
-  const GreyView sharp = finder_.binarize(frame, full, executor);
+  const GreyView sharp = finder_.binarize(frame, full, executor, known_noise_);
   done(Stage::kBinarize);
   finder_.find_regions(sharp, executor), done(Stage::kFindRegions);
   finder_.describe(sharp, executor, seen_);
@@ -239,9 +239,10 @@ void SymbolReader::refuse_cut() {
   symbols.erase(symbols.begin() + count, symbols.end());
 }
 
-std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, double full, bool is_there) {
+std::vector<SymbolMatch> SymbolReader::read_anywhere(const GreyView& frame, double full,
+                                                     const std::optional<FrameNoise>& noise, bool is_there) {
   std::vector<SymbolMatch> matches;
-  is_there_ = is_there;
+  is_there_ = is_there, known_noise_ = noise;
   SerialExecutor alone;
   for (const LatticeSymbol& symbol : read(frame, full, nullptr, alone).symbols) {
     matches.push_back({symbol.centre_px.cast<double>(), cells().pixel(symbol.row, symbol.column), symbol.sigma_px});

@@ -54,7 +54,8 @@ class SymbolReader {
                       StageObserver* observer = nullptr);
   /// The same as pairs of pixels, wherever the symbols lie.
   /// @param is_there  whether the pattern is likely to be seen: otherwise it is not worth to find out how blurred it is
-  [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, double full, bool is_there = true);
+  [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, double full,
+                                                       const std::optional<FrameNoise>& noise, bool is_there = true);
 
   /// The symbols of the last frame whose cells are certain and not on their epipolar lines, where they are seen.
   void list_off_line(std::vector<SymbolMatch>& matches) const;
@@ -114,6 +115,7 @@ class SymbolReader {
   std::vector<std::int32_t> kept_;        // of the lattice's symbols: where they are then
   Sightings seen_;
   Lattice lattice_;
+  std::optional<FrameNoise> known_noise_;
   FrameNoise noise_;  // of the frame, though it may have been sharpened
 };
 

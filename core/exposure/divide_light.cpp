@@ -124,6 +124,28 @@ float faint_light(const GreyView& white) {
                    kFaintSigma * measure_noise(white, guess_full_level(white)).at(0)});
 }
 
+/// The noise of the quotient where a quarter of the surface is darker.
+FrameNoise noise_on_ink(const GreyView& white, const PrintedSurface& surface, double black, float faint) {
+  constexpr double kInk = 0.25;
+  constexpr float kOfBoth = 1.414F;  // the noise of the pattern's image and that of the white one, where it is lit
+  constexpr float kReadable = 0.1F;  // of white: symbols that are noisier are lost, and cost those on paper
+  const auto [width, height] = size_of(white);
+  const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / kPixelsLookedAt)));
+  std::vector<float> levels, light;
+  for (int y = 0; y < height; y += step) {
+    copy_row(white, y, 1, light);
+    for (int x = 0; x < width; x += step) {
+      if (surface.contains(x, y)) levels.push_back(light[x]);
+    }
+  }
+  if (levels.empty()) return {};
+  const auto ink = levels.begin() + static_cast<std::ptrdiff_t>(kInk * static_cast<double>(levels.size()));
+  std::ranges::nth_element(levels, ink);
+  const float sigma = measure_noise(white, guess_full_level(white)).at(*ink);
+  const float share = kOfBoth * sigma / std::max(faint, *ink - static_cast<float>(black));
+  return FrameNoise{1, 0}.scaled(static_cast<float>(kAsBrightAsWhite) * std::min(share, kReadable));
+}
+
 /// Exact where the light is more than faint; below that the less, the fainter it is.
 float share_of(float lit, float light, float faint) {
   return light >= faint ? lit / light : lit * std::max(0.F, light) / (faint * faint);
@@ -168,7 +190,7 @@ Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white, cons
   return quotient;
 }
 
-Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white, const PrintedSurface& surface) {
+Result<DividedPrint> divide_light(const GreyView& pattern, const GreyView& white, const PrintedSurface& surface) {
   if (auto fit = check_sizes(pattern, white, std::nullopt); !fit) return tl::unexpected(fit.error());
   const int width = size_of(white).first, height = size_of(white).second;
   const float faint = faint_light(white);
@@ -201,7 +223,7 @@ Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white, cons
       quotient.row(y)[x] = level_of(share);
     }
   }
-  return quotient;
+  return DividedPrint{std::move(quotient), noise_on_ink(white, surface, black, faint)};
 }
 
 }  // namespace slsd

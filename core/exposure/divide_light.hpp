@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 
+#include "core/exposure/frame_noise.hpp"
 #include "core/image.hpp"
 #include "core/result.hpp"
 
@@ -30,6 +31,13 @@ struct PrintedSurface {
   double blur_px = 0;  ///< one standard deviation of the blur at the print's edges; 0: not known
 };
 
+struct DividedPrint {
+  Grey16 quotient;
+  /// Of the quotient on the print's ink. On paper there is less at the same level: it cannot be measured in the
+  /// quotient by its levels.
+  FrameNoise noise;
+};
+
 /// The same to fractions of a pixel at the print's edges, where there is no dark image. Two things of the camera stay
 /// in a plain quotient, and pull what lies across an edge towards the ink:
 ///
@@ -38,7 +46,7 @@ struct PrintedSurface {
 /// - The camera's blur. What a pixel shows of the pattern is not what is there but what is where most of its light
 /// comes
 ///   from: with a Gaussian blur s and a white image W, farther by s^2 grad W / W. The quotient is moved back by that.
-[[nodiscard]] Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white,
-                                          const PrintedSurface& surface);
+[[nodiscard]] Result<DividedPrint> divide_light(const GreyView& pattern, const GreyView& white,
+                                                const PrintedSurface& surface);
 
 }  // namespace slsd

@@ -12,6 +12,8 @@ namespace {
 
 /// Of the board's pitch: as much of the border as is white for certain.
 constexpr double kBorder = 0.8;
+/// Of the board's pitch: a symbol that is larger than a square of the board is too large to be read among its edges.
+constexpr double kNear = kBorder + 1;
 
 Homography board_from_camera(const Board& board, const BoardSighting& sighting) {
   std::vector<Eigen::Vector2d> camera, plane;
@@ -27,16 +29,24 @@ Homography board_from_camera(const Board& board, const BoardSighting& sighting) 
 BoardRegion::BoardRegion(const Board& board, const BoardSighting& sighting)
     : board_from_camera_(board_from_camera(board, sighting)),
       size_mm_(board.width_mm(), board.height_mm()),
-      border_mm_(kBorder * board.pitch_mm) {}
+      border_mm_(kBorder * board.pitch_mm),
+      near_mm_(kNear * board.pitch_mm) {}
+
+bool BoardRegion::is_within(double margin_mm, const Eigen::Vector2d& camera_px) const {
+  const Eigen::Array2d place = board_from_camera_.map(camera_px);
+  return (place >= -margin_mm).all() && (place <= size_mm_.array() + margin_mm).all();
+}
 
 bool BoardRegion::contains(const Eigen::Vector2d& camera_px) const {
-  const Eigen::Array2d place = board_from_camera_.map(camera_px);
-  return (place >= -border_mm_).all() && (place <= size_mm_.array() + border_mm_).all();
+  return is_within(border_mm_, camera_px);
+}
+
+bool BoardRegion::is_near(const Eigen::Vector2d& camera_px) const {
+  return is_within(near_mm_, camera_px);
 }
 
 bool BoardRegion::is_printed(const Eigen::Vector2d& camera_px) const {
-  const Eigen::Array2d place = board_from_camera_.map(camera_px);
-  return (place >= 0).all() && (place <= size_mm_.array()).all();
+  return is_within(0, camera_px);
 }
 
 double full_share_of_print(const GreyView& image, const Board& board, const BoardSighting& sighting) {

@@ -24,13 +24,17 @@ class BoardRegion {
 
   /// Whether a pixel lies on what is printed, or on the white border that has to be around it.
   [[nodiscard]] bool contains(const Eigen::Vector2d& camera_px) const;
+  /// Whether a symbol that lies on the board may reach there.
+  [[nodiscard]] bool is_near(const Eigen::Vector2d& camera_px) const;
   /// Whether it lies on what is printed.
   [[nodiscard]] bool is_printed(const Eigen::Vector2d& camera_px) const;
 
  private:
   Homography board_from_camera_;
+  [[nodiscard]] bool is_within(double margin_mm, const Eigen::Vector2d& camera_px) const;
+
   Eigen::Vector2d size_mm_;
-  double border_mm_;
+  double border_mm_, near_mm_;
 };
 
 }  // namespace slsd

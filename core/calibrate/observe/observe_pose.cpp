@@ -20,6 +20,16 @@ constexpr std::size_t kPatternRegions = 60;
 /// So few symbols of so many shapes agree by chance.
 constexpr std::size_t kSymbolsCertain = 20;
 
+/// Leaves the board and what is near it. Where the projector lights nothing, the quotient is that of two noises, as
+/// bright as the pattern: the reader would take it for the noise of the frame.
+void clear_surroundings(const BoardRegion& region, Grey16& quotient) {
+  for (int y = 0; y < quotient.height(); ++y) {
+    for (int x = 0; x < quotient.width(); ++x) {
+      if (!region.is_near({x, y})) quotient.at(x, y) = 0;
+    }
+  }
+}
+
 std::string why_no_symbols(std::size_t shapes) {
   if (shapes > kPatternRegions) {
     return fmt::format(
@@ -50,13 +60,14 @@ Result<> observe_pattern(const PosePictures& pictures, const Board& board, const
   const PrintShift shift = find_print_shift(pictures.white, pictures.coded.at(0), board, sighting);
   if (shift.certain()) view.shift_px = shift.px;
   const BoardRegion region(board, sighting);
-  const auto levelled = divide_light(pictures.coded.at(0), pictures.white,
-                                     PrintedSurface{[&](int x, int y) {
-                                                      return region.contains({x, y});
-                                                    },
-                                                    sighting.edge_px});
+  auto levelled = divide_light(pictures.coded.at(0), pictures.white,
+                               PrintedSurface{[&](int x, int y) {
+                                                return region.contains({x, y});
+                                              },
+                                              sighting.edge_px});
   if (!levelled) return tl::unexpected(levelled.error());
-  auto matches = reader.read(levelled->view());
+  clear_surroundings(region, levelled->quotient);
+  auto matches = reader.read(levelled->quotient.view(), levelled->noise);
   if (!matches) return tl::unexpected(matches.error());
   std::erase_if(*matches, [&](const SymbolMatch& match) { return !region.contains(match.camera_px); });
   if (matches->size() < kSymbolsCertain && reader.shapes() > kPatternRegions) matches->clear();

@@ -215,7 +215,7 @@ float Binarizer::measure_usual_contrast() {
     const float contrast = high_[i] - low_[i], midway = low_[i] + 0.5F * contrast;
     if (contrast >= contrast_min(midway)) contrasts_.push_back(contrast / noise_.at(midway));
   }
-  if (contrasts_.empty()) return std::numeric_limits<float>::infinity();
+  if (contrasts_.empty()) return 0;
   const auto middle = contrasts_.begin() + static_cast<std::ptrdiff_t>(contrasts_.size() / 2);
   std::ranges::nth_element(contrasts_, middle);
   return *middle;

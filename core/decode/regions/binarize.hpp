@@ -55,7 +55,7 @@ class Binarizer {
   /// tiles' least and greatest values; 0 where there are none.
   [[nodiscard]] float edge_blur_px() const { return edge_blur_px_; }
   /// Between light and dark of most of what was taken for the pattern in the last frame, in standard deviations of the
-  /// noise midway; infinity where there was none.
+  /// noise midway; 0 if there was none.
   [[nodiscard]] float usual_contrast_sigma() const { return usual_contrast_sigma_; }
 
  private:

@@ -45,14 +45,15 @@ ShapeFinder::ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected,
   meters_.emplace_back(margin_px(pattern.spacing_px, scale), 2 * pitch_px_ * scale);
 }
 
-GreyView ShapeFinder::binarize(const GreyView& frame, double full, Executor& executor) {
+GreyView ShapeFinder::binarize(const GreyView& frame, double full, Executor& executor,
+                               const std::optional<FrameNoise>& noise) {
   frame_levels_ = static_cast<float>(full / 255);
   if (binarize_ == Method::kPaper) {
     mask_ = binarize_paper(frame);
     noise_ = measure_noise(frame, full);
     return frame;
   }
-  binarizer_.binarize(frame, full, mask_, executor);
+  binarizer_.binarize(frame, full, noise, mask_, executor);
   noise_ = binarizer_.noise();
   if (binarizer_.edge_blur_px() >= kBlurMinPx) return binarize_blurred(frame, full, executor);
   if (binarizer_.usual_contrast_sigma() < kFaintSigma) return binarize_faint(frame, full, executor);

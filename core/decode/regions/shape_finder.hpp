@@ -35,7 +35,9 @@ class ShapeFinder {
   /// @param full  the level of a saturated pixel of the frame
   /// @return      what the stages that follow have to look at, the frame itself or as it was sharpened; stands until
   ///              the next call
-  GreyView binarize(const GreyView& frame, double full, Executor& executor);
+  /// @param noise  of the frame if it is known better than it can be measured
+  GreyView binarize(const GreyView& frame, double full, Executor& executor,
+                    const std::optional<FrameNoise>& noise = std::nullopt);
   void find_regions(const GreyView& frame, Executor& executor);
   /// Puts the shapes that may be symbols into the sightings, in place of what was there.
   void describe(const GreyView& frame, Executor& executor, Sightings& seen);

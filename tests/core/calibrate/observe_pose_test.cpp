@@ -18,6 +18,7 @@ namespace {
 constexpr int kWidth = 700, kHeight = 600;
 constexpr double kPaper = 0.8, kInk = 0.06;
 constexpr double kRoom = 0.08;          // of the projector's light
+constexpr double kBehind = 0.02;        // of what the room gives back behind the board
 constexpr int kColumns = 8, kRows = 7;  // squares
 constexpr double kSquareMm = 40;
 constexpr int kSamples = 4;  // across a pixel
@@ -27,10 +28,18 @@ struct Scene {
   double blur_px = 0.5;  ///< of the camera, besides its pixels' size
   double projector_blur_px = 0.5;
   double black_level = 5;
+  /// Of the noise's variance: in the dark, and what each grey level adds; what becomes of light in the camera after it.
+  double dark_variance = 0.49, variance_per_level = 0, gamma = 1;
+  bool in_dark_room = false;  ///< the sheet ends with the board's white border; the projector lights nothing behind it
   Eigen::Affine2d camera_from_board = Eigen::Translation2d(110, 70) * Eigen::Rotation2Dd(0.08) * Eigen::Scaling(1.6);
   Eigen::Affine2d camera_from_projector =
       Eigen::Translation2d(-60, -40) * Eigen::Rotation2Dd(-0.03) * Eigen::Scaling(1.4);
 };
+
+bool is_on_sheet(const Eigen::Vector2d& board_mm) {
+  const Eigen::Array2d square = board_mm / kSquareMm;
+  return (square > -1).all() && (square < Eigen::Array2d(kColumns + 1, kRows + 1)).all();
+}
 
 double reflectance(const Eigen::Vector2d& board_mm) {
   const Eigen::Vector2d square = board_mm / kSquareMm;
@@ -56,19 +65,22 @@ Grey8 photograph(const Scene& scene, const Grey8& projected, std::uint32_t seed)
         const double right = column - left, below = row - top;
         const double lit = (1 - below) * ((1 - right) * shown.at(left, top) + right * shown.at(left + 1, top)) +
                            below * ((1 - right) * shown.at(left, top + 1) + right * shown.at(left + 1, top + 1));
-        sum += reflectance(board * at) * (lit / 255 + kRoom);
+        const bool behind = scene.in_dark_room && !is_on_sheet(board * at);
+        sum += behind ? kBehind : reflectance(board * at) * (lit / 255 + kRoom);
       }
       image.at<double>(y, x) = sum / (kSamples * kSamples);
     }
   }
   cv::GaussianBlur(image, image, {}, scene.blur_px);
   std::mt19937 random(seed);
-  std::normal_distribution<double> noise(0, 0.7);
+  std::normal_distribution<double> noise(0, 1);
   Grey8 photo(kWidth, kHeight);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
-      const double level = scene.black_level + 230 * image.at<double>(y, x) + noise(random);
-      photo.at(x, y) = static_cast<std::uint8_t>(std::clamp(std::round(level), 0., 255.));
+      const double light = scene.black_level + 230 * image.at<double>(y, x);
+      const double sigma = std::sqrt(scene.dark_variance + scene.variance_per_level * light);
+      const double level = std::clamp(light + sigma * noise(random), 0., 255.);
+      photo.at(x, y) = static_cast<std::uint8_t>(std::round(255 * std::pow(level / 255, scene.gamma)));
     }
   }
   return photo;
@@ -160,6 +172,24 @@ TEST(ObservePattern, FindsSymbolsOnTheAverageWhereTheyAreHoweverBlurred) {
                                     << errors.count << " symbols: " << errors.mean_px.transpose() << " px");
     EXPECT_GT(errors.count, 300U);
     EXPECT_LT(errors.mean_px.cwiseAbs().maxCoeff(), 0.008);
+  }
+}
+
+// Taken as a part of the pattern, the noise beside the board drowned all of it at a gamma of 0.5.
+TEST(ObservePattern, FindsSymbolsOfCamerasWithGammaBeforeADarkRoom) {
+  for (const double gamma : {0.45, 0.5, 0.55, 0.6, 0.8, 1.0}) {
+    const Errors errors = errors_of(
+        {.black_level = 0,
+         .dark_variance = 0.5,
+         .variance_per_level = 0.094,
+         .gamma = gamma,
+         .in_dark_room = true,
+         .camera_from_board = Eigen::Translation2d(200, 160) * Eigen::Rotation2Dd(0.08) * Eigen::Scaling(0.8),
+         .camera_from_projector = Eigen::Translation2d(20, 40) * Eigen::Rotation2Dd(-0.03) * Eigen::Scaling(0.8)});
+    SCOPED_TRACE(testing::Message() << "gamma " << gamma << ", " << errors.count << " symbols, " << errors.all_px
+                                    << " px");
+    EXPECT_GT(errors.count, 350U);
+    EXPECT_LT(errors.all_px, 0.25);
   }
 }
 

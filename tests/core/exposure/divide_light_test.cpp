@@ -103,7 +103,8 @@ struct Print {
     return image;
   }
   [[nodiscard]] Grey16 divided() const {
-    return *divide_light(seen(false).view(), seen(true).view(), PrintedSurface{[](int, int) { return true; }, blur_px});
+    return divide_light(seen(false).view(), seen(true).view(), PrintedSurface{[](int, int) { return true; }, blur_px})
+        ->quotient;
   }
   [[nodiscard]] Grey16 plainly_divided() const { return *divide_light(seen(false).view(), seen(true).view()); }
 };
