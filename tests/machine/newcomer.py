@@ -99,6 +99,8 @@ def main():
     passed_over = ["test"] * arguments.quick + ["package"] * bool(arguments.packages)
     with contextlib.closing(Container(root)) as machine:
         newcomer = Newcomer(machine, passed_over)
+        if arguments.packages:
+            machine.run("apt-get", "update")  # ./run package would
         before = installed_on(machine)
         failed = 0
         for block in blocks:
