@@ -5,10 +5,12 @@
 #include <csignal>
 #include <iostream>
 
+#include <systemd/sd-daemon.h>
 #include <CLI/CLI.hpp>
 
 #include "clients/web/announcement.hpp"
 #include "clients/web/page_server.hpp"
+#include "daemon/usage.hpp"
 #include "drivers/files/file.hpp"
 
 namespace {
@@ -62,6 +64,7 @@ slsd::Result<> serve(const PageOptions& options) {
   if (auto opened = server.open(); !opened) return opened;
   auto announcement = slsd::web::Announcement::write(server.port(), announce(options, *token, server.port()));
   if (!announcement) std::cerr << "slsd-web: " << to_string(announcement.error()) << std::endl;
+  sd_notify(0, "READY=1");
   server.run([&] {
     if (announcement) announcement->remove();
   });
@@ -78,7 +81,8 @@ slsd::Result<> print_addresses() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("The page of a structured-light scanner: a client of slsd's socket that browsers can talk to.");
+  CLI::App app("The page of a structured-light scanner: a client of slsd's socket that browsers can talk to.",
+               "slsd-web");
   PageOptions options;
   bool only_address = false;
   app.set_version_flag("--version", "slsd-web " SLSD_VERSION);
@@ -93,11 +97,7 @@ int main(int argc, char** argv) {
   app.add_option("--three", options.three, "the folder of three.js, as Debian's libjs-three has it")
       ->capture_default_str();
   app.add_flag("--address", only_address, "print the address of the page that is running, with its token, and exit");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
+  if (const auto ended = slsd::parse_usage(app, argc, argv)) return *ended;
   std::signal(SIGPIPE, SIG_IGN);
   // Clouds are large: what one took goes back to the system with it, whichever of many threads had it.
   ::mallopt(M_MMAP_THRESHOLD, kOwnPagesBytes);

@@ -241,6 +241,27 @@ class Door(unittest.TestCase):
             web.process.wait()
             self.assertEqual(list(pathlib.Path(web.runtime, "slsd-web").iterdir()), [])
 
+    def test_is_ready_once_its_address_can_be_asked_for(self):
+        with Service() as service, tempfile.TemporaryDirectory() as folder:
+            manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+            self.addCleanup(manager.close)
+            manager.bind(f"{folder}/notify")
+            manager.settimeout(30)
+            environment = {**os.environ, "NOTIFY_SOCKET": f"{folder}/notify", "RUNTIME_DIRECTORY": f"{folder}/run"}
+            os.mkdir(f"{folder}/run")
+            web = subprocess.Popen([BIN / "slsd-web", "--socket", service.socket, "--port", "0"], stdout=subprocess.DEVNULL, env=environment)
+            try:
+                self.assertEqual(manager.recv(64), b"READY=1")
+                self.assertEqual(len(os.listdir(f"{folder}/run")), 1)
+            finally:
+                web.terminate()
+                web.wait()
+
+    def test_suggests_the_nearest_option(self):
+        wrong = subprocess.run([BIN / "slsd-web", "--prot", "1"], capture_output=True, text=True, check=False)
+        self.assertEqual((wrong.returncode, wrong.stdout), (2, ""))
+        self.assertIn("did you mean --port?", wrong.stderr)
+
     def test_a_port_that_is_taken_is_refused(self):
         with Service() as service, Web(service) as web:
             for listen in ("127.0.0.1", "::", "0.0.0.0"):

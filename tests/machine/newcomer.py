@@ -57,6 +57,8 @@ class Newcomer:
     def run_session(self, text):
         for command, expected in session_of(text):
             if command.startswith(NEEDS_A_PERSON):
+                self.write_configuration(text)
+                self.machine.run("systemctl", "restart", "slsd")
                 _, printed = self.login(f"timeout --signal INT 20 {command}")
                 require("board" in printed and "slsd-admin" not in printed, f"{command} prints:\n{printed}")
                 self.login("slsctl calibrate cancel")
