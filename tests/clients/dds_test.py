@@ -6,6 +6,8 @@
 With SLSD_DDS_PYTHON, an interpreter that has Eclipse's package `cyclonedds` (pip install cyclonedds numpy), that reads the
 same once more.
 """
+import contextlib
+import fcntl
 import ipaddress
 import json
 import os
@@ -31,7 +33,21 @@ from dds_load import measure  # noqa: E402
 from python_test import Impostor, ply, result  # noqa: E402
 from service import BIN, SCENE, Service, wait_until  # noqa: E402
 
-DOMAIN = 20 + os.getpid() % 100
+
+
+def take_domain():
+    """A domain that no other test of this machine has, until this process ends. @return it, and what holds it"""
+    for domain in range(20, 120):
+        try:
+            held = open(pathlib.Path(tempfile.gettempdir()) / f"slsd-test-domain-{domain}", "w", encoding="utf-8")
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return domain, held
+        except (BlockingIOError, PermissionError):
+            continue
+    raise RuntimeError("a hundred tests have taken all domains")
+
+
+DOMAIN, HELD = take_domain()
 LOOPBACK = ["--domain", str(DOMAIN), "--interface", "lo", "--peer", "127.0.0.1"]
 
 
@@ -408,8 +424,12 @@ class Discovery(unittest.TestCase):
 
     def listens(self, bridge):
         """The addresses and ports of the sockets that it has."""
-        inodes = {os.readlink(link)[8:-1] for link in pathlib.Path(f"/proc/{bridge.process.pid}/fd").iterdir()
-                  if os.readlink(link).startswith("socket:[")}
+        inodes = set()
+        for link in pathlib.Path(f"/proc/{bridge.process.pid}/fd").iterdir():
+            with contextlib.suppress(FileNotFoundError):  # closed meanwhile
+                target = os.readlink(link)
+                if target.startswith("socket:["):
+                    inodes.add(target[8:-1])
         lines = [line.split() for line in pathlib.Path("/proc/net/udp").read_text(encoding="utf-8").splitlines()[1:]]
         local = [line[1].split(":") for line in lines if line[9] in inodes]
         return {(str(ipaddress.IPv4Address(int(address, 16).to_bytes(4, "little"))), int(port, 16)) for address, port in local}

@@ -25,7 +25,7 @@ import numpy as np  # noqa: E402
 import yaml  # noqa: E402
 
 from dds_test import DOMAIN, matrix, probe, transforms, turn  # noqa: E402
-from ros_test import PYTHON, has_ros, node, said  # noqa: E402
+from ros_test import PYTHON, has_ros, node  # noqa: E402
 from service import BIN, Service, wait_until  # noqa: E402
 
 PACKAGE = HERE.parents[1] / "clients/ros/slsd"
@@ -310,9 +310,8 @@ class LaunchFile(Seen):
 
     @unittest.skipUnless(has_ros(), "no rclpy: the wheels of ROS 2 come from the network")
     def test_is_seen_by_a_node_of_ros(self):
-        # Such nodes announce addresses other than loopback's.
-        with self.launched(ROS_STATIC_PEERS="127.0.0.1"):
-            seen = said(node("1", "30", "points", "image"))
+        with self.launched():
+            seen = node("--calls", "1", "--topics", "points", "image")
         self.assertEqual(seen["points"]["frame_id"], "left_optical_frame")
         self.assertGreater(seen["counts"]["image"], 2)
         self.assertTrue(seen["answers"][0][0], seen["answers"])
