@@ -86,16 +86,16 @@ int main(int argc, char** argv) {
   PageOptions options;
   bool only_address = false;
   app.set_version_flag("--version", "slsd-web " SLSD_VERSION);
-  app.add_option("--socket", options.socket, "the service's socket; SLSD_SOCKET names it, too")->capture_default_str();
-  app.add_option("--listen", options.listen, "the address to listen at; beyond loopback it takes a token")
-      ->capture_default_str();
-  app.add_option("--port", options.port, "the port to listen at; 0: any that is free")
-      ->check(CLI::Range(0, 65535))
-      ->capture_default_str();
+  app.add_option("--socket", options.socket,
+                 "the service's socket; SLSD_SOCKET names it, too (" + options.socket.string() + ")");
+  app.add_option("--listen", options.listen,
+                 "the address to listen at; beyond loopback it takes a token (" + options.listen + ")");
+  app.add_option("--port", options.port,
+                 "the port to listen at; 0: any that is free (" + std::to_string(options.port) + ")")
+      ->check(slsd::between(0, 65535));
   app.add_option("--name", options.names, "a name by which browsers ask for the page, besides the address");
   app.add_option("--token-file", options.token_file, "a file with the token to enter; without, each run has its own");
-  app.add_option("--three", options.three, "the folder of three.js, as Debian's libjs-three has it")
-      ->capture_default_str();
+  app.add_option("--three", options.three, "the folder of three.js (that of Debian's libjs-three)");
   app.add_flag("--address", only_address, "print the address of the page that is running, with its token, and exit");
   if (const auto ended = slsd::parse_usage(app, argc, argv)) return *ended;
   std::signal(SIGPIPE, SIG_IGN);

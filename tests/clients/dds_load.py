@@ -68,7 +68,7 @@ class Replay:
                 os.close(memory)
             else:
                 peer.sendall(message + self.cloud)
-            due += 1 / self.rate_hz
+            due = max(due + 1 / self.rate_hz, time.monotonic())  # late ones do not follow in a burst
             time.sleep(max(0, due - time.monotonic()))
 
 
