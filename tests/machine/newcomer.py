@@ -8,6 +8,7 @@ import contextlib
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -92,6 +93,7 @@ def main():
     parser.add_argument("--from", dest="first", metavar="PLACE", help="begin at this block, such as README.md:21")
     parser.add_argument("--packages", type=pathlib.Path, metavar="DIR", help="take these packages and pass over ./run package")
     arguments = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # the container ends with it
     root = arguments.root.resolve()
     lay_out(root, arguments.sources, arguments.packages)
     blocks = [block for page in PAGES for block in blocks_of(page, (arguments.sources / page).read_text(encoding="utf-8"))]
