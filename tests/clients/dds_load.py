@@ -26,6 +26,18 @@ BIN = pathlib.Path(os.environ["SLSD_BIN"])
 FIELDS = "float x,float y,float z,float sigma_mm,uchar intensity,uchar camera".split(",")
 
 
+def take_domain():
+    """A domain that no other test of this machine has, until this process ends. @return it, and what holds it"""
+    for domain in range(20, 120):
+        try:
+            held = open(pathlib.Path(tempfile.gettempdir()) / f"slsd-test-domain-{domain}", "w", encoding="utf-8")
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return domain, held
+        except (BlockingIOError, PermissionError):
+            continue
+    raise RuntimeError("a hundred tests have taken all domains")
+
+
 class Replay:
     """What slsd is to its subscribers, without the work of scanning: the same cloud again and again."""
 
@@ -74,13 +86,13 @@ class Replay:
 
 def measure(scanners=1, points=2600, rate_hz=10.0, seconds=10.0, stalled=False, best_effort=False, rate_max_mb=16.0):
     """@return sent, received, lost (of those after the first that arrived), delays_ms sorted, cpu_s"""
-    domain = 120 + os.getpid() % 100
+    domain, held = take_domain()
     network = ["--domain", str(domain), "--interface", "lo", "--peer", "127.0.0.1", "--rate-max", str(rate_max_mb)]
     names = [f"s{i}" for i in range(scanners)]
     topics = [word for name in names for word in ("--topic", f"{name}/points")]
     read = [BIN / "dds_probe", "--domain", str(domain), *topics, "--stamps", "--count", "1000000000", "--seconds", "600"]
     processes = []
-    with contextlib.ExitStack() as files:
+    with held, contextlib.ExitStack() as files:
         folder = files.enter_context(tempfile.TemporaryDirectory())
         services = {name: Replay(pathlib.Path(folder), name, points, rate_hz) for name in names}
         try:

@@ -7,7 +7,6 @@ With SLSD_DDS_PYTHON, an interpreter that has Eclipse's package `cyclonedds` (pi
 same once more.
 """
 import contextlib
-import fcntl
 import ipaddress
 import json
 import os
@@ -29,23 +28,9 @@ sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daem
 import numpy as np  # noqa: E402
 
 import slsd  # noqa: E402
-from dds_load import measure  # noqa: E402
+from dds_load import measure, take_domain  # noqa: E402
 from python_test import Impostor, ply, result  # noqa: E402
 from service import BIN, SCENE, Service, wait_until  # noqa: E402
-
-
-
-def take_domain():
-    """A domain that no other test of this machine has, until this process ends. @return it, and what holds it"""
-    for domain in range(20, 120):
-        try:
-            held = open(pathlib.Path(tempfile.gettempdir()) / f"slsd-test-domain-{domain}", "w", encoding="utf-8")
-            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return domain, held
-        except (BlockingIOError, PermissionError):
-            continue
-    raise RuntimeError("a hundred tests have taken all domains")
-
 
 DOMAIN, HELD = take_domain()
 LOOPBACK = ["--domain", str(DOMAIN), "--interface", "lo", "--peer", "127.0.0.1"]
