@@ -8,7 +8,7 @@
 
 namespace slsd::dds {
 
-/// Who is looked for, as ROS 2's environment says it (Jazzy and later).
+/// The range of discovery, as ROS 2's environment says it (Jazzy and later).
 struct Discovery {
   enum class Range {
     kSystemDefault,  ///< as Fast DDS is configured; peers are ignored

@@ -23,7 +23,7 @@ struct Failure {
   std::longjmp(reinterpret_cast<Failure*>(codec->err)->back, 1);
 }
 
-/// What libjpeg allocates; freed by the caller, whichever way encode() ends.
+/// Memory that libjpeg allocates; the caller frees it, whichever way encode() ends.
 struct Encoded {
   unsigned char* bytes = nullptr;
   unsigned long size = 0;

@@ -23,7 +23,7 @@ inline constexpr const char* kCalibrationDate = "calibration date";
 
 /// The bytes of one of our points: x y z sigma intensity (float32), camera scanner (uint8), two of padding.
 inline constexpr std::uint32_t kPointStep = 24;
-/// Where they are; `scanner` is of merged clouds only.
+/// The fields of a point; `scanner` is of merged clouds only.
 [[nodiscard]] std::vector<ros::PointField> point_fields(bool merged);
 /// Sets all but the header and the fields: points in one array, unorganised.
 void set_points(ros::PointCloud2& message, std::vector<std::uint8_t> data);

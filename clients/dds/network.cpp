@@ -127,7 +127,7 @@ rtps::GUID_t guid_of(const std::array<std::uint8_t, 16>& bytes) {
 
 }  // namespace
 
-/// What happens in the network, as its threads tell it. Nothing of DDS is called with `mutex` held.
+/// Events of the network, told by its threads. Nothing of DDS is called with `mutex` held.
 struct Events {
   std::mutex mutex;
   std::condition_variable changed;
@@ -137,8 +137,8 @@ struct Events {
 class Backlog {
  public:
   explicit Backlog(double bytes_per_s) : bytes_per_s_(bytes_per_s) {}
-  /// Whether there is room for so many bytes more. Without this check a writer that is too fast drops each sample that
-  /// it is about to finish.
+  /// Takes room for so many bytes more, if there is any. Without this check a writer that is too fast drops each sample
+  /// that it is about to finish.
   bool take(std::size_t bytes) {
     const std::lock_guard lock(mutex_);
     const auto now = std::chrono::steady_clock::now();

@@ -34,7 +34,7 @@ enum class Quality {
   kLatched,  ///< transforms: reliable, and for those who come later too
 };
 
-/// Who wrote a sample, and what a reply to it is related by.
+/// The writer of a sample, and what a reply to it is related by.
 struct Requester {
   std::array<std::uint8_t, 16> guid{};  ///< of the reader that waits for the reply, or of the writer
   std::uint64_t sequence_number = 0;

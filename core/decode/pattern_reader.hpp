@@ -33,7 +33,7 @@ class PatternReader {
   ~PatternReader();
 
   /// @param frame  best with the light of the surface divided out
-  /// @param noise  of the frame if it is known better than it can be measured, as it is no matter of the grey level
+  /// @param noise  of the frame, if it cannot be measured: where light was divided out, it does not follow the level
   /// @return empty where the pattern is not seen
   /// @errors kUnsupported: the frame is too large
   [[nodiscard]] Result<std::vector<SymbolMatch>> read(const GreyView& frame,

@@ -119,13 +119,13 @@ Result<> check_sizes(const GreyView& pattern, const GreyView& white, const std::
 }
 
 /// What light is trusted, in levels of the white image.
-float faint_light(const GreyView& white) {
-  return std::max({kFaintLevels, kFaintShare * brightest(white),
-                   kFaintSigma * measure_noise(white, guess_full_level(white)).at(0)});
+float faint_light(const GreyView& white, const FrameNoise& noise) {
+  return std::max({kFaintLevels, kFaintShare * brightest(white), kFaintSigma * noise.at(0)});
 }
 
 /// The noise of the quotient where a quarter of the surface is darker.
-FrameNoise noise_on_ink(const GreyView& white, const PrintedSurface& surface, double black, float faint) {
+FrameNoise noise_on_ink(const GreyView& white, const FrameNoise& noise, const PrintedSurface& surface, double black,
+                        float faint) {
   constexpr double kInk = 0.25;
   constexpr float kOfBoth = 1.414F;  // the noise of the pattern's image and that of the white one, where it is lit
   constexpr float kReadable = 0.1F;  // of white: symbols that are noisier are lost, and cost those on paper
@@ -141,8 +141,7 @@ FrameNoise noise_on_ink(const GreyView& white, const PrintedSurface& surface, do
   if (levels.empty()) return {};
   const auto ink = levels.begin() + static_cast<std::ptrdiff_t>(kInk * static_cast<double>(levels.size()));
   std::ranges::nth_element(levels, ink);
-  const float sigma = measure_noise(white, guess_full_level(white)).at(*ink);
-  const float share = kOfBoth * sigma / std::max(faint, *ink - static_cast<float>(black));
+  const float share = kOfBoth * noise.at(*ink) / std::max(faint, *ink - static_cast<float>(black));
   return FrameNoise{1, 0}.scaled(static_cast<float>(kAsBrightAsWhite) * std::min(share, kReadable));
 }
 
@@ -175,7 +174,7 @@ float moved_back(float variance, float light, float light_before, float light_af
 Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white, const std::optional<GreyView>& dark) {
   if (auto fit = check_sizes(pattern, white, dark); !fit) return tl::unexpected(fit.error());
   const auto [width, height] = size_of(white);
-  const float faint = faint_light(white);
+  const float faint = faint_light(white, measure_noise(white, guess_full_level(white)));
   Grey16 quotient(width, height);
   std::vector<float> lit, light, room(width, 0.F);
   for (int y = 0; y < height; ++y) {
@@ -193,7 +192,8 @@ Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white, cons
 Result<DividedPrint> divide_light(const GreyView& pattern, const GreyView& white, const PrintedSurface& surface) {
   if (auto fit = check_sizes(pattern, white, std::nullopt); !fit) return tl::unexpected(fit.error());
   const int width = size_of(white).first, height = size_of(white).second;
-  const float faint = faint_light(white);
+  const FrameNoise noise = measure_noise(white, guess_full_level(white));
+  const float faint = faint_light(white, noise);
   const auto black = static_cast<float>(find_black_level(pattern, white, surface.contains));
   const auto variance = static_cast<float>(surface.blur_px * surface.blur_px);
   std::array<DividedRow, 3> rows;  // of row y at y % 3
@@ -223,7 +223,7 @@ Result<DividedPrint> divide_light(const GreyView& pattern, const GreyView& white
       quotient.row(y)[x] = level_of(share);
     }
   }
-  return DividedPrint{std::move(quotient), noise_on_ink(white, surface, black, faint)};
+  return DividedPrint{std::move(quotient), noise_on_ink(white, noise, surface, black, faint)};
 }
 
 }  // namespace slsd

@@ -23,7 +23,7 @@ constexpr char kMount[] = "mount the print on glass or an aluminium composite pl
 constexpr int kPlacesAcross = 8, kPlacesDown = 6;
 constexpr std::size_t kPosesOfPlace = 4;  // of fewer their scatter tells little
 
-/// Where a shape is lowest and highest.
+/// The lowest and the highest place of a shape.
 struct Extremes {
   Eigen::Vector2d lowest, highest;
 };
@@ -96,8 +96,8 @@ HeightMap heights_of(const PoseObservation& pose, const RigModel& rig, const Mot
   return map;
 }
 
-/// What is left at each place in all poses alike: against how far the poses scatter there, which is the measure of
-/// chance whatever the noise is like.
+/// Compares the height that all poses leave at a place with how far they scatter there: that measures chance, whatever
+/// the noise is like.
 void judge_relief(const Observations& observations, const RigModel& rig, BoardReport& board) {
   std::vector<HeightMap> poses;
   for (std::size_t i = 0; i < observations.poses.size(); ++i) {

@@ -30,9 +30,9 @@ class BoardRegion {
   [[nodiscard]] bool is_printed(const Eigen::Vector2d& camera_px) const;
 
  private:
-  Homography board_from_camera_;
   [[nodiscard]] bool is_within(double margin_mm, const Eigen::Vector2d& camera_px) const;
 
+  Homography board_from_camera_;
   Eigen::Vector2d size_mm_;
   double border_mm_, near_mm_;
 };
