@@ -163,6 +163,7 @@ void Decoder::Parts::place_symbols(Executor& executor) {
 
 void Decoder::Parts::triangulate(const Lattice& lattice, double full, Executor& executor) {
   const bool gated = options.correspond == Method::kDefault;
+  const Rules rules(options.trial);
   if (aligner) {
     solutions.clear();
     for (const AlignedSymbol& symbol : *aligned) solutions.push_back({symbol.point_in_camera, symbol.sigma_mm});
@@ -172,17 +173,17 @@ void Decoder::Parts::triangulate(const Lattice& lattice, double full, Executor& 
   decoding.points.clear();
   for (std::size_t i = 0; i < lattice.symbols.size(); ++i) {
     const LatticeSymbol& symbol = lattice.symbols[i];
-    if (aligner && !(*aligned)[i].whole) {
-      reader.reject(symbol, RegionStatus::kDamagedShape);
+    if (rules.apply(DecodeRule::kNotAligned, aligner && !(*aligned)[i].whole)) {
+      reader.reject(symbol, DecodeRule::kNotAligned);
       continue;
     }
     const TriangulatedPoint& point = solutions[i];
     const double depth = point.point_in_camera.z();
     const bool in_range = gated ? depth >= options.depth_min_mm && depth <= options.depth_max_mm : depth > 0;
-    if (in_range && point.point_in_camera.allFinite()) {
+    if (point.point_in_camera.allFinite() && !rules.apply(DecodeRule::kPointOutOfRange, !in_range)) {
       add_point(symbol, aligner ? (*aligned)[i].centre_px : symbol.centre_px, point, full);
     } else {
-      reader.reject(symbol, RegionStatus::kOutOfDepthRange);
+      reader.reject(symbol, DecodeRule::kPointOutOfRange);
     }
   }
 }

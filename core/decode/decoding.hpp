@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -12,31 +13,9 @@
 
 #include "core/cloud/cloud.hpp"
 #include "core/decode/centres/symbol_match.hpp"
+#include "core/decode/rules.hpp"
 
 namespace slsd {
-
-/// What became of a region. Everything but kDecoded is a reason for rejection.
-enum class RegionStatus : std::uint8_t {
-  kDecoded,
-  kTooSmall,
-  kTooLarge,
-  kTouchesBorder,
-  kLowContrast,
-  kUnknownShape,        ///< like none of the pattern's symbols
-  kNoNeighbour,         ///< too few links to read a codeword
-  kNoCodeword,          ///< no window around it is in the pattern, within the distance that can be corrected
-  kAmbiguousCodeword,   ///< the windows around it disagree
-  kClassDisagrees,      ///< its shape is not that of the cell which its windows name
-  kNeighboursDisagree,  ///< its neighbours' shapes are not those of the cells around that cell
-  kDamagedShape,        ///< its shape is that of its cell, but cut or disturbed: its centre would be wrong
-  kOffEpipolarLine,
-  kOutOfDepthRange,
-  kDuplicateCell,  ///< another region claims the cell with better evidence
-};
-inline constexpr int kRegionStatusCount = 15;
-
-/// "too_small", as in the counters of `status`.
-[[nodiscard]] std::string_view to_string(RegionStatus status);
 
 enum class Stage : std::uint8_t {
   kBinarize,
@@ -84,10 +63,12 @@ inline constexpr Directions kDirections;
 struct RegionSeen {
   Eigen::Vector2f centre_px;  ///< in the camera
   RegionStatus status;
-  std::int8_t letter;                 ///< index in the pattern's symbols, or -1
-  std::array<std::int32_t, 4> links;  ///< by Direction: index of the neighbour's region, or -1
-  std::array<bool, 4> broken;         ///< a link that was there and disagreed with its neighbours
-  std::int16_t column, row;           ///< cell of the pattern, where decoded; else -1
+  std::int8_t letter;                              ///< index in the pattern's symbols, or -1
+  std::array<std::int32_t, 4> links;               ///< by Direction: index of the neighbour's region, or -1
+  std::array<bool, 4> broken;                      ///< a link that was there and disagreed with its neighbours
+  std::int16_t column, row;                        ///< cell of the pattern, where decoded; else -1
+  DecodeRule rule = DecodeRule::kWindows;          ///< that decided on its status
+  std::optional<DecodeRule> guard = std::nullopt;  ///< the last that kept it from being brought back
 };
 
 /// What one frame gave: its points, and for every region seen what became of it.
@@ -98,6 +79,7 @@ struct Decoding {
   /// calibration, or of another projector's light.
   std::vector<SymbolMatch> off_line;
   std::array<std::uint32_t, kRegionStatusCount> counts{};  ///< regions by status
+  RuleCounts rules{};                                      ///< regions by rule, and those that a guard kept out
 
   [[nodiscard]] std::uint32_t count(RegionStatus status) const { return counts[static_cast<std::size_t>(status)]; }
 };

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include "core/decode/rules.hpp"
 #include "core/result.hpp"
 
 namespace slsd {
@@ -37,6 +38,7 @@ struct DecodeOptions {
   Method link_grid = Method::kDefault;
   Method decode_windows = Method::kDefault;
   Method correspond = Method::kDefault;
+  RuleTrial* trial = nullptr;  ///< of tools and tests alone; outlives the decoder
 
   [[nodiscard]] Result<> validate() const;
   /// Of the working range, by ratio: 1000 of 500 and 2000.

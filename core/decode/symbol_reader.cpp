@@ -42,18 +42,19 @@ SymbolReader::SymbolReader(const IndexedPattern& indexed, const Lens& projector,
     : options_(options),
       fixed_(std::make_shared<const Fixed>(indexed, projector, options.centre, expected.in_the_middle().scale)),
       paper_(std::move(paper)),
-      finder_(pattern().options, std::move(expected), options.binarize, options.find_regions),
+      finder_(pattern().options, std::move(expected), options.binarize, options.find_regions, Rules(options.trial)),
       linker_({.pitch_px = static_cast<float>(pattern().pitch_px())}),
-      window_decoder_(pattern(), indexed.codebook(), options.wrong_cells_max),
-      review_(pattern(), {}),
+      window_decoder_(pattern(), indexed.codebook(), options.wrong_cells_max, Rules(options.trial)),
+      review_(pattern(), {.rules = Rules(options.trial)}),
       letters_(std::make_shared<const LetterFields>(pattern().options)),
-      mender_(pattern(), letters_),
-      torn_lines_(pattern(), letters_),
-      border_reader_(pattern(), letters_),
+      mender_(pattern(), letters_, Rules(options.trial)),
+      torn_lines_(pattern(), letters_, Rules(options.trial)),
+      border_reader_(pattern(), letters_, Rules(options.trial)),
       correspondence_({.pitch_px = static_cast<float>(pattern().pitch_px()),
                        .symbol_size_px = static_cast<float>(pattern().options.symbol_size_px),
                        .rows = pattern().whole_rows(),
-                       .columns = pattern().whole_columns()}),
+                       .columns = pattern().whole_columns(),
+                       .rules = Rules(options.trial)}),
       centre_correction_(fixed_->appearances.usual().as_measured, static_cast<float>(pattern().pitch_px()),
                          static_cast<float>(pattern().options.symbol_size_px)) {}
 
@@ -226,9 +227,10 @@ void SymbolReader::refuse_cut() {
   kept_.clear();
   std::int32_t count = 0;
   for (const LatticeSymbol& symbol : symbols) {
-    const bool is_cut = symbol.damage_px > limit && std::ranges::find(symbol.neighbours, -1) != symbol.neighbours.end();
+    const bool is_at_rim = std::ranges::find(symbol.neighbours, -1) != symbol.neighbours.end();
+    const bool is_cut = Rules(options_.trial).apply(DecodeRule::kCutCentre, symbol.damage_px > limit && is_at_rim);
     kept_.push_back(is_cut ? -1 : count++);
-    if (is_cut) reject(symbol, RegionStatus::kDamagedShape);
+    if (is_cut) reject(symbol, DecodeRule::kCutCentre);
   }
   if (count == static_cast<std::int32_t>(symbols.size())) return;
   for (std::size_t i = 0; i < symbols.size(); ++i) {
@@ -266,20 +268,27 @@ void SymbolReader::report(Decoding& decoding) const {
   const std::vector<Region>& regions = finder_.regions().regions;
   decoding.regions.resize(regions.size());
   for (std::size_t i = 0; i < regions.size(); ++i) {
-    decoding.regions[i] = {regions[i].middle_px(), finder_.status(i), -1, {-1, -1, -1, -1}, {}, -1, -1};
+    const DecodeRule rule = finder_.rule(i);
+    decoding.regions[i] = {regions[i].middle_px(), text_of(rule).gives, -1, {-1, -1, -1, -1}, {}, -1, -1, rule};
   }
   for (std::size_t i = 0; i < seen_.size(); ++i) {
     RegionSeen& out = decoding.regions[seen_.region[i]];
     const GridNode& node = seen_.nodes[i];
     out.centre_px = {seen_.moments[i].x, seen_.moments[i].y};
-    out.status = seen_.claims[i].status;
+    const CellClaim& claim = seen_.claims[i];
+    out.status = claim.status, out.rule = claim.rule;
+    if (out.status != RegionStatus::kDecoded && claim.guard != DecodeRule::kWindows) out.guard = claim.guard;
     out.letter = seen_.shapes[i].letter;
     for (int d = 0; d < 4; ++d) out.links[d] = node.links[d] < 0 ? -1 : seen_.region[node.links[d]];
     out.broken = node.broken;
-    if (out.status == RegionStatus::kDecoded) out.column = seen_.claims[i].column, out.row = seen_.claims[i].row;
+    if (out.status == RegionStatus::kDecoded) out.column = claim.column, out.row = claim.row;
   }
-  decoding.counts = {};
-  for (const RegionSeen& region : decoding.regions) ++decoding.counts[static_cast<std::size_t>(region.status)];
+  decoding.counts = {}, decoding.rules = {};
+  for (const RegionSeen& region : decoding.regions) {
+    ++decoding.counts[static_cast<std::size_t>(region.status)];
+    ++decoding.rules[static_cast<std::size_t>(region.rule)];
+    if (region.guard) ++decoding.rules[static_cast<std::size_t>(*region.guard)];
+  }
 }
 
 }  // namespace slsd

@@ -60,7 +60,7 @@ class SymbolReader {
   /// The symbols of the last frame whose cells are certain and not on their epipolar lines, where they are seen.
   void list_off_line(std::vector<SymbolMatch>& matches) const;
   /// The symbol turned out to be no point.
-  void reject(const LatticeSymbol& symbol, RegionStatus status) { seen_.claims[symbol.sighting].status = status; }
+  void reject(const LatticeSymbol& symbol, DecodeRule by) { seen_.claims[symbol.sighting].decide(by); }
   /// What became of every region, with the counters.
   void report(Decoding& decoding) const;
 

@@ -9,11 +9,10 @@
 #include <vector>
 
 #include "tests/adversary/misled.hpp"
+#include "tests/adversary/rule_sweep.hpp"
 
 namespace slsd::adversary {
 namespace {
-
-constexpr double kTolerancePx = 1.5;
 
 struct Row {
   int frames = 0, frames_wrong = 0, wrong = 0, undecidable = 0, right = 0, visible = 0;
@@ -33,10 +32,11 @@ void print(const char* name, const Row& row) {
 }
 
 /// @param first  number of each kind's first frame: those of another number are other frames
-Result<int> report(int frames, int first, int only_kind, bool single, const char* picture) {
+/// @param trial  leaves rules out
+Result<int> report(int frames, int first, int only_kind, bool single, const char* picture, RuleTrial& trial) {
   std::vector<Misled> readers;
   for (const int symbol_size_px : {16, 8}) {
-    auto reader = Misled::of(symbol_size_px);
+    auto reader = Misled::of(symbol_size_px, &trial);
     if (!reader) return tl::unexpected(reader.error());
     readers.push_back(std::move(*reader));
   }
@@ -66,6 +66,9 @@ Result<int> report(int frames, int first, int only_kind, bool single, const char
         for (int i = 0; i < kRegionStatusCount; ++i)
           std::fprintf(stderr, "%s %u\n", std::string(to_string(static_cast<RegionStatus>(i))).c_str(),
                        (*decoding)->counts[i]);
+        for (std::size_t i = 0; i < kDecodeRuleCount; ++i)
+          if ((*decoding)->rules[i] > 0)
+            std::fprintf(stderr, "  by %s %u\n", std::string(to_string(decode_rule(i))).c_str(), (*decoding)->rules[i]);
       }
     }
     print(std::string(to_string(kind)).c_str(), row);
@@ -82,10 +85,12 @@ Result<int> report(int frames, int first, int only_kind, bool single, const char
 }  // namespace
 }  // namespace slsd::adversary
 
-// adversary-report [FRAMES] [--first N] [--kind K] [--frame N [--picture FILE.pgm]]
+// adversary-report [FRAMES] [--first N] [--kind K] [--without RULE]... [--each-rule] [--frame N [--picture FILE.pgm]]
 int main(int count, char** arguments) {
   int frames = 1000, first = 0, kind = -1, number = -1;
   const char* picture = nullptr;
+  bool each_rule = false;
+  slsd::RuleTrial trial;
   for (int i = 1; i < count; ++i) {
     const bool more = i + 1 < count;
     if (std::strcmp(arguments[i], "--kind") == 0 && more) {
@@ -94,6 +99,15 @@ int main(int count, char** arguments) {
       number = std::atoi(arguments[++i]);
     } else if (std::strcmp(arguments[i], "--first") == 0 && more) {
       first = std::atoi(arguments[++i]);
+    } else if (std::strcmp(arguments[i], "--without") == 0 && more) {
+      const auto rule = slsd::adversary::rule_named(arguments[++i]);
+      if (!rule) {
+        std::fprintf(stderr, "adversary-report: %s\n", slsd::to_string(rule.error()).c_str());
+        return 2;
+      }
+      trial.off.set(static_cast<std::size_t>(*rule));
+    } else if (std::strcmp(arguments[i], "--each-rule") == 0) {
+      each_rule = true;
     } else if (std::strcmp(arguments[i], "--picture") == 0 && more) {
       picture = arguments[++i];
     } else {
@@ -101,7 +115,8 @@ int main(int count, char** arguments) {
     }
   }
   if (number >= 0) first = number, frames = slsd::adversary::kKinds;
-  const auto wrong = slsd::adversary::report(frames, first, kind, number >= 0, picture);
+  const auto wrong = each_rule ? slsd::adversary::sweep_rules(frames, first, kind)
+                               : slsd::adversary::report(frames, first, kind, number >= 0, picture, trial);
   if (!wrong) std::fprintf(stderr, "adversary-report: %s\n", slsd::to_string(wrong.error()).c_str());
   return wrong && *wrong == 0 ? 0 : 1;
 }

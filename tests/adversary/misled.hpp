@@ -10,13 +10,17 @@
 
 namespace slsd::adversary {
 
+/// How far from its place a point may be that is right.
+inline constexpr double kTolerancePx = 1.5;
+
 /// Decoders of one pattern, and the frames that would mislead them.
 struct Misled {
   FrameMaker maker;
   std::vector<Decoder> decoders;  ///< one to each of three working depths
 
+  /// @param trial  of all decoders; outlives them
   /// @errors as make_pattern() and Decoder::create()
-  [[nodiscard]] static Result<Misled> of(int symbol_size_px);
+  [[nodiscard]] static Result<Misled> of(int symbol_size_px, RuleTrial* trial = nullptr);
 };
 
 }  // namespace slsd::adversary

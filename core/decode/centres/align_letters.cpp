@@ -173,7 +173,7 @@ float LetterAligner::support_beside_print(const LetterScene& scene, const AskedL
   return std::max(asked.task.support, shares_of_cell(scene, asked).agree_beside_print());
 }
 
-void LetterAligner::take_over(const LetterScene& scene, const AskedLetter& asked) const {
+void LetterAligner::take_over(const LetterScene& scene, const AskedLetter& asked, DecodeRule by) const {
   const auto& [node, place, task, centre_px, centroid_px, tilt_px] = asked;
   Sightings& seen = scene.seen;
   seen.nodes[node].centre_px = centre_px;
@@ -183,7 +183,7 @@ void LetterAligner::take_over(const LetterScene& scene, const AskedLetter& asked
   moments.background = task.state.offset, moments.peak = task.state.offset + task.state.gain;
   const float camera_px = std::sqrt(std::abs(place.frame.determinant()));
   seen.misfits[node] = std::sqrt(kMisfitSquaredPerPx * sigma_px(task) * camera_px);
-  seen.claims[node].status = RegionStatus::kDecoded;
+  seen.claims[node].decide(by);
 }
 
 }  // namespace slsd

@@ -96,7 +96,7 @@ class LetterAligner {
   /// How much of the window agrees, or of the cell, where print does not count.
   [[nodiscard]] float support_beside_print(const LetterScene& scene, const AskedLetter& asked) const;
   /// Decodes the sighting with what was found.
-  void take_over(const LetterScene& scene, const AskedLetter& asked) const;
+  void take_over(const LetterScene& scene, const AskedLetter& asked, DecodeRule by) const;
 
  private:
   CodeArray array_;

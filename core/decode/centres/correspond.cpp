@@ -127,7 +127,8 @@ class Surroundings {
 
   /// At the corner of what was put there: on two sides that meet, and between them, it has been refused; or on one of
   /// them something else lies or it has been refused, and on the other the frame ends.
-  [[nodiscard]] bool is_corner(std::int32_t node) const {
+  /// @param at_border  asks for the latter
+  [[nodiscard]] bool is_corner(std::int32_t node, bool at_border) const {
     return std::ranges::any_of(kDirections, [&](Direction one) {
       const auto two = static_cast<Direction>((one + 1) % 4);
       const std::int32_t first = beside(node, one), second = beside(node, two);
@@ -135,8 +136,8 @@ class Surroundings {
       const auto may_be_other = [&](std::int32_t other, Direction d) {
         return is_refused(other) || contradicts(node, d);
       };
-      return (misread(first) && misread(second)) || (is_unread(node, one) && may_be_other(second, two)) ||
-             (is_unread(node, two) && may_be_other(first, one));
+      if (!at_border) return misread(first) && misread(second);
+      return (is_unread(node, one) && may_be_other(second, two)) || (is_unread(node, two) && may_be_other(first, one));
     });
   }
 
@@ -273,6 +274,19 @@ class Surroundings {
   const Eigen::Vector2f frame_px_;
 };
 
+/// The rule that refuses one of those that are left of a rim, or kWindows.
+DecodeRule rule_of_left(const Surroundings& around, const Rules& rules, std::int32_t node) {
+  if (around.is_inside(node)) return DecodeRule::kWindows;
+  if (rules.apply(DecodeRule::kAlone, around.is_alone(node))) return DecodeRule::kAlone;
+  if (rules.apply(DecodeRule::kLastOfLine, around.is_last(node))) return DecodeRule::kLastOfLine;
+  if (rules.apply(DecodeRule::kLeftOfLine, around.is_left(node))) return DecodeRule::kLeftOfLine;
+  if (rules.apply(DecodeRule::kRestOfLine, around.is_rest(node))) return DecodeRule::kRestOfLine;
+  if (rules.apply(DecodeRule::kOnTornLine, around.is_on_torn_line(node))) return DecodeRule::kOnTornLine;
+  if (rules.apply(DecodeRule::kBridge, around.is_bridge(node))) return DecodeRule::kBridge;
+  if (rules.apply(DecodeRule::kPair, around.is_of_pair(node))) return DecodeRule::kPair;
+  return DecodeRule::kWindows;
+}
+
 }  // namespace
 
 void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellClaim>& claims) {
@@ -288,8 +302,9 @@ void Correspondence::settle_duplicates(const CellRays& cells, std::vector<CellCl
     CellClaim& other = claims[holder];
     // Of two islands nothing says which is right; within one a symbol may have been taken apart.
     const float lead = claim.island == other.island ? claim.evidence - other.evidence : 0;
-    if (lead > -options_.evidence_margin) other.status = RegionStatus::kDuplicateCell;
-    if (lead < options_.evidence_margin) claim.status = RegionStatus::kDuplicateCell;
+    constexpr auto kTwice = DecodeRule::kCellTwice;
+    if (options_.rules.apply(kTwice, lead > -options_.evidence_margin)) other.decide(kTwice);
+    if (options_.rules.apply(kTwice, lead < options_.evidence_margin)) claim.decide(kTwice);
     if (lead > 0) holder = static_cast<std::int32_t>(node);
   }
 }
@@ -317,11 +332,11 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, const std::
     next_rim_.clear();
     bool any = false;
     for (std::size_t i = 0; i < rim_.size(); ++i) {
-      if (refused_[i] == 0) {
+      if (refused_[i] == DecodeRule::kWindows) {
         next_rim_.push_back(rim_[i]);
         continue;
       }
-      claims[rim_[i]].status = RegionStatus::kNeighboursDisagree;
+      claims[rim_[i]].decide(refused_[i]);
       any = true;
       for (const Direction d : kDirections) {
         const std::int32_t other = neighbour(nodes, rim_[i], d);
@@ -333,14 +348,17 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, const std::
     std::swap(rim_, next_rim_);
     return any;
   };
-  refuse([&](std::int32_t node) { return around.is_lone(node); });
-  refuse([&](std::int32_t node) { return around.is_corner(node); });
-  while (refuse([&](std::int32_t node) {
-    return !around.is_inside(node) &&
-           (around.is_alone(node) || around.is_last(node) || around.is_left(node) || around.is_rest(node) ||
-            around.is_on_torn_line(node) || around.is_bridge(node) || around.is_of_pair(node));
-  }))
-    continue;
+  const Rules& rules = options_.rules;
+  refuse([&](std::int32_t node) {
+    return rules.apply(DecodeRule::kRefusedAround, around.is_lone(node)) ? DecodeRule::kRefusedAround
+                                                                         : DecodeRule::kWindows;
+  });
+  refuse([&](std::int32_t node) {
+    if (rules.apply(DecodeRule::kCornerMisread, around.is_corner(node, false))) return DecodeRule::kCornerMisread;
+    if (rules.apply(DecodeRule::kCornerAtBorder, around.is_corner(node, true))) return DecodeRule::kCornerAtBorder;
+    return DecodeRule::kWindows;
+  });
+  while (refuse([&](std::int32_t node) { return rule_of_left(around, rules, node); })) continue;
 }
 
 void Correspondence::correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,
@@ -350,10 +368,12 @@ void Correspondence::correspond(const CellRays& cells, std::span<const EpipolarS
       CellClaim& claim = claims[node];
       if (claim.status != RegionStatus::kDecoded) continue;
       const Eigen::Vector2d& direction = cells.ray(claim.row, claim.column).direction;
-      if (std::abs(segments[node].residual_px(direction)) > tolerance_px) {
-        claim.status = RegionStatus::kOffEpipolarLine;
-      } else if (!segments[node].passes(direction, tolerance_px)) {
-        claim.status = RegionStatus::kOutOfDepthRange;
+      const bool off_line = std::abs(segments[node].residual_px(direction)) > tolerance_px;
+      const bool out_of_range = !off_line && !segments[node].passes(direction, tolerance_px);
+      if (options_.rules.apply(DecodeRule::kSymbolOffLine, off_line)) {
+        claim.decide(DecodeRule::kSymbolOffLine);
+      } else if (options_.rules.apply(DecodeRule::kSymbolOutOfRange, out_of_range)) {
+        claim.decide(DecodeRule::kSymbolOutOfRange);
       }
     }
   });

@@ -14,6 +14,7 @@ struct CorrespondOptions {
   float evidence_margin = 2;  ///< by how much the better of two claims on one cell has to be better to stand
   float pitch_px = 18, symbol_size_px = 16;  ///< of the pattern, projector px
   int rows = 44, columns = 71;               ///< of it that are shown whole
+  Rules rules = {};
 };
 
 /// Makes correspondences of claims: each cell belongs to one node at most, on its epipolar line and within the working
@@ -46,7 +47,7 @@ class Correspondence {
   std::vector<std::int32_t> holder_;          // of each cell
   std::vector<std::int32_t> rim_, next_rim_;  // nodes beside which the pattern does not go on
   std::vector<std::uint8_t> at_rim_;          // of each node
-  std::vector<std::uint8_t> refused_;         // of rim_, in one round
+  std::vector<DecodeRule> refused_;           // of rim_, in one round; kWindows: it stays
 };
 
 }  // namespace slsd

@@ -65,6 +65,11 @@ Eigen::Vector2f onto_line(const LetterScene& scene, std::int32_t node, int lette
 
 }  // namespace
 
+bool has_settled(const Rules& rules, CellClaim& claim, const PatchTask& task) {
+  if (task.failed) claim.guard = DecodeRule::kMendUnsettled;
+  return !task.failed && claim.pass(rules, DecodeRule::kMendUnsettled, !(std::abs(task.moved) > kAlignedSettledPx));
+}
+
 Disputes::Disputes(const Pattern& pattern) : array_(pattern.array), pitch_px_(static_cast<float>(pattern.pitch_px())) {}
 
 template <class IsEnd>
@@ -95,9 +100,10 @@ bool Disputes::none_around(const Sightings& seen, std::int32_t node, int reach) 
   return none_around(seen, node, reach, [](std::int32_t, bool) { return false; });
 }
 
-GroupMender::GroupMender(const Pattern& pattern, std::shared_ptr<const LetterFields> letters)
+GroupMender::GroupMender(const Pattern& pattern, std::shared_ptr<const LetterFields> letters, Rules rules)
     : pitch_px_(static_cast<float>(pattern.pitch_px())),
       size_px_(static_cast<float>(pattern.options.symbol_size_px)),
+      rules_(rules),
       aligner_(pattern, std::move(letters)),
       disputes_(pattern) {}
 
@@ -136,7 +142,8 @@ void GroupMender::find_members(const LetterScene& scene) {
       const bool undisputed = disputes_.none_around(seen, node, std::numeric_limits<int>::max(), is_end);
       for (const std::int32_t other : disputes_.of_surface()) verdicts_[other] = undisputed ? kUndisputed : kDisputed;
     }
-    if (verdicts_[node] == kUndisputed) to_ask_.push_back(node);
+    const bool undisputed = verdicts_[node] == kUndisputed;
+    if (scene.seen.claims[node].pass(rules_, DecodeRule::kGroupDisputed, undisputed)) to_ask_.push_back(node);
   }
 }
 
@@ -191,17 +198,22 @@ bool GroupMender::shows_letter(const LetterScene& scene, const AskedLetter& aske
   constexpr float kMovedMax = 0.06F;  // of the pitch
   constexpr float kMiddleMin = 0.6F, kSupportMin = 0.75F;
   const PatchTask& task = asked.task;
-  if (task.failed || std::abs(task.moved) > kAlignedSettledPx) return false;
+  CellClaim& claim = scene.seen.claims[asked.node];
+  if (!has_settled(rules_, claim, task)) return false;
   const bool lone = asked.place.held_by == 1;
-  if (lone && scene.seen.claims[asked.node].status == RegionStatus::kNeighboursDisagree &&
-      is_alone_on_line(scene.seen, asked.node))
-    return false;
-  if (std::abs(task.state.across) > (lone ? kLoneAcrossMaxPx : kAlignedAcrossMaxPx)) return false;
-  if (std::abs(task.state.disparity) > kMovedMax * pitch_px_ || !(asked.tilt_px <= kAlignedTiltMaxPx)) return false;
-  const LightShares middle = aligner_.shares_of_middle(scene, asked);
-  if (middle.agree + middle.darkened < kMiddleMin) return false;
-  const float support_min = lone ? kLoneSupportMin : kSupportMin;
-  return task.support >= support_min || aligner_.support_beside_print(scene, asked) >= support_min;
+  const bool line_alone =
+      lone && claim.status == RegionStatus::kNeighboursDisagree && is_alone_on_line(scene.seen, asked.node);
+  if (!claim.pass(rules_, DecodeRule::kGroupLineAlone, !line_alone)) return false;
+  const bool in_place = std::abs(task.state.across) <= (lone ? kLoneAcrossMaxPx : kAlignedAcrossMaxPx) &&
+                        std::abs(task.state.disparity) <= kMovedMax * pitch_px_ && asked.tilt_px <= kAlignedTiltMaxPx;
+  if (!claim.pass(rules_, DecodeRule::kGroupMisplaced, in_place)) return false;
+  const auto agrees = [&] {
+    const LightShares middle = aligner_.shares_of_middle(scene, asked);
+    if (middle.agree + middle.darkened < kMiddleMin) return false;
+    const float support_min = lone ? kLoneSupportMin : kSupportMin;
+    return task.support >= support_min || aligner_.support_beside_print(scene, asked) >= support_min;
+  };
+  return claim.pass(rules_, DecodeRule::kGroupUnlike, agrees());
 }
 
 /// Of those that agree leaves out those that had been refused where too many of their row or column show light that
@@ -238,11 +250,13 @@ void GroupMender::refuse_torn_lines(const LetterScene& scene) {
       return agreeing < kAgreeingToOne * against;
     });
   };
-  std::erase_if(agreeing_, is_on_torn_line);
+  std::erase_if(agreeing_, [&](std::int32_t i) {
+    return !scene.seen.claims[known_[i].letter.node].pass(rules_, DecodeRule::kGroupTornLine, !is_on_torn_line(i));
+  });
 }
 
 /// Of those that agree those that are enough beside each other.
-void GroupMender::keep_groups(const Sightings& seen) {
+void GroupMender::keep_groups(Sightings& seen) {
   enum : std::uint8_t { kNo, kAgrees, kInGroup };
   agrees_.assign(seen.size(), kNo);
   const auto node_of = [&](std::int32_t i) { return known_[i].letter.node; };
@@ -257,7 +271,9 @@ void GroupMender::keep_groups(const Sightings& seen) {
         walk_.walk(seen.nodes, node_of(i), std::numeric_limits<int>::max(), look);
     for (const LinkWalk::Stop& stop : group) agrees_[stop.node] = group.size() >= kFewestBeside ? kInGroup : kNo;
   }
-  std::erase_if(agreeing_, [&](std::int32_t i) { return agrees_[node_of(i)] != kInGroup; });
+  std::erase_if(agreeing_, [&](std::int32_t i) {
+    return !seen.claims[node_of(i)].pass(rules_, DecodeRule::kGroupTooFew, agrees_[node_of(i)] == kInGroup);
+  });
 }
 
 /// Those that are still where they were in an earlier round are as they were then.
@@ -294,6 +310,8 @@ void GroupMender::start(const Sightings& seen) {
 }
 
 const std::vector<std::int32_t>& GroupMender::mend(const LetterScene& scene) {
+  mended_.clear();
+  if (!rules_.has(DecodeRule::kMendedInGroup)) return mended_;
   find_members(scene);
   align_members(scene);
   agreeing_.clear();
@@ -301,9 +319,8 @@ const std::vector<std::int32_t>& GroupMender::mend(const LetterScene& scene) {
     if (const std::int32_t i = asked_of_[node]; i >= 0 && known_[i].shows_letter) agreeing_.push_back(i);
   refuse_torn_lines(scene);
   keep_groups(scene.seen);
-  mended_.clear();
   for (const std::int32_t i : agreeing_) {
-    aligner_.take_over(scene, known_[i].letter);
+    aligner_.take_over(scene, known_[i].letter, DecodeRule::kMendedInGroup);
     mended_.push_back(known_[i].letter.node);
   }
   return mended_;

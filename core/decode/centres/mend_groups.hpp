@@ -37,13 +37,16 @@ class Disputes {
   std::vector<std::int32_t> of_surface_;
 };
 
+/// Whether the aligning of a letter came to an end; a guard of all that brings symbols back.
+[[nodiscard]] bool has_settled(const Rules& rules, CellClaim& claim, const PatchTask& task);
+
 /// Finds the places of symbols where nothing beside them stands that could hold them: those beside each other hold each
 /// other. A plane of the grid is laid through what is known of them, and three and more that show their letters where
 /// it has them are decoded. See docs/decoder.md, "Where nothing stands".
 /// @thread thread-bound: keeps its buffers; the letters are shared with copies
 class GroupMender {
  public:
-  GroupMender(const Pattern& pattern, std::shared_ptr<const LetterFields> letters);
+  GroupMender(const Pattern& pattern, std::shared_ptr<const LetterFields> letters, Rules rules = {});
 
   /// To be called before the first of a frame's rounds.
   void start(const Sightings& seen);
@@ -62,9 +65,10 @@ class GroupMender {
   [[nodiscard]] LetterPlace place_of(const LetterScene& scene, std::int32_t node);
   [[nodiscard]] bool shows_letter(const LetterScene& scene, const AskedLetter& asked) const;
   void refuse_torn_lines(const LetterScene& scene);
-  void keep_groups(const Sightings& seen);
+  void keep_groups(Sightings& seen);
 
   float pitch_px_, size_px_;
+  Rules rules_;
   LetterAligner aligner_;
   Disputes disputes_;
   LinkWalk walk_;

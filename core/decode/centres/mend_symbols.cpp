@@ -103,19 +103,27 @@ bool shows_centre(const AskedLetter& asked, const LightShares& middle) {
 
 }  // namespace
 
-SymbolMender::SymbolMender(const Pattern& pattern, const std::shared_ptr<const LetterFields>& letters)
+SymbolMender::SymbolMender(const Pattern& pattern, const std::shared_ptr<const LetterFields>& letters, Rules rules)
     : pitch_px_(static_cast<float>(pattern.pitch_px())),
+      rules_(rules),
       aligner_(pattern, letters),
-      groups_(pattern, letters),
+      groups_(pattern, letters, rules),
       disputes_(pattern) {}
+
+DecodeRule SymbolMender::rule_of(Held held) {
+  return held == Held::kByOne   ? DecodeRule::kMendedByOne
+         : held == Held::kByTwo ? DecodeRule::kMendedByTwo
+                                : DecodeRule::kMendedAtCorner;
+}
 
 /// What is worn, and what its surroundings have refused, where as far as it could have come with them nothing disputes
 /// it.
 bool SymbolMender::is_asked(const LetterScene& scene, std::int32_t node) {
   constexpr int kReach = 3;
-  const CellClaim& claim = scene.seen.claims[node];
+  CellClaim& claim = scene.seen.claims[node];
   if (claim.status == RegionStatus::kNeighboursDisagree)
-    return claim.named() && disputes_.none_around(scene.seen, node, kReach);
+    return claim.named() &&
+           claim.pass(rules_, DecodeRule::kMendDisputed, disputes_.none_around(scene.seen, node, kReach));
   return is_worn(scene.gate, scene.seen, node);
 }
 
@@ -148,10 +156,11 @@ void SymbolMender::sort_asked() {
 }
 
 /// Whether enough hold it, or one that may be enough.
-bool SymbolMender::may_be_held(const Sightings& seen, const LetterPlace& place, Held held, std::int32_t node) const {
+bool SymbolMender::may_be_held(Sightings& seen, const LetterPlace& place, Held held, std::int32_t node) const {
   switch (held) {
     case Held::kByOne:
-      return place.held_by == 1 && stands_with_one(seen, node, to_ask_);
+      return place.held_by == 1 &&
+             seen.claims[node].pass(rules_, DecodeRule::kMendAlone, stands_with_one(seen, node, to_ask_));
     case Held::kByTwo:
       return place.held_by >= kHeldBy;
     case Held::kAtCorner:
@@ -161,24 +170,31 @@ bool SymbolMender::may_be_held(const Sightings& seen, const LetterPlace& place, 
 }
 
 /// Whether it settled near where it was looked for, and on its line.
-bool SymbolMender::lies_there(const Sightings& seen, const AskedLetter& asked) const {
+bool SymbolMender::lies_there(Sightings& seen, const AskedLetter& asked) const {
   const PatchTask& task = asked.task;
-  const RegionStatus status = seen.claims[asked.node].status;
+  CellClaim& claim = seen.claims[asked.node];
+  const RegionStatus status = claim.status;
   const bool lone = asked.place.held_by < kHeldBy, refused = status == RegionStatus::kNeighboursDisagree;
-  if (task.failed || std::abs(task.moved) > kAlignedSettledPx) return false;
-  if (std::abs(task.state.across) > (lone ? kLoneAcrossMaxPx : kAlignedAcrossMaxPx)) return false;
-  if (std::abs(task.state.disparity) > kMovedMax * pitch_px_) return false;
-  // What is tilted out of all proportion lies anywhere.
-  if (!((asked.centre_px - task.map.middle_px).norm() < 0.5F * pitch_px_)) return false;
-  if (lone || refused) return std::abs(task.state.disparity) <= kTightSlip * pitch_px_;
-  if (status != RegionStatus::kDecoded) return true;
-  const GridNode& node = seen.nodes[asked.node];
-  return (node.frame.inverse() * (asked.centre_px - node.centre_px)).norm() < kMovedMax * pitch_px_;
+  if (!has_settled(rules_, claim, task)) return false;
+  const float across_max_px = lone ? kLoneAcrossMaxPx : kAlignedAcrossMaxPx;
+  if (!claim.pass(rules_, DecodeRule::kMendOffLine, std::abs(task.state.across) <= across_max_px)) return false;
+  const auto lies_near = [&] {
+    if (std::abs(task.state.disparity) > kMovedMax * pitch_px_) return false;
+    // What is tilted out of all proportion lies anywhere.
+    if (!((asked.centre_px - task.map.middle_px).norm() < 0.5F * pitch_px_)) return false;
+    if (lone || refused) return std::abs(task.state.disparity) <= kTightSlip * pitch_px_;
+    if (status != RegionStatus::kDecoded) return true;
+    const GridNode& node = seen.nodes[asked.node];
+    return (node.frame.inverse() * (asked.centre_px - node.centre_px)).norm() < kMovedMax * pitch_px_;
+  };
+  return claim.pass(rules_, DecodeRule::kMendMoved, lies_near());
 }
 
 /// @param held  by how many at least; by one, and at a corner, by no more
 void SymbolMender::mend_asked(const LetterScene& scene, Held held) {
   Sightings& seen = scene.seen;
+  const DecodeRule rule = rule_of(held);
+  if (!rules_.has(rule)) return;
   const bool lone = held == Held::kByOne;
   const float tilt_max_px = lone ? kLoneTiltMaxPx : held == Held::kByTwo ? kAlignedTiltMaxPx : kTiltAtCornersMaxPx;
   aligner_.clear();
@@ -190,9 +206,9 @@ void SymbolMender::mend_asked(const LetterScene& scene, Held held) {
   std::vector<AskedLetter>& all = aligner_.asked();
   for (std::size_t i = 0; i < all.size(); ++i) {
     AskedLetter& asked = all[i];
-    const CellClaim& claim = seen.claims[asked.node];
+    CellClaim& claim = seen.claims[asked.node];
     if (!lies_there(seen, asked)) continue;
-    if (asked.tilt_px > tilt_max_px) {
+    if (!claim.pass(rules_, DecodeRule::kMendTilted, !(asked.tilt_px > tilt_max_px))) {
       const bool at_corner = asked.place.held_by == kHeldBy && claim.status != RegionStatus::kNeighboursDisagree;
       if (at_corner && held == Held::kByTwo) turned_.push_back(asked.node);
       continue;
@@ -203,16 +219,20 @@ void SymbolMender::mend_asked(const LetterScene& scene, Held held) {
     if (shown && (lone || (asked.place.held_by > kHeldBy && support < kSupportGood)))
       support = aligner_.support_beside_print(scene, asked);
     const float of_two = claim.status == RegionStatus::kDecoded ? kSupportGood : kWholeSupportMin;
-    if (shown && support >= (lone ? kLoneSupportMin : of_two)) {
+    if (claim.pass(rules_, DecodeRule::kMendHidden, shown) &&
+        claim.pass(rules_, DecodeRule::kMendUnlike, support >= (lone ? kLoneSupportMin : of_two))) {
       agreeing_.push_back(i);
       if (lone) lone_.push_back(asked.node);
-    } else if (claim.status == RegionStatus::kDamagedShape && middle.brighter > kHidden) {
+    } else if (rules_.apply(DecodeRule::kHidden,
+                            claim.status == RegionStatus::kDamagedShape && middle.brighter > kHidden)) {
+      claim.decide(DecodeRule::kHidden);
       seen.misfits[asked.node] = std::numeric_limits<float>::infinity();
     }
   }
   for (const std::size_t i : agreeing_) {
-    if (lone && !stands_with_one(seen, all[i].node, lone_)) continue;
-    aligner_.take_over(scene, all[i]);
+    CellClaim& claim = seen.claims[all[i].node];
+    if (lone && !claim.pass(rules_, DecodeRule::kMendAlone, stands_with_one(seen, all[i].node, lone_))) continue;
+    aligner_.take_over(scene, all[i], rule);
     mended_.push_back(all[i].node);
   }
 }

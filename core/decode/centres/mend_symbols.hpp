@@ -18,7 +18,7 @@ namespace slsd {
 /// @thread thread-bound: keeps its buffers; the letters are shared with copies
 class SymbolMender {
  public:
-  SymbolMender(const Pattern& pattern, const std::shared_ptr<const LetterFields>& letters);
+  SymbolMender(const Pattern& pattern, const std::shared_ptr<const LetterFields>& letters, Rules rules = {});
 
   /// What is mended is decoded, with another place, frame, light and misfit, and what is damaged and hidden in its
   /// middle has a misfit without bounds.
@@ -27,15 +27,17 @@ class SymbolMender {
 
  private:
   enum class Held : std::uint8_t { kByOne, kByTwo, kAtCorner };
+  [[nodiscard]] static DecodeRule rule_of(Held held);
   [[nodiscard]] bool is_asked(const LetterScene& scene, std::int32_t node);
   void ask_all(const LetterScene& scene);
   void ask_beside(const LetterScene& scene, std::size_t first, Held held);
   void sort_asked();
   void mend_asked(const LetterScene& scene, Held held);
-  [[nodiscard]] bool may_be_held(const Sightings& seen, const LetterPlace& place, Held held, std::int32_t node) const;
-  [[nodiscard]] bool lies_there(const Sightings& seen, const AskedLetter& asked) const;
+  [[nodiscard]] bool may_be_held(Sightings& seen, const LetterPlace& place, Held held, std::int32_t node) const;
+  [[nodiscard]] bool lies_there(Sightings& seen, const AskedLetter& asked) const;
 
   float pitch_px_;
+  Rules rules_;
   LetterAligner aligner_;
   GroupMender groups_;
   Disputes disputes_;

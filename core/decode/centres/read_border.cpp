@@ -73,8 +73,9 @@ bool is_at_border(const Eigen::Vector2f& centre_px, const LatticeFrame& frame, f
   return (centre_px.array() < reach).any() || (centre_px.array() > frame_px.array() - 1 - reach).any();
 }
 
-BorderReader::BorderReader(const Pattern& pattern, std::shared_ptr<const LetterFields> letters)
+BorderReader::BorderReader(const Pattern& pattern, std::shared_ptr<const LetterFields> letters, Rules rules)
     : array_(pattern.array),
+      rules_(rules),
       rows_(pattern.whole_rows()),
       columns_(pattern.whole_columns()),
       pitch_px_(static_cast<float>(pattern.pitch_px())),
@@ -129,12 +130,13 @@ void BorderReader::refuse(const GreyView& frame, float blur_px, Sightings& seen)
                                                   : (pitch_px_ * (from.frame * step(d))).eval();
       const Eigen::Vector2f there_px = from.centre_px + step_px;
       if (!is_at_border(there_px, from.frame, size_px_, frame_px)) continue;
-      if (!shows_another(frame, there_px, from.frame, array_.at(cell.row, cell.column))) continue;
+      const bool other = shows_another(frame, there_px, from.frame, array_.at(cell.row, cell.column));
+      if (!rules_.apply(DecodeRule::kOtherAtBorder, other)) continue;
       refused_.push_back(node);
       break;
     }
   }
-  for (const std::int32_t node : refused_) seen.claims[node].status = RegionStatus::kNeighboursDisagree;
+  for (const std::int32_t node : refused_) seen.claims[node].decide(DecodeRule::kOtherAtBorder);
 }
 
 }  // namespace slsd

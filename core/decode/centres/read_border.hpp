@@ -25,7 +25,7 @@ namespace slsd {
 /// @thread thread-bound: keeps its buffers; the letters are shared with copies
 class BorderReader {
  public:
-  BorderReader(const Pattern& pattern, std::shared_ptr<const LetterFields> letters);
+  BorderReader(const Pattern& pattern, std::shared_ptr<const LetterFields> letters, Rules rules = {});
 
   /// Refuses what is decoded beside a symbol at the border that is plainly of another letter than its cell's.
   /// @param blur_px  of the pattern in the frame, standard deviation, projector px
@@ -37,6 +37,7 @@ class BorderReader {
                                    const LatticeFrame& lattice_frame, int letter) const;
 
   CodeArray array_;
+  Rules rules_;
   int rows_, columns_;  // of it that are shown whole
   float pitch_px_, size_px_;
   int letter_count_;

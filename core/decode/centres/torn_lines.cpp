@@ -38,8 +38,8 @@ bool stands(const Sightings& seen, std::int32_t node) {
 
 }  // namespace
 
-TornLines::TornLines(const Pattern& pattern, std::shared_ptr<const LetterFields> letters)
-    : pitch_px_(static_cast<float>(pattern.pitch_px())), aligner_(pattern, std::move(letters)) {}
+TornLines::TornLines(const Pattern& pattern, std::shared_ptr<const LetterFields> letters, Rules rules)
+    : pitch_px_(static_cast<float>(pattern.pitch_px())), rules_(rules), aligner_(pattern, std::move(letters)) {}
 
 /// Whether as many of its line speak against it as stand, itself among them.
 /// @param votes  of those that are doubtful: (node) -> bool
@@ -116,11 +116,12 @@ bool TornLines::refuse_outvoted(const LetterScene& scene) {
   std::erase_if(suspects_, [&](const Suspect& suspect) {
     return !is_outvoted(seen, suspect, [&](std::int32_t other) { return shows_other_light_[other] != 0; });
   });
-  for (const Suspect& suspect : suspects_) seen.claims[suspect.node].status = RegionStatus::kNeighboursDisagree;
+  for (const Suspect& suspect : suspects_) seen.claims[suspect.node].decide(DecodeRule::kOtherLight);
   return !suspects_.empty();
 }
 
 void TornLines::refuse(const LetterScene& scene) {
+  if (!rules_.has(DecodeRule::kOtherLight)) return;
   is_asked_.assign(scene.seen.size(), 0), shows_other_light_.assign(scene.seen.size(), 0);
   refused_.clear();
   // What is refused stands for the others no longer.
@@ -137,7 +138,7 @@ void TornLines::refuse_left_alone(Sightings& seen) const {
       if (other < 0 || !stands(seen, other)) continue;
       const bool alone = std::ranges::all_of(
           kDirections, [&](Direction d) { return decoded_beside(seen.nodes, seen.claims, other, d) < 0; });
-      if (alone) seen.claims[other].status = RegionStatus::kNeighboursDisagree;
+      if (rules_.apply(DecodeRule::kLeftAlone, alone)) seen.claims[other].decide(DecodeRule::kLeftAlone);
     }
   }
 }

@@ -17,7 +17,7 @@ namespace slsd {
 /// @thread thread-bound: keeps its buffers; the letters are shared with copies
 class TornLines {
  public:
-  TornLines(const Pattern& pattern, std::shared_ptr<const LetterFields> letters);
+  TornLines(const Pattern& pattern, std::shared_ptr<const LetterFields> letters, Rules rules = {});
 
   /// Refuses what is decoded on a line where as many show other light as are decoded, until nothing more goes, and what
   /// that leaves alone.
@@ -36,6 +36,7 @@ class TornLines {
   [[nodiscard]] static bool is_outvoted(const Sightings& seen, const Suspect& suspect, const Votes& votes);
 
   float pitch_px_;
+  Rules rules_;
   LetterAligner aligner_;
   std::vector<std::uint8_t> is_suspect_;  // of each sighting, a bit to each of its two lines
   std::vector<Suspect> suspects_;

@@ -22,9 +22,11 @@ struct CellClaim {
   std::int16_t row = -1, column = -1;
   float evidence = 0;  ///< log-likelihood of the window's shapes at this cell against chance, natural logarithm;
                        ///< weighed where another claims the cell too
-  RegionStatus status = RegionStatus::kNoNeighbour;  ///< kDecoded, or why not
+  RegionStatus status = RegionStatus::kNoNeighbour;  ///< kDecoded, or why not; decide() alone writes it
   std::int32_t island = -1;                          ///< that it is part of: see IslandJudge
   GridFit grid_fit = GridFit::kTight;                ///< of one at a rim; inside all are
+  DecodeRule rule = DecodeRule::kNoNeighbour;        ///< that decided on the status
+  DecodeRule guard = DecodeRule::kWindows;           ///< the last that kept it from being brought back, or kWindows
 
   struct Cell {
     int row, column;
@@ -33,6 +35,14 @@ struct CellClaim {
       return {row + (d == kDown) - (d == kUp), column + (d == kRight) - (d == kLeft)};
     }
   };
+
+  void decide(DecodeRule by) { status = text_of(by).gives, rule = by; }
+  /// @return  whether the guard lets it be brought back
+  bool pass(const Rules& rules, DecodeRule by, bool holds) {
+    const bool stopped = rules.apply(by, !holds);
+    if (stopped) guard = by;
+    return !stopped;
+  }
 
   [[nodiscard]] bool named() const { return row >= 0; }
   [[nodiscard]] bool same_cell(int other_row, int other_column) const {

@@ -13,14 +13,18 @@ constexpr int kCorrectedWeight = 1;
 
 }  // namespace
 
-WindowDecoder::WindowDecoder(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max)
+WindowDecoder::WindowDecoder(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max,
+                             Rules rules)
     : array_(pattern.array),
       codebook_(std::move(codebook)),
       unique_(pattern.array.minimum_distance > 0),
       corrects_(pattern.array.minimum_distance >= 3),
       log_letters_(std::log(static_cast<float>(pattern.letters()))),
-      judge_(pattern,
-             {.rows = codebook_->rows(), .columns = codebook_->columns(), .wrong_cells_max = wrong_cells_max}) {}
+      rules_(rules),
+      judge_(pattern, {.rows = codebook_->rows(),
+                       .columns = codebook_->columns(),
+                       .wrong_cells_max = wrong_cells_max,
+                       .rules = rules}) {}
 
 /// Of the nine letters around a node; Codebook::kNoKey where one is not known.
 std::uint32_t WindowDecoder::key_of(const Neighbourhood& around) const {
@@ -134,13 +138,14 @@ bool WindowDecoder::is_unanimous(std::int32_t node) const {
 
 void WindowDecoder::elect(std::int32_t node, const CellGate& gate, CellClaim& claim) const {
   if (is_unanimous(node)) {
-    claim = {hits_[node].row, hits_[node].column, 0, RegionStatus::kDecoded};
+    claim = {hits_[node].row, hits_[node].column};
+    claim.decide(DecodeRule::kWindows);
     return;
   }
   const Ballot ballot = collect_votes(node, gate);
   claim = {};
   const bool linked = std::ranges::count_if(around_[node], [](std::int32_t other) { return other >= 0; }) > 1;
-  claim.status = linked ? RegionStatus::kNoCodeword : RegionStatus::kNoNeighbour;
+  claim.decide(linked ? DecodeRule::kNoWindow : DecodeRule::kNoNeighbour);
   int best = 0, second = 0;
   for (int i = 0; i < ballot.count; ++i) {
     const int weight = ballot.votes[i].weight;
@@ -154,8 +159,10 @@ void WindowDecoder::elect(std::int32_t node, const CellGate& gate, CellClaim& cl
     }
   }
   if (best == 0) return;
-  claim.status = RegionStatus::kDecoded;
-  if (2 * second > best) claim = {-1, -1, 0, RegionStatus::kAmbiguousCodeword};
+  claim.decide(DecodeRule::kWindows);
+  if (!rules_.apply(DecodeRule::kWindowsDisagree, 2 * second > best)) return;
+  claim = {};
+  claim.decide(DecodeRule::kWindowsDisagree);
 }
 
 /// Weighs the claims on cells that are claimed more than once: the log-likelihood of each window's shapes against

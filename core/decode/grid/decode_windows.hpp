@@ -29,7 +29,8 @@ class WindowDecoder {
  public:
   /// @param codebook         of the part of the pattern's array that is shown
   /// @param wrong_cells_max  see IslandOptions
-  WindowDecoder(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max);
+  WindowDecoder(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max,
+                Rules rules = {});
 
   void decode(const std::vector<GridNode>& nodes, const std::vector<Classification>& shapes, const CellGate& gate,
               Executor& executor, std::vector<CellClaim>& claims);
@@ -73,6 +74,7 @@ class WindowDecoder {
   std::vector<Neighbourhood> around_;
   std::vector<Hit> hits_;
   std::vector<std::uint8_t> claimed_;  // of each cell: whether once, or more often
+  Rules rules_;
   IslandJudge judge_;
 };
 

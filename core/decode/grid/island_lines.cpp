@@ -120,15 +120,24 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
       const float length =
           static_cast<float>(to - from + 1) + (begins ? begin.doubtful : 0) + (ends ? end.doubtful : 0);
       const float usual = log_letters_ * length;
-      const bool contradicted = is_misread(line_[i]) || (begins && begin.contradicts) || (ends && end.contradicts) ||
-                                evidence < kUsualShare * usual ||
-                                (evidence < kUsualShareOffGrid * usual && is_off_grid(frame, forth, from, to));
+      const Rules& rules = options_.rules;
+      const auto contradicted = [&]() -> std::optional<DecodeRule> {
+        const bool ended = (begins && begin.contradicts) || (ends && end.contradicts);
+        if (rules.apply(DecodeRule::kLineMisread, is_misread(line_[i]))) return DecodeRule::kLineMisread;
+        if (rules.apply(DecodeRule::kLineContradicted, ended)) return DecodeRule::kLineContradicted;
+        if (rules.apply(DecodeRule::kLineWeak, evidence < kUsualShare * usual)) return DecodeRule::kLineWeak;
+        const bool off_grid = evidence < kUsualShareOffGrid * usual && is_off_grid(frame, forth, from, to);
+        if (rules.apply(DecodeRule::kLineOffGrid, off_grid)) return DecodeRule::kLineOffGrid;
+        return std::nullopt;
+      }();
       const bool misread = any_misread && std::any_of(line_.begin() + from, line_.begin() + to + 1, is_misread);
-      if (is_off_line(line_[i]) && are_off_line(frame, from, to)) {
-        lines_.push_back({line_[i], line_[i], line_[i], 0, 0});
+      if (rules.apply(DecodeRule::kLineOffEpipolar, is_off_line(line_[i]) && are_off_line(frame, from, to))) {
+        lines_.push_back({line_[i], line_[i], line_[i], 0, 0, DecodeRule::kLineOffEpipolar});
         continue;
       }
-      if (!contradicted && (!misread || evidence_against_slides(frame, from, to) >= evidence_min)) continue;
+      if (!contradicted && !rules.apply(DecodeRule::kLineRepeats,
+                                        misread && !(evidence_against_slides(frame, from, to) >= evidence_min)))
+        continue;
       if (evidence > 0 && evidence < evidence_min) evidence += evidence_of_places(frame, forth, from, to);
       // As far as it agrees: what ends it may have been read as one of the island.
       int begun = i, last = i;
@@ -138,7 +147,8 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
       if (agreeing < kClean * log_letters_ * static_cast<float>(last - begun + 1)) agreeing = 0;
       if (evidence >= evidence_min) evidence = std::min(evidence, evidence_against_slides(frame, from, to));
       if (agreeing >= evidence_min) agreeing = std::min(agreeing, evidence_against_slides(frame, begun, last));
-      lines_.push_back({line_[i], line_[begun], line_[last], evidence, agreeing});
+      lines_.push_back(
+          {line_[i], line_[begun], line_[last], evidence, agreeing, contradicted.value_or(DecodeRule::kLineRepeats)});
     }
   }
 }
@@ -234,9 +244,9 @@ void IslandJudge::cut_slid_along(const Frame& frame, std::int32_t island, const 
     int start = 0, end = 0, gap = 0;
     float sum = 0, most = 0;
     const auto refuse = [&] {
-      if (most < evidence_min) return;
+      if (!options_.rules.apply(DecodeRule::kSlid, most >= evidence_min)) return;
       for (int i = start; i < end; ++i)
-        if (line_[i] >= 0 && island_of_[line_[i]] == island) cut_[line_[i]] = 1;
+        if (line_[i] >= 0 && island_of_[line_[i]] == island) cut(line_[i], DecodeRule::kSlid);
     };
     for (int i = 0; i < count; ++i) {
       gap = line_[i] < 0 ? gap + 1 : 0;
@@ -286,15 +296,15 @@ void IslandJudge::cut_contradicted_lines(const Frame& frame) {
     if (std::ranges::count(links, Link::kAgrees) < std::ranges::count(links, Link::kAgainst) + 2) continue;
     for (const Direction d : kDirections) places[d % 2] += links[d] == Link::kAgainst;
   }
-  const auto cut = [&](Direction forth, double count) {
+  const auto cut_along = [&](Direction forth, double count) {
     lines_.clear();
     const auto evidence_min = static_cast<float>(std::log(count / (kShareOfBudget * options_.wrong_cells_max)));
     find_contradicted_lines(frame, forth, evidence_min);
     for (const Line& line : lines_)
-      if (line.evidence < evidence_min && !fits_between(frame, line, evidence_min)) cut_[line.node] = 1;
+      if (line.evidence < evidence_min && !fits_between(frame, line, evidence_min)) cut(line.node, line.rule);
   };
-  cut(kRight, places[1]);
-  cut(kDown, places[0]);
+  cut_along(kRight, places[1]);
+  cut_along(kDown, places[0]);
 }
 
 }  // namespace slsd

@@ -13,6 +13,11 @@
 
 namespace slsd {
 
+void IslandJudge::cut(std::int32_t node, DecodeRule rule) {
+  if (cut_[node] == 0) cut_by_[node] = rule;
+  cut_[node] = 1;
+}
+
 /// The cells of one island, which is_left() and all that follows from it tell of.
 void IslandJudge::look_at_cells(const Frame& frame, std::int32_t island) {
   if (looked_at_ == island) return;
@@ -126,7 +131,7 @@ void IslandJudge::cut_back(const Frame& frame) {
     for (const std::int32_t node : members_)
       if (held_[node] < kHeldBy && cut_[node] == 0) queue_.push_back(node);
     if (queue_.empty()) return;
-    for (const std::int32_t node : queue_) cut_[node] = 1;
+    for (const std::int32_t node : queue_) cut(node, DecodeRule::kHeldByFew);
   }
 }
 
@@ -188,11 +193,11 @@ IslandJudge::Side IslandJudge::side_of(const Frame& frame, const Piece& piece, D
 /// Whether a piece of an island may be of another surface: one whose rim is straight, or turns once, so that the island
 /// holds the piece on one side or on two that meet. Something else lies beside it, or what holds it bends as surfaces
 /// do not.
-bool IslandJudge::may_be_apart(const Frame& frame, const Piece& piece) const {
+std::optional<DecodeRule> IslandJudge::may_be_apart(const Frame& frame, const Piece& piece) const {
   constexpr float kBentAway = 0.15F;  // in the mean of its links
   // Asked first, as most pieces are held on both sides.
   const auto held = [&](Direction d) { return is_held(piece, d); };
-  if ((held(kLeft) && held(kRight)) || (held(kUp) && held(kDown))) return false;
+  if ((held(kLeft) && held(kRight)) || (held(kUp) && held(kDown))) return std::nullopt;
   std::array<Side, 4> sides;
   for (const Direction d : kDirections) sides[d] = side_of(frame, piece, d);
   float bend = 0, links = 0, beyond = 0;
@@ -202,7 +207,11 @@ bool IslandJudge::may_be_apart(const Frame& frame, const Piece& piece) const {
     contradicted |= side.contradicted && side.held_by == 0;
     if (side.held_by == 0) beyond += side.beyond;
   }
-  return contradicted || beyond < kSpeaksAgainst || bend > kBentAway * links;
+  const Rules& rules = options_.rules;
+  if (rules.apply(DecodeRule::kPieceContradicted, contradicted)) return DecodeRule::kPieceContradicted;
+  if (rules.apply(DecodeRule::kPieceDoubtful, beyond < kSpeaksAgainst)) return DecodeRule::kPieceDoubtful;
+  if (rules.apply(DecodeRule::kPieceBent, bend > kBentAway * links)) return DecodeRule::kPieceBent;
+  return std::nullopt;
 }
 
 /// How often the edge of an island turns at the corner above and to the left of a cell.
@@ -238,12 +247,13 @@ std::optional<float> IslandJudge::evidence_of(const Piece& piece) const {
 
 /// Refuses a piece that may be of another surface and says too little for being of this one.
 void IslandJudge::cut_piece(const Frame& frame, const Piece& piece, float missing) {
-  if (!may_be_apart(frame, piece)) return;
+  const auto rule = may_be_apart(frame, piece);
+  if (!rule) return;
   // Where the surface has a corner, another that had it would have to turn as often as an edge is overlooked.
   if (missing <= link_weight_ && turns_without(piece) > 0) return;
   for (int row = piece.row; row < piece.row + piece.rows; ++row)
     for (int column = piece.column; column < piece.column + piece.columns; ++column)
-      cut_[holder_[index_of(row, column)]] = 1;
+      cut(holder_[index_of(row, column)], *rule);
 }
 
 /// Looks at every piece along a row or a column, so many cells wide, that holds a node and might lack evidence.
@@ -299,8 +309,8 @@ void IslandJudge::cut_pieces(const Frame& frame) {
 /// something put there agrees by chance.
 void IslandJudge::cut_notches(const Frame& frame, std::int32_t island) {
   queue_.clear();
-  const auto cut = [&](std::int32_t node) {
-    cut_[node] = 1;
+  const auto leave_out = [&](std::int32_t node) {
+    cut(node, DecodeRule::kNotch);
     holder_of(frame, node) = -1;
     for (const std::int32_t other : frame.beside[node])
       if (other >= 0 && island_of_[other] == island && cut_[other] == 0) queue_.push_back(other);
@@ -309,7 +319,7 @@ void IslandJudge::cut_notches(const Frame& frame, std::int32_t island) {
   if (std::ranges::none_of(members, [&](std::int32_t node) { return cut_[node] != 0; })) return;
   look_at_cells(frame, island);
   for (const std::int32_t node : members)
-    if (cut_[node] != 0) cut(node);
+    if (cut_[node] != 0) leave_out(node);
   // One after the other, as each changes the rim, in the order of their cells.
   for (std::size_t asked = 0; asked < queue_.size();) {
     next_queue_.assign(queue_.begin() + static_cast<std::ptrdiff_t>(asked), queue_.end());
@@ -318,7 +328,9 @@ void IslandJudge::cut_notches(const Frame& frame, std::int32_t island) {
                       [&](std::int32_t node) { return index_of(frame.claims[node].row, frame.claims[node].column); });
     for (const std::int32_t node : next_queue_) {
       const CellClaim& claim = frame.claims[node];
-      if (cut_[node] == 0 && turns_without({claim.row, claim.column, 1, 1}) < 0) cut(node);
+      if (cut_[node] != 0) continue;
+      const bool is_notch = turns_without({claim.row, claim.column, 1, 1}) < 0;
+      if (options_.rules.apply(DecodeRule::kNotch, is_notch)) leave_out(node);
     }
   }
   cut_steps(frame);
@@ -349,17 +361,18 @@ void IslandJudge::cut_steps(const Frame& frame) {
       if (cut_[node] != 0) continue;
       if ((held(node, kLeft) && held(node, kRight)) || (held(node, kUp) && held(node, kDown))) continue;
       for (const Direction d : kDirections) {
-        if (!leads_to_another(node, d)) continue;
+        if (!options_.rules.apply(DecodeRule::kStep, leads_to_another(node, d))) continue;
         next_queue_.push_back(node);
         if (held(node, opposite(d))) queue_.push_back(frame.beside[node][opposite(d)]);
       }
     }
-    for (const std::int32_t node : next_queue_) cut_[node] = 1;
+    for (const std::int32_t node : next_queue_) cut(node, DecodeRule::kStep);
   }
 }
 
 void IslandJudge::cut_rims(const Frame& frame) {
   cut_.assign(frame.nodes.size(), 0);
+  cut_by_.resize(frame.nodes.size());
   holder_.assign(static_cast<std::size_t>(options_.rows) * options_.columns, -1);
   looked_at_ = -1;
   around_.assign(holder_.size(), -1);
@@ -372,7 +385,7 @@ void IslandJudge::cut_rims(const Frame& frame) {
     if (may_come_to_rim(node)) frame.claims[node].grid_fit = grid_fit(frame, node);
   for (std::size_t id = 0; id < islands_.size(); ++id) cut_slid(frame, static_cast<std::int32_t>(id));
   cut_contradicted_lines(frame);
-  cut_back(frame);
+  if (options_.rules.has(DecodeRule::kHeldByFew)) cut_back(frame);
   cut_pieces(frame);
   for (std::size_t id = 0; id < islands_.size(); ++id) cut_notches(frame, static_cast<std::int32_t>(id));
 }

@@ -72,7 +72,8 @@ bool IslandJudge::adopt(const Frame& frame, std::int32_t node, CellClaim& adopte
     }
   }
   if (best == nullptr || (best->ratio <= 0 && best->links < 3) || best_score - second_score < 1) return false;
-  adopted = {static_cast<std::int16_t>(best->row), static_cast<std::int16_t>(best->column), 0, RegionStatus::kDecoded};
+  adopted = {static_cast<std::int16_t>(best->row), static_cast<std::int16_t>(best->column)};
+  adopted.decide(DecodeRule::kGrown);
   return true;
 }
 
@@ -235,8 +236,8 @@ void IslandJudge::weigh(const Frame& frame, Island& island) const {
   const bool strays = 2 * off_line > island.size;
   const double needed = std::log(static_cast<double>(frame.nodes.size())) + cost_of_rim(frame, island) +
                         std::log(static_cast<double>(island.size) / options_.wrong_cells_max);
-  island.status = RegionStatus::kNoCodeword;
-  if (evidence < needed) return;
+  island.rule = DecodeRule::kWeakIsland;
+  if (options_.rules.apply(DecodeRule::kWeakIsland, evidence < needed)) return;
   // Every other place where the epipolar line of one of its nodes lets it be, or anywhere for an island that strays.
   const std::int32_t probe = members[members.size() / 2];
   double places = 0, likelihood_elsewhere = 0;
@@ -252,11 +253,13 @@ void IslandJudge::weigh(const Frame& frame, Island& island) const {
     }
     likelihood_elsewhere += std::exp(there - evidence);
   });
-  if (evidence < needed + std::log(std::max(1., places))) return;
-  if (likelihood_elsewhere * static_cast<double>(island.size) > options_.wrong_cells_max) {
-    island.status = RegionStatus::kAmbiguousCodeword;
+  if (options_.rules.apply(DecodeRule::kWeakIsland, evidence < needed + std::log(std::max(1., places)))) return;
+  const bool fits_elsewhere = likelihood_elsewhere * static_cast<double>(island.size) > options_.wrong_cells_max;
+  if (options_.rules.apply(DecodeRule::kIslandElsewhere, fits_elsewhere)) {
+    island.rule = DecodeRule::kIslandElsewhere;
   } else {
-    island.status = strays ? RegionStatus::kOffEpipolarLine : RegionStatus::kDecoded;
+    island.rule =
+        options_.rules.apply(DecodeRule::kIslandOffLine, strays) ? DecodeRule::kIslandOffLine : DecodeRule::kWindows;
   }
 }
 
@@ -266,7 +269,7 @@ void IslandJudge::refuse_doubles(const Frame& frame) {
   if (islands_.size() < 2) return;
   holder_.assign(static_cast<std::size_t>(options_.rows) * options_.columns, -1);
   for (const Island& island : islands_) {
-    if (island.status != RegionStatus::kDecoded) continue;
+    if (!island.stands()) continue;
     const auto members = std::span(members_).subspan(island.first, island.size);
     for (const std::int32_t node : members) {
       std::int32_t& holder =
@@ -278,7 +281,7 @@ void IslandJudge::refuse_doubles(const Frame& frame) {
   std::vector<std::pair<std::int32_t, double>> shared;  // with which island, and how much evidence
   for (std::size_t id = 0; id < islands_.size(); ++id) {
     Island& island = islands_[id];
-    if (island.status != RegionStatus::kDecoded && island.status != RegionStatus::kDuplicateCell) continue;
+    if (!island.stands() && island.rule != DecodeRule::kIslandTwice) continue;
     shared.clear();
     for (std::int32_t i = island.first; i < island.first + island.size; ++i) {
       const std::int32_t node = members_[i];
@@ -289,8 +292,8 @@ void IslandJudge::refuse_doubles(const Frame& frame) {
       (known == shared.end() ? shared.emplace_back(island_of_[holder], 0.) : *known).second += own_ratio(node);
     }
     for (const auto& [other, evidence] : shared) {
-      if (evidence < needed) continue;
-      island.status = islands_[other].status = RegionStatus::kDuplicateCell;
+      if (options_.rules.apply(DecodeRule::kIslandTwice, evidence >= needed))
+        island.rule = islands_[other].rule = DecodeRule::kIslandTwice;
     }
   }
 }
@@ -302,7 +305,7 @@ void IslandJudge::drop_rejected(const Frame& frame) {
   std::int32_t kept = 0;
   for (const Island& island : islands_) {
     const auto members = std::span(members_).subspan(island.first, island.size);
-    if (island.status != RegionStatus::kDecoded) {
+    if (!island.stands()) {
       for (const std::int32_t node : members) island_of_[node] = -1;
       queue_.insert(queue_.end(), members.begin(), members.end());
       continue;
@@ -322,7 +325,8 @@ void IslandJudge::part_islands(const Frame& frame, Executor& executor) {
   queue_.clear();
   for (const std::int32_t node : members_) {
     if (cut_[node] == 0) continue;
-    frame.claims[node].status = own_ratio(node) < 0 ? RegionStatus::kClassDisagrees : RegionStatus::kNeighboursDisagree;
+    const bool is_misread = options_.rules.apply(DecodeRule::kOtherLetter, own_ratio(node) < 0);
+    frame.claims[node].decide(is_misread ? DecodeRule::kOtherLetter : cut_by_[node]);
     queue_.push_back(node);
     --islands_[island_of_[node]].size;
   }
@@ -341,7 +345,7 @@ void IslandJudge::judge(const std::vector<GridNode>& nodes, const std::vector<Be
                         const std::vector<Classification>& shapes, const CellGate& gate, Executor& executor,
                         std::vector<CellClaim>& claims) {
   const Frame frame{nodes, beside, shapes, gate, claims};
-  grow(frame);
+  if (options_.rules.has(DecodeRule::kGrown)) grow(frame);
   own_.resize(nodes.size());
   executor.run_ranges(nodes.size(),
                       [&](std::size_t first, std::size_t last, int) { look_at_own_cells(frame, first, last); });
@@ -350,10 +354,11 @@ void IslandJudge::judge(const std::vector<GridNode>& nodes, const std::vector<Be
   for (Island& island : islands_) weigh(frame, island);
   const auto take_over = [&] {
     for (const std::int32_t node : members_) {
-      const RegionStatus status = islands_[island_of_[node]].status;
+      const Island& island = islands_[island_of_[node]];
       claims[node].island = island_of_[node];
-      claims[node].status = status;
-      if (status == RegionStatus::kNoCodeword || status == RegionStatus::kAmbiguousCodeword)
+      if (island.stands()) continue;
+      claims[node].decide(island.rule);
+      if (island.rule == DecodeRule::kWeakIsland || island.rule == DecodeRule::kIslandElsewhere)
         claims[node].row = claims[node].column = -1;
     }
   };
@@ -366,15 +371,14 @@ void IslandJudge::judge(const std::vector<GridNode>& nodes, const std::vector<Be
   for (const std::int32_t node : members_) {
     CellClaim& claim = claims[node];
     if (claim.status != RegionStatus::kDecoded) continue;
-    if (shapes[node].letter < 0) {
-      claim.status = RegionStatus::kUnknownShape;
-    } else if (own_ratio(node) < 0) {
-      claim.status = RegionStatus::kClassDisagrees;
-    } else if (!own_[node].on_line) {
-      claim.status = RegionStatus::kOffEpipolarLine;
-    } else if (!own_[node].admitted) {
-      claim.status = RegionStatus::kOutOfDepthRange;
-    }
+    const auto refuse = [&](DecodeRule rule, bool holds) {
+      const bool applies = options_.rules.apply(rule, holds);
+      if (applies) claim.decide(rule);
+      return applies;
+    };
+    refuse(DecodeRule::kNoLetter, shapes[node].letter < 0) || refuse(DecodeRule::kOtherLetter, own_ratio(node) < 0) ||
+        refuse(DecodeRule::kCellOffLine, !own_[node].on_line) ||
+        refuse(DecodeRule::kCellOutOfRange, !own_[node].admitted);
   }
 }
 

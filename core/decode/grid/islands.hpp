@@ -24,6 +24,7 @@ struct IslandOptions {
   int rows = 0, columns = 0;        ///< of the part of the array that is shown
   double wrong_cells_max = 0.001;   ///< in expectation, in a frame
   double link_crosses = 1.0 / 150;  ///< share of links that lead across an edge in depth without being broken for it
+  Rules rules = {};
 };
 
 /// Says which of the cells that were proposed for a frame's nodes are certain.
@@ -59,8 +60,9 @@ class IslandJudge {
   static constexpr Links kAllAgree{Link::kAgrees, Link::kAgrees, Link::kAgrees, Link::kAgrees};
   [[nodiscard]] static bool any_against(const Links& links);
   struct Island {
-    std::int32_t first = 0, size = 0;  // of members_
-    RegionStatus status = RegionStatus::kDecoded;
+    std::int32_t first = 0, size = 0;        // of members_
+    DecodeRule rule = DecodeRule::kWindows;  // that refuses it, or kWindows
+    [[nodiscard]] bool stands() const { return rule == DecodeRule::kWindows; }
   };
 
   /// Cells of an island.
@@ -74,6 +76,7 @@ class IslandJudge {
   struct Line {
     std::int32_t node, first, last;
     float evidence, agreeing;
+    DecodeRule rule;  // that looks at it
   };
   struct Side {
     int held_by = 0;   // links of the island's
@@ -122,7 +125,9 @@ class IslandJudge {
   void cut_steps(const Frame& frame);
   void cut_pieces_through(const Frame& frame, std::int32_t node, float evidence_min);
   void cut_piece(const Frame& frame, const Piece& piece, float missing);
-  [[nodiscard]] bool may_be_apart(const Frame& frame, const Piece& piece) const;
+  void cut(std::int32_t node, DecodeRule rule);
+  /// The rule by which a piece may be of another surface, or nothing.
+  [[nodiscard]] std::optional<DecodeRule> may_be_apart(const Frame& frame, const Piece& piece) const;
   [[nodiscard]] bool is_of_another(const Frame& frame, std::int32_t node, Direction d) const;
   template <class Visit>
   bool any_along(const Piece& piece, Direction d, Visit&& visit) const;
@@ -187,7 +192,8 @@ class IslandJudge {
   std::vector<std::int32_t> members_, queue_, next_queue_;
   std::vector<Links> links_;
   std::vector<CellClaim> adopted_;
-  std::vector<std::uint8_t> cut_;
+  std::vector<std::uint8_t> cut_;              // of each node, whether a rule has cut it
+  std::vector<DecodeRule> cut_by_;             // and which was the first
   std::vector<std::int8_t> held_;              // by so many links more than contradict
   std::vector<std::int32_t> line_;             // of nodes
   std::vector<double> line_ratios_;            // their sums before each of them

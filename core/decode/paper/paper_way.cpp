@@ -80,10 +80,10 @@ void PaperWay::decode_windows(int rows, int columns, Sightings& seen) const {
   seen.claims.assign(seen.size(), {});
   for (std::size_t i = 0; i < seen.size(); ++i) {
     CellClaim& claim = seen.claims[i];
-    claim.status = letters[i] < 0 ? RegionStatus::kUnknownShape : RegionStatus::kNoCodeword;
+    claim.decide(letters[i] < 0 ? DecodeRule::kNoLetter : DecodeRule::kNoWindow);
     if (!cells[i] || cells[i]->row >= rows || cells[i]->column >= columns) continue;
-    claim = {static_cast<std::int16_t>(cells[i]->row), static_cast<std::int16_t>(cells[i]->column), 0,
-             RegionStatus::kDecoded};
+    claim = {static_cast<std::int16_t>(cells[i]->row), static_cast<std::int16_t>(cells[i]->column)};
+    claim.decide(DecodeRule::kWindows);
   }
 }
 

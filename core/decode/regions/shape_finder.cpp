@@ -33,11 +33,13 @@ BinarizeOptions binarize_options(const PatternOptions& pattern, float scale) {
 
 }  // namespace
 
-ShapeFinder::ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize, Method find_regions)
+ShapeFinder::ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize, Method find_regions,
+                         Rules rules)
     : symbol_size_px_(static_cast<float>(pattern.symbol_size_px)),
       pitch_px_(static_cast<float>(pattern.symbol_size_px + pattern.spacing_px)),
       binarize_(binarize),
       find_regions_(find_regions),
+      rules_(rules),
       expected_(std::move(expected)),
       binarizer_(binarize_options(pattern, expected_.in_the_middle().scale)),
       splitter_({.tile_px = binarizer_.options().tile_px}) {
@@ -98,23 +100,23 @@ bool ShapeFinder::is_too_large(const Region& region, float scale) const {
   return static_cast<float>(region.area_px) > kAreaMax * pitch_px * pitch_px || extent > kExtentMax * pitch_px;
 }
 
-RegionStatus ShapeFinder::judge_size(const Region& region) const {
-  if (region.left == 0 || region.top == 0 || region.right == mask_.width() - 1 || region.bottom == mask_.height() - 1) {
-    return RegionStatus::kTouchesBorder;
-  }
+DecodeRule ShapeFinder::judge_size(const Region& region) const {
+  const bool at_border =
+      region.left == 0 || region.top == 0 || region.right == mask_.width() - 1 || region.bottom == mask_.height() - 1;
+  if (rules_.apply(DecodeRule::kTouchesBorder, at_border)) return DecodeRule::kTouchesBorder;
   const float scale = scale_at(region), symbol_px = symbol_size_px_ * scale;
-  if (region.area_px < kAreaMinPx || static_cast<float>(region.area_px) < kAreaMin * symbol_px * symbol_px) {
-    return RegionStatus::kTooSmall;
-  }
-  return is_too_large(region, scale) ? RegionStatus::kTooLarge : RegionStatus::kNoNeighbour;
+  const bool small =
+      region.area_px < kAreaMinPx || static_cast<float>(region.area_px) < kAreaMin * symbol_px * symbol_px;
+  if (rules_.apply(DecodeRule::kTooSmall, small)) return DecodeRule::kTooSmall;
+  return is_too_large(region, scale) ? DecodeRule::kTooLarge : DecodeRule::kNoNeighbour;
 }
 
 void ShapeFinder::describe(const GreyView& frame, Executor& executor, Sightings& seen) {
-  status_.resize(regions_.regions.size());
+  rule_.resize(regions_.regions.size());
   seen.clear();
   for (std::size_t i = 0; i < regions_.regions.size(); ++i) {
-    status_[i] = judge_size(regions_.regions[i]);
-    if (status_[i] == RegionStatus::kNoNeighbour) seen.region.push_back(static_cast<std::int32_t>(i));
+    rule_[i] = judge_size(regions_.regions[i]);
+    if (rule_[i] == DecodeRule::kNoNeighbour) seen.region.push_back(static_cast<std::int32_t>(i));
   }
   const std::size_t workers = executor.workers();
   while (meters_.size() < workers) meters_.push_back(meters_.front().another());
@@ -130,8 +132,9 @@ void ShapeFinder::describe(const GreyView& frame, Executor& executor, Sightings&
   std::size_t kept = 0;
   for (std::size_t i = 0; i < seen.region.size(); ++i) {
     const GreyMoments& moments = seen.moments[i];
-    if (moments.weight <= 0 || moments.peak - moments.background < kContrastMin * frame_levels_) {
-      status_[seen.region[i]] = RegionStatus::kLowContrast;
+    const bool is_faint = moments.peak - moments.background < kContrastMin * frame_levels_;
+    if (moments.weight <= 0 || rules_.apply(DecodeRule::kLowContrast, is_faint)) {
+      rule_[seen.region[i]] = DecodeRule::kLowContrast;
       continue;
     }
     seen.region[kept] = seen.region[i], seen.moments[kept] = moments;

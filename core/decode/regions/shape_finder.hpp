@@ -25,7 +25,8 @@ namespace slsd {
 class ShapeFinder {
  public:
   /// @param expected  how the pattern lies in the frame, to half a step of the grid
-  ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize, Method find_regions);
+  ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize, Method find_regions,
+              Rules rules = {});
 
   /// Of the same scale, to an eighth.
   void expect(ExpectedFrames expected) { expected_ = std::move(expected); }
@@ -45,7 +46,7 @@ class ShapeFinder {
   [[nodiscard]] const Mask& mask() const { return mask_; }
   [[nodiscard]] const Regions& regions() const { return regions_; }
   /// Why a region is no sighting; kNoNeighbour where it is one.
-  [[nodiscard]] RegionStatus status(std::size_t region) const { return status_[region]; }
+  [[nodiscard]] DecodeRule rule(std::size_t region) const { return rule_[region]; }
   /// One to a worker.
   [[nodiscard]] std::span<GreyMomentMeter> meters() { return meters_; }
   /// Levels of the frame for one of 255.
@@ -58,10 +59,11 @@ class ShapeFinder {
   GreyView binarize_faint(const GreyView& frame, double full, Executor& executor);
   [[nodiscard]] float scale_at(const Region& region) const;
   [[nodiscard]] bool is_too_large(const Region& region, float scale) const;
-  [[nodiscard]] RegionStatus judge_size(const Region& region) const;
+  [[nodiscard]] DecodeRule judge_size(const Region& region) const;
 
   float symbol_size_px_, pitch_px_;
   Method binarize_, find_regions_;
+  Rules rules_;
   ExpectedFrames expected_;
   Binarizer binarizer_;
   Sharpener sharpener_;
@@ -71,7 +73,7 @@ class ShapeFinder {
 
   Mask mask_;
   Regions regions_;
-  std::vector<RegionStatus> status_;
+  std::vector<DecodeRule> rule_;
   FrameNoise noise_;
   float frame_levels_ = 1;
 };

@@ -230,8 +230,11 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
   }
   const float at_rim =
       seen.claims[node].grid_fit == GridFit::kTight ? options_.damaged_distance_on_grid : options_.damaged_distance;
-  if (distance > options_.damaged_distance_held || (distance > at_rim && !is_inside(seen, node)))
-    seen.claims[node].status = RegionStatus::kDamagedShape;
+  if (options_.rules.apply(DecodeRule::kTorn, distance > options_.damaged_distance_held)) {
+    seen.claims[node].decide(DecodeRule::kTorn);
+  } else if (options_.rules.apply(DecodeRule::kUnlikeLetter, distance > at_rim && !is_inside(seen, node))) {
+    seen.claims[node].decide(DecodeRule::kUnlikeLetter);
+  }
 }
 
 void SymbolReview::review(const GreyView& frame, const Regions& regions, const GridLinker& linker, const Look& look,
@@ -253,6 +256,7 @@ void SymbolReview::review(const GreyView& frame, const Regions& regions, const G
 void SymbolReview::take_back_held(Sightings& seen) {
   constexpr std::ptrdiff_t kHeldBy = 2;
   held_.clear();
+  if (!options_.rules.has(DecodeRule::kHeldAgain)) return;
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const CellClaim& claim = seen.claims[i];
     if (claim.status != RegionStatus::kDamagedShape || seen.misfits[i] > options_.damaged_distance_held) continue;
@@ -260,7 +264,7 @@ void SymbolReview::take_back_held(Sightings& seen) {
     const auto holds = [&](Direction d) { return decoded_beside(seen.nodes, seen.claims, node, d) >= 0; };
     if (std::ranges::count_if(kDirections, holds) >= kHeldBy) held_.push_back(node);
   }
-  for (const std::int32_t node : held_) seen.claims[node].status = RegionStatus::kDecoded;
+  for (const std::int32_t node : held_) seen.claims[node].decide(DecodeRule::kHeldAgain);
 }
 
 }  // namespace slsd

@@ -31,6 +31,7 @@ struct ReviewOptions {
   /// The same for a symbol among named neighbours on all sides, and for one that two of its island hold: print and
   /// relief disturb a shape, its cell is certain, and its sigma says by how much they may move its centre.
   float damaged_distance_held = kTornDistance;
+  Rules rules = {};
 };
 
 /// Looks again at every symbol whose cell is known: with the frame that its whole neighbours show, with the light

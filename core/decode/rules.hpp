@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <bitset>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+namespace slsd {
+
+/// What became of a region. Everything but kDecoded is a reason for rejection.
+enum class RegionStatus : std::uint8_t {
+  kDecoded,
+  kTooSmall,
+  kTooLarge,
+  kTouchesBorder,
+  kLowContrast,
+  kUnknownShape,        ///< like none of the pattern's symbols
+  kNoNeighbour,         ///< too few links to read a codeword
+  kNoCodeword,          ///< no window around it is in the pattern, within the distance that can be corrected
+  kAmbiguousCodeword,   ///< the windows around it disagree
+  kClassDisagrees,      ///< its shape is not that of the cell which its windows name
+  kNeighboursDisagree,  ///< its neighbours' shapes are not those of the cells around that cell
+  kDamagedShape,        ///< its shape is that of its cell, but cut or disturbed: its centre would be wrong
+  kOffEpipolarLine,
+  kOutOfDepthRange,
+  kDuplicateCell,  ///< another region claims the cell with better evidence
+};
+inline constexpr int kRegionStatusCount = 15;
+
+/// "too_small", as in the counters of `status`.
+[[nodiscard]] std::string_view to_string(RegionStatus status);
+
+/// What decides on a symbol: each test that rejects it, each path that brings it back, and each guard that keeps it
+/// from being brought back. Their texts are in rules.cpp, in this order.
+enum class DecodeRule : std::uint8_t {
+  // Decoded, or brought back.
+  kWindows,
+  kGrown,
+  kHeldAgain,
+  kMendedByTwo,
+  kMendedByOne,
+  kMendedAtCorner,
+  kMendedInGroup,
+  // Regions.
+  kTouchesBorder,
+  kTooSmall,
+  kTooLarge,
+  kLowContrast,
+  // Windows and islands.
+  kNoNeighbour,
+  kNoWindow,
+  kWindowsDisagree,
+  kWeakIsland,
+  kIslandElsewhere,
+  kIslandOffLine,
+  kIslandTwice,
+  kNoLetter,
+  kOtherLetter,
+  kCellOffLine,
+  kCellOutOfRange,
+  // Rims of islands.
+  kSlid,
+  kLineMisread,
+  kLineContradicted,
+  kLineWeak,
+  kLineOffGrid,
+  kLineRepeats,
+  kLineOffEpipolar,
+  kHeldByFew,
+  kPieceContradicted,
+  kPieceDoubtful,
+  kPieceBent,
+  kNotch,
+  kStep,
+  // Its own shape.
+  kTorn,
+  kUnlikeLetter,
+  kHidden,
+  kCutCentre,
+  kNotAligned,
+  // What was refused around it.
+  kRefusedAround,
+  kCornerMisread,
+  kCornerAtBorder,
+  kAlone,
+  kLastOfLine,
+  kLeftOfLine,
+  kRestOfLine,
+  kOnTornLine,
+  kBridge,
+  kPair,
+  kOtherLight,
+  kLeftAlone,
+  kOtherAtBorder,
+  // Its place.
+  kSymbolOffLine,
+  kSymbolOutOfRange,
+  kCellTwice,
+  kPointOutOfRange,
+  // Guards.
+  kMendDisputed,
+  kMendUnsettled,
+  kMendOffLine,
+  kMendMoved,
+  kMendTilted,
+  kMendHidden,
+  kMendUnlike,
+  kMendAlone,
+  kGroupDisputed,
+  kGroupMisplaced,
+  kGroupUnlike,
+  kGroupLineAlone,
+  kGroupTornLine,
+  kGroupTooFew,
+};
+inline constexpr std::size_t kDecodeRuleCount = static_cast<std::size_t>(DecodeRule::kGroupTooFew) + 1;
+
+enum class RuleKind : std::uint8_t {
+  kAccepts,
+  kRejects,
+  kGuards,  ///< keeps a rejected symbol from being brought back; the symbol's status stays
+};
+
+struct RuleText {
+  std::string_view name;  ///< "too_small", as in the counters
+  RuleKind kind;
+  RegionStatus gives;        ///< that a symbol has then; of a guard none
+  bool has_switch;           ///< whether the decoder can do without it
+  std::string_view meaning;  ///< one sentence
+  std::string_view remedy;   ///< what a user may do about it
+};
+
+[[nodiscard]] const RuleText& text_of(DecodeRule rule);
+[[nodiscard]] inline std::string_view to_string(DecodeRule rule) {
+  return text_of(rule).name;
+}
+[[nodiscard]] inline DecodeRule decode_rule(std::size_t index) {
+  return static_cast<DecodeRule>(index);
+}
+
+/// How many regions each rule decided on.
+using RuleCounts = std::array<std::uint32_t, kDecodeRuleCount>;
+
+using RuleSet = std::bitset<kDecodeRuleCount>;
+
+/// For tools and tests: which rules a decoder leaves out, and which of all it has come to apply. It changes from frame
+/// to frame while decoders look at it.
+/// @thread set and read while no decoder runs
+struct RuleTrial {
+  RuleSet off;
+  std::array<std::atomic<bool>, kDecodeRuleCount> met{};
+
+  void forget() {
+    for (auto& one : met) one = false;
+  }
+};
+
+/// How a stage asks its rules. A service has no trial, and leaves none of them out.
+class Rules {
+ public:
+  Rules() = default;
+  explicit Rules(RuleTrial* trial) : trial_(trial) {}
+
+  /// Whether a rule applies: its test holds, and it is not left out.
+  [[nodiscard]] bool apply(DecodeRule rule, bool holds) const { return holds && (trial_ == nullptr || tried(rule)); }
+  /// Of a rule whose test is asked later.
+  [[nodiscard]] bool has(DecodeRule rule) const { return trial_ == nullptr || tried(rule); }
+
+ private:
+  [[nodiscard]] bool tried(DecodeRule rule) const {
+    trial_->met[static_cast<std::size_t>(rule)].store(true, std::memory_order_relaxed);
+    return !trial_->off.test(static_cast<std::size_t>(rule));
+  }
+
+  RuleTrial* trial_ = nullptr;
+};
+
+}  // namespace slsd

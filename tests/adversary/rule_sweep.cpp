@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "tests/adversary/rule_sweep.hpp"
+
+#include <array>
+#include <cstdio>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/adversary/misled.hpp"
+
+namespace slsd::adversary {
+namespace {
+
+/// What a rule has done to all frames.
+struct Effect {
+  int frames_met = 0, frames_worse = 0;
+  int wrong = 0, right = 0;  // more without the rule
+};
+
+class Sweep {
+ public:
+  [[nodiscard]] Result<> prepare() {
+    for (const int symbol_size_px : {16, 8}) {
+      auto reader = Misled::of(symbol_size_px, &trial_);
+      if (!reader) return tl::unexpected(reader.error());
+      readers_.push_back(std::move(*reader));
+    }
+    return {};
+  }
+
+  [[nodiscard]] Result<> look_at(Kind kind, int number) {
+    Misled& reader = readers_[static_cast<std::size_t>(number) % 2];
+    const Frame frame = reader.maker.make(kind, static_cast<std::uint32_t>(number));
+    Decoder& decoder = reader.decoders[static_cast<std::size_t>(number) / 2 % 3];
+    trial_.off = {}, trial_.forget();
+    const auto with = judge(reader, decoder, frame);
+    if (!with) return tl::unexpected(with.error());
+    wrong_ += with->wrong, right_ += with->right, ++frames_;
+    RuleSet met;
+    for (std::size_t i = 0; i < kDecodeRuleCount; ++i) met[i] = trial_.met[i];
+    for (std::size_t i = 0; i < kDecodeRuleCount; ++i) {
+      if (!met[i] || !text_of(decode_rule(i)).has_switch) continue;
+      trial_.off = RuleSet().set(i);
+      const auto without = judge(reader, decoder, frame);
+      if (!without) return tl::unexpected(without.error());
+      Effect& effect = effects_[i];
+      ++effect.frames_met, effect.frames_worse += without->wrong > with->wrong;
+      effect.wrong += without->wrong - with->wrong, effect.right += without->right - with->right;
+    }
+    return {};
+  }
+
+  void print() const {
+    std::printf("%d frames, all rules: %d wrong points, %d right\n\n", frames_, wrong_, right_);
+    std::puts(
+        "| without | met in frames | wrong points more | frames with more | right points more "
+        "|\n|---|---|---|---|---|");
+    for (std::size_t i = 0; i < kDecodeRuleCount; ++i) {
+      if (!text_of(decode_rule(i)).has_switch) continue;
+      const Effect& effect = effects_[i];
+      std::printf("| %s | %d | %d | %d | %d |\n", std::string(to_string(decode_rule(i))).c_str(), effect.frames_met,
+                  effect.wrong, effect.frames_worse, effect.right);
+    }
+  }
+
+  [[nodiscard]] int wrong() const { return wrong_; }
+
+ private:
+  [[nodiscard]] static Result<Verdict> judge(const Misled& reader, Decoder& decoder, const Frame& frame) {
+    const auto decoding = decoder.decode(frame.image.view(), 255);
+    if (!decoding) return tl::unexpected(decoding.error());
+    return reader.maker.judge(frame, (*decoding)->points, kTolerancePx);
+  }
+
+  RuleTrial trial_;
+  std::vector<Misled> readers_;
+  std::array<Effect, kDecodeRuleCount> effects_{};
+  int frames_ = 0, wrong_ = 0, right_ = 0;
+};
+
+}  // namespace
+
+Result<DecodeRule> rule_named(std::string_view name) {
+  for (std::size_t i = 0; i < kDecodeRuleCount; ++i)
+    if (text_of(decode_rule(i)).name == name && text_of(decode_rule(i)).has_switch) return decode_rule(i);
+  return fail(ErrorCode::kNotFound, "the decoder has no rule \"" + std::string(name) +
+                                        "\" that it can do without; docs/decoder.md lists them");
+}
+
+Result<int> sweep_rules(int frames, int first, int only_kind) {
+  Sweep sweep;
+  if (auto prepared = sweep.prepare(); !prepared) return tl::unexpected(prepared.error());
+  for (int number = first; number < first + (frames + kKinds - 1) / kKinds; ++number) {
+    for (int kind = 0; kind < kKinds; ++kind) {
+      if (only_kind >= 0 && kind != only_kind) continue;
+      if (auto looked = sweep.look_at(static_cast<Kind>(kind), number); !looked) return tl::unexpected(looked.error());
+    }
+  }
+  sweep.print();
+  return sweep.wrong();
+}
+
+}  // namespace slsd::adversary

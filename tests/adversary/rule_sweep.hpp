@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string_view>
+
+#include "core/decode/rules.hpp"
+#include "core/result.hpp"
+
+namespace slsd::adversary {
+
+/// @errors kNotFound: no rule of the name, or the decoder cannot do without it
+[[nodiscard]] Result<DecodeRule> rule_named(std::string_view name);
+
+/// Decodes frames once with all rules, then once more without each rule that was met there, and prints for each rule
+/// what it saves and what it costs.
+/// @param only_kind  below 0: all kinds
+/// @return           wrong points with all rules
+/// @errors as Misled::of() and Decoder::decode()
+[[nodiscard]] Result<int> sweep_rules(int frames, int first, int only_kind);
+
+}  // namespace slsd::adversary
