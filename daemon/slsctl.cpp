@@ -68,8 +68,11 @@ void add_scan(CLI::App& app, ClientOptions& options) {
   scan->add_flag("--normals", options.normals, "also write the surface's normals (of pixels)");
   scan->add_flag("--texture", options.texture, "also light the scene in white: intensities are those of the points");
   scan->add_flag("--ambient", options.ambient, "also take a frame without light, and subtract the light of the room");
-  scan->add_option("--picture", options.picture, "write the camera's frame with what was decoded in it")
-      ->type_name("FILE.png");
+  CLI::Option* picture =
+      scan->add_option("--picture", options.picture, "write the camera's frame with what was decoded in it")
+          ->type_name("FILE.png");
+  scan->add_flag("--why", options.why, "mark each rejected region in the picture by the rule that rejected it")
+      ->needs(picture);
   scan->add_option("--cloud-picture", options.cloud_picture, "write a picture of the cloud")->type_name("FILE.png");
   add_camera(scan, options, "the camera of --picture (the first)");
   add_timeout(scan, options);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,9 @@ constexpr std::array<Rgb, kMaxLetters> kLetterColours{{{255, 210, 63},
                                                        {0, 204, 184},
                                                        {206, 168, 120}}};
 constexpr Rgb kRim{12, 14, 18};
+constexpr Rgb kSettledColour{96, 108, 126};
 constexpr double kLegiblePitchPx = 20.0;
+constexpr double kLegibleTextPx = 6.0;
 constexpr int kMaxScale = 3;
 constexpr int kMaxSidePx = 4096;
 constexpr double kDefaultPitchPx = 16.0;
@@ -76,8 +79,17 @@ class Marker {
     canvas_.disc(place(region), 0.2 * pitch_ + 1.0, kRim);
     canvas_.disc(place(region), 0.2 * pitch_, letter_colour(region.letter));
   }
+  /// Of which nothing has to be said.
+  void settled(const RegionSeen& region) { canvas_.disc(place(region), 0.12 * pitch_, kSettledColour); }
   void undecoded(const RegionSeen& region) {
     canvas_.plus(place(region), 0.27 * pitch_, kUndecodedColour, stroke() + 1);
+  }
+  void reason(const RegionSeen& region) {
+    canvas_.plus(place(region), 0.27 * pitch_, rule_colour(region.rule), stroke() + 1);
+    const double height_px = 0.32 * pitch_;
+    if (height_px < kLegibleTextPx) return;
+    canvas_.text(place(region) + Eigen::Vector2d(0.08 * pitch_, -0.1 * pitch_), std::to_string(number_of(region.rule)),
+                 height_px, rule_colour(region.rule));
   }
 
  private:
@@ -105,17 +117,24 @@ void draw_links(Marker& marker, const Decoding& decoding) {
   }
 }
 
-void draw_legend(ColourImage& picture, int top, double text_px, const Decoding& decoding, const Pattern& pattern) {
-  std::array<int, kMaxLetters> seen{};
-  for (const RegionSeen& region : decoding.regions) {
-    const int letter = region.letter;
-    if (decoded(region) && letter < kMaxLetters) ++seen[static_cast<std::size_t>(letter)];
+bool rejects(const Decoding& decoding, DecodeRule rule) {
+  return text_of(rule).kind == RuleKind::kRejects && decoding.rules[static_cast<std::size_t>(rule)] > 0;
+}
+
+/// How many regions each rule rejected, by its number.
+void add_rules(Legend& legend, const Decoding& decoding) {
+  legend.disc(kSettledColour, "decoded: " + std::to_string(decoding.count(RegionStatus::kDecoded)));
+  for (std::size_t i = 0; i < kDecodeRuleCount; ++i) {
+    const DecodeRule rule = decode_rule(i);
+    if (!rejects(decoding, rule)) continue;
+    std::string words(to_string(rule));
+    std::replace(words.begin(), words.end(), '_', ' ');
+    legend.plus(rule_colour(rule),
+                std::to_string(number_of(rule)) + " " + words + ": " + std::to_string(decoding.rules[i]));
   }
-  Legend legend(picture, top, text_px);
-  for (std::size_t letter = 0; letter < pattern.options.symbols.size() && letter < kMaxLetters; ++letter) {
-    const std::string symbol = "symbol " + std::to_string(pattern.options.symbols[letter]) + ": ";
-    legend.disc(letter_colour(static_cast<int>(letter)), symbol + std::to_string(seen[letter]));
-  }
+}
+
+void add_statuses(Legend& legend, const Decoding& decoding) {
   for (int status = 1; status < kRegionStatusCount; ++status) {
     const auto reason = static_cast<RegionStatus>(status);
     if (decoding.count(reason) == 0) continue;
@@ -123,8 +142,33 @@ void draw_legend(ColourImage& picture, int top, double text_px, const Decoding& 
     std::replace(words.begin(), words.end(), '_', ' ');
     legend.plus(kUndecodedColour, words + ": " + std::to_string(decoding.count(reason)));
   }
+}
+
+void draw_legend(ColourImage& picture, int top, double text_px, const Decoding& decoding, const Pattern& pattern,
+                 DecodingLook look) {
+  Legend legend(picture, top, text_px);
+  if (look == DecodingLook::kReasons) return add_rules(legend, decoding);
+  std::array<int, kMaxLetters> seen{};
+  for (const RegionSeen& region : decoding.regions) {
+    const int letter = region.letter;
+    if (decoded(region) && letter < kMaxLetters) ++seen[static_cast<std::size_t>(letter)];
+  }
+  for (std::size_t letter = 0; letter < pattern.options.symbols.size() && letter < kMaxLetters; ++letter) {
+    const std::string symbol = "symbol " + std::to_string(pattern.options.symbols[letter]) + ": ";
+    legend.disc(letter_colour(static_cast<int>(letter)), symbol + std::to_string(seen[letter]));
+  }
+  add_statuses(legend, decoding);
   legend.line(kLinkColour, "link");
   legend.dashes(kBrokenLinkColour, "broken link");
+}
+
+/// Of the legend, in heights of its letters.
+double footer_lines(const Decoding& decoding, DecodingLook look) {
+  constexpr double kUsual = 8.5, kForARule = 0.7;
+  double lines = kUsual;
+  for (std::size_t i = 0; look == DecodingLook::kReasons && i < kDecodeRuleCount; ++i)
+    lines += rejects(decoding, decode_rule(i)) ? kForARule : 0;
+  return lines;
 }
 
 }  // namespace
@@ -133,22 +177,34 @@ Rgb letter_colour(int letter) {
   return kLetterColours[static_cast<std::size_t>(letter) % kLetterColours.size()];
 }
 
-ColourImage draw_decoding(const GreyView& frame, const Decoding& decoding, const Pattern& pattern) {
+/// In steps of the golden angle, so that no two that are near in the list are alike.
+Rgb rule_colour(DecodeRule rule) {
+  constexpr double kGoldenAngle = 137.508, kThird = 120;
+  const double hue = std::fmod(kGoldenAngle * number_of(rule), 360.);
+  Rgb colour;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double away = std::abs(std::remainder(hue - kThird * static_cast<double>(i), 360.));
+    colour[i] = static_cast<std::uint8_t>(std::clamp(90 + 330 * (1 - away / kThird), 70., 255.));
+  }
+  return colour;
+}
+
+ColourImage draw_decoding(const GreyView& frame, const Decoding& decoding, const Pattern& pattern, DecodingLook look) {
   const double pitch = pitch_px(decoding);
   const int scale = scale_of(frame, pitch);
   const double text_px = std::max(8.0, scale * frame_side_px(frame) / 110.0);
-  const int footer_px = static_cast<int>(8.5 * text_px);
+  const int footer_px = static_cast<int>(footer_lines(decoding, look) * text_px);
   ColourImage picture = dimmed_frame(frame, scale, footer_px);
   Marker marker(picture, scale, pitch);
-  draw_links(marker, decoding);
+  if (look == DecodingLook::kSymbols) draw_links(marker, decoding);
   for (const RegionSeen& region : decoding.regions) {
     if (decoded(region)) {
-      marker.symbol(region);
+      look == DecodingLook::kReasons ? marker.settled(region) : marker.symbol(region);
     } else {
-      marker.undecoded(region);
+      look == DecodingLook::kReasons ? marker.reason(region) : marker.undecoded(region);
     }
   }
-  draw_legend(picture, picture.height() - footer_px, text_px, decoding, pattern);
+  draw_legend(picture, picture.height() - footer_px, text_px, decoding, pattern, look);
   return picture;
 }
 

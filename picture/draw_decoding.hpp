@@ -8,13 +8,22 @@
 
 namespace slsd {
 
+/// What the picture of a decoding dwells on.
+enum class DecodingLook : std::uint8_t { kSymbols, kReasons };
+
 /// What the decoder saw (Elahi et al. 2020, figure 9): the frame dimmed; decoded symbols as discs, a colour to each
 /// letter; every other region as a pink plus; links as thin lines, broken ones as red dashes; a legend with counts
 /// below. Enlarged by 2 or 3 where the symbols are small.
+/// With kReasons every undecoded region is a plus in the colour of the rule that rejected it, with the rule's number
+/// where there is room; the legend names the rules, what is decoded is small and grey, and there are no links.
 /// @param decoding  of this frame; regions outside it are cut
 /// @param pattern   whose letters the regions carry
 /// @thread reentrant
-[[nodiscard]] ColourImage draw_decoding(const GreyView& frame, const Decoding& decoding, const Pattern& pattern);
+[[nodiscard]] ColourImage draw_decoding(const GreyView& frame, const Decoding& decoding, const Pattern& pattern,
+                                        DecodingLook look = DecodingLook::kSymbols);
+
+/// Colour of a rule in the picture and its legend: neighbours in the list of rules differ most.
+[[nodiscard]] Rgb rule_colour(DecodeRule rule);
 
 /// Colour of a letter in the picture and its legend.
 /// @param letter  0 to kMaxLetters - 1

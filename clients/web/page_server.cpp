@@ -13,6 +13,7 @@
 #include "core/utc_text.hpp"
 #include "daemon/client/client_commands.hpp"
 #include "daemon/client/connection.hpp"
+#include "daemon/rpc/base64.hpp"
 #include "daemon/rpc/message.hpp"
 #include "drivers/files/file.hpp"
 
@@ -225,6 +226,7 @@ void PageServer::pass_on(const char* path, const char* method) {
 void PageServer::add_requests() {
   get("/api/status", [this](const Request&) { return status(); });
   get("/api/frame", [this](const Request& request) { return image(request, "frame"); });
+  get("/api/reasons", [this](const Request& request) { return reasons(request); });
   get("/api/preview", [this](const Request& request) { return image(request, "preview"); });
   get("/api/cloud", [this](const Request& request) { return cloud(request); });
   get("/api/past", [this](const Request& request) { return past(request); });
@@ -298,6 +300,16 @@ Answer PageServer::image(const Request& request, const char* method) const {
           answered->reply.bytes,
           {header_about(method == std::string_view("preview") ? brief(about) : about)},
           {}};
+}
+
+/// A frame with the rule that rejected each region, and what these mean.
+Answer PageServer::reasons(const Request& request) const {
+  json params{{"why", true}};
+  if (const std::string camera = parameter(request, "camera"); !camera.empty()) params["camera"] = camera;
+  const auto answered = call("preview", std::move(params), kPatience);
+  if (!answered) return refusal(answered.error());
+  const json& about = answered->reply.message["result"];
+  return json_answer({{"png", to_base64(answered->reply.bytes)}, {"reasons", about.value("reasons", json::array())}});
 }
 
 Answer PageServer::cloud(const Request& request) {

@@ -76,6 +76,7 @@ class PageServer {
   [[nodiscard]] Answer log_in(const Request& request, const nlohmann::json& body);
   [[nodiscard]] Answer status();
   [[nodiscard]] Answer image(const Request& request, const char* method) const;
+  [[nodiscard]] Answer reasons(const Request& request) const;
   [[nodiscard]] Answer cloud(const Request& request);
   [[nodiscard]] Answer scan(const nlohmann::json& body);
   [[nodiscard]] Answer past(const Request& request);

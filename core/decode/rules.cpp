@@ -151,6 +151,10 @@ const RuleText& text_of(DecodeRule rule) {
   return kTexts[static_cast<std::size_t>(rule)];
 }
 
+std::string_view to_string(RuleKind kind) {
+  return kind == RuleKind::kAccepts ? "accepts" : kind == RuleKind::kRejects ? "rejects" : "guards";
+}
+
 std::string_view to_string(RegionStatus status) {
   switch (status) {
     case RegionStatus::kDecoded:

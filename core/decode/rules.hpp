@@ -125,6 +125,9 @@ enum class RuleKind : std::uint8_t {
   kGuards,  ///< keeps a rejected symbol from being brought back; the symbol's status stays
 };
 
+/// "rejects", as in the metrics.
+[[nodiscard]] std::string_view to_string(RuleKind kind);
+
 struct RuleText {
   std::string_view name;  ///< "too_small", as in the counters
   RuleKind kind;
@@ -137,6 +140,10 @@ struct RuleText {
 [[nodiscard]] const RuleText& text_of(DecodeRule rule);
 [[nodiscard]] inline std::string_view to_string(DecodeRule rule) {
   return text_of(rule).name;
+}
+/// As docs/decoder.md and the pictures count them, from 1.
+[[nodiscard]] inline int number_of(DecodeRule rule) {
+  return static_cast<int>(rule) + 1;
 }
 [[nodiscard]] inline DecodeRule decode_rule(std::size_t index) {
   return static_cast<DecodeRule>(index);

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <algorithm>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "core/cloud/ply.hpp"
 #include "core/shown_picture.hpp"
@@ -16,6 +19,24 @@ namespace slsd {
 namespace {
 
 using nlohmann::json;
+
+/// A name as CSV has it: quoted, with its quotes doubled.
+std::string csv_field(const std::string& text) {
+  std::string field = "\"";
+  for (const char c : text) field.append(c == '"' ? 2 : 1, c);
+  return field + '"';
+}
+
+/// Every region that gave no point: where it is, and the rules that say why.
+std::string reasons_csv(const ScanResult& scan, const std::vector<std::string>& cameras) {
+  std::string text = "camera,u,v,status,rule,guard\n";
+  for (const RegionReason& reason : scan.reasons) {
+    text += fmt::format("{},{:.2f},{:.2f},{},{},{}\n", csv_field(cameras[reason.camera]), reason.camera_u,
+                        reason.camera_v, to_string(text_of(reason.rule).gives), to_string(reason.rule),
+                        reason.guard ? to_string(*reason.guard) : "");
+  }
+  return text;
+}
 
 /// Writes the scans of one setup as a recording.
 class RecordingPart {
@@ -50,6 +71,8 @@ class RecordingPart {
         line["full_levels"] = scan.outcome->value().full_levels;
         line["cloud"] = "clouds/" + numbered(framed_, ".ply");
         put(line["cloud"], write_ply(scan.outcome->value().cloud));
+        line["reasons"] = "reasons/" + numbered(framed_, ".csv");
+        put(line["reasons"], reasons_csv(scan.outcome->value(), settings_.camera_names));
       }
       ++framed_;
     }

@@ -25,6 +25,7 @@ struct ClientOptions {
   std::string format;                     ///< scan: the cloud's, "ply", "pcd" or "tiff"; empty: as its name ends
   std::string metrics_format;             ///< metrics: "openmetrics" or "prometheus"; empty: by where it goes
   std::filesystem::path picture;          ///< scan: the frame with what was decoded
+  bool why = false;                       ///< scan: the picture says by which rule each region was rejected
   std::filesystem::path cloud_picture;    ///< scan: the cloud, drawn
   std::filesystem::path image;            ///< preview, frame, pattern: the PNG to write
   std::filesystem::path shown;            ///< project: a picture's name, or a file

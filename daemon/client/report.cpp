@@ -86,10 +86,12 @@ std::string times_table(const json& scans) {
   return text;
 }
 
-std::string regions_table(const json& scans) {
-  std::string text = fmt::format("  {:<24}{:>9}{:>14}\n", "regions", "last", "all");
-  const json last = scans.value("regions_of_last", json::object());
-  const json all = scans.value("regions", json::object());
+/// @param what  "regions", or "rules" that decided on them
+std::string counts_table(const json& scans, const std::string& what) {
+  const json last = scans.value(what + "_of_last", json::object());
+  const json all = scans.value(what, json::object());
+  if (all.empty()) return "";  // of a service that is older
+  std::string text = fmt::format("  {:<24}{:>9}{:>14}\n", what, "last", "all");
   for (const auto& [status, count] : all.items()) {
     if (count == 0) continue;
     text += fmt::format("  {:<24}{:>9}{:>14}\n", printable(status), last.value(status, 0), count.get<std::uint64_t>());
@@ -163,7 +165,17 @@ std::string status_table(const json& status) {
   }
   text += device_line(status.value("projector", json::object()));
   for (const json& camera : status.value("cameras", json::array())) text += device_line(camera);
-  return text + scans_lines(scans) + times_table(scans) + regions_table(scans);
+  return text + scans_lines(scans) + times_table(scans) + counts_table(scans, "regions") + counts_table(scans, "rules");
+}
+
+std::string reason_lines(const json& scan) {
+  std::string text;
+  for (const json& reason : scan.value("reasons", json::array())) {
+    text += fmt::format("{:>6} {}{}: {} {}\n", reason.value("regions", 0),
+                        reason.value("kind", "") == "guards" ? "not brought back, " : "", text_of(reason, "rule"),
+                        text_of(reason, "meaning"), text_of(reason, "remedy"));
+  }
+  return text;
 }
 
 std::string scan_line(const json& scan) {

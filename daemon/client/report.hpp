@@ -40,6 +40,9 @@ struct Failure {
 /// status's answer as a table for people.
 [[nodiscard]] std::string status_table(const nlohmann::json& status);
 
+/// Why regions gave no point, a line to each rule; empty where nobody asked.
+[[nodiscard]] std::string reason_lines(const nlohmann::json& scan);
+
 /// A scan in one line: "scan 1a2b3c4d-7: 2345 points of 2390 regions, capture 4.2 ms, decode 51.0 ms".
 [[nodiscard]] std::string scan_line(const nlohmann::json& scan);
 

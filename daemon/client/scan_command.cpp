@@ -145,6 +145,7 @@ tl::expected<std::string, Failure> asked_density(const ClientOptions& options, C
 
 json scan_parameters(const ClientOptions& options, const std::string& density) {
   json params{{"format", asked_format(options, density == "pixels")}, {"picture", !options.picture.empty()}};
+  if (options.why) params["why"] = true;
   if (!density.empty()) params["density"] = density;
   if (!options.camera.empty()) params["camera"] = options.camera;
   if (options.normals) params["normals"] = true;
@@ -171,7 +172,8 @@ int scan_command(const ClientOptions& options) {
   if (!answered) return report(options, answered.error());
   if (auto written = write_files(options, *answered); !written) return report(options, written.error());
   const json& result = answered->reply.message["result"];
-  words(options) << (options.json ? to_line(result) : scan_line(result) + "\n" + empty_line(result));
+  words(options) << (options.json ? to_line(result)
+                                  : scan_line(result) + "\n" + empty_line(result) + reason_lines(result));
   return kDone;
 }
 

@@ -41,7 +41,7 @@ std::vector<RecordedCamera> recorded_cameras(const json& settings) {
     std::ranges::replace_if(
         folder, [](char c) { return !plain(c); }, '_');
     const auto taken = [&](const RecordedCamera& other) { return other.folder == folder; };
-    while (folder.empty() || folder == "clouds" || std::ranges::any_of(cameras, taken)) {
+    while (folder.empty() || folder == "clouds" || folder == "reasons" || std::ranges::any_of(cameras, taken)) {
       folder.append("-").append(std::to_string(cameras.size()));
     }
     cameras.push_back({name, folder});

@@ -145,7 +145,9 @@ void BlackBox::keep_outcome(const std::string& id, const SharedSetup& setup, Res
   Entry& entry = find_or_begin(id, setup);
   entry.scan.outcome = std::move(outcome);
   if (result) {
-    grow(entry, (entry.scan.outcome->value().cloud.points.size() + result->strays.size()) * sizeof(CloudPoint));
+    const ScanResult& kept = entry.scan.outcome->value();
+    grow(entry, (kept.cloud.points.size() + result->strays.size()) * sizeof(CloudPoint) +
+                    kept.reasons.size() * sizeof(RegionReason));
     entry.scan.density = result->dense ? Density::kPixels : Density::kSymbols;
   }
   make_room(id);

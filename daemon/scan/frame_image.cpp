@@ -7,7 +7,6 @@
 #include <variant>
 
 #include "drivers/files/encode_png.hpp"
-#include "picture/draw_decoding.hpp"
 
 namespace slsd {
 namespace {
@@ -69,8 +68,9 @@ Result<FrameImage> image_of(const Frame& frame, FrameCoding coding, std::string 
   return image;
 }
 
-Result<std::string> picture_of(const GreyView& image, const Decoding& decoding, const Pattern& pattern) {
-  return encode_png(draw_decoding(image, decoding, pattern));
+Result<std::string> picture_of(const GreyView& image, const Decoding& decoding, const Pattern& pattern,
+                               DecodingLook look) {
+  return encode_png(draw_decoding(image, decoding, pattern, look));
 }
 
 }  // namespace slsd

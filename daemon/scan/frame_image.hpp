@@ -10,6 +10,7 @@
 #include "core/result.hpp"
 #include "daemon/scan/scan_result.hpp"
 #include "drivers/camera/frame.hpp"
+#include "picture/draw_decoding.hpp"
 
 namespace slsd {
 
@@ -27,6 +28,7 @@ void copy_raw(const Frame& frame, FrameImage& image);
 [[nodiscard]] Result<FrameImage> image_of(const Frame& frame, FrameCoding coding, std::string camera);
 
 /// What was decoded, drawn into the frame, as a PNG. @errors of encode_png() @thread reentrant
-[[nodiscard]] Result<std::string> picture_of(const GreyView& image, const Decoding& decoding, const Pattern& pattern);
+[[nodiscard]] Result<std::string> picture_of(const GreyView& image, const Decoding& decoding, const Pattern& pattern,
+                                             DecodingLook look);
 
 }  // namespace slsd

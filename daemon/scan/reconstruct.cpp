@@ -25,9 +25,14 @@ std::string utc_time(MonotonicTime time) {
   return utc_text_ms(std::chrono::system_clock::now() - (steady_clock::now() - time));
 }
 
-void append(const Decoding& decoding, ScanResult& result) {
+void append(const Decoding& decoding, std::uint8_t camera, ScanResult& result) {
   result.cloud.points.insert(result.cloud.points.end(), decoding.points.begin(), decoding.points.end());
   for (std::size_t i = 0; i < decoding.counts.size(); ++i) result.regions[i] += decoding.counts[i];
+  for (std::size_t i = 0; i < decoding.rules.size(); ++i) result.rules[i] += decoding.rules[i];
+  for (const RegionSeen& region : decoding.regions) {
+    if (region.status == RegionStatus::kDecoded) continue;
+    result.reasons.push_back({region.centre_px.x(), region.centre_px.y(), camera, region.rule, region.guard});
+  }
 }
 
 ScanResult describe(const FrameSet& set, const ScanSetup& setup, const std::string& scan_id) {
@@ -154,7 +159,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
       return fail(decoding.error().code, decoding.error().message, "camera " + setup.camera_names[i]);
     }
     const std::size_t before = result.cloud.points.size();
-    append(**decoding, result);
+    append(**decoding, decoder.camera_index(), result);
     const std::vector<CloudPoint> strays = stray_symbols(**decoding, decoder.camera_index());
     result.strays.insert(result.strays.end(), strays.begin(), strays.end());
     shade(std::span(result.cloud.points).subspan(before), light, result);
@@ -166,7 +171,8 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
       result.dense_time += took, result.decode_time += took;
     }
     if (!request.picture || i != pictured) continue;
-    auto picture = picture_of(set.frames[i].image(), **decoding, setup.pattern);
+    const auto look = request.why ? DecodingLook::kReasons : DecodingLook::kSymbols;
+    auto picture = picture_of(set.frames[i].image(), **decoding, setup.pattern, look);
     if (!picture) return tl::unexpected(picture.error());
     result.picture_png = std::move(*picture);
   }

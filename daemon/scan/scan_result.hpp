@@ -40,6 +40,14 @@ class StageClock final : public StageObserver {
   StageTimes times_{};
 };
 
+/// Why a region gave no point.
+struct RegionReason {
+  float camera_u, camera_v;  ///< its centre
+  std::uint8_t camera;       ///< in the calibration
+  DecodeRule rule;
+  std::optional<DecodeRule> guard;  ///< the last that kept it from being brought back
+};
+
 using RegionCounts = std::array<std::uint32_t, kRegionStatusCount>;
 
 /// The tries of a scan whose frames were lost, torn or late, before the one that it ended with.
@@ -60,6 +68,7 @@ struct ScanRequest {
   bool ambient = false;                     ///< less those in the light of the room alone
   CloudFormats formats = {};                ///< in which the cloud is written
   std::stop_token gone = {};                ///< requested when nobody waits for the outcome any more
+  bool why = false;                         ///< the picture has each rejected region in the colour of its rule
   bool of_stream = false;                   ///< follows another: pixels where nothing moves are measured from there
 };
 
@@ -95,6 +104,8 @@ struct ScanResult {
   LostTries lost = {};
   std::vector<CloudPoint> strays;          ///< symbols that a knocked rig has elsewhere: see stray_symbols()
   RegionCounts regions{};                  ///< of all cameras, by status
+  RuleCounts rules{};                      ///< the same by the rule that decided
+  std::vector<RegionReason> reasons = {};  ///< of all cameras' regions that gave no point
   std::optional<std::uint64_t> saturated;  ///< points without an intensity, as white was too bright; where it was asked
                                            ///< for
   std::optional<std::uint64_t> dense_saturated = {};  ///< the same, of the points of pixels

@@ -44,6 +44,8 @@ struct ScanTotals {
   std::uint64_t lost_tries = 0;  ///< of the scans that succeeded
   std::array<std::uint64_t, kRegionStatusCount> regions{};
   RegionCounts regions_of_last{};
+  std::array<std::uint64_t, kDecodeRuleCount> rules{};
+  RuleCounts rules_of_last{};
   std::uint64_t skipped = 0;  ///< sets of frames taken in free run and not decoded: newer ones came
   Duration capture;
   Duration decode;

@@ -144,8 +144,9 @@ std::optional<RpcError> refused_form(CloudForm form) {
   return std::nullopt;
 }
 
-Outcome scan_reply(const ScanResult& scan, CloudForm form, bool as_memfd, FrameCoding frames) {
+Outcome scan_reply(const ScanResult& scan, CloudForm form, bool as_memfd, FrameCoding frames, bool why) {
   Reply reply{scan_json(scan, form.density)};
+  if (why) reply.result["reasons"] = reasons_json(scan);
   reply.result["format"] = to_string(form.format);
   CloudFiles files = scan.files;
   const SharedBytes cloud = files.file(scan.cloud, scan.dense.get(), form);
@@ -176,17 +177,19 @@ void run_scan(ServiceState& state, const json& params, Session& session, Respond
   const bool as_memfd = reader.choice("transport", {"inline", "memfd"}) == "memfd";
   const int timeout_ms = read_timeout(reader, state);
   const bool picture = reader.boolean("picture", false);
+  const bool why = reader.boolean("why", false);
   const FrameCoding frames = frame_coding(reader.choice("frames", {"none", "raw", "png"}));
   const std::string camera = reader.text("camera");
   const bool texture = reader.boolean("texture", false);
   const bool ambient = reader.boolean("ambient", false);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
   if (auto refused = refused_form(form)) return respond(tl::unexpected(*refused));
-  const ScanRequest request{deadline_in(timeout_ms),  picture,       camera, frames, texture, ambient,
-                            CloudFormats::only(form), session.gone()};
+  const ScanRequest request{deadline_in(timeout_ms),  picture,        camera, frames, texture, ambient,
+                            CloudFormats::only(form), session.gone(), why};
   if (auto refused = session.reserve(expected_bytes(state, request, form))) return respond(tl::unexpected(*refused));
-  state.scanner.scan(request, carry_scan(state, std::move(respond), [form, as_memfd, frames](const ScanResult& scan) {
-                       return scan_reply(scan, form, as_memfd, frames);
+  state.scanner.scan(request,
+                     carry_scan(state, std::move(respond), [form, as_memfd, frames, why](const ScanResult& scan) {
+                       return scan_reply(scan, form, as_memfd, frames, why);
                      }));
 }
 
@@ -206,12 +209,15 @@ void run_preview(ServiceState& state, const json& params, Session& session, Resp
   ParamReader reader(params);
   const int timeout_ms = read_timeout(reader, state);
   const std::string camera = reader.text("camera");
+  const bool why = reader.boolean("why", false);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
   ScanRequest request{deadline_in(timeout_ms), true, camera};
+  request.why = why;
   request.gone = session.gone();
   if (auto refused = session.reserve(expected_bytes(state, request))) return respond(tl::unexpected(*refused));
-  state.scanner.scan(request, carry_scan(state, std::move(respond), [](const ScanResult& scan) -> Outcome {
+  state.scanner.scan(request, carry_scan(state, std::move(respond), [why](const ScanResult& scan) -> Outcome {
                        json result = scan_json(scan);
+                       if (why) result["reasons"] = reasons_json(scan);
                        result["format"] = "png";
                        return bytes_reply(scan.picture_png, std::move(result));
                      }));

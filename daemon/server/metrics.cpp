@@ -211,6 +211,12 @@ void tell_scans(const ServiceState& state, Exposition& out) {
   out.family("slsd_regions", "counter", "Regions of all frames, decoded or by the reason why not.");
   for (std::size_t i = 0; i < totals.regions.size(); ++i)
     out.sample(static_cast<double>(totals.regions[i]), {{"status", to_string(static_cast<RegionStatus>(i))}});
+  out.family(
+      "slsd_regions_by_rule", "counter",
+      "Regions of all frames by the rule that decided on them; guards kept what was rejected from being brought back.");
+  for (std::size_t i = 0; i < totals.rules.size(); ++i)
+    out.sample(static_cast<double>(totals.rules[i]),
+               {{"rule", to_string(decode_rule(i))}, {"kind", to_string(text_of(decode_rule(i)).kind)}});
   out.family("slsd_pixels", "counter", "Pixels of all dense clouds, measured or by the reason why not.");
   for (std::size_t i = 0; i < totals.pixels.size(); ++i)
     out.sample(static_cast<double>(totals.pixels[i]), {{"status", to_string(static_cast<DensePixel>(i))}});

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <functional>
+#include <vector>
 
 #include "core/printable.hpp"
 #include "daemon/rpc/message.hpp"
@@ -30,6 +32,15 @@ json regions_json(const Counts& counts) {
   return regions;
 }
 
+/// Of the rules that decided on a region.
+template <class Counts>
+json rules_json(const Counts& counts) {
+  json rules = json::object();
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    if (counts[i] > 0) rules[std::string(to_string(decode_rule(i)))] = counts[i];
+  return rules;
+}
+
 json duration_json(const Duration& duration) {
   return {{"last", milliseconds(duration.last)},
           {"mean", milliseconds(duration.mean())},
@@ -51,6 +62,8 @@ json totals_json(const ScanTotals& totals) {
               {"points_of_last", totals.points},
               {"regions", regions_json(totals.regions)},
               {"regions_of_last", regions_json(totals.regions_of_last)},
+              {"rules", rules_json(totals.rules)},
+              {"rules_of_last", rules_json(totals.rules_of_last)},
               {"capture_ms", duration_json(totals.capture)},
               {"decode_ms", duration_json(totals.decode)},
               {"latency_ms", duration_json(totals.latency)},
@@ -191,6 +204,7 @@ json scan_json(const ScanResult& scan, Density density) {
               {"frame", scan.cloud.frame},
               {"points", scan.cloud.points.size()},
               {"regions", regions_json(scan.regions)},
+              {"rules", rules_json(scan.rules)},
               {"received_monotonic_us",
                std::chrono::duration_cast<std::chrono::microseconds>(scan.received.time_since_epoch()).count()},
               {"skipped", scan.skipped},
@@ -212,6 +226,23 @@ json scan_json(const ScanResult& scan, Density density) {
     result["lost_tries"] = std::move(lost);
   }
   return result;
+}
+
+json reasons_json(const ScanResult& scan) {
+  std::vector<DecodeRule> rules;
+  const auto count = [&](DecodeRule rule) { return scan.rules[static_cast<std::size_t>(rule)]; };
+  for (std::size_t i = 0; i < kDecodeRuleCount; ++i)
+    if (scan.rules[i] > 0 && text_of(decode_rule(i)).kind != RuleKind::kAccepts) rules.push_back(decode_rule(i));
+  std::ranges::stable_sort(rules, std::greater(), count);
+  json reasons = json::array();
+  for (const DecodeRule rule : rules) {
+    const RuleText& text = text_of(rule);
+    json reason{{"rule", text.name},      {"number", number_of(rule)}, {"kind", to_string(text.kind)},
+                {"regions", count(rule)}, {"meaning", text.meaning},   {"remedy", text.remedy}};
+    if (text.kind == RuleKind::kRejects) reason["status"] = to_string(text.gives);
+    reasons.push_back(std::move(reason));
+  }
+  return reasons;
 }
 
 json frame_json(const FrameImage& frame) {

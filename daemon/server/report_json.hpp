@@ -13,6 +13,10 @@ namespace slsd {
 /// What a client is told of a scan besides its cloud: id, time, number of points, regions by status, times.
 [[nodiscard]] nlohmann::json scan_json(const ScanResult& scan, Density density = Density::kSymbols);
 
+/// The rules that rejected regions of a scan or kept them from being brought back, the commonest first: each with its
+/// count, its status, what it means and what a user may do.
+[[nodiscard]] nlohmann::json reasons_json(const ScanResult& scan);
+
 /// The time since the last byte of a scan's frames, in milliseconds, for its `latency_ms`.
 [[nodiscard]] double latency_ms(MonotonicTime received);
 

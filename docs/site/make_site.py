@@ -21,7 +21,7 @@ PAGES = {
             "docs/examples.md": "Examples", "docs/ros.md": "ROS 2", "clients/ros/README.md": "ROS 2 launch file",
             "docs/fleet.md": "Many scanners"},
     "Run": {"docs/supervision.md": "Supervision", "docs/metrics.md": "Metrics"},
-    "Understand": {"docs/decoder.md": "The decoder", "docs/alphabet.md": "The alphabet", "docs/arrays.md": "The arrays",
+    "Understand": {"docs/decoder.md": "The decoder", "docs/reasons.md": "Reasons", "docs/alphabet.md": "The alphabet", "docs/arrays.md": "The arrays",
                    "docs/developing.md": "Developing", "tests/corpus/README.md": "The corpus", "CHANGELOG.md": "Changes"},
 }
 TEXT_ENDINGS = {".toml", ".hpp", ".cpp", ".py", ""}  # shown as they are

@@ -8,6 +8,7 @@
 #include "docs/tables/alphabet_tables.hpp"
 #include "docs/tables/array_tables.hpp"
 #include "docs/tables/profile_chart.hpp"
+#include "docs/tables/reason_table.hpp"
 #include "docs/tables/shipped_patterns.hpp"
 
 namespace {
@@ -32,7 +33,8 @@ bool write_documents(const std::string& folder) {
   return slsd::write_alphabet_picture(folder + "/alphabet.png") &&
          slsd::write_profile_chart(profiles, folder + "/profiles.png") &&
          write(folder + "/arrays.md", slsd::array_document(profiles)) &&
-         write(folder + "/alphabet.md", slsd::alphabet_document());
+         write(folder + "/alphabet.md", slsd::alphabet_document()) &&
+         write(folder + "/reasons.md", slsd::reason_document());
 }
 
 }  // namespace

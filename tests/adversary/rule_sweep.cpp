@@ -86,7 +86,7 @@ Result<DecodeRule> rule_named(std::string_view name) {
   for (std::size_t i = 0; i < kDecodeRuleCount; ++i)
     if (text_of(decode_rule(i)).name == name && text_of(decode_rule(i)).has_switch) return decode_rule(i);
   return fail(ErrorCode::kNotFound, "the decoder has no rule \"" + std::string(name) +
-                                        "\" that it can do without; docs/decoder.md lists them");
+                                        "\" that it can do without; docs/reasons.md lists them");
 }
 
 Result<int> sweep_rules(int frames, int first, int only_kind) {

@@ -118,6 +118,10 @@ class Views(unittest.TestCase):
             browser.click("#propose")
             browser.wait("document.querySelectorAll('#exposure p').length > 0 && "
                          "!/looks at/.test(document.getElementById('exposure').textContent)", "no proposal")
+            browser.click("#ask-reasons")
+            browser.wait("!document.getElementById('reasons-list').hidden", "no reasons")
+            self.assertIn("touches border", browser.run("return document.getElementById('reasons-list').textContent;"))
+            self.assertGreater(browser.run("return document.getElementById('reasons').width;"), 640)
             browser.click("#cloud-live")
             shown = browser.run("return shownScan.scan;")
             browser.wait(f"shownScan.scan !== '{shown}'", "no live cloud")

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """The black box: bundles of the last scans, by hand and by the service itself, and their replay."""
+import collections
+import csv
 import io
 import json
 import os
@@ -85,6 +87,14 @@ class Bundle(unittest.TestCase):
                 dense = client.call("scan", timeout_ms=60000, density="pixels")[1]
             files = self.bundle(service)
         self.assertEqual([files[f"recording-1/clouds/0000000{i}.ply"] for i in range(2)], clouds)
+        told = [json.loads(line) for line in files["recording-1/scans.jsonl"].splitlines()]
+        for scan in told:
+            reasons = list(csv.DictReader(files["recording-1/" + scan["reasons"]].decode().splitlines()))
+            for key, told_counts in (("status", scan["regions"]), ("rule", scan["rules"])):
+                counts = collections.Counter(reason[key] for reason in reasons)
+                self.assertGreater(len(counts), 1)
+                self.assertEqual(counts, {name: told_counts[name] for name in counts})
+            self.assertEqual(len(reasons), sum(scan["regions"].values()) - scan["regions"]["decoded"])
         result = replay(self.file, "--unpack", self.folder / "unpacked")
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
         self.assertEqual(result.stdout.count("the same cloud, byte for byte"), 3)

@@ -385,6 +385,27 @@ class Slsctl(unittest.TestCase):
         for picture in (seen, drawn):
             self.assertTrue(picture.read_bytes().startswith(b"\x89PNG"))
 
+    def test_scan_says_why_symbols_are_missing(self):
+        plain, why = self.folder / "seen.png", self.folder / "why.png"
+        self.assertEqual(self.slsctl("scan", "--picture", plain).returncode, 0)
+        result = self.slsctl("scan", "--picture", why, "--why")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertTrue(why.read_bytes().startswith(b"\x89PNG"))
+        self.assertNotEqual(plain.read_bytes(), why.read_bytes())
+        self.assertRegex(result.stdout, r"\n +\d+ touches_border: The region touches the border.*Move the object")
+        told = json.loads(self.slsctl("scan", "--picture", why, "--why", "--json").stdout)
+        for reason in told["reasons"]:
+            self.assertEqual(reason["regions"], told["rules"][reason["rule"]])
+            self.assertIn(reason["kind"], ("rejects", "guards"))
+            if reason["kind"] == "rejects":
+                self.assertGreaterEqual(told["regions"][reason["status"]], reason["regions"])
+        rejected = sum(reason["regions"] for reason in told["reasons"] if reason["kind"] == "rejects")
+        self.assertEqual(rejected, sum(told["regions"].values()) - told["regions"]["decoded"])
+        lone = self.slsctl("scan", "-o", self.folder / "c.ply", "--why")
+        self.assertEqual(lone.returncode, 2)
+        self.assertIn("--picture", lone.stderr)
+        self.assertRegex(self.slsctl("status").stdout, r"  rules +last +all\n(  .*\n)*  touches_border +\d")
+
     def test_images_are_written(self):
         for command in ("frame", "pattern", "preview"):
             file = self.folder / (command + ".png")

@@ -66,6 +66,10 @@ class View(unittest.TestCase):
         self.assertEqual(now.value("slsd_requests_failed_total", error="invalid_params"), 1)
         for status in replies[0]["regions"]:
             self.assertEqual(now.value("slsd_regions_total", status=status), sum(r["regions"][status] for r in replies))
+        for rule in set().union(*(r["rules"] for r in replies)):
+            counted = [sample for sample in now.samples if sample[0] == "slsd_regions_by_rule_total" and ("rule", rule) in sample]
+            self.assertEqual(len(counted), 1, rule)
+            self.assertEqual(now.samples[counted[0]], sum(r["rules"].get(rule, 0) for r in replies))
         for status, count in dense["pixels"].items():
             self.assertEqual(now.value("slsd_pixels_total", status=status), count)
         self.assertEqual(now.value("slsd_camera_frames_total", camera="camera"), 4)

@@ -137,6 +137,26 @@ TEST(DrawDecoding, StandsRegionsOutsideTheFrameAndNone) {
   EXPECT_FALSE(draw_decoding(scene.frame.view(), {}, {}).empty());
 }
 
+TEST(DrawDecoding, ShowsReasonsInTheColoursOfTheirRules) {
+  Scene scene = scene_of({"a-+ + b"});
+  scene.decoding.regions[1].rule = DecodeRule::kTorn, scene.decoding.regions[2].rule = DecodeRule::kNotch;
+  for (const DecodeRule rule : {DecodeRule::kTorn, DecodeRule::kNotch})
+    scene.decoding.rules[static_cast<std::size_t>(rule)] = 1;
+  const ColourImage picture = draw_decoding(scene.frame.view(), scene.decoding, scene.pattern, DecodingLook::kReasons);
+  EXPECT_TRUE(has(picture, 2 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kTorn)));
+  EXPECT_FALSE(has(picture, 2 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kNotch)));
+  EXPECT_TRUE(has(picture, 3 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kNotch)));
+  EXPECT_FALSE(has(picture, kPitchPx, kPitchPx, letter_colour(0))) << "letters would hide what is asked for";
+  EXPECT_FALSE(has(picture, 3 * kPitchPx / 2, kPitchPx, kLinkColour));
+  const ColourImage few = draw_decoding(scene.frame.view(), {}, scene.pattern, DecodingLook::kReasons);
+  EXPECT_GT(picture.height(), few.height()) << "the legend has a place for each rule";
+}
+
+TEST(DrawDecoding, TellsRulesApartThatAreNearInTheList) {
+  for (std::size_t i = 1; i < kDecodeRuleCount; ++i)
+    EXPECT_FALSE(close(rule_colour(decode_rule(i)), rule_colour(decode_rule(i - 1)))) << i;
+}
+
 TEST(DrawDecoding, DimsTheFrame) {
   const Grey8 white(64, 48, 255);
   const ColourImage picture = draw_decoding(white.view(), {}, {});

@@ -252,6 +252,22 @@ async function proposeExposure() {
   }
 }
 
+// A frame with the rule that rejected each region, and what to do about it.
+async function showReasons() {
+  const told = await (await ask("api/reasons?camera=" + encodeURIComponent($("which-camera").value))).json();
+  const bytes = Uint8Array.from(atob(told.png), (letter) => letter.charCodeAt(0));
+  const image = await createImageBitmap(new Blob([bytes], {type: "image/png"}));
+  fitCanvas($("reasons"), image);
+  $("reasons").getContext("2d").drawImage(image, 0, 0);
+  $("reasons-list").replaceChildren(...told.reasons.map((reason) => {
+    const row = element("tr", "");
+    row.append(element("td", String(reason.regions)), element("td", `${reason.number} ${reason.rule.replaceAll("_", " ")}`),
+               element("td", reason.meaning), element("td", reason.remedy));
+    return row;
+  }));
+  $("reasons").hidden = $("reasons-list").hidden = false;
+}
+
 // ---- cloud ----
 
 let view = null;
@@ -412,6 +428,7 @@ function begin() {
     });
   }
   onClick($("propose"), proposeExposure);
+  onClick($("ask-reasons"), showReasons);
   onClick($("scan"), scan);
   onClick($("draw-again"), async () => view.drawAgain());
   onClick($("whole"), async () => view && view.frameAll());

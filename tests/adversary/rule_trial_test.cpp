@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <optional>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "tests/adversary/misled.hpp"
+#include "tests/adversary/rule_sweep.hpp"
+
+namespace slsd::adversary {
+namespace {
+
+class Trial : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto misled = Misled::of(16, &trial_);
+    ASSERT_TRUE(misled);
+    misled_.emplace(std::move(*misled));
+  }
+  const Decoding& decode(Kind kind) {
+    const Frame frame = misled_->maker.make(kind, 0);
+    const auto decoding = misled_->decoders[0].decode(frame.image.view(), 255);
+    EXPECT_TRUE(decoding);
+    return **decoding;
+  }
+
+  RuleTrial trial_;
+  std::optional<Misled> misled_;
+};
+
+TEST_F(Trial, EveryRegionHasTheStatusThatItsRuleGives) {
+  for (int kind = 0; kind < kKinds; ++kind) {
+    const Decoding& decoding = decode(static_cast<Kind>(kind));
+    std::size_t decided = 0;
+    for (const RegionSeen& region : decoding.regions) {
+      EXPECT_EQ(region.status, text_of(region.rule).gives) << to_string(region.rule);
+      EXPECT_NE(text_of(region.rule).kind, RuleKind::kGuards) << to_string(region.rule);
+      const RuleKind guard = region.guard ? text_of(*region.guard).kind : RuleKind::kGuards;
+      EXPECT_EQ(guard, RuleKind::kGuards);
+    }
+    for (std::size_t i = 0; i < kDecodeRuleCount; ++i)
+      if (text_of(decode_rule(i)).kind != RuleKind::kGuards) decided += decoding.rules[i];
+    EXPECT_EQ(decided, decoding.regions.size());
+  }
+}
+
+TEST_F(Trial, LeavesARuleOutAndTakesItBack) {
+  constexpr auto kIndex = static_cast<std::size_t>(DecodeRule::kGrown);
+  const RuleCounts before = decode(Kind::kShelves).rules;
+  EXPECT_GT(before[kIndex], 0U);
+  trial_.off.set(kIndex);
+  EXPECT_EQ(decode(Kind::kShelves).rules[kIndex], 0U);
+  trial_.off.reset();
+  EXPECT_EQ(decode(Kind::kShelves).rules, before);
+}
+
+TEST_F(Trial, ARuleThatWasNotMetChangesNothing) {
+  const RuleCounts all = decode(Kind::kShelves).rules;
+  RuleSet met;
+  for (std::size_t i = 0; i < kDecodeRuleCount; ++i) met[i] = trial_.met[i];
+  EXPECT_TRUE(met.any());
+  trial_.off = ~met;
+  EXPECT_EQ(decode(Kind::kShelves).rules, all);
+}
+
+TEST(RuleNames, OfRulesWithASwitchAreKnown) {
+  EXPECT_EQ(*rule_named("notch"), DecodeRule::kNotch);
+  EXPECT_FALSE(rule_named("no_window")) << "nothing names a cell then";
+  EXPECT_EQ(rule_named("nonsense").error().code, ErrorCode::kNotFound);
+}
+
+}  // namespace
+}  // namespace slsd::adversary
