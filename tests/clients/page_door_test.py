@@ -43,7 +43,7 @@ class Door(unittest.TestCase):
             self.assertEqual(web.get("/api/status")[0], 200)
             for stranger in ({}, {"X-Slsd-Page": "1"}, {"Authorization": "Bearer "}, {"Authorization": "Bearer " + "0" * 48},
                              {"Authorization": "Basic " + web.token}, {"Cookie": f"slsd_session_{web.port}="}):
-                for path in ("status", "frame", "preview", "cloud?density=symbols&after=0", "past?scan=1", "metrics", "exposure",
+                for path in ("status", "frame", "preview", "reasons", "cloud?density=symbols&after=0", "past?scan=1", "metrics", "exposure",
                              "calibration", "nothing"):
                     status, name = name_of(web.ask("GET", "/api/" + path, headers=stranger))
                     self.assertEqual((status, name in ("no_token", "wrong_token")), (401, True), (path, stranger))

@@ -97,6 +97,10 @@ class Scans(unittest.TestCase):
         with slsd.Scanner(self.service.socket) as scanner:
             cloud = scanner.scan(picture=True, frames=True)
             self.assertTrue(cloud.picture.startswith(b"\x89PNG"))
+            self.assertNotIn("reasons", cloud.description)
+            why = scanner.scan(picture=True, why=True)
+            self.assertNotEqual(why.picture, cloud.picture)
+            self.assertTrue(all(reason["remedy"] for reason in why.description["reasons"]))
             self.assertEqual([frame.description["light"] for frame in cloud.frames], ["pattern"])
             frame = scanner.frame()
             np.testing.assert_array_equal(frame.image, cloud.frames[0].image)

@@ -79,7 +79,7 @@ class Scanner:
 
     def scan(self, *, timeout_s: float | None = 5.0, density: Density | None = None, normals: bool = False,
              texture: bool = False, ambient: bool = False, picture: bool = False, camera: str | None = None,
-             frames: bool = False, shared: bool = True) -> Cloud:
+             frames: bool = False, shared: bool = True, why: bool = False) -> Cloud:
         """Takes one scan.
 
         density  a point for each "symbols" of the pattern or for each of the camera's "pixels"; None: as configured
@@ -91,10 +91,12 @@ class Scanner:
         frames   the frames themselves, in `frames`
         shared   the points lie in memory that is shared with the service until the cloud is released: nothing is
                  copied. The service lends a few dense clouds at once; False copies
+        why      in `description["reasons"]`, the rules that rejected regions, with remedies; the picture marks each region
+                 by its rule
         """
         params = _params(format="ply", transport="memfd" if shared else "inline", timeout_ms=_milliseconds(timeout_s),
                          density=density, normals=normals, texture=texture, ambient=ambient, picture=picture,
-                         camera=camera, frames="raw" if frames else None)
+                         camera=camera, frames="raw" if frames else None, why=why)
         answer = self._call("scan", params, timeout_s)
         cloud = read_ply(_need(answer, "the cloud"), answer.result)
         for event, data in answer.events:
