@@ -115,7 +115,7 @@ int main(int count, char** arguments) {
     }
   }
   if (number >= 0) first = number, frames = slsd::adversary::kKinds;
-  const auto wrong = each_rule ? slsd::adversary::sweep_rules(frames, first, kind)
+  const auto wrong = each_rule ? slsd::adversary::sweep_rules(frames, first, kind, trial.off)
                                : slsd::adversary::report(frames, first, kind, number >= 0, picture, trial);
   if (!wrong) std::fprintf(stderr, "adversary-report: %s\n", slsd::to_string(wrong.error()).c_str());
   return wrong && *wrong == 0 ? 0 : 1;

@@ -21,6 +21,8 @@ struct Effect {
 
 class Sweep {
  public:
+  explicit Sweep(const RuleSet& off) : off_(off) {}
+
   [[nodiscard]] Result<> prepare() {
     for (const int symbol_size_px : {16, 8}) {
       auto reader = Misled::of(symbol_size_px, &trial_);
@@ -34,15 +36,15 @@ class Sweep {
     Misled& reader = readers_[static_cast<std::size_t>(number) % 2];
     const Frame frame = reader.maker.make(kind, static_cast<std::uint32_t>(number));
     Decoder& decoder = reader.decoders[static_cast<std::size_t>(number) / 2 % 3];
-    trial_.off = {}, trial_.forget();
+    trial_.off = off_, trial_.forget();
     const auto with = judge(reader, decoder, frame);
     if (!with) return tl::unexpected(with.error());
     wrong_ += with->wrong, right_ += with->right, ++frames_;
     RuleSet met;
     for (std::size_t i = 0; i < kDecodeRuleCount; ++i) met[i] = trial_.met[i];
     for (std::size_t i = 0; i < kDecodeRuleCount; ++i) {
-      if (!met[i] || !text_of(decode_rule(i)).has_switch) continue;
-      trial_.off = RuleSet().set(i);
+      if (!met[i] || off_[i] || !text_of(decode_rule(i)).has_switch) continue;
+      trial_.off = RuleSet(off_).set(i);
       const auto without = judge(reader, decoder, frame);
       if (!without) return tl::unexpected(without.error());
       Effect& effect = effects_[i];
@@ -53,12 +55,12 @@ class Sweep {
   }
 
   void print() const {
-    std::printf("%d frames, all rules: %d wrong points, %d right\n\n", frames_, wrong_, right_);
+    std::printf("%d frames, all these rules: %d wrong points, %d right\n\n", frames_, wrong_, right_);
     std::puts(
         "| without | met in frames | wrong points more | frames with more | right points more "
         "|\n|---|---|---|---|---|");
     for (std::size_t i = 0; i < kDecodeRuleCount; ++i) {
-      if (!text_of(decode_rule(i)).has_switch) continue;
+      if (off_[i] || !text_of(decode_rule(i)).has_switch) continue;
       const Effect& effect = effects_[i];
       std::printf("| %s | %d | %d | %d | %d |\n", std::string(to_string(decode_rule(i))).c_str(), effect.frames_met,
                   effect.wrong, effect.frames_worse, effect.right);
@@ -74,6 +76,7 @@ class Sweep {
     return reader.maker.judge(frame, (*decoding)->points, kTolerancePx);
   }
 
+  RuleSet off_;
   RuleTrial trial_;
   std::vector<Misled> readers_;
   std::array<Effect, kDecodeRuleCount> effects_{};
@@ -89,8 +92,8 @@ Result<DecodeRule> rule_named(std::string_view name) {
                                         "\" that it can do without; docs/reasons.md lists them");
 }
 
-Result<int> sweep_rules(int frames, int first, int only_kind) {
-  Sweep sweep;
+Result<int> sweep_rules(int frames, int first, int only_kind, const RuleSet& off) {
+  Sweep sweep(off);
   if (auto prepared = sweep.prepare(); !prepared) return tl::unexpected(prepared.error());
   for (int number = first; number < first + (frames + kKinds - 1) / kKinds; ++number) {
     for (int kind = 0; kind < kKinds; ++kind) {
