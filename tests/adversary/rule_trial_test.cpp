@@ -46,7 +46,7 @@ TEST_F(Trial, EveryRegionHasTheStatusThatItsRuleGives) {
 }
 
 TEST_F(Trial, LeavesARuleOutAndTakesItBack) {
-  constexpr auto kIndex = static_cast<std::size_t>(DecodeRule::kGrown);
+  constexpr auto kIndex = static_cast<std::size_t>(DecodeRule::kTouchesBorder);
   const RuleCounts before = decode(Kind::kShelves).rules;
   EXPECT_GT(before[kIndex], 0U);
   trial_.off.set(kIndex);
