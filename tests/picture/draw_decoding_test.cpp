@@ -148,7 +148,8 @@ TEST(DrawDecoding, ShowsReasonsInTheColoursOfTheirRules) {
   EXPECT_TRUE(has(picture, 3 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kNotch)));
   EXPECT_FALSE(has(picture, kPitchPx, kPitchPx, letter_colour(0))) << "letters would hide what is asked for";
   EXPECT_FALSE(has(picture, 3 * kPitchPx / 2, kPitchPx, kLinkColour));
-  const ColourImage few = draw_decoding(scene.frame.view(), {}, scene.pattern, DecodingLook::kReasons);
+  scene.decoding.rules = {};
+  const ColourImage few = draw_decoding(scene.frame.view(), scene.decoding, scene.pattern, DecodingLook::kReasons);
   EXPECT_GT(picture.height(), few.height()) << "the legend has a place for each rule";
 }
 
