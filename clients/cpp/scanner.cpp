@@ -186,6 +186,7 @@ Cloud Scanner::scan(const ScanOptions& options) {
   if (options.texture) params["texture"] = true;
   if (options.ambient) params["ambient"] = true;
   if (options.picture) params["picture"] = true;
+  if (options.why) params["why"] = true;
   if (options.frames) params["frames"] = "raw";
   Answer answer = state_->call("scan", text_of(params), options.timeout);
   Cloud cloud = Cloud::read_ply(needed(std::move(answer.bytes), "the cloud"), text_of(answer.result));

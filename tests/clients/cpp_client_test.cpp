@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <mutex>
 #include <thread>
 
 #include <slsd/scanner.hpp>
@@ -48,7 +49,11 @@ class Impostor {
       std::vector<int> peers;
       for (int peer; (peer = ::accept(listener_, nullptr, nullptr)) >= 0;) {
         char line[4096];
-        (void)!::read(peer, line, sizeof line);
+        const ssize_t got = ::read(peer, line, sizeof line);
+        {
+          const std::lock_guard lock(mutex_);
+          asked_.assign(line, got < 0 ? 0 : static_cast<std::size_t>(got));
+        }
         send(peer, answer, descriptor);
         if (hangs_up) {
           ::close(peer);
@@ -66,6 +71,11 @@ class Impostor {
     std::filesystem::remove_all(folder_);
   }
   [[nodiscard]] std::string path() const { return folder_ + "/slsd.sock"; }
+  /// What the last peer sent.
+  [[nodiscard]] std::string asked() const {
+    const std::lock_guard lock(mutex_);
+    return asked_;
+  }
 
  private:
   static void send(int peer, const std::string& bytes, int descriptor) {
@@ -86,7 +96,8 @@ class Impostor {
     (void)!::sendmsg(peer, &header, MSG_NOSIGNAL);
   }
 
-  std::string folder_;
+  std::string folder_, asked_;
+  mutable std::mutex mutex_;
   int listener_;
   std::thread thread_;
 };
@@ -185,6 +196,17 @@ TEST(Scan, RefusesWhatIsNotSlsd) {
   }
   EXPECT_THAT(refused<ProtocolError>(result("")), HasSubstr("did not come"));
   EXPECT_THAT(refused<ConnectionLost>(result("\"bytes\":4294967296", "ply")), HasSubstr("hung up"));
+}
+
+TEST(Scan, AsksForReasonsAlone) {
+  const std::string file = ply(3);
+  const Impostor impostor(result("\"reasons\":[],\"bytes\":" + std::to_string(file.size()), file));
+  Scanner scanner(impostor.path());
+  ScanOptions options;
+  options.why = true;
+  EXPECT_THAT(scanner.scan(options).description, HasSubstr("reasons"));
+  EXPECT_THAT(impostor.asked(), HasSubstr("\"why\":true"));
+  EXPECT_THAT(impostor.asked(), Not(HasSubstr("picture")));
 }
 
 TEST(Scan, MapsASealedMemfdAndRefusesAnyOther) {

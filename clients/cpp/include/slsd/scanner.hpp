@@ -23,6 +23,8 @@ struct ScanOptions {
   bool ambient = false;                     ///< less the light of the room, by a third
   bool picture = false;                     ///< the frame with what was decoded drawn in
   bool frames = false;                      ///< the frames themselves
+  bool why = false;                         ///< which rules rejected regions, in `reasons` of the
+                                            ///< description; the picture marks each region by its rule
 };
 
 struct StreamOptions {
