@@ -18,15 +18,6 @@ namespace {
 constexpr int kWidth = 800, kHeight = 600;
 constexpr double kNearestMm = 1300, kFarthestMm = 2450;
 constexpr int kReach = 2;  // of the neighbourhood that has to be the pattern's for a light to be undecidable
-constexpr float kNoiseTable = 1 << 18;
-
-/// Numbers that are the same on every machine, which std's distributions are not.
-double uniform(std::mt19937& random, double low, double high) {
-  return low + (high - low) * static_cast<double>(random()) * 0x1p-32;
-}
-int whole(std::mt19937& random, int low, int high) {
-  return low + static_cast<int>(random() % static_cast<std::uint32_t>(high - low + 1));
-}
 
 Calibration cropped_rig() {
   Calibration rig = paper_rig();
@@ -61,15 +52,9 @@ std::string_view to_string(Kind kind) {
 }
 
 FrameMaker::FrameMaker(const Pattern& pattern, CodeArray foreign)
-    : pattern_(pattern), foreign_(std::move(foreign)), rig_(cropped_rig()) {
+    : pattern_(pattern), foreign_(std::move(foreign)), rig_(cropped_rig()), noise_(noise_table()) {
   for (const int number : pattern.options.symbols)
     glyphs_.push_back(draw_symbol(number, pattern.options.symbol_size_px));
-  std::mt19937 random(7);
-  for (int i = 0; i < static_cast<int>(kNoiseTable); ++i) {
-    double sum = 0;
-    for (int j = 0; j < 6; ++j) sum += uniform(random, -1, 1);
-    noise_.push_back(static_cast<float>(sum / std::sqrt(2.)));
-  }
 }
 
 Shown FrameMaker::true_letters() const {
@@ -202,7 +187,6 @@ Grey8 FrameMaker::draw(const Shown& shown, bool mirrored) const {
   return image;
 }
 
-/// For points with normal . X = distance in the camera's frame.
 Eigen::Matrix3f FrameMaker::seen_on_plane(const Eigen::Vector3d& normal, double distance_mm) const {
   const RigidTransform& motion = rig_.cameras[0].projector_from_camera;
   const Eigen::Matrix3d homography = matrix_of(rig_.projector) *
@@ -358,10 +342,10 @@ void FrameMaker::expose(Random& random, Frame& frame) {
   const float sigma = static_cast<float>(uniform(random, 0.5, 6));
   frame.image = Grey8(kWidth, kHeight);
   for (int y = 0; y < kHeight; ++y) {
-    const auto mask = static_cast<std::uint32_t>(kNoiseTable) - 1;
+    constexpr std::uint32_t kMask = kNoiseTable - 1;
     auto at = static_cast<std::uint32_t>(random());
     for (int x = 0; x < kWidth; ++x, ++at) {
-      const float grey = dark + contrast * light(y, x) + sigma * noise_[at & mask];
+      const float grey = dark + contrast * light(y, x) + sigma * noise_[at & kMask];
       frame.image.at(x, y) = static_cast<std::uint8_t>(std::clamp(grey + 0.5F, 0.F, 255.F));
     }
   }

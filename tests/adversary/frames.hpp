@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <random>
 #include <string_view>
 #include <vector>
 
@@ -14,6 +13,7 @@
 #include "core/code/pattern.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/image.hpp"
+#include "tests/adversary/random_numbers.hpp"
 
 namespace slsd::adversary {
 
@@ -93,19 +93,20 @@ class FrameMaker {
   /// @param tolerance_px  how far off its epipolar line a symbol may be that no decoder can tell from a right one
   [[nodiscard]] Verdict judge(const Frame& frame, const std::vector<CloudPoint>& points, double tolerance_px) const;
 
+  /// Projector px from camera px, homogeneous, of the plane normal . X = distance in the camera's frame.
+  [[nodiscard]] Eigen::Matrix3f seen_on_plane(const Eigen::Vector3d& normal, double distance_mm) const;
+
   /// Whose camera has 800x600 pixels.
   [[nodiscard]] const Calibration& calibration() const { return rig_; }
   [[nodiscard]] const Pattern& pattern() const { return pattern_; }
 
  private:
-  using Random = std::mt19937;
   [[nodiscard]] Shown true_letters() const;
   [[nodiscard]] Shown letters_of(Kind kind, Random& random) const;
   void lay_surfaces(Kind kind, Random& random, Frame& frame) const;
   void add_second_projector(Kind kind, Random& random, Frame& frame) const;
   [[nodiscard]] Grey8 draw(const Shown& shown, bool mirrored) const;
   void expose(Random& random, Frame& frame);
-  [[nodiscard]] Eigen::Matrix3f seen_on_plane(const Eigen::Vector3d& normal, double distance_mm) const;
   [[nodiscard]] bool is_side_alike(const Light& light, int surface, int row, int column, const CloudPoint& point) const;
   [[nodiscard]] bool undecidable(const Frame& frame, const Light& light, int surface, int row, int column,
                                  const CloudPoint& point, double tolerance_px) const;

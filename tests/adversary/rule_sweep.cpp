@@ -4,11 +4,13 @@
 
 #include <array>
 #include <cstdio>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "tests/adversary/misled.hpp"
+#include "tests/adversary/scene_frames.hpp"
 
 namespace slsd::adversary {
 namespace {
@@ -27,6 +29,7 @@ class Sweep {
     for (const int symbol_size_px : {16, 8}) {
       auto reader = Misled::of(symbol_size_px, &trial_);
       if (!reader) return tl::unexpected(reader.error());
+      scene_makers_.emplace_back(reader->maker.pattern(), reader->maker.calibration());
       readers_.push_back(std::move(*reader));
     }
     return {};
@@ -35,23 +38,20 @@ class Sweep {
   [[nodiscard]] Result<> look_at(Kind kind, int number) {
     Misled& reader = readers_[static_cast<std::size_t>(number) % 2];
     const Frame frame = reader.maker.make(kind, static_cast<std::uint32_t>(number));
-    Decoder& decoder = reader.decoders[static_cast<std::size_t>(number) / 2 % 3];
-    trial_.off = off_, trial_.forget();
-    const auto with = judge(reader, decoder, frame);
-    if (!with) return tl::unexpected(with.error());
-    wrong_ += with->wrong, right_ += with->right, ++frames_;
-    RuleSet met;
-    for (std::size_t i = 0; i < kDecodeRuleCount; ++i) met[i] = trial_.met[i];
-    for (std::size_t i = 0; i < kDecodeRuleCount; ++i) {
-      if (!met[i] || off_[i] || !text_of(decode_rule(i)).has_switch) continue;
-      trial_.off = RuleSet(off_).set(i);
-      const auto without = judge(reader, decoder, frame);
-      if (!without) return tl::unexpected(without.error());
-      Effect& effect = effects_[i];
-      ++effect.frames_met, effect.frames_worse += without->wrong > with->wrong;
-      effect.wrong += without->wrong - with->wrong, effect.right += without->right - with->right;
-    }
-    return {};
+    return compare(reader.decoders[static_cast<std::size_t>(number) / 2 % 3], frame.image, [&](const auto& points) {
+      const Verdict verdict = reader.maker.judge(frame, points, kTolerancePx);
+      return Counted{verdict.wrong, verdict.right};
+    });
+  }
+
+  [[nodiscard]] Result<> look_at_scene(int index, int number) {
+    Misled& reader = readers_[static_cast<std::size_t>(number) % 2];
+    const SceneFrameMaker& maker = scene_makers_[static_cast<std::size_t>(number) % 2];
+    const SceneFrame frame = maker.make(index, static_cast<std::uint32_t>(number));
+    return compare(reader.decoders[static_cast<std::size_t>(number) / 2 % 3], frame.image, [&](const auto& points) {
+      const SceneVerdict verdict = maker.judge(frame.truth, points);
+      return Counted{verdict.wrong, verdict.right};
+    });
   }
 
   void print() const {
@@ -70,15 +70,39 @@ class Sweep {
   [[nodiscard]] int wrong() const { return wrong_; }
 
  private:
-  [[nodiscard]] static Result<Verdict> judge(const Misled& reader, Decoder& decoder, const Frame& frame) {
-    const auto decoding = decoder.decode(frame.image.view(), 255);
-    if (!decoding) return tl::unexpected(decoding.error());
-    return reader.maker.judge(frame, (*decoding)->points, kTolerancePx);
+  struct Counted {
+    int wrong = 0, right = 0;
+  };
+  using Judge = std::function<Counted(const std::vector<CloudPoint>&)>;
+
+  [[nodiscard]] Result<> compare(Decoder& decoder, const Grey8& image, const Judge& judge) {
+    const auto decode = [&]() -> Result<Counted> {
+      const auto decoding = decoder.decode(image.view(), 255);
+      if (!decoding) return tl::unexpected(decoding.error());
+      return judge((*decoding)->points);
+    };
+    trial_.off = off_, trial_.forget();
+    const auto with = decode();
+    if (!with) return tl::unexpected(with.error());
+    wrong_ += with->wrong, right_ += with->right, ++frames_;
+    RuleSet met;
+    for (std::size_t i = 0; i < kDecodeRuleCount; ++i) met[i] = trial_.met[i];
+    for (std::size_t i = 0; i < kDecodeRuleCount; ++i) {
+      if (!met[i] || off_[i] || !text_of(decode_rule(i)).has_switch) continue;
+      trial_.off = RuleSet(off_).set(i);
+      const auto without = decode();
+      if (!without) return tl::unexpected(without.error());
+      Effect& effect = effects_[i];
+      ++effect.frames_met, effect.frames_worse += without->wrong > with->wrong;
+      effect.wrong += without->wrong - with->wrong, effect.right += without->right - with->right;
+    }
+    return {};
   }
 
   RuleSet off_;
   RuleTrial trial_;
   std::vector<Misled> readers_;
+  std::vector<SceneFrameMaker> scene_makers_;
   std::array<Effect, kDecodeRuleCount> effects_{};
   int frames_ = 0, wrong_ = 0, right_ = 0;
 };
@@ -92,14 +116,14 @@ Result<DecodeRule> rule_named(std::string_view name) {
                                         "\" that it can do without; docs/reasons.md lists them");
 }
 
-Result<int> sweep_rules(int frames, int first, int only_kind, const RuleSet& off) {
+Result<int> sweep_rules(const ReportOptions& options, const RuleSet& off) {
   Sweep sweep(off);
   if (auto prepared = sweep.prepare(); !prepared) return tl::unexpected(prepared.error());
-  for (int number = first; number < first + (frames + kKinds - 1) / kKinds; ++number) {
-    for (int kind = 0; kind < kKinds; ++kind) {
-      if (only_kind >= 0 && kind != only_kind) continue;
-      if (auto looked = sweep.look_at(static_cast<Kind>(kind), number); !looked) return tl::unexpected(looked.error());
-    }
+  for (int number = options.first; number < options.first + options.frames_of_a_kind; ++number) {
+    for (const Kind kind : drawn_grid_kinds(options))
+      if (auto looked = sweep.look_at(kind, number); !looked) return tl::unexpected(looked.error());
+    for (const int index : drawn_scene_kinds(options))
+      if (auto looked = sweep.look_at_scene(index, number); !looked) return tl::unexpected(looked.error());
   }
   sweep.print();
   return sweep.wrong();

@@ -6,6 +6,7 @@
 
 #include "core/decode/rules.hpp"
 #include "core/result.hpp"
+#include "tests/adversary/report_table.hpp"
 
 namespace slsd::adversary {
 
@@ -14,10 +15,9 @@ namespace slsd::adversary {
 
 /// Decodes frames once with all rules, then once more without each rule that was met there, and prints for each rule
 /// what it saves and what it costs.
-/// @param only_kind  below 0: all kinds
-/// @param off        left out throughout: two rules that save the same save nothing one by one
-/// @return           wrong points with all others
+/// @param off  left out throughout: two rules that save the same save nothing one by one
+/// @return     wrong points with all others
 /// @errors as Misled::of() and Decoder::decode()
-[[nodiscard]] Result<int> sweep_rules(int frames, int first, int only_kind, const RuleSet& off);
+[[nodiscard]] Result<int> sweep_rules(const ReportOptions& options, const RuleSet& off);
 
 }  // namespace slsd::adversary
