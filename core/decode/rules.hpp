@@ -69,7 +69,6 @@ enum class DecodeRule : std::uint8_t {
   kLineWeak,
   kLineOffGrid,
   kLineRepeats,
-  kLineOffEpipolar,
   kHeldByFew,
   kPieceContradicted,
   kPieceDoubtful,
@@ -84,7 +83,6 @@ enum class DecodeRule : std::uint8_t {
   kNotAligned,
   // What was refused around it.
   kRefusedAround,
-  kCornerMisread,
   kCornerAtBorder,
   kAlone,
   kLastOfLine,
@@ -113,7 +111,6 @@ enum class DecodeRule : std::uint8_t {
   kGroupDisputed,
   kGroupMisplaced,
   kGroupUnlike,
-  kGroupLineAlone,
   kGroupTornLine,
   kGroupTooFew,
 };
