@@ -27,6 +27,16 @@ Matrix3d turned(double roll_deg, double tilt_deg, double slant_deg) {
       .toRotationMatrix();
 }
 
+/// Draws one number after the other: compilers evaluate arguments in an order of their own.
+Matrix3d tilted(Random& random, double most_deg) {
+  const double tilt = uniform(random, -most_deg, most_deg), slant = uniform(random, -most_deg, most_deg);
+  return turned(0, tilt, slant);
+}
+Matrix3d turned_and_tilted(Random& random, double most_deg) {
+  const Matrix3d roll = turned(uniform(random, 0, 180), 0, 0);
+  return roll * tilted(random, most_deg);
+}
+
 double any_albedo(Random& random) {
   return log_uniform(random, 0.35, 1);
 }
@@ -42,7 +52,7 @@ Vector3d somewhere(Random& random, double depth_mm) {
 DepthScene with_wall(Random& random, double depth_mm) {
   DepthScene scene;
   scene.begin_part(any_albedo(random));
-  scene.add(Plate{{0, 0, depth_mm}, turned(0, uniform(random, -12, 12), uniform(random, -12, 12)), {kLongMm, kLongMm}});
+  scene.add(Plate{{0, 0, depth_mm}, tilted(random, 12), {kLongMm, kLongMm}});
   return scene;
 }
 
@@ -55,7 +65,7 @@ DepthScene lay_slats(Random& random, double symbol_mm) {
   const bool uneven = whole(random, 0, 1) == 1;
   for (double at = -kReachMm + uniform(random, 0, pitch); at < kReachMm; at += pitch) {
     scene.begin_part(any_albedo(random));
-    const Matrix3d own = uneven ? Matrix3d(slat * turned(uniform(random, -2, 2), uniform(random, -6, 6), 0)) : slat;
+    const Matrix3d own = uneven ? Matrix3d(slat * tilted(random, 5)) : slat;
     scene.add(Plate{Vector3d(0, 0, depth) + at * blind.col(1), own, {kLongMm, width / 2}});
   }
   return scene;
@@ -78,8 +88,8 @@ DepthScene lay_pickets(Random& random, double symbol_mm) {
   const double roll = either_sign(random, uniform(random, 20, 70)), depth = uniform(random, kNearMm, 2050);
   const bool uneven = whole(random, 0, 1) == 1, crossed = whole(random, 0, 2) == 0;
   add_fence(random, symbol_mm, roll, depth, uneven, scene);
-  if (crossed)
-    add_fence(random, symbol_mm, roll + uniform(random, 50, 90), depth + uniform(random, 5, 40), false, scene);
+  const double crossing = uniform(random, 50, 90), behind = uniform(random, 5, 40);
+  if (crossed) add_fence(random, symbol_mm, roll + crossing, depth + behind, false, scene);
   return scene;
 }
 
@@ -91,7 +101,7 @@ DepthScene lay_leaves(Random& random, double symbol_mm) {
     const double half = largest * uniform(random, 0.4, 1);
     scene.begin_part(any_albedo(random));
     scene.add(Plate{somewhere(random, uniform(random, kNearMm, wall - 30)),
-                    turned(uniform(random, 0, 180), uniform(random, -50, 50), uniform(random, -50, 50)),
+                    turned_and_tilted(random, 50),
                     {half, half * uniform(random, 0.3, 0.8)},
                     Outline::kEllipse});
   }
@@ -132,7 +142,7 @@ DepthScene lay_cables(Random& random, double symbol_mm) {
 /// Boards of one thickness on a wall: side by side as a terrace, or across each other.
 DepthScene lay_small_steps(Random& random, double symbol_mm) {
   const Vector3d middle(0, 0, uniform(random, 1750, 2250));
-  const Matrix3d wall = turned(0, uniform(random, -20, 20), uniform(random, -20, 20));
+  const Matrix3d wall = tilted(random, 20);
   const double step = uniform(random, 15, 30), roll = uniform(random, 0, 180);
   const bool terrace = whole(random, 0, 1) == 1;
   DepthScene scene;
@@ -151,9 +161,10 @@ DepthScene lay_small_steps(Random& random, double symbol_mm) {
   }
   for (int boards = whole(random, 8, 30); boards > 0; --boards) {
     const double high = step * whole(random, 1, 3);
-    const Vector3d at(uniform(random, -250, 250), uniform(random, -190, 190), -high / 2);
-    const Vector3d half(symbol_mm * uniform(random, 1, 8), symbol_mm * uniform(random, 0.5, 4), high / 2);
-    scene.add_box(middle + wall * at, wall * turned(uniform(random, 0, 180), 0, 0), half, any_albedo(random));
+    const Vector3d at{uniform(random, -250, 250), uniform(random, -190, 190), -high / 2};
+    const Vector3d half{symbol_mm * uniform(random, 1, 8), symbol_mm * uniform(random, 0.5, 4), high / 2};
+    const Matrix3d axes = wall * turned(uniform(random, 0, 180), 0, 0);
+    scene.add_box(middle + wall * at, axes, half, any_albedo(random));
   }
   return scene;
 }
@@ -164,7 +175,7 @@ DepthScene lay_perforated_plate(Random& random, double symbol_mm) {
   const double radius = symbol_mm * log_uniform(random, 0.5, 4);
   scene.begin_part(any_albedo(random));
   scene.add(Plate{somewhere(random, depth),
-                  turned(uniform(random, 0, 180), uniform(random, -12, 12), uniform(random, -12, 12)),
+                  turned_and_tilted(random, 12),
                   {kLongMm, kLongMm},
                   Outline::kHoles,
                   radius,
@@ -188,9 +199,10 @@ DepthScene lay_pile(Random& random, double symbol_mm) {
   const double wall = uniform(random, 2100, kFarMm - 50), high = uniform(random, 100, 450);
   DepthScene scene = with_wall(random, wall);
   for (int boxes = whole(random, 10, 40); boxes > 0; --boxes) {
-    const Vector3d half(symbol_mm * uniform(random, 1, 6), symbol_mm * uniform(random, 1, 4), uniform(random, 5, 40));
-    const Matrix3d axes = turned(uniform(random, 0, 180), uniform(random, -25, 25), uniform(random, -25, 25));
-    scene.add_box(somewhere(random, wall - uniform(random, 0, high)), axes, half, any_albedo(random));
+    const Vector3d half{symbol_mm * uniform(random, 1, 6), symbol_mm * uniform(random, 1, 4), uniform(random, 5, 40)};
+    const Matrix3d axes = turned_and_tilted(random, 25);
+    const Vector3d at = somewhere(random, wall - uniform(random, 0, high));
+    scene.add_box(at, axes, half, any_albedo(random));
   }
   return scene;
 }
@@ -203,7 +215,8 @@ DepthScene lay_stairs(Random& random, double symbol_mm) {
                tread = from_below ? riser * uniform(random, 0.3, 0.7) : symbol_mm * uniform(random, 1.5, 7);
   const double tilt = from_below ? uniform(random, -15, -2)  // the risers face the camera at 0, the treads at 90
                                  : std::atan2(tread, riser) * kDegrees + uniform(random, -35, 35);
-  const Matrix3d axes = turned(either_sign(random, uniform(random, 5, 60)), tilt, uniform(random, -15, 15));
+  const double roll = either_sign(random, uniform(random, 5, 60)), slant = uniform(random, -15, 15);
+  const Matrix3d axes = turned(roll, tilt, slant);
   const Vector3d middle(0, 0, uniform(random, 1900, 2050));
   DepthScene scene;
   const int steps = static_cast<int>(1.5 * kReachMm / std::hypot(tread, riser)) + 2;
