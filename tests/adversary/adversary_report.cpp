@@ -62,8 +62,8 @@ Result<int> report(const ReportOptions& options, RuleTrial& trial) {
 }  // namespace
 }  // namespace slsd::adversary
 
-// adversary-report [FRAMES] [--kept-out] [--first N] [--kind K] [--without RULE]... [--each-rule] [--frame N [--picture
-// FILE.pgm]]
+// adversary-report [FRAMES] [--kept-out] [--clean] [--first N] [--kind K] [--without RULE]... [--each-rule] [--frame N
+// [--picture FILE.pgm]]
 int main(int count, char** arguments) {
   slsd::adversary::ReportOptions options;
   int frames = 1000, number = -1;
@@ -81,6 +81,8 @@ int main(int count, char** arguments) {
       options.picture = arguments[++i];
     } else if (std::strcmp(arguments[i], "--kept-out") == 0) {
       options.kept_out = true;
+    } else if (std::strcmp(arguments[i], "--clean") == 0) {
+      options.clean = true;
     } else if (std::strcmp(arguments[i], "--without") == 0 && more) {
       const auto rule = slsd::adversary::rule_named(arguments[++i]);
       if (!rule) {

@@ -44,10 +44,10 @@ class Sweep {
     });
   }
 
-  [[nodiscard]] Result<> look_at_scene(int index, int number) {
+  [[nodiscard]] Result<> look_at_scene(int index, int number, bool clean) {
     Misled& reader = readers_[static_cast<std::size_t>(number) % 2];
     const SceneFrameMaker& maker = scene_makers_[static_cast<std::size_t>(number) % 2];
-    const SceneFrame frame = maker.make(index, static_cast<std::uint32_t>(number));
+    const SceneFrame frame = maker.make(index, static_cast<std::uint32_t>(number), clean);
     return compare(reader.decoders[static_cast<std::size_t>(number) / 2 % 3], frame.image, [&](const auto& points) {
       const SceneVerdict verdict = maker.judge(frame.truth, points);
       return Counted{verdict.wrong, verdict.right};
@@ -123,7 +123,8 @@ Result<int> sweep_rules(const ReportOptions& options, const RuleSet& off) {
     for (const Kind kind : drawn_grid_kinds(options))
       if (auto looked = sweep.look_at(kind, number); !looked) return tl::unexpected(looked.error());
     for (const int index : drawn_scene_kinds(options))
-      if (auto looked = sweep.look_at_scene(index, number); !looked) return tl::unexpected(looked.error());
+      if (auto looked = sweep.look_at_scene(index, number, options.clean); !looked)
+        return tl::unexpected(looked.error());
   }
   sweep.print();
   return sweep.wrong();

@@ -57,14 +57,14 @@ SceneFrame SceneFrameMaker::take(const DepthScene& scene, const SceneLight& ligh
   return frame;
 }
 
-SceneFrame SceneFrameMaker::make(int kind, std::uint32_t number) const {
+SceneFrame SceneFrameMaker::make(int kind, std::uint32_t number, bool clean) const {
   constexpr double kReferenceMm = 2000;
   std::seed_seq seed{kSceneSeeds + static_cast<std::uint32_t>(kind), number,
                      static_cast<std::uint32_t>(pattern_.options.symbol_size_px)};
   Random random(seed);
   const DepthScene scene =
       scene_kinds()[static_cast<std::size_t>(kind)].lay(random, pattern_.pitch_px() / rig_.projector.fx * kReferenceMm);
-  const SceneLight light = SceneLight::draw(random);
+  const SceneLight light = clean ? SceneLight::clean() : SceneLight::draw(random);
   return take(scene, light, random);
 }
 

@@ -36,8 +36,9 @@ class SceneFrameMaker {
   SceneFrameMaker(const Pattern& pattern, Calibration rig);
 
   /// The same kind and number give the same frame.
-  /// @param kind  index in scene_kinds()
-  [[nodiscard]] SceneFrame make(int kind, std::uint32_t number) const;
+  /// @param kind   index in scene_kinds()
+  /// @param clean  takes the picture of the same scene by SceneLight::clean()
+  [[nodiscard]] SceneFrame make(int kind, std::uint32_t number, bool clean = false) const;
   [[nodiscard]] SceneFrame take(const DepthScene& scene, const SceneLight& light, Random& random) const;
 
   [[nodiscard]] SceneVerdict judge(const SceneTruth& truth, const std::vector<CloudPoint>& points) const;

@@ -167,6 +167,14 @@ TEST_F(SceneBench, TheRoomLightsWhatTheProjectorDoesNot) {
   EXPECT_GT(clipped(2), 50000);
 }
 
+TEST_F(SceneBench, CleanLightShowsTheSameScene) {
+  const SceneFrame any = maker.make(4, 2), clean = maker.make(4, 2, true);
+  EXPECT_EQ(any.truth.depth_mm, clean.truth.depth_mm);
+  EXPECT_FALSE(any.image == clean.image);
+  const SceneVerdict verdict = maker.judge(clean.truth, decode(clean.image));
+  EXPECT_GT(verdict.decoded, verdict.visible / 2);
+}
+
 TEST_F(SceneBench, AFrameOfOneNumberIsTheSameTwice) {
   for (int kind = 0; kind < static_cast<int>(scene_kinds().size()); ++kind) {
     const SceneFrame once = maker.make(kind, 3), again = maker.make(kind, 3);

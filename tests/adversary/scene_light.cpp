@@ -119,6 +119,10 @@ SceneLight SceneLight::draw(Random& random) {
   return light;
 }
 
+SceneLight SceneLight::clean() {
+  return {.blur_px = 0.5, .halo = true, .room = 0.05};
+}
+
 Grey8 expose(const SceneTruth& truth, const Grey8& shown, const SceneLight& light, const std::vector<float>& noise,
              Random& random) {
   const LightSums sum = sum_light(truth, shown, light);

@@ -30,6 +30,8 @@ struct SceneLight {
 
   /// Draws all of it: laboratory to lit room, dim to clipped, industrial camera or webcam.
   [[nodiscard]] static SceneLight draw(Random& random);
+  /// A dark laboratory, a sharp lens and a good exposure.
+  [[nodiscard]] static SceneLight clean();
 };
 
 /// Takes the picture.
