@@ -58,8 +58,10 @@ GreyView ShapeFinder::binarize(const GreyView& frame, double full, Executor& exe
   binarizer_.binarize(frame, full, noise, mask_, executor);
   noise_ = binarizer_.noise();
   if (binarizer_.edge_blur_px() >= kBlurMinPx) return binarize_blurred(frame, full, executor);
-  if (binarizer_.usual_contrast_sigma() < kFaintSigma) return binarize_faint(frame, full, executor);
-  return frame;
+  // A frame without any contrast is empty, unless the reader knows that the noise may drown all of the pattern.
+  const float contrast_sigma = binarizer_.usual_contrast_sigma();
+  const bool is_faint = contrast_sigma > 0 ? contrast_sigma < kFaintSigma : noise.has_value();
+  return is_faint ? binarize_faint(frame, full, executor) : frame;
 }
 
 GreyView ShapeFinder::binarize_blurred(const GreyView& frame, double full, Executor& executor) {

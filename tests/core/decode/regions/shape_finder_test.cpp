@@ -39,5 +39,16 @@ TEST(ShapeFinder, UndoesNoMoreBlurThanAFifthOfASymbol) {
   EXPECT_GT(off_levels(0.85F * 2.4F), 500);
 }
 
+// Empty frames are what most scans of a dark room see, and smoothing takes several times as long as all the rest.
+TEST(ShapeFinder, SmoothsAnEmptyFrameOnlyForAReaderWhoKnowsItsNoise) {
+  const Pattern pattern = *make_pattern({});
+  const Grey8 black(640, 480, 3);
+  ShapeFinder finder(pattern.options, {Eigen::Matrix3d::Identity(), black.width(), black.height()}, Method::kDefault,
+                     Method::kDefault);
+  const GreyView frame = black.view();
+  EXPECT_EQ(finder.binarize(frame, 255, alone).index(), frame.index());
+  EXPECT_NE(finder.binarize(frame, 255, alone, FrameNoise{1, 0}).index(), frame.index());
+}
+
 }  // namespace
 }  // namespace slsd
