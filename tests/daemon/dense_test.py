@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """A point for each camera pixel: what a request gets, in every format, and what is refused."""
-import math
 import pathlib
 import shutil
 import struct
 import tempfile
 import unittest
+
+import numpy as np
 
 from client import RpcError
 from record_test import lines_of, measured, two_cameras
@@ -30,30 +31,42 @@ socket = "slsd.sock"
 """
 
 
+def layout_of(names, types, sizes):
+    """The record of a cloud's file."""
+    kinds = {("F", 4): "<f4", ("U", 1): "u1", ("float", 4): "<f4", ("uchar", 1): "u1"}
+    return np.dtype([(name, kinds[kind, size]) for name, kind, size in zip(names, types, sizes, strict=True)])
+
+
 def ply(bytes_):
-    """The header's lines, and the records."""
+    """The properties' names, and the records."""
     header, body = bytes_.split(b"end_header\n", 1)
-    lines = header.decode().split("\n")
-    count = next(int(line.split()[2]) for line in lines if line.startswith("element vertex"))
-    size = sum({"float": 4, "uchar": 1}[line.split()[1]] for line in lines if line.startswith("property"))
-    assert len(body) == count * size, (len(body), count, size)
-    return [line.split()[2] for line in lines if line.startswith("property")], [
-        body[i:i + size] for i in range(0, len(body), size)]
+    lines = [line.split() for line in header.decode().split("\n")]
+    count = next(int(line[2]) for line in lines if line[:2] == ["element", "vertex"])
+    types, names = zip(*(line[1:] for line in lines if line[:1] == ["property"]))
+    records = np.frombuffer(body, layout_of(names, types, [4 if kind == "float" else 1 for kind in types]))
+    assert len(records) == count, (len(records), count)
+    return list(names), records
 
 
 def pcd(bytes_):
     header, body = bytes_.split(b"DATA binary\n", 1)
     fields = dict(line.split(" ", 1) for line in header.decode().split("\n") if line and not line.startswith("#"))
     width, height = int(fields["WIDTH"]), int(fields["HEIGHT"])
-    size = sum(int(bytes_of) for bytes_of in fields["SIZE"].split())
-    assert len(body) == width * height * size
-    return fields, width, height, [body[i:i + size] for i in range(0, len(body), size)]
+    layout = layout_of(fields["FIELDS"].split(), fields["TYPE"].split(), map(int, fields["SIZE"].split()))
+    records = np.frombuffer(body, layout)
+    assert len(records) == width * height
+    return fields, width, height, records
 
 
-def as_ply(record):
-    """A record of a PCD as a PLY has it, where intensity is a byte."""
-    intensity, = struct.unpack_from("<f", record, 16)
-    return record[:16] + bytes([int(intensity)]) + record[20:]
+def as_ply(records):
+    """The points of a PCD as a PLY has them: intensity is a byte, normals have shorter names, and no pixel is empty."""
+    measured = records[~np.isnan(records["z"])]
+    names = [name.replace("normal_", "n") for name in measured.dtype.names]
+    kinds = ["u1" if name == "intensity" else measured.dtype[i] for i, name in enumerate(names)]
+    points = np.empty(len(measured), np.dtype(list(zip(names, kinds))))
+    for name, of_pcd in zip(names, measured.dtype.names):
+        points[name] = measured[of_pcd]
+    return points
 
 
 def tiff_pages(bytes_):
@@ -66,7 +79,7 @@ def tiff_pages(bytes_):
             tag, kind, number, value = struct.unpack_from("<HHII", bytes_, at + 2 + 12 * i)
             tags[tag] = value & 0xFFFF if kind == 3 else value
         assert (tags[258], tags[259], tags[339]) == (32, 1, 3), tags
-        pixels = struct.unpack_from(f"<{tags[256] * tags[257]}f", bytes_, tags[273])
+        pixels = np.frombuffer(bytes_, "<f4", tags[256] * tags[257], tags[273])
         pages.append((tags[256], tags[257], pixels))
         at = struct.unpack_from("<I", bytes_, at + 2 + 12 * count)[0]
     return pages
@@ -74,15 +87,12 @@ def tiff_pages(bytes_):
 
 def assert_same_surface(test, cloud, single):
     """Where nothing moves, a stream measures from frame to frame: the same pixels, and to well within their sigma."""
-    one, other = (struct.iter_unpack("<5fB", bytes_.split(b"DATA binary\n", 1)[1]) for bytes_ in (cloud, single))
-    both = either = far = 0
-    for (_, _, z, _, _, _), (_, _, single_z, sigma_mm, _, _) in zip(one, other, strict=True):
-        there, single_there = z == z, single_z == single_z  # NaN where nothing is
-        either += there or single_there
-        both += there and single_there
-        far += abs(z - single_z) > 0.5 * sigma_mm
-    test.assertGreater(both, 0.98 * either)
-    test.assertLess(far, 0.01 * both)
+    one, other = pcd(cloud)[3], pcd(single)[3]
+    there, single_there = ~np.isnan(one["z"]), ~np.isnan(other["z"])
+    both = there & single_there
+    far = np.abs(one["z"] - other["z"])[both] > 0.5 * one["sigma_mm"][both]
+    test.assertGreater(both.sum(), 0.98 * (there | single_there).sum())
+    test.assertLess(far.sum(), 0.01 * both.sum())
 
 
 class Dense(unittest.TestCase):
@@ -109,30 +119,27 @@ class Dense(unittest.TestCase):
         self.assertEqual(sum(scan["pixels"].values()), width * height)
         self.assertGreater(scan["points"], 0.2 * width * height)
         self.assertEqual((fields["SIZE"], fields["TYPE"]), ("4 4 4 4 4 1", "F F F F F U"))  # PCL's intensity is a float
-        self.assertGreater(len({record[16:20] for record in records}), 10)
-        measured = [as_ply(record) for record in records if not math.isnan(struct.unpack_from("<f", record, 8)[0])]
-        self.assertEqual(measured, points)
-        self.assertEqual({record for record in records if math.isnan(struct.unpack_from("<f", record, 8)[0])},
-                         {4 * NO_POINT + b"\0\0\0\0\0"})
+        self.assertGreater(len(np.unique(records["intensity"])), 10)
+        self.assertEqual(as_ply(records).tobytes(), points.tobytes())
+        empty = records[np.isnan(records["z"])]
+        self.assertEqual(empty.tobytes(), len(empty) * (4 * NO_POINT + b"\0\0\0\0\0"))
         _, cloud = self.client.call("scan", density="pixels", timeout_ms=60_000, format="tiff")
         (width_z, height_z, depth), (_, _, sigma) = tiff_pages(cloud)
         self.assertEqual((width_z, height_z), (width, height))
-        for record, z, of_sigma in list(zip(records, depth, sigma))[::997]:
-            self.assertEqual(struct.pack("<f", z) if z == z else NO_POINT, record[8:12])
-            self.assertEqual(math.isnan(of_sigma), math.isnan(z))
+        np.testing.assert_array_equal(depth, records["z"])
+        np.testing.assert_array_equal(np.isnan(sigma), np.isnan(depth))
 
     def test_normals_face_the_camera(self):
         _, cloud = self.client.call("scan", density="pixels", timeout_ms=60_000, normals=True)
         names, points = ply(cloud)
         self.assertEqual(names[6:], ["nx", "ny", "nz"])
-        for point in points[::1009]:
-            x, y, z, nx, ny, nz = struct.unpack_from("<3f", point) + struct.unpack_from("<3f", point, 18)
-            self.assertAlmostEqual(nx * nx + ny * ny + nz * nz, 1, 4)
-            self.assertLess(nx * x + ny * y + nz * z, 0)
+        at, normals = (np.stack([points[name] for name in of], axis=1) for of in (("x", "y", "z"), ("nx", "ny", "nz")))
+        np.testing.assert_allclose((normals ** 2).sum(axis=1), 1, atol=1e-4)
+        self.assertTrue(((normals * at).sum(axis=1) < 0).all())
         _, cloud = self.client.call("scan", density="pixels", timeout_ms=60_000, normals=True, format="pcd")
         fields, _, _, records = pcd(cloud)
         self.assertEqual(fields["FIELDS"].split()[6:], ["normal_x", "normal_y", "normal_z"])
-        self.assertEqual([as_ply(record) for record in records if record[8:12] != NO_POINT], points)
+        self.assertEqual(as_ply(records).tobytes(), points.tobytes())
 
     def test_what_does_not_go_together_is_refused(self):
         for params in ({"format": "tiff"}, {"normals": True}, {"density": "symbols", "normals": True},
@@ -212,10 +219,12 @@ class Dense(unittest.TestCase):
             _, points = ply((out / "a.ply").read_bytes())
             names, drawn_points = ply((out / "b.ply").read_bytes())
             self.assertEqual(names[6:], ["nx", "ny", "nz"])
-            self.assertEqual([point[:18] for point in drawn_points], points)
-            self.assertEqual(drawn_points, ply(self.client.call("scan", normals=True, **PIXEL_SCAN)[1])[1])
+            for name in points.dtype.names:
+                np.testing.assert_array_equal(drawn_points[name], points[name])
+            again = ply(self.client.call("scan", normals=True, **PIXEL_SCAN)[1])[1]
+            self.assertEqual(drawn_points.tobytes(), again.tobytes())
             self.assertEqual(len(tiff_pages((out / "a.tiff").read_bytes())), 2)
-            self.assertEqual(pcd((out / "a.pcd").read_bytes())[3], pcd(self.organised)[3])
+            self.assertEqual(pcd((out / "a.pcd").read_bytes())[3].tobytes(), pcd(self.organised)[3].tobytes())
             self.assertTrue((out / "b.png").read_bytes().startswith(b"\x89PNG"))
 
 
@@ -251,8 +260,8 @@ class DenseElsewhere(unittest.TestCase):
             self.assertEqual((width, height), (1600, 2400))
             self.assertEqual(len(scan["epipolar_px"]), 2)
             self.assertEqual(sum(scan["pixels"].values()), width * height)
-            self.assertEqual({record[20] for record in records[:width * height // 2]}, {0})
-            self.assertEqual({record[20] for record in records[width * height // 2:]}, {1})
+            first, second = np.split(records["camera"], 2)
+            self.assertEqual((set(first), set(second)), ({0}, {1}))
             _, depth_maps = client.call("scan", format="tiff", **PIXEL_SCAN)
             self.assertEqual([page[:2] for page in tiff_pages(depth_maps)], 4 * [(1600, 1200)])
 
@@ -264,7 +273,7 @@ class DenseElsewhere(unittest.TestCase):
         with Service(camera_path=frames) as service, service.client() as client:
             scan, cloud = client.call("scan", texture=True, ambient=True, **PIXEL_SCAN)
             self.assertGreater(scan["points"], 100_000)
-            self.assertEqual({point[16] for point in ply(cloud)[1]}, {60})
+            self.assertEqual(set(ply(cloud)[1]["intensity"]), {60})
             self.assertEqual(scan["saturated"], 0)
             self.assertLess(scan["white_differs"], 0.1)
 
