@@ -48,7 +48,7 @@ class Writer {
     line("dt: d");
     std::string numbers = "data: [";
     for (Eigen::Index i = 0; i < matrix.size(); ++i) {
-      const std::string number = " " + number_text(matrix(i / matrix.cols(), i % matrix.cols()));
+      const std::string number = std::string(" ").append(number_text(matrix(i / matrix.cols(), i % matrix.cols())));
       if (indent_ + numbers.size() + number.size() >= kLineLength) {
         line(numbers);
         numbers = "   ";
