@@ -157,6 +157,10 @@ using RuleSet = std::bitset<kDecodeRuleCount>;
 struct RuleTrial {
   RuleSet off;
   std::array<std::atomic<bool>, kDecodeRuleCount> met{};
+  /// Whether CellInference decides in place of windows, islands and what is rejected around them, and the nats that a
+  /// symbol needs then.
+  bool infers = false;
+  float margin_min = 8;
 
   void forget() {
     for (auto& one : met) one = false;

@@ -45,6 +45,7 @@ SymbolReader::SymbolReader(const IndexedPattern& indexed, const Lens& projector,
       finder_(pattern().options, std::move(expected), options.binarize, options.find_regions, Rules(options.trial)),
       linker_({.pitch_px = static_cast<float>(pattern().pitch_px())}),
       window_decoder_(pattern(), indexed.codebook(), options.wrong_cells_max, Rules(options.trial)),
+      inference_(pattern(), indexed.codebook()),
       review_(pattern(), {.rules = Rules(options.trial)}),
       letters_(std::make_shared<const LetterFields>(pattern().options)),
       mender_(pattern(), letters_, Rules(options.trial)),
@@ -72,7 +73,7 @@ const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarVi
   classify(executor), done(Stage::kClassify);
   link_grid(executor), done(Stage::kLinkGrid);
   if (view != nullptr) view->look_at(seen_, executor);
-  decode_windows(view, executor), done(Stage::kDecodeWindows);
+  decode_windows(sharp, view, executor), done(Stage::kDecodeWindows);
   review(sharp, executor), done(Stage::kReview);
   correspond(sharp, view, executor);
   fit_lattice(frame, full, view, executor), done(Stage::kCorrespond);
@@ -147,9 +148,13 @@ void SymbolReader::classify_in_measured_frames(Executor& executor) {
   });
 }
 
-void SymbolReader::decode_windows(const EpipolarView* view, Executor& executor) {
+void SymbolReader::decode_windows(const GreyView& frame, const EpipolarView* view, Executor& executor) {
   if (options_.decode_windows == Method::kPaper)
     return paper_->decode_windows(pattern().whole_rows(), pattern().whole_columns(), seen_);
+  if (infers()) {
+    const OtherLight light(frame, *letters_, letters_->at(blur_px()), static_cast<float>(pattern().pitch_px()));
+    return inference_.infer(gate_of(view), options_.trial->margin_min, light, executor, seen_);
+  }
   window_decoder_.decode(seen_.nodes, seen_.shapes, gate_of(view), executor, seen_.claims);
 }
 
@@ -169,7 +174,7 @@ void SymbolReader::mend(const GreyView& frame, EpipolarView& view) {
   const LetterScene scene{
       frame, 255.0 * finder_.frame_levels(), finder_.noise(), letters_->at(blur_px()), gate, look_->as_measured, seen_};
   mended_ = mender_.mend(scene);
-  torn_lines_.refuse(scene);
+  if (!infers()) torn_lines_.refuse(scene);
   for (const std::int32_t sighting : mended_) view.look_again_at(sighting, seen_);
 }
 
@@ -187,10 +192,10 @@ void SymbolReader::correspond(const GreyView& frame, EpipolarView* view, Executo
   if (options_.decode_windows == Method::kDefault) {
     const Eigen::Vector2f frame_px(static_cast<float>(finder_.mask().width()),
                                    static_cast<float>(finder_.mask().height()));
-    correspondence_.refuse_lone(seen_.nodes, seen_.shapes, frame_px, executor, seen_.claims);
+    if (!infers()) correspondence_.refuse_lone(seen_.nodes, seen_.shapes, frame_px, executor, seen_.claims);
     if (view != nullptr) mend(frame, *view);
     review_.take_back_held(seen_);
-    if (!options_.any_paper()) border_reader_.refuse(frame, blur_px(), seen_);
+    if (!options_.any_paper() && !infers()) border_reader_.refuse(frame, blur_px(), seen_);
   }
   if (view == nullptr) {
     correspondence_.settle_duplicates(cells(), seen_.claims);

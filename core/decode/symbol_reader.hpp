@@ -20,6 +20,7 @@
 #include "core/decode/grid/lattice_frame.hpp"
 #include "core/decode/grid/link_grid.hpp"
 #include "core/decode/grid/sightings.hpp"
+#include "core/decode/inference/infer_cells.hpp"
 #include "core/decode/lattice.hpp"
 #include "core/decode/options.hpp"
 #include "core/decode/paper/paper_way.hpp"
@@ -60,6 +61,8 @@ class SymbolReader {
   /// The symbols of the last frame whose cells are certain and not on their epipolar lines, where they are seen.
   void list_off_line(std::vector<SymbolMatch>& matches) const;
   /// The symbol turned out to be no point.
+  /// Whether a trial asks for the inference in place of windows, islands and what is rejected around them.
+  [[nodiscard]] bool infers() const { return options_.trial != nullptr && options_.trial->infers; }
   void reject(const LatticeSymbol& symbol, DecodeRule by) { seen_.claims[symbol.sighting].decide(by); }
   /// What became of every region, with the counters.
   void report(Decoding& decoding) const;
@@ -83,7 +86,7 @@ class SymbolReader {
   void classify(Executor& executor);
   void link_grid(Executor& executor);
   void classify_in_measured_frames(Executor& executor);
-  void decode_windows(const EpipolarView* view, Executor& executor);
+  void decode_windows(const GreyView& frame, const EpipolarView* view, Executor& executor);
   void review(const GreyView& frame, Executor& executor);
   [[nodiscard]] CellGate gate_of(const EpipolarView* view) const;
   /// Of the pattern in this frame, standard deviation, projector px.
@@ -99,6 +102,7 @@ class SymbolReader {
   ShapeFinder finder_;
   GridLinker linker_;
   WindowDecoder window_decoder_;
+  CellInference inference_;
   SymbolReview review_;
   std::shared_ptr<const LetterFields> letters_;
   SymbolMender mender_;

@@ -62,8 +62,9 @@ Result<int> report(const ReportOptions& options, RuleTrial& trial) {
 }  // namespace
 }  // namespace slsd::adversary
 
-// adversary-report [FRAMES] [--kept-out] [--clean] [--first N] [--kind K] [--without RULE]... [--each-rule] [--frame N
-// [--picture FILE.pgm]]
+// adversary-report [FRAMES] [--kept-out] [--clean] [--first N] [--kind K] [--without RULE]... [--each-rule]
+// [--inference
+// [--margin NATS]] [--frame N [--picture FILE.pgm]]
 int main(int count, char** arguments) {
   slsd::adversary::ReportOptions options;
   int frames = 1000, number = -1;
@@ -90,6 +91,10 @@ int main(int count, char** arguments) {
         return 2;
       }
       trial.off.set(static_cast<std::size_t>(*rule));
+    } else if (std::strcmp(arguments[i], "--inference") == 0) {
+      trial.infers = true;
+    } else if (std::strcmp(arguments[i], "--margin") == 0 && more) {
+      trial.margin_min = static_cast<float>(std::atof(arguments[++i]));
     } else if (std::strcmp(arguments[i], "--each-rule") == 0) {
       each_rule = true;
     } else {

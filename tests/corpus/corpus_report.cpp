@@ -126,6 +126,10 @@ int main(int argc, char** argv) {
   auto* const folders_given =
       app.add_option("folders", folders, "each with the files of a scene; without any the corpus");
   app.add_flag("--texture", options.texture, "divide out their white/frame.png")->needs(folders_given);
+  slsd::RuleTrial trial;
+  app.add_flag("--inference", trial.infers, "cells by the inference in place of the rules")->needs(folders_given);
+  app.add_option("--margin", trial.margin_min, "nats that it asks for")->needs(folders_given);
+  options.decode.trial = &trial;
   app.add_option("--depth-max", options.decode.depth_max_mm, "mm, for scenes beyond the usual working depth")
       ->needs(folders_given);
   CLI11_PARSE(app, argc, argv);

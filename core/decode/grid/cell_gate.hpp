@@ -2,7 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -67,6 +69,39 @@ class CellGate {
         if (admits(node, r, c)) visit(r, c);
       }
     }
+  }
+  /// Calls visit(row, column) for the cells that a node can be, one to each column, or to each row, that its epipolar
+  /// line crosses.
+  /// @param astray_px  how much farther from its line than others the node may lie
+  template <class Visit>
+  void visit_along(std::int32_t node, double astray_px, Visit&& visit) const {
+    const EpipolarSegment& segment = segments_[static_cast<std::size_t>(node)];
+    if (segment.empty()) return;
+    const auto off_line = [&](int row, int column) { return segment.residual_px(cells_.ray(row, column).direction); };
+    const int last_row = cells_.rows() - 1, last_column = cells_.columns() - 1;
+    const double first = off_line(0, 0);
+    const double per_row = (off_line(last_row, 0) - first) / std::max(1, last_row);
+    const double per_column = (off_line(0, last_column) - first) / std::max(1, last_column);
+    const bool is_steep = std::abs(per_column) > std::abs(per_row);
+    const int last_along = is_steep ? last_row : last_column, last_across = is_steep ? last_column : last_row;
+    const double slope = is_steep ? per_column : per_row;
+    const auto off_line_at = [&](int along, int across) {
+      return is_steep ? off_line(along, across) : off_line(across, along);
+    };
+    double across = -first / slope;
+    for (int along = 0; along <= last_along; ++along) {
+      // From the row before, which a line that bends with the lens leaves little by little.
+      const int before = static_cast<int>(std::lround(std::clamp<double>(across, 0, last_across)));
+      across = before - off_line_at(along, before) / slope;
+      const auto nearest = static_cast<int>(std::lround(std::clamp<double>(across, -1, last_across + 1)));
+      if (nearest < 0 || nearest > last_across) continue;
+      const int row = is_steep ? along : nearest, column = is_steep ? nearest : along;
+      if (admits(node, row, column, astray_px)) visit(row, column);
+    }
+  }
+  /// From cell to cell, projector px.
+  [[nodiscard]] double pitch_px() const {
+    return cells_.rows() > 1 ? (cells_.pixel(1, 0) - cells_.pixel(0, 0)).y() : 0;
   }
   /// Calls visit(row, column) for every cell that a node can be; with `anywhere` for every cell.
   template <class Visit>

@@ -12,7 +12,7 @@ void find_beside(const std::vector<GridNode>& nodes, std::vector<Beside>& beside
   }
 }
 
-Neighbourhood neighbourhood(const std::vector<Beside>& beside, std::int32_t node) {
+Neighbourhood neighbourhood(std::span<const Beside> beside, std::int32_t node) {
   static constexpr Beside kNothing{-1, -1, -1, -1};
   const auto around = [&](std::int32_t from) -> const Beside& { return from < 0 ? kNothing : beside[from]; };
   const auto [right, down, left, up] = beside[node];

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/code/code_array.hpp"
@@ -86,6 +87,6 @@ void find_beside(const std::vector<GridNode>& nodes, std::vector<Beside>& beside
 
 /// Follows the links around a node. A corner can be reached by two ways; where they lead to different nodes it is left
 /// out.
-[[nodiscard]] Neighbourhood neighbourhood(const std::vector<Beside>& beside, std::int32_t node);
+[[nodiscard]] Neighbourhood neighbourhood(std::span<const Beside> beside, std::int32_t node);
 
 }  // namespace slsd

@@ -132,6 +132,12 @@ void Classifier::classify(const EightShapes& shapes, std::span<Classification> t
   }
 }
 
+float Classification::share_of(int of_letter, float even) const {
+  const float doubt = std::clamp(kDoubtMin + kDoubtSlope * (distance - kDoubtFrom), kDoubtMin, kDoubtMax);
+  const float mixed = std::exp(log_probability[static_cast<std::size_t>(of_letter)]);
+  return std::clamp((mixed - doubt * even) / (1 - doubt), 0.F, 1.F);
+}
+
 Classification Classifier::classify(const ShapeFeatures& features) const {
   EightShapes one;
   one.set(0, features);

@@ -29,6 +29,9 @@ struct Classification {
     return letter >= 0 && distance < kWellSeen;
   }
   [[nodiscard]] bool is_torn() const { return distance >= kTornDistance; }
+  /// The probability of a letter, 0 to 1, if nothing but the letters can be there: without the doubt that is mixed in.
+  /// @param even  of one letter among all
+  [[nodiscard]] float share_of(int of_letter, float even) const;
 };
 
 /// Compares features with prototypes, those of eight shapes at once.

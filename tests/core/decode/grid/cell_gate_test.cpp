@@ -54,6 +54,10 @@ TEST_P(CellGateOfATiltedLine, VisitsAllCellsOnIt) {
       if (Cell(row, column) != from) admitted.emplace_back(row, column);
     });
     EXPECT_THAT(followed, testing::UnorderedElementsAreArray(admitted)) << from.first << ", " << from.second;
+    std::vector<Cell> along;
+    gate.visit_along(0, 0, [&](int row, int column) { along.emplace_back(row, column); });
+    admitted.push_back(from);
+    EXPECT_THAT(along, testing::UnorderedElementsAreArray(admitted)) << from.first << ", " << from.second;
     all += admitted.size();
   }
   EXPECT_GT(all, 5U);

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/decode/grid/link_grid.hpp"
+#include "core/decode/inference/letter_evidence.hpp"
+#include "core/decode/inference/surface_links.hpp"
+
+namespace slsd {
+
+/// How likely an edge in depth crosses a link, from how often links around it are broken or lead to another cell: along
+/// rows and along columns, each as the surroundings show.
+/// @thread thread-bound: keeps its buffers
+class EdgePrior {
+ public:
+  void measure(const NodesSeen& seen, const LetterEvidence& letters);
+
+  /// Log-odds that no edge crosses a link of the node.
+  [[nodiscard]] float log_odds(std::size_t node, Direction d) const;
+  /// Whether a link that link_grid made leads across an edge: it is broken, or its cells contradict each other.
+  [[nodiscard]] bool is_cut(std::size_t node, Direction d) const { return cut_[node][d]; }
+
+ private:
+  /// Of the links around a node, along rows and along columns.
+  struct Count {
+    std::array<float, 2> links{}, cut{};
+  };
+  void find_cut(const NodesSeen& seen, const LetterEvidence& letters);
+  void spread(const NodesSeen& seen);
+
+  std::vector<std::array<bool, 4>> cut_;
+  std::vector<Count> counts_, next_;
+  float usual_share_ = 0;
+};
+
+}  // namespace slsd

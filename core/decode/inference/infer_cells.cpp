@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/inference/infer_cells.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace slsd {
+namespace {
+
+constexpr float kMisreadNats = -2;    // nats: such a shape is none of the surface that its neighbours are on
+constexpr float kGoesOn = 0.5F;       // nats that hold a link beside a cut one: edges go on straight
+constexpr float kLineMore = 0.1F;     // nats that each further link of a straight edge costs
+constexpr float kSideMore = 2;        // the same of each further side that is cut: edges turn corners and come in pairs
+constexpr float kPrintedMax = 0.06F;  // of a cell that print lights
+constexpr float kAgainstMax = 9;      // nats
+constexpr float kSlipKnown = 1;       // nats: the link beside shows that no edge comes that way
+constexpr int kSideLinks = 8;         // that a side counts at most
+constexpr float kUsualPlaces = 40;    // on an epipolar line, for which the threshold was measured
+
+bool is_along_row(Direction d) {
+  return d == kRight || d == kLeft;
+}
+
+}  // namespace
+
+CellInference::CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook)
+    : grid_{codebook->rows(), codebook->columns()},
+      proposer_(pattern.array, codebook),
+      letters_(pattern.array, grid_),
+      links_(static_cast<float>(pattern.pitch_px())),
+      pitch_px_(static_cast<float>(pattern.pitch_px())) {}
+
+NodesSeen CellInference::view_of(const Sightings& seen) const {
+  return {seen.nodes, beside_, seen.moments, labels_};
+}
+
+/// Whether print tore a symbol, from the place where its whole neighbours put it.
+void CellInference::find_printed(const Sightings& seen, const OtherLight& light) {
+  printed_.assign(seen.size(), 0);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (seen.shapes[i].is_well_seen()) continue;
+    OtherLight::Place place{Eigen::Vector2f::Zero(), Eigen::Matrix2f::Zero(), 0, 0};
+    std::int32_t cell = -1;
+    float held_by = 0;
+    for (const Direction d : kDirections) {
+      const std::int32_t other = beside_[i][d];
+      if (other < 0 || !seen.shapes[other].is_well_seen()) continue;
+      const std::int32_t here = grid_.beyond(labels_[other], opposite(d));
+      if (here < 0 || (cell >= 0 && here != cell)) continue;
+      cell = here, held_by += 1;
+      const GridNode& from = seen.nodes[other];
+      place.centre_px += from.centre_px - from.frame * (pitch_px_ * step(d));
+      place.frame += from.frame;
+      place.background += seen.moments[other].background, place.peak += seen.moments[other].peak;
+    }
+    if (held_by == 0) continue;
+    place = {place.centre_px / held_by, place.frame / held_by, place.background / held_by, place.peak / held_by};
+    const float share = light.share(letters_.letter_of(cell), place);
+    printed_[i] = share >= 0 && share < kPrintedMax;
+  }
+}
+
+void CellInference::drop_misread() {
+  for (std::size_t i = 0; i < labels_.size(); ++i) {
+    nats_[i] = labels_[i] < 0 ? 0 : letters_.of(static_cast<std::int32_t>(i), labels_[i]);
+    if (nats_[i] < kMisreadNats) labels_[i] = -1, nats_[i] = 0;
+  }
+}
+
+void CellInference::set_capacities() {
+  capacity_.assign(labels_.size(), {}), against_.assign(labels_.size(), {});
+  for (std::size_t i = 0; i < labels_.size(); ++i) {
+    const bool is_torn = labels_[i] < 0 && proposed_[i] >= 0 && !letters_.shapes()[i].is_well_seen();
+    if (labels_[i] < 0 && !is_torn) continue;
+    for (const Direction d : kDirections) {
+      const std::int32_t other = beside_[i][d];
+      if (other < 0) continue;
+      const float slip = links_.of(i)[d];
+      const float odds = 0.5F * (prior_.log_odds(i, d) + prior_.log_odds(static_cast<std::size_t>(other), d));
+      const float trusted = std::max(0.F, odds + slip);
+      const std::int32_t there = grid_.beyond(proposed_[i], d);
+      if (there >= 0 && labels_[other] == there) {
+        capacity_[i][d] = trusted;
+      } else if (!is_torn) {  // what is torn contradicts nothing, and holds nothing: others hold it
+        const float against = there < 0 ? kAgainstMax : -letters_.of(other, there);
+        against_[i][d] = std::min(trusted, std::max(0.F, against));
+      }
+    }
+  }
+  lower_beside_edges();
+}
+
+/// An edge that ends beside a link is likely to go on across it.
+void CellInference::lower_beside_edges() {
+  for (std::size_t i = 0; i < labels_.size(); ++i) {
+    for (const Direction d : kDirections) {
+      if (capacity_[i][d] <= 0) continue;
+      const std::int32_t other = beside_[i][d];
+      for (const int side : {0, 1}) {
+        const Direction aside = across(d, side);
+        const std::int32_t by_this = beside_[i][aside], by_other = beside_[other][aside];
+        const bool goes_on = (by_this >= 0 && prior_.is_cut(static_cast<std::size_t>(by_this), d)) ||
+                             (by_other >= 0 && prior_.is_cut(static_cast<std::size_t>(by_other), opposite(d)));
+        if (!goes_on) continue;
+        const bool is_known = by_this >= 0 && links_.of(static_cast<std::size_t>(by_this))[d] > kSlipKnown;
+        const float slip = is_known ? 0.F : std::max(0.F, links_.of(i)[d]);
+        capacity_[i][d] = std::min(capacity_[i][d], kGoesOn + slip);
+      }
+    }
+  }
+}
+
+/// A straight edge is one event: links side by side that it crosses share what one of them is trusted, and little more.
+void CellInference::join_lines() {
+  line_capacity_.clear();
+  for (const Direction d : kDirections) {
+    const Direction along = is_along_row(d) ? kDown : kRight;
+    for (std::size_t i = 0; i < labels_.size(); ++i) {
+      const bool pushes = against_[i][d] > 0;
+      const auto& strength = pushes ? against_ : capacity_;
+      if (labels_[i] < 0 || strength[i][d] <= 0 || flow_.line_of(i, d) >= 0 || (!pushes && d >= kLeft)) continue;
+      const auto next = [&](std::int32_t at, Direction way) {
+        const std::int32_t other = capacity_[at][way] > 0 ? beside_[at][way] : -1;
+        const bool crosses = other >= 0 && labels_[other] >= 0 && strength[other][d] > 0;
+        return crosses && flow_.line_of(static_cast<std::size_t>(other), d) < 0 ? other : -1;
+      };
+      auto at = static_cast<std::int32_t>(i);
+      for (std::int32_t back = next(at, opposite(along)); back >= 0 && back != static_cast<std::int32_t>(i);
+           back = next(at, opposite(along)))
+        at = back;
+      const std::int32_t line = flow_.add_line(0);
+      float most = 0, count = 0;
+      for (; at >= 0; at = next(at, along)) {
+        flow_.put_on_line(static_cast<std::size_t>(at), d, line);
+        if (!pushes) flow_.put_on_line(static_cast<std::size_t>(beside_[at][d]), opposite(d), line);
+        most = std::max(most, strength[at][d]), count += 1;
+      }
+      line_capacity_.push_back(most + kLineMore * (count - 1));
+      flow_.set_line(line, line_capacity_.back());
+    }
+  }
+}
+
+void CellInference::draw_contradictions() {
+  for (std::size_t i = 0; i < labels_.size(); ++i) {
+    if (labels_[i] < 0) continue;
+    const auto node = static_cast<std::int32_t>(i);
+    if (nats_[i] < 0) static_cast<void>(flow_.draw(node, -nats_[i]));
+    for (const Direction d : kDirections) {
+      if (against_[i][d] <= 0) continue;
+      const std::int32_t line = flow_.line_of(i, d);
+      const float wanted = line < 0 ? against_[i][d] : std::min(against_[i][d], flow_.line_left(line, d));
+      if (wanted <= 0) continue;
+      const float drawn = flow_.draw(node, wanted);
+      if (line >= 0) flow_.take_from_line(line, d, drawn);
+    }
+  }
+}
+
+/// The first side that is cut counts in full, and each further one little, less what contradictions have drawn.
+EvidenceFlow::Budget CellInference::budget_of(std::size_t node) const {
+  std::array<float, 4> side{}, drawn{};
+  for (const Direction d : kDirections) {
+    const float capacity = capacity_[node][d];
+    if (capacity <= 0) continue;
+    const std::int32_t line = flow_.line_of(node, d);
+    side[d] = line < 0 ? capacity : std::min(line_capacity_[line], capacity + kLineMore * kSideLinks);
+    drawn[d] = std::max(0.F, capacity - flow_.capacity_left(node, d));
+  }
+  const auto together = [&](std::initializer_list<Direction> sides) {
+    float most = 0, more = 0, gone = 0;
+    for (const Direction d : sides) {
+      most = std::max(most, side[d]), more += std::min(side[d], kSideMore), gone += drawn[d];
+    }
+    return std::max(0.F, most + more - std::min(most, kSideMore) - gone);
+  };
+  return {together({kRight, kDown, kLeft, kUp}), together({kRight, kLeft}), together({kDown, kUp})};
+}
+
+void CellInference::measure_margins() {
+  flow_.keep();
+  margins_.assign(labels_.size(), 0);
+  for (std::size_t i = 0; i < labels_.size(); ++i) {
+    if (proposed_[i] < 0) continue;
+    margins_[i] = flow_.draw(static_cast<std::int32_t>(i), margin_max_, budget_of(i));
+    flow_.restore();
+  }
+}
+
+/// Nodes whose links lead from cell to cell.
+void CellInference::find_islands() {
+  island_.assign(labels_.size(), -1);
+  std::int32_t islands = 0;
+  for (std::size_t first = 0; first < labels_.size(); ++first) {
+    if (proposed_[first] < 0 || island_[first] >= 0) continue;
+    queue_.assign(1, static_cast<std::int32_t>(first));
+    island_[first] = islands;
+    for (std::size_t next = 0; next < queue_.size(); ++next) {
+      const std::int32_t node = queue_[next];
+      for (const Direction d : kDirections) {
+        const std::int32_t other = beside_[node][d];
+        if (other < 0 || island_[other] >= 0 || proposed_[other] < 0) continue;
+        if (proposed_[other] != grid_.beyond(proposed_[node], d)) continue;
+        island_[other] = islands;
+        queue_.push_back(other);
+      }
+    }
+    ++islands;
+  }
+}
+
+/// Of a node at a rim; another surface fits tightly in one of sixty cases at most.
+GridFit CellInference::grid_fit(std::size_t node) const {
+  float most = 0;
+  int held_by = 0, sides = 0;
+  for (const Direction d : kDirections) {
+    if (capacity_[node][d] <= 0) continue;
+    ++sides;
+    const std::int32_t other = beside_[node][d];
+    const float slip = links_.slip(static_cast<std::size_t>(other), d);
+    if (!std::isnan(slip)) most = std::max(most, std::abs(slip)), ++held_by;
+  }
+  constexpr int kAllSides = 4, kTightLinks = 2;
+  if (sides == kAllSides) return GridFit::kTight;
+  if (held_by == 0 || most > kOffGridSlip) return GridFit::kNone;
+  return held_by >= kTightLinks && most <= kTightSlip ? GridFit::kTight : GridFit::kLoose;
+}
+
+/// What becomes of a node whose cell was proposed.
+DecodeRule CellInference::decide(const CellGate& gate, const Classification& shape, std::size_t node) const {
+  const int row = grid_.row_of(proposed_[node]), column = grid_.column_of(proposed_[node]);
+  const bool speaks = labels_[node] >= 0 && nats_[node] > 0;
+  if (shape.letter < 0) return DecodeRule::kNoLetter;
+  if (!speaks && shape.is_well_seen()) return DecodeRule::kOtherLetter;
+  if (margins_[node] < margin_max_) return DecodeRule::kHeldByFew;
+  if (!speaks) return DecodeRule::kTorn;
+  if (!gate.on_line(gate.residual_px(static_cast<std::int32_t>(node), row, column))) return DecodeRule::kCellOffLine;
+  if (!gate.admits(static_cast<std::int32_t>(node), row, column)) return DecodeRule::kCellOutOfRange;
+  return DecodeRule::kWindows;
+}
+
+void CellInference::claim_cells(const CellGate& gate, Sightings& seen) const {
+  seen.claims.assign(seen.size(), {});
+  seen.misfits.assign(seen.size(), std::numeric_limits<float>::infinity());
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    CellClaim& claim = seen.claims[i];
+    if (proposed_[i] < 0) {
+      const bool is_linked = std::ranges::any_of(beside_[i], [](std::int32_t other) { return other >= 0; });
+      claim.decide(is_linked ? DecodeRule::kNoWindow : DecodeRule::kNoNeighbour);
+      continue;
+    }
+    claim.row = static_cast<std::int16_t>(grid_.row_of(proposed_[i]));
+    claim.column = static_cast<std::int16_t>(grid_.column_of(proposed_[i]));
+    claim.island = island_[i];
+    claim.evidence = margins_[i];
+    claim.grid_fit = grid_fit(i);
+    claim.decide(decide(gate, seen.shapes[i], i));
+  }
+}
+
+void CellInference::fill_flow() {
+  flow_.clear(beside_);
+  for (std::size_t i = 0; i < labels_.size(); ++i) {
+    flow_.set_supply(i, std::max(0.F, nats_[i]));
+    for (const Direction d : kDirections) flow_.set_capacity(i, d, capacity_[i][d]);
+  }
+  join_lines();
+}
+
+void CellInference::infer(const CellGate& gate, float margin_min, const OtherLight& light, Executor& executor,
+                          Sightings& seen) {
+  const float cells = static_cast<float>(grid_.rows) * static_cast<float>(grid_.columns);
+  margin_max_ = margin_min + (gate.knows_lines() ? 0 : std::log(std::max(1.F, cells / kUsualPlaces)));
+  find_beside(seen.nodes, beside_);
+  proposer_.propose(beside_, seen.shapes, gate, executor, proposed_);
+  labels_ = proposed_;
+  nats_.resize(labels_.size());
+  letters_.look_at(seen.shapes);
+  links_.measure(view_of(seen), letters_, gate);
+  find_printed(seen, light);
+  letters_.measure_torn(beside_, labels_, printed_);
+  drop_misread();
+  prior_.measure(view_of(seen), letters_);
+  set_capacities();
+  fill_flow();
+  draw_contradictions();
+  measure_margins();
+  find_islands();
+  claim_cells(gate, seen);
+}
+
+}  // namespace slsd

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/code/codebook.hpp"
+#include "core/decode/grid/cell_gate.hpp"
+#include "core/decode/grid/neighbourhood.hpp"
+#include "core/decode/inference/cell_grid.hpp"
+#include "core/decode/symbols/classify.hpp"
+#include "core/executor.hpp"
+
+namespace slsd {
+
+/// Proposes the cell of each node: the one whose 3x3 window its shapes and its neighbours' speak for most, among the
+/// cells that the calibration allows, and those beside the cells of its neighbours. Says nothing of how certain it is.
+/// @thread thread-bound: keeps its buffers
+class CellProposer {
+ public:
+  /// @param codebook  of the part of the pattern's array that is shown
+  CellProposer(const CodeArray& array, std::shared_ptr<const Codebook> codebook);
+
+  /// @param labels  becomes one cell to a node, or -1
+  void propose(std::span<const Beside> beside, std::span<const Classification> shapes, const CellGate& gate,
+               Executor& executor, std::vector<std::int32_t>& labels);
+
+ private:
+  struct Frame {
+    std::span<const Beside> beside;
+    std::span<const Classification> shapes;
+    const CellGate& gate;
+  };
+  /// A cell, and the nats that its window has for it.
+  struct Proposal {
+    std::int32_t cell = -1;
+    float nats = 0;
+    bool certain = false;  ///< most letters of its window are there and agree
+  };
+  [[nodiscard]] float window_nats(std::int32_t node, std::int32_t cell) const;
+  [[nodiscard]] Proposal weigh(std::int32_t node, std::int32_t cell) const;
+  [[nodiscard]] Proposal continued(const Frame& frame, std::int32_t node, std::int32_t first) const;
+  [[nodiscard]] Proposal best_on_line(const Frame& frame, std::int32_t node) const;
+  [[nodiscard]] Proposal looked_up(const Frame& frame, std::int32_t node) const;
+  void propose_range(const Frame& frame, std::int32_t first, std::int32_t last);
+  void carry_on(const Frame& frame);
+
+  CellGrid grid_;
+  std::shared_ptr<const Codebook> codebook_;
+  bool unique_;
+  float log_letters_;
+  std::vector<std::uint8_t> letters_;  // of each cell, with a border of one all round whose letter is kNoLetter
+  int stride_;
+  std::vector<Neighbourhood> around_;
+  std::vector<std::array<float, kMaxLetters + 1>> nats_;  // of each node from the second on, by letter; none has 0
+  std::vector<Proposal> proposals_, next_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/decode/grid/cell_gate.hpp"
+#include "core/decode/grid/link_grid.hpp"
+#include "core/decode/grid/neighbourhood.hpp"
+#include "core/decode/inference/letter_evidence.hpp"
+#include "core/decode/symbols/grey_moments.hpp"
+
+namespace slsd {
+
+/// What a frame shows of its nodes before any cell is certain, one entry to each node.
+struct NodesSeen {
+  std::span<const GridNode> nodes;
+  std::span<const Beside> beside;
+  std::span<const GreyMoments> moments;
+  std::span<const std::int32_t> labels;  ///< cells, -1: none
+};
+
+/// The nats by which each link speaks for one surface on both its sides, against an edge in depth across it.
+///
+/// - Slip: how far a step along a line differs from the step behind it, along the epipolar line. On one surface it is
+///   drawn from Student's t, as wide as what depth cannot move (the difference across the epipolar line) and how much
+///   the surface bent before; across an edge it is anywhere within the search.
+/// - Light: how much brighter one symbol is than the other, each compared with the mean of its letter. On one surface
+/// it
+///   is drawn from Student's t, as wide as the links of this frame; across an edge from a broad normal law. Light never
+///   speaks for one surface, as two surfaces may be lit alike.
+/// @thread thread-bound: keeps its buffers
+class SurfaceLinks {
+ public:
+  explicit SurfaceLinks(float pitch_px) : pitch_px_(pitch_px) {}
+
+  void measure(const NodesSeen& seen, const LetterEvidence& letters, const CellGate& gate);
+
+  /// By Direction; 0 for links that nothing is known of.
+  [[nodiscard]] const std::array<float, 4>& of(std::size_t node) const { return nats_[node]; }
+  /// How far the step on is from the step behind, along the epipolar line, cells; NaN unless both are there.
+  [[nodiscard]] float slip(std::size_t node, Direction d) const { return bends_[node][d % 2].x(); }
+
+ private:
+  void measure_bends(const NodesSeen& seen, const CellGate& gate, const CellGrid& grid);
+  [[nodiscard]] float usual_slip(const NodesSeen& seen, const LetterEvidence& letters);
+  void measure_slips(const NodesSeen& seen, float least);
+  void measure_light(const NodesSeen& seen, const LetterEvidence& letters);
+  void add_light(const NodesSeen& seen, const CellGrid& grid);
+
+  float pitch_px_;
+  std::vector<std::array<Eigen::Vector2f, 2>> bends_;  // along rows and columns: along the epipolar line, and across
+  std::vector<std::array<float, 4>> nats_;
+  std::vector<float> light_;  // of each node, logarithm, less its letter's mean; NaN where it is not known
+  std::vector<float> sample_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/decode/inference/infer_cells.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <random>
+#include <span>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "tests/core/decode/alone.hpp"
+#include "tests/core/decode/grid/simulated_grid.hpp"
+#include "tests/core/decode/shipped_pattern.hpp"
+#include "tests/simulator/simulator.hpp"
+
+namespace slsd {
+namespace {
+
+/// Nodes of a grid, linked wherever two are side by side, that show the letters they are given.
+class InferCells : public testing::Test {
+ protected:
+  InferCells()
+      : pattern_(shipped_pattern("16px-5.toml")),
+        cells_(pattern_, flat_prototypes(), paper_rig().projector),
+        inference_(pattern_, std::make_shared<const Codebook>(pattern_.array, kWholeRows, kWholeColumns)) {}
+
+  void show(int row, int column, int letter, float distance = 1) {
+    grid_.add(row, column, {18.F * static_cast<float>(column), 18.F * static_cast<float>(row)},
+              LatticeFrame::Identity());
+    Classification shape = read_as(letter, 5, 0.99);
+    shape.distance = distance;
+    seen_.shapes.push_back(shape);
+  }
+  /// @param slid  columns by which the letters are those of other cells
+  void show_pattern(int top, int left, int bottom, int right, int slid = 0) {
+    for (int row = top; row < bottom; ++row)
+      for (int column = left; column < right; ++column) show(row, column, pattern_.array.at(row, column + slid));
+  }
+  void infer() {
+    grid_.link_truly();
+    seen_.nodes = grid_.nodes;
+    seen_.region.resize(seen_.nodes.size());
+    seen_.moments.assign(seen_.nodes.size(), {});
+    for (GreyMoments& moments : seen_.moments) moments.background = 20, moments.peak = 180;
+    if (!seen_.moments.empty()) seen_.moments.back().peak = peak_of_last_;
+    // Each cell where it is at one depth; those of slid letters lie on the same lines.
+    const Calibration rig = paper_rig();
+    const RigidTransform& to_projector = rig.cameras[0].projector_from_camera;
+    const EpipolarGate gate(rig.cameras[0], rig.projector, 350, 3200);
+    segments_.clear();
+    for (const auto& [row, column] : grid_.cells) {
+      const Eigen::Vector3d point = 1000 * cells_.ray(row, column).direction.homogeneous();
+      segments_.push_back(
+          gate.prepare((to_projector.rotation.transpose() * (point - to_projector.translation)).hnormalized()));
+    }
+    const Grey8 dark(4, 4, 0);
+    const GreyView frame = dark.view();
+    const LetterFields letters(pattern_.options);
+    inference_.infer(CellGate(cells_, segments_, 1.5), margin_min_, OtherLight(frame, letters, letters.at(0.5F), 18),
+                     alone, seen_);
+  }
+  [[nodiscard]] const CellClaim& claim_at(int row, int column) const {
+    return seen_.claims[static_cast<std::size_t>(grid_.node_at(row, column))];
+  }
+  struct Score {
+    int decoded = 0, wrong = 0;
+  };
+  /// Those that show the letters of their own cells are right there.
+  [[nodiscard]] Score score() const {
+    Score score;
+    for (std::size_t i = 0; i < seen_.claims.size(); ++i) {
+      if (seen_.claims[i].status != RegionStatus::kDecoded) continue;
+      ++score.decoded;
+      score.wrong += !seen_.claims[i].same_cell(grid_.cells[i].first, grid_.cells[i].second);
+    }
+    return score;
+  }
+
+  Pattern pattern_;
+  CellRays cells_;
+  CellInference inference_;
+  SimulatedGrid grid_;
+  Sightings seen_;
+  float peak_of_last_ = 180, margin_min_ = 8;
+  std::vector<EpipolarSegment> segments_;
+};
+
+TEST_F(InferCells, AcceptsAWholeSurface) {
+  show_pattern(2, 3, 30, 40);
+  infer();
+  EXPECT_EQ(score().decoded, 28 * 37);
+  EXPECT_EQ(score().wrong, 0);
+}
+
+TEST_F(InferCells, AcceptsNothingOfRandomLetters) {
+  std::mt19937 random(4);
+  for (int row = 0; row < 40; ++row)
+    for (int column = 0; column < 60; ++column) show(row, column, static_cast<int>(random() % 5));
+  infer();
+  EXPECT_EQ(score().decoded, 0);
+}
+
+TEST_F(InferCells, AcceptsNoIslandOfThreeSymbols) {
+  show_pattern(5, 5, 6, 8);
+  infer();
+  EXPECT_EQ(score().decoded, 0);
+}
+
+// Links across an edge in depth that is not seen as one lead to symbols of other cells.
+TEST_F(InferCells, KeepsTwoSurfacesApart) {
+  show_pattern(0, 0, 30, 20);
+  for (int row = 0; row < 30; ++row)
+    for (int column = 20; column < 40; ++column) show(row, column, pattern_.array.at(row, column + 6));
+  infer();
+  for (std::size_t i = 0; i < seen_.claims.size(); ++i) {
+    const auto [row, column] = grid_.cells[i];
+    if (seen_.claims[i].status != RegionStatus::kDecoded) continue;
+    EXPECT_TRUE(seen_.claims[i].same_cell(row, column < 20 ? column : column + 6)) << row << ", " << column;
+  }
+  EXPECT_GT(score().decoded, 30 * 40 * 4 / 5);
+}
+
+TEST_F(InferCells, SaysOfAMisreadSymbolThatItsLetterIsAnother) {
+  show_pattern(0, 0, 20, 20);
+  const auto node = static_cast<std::size_t>(grid_.node_at(10, 10));
+  seen_.shapes[node] = read_as((pattern_.array.at(10, 10) + 1) % 5, 5, 0.99);
+  infer();
+  EXPECT_EQ(claim_at(10, 10).rule, DecodeRule::kOtherLetter);
+  EXPECT_GE(score().decoded, 20 * 20 - 5);  // those beside it may lie across an edge from it
+  EXPECT_EQ(score().wrong, 0);
+}
+
+TEST_F(InferCells, SaysOfATornSymbolThatItIsDamaged) {
+  show_pattern(0, 0, 20, 20);
+  const auto node = static_cast<std::size_t>(grid_.node_at(10, 10));
+  seen_.shapes[node].distance = 20;
+  infer();
+  EXPECT_EQ(claim_at(10, 10).status, RegionStatus::kDamagedShape);
+  EXPECT_TRUE(claim_at(10, 10).same_cell(10, 10));
+}
+
+// Geometry does not tell a symbol of the wall behind, seen through a gap, from an honest corner.
+TEST_F(InferCells, TrustsASymbolThatIsDarkerThanItsHoldersLess) {
+  std::vector<float> margins;
+  for (const float peak : {180.F, 90.F}) {
+    grid_ = {}, seen_ = {};
+    show_pattern(0, 0, 20, 20);
+    show(20, 19, pattern_.array.at(20, 19));
+    peak_of_last_ = peak;
+    margin_min_ = 20;
+    infer();
+    margins.push_back(claim_at(20, 19).evidence);
+  }
+  EXPECT_LT(margins[1], margins[0] - 1);
+}
+
+TEST_F(InferCells, OfNoNodesIsNothing) {
+  infer();
+  EXPECT_THAT(seen_.claims, testing::IsEmpty());
+}
+
+}  // namespace
+}  // namespace slsd
