@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Runs every block of README.md and docs/installing.md as it is written, in an empty Debian, as a user who has sudo:
+"""Runs every block of README.md and docs/installing.md as it is written, each page in an empty Debian, as a user who has sudo:
 newcomer.py ROOT SOURCES [--quick] [--from PLACE] [--packages DIR]. As root. ROOT is a Debian with systemd and sudo; SOURCES a clone."""
 import argparse
 import contextlib
+import itertools
 import pathlib
 import re
 import shutil
@@ -94,25 +95,35 @@ def main():
     parser.add_argument("--packages", type=pathlib.Path, metavar="DIR", help="take these packages and pass over ./run package")
     arguments = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # the container ends with it
-    root = arguments.root.resolve()
-    lay_out(root, arguments.sources, arguments.packages)
     blocks = [block for page in PAGES for block in blocks_of(page, (arguments.sources / page).read_text(encoding="utf-8"))]
     places = [block.place for block in blocks]
     require(arguments.first is None or arguments.first in places, f"no block {arguments.first}; there are: {' '.join(places)}")
     blocks = blocks[places.index(arguments.first):] if arguments.first else blocks
+    pages = itertools.groupby(blocks, key=lambda block: block.page)
+    failed = sum(run_page(arguments, list(of_page)) for _, of_page in pages)
+    print(f"{failed} of {len(blocks)} blocks failed", flush=True)
+    return 1 if failed else 0
+
+
+def run_page(arguments, blocks):
+    """Each page begins on an empty Debian, as its reader does. @return how many of its blocks failed"""
+    empty = arguments.root.resolve()
+    root = empty.with_name(empty.name + ".page")
+    subprocess.run(["rm", "-rf", root], check=True)
+    subprocess.run(["cp", "-a", "--reflink=auto", empty, root], check=True)
+    lay_out(root, arguments.sources, arguments.packages)
     passed_over = ["test"] * arguments.quick + ["package"] * bool(arguments.packages)
+    failed = 0
     with contextlib.closing(Container(root)) as machine:
         newcomer = Newcomer(machine, passed_over)
         if arguments.packages:
             machine.run("apt-get", "update")  # ./run package would
         before = installed_on(machine)
-        failed = 0
-        for block in blocks:
+        for i, block in enumerate(blocks):
             failed += not newcomer.run(block)
-            if block is blocks[0]:
+            if i == 0:
                 print(f"{installed_on(machine) - before} packages for the first block", flush=True)
-    print(f"{failed} of {len(blocks)} blocks failed", flush=True)
-    return 1 if failed else 0
+    return failed
 
 
 def installed_on(machine):
