@@ -69,6 +69,7 @@ enum class DecodeRule : std::uint8_t {
   kLineWeak,
   kLineOffGrid,
   kLineRepeats,
+  kLineOffEpipolar,
   kHeldByFew,
   kPieceContradicted,
   kPieceDoubtful,
@@ -83,6 +84,7 @@ enum class DecodeRule : std::uint8_t {
   kNotAligned,
   // What was refused around it.
   kRefusedAround,
+  kCornerMisread,
   kCornerAtBorder,
   kAlone,
   kLastOfLine,
@@ -111,6 +113,7 @@ enum class DecodeRule : std::uint8_t {
   kGroupDisputed,
   kGroupMisplaced,
   kGroupUnlike,
+  kGroupLineAlone,
   kGroupTornLine,
   kGroupTooFew,
 };

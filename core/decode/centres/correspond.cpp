@@ -125,9 +125,10 @@ class Surroundings {
            claims_[other].grid_fit != GridFit::kTight;
   }
 
-  /// At the corner between the frame's border on one side, and on a side that meets it something else or what has been
-  /// refused.
-  [[nodiscard]] bool is_corner_at_border(std::int32_t node) const {
+  /// At the corner of what was put there: on two sides that meet, and between them, it has been refused; or on one of
+  /// them something else lies or it has been refused, and on the other the frame ends.
+  /// @param at_border  asks for the latter
+  [[nodiscard]] bool is_corner(std::int32_t node, bool at_border) const {
     return std::ranges::any_of(kDirections, [&](Direction one) {
       const auto two = static_cast<Direction>((one + 1) % 4);
       const std::int32_t first = beside(node, one), second = beside(node, two);
@@ -135,6 +136,7 @@ class Surroundings {
       const auto may_be_other = [&](std::int32_t other, Direction d) {
         return is_refused(other) || contradicts(node, d);
       };
+      if (!at_border) return misread(first) && misread(second);
       return (is_unread(node, one) && may_be_other(second, two)) || (is_unread(node, two) && may_be_other(first, one));
     });
   }
@@ -352,8 +354,9 @@ void Correspondence::refuse_lone(const std::vector<GridNode>& nodes, const std::
                                                                          : DecodeRule::kWindows;
   });
   refuse([&](std::int32_t node) {
-    return rules.apply(DecodeRule::kCornerAtBorder, around.is_corner_at_border(node)) ? DecodeRule::kCornerAtBorder
-                                                                                      : DecodeRule::kWindows;
+    if (rules.apply(DecodeRule::kCornerMisread, around.is_corner(node, false))) return DecodeRule::kCornerMisread;
+    if (rules.apply(DecodeRule::kCornerAtBorder, around.is_corner(node, true))) return DecodeRule::kCornerAtBorder;
+    return DecodeRule::kWindows;
   });
   while (refuse([&](std::int32_t node) { return rule_of_left(around, rules, node); })) continue;
 }

@@ -36,6 +36,20 @@ std::int32_t member_beside(const Sightings& seen, std::int32_t node, Direction d
   return other >= 0 && is_member(seen.claims[other]) && seen.claims[node].fits(seen.claims[other], d) ? other : -1;
 }
 
+/// Of a node that one member holds: whether links lead on along the line across, and to nothing there that has a cell.
+/// All of that line may be of another surface, and this one of its letters be the right one by chance.
+bool is_alone_on_line(const Sightings& seen, std::int32_t node) {
+  const Direction held_from =
+      *std::ranges::find_if(kDirections, [&](Direction d) { return member_beside(seen, node, d) >= 0; });
+  bool linked = false;
+  for (const int side : {0, 1}) {
+    const std::int32_t other = seen.nodes[node].links[across(held_from, side)];
+    if (other >= 0 && seen.claims[other].named()) return false;
+    linked |= other >= 0;
+  }
+  return linked;
+}
+
 /// A symbol's square, moved across its epipolar line until it is on it.
 /// @param node  that was seen near it
 Eigen::Vector2f onto_line(const LetterScene& scene, std::int32_t node, int letter, const Eigen::Vector2f& centre_px,
@@ -178,8 +192,8 @@ LetterPlace GroupMender::place_of(const LetterScene& scene, std::int32_t node) {
 }
 
 /// Whether its letter is seen where the others have it, tilted as they are. What print darkens does not count: but what
-/// is seen in its middle may be nothing else. With one beside it, it may lie beyond the edge of their surface: more is
-/// asked then.
+/// is seen in its middle may be nothing else. With one beside it, it may lie beyond the edge of their surface; what had
+/// been refused for its surroundings is not alone on its line then.
 bool GroupMender::shows_letter(const LetterScene& scene, const AskedLetter& asked) const {
   constexpr float kMovedMax = 0.06F;  // of the pitch
   constexpr float kMiddleMin = 0.6F, kSupportMin = 0.75F;
@@ -187,6 +201,9 @@ bool GroupMender::shows_letter(const LetterScene& scene, const AskedLetter& aske
   CellClaim& claim = scene.seen.claims[asked.node];
   if (!has_settled(rules_, claim, task)) return false;
   const bool lone = asked.place.held_by == 1;
+  const bool line_alone =
+      lone && claim.status == RegionStatus::kNeighboursDisagree && is_alone_on_line(scene.seen, asked.node);
+  if (!claim.pass(rules_, DecodeRule::kGroupLineAlone, !line_alone)) return false;
   const bool in_place = std::abs(task.state.across) <= (lone ? kLoneAcrossMaxPx : kAlignedAcrossMaxPx) &&
                         std::abs(task.state.disparity) <= kMovedMax * pitch_px_ && asked.tilt_px <= kAlignedTiltMaxPx;
   if (!claim.pass(rules_, DecodeRule::kGroupMisplaced, in_place)) return false;

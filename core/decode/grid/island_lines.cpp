@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/decode/grid/islands.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 
@@ -53,6 +54,23 @@ float IslandJudge::evidence_of_places(const Frame& frame, Direction forth, int f
   return any ? -std::log(2 * kTightSlip) : 0;
 }
 
+/// Whether most of a part of line_ lie equally far off their epipolar lines: no depth moves a surface there, so what
+/// their letters name is another place.
+bool IslandJudge::are_off_line(const Frame& frame, int from, int to) {
+  constexpr int kFewest = 5;
+  constexpr float kAlike = 0.125F, kLeastPx = 0.25F;
+  if (to - from + 1 < kFewest) return false;
+  off_lines_px_.clear();
+  for (int i = from; i <= to; ++i) off_lines_px_.push_back(own_[line_[i]].off_line_px);
+  const float middle = median_in_place(off_lines_px_);
+  if (std::abs(middle) <= std::max(off_line_max_px_, kLeastPx)) return false;
+  const auto is_alike = [&](std::int32_t node) {
+    return frame.shapes[node].is_well_seen() && std::abs(own_[node].off_line_px - middle) < kAlike * std::abs(middle);
+  };
+  const auto alike = std::count_if(line_.begin() + from, line_.begin() + to + 1, is_alike);
+  return 2 * alike > to - from + 1;
+}
+
 /// Keeps for every node the evidence of the line of nodes through it, as far as it agrees and so far around it, where
 /// something contradicts it.
 void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, float evidence_min) {
@@ -90,7 +108,8 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
     const double lacking = log_letters_ * static_cast<double>(count) - line_ratios_.back();
     const int shortest = std::min(count, kReach + 1);
     if (!any_misread && !begin.contradicts && !end.contradicts && begin.doubtful == 0 && end.doubtful == 0 &&
-        lacking < kUnnoticed * log_letters_ * shortest)
+        lacking < kUnnoticed * log_letters_ * shortest &&
+        std::ranges::none_of(line_, [&](std::int32_t node) { return is_off_line(node); }))
       continue;
     slides_.clear(), slid_ratios_.clear();
     for (int i = 0; i < count; ++i) {
@@ -112,6 +131,10 @@ void IslandJudge::find_contradicted_lines(const Frame& frame, Direction forth, f
         return std::nullopt;
       }();
       const bool misread = any_misread && std::any_of(line_.begin() + from, line_.begin() + to + 1, is_misread);
+      if (rules.apply(DecodeRule::kLineOffEpipolar, is_off_line(line_[i]) && are_off_line(frame, from, to))) {
+        lines_.push_back({line_[i], line_[i], line_[i], 0, 0, DecodeRule::kLineOffEpipolar});
+        continue;
+      }
       if (!contradicted && !rules.apply(DecodeRule::kLineRepeats,
                                         misread && !(evidence_against_slides(frame, from, to) >= evidence_min)))
         continue;

@@ -156,6 +156,7 @@ class IslandJudge {
   [[nodiscard]] bool is_off_line(std::int32_t node) const {
     return std::abs(own_[node].off_line_px) > off_line_max_px_;
   }
+  [[nodiscard]] bool are_off_line(const Frame& frame, int from, int to);
   [[nodiscard]] GridFit grid_fit(const Frame& frame, std::int32_t node) const;
   /// Up to which slip a link fits the grid tightly.
   [[nodiscard]] float tight_slip() const { return std::min(0.5F * slip_max_, kTightSlip); }
@@ -207,7 +208,7 @@ class IslandJudge {
   std::int32_t looked_at_ = -1;
   std::vector<float> slips_;         // of a sample of links, or of those across a line
   float slip_max_ = 0;               // of links on one surface, cells
-  std::vector<float> off_lines_px_;  // of a sample of nodes
+  std::vector<float> off_lines_px_;  // of a sample of nodes, or of those of a line
   float off_line_max_px_ = 0;        // of whole symbols
 };
 

@@ -355,6 +355,18 @@ TEST(RefuseLone, RefusesTwoThatHaveNothingElseStandingBesideThem) {
   EXPECT_EQ(standing(3, GridFit::kLoose), 3);
 }
 
+// The corner of something that was put there agrees by chance.
+TEST(RefuseLone, RefusesTheCornerOfWhatIsMisread) {
+  RimSheet sheet;
+  for (const auto& [row, column] : {std::pair(2, 5), std::pair(3, 4)})
+    sheet.at(row, column).status = RegionStatus::kClassDisagrees;
+  sheet.refuse_lone();
+  EXPECT_EQ(sheet.at(2, 4).status, kDecoded) << "what lies between the two stands";
+  sheet.at(3, 5).status = RegionStatus::kNoCodeword;
+  sheet.refuse_lone();
+  EXPECT_EQ(sheet.at(2, 4).status, RegionStatus::kNeighboursDisagree);
+}
+
 // The border of the frame cuts what is beyond, and nobody knows what it is.
 TEST(RefuseLone, RefusesTheCornerWhereTheFrameEnds) {
   const float beyond_last = 100 + 8 * SimulatedGrid::kPitchPx + 12;  // less than the next one needs

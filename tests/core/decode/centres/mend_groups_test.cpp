@@ -162,6 +162,25 @@ TEST_F(MendGroups, HaveOneBesideThem) {
   EXPECT_THAT(mend_all(), testing::IsEmpty());
 }
 
+// The row above them may be of another surface, where what is whole and lit as the pattern is there by chance.
+TEST_F(MendGroups, HaveOthersOfTheirLineBesideThemWhereOneHoldsThem) {
+  constexpr int kAbove = 2;
+  darken_all_but({kAbove, 7, 12, 17});
+  const Sightings all = seen_;
+  const CellClaim unnamed{.status = RegionStatus::kNoCodeword};
+  const auto is_mended = [&](RegionStatus status, const CellClaim& left, const CellClaim& right) {
+    seen_ = all;
+    seen_.claims[kAbove].status = status, seen_.claims[kAbove].grid_fit = GridFit::kLoose;
+    seen_.claims[kAbove - 1] = left, seen_.claims[kAbove + 1] = right;
+    return std::ranges::count(mend_all(), kAbove) == 1;
+  };
+  const CellClaim elsewhere{.row = 5, .column = 5, .status = RegionStatus::kDamagedShape, .island = 1};
+  EXPECT_FALSE(is_mended(RegionStatus::kNeighboursDisagree, unnamed, unnamed));
+  EXPECT_TRUE(is_mended(RegionStatus::kDamagedShape, unnamed, unnamed)) << "its surroundings did not refuse it";
+  EXPECT_TRUE(is_mended(RegionStatus::kNeighboursDisagree, elsewhere, unnamed));
+  EXPECT_TRUE(is_mended(RegionStatus::kNeighboursDisagree, all.claims[kAbove - 1], unnamed)) << "two hold it";
+}
+
 // Those of a row alone do not tell how the grid goes on across it.
 TEST_F(MendGroups, LieInNoSingleRow) {
   for (std::int32_t node = 0; node < kCount; ++node) seen_.nodes[node].links[kUp] = seen_.nodes[node].links[kDown] = -1;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <functional>
+
 #include "tests/core/decode/grid/shown_islands.hpp"
 
 namespace slsd {
@@ -130,6 +132,50 @@ TEST_F(IslandsAboveAShortRow, LoseItWhereTheyTurnAwayTooFast) {
 
 TEST_F(IslandsAboveAShortRow, KeepItWhereNothingTellsWhatDepthWouldMove) {
   EXPECT_GE(kept(0.4F, 0, false), 4);
+}
+
+/// What becomes of a row in a sheet's midst whose letters are right and lie so far off their lines.
+class IslandsWithARowOffItsLines : public test::ShownIslands {
+ protected:
+  int kept(const std::function<double(int)>& off_px, float distance = 1) {
+    grid_ = {}, shapes_.clear();
+    show_pattern(10, 10, 20, 40);
+    std::vector<EpipolarSegment> segments;
+    for (const auto& [row, column] : grid_.cells)
+      segments.push_back(line_below(row, column, row == 15 ? off_px(column) : 0));
+    for (int column = 10; column < 40; ++column) shapes_[grid_.node_at(15, column)].distance = distance;
+    const auto claims = decode(segments);
+    int count = 0;
+    for (int column = 10; column < 40; ++column) count += is_decoded(claims, 15, column);
+    EXPECT_GE(decoded(claims), 265);  // of 270 in the other rows
+    return count;
+  }
+};
+
+// The row of another surface, some columns on, whose letters come again: no depth puts it off its lines.
+TEST_F(IslandsWithARowOffItsLines, LoseItWhereAllOfItIs) {
+  EXPECT_EQ(kept([](int) { return 0.8; }), 0);
+  EXPECT_EQ(kept([](int column) { return -0.8 + (column % 2 == 0 ? 0.05 : -0.05); }), 0);
+}
+
+TEST_F(IslandsWithARowOffItsLines, KeepWhatIsLittleOff) {
+  EXPECT_EQ(kept([](int) { return 0.24; }), 30);
+}
+
+// An edge that cuts the row moves each letter as it is.
+TEST_F(IslandsWithARowOffItsLines, KeepWhatIsUnevenlyOff) {
+  EXPECT_GE(kept([](int column) { return 0.4 + 0.25 * (column % 4); }), 28);
+}
+
+// A third of them lie at the median, the others to both sides of it.
+TEST_F(IslandsWithARowOffItsLines, TakeWhatIsAnEighthOffTheMedianForAlike) {
+  const auto spread = [](double share) { return [share](int column) { return 0.8 * (1 + share * (column % 3 - 1)); }; };
+  EXPECT_EQ(kept(spread(0.11)), 0);
+  EXPECT_GE(kept(spread(0.14)), 28);
+}
+
+TEST_F(IslandsWithARowOffItsLines, KeepWhatIsNotWellSeen) {
+  EXPECT_GE(kept([](int) { return 0.8; }, 4), 28);
 }
 
 }  // namespace
