@@ -9,15 +9,16 @@
 namespace slsd {
 namespace {
 
-constexpr float kMisreadNats = -2;    // nats: such a shape is none of the surface that its neighbours are on
-constexpr float kGoesOn = 0.5F;       // nats that hold a link beside a cut one: edges go on straight
-constexpr float kLineMore = 0.1F;     // nats that each further link of a straight edge costs
-constexpr float kSideMore = 2;        // the same of each further side that is cut: edges turn corners and come in pairs
-constexpr float kPrintedMax = 0.06F;  // of a cell that print lights
-constexpr float kAgainstMax = 9;      // nats
-constexpr float kSlipKnown = 1;       // nats: the link beside shows that no edge comes that way
-constexpr int kSideLinks = 8;         // that a side counts at most
-constexpr float kUsualPlaces = 40;    // on an epipolar line, for which the threshold was measured
+constexpr float kMisreadNats = -2;  // nats: such a shape is none of the surface that its neighbours are on
+constexpr float kGoesOn = 0.5F;     // nats that hold a link beside a cut one: edges go on straight
+constexpr float kLineMore = 0.1F;   // nats that each further link of a straight edge costs
+constexpr float kSideMore = 2;      // the same of each further side that is cut: edges turn corners and come in pairs
+constexpr float kPrintedLightMax = 1.2F;  // of the light of its neighbours: print takes light
+constexpr float kPrintedMax = 0.06F;      // of a cell that print lights
+constexpr float kAgainstMax = 9;          // nats
+constexpr float kSlipKnown = 1;           // nats: the link beside shows that no edge comes that way
+constexpr int kSideLinks = 8;             // that a side counts at most
+constexpr float kUsualPlaces = 40;        // on an epipolar line, for which the threshold was measured
 
 bool is_along_row(Direction d) {
   return d == kRight || d == kLeft;
@@ -58,7 +59,9 @@ void CellInference::find_printed(const Sightings& seen, const OtherLight& light)
     if (held_by == 0) continue;
     place = {place.centre_px / held_by, place.frame / held_by, place.background / held_by, place.peak / held_by};
     const float share = light.share(letters_.letter_of(cell), place);
-    printed_[i] = share >= 0 && share < kPrintedMax;
+    const float contrast = seen.moments[i].peak - seen.moments[i].background;
+    const bool is_brighter = contrast > kPrintedLightMax * (place.peak - place.background);
+    printed_[i] = share >= 0 && share < kPrintedMax && !is_brighter;
   }
 }
 
@@ -70,7 +73,7 @@ void CellInference::drop_misread() {
 }
 
 void CellInference::set_capacities() {
-  capacity_.assign(labels_.size(), {}), against_.assign(labels_.size(), {});
+  capacity_.assign(labels_.size(), {}), against_.assign(labels_.size(), {}), rivals_.assign(labels_.size(), 0);
   for (std::size_t i = 0; i < labels_.size(); ++i) {
     const bool is_torn = labels_[i] < 0 && proposed_[i] >= 0 && !letters_.shapes()[i].is_well_seen();
     if (labels_[i] < 0 && !is_torn) continue;
@@ -85,11 +88,19 @@ void CellInference::set_capacities() {
         capacity_[i][d] = trusted;
       } else if (!is_torn) {  // what is torn contradicts nothing, and holds nothing: others hold it
         const float against = there < 0 ? kAgainstMax : -letters_.of(other, there);
-        against_[i][d] = std::min(trusted, std::max(0.F, against));
+        const float rival = rival_nats(i, d);
+        against_[i][d] = std::min(trusted, std::max({0.F, against, rival > 0 ? trusted : 0.F}));
+        rivals_[i] = std::max(rivals_[i], rival);
       }
     }
   }
   lower_beside_edges();
+}
+
+/// The nats of a node for the cell that a neighbour of another cell puts it on: their link holds then.
+float CellInference::rival_nats(std::size_t node, Direction d) const {
+  const std::int32_t cell = grid_.beyond(labels_[static_cast<std::size_t>(beside_[node][d])], opposite(d));
+  return cell < 0 || cell == labels_[node] ? 0 : std::max(0.F, letters_.of(static_cast<std::int32_t>(node), cell));
 }
 
 /// An edge that ends beside a link is likely to go on across it.
@@ -263,7 +274,7 @@ void CellInference::claim_cells(const CellGate& gate, Sightings& seen) const {
 void CellInference::fill_flow() {
   flow_.clear(beside_);
   for (std::size_t i = 0; i < labels_.size(); ++i) {
-    flow_.set_supply(i, std::max(0.F, nats_[i]));
+    flow_.set_supply(i, std::max(0.F, nats_[i] - rivals_[i]));
     for (const Direction d : kDirections) flow_.set_capacity(i, d, capacity_[i][d]);
   }
   join_lines();

@@ -46,6 +46,7 @@ class CellInference {
   void find_printed(const Sightings& seen, const OtherLight& light);
   void drop_misread();
   void set_capacities();
+  [[nodiscard]] float rival_nats(std::size_t node, Direction d) const;
   void lower_beside_edges();
   void join_lines();
   void fill_flow();
@@ -67,7 +68,8 @@ class CellInference {
   std::vector<Beside> beside_;
   std::vector<std::int32_t> proposed_, labels_;  // cells; labels without the misread ones
   std::vector<std::uint8_t> printed_;
-  std::vector<float> nats_, margins_;                     // of each node: of its own letter, and of its cell
+  std::vector<float> rivals_;          // of each node: the nats of another cell that a neighbour names
+  std::vector<float> nats_, margins_;  // of each node: of its own letter, and of its cell
   std::vector<std::array<float, 4>> capacity_, against_;  // of each link, at the start
   std::vector<float> line_capacity_;
   std::vector<std::int32_t> island_, queue_;

@@ -99,15 +99,16 @@ void SurfaceLinks::measure_light(const NodesSeen& seen, const LetterEvidence& le
   std::array<float, kMaxLetters> sum{}, count{};
   for (std::size_t i = 0; i < seen.nodes.size(); ++i) {
     const float contrast = seen.moments[i].peak - seen.moments[i].background;
-    if (seen.labels[i] < 0 || contrast <= 0 || !letters.shapes()[i].is_well_seen()) continue;
+    if (seen.labels[i] < 0 || contrast <= 0) continue;
     light_[i] = std::log(contrast);
+    if (!letters.shapes()[i].is_well_seen()) continue;
     const int letter = letters.letter_of(seen.labels[i]);
     sum[letter] += light_[i], count[letter] += 1;
   }
   for (std::size_t i = 0; i < seen.nodes.size(); ++i) {
     if (std::isnan(light_[i])) continue;
     const int letter = letters.letter_of(seen.labels[i]);
-    light_[i] -= sum[letter] / count[letter];
+    light_[i] = count[letter] > 0 ? light_[i] - sum[letter] / count[letter] : kUnknown;
   }
 }
 
