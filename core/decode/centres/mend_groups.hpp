@@ -37,7 +37,7 @@ class Disputes {
   std::vector<std::int32_t> of_surface_;
 };
 
-/// Whether the aligning of a letter came to an end; a guard of all that brings symbols back.
+/// The guard of all that brings symbols back: the aligning of a letter came to an end.
 [[nodiscard]] bool has_settled(const Rules& rules, CellClaim& claim, const PatchTask& task);
 
 /// Finds the places of symbols where nothing beside them stands that could hold them: those beside each other hold each

@@ -13,8 +13,8 @@
 
 namespace slsd {
 
-/// How likely an edge in depth crosses a link, from how often links around it are broken or lead to another cell: along
-/// rows and along columns, each as the surroundings show.
+/// The prior of an edge in depth across a link, from how often links around it are broken or lead to another cell:
+/// along rows and along columns, each as the surroundings show.
 /// @thread thread-bound: keeps its buffers
 class EdgePrior {
  public:
@@ -22,7 +22,7 @@ class EdgePrior {
 
   /// Log-odds that no edge crosses a link of the node.
   [[nodiscard]] float log_odds(std::size_t node, Direction d) const;
-  /// Whether a link that link_grid made leads across an edge: it is broken, or its cells contradict each other.
+  /// Tells links of link_grid that lead across an edge: they are broken, or their cells contradict each other.
   [[nodiscard]] bool is_cut(std::size_t node, Direction d) const { return cut_[node][d]; }
 
  private:

@@ -8,7 +8,7 @@ namespace slsd {
 namespace {
 
 constexpr float kNothing = 1e-4F;  // nats
-/// How many nodes a search reaches at most: what is farther away hardly adds to a margin that nearer ones lack.
+/// Most nodes that a search reaches: what is farther away hardly adds to a margin that nearer ones lack.
 constexpr std::size_t kSearchedNodes = 80;
 constexpr std::uint8_t kFirst = 4;
 

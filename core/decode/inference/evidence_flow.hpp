@@ -19,7 +19,7 @@ namespace slsd {
 /// @thread thread-bound: keeps its buffers
 class EvidenceFlow {
  public:
-  /// What may reach a node in all, along its row and along its column; the rest of the flow is its own supply.
+  /// Limits on the nats that reach a node from others: in all, along its row and along its column.
   struct Budget {
     float all, row, column;
   };

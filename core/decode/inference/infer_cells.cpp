@@ -37,7 +37,7 @@ NodesSeen CellInference::view_of(const Sightings& seen) const {
   return {seen.nodes, beside_, seen.moments, labels_};
 }
 
-/// Whether print tore a symbol, from the place where its whole neighbours put it.
+/// Finds the torn symbols that print tore, each at the place where its whole neighbours put it.
 void CellInference::find_printed(const Sightings& seen, const OtherLight& light) {
   printed_.assign(seen.size(), 0);
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -239,7 +239,7 @@ GridFit CellInference::grid_fit(std::size_t node) const {
   return held_by >= kTightLinks && most <= kTightSlip ? GridFit::kTight : GridFit::kLoose;
 }
 
-/// What becomes of a node whose cell was proposed.
+/// Names the rule that accepts or rejects a node whose cell was proposed.
 DecodeRule CellInference::decide(const CellGate& gate, const Classification& shape, std::size_t node) const {
   const int row = grid_.row_of(proposed_[node]), column = grid_.column_of(proposed_[node]);
   const bool speaks = labels_[node] >= 0 && nats_[node] > 0;

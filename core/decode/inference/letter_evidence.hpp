@@ -16,7 +16,7 @@ namespace slsd {
 
 /// The nats by which a shape speaks for a cell: how much likelier it is as the letter of that cell than by chance.
 ///
-/// What a classification takes for its doubt is replaced by the shares that were measured: of shapes at each distance
+/// Measured shares replace the doubt that a classification assumes: of shapes at each distance
 /// from their prototype, those that show another letter than their cell's. A torn shape also speaks for an edge through
 /// the symbol, the more, the fewer are torn amid the surfaces of the frame.
 /// @thread thread-bound: keeps its buffers
