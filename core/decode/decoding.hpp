@@ -67,8 +67,9 @@ struct RegionSeen {
   std::array<std::int32_t, 4> links;               ///< by Direction: index of the neighbour's region, or -1
   std::array<bool, 4> broken;                      ///< a link that was there and disagreed with its neighbours
   std::int16_t column, row;                        ///< cell of the pattern, where decoded; else -1
-  DecodeRule rule = DecodeRule::kWindows;          ///< that decided on its status
-  std::optional<DecodeRule> guard = std::nullopt;  ///< the last that kept it from being brought back
+  DecodeRule rule = DecodeRule::kCertain;          ///< that decided on its status
+  std::optional<DecodeRule> guard = std::nullopt;  ///< the last that kept it from being mended
+  float margin_nats = 0;  ///< by which its cell is likelier than any other, up to what it needs
 };
 
 /// What one frame gave: its points, and for every region seen what became of it.

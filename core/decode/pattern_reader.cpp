@@ -28,6 +28,8 @@ constexpr double kFewOfMany = 4;
 constexpr std::size_t kCertain = 40, kLeast = 12;
 /// The share of symbols that has to lie within this part of a cell from where the plane of the others puts them.
 constexpr double kAgreeingShare = 0.6, kAgreeingCells = 0.6;
+/// That a frame may have: what agrees with a plane is kept, and the bundle adjustment leaves out the rest.
+constexpr double kWrongCellsMax = 0.1;
 /// How far from the scale that a reader was made for it is still used.
 constexpr double kSameScale = 1.12;
 
@@ -97,7 +99,8 @@ struct PatternReader::Trial {
   double scale;
 
   Trial(const IndexedPattern& pattern, ExpectedFrames frames)
-      : reader(pattern, any_lens(pattern.pattern().options), std::move(frames), {}, std::nullopt),
+      : reader(pattern, any_lens(pattern.pattern().options), std::move(frames), {.wrong_cells_max = kWrongCellsMax},
+               std::nullopt),
         scale(reader.expected_scale()) {}
 };
 

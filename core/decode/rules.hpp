@@ -27,102 +27,55 @@ enum class RegionStatus : std::uint8_t {
   kDamagedShape,        ///< its shape is that of its cell, but cut or disturbed: its centre would be wrong
   kOffEpipolarLine,
   kOutOfDepthRange,
-  kDuplicateCell,  ///< another region claims the cell with better evidence
+  kDuplicateCell,  ///< another region claims the cell, too
 };
 inline constexpr int kRegionStatusCount = 15;
 
 /// "too_small", as in the counters of `status`.
 [[nodiscard]] std::string_view to_string(RegionStatus status);
 
-/// What decides on a symbol: each test that rejects it, each path that brings it back, and each guard that keeps it
-/// from being brought back. Their texts are in rules.cpp, in this order.
+/// What decides on a symbol: the ways to accept it, each test that rejects it, and each guard that keeps it from being
+/// mended. Their texts are in rules.cpp, in this order.
 enum class DecodeRule : std::uint8_t {
-  // Decoded, or brought back.
-  kWindows,
-  kGrown,
-  kHeldAgain,
-  kMendedByTwo,
-  kMendedByOne,
-  kMendedAtCorner,
-  kMendedInGroup,
+  kCertain,
+  kMended,
   // Regions.
   kTouchesBorder,
   kTooSmall,
   kTooLarge,
   kLowContrast,
-  // Windows and islands.
+  // Cells.
   kNoNeighbour,
   kNoWindow,
-  kWindowsDisagree,
-  kWeakIsland,
-  kIslandElsewhere,
-  kIslandOffLine,
-  kIslandTwice,
   kNoLetter,
   kOtherLetter,
+  kUncertain,
   kCellOffLine,
   kCellOutOfRange,
-  // Rims of islands.
-  kSlid,
-  kLineMisread,
-  kLineContradicted,
-  kLineWeak,
-  kLineOffGrid,
-  kLineRepeats,
-  kLineOffEpipolar,
-  kHeldByFew,
-  kPieceContradicted,
-  kPieceDoubtful,
-  kPieceBent,
-  kNotch,
-  kStep,
-  // Its own shape.
+  // Shapes.
   kTorn,
   kUnlikeLetter,
-  kHidden,
   kCutCentre,
   kNotAligned,
-  // What was refused around it.
-  kRefusedAround,
-  kCornerMisread,
-  kCornerAtBorder,
-  kAlone,
-  kLastOfLine,
-  kLeftOfLine,
-  kRestOfLine,
-  kOnTornLine,
-  kBridge,
-  kPair,
-  kOtherLight,
-  kLeftAlone,
-  kOtherAtBorder,
-  // Its place.
+  // Places.
   kSymbolOffLine,
   kSymbolOutOfRange,
   kCellTwice,
   kPointOutOfRange,
   // Guards.
-  kMendDisputed,
   kMendUnsettled,
   kMendOffLine,
   kMendMoved,
   kMendTilted,
   kMendHidden,
   kMendUnlike,
-  kMendAlone,
-  kGroupDisputed,
-  kGroupMisplaced,
-  kGroupUnlike,
-  kGroupLineAlone,
-  kGroupTornLine,
-  kGroupTooFew,
 };
-inline constexpr std::size_t kDecodeRuleCount = static_cast<std::size_t>(DecodeRule::kGroupTooFew) + 1;
+inline constexpr std::size_t kDecodeRuleCount = static_cast<std::size_t>(DecodeRule::kMendUnlike) + 1;
 
 enum class RuleKind : std::uint8_t {
   kAccepts,
   kRejects,
-  kGuards,  ///< keeps a rejected symbol from being brought back; the symbol's status stays
+  kGuards,  ///< keeps a symbol from being mended; another rule decides on it
 };
 
 /// "rejects", as in the metrics.
@@ -160,10 +113,6 @@ using RuleSet = std::bitset<kDecodeRuleCount>;
 struct RuleTrial {
   RuleSet off;
   std::array<std::atomic<bool>, kDecodeRuleCount> met{};
-  /// Whether CellInference decides in place of windows, islands and what is rejected around them, and the nats that a
-  /// symbol needs then.
-  bool infers = false;
-  float margin_min = 8;
 
   void forget() {
     for (auto& one : met) one = false;
@@ -178,8 +127,6 @@ class Rules {
 
   /// Whether a rule applies: its test holds, and it is not left out.
   [[nodiscard]] bool apply(DecodeRule rule, bool holds) const { return holds && (trial_ == nullptr || tried(rule)); }
-  /// Of a rule whose test is asked later.
-  [[nodiscard]] bool has(DecodeRule rule) const { return trial_ == nullptr || tried(rule); }
 
  private:
   [[nodiscard]] bool tried(DecodeRule rule) const {

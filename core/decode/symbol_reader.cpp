@@ -44,18 +44,11 @@ SymbolReader::SymbolReader(const IndexedPattern& indexed, const Lens& projector,
       paper_(std::move(paper)),
       finder_(pattern().options, std::move(expected), options.binarize, options.find_regions, Rules(options.trial)),
       linker_({.pitch_px = static_cast<float>(pattern().pitch_px())}),
-      window_decoder_(pattern(), indexed.codebook(), options.wrong_cells_max, Rules(options.trial)),
-      inference_(pattern(), indexed.codebook()),
+      inference_(pattern(), indexed.codebook(), options.wrong_cells_max),
       review_(pattern(), {.rules = Rules(options.trial)}),
       letters_(std::make_shared<const LetterFields>(pattern().options)),
       mender_(pattern(), letters_, Rules(options.trial)),
-      torn_lines_(pattern(), letters_, Rules(options.trial)),
-      border_reader_(pattern(), letters_, Rules(options.trial)),
-      correspondence_({.pitch_px = static_cast<float>(pattern().pitch_px()),
-                       .symbol_size_px = static_cast<float>(pattern().options.symbol_size_px),
-                       .rows = pattern().whole_rows(),
-                       .columns = pattern().whole_columns(),
-                       .rules = Rules(options.trial)}),
+      correspondence_(Rules(options.trial)),
       centre_correction_(fixed_->appearances.usual().as_measured, static_cast<float>(pattern().pitch_px()),
                          static_cast<float>(pattern().options.symbol_size_px)) {}
 
@@ -73,9 +66,9 @@ const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarVi
   classify(executor), done(Stage::kClassify);
   link_grid(executor), done(Stage::kLinkGrid);
   if (view != nullptr) view->look_at(seen_, executor);
-  decode_windows(sharp, view, executor), done(Stage::kDecodeWindows);
+  infer_cells(sharp, view, executor), done(Stage::kDecodeWindows);
   review(sharp, executor), done(Stage::kReview);
-  correspond(sharp, view, executor);
+  correspond(view, executor);
   fit_lattice(frame, full, view, executor), done(Stage::kCorrespond);
   return lattice_;
 }
@@ -148,14 +141,17 @@ void SymbolReader::classify_in_measured_frames(Executor& executor) {
   });
 }
 
-void SymbolReader::decode_windows(const GreyView& frame, const EpipolarView* view, Executor& executor) {
-  if (options_.decode_windows == Method::kPaper)
-    return paper_->decode_windows(pattern().whole_rows(), pattern().whole_columns(), seen_);
-  if (infers()) {
-    const OtherLight light(frame, *letters_, letters_->at(blur_px()), static_cast<float>(pattern().pitch_px()));
-    return inference_.infer(gate_of(view), options_.trial->margin_min, light, executor, seen_);
+/// What is worn is mended between: it is evidence then, too.
+void SymbolReader::infer_cells(const GreyView& frame, EpipolarView* view, Executor& executor) {
+  if (options_.decode_windows == Method::kPaper) {
+    paper_->decode_windows(pattern().whole_rows(), pattern().whole_columns(), seen_);
+    seen_.aligned.assign(seen_.size(), Aligned::kNot);
+    return;
   }
-  window_decoder_.decode(seen_.nodes, seen_.shapes, gate_of(view), executor, seen_.claims);
+  const CellGate gate = gate_of(view);
+  inference_.propose(gate, executor, seen_);
+  mend(frame, gate, view);
+  inference_.decide(gate, seen_);
 }
 
 CellGate SymbolReader::gate_of(const EpipolarView* view) const {
@@ -167,15 +163,14 @@ float SymbolReader::blur_px() const {
   return look_->blur_px.value_or(expected_scale()) / expected_scale();
 }
 
-/// Where epipolar lines are known, and all stages before go the default way.
-void SymbolReader::mend(const GreyView& frame, EpipolarView& view) {
+/// Needs the default way of all stages.
+void SymbolReader::mend(const GreyView& frame, const CellGate& gate, EpipolarView* view) {
   if (options_.any_paper()) return;
-  const CellGate gate = gate_of(&view);
   const LetterScene scene{
       frame, 255.0 * finder_.frame_levels(), finder_.noise(), letters_->at(blur_px()), gate, look_->as_measured, seen_};
-  mended_ = mender_.mend(scene);
-  if (!infers()) torn_lines_.refuse(scene);
-  for (const std::int32_t sighting : mended_) view.look_again_at(sighting, seen_);
+  const std::vector<std::int32_t>& mended = mender_.mend(scene);
+  if (view == nullptr) return;
+  for (const std::int32_t sighting : mended) view->look_again_at(sighting, seen_);
 }
 
 void SymbolReader::review(const GreyView& frame, Executor& executor) {
@@ -186,17 +181,7 @@ void SymbolReader::review(const GreyView& frame, Executor& executor) {
                    seen_);
 }
 
-/// @param frame  what the symbols were measured in
-void SymbolReader::correspond(const GreyView& frame, EpipolarView* view, Executor& executor) {
-  mended_ = {};
-  if (options_.decode_windows == Method::kDefault) {
-    const Eigen::Vector2f frame_px(static_cast<float>(finder_.mask().width()),
-                                   static_cast<float>(finder_.mask().height()));
-    if (!infers()) correspondence_.refuse_lone(seen_.nodes, seen_.shapes, frame_px, executor, seen_.claims);
-    if (view != nullptr) mend(frame, *view);
-    review_.take_back_held(seen_);
-    if (!options_.any_paper() && !infers()) border_reader_.refuse(frame, blur_px(), seen_);
-  }
+void SymbolReader::correspond(const EpipolarView* view, Executor& executor) {
   if (view == nullptr) {
     correspondence_.settle_duplicates(cells(), seen_.claims);
   } else if (options_.correspond == Method::kDefault) {
@@ -209,7 +194,7 @@ void SymbolReader::fit_lattice(const GreyView& frame, double full, const Epipola
                              seen_.misfits);
   // The paper knows no correction, and what was aligned needs none.
   for (LatticeSymbol& symbol : lattice_.symbols) {
-    if (options_.centre == Method::kDefault && !std::ranges::binary_search(mended_, symbol.sighting)) continue;
+    if (options_.centre == Method::kDefault && !is_aligned(seen_.aligned[symbol.sighting])) continue;
     const GreyMoments& moments = seen_.moments[symbol.sighting];
     symbol.centre_px = {moments.x, moments.y};
   }
@@ -281,8 +266,8 @@ void SymbolReader::report(Decoding& decoding) const {
     const GridNode& node = seen_.nodes[i];
     out.centre_px = {seen_.moments[i].x, seen_.moments[i].y};
     const CellClaim& claim = seen_.claims[i];
-    out.status = claim.status, out.rule = claim.rule;
-    if (out.status != RegionStatus::kDecoded && claim.guard != DecodeRule::kWindows) out.guard = claim.guard;
+    out.status = claim.status, out.rule = claim.rule, out.margin_nats = claim.margin_nats;
+    if (out.status != RegionStatus::kDecoded && claim.guard != DecodeRule::kCertain) out.guard = claim.guard;
     out.letter = seen_.shapes[i].letter;
     for (int d = 0; d < 4; ++d) out.links[d] = node.links[d] < 0 ? -1 : seen_.region[node.links[d]];
     out.broken = node.broken;

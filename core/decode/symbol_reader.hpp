@@ -11,11 +11,8 @@
 #include "core/decode/centres/correspond.hpp"
 #include "core/decode/centres/curvature.hpp"
 #include "core/decode/centres/mend_symbols.hpp"
-#include "core/decode/centres/read_border.hpp"
 #include "core/decode/centres/symbol_match.hpp"
-#include "core/decode/centres/torn_lines.hpp"
 #include "core/decode/decoding.hpp"
-#include "core/decode/grid/decode_windows.hpp"
 #include "core/decode/grid/epipolar_view.hpp"
 #include "core/decode/grid/lattice_frame.hpp"
 #include "core/decode/grid/link_grid.hpp"
@@ -61,8 +58,6 @@ class SymbolReader {
   /// The symbols of the last frame whose cells are certain and not on their epipolar lines, where they are seen.
   void list_off_line(std::vector<SymbolMatch>& matches) const;
   /// The symbol turned out to be no point.
-  /// Whether a trial asks for the inference in place of windows, islands and what is rejected around them.
-  [[nodiscard]] bool infers() const { return options_.trial != nullptr && options_.trial->infers; }
   void reject(const LatticeSymbol& symbol, DecodeRule by) { seen_.claims[symbol.sighting].decide(by); }
   /// What became of every region, with the counters.
   void report(Decoding& decoding) const;
@@ -86,13 +81,13 @@ class SymbolReader {
   void classify(Executor& executor);
   void link_grid(Executor& executor);
   void classify_in_measured_frames(Executor& executor);
-  void decode_windows(const GreyView& frame, const EpipolarView* view, Executor& executor);
+  void infer_cells(const GreyView& frame, EpipolarView* view, Executor& executor);
   void review(const GreyView& frame, Executor& executor);
   [[nodiscard]] CellGate gate_of(const EpipolarView* view) const;
   /// Of the pattern in this frame, standard deviation, projector px.
   [[nodiscard]] float blur_px() const;
-  void mend(const GreyView& frame, EpipolarView& view);
-  void correspond(const GreyView& frame, EpipolarView* view, Executor& executor);
+  void mend(const GreyView& frame, const CellGate& gate, EpipolarView* view);
+  void correspond(const EpipolarView* view, Executor& executor);
   void refuse_cut();
   void fit_lattice(const GreyView& frame, double full, const EpipolarView* view, Executor& executor);
 
@@ -101,13 +96,10 @@ class SymbolReader {
   std::optional<PaperWay> paper_;
   ShapeFinder finder_;
   GridLinker linker_;
-  WindowDecoder window_decoder_;
   CellInference inference_;
   SymbolReview review_;
   std::shared_ptr<const LetterFields> letters_;
   SymbolMender mender_;
-  TornLines torn_lines_;
-  BorderReader border_reader_;
   Correspondence correspondence_;
   CentreCorrection centre_correction_;
   CentreJudge centre_judge_;
@@ -115,8 +107,7 @@ class SymbolReader {
   bool is_there_ = true;
   const Appearance* look_ = nullptr;  // of this frame's symbols
   std::vector<ShapeFeatures> sample_;
-  std::span<const std::int32_t> mended_;  // sightings
-  std::vector<std::int32_t> kept_;        // of the lattice's symbols: where they are then
+  std::vector<std::int32_t> kept_;  // of the lattice's symbols: where they are then
   Sightings seen_;
   Lattice lattice_;
   std::optional<FrameNoise> known_noise_;

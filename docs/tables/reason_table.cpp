@@ -42,10 +42,11 @@ std::string table_of(RuleKind kind) {
 }  // namespace
 
 std::string reason_document() {
-  return kIntroduction + std::string("## Rejected\n\n") + table_of(RuleKind::kRejects) +
-         "## Decoded, or brought back\n\n" + table_of(RuleKind::kAccepts) +
-         "## Not brought back\n\nA rejected symbol may be brought back. Each of these guards is the last that kept it "
-         "from that; its status stays.\n\n" +
+  return kIntroduction + std::string("## Rejected\n\n") + table_of(RuleKind::kRejects) + "## Decoded\n\n" +
+         table_of(RuleKind::kAccepts) +
+         "## Not mended\n\nThe decoder aligns a spoilt symbol with its letter. Each of these guards is the last that "
+         "kept "
+         "it from that; another rule decides on it.\n\n" +
          table_of(RuleKind::kGuards);
 }
 

@@ -44,7 +44,7 @@ Result<Row> report_grid(std::vector<Misled>& readers, const ReportOptions& optio
 Result<int> report(const ReportOptions& options, RuleTrial& trial) {
   std::vector<Misled> readers;
   for (const int symbol_size_px : {16, 8}) {
-    auto reader = Misled::of(symbol_size_px, &trial);
+    auto reader = Misled::of(symbol_size_px, &trial, options.wrong_cells_max);
     if (!reader) return tl::unexpected(reader.error());
     readers.push_back(std::move(*reader));
   }
@@ -63,8 +63,7 @@ Result<int> report(const ReportOptions& options, RuleTrial& trial) {
 }  // namespace slsd::adversary
 
 // adversary-report [FRAMES] [--kept-out] [--clean] [--first N] [--kind K] [--without RULE]... [--each-rule]
-// [--inference
-// [--margin NATS]] [--frame N [--picture FILE.pgm]]
+// [--wrong-cells MAX] [--frame N [--picture FILE.pgm]]
 int main(int count, char** arguments) {
   slsd::adversary::ReportOptions options;
   int frames = 1000, number = -1;
@@ -91,10 +90,8 @@ int main(int count, char** arguments) {
         return 2;
       }
       trial.off.set(static_cast<std::size_t>(*rule));
-    } else if (std::strcmp(arguments[i], "--inference") == 0) {
-      trial.infers = true;
-    } else if (std::strcmp(arguments[i], "--margin") == 0 && more) {
-      trial.margin_min = static_cast<float>(std::atof(arguments[++i]));
+    } else if (std::strcmp(arguments[i], "--wrong-cells") == 0 && more) {
+      options.wrong_cells_max = std::atof(arguments[++i]);
     } else if (std::strcmp(arguments[i], "--each-rule") == 0) {
       each_rule = true;
     } else {

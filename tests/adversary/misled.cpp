@@ -6,7 +6,7 @@
 
 namespace slsd::adversary {
 
-Result<Misled> Misled::of(int symbol_size_px, RuleTrial* trial) {
+Result<Misled> Misled::of(int symbol_size_px, RuleTrial* trial, double wrong_cells_max) {
   PatternOptions options{.symbol_size_px = symbol_size_px, .spacing_px = 2};
   const auto pattern = make_pattern(options);
   if (!pattern) return tl::unexpected(pattern.error());
@@ -16,8 +16,9 @@ Result<Misled> Misled::of(int symbol_size_px, RuleTrial* trial) {
   Misled misled{FrameMaker(*pattern, foreign->array), {}};
   const IndexedPattern indexed(*pattern);
   for (const auto& [nearest, farthest] : {std::pair(350., 3200.), {400., 2500.}, {1500., 2500.}}) {
-    auto decoder = Decoder::create(indexed, misled.maker.calibration(), 0,
-                                   {.depth_min_mm = nearest, .depth_max_mm = farthest, .trial = trial});
+    auto decoder = Decoder::create(
+        indexed, misled.maker.calibration(), 0,
+        {.depth_min_mm = nearest, .depth_max_mm = farthest, .wrong_cells_max = wrong_cells_max, .trial = trial});
     if (!decoder) return tl::unexpected(decoder.error());
     misled.decoders.push_back(std::move(*decoder));
   }

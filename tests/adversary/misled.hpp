@@ -18,9 +18,11 @@ struct Misled {
   FrameMaker maker;
   std::vector<Decoder> decoders;  ///< one to each of three working depths
 
-  /// @param trial  of all decoders; outlives them
+  /// @param trial            of all decoders; outlives them
+  /// @param wrong_cells_max  see DecodeOptions
   /// @errors as make_pattern() and Decoder::create()
-  [[nodiscard]] static Result<Misled> of(int symbol_size_px, RuleTrial* trial = nullptr);
+  [[nodiscard]] static Result<Misled> of(int symbol_size_px, RuleTrial* trial = nullptr,
+                                         double wrong_cells_max = DecodeOptions().wrong_cells_max);
 };
 
 }  // namespace slsd::adversary

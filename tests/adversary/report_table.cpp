@@ -57,8 +57,12 @@ void print(std::string_view name, const Row& row) {
 void tell(const ReportOptions& options, int kind, int number, const Grey8& image, const Decoding& decoding,
           const std::vector<CloudPoint>& wrong_points) {
   for (const CloudPoint& point : wrong_points) {
-    std::fprintf(stderr, "wrong: --kind %d --frame %d: row %d, column %d at (%.1f, %.1f) px\n", kind, number, point.row,
-                 point.column, point.camera_u, point.camera_v);
+    const auto symbol = std::ranges::find_if(decoding.regions, [&](const RegionSeen& region) {
+      return region.row == point.row && region.column == point.column;
+    });
+    std::fprintf(stderr, "wrong: --kind %d --frame %d: row %d, column %d at (%.1f, %.1f) px, %s by %.1f nats\n", kind,
+                 number, point.row, point.column, point.camera_u, point.camera_v,
+                 std::string(to_string(symbol->rule)).c_str(), symbol->margin_nats);
   }
   if (options.picture != nullptr) write_pgm(image, options.picture);
   if (!options.single) return;

@@ -28,6 +28,7 @@ struct ReportOptions {
   int first = 0;       ///< number of each kind's first frame: those of another number are other frames
   int only_kind = -1;  ///< below 0: all kinds
   bool kept_out = false;
+  double wrong_cells_max = DecodeOptions().wrong_cells_max;
   bool clean = false;   ///< scenes in the best of light
   bool single = false;  ///< tells why a single frame's regions gave no point
   const char* picture = nullptr;

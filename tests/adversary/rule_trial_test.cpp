@@ -65,7 +65,7 @@ TEST_F(Trial, ARuleThatWasNotMetChangesNothing) {
 }
 
 TEST(RuleNames, OfRulesWithASwitchAreKnown) {
-  EXPECT_EQ(*rule_named("notch"), DecodeRule::kNotch);
+  EXPECT_EQ(*rule_named("cell_twice"), DecodeRule::kCellTwice);
   EXPECT_FALSE(rule_named("no_window")) << "nothing names a cell then";
   EXPECT_EQ(rule_named("nonsense").error().code, ErrorCode::kNotFound);
 }

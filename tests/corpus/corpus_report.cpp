@@ -70,11 +70,12 @@ Result<> print_report() {
   return {};
 }
 
-/// What became of the regions that gave no point, the commonest first.
+/// The rules that decided on the regions that gave no point, and the guards that kept them so, the commonest first.
 std::string reasons(const Decoding& decoding) {
   std::vector<std::pair<std::uint32_t, std::string>> counts;
-  for (int i = 1; i < kRegionStatusCount; ++i)
-    counts.emplace_back(decoding.counts[i], to_string(static_cast<RegionStatus>(i)));
+  for (std::size_t i = 0; i < kDecodeRuleCount; ++i)
+    if (text_of(decode_rule(i)).kind != RuleKind::kAccepts)
+      counts.emplace_back(decoding.rules[i], to_string(decode_rule(i)));
   std::ranges::sort(counts, std::greater<>());
   std::string text;
   for (const auto& [count, reason] : counts)
@@ -126,10 +127,7 @@ int main(int argc, char** argv) {
   auto* const folders_given =
       app.add_option("folders", folders, "each with the files of a scene; without any the corpus");
   app.add_flag("--texture", options.texture, "divide out their white/frame.png")->needs(folders_given);
-  slsd::RuleTrial trial;
-  app.add_flag("--inference", trial.infers, "cells by the inference in place of the rules")->needs(folders_given);
-  app.add_option("--margin", trial.margin_min, "nats that it asks for")->needs(folders_given);
-  options.decode.trial = &trial;
+  app.add_option("--wrong-cells", options.decode.wrong_cells_max, "that a frame may have")->needs(folders_given);
   app.add_option("--depth-max", options.decode.depth_max_mm, "mm, for scenes beyond the usual working depth")
       ->needs(folders_given);
   CLI11_PARSE(app, argc, argv);

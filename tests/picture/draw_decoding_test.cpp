@@ -139,13 +139,13 @@ TEST(DrawDecoding, StandsRegionsOutsideTheFrameAndNone) {
 
 TEST(DrawDecoding, ShowsReasonsInTheColoursOfTheirRules) {
   Scene scene = scene_of({"a-+ + b"});
-  scene.decoding.regions[1].rule = DecodeRule::kTorn, scene.decoding.regions[2].rule = DecodeRule::kNotch;
-  for (const DecodeRule rule : {DecodeRule::kTorn, DecodeRule::kNotch})
+  scene.decoding.regions[1].rule = DecodeRule::kTorn, scene.decoding.regions[2].rule = DecodeRule::kUncertain;
+  for (const DecodeRule rule : {DecodeRule::kTorn, DecodeRule::kUncertain})
     scene.decoding.rules[static_cast<std::size_t>(rule)] = 1;
   const ColourImage picture = draw_decoding(scene.frame.view(), scene.decoding, scene.pattern, DecodingLook::kReasons);
   EXPECT_TRUE(has(picture, 2 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kTorn)));
-  EXPECT_FALSE(has(picture, 2 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kNotch)));
-  EXPECT_TRUE(has(picture, 3 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kNotch)));
+  EXPECT_FALSE(has(picture, 2 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kUncertain)));
+  EXPECT_TRUE(has(picture, 3 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kUncertain)));
   EXPECT_FALSE(has(picture, kPitchPx, kPitchPx, letter_colour(0))) << "letters would hide what is asked for";
   EXPECT_FALSE(has(picture, 3 * kPitchPx / 2, kPitchPx, kLinkColour));
   scene.decoding.rules = {};

@@ -173,7 +173,7 @@ float LetterAligner::support_beside_print(const LetterScene& scene, const AskedL
   return std::max(asked.task.support, shares_of_cell(scene, asked).agree_beside_print());
 }
 
-void LetterAligner::take_over(const LetterScene& scene, const AskedLetter& asked, DecodeRule by) const {
+void LetterAligner::take_over(const LetterScene& scene, const AskedLetter& asked) const {
   const auto& [node, place, task, centre_px, centroid_px, tilt_px] = asked;
   Sightings& seen = scene.seen;
   seen.nodes[node].centre_px = centre_px;
@@ -183,7 +183,14 @@ void LetterAligner::take_over(const LetterScene& scene, const AskedLetter& asked
   moments.background = task.state.offset, moments.peak = task.state.offset + task.state.gain;
   const float camera_px = std::sqrt(std::abs(place.frame.determinant()));
   seen.misfits[node] = std::sqrt(kMisfitSquaredPerPx * sigma_px(task) * camera_px);
-  seen.claims[node].decide(by);
+  seen.claims[node].decide(DecodeRule::kMended);
+  // What an edge leaves of a symbol may be the letter of either side.
+  constexpr float kDistanceWhole = 2.5F, kDistanceAtEdge = 4;
+  const bool at_edge = shows_other_light(scene, asked) || support_beside_print(scene, asked) < kWholeBesidePrintMin;
+  seen.aligned[node] = at_edge ? Aligned::kAtEdge : Aligned::kWhole;
+  seen.nodes[node].torn = at_edge;
+  seen.shapes[node] = Classification::of_letter(letter_of(seen.claims[node]), array_.letters,
+                                                at_edge ? kDistanceAtEdge : kDistanceWhole);
 }
 
 }  // namespace slsd

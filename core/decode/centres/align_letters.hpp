@@ -95,8 +95,8 @@ class LetterAligner {
   [[nodiscard]] bool shows_other_light(const LetterScene& scene, const AskedLetter& asked) const;
   /// How much of the window agrees, or of the cell, where print does not count.
   [[nodiscard]] float support_beside_print(const LetterScene& scene, const AskedLetter& asked) const;
-  /// Decodes the sighting with what was found.
-  void take_over(const LetterScene& scene, const AskedLetter& asked, DecodeRule by) const;
+  /// Gives the sighting what was found: it shows its letter then, and stands for now.
+  void take_over(const LetterScene& scene, const AskedLetter& asked) const;
 
  private:
   CodeArray array_;
@@ -110,6 +110,8 @@ class LetterAligner {
 inline constexpr float kAlignedAcrossMaxPx = 0.4F, kAlignedSettledPx = 0.05F;
 /// Parts of two surfaces look tilted more, and the place is then on neither.
 inline constexpr float kAlignedTiltMaxPx = 0.5F;
+/// So much of a cell agrees, where print does not count, unless an edge runs through it.
+inline constexpr float kWholeBesidePrintMin = 0.85F;
 /// What has one alone beside it lies nearer to its line, and is seen better, where print does not count.
 inline constexpr float kLoneAcrossMaxPx = 0.2F, kLoneSupportMin = 0.85F;
 

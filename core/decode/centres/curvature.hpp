@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "core/decode/grid/decode_windows.hpp"
 #include "core/decode/grid/link_grid.hpp"
+#include "core/decode/grid/sightings.hpp"
 #include "core/decode/lattice.hpp"
 #include "core/decode/symbols/grey_moments.hpp"
 #include "core/decode/symbols/prototypes.hpp"

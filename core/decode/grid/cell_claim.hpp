@@ -8,7 +8,7 @@
 
 namespace slsd {
 
-/// How near a symbol lies to where its island's steps lead: off it, as near as on one surface, or so near that another
+/// How near a symbol lies to where the steps beside it lead: off it, as near as on one surface, or so near that another
 /// surface hardly ever is.
 enum class GridFit : std::uint8_t { kNone, kLoose, kTight };
 
@@ -20,13 +20,11 @@ inline constexpr float kOffGridSlip = 0.1F;
 /// A cell of the pattern that a node was found to be, and how well its surroundings speak for it.
 struct CellClaim {
   std::int16_t row = -1, column = -1;
-  float evidence = 0;  ///< log-likelihood of the window's shapes at this cell against chance, natural logarithm;
-                       ///< weighed where another claims the cell too
+  float margin_nats = 0;  ///< nats by which its cell is likelier than any other, up to what it needs
   RegionStatus status = RegionStatus::kNoNeighbour;  ///< kDecoded, or why not; decide() alone writes it
-  std::int32_t island = -1;                          ///< that it is part of: see IslandJudge
   GridFit grid_fit = GridFit::kTight;                ///< of one at a rim; inside all are
   DecodeRule rule = DecodeRule::kNoNeighbour;        ///< that decided on the status
-  DecodeRule guard = DecodeRule::kWindows;           ///< the last that kept it from being brought back, or kWindows
+  DecodeRule guard = DecodeRule::kCertain;           ///< the last that kept it from being mended, or kCertain
 
   struct Cell {
     int row, column;
@@ -37,7 +35,7 @@ struct CellClaim {
   };
 
   void decide(DecodeRule by) { status = text_of(by).gives, rule = by; }
-  /// @return  whether the guard lets it be brought back
+  /// @return  whether the guard lets it be mended
   bool pass(const Rules& rules, DecodeRule by, bool holds) {
     const bool stopped = rules.apply(by, !holds);
     if (stopped) guard = by;

@@ -35,8 +35,10 @@ class CellGate {
   }
   /// Whether what is so far off lies on its epipolar line, at whatever depth.
   [[nodiscard]] bool on_line(double residual_px) const { return std::abs(residual_px) <= tolerance_px_; }
-  /// Which way a node's epipolar line leads past a cell: cells to the right and down, of length one.
+  /// Which way a node's epipolar line leads past a cell: cells to the right and down, of length one. Lines that are not
+  /// known are taken for rows.
   [[nodiscard]] Eigen::Vector2f way_of_line(std::int32_t node, int row, int column) const {
+    if (segments_.empty()) return {1, 0};
     const auto off_line = [&](int r, int c) { return segments_[node].residual_px(cells_.ray(r, c).direction); };
     const int down = row + 1 < cells_.rows() ? 1 : -1, right = column + 1 < cells_.columns() ? 1 : -1;
     const double here = off_line(row, column);
@@ -45,31 +47,6 @@ class CellGate {
         .cast<float>();
   }
   [[nodiscard]] bool knows_lines() const { return !segments_.empty(); }
-  /// Calls visit(row, column) for the cells that a node can be, found from one that lies on its epipolar line, which is
-  /// left out: the line is followed from row to row or from column to column, whichever are more.
-  template <class Visit>
-  void visit_line(std::int32_t node, int row, int column, Visit&& visit) const {
-    const auto off_line = [&](int r, int c) {
-      return std::abs(segments_[node].residual_px(cells_.ray(r, c).direction));
-    };
-    const auto change = [&](int down, int right) {
-      const bool forth = row + down < cells_.rows() && column + right < cells_.columns();
-      return off_line(forth ? row + down : row - down, forth ? column + right : column - right);
-    };
-    const int down = change(1, 0) < change(0, 1) ? 1 : 0, right = 1 - down;
-    for (const int way : {1, -1}) {
-      int r = row + way * down, c = column + way * right;
-      for (; r >= 0 && c >= 0 && r < cells_.rows() && c < cells_.columns(); r += way * down, c += way * right) {
-        for (const int aside : {-1, 1}) {
-          const int beside_row = r + aside * right, beside_column = c + aside * down;
-          if (beside_row < 0 || beside_column < 0 || beside_row >= cells_.rows() || beside_column >= cells_.columns())
-            continue;
-          if (off_line(beside_row, beside_column) < off_line(r, c)) r = beside_row, c = beside_column;
-        }
-        if (admits(node, r, c)) visit(r, c);
-      }
-    }
-  }
   /// Calls visit(row, column) for the cells that a node can be, one to each column, or to each row, that its epipolar
   /// line crosses.
   /// @param astray_px  how much farther from its line than others the node may lie
@@ -102,14 +79,6 @@ class CellGate {
   /// From cell to cell, projector px.
   [[nodiscard]] double pitch_px() const {
     return cells_.rows() > 1 ? (cells_.pixel(1, 0) - cells_.pixel(0, 0)).y() : 0;
-  }
-  /// Calls visit(row, column) for every cell that a node can be; with `anywhere` for every cell.
-  template <class Visit>
-  void visit(std::int32_t node, bool anywhere, Visit&& visit) const {
-    for (int row = 0; row < cells_.rows(); ++row) {
-      for (int column = 0; column < cells_.columns(); ++column)
-        if (anywhere || admits(node, row, column)) visit(row, column);
-    }
   }
 
  private:

@@ -5,12 +5,24 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/decode/grid/decode_windows.hpp"
+#include "core/decode/grid/cell_claim.hpp"
 #include "core/decode/grid/link_grid.hpp"
 #include "core/decode/symbols/classify.hpp"
 #include "core/decode/symbols/grey_moments.hpp"
 
 namespace slsd {
+
+/// Whether the place of a symbol comes from aligning its letter with the frame, and what its cell shows.
+enum class Aligned : std::uint8_t {
+  kNot,
+  kPrinted,  ///< not aligned, but its cell is not lit where its letter is dark: print may have torn it
+  kWhole,    ///< aligned, and whole but for print
+  kAtEdge,   ///< aligned, but a part of it is missing, or lit where its letter is dark, as at an edge in depth
+};
+
+[[nodiscard]] constexpr bool is_aligned(Aligned how) {
+  return how == Aligned::kWhole || how == Aligned::kAtEdge;
+}
 
 /// The regions that may be symbols, and what the stages find out about them: one entry to each, at the same index.
 struct Sightings {
@@ -19,10 +31,13 @@ struct Sightings {
   std::vector<Classification> shapes;
   std::vector<GridNode> nodes;
   std::vector<CellClaim> claims;
+  std::vector<Aligned> aligned;
   std::vector<float> misfits;  ///< of each from its cell's letter, standard deviations, where review measured it
 
   [[nodiscard]] std::size_t size() const { return region.size(); }
-  void clear() { region.clear(), moments.clear(), shapes.clear(), nodes.clear(), claims.clear(), misfits.clear(); }
+  void clear() {
+    region.clear(), moments.clear(), shapes.clear(), nodes.clear(), claims.clear(), aligned.clear(), misfits.clear();
+  }
 };
 
 }  // namespace slsd

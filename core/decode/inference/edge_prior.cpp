@@ -67,6 +67,7 @@ void EdgePrior::measure(const NodesSeen& seen, const LetterEvidence& letters) {
         continue;
       }
       const bool own = seen.nodes[i].broken[d] || contradicts(seen, letters, static_cast<std::int32_t>(i), other, d);
+      if (seen.aligned[i] == Aligned::kPrinted || seen.aligned[other] == Aligned::kPrinted) continue;
       const float share = own ? 1 : seen.nodes[other].torn ? kTornIsCut : 0;
       counts_[i].links[d % 2] += 1, counts_[i].cut[d % 2] += share;
       links += 1, cut += share;

@@ -13,56 +13,33 @@ constexpr float kMisreadNats = -2;  // nats: such a shape is none of the surface
 constexpr float kGoesOn = 0.5F;     // nats that hold a link beside a cut one: edges go on straight
 constexpr float kLineMore = 0.1F;   // nats that each further link of a straight edge costs
 constexpr float kSideMore = 2;      // the same of each further side that is cut: edges turn corners and come in pairs
-constexpr float kPrintedLightMax = 1.2F;  // of the light of its neighbours: print takes light
-constexpr float kPrintedMax = 0.06F;      // of a cell that print lights
-constexpr float kAgainstMax = 9;          // nats
-constexpr float kSlipKnown = 1;           // nats: the link beside shows that no edge comes that way
-constexpr int kSideLinks = 8;             // that a side counts at most
-constexpr float kUsualPlaces = 40;        // on an epipolar line, for which the threshold was measured
+constexpr float kAgainstMax = 9;    // nats
+constexpr float kSlipKnown = 1;     // nats: the link beside shows that no edge comes that way
+constexpr int kSideLinks = 8;       // that a side counts at most
+constexpr float kUsualPlaces = 40;  // on an epipolar line, for which the threshold was measured
 
 bool is_along_row(Direction d) {
   return d == kRight || d == kLeft;
 }
 
+/// Ten times fewer wrong cells cost log(10) nats, up to what a symbol inside a surface has.
+float margin_min_of(double wrong_cells_max) {
+  constexpr float kMarginOfBudget = 8, kMarginMax = 14;  // nats
+  constexpr double kBudget = 0.001;
+  return std::clamp(kMarginOfBudget + static_cast<float>(std::log(kBudget / wrong_cells_max)), 0.F, kMarginMax);
+}
+
 }  // namespace
 
-CellInference::CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook)
+CellInference::CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max)
     : grid_{codebook->rows(), codebook->columns()},
       proposer_(pattern.array, codebook),
       letters_(pattern.array, grid_),
       links_(static_cast<float>(pattern.pitch_px())),
-      pitch_px_(static_cast<float>(pattern.pitch_px())) {}
+      margin_min_(margin_min_of(wrong_cells_max)) {}
 
 NodesSeen CellInference::view_of(const Sightings& seen) const {
-  return {seen.nodes, beside_, seen.moments, labels_};
-}
-
-/// Finds the torn symbols that print tore, each at the place where its whole neighbours put it.
-void CellInference::find_printed(const Sightings& seen, const OtherLight& light) {
-  printed_.assign(seen.size(), 0);
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (seen.shapes[i].is_well_seen()) continue;
-    OtherLight::Place place{Eigen::Vector2f::Zero(), Eigen::Matrix2f::Zero(), 0, 0};
-    std::int32_t cell = -1;
-    float held_by = 0;
-    for (const Direction d : kDirections) {
-      const std::int32_t other = beside_[i][d];
-      if (other < 0 || !seen.shapes[other].is_well_seen()) continue;
-      const std::int32_t here = grid_.beyond(labels_[other], opposite(d));
-      if (here < 0 || (cell >= 0 && here != cell)) continue;
-      cell = here, held_by += 1;
-      const GridNode& from = seen.nodes[other];
-      place.centre_px += from.centre_px - from.frame * (pitch_px_ * step(d));
-      place.frame += from.frame;
-      place.background += seen.moments[other].background, place.peak += seen.moments[other].peak;
-    }
-    if (held_by == 0) continue;
-    place = {place.centre_px / held_by, place.frame / held_by, place.background / held_by, place.peak / held_by};
-    const float share = light.share(letters_.letter_of(cell), place);
-    const float contrast = seen.moments[i].peak - seen.moments[i].background;
-    const bool is_brighter = contrast > kPrintedLightMax * (place.peak - place.background);
-    printed_[i] = share >= 0 && share < kPrintedMax && !is_brighter;
-  }
+  return {seen.nodes, beside_, seen.moments, seen.aligned, labels_};
 }
 
 void CellInference::drop_misread() {
@@ -200,28 +177,6 @@ void CellInference::measure_margins() {
   }
 }
 
-/// Nodes whose links lead from cell to cell.
-void CellInference::find_islands() {
-  island_.assign(labels_.size(), -1);
-  std::int32_t islands = 0;
-  for (std::size_t first = 0; first < labels_.size(); ++first) {
-    if (proposed_[first] < 0 || island_[first] >= 0) continue;
-    queue_.assign(1, static_cast<std::int32_t>(first));
-    island_[first] = islands;
-    for (std::size_t next = 0; next < queue_.size(); ++next) {
-      const std::int32_t node = queue_[next];
-      for (const Direction d : kDirections) {
-        const std::int32_t other = beside_[node][d];
-        if (other < 0 || island_[other] >= 0 || proposed_[other] < 0) continue;
-        if (proposed_[other] != grid_.beyond(proposed_[node], d)) continue;
-        island_[other] = islands;
-        queue_.push_back(other);
-      }
-    }
-    ++islands;
-  }
-}
-
 /// Of a node at a rim; another surface fits tightly in one of sixty cases at most.
 GridFit CellInference::grid_fit(std::size_t node) const {
   float most = 0;
@@ -240,34 +195,26 @@ GridFit CellInference::grid_fit(std::size_t node) const {
 }
 
 /// Names the rule that accepts or rejects a node whose cell was proposed.
-DecodeRule CellInference::decide(const CellGate& gate, const Classification& shape, std::size_t node) const {
+DecodeRule CellInference::rule_of(const CellGate& gate, const Sightings& seen, std::size_t node) const {
   const int row = grid_.row_of(proposed_[node]), column = grid_.column_of(proposed_[node]);
+  const Classification& shape = seen.shapes[node];
   const bool speaks = labels_[node] >= 0 && nats_[node] > 0;
   if (shape.letter < 0) return DecodeRule::kNoLetter;
   if (!speaks && shape.is_well_seen()) return DecodeRule::kOtherLetter;
-  if (margins_[node] < margin_max_) return DecodeRule::kHeldByFew;
-  if (!speaks) return DecodeRule::kTorn;
+  if (margins_[node] < margin_max_) return DecodeRule::kUncertain;
+  if (!speaks && !is_aligned(seen.aligned[node])) return DecodeRule::kTorn;
   if (!gate.on_line(gate.residual_px(static_cast<std::int32_t>(node), row, column))) return DecodeRule::kCellOffLine;
   if (!gate.admits(static_cast<std::int32_t>(node), row, column)) return DecodeRule::kCellOutOfRange;
-  return DecodeRule::kWindows;
+  return is_aligned(seen.aligned[node]) ? DecodeRule::kMended : DecodeRule::kCertain;
 }
 
 void CellInference::claim_cells(const CellGate& gate, Sightings& seen) const {
-  seen.claims.assign(seen.size(), {});
-  seen.misfits.assign(seen.size(), std::numeric_limits<float>::infinity());
   for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (proposed_[i] < 0) continue;
     CellClaim& claim = seen.claims[i];
-    if (proposed_[i] < 0) {
-      const bool is_linked = std::ranges::any_of(beside_[i], [](std::int32_t other) { return other >= 0; });
-      claim.decide(is_linked ? DecodeRule::kNoWindow : DecodeRule::kNoNeighbour);
-      continue;
-    }
-    claim.row = static_cast<std::int16_t>(grid_.row_of(proposed_[i]));
-    claim.column = static_cast<std::int16_t>(grid_.column_of(proposed_[i]));
-    claim.island = island_[i];
-    claim.evidence = margins_[i];
+    claim.margin_nats = margins_[i];
     claim.grid_fit = grid_fit(i);
-    claim.decide(decide(gate, seen.shapes[i], i));
+    claim.decide(rule_of(gate, seen, i));
   }
 }
 
@@ -280,25 +227,44 @@ void CellInference::fill_flow() {
   join_lines();
 }
 
-void CellInference::infer(const CellGate& gate, float margin_min, const OtherLight& light, Executor& executor,
-                          Sightings& seen) {
-  const float cells = static_cast<float>(grid_.rows) * static_cast<float>(grid_.columns);
-  margin_max_ = margin_min + (gate.knows_lines() ? 0 : std::log(std::max(1.F, cells / kUsualPlaces)));
+void CellInference::propose(const CellGate& gate, Executor& executor, Sightings& seen) {
   find_beside(seen.nodes, beside_);
-  proposer_.propose(beside_, seen.shapes, gate, executor, proposed_);
+  proposer_.propose(seen.nodes, beside_, seen.shapes, gate, executor, proposed_);
+  seen.claims.assign(seen.size(), {});
+  seen.aligned.assign(seen.size(), Aligned::kNot);
+  seen.misfits.assign(seen.size(), std::numeric_limits<float>::infinity());
+  letters_.look_at(seen.shapes, seen.aligned);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    CellClaim& claim = seen.claims[i];
+    if (proposed_[i] < 0) {
+      const bool is_linked = std::ranges::any_of(beside_[i], [](std::int32_t other) { return other >= 0; });
+      claim.decide(is_linked ? DecodeRule::kNoWindow : DecodeRule::kNoNeighbour);
+      continue;
+    }
+    claim.row = static_cast<std::int16_t>(grid_.row_of(proposed_[i]));
+    claim.column = static_cast<std::int16_t>(grid_.column_of(proposed_[i]));
+    const bool speaks = letters_.of(static_cast<std::int32_t>(i), proposed_[i]) > 0;
+    const bool is_well_seen = seen.shapes[i].is_well_seen();
+    if (speaks) seen.misfits[i] = seen.shapes[i].distance;
+    claim.decide(!is_well_seen ? DecodeRule::kTorn : speaks ? DecodeRule::kCertain : DecodeRule::kOtherLetter);
+  }
+}
+
+void CellInference::decide(const CellGate& gate, Sightings& seen) {
+  const float cells = static_cast<float>(grid_.rows) * static_cast<float>(grid_.columns);
+  margin_max_ = margin_min_ + (gate.knows_lines() ? 0 : std::log(std::max(1.F, cells / kUsualPlaces)));
+  find_beside(seen.nodes, beside_);  // what was mended has other links
   labels_ = proposed_;
   nats_.resize(labels_.size());
-  letters_.look_at(seen.shapes);
+  letters_.look_at(seen.shapes, seen.aligned);
   links_.measure(view_of(seen), letters_, gate);
-  find_printed(seen, light);
-  letters_.measure_torn(beside_, labels_, printed_);
+  letters_.measure_torn(beside_, labels_);
   drop_misread();
   prior_.measure(view_of(seen), letters_);
   set_capacities();
   fill_flow();
   draw_contradictions();
   measure_margins();
-  find_islands();
   claim_cells(gate, seen);
 }
 

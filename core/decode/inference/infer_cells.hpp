@@ -16,7 +16,6 @@
 #include "core/decode/inference/edge_prior.hpp"
 #include "core/decode/inference/evidence_flow.hpp"
 #include "core/decode/inference/letter_evidence.hpp"
-#include "core/decode/inference/other_light.hpp"
 #include "core/decode/inference/propose_cells.hpp"
 #include "core/decode/inference/surface_links.hpp"
 #include "core/executor.hpp"
@@ -32,18 +31,20 @@ namespace slsd {
 /// @thread thread-bound: keeps its buffers
 class CellInference {
  public:
-  /// @param codebook  of the part of the pattern's array that is shown
-  CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook);
+  /// @param codebook         of the part of the pattern's array that is shown
+  /// @param wrong_cells_max  that a frame may have, in expectation
+  CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max);
 
-  /// @param margin_min  nats that a symbol needs with a calibration; without one, in which every cell is possible, it
-  ///                    needs as many more as there are more cells
-  /// @param light       tells print from edges in torn symbols
-  /// @param seen        in: nodes, shapes and moments; out: claims, whose evidence is the margin up to that threshold
-  void infer(const CellGate& gate, float margin_min, const OtherLight& light, Executor& executor, Sightings& seen);
+  /// Names a cell for each node that has one, and decides on none of them.
+  /// @param seen  in: nodes and shapes; out: claims, of which those stand for now that show their letters well
+  void propose(const CellGate& gate, Executor& executor, Sightings& seen);
+  /// Decides on what was proposed.
+  /// @param seen  in: nodes, shapes, moments, and what was aligned; out: claims, with their margins up to the
+  ///              threshold
+  void decide(const CellGate& gate, Sightings& seen);
 
  private:
   [[nodiscard]] NodesSeen view_of(const Sightings& seen) const;
-  void find_printed(const Sightings& seen, const OtherLight& light);
   void drop_misread();
   void set_capacities();
   [[nodiscard]] float rival_nats(std::size_t node, Direction d) const;
@@ -53,8 +54,7 @@ class CellInference {
   void draw_contradictions();
   [[nodiscard]] EvidenceFlow::Budget budget_of(std::size_t node) const;
   void measure_margins();
-  void find_islands();
-  [[nodiscard]] DecodeRule decide(const CellGate& gate, const Classification& shape, std::size_t node) const;
+  [[nodiscard]] DecodeRule rule_of(const CellGate& gate, const Sightings& seen, std::size_t node) const;
   void claim_cells(const CellGate& gate, Sightings& seen) const;
   [[nodiscard]] GridFit grid_fit(std::size_t node) const;
 
@@ -64,15 +64,13 @@ class CellInference {
   SurfaceLinks links_;
   EdgePrior prior_;
   EvidenceFlow flow_;
-  float pitch_px_, margin_max_ = 0;
+  float margin_min_, margin_max_ = 0;
   std::vector<Beside> beside_;
   std::vector<std::int32_t> proposed_, labels_;  // cells; labels without the misread ones
-  std::vector<std::uint8_t> printed_;
-  std::vector<float> rivals_;          // of each node: the nats of another cell that a neighbour names
-  std::vector<float> nats_, margins_;  // of each node: of its own letter, and of its cell
+  std::vector<float> rivals_;                    // of each node: the nats of another cell that a neighbour names
+  std::vector<float> nats_, margins_;            // of each node: of its own letter, and of its cell
   std::vector<std::array<float, 4>> capacity_, against_;  // of each link, at the start
   std::vector<float> line_capacity_;
-  std::vector<std::int32_t> island_, queue_;
 };
 
 }  // namespace slsd

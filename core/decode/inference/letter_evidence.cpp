@@ -27,19 +27,20 @@ LetterEvidence::LetterEvidence(const CodeArray& array, CellGrid grid)
       letters_.push_back(static_cast<std::uint8_t>(array.at(row, column)));
 }
 
-LetterEvidence::Wholeness LetterEvidence::wholeness_of(const Classification& shape) {
+/// What aligned alone is whole but for print.
+LetterEvidence::Wholeness LetterEvidence::wholeness_of(std::size_t node) const {
+  if (aligned_[node] != Aligned::kNot) return aligned_[node] == Aligned::kAtEdge ? kTorn : kWhole;
+  const Classification& shape = shapes_[node];
   if (shape.is_well_seen()) return kWhole;
   return shape.distance < kTornDistance ? kDoubtful : kTorn;
 }
 
-void LetterEvidence::look_at(std::span<const Classification> shapes) {
-  shapes_ = shapes;
-  printed_.assign(shapes.size(), 0);
+void LetterEvidence::look_at(std::span<const Classification> shapes, std::span<const Aligned> aligned) {
+  shapes_ = shapes, aligned_ = aligned;
   torn_nats_ = {};
 }
 
-void LetterEvidence::measure_torn(std::span<const Beside> beside, std::span<const std::int32_t> labels,
-                                  std::span<const std::uint8_t> printed) {
+void LetterEvidence::measure_torn(std::span<const Beside> beside, std::span<const std::int32_t> labels) {
   constexpr float kAgrees = 1;     // nats
   constexpr float kAsIfSeen = 20;  // symbols, one of them torn
   std::array<float, kWholenesses> count{};
@@ -50,13 +51,12 @@ void LetterEvidence::measure_torn(std::span<const Beside> beside, std::span<cons
       return other >= 0 && labels[other] >= 0 && labels[other] == grid_.beyond(labels[node], d) &&
              of(other, labels[other]) > kAgrees;
     });
-    if (is_amid) ++count[wholeness_of(shapes_[node])], ++amid;
+    if (is_amid) ++count[wholeness_of(node)], ++amid;
   }
   const auto nats = [&](Wholeness how, float at_edges) {
     return std::min(0.F, std::log((count[how] + 1) / (amid + kAsIfSeen) / at_edges));
   };
   torn_nats_ = {0, nats(kDoubtful, kDoubtfulAtEdges), nats(kTorn, kTornAtEdges)};
-  printed_.assign(printed.begin(), printed.end());
 }
 
 float LetterEvidence::of(std::int32_t node, std::int32_t cell) const {
@@ -65,8 +65,10 @@ float LetterEvidence::of(std::int32_t node, std::int32_t cell) const {
   const float share = shape.share_of(letter_of(cell), 1 / letter_count_);
   const float misread =
       std::ranges::find_if(kMisread, [&](const Misread& m) { return shape.distance < m.distance_max; })->share;
-  const float torn = printed_[static_cast<std::size_t>(node)] != 0 ? 0 : torn_nats_[wholeness_of(shape)];
-  return std::log((1 - misread) * share * letter_count_ + misread) + torn;
+  const float torn = torn_nats_[wholeness_of(static_cast<std::size_t>(node))];
+  const float nats = std::log((1 - misread) * share * letter_count_ + misread) + torn;
+  // What cannot be aligned where its neighbours put it may be another symbol.
+  return aligned_[static_cast<std::size_t>(node)] == Aligned::kPrinted ? std::min(0.F, nats) : nats;
 }
 
 }  // namespace slsd

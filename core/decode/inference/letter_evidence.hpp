@@ -9,6 +9,7 @@
 
 #include "core/code/code_array.hpp"
 #include "core/decode/grid/neighbourhood.hpp"
+#include "core/decode/grid/sightings.hpp"
 #include "core/decode/inference/cell_grid.hpp"
 #include "core/decode/symbols/classify.hpp"
 
@@ -25,11 +26,9 @@ class LetterEvidence {
   LetterEvidence(const CodeArray& array, CellGrid grid);
 
   /// Looks at a new frame, none of whose torn shapes speaks for an edge until measure_torn().
-  void look_at(std::span<const Classification> shapes);
+  void look_at(std::span<const Classification> shapes, std::span<const Aligned> aligned);
   /// @param labels   cells, one to a node
-  /// @param printed  one to a node: print tore it, which is no edge
-  void measure_torn(std::span<const Beside> beside, std::span<const std::int32_t> labels,
-                    std::span<const std::uint8_t> printed);
+  void measure_torn(std::span<const Beside> beside, std::span<const std::int32_t> labels);
 
   /// Nats for a cell of the grid; below 0 against it.
   [[nodiscard]] float of(std::int32_t node, std::int32_t cell) const;
@@ -40,13 +39,13 @@ class LetterEvidence {
  private:
   enum Wholeness : std::uint8_t { kWhole, kDoubtful, kTorn };
   static constexpr int kWholenesses = 3;
-  [[nodiscard]] static Wholeness wholeness_of(const Classification& shape);
+  [[nodiscard]] Wholeness wholeness_of(std::size_t node) const;
 
   CellGrid grid_;
   float letter_count_;
   std::vector<std::uint8_t> letters_;  // of each cell of the grid
   std::span<const Classification> shapes_;
-  std::vector<std::uint8_t> printed_;
+  std::span<const Aligned> aligned_;
   std::array<float, kWholenesses> torn_nats_{};
 };
 

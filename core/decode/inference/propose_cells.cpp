@@ -12,6 +12,8 @@ constexpr std::uint8_t kNoLetter = kMaxLetters;
 /// A window is certain with so many of its nine letters, and so much of the evidence that they can give.
 constexpr int kCertainLetters = 6;
 constexpr float kCertainShare = 0.85F;
+/// Of some forty cells on an epipolar line, the one beside that of a certain neighbour, nats.
+constexpr float kBesideCertain = 3.7F;
 /// How far off its line a shape may lie that is not whole, of the pitch of the cells.
 constexpr double kAstrayShare = 0.2;
 
@@ -104,24 +106,29 @@ void CellProposer::carry_on(const Frame& frame) {
   for (std::size_t i = 0; i < proposals_.size(); ++i) {
     if (proposals_[i].certain) continue;
     const auto node = static_cast<std::int32_t>(i);
-    const double astray_px = frame.shapes[i].is_well_seen() ? 0 : kAstrayShare * frame.gate.pitch_px();
+    const bool is_worn = !frame.shapes[i].is_well_seen();  // its centroid may lie elsewhere, and break its links
+    const double astray_px = is_worn ? kAstrayShare * frame.gate.pitch_px() : 0;
     for (const Direction d : kDirections) {
-      const std::int32_t other = frame.beside[i][d];
+      const std::int32_t other = is_worn ? frame.nodes[i].links[d] : frame.beside[i][d];
       if (other < 0) continue;
-      const std::int32_t cell = grid_.beyond(proposals_[static_cast<std::size_t>(other)].cell, opposite(d));
+      const Proposal& from = proposals_[static_cast<std::size_t>(other)];
+      const std::int32_t cell = grid_.beyond(from.cell, opposite(d));
       if (cell < 0 || cell == next_[i].cell) continue;
       if (!frame.gate.admits(node, grid_.row_of(cell), grid_.column_of(cell), astray_px)) continue;
-      if (const Proposal there = weigh(node, cell); next_[i].cell < 0 || there.nats > next_[i].nats) next_[i] = there;
+      Proposal there = weigh(node, cell);
+      if (is_worn && from.certain) there.nats += kBesideCertain;
+      if (next_[i].cell < 0 || there.nats > next_[i].nats) next_[i] = there;
     }
   }
   proposals_.swap(next_);
 }
 
-void CellProposer::propose(std::span<const Beside> beside, std::span<const Classification> shapes, const CellGate& gate,
-                           Executor& executor, std::vector<std::int32_t>& labels) {
+void CellProposer::propose(std::span<const GridNode> nodes, std::span<const Beside> beside,
+                           std::span<const Classification> shapes, const CellGate& gate, Executor& executor,
+                           std::vector<std::int32_t>& labels) {
   constexpr std::size_t kRange = 768;  // some rows of windows: most continue one of their range
   constexpr int kCarried = 3;          // links
-  const Frame frame{beside, shapes, gate};
+  const Frame frame{nodes, beside, shapes, gate};
   around_.resize(beside.size());
   proposals_.resize(beside.size());
   nats_.assign(1, {});

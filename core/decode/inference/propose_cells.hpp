@@ -26,11 +26,12 @@ class CellProposer {
   CellProposer(const CodeArray& array, std::shared_ptr<const Codebook> codebook);
 
   /// @param labels  becomes one cell to a node, or -1
-  void propose(std::span<const Beside> beside, std::span<const Classification> shapes, const CellGate& gate,
-               Executor& executor, std::vector<std::int32_t>& labels);
+  void propose(std::span<const GridNode> nodes, std::span<const Beside> beside, std::span<const Classification> shapes,
+               const CellGate& gate, Executor& executor, std::vector<std::int32_t>& labels);
 
  private:
   struct Frame {
+    std::span<const GridNode> nodes;
     std::span<const Beside> beside;
     std::span<const Classification> shapes;
     const CellGate& gate;

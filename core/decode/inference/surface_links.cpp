@@ -18,10 +18,11 @@ constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 constexpr std::size_t kSamplesMin = 20;
 /// Slips on one surface, cells: without a sample, and what their width is at least and at most.
 constexpr float kUsualSlip = 0.008F, kSlipMin = 0.002F, kSlipMax = 0.02F, kSlipWidthMax = 0.1F;
-constexpr float kSlipRange = 0.6F;  // of a step across an edge, cells
-constexpr float kNatsMin = -4;      // what a slip says against a link at most
+constexpr float kSlipRange = 0.6F;   // of a step across an edge, cells
+constexpr float kNatsMin = -4;       // what a slip says against a link at most
+constexpr float kLightNatsMin = -8;  // and what light says
 /// Light across an edge, standard deviation of its logarithm; and on one surface, its width at least and at most.
-constexpr float kLightAcross = 0.7F, kLightMin = 0.03F, kLightMax = 0.3F;
+constexpr float kLightAcross = 0.7F, kLightMin = 0.03F, kLightMax = 0.3F, kLightWidthMax = 0.5F;
 
 /// Density of Student's t with four degrees of freedom.
 float student(float x, float width) {
@@ -36,15 +37,14 @@ float normal(float x, float sigma) {
 
 }  // namespace
 
-/// Without a calibration the epipolar lines are taken for rows.
 void SurfaceLinks::measure_bends(const NodesSeen& seen, const CellGate& gate, const CellGrid& grid) {
   bends_.assign(seen.nodes.size(), {Eigen::Vector2f(kUnknown, kUnknown), Eigen::Vector2f(kUnknown, kUnknown)});
   for (std::size_t i = 0; i < seen.nodes.size(); ++i) {
     const GridNode& node = seen.nodes[i];
     const std::int32_t cell = seen.labels[i];
-    Eigen::Vector2f along(1, 0);
-    if (cell >= 0 && gate.knows_lines())
-      along = gate.way_of_line(static_cast<std::int32_t>(i), grid.row_of(cell), grid.column_of(cell));
+    if (cell < 0) continue;
+    const Eigen::Vector2f along =
+        gate.way_of_line(static_cast<std::int32_t>(i), grid.row_of(cell), grid.column_of(cell));
     const Eigen::Matrix2f cells_from_camera = node.frame.inverse() / pitch_px_;
     for (const Direction d : {kRight, kDown}) {
       const std::int32_t on = seen.beside[i][d], behind = seen.beside[i][opposite(d)];
@@ -80,7 +80,8 @@ void SurfaceLinks::measure_slips(const NodesSeen& seen, float least) {
         if (std::isnan(bend.x())) return;
         const std::int32_t behind = seen.beside[from][opposite(way)];
         if (seen.nodes[behind].torn) return;
-        const float before = bends_[behind][way % 2].x();
+        float before = bends_[behind][way % 2].x();
+        if (before * bend.x() < 0) before = 0;  // one symbol that is out of place bends its neighbours the other way
         const float variance =
             least * least + 0.5F * bend.y() * bend.y() + (std::isnan(before) ? 0.F : 0.25F * before * before);
         const float width = std::min(std::sqrt(variance), kSlipWidthMax);
@@ -125,11 +126,22 @@ void SurfaceLinks::add_light(const NodesSeen& seen, const CellGrid& grid) {
   if (sample_.size() < kSamplesMin) return;
   constexpr float kWidthOfMedian = 1.35F;  // of Student's t with four degrees of freedom: 1 / its quartile
   const float width = std::clamp(kWidthOfMedian * median_in_place(sample_), kLightMin, kLightMax);
+  constexpr float kOfBefore = 0.5F;  // towards a limb light falls faster from link to link
   for (std::size_t i = 0; i < seen.nodes.size(); ++i) {
     for (const Direction d : {kRight, kDown}) {
       const float by = difference(i, d);
       if (std::isnan(by)) continue;
-      const float nats = std::max(std::min(0.F, std::log(student(by, width) / normal(by, kLightAcross))), kNatsMin);
+      float most = -std::numeric_limits<float>::infinity();
+      const auto compare = [&](float before) {
+        if (before * by < 0) return;
+        const float as_before = std::min(std::hypot(width, kOfBefore * before), kLightWidthMax);
+        most = std::max(most, std::log(student(by, as_before) / normal(by, kLightAcross)));
+      };
+      compare(0);
+      const std::int32_t on = seen.beside[i][d], behind = seen.beside[i][opposite(d)];
+      if (behind >= 0 && !std::isnan(difference(behind, d))) compare(difference(behind, d));
+      if (!std::isnan(difference(on, d))) compare(difference(on, d));
+      const float nats = std::max(std::min(0.F, most), kLightNatsMin);
       nats_[i][d] += nats;
       nats_[seen.beside[i][d]][opposite(d)] += nats;
     }

@@ -20,6 +20,7 @@ struct NodesSeen {
   std::span<const GridNode> nodes;
   std::span<const Beside> beside;
   std::span<const GreyMoments> moments;
+  std::span<const Aligned> aligned;
   std::span<const std::int32_t> labels;  ///< cells, -1: none
 };
 

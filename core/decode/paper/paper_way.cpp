@@ -83,7 +83,7 @@ void PaperWay::decode_windows(int rows, int columns, Sightings& seen) const {
     claim.decide(letters[i] < 0 ? DecodeRule::kNoLetter : DecodeRule::kNoWindow);
     if (!cells[i] || cells[i]->row >= rows || cells[i]->column >= columns) continue;
     claim = {static_cast<std::int16_t>(cells[i]->row), static_cast<std::int16_t>(cells[i]->column)};
-    claim.decide(DecodeRule::kWindows);
+    claim.decide(DecodeRule::kCertain);
   }
 }
 

@@ -138,6 +138,16 @@ float Classification::share_of(int of_letter, float even) const {
   return std::clamp((mixed - doubt * even) / (1 - doubt), 0.F, 1.F);
 }
 
+Classification Classification::of_letter(int letter, int letters, float distance) {
+  const float even = 1 / static_cast<float>(letters);
+  Classification known;
+  known.letter = static_cast<std::int8_t>(letter), known.distance = distance, known.likelihood = 1;
+  const float doubt = std::clamp(kDoubtMin + kDoubtSlope * (distance - kDoubtFrom), kDoubtMin, kDoubtMax);
+  for (int other = 0; other < letters; ++other)
+    known.log_probability[static_cast<std::size_t>(other)] = std::log(doubt * even + (other == letter ? 1 - doubt : 0));
+  return known;
+}
+
 Classification Classifier::classify(const ShapeFeatures& features) const {
   EightShapes one;
   one.set(0, features);

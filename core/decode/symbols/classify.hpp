@@ -23,6 +23,8 @@ struct Classification {
   float likelihood = 0;     ///< of the features if it is the likeliest letter, up to a factor common to all classifiers
   std::int8_t letter = -1;  ///< the likeliest, or -1: like none of them
 
+  /// Of a shape that is known to show a letter, as if it had been classified at a distance.
+  [[nodiscard]] static Classification of_letter(int letter, int letters, float distance);
   /// Whole, or nearly: what it shows counts.
   [[nodiscard]] bool is_well_seen() const {
     constexpr float kWellSeen = 3;  // standard deviations

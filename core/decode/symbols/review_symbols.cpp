@@ -9,6 +9,7 @@
 
 #include <Eigen/LU>
 
+#include "core/decode/grid/neighbourhood.hpp"
 #include "core/lanes.hpp"
 
 namespace slsd {
@@ -16,6 +17,11 @@ namespace {
 
 /// How much farther from its letter a symbol may come to be by levelling the light: its centre gains even so.
 constexpr float kLevellingTolerance = 0.3F;
+
+/// What was aligned has its place from there.
+bool is_reviewed(const Sightings& seen, std::size_t node) {
+  return seen.claims[node].status == RegionStatus::kDecoded && !is_aligned(seen.aligned[node]);
+}
 
 float light_of(const Sightings& seen, std::int32_t node) {
   return seen.moments[node].peak - seen.moments[node].background;
@@ -61,20 +67,21 @@ SymbolReview::SymbolReview(const Pattern& pattern, ReviewOptions options)
       pitch_px_(static_cast<float>(pattern.pitch_px())),
       options_(options) {}
 
-/// Mean of the frames of a symbol and of those of its island around it, up to two links away.
+/// Mean of the frames of a symbol and of those around it whose cells fit, up to two links away.
 std::optional<LatticeFrame> SymbolReview::frame_around(const Sightings& seen, std::size_t node) const {
   LatticeFrame sum = seen.nodes[node].frame;
   float count = 1;
-  const auto add = [&](std::int32_t other) {
-    if (other < 0 || decoded_[other] == 0 || seen.claims[other].island != seen.claims[node].island) return false;
+  const auto add = [&](std::int32_t from, Direction d) -> std::int32_t {
+    const std::int32_t other = neighbour(seen.nodes, from, d);
+    if (other < 0 || decoded_[other] == 0 || !seen.claims[from].fits(seen.claims[other], d)) return -1;
     if (seen.nodes[other].measured_u && seen.nodes[other].measured_v) sum += seen.nodes[other].frame, ++count;
-    return true;
+    return other;
   };
   for (const Direction d : kDirections) {
-    const std::int32_t other = neighbour(seen.nodes, static_cast<std::int32_t>(node), d);
-    if (!add(other)) continue;
-    add(neighbour(seen.nodes, other, d));
-    add(neighbour(seen.nodes, other, static_cast<Direction>((d + 1) % 4)));
+    const std::int32_t other = add(static_cast<std::int32_t>(node), d);
+    if (other < 0) continue;
+    add(other, d);
+    add(other, across(d, 1));
   }
   if (count == 1) return std::nullopt;
   return sum / count;
@@ -144,8 +151,7 @@ void SymbolReview::measure_around_distrusted(const GridLinker& linker, Sightings
   visit([&](std::size_t i) { linker.measure_frame(seen.nodes, trusted_, i); });
   // All frames first: a distance may be measured in those around.
   visit([&](std::size_t i) {
-    if (seen.claims[i].status == RegionStatus::kDecoded)
-      seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
+    if (is_reviewed(seen, i)) seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
   });
 }
 
@@ -153,7 +159,7 @@ void SymbolReview::trust_whole_symbols(const GridLinker& linker, const Classifie
                                        Sightings& seen) {
   trusted_.resize(seen.size());
   seen.misfits.resize(seen.size());
-  for (std::size_t i = 0; i < seen.size(); ++i) trusted_[i] = seen.claims[i].status == RegionStatus::kDecoded;
+  for (std::size_t i = 0; i < seen.size(); ++i) trusted_[i] = is_reviewed(seen, i);
   decoded_ = trusted_;
   measure_distances(letters, executor, seen);
   distrusted_.clear();
@@ -246,25 +252,11 @@ void SymbolReview::review(const GreyView& frame, const Regions& regions, const G
       [&](const auto& view) {
         executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int worker) {
           for (std::size_t i = first; i < last; ++i) {
-            if (seen.claims[i].status == RegionStatus::kDecoded) review_node(view, regions, meters[worker], seen, i);
+            if (is_reviewed(seen, i)) review_node(view, regions, meters[worker], seen, i);
           }
         });
       },
       frame);
-}
-
-void SymbolReview::take_back_held(Sightings& seen) {
-  constexpr std::ptrdiff_t kHeldBy = 2;
-  held_.clear();
-  if (!options_.rules.has(DecodeRule::kHeldAgain)) return;
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    const CellClaim& claim = seen.claims[i];
-    if (claim.status != RegionStatus::kDamagedShape || seen.misfits[i] > options_.damaged_distance_held) continue;
-    const auto node = static_cast<std::int32_t>(i);
-    const auto holds = [&](Direction d) { return decoded_beside(seen.nodes, seen.claims, node, d) >= 0; };
-    if (std::ranges::count_if(kDirections, holds) >= kHeldBy) held_.push_back(node);
-  }
-  for (const std::int32_t node : held_) seen.claims[node].decide(DecodeRule::kHeldAgain);
 }
 
 }  // namespace slsd

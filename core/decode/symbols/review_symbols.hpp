@@ -23,13 +23,12 @@ struct ReviewOptions {
   float doubtful_distance = 1.5F;
   /// How far from its region it may be found there, of the pitch.
   float moved_max = 0.25F;
-  /// The same beyond which a symbol at the edge of what is decoded may be cut by an edge or a shadow: it is damaged,
-  /// but for one that its island holds.
+  /// The same beyond which a symbol at the edge of what is decoded may be cut by an edge or a shadow: it is damaged.
   float damaged_distance = 2.5F;
-  /// The same for one on the grid of its island: it may have been printed on.
+  /// The same for one on the grid of its neighbours: it may have been printed on.
   float damaged_distance_on_grid = 4;
-  /// The same for a symbol among named neighbours on all sides, and for one that two of its island hold: print and
-  /// relief disturb a shape, its cell is certain, and its sigma says by how much they may move its centre.
+  /// The same for a symbol among named neighbours on all sides: print and relief disturb a shape, its cell is certain,
+  /// and its sigma says by how much they may move its centre.
   float damaged_distance_held = kTornDistance;
   Rules rules = {};
 };
@@ -51,9 +50,6 @@ class SymbolReview {
   /// @param seen    in and out: moments, frames and claims change
   void review(const GreyView& frame, const Regions& regions, const GridLinker& linker, const Look& look,
               std::span<GreyMomentMeter> meters, Executor& executor, Sightings& seen);
-
-  /// Takes back what was damaged and two symbols of its island hold, once none is left that its surroundings refuse.
-  void take_back_held(Sightings& seen);
 
  private:
   void measure_around_distrusted(const GridLinker& linker, Sightings& seen);
@@ -81,7 +77,7 @@ class SymbolReview {
   ReviewOptions options_;
   std::vector<std::uint8_t> trusted_;
   std::vector<std::uint8_t> decoded_;  // of each node, when the review began
-  std::vector<std::int32_t> distrusted_, held_;
+  std::vector<std::int32_t> distrusted_;
   std::vector<Eigen::Vector2f> light_changes_;  // from cell to cell along u and v, relative
 };
 

@@ -47,13 +47,13 @@ class MendedPlane : public testing::Test {
         seen_.misfits.push_back(1);
         seen_.claims.push_back({.row = static_cast<std::int16_t>(kRow + row),
                                 .column = static_cast<std::int16_t>(kColumn + column),
-                                .status = RegionStatus::kDecoded,
-                                .island = 0});
+                                .status = RegionStatus::kDecoded});
+        seen_.aligned.push_back(Aligned::kNot);
         segments_.push_back(gate.prepare(pixel_ray(rig_.cameras[0].lens, centre.cast<double>()).direction));
       }
     }
     // A centroid that has gone with what is missing.
-    seen_.claims[kWorn].status = RegionStatus::kOffEpipolarLine;
+    seen_.claims[kWorn].status = RegionStatus::kDamagedShape;
     seen_.moments[kWorn].x += 2, seen_.moments[kWorn].y -= 3;
     seen_.nodes[kWorn].centre_px += Eigen::Vector2f(2, -3);
   }
@@ -77,6 +77,9 @@ class MendedPlane : public testing::Test {
       }
     }
   }
+
+  /// Leaves a symbol none that holds others.
+  void hold_nothing(int node) { seen_.claims[node].status = RegionStatus::kClassDisagrees; }
 
   /// What look(scene) makes of all that is seen.
   template <class Look>

@@ -24,7 +24,7 @@ class InferCells : public testing::Test {
   InferCells()
       : pattern_(shipped_pattern("16px-5.toml")),
         cells_(pattern_, flat_prototypes(), paper_rig().projector),
-        inference_(pattern_, std::make_shared<const Codebook>(pattern_.array, kWholeRows, kWholeColumns)) {}
+        codebook_(std::make_shared<const Codebook>(pattern_.array, kWholeRows, kWholeColumns)) {}
 
   void show(int row, int column, int letter, float distance = 1) {
     grid_.add(row, column, {18.F * static_cast<float>(column), 18.F * static_cast<float>(row)},
@@ -48,18 +48,17 @@ class InferCells : public testing::Test {
     // Each cell where it is at one depth; those of slid letters lie on the same lines.
     const Calibration rig = paper_rig();
     const RigidTransform& to_projector = rig.cameras[0].projector_from_camera;
-    const EpipolarGate gate(rig.cameras[0], rig.projector, 350, 3200);
+    const EpipolarGate lines(rig.cameras[0], rig.projector, 350, 3200);
     segments_.clear();
     for (const auto& [row, column] : grid_.cells) {
       const Eigen::Vector3d point = 1000 * cells_.ray(row, column).direction.homogeneous();
       segments_.push_back(
-          gate.prepare((to_projector.rotation.transpose() * (point - to_projector.translation)).hnormalized()));
+          lines.prepare((to_projector.rotation.transpose() * (point - to_projector.translation)).hnormalized()));
     }
-    const Grey8 dark(4, 4, 0);
-    const GreyView frame = dark.view();
-    const LetterFields letters(pattern_.options);
-    inference_.infer(CellGate(cells_, segments_, 1.5), margin_min_, OtherLight(frame, letters, letters.at(0.5F), 18),
-                     alone, seen_);
+    CellInference inference(pattern_, codebook_, wrong_cells_max_);
+    const CellGate gate(cells_, segments_, 1.5);
+    inference.propose(gate, alone, seen_);
+    inference.decide(gate, seen_);
   }
   [[nodiscard]] const CellClaim& claim_at(int row, int column) const {
     return seen_.claims[static_cast<std::size_t>(grid_.node_at(row, column))];
@@ -80,10 +79,11 @@ class InferCells : public testing::Test {
 
   Pattern pattern_;
   CellRays cells_;
-  CellInference inference_;
+  std::shared_ptr<const Codebook> codebook_;
   SimulatedGrid grid_;
   Sightings seen_;
-  float peak_of_last_ = 180, margin_min_ = 8;
+  float peak_of_last_ = 180;
+  double wrong_cells_max_ = 0.001;
   std::vector<EpipolarSegment> segments_;
 };
 
@@ -149,9 +149,9 @@ TEST_F(InferCells, TrustsASymbolThatIsDarkerThanItsHoldersLess) {
     show_pattern(0, 0, 20, 20);
     show(20, 19, pattern_.array.at(20, 19));
     peak_of_last_ = peak;
-    margin_min_ = 20;
+    wrong_cells_max_ = 1e-9;
     infer();
-    margins.push_back(claim_at(20, 19).evidence);
+    margins.push_back(claim_at(20, 19).margin_nats);
   }
   EXPECT_LT(margins[1], margins[0] - 1);
 }

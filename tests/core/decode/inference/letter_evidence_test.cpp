@@ -31,7 +31,8 @@ TEST(LetterEvidence, IsAtMostTheLogarithmOfTheLetters) {
   const CodeArray array = columns_of_letters(1);
   LetterEvidence evidence(array, {1, kLetters});
   const std::vector<Classification> shapes{shape_of(2, 1)};
-  evidence.look_at(shapes);
+  const std::vector<Aligned> aligned(1);
+  evidence.look_at(shapes, aligned);
   EXPECT_LE(evidence.of(0, 2), std::log(5.F));
   EXPECT_GT(evidence.of(0, 2), std::log(5.F) - 0.05F);
   EXPECT_LT(evidence.of(0, 3), -2);
@@ -42,7 +43,8 @@ TEST(LetterEvidence, IsLessTheFartherAShapeIsFromItsLetter) {
   LetterEvidence evidence(array, {1, kLetters});
   std::vector<Classification> shapes;
   for (const float distance : {2.5F, 3.5F, 5.F, 7.F, 10.F, 30.F}) shapes.push_back(shape_of(2, distance));
-  evidence.look_at(shapes);
+  const std::vector<Aligned> aligned(shapes.size());
+  evidence.look_at(shapes, aligned);
   for (std::int32_t i = 0; i + 1 < static_cast<std::int32_t>(shapes.size()); ++i) {
     EXPECT_GT(evidence.of(i, 2), evidence.of(i + 1, 2)) << i;
     EXPECT_LT(evidence.of(i, 1), evidence.of(i + 1, 1)) << i;
@@ -53,36 +55,40 @@ TEST(LetterEvidence, SaysNothingOfAShapeThatIsNoLetter) {
   const CodeArray array = columns_of_letters(1);
   LetterEvidence evidence(array, {1, kLetters});
   std::vector<Classification> shapes{shape_of(2, 1)};
+  const std::vector<Aligned> aligned(1);
   shapes[0].letter = -1;
-  evidence.look_at(shapes);
+  evidence.look_at(shapes, aligned);
   EXPECT_EQ(evidence.of(0, 2), 0);
 }
 
 // Amid whole surfaces a torn shape is rare, so it speaks for an edge; print that tore it does not.
 TEST(LetterEvidence, OfATornShapeSpeaksForAnEdgeUnlessItWasPrintedOn) {
-  constexpr int kRows = 9;
-  const CodeArray array = columns_of_letters(kRows);
-  LetterEvidence evidence(array, {kRows, kLetters});
+  constexpr int kHigh = 9;
+  const CodeArray array = columns_of_letters(kHigh);
+  LetterEvidence evidence(array, {kHigh, kLetters});
   std::vector<Classification> shapes;
   std::vector<Beside> beside;
   std::vector<std::int32_t> labels;
-  for (int i = 0; i < kRows * kLetters; ++i) {
+  for (int i = 0; i < kHigh * kLetters; ++i) {
     const int row = i / kLetters, column = i % kLetters;
-    const auto at = [&](int r, int c) { return r < 0 || c < 0 || r >= kRows || c >= kLetters ? -1 : r * kLetters + c; };
+    const auto at = [&](int r, int c) { return r < 0 || c < 0 || r >= kHigh || c >= kLetters ? -1 : r * kLetters + c; };
     beside.push_back({at(row, column + 1), at(row + 1, column), at(row, column - 1), at(row - 1, column)});
     shapes.push_back(shape_of(column, 1));
     labels.push_back(i);
   }
   shapes.back().distance = 20;
-  evidence.look_at(shapes);
-  const std::int32_t torn = kRows * kLetters - 1;
+  std::vector<Aligned> aligned(shapes.size());
+  evidence.look_at(shapes, aligned);
+  const std::int32_t torn = kHigh * kLetters - 1;
   const float before = evidence.of(torn, torn);
-  std::vector<std::uint8_t> printed(shapes.size(), 0);
-  evidence.measure_torn(beside, labels, printed);
+  evidence.measure_torn(beside, labels);
   EXPECT_LT(evidence.of(torn, torn), before - 1);
-  printed.back() = 1;
-  evidence.measure_torn(beside, labels, printed);
+  aligned.back() = Aligned::kWhole;
   EXPECT_EQ(evidence.of(torn, torn), before);
+  aligned.back() = Aligned::kPrinted;
+  EXPECT_EQ(evidence.of(torn, torn), 0) << "what cannot be aligned may be another symbol";
+  aligned.back() = Aligned::kAtEdge;
+  EXPECT_LT(evidence.of(torn, torn), before - 1) << "though its letter could be aligned";
 }
 
 }  // namespace

@@ -22,6 +22,7 @@ struct Plane {
   SimulatedGrid grid;
   std::vector<Classification> shapes;
   std::vector<GreyMoments> moments;
+  std::vector<Aligned> aligned;
   std::vector<std::int32_t> labels;
   std::vector<Beside> beside;
   SurfaceLinks links{SimulatedGrid::kPitchPx};
@@ -41,9 +42,10 @@ struct Plane {
     grid.link_truly();
   }
   void measure() {
+    aligned.assign(grid.nodes.size(), Aligned::kNot);
     find_beside(grid.nodes, beside);
-    letters.look_at(shapes);
-    links.measure({grid.nodes, beside, moments, labels}, letters, CellGate(cells, {}, 1.5));
+    letters.look_at(shapes, aligned);
+    links.measure({grid.nodes, beside, moments, aligned, labels}, letters, CellGate(cells, {}, 1.5));
   }
   /// Moves all symbols from a column on, cells.
   void slide_from(int column, float by) {

@@ -63,6 +63,7 @@ class ReviewSymbols : public testing::Test {
     seen_.nodes.push_back({centre, frame});
     seen_.shapes.emplace_back();
     seen_.claims.push_back({row, column, 20, RegionStatus::kDecoded});
+    seen_.aligned.push_back(Aligned::kNot);
   }
 
   void review() {
@@ -162,42 +163,6 @@ TEST_F(ReviewSymbols, TakesTheFramesAroundForOneThatIsOffOnTheGridAlone) {
   }
 }
 
-/// Damaged symbols, so far from their letters, with some of those beside them refused.
-class DamagedSymbols : public ReviewSymbols {
- protected:
-  RegionStatus after(float misfit, std::initializer_list<Direction> refused, std::int32_t island = 0) {
-    seen_ = {};
-    look();
-    seen_.misfits.assign(seen_.size(), 1);
-    const std::size_t damaged = sighting_at(4, 5);
-    seen_.claims[damaged].status = RegionStatus::kDamagedShape, seen_.claims[damaged].island = island;
-    for (CellClaim& claim : seen_.claims) claim.island = claim.island < 0 ? 0 : claim.island;
-    seen_.misfits[damaged] = misfit;
-    for (const Direction d : refused)
-      seen_.claims[neighbour(seen_.nodes, static_cast<std::int32_t>(damaged), d)].status =
-          RegionStatus::kNeighboursDisagree;
-    SymbolReview(pattern_, {}).take_back_held(seen_);
-    return seen_.claims[damaged].status;
-  }
-};
-
-TEST_F(DamagedSymbols, AreTakenBackWhereTwoOfTheirIslandHoldThem) {
-  EXPECT_EQ(after(5, {kUp, kLeft}), RegionStatus::kDecoded);
-  EXPECT_EQ(after(5.9F, {}), RegionStatus::kDecoded);
-}
-
-TEST_F(DamagedSymbols, AreNotTakenBackWhereOneHoldsThem) {
-  EXPECT_EQ(after(5, {kUp, kLeft, kDown}), RegionStatus::kDamagedShape);
-}
-
-TEST_F(DamagedSymbols, AreNotTakenBackByAnotherIsland) {
-  EXPECT_EQ(after(5, {}, 1), RegionStatus::kDamagedShape);
-}
-
-TEST_F(DamagedSymbols, AreNotTakenBackWhereTooLittleIsLeft) {
-  EXPECT_EQ(after(6.1F, {}), RegionStatus::kDamagedShape);
-}
-
 TEST_F(ReviewSymbols, LevelsTheLight) {
   for (int x = 0; x < kSidePx; ++x) light_.col(x) *= std::exp(-0.12 * x / kPitchPx);
   look();
@@ -206,6 +171,16 @@ TEST_F(ReviewSymbols, LevelsTheLight) {
   EXPECT_GT(before, 0.05);
   EXPECT_LT(centre_error(), 0.6 * before);
   EXPECT_GE(count(RegionStatus::kDecoded), kCells * kCells * 95 / 100);
+}
+
+TEST_F(ReviewSymbols, LeavesWhatWasAlignedWhereItIs) {
+  light_.col(kSidePx / 2) *= 0.2;
+  look();
+  for (Aligned& aligned : seen_.aligned) aligned = Aligned::kWhole;
+  const std::vector<GreyMoments> before = seen_.moments;
+  review();
+  for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(seen_.moments[i].x, before[i].x) << i;
+  EXPECT_EQ(count(RegionStatus::kDecoded), kCells * kCells);
 }
 
 TEST_F(ReviewSymbols, LooksAtNoSymbolThatWasRejected) {
