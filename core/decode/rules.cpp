@@ -43,7 +43,7 @@ constexpr std::array<RuleText, kDecodeRuleCount> kTexts{{
     {"other_letter", kRejects, kClassDisagrees, false, "Its shape is another letter's than its cell's.", kDisturbed},
     {"uncertain", kRejects, kNeighboursDisagree, false,
      "Its letter and those around it do not make its cell as certain as wrong_cells_max asks.", kSeeMore},
-    {"cell_off_line", kRejects, kOffEpipolarLine, false, "It lies off its cell's epipolar line.", kCheckRig},
+    {"cell_off_line", kRejects, kOffEpipolarLine, false, "It, or most of the surface around it, lies off its epipolar lines.", kCheckRig},
     {"cell_out_of_range", kRejects, kOutOfDepthRange, false, "Its cell would lie outside the working depth.",
      kSetDepth},
     {"torn", kRejects, kDamagedShape, true, "It is far from its letter, wherever it lies.", kDisturbed},

@@ -151,7 +151,7 @@ void SymbolReader::infer_cells(const GreyView& frame, EpipolarView* view, Execut
   const CellGate gate = gate_of(view);
   inference_.propose(gate, executor, seen_);
   mend(frame, gate, view);
-  inference_.decide(gate, seen_);
+  inference_.decide(gate, executor, seen_);
 }
 
 CellGate SymbolReader::gate_of(const EpipolarView* view) const {

@@ -19,6 +19,8 @@ constexpr float kMovedMax = 0.08F;
 /// From its neighbours, where few hold it: towards a limb the surface turns away. Between those on both sides it
 /// cannot.
 constexpr float kTiltBesideFewMaxPx = 1;
+/// What noise tilts, in standard deviations of the disparity: that of the slope is sqrt(3) times as much at the sides.
+constexpr float kTiltSigmas = 5;
 /// What one alone holds is tilted less, and lies nearer to where it is put.
 constexpr float kLoneTiltMaxPx = 0.25F, kLoneMovedMax = 0.008F;
 /// From which distance from its letter on, standard deviations, or how far off its line, projector px, a symbol that
@@ -124,7 +126,9 @@ bool SymbolMender::lies_there(Sightings& seen, const AskedLetter& asked) const {
     return (node.frame.inverse() * (asked.centre_px - node.centre_px)).norm() < kMovedMax * pitch_px_;
   };
   if (!claim.pass(rules_, DecodeRule::kMendMoved, lies_near())) return false;
-  const float beside_more_px = asked.place.held_by > kFewHolders ? kAlignedTiltMaxPx : kTiltBesideFewMaxPx;
+  const float noise_px = kTiltSigmas * task.noise * std::sqrt(task.variance);
+  const float beside_more_px =
+      asked.place.held_by > kFewHolders ? std::hypot(kAlignedTiltMaxPx, noise_px) : kTiltBesideFewMaxPx;
   return claim.pass(rules_, DecodeRule::kMendTilted, asked.tilt_px <= (lone ? kLoneTiltMaxPx : beside_more_px));
 }
 

@@ -73,14 +73,16 @@ void EdgePrior::measure(const NodesSeen& seen, const LetterEvidence& letters) {
       links += 1, cut += share;
     }
   }
-  usual_share_ = std::clamp(cut / links, kShareMin, kUsualMax);
+  const float usual_share = std::clamp(cut / links, kShareMin, kUsualMax);
   for (int link = 0; link < kSpreadLinks; ++link) spread(seen);
+  odds_.resize(counts_.size());
+  for (std::size_t i = 0; i < counts_.size(); ++i)
+    for (const std::size_t along : {0, 1})
+      odds_[i][along] = odds_of(counts_[i].links[along], counts_[i].cut[along], usual_share);
 }
 
-float EdgePrior::log_odds(std::size_t node, Direction d) const {
-  const Count& count = counts_[node];
-  const float share = std::clamp((count.cut[d % 2] + kUsualCounts * usual_share_) / (count.links[d % 2] + kUsualCounts),
-                                 kShareMin, kShareMax);
+float EdgePrior::odds_of(float links, float cut, float usual_share) {
+  const float share = std::clamp((cut + kUsualCounts * usual_share) / (links + kUsualCounts), kShareMin, kShareMax);
   return std::log((1 - share) / share);
 }
 

@@ -21,7 +21,7 @@ class EdgePrior {
   void measure(const NodesSeen& seen, const LetterEvidence& letters);
 
   /// Log-odds that no edge crosses a link of the node.
-  [[nodiscard]] float log_odds(std::size_t node, Direction d) const;
+  [[nodiscard]] float log_odds(std::size_t node, Direction d) const { return odds_[node][d % 2]; }
   /// Tells links of link_grid that lead across an edge: they are broken, or their cells contradict each other.
   [[nodiscard]] bool is_cut(std::size_t node, Direction d) const { return cut_[node][d]; }
 
@@ -32,10 +32,11 @@ class EdgePrior {
   };
   void find_cut(const NodesSeen& seen, const LetterEvidence& letters);
   void spread(const NodesSeen& seen);
+  [[nodiscard]] static float odds_of(float links, float cut, float usual_share);
 
   std::vector<std::array<bool, 4>> cut_;
   std::vector<Count> counts_, next_;
-  float usual_share_ = 0;
+  std::vector<std::array<float, 2>> odds_;  // of each node, along rows and along columns
 };
 
 }  // namespace slsd

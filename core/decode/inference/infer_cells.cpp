@@ -148,14 +148,14 @@ void CellInference::draw_contradictions() {
 }
 
 /// The first side that is cut counts in full, and each further one little, less what contradictions have drawn.
-EvidenceFlow::Budget CellInference::budget_of(std::size_t node) const {
+EvidenceFlow::Budget CellInference::budget_of(const EvidenceFlow& flow, std::size_t node) const {
   std::array<float, 4> side{}, drawn{};
   for (const Direction d : kDirections) {
     const float capacity = capacity_[node][d];
     if (capacity <= 0) continue;
-    const std::int32_t line = flow_.line_of(node, d);
+    const std::int32_t line = flow.line_of(node, d);
     side[d] = line < 0 ? capacity : std::min(line_capacity_[line], capacity + kLineMore * kSideLinks);
-    drawn[d] = std::max(0.F, capacity - flow_.capacity_left(node, d));
+    drawn[d] = std::max(0.F, capacity - flow.capacity_left(node, d));
   }
   const auto together = [&](std::initializer_list<Direction> sides) {
     float most = 0, more = 0, gone = 0;
@@ -167,14 +167,24 @@ EvidenceFlow::Budget CellInference::budget_of(std::size_t node) const {
   return {together({kRight, kDown, kLeft, kUp}), together({kRight, kLeft}), together({kDown, kUp})};
 }
 
-void CellInference::measure_margins() {
+EvidenceFlow& CellInference::flow_of(int worker) {
+  return worker == 0 ? flow_ : helpers_[static_cast<std::size_t>(worker) - 1];
+}
+
+/// What is drawn for one node is restored before the next, so each worker has the same flow.
+void CellInference::measure_margins(Executor& executor) {
   flow_.keep();
+  helpers_.resize(static_cast<std::size_t>(executor.workers()) - 1);
+  for (EvidenceFlow& helper : helpers_) helper = flow_;
   margins_.assign(labels_.size(), 0);
-  for (std::size_t i = 0; i < labels_.size(); ++i) {
-    if (proposed_[i] < 0) continue;
-    margins_[i] = flow_.draw(static_cast<std::int32_t>(i), margin_max_, budget_of(i));
-    flow_.restore();
-  }
+  executor.run_ranges(labels_.size(), [&](std::size_t first, std::size_t last, int worker) {
+    EvidenceFlow& flow = flow_of(worker);
+    for (std::size_t i = first; i < last; ++i) {
+      if (proposed_[i] < 0) continue;
+      margins_[i] = flow.draw(static_cast<std::int32_t>(i), margin_max_, budget_of(flow, i));
+      flow.restore();
+    }
+  });
 }
 
 /// Of a node at a rim; another surface fits tightly in one of sixty cases at most.
@@ -218,6 +228,37 @@ void CellInference::claim_cells(const CellGate& gate, Sightings& seen) const {
   }
 }
 
+void CellInference::find_component(std::int32_t first) {
+  component_.assign(1, first);
+  is_reached_[static_cast<std::size_t>(first)] = 1;
+  for (std::size_t next = 0; next < component_.size(); ++next) {
+    const std::int32_t node = component_[next];
+    for (const Direction d : kDirections) {
+      const std::int32_t other = beside_[node][d];
+      if (other < 0 || is_reached_[other] != 0 || proposed_[other] < 0) continue;
+      if (proposed_[other] != grid_.beyond(proposed_[node], d)) continue;
+      is_reached_[other] = 1;
+      component_.push_back(other);
+    }
+  }
+}
+
+/// If most symbols of a surface that are certain lie off their epipolar lines, the lines are not theirs: the rig has
+/// moved, or another projector lights them. What lies on them by chance is no point either.
+void CellInference::reject_off_line(Sightings& seen) {
+  is_reached_.assign(proposed_.size(), 0);
+  for (std::size_t first = 0; first < proposed_.size(); ++first) {
+    if (proposed_[first] < 0 || is_reached_[first] != 0) continue;
+    find_component(static_cast<std::int32_t>(first));
+    const auto count = [&](RegionStatus status) {
+      return std::ranges::count_if(component_, [&](std::int32_t node) { return seen.claims[node].status == status; });
+    };
+    if (count(RegionStatus::kOffEpipolarLine) <= count(RegionStatus::kDecoded)) continue;
+    for (const std::int32_t node : component_)
+      if (seen.claims[node].status == RegionStatus::kDecoded) seen.claims[node].decide(DecodeRule::kCellOffLine);
+  }
+}
+
 void CellInference::fill_flow() {
   flow_.clear(beside_);
   for (std::size_t i = 0; i < labels_.size(); ++i) {
@@ -250,7 +291,7 @@ void CellInference::propose(const CellGate& gate, Executor& executor, Sightings&
   }
 }
 
-void CellInference::decide(const CellGate& gate, Sightings& seen) {
+void CellInference::decide(const CellGate& gate, Executor& executor, Sightings& seen) {
   const float cells = static_cast<float>(grid_.rows) * static_cast<float>(grid_.columns);
   margin_max_ = margin_min_ + (gate.knows_lines() ? 0 : std::log(std::max(1.F, cells / kUsualPlaces)));
   find_beside(seen.nodes, beside_);  // what was mended has other links
@@ -264,8 +305,9 @@ void CellInference::decide(const CellGate& gate, Sightings& seen) {
   set_capacities();
   fill_flow();
   draw_contradictions();
-  measure_margins();
+  measure_margins(executor);
   claim_cells(gate, seen);
+  if (gate.knows_lines()) reject_off_line(seen);
 }
 
 }  // namespace slsd

@@ -41,7 +41,7 @@ class CellInference {
   /// Decides on what was proposed.
   /// @param seen  in: nodes, shapes, moments, and what was aligned; out: claims, with their margins up to the
   ///              threshold
-  void decide(const CellGate& gate, Sightings& seen);
+  void decide(const CellGate& gate, Executor& executor, Sightings& seen);
 
  private:
   [[nodiscard]] NodesSeen view_of(const Sightings& seen) const;
@@ -52,10 +52,13 @@ class CellInference {
   void join_lines();
   void fill_flow();
   void draw_contradictions();
-  [[nodiscard]] EvidenceFlow::Budget budget_of(std::size_t node) const;
-  void measure_margins();
+  [[nodiscard]] EvidenceFlow::Budget budget_of(const EvidenceFlow& flow, std::size_t node) const;
+  [[nodiscard]] EvidenceFlow& flow_of(int worker);
+  void measure_margins(Executor& executor);
   [[nodiscard]] DecodeRule rule_of(const CellGate& gate, const Sightings& seen, std::size_t node) const;
   void claim_cells(const CellGate& gate, Sightings& seen) const;
+  void find_component(std::int32_t first);
+  void reject_off_line(Sightings& seen);
   [[nodiscard]] GridFit grid_fit(std::size_t node) const;
 
   CellGrid grid_;
@@ -64,6 +67,7 @@ class CellInference {
   SurfaceLinks links_;
   EdgePrior prior_;
   EvidenceFlow flow_;
+  std::vector<EvidenceFlow> helpers_;  // copies of it, one to each further worker
   float margin_min_, margin_max_ = 0;
   std::vector<Beside> beside_;
   std::vector<std::int32_t> proposed_, labels_;  // cells; labels without the misread ones
@@ -71,6 +75,8 @@ class CellInference {
   std::vector<float> nats_, margins_;            // of each node: of its own letter, and of its cell
   std::vector<std::array<float, 4>> capacity_, against_;  // of each link, at the start
   std::vector<float> line_capacity_;
+  std::vector<std::int32_t> component_;   // nodes whose links lead from cell to cell
+  std::vector<std::uint8_t> is_reached_;  // of each node
 };
 
 }  // namespace slsd

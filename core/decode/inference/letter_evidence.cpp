@@ -45,11 +45,13 @@ void LetterEvidence::measure_torn(std::span<const Beside> beside, std::span<cons
   constexpr float kAsIfSeen = 20;  // symbols, one of them torn
   std::array<float, kWholenesses> count{};
   float amid = 0;
+  agrees_.resize(labels.size());
+  for (std::size_t node = 0; node < labels.size(); ++node)
+    agrees_[node] = labels[node] >= 0 && of(static_cast<std::int32_t>(node), labels[node]) > kAgrees;
   for (std::size_t node = 0; node < labels.size(); ++node) {
     const bool is_amid = std::ranges::all_of(kDirections, [&](Direction d) {
       const std::int32_t other = beside[node][d];
-      return other >= 0 && labels[other] >= 0 && labels[other] == grid_.beyond(labels[node], d) &&
-             of(other, labels[other]) > kAgrees;
+      return other >= 0 && agrees_[other] != 0 && labels[other] == grid_.beyond(labels[node], d);
     });
     if (is_amid) ++count[wholeness_of(node)], ++amid;
   }

@@ -47,6 +47,7 @@ class LetterEvidence {
   std::span<const Classification> shapes_;
   std::span<const Aligned> aligned_;
   std::array<float, kWholenesses> torn_nats_{};
+  std::vector<std::uint8_t> agrees_;  // of each node: whether its shape speaks for its label
 };
 
 }  // namespace slsd

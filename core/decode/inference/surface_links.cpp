@@ -26,8 +26,8 @@ constexpr float kLightAcross = 0.7F, kLightMin = 0.03F, kLightMax = 0.3F, kLight
 
 /// Density of Student's t with four degrees of freedom.
 float student(float x, float width) {
-  const float t = x / width;
-  return 0.375F / width / std::pow(1 + t * t / 4, 2.5F);
+  const float t = x / width, tail = 1 + t * t / 4;
+  return 0.375F / (width * tail * tail * std::sqrt(tail));
 }
 
 float normal(float x, float sigma) {
@@ -74,7 +74,7 @@ void SurfaceLinks::measure_slips(const NodesSeen& seen, float least) {
     for (const Direction d : {kRight, kDown}) {
       const std::int32_t other = seen.beside[i][d];
       if (other < 0 || seen.nodes[i].torn || seen.nodes[other].torn) continue;
-      float most = -std::numeric_limits<float>::infinity();
+      float most = 0;  // density
       const auto compare = [&](std::int32_t from, Direction way) {
         const Eigen::Vector2f bend = bends_[from][way % 2];
         if (std::isnan(bend.x())) return;
@@ -85,12 +85,12 @@ void SurfaceLinks::measure_slips(const NodesSeen& seen, float least) {
         const float variance =
             least * least + 0.5F * bend.y() * bend.y() + (std::isnan(before) ? 0.F : 0.25F * before * before);
         const float width = std::min(std::sqrt(variance), kSlipWidthMax);
-        most = std::max(most, std::log(student(bend.x(), width) * kSlipRange));
+        most = std::max(most, student(bend.x(), width));
       };
       compare(static_cast<std::int32_t>(i), d);
       compare(other, opposite(d));
-      if (std::isinf(most)) continue;
-      nats_[i][d] = nats_[other][opposite(d)] = std::max(most, kNatsMin);
+      if (most == 0) continue;
+      nats_[i][d] = nats_[other][opposite(d)] = std::max(std::log(most * kSlipRange), kNatsMin);
     }
   }
 }
@@ -131,17 +131,17 @@ void SurfaceLinks::add_light(const NodesSeen& seen, const CellGrid& grid) {
     for (const Direction d : {kRight, kDown}) {
       const float by = difference(i, d);
       if (std::isnan(by)) continue;
-      float most = -std::numeric_limits<float>::infinity();
+      const float across = normal(by, kLightAcross);
+      float most = student(by, width);  // density
+      if (most >= across) continue;
       const auto compare = [&](float before) {
-        if (before * by < 0) return;
-        const float as_before = std::min(std::hypot(width, kOfBefore * before), kLightWidthMax);
-        most = std::max(most, std::log(student(by, as_before) / normal(by, kLightAcross)));
+        if (!(before * by >= 0)) return;
+        most = std::max(most, student(by, std::min(std::hypot(width, kOfBefore * before), kLightWidthMax)));
       };
-      compare(0);
       const std::int32_t on = seen.beside[i][d], behind = seen.beside[i][opposite(d)];
-      if (behind >= 0 && !std::isnan(difference(behind, d))) compare(difference(behind, d));
-      if (!std::isnan(difference(on, d))) compare(difference(on, d));
-      const float nats = std::max(std::min(0.F, most), kLightNatsMin);
+      if (behind >= 0) compare(difference(behind, d));
+      compare(difference(on, d));
+      const float nats = std::clamp(std::log(most / across), kLightNatsMin, 0.F);
       nats_[i][d] += nats;
       nats_[seen.beside[i][d]][opposite(d)] += nats;
     }

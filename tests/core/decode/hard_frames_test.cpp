@@ -191,7 +191,7 @@ TEST(HardFrames, PlacesSymbolsThatLinesArePrintedOver) {
     }
   }
   const Decoding decoding = decode(decoder, frame.view());
-  EXPECT_GE(static_cast<double>(decoding.points.size()), 0.94 * static_cast<double>(unprinted));
+  EXPECT_GE(static_cast<double>(decoding.points.size()), 0.93 * static_cast<double>(unprinted));
   EXPECT_LT(wrong_points(decoding, test::kTilted, 0.5), 95);
 }
 

@@ -51,14 +51,15 @@ class InferCells : public testing::Test {
     const EpipolarGate lines(rig.cameras[0], rig.projector, 350, 3200);
     segments_.clear();
     for (const auto& [row, column] : grid_.cells) {
-      const Eigen::Vector3d point = 1000 * cells_.ray(row, column).direction.homogeneous();
+      const int line_of = row < first_row_off_line_ ? row : row + 1;
+      const Eigen::Vector3d point = 1000 * cells_.ray(line_of, column).direction.homogeneous();
       segments_.push_back(
           lines.prepare((to_projector.rotation.transpose() * (point - to_projector.translation)).hnormalized()));
     }
     CellInference inference(pattern_, codebook_, wrong_cells_max_);
     const CellGate gate(cells_, segments_, 1.5);
     inference.propose(gate, alone, seen_);
-    inference.decide(gate, seen_);
+    inference.decide(gate, alone, seen_);
   }
   [[nodiscard]] const CellClaim& claim_at(int row, int column) const {
     return seen_.claims[static_cast<std::size_t>(grid_.node_at(row, column))];
@@ -83,6 +84,7 @@ class InferCells : public testing::Test {
   SimulatedGrid grid_;
   Sightings seen_;
   float peak_of_last_ = 180;
+  int first_row_off_line_ = 1000;  // from which on the epipolar lines are those of the next row
   double wrong_cells_max_ = 0.001;
   std::vector<EpipolarSegment> segments_;
 };
@@ -139,6 +141,20 @@ TEST_F(InferCells, SaysOfATornSymbolThatItIsDamaged) {
   infer();
   EXPECT_EQ(claim_at(10, 10).status, RegionStatus::kDamagedShape);
   EXPECT_TRUE(claim_at(10, 10).same_cell(10, 10));
+}
+
+// As of a rig that has moved: some rows lie on the lines of their cells by chance.
+TEST_F(InferCells, RejectsASurfaceMostOfWhichIsOffItsLines) {
+  const auto infer_moved = [&](int rows_on_line) {
+    grid_ = {}, seen_ = {};
+    show_pattern(2, 2, 22, 30);
+    first_row_off_line_ = 2 + rows_on_line;
+    infer();
+    return score().decoded;
+  };
+  EXPECT_EQ(infer_moved(8), 0);
+  EXPECT_GE(infer_moved(12), 11 * 28);
+  EXPECT_GE(std::ranges::count(seen_.claims, RegionStatus::kOffEpipolarLine, &CellClaim::status), 6 * 28);
 }
 
 // Geometry does not tell a symbol of the wall behind, seen through a gap, from an honest corner.
