@@ -51,8 +51,6 @@ struct LetterPlace {
   LatticeFrame frame = LatticeFrame::Zero();
   float background = 0, peak = 0;  ///< grey levels
   int held_by = 0;                 ///< neighbours; none: there is no place
-
-  friend bool operator==(const LetterPlace&, const LetterPlace&) = default;
 };
 
 /// One letter in its cell, and what aligning has found.

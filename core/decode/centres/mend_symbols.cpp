@@ -19,16 +19,17 @@ constexpr float kMovedMax = 0.08F;
 /// From its neighbours, where few hold it: towards a limb the surface turns away. Between those on both sides it
 /// cannot.
 constexpr float kTiltBesideFewMaxPx = 1;
-/// What noise tilts, in standard deviations of the disparity: that of the slope is sqrt(3) times as much at the sides.
+/// Tilt that noise may make, in standard deviations of the disparity: that of the slope is sqrt(3) times as much at the
+/// sides.
 constexpr float kTiltSigmas = 5;
-/// What one alone holds is tilted less, and lies nearer to where it is put.
+/// Limits of a symbol that one alone holds.
 constexpr float kLoneTiltMaxPx = 0.25F, kLoneMovedMax = 0.008F;
 /// From which distance from its letter on, standard deviations, or how far off its line, projector px, a symbol that
 /// shows its letter is aligned, too: its patch has to agree well then.
 constexpr float kDoubtfulDistance = 2.5F, kDoubtfulAcrossPx = 0.25F, kSupportGood = 0.65F;
 
-/// Print takes light from a cell, and lights less than this share of it where its letter is dark.
-constexpr float kPrintedLightMax = 1.2F, kOtherLightMin = 0.06F;
+/// Light of a printed symbol against that of its neighbours, at most: print takes light.
+constexpr float kPrintedLightMax = 1.2F;
 
 bool is_worn(const CellGate& gate, const Sightings& seen, std::int32_t node) {
   const CellClaim& claim = seen.claims[node];
@@ -151,11 +152,10 @@ void SymbolMender::mend_asked(const LetterScene& scene) {
       aligner_.ask(scene, node, place);
   for (const AskedLetter& asked : aligner_.asked()) {
     if (scene.seen.shapes[asked.node].is_well_seen()) continue;
-    const LightShares shares = aligner_.shares_of_cell(scene, asked);
     const GreyMoments& light = scene.seen.moments[asked.node];
     const bool brighter =
         light.peak - light.background > kPrintedLightMax * (asked.place.peak - asked.place.background);
-    if (shares.beside < kOtherLightMin && !brighter) scene.seen.aligned[asked.node] = Aligned::kPrinted;
+    if (!brighter && !aligner_.shows_other_light(scene, asked)) scene.seen.aligned[asked.node] = Aligned::kPrinted;
   }
   aligner_.align(scene);
   // All are asked before any is mended, so that their order decides nothing.

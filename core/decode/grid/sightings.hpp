@@ -12,7 +12,7 @@
 
 namespace slsd {
 
-/// Whether the place of a symbol comes from aligning its letter with the frame, and what its cell shows.
+/// The result of aligning a symbol's letter with the frame.
 enum class Aligned : std::uint8_t {
   kNot,
   kPrinted,  ///< not aligned, but its cell is not lit where its letter is dark: print may have torn it

@@ -171,7 +171,7 @@ EvidenceFlow& CellInference::flow_of(int worker) {
   return worker == 0 ? flow_ : helpers_[static_cast<std::size_t>(worker) - 1];
 }
 
-/// What is drawn for one node is restored before the next, so each worker has the same flow.
+/// Restores the flow after each node, so the order of nodes and workers decides nothing.
 void CellInference::measure_margins(Executor& executor) {
   flow_.keep();
   helpers_.resize(static_cast<std::size_t>(executor.workers()) - 1);

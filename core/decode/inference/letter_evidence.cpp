@@ -27,7 +27,7 @@ LetterEvidence::LetterEvidence(const CodeArray& array, CellGrid grid)
       letters_.push_back(static_cast<std::uint8_t>(array.at(row, column)));
 }
 
-/// What aligned alone is whole but for print.
+/// Aligned and printed symbols are whole, unless an edge may run through them.
 LetterEvidence::Wholeness LetterEvidence::wholeness_of(std::size_t node) const {
   if (aligned_[node] != Aligned::kNot) return aligned_[node] == Aligned::kAtEdge ? kTorn : kWhole;
   const Classification& shape = shapes_[node];
