@@ -3,6 +3,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
+#include <iterator>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -21,9 +24,10 @@ Result<Row> report_grid(std::vector<Misled>& readers, const ReportOptions& optio
   for (const Kind kind : drawn_grid_kinds(options)) {
     Row row;
     for (int n = options.first; n < options.first + options.frames_of_a_kind; ++n) {
-      Misled& reader = readers[n % 2];
+      Misled& reader = readers[static_cast<std::size_t>(n) % readers.size()];
       const Frame frame = reader.maker.make(kind, static_cast<std::uint32_t>(n));
-      const auto decoding = reader.decoders[n / 2 % 3].decode(frame.image.view(), 255);
+      const auto decoding =
+          reader.decoders[static_cast<std::size_t>(n) / readers.size() % 3].decode(frame.image.view(), 255);
       if (!decoding) return tl::unexpected(decoding.error());
       const Verdict verdict = reader.maker.judge(frame, (*decoding)->points, kTolerancePx);
       row.add(
@@ -39,12 +43,33 @@ Result<Row> report_grid(std::vector<Misled>& readers, const ReportOptions& optio
   return all;
 }
 
+Result<std::vector<Pattern>> shown_patterns(const ReportOptions& options) {
+  std::vector<Pattern> patterns;
+  const auto add = [&](Result<Pattern> pattern) -> Result<> {
+    if (!pattern) return tl::unexpected(pattern.error());
+    patterns.push_back(std::move(*pattern));
+    return {};
+  };
+  for (const std::string& file : options.patterns) {
+    std::ifstream stream(file, std::ios::binary);
+    const std::string text(std::istreambuf_iterator<char>(stream), {});
+    if (auto added = add(read_pattern(text, file)); !added) return tl::unexpected(added.error());
+  }
+  if (!patterns.empty()) return patterns;
+  for (const int symbol_size_px : {16, 8})
+    if (auto added = add(make_pattern({.symbol_size_px = symbol_size_px})); !added)
+      return tl::unexpected(added.error());
+  return patterns;
+}
+
 /// @param trial  leaves rules out
 /// @return       wrong points
 Result<int> report(const ReportOptions& options, RuleTrial& trial) {
+  auto patterns = shown_patterns(options);
+  if (!patterns) return tl::unexpected(patterns.error());
   std::vector<Misled> readers;
-  for (const int symbol_size_px : {16, 8}) {
-    auto reader = Misled::of(symbol_size_px, &trial, options.wrong_cells_max);
+  for (const Pattern& pattern : *patterns) {
+    auto reader = Misled::of(pattern, &trial, options.wrong_cells_max);
     if (!reader) return tl::unexpected(reader.error());
     readers.push_back(std::move(*reader));
   }
@@ -63,7 +88,7 @@ Result<int> report(const ReportOptions& options, RuleTrial& trial) {
 }  // namespace slsd::adversary
 
 // adversary-report [FRAMES] [--kept-out] [--clean] [--first N] [--kind K] [--without RULE]... [--each-rule]
-// [--wrong-cells MAX] [--frame N [--picture FILE.pgm]]
+// [--wrong-cells MAX] [--pattern FILE]... [--frame N [--picture FILE.pgm]]
 int main(int count, char** arguments) {
   slsd::adversary::ReportOptions options;
   int frames = 1000, number = -1;
@@ -92,6 +117,8 @@ int main(int count, char** arguments) {
       trial.off.set(static_cast<std::size_t>(*rule));
     } else if (std::strcmp(arguments[i], "--wrong-cells") == 0 && more) {
       options.wrong_cells_max = std::atof(arguments[++i]);
+    } else if (std::strcmp(arguments[i], "--pattern") == 0 && more) {
+      options.patterns.emplace_back(arguments[++i]);
     } else if (std::strcmp(arguments[i], "--each-rule") == 0) {
       each_rule = true;
     } else {

@@ -7,14 +7,17 @@
 namespace slsd::adversary {
 
 Result<Misled> Misled::of(int symbol_size_px, RuleTrial* trial, double wrong_cells_max) {
-  PatternOptions options{.symbol_size_px = symbol_size_px, .spacing_px = 2};
-  const auto pattern = make_pattern(options);
-  if (!pattern) return tl::unexpected(pattern.error());
+  const auto pattern = make_pattern({.symbol_size_px = symbol_size_px, .spacing_px = 2});
+  return pattern ? of(*pattern, trial, wrong_cells_max) : tl::unexpected(pattern.error());
+}
+
+Result<Misled> Misled::of(const Pattern& pattern, RuleTrial* trial, double wrong_cells_max) {
+  PatternOptions options = pattern.options;
   options.seed += 1;
   const auto foreign = make_pattern(options);
   if (!foreign) return tl::unexpected(foreign.error());
-  Misled misled{FrameMaker(*pattern, foreign->array), {}};
-  const IndexedPattern indexed(*pattern);
+  Misled misled{FrameMaker(pattern, foreign->array), {}};
+  const IndexedPattern indexed(pattern);
   for (const auto& [nearest, farthest] : {std::pair(350., 3200.), {400., 2500.}, {1500., 2500.}}) {
     auto decoder = Decoder::create(
         indexed, misled.maker.calibration(), 0,

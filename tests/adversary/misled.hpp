@@ -23,6 +23,8 @@ struct Misled {
   /// @errors as make_pattern() and Decoder::create()
   [[nodiscard]] static Result<Misled> of(int symbol_size_px, RuleTrial* trial = nullptr,
                                          double wrong_cells_max = DecodeOptions().wrong_cells_max);
+  /// The same with any pattern. The foreign array is another one of the same options.
+  [[nodiscard]] static Result<Misled> of(const Pattern& pattern, RuleTrial* trial, double wrong_cells_max);
 };
 
 }  // namespace slsd::adversary

@@ -32,6 +32,7 @@ struct ReportOptions {
   bool clean = false;   ///< scenes in the best of light
   bool single = false;  ///< tells why a single frame's regions gave no point
   const char* picture = nullptr;
+  std::vector<std::string> patterns{};  ///< files of the patterns that are shown; none: the default at 16 and 8 px
 };
 
 /// Number of a scene kind among all kinds: those on the grid come first.

@@ -15,7 +15,7 @@ Result<Row> report_scenes(std::vector<Misled>& readers, const ReportOptions& opt
     for (int number = options.first; number < options.first + options.frames_of_a_kind; ++number) {
       const auto size = static_cast<std::size_t>(number) % readers.size();
       const SceneFrame frame = makers[size].make(index, static_cast<std::uint32_t>(number), options.clean);
-      Decoder& decoder = readers[size].decoders[static_cast<std::size_t>(number) / 2 % 3];
+      Decoder& decoder = readers[size].decoders[static_cast<std::size_t>(number) / readers.size() % 3];
       const auto decoding = decoder.decode(frame.image.view(), 255);
       if (!decoding) return tl::unexpected(decoding.error());
       const SceneVerdict verdict = makers[size].judge(frame.truth, (*decoding)->points);
