@@ -2,6 +2,11 @@
 // Copyright the slsd authors
 #include "core/code/array_bounds.hpp"
 
+#include <algorithm>
+#include <tuple>
+
+#include "core/code/runs.hpp"
+
 namespace slsd {
 namespace {
 
@@ -71,6 +76,21 @@ std::optional<std::string> forbidding_bound(const ArrayOptions& options, int min
   if (needed > packing)
     return "Hamming bound: " + array_in_words(options) + ", but " + letters + " have at most " + grouped(packing) +
            " words at distance " + std::to_string(minimum_distance);
+  return std::nullopt;
+}
+
+std::optional<std::string> forbidding_run_bound(int letters, int cells, int reach) {
+  const std::int64_t words = power(letters, kShortestRun);
+  const std::int64_t packing = power(letters, kLongestRun) / (1 + kLongestRun * (letters - 1));
+  for (const auto& [name, length, most] : {std::tuple("Singleton bound: ", kShortestRun, words),
+                                           {"Singleton bound: ", kLongestRun, words},
+                                           {"Hamming bound: ", kLongestRun, packing}}) {
+    const int runs = std::min(reach + 1, cells - length + 1);
+    if (runs > most)
+      return name + std::to_string(runs) + " runs of " + std::to_string(length) + " letters would have to differ in " +
+             std::to_string(length - kShortestRun + 1) + ", but " + std::to_string(letters) + " letters have at most " +
+             grouped(most) + " such runs";
+  }
   return std::nullopt;
 }
 

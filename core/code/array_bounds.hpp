@@ -23,4 +23,10 @@ namespace slsd {
 /// Pigeonhole (doubled under half turn, words that equal their own turn excluded), Singleton, Hamming.
 [[nodiscard]] std::optional<std::string> forbidding_bound(const ArrayOptions& options, int minimum_distance);
 
+/// The bound that forbids lines of letters in which no run recurs within the reach, in words; empty if none does.
+/// Singleton for runs of 3, Singleton and Hamming for runs of 5 that differ in 3 letters.
+/// @param cells  of a line: columns of a row, rows of a column
+/// @param reach  in cells
+[[nodiscard]] std::optional<std::string> forbidding_run_bound(int letters, int cells, int reach);
+
 }  // namespace slsd

@@ -8,6 +8,7 @@
 #include "core/code/array_bounds.hpp"
 #include "core/code/constructive_array.hpp"
 #include "core/code/paper_array.hpp"
+#include "core/code/runs.hpp"
 
 namespace slsd {
 namespace {
@@ -15,6 +16,9 @@ namespace {
 constexpr int kPaperDraws = 2000;
 constexpr std::int64_t kStepsForDistanceAsked = 6'000'000;
 constexpr std::int64_t kStepsForDistanceTried = 1'500'000;
+constexpr std::int64_t kStepsForReachAsked = 6'000'000;
+constexpr std::int64_t kStepsForReachTried = 1'500'000;
+constexpr int kReachStep = 5;  // columns or rows, from one reach that is tried to the next
 
 // Windows times the words that each forbids, over all words. Raster greedy construction succeeds up to about 1.6;
 // beyond 1.9 no trial ever did, and the search for the largest distance does not begin there.
@@ -42,10 +46,15 @@ Result<CodeArray> verified(CodeArray array, const ArrayOptions& options, int dis
               "the array that was constructed fails its check: distance " + std::to_string(array.minimum_distance));
 }
 
-Result<CodeArray> construct_with(const ArrayOptions& options, int distance) {
+Result<> check_bounds(const ArrayOptions& options, int distance) {
   if (const auto bound = forbidding_bound(options, distance))
     return fail(ErrorCode::kImpossible, *bound + ": use more letters or larger symbols");
-  auto array = construct_array(options, distance, kStepsForDistanceAsked);
+  return {};
+}
+
+Result<CodeArray> construct_with(const ArrayOptions& options, int distance) {
+  if (auto possible = check_bounds(options, distance); !possible) return tl::unexpected(possible.error());
+  auto array = construct_array(options, distance, RunReach{}, kStepsForDistanceAsked);
   if (!array) return fail(ErrorCode::kImpossible, searched_in_vain(options, distance));
   return verified(std::move(*array), options, distance);
 }
@@ -53,10 +62,93 @@ Result<CodeArray> construct_with(const ArrayOptions& options, int distance) {
 Result<CodeArray> construct_largest(const ArrayOptions& options) {
   for (int distance = kWindowCells; distance > 1; --distance) {
     if (forbidding_bound(options, distance) || density(options, distance) > kHopelessDensity) continue;
-    if (auto array = construct_array(options, distance, kStepsForDistanceTried))
+    if (auto array = construct_array(options, distance, RunReach{}, kStepsForDistanceTried))
       return verified(std::move(*array), options, distance);
   }
   return construct_with(options, 1);
+}
+
+/// Widens the reach of the array's runs until a search fails.
+class WithoutRepeats {
+ public:
+  WithoutRepeats(const ArrayOptions& options, int distance)
+      : options_(options),
+        distance_(distance),
+        reach_{options.row_reach.value_or(0), options.column_reach.value_or(0)} {}
+
+  Result<CodeArray> make() {
+    if (const auto bound = bound_on(reach_))
+      return fail(ErrorCode::kImpossible, *bound + ": use more letters or a smaller row_reach or column_reach");
+    const bool single_run = options_.rows == kShortestRun && options_.columns == kShortestRun;
+    if (reach_ != RunReach{} || single_run) {
+      made_ = construct_array(options_, distance_, reach_, kStepsForReachAsked);
+      if (!made_) return fail(ErrorCode::kImpossible, searched_in_vain_for(reach_));
+    }
+    if (!options_.row_reach) widen(&RunReach::along_rows, options_.columns - kShortestRun);
+    if (!options_.column_reach) widen(&RunReach::along_columns, options_.rows - kShortestRun);
+    if (!made_) return fail(ErrorCode::kImpossible, searched_in_vain_for(failed_));
+    return checked();
+  }
+
+ private:
+  void widen(int RunReach::*along, int end) {
+    while (reach_.*along < end) {
+      RunReach wider = reach_;
+      wider.*along = std::min(wider.*along + kReachStep, end);
+      auto array = bound_on(wider) ? std::nullopt : construct_array(options_, distance_, wider, kStepsForReachTried);
+      if (!array) {
+        if (failed_ == RunReach{}) failed_ = wider;
+        return;
+      }
+      made_ = std::move(array);
+      reach_ = wider;
+    }
+  }
+
+  [[nodiscard]] std::optional<std::string> bound_on(RunReach reach) const {
+    auto bound = forbidding_run_bound(options_.letters, options_.columns, reach.along_rows);
+    return bound ? bound : forbidding_run_bound(options_.letters, options_.rows, reach.along_columns);
+  }
+
+  [[nodiscard]] std::string searched_in_vain_for(RunReach reach) const {
+    return "found no " + std::to_string(options_.rows) + "x" + std::to_string(options_.columns) + " array of " +
+           std::to_string(options_.letters) + " letters with minimum distance " + std::to_string(distance_) +
+           " in which no run recurs within " + std::to_string(reach.along_rows) + " columns and " +
+           std::to_string(reach.along_columns) +
+           " rows, within the search budget: try another seed, more letters, larger symbols, or a smaller row_reach, "
+           "column_reach or minimum distance";
+  }
+
+  Result<CodeArray> checked() {
+    made_->row_reach = repeat_free_reach(*made_, Along::kRows);
+    made_->column_reach = repeat_free_reach(*made_, Along::kColumns);
+    const bool kept = made_->row_reach >= std::min(reach_.along_rows, options_.columns - kShortestRun) &&
+                      made_->column_reach >= std::min(reach_.along_columns, options_.rows - kShortestRun);
+    assert(kept);
+    if (kept) return verified(std::move(*made_), options_, distance_);
+    return fail(ErrorCode::kImpossible, "the array that was constructed fails its check: runs recur within " +
+                                            std::to_string(made_->row_reach) + " columns and " +
+                                            std::to_string(made_->column_reach) + " rows");
+  }
+
+  const ArrayOptions& options_;
+  int distance_;
+  RunReach reach_, failed_;
+  std::optional<CodeArray> made_;
+};
+
+Result<CodeArray> construct(const ArrayOptions& options) {
+  return options.minimum_distance ? construct_with(options, *options.minimum_distance) : construct_largest(options);
+}
+
+Result<CodeArray> construct_without_repeats(const ArrayOptions& options) {
+  if (options.minimum_distance) {
+    if (auto possible = check_bounds(options, *options.minimum_distance); !possible)
+      return tl::unexpected(possible.error());
+    return WithoutRepeats(options, *options.minimum_distance).make();
+  }
+  const auto windows_alone = construct_largest(options);
+  return windows_alone ? WithoutRepeats(options, windows_alone->minimum_distance).make() : windows_alone;
 }
 
 Result<CodeArray> draw_by_rejection(const ArrayOptions& options) {
@@ -73,7 +165,30 @@ Result<CodeArray> draw_by_rejection(const ArrayOptions& options) {
                                           "letters, larger symbols or the constructive method");
 }
 
+Result<> check_reach(const ArrayOptions& options) {
+  const auto refuse = [](const char* what) { return fail(ErrorCode::kInvalidArgument, what); };
+  if (!options.row_reach && !options.column_reach) return {};
+  if (options.method != ArrayMethod::kNoRepeats)
+    return refuse("row_reach and column_reach need method = \"no_repeats\"");
+  for (const int reach : {options.row_reach.value_or(0), options.column_reach.value_or(0)})
+    if (reach < 0 || reach > kMaxArrayExtent) return refuse("row_reach and column_reach must be 0 to 512");
+  if (options.row_reach == 0 && options.column_reach == 0)
+    return refuse("row_reach and column_reach are both 0, and nothing is asked of runs: use method = \"constructive\"");
+  return {};
+}
+
 }  // namespace
+
+std::string_view to_string(ArrayMethod method) {
+  switch (method) {
+    case ArrayMethod::kPaper:
+      return "paper";
+    case ArrayMethod::kConstructive:
+      return "constructive";
+    default:
+      return "no_repeats";
+  }
+}
 
 Result<> ArrayOptions::validate() const {
   const auto refuse = [](const char* what) { return fail(ErrorCode::kInvalidArgument, what); };
@@ -86,13 +201,13 @@ Result<> ArrayOptions::validate() const {
     return refuse(
         "the paper's method promises neither minimum_distance nor half_turn_unique: leave both out, or use "
         "the constructive method");
-  return {};
+  return check_reach(*this);
 }
 
 Result<CodeArray> make_code_array(const ArrayOptions& options) {
   if (auto valid = options.validate(); !valid) return tl::unexpected(valid.error());
   if (options.method == ArrayMethod::kPaper) return draw_by_rejection(options);
-  return options.minimum_distance ? construct_with(options, *options.minimum_distance) : construct_largest(options);
+  return options.method == ArrayMethod::kNoRepeats ? construct_without_repeats(options) : construct(options);
 }
 
 int array_extent(int projector_px, int symbol_size_px, int spacing_px) {

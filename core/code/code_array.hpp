@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "core/result.hpp"
@@ -25,6 +26,9 @@ struct CodeArray {
   /// What minimum_window_distance() found when the array was made or read, turned windows included where they were
   /// asked for; 0 where nobody looked. Computing it takes seconds for the largest arrays.
   int minimum_distance = 0;
+  /// What repeat_free_reach() found along rows, in columns, and along columns, in rows; 0 unless the array was made or
+  /// read as ArrayMethod::kNoRepeats.
+  int row_reach = 0, column_reach = 0;
 
   [[nodiscard]] int at(int row, int column) const { return cells[static_cast<std::size_t>(row) * columns + column]; }
   friend bool operator==(const CodeArray&, const CodeArray&) = default;
@@ -33,7 +37,11 @@ struct CodeArray {
 enum class ArrayMethod {
   kPaper,         ///< aligned windows pairwise different, by rejection (Elahi et al. 2020, figure 2)
   kConstructive,  ///< every overlapping window unique, with a minimum Hamming distance
+  kNoRepeats,     ///< the same, and no run of letters recurs nearby in its row or column (core/code/runs.hpp)
 };
+
+/// As in a pattern file or the configuration: "paper", "constructive", "no_repeats".
+[[nodiscard]] std::string_view to_string(ArrayMethod method);
 
 struct ArrayOptions {
   int rows = 45;
@@ -44,6 +52,11 @@ struct ArrayOptions {
   /// Hamming, over all overlapping windows; without it the largest that is reached.
   std::optional<int> minimum_distance{};
   bool half_turn_unique = false;  ///< windows also differ from every window turned by 180 degrees
+  /// kNoRepeats only: columns within which no run recurs in its row, 0 to 512. Without it as far as the search gets,
+  /// rows first.
+  std::optional<int> row_reach{};
+  /// The same for runs along columns, in rows.
+  std::optional<int> column_reach{};
 
   [[nodiscard]] Result<> validate() const;
 };

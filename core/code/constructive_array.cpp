@@ -4,23 +4,43 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "core/code/letter_source.hpp"
+#include "core/code/runs.hpp"
 #include "core/code/window_index.hpp"
 
 namespace slsd {
 namespace {
 
-constexpr int kStepsPerCell = 60;     // within one row, before rows are rolled back
 constexpr int kRollbacksPerRow = 12;  // over the whole array, before a restart
-constexpr int kLongestRollbackRows = 8;
+
+// How long the search stays with a row before it takes rows back.
+struct Patience {
+  int steps_per_cell;
+  int tries;
+  int longest_rollback_rows;
+};
+
+// A row without repeats fails by its own letters more often than by those of the rows above.
+constexpr Patience kWithWindowsOnly{60, 1, 8}, kWithoutRepeats{200, 16, 2};
+
+CodeArray transposed(const CodeArray& array) {
+  CodeArray turned{array.columns, array.rows, array.letters, {}};
+  for (int row = 0; row < turned.rows; ++row)
+    for (int column = 0; column < turned.columns; ++column)
+      turned.cells.push_back(static_cast<std::uint8_t>(array.at(column, row)));
+  return turned;
+}
 
 /// The search of one array: a stack of cells, each with the letters that are still to be tried there.
 class Construction {
  public:
-  Construction(const ArrayOptions& options, int minimum_distance, std::int64_t step_budget)
+  Construction(const ArrayOptions& options, int minimum_distance, RunReach reach, std::int64_t step_budget)
       : options_(options),
         minimum_distance_(minimum_distance),
+        reach_(reach),
+        patience_(reach == RunReach{} ? kWithWindowsOnly : kWithoutRepeats),
         steps_left_(step_budget),
         source_(options.seed),
         index_(options.letters, minimum_distance),
@@ -31,7 +51,7 @@ class Construction {
   std::optional<CodeArray> run() {
     int rollbacks = 0;
     while (next_ < cell_count()) {
-      if (fill_row()) continue;
+      if (fill_row_in_tries()) continue;
       if (steps_left_ <= 0) return std::nullopt;
       if (rollbacks++ < kRollbacksPerRow * options_.rows) {
         roll_back();
@@ -51,11 +71,17 @@ class Construction {
 
   [[nodiscard]] int cell_count() const { return static_cast<int>(array_.cells.size()); }
 
+  bool fill_row_in_tries() {
+    for (int tries = patience_.tries; tries > 0 && steps_left_ > 0; --tries)
+      if (fill_row()) return true;
+    return false;
+  }
+
   // From the row's first free cell to its end, depth first; false where the row's steps are used up or nothing fits.
   bool fill_row() {
     const int first = next_ / options_.columns * options_.columns;
     const int end = first + options_.columns;
-    std::int64_t steps = std::int64_t{kStepsPerCell} * options_.columns;
+    std::int64_t steps = std::int64_t{patience_.steps_per_cell} * options_.columns;
     next_ = first;
     open_cell();
     while (next_ < end) {
@@ -76,7 +102,7 @@ class Construction {
 
   void roll_back() {
     const int row = next_ / options_.columns;
-    take_back_to(std::max(0, row - 1 - source_.below(kLongestRollbackRows)) * options_.columns);
+    take_back_to(std::max(0, row - 1 - source_.below(patience_.longest_rollback_rows)) * options_.columns);
   }
 
   void open_cell() {
@@ -93,12 +119,30 @@ class Construction {
     Choices& choices = choices_[next_];
     if (choices.tried == options_.letters) return false;
     array_.cells[next_] = choices.order[choices.tried++];
+    if (ends_recurring_run(1, next_ % options_.columns, reach_.along_rows) ||
+        ends_recurring_run(options_.columns, next_ / options_.columns, reach_.along_columns))
+      return false;
     if (!ends_window(next_)) return true;
     const PackedWindow window = window_ending_at(next_);
     if (!fits(window)) return false;
     index_.add(window);
     if (options_.half_turn_unique) index_.add(half_turned(window));
     return true;
+  }
+
+  // Whether a run that ends at the next cell is too like one that ends before it in the line.
+  // step: from a cell of the line to the next one; position: of the cell in the line.
+  [[nodiscard]] bool ends_recurring_run(int step, int position, int reach) const {
+    const std::uint8_t* const run = &array_.cells[static_cast<std::size_t>(next_)];
+    for (int apart = 1; apart <= std::min(reach, position); ++apart) {
+      const int longest = std::min(kLongestRun, position - apart + 1);
+      int differing = 0;
+      for (int back = 0; back < longest; ++back) {
+        differing += run[-back * step] != run[-(back + apart) * step] ? 1 : 0;
+        if (back + 1 - differing >= kShortestRun) return true;
+      }
+    }
+    return false;
   }
 
   [[nodiscard]] bool fits(PackedWindow window) const {
@@ -130,6 +174,8 @@ class Construction {
 
   const ArrayOptions& options_;
   int minimum_distance_;
+  RunReach reach_;
+  Patience patience_;
   std::int64_t steps_left_;
   LetterSource source_;
   WindowIndex index_;
@@ -140,8 +186,14 @@ class Construction {
 
 }  // namespace
 
-std::optional<CodeArray> construct_array(const ArrayOptions& options, int minimum_distance, std::int64_t step_budget) {
-  return Construction(options, minimum_distance, step_budget).run();
+std::optional<CodeArray> construct_array(const ArrayOptions& options, int minimum_distance, RunReach reach,
+                                         std::int64_t step_budget) {
+  if (reach.along_columns <= reach.along_rows) return Construction(options, minimum_distance, reach, step_budget).run();
+  ArrayOptions turned = options;
+  std::swap(turned.rows, turned.columns);
+  std::swap(reach.along_rows, reach.along_columns);
+  const auto array = Construction(turned, minimum_distance, reach, step_budget).run();
+  return array ? std::optional(transposed(*array)) : std::nullopt;
 }
 
 }  // namespace slsd

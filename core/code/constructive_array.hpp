@@ -9,14 +9,25 @@
 
 namespace slsd {
 
-/// Fills the array cell by cell so that every overlapping 3x3 window keeps the distance from all before it: random
-/// order of letters, backtracking within the row, rows rolled back where one cannot be filled, restarts from nothing.
+/// How far no run of letters recurs in its line (core/code/runs.hpp); 0: runs may recur anywhere. A reach beyond the
+/// end of the line covers the whole line.
+struct RunReach {
+  int along_rows = 0;     ///< columns
+  int along_columns = 0;  ///< rows
+
+  friend bool operator==(const RunReach&, const RunReach&) = default;
+};
+
+/// Fills the array cell by cell so that every overlapping 3x3 window keeps the distance from all before it, and no run
+/// recurs within its reach: random order of letters, backtracking within the row, rows rolled back if one cannot be
+/// filled, restarts from nothing. If columns have the longer reach, it fills column by column.
 /// @param options           rows and columns at least 3, letters, seed, half_turn_unique
 /// @param minimum_distance  1 to 9
+/// @param reach             0 or more columns and rows
 /// @param step_budget       letters tried before it gives up; steps and not seconds, so that every machine agrees
-/// @return                  empty where the budget did not suffice
+/// @return                  empty if the budget did not suffice
 /// @thread reentrant
 [[nodiscard]] std::optional<CodeArray> construct_array(const ArrayOptions& options, int minimum_distance,
-                                                       std::int64_t step_budget);
+                                                       RunReach reach, std::int64_t step_budget);
 
 }  // namespace slsd

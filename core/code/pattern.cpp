@@ -39,7 +39,9 @@ ArrayOptions array_options(const PatternOptions& options) {
           .seed = options.seed,
           .method = options.method,
           .minimum_distance = options.minimum_distance,
-          .half_turn_unique = options.half_turn_unique};
+          .half_turn_unique = options.half_turn_unique,
+          .row_reach = options.row_reach,
+          .column_reach = options.column_reach};
 }
 
 int whole_cells(int projector_px, int first_px, int size_px, int pitch_px, int cells) {

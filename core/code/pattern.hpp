@@ -31,6 +31,8 @@ struct PatternOptions {
   ArrayMethod method = ArrayMethod::kConstructive;
   std::optional<int> minimum_distance{};
   bool half_turn_unique = false;
+  std::optional<int> row_reach{};     ///< columns; see ArrayOptions
+  std::optional<int> column_reach{};  ///< rows
 
   [[nodiscard]] Result<> validate() const;
   friend bool operator==(const PatternOptions&, const PatternOptions&) = default;

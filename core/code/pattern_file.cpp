@@ -8,6 +8,7 @@
 #include "core/code/key_reader.hpp"
 #include "core/code/paper_array.hpp"
 #include "core/code/pattern.hpp"
+#include "core/code/runs.hpp"
 
 namespace slsd {
 namespace {
@@ -16,9 +17,11 @@ constexpr std::size_t kMaxTextBytes = 1 << 20;  // the largest array, 512x512, i
 
 constexpr std::array<std::string_view, 3> kTables = {"projector", "pattern", "array"};
 constexpr std::array<std::string_view, 2> kProjectorKeys = {"width_px", "height_px"};
-constexpr std::array<std::string_view, 7> kPatternKeys = {
-    "symbol_size_px", "spacing_px", "symbols", "seed", "method", "minimum_distance", "half_turn_unique"};
-constexpr std::array<std::string_view, 4> kArrayKeys = {"rows", "columns", "minimum_distance", "letters"};
+constexpr std::array<std::string_view, 9> kPatternKeys = {
+    "symbol_size_px",   "spacing_px",       "symbols",   "seed",        "method",
+    "minimum_distance", "half_turn_unique", "row_reach", "column_reach"};
+constexpr std::array<std::string_view, 6> kArrayKeys = {"rows",      "columns",      "minimum_distance",
+                                                        "row_reach", "column_reach", "letters"};
 
 std::string list_of(const std::vector<int>& numbers) {
   std::string text;
@@ -38,17 +41,32 @@ std::string options_in_toml(const PatternOptions& options) {
                      "\n\n[pattern]\nsymbol_size_px = " + std::to_string(options.symbol_size_px) +
                      "\nspacing_px = " + std::to_string(options.spacing_px) +
                      "\nsymbols = " + list_of(options.symbols) + "\nseed = " + std::to_string(options.seed) +
-                     "\nmethod = " + (options.method == ArrayMethod::kPaper ? "\"paper\"" : "\"constructive\"") + "\n";
-  if (options.minimum_distance) text += "minimum_distance = " + std::to_string(*options.minimum_distance) + "\n";
+                     "\nmethod = \"" + std::string(to_string(options.method)) + "\"\n";
+  const auto add = [&text](const char* key, std::optional<int> value) {
+    if (value) text += std::string(key) + " = " + std::to_string(*value) + "\n";
+  };
+  add("minimum_distance", options.minimum_distance);
+  add("row_reach", options.row_reach);
+  add("column_reach", options.column_reach);
   return text + "half_turn_unique = " + (options.half_turn_unique ? "true" : "false") + "\n";
 }
 
+std::string reach_in_toml(const Pattern& pattern) {
+  if (pattern.options.method != ArrayMethod::kNoRepeats) return {};
+  return "# Columns within which no run of letters recurs in its row, and rows within which none does in its column.\n"
+         "row_reach = " +
+         std::to_string(pattern.array.row_reach) + "\ncolumn_reach = " + std::to_string(pattern.array.column_reach) +
+         "\n";
+}
+
 ArrayMethod read_method(KeyReader& reader, const toml::table& table) {
-  const std::string method = reader.string(table, "method");
-  if (method != "paper" && method != "constructive" && !reader.error())
+  const std::string name = reader.string(table, "method");
+  for (const ArrayMethod method : {ArrayMethod::kPaper, ArrayMethod::kConstructive, ArrayMethod::kNoRepeats})
+    if (name == to_string(method)) return method;
+  if (!reader.error())
     reader.refuse(*table.get("method"), ErrorCode::kInvalidArgument,
-                  "\"method\" must be \"constructive\" or \"paper\"");
-  return method == "paper" ? ArrayMethod::kPaper : ArrayMethod::kConstructive;
+                  "\"method\" must be \"constructive\", \"no_repeats\" or \"paper\"");
+  return ArrayMethod::kConstructive;
 }
 
 int read_int(KeyReader& reader, const toml::table& table, std::string_view key, int low, int high) {
@@ -67,6 +85,9 @@ PatternOptions read_options(KeyReader& reader, const toml::table& projector, con
   options.method = read_method(reader, pattern);
   if (pattern.contains("minimum_distance"))
     options.minimum_distance = read_int(reader, pattern, "minimum_distance", 1, kWindowCells);
+  if (pattern.contains("row_reach")) options.row_reach = read_int(reader, pattern, "row_reach", 0, kMaxArrayExtent);
+  if (pattern.contains("column_reach"))
+    options.column_reach = read_int(reader, pattern, "column_reach", 0, kMaxArrayExtent);
   options.half_turn_unique = reader.boolean(pattern, "half_turn_unique");
   if (auto valid = options.validate(); !valid) reader.refuse(pattern, valid.error().code, valid.error().message);
   if (options.symbols.empty()) reader.refuse(pattern, ErrorCode::kInvalidArgument, "symbols must name 2 to 8 symbols");
@@ -107,6 +128,23 @@ CodeArray read_array(KeyReader& reader, const toml::table& table, const PatternO
   return array;
 }
 
+void check_reach(KeyReader& reader, const toml::table& table, Pattern& pattern) {
+  CodeArray& array = pattern.array;
+  const auto promised = [&](const char* key, std::optional<int> asked, int cells) {
+    return std::max(read_int(reader, table, key, 0, kMaxArrayExtent),
+                    std::min(asked.value_or(0), cells - kShortestRun));
+  };
+  const int row_reach = promised("row_reach", pattern.options.row_reach, array.columns),
+            column_reach = promised("column_reach", pattern.options.column_reach, array.rows);
+  array.row_reach = repeat_free_reach(array, Along::kRows);
+  array.column_reach = repeat_free_reach(array, Along::kColumns);
+  if (array.row_reach < row_reach || array.column_reach < column_reach)
+    reader.refuse(table, ErrorCode::kMismatch,
+                  "runs of \"letters\" recur after " + std::to_string(array.row_reach + 1) + " columns or " +
+                      std::to_string(array.column_reach + 1) +
+                      " rows, sooner than the file promises: a letter was changed; make the pattern anew");
+}
+
 // What the file promises is computed anew: a letter changed by hand or in transit must not become a wrong point.
 void check_promises(KeyReader& reader, const toml::table& table, Pattern& pattern) {
   const int promised = read_int(reader, table, "minimum_distance", 0, kWindowCells);
@@ -120,9 +158,12 @@ void check_promises(KeyReader& reader, const toml::table& table, Pattern& patter
   if (pattern.options.method == ArrayMethod::kPaper && !aligned_windows_differ(pattern.array))
     reader.refuse(table, ErrorCode::kMismatch,
                   "two aligned windows of \"letters\" are equal: a letter was changed; make the pattern anew");
-  if (pattern.options.method == ArrayMethod::kConstructive && found < 1)
+  if (pattern.options.method != ArrayMethod::kPaper && found < 1)
     reader.refuse(table, ErrorCode::kMismatch,
                   "two windows of \"letters\" are equal: a letter was changed; make the pattern anew");
+  if (pattern.options.method == ArrayMethod::kNoRepeats) return check_reach(reader, table, pattern);
+  if (table.contains("row_reach") || table.contains("column_reach"))
+    reader.refuse(table, ErrorCode::kInvalidArgument, "row_reach and column_reach need method = \"no_repeats\"");
 }
 
 Result<Pattern> pattern_from(const toml::table& document, std::string_view name) {
@@ -149,7 +190,8 @@ std::string write_pattern(const Pattern& pattern) {
   std::string text = "# A pattern of slsd. Letter i of the array is shown as symbols[i].\n" +
                      options_in_toml(pattern.options) + "\n[array]\nrows = " + std::to_string(array.rows) +
                      "\ncolumns = " + std::to_string(array.columns) + "\n# Hamming, between any two 3x3 windows.\n" +
-                     "minimum_distance = " + std::to_string(array.minimum_distance) + "\nletters = [\n";
+                     "minimum_distance = " + std::to_string(array.minimum_distance) + "\n" + reach_in_toml(pattern) +
+                     "letters = [\n";
   for (int row = 0; row < array.rows; ++row) text += "  \"" + row_of_letters(array, row) + "\",\n";
   return text + "]\n";
 }

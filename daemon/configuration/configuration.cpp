@@ -23,6 +23,7 @@ constexpr std::array kProjectorDrivers{std::pair("headless"sv, ProjectorDriver::
                                        std::pair("glfw"sv, ProjectorDriver::kGlfw)};
 constexpr auto kIdlePictures = std::span(kPictureNames).first(3);  // pattern, white and black
 constexpr std::array kArrayMethods{std::pair("constructive"sv, ArrayMethod::kConstructive),
+                                   std::pair("no_repeats"sv, ArrayMethod::kNoRepeats),
                                    std::pair("paper"sv, ArrayMethod::kPaper)};
 constexpr std::array kPrecisions{std::pair("standard"sv, Precision::kStandard), std::pair("fine"sv, Precision::kFine)};
 constexpr std::array kDensities{std::pair("symbols"sv, Density::kSymbols), std::pair("pixels"sv, Density::kPixels)};
@@ -48,8 +49,8 @@ Result<> read_projector(const toml::table* table, const path& file, ProjectorOpt
 
 // A pattern file holds the whole pattern: another key beside it could only contradict it.
 void refuse_keys_beside_file(TableReader& reader) {
-  for (const char* key :
-       {"symbol_size_px", "spacing_px", "symbols", "seed", "method", "minimum_distance", "half_turn_unique"}) {
+  for (const char* key : {"symbol_size_px", "spacing_px", "symbols", "seed", "method", "minimum_distance",
+                          "half_turn_unique", "row_reach", "column_reach"}) {
     if (reader.has(key)) reader.refuse(key, "cannot stand beside file, which holds the whole pattern: remove one");
   }
 }
@@ -67,6 +68,8 @@ Result<> read_pattern_table(const toml::table* table, const path& file, Configur
   reader.choose("method", options.method, kArrayMethods);
   reader.read("minimum_distance", options.minimum_distance);
   reader.read("half_turn_unique", options.half_turn_unique);
+  reader.read("row_reach", options.row_reach);
+  reader.read("column_reach", options.column_reach);
   if (!configuration.pattern_file.empty()) refuse_keys_beside_file(reader);
   if (auto read = reader.finish(options.validate()); !read) return read;
   if (options.symbols.empty()) options.symbols = default_symbols(options.symbol_size_px);

@@ -51,9 +51,11 @@ class PatternSettings(TypedDict, total=False):
     spacing_px: Optional[int]
     symbols: Optional[List[int]]
     seed: Optional[int]
-    method: Optional[Literal["constructive", "paper"]]
+    method: Optional[Literal["constructive", "no_repeats", "paper"]]
     minimum_distance: Optional[int]
     half_turn_unique: Optional[bool]
+    row_reach: Optional[int]
+    column_reach: Optional[int]
 
 
 class CameraSettings(TypedDict, total=False):

@@ -39,8 +39,12 @@ RC_GTEST_PROP(PatternFile, ReadsWhatItWrites, ()) {
   options.spacing_px = *rc::gen::inRange(1, 17);
   options.symbols = *rc::gen::element(std::vector<int>{1, 2, 3, 4, 5}, std::vector<int>{25, 7, 22, 12, 8, 6, 3, 1});
   options.seed = *rc::gen::arbitrary<std::uint32_t>();
-  options.method = *rc::gen::element(ArrayMethod::kPaper, ArrayMethod::kConstructive);
-  if (options.method == ArrayMethod::kConstructive) {
+  options.method = *rc::gen::element(ArrayMethod::kPaper, ArrayMethod::kConstructive, ArrayMethod::kNoRepeats);
+  if (options.method == ArrayMethod::kNoRepeats) {
+    options.row_reach = *rc::gen::element(std::optional<int>(1), std::optional<int>(3));
+    options.column_reach = *rc::gen::element(std::optional<int>(0), std::optional<int>(3));
+    options.minimum_distance = 1;
+  } else if (options.method == ArrayMethod::kConstructive) {
     options.minimum_distance = *rc::gen::element(std::optional<int>(1), std::optional<int>(2));
     options.half_turn_unique = *rc::gen::arbitrary<bool>() && options.symbols.size() > 5;
   }
@@ -73,7 +77,8 @@ TEST(ReadPattern, RefusesWrongTypesAndRanges) {
   EXPECT_THAT(refusal(file_with("symbol_size_px = 16", "symbol_size_px = 13")), HasSubstr("8, 10, 12, 14 or 16"));
   EXPECT_THAT(refusal(file_with("[5, 7, 22, 25, 12]", "[5, 7, 22, 25, 26]")), HasSubstr("1 to 25"));
   EXPECT_THAT(refusal(file_with("[5, 7, 22, 25, 12]", "[]")), HasSubstr("2 to 8 symbols"));
-  EXPECT_THAT(refusal(file_with("\"constructive\"", "\"random\"")), HasSubstr("\"constructive\" or \"paper\""));
+  EXPECT_THAT(refusal(file_with("\"constructive\"", "\"random\"")),
+              HasSubstr("\"constructive\", \"no_repeats\" or \"paper\""));
   EXPECT_THAT(refusal(file_with("half_turn_unique = false", "half_turn_unique = 0")), HasSubstr("true or false"));
   EXPECT_THAT(refusal(file_with("[array]", "[[array]]")), HasSubstr("must be a table"));
 }
@@ -98,6 +103,43 @@ TEST(ReadPattern, RefusesAChangedLetter) {
   changed.options.minimum_distance.reset();
   changed.array.minimum_distance = 0;
   EXPECT_THAT(refusal(write_pattern(changed)), HasSubstr("two windows of \"letters\" are equal"));
+}
+
+// 36 columns and 21 rows.
+std::string file_without_repeats() {
+  const auto pattern = make_pattern({.projector_width_px = 640,
+                                     .projector_height_px = 360,
+                                     .symbols = {5, 7, 22, 25, 12, 9},
+                                     .method = ArrayMethod::kNoRepeats,
+                                     .minimum_distance = 3,
+                                     .row_reach = 30,
+                                     .column_reach = 10});
+  EXPECT_TRUE(pattern);
+  return write_pattern(*pattern);
+}
+
+TEST(ReadPattern, RefusesRunsThatRecurSoonerThanPromised) {
+  const std::string text = file_without_repeats();
+  const std::size_t letters = text.find("letters = [") + 15;  // of the first row
+  ASSERT_EQ(refusal(text), "read");
+  std::string changed = text;
+  changed.replace(letters + 20, 3, text.substr(letters, 3));
+  EXPECT_THAT(refusal(changed), HasSubstr("recur after"));
+  std::string promises_more = text;
+  promises_more.replace(text.rfind("column_reach = ") + 15, 2, "19");
+  EXPECT_THAT(refusal(promises_more), HasSubstr("sooner than the file promises"));
+  std::string asks_more = text;
+  asks_more.replace(text.find("column_reach = ") + 15, 2, "19");
+  EXPECT_THAT(refusal(asks_more), HasSubstr("sooner than the file promises"));
+}
+
+TEST(ReadPattern, NeedsTheReachOfRunsOnlyWithoutRepeats) {
+  std::string text = file_without_repeats();
+  const std::size_t at = text.rfind("row_reach");
+  EXPECT_THAT(refusal(text.substr(0, at) + text.substr(text.find('\n', at) + 1)),
+              HasSubstr("the key \"row_reach\" is missing"));
+  EXPECT_THAT(refusal(file_with("letters = [", "row_reach = 3\nletters = [")), HasSubstr("method = \"no_repeats\""));
+  EXPECT_THAT(refusal(file_with("seed = 1", "seed = 1\nrow_reach = 3")), HasSubstr("method = \"no_repeats\""));
 }
 
 TEST(ReadPattern, RefusesRubbish) {

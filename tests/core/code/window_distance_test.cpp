@@ -3,18 +3,11 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "core/code/letter_source.hpp"
 #include "tests/core/code/naive_distance.hpp"
+#include "tests/core/code/random_array.hpp"
 
 namespace slsd {
 namespace {
-
-CodeArray random_array(int rows, int columns, int letters, std::uint32_t seed) {
-  LetterSource source(seed);
-  CodeArray array{rows, columns, letters, {}};
-  for (int i = 0; i < rows * columns; ++i) array.cells.push_back(static_cast<std::uint8_t>(source.below(letters)));
-  return array;
-}
 
 RC_GTEST_PROP(MinimumWindowDistance, AgreesWithSixPlainLoops, ()) {
   const CodeArray array = random_array(*rc::gen::inRange(3, 9), *rc::gen::inRange(3, 9), *rc::gen::inRange(2, 9),

@@ -99,7 +99,9 @@ std::string shipped_part(const std::string& heading) {
 // Every key stands in its table of the shipped file, in force or in a comment.
 TEST(ReadConfiguration, ShippedFileHasEveryKey) {
   const std::pair<const char*, const char*> tables[] = {
-      {"[pattern]", "file symbol_size_px spacing_px symbols seed method minimum_distance half_turn_unique"},
+      {"[pattern]",
+       "file symbol_size_px spacing_px symbols seed method minimum_distance half_turn_unique row_reach "
+       "column_reach"},
       {"[projector]", "driver monitor width_px height_px brightness gamma black_level refresh_hz idle idle_after_ms"},
       {"# [[camera]]",
        "name driver path loop rate_hz bayer faults device width_px height_px format frame_rate_hz exposure_us "

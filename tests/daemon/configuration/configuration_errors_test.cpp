@@ -51,6 +51,13 @@ TEST(ReadConfiguration, PlacesRangesAtTheKey) {
   EXPECT_THAT(error_of(v4l2 + "width_px = 640\n"), HasSubstr("needs height_px"));
 }
 
+TEST(ReadConfiguration, RefusesAReachOfRunsThatTheMethodDoesNotPromise) {
+  EXPECT_THAT(error_of("[pattern]\nmethod = \"constructive\"\nrow_reach = 40\n"),
+              HasSubstr("row_reach and column_reach need method = \"no_repeats\""));
+  EXPECT_THAT(error_of("[pattern]\nmethod = \"no_repeats\"\nrow_reach = 600\n"), HasSubstr("0 to 512"));
+  EXPECT_THAT(error_of("[pattern]\nfile = \"p.toml\"\ncolumn_reach = 3\n"), HasSubstr("cannot stand beside file"));
+}
+
 TEST(ReadConfiguration, RefusesWrongTypes) {
   for (const char* text : {"pattern = 3",
                            "camera = 3",

@@ -23,9 +23,11 @@ symbol_size_px = 8
 spacing_px = 1
 symbols = [7, 22, 25, 5]
 seed = 4294967295
-method = "constructive"
+method = "no_repeats"
 minimum_distance = 2
 half_turn_unique = true
+row_reach = 40
+column_reach = 0
 [projector]
 driver = "glfw"
 monitor = "HDMI-1"
@@ -69,6 +71,9 @@ socket_mode = 0o600
   EXPECT_EQ(configuration->pattern.seed, 4294967295U);
   EXPECT_TRUE(configuration->pattern.half_turn_unique);
   EXPECT_EQ(configuration->pattern.minimum_distance, 2);
+  EXPECT_EQ(configuration->pattern.method, ArrayMethod::kNoRepeats);
+  EXPECT_EQ(configuration->pattern.row_reach, 40);
+  EXPECT_EQ(configuration->pattern.column_reach, 0);
   EXPECT_EQ(configuration->pattern.projector_width_px, 1920);
   EXPECT_EQ(configuration->projector.driver, ProjectorDriver::kGlfw);
   EXPECT_EQ(configuration->projector.light.brightness, 0.5);
