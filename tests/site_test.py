@@ -71,6 +71,8 @@ class Site(unittest.TestCase):
     def test_every_page_of_the_documentation_is_there(self):
         for source in (SOURCE / "docs").glob("*.md"):
             self.assertTrue((self.folder / f"{source.stem}.html").is_file(), source)
+        for source in (SOURCE / "docs/notes").glob("*.md"):
+            self.assertTrue((self.folder / f"notes-{source.stem}.html").is_file(), source)
         for source in (SOURCE / "man").iterdir():
             self.assertTrue((self.folder / "man" / f"{source.name}.html").is_file(), source)
 

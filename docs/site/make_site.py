@@ -33,6 +33,9 @@ def pages():
     for group, files in PAGES.items():
         for source, title in files.items():
             yield group, source, title, file_of(source)
+    for source in sorted((SOURCE / "docs/notes").glob("*.md")):
+        title = source.read_text(encoding="utf-8").split("\n", 1)[0].removeprefix("# ")
+        yield "Notes", f"docs/notes/{source.name}", title, file_of(f"docs/notes/{source.name}")
     for source in sorted((SOURCE / "man").glob("*.[1-9]")):
         yield "Manual", f"man/{source.name}", f"{source.stem}({source.suffix[1:]})", f"man/{source.name}.html"
 

@@ -27,7 +27,7 @@ struct BundleOptions {
   double plane_corner_sigma_px = 0.1;  ///< of the reference plane's corners
   double symbol_sigma_factor = 1;      ///< of ProjectedPoint::sigma_px
   /// Of what all symbols of a view are off by alike, which no count of symbols makes less: light that is skewed out of
-  /// focus, an exposure that moved. docs/calibration.md has what was seen of it.
+  /// focus, an exposure that moved. docs/notes/2026-11-calibration.md has what was seen of it.
   double symbol_shift_px = 0.005;
 
   [[nodiscard]] double corner_sigma_of(PoseSubject subject) const {
