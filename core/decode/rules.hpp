@@ -94,7 +94,7 @@ struct RuleText {
 [[nodiscard]] inline std::string_view to_string(DecodeRule rule) {
   return text_of(rule).name;
 }
-/// As docs/decoder.md and the pictures count them, from 1.
+/// As docs/reasons.md and the pictures count them, from 1.
 [[nodiscard]] inline int number_of(DecodeRule rule) {
   return static_cast<int>(rule) + 1;
 }

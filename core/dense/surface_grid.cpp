@@ -27,7 +27,7 @@ constexpr float kSigmaMaxPx = 0.3F;
 constexpr float kGainSlopeMax = 0.08F;  // of the gain, for one camera px
 constexpr float kContrastMin = 4;       // of the gain over the noise of a pixel
 
-/// Parts of sigma, as for symbols (docs/decoder.md).
+/// Parts of sigma, as for symbols (docs/notes/2026-11-decoder.md).
 constexpr float kLeastPx = 0.003F, kOfScatter = 0.8F;
 /// Of the share of the window that is saturated: its rims are wrong too.
 constexpr float kOfUnseen = 4;

@@ -28,7 +28,7 @@ struct AlignedSymbol {
 };
 
 /// What an aligned patch's place is off by for noise, for relief within it and for what of it is not there: one
-/// standard deviation, projector px. Fitted to rendered frames (docs/decoder.md).
+/// standard deviation, projector px. Fitted to rendered frames (docs/notes/2026-11-decoder.md).
 /// @param variance  of the disparity, from the residual that is left, px^2
 /// @param scatter   of the disparities of the patch's parts, px
 /// @param support   the share of the patch that agrees with the pattern

@@ -18,7 +18,7 @@ constexpr float kFarthestSquared = 1e5F;  // farther than that all are equally u
 
 /// How often a shape is another letter than the likeliest for what the prototypes do not know: cut at an edge, torn,
 /// run together, printed on. It grows with the distance from the nearest prototype. Measured on drawn and rendered
-/// frames: docs/decoder.md has the table.
+/// frames: docs/notes/2026-11-decoder.md has the table.
 constexpr float kDoubtMin = 0.01F, kDoubtMax = 0.5F;
 constexpr float kDoubtFrom = 2, kDoubtSlope = 0.12F;
 

@@ -163,7 +163,7 @@ class JudgedBlock {
   std::vector<float> across_px_, disparities_px_;
 };
 
-// docs/decoder.md derives it; here it is written down once more, term by term.
+// docs/notes/2026-11-decoder.md derives it; here it is written down once more, term by term.
 TEST(CentreJudge, FollowsThePlainFormula) {
   JudgedBlock block;
   const FrameNoise noise{.dark_variance = 4, .variance_per_level = 0.02F};
