@@ -17,7 +17,7 @@ namespace {
 constexpr float kSettledPx = 0.1F;
 constexpr int kStepsMost = 4;
 
-/// What makes a fit one: docs/dense.md has what each is for.
+/// What makes a fit one: docs/notes/2026-11-dense.md has what each is for.
 constexpr float kSupportMin = 0.6F;   // of the window's pixels agree
 constexpr float kSeenMin = 0.7F;      // of them are in the frame and not saturated
 constexpr float kResidualMax = 0.3F;  // of the gain

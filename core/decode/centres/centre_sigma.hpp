@@ -35,7 +35,8 @@ namespace slsd {
 /// the neighbours to both sides, less the same of the neighbours, which a surface's own curvature has; unevenness: its
 /// root mean square with theirs, beyond noise and 0.02 px; misfit^2: of the shape, in standard deviations, beyond the
 /// frame's median. What disturbs centres makes them rough and uneven, so both together count most: a surface near the
-/// devices that symbols can follow is uneven alone. The factors are fitted to rendered frames (docs/notes/2026-11-decoder.md).
+/// devices that symbols can follow is uneven alone. The factors are fitted to rendered frames
+/// (docs/notes/2026-11-decoder.md).
 /// @thread thread-bound: keeps its buffers
 class CentreJudge {
  public:
