@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """The blocks of README.md and docs/installing.md that need no installation run as they are written; the others are sound
-shell. `./run newcomer` runs them all."""
+shell. `./run newcomer` runs them all. Every file and function that docs/architecture.md names is there."""
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -77,6 +78,27 @@ class Documents(unittest.TestCase):
         self.assertEqual(session_of("$ one\na ... c\n$ two\n"), [("one", ["a ... c"]), ("two", [])])
         self.assertTrue(fits(["a ... c"], "before\na b c\nafter\n"))
         self.assertFalse(fits(["a ... c", "x"], "x\na b c\n"))
+
+
+class Map(unittest.TestCase):
+    ROOMS = ("bench", "clients", "config", "core", "daemon", "docs", "drivers", "man", "picture", "programs", "systemd", "tests")
+
+    @classmethod
+    def setUpClass(cls):
+        cls.names = re.findall(r"`([^`\s]+)`", (SOURCE / "docs/architecture.md").read_text(encoding="utf-8"))
+        cls.files = [f"/{file.relative_to(SOURCE)}" for room in cls.ROOMS for file in (SOURCE / room).rglob("*") if file.is_file()]
+
+    def test_names_files_that_are_there(self):
+        named = {name for name in self.names if re.fullmatch(r"[\w/.-]+\.(cpp|hpp|py|toml|js|html|css|md|catalog|[158])", name)}
+        self.assertGreater(len(named), 50)
+        self.assertEqual({name for name in named if not any(file.endswith(f"/{name}") for file in self.files)}, set())
+
+    def test_names_functions_that_are_there(self):
+        named = {name.removesuffix("()").rpartition("::")[2] for name in self.names if re.fullmatch(r"[\w:]+\(\)", name)}
+        self.assertGreater(len(named), 25)
+        sources = "".join((SOURCE / file[1:]).read_text(encoding="utf-8") for file in self.files if file.endswith(("pp", ".in")))
+        known = set(re.findall(r"\w+", sources))
+        self.assertEqual(named - known, set())
 
 
 if __name__ == "__main__":
