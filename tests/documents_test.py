@@ -62,6 +62,21 @@ class Documents(unittest.TestCase):
         for name in ("cloud.ply", "decoded.png"):
             self.assertGreater((self.folder / name).stat().st_size, 1000)
 
+    def test_tasks_scan_recorded_frames(self):
+        page = (SOURCE / "docs/tasks.md").read_text(encoding="utf-8")
+        commands = [line.strip() for line in page.splitlines() if re.match(r"    slsctl (scan|preview) ", line)]
+        commands += re.findall(r"`(slsctl scan [^`]+)`", page)
+        self.assertGreater(len(commands), 3)
+        scanner = SOURCE / "tests/clients/recorded/gap/slsd.toml"
+        configuration = scanner.read_text(encoding="utf-8").replace("/tmp/slsd-example.sock", str(self.socket))
+        configuration = re.sub(r'(file|path) = "', rf'\1 = "{scanner.parent}/', configuration)
+        (self.folder / "slsd.toml").write_text(configuration + "[scan]\ntimeout_ms = 60000\n", encoding="utf-8")
+        text = "\n".join(["PATH=$PWD/build/release/bin:$PATH", "slsd --config slsd.toml &",
+                          "until slsctl status >/dev/null 2>&1; do sleep 0.1; done", *commands, "kill %1"])
+        self.run_here("bash", "-e", text=text)
+        for name in re.findall(r"[\w]+\.(?:ply|png|tiff)", " ".join(commands)):
+            self.assertGreater((self.folder / name).stat().st_size, 1000, name)
+
     def test_every_block_is_sound(self):
         self.assertGreater(len(BLOCKS), 15)
         for block in BLOCKS:
