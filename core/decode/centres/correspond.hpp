@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "core/decode/grid/cell_claim.hpp"
-#include "core/decode/symbols/classify.hpp"
+#include "core/decode/grid/cell_rays.hpp"
+#include "core/executor.hpp"
+#include "core/geometry/epipolar_gate.hpp"
 
 namespace slsd {
 

@@ -30,9 +30,8 @@ struct NodesSeen {
 ///   drawn from Student's t, as wide as what depth cannot move (the difference across the epipolar line) and how much
 ///   the surface bent before; across an edge it is anywhere within the search.
 /// - Light: how much brighter one symbol is than the other, each compared with the mean of its letter. On one surface
-/// it
-///   is drawn from Student's t, as wide as the links of this frame; across an edge from a broad normal law. Light never
-///   speaks for one surface, as two surfaces may be lit alike.
+///   it is drawn from Student's t, as wide as the links of this frame; across an edge from a broad normal law. Light
+///   never speaks for one surface, as two surfaces may be lit alike.
 /// @thread thread-bound: keeps its buffers
 class SurfaceLinks {
  public:
