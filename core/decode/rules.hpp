@@ -107,11 +107,12 @@ using RuleCounts = std::array<std::uint32_t, kDecodeRuleCount>;
 
 using RuleSet = std::bitset<kDecodeRuleCount>;
 
-/// For tools and tests: which rules a decoder leaves out, and which of all it has come to apply. It changes from frame
-/// to frame while decoders look at it.
+/// For tools and tests: which rules a decoder leaves out, which of all it has come to apply, and whether it measures
+/// margins beyond what a cell needs. It changes from frame to frame while decoders look at it.
 /// @thread set and read while no decoder runs
 struct RuleTrial {
   RuleSet off;
+  bool whole_margins = false;
   std::array<std::atomic<bool>, kDecodeRuleCount> met{};
 
   void forget() {
@@ -127,6 +128,7 @@ class Rules {
 
   /// Whether a rule applies: its test holds, and it is not left out.
   [[nodiscard]] bool apply(DecodeRule rule, bool holds) const { return holds && (trial_ == nullptr || tried(rule)); }
+  [[nodiscard]] bool whole_margins() const { return trial_ != nullptr && trial_->whole_margins; }
 
  private:
   [[nodiscard]] bool tried(DecodeRule rule) const {

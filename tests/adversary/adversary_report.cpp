@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/adversary/margin_table.hpp"
 #include "tests/adversary/misled.hpp"
 #include "tests/adversary/report_table.hpp"
 #include "tests/adversary/rule_sweep.hpp"
@@ -19,7 +20,7 @@ namespace {
 
 /// Decodes frames whose edges follow the pattern's grid, and prints a row for each kind.
 /// @return all of them
-Result<Row> report_grid(std::vector<Misled>& readers, const ReportOptions& options) {
+Result<Row> report_grid(std::vector<Misled>& readers, const ReportOptions& options, MarginTable& margins) {
   Row all, slats;
   for (const Kind kind : drawn_grid_kinds(options)) {
     Row row;
@@ -32,6 +33,7 @@ Result<Row> report_grid(std::vector<Misled>& readers, const ReportOptions& optio
       const Verdict verdict = reader.maker.judge(frame, (*decoding)->points, kTolerancePx);
       row.add(
           {1, verdict.wrong > 0, verdict.wrong, verdict.undecidable, verdict.right, verdict.right, verdict.visible});
+      margins.add(**decoding, verdict.wrong_points);
       tell(options, static_cast<int>(kind), n, frame.image, **decoding, verdict.wrong_points);
     }
     print(to_string(kind), row);
@@ -73,14 +75,16 @@ Result<int> report(const ReportOptions& options, RuleTrial& trial) {
     if (!reader) return tl::unexpected(reader.error());
     readers.push_back(std::move(*reader));
   }
+  MarginTable margins;
   print_heading();
-  const auto grid = report_grid(readers, options);
+  const auto grid = report_grid(readers, options, margins);
   if (!grid) return tl::unexpected(grid.error());
-  const auto scenes = report_scenes(readers, options);
+  const auto scenes = report_scenes(readers, options, margins);
   if (!scenes) return tl::unexpected(scenes.error());
   Row all = *grid;
   all.add(*scenes);
   if (options.only_kind < 0) print("all", all);
+  if (options.margins) margins.print();
   return all.wrong;
 }
 
@@ -88,7 +92,7 @@ Result<int> report(const ReportOptions& options, RuleTrial& trial) {
 }  // namespace slsd::adversary
 
 // adversary-report [FRAMES] [--kept-out] [--clean] [--first N] [--kind K] [--without RULE]... [--each-rule]
-// [--wrong-cells MAX] [--pattern FILE]... [--frame N [--picture FILE.pgm]]
+// [--wrong-cells MAX] [--margins] [--pattern FILE]... [--frame N [--picture FILE.pgm]]
 int main(int count, char** arguments) {
   slsd::adversary::ReportOptions options;
   int frames = 1000, number = -1;
@@ -119,6 +123,8 @@ int main(int count, char** arguments) {
       options.wrong_cells_max = std::atof(arguments[++i]);
     } else if (std::strcmp(arguments[i], "--pattern") == 0 && more) {
       options.patterns.emplace_back(arguments[++i]);
+    } else if (std::strcmp(arguments[i], "--margins") == 0) {
+      options.margins = trial.whole_margins = true;
     } else if (std::strcmp(arguments[i], "--each-rule") == 0) {
       each_rule = true;
     } else {

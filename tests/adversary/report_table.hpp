@@ -29,8 +29,9 @@ struct ReportOptions {
   int only_kind = -1;  ///< below 0: all kinds
   bool kept_out = false;
   double wrong_cells_max = DecodeOptions().wrong_cells_max;
-  bool clean = false;   ///< scenes in the best of light
-  bool single = false;  ///< tells why a single frame's regions gave no point
+  bool margins = false;  ///< counts points by margin
+  bool clean = false;    ///< scenes in the best of light
+  bool single = false;   ///< tells why a single frame's regions gave no point
   const char* picture = nullptr;
   std::vector<std::string> patterns{};  ///< files of the patterns that are shown; none: the default at 16 and 8 px
 };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -53,6 +54,21 @@ TEST_F(Trial, LeavesARuleOutAndTakesItBack) {
   EXPECT_EQ(decode(Kind::kShelves).rules[kIndex], 0U);
   trial_.off.reset();
   EXPECT_EQ(decode(Kind::kShelves).rules, before);
+}
+
+TEST_F(Trial, WholeMarginsDecideAlike) {
+  const Decoding before = decode(Kind::kPickets);
+  trial_.whole_margins = true;
+  const Decoding& whole = decode(Kind::kPickets);
+  EXPECT_EQ(whole.points, before.points);
+  float most = 0, most_before = 0;
+  for (std::size_t i = 0; i < whole.regions.size(); ++i) {
+    EXPECT_EQ(whole.regions[i].rule, before.regions[i].rule);
+    EXPECT_GE(whole.regions[i].margin_nats, before.regions[i].margin_nats - 1e-3F);
+    most = std::max(most, whole.regions[i].margin_nats);
+    most_before = std::max(most_before, before.regions[i].margin_nats);
+  }
+  EXPECT_GT(most, most_before + 1);
 }
 
 TEST_F(Trial, ARuleThatWasNotMetChangesNothing) {

@@ -6,7 +6,7 @@
 
 namespace slsd::adversary {
 
-Result<Row> report_scenes(std::vector<Misled>& readers, const ReportOptions& options) {
+Result<Row> report_scenes(std::vector<Misled>& readers, const ReportOptions& options, MarginTable& margins) {
   std::vector<SceneFrameMaker> makers;
   for (const Misled& reader : readers) makers.emplace_back(reader.maker.pattern(), reader.maker.calibration());
   Row all{.in_the_air = 0};
@@ -21,6 +21,7 @@ Result<Row> report_scenes(std::vector<Misled>& readers, const ReportOptions& opt
       const SceneVerdict verdict = makers[size].judge(frame.truth, (*decoding)->points);
       row.add({1, verdict.wrong > 0, verdict.wrong, 0, verdict.right, verdict.decoded, verdict.visible,
                verdict.in_the_air});
+      margins.add(**decoding, verdict.wrong_points);
       tell(options, number_of_scene_kind(index), number, frame.image, **decoding, verdict.wrong_points);
     }
     print(scene_kinds()[static_cast<std::size_t>(index)].name, row);

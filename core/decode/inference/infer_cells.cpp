@@ -22,17 +22,21 @@ bool is_along_row(Direction d) {
   return d == kRight || d == kLeft;
 }
 
-/// Ten times fewer wrong cells cost log(10) nats, up to what a symbol inside a surface has.
+constexpr float kMarginMax = 14;  // nats: what a symbol inside a surface has
+
+/// Ten times fewer wrong cells cost log(10) nats.
 float margin_min_of(double wrong_cells_max) {
-  constexpr float kMarginOfBudget = 8, kMarginMax = 14;  // nats
+  constexpr float kMarginOfBudget = 8;  // nats
   constexpr double kBudget = 0.001;
   return std::clamp(kMarginOfBudget + static_cast<float>(std::log(kBudget / wrong_cells_max)), 0.F, kMarginMax);
 }
 
 }  // namespace
 
-CellInference::CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max)
-    : grid_{codebook->rows(), codebook->columns()},
+CellInference::CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max,
+                             Rules rules)
+    : rules_(rules),
+      grid_{codebook->rows(), codebook->columns()},
       proposer_(pattern.array, codebook),
       letters_(pattern.array, grid_),
       links_(static_cast<float>(pattern.pitch_px())),
@@ -177,11 +181,12 @@ void CellInference::measure_margins(Executor& executor) {
   helpers_.resize(static_cast<std::size_t>(executor.workers()) - 1);
   for (EvidenceFlow& helper : helpers_) helper = flow_;
   margins_.assign(labels_.size(), 0);
+  const float margin_max = rules_.whole_margins() ? margin_needed_ - margin_min_ + kMarginMax : margin_needed_;
   executor.run_ranges(labels_.size(), [&](std::size_t first, std::size_t last, int worker) {
     EvidenceFlow& flow = flow_of(worker);
     for (std::size_t i = first; i < last; ++i) {
       if (proposed_[i] < 0) continue;
-      margins_[i] = flow.draw(static_cast<std::int32_t>(i), margin_max_, budget_of(flow, i));
+      margins_[i] = flow.draw(static_cast<std::int32_t>(i), margin_max, budget_of(flow, i));
       flow.restore();
     }
   });
@@ -211,7 +216,7 @@ DecodeRule CellInference::rule_of(const CellGate& gate, const Sightings& seen, s
   const bool speaks = labels_[node] >= 0 && nats_[node] > 0;
   if (shape.letter < 0) return DecodeRule::kNoLetter;
   if (!speaks && shape.is_well_seen()) return DecodeRule::kOtherLetter;
-  if (margins_[node] < margin_max_) return DecodeRule::kUncertain;
+  if (margins_[node] < margin_needed_) return DecodeRule::kUncertain;
   if (!speaks && !is_aligned(seen.aligned[node])) return DecodeRule::kTorn;
   if (!gate.on_line(gate.residual_px(static_cast<std::int32_t>(node), row, column))) return DecodeRule::kCellOffLine;
   if (!gate.admits(static_cast<std::int32_t>(node), row, column)) return DecodeRule::kCellOutOfRange;
@@ -293,7 +298,7 @@ void CellInference::propose(const CellGate& gate, Executor& executor, Sightings&
 
 void CellInference::decide(const CellGate& gate, Executor& executor, Sightings& seen) {
   const float cells = static_cast<float>(grid_.rows) * static_cast<float>(grid_.columns);
-  margin_max_ = margin_min_ + (gate.knows_lines() ? 0 : std::log(std::max(1.F, cells / kUsualPlaces)));
+  margin_needed_ = margin_min_ + (gate.knows_lines() ? 0 : std::log(std::max(1.F, cells / kUsualPlaces)));
   find_beside(seen.nodes, beside_);  // what was mended has other links
   labels_ = proposed_;
   nats_.resize(labels_.size());

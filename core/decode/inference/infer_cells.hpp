@@ -33,7 +33,8 @@ class CellInference {
  public:
   /// @param codebook         of the part of the pattern's array that is shown
   /// @param wrong_cells_max  about how many a frame may have: sets the margin that a node needs
-  CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max);
+  CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max,
+                Rules rules = {});
 
   /// Names a cell for each node that has one, and decides on none of them.
   /// @param seen  in: nodes and shapes; out: claims, of which those stand for now that show their letters well
@@ -61,6 +62,7 @@ class CellInference {
   void reject_off_line(Sightings& seen);
   [[nodiscard]] GridFit grid_fit(std::size_t node) const;
 
+  Rules rules_;
   CellGrid grid_;
   CellProposer proposer_;
   LetterEvidence letters_;
@@ -68,7 +70,7 @@ class CellInference {
   EdgePrior prior_;
   EvidenceFlow flow_;
   std::vector<EvidenceFlow> helpers_;  // copies of it, one to each further worker
-  float margin_min_, margin_max_ = 0;
+  float margin_min_, margin_needed_ = 0;
   std::vector<Beside> beside_;
   std::vector<std::int32_t> proposed_, labels_;  // cells; labels without the misread ones
   std::vector<float> rivals_;                    // of each node: the nats of another cell that a neighbour names
