@@ -8,12 +8,12 @@
 #include <Eigen/LU>
 
 #include "core/decode/centres/align_symbols.hpp"
+#include "core/decode/centres/letter_place.hpp"
 #include "core/decode/grid/neighbourhood.hpp"
 
 namespace slsd {
 namespace {
 
-constexpr int kFewHolders = 2;
 /// From where its neighbours put it, and from where it was seen, of the pitch.
 constexpr float kMovedMax = 0.08F;
 /// From its neighbours, where few hold it: towards a limb the surface turns away. Between those on both sides it
@@ -36,39 +36,6 @@ bool is_worn(const CellGate& gate, const Sightings& seen, std::int32_t node) {
   if (!claim.named() || is_aligned(seen.aligned[node])) return false;
   if (claim.status != RegionStatus::kDecoded) return claim.status == RegionStatus::kDamagedShape;
   return seen.misfits[node] > kDoubtfulDistance || gate.off_line_px(node, claim.row, claim.column) > kDoubtfulAcrossPx;
-}
-
-/// One beside a node that stands for now, on the cell that lies there. Its link may be broken, as the centroid of what
-/// is worn lies elsewhere.
-std::int32_t holder_of(const Sightings& seen, std::int32_t node, Direction d) {
-  const std::int32_t other = seen.nodes[node].links[d];
-  const bool holds = other >= 0 && seen.claims[other].status == RegionStatus::kDecoded;
-  return holds && seen.claims[node].fits(seen.claims[other], d) ? other : -1;
-}
-
-/// Between those on both sides of it, or one step on from two in a line; the mean.
-LetterPlace place_by_neighbours(const Sightings& seen, std::int32_t node) {
-  const auto holder = [&](std::int32_t of, Direction d) { return holder_of(seen, of, d); };
-  LetterPlace place;
-  float count = 0;
-  for (const Direction d : kDirections) {
-    const std::int32_t beside = holder(node, d);
-    if (beside < 0) continue;
-    ++place.held_by;
-    const GreyMoments& light = seen.moments[beside];
-    place.frame += seen.nodes[beside].frame, place.background += light.background, place.peak += light.peak;
-    const Eigen::Vector2f& centre = seen.nodes[beside].centre_px;
-    const std::int32_t behind = holder(node, opposite(d)), next = decoded_beside(seen.nodes, seen.claims, beside, d);
-    if (behind >= 0) {
-      place.centre_px += 0.5F * (centre + seen.nodes[behind].centre_px), ++count;
-    } else if (next >= 0) {
-      place.centre_px += 2 * centre - seen.nodes[next].centre_px, ++count;
-    }
-  }
-  if (count == 0) return {};
-  const auto held_by = static_cast<float>(place.held_by);
-  return {place.centre_px / count, place.frame / held_by, place.background / held_by, place.peak / held_by,
-          place.held_by};
 }
 
 /// It lies where those that hold it put it.
@@ -147,9 +114,11 @@ bool SymbolMender::shows_letter(const LetterScene& scene, const AskedLetter& ask
 
 void SymbolMender::mend_asked(const LetterScene& scene) {
   aligner_.clear();
-  for (const std::int32_t node : to_ask_)
-    if (const LetterPlace place = place_by_neighbours(scene.seen, node); place.held_by > 0)
-      aligner_.ask(scene, node, place);
+  for (const std::int32_t node : to_ask_) {
+    LetterPlace place = place_by_neighbours(scene.seen, node);
+    if (place.held_by == 0) place = place_by_plane(scene.seen, node, pitch_px_, around_);
+    if (place.held_by > 0) aligner_.ask(scene, node, place);
+  }
   for (const AskedLetter& asked : aligner_.asked()) {
     if (scene.seen.shapes[asked.node].is_well_seen()) continue;
     const GreyMoments& light = scene.seen.moments[asked.node];
