@@ -27,6 +27,13 @@ function(slsd_link_by_file target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
 endfunction()
 
+# For rooms that compute little: of the build for recorded frames, which is to be quick, they need no optimizing.
+macro(slsd_compile_quickly)
+  if(NOT SLSD_DEVICES)
+    add_compile_options(-O0)
+  endif()
+endmacro()
+
 add_library(slsd_settings INTERFACE)
 target_include_directories(slsd_settings INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(slsd_settings INTERFACE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion

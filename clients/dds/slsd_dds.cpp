@@ -9,7 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "bridge.hpp"
-#include "daemon/usage.hpp"
+#include "clients/usage/usage.hpp"
 #include "merge.hpp"
 
 namespace {

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "daemon/client/connection.hpp"
+#include "clients/connection/connection.hpp"
 
 namespace slsd::web {
 namespace {

@@ -12,8 +12,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "clients/slsctl/report.hpp"
 #include "core/result.hpp"
-#include "daemon/client/report.hpp"
 
 namespace slsd::web {
 

@@ -9,10 +9,10 @@
 #include <cstdint>
 #include <utility>
 
+#include "clients/connection/connection.hpp"
+#include "clients/slsctl/client_commands.hpp"
 #include "core/printable.hpp"
 #include "core/utc_text.hpp"
-#include "daemon/client/client_commands.hpp"
-#include "daemon/client/connection.hpp"
 #include "daemon/rpc/base64.hpp"
 #include "daemon/rpc/message.hpp"
 #include "drivers/files/file.hpp"

@@ -8,9 +8,9 @@
 #include <systemd/sd-daemon.h>
 #include <CLI/CLI.hpp>
 
+#include "clients/usage/usage.hpp"
 #include "clients/web/announcement.hpp"
 #include "clients/web/page_server.hpp"
-#include "daemon/usage.hpp"
 #include "drivers/files/file.hpp"
 
 namespace {

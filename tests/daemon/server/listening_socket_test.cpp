@@ -16,7 +16,7 @@
 
 #include <gmock/gmock.h>
 
-#include "daemon/client/connection.hpp"
+#include "clients/connection/connection.hpp"
 #include "daemon/configuration/server_options.hpp"
 #include "drivers/system/file_descriptor.hpp"
 

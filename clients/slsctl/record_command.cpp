@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <iostream>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/recording.hpp"
+#include "clients/slsctl/report.hpp"
+#include "daemon/rpc/message.hpp"
+#include "drivers/system/interrupt.hpp"
+
+namespace slsd {
+namespace {
+
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+// Longer than a camera takes to come back after its plug was pulled, short enough not to record nothing all night.
+constexpr auto kPatience = 60s;
+
+// What passes by itself, or when a hand plugs something in again.
+bool passes(const Failure& failure) {
+  constexpr std::array kPassing{"frame_dropped", "frame_torn", "frame_stale",  "frame_late",
+                                "frame_skewed",  "timeout",    "disconnected", "busy"};
+  for (const char* name : kPassing) {
+    if (failure.error.name == name) return true;
+  }
+  return false;
+}
+
+class Recorder {
+ public:
+  /// @param settings  as at the beginning
+  Recorder(const ClientOptions& options, Connection connection, Recording recording, json settings)
+      : options_(options),
+        connection_(std::move(connection)),
+        recording_(std::move(recording)),
+        settings_(std::move(settings)) {}
+
+  /// The first thing that ended it too early.
+  [[nodiscard]] std::optional<Failure> run() {
+    std::optional<Failure> failed = ask_for_scan();
+    while (!failed) {
+      auto reply = connection_.reply();
+      if (!reply) failed = failure(reply.error());
+      if (failed) break;
+      const auto answered = judge(std::move(reply));
+      const bool ends = enough(answered ? 1 : 0);
+      if (!ends) failed = ask_for_scan();
+      if (auto kept = keep(answered)) failed = kept;
+      show_progress();
+      if (ends) break;
+    }
+    if (!failed) failed = check_settings();
+    if (auto finished = recording_.finish(); !finished && !failed) failed = file_failure(finished.error());
+    end_progress();
+    return failed;
+  }
+
+  [[nodiscard]] json summary() const {
+    return {{"folder", options_.folder.string()},
+            {"scans", recording_.scans()},
+            {"failed", recording_.failures()},
+            {"bytes_written", recording_.bytes()},
+            {"seconds", seconds()}};
+  }
+
+ private:
+  /// @param coming  scans that are not written yet
+  [[nodiscard]] bool enough(std::uint64_t coming) const {
+    if (Interrupt::came()) return true;
+    if (options_.count > 0 && recording_.scans() + coming >= options_.count) return true;
+    return options_.seconds && seconds() >= *options_.seconds;
+  }
+
+  [[nodiscard]] double seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
+
+  [[nodiscard]] static Failure file_failure(const Error& error) { return {kRequestFailed, rpc_error(error)}; }
+
+  [[nodiscard]] std::optional<Failure> ask_for_scan() {
+    json params{{"format", "ply"}, {"frames", "raw"}};
+    if (options_.timeout_ms) params["timeout_ms"] = *options_.timeout_ms;
+    if (auto sent = connection_.request("scan", params); !sent) return failure(sent.error());
+    return std::nullopt;
+  }
+
+  [[nodiscard]] std::optional<Failure> keep(const tl::expected<Answered, Failure>& answered) {
+    if (!answered) return keep_failure(answered.error());
+    last_good_ = Clock::now();
+    if (auto kept = recording_.add(*answered); !kept) return file_failure(kept.error());
+    return std::nullopt;
+  }
+
+  [[nodiscard]] std::optional<Failure> keep_failure(const Failure& failure) {
+    if (!passes(failure) || Clock::now() - last_good_ > kPatience) return failure;
+    if (auto kept = recording_.add_failure(failure.error.to_json()); !kept) return file_failure(kept.error());
+    return std::nullopt;
+  }
+
+  // One that was told to reload decodes the later frames with a pattern or calibration that was not recorded.
+  [[nodiscard]] std::optional<Failure> check_settings() {
+    const auto now = ask(connection_, "settings", json::object());
+    if (!now) return now.error();
+    if (now->reply.message["result"] == settings_) return std::nullopt;
+    return file_failure({ErrorCode::kMismatch,
+                         "the service was reloaded meanwhile: the recording has the settings of its beginning, which "
+                         "are not those of its last scans; record again",
+                         options_.folder.string()});
+  }
+
+  void show_progress() const {
+    if (options_.json || ::isatty(STDERR_FILENO) == 0) return;
+    std::cerr << fmt::format("\r{} scans, {} failed, {:.1f} MB, {:.1f} s, {:.1f} a second ", recording_.scans(),
+                             recording_.failures(), static_cast<double>(recording_.bytes()) / 1e6, seconds(),
+                             static_cast<double>(recording_.scans()) / seconds())
+              << std::flush;
+  }
+
+  void end_progress() const {
+    if (!options_.json && ::isatty(STDERR_FILENO) != 0) std::cerr << "\n";
+  }
+
+  const ClientOptions& options_;
+  Connection connection_;
+  Recording recording_;
+  json settings_;
+  Clock::time_point begin_ = Clock::now();
+  Clock::time_point last_good_ = begin_;
+};
+
+std::string summary_line(const json& summary) {
+  return fmt::format("{}: {} scans, {} failed, {:.1f} MB in {:.1f} s\n", summary.value("folder", ""),
+                     summary.value("scans", 0), summary.value("failed", 0), summary.value("bytes_written", 0.0) / 1e6,
+                     summary.value("seconds", 0.0));
+}
+
+}  // namespace
+
+int record_command(const ClientOptions& options) {
+  auto connection = Connection::open(options.socket);
+  if (!connection) return report(options, failure(connection.error()));
+  auto settings = ask(*connection, "settings", json::object());
+  if (!settings) return report(options, settings.error());
+  json& told = settings->reply.message["result"];
+  auto recording = Recording::create(options.folder, told, options.clouds);
+  if (!recording) return report(options, {kRequestFailed, rpc_error(recording.error())});
+  Interrupt::watch();
+  Recorder recorder(options, std::move(*connection), std::move(*recording), std::move(told));
+  const auto failed = recorder.run();
+  if (failed) return report(options, *failed);
+  const json summary = recorder.summary();
+  std::cout << (options.json ? to_line(summary) : summary_line(summary));
+  return kDone;
+}
+
+}  // namespace slsd

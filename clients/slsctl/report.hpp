@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json.hpp>
+
+#include "clients/connection/connection.hpp"
+#include "clients/slsctl/client_options.hpp"
+#include "daemon/rpc/message.hpp"
+
+namespace slsd {
+
+/// Why a command failed: the daemon's own error, or one of this side, with the exit status that it means.
+struct Failure {
+  int exit_status;
+  RpcError error;
+};
+
+/// A failure on this side. @return kNoDaemon where there is none, else kRequestFailed
+[[nodiscard]] Failure failure(const Error& error);
+
+/// A call's outcome; a JSON-RPC error is a failure.
+[[nodiscard]] tl::expected<Answered, Failure> judge(Result<Answered> answered);
+
+/// One call; a JSON-RPC error is a failure.
+[[nodiscard]] tl::expected<Answered, Failure> ask(Connection& connection, std::string_view method,
+                                                  const nlohmann::json& params);
+
+/// One call on a connection of its own.
+[[nodiscard]] tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_view method,
+                                                  const nlohmann::json& params);
+
+/// Says what went wrong, as text on standard error or, with --json, as an object on standard output.
+/// @return the exit status
+[[nodiscard]] int report(const ClientOptions& options, const Failure& failure);
+
+/// status's answer as a table for people.
+[[nodiscard]] std::string status_table(const nlohmann::json& status);
+
+/// Why regions gave no point, a line to each rule; empty where nobody asked.
+[[nodiscard]] std::string reason_lines(const nlohmann::json& scan);
+
+/// A scan in one line: "scan 1a2b3c4d-7: 2345 points of 2390 regions, capture 4.2 ms, decode 51.0 ms".
+[[nodiscard]] std::string scan_line(const nlohmann::json& scan);
+
+/// Why a scan, or the last one of status's `scans`, gave no points, in a line; empty if it gave some.
+[[nodiscard]] std::string empty_line(const nlohmann::json& scan);
+
+}  // namespace slsd

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <ostream>
+
+#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/output.hpp"
+#include "clients/slsctl/progress.hpp"
+#include "clients/slsctl/report.hpp"
+#include "core/cloud/pcd.hpp"
+#include "core/cloud/ply.hpp"
+#include "daemon/rpc/message.hpp"
+#include "drivers/files/encode_png.hpp"
+#include "picture/render_cloud.hpp"
+
+namespace slsd {
+namespace {
+
+using nlohmann::json;
+using std::filesystem::path;
+
+// Every other pixel of an organised cloud, as the lattice that a picture is drawn of.
+constexpr int kPictureStep = 2;
+
+// A record of an organised cloud: x y z sigma_mm intensity as floats, camera as a byte, a normal.
+constexpr std::size_t kIntensityAt = 16, kCameraAt = 20;
+
+std::size_t record_bytes(bool normals) {
+  return normals ? 33 : 21;
+}
+
+float float_at(const char* bytes) {
+  float value;
+  std::memcpy(&value, bytes, sizeof value);
+  return value;
+}
+
+Result<Cloud> lattice_of_pixels(const json& result, std::string_view pcd, bool normals) {
+  const std::size_t data = pcd.find("\nDATA binary\n"), record = record_bytes(normals);
+  const auto field = [&](std::string_view key) {
+    const std::size_t at = pcd.find(key);
+    return at >= data ? 0 : std::atoi(pcd.data() + at + key.size());
+  };
+  const int width = field("\nWIDTH "), height = result.value("height_px", 0);
+  const std::size_t begin = data + 13, needed = record * static_cast<std::size_t>(width) * height;
+  if (data == std::string_view::npos || width <= 0 || height <= 0 || pcd.size() - begin < needed)
+    return fail(ErrorCode::kMalformed, "the service's cloud is not organised as its pixels are");
+  Cloud cloud;
+  cloud.lattice_columns = (width + kPictureStep - 1) / kPictureStep;
+  cloud.lattice_rows = (height + kPictureStep - 1) / kPictureStep;
+  cloud.scan_id = result.value("scan", ""), cloud.time = result.value("time", "");
+  for (int y = 0; y < height; y += kPictureStep) {
+    for (int x = 0; x < width; x += kPictureStep) {
+      const char* from = pcd.data() + begin + record * (static_cast<std::size_t>(y) * width + x);
+      CloudPoint point;
+      point.x = float_at(from), point.y = float_at(from + 4), point.z = float_at(from + 8);
+      if (!(point.z > 0)) continue;
+      point.column = static_cast<std::uint16_t>(x / kPictureStep);
+      point.row = static_cast<std::uint16_t>(y / kPictureStep);
+      point.intensity = static_cast<std::uint8_t>(float_at(from + kIntensityAt));
+      cloud.points.push_back(point);
+    }
+  }
+  return cloud;
+}
+
+// The points of an organised cloud that are there, as a PLY, whose intensity is a byte.
+std::string dense_ply_of(const json& result, std::string_view pcd, bool normals) {
+  const std::size_t begin = pcd.find("\nDATA binary\n") + 13, record = record_bytes(normals);
+  std::string points;
+  std::size_t count = 0;
+  for (std::size_t at = begin; at + record <= pcd.size(); at += record) {
+    const std::string_view from = pcd.substr(at, record);
+    if (std::isnan(float_at(from.data() + 8))) continue;
+    points.append(from.substr(0, kIntensityAt));
+    points += static_cast<char>(static_cast<std::uint8_t>(float_at(from.data() + kIntensityAt)));
+    points.append(from.substr(kCameraAt));
+    ++count;
+  }
+  std::string ply = "ply\nformat binary_little_endian 1.0\ncomment scan_id " + result.value("scan", "") +
+                    "\ncomment time " + result.value("time", "") + "\ncomment frame " +
+                    std::to_string(result.value("frame", std::uint64_t{0})) +
+                    "\ncomment units mm\ncomment coordinate_frame rig: the first camera's, x right, y down, z forward\n"
+                    "element vertex " +
+                    std::to_string(count) +
+                    "\nproperty float x\nproperty float y\nproperty float z\nproperty float sigma_mm\nproperty uchar "
+                    "intensity\nproperty uchar camera\n";
+  if (normals) ply += "property float nx\nproperty float ny\nproperty float nz\n";
+  return ply + "end_header\n" + points;
+}
+
+tl::expected<void, Failure> write_cloud_picture(const path& file, const Result<Cloud>& cloud, std::size_t measured) {
+  if (!cloud) return tl::unexpected(failure(cloud.error()));
+  const auto png = encode_png(render_cloud(*cloud, {}, measured));
+  if (!png) return tl::unexpected(failure(png.error()));
+  return write_output(file, *png);
+}
+
+// A picture of a cloud is drawn here: of symbols from a PLY, of pixels from a PCD. The file is then made of that.
+std::string asked_format(const ClientOptions& options, bool dense) {
+  if (options.cloud_picture.empty()) return cloud_format(options);
+  return dense ? "pcd" : "ply";
+}
+
+tl::expected<void, Failure> write_cloud(const ClientOptions& options, const json& result, std::string_view bytes,
+                                        bool dense) {
+  if (options.output.empty()) return {};
+  if (asked_format(options, dense) == cloud_format(options)) return write_output(options.output, bytes);
+  if (dense) return write_output(options.output, dense_ply_of(result, bytes, options.normals));
+  const auto cloud = read_ply(bytes, "the service's cloud");
+  if (!cloud) return tl::unexpected(failure(cloud.error()));
+  return write_output(options.output, write_pcd(*cloud));
+}
+
+tl::expected<void, Failure> write_files(const ClientOptions& options, const Answered& answered) {
+  const json& result = answered.reply.message["result"];
+  const std::string_view bytes = answered.reply.bytes;
+  const bool dense = result.value("density", "") == "pixels";
+  auto written = write_cloud(options, result, bytes, dense);
+  if (written && !options.cloud_picture.empty()) {
+    written = write_cloud_picture(
+        options.cloud_picture,
+        dense ? lattice_of_pixels(result, bytes, options.normals) : read_ply(bytes, "the service's cloud"),
+        result.value("points", std::size_t{0}));
+  }
+  for (const Received& event : answered.events) {
+    const bool picture = event.message.value("method", "") == "picture";
+    if (written && picture && !options.picture.empty()) written = write_output(options.picture, event.bytes);
+  }
+  return written;
+}
+
+/// What to ask for; empty: as the service is configured. A picture's format depends on it.
+tl::expected<std::string, Failure> asked_density(const ClientOptions& options, Connection& connection) {
+  if (!options.density.empty()) return options.density;
+  if (options.normals || cloud_format(options) == "tiff") return "pixels";
+  if (options.cloud_picture.empty()) return "";
+  const auto settings = ask(connection, "settings", json::object());
+  if (!settings) return tl::unexpected(settings.error());
+  const json configured = settings->reply.message["result"].value("configuration", json::object());
+  return configured.value("decode", json::object()).value("density", "symbols");
+}
+
+json scan_parameters(const ClientOptions& options, const std::string& density) {
+  json params{{"format", asked_format(options, density == "pixels")}, {"picture", !options.picture.empty()}};
+  if (options.why) params["why"] = true;
+  if (!density.empty()) params["density"] = density;
+  if (!options.camera.empty()) params["camera"] = options.camera;
+  if (options.normals) params["normals"] = true;
+  if (options.texture) params["texture"] = true;
+  if (options.ambient) params["ambient"] = true;
+  if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;
+  return params;
+}
+
+tl::expected<Answered, Failure> scan(const ClientOptions& options) {
+  auto connection = Connection::open(options.socket);
+  if (!connection) return tl::unexpected(failure(connection.error()));
+  const auto density = asked_density(options, *connection);
+  if (!density) return tl::unexpected(density.error());
+  const Progress progress(options, *connection, *density == "pixels" ? "measuring every pixel" : "scanning");
+  return ask(*connection, "scan", scan_parameters(options, *density));
+}
+
+}  // namespace
+
+int scan_command(const ClientOptions& options) {
+  if (auto writable = check_outputs(options); !writable) return report(options, writable.error());
+  const auto answered = scan(options);
+  if (!answered) return report(options, answered.error());
+  if (auto written = write_files(options, *answered); !written) return report(options, written.error());
+  const json& result = answered->reply.message["result"];
+  words(options) << (options.json ? to_line(result)
+                                  : scan_line(result) + "\n" + empty_line(result) + reason_lines(result));
+  return kDone;
+}
+
+}  // namespace slsd

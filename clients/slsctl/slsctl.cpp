@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/client_options.hpp"
+#include "clients/slsctl/output.hpp"
+#include "clients/usage/usage.hpp"
+#include "core/shown_picture.hpp"
+#include "drivers/files/file.hpp"
+
+namespace {
+
+using slsd::between;
+using slsd::ClientOptions;
+using slsd::one_of;
+
+constexpr double kManyTimes = 1e9;
+
+const char* const kMeasure = "Measure";
+const char* const kWatch = "Watch";
+const char* const kSetUp = "Set up";
+const char* const kDiagnose = "Diagnose";
+
+/// A command of a group of the help, with examples below its options.
+CLI::App* add_command(CLI::App& app, const char* group, const std::string& name, const std::string& what,
+                      const std::string& examples) {
+  CLI::App* command = app.add_subcommand(name, what);
+  command->group(group);
+  command->footer("Examples:\n" + examples + "\n--socket and --json are options of every command: see slsctl --help");
+  return command;
+}
+
+void add_camera(CLI::App* command, ClientOptions& options, const std::string& what) {
+  command->add_option("--camera", options.camera, what)->type_name("NAME");
+}
+
+void add_density(CLI::App* command, ClientOptions& options) {
+  command->add_option("--density", options.density, "a point for each symbol, or for each camera pixel")
+      ->check(one_of({"symbols", "pixels"}));
+}
+
+void add_timeout(CLI::App* command, ClientOptions& options) {
+  command->add_option("--timeout-ms", options.timeout_ms, "how long to wait for devices and frames (5000)")
+      ->check(between(1, 600'000))
+      ->type_name("N");
+}
+
+void add_count(CLI::App* command, ClientOptions& options, const std::string& name, const std::string& what) {
+  command->add_option(name, options.count, what)->check(between(1, kManyTimes))->type_name("N");
+}
+
+void add_scan(CLI::App& app, ClientOptions& options) {
+  CLI::App* scan = add_command(app, kMeasure, "scan", "take one scan and write its point cloud",
+                               "  slsctl scan cloud.ply\n"
+                               "  slsctl scan --density pixels depth.tiff\n"
+                               "  slsctl scan --format pcd -o - | my-program\n");
+  CLI::Option* output = scan->add_option("-o,--output,CLOUD", options.output,
+                                         "the file to write: .ply, .pcd or .tiff; - is standard output")
+                            ->type_name("FILE");
+  scan->add_option("--format", options.format, "the format, if the file's name does not tell it")
+      ->check(one_of({"ply", "pcd", "tiff"}))
+      ->needs(output);
+  add_density(scan, options);
+  scan->add_flag("--normals", options.normals, "also write the surface's normals (of pixels)");
+  scan->add_flag("--texture", options.texture, "also light the scene in white: intensities are those of the points");
+  scan->add_flag("--ambient", options.ambient, "also take a frame without light, and subtract the light of the room");
+  CLI::Option* picture =
+      scan->add_option("--picture", options.picture, "write the camera's frame with what was decoded in it")
+          ->type_name("FILE.png");
+  scan->add_flag("--why", options.why, "mark each rejected region in the picture by the rule that rejected it")
+      ->needs(picture);
+  scan->add_option("--cloud-picture", options.cloud_picture, "write a picture of the cloud")->type_name("FILE.png");
+  add_camera(scan, options, "the camera of --picture (the first)");
+  add_timeout(scan, options);
+}
+
+void add_record(CLI::App& app, ClientOptions& options) {
+  CLI::App* record = add_command(app, kMeasure, "record", "scan again and again, and keep the frames to replay them",
+                                 "  slsctl record session-1 --frames 100\n"
+                                 "  slsctl record session-2 --seconds 60 --clouds\n");
+  record->add_option("DIR", options.folder, "a new or an empty folder")->required()->type_name("FOLDER");
+  add_count(record, options, "--frames", "end after so many scans");
+  record->add_option("--seconds", options.seconds, "end after so long")->check(between(0.001, 1e9))->type_name("S");
+  record->add_flag("--clouds", options.clouds, "keep the clouds too");
+  add_timeout(record, options);
+}
+
+void add_watching(CLI::App& app, ClientOptions& options) {
+  add_command(app, kWatch, "status", "show the state of service, devices and scans", "  slsctl status\n");
+  CLI::App* watch = add_command(app, kWatch, "watch", "print a line for each cloud; the service scans meanwhile",
+                                "  slsctl watch --rate 2\n  slsctl watch --count 1 --json\n");
+  add_count(watch, options, "--count", "end after so many clouds");
+  watch->add_option("--rate", options.rate_hz, "at most so many a second")
+      ->check(between(0.001, 1000.0))
+      ->type_name("HZ");
+  add_density(watch, options);
+  CLI::App* top = add_command(app, kWatch, "top", "show rates, times and states live",
+                              "  slsctl top\n  slsctl top --interval 10 --json\n");
+  top->add_option("--interval", options.interval_s, "seconds between two looks (1)")
+      ->check(between(0.1, 3600.0))
+      ->type_name("S");
+  add_count(top, options, "--count", "end after so many looks");
+  CLI::App* metrics = add_command(app, kWatch, "metrics", "print what the service counts, as text for Prometheus",
+                                  "  slsctl metrics\n  slsctl metrics -o /var/lib/node_exporter/slsd.prom\n");
+  metrics->add_option("-o,--output,FILE", options.output, "the file to write, whole or not at all")->type_name("FILE");
+  metrics
+      ->add_option("--format", options.metrics_format,
+                   "printed: openmetrics; in a file: prometheus, the older text format")
+      ->check(one_of({"openmetrics", "prometheus"}));
+}
+
+void add_image(CLI::App& app, ClientOptions& options, const char* group, const std::string& name,
+               const std::string& what, const std::string& examples) {
+  CLI::App* command = add_command(app, group, name, what, examples);
+  command->add_option("-o,--output,FILE", options.image, "the PNG to write; - is standard output")
+      ->required()
+      ->type_name("FILE.png");
+  if (name == "pattern") return;
+  add_camera(command, options, "which camera (the first)");
+  add_timeout(command, options);
+  if (name == "frame") command->add_flag("--as-shown", options.as_shown, "leave what the projector shows");
+}
+
+const CLI::Validator kPicture(
+    [](const std::string& picture) {
+      const bool named = picture != "image" && picture != "held" && slsd::picture_named(picture);
+      if (named || slsd::lower_extension(picture) == ".png") return std::string();
+      return slsd::quoted(picture) +
+             " is neither pattern, idle, white, black, focus nor grid, nor a file that ends in .png";
+    },
+    "{pattern,idle,white,black,focus,grid} or FILE.png");
+
+const CLI::Validator kAssignment(
+    [](const std::string& text) {
+      const bool whole = text.find('=') != std::string::npos && text.find('.') < text.find('=');
+      return whole ? std::string()
+                   : slsd::quoted(text) + " is no setting: write TABLE.KEY=VALUE or camera.NAME.KEY=VALUE";
+    },
+    "");
+
+void add_calibrate(CLI::App& app, ClientOptions& options) {
+  CLI::App* calibrate = add_command(app, kSetUp, "calibrate", "calibrate with the service's devices, pose after pose",
+                                    "  slsctl calibrate --board charuco:11x7:23:17.25:DICT_5X5_1000\n"
+                                    "  slsctl calibrate --resume --poses 20\n"
+                                    "  slsctl calibrate cancel\n");
+  calibrate
+      ->add_option("ACTION", options.action,
+                   "begin one and follow it (begin), or look at, end or cancel the one under way")
+      ->check(one_of({"begin", "look", "end", "cancel"}));
+  calibrate->add_option("--board", options.board, "the board; the manual of slsd lists the kinds");
+  calibrate->add_option("--ruler", options.ruler, "what the ruler on the print says and measures, in mm")
+      ->type_name("NOMINAL:MEASURED");
+  calibrate->add_option("--code", options.code, "what is projected on it (pattern)")
+      ->check(one_of({"pattern", "gray"}));
+  calibrate->add_option("--poses", options.poses, "how many poses to take (12)")->check(between(3, 99))->type_name("N");
+  calibrate->add_flag("--resume", options.resume, "go on with the pictures of the last session");
+}
+
+void add_exposure(CLI::App& app, ClientOptions& options) {
+  CLI::App* exposure = add_command(app, kSetUp, "exposure", "look at the scene and propose exposure and gain",
+                                   "  slsctl exposure\n  slsctl exposure --camera left --gain-max-db 6\n");
+  add_camera(exposure, options, "which camera (the first)");
+  exposure->add_option("--exposure-max-us", options.exposure_max_us, "the longest exposure to propose (100000)")
+      ->check(between(1.0, 1e7))
+      ->type_name("N");
+  exposure->add_option("--gain-max-db", options.gain_max_db, "the highest gain to propose (24)")
+      ->check(between(0.0, 60.0))
+      ->type_name("N");
+  add_timeout(exposure, options);
+}
+
+void add_project(CLI::App& app, ClientOptions& options) {
+  CLI::App* project = add_command(app, kSetUp, "project", "show a picture until the next scan",
+                                  "  slsctl project focus\n  slsctl project chart.png\n  slsctl project idle\n");
+  project->add_option("PICTURE", options.shown, "what to show; an image has the projector's size")
+      ->required()
+      ->check(kPicture);
+  add_timeout(project, options);
+}
+
+void add_settings(CLI::App& app, ClientOptions& options) {
+  CLI::App* set = add_command(app, kSetUp, "set", "change settings without a restart, and keep them",
+                              "  slsctl set camera.left.exposure_us=8000\n"
+                              "  slsctl set decode.density=pixels decode.depth_max_mm=1500\n"
+                              "  slsctl set decode.density=default\n");
+  set->add_option("SETTING", options.assignments,
+                  "decode.KEY=VALUE or camera.NAME.exposure_us=N; =default takes it back")
+      ->required()
+      ->check(kAssignment)
+      ->type_name("TABLE.KEY=VALUE");
+  add_command(app, kSetUp, "settings", "list the settings that are given, and where each is from",
+              "  slsctl settings\n");
+}
+
+void add_bundle(CLI::App& app, ClientOptions& options) {
+  CLI::App* bundle = add_command(app, kDiagnose, "bundle", "write the last scans with all that belongs to them",
+                                 "  slsctl bundle\n  slsctl bundle fault.tar\n");
+  bundle->add_option("-o,--output,FILE", options.output, "the file to write (slsd-TIME.tar); - is standard output")
+      ->type_name("FILE.tar");
+}
+
+void add_commands(CLI::App& app, ClientOptions& options) {
+  add_scan(app, options);
+  add_record(app, options);
+  add_watching(app, options);
+  add_calibrate(app, options);
+  add_exposure(app, options);
+  add_project(app, options);
+  add_image(app, options, kSetUp, "frame", "write what a camera sees", "  slsctl frame left.png --camera left\n");
+  add_settings(app, options);
+  add_image(app, options, kDiagnose, "preview", "scan, and write the frame with what was decoded in it",
+            "  slsctl preview decoded.png\n");
+  add_image(app, options, kDiagnose, "pattern", "write the pattern that the projector shows",
+            "  slsctl pattern pattern.png\n");
+  add_bundle(app, options);
+}
+
+int run(const std::string& command, const ClientOptions& options) {
+  if (command == "scan") return slsd::scan_command(options);
+  if (command == "status") return slsd::status_command(options);
+  if (command == "watch") return slsd::watch_command(options);
+  if (command == "metrics") return slsd::metrics_command(options);
+  if (command == "set") return slsd::set_command(options);
+  if (command == "settings") return slsd::settings_command(options);
+  if (command == "bundle") return slsd::bundle_command(options);
+  if (command == "calibrate") return slsd::calibrate_command(options);
+  if (command == "top") return slsd::top_command(options);
+  if (command == "exposure") return slsd::exposure_command(options);
+  if (command == "project") return slsd::project_command(options);
+  if (command == "record") return slsd::record_command(options);
+  return slsd::image_command(options, command);
+}
+
+/// "help scan" is "scan --help".
+std::vector<const char*> without_help_command(int argc, char** argv) {
+  std::vector<const char*> arguments(argv, argv + argc);
+  if (argc < 2 || std::string_view(argv[1]) != "help") return arguments;
+  arguments.erase(arguments.begin() + 1);
+  arguments.push_back("--help");
+  return arguments;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Talks to slsd, the service of a structured-light scanner.\n"
+      "Exit status: 0 done, 1 the request failed, 2 wrong usage, 3 no service answers.",
+      "slsctl");
+  ClientOptions options;
+  app.set_version_flag("--version", "slsctl " SLSD_VERSION);
+  app.add_option("--socket", options.socket,
+                 "the service's socket (SLSD_SOCKET in the environment, or /run/slsd/slsd.sock)")
+      ->type_name("PATH");
+  app.add_flag("--json", options.json, "print JSON, one object to a line, errors too");
+  app.require_subcommand(1);
+  app.fallthrough();
+  app.footer("\"slsctl COMMAND --help\" shows the options of a command and examples.");
+  add_commands(app, options);
+  const auto arguments = without_help_command(argc, argv);
+  std::string command;
+  const auto check = [&] {
+    command = app.get_subcommands().front()->get_name();
+    if (const auto wrong = slsd::wrong_outputs(options, command); !wrong.empty()) throw CLI::ValidationError(wrong);
+  };
+  if (const auto ended = slsd::parse_usage(app, static_cast<int>(arguments.size()), arguments.data(), check))
+    return *ended;
+  return slsd::finish(options, run(command, options));
+}

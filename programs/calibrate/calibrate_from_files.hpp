@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include "core/result.hpp"
+#include "programs/calibrate/calibrate_request.hpp"
+
+namespace slsd {
+
+/// Calibrates from captures on disk, without any hardware; prints what each pose shows, the result and the verdict, and
+/// keeps it.
+/// @errors of the configuration, the files, the board's text and calibrate(); kImpossible: the verdict is bad,
+///         or worse than that in force, and no output was asked for: what is in force stays
+[[nodiscard]] Result<> calibrate_from_files(const CalibrateRequest& request);
+
+}  // namespace slsd

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "core/code/pattern.hpp"
+#include "core/result.hpp"
+#include "daemon/configuration/configuration.hpp"
+#include "programs/calibrate/captures/capture_folder.hpp"
+
+namespace slsd {
+
+/// The pattern that was recorded beside captures, as pattern.toml, or the configured one.
+/// @errors of the file, read_pattern() and configured_pattern()
+[[nodiscard]] Result<Pattern> captured_pattern(const std::filesystem::path& folder, const Configuration& configuration);
+
+/// Whether there is no picture of the pattern, but of a Gray code.
+[[nodiscard]] bool captured_in_gray(const std::vector<CapturedPose>& poses);
+
+}  // namespace slsd

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/calibrate/observe/observations.hpp"
+#include "programs/calibrate/session/board_look.hpp"
+#include "programs/calibrate/session/board_place.hpp"
+
+namespace slsd {
+
+/// The poses of a session so far, and what they lack.
+/// @thread thread-bound
+class PoseCollection {
+ public:
+  /// @param so_far  with every camera's name; sizes where poses were read from a record
+  /// @param subject  what they show; poses of something else are passed over
+  PoseCollection(const Board& board, const Observations& so_far, PoseSubject subject = PoseSubject::kBoard);
+
+  /// The sizes of the cameras' pictures, in their order.
+  /// @errors kMismatch: the poses so far are of another size
+  [[nodiscard]] Result<> set_sizes(const std::vector<GreyImage>& pictures);
+
+  void add(PoseObservation pose);
+  [[nodiscard]] const Observations& observations() const { return observations_; }
+  [[nodiscard]] std::size_t size() const { return observations_.poses.size(); }
+  [[nodiscard]] PoseSubject subject() const { return subject_; }
+
+  /// The pose that shows the board just so, to every camera that sees it now; empty where none does.
+  [[nodiscard]] std::string same_as(const BoardSightings& sightings) const;
+  /// Of the blurs of a camera's views the middle one, px; 0 below three views.
+  [[nodiscard]] double usual_blur_px(std::size_t camera) const;
+  /// What the next pose should be to help most: "tilt the board ...".
+  [[nodiscard]] std::string most_helpful() const;
+
+ private:
+  using Places = std::map<std::size_t, BoardPlace>;  // by camera
+  [[nodiscard]] std::string missing_tilt() const;
+  [[nodiscard]] std::string missing_place(double enough) const;
+  [[nodiscard]] std::string missing_distance() const;
+  [[nodiscard]] std::string next_place_of_plane() const;
+
+  Board board_;
+  PoseSubject subject_;
+  Observations observations_;
+  std::vector<Places> places_;  // one to a pose
+};
+
+}  // namespace slsd

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/calibrate/calibrate.hpp"
+#include "programs/calibrate/captures/capture_folder.hpp"
+#include "programs/calibrate/captures/pose_observer.hpp"
+
+namespace slsd {
+
+/// What captures on disk show, and the poses that show nothing of use.
+struct ReadCaptures {
+  Observations observations;
+  std::vector<PoseReport> refused;
+};
+
+/// Reads the pictures of every pose and looks at them.
+/// @param names   of the cameras, the first one first; a folder's name, or the only camera's
+/// @param observers  that of the plane where a capture is of it
+/// @param report  is told a line for each picture
+/// @errors kMismatch: pictures of different sizes; kNotFound: a folder of no camera
+[[nodiscard]] Result<ReadCaptures> read_captures(const std::vector<CapturedPose>& poses,
+                                                 const std::vector<std::string>& names, const ImageSize& projector,
+                                                 bool gray_code, PoseObservers& observers,
+                                                 const std::function<void(const std::string&)>& report);
+
+}  // namespace slsd

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "programs/calibrate/session/board_look.hpp"
+
+namespace slsd {
+
+/// A look's line for the terminal: for each camera "left: 60 corners, edges 0.6 px, clipped 0 %", or why it sees no
+/// board.
+/// @param cameras  their names
+/// @thread reentrant
+[[nodiscard]] std::string look_text(const BoardSightings& sightings, const std::vector<std::string>& cameras);
+
+/// Why cameras see no board, a line to each, begun by a line end.
+/// @thread reentrant
+[[nodiscard]] std::string unseen_text(const BoardSightings& sightings, const std::vector<std::string>& cameras);
+
+}  // namespace slsd

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "programs/calibrate/captures/pose_collection.hpp"
+#include "programs/calibrate/session/pose_recorder.hpp"
+#include "programs/calibrate/session/pose_source.hpp"
+#include "programs/calibrate/session/pose_taker.hpp"
+#include "programs/calibrate/session/session_terminal.hpp"
+#include "programs/calibrate/session/sign.hpp"
+#include "programs/latency/timepiece.hpp"
+
+namespace slsd {
+
+struct PoseSessionOptions {
+  std::size_t poses = 12;                         ///< at which the session ends, those of before among them
+  std::chrono::milliseconds sign{500};            ///< how long a sign is shown
+  std::chrono::milliseconds after_refusal{2000};  ///< before a board that is still there is tried again
+  std::chrono::seconds patience{60};     ///< without a board until the operator is told what to do; without the devices
+                                         ///< until the session ends
+  std::chrono::milliseconds retry{500};  ///< between two tries of devices that fail
+  bool begun = false;                    ///< the devices have given a picture before: they are worth patience at once
+};
+
+/// What a session is at, for who shows it in another way than a terminal does.
+struct PoseProgress {
+  std::string_view state;  ///< "no board", "moving", "still", "done", "hold", "taken" or "again"
+  std::string text;        ///< why a pose was not taken; else empty
+  std::size_t wanted = 0;
+  const PoseCollection& poses;
+  const BoardSightings& sightings;
+};
+
+/// What a session works with; all of it outlives it.
+struct PoseSessionParts {
+  PoseSource& source;
+  PoseTaker& taker;
+  PoseRecorder& recorder;
+  PoseCollection& poses;
+  SessionTerminal& terminal;
+  Timepiece time;
+  std::function<bool()> interrupted;
+  std::function<void(const PoseProgress&)> progress = [](const PoseProgress&) {};
+};
+
+/// Takes poses of a board that a person holds, without a key pressed:
+///
+///     white ---> board seen, still for two looks ---> "hold" ---> white, pattern, white ---> kept, "taken"
+///       ^  \-> not seen, moves                |                          \-> refused, "again"
+///       |                                     \-> as an earlier pose, "again"          |
+///       \------------------------------------------------------------------------------/
+///
+/// @thread thread-bound
+class PoseSession {
+ public:
+  PoseSession(PoseSessionParts parts, const PoseSessionOptions& options);
+
+  /// Until there are poses enough, or it is interrupted.
+  /// @errors of the recorder; those of the devices: at once where they do not begin, else after their patience;
+  ///         kMismatch: the cameras are not those of the poses so far
+  [[nodiscard]] Result<> run();
+
+ private:
+  [[nodiscard]] Result<> step();
+  [[nodiscard]] Result<> bear(const Error& error);
+  void watch_for_board(const BoardSightings& sightings);
+  void show_state(const BoardSightings& sightings, double moved);
+  [[nodiscard]] Result<> attempt(const BoardSightings& sightings);
+  [[nodiscard]] Result<> keep(PoseTrial trial, BoardSightings sightings);
+  void refuse(const std::string& why);
+  void show(Sign sign, const std::string& why = {});
+
+  PoseSessionParts parts_;
+  PoseSessionOptions options_;
+  BoardSightings last_;                    // of the look before
+  std::optional<BoardSightings> handled_;  // those that need no second attempt until the board moves
+  MonotonicTime next_attempt_{};
+  MonotonicTime tell_at_{};                  // when there has been no board for long
+  std::optional<MonotonicTime> bear_until_;  // while the devices fail
+  bool begun_;                               // the devices have given a picture
+  bool sized_ = false;                       // the sizes of the cameras' pictures are known
+  Eigen::Vector2d sign_centre_px_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "programs/calibrate/captures/captured_pictures.hpp"
+#include "programs/calibrate/captures/pose_collection.hpp"
+#include "programs/calibrate/captures/pose_observer.hpp"
+#include "programs/calibrate/session/board_look.hpp"
+#include "programs/calibrate/session/pose_source.hpp"
+
+namespace slsd {
+
+/// A pose that was tried.
+struct PoseTrial {
+  std::vector<PoseView> views;             ///< of the cameras that saw enough; empty: the pose is refused
+  std::vector<CapturedPictures> pictures;  ///< one to a camera
+  std::vector<std::string> lacks;          ///< why a camera's view does not count, a sentence each
+  std::vector<std::string> advice;         ///< what could be better
+  std::chrono::nanoseconds work{};         ///< the machine's own, without waiting for devices
+
+  [[nodiscard]] bool refused() const { return views.empty(); }
+  /// The reasons in one line.
+  [[nodiscard]] std::string why() const;
+};
+
+/// Takes a pose: pattern or Gray code, then white again to see whether the board was held still.
+/// @thread thread-bound
+class PoseTaker {
+ public:
+  /// @param images  of the projector's size: the pattern alone, or the Gray code, for which black is shown too
+  PoseTaker(PoseSource& source, PoseObserver& observer, std::vector<Grey8> images, bool gray_code);
+
+  /// White light, and a look at the board in it. @errors of PoseSource::grab()
+  [[nodiscard]] Result<BoardLook> look();
+
+  /// @param before  a look() at the board, held still
+  /// @param taken   the poses so far, against which blur is judged
+  /// @errors of PoseSource::grab()
+  [[nodiscard]] Result<PoseTrial> take(BoardLook before, const PoseCollection& taken);
+
+ private:
+  [[nodiscard]] Result<std::vector<GreyImage>> grab_under(const Grey8& image);
+  [[nodiscard]] Result<> project(std::vector<CapturedPictures>& pictures);
+  [[nodiscard]] Result<PoseView> judge(std::size_t camera, const Result<BoardSighting>& sighting,
+                                       const CapturedPictures& pictures, double usual_blur_px);
+
+  PoseSource& source_;
+  PoseObserver& observer_;
+  std::vector<Grey8> images_;
+  bool gray_code_;
+  Grey8 white_, black_;
+};
+
+}  // namespace slsd

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "programs/command_line.hpp"
+
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+
+#include "clients/usage/usage.hpp"
+#include "daemon/configuration/configuration.hpp"
+
+namespace slsd {
+namespace {
+
+void add_calibration_options(CLI::App& app, CommandLine& line) {
+  CalibrateRequest& request = line.request;
+  auto* calibrate = app.get_option("--calibrate");
+  auto* latency = app.add_flag("--latency", line.latency, "with --calibrate: how late each camera sees the projector");
+  latency->needs(calibrate);
+  app.add_option("--output", request.output, "with --calibrate: the file that it is kept in")->needs(calibrate);
+  app.add_option("--from", request.from, "a folder of captures, without any hardware")->excludes(latency);
+  app.add_option(
+         "--board", request.board,
+         "charuco:COLSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY (squares), chessboard:COLSxROWS:SQUARE_MM (inner corners), "
+         "circles:COLSxROWS:SPACING_MM:DIAMETER_MM, plane:COLSxROWS:PITCH_MM:MARKER_MM:DICTIONARY")
+      ->excludes(latency);
+  app.add_option("--ruler", request.ruler,
+                 "NOMINAL:MEASURED, in mm: what the ruler on the print says and what it measures")
+      ->excludes(latency);
+  app.add_option("--plane", request.plane,
+                 "with --calibrate: the reference plane of the second step, such as plane:8x5:100:40:DICT_4X4_50")
+      ->needs(calibrate)
+      ->excludes(latency);
+  app.add_option("--plane-ruler", request.plane_ruler, "as --ruler, of the reference plane's print")->needs("--plane");
+  app.add_option("--planes", request.planes, "with --plane: how many looks at it a session takes")
+      ->check(between(1, 99))
+      ->needs("--plane");
+  app.add_option("--use", request.use, "with --calibrate --from: FIRST:LAST, the poses of that part alone")
+      ->needs(calibrate)
+      ->needs("--from");
+  app.add_flag("--force", request.force,
+               "with --calibrate: replace the calibration in force though distances are of another scale by it")
+      ->needs(calibrate);
+  const auto choose_code = [&request](const std::string& code) { request.gray_code = code == "gray"; };
+  app.add_option_function<std::string>("--code", choose_code,
+                                       "what is projected: the pattern, or a Gray code that takes many pictures a pose")
+      ->check(one_of({"pattern", "gray"}))
+      ->needs(calibrate);
+  app.add_option("--poses", request.poses, "with --calibrate: how many poses a session takes")
+      ->check(between(3, 99))
+      ->needs(calibrate);
+  app.add_option("--record", request.record,
+                 "with --calibrate: the folder that the captures go to; poses in it already are taken over")
+      ->needs(calibrate);
+  app.add_option("--socket", request.socket,
+                 "with --calibrate: take the poses with the devices of the service that listens there")
+      ->needs(calibrate)
+      ->excludes(latency)
+      ->excludes("--from");
+  app.add_flag("--progress", request.progress, "with --calibrate: tell what is seen in JSON, too, a line each")
+      ->needs(calibrate);
+}
+
+CLI::Option* add_print_options(CLI::App& app, PrintRequest& request) {
+  auto* print = app.add_option("--print-board", request.file, "write a board for calibrating: .pdf, .svg or .png");
+  app.add_option("--paper", request.paper, "the paper to print on; a size is in mm")
+      ->type_name("{A0,A1,A2,A3,A4,letter} or WIDTHxHEIGHT")
+      ->needs(print);
+  app.add_option("--dpi", request.dpi, "of a board that is a PNG")->needs(print);
+  return print;
+}
+
+void add_extrinsics_options(CLI::App& app, ExtrinsicsRequest& request) {
+  auto* extrinsics = app.add_option("--extrinsics", request.file,
+                                    "measure where several scanners stand, by a board that they see, and write it");
+  app.add_option("--scanner", request.scanners, "with --extrinsics: NAME=SOCKET; the first is the frame of all")
+      ->needs(extrinsics);
+  app.add_option("--parent", request.parent, "with --extrinsics: the name of that frame (cell)")->needs(extrinsics);
+  app.add_option("--places", request.places, "with --extrinsics: places of the board (3)")
+      ->check(between(1, 99))
+      ->needs(extrinsics);
+  for (const char* other : {"--calibrate", "--verify", "--pattern", "--check", "--check-config", "--list"})
+    extrinsics->excludes(app.get_option(other));
+}
+
+void add_options(CLI::App& app, CommandLine& line) {
+  app.set_version_flag("--version", "slsd " SLSD_VERSION);
+  app.add_option("--config", line.configuration, "configuration file; without it " + std::string(kConfigurationFile));
+  app.add_option("--log-level", line.level, "least level that is logged")
+      ->check(one_of({"trace", "debug", "info", "warning", "error", "critical"}));
+  auto* pattern = app.add_option("--pattern", line.pattern_image, "write the image that the projector shows, as a PNG");
+  auto* check = app.add_flag("--check", line.check, "look at everything that a scan needs, and say what to do");
+  auto* check_configuration = app.add_flag("--check-config", line.check_configuration,
+                                           "look at the configuration alone: no device, no service");
+  auto* replay =
+      app.add_option("--replay", line.bundle,
+                     "decode the scans of a bundle of slsctl bundle, and say whether their clouds are the same");
+  app.add_option("--unpack", line.folder, "with --replay: a new folder, for what is in the bundle and the clouds")
+      ->needs(replay);
+  auto* list = app.add_flag("--list", line.list, "list the cameras and projectors that are seen");
+  app.add_flag("--json", line.as_json, "list as JSON")->needs(list);
+  auto* calibrate = app.add_flag("--calibrate", line.calibrate, "measure the scanner itself");
+  auto* verify = app.add_flag("--verify", line.verify, "measure a board or a plane with the calibration in force");
+  add_calibration_options(app, line);
+  calibrate->excludes(verify)->excludes(pattern)->excludes(check)->excludes(list);
+  verify->excludes(pattern)->excludes(check)->excludes(list);
+  pattern->excludes(check)->excludes(list);
+  check->excludes(list);
+  check_configuration->excludes(calibrate)->excludes(verify)->excludes(pattern)->excludes(check)->excludes(list);
+  add_extrinsics_options(app, line.extrinsics);
+  replay->excludes(calibrate)->excludes(verify)->excludes(pattern)->excludes(check)->excludes(check_configuration);
+  replay->excludes(list)->excludes(app.get_option("--extrinsics"));
+  add_print_options(app, line.print)
+      ->excludes(replay)
+      ->excludes(pattern)
+      ->excludes(calibrate)
+      ->excludes(verify)
+      ->excludes(check)
+      ->excludes(check_configuration)
+      ->excludes(list)
+      ->excludes("--extrinsics");
+}
+
+/// --from, --board and --ruler belong to several commands.
+void check_commands(const CLI::App& app, const CommandLine& line) {
+  if (line.verify && app.count("--ruler") > 0 && app.count("--board") == 0) {
+    throw CLI::RequiresError("--ruler with --verify", "--board");
+  }
+  if (line.calibrate || line.verify) return;
+  const bool extrinsics = !line.extrinsics.file.empty();
+  for (const char* option : {"--from", "--ruler"}) {
+    if (app.count(option) > 0 && !(extrinsics && option == std::string_view("--ruler")))
+      throw CLI::RequiresError(option, "--calibrate or --verify");
+  }
+  if (app.count("--board") > 0 && line.print.file.empty() && !extrinsics) {
+    throw CLI::RequiresError("--board", "--calibrate, --verify, --extrinsics or --print-board");
+  }
+}
+
+}  // namespace
+
+tl::expected<CommandLine, int> parse_command_line(int argc, char** argv) {
+  CLI::App app("The service of a single-shot structured-light scanner. Without an option it serves in the foreground.",
+               "slsd");
+  CommandLine line;
+  add_options(app, line);
+  const auto ended = parse_usage(app, argc, argv, [&] { check_commands(app, line); });
+  if (ended) return tl::unexpected(*ended);
+  line.request.configuration_file = line.configuration;
+  line.print.board = line.request.board;
+  return line;
+}
+
+int exit_status(const Result<>& result) {
+  if (!result) std::cerr << "slsd: " << to_string(result.error()) << "\n";
+  return result ? kDone : kFailed;
+}
+
+}  // namespace slsd

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <tl/expected.hpp>
+
+#include "programs/calibrate/calibrate_request.hpp"
+#include "programs/calibrate/measure_extrinsics.hpp"
+#include "programs/commands/commands.hpp"
+
+namespace slsd {
+
+inline constexpr int kDone = 0;
+inline constexpr int kFailed = 1;
+inline constexpr int kWrongUsage = 2;
+
+/// What the command line asks for: that of slsd, and of slsd-calibrate, which carries out a part of it.
+struct CommandLine {
+  std::optional<std::filesystem::path> configuration;
+  std::string level = "info";
+  std::filesystem::path pattern_image;
+  std::filesystem::path bundle;  ///< to be replayed
+  std::filesystem::path folder;  ///< where it is unpacked; empty: nowhere
+  bool check = false, check_configuration = false, list = false, as_json = false;
+  bool calibrate = false, latency = false, verify = false;
+  CalibrateRequest request;
+  PrintRequest print;
+  ExtrinsicsRequest extrinsics;
+
+  /// Whether slsd-calibrate carries it out.
+  [[nodiscard]] bool calibrates() const {
+    return calibrate || verify || !print.file.empty() || !extrinsics.file.empty();
+  }
+};
+
+/// Prints help, version or what is wrong with the usage.
+/// @return  what is asked for, or the status to exit with
+[[nodiscard]] tl::expected<CommandLine, int> parse_command_line(int argc, char** argv);
+
+/// What a program says of a command that failed. @return its exit status
+[[nodiscard]] int exit_status(const Result<>& result);
+
+}  // namespace slsd

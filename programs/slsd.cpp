@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <malloc.h>
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "core/printable.hpp"
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/configuration/settings_over.hpp"
+#include "daemon/scan/message_ids.hpp"
+#include "daemon/service/logging.hpp"
+#include "daemon/service/notifier.hpp"
+#include "daemon/service/service.hpp"
+#include "drivers/system/own_program.hpp"
+#include "programs/command_line.hpp"
+#include "programs/start_calibrating.hpp"
+
+namespace {
+
+constexpr int kWrongConfiguration = 78;  // EX_CONFIG; the unit does not start the service again
+constexpr int kOwnPagesBytes = 1 << 20;
+
+/// Whether the same start may succeed later, with nobody having changed anything: when a volume is mounted, or another
+/// daemon ends.
+bool may_pass(slsd::ErrorCode code) {
+  using slsd::ErrorCode;
+  constexpr std::array kLasting{ErrorCode::kInvalidArgument, ErrorCode::kMalformed,   ErrorCode::kMismatch,
+                                ErrorCode::kImpossible,      ErrorCode::kUnsupported, ErrorCode::kPermissionDenied,
+                                ErrorCode::kAlreadyExists};
+  return std::ranges::find(kLasting, code) == kLasting.end();
+}
+
+int not_served(const slsd::Error& error, bool passes) {
+  const std::string why = to_string(error);
+  const slsd::MessageId id(slsd::MessageId::kDoesNotStart);
+  spdlog::critical("{}", why);
+  slsd::Notifier().status("does not start: " + slsd::printable(why, 1000));  // as `systemctl status` shows it
+  return passes ? slsd::kFailed : kWrongConfiguration;
+}
+
+using MadeService = slsd::Result<std::unique_ptr<slsd::Service>>;
+
+/// The service with what was set over its socket before, as far as that still fits: it holds up no start.
+MadeService make_service(const std::filesystem::path& file, slsd::Configuration configuration) {
+  const auto kept_file = slsd::kept_settings_file(file);
+  const auto kept = slsd::read_kept_settings(kept_file);
+  std::optional<slsd::Error> why;
+  if (!kept) {
+    why = kept.error();
+  } else if (!kept->empty()) {
+    auto with_kept = slsd::load_configuration_with(file, *kept);
+    MadeService made = with_kept ? slsd::Service::create(std::move(*with_kept), file, *kept)
+                                 : MadeService(tl::unexpected(with_kept.error()));
+    if (made) return made;
+    why = made.error();
+  }
+  if (why) spdlog::warn("{}: what was set over the socket is passed over: {}", kept_file.string(), to_string(*why));
+  return slsd::Service::create(std::move(configuration), file, nlohmann::json::object());
+}
+
+int serve(const std::filesystem::path& configuration_file) {
+  // Else the first frame's buffer that is freed raises this, and those of cameras that come and go fragment the heap:
+  // by 20 % in 240 losses of one.
+  ::mallopt(M_MMAP_THRESHOLD, kOwnPagesBytes);
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGIO, SIG_IGN);   // of the leases by which lent memfds are watched, should anybody else open one
+  std::signal(SIGHUP, SIG_IGN);  // what a reload would read is about to be read
+  spdlog::info("slsd {} starts with {}", SLSD_VERSION, configuration_file.string());
+  slsd::queue_log();
+  auto configuration = slsd::load_configuration(configuration_file);
+  if (!configuration) {
+    // What is not found of a file that is there is a user or a group, which may come later from another host.
+    const slsd::ErrorCode code = configuration.error().code;
+    std::error_code ignored;
+    const bool named = code == slsd::ErrorCode::kNotFound && std::filesystem::exists(configuration_file, ignored);
+    return not_served(configuration.error(), named || code == slsd::ErrorCode::kIo);
+  }
+  auto service = make_service(configuration_file, std::move(*configuration));
+  if (service) (*service)->set_calibrator(slsd::find_own_program(slsd::kCalibrator));
+  const auto served = service ? (*service)->run() : slsd::Result<>(tl::unexpected(service.error()));
+  return served ? slsd::kDone : not_served(served.error(), may_pass(served.error().code));
+}
+
+int check_configuration(const slsd::CommandLine& line) {
+  const auto checked = slsd::check_configuration(line.configuration);
+  const int status = slsd::exit_status(checked);
+  return checked || may_pass(checked.error().code) ? status : kWrongConfiguration;
+}
+
+int carry_out(const slsd::CommandLine& line) {
+  if (!line.pattern_image.empty())
+    return slsd::exit_status(slsd::write_pattern_image(line.configuration, line.pattern_image));
+  if (!line.bundle.empty()) return slsd::exit_status(slsd::replay_bundle(line.bundle, line.folder));
+  if (line.list) return slsd::exit_status(slsd::list_devices(line.configuration, line.as_json));
+  if (line.check_configuration) return check_configuration(line);
+  if (line.check) return slsd::check_everything(line.configuration) ? slsd::kDone : slsd::kFailed;
+  // Of one name for good: a reload compares the paths in it with those of the start.
+  std::error_code ignored;
+  const std::filesystem::path file = line.configuration.value_or(slsd::kConfigurationFile);
+  const auto absolute = std::filesystem::absolute(file, ignored);
+  return serve(absolute.empty() ? file : absolute);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto line = slsd::parse_command_line(argc, argv);
+  if (!line) return line.error();
+  if (line->calibrates()) return slsd::exit_status(slsd::start_calibrating(argv));
+  slsd::start_logging(spdlog::level::from_str(line->level));
+  const int status = carry_out(*line);
+  slsd::flush_log(slsd::kLogPatience);
+  return status;
+}

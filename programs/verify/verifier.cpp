@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "programs/verify/verifier.hpp"
+
+#include <iostream>
+
+#include <fmt/format.h>
+
+#include "core/calibrate/observe/observe_plane.hpp"
+#include "daemon/scan/scan_setup.hpp"
+#include "programs/calibrate/board_request.hpp"
+#include "programs/verify/verify_text.hpp"
+
+namespace slsd {
+namespace {
+
+/// The board that is asked for; else the one of the calibration, as far as its file names it in our words.
+Result<Board> board_to_look_for(const CalibrateRequest& request, const Calibration& calibration) {
+  if (request.board.empty() && !request.ruler.empty()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "name the print whose ruler it is by --board too: the board of the calibration file is already as it "
+                "was measured",
+                "--ruler " + request.ruler);
+  }
+  if (request.board.empty() && calibration.report.board) {
+    if (auto board = parse_board(*calibration.report.board)) return board;
+  }
+  return requested_board(request);
+}
+
+ImageSize size_of(const Lens& lens) {
+  return {lens.width_px, lens.height_px};
+}
+
+Result<> check_size(const CapturedPictures& pictures, const CalibratedCamera& camera, const std::string& name) {
+  const ImageSize own = size_of(camera.lens);
+  for (const GreyImage& picture : pictures.coded) {
+    const ImageSize seen = size_of(picture);
+    if (seen == own) continue;
+    return fail(ErrorCode::kMismatch,
+                fmt::format("has pictures of {}x{} px, and its calibration is for {}x{}: set the camera's size, or "
+                            "calibrate again",
+                            seen.width_px, seen.height_px, own.width_px, own.height_px),
+                name);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Verifier> Verifier::create(const CalibrateRequest& request, const Configuration& configuration, Pattern pattern,
+                                  bool gray_code) {
+  auto calibration = configured_calibration(configuration);
+  if (!calibration) return tl::unexpected(calibration.error());
+  if (!*calibration) {
+    return fail(ErrorCode::kNotFound, "there is no calibration to verify: name its file as [calibration] file");
+  }
+  const ImageSize projector = size_of((*calibration)->projector);
+  const PatternOptions& shown = pattern.options;
+  if (!gray_code && projector != ImageSize{shown.projector_width_px, shown.projector_height_px}) {
+    return fail(
+        ErrorCode::kMismatch,
+        fmt::format("the pattern is for a projector of {}x{} px, and the calibration for {}x{}: they do not "
+                    "belong together",
+                    shown.projector_width_px, shown.projector_height_px, projector.width_px, projector.height_px));
+  }
+  const auto board = board_to_look_for(request, **calibration);
+  if (!board) return tl::unexpected(board.error());
+  Verifier verifier(std::move(**calibration), *board, std::move(pattern));
+  verifier.gray_code_ = gray_code;
+  verifier.board_asked_for_ = !request.board.empty();
+  verifier.limits_.epipolar_px = epipolar_limit_px(verifier.calibration_.report.epipolar_error_px);
+  if (!configuration.cameras.empty()) verifier.first_camera_ = configuration.cameras.front().name();
+  const auto& date = verifier.calibration_.report.date;
+  std::cout << fmt::format("calibration {}{}, board {}\n", configuration.calibration_file.string(),
+                           date ? " of " + *date : "", to_string(*board));
+  return verifier;
+}
+
+Result<PoseView> Verifier::observe_without_board(const PosePictures& pictures, bool has_white,
+                                                 PatternReader& reader) const {
+  if (!gray_code_) {
+    return observe_plane(pictures.coded.at(0), has_white ? std::optional(pictures.white) : std::nullopt, reader);
+  }
+  if (!pictures.black) return fail(ErrorCode::kNotFound, "the Gray code needs a picture under the black projector too");
+  return observe_plane({pictures.white, *pictures.black, pictures.coded}, size_of(calibration_.projector));
+}
+
+Result<PoseView> Verifier::observe(const CapturedPictures& owned, std::size_t camera, std::string& remark) {
+  const PosePictures pictures = owned.views();
+  PatternReader& reader = readers_.try_emplace(camera, pattern_).first->second;
+  const bool has_white = size_of(owned.white) != ImageSize{};
+  if (!has_white) return observe_without_board(pictures, has_white, reader);
+  BoardSighting sighting;
+  auto view = observe_board(pictures, board_, sighting);
+  if (!view) {
+    remark = to_string(view.error());
+    return observe_without_board(pictures, has_white, reader);
+  }
+  const auto read = gray_code_ ? observe_gray_code(pictures, board_, sighting, size_of(calibration_.projector), *view)
+                               : observe_pattern(pictures, board_, sighting, reader, *view);
+  if (!read) return tl::unexpected(read.error());
+  return view;
+}
+
+Result<> Verifier::look(const std::string& name, const std::string& camera, const CapturedPictures& pictures) {
+  const CalibratedCamera* const known = calibration_.camera(camera.empty() ? first_camera_ : camera);
+  if (known == nullptr) return fail(ErrorCode::kNotFound, "the calibration has no camera of this name", camera);
+  if (auto fits = check_size(pictures, *known, name); !fits) return fits;
+  std::string remark;
+  const auto view = observe(pictures, static_cast<std::size_t>(known - calibration_.cameras.data()), remark);
+  if (!remark.empty()) std::cout << fmt::format("{}: taken as a plain plane: {}\n", name, remark);
+  const auto check = view ? check_view(*view, *known, calibration_.projector) : tl::unexpected(view.error());
+  if (!check) {
+    std::cout << fmt::format("{}: cannot be measured: {}", name, to_string(check.error())) << std::endl;
+    return {};
+  }
+  std::cout << fmt::format("{}: {}", name, check_text(*check, limits_)) << std::endl;
+  checks_.push_back(*check);
+  return {};
+}
+
+Result<> Verifier::finish() const {
+  if (checks_.empty()) {
+    return fail(ErrorCode::kNotFound,
+                "nothing could be measured, so that nothing is said of the calibration; if the board is lit and in "
+                "focus, the rig is far from its calibration: calibrate again");
+  }
+  const VerifySummary summary = summarise(checks_, limits_);
+  std::cout << summary_text(summary, limits_) << std::flush;
+  if (!summary.faults.empty()) {
+    return fail(ErrorCode::kMismatch, "the calibration does not hold: " + advice(summary));
+  }
+  if (board_asked_for_ && summary.views_with_board == 0) {
+    return fail(ErrorCode::kNotFound, "the board was never seen, so that distances were not checked: show it",
+                describe(board_));
+  }
+  return {};
+}
+
+}  // namespace slsd

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/board/board.hpp"
+#include "core/calibrate/judge/verify.hpp"
+#include "core/calibrate/observe/observe_pose.hpp"
+#include "core/code/codebook.hpp"
+#include "core/geometry/calibration.hpp"
+#include "core/result.hpp"
+#include "daemon/configuration/configuration.hpp"
+#include "programs/calibrate/calibrate_request.hpp"
+#include "programs/calibrate/captures/captured_pictures.hpp"
+
+namespace slsd {
+
+/// Looks at flat things by the calibration in force, and prints what each look says of it.
+/// @thread thread-bound
+class Verifier {
+ public:
+  /// @param pattern    what is projected, unless it is a Gray code
+  /// @errors kNotFound: no calibration is configured; those of its file and of the board's text; kInvalidArgument: a
+  ///         ruler of no board; kMismatch: the pattern is for another projector
+  [[nodiscard]] static Result<Verifier> create(const CalibrateRequest& request, const Configuration& configuration,
+                                               Pattern pattern, bool gray_code);
+
+  /// One camera's look. What cannot be measured in it is printed, and does not count.
+  /// @param name      what is printed before it
+  /// @param camera    its name; empty: the configuration's first
+  /// @param pictures  an empty white one: a plain plane
+  /// @errors kNotFound: the calibration does not know the camera; kMismatch: the pictures are not of its size
+  [[nodiscard]] Result<> look(const std::string& name, const std::string& camera, const CapturedPictures& pictures);
+
+  /// Prints what all looks say together.
+  /// @errors kMismatch: the calibration does not hold any more; the message says what to do; kNotFound: nothing was
+  ///         measured, or the board that was asked for was never seen
+  [[nodiscard]] Result<> finish() const;
+
+  [[nodiscard]] const Pattern& pattern() const { return pattern_.pattern(); }
+
+ private:
+  Verifier(Calibration calibration, Board board, Pattern pattern)
+      : calibration_(std::move(calibration)), board_(board), pattern_(std::move(pattern)) {}
+  [[nodiscard]] Result<PoseView> observe(const CapturedPictures& pictures, std::size_t camera, std::string& remark);
+  [[nodiscard]] Result<PoseView> observe_without_board(const PosePictures& pictures, bool has_white,
+                                                       PatternReader& reader) const;
+
+  Calibration calibration_;
+  Board board_;
+  IndexedPattern pattern_;
+  std::string first_camera_;
+  bool gray_code_ = false;
+  bool board_asked_for_ = false;
+  VerifyLimits limits_;
+  std::map<std::size_t, PatternReader> readers_;  // one to a camera: each keeps where its pattern lies
+  std::vector<ViewCheck> checks_;
+};
+
+}  // namespace slsd
