@@ -11,7 +11,6 @@
 
 #include "core/decode/pattern_reader.hpp"
 #include "core/geometry/epipolar_limit.hpp"
-#include "daemon/scan/scan_setup.hpp"
 #include "drivers/files/grey_image.hpp"
 
 namespace slsd {
@@ -59,7 +58,7 @@ std::string doubt_by_frame(const GreyView& frame, const Pattern& pattern, const 
                       epipolar_gate_px(calibration.report.epipolar_error_px));
 }
 
-std::string EmptyClouds::doubt(const ScanSetup& setup, const FrameSet& set, const std::vector<std::size_t>& cameras,
+std::string EmptyClouds::doubt(const ScanBasis& basis, const FrameSet& set, const std::vector<std::size_t>& cameras,
                                MonotonicTime until) {
   const auto is_ready = [](const std::shared_future<Doubt>& doubt, MonotonicTime time) {
     return doubt.wait_until(time) == std::future_status::ready;
@@ -71,8 +70,8 @@ std::string EmptyClouds::doubt(const ScanSetup& setup, const FrameSet& set, cons
     if (!doubt_.valid() || (is_ready(doubt_, now) && now >= doubt_.get().next)) {
       std::vector<GreyImage> frames;
       for (const Frame& frame : set.frames) frames.push_back(copy_of(frame.image()));
-      auto look = [frames = std::move(frames), pattern = setup.pattern, calibration = *setup.calibration, cameras,
-                   range = DepthRange{setup.depth_min_mm, setup.depth_max_mm}]() -> Doubt {
+      auto look = [frames = std::move(frames), pattern = basis.pattern, calibration = *basis.calibration, cameras,
+                   range = basis.range]() -> Doubt {
         const auto begin = steady_clock::now();
         std::string text;
         for (std::size_t i = 0; i < frames.size() && text.empty(); ++i) {
@@ -93,12 +92,12 @@ std::string EmptyClouds::doubt(const ScanSetup& setup, const FrameSet& set, cons
   return is_ready(doubt, until) ? doubt.get().text : std::string();
 }
 
-std::string EmptyClouds::explain(const ScanSetup& setup, const FrameSet& set, const std::vector<std::size_t>& cameras,
+std::string EmptyClouds::explain(const ScanBasis& basis, const FrameSet& set, const std::vector<std::size_t>& cameras,
                                  const ScanResult& result, MonotonicTime until) {
   const auto seen = std::accumulate(result.regions.begin(), result.regions.end(), std::uint64_t{0});
-  std::string why = seen >= kSymbolsForDoubt ? doubt(setup, set, cameras, until) : std::string();
+  std::string why = seen >= kSymbolsForDoubt ? doubt(basis, set, cameras, until) : std::string();
   if (!why.empty()) return why;
-  return setup.doubts.empty() || seen < kSymbolsForDoubt ? by_counts(result.regions) : setup.doubts.front();
+  return basis.doubts.empty() || seen < kSymbolsForDoubt ? by_counts(result.regions) : basis.doubts.front();
 }
 
 }  // namespace slsd

@@ -5,11 +5,13 @@
 #include <chrono>
 #include <future>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/calibrate/doubt/calibration_doubts.hpp"
 #include "core/code/pattern.hpp"
+#include "core/geometry/calibration.hpp"
 #include "core/image.hpp"
 #include "daemon/scan/frame_set.hpp"
 #include "daemon/scan/scan_result.hpp"
@@ -24,7 +26,13 @@ namespace slsd {
 [[nodiscard]] std::string doubt_by_frame(const GreyView& frame, const Pattern& pattern, const Calibration& calibration,
                                          std::size_t camera, const DepthRange& range, std::size_t& read);
 
-struct ScanSetup;
+/// Pattern, calibration and working range of a scan, by which an empty cloud is explained. Borrows.
+struct ScanBasis {
+  const Pattern& pattern;
+  const std::optional<Calibration>& calibration;
+  DepthRange range;
+  const std::vector<std::string>& doubts;  ///< about the calibration, as calibration_doubts() has them
+};
 
 /// Says why scans gave no points.
 /// @thread thread-safe: lanes share it. Frames are read in a thread of its own, so that no scan is late for it
@@ -32,7 +40,7 @@ class EmptyClouds {
  public:
   /// @param cameras  of the calibration, one to a frame
   /// @param until    how long it may wait for what the frames say of the calibration; the next empty cloud has it
-  [[nodiscard]] std::string explain(const ScanSetup& setup, const FrameSet& set,
+  [[nodiscard]] std::string explain(const ScanBasis& basis, const FrameSet& set,
                                     const std::vector<std::size_t>& cameras, const ScanResult& result,
                                     MonotonicTime until);
 
@@ -41,7 +49,7 @@ class EmptyClouds {
     std::string text;
     MonotonicTime next;  ///< it is not worth to look again before
   };
-  [[nodiscard]] std::string doubt(const ScanSetup& setup, const FrameSet& set, const std::vector<std::size_t>& cameras,
+  [[nodiscard]] std::string doubt(const ScanBasis& basis, const FrameSet& set, const std::vector<std::size_t>& cameras,
                                   MonotonicTime until);
 
   std::mutex mutex_;

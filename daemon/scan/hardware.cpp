@@ -2,12 +2,9 @@
 // Copyright the slsd authors
 #include "daemon/scan/hardware.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 
 #include "core/printable.hpp"
-#include "daemon/scan/message_ids.hpp"
 
 namespace slsd {
 
@@ -46,19 +43,6 @@ std::string calibrated_hardware(const Calibration& calibration, const Calibrated
   const auto index = static_cast<std::size_t>(&camera - calibration.cameras.data());
   const std::vector<std::string>& serials = calibration.report.camera_serials;
   return index < serials.size() ? serials[index] : std::string();
-}
-
-Result<> HardwareGuard::check(const std::shared_ptr<ScanSetup>& setup, const Rig& rig) {
-  const std::uint64_t openings = rig.openings();
-  if (setup_.lock() == setup && openings == openings_) return verdict_;
-  setup_ = setup, openings_ = openings;
-  verdict_ = setup->calibration ? check_hardware(*setup->calibration, rig.status()) : Result<>();
-  if (!verdict_ && setup->other_hardware == OtherHardware::kWarn) {
-    const MessageId id(MessageId::kOtherHardware);
-    spdlog::warn("{}", to_string(verdict_.error()));
-    verdict_ = {};
-  }
-  return verdict_;
 }
 
 }  // namespace slsd

@@ -122,7 +122,8 @@ std::string why_empty(const FrameSet& set, const ScanSetup& setup, std::size_t l
   const MonotonicTime until = request.of_stream || request.deadline < now ? now : now + (request.deadline - now) / 2;
   std::vector<std::size_t> cameras;
   for (const Decoder& decoder : setup.lanes[lane]) cameras.push_back(decoder.camera_index());
-  return setup.empty_clouds->explain(setup, set, cameras, result, until);
+  const ScanBasis basis{setup.pattern, setup.calibration, {setup.depth_min_mm, setup.depth_max_mm}, setup.doubts};
+  return setup.empty_clouds->explain(basis, set, cameras, result, until);
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include "core/result.hpp"
 #include "daemon/scan/decode_lanes.hpp"
 #include "daemon/scan/frame_set.hpp"
-#include "daemon/scan/hardware.hpp"
+#include "daemon/scan/hardware_guard.hpp"
 #include "daemon/scan/rig.hpp"
 #include "daemon/scan/scan_result.hpp"
 #include "daemon/scan/scan_setup.hpp"

@@ -18,7 +18,7 @@
 #include "daemon/scan/calibration_watch.hpp"
 #include "daemon/scan/deadlines.hpp"
 #include "daemon/scan/decode_lanes.hpp"
-#include "daemon/scan/hardware.hpp"
+#include "daemon/scan/hardware_guard.hpp"
 #include "daemon/scan/heartbeat.hpp"
 #include "daemon/scan/projected_picture.hpp"
 #include "daemon/scan/rig.hpp"

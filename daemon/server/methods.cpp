@@ -19,7 +19,8 @@
 #include "daemon/rpc/param_reader.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "daemon/server/metrics.hpp"
-#include "daemon/server/report_json.hpp"
+#include "daemon/server/scan_json.hpp"
+#include "daemon/server/status_json.hpp"
 
 namespace slsd {
 namespace {
@@ -409,17 +410,25 @@ void run_calibrate(ServiceState& state, const json& params, Session&, Respond re
   respond(Reply{state.calibration->look()});
 }
 
+bool always(const json&) {
+  return true;
+}
+
+bool unless_as_shown(const json& params) {
+  return params.value("as_shown", json()) != true;
+}
+
 constexpr std::array kMethods{
     RpcMethod{"bundle", Role::kAdminister, run_bundle},
     RpcMethod{"calibrate", Role::kAdminister, run_calibrate},
-    RpcMethod{"frame", Role::kScan, run_frame},
+    RpcMethod{"frame", Role::kScan, run_frame, unless_as_shown},
     RpcMethod{"metrics", Role::kObserve, run_metrics},
     RpcMethod{"pattern", Role::kObserve, run_pattern},
-    RpcMethod{"preview", Role::kScan, run_preview},
-    RpcMethod{"project", Role::kAdminister, run_project},
-    RpcMethod{"reload", Role::kAdminister, run_reload},
-    RpcMethod{"scan", Role::kScan, run_scan},
-    RpcMethod{"set", Role::kAdminister, run_set},
+    RpcMethod{"preview", Role::kScan, run_preview, always},
+    RpcMethod{"project", Role::kAdminister, run_project, always},
+    RpcMethod{"reload", Role::kAdminister, run_reload, always},
+    RpcMethod{"scan", Role::kScan, run_scan, always},
+    RpcMethod{"set", Role::kAdminister, run_set, always},
     RpcMethod{"settings", Role::kObserve, run_settings},
     RpcMethod{"status", Role::kObserve, run_status},
     RpcMethod{"subscribe", Role::kScan, run_subscribe},
@@ -439,14 +448,11 @@ RpcError not_for(Session& session, const RpcMethod& method) {
                     {}});
 }
 
-// While somebody holds a board into the light nobody else's scan changes it.
-bool would_disturb(const ServiceState& state, const Request& request, const Session& session) {
+// While somebody holds a board into the light no other client changes it.
+bool would_disturb(const ServiceState& state, const RpcMethod& method, const json& params, const Session& session) {
   if (!state.calibration || !state.calibration->under_way()) return false;
   if (session.peer().process == state.calibration->process()) return false;
-  constexpr std::array<std::string_view, 5> kDisturb{"preview", "project", "reload", "scan", "set"};
-  const json as_shown = request.method == "frame" ? request.params.value("as_shown", json()) : json();
-  return std::ranges::find(kDisturb, request.method) != kDisturb.end() ||
-         (request.method == "frame" && as_shown != true);
+  return method.disturbs != nullptr && method.disturbs(params);
 }
 
 }  // namespace
@@ -480,7 +486,7 @@ void dispatch(ServiceState& state, const Request& request, Session& session, Res
   const auto found = std::ranges::lower_bound(kMethods, request.method, {}, &RpcMethod::name);
   if (found != kMethods.end() && found->name == request.method) {
     if (session.role() < found->role) return respond(tl::unexpected(not_for(session, *found)));
-    if (would_disturb(state, request, session))
+    if (would_disturb(state, *found, request.params, session))
       return respond(tl::unexpected(rpc_error(
           {ErrorCode::kBusy, "a calibration is under way: wait until it has ended, or cancel it (calibrate)", {}})));
     const bool is_look = request.method == "calibrate" && request.params.value("action", json("look")) == "look";

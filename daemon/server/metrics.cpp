@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "daemon/scan/scan_statistics.hpp"
-#include "daemon/server/report_json.hpp"
+#include "daemon/server/status_json.hpp"
 
 namespace slsd {
 namespace {
@@ -123,11 +123,8 @@ void tell_clients(const ServiceState& state, Exposition& out) {
   out.sample(static_cast<double>(memory.lent()), {{"part", "lent"}});
   out.sample(static_cast<double>(memory.limit()), {{"part", "limit"}});
   out.family("slsd_requests", "counter", "Requests, by method.");
-  for (const RpcMethod& method : methods()) {
-    const auto asked = state.requests.by_method.find(method.name);
-    const bool ever = asked != state.requests.by_method.end();
-    out.sample(ever ? static_cast<double>(asked->second) : 0, {{"method", method.name}});
-  }
+  for (const auto& [method, asked] : state.requests.by_method)
+    out.sample(static_cast<double>(asked), {{"method", method}});
   out.family("slsd_requests_failed", "counter", "Requests that were answered with an error, by its name.");
   for (const auto& [name, failed] : state.requests.failed) out.sample(static_cast<double>(failed), {{"error", name}});
 }

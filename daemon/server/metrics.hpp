@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "daemon/server/methods.hpp"
+#include "daemon/server/service_state.hpp"
 
 namespace slsd {
 

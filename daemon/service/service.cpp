@@ -16,8 +16,9 @@
 #include "daemon/scan/devices.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "daemon/scan/projected_picture.hpp"
+#include "daemon/server/methods.hpp"
 #include "daemon/server/metrics.hpp"
-#include "daemon/server/report_json.hpp"
+#include "daemon/server/status_json.hpp"
 #include "daemon/service/logging.hpp"
 #include "drivers/files/file.hpp"
 
@@ -115,6 +116,7 @@ Service::Service(Configuration configuration, const std::filesystem::path& file,
   };
   server_ = std::make_unique<Server>(events_, state_.configuration.server, handler, demand_changed);
   state_.server = server_.get();
+  for (const RpcMethod& method : methods()) state_.requests.by_method[method.name] = 0;
   state_.log_lines_dropped = log_lines_dropped;
   state_.reload = [this](const nlohmann::json& settings, Respond answered) { reload(settings, std::move(answered)); };
   state_.calibration = std::make_unique<CalibrationRun>(events_, [this](bool made) { calibrated(state_, made); });

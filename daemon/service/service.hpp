@@ -16,8 +16,8 @@
 #include "daemon/bundle/bundle_store.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/scan/scanner.hpp"
-#include "daemon/server/methods.hpp"
 #include "daemon/server/server.hpp"
+#include "daemon/server/service_state.hpp"
 #include "daemon/service/notifier.hpp"
 
 namespace slsd {

@@ -7,6 +7,7 @@
 
 #include <gmock/gmock.h>
 
+#include "daemon/scan/hardware_guard.hpp"
 #include "drivers/projector/headless_projector.hpp"
 #include "tests/core/geometry/paper_rig.hpp"
 

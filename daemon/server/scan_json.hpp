@@ -4,9 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/configuration/configuration.hpp"
 #include "daemon/scan/scan_result.hpp"
-#include "daemon/server/methods.hpp"
 
 namespace slsd {
 
@@ -22,18 +20,5 @@ namespace slsd {
 
 /// A frame's size, depth, number and times. The camera only where the image names it.
 [[nodiscard]] nlohmann::json frame_json(const FrameImage& frame);
-
-/// What `settings` answers besides the pattern and the calibration: version, projector, cameras, and the keys that the
-/// configuration in force gives.
-[[nodiscard]] nlohmann::json settings_json(const Configuration& configuration);
-
-/// What `status` answers: the service, its devices, and what all scans came to.
-[[nodiscard]] nlohmann::json status_json(const ServiceState& state);
-
-/// Whether all devices are open, and there is a calibration.
-[[nodiscard]] bool is_ready(const ServiceState& state);
-
-/// Memory of this process.
-[[nodiscard]] std::uint64_t resident_bytes();
 
 }  // namespace slsd

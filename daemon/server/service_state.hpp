@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include <asio/io_context.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/scan/scanner.hpp"
+#include "daemon/server/calibration_run.hpp"
+#include "daemon/server/reply.hpp"
+#include "daemon/server/server.hpp"
+
+namespace slsd {
+
+/// What was asked for so far.
+struct RequestCounts {
+  std::map<std::string_view, std::uint64_t> by_method;  ///< of all methods
+  std::map<std::string, std::uint64_t> failed;          ///< by the error's name
+};
+
+/// How many pictures one user may have shown at a time, which fills up again as time goes by.
+struct PictureAllowance {
+  double left;
+  std::chrono::steady_clock::time_point since;
+};
+
+/// What the methods act on. Everything outlives the server's sessions.
+struct ServiceState {
+  asio::io_context& events;
+  Scanner& scanner;
+  std::filesystem::path configuration_file;
+  Configuration configuration;  ///< in force; a reload replaces what it may
+  std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
+  Server* server = nullptr;
+  std::function<std::uint64_t()> log_lines_dropped = {};
+  /// Reads the configuration anew, with these settings over it, then answers.
+  std::function<void(nlohmann::json settings, Respond)> reload = {};
+  nlohmann::json settings = nlohmann::json::object();  ///< set over the socket, as merge_settings() has them
+  /// Writes a bundle of the last scans, then answers with its bytes.
+  std::function<void(Scanner::Answer<std::string>)> bundle = {};
+  std::function<std::uint64_t()> bundles_written = {};  ///< by itself
+  RequestCounts requests = {};
+  std::map<std::uint32_t, PictureAllowance> pictures = {};  ///< by user; who is not in it has all
+  std::filesystem::path calibrator = {};                    ///< slsd-calibrate; empty: not found
+  std::unique_ptr<CalibrationRun> calibration = {};
+};
+
+}  // namespace slsd

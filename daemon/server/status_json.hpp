@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstdint>
+
+#include <nlohmann/json.hpp>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/server/service_state.hpp"
+
+namespace slsd {
+
+/// What `settings` answers besides the pattern and the calibration: version, projector, cameras, and the keys that the
+/// configuration in force gives.
+[[nodiscard]] nlohmann::json settings_json(const Configuration& configuration);
+
+/// What `status` answers: the service, its devices, and what all scans came to.
+[[nodiscard]] nlohmann::json status_json(const ServiceState& state);
+
+/// Whether all devices are open, and there is a calibration.
+[[nodiscard]] bool is_ready(const ServiceState& state);
+
+/// Memory of this process.
+[[nodiscard]] std::uint64_t resident_bytes();
+
+}  // namespace slsd
