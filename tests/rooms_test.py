@@ -37,6 +37,13 @@ BELOW = {
                                             "clients/connection", "programs/latency"},
 }
 
+# Circles of files that are there still. None may be added.
+KNOWN_CIRCLES = [
+    ["core/code/array_bounds", "core/code/code_array", "core/code/constructive_array", "core/code/paper_array",
+     "core/code/runs", "core/code/window_index"],
+    ["core/code/symbol", "core/code/symbol_rules"],
+]
+
 
 def room_of(file):
     parts = file.relative_to(SOURCE).parts
@@ -106,6 +113,13 @@ class Rooms(unittest.TestCase):
 
     def test_no_loop_between_top_rooms(self):
         self.assertEqual(circles(graph_by(lambda file: file.relative_to(SOURCE).parts[0])), [])
+
+
+    def test_no_circle_within_a_room(self):
+        """A header and the source of its name count as one: both say what the one depends on."""
+        found = circles(graph_by(lambda file: str(file.relative_to(SOURCE).with_suffix(""))))
+        self.assertEqual([circle for circle in found if circle not in KNOWN_CIRCLES], [])
+        self.assertEqual([circle for circle in KNOWN_CIRCLES if circle not in found], [], "ended: take it off the list")
 
 
 class Circles(unittest.TestCase):

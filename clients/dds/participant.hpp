@@ -4,7 +4,8 @@
 
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 
-#include "network.hpp"
+#include "core/result.hpp"
+#include "network_options.hpp"
 
 namespace slsd::dds {
 

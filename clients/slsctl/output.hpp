@@ -10,8 +10,8 @@
 
 #include <tl/expected.hpp>
 
+#include "clients/slsctl/ask.hpp"
 #include "clients/slsctl/client_options.hpp"
-#include "clients/slsctl/report.hpp"
 
 namespace slsd {
 

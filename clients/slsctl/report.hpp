@@ -3,35 +3,13 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 
 #include <nlohmann/json.hpp>
 
-#include "clients/connection/connection.hpp"
+#include "clients/slsctl/ask.hpp"
 #include "clients/slsctl/client_options.hpp"
-#include "daemon/rpc/message.hpp"
 
 namespace slsd {
-
-/// Why a command failed: the daemon's own error, or one of this side, with the exit status that it means.
-struct Failure {
-  int exit_status;
-  RpcError error;
-};
-
-/// A failure on this side. @return kNoDaemon where there is none, else kRequestFailed
-[[nodiscard]] Failure failure(const Error& error);
-
-/// A call's outcome; a JSON-RPC error is a failure.
-[[nodiscard]] tl::expected<Answered, Failure> judge(Result<Answered> answered);
-
-/// One call; a JSON-RPC error is a failure.
-[[nodiscard]] tl::expected<Answered, Failure> ask(Connection& connection, std::string_view method,
-                                                  const nlohmann::json& params);
-
-/// One call on a connection of its own.
-[[nodiscard]] tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_view method,
-                                                  const nlohmann::json& params);
 
 /// Says what went wrong, as text on standard error or, with --json, as an object on standard output.
 /// @return the exit status

@@ -11,7 +11,7 @@
 #include <boost/asio/thread_pool.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 
-#include "clients/web/http_server.hpp"
+#include "clients/web/answer.hpp"
 
 namespace slsd::web {
 

@@ -4,39 +4,12 @@
 
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
-#include <utility>
-#include <vector>
 
-#include <slsd/connection.hpp>
-
-#include "clients/web/request.hpp"
+#include "clients/web/answer.hpp"
 #include "core/result.hpp"
 
 namespace slsd::web {
-
-/// The reply to a request.
-struct Answer {
-  int status = 200;
-  std::string type;                                          ///< of the body; empty: no body
-  client::Bytes body;                                        ///< sent in pieces of 1 MiB
-  std::vector<std::pair<std::string, std::string>> headers;  ///< beside those that every answer has
-  std::function<void(std::string_view)> on_sent;             ///< of each piece, when it is sent; may be empty
-};
-
-/// A refusal as the page reads it.
-[[nodiscard]] Answer answer_of(const Refusal& refusal);
-
-/// Callbacks by which the server asks the page behind it.
-struct Handlers {
-  /// Judges a request by its head alone, before its body is read. @return the refusal, if any. @thread that of run()
-  std::function<std::optional<Answer>(const Request&)> refuse;
-  /// Answers an admitted request; may block. @thread one of many
-  std::function<Answer(const Request&)> answer;
-  std::vector<std::pair<std::string, std::string>> headers;  ///< of every answer
-  std::size_t body_bytes_max;
-};
 
 /// HTTP/1.1 over Boost.Asio and Boost.Beast.
 ///

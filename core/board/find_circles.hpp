@@ -2,8 +2,10 @@
 // Copyright the slsd authors
 #pragma once
 
+#include "core/board/board.hpp"
 #include "core/board/board_photo.hpp"
-#include "core/board/find_board.hpp"
+#include "core/board/board_sighting.hpp"
+#include "core/result.hpp"
 
 namespace slsd {
 

@@ -4,8 +4,9 @@
 
 #include <vector>
 
+#include "core/board/board.hpp"
 #include "core/board/board_photo.hpp"
-#include "core/board/find_board.hpp"
+#include "core/board/board_sighting.hpp"
 
 namespace slsd {
 

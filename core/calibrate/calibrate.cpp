@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "core/calibrate/judge/pose_list.hpp"
+#include "core/calibrate/judge/verdict.hpp"
 #include "core/calibrate/solve/adjustment.hpp"
 #include "core/calibrate/solve/initial_rig.hpp"
 #include "core/calibrate/solve/point_residuals.hpp"

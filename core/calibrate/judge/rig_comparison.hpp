@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "core/calibrate/calibrate.hpp"
+#include "core/calibrate/judge/calibration_outcome.hpp"
 
 namespace slsd {
 

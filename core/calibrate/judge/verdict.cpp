@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "core/calibrate/calibrate.hpp"
 #include "core/calibrate/judge/coverage.hpp"
 
 namespace slsd {
@@ -60,25 +59,6 @@ void judge_poses(const CalibrationOutcome& outcome, Jury& jury) {
 }
 
 }  // namespace
-
-std::string_view to_string(Grade grade) {
-  switch (grade) {
-    case Grade::kGood:
-      return "good";
-    case Grade::kUsable:
-      return "usable";
-    case Grade::kBad:
-      break;
-  }
-  return "bad";
-}
-
-std::optional<Grade> parse_grade(std::string_view name) {
-  for (const Grade grade : {Grade::kGood, Grade::kUsable, Grade::kBad}) {
-    if (to_string(grade) == name) return grade;
-  }
-  return std::nullopt;
-}
 
 Verdict judge(const CalibrationOutcome& outcome) {
   Jury jury;

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "core/calibrate/judge/coverage.hpp"
-#include "core/calibrate/judge/verdict.hpp"
+#include "core/calibrate/judge/grade.hpp"
 #include "core/calibrate/solve/point_residuals.hpp"
 #include "programs/calibrate/report/svg_figure.hpp"
 

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "core/calibrate/judge/verdict.hpp"
+#include "core/calibrate/judge/grade.hpp"
 #include "programs/calibrate/report/image_figures.hpp"
 #include "programs/calibrate/report/rig_figures.hpp"
 #include "programs/calibrate/report/svg_figure.hpp"

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace slsd {
+
+enum class Grade { kGood, kUsable, kBad };
+[[nodiscard]] std::string_view to_string(Grade grade);
+/// Nothing: it is the name of none.
+[[nodiscard]] std::optional<Grade> parse_grade(std::string_view name);
+
+/// Up to where a figure is good, and up to where usable.
+struct Bounds {
+  double good, usable;
+};
+inline constexpr Bounds kHeldOutPx{0.3, 1.0};   ///< each pose under the calibration by the others
+inline constexpr Bounds kEpipolarPx{0.3, 1.0};  ///< symbols off their epipolar lines, in the projector
+inline constexpr Bounds kDepthShare{0.001,
+                                    0.005};   ///< the depth's deviation, of the distance, in the middle of the range
+inline constexpr double kCoverageGood = 0.5;  ///< of an image
+inline constexpr double kTiltGoodDeg = 15;    ///< of the most tilted pose
+inline constexpr std::size_t kPosesGood = 8;
+
+/// One word on a calibration, why, and what to shoot next.
+struct Verdict {
+  Grade grade = Grade::kBad;
+  std::vector<std::string> reasons;  ///< what keeps it from a better grade; empty for a good one
+  std::vector<std::string> advice;   ///< what would help most
+};
+
+}  // namespace slsd
