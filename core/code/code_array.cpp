@@ -46,14 +46,9 @@ Result<CodeArray> verified(CodeArray array, const ArrayOptions& options, int dis
               "the array that was constructed fails its check: distance " + std::to_string(array.minimum_distance));
 }
 
-Result<> check_bounds(const ArrayOptions& options, int distance) {
+Result<CodeArray> construct_with(const ArrayOptions& options, int distance) {
   if (const auto bound = forbidding_bound(options, distance))
     return fail(ErrorCode::kImpossible, *bound + ": use more letters or larger symbols");
-  return {};
-}
-
-Result<CodeArray> construct_with(const ArrayOptions& options, int distance) {
-  if (auto possible = check_bounds(options, distance); !possible) return tl::unexpected(possible.error());
   auto array = construct_array(options, distance, RunReach{}, kStepsForDistanceAsked);
   if (!array) return fail(ErrorCode::kImpossible, searched_in_vain(options, distance));
   return verified(std::move(*array), options, distance);
@@ -71,22 +66,23 @@ Result<CodeArray> construct_largest(const ArrayOptions& options) {
 /// Widens the reach of the array's runs until a search fails.
 class WithoutRepeats {
  public:
-  WithoutRepeats(const ArrayOptions& options, int distance)
+  /// @param windows_alone  the array of these options in which runs may recur
+  WithoutRepeats(const ArrayOptions& options, CodeArray windows_alone)
       : options_(options),
-        distance_(distance),
-        reach_{options.row_reach.value_or(0), options.column_reach.value_or(0)} {}
+        distance_(options.minimum_distance.value_or(windows_alone.minimum_distance)),
+        reach_{options.row_reach.value_or(0), options.column_reach.value_or(0)},
+        made_(std::move(windows_alone)) {}
 
   Result<CodeArray> make() {
     if (const auto bound = bound_on(reach_))
       return fail(ErrorCode::kImpossible, *bound + ": use more letters or a smaller row_reach or column_reach");
-    const bool single_run = options_.rows == kShortestRun && options_.columns == kShortestRun;
-    if (reach_ != RunReach{} || single_run) {
-      made_ = construct_array(options_, distance_, reach_, kStepsForReachAsked);
-      if (!made_) return fail(ErrorCode::kImpossible, searched_in_vain_for(reach_));
+    if (reach_ != RunReach{}) {
+      auto array = construct_array(options_, distance_, reach_, kStepsForReachAsked);
+      if (!array) return fail(ErrorCode::kImpossible, searched_in_vain_for(reach_));
+      made_ = std::move(*array);
     }
     if (!options_.row_reach) widen(&RunReach::along_rows, options_.columns - kShortestRun);
     if (!options_.column_reach) widen(&RunReach::along_columns, options_.rows - kShortestRun);
-    if (!made_) return fail(ErrorCode::kImpossible, searched_in_vain_for(failed_));
     return checked();
   }
 
@@ -96,11 +92,8 @@ class WithoutRepeats {
       RunReach wider = reach_;
       wider.*along = std::min(wider.*along + kReachStep, end);
       auto array = bound_on(wider) ? std::nullopt : construct_array(options_, distance_, wider, kStepsForReachTried);
-      if (!array) {
-        if (failed_ == RunReach{}) failed_ = wider;
-        return;
-      }
-      made_ = std::move(array);
+      if (!array) return;
+      made_ = std::move(*array);
       reach_ = wider;
     }
   }
@@ -120,21 +113,21 @@ class WithoutRepeats {
   }
 
   Result<CodeArray> checked() {
-    made_->row_reach = repeat_free_reach(*made_, Along::kRows);
-    made_->column_reach = repeat_free_reach(*made_, Along::kColumns);
-    const bool kept = made_->row_reach >= std::min(reach_.along_rows, options_.columns - kShortestRun) &&
-                      made_->column_reach >= std::min(reach_.along_columns, options_.rows - kShortestRun);
+    made_.row_reach = repeat_free_reach(made_, Along::kRows);
+    made_.column_reach = repeat_free_reach(made_, Along::kColumns);
+    const bool kept = made_.row_reach >= std::min(reach_.along_rows, options_.columns - kShortestRun) &&
+                      made_.column_reach >= std::min(reach_.along_columns, options_.rows - kShortestRun);
     assert(kept);
-    if (kept) return verified(std::move(*made_), options_, distance_);
+    if (kept) return verified(std::move(made_), options_, distance_);
     return fail(ErrorCode::kImpossible, "the array that was constructed fails its check: runs recur within " +
-                                            std::to_string(made_->row_reach) + " columns and " +
-                                            std::to_string(made_->column_reach) + " rows");
+                                            std::to_string(made_.row_reach) + " columns and " +
+                                            std::to_string(made_.column_reach) + " rows");
   }
 
   const ArrayOptions& options_;
   int distance_;
-  RunReach reach_, failed_;
-  std::optional<CodeArray> made_;
+  RunReach reach_;
+  CodeArray made_;
 };
 
 Result<CodeArray> construct(const ArrayOptions& options) {
@@ -142,13 +135,8 @@ Result<CodeArray> construct(const ArrayOptions& options) {
 }
 
 Result<CodeArray> construct_without_repeats(const ArrayOptions& options) {
-  if (options.minimum_distance) {
-    if (auto possible = check_bounds(options, *options.minimum_distance); !possible)
-      return tl::unexpected(possible.error());
-    return WithoutRepeats(options, *options.minimum_distance).make();
-  }
-  const auto windows_alone = construct_largest(options);
-  return windows_alone ? WithoutRepeats(options, windows_alone->minimum_distance).make() : windows_alone;
+  auto windows_alone = construct(options);
+  return windows_alone ? WithoutRepeats(options, std::move(*windows_alone)).make() : windows_alone;
 }
 
 Result<CodeArray> draw_by_rejection(const ArrayOptions& options) {

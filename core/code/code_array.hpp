@@ -53,7 +53,7 @@ struct ArrayOptions {
   std::optional<int> minimum_distance{};
   bool half_turn_unique = false;  ///< windows also differ from every window turned by 180 degrees
   /// kNoRepeats only: columns within which no run recurs in its row, 0 to 512. Without it as far as the search gets,
-  /// rows first.
+  /// rows first, which may be nowhere with few letters.
   std::optional<int> row_reach{};
   /// The same for runs along columns, in rows.
   std::optional<int> column_reach{};

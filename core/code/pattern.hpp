@@ -28,7 +28,7 @@ struct PatternOptions {
   int spacing_px = 2;             ///< 1 to 16; dark, between two symbols
   std::vector<int> symbols{};     ///< 2 to 8 different symbol numbers; letter i of the array is shown as symbols[i]
   std::uint32_t seed = 1;
-  ArrayMethod method = ArrayMethod::kConstructive;
+  ArrayMethod method = ArrayMethod::kNoRepeats;
   std::optional<int> minimum_distance{};
   bool half_turn_unique = false;
   std::optional<int> row_reach{};     ///< columns; see ArrayOptions

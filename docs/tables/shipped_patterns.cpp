@@ -4,23 +4,23 @@
 
 namespace slsd {
 
-constexpr ArrayMethod kNoRepeats = ArrayMethod::kNoRepeats;
+constexpr ArrayMethod kConstructive = ArrayMethod::kConstructive;
 
 std::vector<ShippedPattern> shipped_patterns() {
   return {{"paper-1", {.symbols = {5, 7, 22}, .method = ArrayMethod::kPaper}},
           {"paper-2", {.symbols = {25, 7, 22}, .method = ArrayMethod::kPaper}},
-          {"16px-5", {.symbol_size_px = 16}},
-          {"14px-5", {.symbol_size_px = 14}},
-          {"12px-6", {.symbol_size_px = 12}},
-          {"10px-6", {.symbol_size_px = 10}},
-          {"8px-6", {.symbol_size_px = 8}},
-          {"8px-6-dense", {.symbol_size_px = 8, .spacing_px = 1}},
-          {"16px-6-no-repeats", {.symbol_size_px = 16, .symbols = {9, 11, 13, 14, 18, 19}, .method = kNoRepeats}},
-          {"14px-6-no-repeats", {.symbol_size_px = 14, .symbols = {11, 12, 13, 14, 16, 24}, .method = kNoRepeats}},
-          {"12px-6-no-repeats", {.symbol_size_px = 12, .method = kNoRepeats}},
-          {"10px-6-no-repeats", {.symbol_size_px = 10, .method = kNoRepeats}},
-          {"8px-6-no-repeats", {.symbol_size_px = 8, .method = kNoRepeats}},
-          {"8px-6-dense-no-repeats", {.symbol_size_px = 8, .spacing_px = 1, .method = kNoRepeats}}};
+          {"16px-5", {.symbol_size_px = 16, .symbols = {11, 13, 14, 18, 19}, .method = kConstructive}},
+          {"14px-5", {.symbol_size_px = 14, .symbols = {11, 13, 14, 16, 24}, .method = kConstructive}},
+          {"12px-6", {.symbol_size_px = 12, .method = kConstructive}},
+          {"10px-6", {.symbol_size_px = 10, .method = kConstructive}},
+          {"8px-6", {.symbol_size_px = 8, .method = kConstructive}},
+          {"8px-6-dense", {.symbol_size_px = 8, .spacing_px = 1, .method = kConstructive}},
+          {"16px-6-no-repeats", {.symbol_size_px = 16}},
+          {"14px-6-no-repeats", {.symbol_size_px = 14}},
+          {"12px-6-no-repeats", {.symbol_size_px = 12}},
+          {"10px-6-no-repeats", {.symbol_size_px = 10}},
+          {"8px-6-no-repeats", {.symbol_size_px = 8}},
+          {"8px-6-dense-no-repeats", {.symbol_size_px = 8, .spacing_px = 1}}};
 }
 
 }  // namespace slsd

@@ -14,7 +14,8 @@ struct ShippedPattern {
   PatternOptions options;
 };
 
-/// The patterns in config/patterns, all for 1280x800: the paper's two, and the best at each size.
+/// The patterns in config/patterns, all for 1280x800: the paper's two, and at each size one in which runs of letters
+/// recur and the default, in which they do not.
 [[nodiscard]] std::vector<ShippedPattern> shipped_patterns();
 
 }  // namespace slsd

@@ -340,7 +340,7 @@ class Check {
         findings_.warn(
             fmt::format("{}: the pattern is too coarse for this camera, which sees its symbols {:.0f} px apart; the "
                         "surface is fitted "
-                        "in windows of {} px: take smaller symbols, such as those of config/patterns/8px-6-dense.toml",
+                        "in windows of {} px: take smaller symbols, such as those of config/patterns/8px-6-dense-no-repeats.toml",
                         name, outlook.pitch_px, mapper.window_px()));
       }
       const int stride = DenseMapper::stride_px(camera.lens, setup.decode.dense);

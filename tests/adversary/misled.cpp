@@ -7,7 +7,9 @@
 namespace slsd::adversary {
 
 Result<Misled> Misled::of(int symbol_size_px, RuleTrial* trial, double wrong_cells_max) {
-  const auto pattern = make_pattern({.symbol_size_px = symbol_size_px, .spacing_px = 2});
+  PatternOptions options{.symbol_size_px = symbol_size_px, .method = ArrayMethod::kConstructive};
+  if (symbol_size_px == 16) options.symbols = {11, 13, 14, 18, 19};
+  const auto pattern = make_pattern(options);
   return pattern ? of(*pattern, trial, wrong_cells_max) : tl::unexpected(pattern.error());
 }
 

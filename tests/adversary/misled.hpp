@@ -18,6 +18,8 @@ struct Misled {
   FrameMaker maker;
   std::vector<Decoder> decoders;  ///< one to each of three working depths
 
+  /// Of a pattern in which runs of letters recur, which is the harder test: 16px-5 or 8px-6.
+  /// @param symbol_size_px   16 or 8
   /// @param trial            of all decoders; outlives them
   /// @param wrong_cells_max  see DecodeOptions
   /// @errors as make_pattern() and Decoder::create()

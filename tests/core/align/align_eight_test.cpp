@@ -20,7 +20,10 @@ constexpr int kSide = 21;
 constexpr float kNoise = 2;
 
 const PatternField& blurred_field() {
-  static const PatternField made(draw_pattern(make_pattern({}).value()).view(), 0.72F);
+  static const PatternField made(
+      draw_pattern(make_pattern({.symbols = {11, 13, 14, 18, 19}, .method = ArrayMethod::kConstructive}).value())
+          .view(),
+      0.72F);
   return made;
 }
 
@@ -28,7 +31,9 @@ const PatternField& blurred_field() {
 struct Seen {
   Calibration rig = paper_rig();
   Surface surface = plane({0, 0, 2000}, {0.3, 0.15, -1});
-  Grey8 frame = simulate(draw_pattern(make_pattern({}).value()), rig, surface, {});
+  Grey8 frame = simulate(
+      draw_pattern(make_pattern({.symbols = {11, 13, 14, 18, 19}, .method = ArrayMethod::kConstructive}).value()), rig,
+      surface, {});
 
   /// What is fitted around a pixel, from a start that is off.
   [[nodiscard]] PatchTask task(int x, int y, float off_px) const {

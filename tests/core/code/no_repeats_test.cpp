@@ -103,7 +103,16 @@ TEST(NoRepeats, GivesUpASearchThatFindsNothing) {
   const ArrayOptions wide{.rows = 45, .columns = 72, .letters = 5, .minimum_distance = 3, .row_reach = 60};
   EXPECT_THAT(why_not(wide), HasSubstr("no run recurs within 60 columns and 0 rows, within the search budget"));
   const ArrayOptions dense{.rows = 90, .columns = 144, .letters = 5, .minimum_distance = 3};
-  EXPECT_THAT(why_not(dense), HasSubstr("no run recurs within 5 columns and 0 rows, within the search budget"));
+  EXPECT_THAT(why_not(dense), HasSubstr("found no 90x144 array of 5 letters with minimum distance 3 within"));
+}
+
+TEST(NoRepeats, ReachesNowhereWithTooFewLettersUnlessAskedTo) {
+  const ArrayOptions few{.rows = 45, .columns = 72, .letters = 3};
+  const auto array = array_of(few);
+  ASSERT_TRUE(array) << array.error().message;
+  EXPECT_EQ(array->row_reach, naive_row_reach(*array));
+  EXPECT_LT(array->row_reach, 10);
+  EXPECT_GE(array->minimum_distance, 1);
 }
 
 TEST(NoRepeats, NamesTheBoundOfWindows) {

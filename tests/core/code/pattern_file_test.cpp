@@ -12,8 +12,11 @@ namespace {
 using ::testing::HasSubstr;
 
 Pattern small_pattern() {
-  auto pattern = make_pattern(
-      {.projector_width_px = 640, .projector_height_px = 360, .symbols = {5, 7, 22, 25, 12}, .minimum_distance = 3});
+  auto pattern = make_pattern({.projector_width_px = 640,
+                               .projector_height_px = 360,
+                               .symbols = {5, 7, 22, 25, 12},
+                               .method = ArrayMethod::kConstructive,
+                               .minimum_distance = 3});
   EXPECT_TRUE(pattern);
   return *pattern;
 }

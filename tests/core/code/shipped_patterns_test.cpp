@@ -12,7 +12,7 @@
 namespace slsd {
 namespace {
 
-constexpr ArrayMethod kNoRepeats = ArrayMethod::kNoRepeats;
+constexpr ArrayMethod kConstructive = ArrayMethod::kConstructive, kNoRepeats = ArrayMethod::kNoRepeats;
 
 struct Shipped {
   const char* name;
@@ -28,12 +28,16 @@ void PrintTo(const Shipped& shipped, std::ostream* out) {
 const Shipped kShipped[] = {
     {"paper-1", {.symbols = {5, 7, 22}, .method = ArrayMethod::kPaper}, 45, 72, 0},
     {"paper-2", {.symbols = {25, 7, 22}, .method = ArrayMethod::kPaper}, 45, 72, 0},
-    {"16px-5", {.symbols = default_symbols(16)}, 45, 72, 3},
-    {"14px-5", {.symbol_size_px = 14, .symbols = default_symbols(14)}, 51, 81, 3},
-    {"12px-6", {.symbol_size_px = 12, .symbols = default_symbols(12)}, 60, 93, 3},
-    {"10px-6", {.symbol_size_px = 10, .symbols = default_symbols(10)}, 69, 108, 3},
-    {"8px-6", {.symbol_size_px = 8, .symbols = default_symbols(8)}, 81, 129, 3},
-    {"8px-6-dense", {.symbol_size_px = 8, .spacing_px = 1, .symbols = default_symbols(8)}, 90, 144, 3},
+    {"16px-5", {.symbols = {11, 13, 14, 18, 19}, .method = kConstructive}, 45, 72, 3},
+    {"14px-5", {.symbol_size_px = 14, .symbols = {11, 13, 14, 16, 24}, .method = kConstructive}, 51, 81, 3},
+    {"12px-6", {.symbol_size_px = 12, .symbols = default_symbols(12), .method = kConstructive}, 60, 93, 3},
+    {"10px-6", {.symbol_size_px = 10, .symbols = default_symbols(10), .method = kConstructive}, 69, 108, 3},
+    {"8px-6", {.symbol_size_px = 8, .symbols = default_symbols(8), .method = kConstructive}, 81, 129, 3},
+    {"8px-6-dense",
+     {.symbol_size_px = 8, .spacing_px = 1, .symbols = default_symbols(8), .method = kConstructive},
+     90,
+     144,
+     3},
     {"16px-6-no-repeats", {.symbols = {9, 11, 13, 14, 18, 19}, .method = kNoRepeats}, 45, 72, 3, 69, 15},
     {"14px-6-no-repeats",
      {.symbol_size_px = 14, .symbols = {11, 12, 13, 14, 16, 24}, .method = kNoRepeats},

@@ -34,6 +34,7 @@ Pattern pattern_of(std::uint32_t seed = 1) {
   options.symbol_size_px = 8, options.spacing_px = 1;
   options.symbols = {9, 10, 11, 12, 18, 19};
   options.seed = seed;
+  options.method = ArrayMethod::kConstructive;
   return make_pattern(options).value();
 }
 

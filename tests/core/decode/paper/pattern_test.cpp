@@ -24,6 +24,7 @@ struct Read {
 Pattern paper_pattern(std::vector<int> symbols) {
   PatternOptions options;
   options.symbols = std::move(symbols);
+  options.method = ArrayMethod::kConstructive;
   auto pattern = make_pattern(options);
   EXPECT_TRUE(pattern) << (pattern ? "" : pattern.error().message);
   return *pattern;
