@@ -41,7 +41,6 @@ BELOW = {
 KNOWN_CIRCLES = [
     ["core/code/array_bounds", "core/code/code_array", "core/code/constructive_array", "core/code/paper_array",
      "core/code/runs", "core/code/window_index"],
-    ["core/code/symbol", "core/code/symbol_rules"],
 ]
 
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "core/code/symbol.hpp"
+#include "core/code/alphabet.hpp"
 
 namespace slsd {
 
