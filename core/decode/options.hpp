@@ -26,7 +26,8 @@ struct DenseOptions {
 struct DecodeOptions {
   double depth_min_mm = 400.0;  ///< working range along the camera's z axis; cuts the candidates of a codeword
   double depth_max_mm = 2500.0;
-  double wrong_cells_max = 0.001;  ///< about how many a frame may have: sets the margin; 1e-9 to 1
+  /// How many a frame that is made to mislead may have on average: sets the margin; 1e-9 to 1.
+  double wrong_cells_max = 0.005;
   /// kFine: each decoded symbol's patch is aligned with the pattern, which takes several times as long.
   Precision precision = Precision::kStandard;
   Density density = Density::kSymbols;  ///< unless a request says

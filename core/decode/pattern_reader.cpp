@@ -29,7 +29,7 @@ constexpr std::size_t kCertain = 40, kLeast = 12;
 /// The share of symbols that has to lie within this part of a cell from where the plane of the others puts them.
 constexpr double kAgreeingShare = 0.6, kAgreeingCells = 0.6;
 /// That a frame may have: what agrees with a plane is kept, and the bundle adjustment leaves out the rest.
-constexpr double kWrongCellsMax = 0.1;
+constexpr double kWrongCellsMax = 0.075;
 /// How far from the scale that a reader was made for it is still used.
 constexpr double kSameScale = 1.12;
 

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/adversary/margin_table.hpp"
 #include "tests/adversary/misled.hpp"
 #include "tests/adversary/rule_sweep.hpp"
 
@@ -69,6 +70,29 @@ TEST_F(Trial, WholeMarginsDecideAlike) {
     most_before = std::max(most_before, before.regions[i].margin_nats);
   }
   EXPECT_GT(most, most_before + 1);
+}
+
+TEST(Margins, SayHowManyCellsAreWrong) {
+  RuleTrial trial;
+  trial.whole_margins = true;
+  constexpr double kNearlyAll = 0.5;
+  Misled misled = Misled::of(8, &trial, kNearlyAll).value();
+  MarginTable table;
+  for (int kind = 0; kind < kKinds; ++kind) {
+    for (std::uint32_t number = 500; number < 504; ++number) {
+      const Frame frame = misled.maker.make(static_cast<Kind>(kind), number);
+      const auto decoding = misled.decoders[number % 3].decode(frame.image.view(), 255);
+      ASSERT_TRUE(decoding);
+      table.add(**decoding, misled.maker.judge(frame, (*decoding)->points, kTolerancePx).wrong_points);
+    }
+  }
+  double expected = 0, wrong = 0;
+  constexpr int kFirstNat = 3;  // below, more are wrong than the model says
+  for (int nat = kFirstNat; nat < MarginTable::kNats; ++nat)
+    expected += table.at(nat).expected, wrong += table.at(nat).wrong;
+  EXPECT_GT(expected, 5);
+  EXPECT_LT(wrong, 3 * expected);
+  EXPECT_GT(wrong, expected / 3);
 }
 
 TEST_F(Trial, ARuleThatWasNotMetChangesNothing) {

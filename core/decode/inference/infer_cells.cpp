@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/decode/inference/margin.hpp"
+
 namespace slsd {
 namespace {
 
@@ -22,15 +24,6 @@ bool is_along_row(Direction d) {
   return d == kRight || d == kLeft;
 }
 
-constexpr float kMarginMax = 14;  // nats: what a symbol inside a surface has
-
-/// Ten times fewer wrong cells cost log(10) nats.
-float margin_min_of(double wrong_cells_max) {
-  constexpr float kMarginOfBudget = 8;  // nats
-  constexpr double kBudget = 0.001;
-  return std::clamp(kMarginOfBudget + static_cast<float>(std::log(kBudget / wrong_cells_max)), 0.F, kMarginMax);
-}
-
 }  // namespace
 
 CellInference::CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max,
@@ -40,7 +33,7 @@ CellInference::CellInference(const Pattern& pattern, std::shared_ptr<const Codeb
       proposer_(pattern.array, codebook),
       letters_(pattern.array, grid_),
       links_(static_cast<float>(pattern.pitch_px())),
-      margin_min_(margin_min_of(wrong_cells_max)) {}
+      margin_min_(margin_for(wrong_cells_max)) {}
 
 NodesSeen CellInference::view_of(const Sightings& seen) const {
   return {seen.nodes, beside_, seen.moments, seen.aligned, labels_};

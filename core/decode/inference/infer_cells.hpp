@@ -32,7 +32,7 @@ namespace slsd {
 class CellInference {
  public:
   /// @param codebook         of the part of the pattern's array that is shown
-  /// @param wrong_cells_max  about how many a frame may have: sets the margin that a node needs
+  /// @param wrong_cells_max  how many a frame may have: sets the margin that a node needs
   CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max,
                 Rules rules = {});
 
