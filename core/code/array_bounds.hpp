@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "core/code/code_array.hpp"
+#include "core/code/array.hpp"
 
 namespace slsd {
 

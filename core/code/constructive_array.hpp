@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/code/code_array.hpp"
+#include "core/code/array.hpp"
 
 namespace slsd {
 

@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "core/code/code_array.hpp"
+#include "core/code/array.hpp"
 
 namespace slsd {
 

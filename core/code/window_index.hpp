@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/code/code_array.hpp"
+#include "core/code/array.hpp"
 
 namespace slsd {
 
