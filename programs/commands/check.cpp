@@ -337,11 +337,11 @@ class Check {
       const DenseOutlook outlook =
           dense_outlook(setup.pattern, *setup.calibration, made.camera_index(), setup.decode, mapper.window_px());
       if (outlook.too_coarse) {
-        findings_.warn(
-            fmt::format("{}: the pattern is too coarse for this camera, which sees its symbols {:.0f} px apart; the "
-                        "surface is fitted "
-                        "in windows of {} px: take smaller symbols, such as those of config/patterns/8px-6-dense-no-repeats.toml",
-                        name, outlook.pitch_px, mapper.window_px()));
+        findings_.warn(fmt::format(
+            "{}: the pattern is too coarse for this camera, which sees its symbols {:.0f} px apart; the "
+            "surface is fitted "
+            "in windows of {} px: take smaller symbols, such as those of config/patterns/8px-6-dense-no-repeats.toml",
+            name, outlook.pitch_px, mapper.window_px()));
       }
       const int stride = DenseMapper::stride_px(camera.lens, setup.decode.dense);
       if (stride != setup.decode.dense.stride_px) {
