@@ -21,10 +21,10 @@ inline constexpr int kBundleVersion = 1;
 /// A longer file is refused before it is read.
 inline constexpr std::size_t kBundleBytesMax = std::size_t{1} << 30U;
 
-/// What a bundle tells besides the scans.
+/// The service's state, written into a bundle beside the scans.
 struct BundleNotes {
   nlohmann::json reason;  ///< the scan that failed and its error; null where somebody asked
-  nlohmann::json status;  ///< as `status`, `settings` and `metrics` answer
+  nlohmann::json status;  ///< answers to `status`, `settings` and `metrics`
   nlohmann::json settings;
   std::string metrics;
 };
@@ -67,9 +67,9 @@ struct BundledRecording {
 
 /// A bundle as it was read; its views are of the archive's bytes, which outlive it.
 struct Bundle {
-  std::string version;  ///< of slsd that wrote it
+  std::string version;  ///< the version of slsd that wrote the bundle
   std::string written;
-  std::string reason;  ///< of the failed scan, or empty
+  std::string reason;  ///< the error of the failed scan, or empty
   std::vector<TarFile> files;
   std::vector<BundledRecording> recordings;
 };

@@ -16,11 +16,11 @@ namespace slsd {
 
 struct ServerOptions;
 
-/// What a client may do. Each may what those before it may.
+/// The rights of a client. Each role includes those before it.
 enum class Role : std::uint8_t { kNone, kObserve, kScan, kAdminister };
 [[nodiscard]] std::string_view to_string(Role role);
 
-/// Who is at the other end of a Unix socket, as the kernel says.
+/// The peer of a Unix socket, as the kernel reports it.
 struct Peer {
   uid_t user;
   gid_t group;
@@ -30,7 +30,7 @@ struct Peer {
 /// @return  of a socket that is gone, a user who may nothing
 [[nodiscard]] Peer peer_of(int socket);
 
-/// Who may what: [server] observe, scan and administer with the numbers behind the names.
+/// The rights by user and group: [server] observe, scan and administer, with names resolved to numbers.
 class AccessRules {
  public:
   /// Names of users, of groups as "@name", or "*" for whoever can open the socket.

@@ -13,7 +13,7 @@ namespace slsd {
 struct BlackBoxOptions {
   int memory_max_mb = 16;        ///< 0 to 512; of frames and points; 0: keeps nothing
   int disk_max_mb = 64;          ///< 0 to 65536; of the bundles that it writes by itself; 0: writes none
-  std::filesystem::path folder;  ///< that these go to; empty: the folder "bundles" of systemd's StateDirectory=
+  std::filesystem::path folder;  ///< the bundles' folder; empty: the folder "bundles" of systemd's StateDirectory=
 
   [[nodiscard]] std::size_t memory_max_bytes() const { return static_cast<std::size_t>(memory_max_mb) << 20U; }
   [[nodiscard]] std::size_t disk_max_bytes() const { return static_cast<std::size_t>(disk_max_mb) << 20U; }

@@ -16,7 +16,7 @@
 
 namespace slsd {
 
-/// What to do with the options of each driver, for std::visit: one that is forgotten does not compile.
+/// The visitor for std::visit with one function per driver's options. A forgotten driver does not compile.
 template <class... Visits>
 struct Overloaded : Visits... {
   using Visits::operator()...;
@@ -27,14 +27,14 @@ Overloaded(Visits...) -> Overloaded<Visits...>;
 /// A [[camera]] table: the keys of its driver, and what all drivers have in common.
 struct CameraOptions {
   std::variant<FileCameraOptions, V4l2CameraOptions, AravisCameraOptions> of_driver;
-  std::vector<Fault> faults;  ///< what the camera does wrong, for the tests of everything above it
+  std::vector<Fault> faults;  ///< errors that the camera is made to show, for tests of the code above it
 
   [[nodiscard]] const std::string& name() const;
   [[nodiscard]] std::string_view driver() const;  ///< "file", "v4l2" or "aravis"
-  /// As configured; nothing where the driver keeps the camera's own, or has none.
+  /// The configured exposure. Empty if the driver keeps the camera's own or has none.
   [[nodiscard]] std::optional<double> exposure_us() const;
   [[nodiscard]] std::optional<double> gain_db() const;
-  /// Of its pixels, by the driver's name for it; empty where the driver chooses.
+  /// The pixel format, by the driver's name for it. Empty if the driver chooses.
   [[nodiscard]] std::string format() const;
   /// Its frames are files': no device is looked for.
   [[nodiscard]] bool replays() const { return std::holds_alternative<FileCameraOptions>(of_driver); }

@@ -22,13 +22,13 @@ namespace slsd {
 
 inline constexpr const char* kConfigurationFile = "/etc/slsd/slsd.toml";
 
-/// What becomes of a scan whose camera or projector is not the one that was calibrated.
+/// The outcome of a scan whose camera or projector is not the calibrated one.
 enum class OtherHardware { kError, kWarn };
 
-/// What the configuration file says, a member to a table. Paths are those of the file, joined to its folder.
+/// The configuration file's content, one member per table. Paths are those of the file, joined to its folder.
 struct Configuration {
-  std::filesystem::path pattern_file;  ///< where it is not empty, it takes the place of `pattern`
-  PatternOptions pattern;              ///< with the projector's size, and the symbols named
+  std::filesystem::path pattern_file;  ///< replaces `pattern` unless it is empty
+  PatternOptions pattern;              ///< includes the projector's size and the named symbols
   ProjectorOptions projector;
   std::vector<CameraOptions> cameras;
   std::filesystem::path calibration_file;  ///< empty: none, and no scan is possible

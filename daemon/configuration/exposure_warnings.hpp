@@ -9,8 +9,8 @@
 
 namespace slsd {
 
-/// What is wrong with the configured exposures for the projector's refresh and the lamps' flicker, a sentence to each
-/// camera, with the nearest exposures that suit them. Nothing where all is well or no exposure is configured.
+/// Warnings about exposures that do not suit the projector's refresh or the lamps' flicker. Each camera gets one
+/// sentence, with the nearest exposures that suit them. Empty if all suit or no exposure is configured.
 /// @thread reentrant
 [[nodiscard]] std::vector<std::string> exposure_warnings(const Configuration& configuration);
 

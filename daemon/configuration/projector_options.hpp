@@ -21,12 +21,12 @@ struct ProjectorOptions {
   std::string monitor;  ///< name, EDID serial or place on the desktop; empty: the monitor that is not the primary
   int width_px = 1280;  ///< 640 to 3840
   int height_px = 800;  ///< 360 to 2160
-  LightOptions light;   ///< how grey becomes light
+  LightOptions light;   ///< conversion of grey levels to light
   /// Turn the monitor on and set it to that size, where nobody else does; unset: where the display is the scanner's
   /// own.
   std::optional<bool> enable_output;
   double refresh_hz = 60.0;          ///< 10 to 1000; 0: it lights steadily, so that every exposure suits it
-  Picture idle = Picture::kPattern;  ///< when nobody has scanned for a while: that, kBlack or kWhite
+  Picture idle = Picture::kPattern;  ///< shown when nobody has scanned for a while: kPattern, kBlack or kWhite
   int idle_after_ms = 2000;          ///< 0 to 3600000; how long after a scan that takes the pattern's place
 
   [[nodiscard]] Result<> validate() const;

@@ -22,7 +22,7 @@ struct ServerOptions {
   int request_bytes_max = 1024 * 1024;  ///< 1024 to 16777216; a longer line is an error and ends the connection
   int memory_max_mb = 512;  ///< 16 to 65536; all that waits for clients together, and at most half of it for
                             ///< one
-  /// Who may do what: users, groups as "@name", or "*" for whoever can open the socket. See AccessRules.
+  /// Users with each right: names, groups as "@name", or "*" for whoever can open the socket. See AccessRules.
   std::vector<std::string> observe{"*"}, scan{"*"}, administer{"@slsd-admin"};
   int send_timeout_ms = 30'000;  ///< 100 to 600000; a client that takes neither a megabyte nor all of a message
                                  ///< in so long is dropped

@@ -20,30 +20,31 @@ namespace slsd {
 /// "pattern", which stands in the place of the whole table. They are kept in a file of their own, so that nobody but
 /// the administrator writes the configuration.
 
-/// Those before, with others set; null takes one away, and the configuration file's is in force again.
+/// Merges `changes` into the settings `before`. A null removes a setting, so that the configuration file's is in force
+/// again.
 /// @errors kInvalidArgument: another table, key or kind of value than above
 /// @thread reentrant
 [[nodiscard]] Result<nlohmann::json> merge_settings(nlohmann::json before, const nlohmann::json& changes);
 
-/// As load_configuration(), with the settings in the places of its own.
+/// Loads the configuration as load_configuration() does, then replaces its values by `settings`.
 /// @errors as load_configuration(); kNotFound: no camera of a name; kInvalidArgument: no such key, or out of range
 [[nodiscard]] Result<Configuration> load_configuration_with(const std::filesystem::path& file,
                                                             const nlohmann::json& settings);
 
-/// Where the settings of a configuration are kept: in the folder of systemd's $STATE_DIRECTORY, by the configuration's
-/// name, as several services may share the folder. Empty where there is no such folder, and nothing is kept.
+/// The file that keeps a configuration's settings, in the folder of systemd's $STATE_DIRECTORY. Its name comes from the
+/// configuration's, as several services may share the folder. Empty if there is no such folder: nothing is kept.
 [[nodiscard]] std::filesystem::path kept_settings_file(const std::filesystem::path& configuration);
-/// What is kept there; nothing where there is no file.
+/// Reads the kept settings. An empty object if there is no file.
 /// @errors kMalformed: it is not what was written; of read_file()
 [[nodiscard]] Result<nlohmann::json> read_kept_settings(const std::filesystem::path& file);
-/// For others than the service: what it kept, where systemd keeps the state of a configuration in /etc/slsd, whoever
-/// asks. @errors as read_kept_settings()
+/// Finds the settings that the service kept, for other programs. Looks where systemd keeps the state of a configuration
+/// in /etc/slsd, whoever asks. @errors as read_kept_settings()
 [[nodiscard]] Result<nlohmann::json> find_kept_settings(const std::filesystem::path& configuration);
 /// "calibration.file, camera.left.gain_db"
 [[nodiscard]] std::string names_of_settings(const nlohmann::json& settings);
 
-/// As load_configuration_or_defaults(), with what was set over the service's socket and kept. What no longer fits is
-/// passed over, as the service does.
+/// Loads the configuration as load_configuration_or_defaults() does, with the settings that were set over the service's
+/// socket and kept. Skips settings that no longer fit, as the service does.
 /// @param told  gets a line that says what is not as the file has it
 [[nodiscard]] Result<Configuration> load_configuration_in_force(const std::optional<std::filesystem::path>& file,
                                                                 std::ostream& told);

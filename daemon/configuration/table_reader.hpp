@@ -17,7 +17,7 @@
 
 namespace slsd {
 
-/// Where a node stands, as "file:line:column".
+/// The place of a node, as "file:line:column".
 [[nodiscard]] std::string place_of(const toml::source_region& source, std::string_view file);
 
 /// Reads the keys of one TOML table into an options struct. A key that is not there keeps the value's default; the

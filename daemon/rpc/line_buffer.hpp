@@ -22,15 +22,15 @@ class LineBuffer {
   /// The next whole line without its line feed or carriage return and line feed; nothing where none is whole. Valid
   /// until the next call.
   [[nodiscard]] std::optional<std::string_view> next_line();
-  /// What is left when no more bytes come: a last line that lacks its line feed. Nothing where nothing is left. Valid
-  /// until the next call.
+  /// The rest when no more bytes come: a last line that lacks its line feed. Empty if nothing is left. Valid until the
+  /// next call.
   [[nodiscard]] std::optional<std::string_view> rest();
 
   /// Whether the line that has begun is longer than the limit.
   [[nodiscard]] bool overflown() const { return bytes_.size() - begin_ > limit_bytes_ && searched_ == bytes_.size(); }
-  /// How many bytes wait to be read as lines.
+  /// The number of bytes that wait to be read as lines.
   [[nodiscard]] std::size_t size() const { return bytes_.size() - begin_; }
-  /// What it holds of memory.
+  /// The allocated memory, in bytes.
   [[nodiscard]] std::size_t capacity() const { return bytes_.capacity(); }
   /// Gives back what it holds, lines that are not read yet with it.
   void clear();
@@ -38,7 +38,7 @@ class LineBuffer {
  private:
   std::size_t limit_bytes_;
   std::string bytes_;
-  std::size_t begin_ = 0;     ///< of the next line; what is before was read
+  std::size_t begin_ = 0;     ///< start of the next line; the bytes before were read
   std::size_t searched_ = 0;  ///< no line feed from begin_ to here
 };
 

@@ -12,12 +12,12 @@
 
 namespace slsd {
 
-/// What a client is told when its request failed. JSON-RPC's own codes, and ours from -32001 down, listed in
+/// The error sent to a client whose request failed. The codes are JSON-RPC's own, and ours from -32001 down, listed in
 /// docs/protocol.md.
 struct RpcError {
   int code;
   std::string name;     ///< "frame_stale": what a program compares
-  std::string message;  ///< what happened and what to do
+  std::string message;  ///< the cause and the remedy
   std::string where;    ///< file:line:column, key, device, or empty
 
   /// Printable, and at most about 2 kB, whatever it quotes.

@@ -34,8 +34,8 @@ struct BadRequest {
 /// @thread reentrant
 [[nodiscard]] tl::expected<Request, BadRequest> parse_request(std::string_view line);
 
-/// What a JSON text will take to read: how deep objects and arrays are nested, and how many values there are at most.
-/// Brackets and commas within texts do not count. Looks no further where one is beyond its limit.
+/// The cost of reading a JSON text: the depth of its nested objects and arrays, and an upper bound on its values.
+/// Brackets and commas within texts do not count. Counting stops at a limit that is exceeded.
 struct JsonShape {
   int depth = 0;
   int values = 1;

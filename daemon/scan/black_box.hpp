@@ -21,7 +21,7 @@
 
 namespace slsd {
 
-/// What a kept scan was decoded by.
+/// The settings that a kept scan was decoded with.
 struct KeptSettings {
   Pattern pattern;
   std::optional<Calibration> calibration;
@@ -38,11 +38,11 @@ using KeptFrames = std::vector<FrameImage>;
 /// One scan, as far as it is known: one that ended before it had frames has none.
 struct KeptScan {
   std::string id;
-  std::chrono::system_clock::time_point time;         ///< when it was kept first
+  std::chrono::system_clock::time_point time;         ///< time of the first such scan
   std::shared_ptr<const KeptSettings> settings;       ///< null where it had no turn
   std::shared_ptr<const KeptFrames> frames;           ///< null: none, or too large
   bool too_large = false;                             ///< its frames alone are more than may be kept
-  Density density = Density::kSymbols;                ///< of the cloud that was asked for
+  Density density = Density::kSymbols;                ///< the requested cloud's
   std::shared_ptr<const Result<ScanResult>> outcome;  ///< null while it is decoded; without pictures and dense points
   std::uint64_t times = 1;                            ///< such failures without frames, one after the other
 };
@@ -56,7 +56,7 @@ class BlackBox {
   explicit BlackBox(std::size_t bytes_max) : bytes_max_(bytes_max) {}
 
   [[nodiscard]] std::size_t bytes_max() const { return bytes_max_; }
-  /// What it holds now.
+  /// The bytes held now.
   [[nodiscard]] std::size_t bytes() const;
 
   void keep_frames(const std::string& id, const FrameSet& set, const SharedSetup& setup, Density density);

@@ -21,7 +21,7 @@
 
 namespace slsd {
 
-/// Which frame a capture takes.
+/// The choice of the frame that a capture takes.
 enum class Exposure {
   kFresh,  ///< the first whose exposure begins after the capture
   kNext,   ///< the one after the last, where the camera runs freely
@@ -68,12 +68,12 @@ class CameraRunner {
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] DeviceStatus status() const;
-  /// How many times it was opened.
+  /// The number of times the camera was opened.
   [[nodiscard]] std::uint64_t openings() const;
   [[nodiscard]] const Heartbeat& heartbeat() const { return heartbeat_; }
   /// Whether it replays recorded images.
   [[nodiscard]] bool replays() const { return replays_; }
-  /// Of a camera that runs freely; 0: of any other.
+  /// The frame rate of a camera that runs freely; 0 for any other.
   [[nodiscard]] double rate_hz() const { return rate_hz_; }
 
   /// Waits until the camera is open.
@@ -140,9 +140,9 @@ class CameraRunner {
   SequenceGaps gaps_;
   std::optional<Order> order_;
   std::optional<Result<Frame>> answer_;
-  std::optional<Replacement> replacement_;  ///< that its thread has not begun
+  std::optional<Replacement> replacement_;  ///< waits until the camera's thread begins it
   std::uint64_t replacements_ = 0;          ///< begun and given up: one of another number is not awaited
-  std::optional<Result<>> replaced_;        ///< how the last one ended
+  std::optional<Result<>> replaced_;        ///< outcome of the last replacement
   bool given_up_ = false;                   ///< the driver is over its time; its answer is thrown away
   bool stopped_ = false;
   std::atomic<bool> ended_{false};

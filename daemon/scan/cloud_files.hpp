@@ -27,7 +27,7 @@ enum class CloudFormat : std::uint8_t { kPly, kPcd, kTiff };
   return density == Density::kPixels ? "pixels" : "symbols";
 }
 
-/// What somebody wants a cloud as. Depth maps and normals are of dense clouds alone.
+/// The form of a cloud that a client asks for. Only dense clouds have depth maps and normals.
 struct CloudForm {
   CloudFormat format = CloudFormat::kPly;
   Density density = Density::kSymbols;

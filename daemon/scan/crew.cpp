@@ -11,8 +11,8 @@
 namespace slsd {
 namespace {
 
-/// Until it is so, or not for long. Between the stages of a frame lie some microseconds, and a thread that sleeps takes
-/// more to wake up.
+/// Spins until the predicate holds, or for a short time. The stages of a frame are some microseconds apart, and a
+/// sleeping thread takes longer to wake up.
 template <class Predicate>
 void stay_awake(Predicate&& is_so) {
   constexpr std::chrono::microseconds kAwake{50};

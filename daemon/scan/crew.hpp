@@ -34,7 +34,7 @@ class Crew final : public Executor {
   /// @param helpers  threads besides the caller's: with it, one to a processor
   explicit Crew(int helpers);
   ~Crew() override;
-  /// As many as leave no processor without one.
+  /// The number of helpers that, with the caller, gives every processor a thread.
   [[nodiscard]] static int helpers_here();
 
   [[nodiscard]] int workers() const override { return static_cast<int>(threads_.size()) + 1; }

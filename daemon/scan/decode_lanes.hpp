@@ -19,7 +19,7 @@
 
 namespace slsd {
 
-/// What is computed of frames, and then told. Shared by the lanes and those who may end it meanwhile.
+/// A computation on frames whose result is then delivered. The lanes share it with those who may end it meanwhile.
 class FrameJob {
  public:
   virtual ~FrameJob() = default;
@@ -40,8 +40,8 @@ class DecodeLanes {
  public:
   static constexpr std::size_t kMaxLanes = 2;
   static constexpr std::size_t kWaitingMax = 3;
-  /// How long what was offered may wait when more comes: a lane that is late for once loses nothing, and lanes that are
-  /// slower than the cameras make no cloud older than that.
+  /// The longest wait of an offered job when more jobs come. A lane that is late once loses nothing. Lanes that are
+  /// slower than the cameras make no cloud older than this.
   static constexpr std::chrono::milliseconds kTurn{20};
   /// One where there is but one processor.
   [[nodiscard]] static std::size_t lanes_here();
@@ -56,7 +56,7 @@ class DecodeLanes {
   /// The newest wins: where too many wait, or the oldest that was offered has waited for too long, that one is
   /// destroyed undelivered.
   void offer(std::shared_ptr<FrameJob> job, MonotonicTime now = std::chrono::steady_clock::now());
-  /// How many of those offered were destroyed undelivered, since the start.
+  /// The number of offered jobs destroyed undelivered since the start.
   [[nodiscard]] std::uint64_t skipped() const;
 
   /// Waits until one more job is done than `done` of them. @return false: none is under way, or patience ended first
@@ -74,7 +74,7 @@ class DecodeLanes {
   struct Waiting {
     std::shared_ptr<FrameJob> job;
     bool may_be_skipped = false;
-    MonotonicTime since;  ///< of one that may be skipped
+    MonotonicTime since;  ///< time of the offer, if the job may be skipped
   };
   void run(std::size_t lane, const std::stop_token& stop);
   void append(Waiting waiting, std::unique_lock<std::mutex>& lock);
@@ -85,8 +85,8 @@ class DecodeLanes {
   std::condition_variable_any changed_;
   std::deque<Waiting> waiting_;
   std::uint64_t arrived_ = 0;    ///< jobs put in, less those skipped
-  std::uint64_t taken_ = 0;      ///< by lanes
-  std::uint64_t delivered_ = 0;  ///< of those taken
+  std::uint64_t taken_ = 0;      ///< jobs taken by lanes
+  std::uint64_t delivered_ = 0;  ///< jobs delivered, of those taken
   std::uint64_t skipped_ = 0;
   std::size_t running_ = 0;
   std::array<Heartbeat, kMaxLanes> heartbeats_;

@@ -13,7 +13,7 @@
 
 namespace slsd {
 
-/// How a camera or the projector is; docs/supervision.md draws the ways from one to the other.
+/// The state of a camera or the projector. docs/supervision.md draws the transitions.
 enum class DeviceState {
   kAbsent,     ///< nothing of its name answers; it is looked for again
   kOpening,    ///< being opened and configured
@@ -37,7 +37,7 @@ enum class DeviceState {
   return nothing_there ? DeviceState::kAbsent : DeviceState::kFaulted;
 }
 
-/// What `status` says of a projector or a camera.
+/// The status of a projector or a camera, as `status` reports it.
 struct DeviceStatus {
   std::string name;
   std::string driver;
@@ -46,19 +46,19 @@ struct DeviceStatus {
   int width_px = 0;
   int height_px = 0;
   DeviceState state = DeviceState::kOpening;
-  std::string problem;            ///< why it is not open; empty while it is
-  std::string shows;              ///< of a projector: "pattern", "white", "black", "idle" or "held"; empty: nothing
+  std::string problem;            ///< cause of its not being open; empty while it is open
+  std::string shows;              ///< a projector's picture: "pattern", "white", "black", "idle" or "held"; empty: none
   std::uint64_t opened = 0;       ///< times
   std::uint64_t frames = 0;       ///< delivered
   std::uint64_t frames_lost = 0;  ///< asked for and not delivered, or missing between two that were
-  std::map<ErrorCode, std::uint64_t> frames_failed;  ///< of the lost those that an error told of
+  std::map<ErrorCode, std::uint64_t> frames_failed;  ///< lost frames that an error reported
   std::vector<DriverFigure> figures;                 ///< the driver's own
 };
 
 /// All of a rig's.
 struct RigStatus {
   DeviceStatus projector;
-  std::vector<DeviceStatus> cameras;  ///< as configured
+  std::vector<DeviceStatus> cameras;  ///< in the configuration's order
 };
 
 }  // namespace slsd

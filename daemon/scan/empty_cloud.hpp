@@ -53,7 +53,7 @@ class EmptyClouds {
                                   MonotonicTime until);
 
   std::mutex mutex_;
-  std::shared_future<Doubt> doubt_;  ///< of the last look
+  std::shared_future<Doubt> doubt_;  ///< result of the last look
 };
 
 }  // namespace slsd

@@ -27,7 +27,7 @@ void copy_raw(const Frame& frame, FrameImage& image);
 /// A frame as it is to be kept. @param coding  not kNone @errors of encode_png() @thread reentrant
 [[nodiscard]] Result<FrameImage> image_of(const Frame& frame, FrameCoding coding, std::string camera);
 
-/// What was decoded, drawn into the frame, as a PNG. @errors of encode_png() @thread reentrant
+/// Draws what was decoded into the frame, as a PNG. @errors of encode_png() @thread reentrant
 [[nodiscard]] Result<std::string> picture_of(const GreyView& image, const Decoding& decoding, const Pattern& pattern,
                                              DecodingLook look);
 

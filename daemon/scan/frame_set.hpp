@@ -10,7 +10,7 @@
 
 namespace slsd {
 
-/// Which frames a scan takes besides those of the pattern.
+/// The frames that a scan takes besides those of the pattern.
 struct LightFrames {
   bool white = false;  ///< while the projector shows white
   bool dark = false;   ///< while it shows black
@@ -19,13 +19,13 @@ struct LightFrames {
 /// One frame of each camera, all of one exposure; and where they were asked for, as many in other light.
 /// @thread thread-bound; may be moved between threads
 struct FrameSet {
-  std::vector<Frame> frames;  ///< in the cameras' order; at least one
-  std::vector<Frame> white;   ///< as many, or none
+  std::vector<Frame> frames;  ///< one per camera, in the cameras' order; at least one
+  std::vector<Frame> white;   ///< one per camera, or none
   std::vector<Frame> dark;
-  std::chrono::nanoseconds capture_time{};  ///< from the request to the last frame
-  std::chrono::nanoseconds skew{};          ///< from the first camera's exposure of the pattern to the last one's
+  std::chrono::nanoseconds capture_time{};  ///< time from the request to the last frame
+  std::chrono::nanoseconds skew{};          ///< time from the first camera's exposure of the pattern to the last one's
 
-  /// When the last byte of the last frame was there.
+  /// The time when the last byte of the last frame had arrived.
   [[nodiscard]] MonotonicTime received() const {
     MonotonicTime last{};
     for (const auto* each : {&frames, &white, &dark}) {

@@ -10,8 +10,8 @@
 
 namespace slsd {
 
-/// What tells one projector from the others, from its EDID: maker and model with the serial number; empty where that
-/// cannot be told. As CameraDescription::hardware.
+/// The identity of a projector, from its EDID: maker and model with the serial number. Empty if the EDID does not tell.
+/// See CameraDescription::hardware.
 [[nodiscard]] std::string projector_hardware(const std::string& model, const std::string& serial);
 
 /// Writes down what a calibration was made with, as far as it can be told.

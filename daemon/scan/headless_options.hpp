@@ -7,7 +7,7 @@
 
 namespace slsd {
 
-/// What a headless projector reads of the [projector] table.
+/// The [projector] options that a headless projector uses.
 /// @thread reentrant
 [[nodiscard]] inline HeadlessProjectorOptions headless_options(const ProjectorOptions& options) {
   HeadlessProjectorOptions headless;

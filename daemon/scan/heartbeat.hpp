@@ -7,7 +7,8 @@
 
 namespace slsd {
 
-/// Within which a piece of work is done: decoding a frame, drawing a picture, making a pattern and its decoders.
+/// The time within which one piece of work is done: decoding a frame, drawing a picture, making a pattern and its
+/// decoders.
 inline constexpr auto kWorkPromise = std::chrono::seconds(60);
 
 /// A thread's promise to be heard of again before a certain time, for the watchdog of another thread.
@@ -16,7 +17,7 @@ class Heartbeat {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// To be heard of again within this time from now.
+  /// Promises a sign of life within this time from now.
   void promise(Clock::duration within) { until_ = (Clock::now() + within).time_since_epoch().count(); }
 
   /// Nothing is promised until the next promise.

@@ -9,8 +9,8 @@
 
 namespace slsd {
 
-/// What the lines are about that this thread logs from now on, to the end of the block. The journal keeps it beside
-/// each line, so that `journalctl SLSD_CAMERA=left` has them all; a line's own text tells it to everybody else.
+/// The subject of the lines that this thread logs from now on, to the end of the block. The journal keeps it beside
+/// each line, so that `journalctl SLSD_CAMERA=left` has them all. Other readers find it in the line's own text.
 /// @thread thread-bound
 class LogField {
  public:
@@ -23,7 +23,7 @@ class LogField {
 
   [[nodiscard]] std::string_view name() const { return name_; }
   [[nodiscard]] const std::string& value() const { return value_; }
-  /// Those of the calling thread, the newest first.
+  /// The fields of the calling thread, the newest first.
   [[nodiscard]] static std::vector<const LogField*> here() {
     std::vector<const LogField*> fields;
     for (const LogField* field = newest_; field != nullptr; field = field->before_) fields.push_back(field);

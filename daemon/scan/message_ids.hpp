@@ -9,8 +9,8 @@
 
 namespace slsd {
 
-/// What a line of the log is an instance of, by an id that stays as it is while texts change: for `journalctl
-/// MESSAGE_ID=...`, and for systemd/slsd.catalog, which explains each.
+/// The kind of a log line, by an id that stays as it is while texts change. Use it with `journalctl MESSAGE_ID=...`;
+/// systemd/slsd.catalog explains each.
 /// @thread thread-bound, as LogField
 class MessageId {
  public:

@@ -17,7 +17,7 @@
 
 namespace slsd {
 
-/// How long somebody waits for devices, what ends that sooner, and who is told of it meanwhile. What waits does so in
+/// The limits of a wait for devices: its deadline, what ends it sooner, and who hears of it meanwhile. Waiters wait in
 /// steps of a second at most, however far the deadline is.
 /// @thread thread-bound
 struct Patience {

@@ -19,8 +19,8 @@ namespace slsd {
 /// A picture is to be shown.
 struct ProjectRequest {
   Picture picture = Picture::kIdle;  ///< not kHeld
-  std::string png;                   ///< for kImage
-  MonotonicTime deadline;            ///< for the projector to be ready
+  std::string png;                   ///< the image for kImage
+  MonotonicTime deadline;            ///< end of the wait for the projector
   std::stop_token gone = {};         ///< requested when nobody waits for the outcome any more
 };
 
@@ -33,7 +33,7 @@ struct ProjectRequest {
 [[nodiscard]] Result<std::optional<Grey8>> draw_projected(Picture picture, std::string_view png, const ScanSetup& setup,
                                                           MonotonicTime until);
 
-/// What the configuration has shown when nobody scans; nothing for the pattern. @thread reentrant
+/// The configured idle picture, shown when nobody scans. Empty for the pattern. @thread reentrant
 [[nodiscard]] std::optional<Grey8> draw_idle(const ProjectorOptions& options);
 
 }  // namespace slsd

@@ -32,9 +32,9 @@ class Projection {
   /// @param pattern  of the projector's size
   Projection(std::unique_ptr<Projector> projector, Grey8 pattern, const ScanOptions& options);
 
-  /// What scans show from the next one on.
+  /// Sets the pattern of the scans from the next one on.
   void set_pattern(Grey8 pattern);
-  /// What is shown when nobody has scanned for a while; nothing: the pattern stays.
+  /// Sets the picture shown when nobody has scanned for a while. Without a picture the pattern stays.
   void set_idle(std::optional<Grey8> picture, std::chrono::milliseconds after);
 
   /// Shows a picture until a scan, another hold() or release(); returns when it is visible.
@@ -47,7 +47,7 @@ class Projection {
   /// Opens the projector and shows what is due; notices that it is gone, or hangs. Takes a tenth of a second at most:
   /// what takes longer goes on, and the next call looks after it.
   void supervise();
-  /// When supervise() will have another picture to show; the end of time where it will not.
+  /// The time when supervise() next changes the picture; the end of time if it will not.
   [[nodiscard]] MonotonicTime next_change() const;
 
   /// Returns when the picture is visible, whatever was shown before.
@@ -60,9 +60,9 @@ class Projection {
   /// Whether what was shown still is. Asked after each capture; comes back 0.3 s after the deadline, or after now, at
   /// the latest. @errors kDisconnected
   [[nodiscard]] Result<> check(MonotonicTime deadline);
-  /// From when on every exposure sees what is shown, and nothing of what was shown before.
+  /// The time from which every exposure sees the current picture alone, and nothing of the one before.
   [[nodiscard]] MonotonicTime visible() const { return visible_; }
-  /// How often another picture was shown; frames of different counts do not belong together.
+  /// The number of picture changes. Frames of different counts do not belong together.
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
 
   /// @thread thread-safe

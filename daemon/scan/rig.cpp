@@ -197,7 +197,8 @@ Result<> Rig::align(std::vector<Frame>& frames, const Shot& shot) {
   return {};
 }
 
-/// By how much the camera may begin before the last of the others, and no frame of it be nearer.
+/// The longest time by which the camera may begin before the last of the others, while none of its later frames is
+/// nearer.
 std::chrono::nanoseconds Rig::slack(const CameraRunner& camera) const {
   if (camera.rate_hz() <= 0) return std::chrono::nanoseconds::max();
   return std::chrono::nanoseconds(static_cast<std::int64_t>(0.5e9 / camera.rate_hz()));

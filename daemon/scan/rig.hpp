@@ -39,7 +39,7 @@ class Rig {
 
   /// Opens the projector and shows what is due; notices that it is gone.
   void supervise() { projection_.supervise(); }
-  /// When supervise() will have something to do, unless a device is lost; the end of time where it will not.
+  /// The time when supervise() next has work, unless a device is lost; the end of time if it has none.
   [[nodiscard]] MonotonicTime next_change() const { return projection_.next_change(); }
 
   /// All cameras replay images at the trigger: nothing but the processor limits how often.
@@ -63,7 +63,7 @@ class Rig {
 
   /// Shows another pattern from the next capture on.
   void show(Grey8 image) { projection_.set_pattern(std::move(image)); }
-  /// What is shown when nobody has scanned for a while; nothing: the pattern stays.
+  /// Sets the picture shown when nobody has scanned for a while. Without a picture the pattern stays.
   void set_idle(std::optional<Grey8> picture, std::chrono::milliseconds after) {
     projection_.set_idle(std::move(picture), after);
   }
@@ -73,7 +73,7 @@ class Rig {
   /// Shows the idle picture, at once. @errors as hold()
   [[nodiscard]] Result<> release(const Patience& patience);
 
-  /// As CameraRunner::replace(). @param camera  its index @thread thread-safe
+  /// Replaces a camera as CameraRunner::replace() does. @param camera  its index @thread thread-safe
   [[nodiscard]] Result<> replace(std::size_t camera, std::unique_ptr<Camera> next, std::unique_ptr<Camera> otherwise,
                                  MonotonicTime deadline) {
     return runners_[camera]->replace(std::move(next), std::move(otherwise), deadline);
@@ -87,12 +87,13 @@ class Rig {
   [[nodiscard]] DeviceStatus projector_status() const { return projection_.status(); }
   [[nodiscard]] std::vector<DeviceStatus> camera_statuses() const;
   [[nodiscard]] RigStatus status() const { return {projector_status(), camera_statuses()}; }
-  /// How many times devices were opened, all together: as it grows, one may be another one than before.
+  /// The number of times that devices were opened, all together. When it grows, a device may be another one than
+  /// before.
   [[nodiscard]] std::uint64_t openings() const;
 
  private:
   using Cameras = std::span<CameraRunner* const>;
-  /// How one set of frames is exposed.
+  /// The conditions under which one set of frames is exposed.
   struct Shot {
     const Patience& patience;
     Exposure exposure = Exposure::kFresh;

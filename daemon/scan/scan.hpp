@@ -37,7 +37,7 @@ class Scan final : public TaskOf<ScanResult>, public FrameJob {
   [[nodiscard]] const ScanRequest& request() const { return request_; }
   [[nodiscard]] std::uint64_t number() const { return number_; }
   [[nodiscard]] const std::string& id() const { return id_; }
-  /// By which it is decoded; null before its turn.
+  /// The setup that decodes the scan; null before its turn.
   [[nodiscard]] const SharedSetup& setup() const { return setup_; }
   [[nodiscard]] bool exposed() const { return set_.has_value(); }
 

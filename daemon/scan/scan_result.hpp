@@ -40,10 +40,10 @@ class StageClock final : public StageObserver {
   StageTimes times_{};
 };
 
-/// Why a region gave no point.
+/// The reason for which a region gave no point.
 struct RegionReason {
   float camera_u, camera_v;  ///< its centre
-  std::uint8_t camera;       ///< in the calibration
+  std::uint8_t camera;       ///< index of the camera in the calibration
   DecodeRule rule;
   std::optional<DecodeRule> guard;  ///< the last that kept it from being brought back
 };
@@ -56,17 +56,17 @@ struct LostTries {
   std::vector<Error> last;  ///< the newest few, oldest first
 };
 
-/// How the frames that a cloud was decoded from are kept beside it.
+/// The coding of a cloud's frames that are kept beside it.
 enum class FrameCoding { kNone, kRaw, kPng };
 
 struct ScanRequest {
-  MonotonicTime deadline;                   ///< for the devices to be ready and the frames to be there
+  MonotonicTime deadline;                   ///< end of the wait for the devices and the frames
   bool picture = false;                     ///< also draw what was decoded in the frame
-  std::string camera;                       ///< whose picture; empty: the first's
-  FrameCoding frames = FrameCoding::kNone;  ///< what becomes of the frames besides the cloud
+  std::string camera;                       ///< the camera of the picture; empty: the first
+  FrameCoding frames = FrameCoding::kNone;  ///< coding of the frames that come with the cloud
   bool texture = false;                     ///< intensities from frames in white light
   bool ambient = false;                     ///< less those in the light of the room alone
-  CloudFormats formats = {};                ///< in which the cloud is written
+  CloudFormats formats = {};                ///< formats in which the cloud is written
   std::stop_token gone = {};                ///< requested when nobody waits for the outcome any more
   bool why = false;                         ///< the picture has each rejected region in the colour of its rule
   bool of_stream = false;                   ///< follows another: pixels where nothing moves are measured from there
@@ -94,7 +94,7 @@ struct FrameImage {
   MonotonicTime received = {};
 };
 
-/// What a scan gave.
+/// The outcome of a scan.
 struct ScanResult {
   Cloud cloud;
   std::shared_ptr<const DenseCloud> dense = {};  ///< a point for each pixel, where it was asked for; shared: as large
@@ -103,18 +103,18 @@ struct ScanResult {
   CloudFiles files = {};                         ///< the cloud's, in the formats that were asked for
   LostTries lost = {};
   std::vector<CloudPoint> strays;          ///< symbols that a knocked rig has elsewhere: see stray_symbols()
-  RegionCounts regions{};                  ///< of all cameras, by status
+  RegionCounts regions{};                  ///< regions of all cameras, by status
   RuleCounts rules{};                      ///< the same by the rule that decided
-  std::vector<RegionReason> reasons = {};  ///< of all cameras' regions that gave no point
+  std::vector<RegionReason> reasons = {};  ///< one for each region that gave no point, of all cameras
   std::optional<std::uint64_t> saturated;  ///< points without an intensity, as white was too bright; where it was asked
                                            ///< for
   std::optional<std::uint64_t> dense_saturated = {};  ///< the same, of the points of pixels
-  MonotonicTime received;                             ///< when the last byte of its frames was there
-  std::chrono::nanoseconds skew{};                    ///< from the first camera's exposure to the last one's
+  MonotonicTime received;                             ///< time when the last byte of its frames had arrived
+  std::chrono::nanoseconds skew{};                    ///< time from the first camera's exposure to the last one's
   std::uint64_t skipped = 0;  ///< sets of frames since the scan before that were not decoded: newer ones came
   std::chrono::nanoseconds capture_time{};
   std::chrono::nanoseconds decode_time{};
-  std::chrono::nanoseconds dense_time{};  ///< of that, for the points of pixels
+  std::chrono::nanoseconds dense_time{};  ///< the part of decode_time spent on the points of pixels
   StageTimes stage_times{};
   std::vector<double> full_levels;  ///< the level of a saturated pixel, of each camera
   std::string picture_png;          ///< empty unless asked for

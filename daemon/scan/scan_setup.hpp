@@ -32,7 +32,7 @@ namespace slsd {
 /// a calibration.
 [[nodiscard]] double pattern_scale(const std::optional<Calibration>& calibration, const DecodeOptions& options);
 
-/// What is risky about the pattern's choice of symbols at a scale, a sentence each; nothing where nothing is. Takes a
+/// Warnings about the pattern's choice of symbols at a scale, one sentence each. Empty if there is no risk. Takes a
 /// part of a second of computing.
 [[nodiscard]] std::vector<std::string> symbol_warnings(const PatternOptions& pattern, double scale);
 
@@ -41,14 +41,14 @@ namespace slsd {
 /// cameras
 [[nodiscard]] Result<std::optional<Calibration>> configured_calibration(const Configuration& configuration);
 
-/// What a scan's cloud depends on besides its frames, as text that can be read again.
+/// The files that a scan's cloud depends on besides its frames, as text that can be read again.
 struct ScanFiles {
   std::string pattern;      ///< a pattern file
   std::string calibration;  ///< a calibration file; empty: none
 };
 
-/// What the calibration's own error, as its report has it, would do to dense clouds: warnings, each with what to do.
-/// Empty where it is small beside what the clouds measure, or not known.
+/// Warnings about the effect of the calibration's own error, as its report has it, on dense clouds. Each tells what to
+/// do. Empty if the error is unknown or small beside what the clouds measure.
 [[nodiscard]] std::vector<std::string> calibration_error_warnings(const Calibration& calibration);
 
 /// The levels of saturated pixels that the cameras' frames have shown: where no format says, a faint frame after a
@@ -64,7 +64,8 @@ class FullLevels {
   std::vector<double> greatest_;
 };
 
-/// What measures a point for each pixel: made when it is first asked for, as it takes more memory than all else.
+/// The mappers that measure a point for each pixel. They are made on the first request, as they take more memory than
+/// all else.
 /// @thread thread-safe; what it lends belongs to the lane's thread
 class DenseMappers {
  public:
@@ -93,20 +94,19 @@ class DenseMappers {
 /// @thread a lane belongs to one thread at a time; the rest does not change, but for the full levels
 struct ScanSetup {
   Pattern pattern;
-  Grey8 image;  ///< what the projector shows
+  Grey8 image;  ///< the projector's picture of the pattern
   std::optional<Calibration> calibration;
-  std::vector<std::string> camera_names;    ///< of the configured cameras
-  std::vector<std::vector<Decoder>> lanes;  ///< for each thread that decodes, one to a configured camera; empty without
-                                            ///< a calibration
+  std::vector<std::string> camera_names;    ///< names of the configured cameras
+  std::vector<std::vector<Decoder>> lanes;  ///< by decoding thread, then by configured camera; none without calibration
   OtherHardware other_hardware = OtherHardware::kError;
-  std::vector<std::string> camera_formats = {};  ///< as configured, "Mono12"; empty where it is left open
+  std::vector<std::string> camera_formats = {};  ///< configured formats, such as "Mono12"; empty texts if left open
   std::unique_ptr<FullLevels> full_levels = std::make_unique<FullLevels>();
   DecodeOptions decode = {};
   std::unique_ptr<DenseMappers> dense = std::make_unique<DenseMappers>();
   std::unique_ptr<Crew> crew = std::make_unique<Crew>(Crew::helpers_here());  ///< helps the lanes
   std::unique_ptr<EmptyClouds> empty_clouds = std::make_unique<EmptyClouds>();
   std::vector<std::string> doubts = {};                ///< about the calibration, as calibration_doubts() has them
-  double depth_min_mm = DecodeOptions{}.depth_min_mm;  ///< where along the cameras' axes there may be something
+  double depth_min_mm = DecodeOptions{}.depth_min_mm;  ///< nearest depth of the scene, along the cameras' axes
   double depth_max_mm = DecodeOptions{}.depth_max_mm;
 
   /// @param lanes  how many threads decode

@@ -19,7 +19,7 @@ namespace slsd {
 inline constexpr std::array kDurationBounds{0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05,
                                             0.1,    0.2,   0.5,   1.0,   2.0,  5.0};
 
-/// How long something took: the last time, on average, at most, and how often how long.
+/// The times that one activity took: the last, the mean, the maximum, and a histogram.
 struct Duration {
   std::chrono::nanoseconds last{};
   std::chrono::nanoseconds total{};
@@ -33,15 +33,15 @@ struct Duration {
   }
 };
 
-/// What all scans since the start came to.
+/// The totals of all scans since the start.
 struct ScanTotals {
   std::uint64_t succeeded = 0;
   std::map<ErrorCode, std::uint64_t> failed;
   std::optional<Error> last_error;
-  std::uint64_t points = 0;      ///< of the last scan
-  std::string empty;             ///< why the last scan gave no point; empty: it gave some
-  std::uint64_t all_points = 0;  ///< of symbols
-  std::uint64_t lost_tries = 0;  ///< of the scans that succeeded
+  std::uint64_t points = 0;      ///< points of the last scan
+  std::string empty;             ///< cause of the last scan's empty cloud; empty: it had points
+  std::uint64_t all_points = 0;  ///< points of symbols, of all scans
+  std::uint64_t lost_tries = 0;  ///< lost tries of the scans that succeeded
   std::array<std::uint64_t, kRegionStatusCount> regions{};
   RegionCounts regions_of_last{};
   std::array<std::uint64_t, kDecodeRuleCount> rules{};
@@ -49,9 +49,9 @@ struct ScanTotals {
   std::uint64_t skipped = 0;  ///< sets of frames taken in free run and not decoded: newer ones came
   Duration capture;
   Duration decode;
-  Duration latency;  ///< from the last byte of a scan's frames to its cloud at a client's socket
+  Duration latency;  ///< time from the last byte of a scan's frames to its cloud at a client's socket
   std::array<Duration, kStageCount> stages{};
-  Duration dense;  ///< of the scans with a point for each pixel, what those took
+  Duration dense;  ///< time for the points of pixels, of the scans that have them
   std::array<std::uint64_t, kDensePixelCount> pixels{};
 };
 

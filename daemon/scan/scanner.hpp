@@ -27,12 +27,12 @@
 
 namespace slsd {
 
-/// What scans in free run give: a cloud, or why there is none.
+/// The outcome of a scan in free run: a cloud, or the reason for having none.
 using FreeScan = std::shared_ptr<const Result<ScanResult>>;  // shared: every subscriber reads it at its own pace
 
-/// What the subscribers together want.
+/// The combined wishes of the subscribers.
 struct FreeRun {
-  double rate_hz = 0;  ///< at most; infinity: as fast as frames come
+  double rate_hz = 0;  ///< maximum rate; infinity: as fast as frames come
   CloudFormats formats;
 };
 
@@ -66,7 +66,7 @@ class Scanner {
 
   // These wait for no device.
 
-  /// What the next scan is decoded by.
+  /// The setup that decodes the next scan.
   [[nodiscard]] SharedSetup setup() const;
   /// The pattern's image as a PNG.
   void pattern(Answer<std::string> answer);
@@ -97,10 +97,10 @@ class Scanner {
   [[nodiscard]] ScanTotals totals() const { return statistics_.totals(); }
   /// A scan's cloud was handed to a client's socket, so long after the last byte of its frames was there.
   void note_latency(std::chrono::nanoseconds time) { statistics_.note_latency(time); }
-  /// What the scans say of the calibration, one to a configured camera; empty before the first scan.
+  /// The drift of the calibration that the scans show, one per configured camera; empty before the first scan.
   [[nodiscard]] std::vector<DriftState> drifts() const { return watch_.states(); }
-  [[nodiscard]] const BlackBox& black_box() const { return black_box_; }  ///< for its figures
-  [[nodiscard]] const Rig& rig() const { return *rig_; }                  ///< for its statuses
+  [[nodiscard]] const BlackBox& black_box() const { return black_box_; }  ///< its figures are for metrics
+  [[nodiscard]] const Rig& rig() const { return *rig_; }                  ///< its statuses are for clients
 
   /// Ends what is under way, soon, and the threads; requests that wait are answered kCancelled.
   void request_stop();
@@ -140,8 +140,8 @@ class Scanner {
   std::unique_ptr<Rig> rig_;
   mutable std::mutex mutex_;  ///< guards the two below
   SharedSetup setup_;
-  std::shared_ptr<Task> under_way_;  ///< on the scanner's thread
-  SharedSetup adopted_;              ///< by the scanner's thread
+  std::shared_ptr<Task> under_way_;  ///< the task on the scanner's thread
+  SharedSetup adopted_;              ///< the setup that the scanner's thread uses
   std::function<void(FreeScan)> listener_;
   std::function<void(const std::string&, const Error&)> failure_listener_;
   BoundedQueue<Turn> queue_;
@@ -157,7 +157,7 @@ class Scanner {
   std::mutex concluding_;  ///< guards skipped_told_, and keeps the log's lines in the order of the totals
   std::uint64_t skipped_told_ = 0;
   std::atomic<int> failures_in_a_row_{0};
-  std::atomic<bool> empty_told_{false};  ///< why the scans give no points
+  std::atomic<bool> empty_told_{false};  ///< the log has the cause of empty clouds
   std::atomic<double> free_rate_hz_{0};  ///< 0: only when asked
   std::atomic<CloudFormats> free_formats_{};
   MonotonicTime next_free_scan_{};

@@ -15,8 +15,8 @@
 
 namespace slsd {
 
-/// What a client asked of the devices, from its arrival to its one outcome. Whoever comes first ends it: the work that
-/// is done, the deadline, the client that hung up, or the service that stops. What comes later is thrown away.
+/// A client's request to the devices, from its arrival to its one outcome. The first to end it wins: the work that is
+/// done, the deadline, the client that hung up, or the service that stops. Later outcomes are thrown away.
 ///
 ///     waiting --its turn--> under way --done--> over
 ///        \______________________\____ deadline, hang-up, stop ____/
@@ -32,7 +32,7 @@ class Task : public std::enable_shared_from_this<Task> {  // shared: whoever end
   [[nodiscard]] MonotonicTime deadline() const { return deadline_; }
   [[nodiscard]] bool over() const { return over_.stop_requested(); }
 
-  /// How long its work may wait; that tells of whom it waits for.
+  /// The limits of its work's wait. The wait reports whom it waits for.
   [[nodiscard]] Patience patience() {
     Patience patience(deadline_, over_.get_token());
     patience.waits_for = [this](const std::string& device) {

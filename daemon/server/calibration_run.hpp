@@ -46,10 +46,10 @@ class CalibrationRun {
   void conclude(const Result<>& in_force);
 
   [[nodiscard]] bool under_way() const { return phase_ != Phase::kNone; }
-  /// Whose requests are its own; 0: none.
+  /// The process whose requests are the session's own; 0: none.
   [[nodiscard]] pid_t process() const { return process_; }
-  /// What it is at, and how the last one ended. Who shows a session asks again and again: one that nobody looks at any
-  /// more is given up.
+  /// The session's state, and the outcome of the last one. Clients that show a session call this again and again: a
+  /// session that nobody looks at any more is given up.
   [[nodiscard]] nlohmann::json look();
 
  private:
@@ -74,7 +74,7 @@ class CalibrationRun {
   nlohmann::json progress_;
   nlohmann::json outcome_;
   nlohmann::json error_;
-  std::deque<std::string> log_;  ///< what it says to a person, the last lines
+  std::deque<std::string> log_;  ///< its last lines for a person
 };
 
 }  // namespace slsd

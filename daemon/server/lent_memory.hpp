@@ -14,8 +14,8 @@ namespace slsd {
 
 /// A memfd that holds bytes and can neither change nor shrink nor grow.
 struct SealedMemory {
-  FileDescriptor given;  ///< for the client, to be read and mapped
-  FileDescriptor kept;   ///< by which we see whether anybody has it still
+  FileDescriptor given;  ///< the client's descriptor, to be read and mapped
+  FileDescriptor kept;   ///< our descriptor, which shows whether anybody still has the memory
   std::size_t bytes = 0;
 };
 
@@ -43,7 +43,7 @@ class LentMemory {
   /// Forgets those that nobody has any more.
   void sweep();
   [[nodiscard]] std::size_t count() const { return lent_.size(); }
-  /// How many somebody still has.
+  /// The number of pieces that somebody still has.
   [[nodiscard]] std::size_t count_of(const void* to);
 
  private:

@@ -29,7 +29,7 @@ class MemoryBudget {
 
   [[nodiscard]] std::size_t limit() const { return limit_bytes_; }
   [[nodiscard]] std::size_t held() const { return held_; }
-  /// What one client may hold where no other holds anything.
+  /// The limit of one client while no other holds anything.
   [[nodiscard]] std::size_t limit_of_one() const { return limit_bytes_ / 2; }
 
   /// Memory that outlives its client, as clouds that are lent: all of it together at most a half.
@@ -40,12 +40,12 @@ class MemoryBudget {
  private:
   friend class MemoryAccount;
   std::size_t limit_bytes_;
-  std::size_t held_ = 0;  ///< what is lent, too
+  std::size_t held_ = 0;  ///< bytes held, including those lent
   std::size_t lent_ = 0;
-  std::map<std::uint32_t, std::size_t> held_by_user_;  ///< of those that count as one client
+  std::map<std::uint32_t, std::size_t> held_by_user_;  ///< bytes of the accounts that count as one client
 };
 
-/// What one client holds of it.
+/// One client's account with the budget.
 /// @thread thread-bound
 class MemoryAccount {
  public:

@@ -18,7 +18,7 @@ namespace slsd {
 /// One method of the socket's protocol.
 struct RpcMethod {
   std::string_view name;
-  Role role;  ///< that it takes
+  Role role;  ///< role that a client needs
   void (*run)(ServiceState& state, const nlohmann::json& params, Session& session, Respond respond);
   /// Whether a request with these parameters changes the light, or what a scan gives. Null: none does.
   bool (*disturbs)(const nlohmann::json& params) = nullptr;
@@ -27,7 +27,7 @@ struct RpcMethod {
 /// All methods, by name.
 [[nodiscard]] std::span<const RpcMethod> methods();
 
-/// What follows when slsd-calibrate has ended: what it made comes into force as `set` does it, and scans go on.
+/// Acts on the end of slsd-calibrate: the calibration it made comes into force as `set` does it, and scans go on.
 void calibrated(ServiceState& state, bool made);
 
 /// Carries a request out. @thread thread-bound to the event loop's

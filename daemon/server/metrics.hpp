@@ -12,7 +12,7 @@ namespace slsd {
 /// the type and the help of a counter are those of its name with "_total".
 enum class MetricsFormat { kOpenMetrics, kPrometheus };
 
-/// What `metrics` answers: the service, its devices, clients and scans. docs/metrics.md lists them.
+/// The answer to `metrics`: the service, its devices, clients and scans. docs/metrics.md lists the metrics.
 /// @thread thread-bound to the event loop's
 [[nodiscard]] std::string metrics_text(const ServiceState& state, MetricsFormat format = MetricsFormat::kOpenMetrics);
 

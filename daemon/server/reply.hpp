@@ -17,20 +17,20 @@
 
 namespace slsd {
 
-/// What goes to a client in one piece: a line, the bytes that follow it, and a descriptor that comes with the line.
+/// One piece of output to a client: a line, the bytes that follow it, and a descriptor that comes with the line.
 struct Outgoing {
   enum class Kind { kReply, kEvent };
   Kind kind = Kind::kReply;
   std::string line;
   SharedBytes bytes;          ///< null: none
   FileDescriptor descriptor;  ///< sent with the line's first byte
-  FileDescriptor kept;        ///< where the descriptor is that of a SealedMemory: its other one, to be counted as lent
+  FileDescriptor kept;        ///< the other descriptor of a SealedMemory, to be counted as lent
   std::size_t lent_bytes = 0;
 
   [[nodiscard]] std::size_t size() const { return line.size() + (bytes ? bytes->size() : 0); }
 };
 
-/// What a method gives: its result, the bytes that follow the reply or a memfd, and events that go out before it.
+/// The outcome of a method: its result, the bytes that follow the reply or a memfd, and events that go out before it.
 struct Reply {
   nlohmann::json result;
   SharedBytes bytes = nullptr;

@@ -8,7 +8,7 @@
 
 namespace slsd {
 
-/// What a client is told of a scan besides its cloud: id, time, number of points, regions by status, times.
+/// The description of a scan for clients, besides its cloud: id, time, number of points, regions by status, times.
 [[nodiscard]] nlohmann::json scan_json(const ScanResult& scan, Density density = Density::kSymbols);
 
 /// The rules that rejected regions of a scan or kept them from being brought back, the commonest first: each with its

@@ -24,7 +24,7 @@ namespace slsd {
 /// @thread thread-bound to the event loop's, but for publish()
 class Server {
  public:
-  /// What the subscribers together want; nothing where there are none.
+  /// Called with the combined wishes of the subscribers; without a value if there are none.
   using DemandChanged = std::function<void(std::optional<FreeRun> demand)>;
 
   /// Carries a request out; answers through respond, now or later.
@@ -47,11 +47,11 @@ class Server {
 
   [[nodiscard]] std::size_t clients() const { return sessions_.size(); }
   [[nodiscard]] std::size_t subscribers() const;
-  /// How many were too slow to take what was sent to them.
+  /// The number of clients dropped because they read too slowly.
   [[nodiscard]] std::uint64_t dropped() const { return room_->traffic.dropped; }
   [[nodiscard]] const Traffic& traffic() const { return room_->traffic; }
   [[nodiscard]] const MemoryBudget& memory() const { return room_->memory; }
-  /// To be called when a session's subscription changed.
+  /// Recomputes the demand. Call it when a session's subscription changed.
   void update_demand();
 
   /// Hands a free scan over; of those that the event loop did not get to yet the oldest are lost, and counted.

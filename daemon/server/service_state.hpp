@@ -22,24 +22,24 @@
 
 namespace slsd {
 
-/// What was asked for so far.
+/// The counts of requests so far.
 struct RequestCounts {
-  std::map<std::string_view, std::uint64_t> by_method;  ///< of all methods
-  std::map<std::string, std::uint64_t> failed;          ///< by the error's name
+  std::map<std::string_view, std::uint64_t> by_method;  ///< requests to each method
+  std::map<std::string, std::uint64_t> failed;          ///< failed requests, by the error's name
 };
 
-/// How many pictures one user may have shown at a time, which fills up again as time goes by.
+/// The number of pictures that one user may have shown at a time. It fills up again as time goes by.
 struct PictureAllowance {
   double left;
   std::chrono::steady_clock::time_point since;
 };
 
-/// What the methods act on. Everything outlives the server's sessions.
+/// The state that the methods act on. Everything outlives the server's sessions.
 struct ServiceState {
   asio::io_context& events;
   Scanner& scanner;
   std::filesystem::path configuration_file;
-  Configuration configuration;  ///< in force; a reload replaces what it may
+  Configuration configuration;  ///< the one in force; a reload replaces its changeable parts
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   Server* server = nullptr;
   std::function<std::uint64_t()> log_lines_dropped = {};
@@ -48,9 +48,9 @@ struct ServiceState {
   nlohmann::json settings = nlohmann::json::object();  ///< set over the socket, as merge_settings() has them
   /// Writes a bundle of the last scans, then answers with its bytes.
   std::function<void(Scanner::Answer<std::string>)> bundle = {};
-  std::function<std::uint64_t()> bundles_written = {};  ///< by itself
+  std::function<std::uint64_t()> bundles_written = {};  ///< number of bundles that the service wrote by itself
   RequestCounts requests = {};
-  std::map<std::uint32_t, PictureAllowance> pictures = {};  ///< by user; who is not in it has all
+  std::map<std::uint32_t, PictureAllowance> pictures = {};  ///< allowances by user; a user without an entry has all
   std::filesystem::path calibrator = {};                    ///< slsd-calibrate; empty: not found
   std::unique_ptr<CalibrationRun> calibration = {};
 };

@@ -30,17 +30,17 @@ namespace slsd {
 
 class Session;
 
-/// What went between a server and all its clients so far.
+/// The traffic between a server and all its clients so far.
 struct Traffic {
   std::uint64_t accepted = 0;     ///< clients
-  std::uint64_t refused = 0;      ///< for want of places or of a role
-  std::uint64_t dropped = 0;      ///< as they were too slow
-  std::uint64_t clouds_lost = 0;  ///< by subscribers that read too slowly
+  std::uint64_t refused = 0;      ///< connections refused for want of places or of a role
+  std::uint64_t dropped = 0;      ///< clients dropped because they read too slowly
+  std::uint64_t clouds_lost = 0;  ///< clouds lost because a subscriber read too slowly
   std::uint64_t bytes_received = 0;
   std::uint64_t bytes_sent = 0;
 };
 
-/// What the sessions of a server have in common.
+/// The state that the sessions of a server share.
 struct SessionRoom {
   SessionRoom(asio::io_context& events, const ServerOptions& server_options)
       : options(server_options),
@@ -54,7 +54,7 @@ struct SessionRoom {
   MemoryBudget memory;
   LentMemory lent;
   Turns turns;
-  std::array<char, 65536> chunk{};  ///< of the session whose turn it is
+  std::array<char, 65536> chunk{};  ///< input of the session whose turn it is
   Traffic traffic;
   /// Carries a request out; answers through respond, now or later.
   std::function<void(const Request&, Session&, Respond respond)> handler = {};
@@ -146,15 +146,15 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
   LineBuffer lines_;
   Input input_ = Input::kOpen;
   std::stop_source gone_;
-  bool answering_ = false;  ///< from a request's line to the last byte of its reply
-  bool wanted_ = false;     ///< that reply
-  nlohmann::json id_;       ///< of the request under way
+  bool answering_ = false;  ///< true from a request's line to the last byte of its reply
+  bool wanted_ = false;     ///< the request expects a reply
+  nlohmann::json id_;       ///< id of the request under way
   std::uint64_t number_ = 0;
   bool in_turn_ = false;
   std::deque<Outgoing> outgoing_;
   bool writing_ = false;   ///< or waits until more can be sent
   std::size_t sent_ = 0;   ///< bytes of the first outgoing
-  std::size_t timed_ = 0;  ///< of these, when the timer was set
+  std::size_t timed_ = 0;  ///< bytes sent when the timer was set
   bool timing_ = false;
   std::chrono::steady_clock::time_point sent_at_{};
   std::optional<Subscription> subscription_;

@@ -11,11 +11,11 @@
 
 namespace slsd {
 
-/// What `settings` answers besides the pattern and the calibration: version, projector, cameras, and the keys that the
-/// configuration in force gives.
+/// The answer to `settings` besides the pattern and the calibration: version, projector, cameras, and the keys of the
+/// configuration in force.
 [[nodiscard]] nlohmann::json settings_json(const Configuration& configuration);
 
-/// What `status` answers: the service, its devices, and what all scans came to.
+/// The answer to `status`: the service, its devices, and the totals of all scans.
 [[nodiscard]] nlohmann::json status_json(const ServiceState& state);
 
 /// Whether all devices are open, and there is a calibration.

@@ -28,7 +28,7 @@ class Publication {
   [[nodiscard]] SharedBytes cloud(CloudForm form) { return files_.file((*scan_)->cloud, (*scan_)->dense.get(), form); }
   /// Whether it is a cloud of that density: a scan that was taken before somebody asked for pixels has none.
   [[nodiscard]] bool fits(CloudForm form) const { return !*scan_ || !form.dense() || (*scan_)->dense; }
-  /// What it holds of memory: the cloud, and its files so far.
+  /// The memory it holds, in bytes: the cloud, and its files so far.
   [[nodiscard]] std::size_t bytes() const {
     if (!*scan_) return 0;
     return (*scan_)->cloud.points.size() * sizeof(CloudPoint) + files_.bytes() +
@@ -42,9 +42,9 @@ class Publication {
 
 using SharedPublication = std::shared_ptr<Publication>;  // shared: clients send it at their own pace
 
-/// What one client wants of the free scans. Clouds that could not be sent yet keep their turn, so that those that come
-/// together all arrive; the newest wins: where there are too many, or they have waited too long, the oldest are lost
-/// and counted.
+/// One client's subscription to the free scans. Clouds that could not be sent yet keep their turn, so that those that
+/// come together all arrive. The newest wins: the oldest are lost and counted if there are too many or they have waited
+/// too long.
 /// @thread thread-bound
 class Subscription {
  public:
@@ -68,7 +68,7 @@ class Subscription {
   }
   /// Clouds lost since this was asked before.
   [[nodiscard]] std::uint64_t take_uncounted() { return std::exchange(uncounted_, 0); }
-  /// What those that wait hold of memory.
+  /// The memory that the waiting clouds hold, in bytes.
   [[nodiscard]] std::size_t waiting_bytes() const;
   /// Loses the one that has waited longest.
   void lose_oldest();

@@ -35,12 +35,12 @@ class Turns {
   struct Taker {
     std::chrono::nanoseconds used_until{};
     std::chrono::nanoseconds last_cost{};
-    std::optional<std::chrono::nanoseconds> left_at;  ///< when its last turn ended
-    bool asked = false;                               ///< for a turn that has not begun
+    std::optional<std::chrono::nanoseconds> left_at;  ///< time when its last turn ended
+    bool asked = false;                               ///< it waits for a turn that has not begun
   };
 
   using Time = std::chrono::nanoseconds (*)();
-  /// Of the processor, that this thread had.
+  /// The processor time that this thread has used.
   [[nodiscard]] static std::chrono::nanoseconds processor_time();
 
   /// @param time  another one is for tests
@@ -63,14 +63,15 @@ class Turns {
     std::chrono::nanoseconds start;
     std::function<void()> turn;
   };
-  /// Whose turn is under way, and what it asks for meanwhile: that waits until the turn's cost is known.
+  /// The taker whose turn is under way. Its next request waits in the two members below, until the turn's cost is
+  /// known.
   Taker* running_ = nullptr;
   std::chrono::nanoseconds again_cost_{};
   std::function<void()> again_;
   asio::io_context& events_;
   Time time_;
-  std::multimap<std::chrono::nanoseconds, Waiting> waiting_;  ///< by expected end; equals in the order of asking
-  std::chrono::nanoseconds now_{};                            ///< where who comes anew begins
+  std::multimap<std::chrono::nanoseconds, Waiting> waiting_;  ///< sorted by expected end; equals in the order of asking
+  std::chrono::nanoseconds now_{};                            ///< earliest start of a taker's turn
 };
 
 }  // namespace slsd

@@ -37,7 +37,7 @@ constexpr std::size_t kFieldBytesMax = 256;
 
 std::shared_ptr<LogSink> log_sink;  // of this program
 
-/// As sd-daemon(3) writes a level.
+/// The prefix of a log level for the journal, as in sd-daemon(3).
 std::string_view journal_prefix(level_enum level) {
   if (level >= spdlog::level::critical) return "<2>";
   if (level == spdlog::level::err) return "<3>";

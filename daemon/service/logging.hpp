@@ -16,7 +16,7 @@ namespace slsd {
 
 /// The longest line of the log, with its end. What would be longer ends in an ellipsis.
 inline constexpr std::size_t kLogLineBytesMax = 2048;
-/// How long the end of the program waits for whoever reads the log.
+/// The longest wait for the log's reader at the end of the program.
 inline constexpr std::chrono::milliseconds kLogPatience{300};
 /// So many lines wait for whoever reads the log; what comes then is dropped and counted, until half of them are read.
 inline constexpr std::size_t kLogLinesMax = 1024;
@@ -34,7 +34,7 @@ class LogSink final : public spdlog::sinks::sink {
     std::string text;
     std::vector<std::string> fields;  ///< "SLSD_CAMERA=left": each LogField of the thread that logged it
   };
-  /// How a line begins and where it goes.
+  /// The prefix and the destination of a line.
   struct Output {
     std::function<std::string(const spdlog::details::log_msg&)> prefix;
     std::function<void(const Line&)> write;  ///< may wait for its reader
@@ -47,7 +47,7 @@ class LogSink final : public spdlog::sinks::sink {
   void set_pattern(const std::string&) override {}
   void set_formatter(std::unique_ptr<spdlog::formatter>) override {}
 
-  /// From now on.
+  /// Queues every line from now on.
   void queue_lines();
   /// Waits until all is written that was logged before, at most so long. @return whether it is
   [[nodiscard]] bool wait_written(std::chrono::milliseconds patience) const;
@@ -62,7 +62,7 @@ class LogSink final : public spdlog::sinks::sink {
 /// Sends the log to the journal where systemd reads standard error, with each line's priority; elsewhere to standard
 /// error, with time and level. At once; a command's log and its output come in the order in which they are told.
 void start_logging(spdlog::level::level_enum level);
-/// From now on no line of the log holds up anybody: for the service.
+/// Queues the log's lines from now on, so that no line holds up anybody. For the service.
 void queue_log();
 /// Before the program ends: gives the log's reader so long to take what is left.
 void flush_log(std::chrono::milliseconds patience);

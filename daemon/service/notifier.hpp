@@ -20,7 +20,7 @@ class Notifier {
   void stopping() const;
   void ping_watchdog() const;
 
-  /// How long the manager waits for a ping before it acts; nothing where it does not watch.
+  /// The time within which the manager expects a ping before it acts. Empty if it does not watch.
   [[nodiscard]] static std::optional<std::chrono::microseconds> watchdog_time();
 };
 

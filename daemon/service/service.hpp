@@ -50,7 +50,7 @@ class Service {
                                                                nlohmann::json settings);
   ~Service();
 
-  /// Where slsd-calibrate is, for the method `calibrate`.
+  /// Sets the path of slsd-calibrate, for the method `calibrate`.
   void set_calibrator(std::filesystem::path program) { state_.calibrator = std::move(program); }
 
   /// Serves until SIGTERM or SIGINT. @errors of Server::open()
