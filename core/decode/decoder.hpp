@@ -49,7 +49,7 @@ class Decoder {
   Decoder& operator=(Decoder&&) noexcept;
   ~Decoder();
 
-  [[nodiscard]] std::uint8_t camera_index() const;  ///< in the calibration
+  [[nodiscard]] std::uint8_t camera_index() const;  ///< index in the calibration
 
   /// Image to points. The result stands until the next call. Nothing found is an empty result with its counters.
   /// @param full      the level of a saturated pixel: 255, 1023, 65535...; without it as HeldFullLevel has it
@@ -57,7 +57,7 @@ class Decoder {
   /// @errors kMismatch: the frame is not of the calibration's size
   [[nodiscard]] Result<const Decoding*> decode(const GreyView& frame, std::optional<double> full = std::nullopt,
                                                StageObserver* observer = nullptr, Executor* executor = nullptr);
-  /// Of the last frame that was decoded.
+  /// Returns the symbols of the last decoded frame.
   [[nodiscard]] DecodedSymbols symbols();
 
  private:

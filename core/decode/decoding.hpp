@@ -26,7 +26,7 @@ enum class Stage : std::uint8_t {
   kDecodeWindows,
   kReview,
   kCorrespond,
-  kAlign,  ///< with precision "fine" alone
+  kAlign,  ///< only with precision "fine"
   kTriangulate
 };
 inline constexpr int kStageCount = 10;
@@ -61,18 +61,18 @@ inline constexpr Directions kDirections;
 
 /// One region of the frame, whatever became of it. The trace from which pictures are drawn.
 struct RegionSeen {
-  Eigen::Vector2f centre_px;  ///< in the camera
+  Eigen::Vector2f centre_px;  ///< place in the camera's image
   RegionStatus status;
   std::int8_t letter;                              ///< index in the pattern's symbols, or -1
   std::array<std::int32_t, 4> links;               ///< by Direction: index of the neighbour's region, or -1
   std::array<bool, 4> broken;                      ///< a link that was there and disagreed with its neighbours
   std::int16_t column, row;                        ///< cell of the pattern, where decoded; else -1
-  DecodeRule rule = DecodeRule::kCertain;          ///< that decided on its status
+  DecodeRule rule = DecodeRule::kCertain;          ///< the rule that decided on its status
   std::optional<DecodeRule> guard = std::nullopt;  ///< the last that kept it from being mended
-  float margin_nats = 0;  ///< by which its cell is likelier than any other, up to what it needs
+  float margin_nats = 0;                           ///< lead of its cell over any other, up to the margin that it needs
 };
 
-/// What one frame gave: its points, and for every region seen what became of it.
+/// Results of one frame: its points, and the status of every region.
 struct Decoding {
   std::vector<CloudPoint> points;
   std::vector<RegionSeen> regions;

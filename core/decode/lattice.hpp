@@ -12,8 +12,8 @@
 
 namespace slsd {
 
-/// How the map from the pattern to the camera bends around a symbol: its second derivatives, camera px per projector px
-/// squared.
+/// Curvature of the map from the pattern to the camera around a symbol: its second derivatives, camera px per projector
+/// px squared.
 struct Bend {
   Eigen::Vector2f uu{0, 0}, uv{0, 0}, vv{0, 0};
 };
@@ -23,18 +23,18 @@ struct Bend {
 struct LatticeSymbol {
   std::int32_t sighting;                   ///< index in Sightings
   std::int16_t row, column;                ///< cell of the pattern
-  Eigen::Vector2f centre_px;               ///< what the camera sees lit by the symbol's centroid in the projector
+  Eigen::Vector2f centre_px;               ///< image of the point that the symbol's centroid lights
   LatticeFrame frame;                      ///< camera px for one projector px
   Bend bend;                               ///< zero where no neighbours tell
   float background, gain;                  ///< grey levels of the frame: the dark, and what light adds to it
-  float misfit;                            ///< of its shape, standard deviations from its letter's
+  float misfit;                            ///< distance of its shape from its letter, standard deviations
   float weight;                            ///< its lit area, camera px squared
   float sigma_px;                          ///< one standard deviation of the centre, in x and in y
-  float damage_px;                         ///< by what an edge that cuts it might have moved it
+  float damage_px;                         ///< possible shift of its centre by an edge that cuts it
   std::array<std::int32_t, 4> neighbours;  ///< by Direction: symbols of the cells beside, linked to it, or -1
 };
 
-/// What a frame shows of the pattern. Points, pictures and alignments are made from it.
+/// The part of the pattern that a frame shows. Points, pictures and alignments are made from it.
 struct Lattice {
   std::vector<LatticeSymbol> symbols;
 };

@@ -9,10 +9,10 @@ namespace slsd {
 
 enum class Method { kDefault, kPaper };
 enum class Precision { kStandard, kFine };
-/// What a cloud has a point for.
+/// The kind of points in a cloud: one for each symbol or for each pixel.
 enum class Density { kSymbols, kPixels };
 
-/// What the keys of [decode] say of clouds with a point for each pixel.
+/// Settings for clouds with a point for each pixel: the dense_ keys of [decode].
 struct DenseOptions {
   int stride_px = 4;      ///< dense_stride_px, 1 to 16; the surface is fitted every so many camera pixels
   double prune_px = 1.5;  ///< dense_prune_px, 0 to 16; points this close to a hole or a jump in depth are dropped
@@ -26,9 +26,9 @@ struct DenseOptions {
 struct DecodeOptions {
   double depth_min_mm = 400.0;  ///< working range along the camera's z axis; cuts the candidates of a codeword
   double depth_max_mm = 2500.0;
-  /// How many a frame that is made to mislead may have on average: sets the margin; 1e-9 to 1.
+  /// Mean number of wrong cells allowed in a frame that is made to mislead: sets the margin; 1e-9 to 1.
   double wrong_cells_max = 0.005;
-  /// kFine: each decoded symbol's patch is aligned with the pattern, which takes several times as long.
+  /// Alignment with the pattern: kFine aligns each decoded symbol's patch, which takes several times as long.
   Precision precision = Precision::kStandard;
   Density density = Density::kSymbols;  ///< unless a request says
   DenseOptions dense = {};
@@ -39,12 +39,12 @@ struct DecodeOptions {
   Method link_grid = Method::kDefault;
   Method decode_windows = Method::kDefault;
   Method correspond = Method::kDefault;
-  RuleTrial* trial = nullptr;  ///< of tools and tests alone; outlives the decoder
+  RuleTrial* trial = nullptr;  ///< only for tools and tests; outlives the decoder
 
   [[nodiscard]] Result<> validate() const;
-  /// Of the working range, by ratio: 1000 of 500 and 2000.
+  /// Middle of the working range, by ratio: 1000 for 500 and 2000.
   [[nodiscard]] double middle_depth_mm() const;
-  /// Whether any stage goes the paper's way.
+  /// Tells whether any stage uses the paper's method.
   [[nodiscard]] bool any_paper() const;
   friend bool operator==(const DecodeOptions&, const DecodeOptions&) = default;
 };

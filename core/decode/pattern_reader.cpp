@@ -28,9 +28,10 @@ constexpr double kFewOfMany = 4;
 constexpr std::size_t kCertain = 40, kLeast = 12;
 /// The share of symbols that has to lie within this part of a cell from where the plane of the others puts them.
 constexpr double kAgreeingShare = 0.6, kAgreeingCells = 0.6;
-/// That a frame may have: what agrees with a plane is kept, and the bundle adjustment leaves out the rest.
+/// Wrong cells that a frame may have: cells that agree with a plane are kept, and the bundle adjustment leaves out the
+/// rest.
 constexpr double kWrongCellsMax = 0.075;
-/// How far from the scale that a reader was made for it is still used.
+/// Ratio to the scale that a reader was made for up to which it is still used.
 constexpr double kSameScale = 1.12;
 
 /// Nothing needs the projector's lens before there is a calibration; the cells' pixels do not depend on it.
@@ -156,8 +157,8 @@ std::vector<SymbolMatch> PatternReader::attempt(const Homography& camera_from_pr
   return matches;
 }
 
-/// Those at which shapes have a symbol's size, on nearly as many pixels as at any other: prototypes are made for these
-/// alone.
+/// Finds the scales at which shapes have a symbol's size, on nearly as many pixels as at any other scale. Prototypes
+/// are made for these alone.
 std::vector<double> PatternReader::likely_scales(const GreyView& whole) {
   const std::vector<double> scales = scales_to_try();
   std::vector<double> lit_px;
@@ -187,7 +188,7 @@ std::vector<double> PatternReader::likely_scales(const GreyView& whole) {
   return likely;
 }
 
-/// As the camera stands, then at every turn.
+/// Searches as the camera stands, then at every turn.
 std::vector<SymbolMatch> PatternReader::search(const GreyView& frame) {
   std::vector<SymbolMatch> best;
   const auto found_at = [&](double angle, double scale) {

@@ -40,7 +40,7 @@ class PatternReader {
                                                       const std::optional<FrameNoise>& noise = std::nullopt);
 
   [[nodiscard]] const Pattern& pattern() const { return pattern_.pattern(); }
-  /// How many shapes of a symbol's size the last frame had: many, and none read, is another pattern.
+  /// Number of shapes of a symbol's size in the last frame. Many shapes of which none was read show another pattern.
   [[nodiscard]] std::size_t shapes() const { return shapes_; }
 
  private:
@@ -52,7 +52,7 @@ class PatternReader {
   };
   /// The frame in which symbols of a scale have a size that is quick to read, and no larger than needed to be exact.
   [[nodiscard]] Shrunk frame_for(double scale, const GreyView& frame);
-  /// Of a shrunk frame, as far as it is known.
+  /// Noise of a shrunk frame, as far as it is known.
   [[nodiscard]] std::optional<FrameNoise> noise_of(const Shrunk& frame) const;
   [[nodiscard]] std::vector<SymbolMatch> attempt(const Homography& camera_from_projector, const GreyView& frame,
                                                  bool is_there);

@@ -11,7 +11,7 @@
 
 namespace slsd {
 
-/// What became of a region. Everything but kDecoded is a reason for rejection.
+/// Status of a region. Everything but kDecoded is a reason for rejection.
 enum class RegionStatus : std::uint8_t {
   kDecoded,
   kTooSmall,
@@ -34,8 +34,8 @@ inline constexpr int kRegionStatusCount = 15;
 /// "too_small", as in the counters of `status`.
 [[nodiscard]] std::string_view to_string(RegionStatus status);
 
-/// What decides on a symbol: the ways to accept it, each test that rejects it, and each guard that keeps it from being
-/// mended. Their texts are in rules.cpp, in this order.
+/// Rules that decide on a symbol: the ways to accept it, each test that rejects it, and each guard that keeps it from
+/// being mended. Their texts are in rules.cpp, in this order.
 enum class DecodeRule : std::uint8_t {
   kCertain,
   kMended,
@@ -84,17 +84,17 @@ enum class RuleKind : std::uint8_t {
 struct RuleText {
   std::string_view name;  ///< "too_small", as in the counters
   RuleKind kind;
-  RegionStatus gives;        ///< that a symbol has then; of a guard none
+  RegionStatus gives;        ///< resulting status of a symbol; none for a guard
   bool has_switch;           ///< whether the decoder can do without it
   std::string_view meaning;  ///< one sentence
-  std::string_view remedy;   ///< what a user may do about it
+  std::string_view remedy;   ///< action that a user may take
 };
 
 [[nodiscard]] const RuleText& text_of(DecodeRule rule);
 [[nodiscard]] inline std::string_view to_string(DecodeRule rule) {
   return text_of(rule).name;
 }
-/// As docs/reasons.md and the pictures count them, from 1.
+/// Number of a rule in docs/reasons.md and in the pictures, from 1.
 [[nodiscard]] inline int number_of(DecodeRule rule) {
   return static_cast<int>(rule) + 1;
 }
@@ -102,13 +102,13 @@ struct RuleText {
   return static_cast<DecodeRule>(index);
 }
 
-/// How many regions each rule decided on.
+/// Number of regions that each rule decided on.
 using RuleCounts = std::array<std::uint32_t, kDecodeRuleCount>;
 
 using RuleSet = std::bitset<kDecodeRuleCount>;
 
-/// For tools and tests: which rules a decoder leaves out, which of all it has come to apply, and whether it measures
-/// margins beyond what a cell needs. It changes from frame to frame while decoders look at it.
+/// Trial of a decoder's rules, for tools and tests. It names the rules to leave out, collects those that came to apply,
+/// and may ask for margins beyond what a cell needs. It changes from frame to frame while decoders use it.
 /// @thread set and read while no decoder runs
 struct RuleTrial {
   RuleSet off;
@@ -120,13 +120,13 @@ struct RuleTrial {
   }
 };
 
-/// How a stage asks its rules. A service has no trial, and leaves none of them out.
+/// Access of a stage to its rules. A service has no trial, and leaves none of them out.
 class Rules {
  public:
   Rules() = default;
   explicit Rules(RuleTrial* trial) : trial_(trial) {}
 
-  /// Whether a rule applies: its test holds, and it is not left out.
+  /// Tells whether a rule applies: its test holds, and it is not left out.
   [[nodiscard]] bool apply(DecodeRule rule, bool holds) const { return holds && (trial_ == nullptr || tried(rule)); }
   [[nodiscard]] bool whole_margins() const { return trial_ != nullptr && trial_->whole_margins; }
 

@@ -73,7 +73,7 @@ const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarVi
   return lattice_;
 }
 
-/// How symbols look in this frame, by a sample of those whose neighbours show how they lie.
+/// Measures the look of symbols in this frame, from a sample whose neighbours show their local frames.
 void SymbolReader::measure_look() {
   constexpr std::size_t kSamples = 200;
   const float size = static_cast<float>(pattern().options.symbol_size_px);
@@ -141,7 +141,7 @@ void SymbolReader::classify_in_measured_frames(Executor& executor) {
   });
 }
 
-/// What is worn is mended between: it is evidence then, too.
+/// Infers the cells, and mends worn symbols in between: these are evidence then, too.
 void SymbolReader::infer_cells(const GreyView& frame, EpipolarView* view, Executor& executor) {
   if (options_.decode_windows == Method::kPaper) {
     paper_->decode_windows(pattern().whole_rows(), pattern().whole_columns(), seen_);
@@ -208,8 +208,8 @@ void SymbolReader::fit_lattice(const GreyView& frame, double full, const Epipola
   noise_ = measure_noise(frame, full);
 }
 
-/// What is left of a symbol that an edge cuts may still look like it, but its centre lies elsewhere: at a rim what is
-/// an order less certain than most goes.
+/// Refuses symbols that an edge cuts. The rest of one may still look like it, but its centre lies elsewhere. At a rim,
+/// symbols an order less certain than the median go.
 void SymbolReader::refuse_cut() {
   constexpr float kOfMedian = 13;
   std::vector<LatticeSymbol>& symbols = lattice_.symbols;

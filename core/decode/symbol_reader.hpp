@@ -39,7 +39,7 @@ class SymbolReader {
   SymbolReader(const IndexedPattern& pattern, const Lens& projector, ExpectedFrames expected,
                const DecodeOptions& options, std::optional<PaperWay> paper);
 
-  /// Of the same scale, to an eighth.
+  /// Sets expected frames of the same scale, to an eighth.
   void expect(ExpectedFrames expected) { finder_.expect(std::move(expected)); }
   [[nodiscard]] float expected_scale() const { return finder_.expected().in_the_middle().scale; }
 
@@ -59,14 +59,14 @@ class SymbolReader {
   void list_off_line(std::vector<SymbolMatch>& matches) const;
   /// The symbol turned out to be no point.
   void reject(const LatticeSymbol& symbol, DecodeRule by) { seen_.claims[symbol.sighting].decide(by); }
-  /// What became of every region, with the counters.
+  /// Reports the status of every region, with the counters.
   void report(Decoding& decoding) const;
 
   [[nodiscard]] const Pattern& pattern() const { return fixed_->pattern.pattern(); }
-  /// Of the last frame.
+  /// Returns the noise of the last frame.
   [[nodiscard]] const FrameNoise& noise() const { return noise_; }
   [[nodiscard]] const CellRays& cells() const { return fixed_->cells; }
-  /// How many shapes of a symbol's size the last frame had.
+  /// Number of shapes of a symbol's size in the last frame.
   [[nodiscard]] std::size_t shapes() const { return seen_.size(); }
 
  private:
@@ -84,7 +84,7 @@ class SymbolReader {
   void infer_cells(const GreyView& frame, EpipolarView* view, Executor& executor);
   void review(const GreyView& frame, Executor& executor);
   [[nodiscard]] CellGate gate_of(const EpipolarView* view) const;
-  /// Of the pattern in this frame, standard deviation, projector px.
+  /// Blur of the pattern in this frame, standard deviation, projector px.
   [[nodiscard]] float blur_px() const;
   void mend(const GreyView& frame, const CellGate& gate, EpipolarView* view);
   void correspond(const EpipolarView* view, Executor& executor);

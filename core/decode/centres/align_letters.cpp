@@ -126,7 +126,7 @@ void LetterAligner::ask(const LetterScene& scene, std::int32_t node, const Lette
   asked_.push_back({.node = node, .place = place, .task = task});
 }
 
-/// In windows that lie within their cells: beyond is what neighbours light.
+/// Aligns in windows that lie within their cells: light from the neighbours falls beyond.
 void LetterAligner::align(const LetterScene& scene) {
   std::array<PatchTask*, kEight> eight;
   for (std::size_t first = 0; first < asked_.size(); first += kEight) {

@@ -23,10 +23,10 @@ namespace slsd {
 class LetterFields {
  public:
   explicit LetterFields(const PatternOptions& pattern);
-  /// That of the nearest blur.
+  /// Returns the letters at the nearest blur.
   /// @param blur_px  standard deviation, projector px
   [[nodiscard]] const PatternField& at(float blur_px) const { return fields_.nearest(blur_px); }
-  /// Where in them the middle of a letter's square is.
+  /// Returns the middle of a letter's square in these fields.
   [[nodiscard]] Eigen::Vector2f middle_px(int letter) const;
 
  private:
@@ -39,15 +39,15 @@ struct LetterScene {
   const GreyView& frame;
   double full;  ///< the level of a saturated pixel
   const FrameNoise& noise;
-  const PatternField& letters;  ///< as blurred as the pattern is in the frame
-  const CellGate& gate;         ///< that knows the epipolar lines
+  const PatternField& letters;  ///< blurred as the pattern is in the frame
+  const CellGate& gate;         ///< holds the epipolar lines
   std::span<const Prototype> prototypes;
   Sightings& seen;
 };
 
-/// Where a symbol is looked for, and in what light.
+/// The expected place of a symbol, and the light there.
 struct LetterPlace {
-  Eigen::Vector2f centre_px = Eigen::Vector2f::Zero();  ///< of its square, in the camera
+  Eigen::Vector2f centre_px = Eigen::Vector2f::Zero();  ///< middle of its square in the camera's image
   LatticeFrame frame = LatticeFrame::Zero();
   float background = 0, peak = 0;  ///< grey levels
   int held_by = 0;                 ///< neighbours; none: there is no place
@@ -58,16 +58,18 @@ struct AskedLetter {
   std::int32_t node;  ///< in Sightings
   LetterPlace place;
   PatchTask task;
-  /// Where the middle of its square and its centroid are seen, camera px.
+  /// Measured middle of the letter's square, and its centroid, camera px.
   Eigen::Vector2f centre_px = Eigen::Vector2f::Zero(), centroid_px = Eigen::Vector2f::Zero();
-  float tilt_px = 0;  ///< how far its tilt from its place's moves the middles of its cell's sides, projector px
+  float tilt_px = 0;  ///< shift of the middles of its cell's sides by its tilt against the place's, projector px
 };
 
-/// Of the pixels in a square, those that agree with the letter, those that are brighter than its light, those that are
-/// lit beside it, where it is dark, and those that it lights, but less than it should, as on print.
+/// Shares of the pixels in a square: those that agree with the letter, those that are brighter than its light, and two
+/// more. `beside` counts lit pixels where the letter is dark. `darkened` counts pixels that are lit too weakly, as on
+/// print.
 struct LightShares {
   float agree, brighter, beside, darkened;
-  /// Of those that print leaves as they are, counted as two fifths at least: fewer tell too little.
+  /// Share that agrees among the pixels that print leaves alone. It counts them as two fifths at least: fewer tell too
+  /// little.
   [[nodiscard]] float agree_beside_print() const;
 };
 
@@ -82,16 +84,17 @@ class LetterAligner {
   /// Looks for a symbol at a place, unless its cell reaches beyond the frame there.
   void ask(const LetterScene& scene, std::int32_t node, const LetterPlace& place);
   void align(const LetterScene& scene);
-  /// In the order in which they were asked.
+  /// Returns the letters in the order in which they were asked.
   [[nodiscard]] std::vector<AskedLetter>& asked() { return asked_; }
   [[nodiscard]] const std::vector<AskedLetter>& asked() const { return asked_; }
 
   [[nodiscard]] int letter_of(const CellClaim& claim) const { return array_.at(claim.row, claim.column); }
   [[nodiscard]] LightShares shares_of_middle(const LetterScene& scene, const AskedLetter& asked) const;
   [[nodiscard]] LightShares shares_of_cell(const LetterScene& scene, const AskedLetter& asked) const;
-  /// Whether there is light in its cell where its letter has none, as where two surfaces share it: print gives none.
+  /// Tells whether the cell has light where its letter has none. Two surfaces that share a cell cause this; print does
+  /// not.
   [[nodiscard]] bool shows_other_light(const LetterScene& scene, const AskedLetter& asked) const;
-  /// How much of the window agrees, or of the cell, where print does not count.
+  /// Share of the window or of the cell that agrees, without pixels that print darkens. The larger of the two counts.
   [[nodiscard]] float support_beside_print(const LetterScene& scene, const AskedLetter& asked) const;
   /// Gives the sighting what was found: it shows its letter then, and stands for now.
   void take_over(const LetterScene& scene, const AskedLetter& asked) const;
@@ -108,9 +111,10 @@ class LetterAligner {
 inline constexpr float kAlignedAcrossMaxPx = 0.4F, kAlignedSettledPx = 0.05F;
 /// Parts of two surfaces look tilted more, and the place is then on neither.
 inline constexpr float kAlignedTiltMaxPx = 0.5F;
-/// So much of a cell agrees, where print does not count, unless an edge runs through it.
+/// Share of a cell that agrees at least, without pixels that print darkens, unless an edge runs through the cell.
 inline constexpr float kWholeBesidePrintMin = 0.85F;
-/// What has one alone beside it lies nearer to its line, and is seen better, where print does not count.
+/// Limits of a symbol with a single neighbour: it lies nearer to its line and agrees better, without pixels that print
+/// darkens.
 inline constexpr float kLoneAcrossMaxPx = 0.2F, kLoneSupportMin = 0.85F;
 
 }  // namespace slsd

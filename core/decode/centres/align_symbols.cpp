@@ -12,16 +12,16 @@
 namespace slsd {
 namespace {
 
-/// How far beyond its cell a symbol's patch reaches, projector px: its neighbours' edges help to place it.
+/// Width of a patch's rim beyond its cell, projector px: the neighbours' edges help to place it.
 constexpr float kBeyondCellPx = 1.5F;
 /// The share of a patch that agrees with the pattern, below which it is tried whether a neighbour's plane fits better.
 constexpr float kSupportWeak = 0.94F;
-/// What else a patch's place is off by, fitted as aligned_sigma_px is: see AlignedSymbol::sigma_mm.
+/// Further errors of a patch's place, fitted as for aligned_sigma_px: see AlignedSymbol::sigma_mm.
 constexpr float kSamplingPx = 0.002F;     // sampling of the pattern, projector px
 constexpr float kOfDisagreement = 0.17F;  // with the neighbours' planes
 constexpr float kOfShading = 0.5F;        // of the relative change of the light for one px
 
-/// How many symbols tell the frame's blur.
+/// Number of symbols from which the frame's blur is measured.
 constexpr std::size_t kBlurSamples = 40;
 
 /// The inverse depth of a patch's plane at a camera pixel, from the patch's middle; and its change for one px.
@@ -32,7 +32,7 @@ double inverse_depth(const PatchMap& map, const PatchState& state, const Eigen::
   return map.reference_inverse_depth + disparity * map.inverse_depth_per_px;
 }
 
-/// Of the disparity in the patch's middle, from the residual that is left.
+/// Variance of the disparity in the patch's middle, from the residual that is left.
 float variance_of_noise(const PatchFit& fit) {
   return fit.covariance(0, 0) * fit.residual * fit.residual;
 }
@@ -145,8 +145,8 @@ std::size_t SymbolAligner::find_blur(const GreyView& frame, double full, const F
   return best;
 }
 
-/// Where a part of a symbol is cut off, the rest of it fits many a plane nearly; its neighbours know better where to
-/// begin.
+/// Tries the planes of the neighbours as starts. If part of a symbol is cut off, many planes nearly fit the rest; its
+/// neighbours' planes are better starts.
 void SymbolAligner::try_neighbours(const GreyView& frame, double full, const FrameNoise& noise, const Lattice& lattice,
                                    std::size_t index, std::size_t blur) {
   Patch& patch = patches_[index];
@@ -161,7 +161,7 @@ void SymbolAligner::try_neighbours(const GreyView& frame, double full, const Fra
   }
 }
 
-/// How far off its neighbours' planes, continued, a patch lies: the median of them, projector px, less what noise does.
+/// Median distance of a patch from its neighbours' planes, continued to it, projector px, less the share of the noise.
 float SymbolAligner::disagreement_px(const Lattice& lattice, std::size_t index) const {
   const Patch& own = patches_[index];
   std::array<float, 4> off;

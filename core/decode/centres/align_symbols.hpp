@@ -19,16 +19,16 @@ namespace slsd {
 /// A symbol's place after its patch was aligned with the pattern.
 struct AlignedSymbol {
   Eigen::Vector3d point_in_camera;  ///< mm: what the symbol's centroid in the projector lights
-  Eigen::Vector2f centre_px;        ///< where the camera sees it
-  /// One standard deviation along the camera's ray: of noise, of relief within the patch (its parts' disparities
-  /// scatter), between patches (neighbours' planes, continued, disagree), of what is not there as it should be, and of
-  /// light that changes.
+  Eigen::Vector2f centre_px;        ///< its place in the camera's image
+  /// Standard deviation along the camera's ray. It covers noise, relief within the patch (its parts' disparities
+  /// scatter), and disagreement with the neighbours' planes. It also covers missing parts of the pattern, and changes
+  /// of light.
   float sigma_mm;
   bool whole;  ///< the pattern is there as it should be
 };
 
-/// What an aligned patch's place is off by for noise, for relief within it and for what of it is not there: one
-/// standard deviation, projector px. Fitted to rendered frames (docs/notes/2026-11-decoder.md).
+/// Standard deviation of an aligned patch's place from noise, from relief within it and from missing parts of it,
+/// projector px. Fitted to rendered frames (docs/notes/2026-11-decoder.md).
 /// @param variance  of the disparity, from the residual that is left, px^2
 /// @param scatter   of the disparities of the patch's parts, px
 /// @param support   the share of the patch that agrees with the pattern

@@ -23,10 +23,10 @@ constexpr float kLeastPx = 0.01F;  // what is left of sampling and blur
 constexpr float kOfAcross = 0.4F, kOfUneven = 0.4F;
 constexpr float kOfRoughness = 0.25F, kOfUnevenness = 0.25F;
 constexpr float kOfMisfitSquared = 0.01F;  // px
-/// What lies across, and what is uneven, on the smoothest of surfaces, besides noise.
+/// Residual across the line, and unevenness, on the smoothest surfaces, besides noise.
 constexpr float kSmoothAcrossPx = 0.03F, kSmoothUnevenPx = 0.02F;
 constexpr float kUnknownBendPx = 0.015F;
-/// Of a shape that is cut, not only worn.
+/// Factors for shapes that are cut, not only worn.
 constexpr float kDamageOfAcross = 0.35F;
 constexpr float kDamageOfMisfitSquared = 0.018F;  // px
 /// Beyond this a neighbour's residual is a fault of its own.
@@ -45,8 +45,8 @@ bool has_bend(const LatticeSymbol& symbol) {
   });
 }
 
-/// By how much a symbol's disparity is beyond those of its neighbours to both sides, mean of the pairs that are there,
-/// 0 of none. A plane's is linear over the image.
+/// Difference between a symbol's disparity and the line between its neighbours on opposite sides, mean of the pairs; 0
+/// without pairs. A plane's disparity is linear over the image.
 float off_neighbours(const std::vector<LatticeSymbol>& symbols, const std::vector<float>& disparities_px,
                      std::size_t i) {
   float sum = 0, count = 0;
@@ -62,7 +62,7 @@ float off_neighbours(const std::vector<LatticeSymbol>& symbols, const std::vecto
   return count > 0 ? sum / count : 0;
 }
 
-/// By how much a symbol's value is beyond the middle of its neighbours', the upper one of two; 0 of none.
+/// Difference between a symbol's value and the median of its neighbours', the upper one of two; 0 without neighbours.
 float off_those_around(const std::vector<float>& values, const std::array<std::int32_t, 4>& neighbours, std::size_t i) {
   // Nothing here branches, as no processor foretells how values lie: those that are missing lie far below and far above
   // by turns, and of four the middle is the second greatest.
@@ -80,7 +80,7 @@ float off_those_around(const std::vector<float>& values, const std::array<std::i
   return any ? values[i] - middle : 0;
 }
 
-/// What is known of many symbols at once, each number in a column.
+/// Properties of many symbols at once, one column for each.
 constexpr std::size_t kAtOnce = 64;
 struct Columns {
   using Column = std::array<float, kAtOnce>;

@@ -14,14 +14,14 @@
 namespace slsd {
 namespace {
 
-/// From a cell's number to that of the one below: more than any pattern has columns, so that none lies beside the end
-/// of another row.
+/// Step from a cell's number to that of the cell below. It exceeds the columns of any pattern, so no cell lies beside
+/// the end of another row.
 constexpr std::int32_t kRowStep = 1 << 16;
 
 /// Bend over a symbol's size that moves its centre by a tenth of that: about as much as noise does.
 constexpr float kSlightPx = 0.12F;
 
-/// How far the centroid of a symbol's image lies from the point that its centroid lights.
+/// Offset from the point that a symbol's centroid lights to the centroid of its image.
 /// @param m  second moments of the symbol, projector px squared
 Eigen::Vector2f pull_of(const Bend& bend, const LatticeFrame& frame, const Eigen::Matrix2f& m) {
   const Eigen::Matrix2f inverse = frame.inverse();
@@ -48,7 +48,7 @@ CentreCorrection::CentreCorrection(const std::vector<Prototype>& prototypes, flo
   }
 }
 
-/// Where its neighbours are that are decoded, and as such agree with it.
+/// Finds the decoded neighbours whose cells agree with the symbol's.
 CentreCorrection::Neighbours CentreCorrection::find_neighbours(const std::vector<GridNode>& nodes,
                                                                std::int32_t node) const {
   constexpr std::array<std::int32_t, 4> kBeyond{1, kRowStep, -1, -kRowStep};  // by Direction

@@ -15,9 +15,9 @@
 
 namespace slsd {
 
-/// Where the camera sees the point of the surface that a symbol's centroid in the projector lights. The centroid of the
-/// symbol's image is not that point: perspective and curvature show more of one half than of the other, by some
-/// hundredths of a pixel on planes and by half a pixel at the limb of a cylinder. With the map c(u) = c0 + F u + Q(u)/2
+/// Finds the image of the point that a symbol's centroid in the projector lights. The centroid of the symbol's image is
+/// not that point: perspective and curvature show more of one half than of the other. The error is some hundredths of a
+/// pixel on planes, and half a pixel at the limb of a cylinder. With the map c(u) = c0 + F u + Q(u)/2
 /// around the centroid, M the symbol's second moments and J = det(dc/du),
 ///
 ///     centroid of the image = c0 + Q(M)/2 + F M grad(log J)

@@ -29,8 +29,8 @@ void find_around(const Sightings& seen, std::int32_t node, std::vector<std::int3
 
 /// Camera px of projector px from a symbol's middle, by least squares.
 struct PlaneFit {
-  Eigen::Matrix<float, 3, 2> map;  ///< of (1, right, down)
-  float rms_px = 0;                ///< how far the nodes lie off it, camera px
+  Eigen::Matrix<float, 3, 2> map;  ///< maps (1, right, down), projector px, to camera px
+  float rms_px = 0;                ///< distance of the nodes from it, camera px
 };
 
 Eigen::Vector3f offset_of(const CellClaim& from, const CellClaim& claim, float pitch_px) {

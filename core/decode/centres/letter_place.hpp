@@ -17,12 +17,13 @@ inline constexpr int kFewHolders = 2;
 /// the centroid of what is worn lies elsewhere.
 [[nodiscard]] std::int32_t holder_of(const Sightings& seen, std::int32_t node, Direction d);
 
-/// Where the neighbours that stand for now put a symbol: between those on both sides of it, or one step on from two in
-/// a line; the mean. No place without such neighbours.
+/// Place of a symbol between accepted neighbours on both sides, or one step on from two in a line; the mean of these.
+/// Without such neighbours there is no place.
 [[nodiscard]] LetterPlace place_by_neighbours(const Sightings& seen, std::int32_t node);
 
-/// Where a plane puts a symbol: through those around it that are worn, too, on proposed cells that lie beside each
-/// other as they do. Print wears each in another way. No place if they are few, or lie on no plane.
+/// Place of a symbol on a plane through the symbols around it, worn ones included. The proposed cells of these must lie
+/// beside each other as the symbols do. Print wears each symbol differently. There is no place if they are few, or lie
+/// on no plane.
 /// @param around  holds them; its memory is kept
 [[nodiscard]] LetterPlace place_by_plane(const Sightings& seen, std::int32_t node, float pitch_px,
                                          std::vector<std::int32_t>& around);

@@ -14,18 +14,18 @@
 namespace slsd {
 namespace {
 
-/// From where its neighbours put it, and from where it was seen, of the pitch.
+/// Largest distance from the place that its neighbours predict, and from its measured place, of the pitch.
 constexpr float kMovedMax = 0.08F;
-/// From its neighbours, where few hold it: towards a limb the surface turns away. Between those on both sides it
-/// cannot.
+/// Largest tilt against the neighbours, if few hold the symbol: towards a limb the surface turns away. Between
+/// neighbours on both sides it cannot.
 constexpr float kTiltBesideFewMaxPx = 1;
 /// Tilt that noise may make, in standard deviations of the disparity: that of the slope is sqrt(3) times as much at the
 /// sides.
 constexpr float kTiltSigmas = 5;
 /// Limits of a symbol that one alone holds.
 constexpr float kLoneTiltMaxPx = 0.25F, kLoneMovedMax = 0.008F;
-/// From which distance from its letter on, standard deviations, or how far off its line, projector px, a symbol that
-/// shows its letter is aligned, too: its patch has to agree well then.
+/// Distance from its letter, standard deviations, or from its line, projector px, from which a decoded symbol is
+/// aligned as well. Its patch must then agree well.
 constexpr float kDoubtfulDistance = 2.5F, kDoubtfulAcrossPx = 0.25F, kSupportGood = 0.65F;
 
 /// Light of a printed symbol against that of its neighbours, at most: print takes light.
@@ -45,9 +45,9 @@ void mend_links(Sightings& seen, std::int32_t node) {
       seen.nodes[node].broken[d] = seen.nodes[other].broken[opposite(d)] = false;
 }
 
-/// Where another surface hides the centre, the camera does not see the point. Beside few that hold it a surface is
-/// likelier to end: the more of the middle has to be seen the less of the patch is. Elsewhere what print darkens does
-/// not count.
+/// Tells whether the camera sees the symbol's centre, which another surface may hide. A surface is likelier to end
+/// beside few holders: the less of the patch agrees, the more of the middle has to agree. With more holders, pixels
+/// that print darkens do not count.
 bool shows_centre(const AskedLetter& asked, const LightShares& middle) {
   constexpr float kMiddleMin = 0.67F, kBothBesideFewMin = 1.45F;
   if (asked.place.held_by > kFewHolders) return middle.agree_beside_print() >= kMiddleMin;
@@ -76,7 +76,7 @@ void SymbolMender::ask_beside(const LetterScene& scene, std::size_t first) {
   to_ask_.erase(std::unique(to_ask_.begin(), to_ask_.end()), to_ask_.end());
 }
 
-/// Whether it settled near where it was looked for, and on its line.
+/// Tells whether the letter settled near its predicted place, and on its line.
 bool SymbolMender::lies_there(Sightings& seen, const AskedLetter& asked) const {
   const PatchTask& task = asked.task;
   CellClaim& claim = seen.claims[asked.node];

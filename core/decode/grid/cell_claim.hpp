@@ -8,13 +8,13 @@
 
 namespace slsd {
 
-/// How near a symbol lies to where the steps beside it lead: off it, as near as on one surface, or so near that another
+/// Distance of a symbol from where the steps beside it lead: off it, as near as on one surface, or so near that another
 /// surface hardly ever is.
 enum class GridFit : std::uint8_t { kNone, kLoose, kTight };
 
-/// How far from there, in cells along the epipolar line, another surface lies in one of sixty cases at most.
+/// Distance from there, in cells along the epipolar line, at which another surface lies in one of sixty cases at most.
 inline constexpr float kTightSlip = 0.008F;
-/// And from where on what is there is of another surface, however much the frame's own surfaces bend.
+/// Slip from which on a symbol belongs to another surface, however much the frame's own surfaces bend.
 inline constexpr float kOffGridSlip = 0.1F;
 
 /// A cell of the pattern that a node was found to be, and how well its surroundings speak for it.
@@ -22,8 +22,8 @@ struct CellClaim {
   std::int16_t row = -1, column = -1;
   float margin_nats = 0;  ///< nats by which its cell is likelier than any other, up to what it needs
   RegionStatus status = RegionStatus::kNoNeighbour;  ///< kDecoded, or why not; decide() alone writes it
-  GridFit grid_fit = GridFit::kTight;                ///< of one at a rim; inside all are
-  DecodeRule rule = DecodeRule::kNoNeighbour;        ///< that decided on the status
+  GridFit grid_fit = GridFit::kTight;                ///< fit of a node at a rim; nodes inside always fit
+  DecodeRule rule = DecodeRule::kNoNeighbour;        ///< the rule that decided on the status
   DecodeRule guard = DecodeRule::kCertain;           ///< the last that kept it from being mended, or kCertain
 
   struct Cell {
@@ -47,7 +47,7 @@ struct CellClaim {
     return row == other_row && column == other_column;
   }
   [[nodiscard]] Cell cell() const { return {row, column}; }
-  /// Whether a neighbour's cell lies beside its own as the neighbour does.
+  /// Tells whether a neighbour's cell lies beside its own as the neighbour does.
   [[nodiscard]] bool fits(const CellClaim& neighbour, Direction d) const {
     const Cell there = cell().beyond(d);
     return neighbour.same_cell(there.row, there.column);

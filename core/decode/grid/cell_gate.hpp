@@ -13,7 +13,7 @@
 
 namespace slsd {
 
-/// Which cells a node can be: those on its epipolar line, within the working depth. Leaves one in 25 to 200.
+/// The cells that a node can be: those on its epipolar line, within the working depth. Leaves one in 25 to 200.
 /// @thread reentrant
 class CellGate {
  public:
@@ -26,17 +26,17 @@ class CellGate {
   [[nodiscard]] bool admits(std::int32_t node, int row, int column, double astray_px = 0) const {
     return segments_.empty() || segments_[node].passes(cells_.ray(row, column).direction, tolerance_px_ + astray_px);
   }
-  /// How far the cell lies off the node's epipolar line and to which side, projector px; 0 where lines are not known.
+  /// Signed distance of the cell from the node's epipolar line, projector px; 0 without known lines.
   [[nodiscard]] double residual_px(std::int32_t node, int row, int column) const {
     return segments_.empty() ? 0 : segments_[node].residual_px(cells_.ray(row, column).direction);
   }
   [[nodiscard]] double off_line_px(std::int32_t node, int row, int column) const {
     return std::abs(residual_px(node, row, column));
   }
-  /// Whether what is so far off lies on its epipolar line, at whatever depth.
+  /// Tells whether a node at this distance lies on its epipolar line, at whatever depth.
   [[nodiscard]] bool on_line(double residual_px) const { return std::abs(residual_px) <= tolerance_px_; }
-  /// Which way a node's epipolar line leads past a cell: cells to the right and down, of length one. Lines that are not
-  /// known are taken for rows.
+  /// Direction of a node's epipolar line past a cell: cells to the right and down, of length one. Unknown lines are
+  /// taken for rows.
   [[nodiscard]] Eigen::Vector2f way_of_line(std::int32_t node, int row, int column) const {
     if (segments_.empty()) return {1, 0};
     const auto off_line = [&](int r, int c) { return segments_[node].residual_px(cells_.ray(r, c).direction); };
@@ -76,7 +76,7 @@ class CellGate {
       if (admits(node, row, column, astray_px)) visit(row, column);
     }
   }
-  /// From cell to cell, projector px.
+  /// Distance from cell to cell, projector px.
   [[nodiscard]] double pitch_px() const {
     return cells_.rows() > 1 ? (cells_.pixel(1, 0) - cells_.pixel(0, 0)).y() : 0;
   }

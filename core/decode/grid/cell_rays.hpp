@@ -10,7 +10,8 @@
 
 namespace slsd {
 
-/// Where each cell's symbol leaves the projector: its centroid as the camera's estimator sees it, and that pixel's ray.
+/// Rays on which the cells' symbols leave the projector: each symbol's centroid as the camera's estimator sees it, and
+/// that pixel's ray.
 /// @thread reentrant
 class CellRays {
  public:

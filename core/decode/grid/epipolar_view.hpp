@@ -18,8 +18,8 @@
 
 namespace slsd {
 
-/// What the calibration knows of the sightings of a frame: the ray on which each lies, and the part of the projector's
-/// epipolar line that the working depth leaves.
+/// Epipolar geometry of a frame's sightings: the ray of each, and the part of the projector's epipolar line within the
+/// working depth.
 /// @thread thread-bound: keeps its buffers
 class EpipolarView {
  public:
@@ -49,7 +49,7 @@ class EpipolarView {
         },
         PixelRays::kAtOnce);
   }
-  /// At one that was found to lie elsewhere.
+  /// Updates one sighting whose centre has moved.
   void look_again_at(std::int32_t sighting, const Sightings& seen) {
     const GreyMoments& moments = seen.moments[sighting];
     pixels_[sighting] = {moments.x, moments.y};
@@ -65,7 +65,7 @@ class EpipolarView {
     ray.direction += ray.turn * (camera_px - pixels_[sighting]).cast<double>();
     return ray;
   }
-  /// Of symbols whose centres lie near their sightings:
+  /// Compares symbols, whose centres lie near their sightings, with their cells.
   /// @param residuals_px    how far each cell lies off the epipolar line of its centre, projector px, signed
   /// @param disparities_px  camera px
   void compare(std::span<const LatticeSymbol> symbols, const CellRays& cells, std::span<float> residuals_px,

@@ -12,8 +12,8 @@
 
 namespace slsd {
 
-/// How the pattern lies in the camera's image around a symbol: the camera's steps for one projector pixel to the right
-/// (first column) and one down (second column).
+/// Local frame of the pattern in the camera's image around a symbol: the camera's steps for one projector pixel to the
+/// right (first column) and one down (second column).
 using LatticeFrame = Eigen::Matrix2f;
 
 /// A frame and what follows from it.
@@ -30,7 +30,7 @@ class ExpectedFrames {
  public:
   ExpectedFrames(const CalibratedCamera& camera, const Lens& projector, double depth_mm);
 
-  /// Those of a plane that is known by its homography alone.
+  /// Makes the frames of a plane from its homography alone.
   /// @param camera_from_projector  maps homogeneous projector px to camera px
   ExpectedFrames(const Eigen::Matrix3d& camera_from_projector, int camera_width_px, int camera_height_px);
 

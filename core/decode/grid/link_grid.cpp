@@ -15,12 +15,12 @@
 namespace slsd {
 namespace {
 
-/// How much a measured step may differ from the expected one before it is taken for a wrong link.
+/// Largest change of a measured step against the expected one, as a share; beyond it the link is wrong.
 constexpr float kFrameChangeMax = 0.5F;
-/// Of the pitch: what is so near to where the frame puts a neighbour is the neighbour, as no other can be nearer.
+/// Distance from the expected place, of the pitch, within which a node is surely the neighbour: no other can be nearer.
 constexpr float kEvident = 0.15F;
 
-/// From a node to its neighbour, camera px.
+/// Vector from a node to its neighbour, camera px.
 Eigen::Vector2f link_vector(const std::vector<GridNode>& nodes, std::size_t from, Direction direction) {
   return nodes[nodes[from].links[direction]].centre_px - nodes[from].centre_px;
 }
@@ -127,8 +127,7 @@ GridLinker::Links GridLinker::likely(const Range& range, std::int32_t from) cons
   return likely;
 }
 
-/// Which of the nodes are so near to where the frame puts the neighbours that no others can be nearer: bits by
-/// Direction.
+/// Finds the nodes so near to the neighbours' expected places that no others can be nearer: bits by Direction.
 unsigned GridLinker::find_evident(const std::vector<GridNode>& nodes, std::int32_t from, const Links& others,
                                   const Eigen::Matrix2f& cells_from_camera) {
   constexpr FourLanes kStepX = {1, 0, -1, 0}, kStepY = {0, 1, 0, -1};
@@ -205,7 +204,7 @@ void GridLinker::measure_frame(std::vector<GridNode>& nodes, const std::vector<s
   }
 }
 
-/// Those which the links that changed have a part in; a node that lost a link counts as one that has it.
+/// Measures the frames that use a changed link; a node that lost a link has changed as well.
 void GridLinker::measure_changed_frames(std::vector<GridNode>& nodes) {
   for (std::size_t node = 0; node < nodes.size(); ++node) {
     if (relinked_[node] == 0) continue;
@@ -234,9 +233,9 @@ void GridLinker::measure_steps(const std::vector<GridNode>& nodes, Executor& exe
   });
 }
 
-/// Whether the same step behind and before a link, or most of those behind, before and on both sides, disagree with it.
-/// Along a straight edge in depth the links on both sides agree with it; those behind and before do not. Those of what
-/// is torn are asked about what is torn alone.
+/// Finds links that disagree with the same step behind and before, or with most of those behind, before and on both
+/// sides. Along a straight edge in depth the links on both sides agree; those behind and before do not. Links of torn
+/// shapes are compared with links of torn shapes alone.
 /// @return a bit for the link to the right, and one for that down
 unsigned GridLinker::find_inconsistent(const GridNode& node, std::size_t index) const {
   const auto load = [](const std::vector<std::array<float, 4>>& from, std::size_t at) {

@@ -21,14 +21,14 @@ struct GridNode {
   std::array<std::int32_t, 4> links{-1, -1, -1, -1};  ///< by Direction
   std::array<bool, 4> broken{};
   bool torn = false;                            ///< in: its links say nothing of those beside them
-  bool measured_u = false, measured_v = false;  ///< which steps of the frame come from neighbours
+  bool measured_u = false, measured_v = false;  ///< steps of the frame that come from neighbours
 };
 
 struct LinkGridOptions {
   float pitch_px = 18;           ///< projector px from cell to cell
-  float search_radius = 0.42F;   ///< of the pitch: how far from its expected place a first neighbour may be
+  float search_radius = 0.42F;   ///< largest distance of a first neighbour from its expected place, of the pitch
   float refined_radius = 0.28F;  ///< the same once the frame is measured
-  float deviation_max = 0.17F;   ///< of the pitch: how far a link may differ from those beside and behind it
+  float deviation_max = 0.17F;   ///< largest difference of a link from those beside and behind it, of the pitch
 };
 
 /// The opposite way along a link.

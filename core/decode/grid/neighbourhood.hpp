@@ -23,7 +23,7 @@ using Neighbourhood = std::array<std::int32_t, kWindowCells>;
   return nodes[node].links[direction];
 }
 
-/// That neighbour, if it is decoded, of the cell that lies there; -1 otherwise.
+/// Finds the neighbour in a direction if it is decoded as the cell that lies there; -1 otherwise.
 [[nodiscard]] inline std::int32_t decoded_beside(const std::vector<GridNode>& nodes,
                                                  const std::vector<CellClaim>& claims, std::int32_t node,
                                                  Direction direction) {

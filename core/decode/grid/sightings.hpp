@@ -32,7 +32,7 @@ struct Sightings {
   std::vector<GridNode> nodes;
   std::vector<CellClaim> claims;
   std::vector<Aligned> aligned;
-  std::vector<float> misfits;  ///< of each from its cell's letter, standard deviations, where review measured it
+  std::vector<float> misfits;  ///< distances from their cells' letters, standard deviations, where review measured them
 
   [[nodiscard]] std::size_t size() const { return region.size(); }
   void clear() {

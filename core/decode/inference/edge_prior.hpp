@@ -26,7 +26,7 @@ class EdgePrior {
   [[nodiscard]] bool is_cut(std::size_t node, Direction d) const { return cut_[node][d]; }
 
  private:
-  /// Of the links around a node, along rows and along columns.
+  /// Counts of the links around a node, along rows and along columns.
   struct Count {
     std::array<float, 2> links{}, cut{};
   };

@@ -185,7 +185,7 @@ void CellInference::measure_margins(Executor& executor) {
   });
 }
 
-/// Of a node at a rim; another surface fits tightly in one of sixty cases at most.
+/// Fit of a node at a rim; another surface fits tightly in one of sixty cases at most.
 GridFit CellInference::grid_fit(std::size_t node) const {
   float most = 0;
   int held_by = 0, sides = 0;
@@ -241,8 +241,8 @@ void CellInference::find_component(std::int32_t first) {
   }
 }
 
-/// If most symbols of a surface that are certain lie off their epipolar lines, the lines are not theirs: the rig has
-/// moved, or another projector lights them. What lies on them by chance is no point either.
+/// Rejects the symbols of a surface if most of its certain ones lie off their epipolar lines. Then the rig has moved,
+/// or another projector lights them. Symbols that lie on the lines by chance are no points either.
 void CellInference::reject_off_line(Sightings& seen) {
   is_reached_.assign(proposed_.size(), 0);
   for (std::size_t first = 0; first < proposed_.size(); ++first) {

@@ -14,7 +14,7 @@ struct Misread {
 };
 constexpr std::array kMisread{Misread{2, 0.001F}, Misread{3, 0.01F}, Misread{4, 0.05F},   Misread{6, 0.15F},
                               Misread{8, 0.5F},   Misread{12, 0.8F}, Misread{1e9F, 0.95F}};
-/// Of the symbols that an edge runs through, those whose shapes are doubtful and torn.
+/// Shares of doubtful and of torn shapes among the symbols that an edge runs through.
 constexpr float kDoubtfulAtEdges = 0.2F, kTornAtEdges = 0.5F;
 
 }  // namespace

@@ -12,9 +12,9 @@ constexpr std::uint8_t kNoLetter = kMaxLetters;
 /// A window is certain with so many of its nine letters, and so much of the evidence that they can give.
 constexpr int kCertainLetters = 6;
 constexpr float kCertainShare = 0.85F;
-/// Of some forty cells on an epipolar line, the one beside that of a certain neighbour, nats.
+/// Evidence for the cell beside that of a certain neighbour, against some forty cells on an epipolar line, nats.
 constexpr float kBesideCertain = 3.7F;
-/// How far off its line a shape may lie that is not whole, of the pitch of the cells.
+/// Distance from its line at which a shape that is not whole may lie, of the pitch of the cells.
 constexpr double kAstrayShare = 0.2;
 
 }  // namespace

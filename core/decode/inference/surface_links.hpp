@@ -15,7 +15,7 @@
 
 namespace slsd {
 
-/// What a frame shows of its nodes before any cell is certain, one entry to each node.
+/// Properties of a frame's nodes before any cell is certain, one entry for each node.
 struct NodesSeen {
   std::span<const GridNode> nodes;
   std::span<const Beside> beside;
@@ -39,9 +39,9 @@ class SurfaceLinks {
 
   void measure(const NodesSeen& seen, const LetterEvidence& letters, const CellGate& gate);
 
-  /// By Direction; 0 for links that nothing is known of.
+  /// Returns a node's links by Direction; 0 for links without evidence.
   [[nodiscard]] const std::array<float, 4>& of(std::size_t node) const { return nats_[node]; }
-  /// How far the step on is from the step behind, along the epipolar line, cells; NaN unless both are there.
+  /// Difference between the step on and the step behind, along the epipolar line, cells; NaN unless both are there.
   [[nodiscard]] float slip(std::size_t node, Direction d) const { return bends_[node][d % 2].x(); }
 
  private:

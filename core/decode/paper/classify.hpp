@@ -23,14 +23,14 @@ using ComparedDescriptors = std::array<double, kComparedCount>;
 /// @param side_px  side of a symbol's cell without its spacing, as the camera sees it
 [[nodiscard]] ComparedDescriptors compared(const Descriptors& shape, double side_px);
 
-/// What a region's descriptors have to be for it to be a letter; open at the ends.
+/// Intervals in which a region's descriptors lie if it is a letter; open at the ends.
 struct LetterThresholds {
   struct Interval {
     double low = -std::numeric_limits<double>::infinity();
     double high = std::numeric_limits<double>::infinity();
   };
   std::array<Interval, kComparedCount> intervals;
-  double orientation_rad = 0;     ///< of the symbol as it is drawn
+  double orientation_rad = 0;     ///< the symbol's orientation as it is drawn
   double orientation_margin_rad;  ///< half the interval around it, modulo pi; pi where the symbol carries no direction
 };
 

@@ -18,14 +18,14 @@ struct PaperRegion {
   int letter = -1;    ///< or -1: it starts no search, but may be found
 };
 
-/// By Direction: index of the neighbour's region, or -1.
+/// Links by Direction: index of the neighbour's region, or -1.
 using Links = std::array<std::int32_t, 4>;
 
-/// What a pattern's symbols tell about the grid around them.
+/// Properties of a pattern's grid around each symbol.
 struct PaperGrid {
   struct Letter {
     bool carries_direction;
-    double orientation_rad;  ///< as it is drawn
+    double orientation_rad;  ///< the symbol's orientation as it is drawn
     bool fills_cell;         ///< its least rectangle is the cell, so that its area tells the grid distance
   };
   std::vector<Letter> letters;

@@ -89,8 +89,8 @@ struct ThresholdLine {
   int tiles, tile_px;
 };
 
-/// From the centre of the first tile to that of the last, kLanes at a time: the last ones of a tile may lie beyond its
-/// end, where the next tile's follow.
+/// Draws from the centre of the first tile to that of the last, kLanes pixels at a time. The last pixels of a tile may
+/// lie beyond its end, where the next tile's follow.
 template <class T>
 inline __attribute__((always_inline)) void draw_line(const ThresholdLine& line, T* threshold) {
   for (int tile = 0; tile + 1 < line.tiles; ++tile) {
@@ -115,7 +115,7 @@ void combine_3x3(const std::vector<float>& tiles, int stride, Operation operatio
 
 }  // namespace
 
-/// Of a row of tiles.
+/// Finds the extremes of one row of tiles.
 template <class T>
 void Binarizer::find_extremes(const ImageView<T>& frame, int row, RowBuffers<T>& buffers) {
   const int tile = options_.tile_px;

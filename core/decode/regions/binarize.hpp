@@ -19,8 +19,8 @@ struct BinarizeOptions {
   /// Side of a tile in camera pixels. A threshold is taken from 3x3 tiles, which have to hold a symbol and a gap: half
   /// the pitch of the grid as the camera sees it.
   int tile_px = 12;
-  /// Where the threshold lies between dark and light. Below the middle keeps a symbol whose parts touch at a corner in
-  /// one piece; at the middle keeps neighbours apart that are less than two pixels from each other.
+  /// Threshold's place between dark and light. Below the middle, a symbol whose parts touch at a corner stays in one
+  /// piece; at the middle, neighbours less than two pixels apart stay separate.
   float level = 0.5F;
   /// Smallest difference between light and dark that is taken for the pattern, of 255 levels.
   int contrast_min = 5;
@@ -49,7 +49,7 @@ class Binarizer {
   [[nodiscard]] float contrast_min(float level) const {
     return std::max(contrast_floor_, options_.contrast_min_sigma * noise_.at(level));
   }
-  /// Of the last frame.
+  /// Returns the noise of the last frame.
   [[nodiscard]] const FrameNoise& noise() const { return noise_; }
   /// One standard deviation of the blur at the sharpest edges of the last frame, from how steep they are between its
   /// tiles' least and greatest values; 0 where there are none.
@@ -63,7 +63,7 @@ class Binarizer {
   struct RowBuffers {
     std::vector<T> threshold, least, greatest;
   };
-  /// Of one worker.
+  /// Buffers of one worker.
   struct Buffers {
     std::tuple<RowBuffers<std::uint8_t>, RowBuffers<std::uint16_t>> rows;
     std::vector<int> at_centre, step;  // of a row of thresholds, binary fractions

@@ -23,8 +23,8 @@ struct Descriptors {
   /// and two diagonal lit pixels: n2 + (n1 + n3 + 2 nd) / sqrt(2) (Gray's bit quads).
   double perimeter_to_area = 0;
   double area_px = 0;          ///< the area function: lit pixels, m00
-  double orientation_rad = 0;  ///< of the longer axis from x towards y: equation (9) with atan2; above -pi/2 to pi/2
-  double equivalent_diameter_px = 0;  ///< of the disc of the same area: sqrt(4 area / pi)
+  double orientation_rad = 0;  ///< the longer axis from x towards y: equation (9) with atan2; above -pi/2 to pi/2
+  double equivalent_diameter_px = 0;  ///< diameter of a disc of the same area: sqrt(4 area / pi)
   double filled_area_ratio = 0;       ///< area / area with the holes filled; above 0 to 1
   int euler_number = 0;               ///< parts less holes, 8-connected: (n1 - n3 - 2 nd) / 4
   Eigen::Vector2d centroid_px{0, 0};  ///< m10 / m00, m01 / m00 (equation (8)); the mask's first pixel is (0, 0)

@@ -110,7 +110,7 @@ void RegionFinder::label_rows(const Mask& mask, int top, int bottom, Band& band)
   }
 }
 
-/// In the order of the bands, and so of their first pixels.
+/// Collects the labels in the order of the bands, and so of their first pixels.
 void RegionFinder::collect_labels(std::span<Band> bands) {
   labels_.clear();
   for (Band& band : bands) {
@@ -145,8 +145,8 @@ void RegionFinder::number_regions(Regions& found) {
   }
 }
 
-/// Where each band's runs of each region go. From here on a label's parent is the first label of its region in its
-/// band, which keeps that place.
+/// Places each band's runs of each region. From here on a label's parent is the first label of its region in its band,
+/// which keeps that place.
 void RegionFinder::place_runs(std::span<const Band> bands, Regions& found) {
   std::int32_t next = 0;
   cursor_.clear();

@@ -16,7 +16,7 @@
 
 namespace slsd {
 
-/// Which pixels of a frame are lit, one bit each: so small that it stays in the cache between the stages.
+/// The lit pixels of a frame, one bit for each: so small that it stays in the cache between the stages.
 /// @thread reentrant
 class Mask {
  public:

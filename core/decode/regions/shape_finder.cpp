@@ -21,9 +21,9 @@ constexpr float kExtentMax = 1.5F;  // of a cell's side
 constexpr float kBlurMinPx = 1.9F;
 constexpr float kBlurUndone = 0.85F;
 constexpr float kBlurMax = 0.2F;
-/// Where the light mostly has a contrast of less, in standard deviations of the noise, half of it drowns.
+/// Usual contrast of the light, in standard deviations of the noise, below which noise hides half of it.
 constexpr float kFaintSigma = 18;
-/// Between a region's peak and its background, of 255 levels.
+/// Difference between a region's peak and its background, of 255 levels.
 constexpr float kContrastMin = static_cast<float>(BinarizeOptions().contrast_min);
 
 BinarizeOptions binarize_options(const PatternOptions& pattern, float scale) {
@@ -74,8 +74,8 @@ GreyView ShapeFinder::binarize_blurred(const GreyView& frame, double full, Execu
   return sharp;
 }
 
-/// What is left of the noise is not of single pixels: what sums up over a symbol has all of it, and the mask alone is
-/// told of less.
+/// Smooths and binarizes a faint frame. The noise that is left is correlated between pixels: stages that sum over a
+/// symbol get all of it, and the mask alone gets less.
 GreyView ShapeFinder::binarize_faint(const GreyView& frame, double full, Executor& executor) {
   const GreyView smooth = sharpener_.smooth(frame, full).view();
   frame_levels_ = kSharpenedFull / 255;

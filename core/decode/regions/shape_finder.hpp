@@ -28,7 +28,7 @@ class ShapeFinder {
   ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize, Method find_regions,
               Rules rules = {});
 
-  /// Of the same scale, to an eighth.
+  /// Sets expected frames of the same scale, to an eighth.
   void expect(ExpectedFrames expected) { expected_ = std::move(expected); }
   [[nodiscard]] const ExpectedFrames& expected() const { return expected_; }
 
@@ -45,13 +45,13 @@ class ShapeFinder {
 
   [[nodiscard]] const Mask& mask() const { return mask_; }
   [[nodiscard]] const Regions& regions() const { return regions_; }
-  /// Why a region is no sighting; kNoNeighbour where it is one.
+  /// Reason why a region is no sighting; kNoNeighbour for a sighting.
   [[nodiscard]] DecodeRule rule(std::size_t region) const { return rule_[region]; }
   /// One to a worker.
   [[nodiscard]] std::span<GreyMomentMeter> meters() { return meters_; }
   /// Levels of the frame for one of 255.
   [[nodiscard]] float frame_levels() const { return frame_levels_; }
-  /// Of the frame that binarize() returned.
+  /// Returns the noise of the frame that binarize() returned.
   [[nodiscard]] const FrameNoise& noise() const { return noise_; }
 
  private:

@@ -8,7 +8,7 @@
 
 namespace slsd {
 
-/// What smoothing leaves of a pixel's noise.
+/// Share of a pixel's noise that smoothing leaves.
 inline constexpr float kSmoothedNoise = 0.375F;
 
 /// Levels of a sharpened frame where the frame was saturated; above it is room for what its edges overshoot.

@@ -8,7 +8,7 @@
 namespace slsd {
 namespace {
 
-/// Of a tile that has no pixel of the region near it.
+/// Value of a tile that has no pixel of the region near it.
 constexpr float kNone = std::numeric_limits<float>::lowest();
 
 }  // namespace
@@ -49,7 +49,7 @@ void RegionSplitter::measure_tiles(const ImageView<T>& frame, const Region& regi
   }
 }
 
-/// As binarize does it: midway in three by three tiles, and the mean of three by three of these.
+/// Sets thresholds as binarize does: midway in three by three tiles, then the mean of three by three of these.
 void RegionSplitter::set_thresholds(float contrast_min) {
   midway_.assign(tiles_.size(), kNone);
   threshold_.assign(tiles_.size(), 0);

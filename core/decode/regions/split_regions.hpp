@@ -13,9 +13,9 @@ namespace slsd {
 struct SplitOptions {
   /// Side of a tile in camera pixels, as for binarize.
   int tile_px = 12;
-  /// Where the threshold lies between the least and the greatest grey value of the region's own pixels around.
+  /// Threshold's place between the least and the greatest grey value of the region's own pixels nearby.
   float level = 0.35F;
-  /// How often what is left in one piece is asked again; each time the gaps have to be less dark.
+  /// Number of attempts on pieces that did not split; each accepts gaps that are less dark.
   int rounds = 4;
 };
 
@@ -50,7 +50,7 @@ class RegionSplitter {
   }
 
  private:
-  /// What a region's pixels span in a tile of its box.
+  /// Range of a region's pixels in a tile of its box.
   struct TileRange {
     float least, greatest;
   };

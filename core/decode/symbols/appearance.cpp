@@ -10,8 +10,7 @@
 namespace slsd {
 namespace {
 
-/// How far frames are off: the calibration's expectation by the tilt of the surface, a measured one by noise and
-/// curvature.
+/// Errors of local frames: an expected one ignores the tilt of the surface; a measured one has noise and curvature.
 constexpr float kExpectedFrameError = 0.15F;
 constexpr float kMeasuredFrameError = 0.05F;
 /// Standard deviations from the nearest prototype beyond which a shape is none of the pattern's.

@@ -15,9 +15,9 @@
 
 namespace slsd {
 
-/// How a pattern's symbols look, in the frames that the calibration expects and in those that their neighbours show.
+/// The look of a pattern's symbols, in the frames that the calibration expects and in those that their neighbours show.
 struct Appearance {
-  std::optional<float> blur_px;  ///< of projector and camera together, camera px; without it all that occurs
+  std::optional<float> blur_px;  ///< blur of projector and camera together, camera px; without it all blurs that occur
   std::vector<Prototype> as_expected, as_measured;
   Classifier expected, measured;
 
@@ -27,18 +27,18 @@ struct Appearance {
   Appearance(std::optional<float> blur, std::vector<std::vector<Prototype>>&& made);
 };
 
-/// How they look at each blur that occurs. A soft threshold that is low enough to take in what print leaves of a symbol
-/// takes in more of a blurred one, too: what a symbol looks like depends on the blur.
+/// Appearances at each blur that occurs. A soft threshold low enough for the light that print leaves of a symbol takes
+/// in more of a blurred symbol, too. The look of a symbol therefore depends on the blur.
 /// @thread reentrant: each appearance is made when it is first asked for, once for all who share this
 class Appearances {
  public:
   Appearances(const PatternOptions& pattern, float camera_px_per_projector_px);
 
-  /// Of every blur that occurs, for what does not depend on it.
+  /// Returns the appearance over every blur that occurs, for uses that do not depend on it.
   [[nodiscard]] const Appearance& usual() const { return usual_; }
 
   static constexpr std::size_t kShapesMax = 512;
-  /// That in which half of the shapes are the likeliest; the usual one where there are too few to tell.
+  /// Finds the appearance in which half of the shapes are the likeliest; the usual one if there are too few to tell.
   /// @param shapes  a sample of a frame's, in measured frames; kShapesMax of them are looked at
   [[nodiscard]] const Appearance& likeliest(std::span<const ShapeFeatures> shapes) const;
 

@@ -16,13 +16,13 @@ static_assert(kFeatureCount == 8);  // the powers of Student's t
 constexpr float kDegreesOfFreedom = 4;
 constexpr float kFarthestSquared = 1e5F;  // farther than that all are equally unlikely, and a float's range ends
 
-/// How often a shape is another letter than the likeliest for what the prototypes do not know: cut at an edge, torn,
-/// run together, printed on. It grows with the distance from the nearest prototype. Measured on drawn and rendered
-/// frames: docs/notes/2026-11-decoder.md has the table.
+/// Probability that a shape is another letter than the likeliest, for reasons that the prototypes lack: cut at an edge,
+/// torn, run together, printed on. It grows with the distance from the nearest prototype. Measured on drawn and
+/// rendered frames: docs/notes/2026-11-decoder.md has the table.
 constexpr float kDoubtMin = 0.01F, kDoubtMax = 0.5F;
 constexpr float kDoubtFrom = 2, kDoubtSlope = 0.12F;
 
-/// Of eight shapes.
+/// Verdicts on eight shapes.
 struct Verdicts {
   Lanes log_probability[kMaxLetters];
   Lanes distance, best;  // from the nearest prototype, and the greatest likelihood
@@ -50,7 +50,7 @@ inline __attribute__((always_inline)) void take_roots(const Lanes& of, Lanes& ro
   slsd::load(numbers, roots);
 }
 
-/// Of the whitened features from one on. The triangle's rows have no one length, so none is a loop.
+/// Adds the squares of the whitened features from one on. The triangle's rows differ in length, so none is a loop.
 template <int kRow>
 inline __attribute__((always_inline)) void add_squares(const Classifier::Letter& letter, const Lanes* deviation,
                                                        Lanes& squared_distance) {

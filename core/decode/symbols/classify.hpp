@@ -12,20 +12,20 @@
 
 namespace slsd {
 
-/// How far from a letter's prototype, in standard deviations, a shape is torn: its centre lies anywhere.
+/// Distance from a letter's prototype, in standard deviations, beyond which a shape is torn: its centre lies anywhere.
 inline constexpr float kTornDistance = 6;
 
-/// What a shape is likely to be.
+/// Probabilities of the letters that a shape may show.
 struct Classification {
   std::array<float, kMaxLetters>
-      log_probability{};    ///< of each letter, given that it is one of them; natural logarithm; 0 beyond the last
-  float distance = 0;       ///< from the nearest prototype, in standard deviations
-  float likelihood = 0;     ///< of the features if it is the likeliest letter, up to a factor common to all classifiers
+      log_probability{};    ///< natural logarithm for each letter, given that the shape is one; 0 beyond the last
+  float distance = 0;       ///< distance from the nearest prototype, in standard deviations
+  float likelihood = 0;     ///< density of the features as the likeliest letter, up to a common factor
   std::int8_t letter = -1;  ///< the likeliest, or -1: like none of them
 
-  /// Of a shape that is known to show a letter, as if it had been classified at a distance.
+  /// Makes the classification of a shape that is known to show a letter, as if at a given distance.
   [[nodiscard]] static Classification of_letter(int letter, int letters, float distance);
-  /// Whole, or nearly: what it shows counts.
+  /// Tells whether the shape is whole, or nearly: its letter counts.
   [[nodiscard]] bool is_well_seen() const {
     constexpr float kWellSeen = 3;  // standard deviations
     return letter >= 0 && distance < kWellSeen;
@@ -51,7 +51,7 @@ class Classifier {
   /// @param to  of the first of eight, as many as it holds
   void classify(const EightShapes& shapes, std::span<Classification> to) const;
 
-  /// Of eight shapes from each letter's prototype, standard deviations squared.
+  /// Distances of eight shapes from each letter's prototype, standard deviations squared.
   struct EightDistances {
     Lanes of[kMaxLetters];
   };

@@ -17,7 +17,7 @@
 namespace slsd {
 namespace {
 
-/// What is left of the light at the dark end of a symbol, at the least.
+/// Least share of the light at the dark end of a symbol.
 constexpr float kLeastLight = 0.3F;
 
 struct PatchPlace {
@@ -97,7 +97,7 @@ struct CellSquare {
   }
 };
 
-/// As copy_rows, of the pixels in a cell.
+/// Copies as copy_rows does, but the pixels in a cell.
 template <class T>
 inline __attribute__((always_inline)) void copy_square(const ImageView<T>& frame, const PatchPlace& place,
                                                        const CellSquare& cell, float* patch, PatchRange& range) {
@@ -186,7 +186,7 @@ GreyMomentMeter::GreyMomentMeter(int margin_px, float patch_px) : margin_px_(mar
   edges_.reserve(2 * side), rows_.reserve(side), patch_.reserve(side * side);
 }
 
-/// In each row of the patch, from the leftmost to the rightmost pixel within the margin of the region.
+/// Marks, in each row of the patch, the leftmost to the rightmost pixel within the margin of the region.
 PatchEdges GreyMomentMeter::follow_edge(const Region& region, std::span<const Run> runs) {
   // The edges of the region's rows, with as many empty rows above and below as the margin reaches twice.
   const int reach = 2 * margin_px_, rows = height_ + reach;

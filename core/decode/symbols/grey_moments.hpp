@@ -14,10 +14,10 @@
 
 namespace slsd {
 
-/// What a region weighs: moments of its grey values through a soft threshold, a ramp from 10 to 30 % of the way from
-/// the region's own background to its own peak; its centre through one from 20 to 80 %, and to 65 % where the light is
-/// uneven. A pixel on the edge counts by how much of it is lit, so the centre is good to some hundredths of a pixel,
-/// where the binary mask's is eight times worse.
+/// Moments of a region's grey values through a soft threshold. It is a ramp from 10 to 30 % of the way from the
+/// region's own background to its own peak. The centre uses a ramp from 20 to 80 %, or to 65 % in uneven light. A pixel
+/// on the edge counts by its lit share. The centre is therefore good to some hundredths of a pixel; the binary mask's
+/// is eight times worse.
 struct GreyMoments {
   float x = 0, y = 0;                        ///< centre, camera px
   float steady_x = 0, steady_y = 0;          ///< centre that uneven light pulls less, and noise more; where measured
@@ -27,7 +27,7 @@ struct GreyMoments {
   float background = 0, peak = 0;            ///< grey levels of the frame
 };
 
-/// What of a patch's rows belongs to the region or its margin: the columns between these two.
+/// Columns of a patch's rows that belong to the region or its margin: those between these two.
 struct PatchEdges {
   const std::int16_t *before, *after;
 };
@@ -39,7 +39,7 @@ class GreyMomentMeter {
   /// @param margin_px  how far beyond the mask a region's blurred edge is followed; less than the gap to its neighbours
   /// @param patch_px   side of a patch that its buffers are made for
   explicit GreyMomentMeter(int margin_px, float patch_px = 0);
-  /// For another worker.
+  /// Makes a meter for another worker.
   [[nodiscard]] GreyMomentMeter another() const { return GreyMomentMeter(margin_px_, patch_px_); }
 
   template <class T>
@@ -50,7 +50,7 @@ class GreyMomentMeter {
   template <class T>
   void measure_all(const ImageView<T>& frame, const Regions& regions, std::span<const std::int32_t> which,
                    std::span<GreyMoments> moments);
-  /// With the steady centre.
+  /// Measures the moments with the steady centre.
   /// @param shading  relative change of the light for one camera px, levelled out about the middle of the region's box
   template <class T>
   [[nodiscard]] GreyMoments measure_levelled(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
@@ -66,7 +66,7 @@ class GreyMomentMeter {
                                          const Eigen::Vector2f& shading);
 
  private:
-  /// Whether the patch does, padding and all.
+  /// Tells whether the patch lies in the frame, padding and all.
   template <class T>
   [[nodiscard]] bool lies_in(const ImageView<T>& frame) const {
     return left_ >= 0 && top_ >= 0 && left_ + stride_ <= frame.width && top_ + height_ <= frame.height;

@@ -19,8 +19,8 @@
 namespace slsd {
 namespace {
 
-/// What the model leaves out (uneven light, curvature, texture) as a standard deviation of each feature, so that no
-/// direction is held for more certain than it is.
+/// Effects that the model leaves out (uneven light, curvature, texture), as a standard deviation of each feature. They
+/// keep each direction as uncertain as it is.
 constexpr double kFeatureFloor[kFeatureCount] = {0.02, 0.003, 0.003, 0.003, 0.0008, 0.0006, 0.0006, 0.0008};
 
 /// Brings the densities to where floats have room on both sides.

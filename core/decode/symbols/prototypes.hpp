@@ -12,31 +12,31 @@
 
 namespace slsd {
 
-/// How a symbol looks: the distribution of its features over blur, tilt, noise and where it falls on the pixels.
+/// Look of a symbol: the distribution of its features over blur, tilt, noise and place on the pixel grid.
 struct Prototype {
   ShapeFeatures mean;
   Eigen::Matrix<float, kFeatureCount, kFeatureCount>
-      whitening;                       ///< features minus mean, times this, have unit covariance
-  float density;                       ///< at the mean, up to a factor common to all: 1 / volume of the covariance
-  Eigen::Vector2f centroid_px;         ///< centre of its grey moments, from the middle of its square, projector px
+      whitening;                ///< features minus mean, times this, have unit covariance
+  float density;                ///< density at the mean, up to a factor common to all: 1 / volume of the covariance
+  Eigen::Vector2f centroid_px;  ///< centre of its grey moments, from the middle of its square, projector px
   Eigen::Vector2f steady_centroid_px;  ///< its steady centre, likewise
 
-  /// In standard deviations.
+  /// Squared distance from the mean, in standard deviations.
   [[nodiscard]] float squared_distance(const ShapeFeatures& features) const {
     return whitening.lazyProduct(features - mean).squaredNorm();
   }
 };
 
-/// What the prototypes are made for.
+/// Conditions that the prototypes are made for.
 struct PrototypeOptions {
   std::vector<int> symbols;
   int symbol_size_px = 16;
   int spacing_px = 2;
   float camera_px_per_projector_px = 1.4F;
-  /// How far the frame that the features are taken in may be off, as a share of a step: the calibration's expectation
-  /// is off by the tilt of the surface, a frame measured from neighbours by a few hundredths.
+  /// Error of the local frame in which the features are taken, as a share of a step. The calibration's expectation
+  /// ignores the tilt of the surface; a frame measured from neighbours is off by a few hundredths.
   float frame_error = 0.05F;
-  int samples = 120;  ///< looks at each symbol
+  int samples = 120;  ///< simulated looks at each symbol
   /// Standard deviation of the blur of projector and camera, camera px, to a third; without it all that occurs.
   std::optional<float> blur_px{};
   /// Standard deviation of the noise as a share of the contrast; without it all that occurs.
@@ -45,10 +45,10 @@ struct PrototypeOptions {
 
 using FeatureCovariance = Eigen::Matrix<double, kFeatureCount, kFeatureCount>;
 
-/// How one symbol's features are distributed, and how often there are none.
+/// Distribution of one symbol's features, and how often there are none.
 struct SymbolSpread {
   Eigen::Matrix<double, kFeatureCount, 1> mean;
-  FeatureCovariance covariance;  ///< with what the model leaves out
+  FeatureCovariance covariance;  ///< includes the effects that the model leaves out
   double lost;                   ///< share of the looks in which it broke into pieces or grew together with a neighbour
 };
 
@@ -75,8 +75,8 @@ struct SymbolSpread {
 /// Side of the tiles that thresholds are taken from, three by three: half the pitch as the camera sees it.
 [[nodiscard]] int threshold_tile_px(int pitch_px, float camera_px_per_projector_px);
 
-/// Where between dark and light the threshold lies: below the middle where the gaps are wide enough for it, so that a
-/// symbol whose parts touch at a corner stays in one piece; less so for small symbols, of which more run together.
+/// Place of the threshold between dark and light: below the middle if the gaps are wide enough for it. Then a symbol
+/// whose parts touch at a corner stays in one piece. It is less low for small symbols, of which more run together.
 [[nodiscard]] float threshold_level(int symbol_size_px, int spacing_px, float camera_px_per_projector_px);
 
 }  // namespace slsd

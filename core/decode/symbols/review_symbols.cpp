@@ -15,10 +15,10 @@
 namespace slsd {
 namespace {
 
-/// How much farther from its letter a symbol may come to be by levelling the light: its centre gains even so.
+/// Distance that a symbol may gain from its letter by levelling the light: its centre improves even so.
 constexpr float kLevellingTolerance = 0.3F;
 
-/// What was aligned has its place from there.
+/// Tells whether review measures a node; an aligned one has its place from the alignment.
 bool is_reviewed(const Sightings& seen, std::size_t node) {
   return seen.claims[node].status == RegionStatus::kDecoded && !is_aligned(seen.aligned[node]);
 }
@@ -43,8 +43,8 @@ float light_change(const Sightings& seen, std::size_t node, Direction direction)
   return (inwards == direction ? change : -change) / own;
 }
 
-/// Where the neighbours put a node, by continuing the steps of those beside it; quadratic, as steps shrink towards a
-/// limb.
+/// Centre that the neighbours predict for a node, by continuing the steps of those beside it. It is quadratic, as steps
+/// shrink towards a limb.
 std::optional<Eigen::Vector2f> centre_from_neighbours(const std::vector<GridNode>& nodes, std::size_t node) {
   Eigen::Vector2f sum = Eigen::Vector2f::Zero();
   int count = 0;

@@ -21,14 +21,15 @@ struct ReviewOptions {
   /// Standard deviations from its letter's prototype from which on a symbol is measured again where its neighbours put
   /// it.
   float doubtful_distance = 1.5F;
-  /// How far from its region it may be found there, of the pitch.
+  /// Largest distance from its region at which review may find the symbol, of the pitch.
   float moved_max = 0.25F;
-  /// The same beyond which a symbol at the edge of what is decoded may be cut by an edge or a shadow: it is damaged.
+  /// Distance from its letter beyond which a symbol at the edge of the decoded area is damaged: an edge or a shadow may
+  /// cut it.
   float damaged_distance = 2.5F;
-  /// The same for one on the grid of its neighbours: it may have been printed on.
+  /// The same limit for a symbol on the grid of its neighbours: it may have been printed on.
   float damaged_distance_on_grid = 4;
-  /// The same for a symbol among named neighbours on all sides: print and relief disturb a shape, its cell is certain,
-  /// and its sigma says by how much they may move its centre.
+  /// The same limit for a symbol among named neighbours on all sides. Print and relief disturb its shape, but its cell
+  /// is certain; its sigma tells how much they may move its centre.
   float damaged_distance_held = kTornDistance;
   Rules rules = {};
 };
@@ -41,10 +42,10 @@ class SymbolReview {
  public:
   SymbolReview(const Pattern& pattern, ReviewOptions options);
 
-  /// How the letters look in measured frames.
+  /// Look of the letters in measured frames.
   struct Look {
     const std::vector<Prototype>& prototypes;
-    const Classifier& classifier;  ///< of these
+    const Classifier& classifier;  ///< made from the prototypes
   };
   /// @param meters  one to a worker
   /// @param seen    in and out: moments, frames and claims change

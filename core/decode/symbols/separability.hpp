@@ -16,7 +16,7 @@ struct LookOptions {
   double camera_px_per_projector_px = 1.4;  ///< 1.4: camera 1600 px and projector 1280 px wide on the paper's rig
   double blur_px = 1.1;                     ///< standard deviation of the blur of projector and camera, camera px
   double noise = 0.02;                      ///< standard deviation, as a share of the contrast
-  int looks = 160;                          ///< at each symbol
+  int looks = 160;                          ///< simulated looks at each symbol
   double frame_error = 0.07;  ///< largest error of the grid vectors that a look is measured by, as a share of them
 };
 
@@ -28,10 +28,10 @@ struct SymbolPair {
   double distance;
 };
 
-/// What became of one symbol in the simulated camera.
+/// Losses of one symbol in the simulated camera.
 struct SymbolLoss {
   int number;
-  double share;  ///< of the looks in which it broke into pieces or grew together with a neighbour, 0 to 1
+  double share;  ///< share of the looks in which it broke into pieces or grew together with a neighbour, 0 to 1
 };
 
 /// Below this a pair is risky. At 4 the Gaussian error is 1 in 30,000, so that even tails ten times as heavy stay
@@ -42,10 +42,10 @@ inline constexpr double kRiskyDistance = 4.0;
 /// that occurs; a pattern of which each symbol is lost in one of ten still decodes to nine tenths on a sculpture.
 inline constexpr double kRiskyLoss = 0.15;
 
-/// How far apart the members of a set of symbols are.
+/// Distances between the members of a set of symbols.
 struct Separability {
-  std::vector<SymbolPair> pairs;   ///< all of them, the closest first
-  std::vector<SymbolLoss> losses;  ///< in the order of the symbols
+  std::vector<SymbolPair> pairs;   ///< all pairs, the closest first
+  std::vector<SymbolLoss> losses;  ///< one for each symbol, in their order
 
   [[nodiscard]] double smallest_distance() const { return pairs.front().distance; }
   [[nodiscard]] std::vector<SymbolPair> risky_pairs() const;

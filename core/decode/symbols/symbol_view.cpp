@@ -20,7 +20,7 @@ constexpr float kLight = 160, kDark = 20;
 constexpr float kDrawnBlurPx = 0.3F;
 constexpr int kDrawnOneIn = 4;
 
-/// From -reach to reach, with the sum 1.
+/// Gaussian weights from -reach to reach, with the sum 1.
 std::vector<float> gaussian(float sigma_px, int reach) {
   std::vector<float> weights;
   float sum = 0;

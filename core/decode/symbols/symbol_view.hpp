@@ -30,12 +30,12 @@ struct SymbolView {
   Grey8 image;
   Grey8 mask;                 ///< above the threshold
   LatticeFrame frame;         ///< camera px for one projector px
-  Eigen::Vector2f middle_px;  ///< of the symbol's square, in the image
+  Eigen::Vector2f middle_px;  ///< middle of the symbol's square, in the image
 };
 
 /// The error of an assumed frame, up to its size.
 struct FrameError {
-  std::array<float, 4> shares;  ///< of its range, of each entry by rows
+  std::array<float, 4> shares;  ///< shares of its range, one for each entry by rows
 
   /// A matrix near the identity.
   [[nodiscard]] Eigen::Matrix2f of_size(float size) const;

@@ -27,7 +27,7 @@ inline __attribute__((always_inline)) void load_grey(const std::int16_t* from, L
   grey = __builtin_convertvector(reinterpret_cast<IntLanes>(wide), Lanes);
 }
 
-/// To between 0 and 1; kOutside becomes 0.
+/// Clamps to between 0 and 1; kOutside becomes 0.
 template <class Pixel>
 inline __attribute__((always_inline)) void clamp_weight(Lanes& weight) {
   if constexpr (std::is_same_v<Pixel, float>) {
@@ -134,7 +134,7 @@ using WideShorts [[gnu::vector_size(4 * kShortLanes)]] = int;
 /// Registers of a patch, which holds a symbol of 40 px: sums of as many grey values stay within 15 bits.
 constexpr int kShortsMax = 128, kPatchLanesMax = kShortsMax * kShortLanes;
 constexpr int kPatchRowsMax = kShortsMax, kEdgeRows = kPatchRowsMax + 2 * kShortLanes;
-/// Of patches of an odd number of rows, whose middle is that of a row, and of an even number.
+/// Powers for patches of an odd number of rows, whose middle is that of a row, and of an even number.
 constexpr auto kRowPowers = [] {
   std::array<std::array<RowPowers, kPatchRowsMax + 1>, 2> powers{};
   for (const int even : {0, 1}) {
@@ -178,7 +178,7 @@ inline __attribute__((always_inline)) int total_of(const Shorts& lanes) {
   return eighths[0] + eighths[1];
 }
 
-/// What the pixels inside a patch span, and how many others it has.
+/// Range of the pixels inside a patch, and the number of the others.
 struct ShortRange {
   std::int16_t least, greatest;
   int outside;
@@ -197,12 +197,12 @@ struct ShortPatch {
   [[nodiscard]] int lanes() const { return blocks() * height * kShortLanes; }
 };
 
-/// Where the rows of a patch begin and end; with as many more as a register may reach beyond them.
+/// Starts and ends of a patch's rows, with as many more as a register may reach beyond them.
 struct ShortEdges {
   std::int16_t before[kEdgeRows], after[kEdgeRows];
 };
 
-/// Those of the region itself, 2 margins down.
+/// Marks the edges of the region itself, 2 margins down.
 inline __attribute__((always_inline)) void mark_edges(const ShortPatch& place, const Region& region, const Run* runs,
                                                       ShortEdges& edges) {
   const int reach = 2 * place.margin;
@@ -220,7 +220,7 @@ inline __attribute__((always_inline)) void mark_edges(const ShortPatch& place, c
   }
 }
 
-/// With those within the margin above and below: as follow_edge does it.
+/// Widens the edges by the margin above and below, as follow_edge does.
 inline __attribute__((always_inline)) void widen_edges(const ShortPatch& place, ShortEdges& edges) {
   const int reach = 2 * place.margin;
   for (int y = 0; y < place.height; y += kShortLanes) {
@@ -237,7 +237,7 @@ inline __attribute__((always_inline)) void widen_edges(const ShortPatch& place, 
   }
 }
 
-/// As copy_rows; what is outside becomes 0.
+/// Copies as copy_rows does; what is outside becomes 0.
 inline __attribute__((always_inline)) void copy_shorts(const ImageView<std::uint8_t>& frame, const ShortPatch& place,
                                                        const ShortEdges& edges, std::int16_t* patch,
                                                        ShortRange& range) {
@@ -266,7 +266,7 @@ inline __attribute__((always_inline)) void copy_shorts(const ImageView<std::uint
   range.greatest = static_cast<std::int16_t>(-least_of(-greatest));
 }
 
-/// As find_levels_of, in whole numbers: what is outside is zero, and taken for dark.
+/// Finds levels as find_levels_of does, in whole numbers: what is outside is zero, and taken for dark.
 inline __attribute__((always_inline)) void find_short_levels(const std::int16_t* patch, int count,
                                                              const ShortRange& range, PatchLevels& levels) {
   const auto least = static_cast<float>(range.least), greatest = static_cast<float>(range.greatest);

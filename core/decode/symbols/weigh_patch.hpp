@@ -13,15 +13,16 @@
 
 namespace slsd {
 
-/// Where the soft threshold begins and ends, between a region's background and its peak. For a shape it ends where even
-/// print, shading or a camera's gamma leave the bright part bright: it is where light is, however much of it.
+/// Ends of the soft threshold between a region's background and its peak. For a shape, the upper end is the level at
+/// which print, shading or a camera's gamma still leave the bright part bright. The shape is where light is, however
+/// much of it.
 inline constexpr float kRampStart = 0.1F;
 inline constexpr float kRampEnd = 0.3F;
-/// For its centre it is even about the middle and as wide as background and peak allow, so that blur does not move it:
-/// on planes at 2 m 0.09 mm are left of the 0.16 mm of one that is not.
+/// Ends for the centre. They are symmetric about the middle and as wide as background and peak allow, so blur does not
+/// move the centre. On planes at 2 m this leaves 0.09 mm of the 0.16 mm of an asymmetric one.
 inline constexpr float kCentreRampStart = 0.2F;
 inline constexpr float kCentreRampEnd = 0.8F;
-/// Where the light changes within the symbol it ends lower: what is less bright counts as well.
+/// Lower end for light that changes within the symbol: less bright pixels count as well.
 inline constexpr float kSteadyRampEnd = 0.65F;
 
 /// Pixels of a patch that belong to others: every comparison with them is false.
@@ -51,7 +52,7 @@ struct RawMoments {
   float steady = 0, steady_x = 0, steady_y = 0;  ///< and through that of uneven light, where it is measured
 };
 
-/// Whether the centre that uneven light pulls less is measured too: few symbols are asked for it.
+/// Selects whether to measure also the centre that uneven light pulls less: few symbols need it.
 enum class SteadyCentre : std::uint8_t { kLeftOut, kMeasured };
 
 /// A row's y, from the patch's middle, and its powers.
@@ -75,7 +76,7 @@ struct WeighedRegion {
   PatchLevels levels{};
   RawMoments moments{};  ///< about the middle of the region's box; none where the peak is not above the background
 };
-/// Whether a region's patch is small enough, and lies in the frame.
+/// Tells whether a region's patch is small enough, and lies in the frame.
 /// @thread reentrant
 [[nodiscard]] bool can_be_weighed(const ImageView<std::uint8_t>& frame, const Region& region, int margin_px);
 /// All of it at once for some regions that can be weighed, in 16 bits a pixel: half the memory, and twice the pixels to
