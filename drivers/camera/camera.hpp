@@ -17,12 +17,12 @@
 namespace slsd {
 
 struct CameraDescription {
-  std::string name;    ///< as configured
+  std::string name;    ///< configured name
   std::string driver;  ///< "file", "v4l2" or "aravis"
   std::string device;  ///< stable name of the device: path, serial number
   int width_px = 0;
   int height_px = 0;
-  double rate_hz = 0.0;  ///< of a camera that runs freely, after open(); 0: exposes at the trigger, or does not tell
+  double rate_hz = 0.0;  ///< frame rate while it runs freely, after open(); 0: exposes at the trigger, or does not tell
   std::string hardware = {};  ///< after open(): what tells the device from others of its kind, wherever it is plugged
                               ///< in; printable, at most 200 bytes; empty where nothing does
   bool external_trigger = false;  ///< exposes when a line outside of this host says so: it may be silent for long
@@ -59,11 +59,11 @@ class Camera {
   ///         kCancelled: a cancel() came meanwhile
   [[nodiscard]] virtual Result<> open() = 0;
 
-  /// How long open() may take, for who watches over it.
+  /// The longest time that open() may take, for the thread that watches over it.
   [[nodiscard]] virtual std::chrono::nanoseconds open_time_max() const { return std::chrono::minutes(1); }
 
-  /// How long capture() may take where nothing is wrong, whatever its deadline: who watches over it has it asked again
-  /// after that, and takes a driver that does not come back for stuck.
+  /// The longest time that capture() may take if nothing is wrong, whatever its deadline. The thread that watches over
+  /// it asks again after that, and takes a driver that does not come back for stuck.
   [[nodiscard]] virtual std::chrono::nanoseconds frame_time_max() const {
     constexpr double kFloorS = 5;
     const double rate_hz = description().rate_hz;
@@ -82,7 +82,7 @@ class Camera {
   /// and of a camera that exposes at the trigger, as capture(). @errors as capture()
   [[nodiscard]] virtual Result<Frame> capture_next(MonotonicTime deadline) { return capture(deadline); }
 
-  /// What lights the captures that follow; the pattern, where nobody says. A camera sees it, a replay chooses its
+  /// Tells the light of the captures that follow; the default is the pattern. A camera sees it, a replay chooses its
   /// images by it.
   virtual void expect(Picture) {}
 

@@ -13,13 +13,13 @@
 
 namespace slsd {
 
-/// What real cameras do to those who use them.
+/// The faults of real cameras.
 enum class FaultKind {
   kDrop,        ///< the frame is lost: kFrameDropped, and a gap in the sequence numbers
   kTear,        ///< a part of the frame is missing: kFrameTorn
   kLate,        ///< the frame arrives `duration` late (without one: never): kFrameLate where that is past its deadline
   kStale,       ///< the frame was exposed `duration` before the trigger (100 ms), and says so in exposure_start()
-  kStall,       ///< for `duration` (without one: until open()) no frame arrives: kFrameLate for those that wait less
+  kStall,       ///< no frame arrives for `duration` (without one: until open()): kFrameLate for those that wait less
   kHang,        ///< the driver does not come back for `duration` (without one: never), whoever tells it to
   kDisconnect,  ///< the device goes: kDisconnected, also from open() for `duration` (0 s)
 };
@@ -27,7 +27,7 @@ enum class FaultKind {
 /// One fault, at one capture.
 struct Fault {
   FaultKind kind = FaultKind::kDrop;
-  std::uint64_t capture = 1;  ///< at which capture() of the camera's life, counted from 1
+  std::uint64_t capture = 1;  ///< the faulty capture() of the camera's life, counted from 1
   std::optional<std::chrono::nanoseconds> duration;
 
   friend bool operator==(const Fault&, const Fault&) = default;

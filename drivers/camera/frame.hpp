@@ -33,7 +33,7 @@ class LentBuffers : public std::enable_shared_from_this<LentBuffers> {
 
   [[nodiscard]] std::size_t size() const { return lent_.size(); }
   [[nodiscard]] bool is_lent(std::size_t buffer) const { return lent_[buffer].load(std::memory_order_acquire); }
-  /// How many are; one that ends meanwhile on another thread may count or not.
+  /// The number of lent buffers. A lease that ends meanwhile on another thread may count or not.
   [[nodiscard]] std::size_t lent() const {
     return static_cast<std::size_t>(
         std::ranges::count_if(lent_, [](const auto& lent) { return lent.load(std::memory_order_acquire); }));
@@ -53,7 +53,8 @@ class LentBuffers : public std::enable_shared_from_this<LentBuffers> {
     lent_[buffer].store(false, std::memory_order_release);
     take_back(buffer);
   }
-  /// For a driver that wants its buffer back at once; on whichever thread ends the lease.
+  /// Called with a buffer whose lease ended, for a driver that wants it back at once. Runs on the thread that ends the
+  /// lease.
   virtual void take_back(std::size_t /*buffer*/) {}
 
   std::vector<std::atomic<bool>> lent_;
@@ -62,7 +63,7 @@ class LentBuffers : public std::enable_shared_from_this<LentBuffers> {
 /// A buffer that is lent, until the end of this.
 class FrameLease {
  public:
-  FrameLease() = default;  ///< of nothing
+  FrameLease() = default;  ///< holds no buffer
   FrameLease(FrameLease&&) noexcept = default;
   FrameLease& operator=(FrameLease&& other) noexcept {
     std::swap(buffers_, other.buffers_);

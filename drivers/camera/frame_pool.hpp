@@ -40,7 +40,7 @@ class FramePool {
 
  private:
   struct Buffers;
-  std::shared_ptr<Buffers> buffers_;  ///< with the frames
+  std::shared_ptr<Buffers> buffers_;  ///< shared with the frames
 };
 
 }  // namespace slsd

@@ -20,7 +20,7 @@ constexpr std::uint32_t kFileHeaderBytes = 14;
 using Palette = std::array<std::array<std::uint8_t, 3>, 256>;
 
 struct Header {
-  ImageLayout layout;  ///< as stored: one channel is an index
+  ImageLayout layout;  ///< the stored one: one channel is an index
   bool top_down = false;
   std::uint32_t pixels_at = 0;
   std::uint32_t palette_at = 0;

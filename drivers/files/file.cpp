@@ -69,7 +69,8 @@ Result<> write_all(const FileDescriptor& file, std::string_view bytes, const fs:
   return {};
 }
 
-/// What stands at the path now: its type and its permissions; nothing is a regular file with the usual ones.
+/// The type and the permissions of the file at the path now. A missing file counts as a regular one with the usual
+/// permissions.
 mode_t mode_of(const fs::path& path) {
   struct stat status {};
   return ::stat(path.c_str(), &status) == 0 ? status.st_mode : S_IFREG;
@@ -111,7 +112,7 @@ Result<> replace_file(const fs::path& path, mode_t mode, std::string_view bytes)
   return {};
 }
 
-/// Where the links end, be it there or not; in a ring of links at one of them.
+/// The end of the links, be it there or not; in a ring of links one of them.
 fs::path follow_links(fs::path path) {
   constexpr int kLinksMax = 40;
   for (int i = 0; i < kLinksMax; ++i) {

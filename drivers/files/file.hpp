@@ -11,7 +11,7 @@
 
 namespace slsd {
 
-/// How a file's name ends, in lower case: ".ply" of "CLOUD.PLY".
+/// The extension of a file's name, in lower case: ".ply" of "CLOUD.PLY".
 /// @thread reentrant
 [[nodiscard]] std::string lower_extension(const std::filesystem::path& file);
 

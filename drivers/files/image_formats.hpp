@@ -11,7 +11,7 @@
 
 namespace slsd {
 
-/// What a file's bytes are as an image. The errors below have no place; the caller knows it.
+/// The image in a file's bytes. The errors below have no place; the caller knows it.
 struct DecodedImage {
   GreyImage grey;
   bool colour = false;  ///< the file had colours, so that it is no mosaic
@@ -28,7 +28,7 @@ struct DecodedImage {
 [[nodiscard]] Result<DecodedImage> decode_jpeg(std::string_view bytes, std::size_t limit_bytes);
 [[nodiscard]] Result<DecodedImage> decode_bmp(std::string_view bytes, std::size_t limit_bytes);
 
-/// What a header declares.
+/// The image's size and samples that a header declares.
 struct ImageLayout {
   std::uint64_t width_px = 0;
   std::uint64_t height_px = 0;
@@ -37,7 +37,7 @@ struct ImageLayout {
 
   [[nodiscard]] std::size_t row_samples() const { return width_px * static_cast<std::size_t>(channels); }
   [[nodiscard]] bool colour() const { return channels > 2; }
-  /// As a double, which does not overflow.
+  /// The bytes of all samples, as a double, which does not overflow.
   [[nodiscard]] double bytes() const {
     return static_cast<double>(width_px) * static_cast<double>(height_px) * channels * bytes_per_channel;
   }

@@ -29,7 +29,7 @@ class JpegDecoder {
 
   /// @errors kMalformed, kUnsupported (a rare kind, with its remedy)
   [[nodiscard]] Result<> read_header();
-  /// Of the image, after its header was read.
+  /// The image's width, after its header was read.
   [[nodiscard]] int width_px() const { return static_cast<int>(info_.image_width); }
   [[nodiscard]] int height_px() const { return static_cast<int>(info_.image_height); }
   [[nodiscard]] bool colour() const { return info_.num_components > 1; }
@@ -55,7 +55,7 @@ class JpegDecoder {
   [[nodiscard]] Result<> fail_as_told() const;
 
   std::string_view bytes_;
-  std::string_view scan_;  ///< what follows the header of the first scan
+  std::string_view scan_;  ///< the bytes after the header of the first scan
   Failure failure_{};
   jpeg_decompress_struct info_{};
 };

@@ -107,14 +107,14 @@ class Codes {
   };
   std::array<std::uint8_t, 256> values_;
   std::array<Short, 256> short_{};
-  std::array<std::uint32_t, 17> end_{};  ///< of each length, the first code beyond, as 16 bits
+  std::array<std::uint32_t, 17> end_{};  ///< the first code beyond those of each length, as 16 bits
   std::array<int, 17> offset_{};
 };
 
 /// A component's tables, and its mean level as it goes on from block to block.
 struct Component {
   const Codes *dc = nullptr, *ac = nullptr;
-  int level = 0, level_max = 0;  ///< in steps of its quantization
+  int level = 0, level_max = 0;  ///< unit: steps of its quantization
 };
 
 // No picture is brighter than white by more than rounding. Data that was lost takes its differences of level with it.

@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// How the blocks that a JPEG scan holds agree with its size.
+/// The agreement of a JPEG scan's blocks with its size.
 enum class ScanBlocks {
   kAgree,
   kMissing,  ///< data ends before the last block, a code is invalid, or a level is none that a picture has

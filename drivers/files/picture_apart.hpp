@@ -25,7 +25,7 @@ namespace slsd {
                                          std::chrono::steady_clock::time_point until,
                                          const std::filesystem::path& program);
 
-/// What slsd-picture does with the file. @errors as decode_apart() @thread reentrant
+/// Decodes the file as slsd-picture does. @errors as decode_apart() @thread reentrant
 [[nodiscard]] Result<Grey8> decode_projected(std::string_view png, int width_px, int height_px);
 
 // What the two say to one another: a line that is "ok", or an error's code and message; then the pixels, row by row.

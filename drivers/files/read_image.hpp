@@ -12,9 +12,9 @@
 
 namespace slsd {
 
-/// How an image file is read, and what it may cost.
+/// The options for reading an image file, and the limits of its cost.
 struct ReadImageOptions {
-  BayerPattern bayer = BayerPattern::kNone;    ///< what a grey image's pixels stand for; colour images ignore it
+  BayerPattern bayer = BayerPattern::kNone;    ///< meaning of a grey image's pixels; colour images ignore it
   std::size_t limit_file_bytes = 1u << 28;     ///< 256 MiB
   std::size_t limit_decoded_bytes = 1u << 28;  ///< 256 MiB of pixels, as the file's header declares them
 };

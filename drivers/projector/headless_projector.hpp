@@ -19,7 +19,7 @@ struct HeadlessProjectorOptions {
   int height_px = 800;  ///< 1 to 16384
   LightOptions light = {};
   double refresh_hz = 60.0;                       ///< 1 to 1000
-  std::vector<std::uint64_t> disconnect_at = {};  ///< at which image shown, counted from 1, it is found unplugged
+  std::vector<std::uint64_t> disconnect_at = {};  ///< images, counted from 1, at which it is found unplugged
 
   [[nodiscard]] Result<> validate() const;
 };
@@ -50,7 +50,7 @@ class HeadlessProjector final : public Projector {
   bool connected_ = false;
   MonotonicTime first_refresh_;
   Grey8 showing_, light_;                  // what was asked for, and the values that a monitor would get for it
-  std::optional<MonotonicTime> complete_;  ///< of what is shown, until show() has said so
+  std::optional<MonotonicTime> complete_;  ///< end of the first refresh that shows it, until show() has reported it
   std::uint64_t shows_ = 0;
 };
 

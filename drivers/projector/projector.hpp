@@ -16,7 +16,7 @@ struct ProjectorDescription {
   std::string monitor;
   int width_px = 0;
   int height_px = 0;
-  std::string model = {};   ///< as the monitor's EDID says, once it is open; empty: unknown
+  std::string model = {};   ///< model in the monitor's EDID, once it is open; empty: unknown
   std::string serial = {};  ///< likewise; empty: none
 };
 
@@ -45,10 +45,10 @@ class Projector {
   /// scan, and while nobody scans. @errors kDisconnected, kTimeout, kIo
   [[nodiscard]] virtual Result<> check(MonotonicTime deadline) = 0;
 
-  /// What disturbs the light that it gives, as found by open(): a sentence each, with the remedy.
+  /// Warnings about disturbances of its light, as found by open(). Each is one sentence with the remedy.
   [[nodiscard]] virtual std::vector<std::string> warnings() const = 0;
 
-  /// What is shown, as read back from where it is shown; for tests. @errors kDisconnected, kIo
+  /// Reads back the shown image from the place that shows it; for tests. @errors kDisconnected, kIo
   [[nodiscard]] virtual Result<Grey8> read_back() = 0;
 };
 

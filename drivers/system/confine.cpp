@@ -52,8 +52,8 @@ void drop_capabilities() {
   ::syscall(SYS_capset, &header, none);
 }
 
-/// In the language of the kernel's filters, in which a jump skips that many instructions. Of arguments the low halves
-/// are looked at, which is where these flags are.
+/// The filter in the language of the kernel's filters, in which a jump skips that many instructions. It looks at the
+/// low halves of arguments, which is where these flags are.
 std::vector<sock_filter> filter() {
   const auto load = [](std::size_t at) {
     return sock_filter BPF_STMT(BPF_LD | BPF_W | BPF_ABS, static_cast<unsigned>(at));

@@ -8,7 +8,7 @@ namespace slsd {
 /// @thread thread-bound
 class Interrupt {
  public:
-  /// From now on.
+  /// Watches for the signals from now on.
   static void watch();
   [[nodiscard]] static bool came();
 };

@@ -12,7 +12,7 @@
 
 namespace slsd {
 
-/// Where a program of slsd's own is: beside this one, as it is built; else where it is installed, or will be.
+/// Finds a program of slsd's own: beside this one, as it is built; else where it is installed, or will be.
 /// @thread reentrant
 [[nodiscard]] std::filesystem::path find_own_program(const std::string& name);
 

@@ -10,7 +10,7 @@
 
 namespace slsd {
 
-/// What a number of errno means, and what a user does about it.
+/// The meaning of a number of errno, and the user's remedy.
 struct SystemErrorMeaning {
   int number;
   ErrorCode code;

@@ -18,7 +18,7 @@ class WakeEvent {
   enum class Woken {
     kReady,  ///< the other descriptor has something to read
     kGone,   ///< it failed, or was hung up
-    kWoken,  ///< by wake(), which is reset
+    kWoken,  ///< wake() was called; it is reset
     kLate    ///< the time is there
   };
 
@@ -31,7 +31,7 @@ class WakeEvent {
   /// @errors kNoSpace: no descriptor is left
   [[nodiscard]] Result<> open();
 
-  /// For a poll() of one's own: readable once woken, until reset(). -1 before open().
+  /// The descriptor for a poll() of one's own: readable once woken, until reset(). -1 before open().
   [[nodiscard]] int descriptor() const { return number_; }
 
   /// Waits until the descriptor has something to read, with an end at the time. A time in the past looks only.
@@ -47,7 +47,7 @@ class WakeEvent {
   [[nodiscard]] bool take() const;
 
   std::atomic<int> number_{-1};             ///< an eventfd; opened once, closed at the end
-  mutable std::atomic<bool> woken_{false};  ///< what counts; the event only ends the poll()
+  mutable std::atomic<bool> woken_{false};  ///< the truth; the event only ends the poll()
 };
 
 }  // namespace slsd

@@ -15,7 +15,7 @@
 
 namespace slsd {
 
-/// When to expose, by the device's clock; nothing: at once. @thread any member's
+/// Gives the time to expose at, by the device's clock; without a value: at once. @thread any member's
 using ActionTime = std::function<std::optional<std::uint64_t>()>;
 
 /// The GigE Vision cameras of this process that expose at one action command. Each member asks for its exposure, and

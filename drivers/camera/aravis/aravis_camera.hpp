@@ -56,9 +56,9 @@ class AravisCamera final : public Camera {
   void tell_figures(std::vector<DriverFigure>& figures) const override;
   void cancel() override;
 
-  /// Of the session that is open, or the one before.
+  /// The statistics of the open session, or of the one before.
   [[nodiscard]] AravisStatistics statistics() const;
-  /// By how much the device's clock goes faster than the host's; 0 while that cannot be told.
+  /// The rate by which the device's clock is faster than the host's; 0 until it is known.
   [[nodiscard]] double clock_drift_ppm() const;
   /// The names of what on this system may cost frames, or could not be made sure of: "receive_buffer", "packet_size",
   /// "fragments", "packet_resend", "device_clock", "chunks", "first_frame".
@@ -75,7 +75,7 @@ class AravisCamera final : public Camera {
   std::unique_ptr<CaptureEvents> events_;
   std::unique_ptr<AravisSession> session_;
   AravisStatistics ended_;
-  std::optional<MonotonicTime> last_start_;  ///< of the exposure of the frame before
+  std::optional<MonotonicTime> last_start_;  ///< start of the previous frame's exposure
   std::string address_;
   std::vector<std::string> logged_;
   std::vector<std::jthread> closing_;

@@ -35,7 +35,7 @@ constexpr milliseconds kPeriodUnknown{100};
 constexpr int kPeriodsToNext = 5;         // one of them for readout and transfer
 constexpr milliseconds kPauseLeast{100};  // which a busy host makes without anyone's doing
 
-/// Until the exposure has ended.
+/// The longest time from the trigger to the end of the exposure.
 nanoseconds exposure_time(const AravisCameraOptions& options) {
   const double period_us = options.rate_hz > 0.0 ? 1e6 / options.rate_hz : 0.0;
   return from_us(options.exposure_us + options.action_lead_us + period_us);

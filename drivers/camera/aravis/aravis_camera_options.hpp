@@ -13,7 +13,7 @@
 
 namespace slsd {
 
-/// What makes the camera expose.
+/// The trigger of the camera's exposures.
 enum class AravisTrigger {
   kSoftware,  ///< a command at each capture()
   kLine,      ///< a rising edge on an input line
@@ -21,7 +21,7 @@ enum class AravisTrigger {
   kAction,    ///< GigE: one command to all cameras with the same keys
 };
 
-/// By what is told when an exposure began.
+/// The clock that tells when an exposure began.
 enum class AravisClock {
   kAuto,     ///< the device's clock, and the arrival of frames where that cannot be read or trusted
   kDevice,   ///< the device's clock wherever it can be read
@@ -40,23 +40,23 @@ struct AravisCameraOptions {
   double action_lead_us = 0.0;  ///< GigE: so long after the command all expose, by their common clock; 0, and until
                                 ///< they have one: at once
   bool ptp = false;             ///< the camera's clock follows the network's (IEEE 1588)
-  double rate_hz = 0.0;         ///< where it runs freely, up to 10000; 0: as the camera has it
+  double rate_hz = 0.0;         ///< of a camera that runs freely, up to 10000; 0: the camera's own
   AravisClock device_clock = AravisClock::kAuto;
-  double readout_us = 0.0;       ///< by arrival, not by command: the longest from an exposure's end to the frame being
-                                 ///< there, up to 10000000; 0: two periods
-  double exposure_us = 10000.0;  ///< 1 to 10000000
-  double gain_db = 0.0;          ///< 0 to 60
+  double readout_us = 0.0;  ///< used by arrival, not by command: the longest time from an exposure's end to the frame's
+                            ///< arrival, up to 10000000; 0: two periods
+  double exposure_us = 10000.0;                     ///< 1 to 10000000
+  double gain_db = 0.0;                             ///< 0 to 60
   std::string pixel_format = "Mono8";               ///< Mono8, Mono10, Mono12, Mono16, packed, or Bayer in 8 to 16 bits
-  std::optional<std::pair<int, int>> size_px = {};  ///< from the sensor's middle; without it the whole sensor
-  bool chunks = true;    ///< where it has them: what it says of each frame's exposure and gain is compared with these
-  int packet_bytes = 0;  ///< GigE: with headers, 576 to 16000; 0: the largest that gets through
+  std::optional<std::pair<int, int>> size_px = {};  ///< centred on the sensor; without it the whole sensor
+  bool chunks = true;            ///< if the camera has them: each frame's own exposure and gain are compared with these
+  int packet_bytes = 0;          ///< GigE: with headers, 576 to 16000; 0: the largest that gets through
   double packet_delay_us = 0.0;  ///< GigE: between two packets, where several cameras share a link
   int receive_buffer_bytes = 0;  ///< GigE: of the socket; 0: two frames. net.core.rmem_max must allow it
   bool packet_resend = true;     ///< GigE: lost packets are asked for again
   bool packet_socket = true;     ///< GigE: where CAP_NET_RAW allows, packets are taken before the UDP socket
-  int frame_timeout_ms = 1000;   ///< how long after its trigger or the frame before a frame may take, 10 to 60000
+  int frame_timeout_ms = 1000;   ///< longest time from the trigger, or from the frame before, to a frame: 10 to 60000
   int missed_frames_max = 2;     ///< so many in a row missing: the camera is gone
-  int frames_held_max = 8;       ///< how many frames may be held at once, 2 to 64
+  int frames_held_max = 8;       ///< number of frames that may be held at once, 2 to 64
 
   /// Whether `id` is an address.
   [[nodiscard]] bool names_address() const;
@@ -67,26 +67,26 @@ struct AravisCameraOptions {
 
 [[nodiscard]] std::chrono::nanoseconds from_us(double duration_us);
 
-/// How long after it was asked for a frame may come.
+/// The longest time from the request to the arrival of a frame.
 /// @thread reentrant
 [[nodiscard]] std::chrono::nanoseconds frame_patience(const AravisCameraOptions& options);
 
 /// So many streams are tried until one gives a frame.
 inline constexpr int kFirstFrameTries = 3;
 
-/// How long the first frame of a stream is waited for before a new stream is tried; most cameras need less.
+/// The wait for the first frame of a stream before a new stream is tried; most cameras need less.
 /// @param trigger       kFreeRun or kSoftware, whichever proves that frames come
 /// @param tries_before  0 to kFirstFrameTries - 1
 /// @thread reentrant
 [[nodiscard]] std::chrono::nanoseconds first_frame_patience(const AravisCameraOptions& options, AravisTrigger trigger,
                                                             int tries_before);
 
-/// How long all of them together may take, with chunks and again without.
+/// The longest time for all these tries together, with chunks and again without.
 /// @thread reentrant
 [[nodiscard]] std::chrono::nanoseconds first_frame_time_max(const AravisCameraOptions& options);
 
-/// How long ago the exposure of a frame of a camera that runs freely may have begun for the one after it still to be of
-/// now: a few periods.
+/// The greatest age of an exposure after which the next frame is still current, for a camera that runs freely. A few
+/// periods.
 /// @thread reentrant
 [[nodiscard]] std::chrono::nanoseconds next_frame_age_max(const AravisCameraOptions& options);
 

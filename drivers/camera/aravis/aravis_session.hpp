@@ -52,23 +52,23 @@ class AravisSession {
   [[nodiscard]] DeviceClock clock() const { return control_->clock(); }
   /// Looks whether the device's clock can still be trusted. @return whether there is a new warning
   bool note_clock();
-  /// To be asked after a frame that did not come whole. @return whether there is a new warning
+  /// Looks for fragments; call it after a frame that did not come whole. @return whether there is a new warning
   bool note_fragments();
   /// Whether the device still answers; waits a little for a trigger under way.
   [[nodiscard]] bool answers();
   /// @errors kDisconnected: it was lost while nobody asked for a frame
   [[nodiscard]] Result<> check();
-  /// What is left is its end, which may then no more stop the device.
+  /// Gives the device up: the session's end will not stop it.
   void abandon();
 
   /// @errors as Camera::capture(); after kDisconnected only the session's end is left
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline);
-  /// Of a camera that runs freely: the first frame not yet taken whose exposure did not begin before `since`. As
-  /// capture() where that is long ago.
+  /// Captures the first frame not yet taken whose exposure did not begin before `since`, from a camera that runs
+  /// freely. Works as capture() if `since` is long ago.
   [[nodiscard]] Result<Frame> capture_since(MonotonicTime since, MonotonicTime deadline);
 
  private:
-  /// What became of the first frame of a stream.
+  /// The fate of the first frame of a stream.
   enum class FirstFrame { kCame, kUnreadable, kMissing };
 
   AravisSession(const AravisCameraOptions& options, OpenedDevice device, CaptureEvents& events);
@@ -97,11 +97,11 @@ class AravisSession {
   ChunkSelection chunks_;
   std::vector<NetworkWarning> warnings_;
   DeviceClock first_clock_;
-  std::optional<PtpLock> first_ptp_;  ///< where the clock is to follow the network's
+  std::optional<PtpLock> first_ptp_;  ///< set if the clock is to follow the network's
   GObjectPtr<ArvStream> stream_;
   std::unique_ptr<FrameReceiver> receiver_;
   std::unique_ptr<DeviceControl> control_;
-  std::optional<ActionGroup::Member> action_;  ///< where the trigger is an action
+  std::optional<ActionGroup::Member> action_;  ///< set if the trigger is an action
   std::optional<FrameCapture> frame_capture_;  ///< once it is prepared, until it is abandoned
   unsigned long control_lost_handler_ = 0;
   bool abandoned_ = false;

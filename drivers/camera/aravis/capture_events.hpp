@@ -12,8 +12,8 @@
 
 namespace slsd {
 
-/// What a capture waits for: buffers that are done, the answer to a trigger, the loss of the camera, and cancel(). What
-/// an earlier session still reports while it is being closed is passed over.
+/// The events that a capture waits for: buffers that are done, the answer to a trigger, the loss of the camera, and
+/// cancel(). Ignores what an earlier session still reports while it is being closed.
 /// @thread thread-safe
 class CaptureEvents {
  public:
@@ -38,7 +38,7 @@ class CaptureEvents {
   [[nodiscard]] Wake wait_trigger_answered(MonotonicTime until);
   [[nodiscard]] bool trigger_answered() const;
 
-  /// Why the camera is lost; empty while it is not.
+  /// The cause of the camera's loss; empty unless it is lost.
   [[nodiscard]] std::string lost_reason() const;
 
  private:

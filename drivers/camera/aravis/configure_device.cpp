@@ -18,7 +18,7 @@ constexpr double kGainToleranceDb = 0.1;
 constexpr double kRateToleranceShare = 0.01;
 constexpr double kRateUnknownHz = 10.0;
 
-/// What a camera changes by itself would make frames of one scene differ, and decoding with them.
+/// Turns off the camera's automatic changes. They would make frames of one scene differ, and decoding with them.
 Result<> turn_automatics_off(const DeviceFeatures& features) {
   for (const char* name : {"ExposureAuto", "GainAuto", "BlackLevelAuto", "BalanceWhiteAuto"})
     if (auto done = features.choose_if_there(name, "Off"); !done) return done;

@@ -19,7 +19,7 @@ struct DeviceLayout {
   int width_px = 0;
   int height_px = 0;
   PixelLayout pixels;
-  std::chrono::nanoseconds period{0};  ///< of frames, where the camera runs freely
+  std::chrono::nanoseconds period{0};  ///< frame period of a camera that runs freely
 
   [[nodiscard]] std::size_t bytes() const {
     return packed_bytes(static_cast<std::size_t>(width_px) * height_px, pixels.bits_per_pixel());
@@ -59,8 +59,8 @@ struct ChunkSelection {
 /// @errors kUnsupported, kMismatch, kDisconnected
 [[nodiscard]] Result<> turn_chunks_off(const DeviceFeatures& features);
 
-/// How many bytes the camera sends for a frame: those of the image, and of the chunks if some are on. To be asked after
-/// everything else is set, which might change it.
+/// Reads the number of bytes that the camera sends for a frame: those of the image, and of the chunks if some are on.
+/// Call it after everything else is set, as that might change the number.
 /// @errors kMismatch: it is not what the configuration makes; kUnsupported, kDisconnected
 [[nodiscard]] Result<std::size_t> read_payload_bytes(ArvCamera* camera, const DeviceLayout& layout,
                                                      const ChunkSelection& chunks);

@@ -21,8 +21,8 @@ namespace slsd {
 /// An interface of this host that is up and has an IPv4 address.
 struct HostInterface {
   std::string name;     ///< "eth1"
-  in_addr address{};    ///< in network order
-  in_addr mask{};       ///< in network order
+  in_addr address{};    ///< in network byte order
+  in_addr mask{};       ///< in network byte order
   unsigned number = 0;  ///< the kernel's index
   std::optional<int> link_mbps = {};
   std::optional<int> mtu_bytes = {};
@@ -57,11 +57,11 @@ struct NetworkWarning {
 /// The camera can be made to expose by no means that this host has.
 [[nodiscard]] NetworkWarning first_frame_warning();
 
-/// What to do about packets that are small for large frames.
+/// The warning about packets that are small for large frames, with its remedy.
 /// @param interface  of this host to the camera, as far as it is known
 [[nodiscard]] NetworkWarning packet_size_warning(unsigned packet_bytes, const std::optional<HostInterface>& interface);
 
-/// What to do about packets that arrive in pieces.
+/// The warning about packets that arrive in pieces, with its remedy.
 /// @param packet_bytes  that were set; 0: the camera's packets were tried
 [[nodiscard]] NetworkWarning fragments_warning(int packet_bytes, const std::optional<HostInterface>& interface);
 
@@ -69,7 +69,7 @@ struct NetworkWarning {
 /// @param interface  of this host to the camera, as far as it is known
 [[nodiscard]] NetworkWarning packet_socket_warning(const std::optional<HostInterface>& interface);
 
-/// Of this host to the camera, as far as it is known. Nothing for one that is not GigE Vision.
+/// The interface of this host to the camera, as far as it is known. Empty for a camera that is not GigE Vision.
 [[nodiscard]] std::optional<HostInterface> interface_of(ArvCamera* camera);
 
 /// Sets packet size and delay of a GigE Vision camera; nothing for another. To be called before the stream is made.

@@ -39,7 +39,7 @@ class DeviceClock {
   bool observe(const ClockReading& reading);
 
   [[nodiscard]] bool was_read() const { return count_ > 0; }
-  /// Why it is not to be trusted; empty while it is.
+  /// The reason for not trusting the clock; empty while it is trusted.
   [[nodiscard]] std::string_view fault() const { return fault_; }
   /// Whether it can be read, and trusted.
   [[nodiscard]] bool ready() const { return was_read() && fault_.empty(); }
@@ -50,13 +50,13 @@ class DeviceClock {
   [[nodiscard]] bool may_have_shown(std::chrono::nanoseconds device, MonotonicTime before) const;
   /// Whether it can have shown so much between two times. Precondition: ready().
   [[nodiscard]] bool may_have_shown(std::chrono::nanoseconds device, MonotonicTime after, MonotonicTime before) const;
-  /// When the device's clock showed so much. Precondition: ready().
+  /// The host's time when the device's clock showed `device`. Precondition: ready().
   [[nodiscard]] MonotonicTime host_time(std::chrono::nanoseconds device) const;
-  /// What the device's clock shows at a time. Precondition: ready().
+  /// The reading of the device's clock at the host's time. Precondition: ready().
   [[nodiscard]] std::chrono::nanoseconds device_time(MonotonicTime host) const;
-  /// How wrong host_time() of this is, as a standard deviation at most.
+  /// The error of host_time() of this, as a standard deviation at most.
   [[nodiscard]] std::chrono::nanoseconds uncertainty(std::chrono::nanoseconds device) const;
-  /// By how much the device's clock goes faster than the host's, in parts per million; 0 until it can be told.
+  /// The rate by which the device's clock is faster than the host's, in parts per million; 0 until it is known.
   [[nodiscard]] double drift_ppm() const { return (1.0 / host_per_device_ - 1.0) * 1e6; }
 
  private:
@@ -69,14 +69,14 @@ class DeviceClock {
 
   bool may_be_set_;
   std::string_view fault_;
-  int steps_ = 0;                          ///< of late
+  int steps_ = 0;                          ///< recent steps
   int fits_ = 0;                           ///< since the last of them
   std::array<ClockReading, 32> readings_;  ///< a ring
   std::size_t count_ = 0;
   MonotonicTime steady_since_;
   ClockReading reference_;
   double host_per_device_ = 1.0;
-  double drift_error_ = 0.0;  ///< of host_per_device_
+  double drift_error_ = 0.0;  ///< standard error of host_per_device_
 };
 
 }  // namespace slsd

@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint32_t kFragment = IP_MF | IP_OFFMASK;
 constexpr std::uint32_t kFlagsAt = 6, kSourceAt = 12;  // bytes into the header of IP
 
-/// Of IP packets those pieces of this source, and of each a byte.
+/// The filter for fragments of IP packets from this source. It keeps one byte of each.
 std::array<sock_filter, 6> pieces_of(in_addr source) {
   return {{BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kSourceAt),
            BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, ntohl(source.s_addr), 0, 3),

@@ -13,9 +13,9 @@ namespace slsd {
 /// @thread thread-bound
 class FragmentWatch {
  public:
-  /// Of nothing: it sees none.
+  /// Watches nothing and sees no fragments.
   FragmentWatch() = default;
-  /// From now on. Without CAP_NET_RAW it sees none.
+  /// Watches the camera's packets from now on. Without CAP_NET_RAW it sees no fragments.
   explicit FragmentWatch(in_addr camera);
 
   [[nodiscard]] bool seen();

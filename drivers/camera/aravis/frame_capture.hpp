@@ -32,7 +32,7 @@ class FrameCapture {
   [[nodiscard]] Result<> check() const;
   /// @errors as Camera::capture()
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline);
-  /// As AravisSession::capture_since().
+  /// Captures as AravisSession::capture_since() does.
   [[nodiscard]] Result<Frame> capture_since(MonotonicTime since, MonotonicTime deadline);
 
  private:
@@ -62,7 +62,7 @@ class FrameCapture {
   int stale_in_a_row_ = 0;
   int passed_over_ = 0;                       ///< stale frames of this capture
   bool out_of_step_ = false;                  ///< the last frame was of an earlier trigger
-  std::chrono::nanoseconds longest_wait_{0};  ///< for a frame
+  std::chrono::nanoseconds longest_wait_{0};  ///< longest wait for a frame
 };
 
 }  // namespace slsd

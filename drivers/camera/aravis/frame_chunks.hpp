@@ -28,16 +28,16 @@ namespace slsd {
 [[nodiscard]] bool is_image_with_chunks(std::span<const std::uint8_t> frame, std::size_t image_bytes,
                                         std::endian order);
 
-/// What a camera says of one frame in the chunks behind its image; each where the camera has such a chunk.
+/// The data about one frame in the chunks behind its image. Each is set if the camera has such a chunk.
 struct FrameChunks {
-  std::optional<std::chrono::nanoseconds> exposure_start;  ///< by the device's clock
-  std::optional<double> exposure_us;                       ///< as it really was
-  std::optional<double> gain_db;                           ///< as it really was
+  std::optional<std::chrono::nanoseconds> exposure_start;  ///< in the device's clock
+  std::optional<double> exposure_us;                       ///< real exposure time
+  std::optional<double> gain_db;                           ///< real gain
 
   friend bool operator==(const FrameChunks&, const FrameChunks&) = default;
 };
 
-/// What of the frame's settings is not as configured, in words; empty where all is, or nothing is known.
+/// The settings of the frame that are not as configured, in words. Empty if all are, or if nothing is known.
 /// @thread reentrant
 [[nodiscard]] std::string unlike_configured(const FrameChunks& chunks, const AravisCameraOptions& options);
 

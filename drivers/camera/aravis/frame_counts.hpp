@@ -12,8 +12,7 @@ namespace slsd {
 /// @thread thread-bound
 class FrameIds {
  public:
-  /// How many frames went missing between the last identifier and this one; 0 for the first, and for one that goes
-  /// back.
+  /// Counts the frames missing between the last identifier and this one. 0 for the first, and for one that goes back.
   std::uint64_t note(std::uint64_t id) {
     const std::uint64_t before = last_.value_or(id);
     const bool first = !last_.has_value();
@@ -32,13 +31,13 @@ class FrameIds {
   std::optional<std::uint64_t> last_;
 };
 
-/// What became of a camera's frames since open().
+/// The counts of a camera's frames since open().
 struct AravisStatistics {
   std::uint64_t delivered = 0;   ///< handed out
-  std::uint64_t lost = 0;        ///< by the gaps of the frame identifiers: never came, or torn
+  std::uint64_t lost = 0;        ///< frames that never came or were torn, by the gaps of the frame identifiers
   std::uint64_t torn = 0;        ///< came with holes, too short, of another size, or with broken chunks
   std::uint64_t stale = 0;       ///< exposed before they were asked for, and passed over
-  std::uint64_t misexposed = 0;  ///< of another exposure or gain than configured, by their chunks
+  std::uint64_t misexposed = 0;  ///< frames whose chunks tell another exposure or gain than configured
   std::uint64_t packets_sent_again = 0;
   std::uint64_t packets_missing = 0;
   std::uint64_t underruns = 0;  ///< frames that came while no buffer was free

@@ -21,12 +21,12 @@ constexpr int kSpareBuffers = 4;           // being filled, or done and not yet 
 constexpr std::uint64_t kNear = 3;         // frames, of which some may be lost
 constexpr double kLeastOfExposure = 0.95;  // sensors take it a little shorter than they say
 
-/// When its last byte came; noted by the stream's callback.
+/// The time of the frame's last byte; noted by the stream's callback.
 MonotonicTime received(ArvBuffer* buffer) {
   return MonotonicTime(nanoseconds(arv_buffer_get_system_timestamp(buffer)));
 }
 
-/// When its exposure began, by the camera's clock.
+/// The start of the frame's exposure, by the camera's clock.
 nanoseconds stamp_of(ArvBuffer* buffer, const FrameChunks& chunks) {
   return chunks.exposure_start.value_or(nanoseconds(arv_buffer_get_timestamp(buffer)));
 }

@@ -39,12 +39,12 @@ class StreamBuffers {
   [[nodiscard]] int lent() const;
   /// A lease on a buffer that was taken from the stream.
   [[nodiscard]] FrameLease lend(ArvBuffer* buffer);
-  /// For a buffer that was not lent.
+  /// Returns a buffer that was not lent.
   void return_unread(ArvBuffer* buffer);
 
  private:
   struct Shared;
-  std::shared_ptr<Shared> shared_;  ///< with the frames
+  std::shared_ptr<Shared> shared_;  ///< shared with the frames
 };
 
 /// Turns the buffers of a stream into frames, and refuses those that are not what was asked for.
@@ -57,14 +57,14 @@ class FrameReceiver {
   FrameReceiver(ArvStream* stream, const DeviceLayout& layout, const AravisCameraOptions& options,
                 std::size_t payload_bytes, std::unique_ptr<ChunkReader> chunks);
 
-  /// To be called before the camera begins to acquire.
+  /// Prepares for frames; call it before the camera begins to acquire.
   void begin();
   /// Begins to count anew.
   void restart();
 
   [[nodiscard]] bool all_held() const { return buffers_.lent() >= options_.frames_held_max; }
 
-  /// What proves that a frame was exposed after it was asked for.
+  /// The evidence that a frame was exposed after its request.
   struct Proof {
     MonotonicTime asked;  ///< frames exposed before are stale
     const DeviceClock& clock;
@@ -77,7 +77,7 @@ class FrameReceiver {
   [[nodiscard]] Result<std::optional<Frame>> take(const Proof& proof);
   /// Takes the next buffer and gives it back.
   void discard();
-  /// As discard(). @return false if it is a frame whose chunks cannot be read
+  /// Discards as discard() does. @return false if it is a frame whose chunks cannot be read
   [[nodiscard]] bool discard_readable(const DeviceClock& clock);
 
   /// Whether exposures are told by the arrival of frames.
@@ -113,15 +113,15 @@ class FrameReceiver {
   std::unique_ptr<ChunkReader> chunks_;  ///< ends before the buffers
   FrameIds ids_;
   std::uint64_t underruns_ = 0;
-  bool ran_out_ = false;  ///< of buffers, before a gap in the identifiers that has not come yet
+  bool ran_out_ = false;  ///< buffers ran out before a gap in the identifiers that has not come yet
   MonotonicTime began_;
   bool stamps_judged_ = false;
   bool foreign_stamps_ = false;
   std::optional<std::pair<std::uint64_t, MonotonicTime>> last_;  ///< identifier and arrival of the frame before
   bool paced_ = false;                                           ///< the frame before came before
-  std::chrono::nanoseconds period_;                              ///< of frames, as long as any of late
+  std::chrono::nanoseconds period_;                              ///< longest recent frame period
   AravisStatistics counted_;
-  std::optional<FramePool> greys_;  ///< of mosaics turned into grey, and of packed pixels unpacked
+  std::optional<FramePool> greys_;  ///< for grey from mosaics, and for unpacked pixels
   Grey8 grey8_;
   Grey16 grey16_;
   std::vector<std::uint32_t> sums_;

@@ -40,8 +40,8 @@ class GErrorSlot {
   [[nodiscard]] bool failed() const { return error_ != nullptr; }
   [[nodiscard]] std::string message() const { return failed() ? printable(error_->message) : "no reason is given"; }
 
-  /// What the error means to who uses the camera: kDisconnected where the device does not answer, kPermissionDenied
-  /// where another application controls it, else kUnsupported.
+  /// The error's code for users of the camera: kDisconnected if the device does not answer, kPermissionDenied if
+  /// another application controls it, else kUnsupported.
   [[nodiscard]] ErrorCode code() const {
     if (!failed() || error_->domain != ARV_DEVICE_ERROR) return ErrorCode::kUnsupported;
     switch (error_->code) {

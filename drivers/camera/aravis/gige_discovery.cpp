@@ -73,7 +73,8 @@ class ControlChannel {
     return {};
   }
 
-  /// What the reader makes of the answer to the question, if it comes in time; that to an earlier one may come late.
+  /// Asks the question and gives the reader's result of its answer, if that comes in time. The answer to an earlier
+  /// question may come late.
   template <class Question, class Reader>
   [[nodiscard]] auto ask(Question question, Reader read, milliseconds timeout) -> decltype(read(Bytes(), 0)) {
     const std::uint16_t id = ++id_ == 0 ? ++id_ : id_;
@@ -92,7 +93,7 @@ class ControlChannel {
   [[nodiscard]] std::string interface() const { return local_address(socket_.number()); }
 
  private:
-  /// What comes next; empty if nothing does before the end.
+  /// Receives the next datagram; empty if none comes before the end.
   [[nodiscard]] Bytes receive(steady_clock::time_point end) {
     const auto left = std::chrono::ceil<milliseconds>(end - steady_clock::now());
     pollfd waited{socket_.number(), POLLIN, 0};
@@ -147,7 +148,7 @@ unsigned interface_of(msghdr& message) {
   return 0;
 }
 
-/// Of the interface's addresses the one in the device's network; else its first.
+/// The interface's address in the device's network; else its first.
 std::string local_address(const std::vector<HostInterface>& interfaces, unsigned number, in_addr device) {
   std::string address;
   for (const HostInterface& interface : interfaces) {

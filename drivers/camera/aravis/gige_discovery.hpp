@@ -21,7 +21,8 @@ namespace slsd {
 [[nodiscard]] Result<GigeDevice> probe_gige_device(const std::string& address, const std::string& interface,
                                                    std::chrono::milliseconds timeout);
 
-/// Who controls the device, "10.0.0.5:4711", or "another application" where it does not tell; empty if nobody does.
+/// The application that controls the device: "10.0.0.5:4711", or "another application" if the device does not tell.
+/// Empty if none does.
 /// @return nothing if it does not answer
 /// @thread reentrant
 [[nodiscard]] std::optional<std::string> gige_controller(const GigeDevice& device, std::chrono::milliseconds timeout);

@@ -41,7 +41,7 @@ struct GigeDevice {
 /// Nothing if the bytes are something else, or answer another question.
 [[nodiscard]] std::optional<std::uint32_t> read_gvcp_value(std::span<const std::uint8_t> answer, std::uint16_t id);
 
-/// Which devices are to act: those with the device key and the group key, and a bit of the mask in common.
+/// The addressees of an action: devices with the device key and the group key, and a bit of the mask in common.
 struct ActionKeys {
   std::uint32_t device_key = 1;
   std::uint32_t group_key = 1;

@@ -105,7 +105,7 @@ Result<OpenedDevice> control(GObjectPtr<ArvDevice> device, std::string name, std
   return OpenedDevice{std::move(camera), std::move(name), std::move(address)};
 }
 
-/// Who still controls the device after a while; empty if nobody does, or it does not answer.
+/// The application that still controls the device after a while. Empty if none does, or if the device does not answer.
 std::string controller_that_stays(const GigeDevice& device) {
   const auto end = steady_clock::now() + kRelease;
   for (;;) {

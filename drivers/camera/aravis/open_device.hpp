@@ -14,7 +14,7 @@ namespace slsd {
 
 /// A USB3 Vision camera that Aravis can open.
 struct Usb3Device {
-  std::string id;  ///< as Aravis names it
+  std::string id;  ///< Aravis's name for the device
   std::string vendor;
   std::string serial;
 };

@@ -13,16 +13,16 @@
 
 namespace slsd {
 
-/// How pixels of 10 or 12 bits lie in bytes. Rows follow each other without padding.
+/// The packing of pixels of 10 or 12 bits into bytes. Rows follow each other without padding.
 enum class PixelPacking {
-  kNone,    ///< in 1 or 2 bytes of their own
+  kNone,    ///< one or two whole bytes per pixel
   kLsb10,   ///< "Mono10p": bit after bit, the lowest first
   kLsb12,   ///< "Mono12p"
   kGige10,  ///< "Mono10Packed": two pixels in 3 bytes, the low bits of both in the middle one
   kGige12,  ///< "Mono12Packed"
 };
 
-/// Of so many pixels in a row, rounded up.
+/// The bytes of so many packed pixels in a row, rounded up.
 [[nodiscard]] constexpr std::size_t packed_bytes(std::size_t pixels, int bits_per_pixel) {
   return (pixels * static_cast<std::size_t>(bits_per_pixel) + 7) / 8;
 }
@@ -34,15 +34,15 @@ enum class PixelPacking {
 /// @thread reentrant
 void unpack_pixels(std::span<const std::uint8_t> packed, PixelPacking packing, Grey16& pixels);
 
-/// How a camera's pixels lie in memory: whole bytes, little-endian, used from the lowest bit on, or packed.
+/// The layout of a camera's pixels in memory: whole bytes, little-endian, used from the lowest bit on, or packed.
 struct PixelLayout {
-  std::string_view name;    ///< by the Pixel Format Naming Convention
-  std::uint32_t code = 0;   ///< of GigE Vision and USB3 Vision
+  std::string_view name;    ///< name in the Pixel Format Naming Convention
+  std::uint32_t code = 0;   ///< code in GigE Vision and USB3 Vision
   int bytes_per_pixel = 1;  ///< 1 or 2; of packed ones, when they are unpacked
   bool mosaic = false;      ///< a Bayer mosaic, to be turned into grey
   PixelPacking packing = PixelPacking::kNone;
 
-  /// On the wire.
+  /// The bits of a pixel on the wire.
   [[nodiscard]] int bits_per_pixel() const { return static_cast<int>(code >> 16 & 0xff); }
   /// Frames are views of the stream's own buffers.
   [[nodiscard]] bool is_zero_copy() const { return !mosaic && packing == PixelPacking::kNone; }

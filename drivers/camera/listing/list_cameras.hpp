@@ -10,12 +10,12 @@
 
 namespace slsd {
 
-/// Where list_cameras() looks.
+/// The places that list_cameras() searches.
 struct ListingPlaces {
   std::filesystem::path devices = "/dev";
   std::filesystem::path sysfs = "/sys";
   std::vector<std::filesystem::path> configured_nodes = {};  ///< device nodes, wherever they are
-  std::vector<std::string> configured_ids = {};              ///< of GigE Vision and USB3 Vision
+  std::vector<std::string> configured_ids = {};              ///< GigE Vision and USB3 Vision
 };
 
 struct CameraListing {

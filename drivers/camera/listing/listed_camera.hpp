@@ -11,7 +11,7 @@ namespace slsd {
 
 /// A pixel format that a camera offers and slsd reads.
 struct ListedFormat {
-  std::string name;                             ///< as the configuration names it
+  std::string name;                             ///< the configuration's name for it
   std::vector<std::pair<int, int>> sizes_px{};  ///< width and height; for GigE Vision and USB3 Vision the sensor's
 
   friend bool operator==(const ListedFormat&, const ListedFormat&) = default;
@@ -28,11 +28,11 @@ struct ListedCamera {
   std::string node;              ///< path of the device node
   std::string kernel_driver;     ///< "uvcvideo", ...
   std::string address;           ///< IPv4
-  std::string interface;         ///< of this host, with its network: "eth1 (10.0.0.1/24)"
-  std::optional<int> link_mbps;  ///< of USB, or of this host's interface
-  std::string user;              ///< who controls it: "a program on this host", ...
+  std::string interface;         ///< this host's interface with its network: "eth1 (10.0.0.1/24)"
+  std::optional<int> link_mbps;  ///< speed of USB, or of this host's interface
+  std::string user;              ///< the controlling program: "a program on this host", ...
   std::vector<ListedFormat> formats;
-  std::string problem;  ///< why it cannot be used as it is, and what to do
+  std::string problem;  ///< obstacle to its use, and the remedy
 };
 
 }  // namespace slsd

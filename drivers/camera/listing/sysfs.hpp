@@ -16,7 +16,7 @@ namespace slsd {
 /// The whole number that the first line begins with.
 [[nodiscard]] std::optional<int> first_number(const std::filesystem::path& file);
 
-/// What is in a folder, sorted; nothing where it cannot be read.
+/// The entries of a folder, sorted. Empty if it cannot be read.
 [[nodiscard]] std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder);
 
 /// A device on USB, by what the kernel tells of it in sysfs.

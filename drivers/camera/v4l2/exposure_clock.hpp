@@ -42,16 +42,16 @@ class ExposureClock {
   /// The buffer carries a stamp that tells.
   [[nodiscard]] bool is_stamped(const v4l2_buffer& buffer) const;
 
-  /// Of a buffer without a stamp a guess. @param received  when it was taken from the driver
+  /// The start of the buffer's exposure; a guess without a stamp. @param received  when it was taken from the driver
   [[nodiscard]] MonotonicTime exposure_start(const v4l2_buffer& buffer, MonotonicTime received) const;
 
-  /// How many frames at most are exposed or read out at a time.
+  /// The greatest number of frames that are exposed or read out at a time.
   [[nodiscard]] int frames_in_flight() const;
 
-  /// How long ago the exposure of a frame may have begun for the one after it still to be of now: a few periods.
+  /// The greatest age of an exposure after which the next frame is still current: a few periods.
   [[nodiscard]] std::chrono::nanoseconds next_frame_age_max() const;
 
-  /// How long a stream that runs freely may bring nothing, before it is dead: so many frames, and a second at least.
+  /// The longest silence of a live stream that runs freely: so many frames, and a second at least.
   [[nodiscard]] std::chrono::nanoseconds silence_max(int missed_frames_max) const;
 
  private:
@@ -62,7 +62,7 @@ class ExposureClock {
   bool trusted_ = true;
   std::chrono::nanoseconds last_stamp_{0};
   std::uint32_t last_sequence_ = 0;
-  int same_stamps_ = 0;  ///< in a row
+  int same_stamps_ = 0;  ///< equal stamps in a row
 };
 
 }  // namespace slsd

@@ -16,7 +16,7 @@
 
 namespace slsd {
 
-/// How a pixel format holds its grey.
+/// The way in which a pixel format holds its grey.
 enum class GreyLayout {
   kGrey8,     ///< a byte a pixel, row by row; what follows the rows is chroma
   kGrey16,    ///< two bytes a pixel, little-endian
@@ -45,10 +45,10 @@ struct PixelFormat {
 [[nodiscard]] std::uint32_t fourcc_from(std::string_view name);
 [[nodiscard]] std::string fourcc_name(std::uint32_t fourcc);
 
-/// Of a row's first to its last pixel; 0 for JPEG.
+/// The bytes from a row's first to its last pixel; 0 for JPEG.
 [[nodiscard]] std::size_t row_bytes(GreyLayout layout, int width_px);
 
-/// Of the grey that it becomes: 1 or 2.
+/// The bytes of a grey pixel that it becomes: 1 or 2.
 [[nodiscard]] int bytes_per_pixel(GreyLayout layout);
 
 /// Frames are views of the driver's own buffers.
@@ -63,19 +63,19 @@ struct FrameMode {
   friend bool operator==(const FrameMode&, const FrameMode&) = default;
 };
 
-/// How a frame lies in a buffer.
+/// The layout of a frame in a buffer.
 struct FrameLayout {
   FrameMode mode;
   std::size_t stride_bytes = 0;
-  /// Of a whole frame at least; fewer are a torn one. For JPEG one.
+  /// The least number of bytes of a whole frame; fewer are a torn one. For JPEG one.
   std::size_t bytes_min = 0;
 };
 
 /// "GREY 1600x1200".
 [[nodiscard]] std::string to_string(const FrameMode& mode);
 
-/// What the device offers of what can be decoded; of a range of sizes the smallest and the largest, and the one asked
-/// for where it lies within.
+/// The device's modes that can be decoded. A range of sizes gives the smallest and the largest, and the wanted size if
+/// it lies within.
 [[nodiscard]] std::vector<FrameMode> list_modes(const V4l2Device& device, const V4l2CameraOptions& options);
 
 /// The best for decoding of those that fit the options: the order of pixel_formats(), then the largest.

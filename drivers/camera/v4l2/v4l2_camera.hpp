@@ -18,7 +18,7 @@
 
 namespace slsd {
 
-/// What became of a device's frames since the camera was made.
+/// The counts of a device's frames since the camera was made.
 struct V4l2FrameCounts {
   std::uint64_t delivered = 0;
   std::uint64_t before_trigger = 0;  ///< exposed before anyone asked, or while the camera settled
@@ -101,8 +101,8 @@ class V4l2Camera final : public Camera {
   int settling_ = 0;
   int faults_in_a_row_ = 0;
   std::uint64_t next_sequence_ = 0;
-  std::optional<MonotonicTime> last_start_;     ///< of the exposure of the frame before
-  std::optional<std::uint32_t> last_sequence_;  ///< of the driver's; nothing where a gap would mean nothing
+  std::optional<MonotonicTime> last_start_;     ///< start of the previous frame's exposure
+  std::optional<std::uint32_t> last_sequence_;  ///< the driver's; empty while a gap would mean nothing
 };
 
 }  // namespace slsd

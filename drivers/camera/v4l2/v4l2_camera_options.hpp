@@ -27,14 +27,14 @@ struct V4l2CameraOptions {
   std::optional<int> focus_steps = {};  ///< the device's own steps
   std::optional<int> power_line_hz = {};  ///< 0 (no filter), 50 or 60
   bool automatic = false;                 ///< true leaves automatic exposure, gain, white balance and focus as they are
-  std::optional<double> readout_us = {};  ///< from the end of exposure to a frame's last byte, where the device stamps
+  std::optional<double> readout_us = {};  ///< time from the exposure's end to a frame's last byte, if the device stamps
                                           ///< the end; without it a frame's period, which is safe but may cost a frame
   int settle_frames = 2;                  ///< discarded after open(), 0 to 100: exposed under the settings before
-  int frames_held_max = 8;                ///< how many frames may be held at once, 2 to 24
+  int frames_held_max = 8;                ///< number of frames that may be held at once, 2 to 24
   int missed_frames_max = 3;  ///< so many in a row missing, and a second at least: the stream is dead, 0 to 100; 0 for
                               ///< a camera that a signal triggers, whose silence says nothing
 
-  /// Of the device node, or of the link to it.
+  /// The path of the device node, or of the link to it.
   [[nodiscard]] std::filesystem::path device_path() const;
   /// @errors kInvalidArgument: the message begins with the key
   [[nodiscard]] Result<> validate() const;

@@ -11,10 +11,10 @@
 
 namespace slsd {
 
-/// What the device says of its exposures, read back after everything was set.
+/// The device's exposure times, read back after everything was set.
 struct ExposureTiming {
   std::optional<std::chrono::nanoseconds> exposure;  ///< nothing where it has no such control, or sets it by itself
-  std::optional<std::chrono::nanoseconds> period;    ///< from frame to frame; nothing where it does not tell
+  std::optional<std::chrono::nanoseconds> period;    ///< time from frame to frame; empty if it does not tell
 };
 
 /// Turns everything automatic off, then sets what the options name, and compares what the device took: V4L2's

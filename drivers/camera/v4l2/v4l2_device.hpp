@@ -11,8 +11,8 @@
 
 namespace slsd {
 
-/// What a field of a driver's says, which may come from the device itself: printable, whatever bytes it sent, and
-/// whether or not it ended them.
+/// The text in a driver's field, which may come from the device itself. It is printable, whatever bytes the device
+/// sent, and whether or not it ended them.
 [[nodiscard]] std::string device_text(std::span<const unsigned char> field);
 
 /// The link of v4l/by-id that leads to a device node, which is the same wherever the camera is plugged in.

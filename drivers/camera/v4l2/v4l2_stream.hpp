@@ -57,20 +57,20 @@ class V4l2Stream {
   /// Gives the driver those that frames gave back, until it has so many. @errors kDisconnected
   [[nodiscard]] Result<> put_back_returned(std::size_t queued_max = VIDEO_MAX_FRAME);
 
-  /// Of one that the driver has not.
+  /// Lends a buffer that the driver does not have.
   [[nodiscard]] FrameLease lend(std::size_t buffer) { return buffers_->lend(buffer); }
 
   /// Since when the driver has had buffers to fill and has filled none; never, where it has none.
   [[nodiscard]] MonotonicTime quiet_since() const { return queued_ > 0 ? quiet_since_ : MonotonicTime::max(); }
 
-  /// How many the driver has.
+  /// The number of buffers that the driver has.
   [[nodiscard]] std::size_t queued() const { return queued_; }
 
  private:
   V4l2Stream(V4l2Device device, std::shared_ptr<MappedBuffers> buffers);
 
   V4l2Device device_;
-  std::shared_ptr<MappedBuffers> buffers_;  ///< with the frames
+  std::shared_ptr<MappedBuffers> buffers_;  ///< shared with the frames
   std::array<bool, VIDEO_MAX_FRAME> with_driver_{};
   std::size_t queued_ = 0;
   MonotonicTime quiet_since_{};

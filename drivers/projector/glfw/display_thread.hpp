@@ -35,7 +35,7 @@ class DisplayThread {
   void begin(Work work);
   /// Waits for the end of the work. @return whether it has ended, by the time
   [[nodiscard]] bool wait(MonotonicTime until) const;
-  /// When the work under way, or the last, began.
+  /// The start of the work under way, or of the last.
   [[nodiscard]] MonotonicTime begun() const;
 
   /// Whether the screen was open when the thread last looked.

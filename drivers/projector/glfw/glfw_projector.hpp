@@ -40,10 +40,10 @@ class GlfwProjector final : public Projector {
   [[nodiscard]] Result<Grey8> read_back() override;
 
  private:
-  /// What the thread was told to do last and its outcome, until somebody fetched that.
+  /// The thread's last order and its outcome, until somebody fetched that.
   struct Order {
     enum class Task { kOpen, kShow, kCheck, kReadBack } task;
-    Grey8 image = {};  ///< to show
+    Grey8 image = {};  ///< the image to show
     Result<> opened = {};
     RandrOutput output = {};
     std::vector<std::string> warnings = {};

@@ -19,7 +19,7 @@ namespace slsd {
 
 /// The keys of the [projector] table that a projector on a monitor reads.
 struct GlfwProjectorOptions {
-  std::string monitor = {};  ///< as choose_output() takes it
+  std::string monitor = {};  ///< see choose_output()
   int width_px = 1280;       ///< 1 to 16384; the monitor's
   int height_px = 800;       ///< 1 to 16384; the monitor's
   LightOptions light = {};
@@ -69,7 +69,7 @@ class ProjectorScreen {
   RandrOutput output_;
   std::vector<std::string> warnings_;
   std::unique_ptr<GlfwSession> session_;
-  MonotonicTime probed_{};  ///< when the X server last looked for monitors at our wish
+  MonotonicTime probed_{};  ///< time when the X server last looked for monitors at our wish
   std::unique_ptr<FullscreenWindow> window_;
   std::optional<TexelPainter> painter_;
   std::unique_ptr<RefreshClock> clock_;

@@ -11,7 +11,7 @@
 
 namespace slsd {
 
-/// Which monitor is the projector.
+/// Chooses the monitor that is the projector.
 /// @param wanted  its name, its EDID serial, or its place on the desktop as in "+1280+0"; empty: the one that is not
 /// the
 ///                primary, and where there is only one, that
@@ -28,14 +28,14 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] Result<> check_fit(const RandrOutput& output, int width_px, int height_px);
 
-/// What disturbs the light of that monitor: a sentence each, with the remedy.
+/// Warnings about disturbances of that monitor's light. Each is one sentence with the remedy.
 /// @thread reentrant
 [[nodiscard]] std::vector<std::string> output_warnings(const RandrOutput& output, std::span<const RandrOutput> outputs);
 
 /// The monitor that is the projector, and what disturbs its light.
 struct MonitorReport {
   RandrOutput output;
-  std::vector<std::string> warnings;  ///< as output_warnings() says
+  std::vector<std::string> warnings;  ///< see output_warnings()
 };
 
 /// Looks at the monitor that a projector with these options takes; shows nothing on it, and leaves one that is off.

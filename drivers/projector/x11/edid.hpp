@@ -8,10 +8,10 @@
 
 namespace slsd {
 
-/// Who a monitor says that it is.
+/// The identity that a monitor reports.
 struct EdidIdentity {
   std::string model;   ///< its name, else maker and product number; empty: unknown
-  std::string serial;  ///< as text where it has one, else as a number; empty: none
+  std::string serial;  ///< text if the monitor has one, else a number; empty: none
 };
 
 /// Reads the first block of a monitor's EDID (VESA E-EDID 1.4). Bytes that are none give an empty identity.

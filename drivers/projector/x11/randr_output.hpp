@@ -26,7 +26,7 @@ struct DesktopArea {
          b.y_px < a.y_px + a.height_px;
 }
 
-/// What a monitor can be set to.
+/// A mode that a monitor can be set to.
 struct RandrMode {
   unsigned long id = 0;
   int width_px = 0;
@@ -37,17 +37,17 @@ struct RandrMode {
 /// A monitor that is plugged in, as RandR tells of it.
 struct RandrOutput {
   unsigned long id = 0;
-  std::string name;    ///< of the socket: "HDMI-1"
-  std::string model;   ///< as the monitor's EDID says; empty: unknown
-  std::string serial;  ///< as the monitor's EDID says; empty: none
+  std::string name;    ///< name of the socket: "HDMI-1"
+  std::string model;   ///< model in the monitor's EDID; empty: unknown
+  std::string serial;  ///< serial number in the monitor's EDID; empty: none
   bool primary = false;
   bool on = true;         ///< shows a part of the desktop
-  DesktopArea area = {};  ///< that part
-  int mode_width_px = 0;  ///< of the signal
+  DesktopArea area = {};  ///< the shown part of the desktop
+  int mode_width_px = 0;  ///< width of the signal
   int mode_height_px = 0;
-  int native_width_px = 0;  ///< of the mode that the monitor prefers; 0: it does not say
+  int native_width_px = 0;  ///< width of the mode that the monitor prefers; 0: it does not say
   int native_height_px = 0;
-  std::vector<RandrMode> modes = {};  ///< that it can be set to
+  std::vector<RandrMode> modes = {};  ///< modes that it can be set to
   double refresh_hz = 0.0;
   int rotation_deg = 0;  ///< 0, 90, 180 or 270
   bool reflected = false;
@@ -61,14 +61,14 @@ struct RandrOutput {
 };
 
 enum class Probe {
-  kKnown,     ///< what the X server knows
+  kKnown,     ///< the X server's last knowledge
   kHardware,  ///< it looks at its sockets anew, which takes it up to a second
 };
 
 /// The monitors that are plugged in, on or off, in RandR's order.
 [[nodiscard]] std::vector<RandrOutput> read_outputs(_XDisplay* display, Probe probe = Probe::kKnown);
 
-/// Where that output is lit now; nothing where it is unplugged or off.
+/// The area where that output is lit now. Empty if it is unplugged or off.
 [[nodiscard]] std::optional<DesktopArea> lit_area(_XDisplay* display, unsigned long output);
 
 /// Turns a monitor on, or sets it to another size: to its mode of that size whose refresh is nearest. It stays where it
@@ -82,7 +82,7 @@ enum class Probe {
 /// The mode of that size whose refresh is nearest; null where it has none.
 [[nodiscard]] const RandrMode* find_mode(const RandrOutput& output, int width_px, int height_px, double refresh_hz);
 
-/// Where that monitor has room for such a size: where it is, or to the right of all others.
+/// The place where that monitor has room for such a size: its present one, or to the right of all others.
 [[nodiscard]] DesktopArea place_of(const RandrOutput& output, const std::vector<RandrOutput>& outputs, int width_px,
                                    int height_px);
 

@@ -15,9 +15,9 @@ struct xcb_special_event;
 
 namespace slsd {
 
-/// When the monitor of a window begins a refresh, by the X extension Present over a connection of its own: the vertical
-/// blank of the graphics driver, stamped with CLOCK_MONOTONIC. Where Present is not there, the refresh is taken to
-/// begin one period after the buffers were swapped, the latest that is possible.
+/// The clock of the refreshes of a window's monitor, by the X extension Present over a connection of its own. It takes
+/// the vertical blank of the graphics driver, stamped with CLOCK_MONOTONIC. Without Present, it assumes that the
+/// refresh begins one period after the buffers were swapped, the latest that is possible.
 ///
 ///     prepare()  swap                         wait_refresh() returns t
 ///     ----|-------|----|-----------------------|-----------------------

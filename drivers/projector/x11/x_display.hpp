@@ -14,11 +14,11 @@ namespace slsd {
 
 // Xlib ends the process when a request fails or a connection breaks. A service outlives its X server.
 
-/// From now on a request that fails does nothing. GLFW undoes this when it makes a window.
+/// Makes a request that fails do nothing, from now on. GLFW undoes this when it makes a window.
 /// @thread thread-safe
 void survive_x_errors();
 
-/// From now on the end of this connection sets the flag, and what is asked over it afterwards does nothing.
+/// Makes the end of this connection set the flag, from now on. Later requests over it do nothing.
 /// @param lost  outlives the connection
 void survive_loss(_XDisplay* display, std::atomic<bool>& lost);
 
@@ -28,10 +28,10 @@ void survive_loss(_XDisplay* display, std::atomic<bool>& lost);
 /// @return      false where the connection broke
 [[nodiscard]] bool survive_call(const std::function<void()>& call);
 
-/// That no X server answers, and what to do.
+/// The error that no X server answers, with its remedy.
 [[nodiscard]] tl::unexpected<Error> no_display();
 
-/// That the X server hangs, and what to do: kIo.
+/// The error kIo that the X server hangs, with its remedy.
 [[nodiscard]] tl::unexpected<Error> no_answer();
 
 /// Whether the X server that DISPLAY names belongs to the scanner alone, as that of slsd-display.service does: the
