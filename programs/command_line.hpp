@@ -18,13 +18,13 @@ inline constexpr int kDone = 0;
 inline constexpr int kFailed = 1;
 inline constexpr int kWrongUsage = 2;
 
-/// What the command line asks for: that of slsd, and of slsd-calibrate, which carries out a part of it.
+/// The options of slsd's command line. slsd-calibrate carries out a part of them.
 struct CommandLine {
   std::optional<std::filesystem::path> configuration;
   std::string level = "info";
   std::filesystem::path pattern_image;
-  std::filesystem::path bundle;  ///< to be replayed
-  std::filesystem::path folder;  ///< where it is unpacked; empty: nowhere
+  std::filesystem::path bundle;  ///< the bundle to replay
+  std::filesystem::path folder;  ///< destination of its content; empty: none
   bool check = false, check_configuration = false, list = false, as_json = false;
   bool calibrate = false, latency = false, verify = false;
   CalibrateRequest request;
@@ -41,7 +41,7 @@ struct CommandLine {
 /// @return  what is asked for, or the status to exit with
 [[nodiscard]] tl::expected<CommandLine, int> parse_command_line(int argc, char** argv);
 
-/// What a program says of a command that failed. @return its exit status
+/// Prints the error of a command that failed. @return the program's exit status
 [[nodiscard]] int exit_status(const Result<>& result);
 
 }  // namespace slsd

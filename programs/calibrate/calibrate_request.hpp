@@ -8,7 +8,7 @@
 
 namespace slsd {
 
-/// What `slsd --calibrate` is asked for on its command line.
+/// The options of `slsd --calibrate` from its command line.
 struct CalibrateRequest {
   std::optional<std::filesystem::path> configuration_file;
   std::filesystem::path from;    ///< a folder of captures; empty: the configured devices
@@ -16,12 +16,12 @@ struct CalibrateRequest {
   std::string board;             ///< empty: the default board
   std::string ruler;             ///< "NOMINAL:MEASURED" in mm, as the print's ruler was measured; empty: true to scale
   std::string plane;             ///< the reference plane; empty: no second step
-  std::string plane_ruler;       ///< as `ruler`, of the plane's print
+  std::string plane_ruler;       ///< like `ruler`, of the plane's print
   std::string use;               ///< "FIRST:LAST", with `from`: the poses of that part; empty: all
   bool force = false;            ///< replaces the calibration in force though distances are of another scale by it
   bool gray_code = false;        ///< instead of the pattern
-  std::filesystem::path record;  ///< where a session's captures go; empty: beside the calibration file
-  std::filesystem::path socket;  ///< of a running service, whose devices a session uses; empty: the configured ones
+  std::filesystem::path record;  ///< destination of a session's captures; empty: beside the calibration file
+  std::filesystem::path socket;  ///< socket of the service whose devices a session uses; empty: the configured devices
   bool progress = false;         ///< a session tells what it sees in JSON, too, a line each
   int poses = 12;                ///< 3 to 99; how many poses a session takes, those recorded before among them
   int planes = 3;                ///< 1 to 99; how many looks at the reference plane it takes, likewise

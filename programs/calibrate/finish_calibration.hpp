@@ -13,7 +13,7 @@
 
 namespace slsd {
 
-/// Where a calibration is to be kept: as asked for, or where the configuration has it.
+/// The file that keeps a calibration: the requested one, or the configured one.
 /// @errors kInvalidArgument: neither says, or it is the place of the report; those of check_writable()
 [[nodiscard]] Result<std::filesystem::path> file_to_keep(const CalibrateRequest& request,
                                                          const Configuration& configuration);

@@ -17,7 +17,7 @@ namespace slsd {
 [[nodiscard]] std::optional<Calibration> calibration_in_force(const Calibration& calibration,
                                                               const std::filesystem::path& file);
 
-/// What the calibration in force says against replacing it, and what has changed since.
+/// Compares a calibration with the one in force: objections to replacing that, and what has changed since.
 /// @param board       as it was said to be
 /// @errors kMismatch: the rig is the same, and the board is of another scale by the one in force, with both numbers;
 ///         kImpossible: the rig is the same, and the one in force is better

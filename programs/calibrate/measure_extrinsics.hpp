@@ -11,12 +11,12 @@
 
 namespace slsd {
 
-/// What `slsd --extrinsics` is asked for on its command line, beside the board and its ruler.
+/// The options of `slsd --extrinsics` from its command line, beside the board and its ruler.
 struct ExtrinsicsRequest {
-  std::filesystem::path file;         ///< that they are written to
+  std::filesystem::path file;         ///< output file
   std::vector<std::string> scanners;  ///< "NAME=SOCKET"; the first is the frame of all
   std::string parent = "cell";        ///< the name of that frame
-  int places = 3;                     ///< of the board, that two scanners or more see
+  int places = 3;                     ///< places of the board that two scanners or more see
 };
 
 /// Measures where scanners stand to each other by a board that two or more of them see, and writes the file that

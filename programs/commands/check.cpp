@@ -61,7 +61,7 @@ class Findings {
   bool scan_possible_ = true;
 };
 
-/// What the service that runs says of itself: it holds the devices, which nobody else can open meanwhile.
+/// The running service, asked about itself. It holds the devices, which nobody else can open meanwhile.
 class LiveService {
  public:
   /// Asks it, and waits some seconds for devices that it is opening.
@@ -101,7 +101,7 @@ class LiveService {
     }
     return tables;
   }
-  /// What was set over its socket, in the places of the file's keys.
+  /// The settings over its socket, which replace those of the file.
   [[nodiscard]] Result<json> set() const {
     return merge_settings(json::object(), settings_.value("set", json::object()));
   }
@@ -111,7 +111,7 @@ class LiveService {
       if (camera.value("name", "") == name) return camera;
     return json::object();
   }
-  /// Why its last scan gave no points; empty: it gave some.
+  /// The reason for its last scan's having no points; empty: it had some.
   [[nodiscard]] std::string why_empty() const {
     const json empty = status_.value("scans", json::object()).value("empty", json());
     return empty.is_string() ? printable(empty.get<std::string>(), kLongestProblem) : std::string();
@@ -222,7 +222,7 @@ class Check {
     findings_.good("as set over the socket: " + names_of_settings(*settings));
   }
 
-  /// What the service says of a device that it holds. @return whether it is open
+  /// Notes the service's report about a device that it holds. @return whether it is open
   bool note_held(const std::string& name, const json& device) {
     const std::string state = device.value("state", "not among its cameras");
     const std::string problem = printable(device.value("problem", ""), kLongestProblem);
@@ -396,7 +396,7 @@ class Check {
         drift.value("off_since_scan", std::uint64_t{0})));
   }
 
-  /// As the latency's report names it; empty where that cannot be told.
+  /// The projector's name as in the latency's report; empty if that cannot be told.
   [[nodiscard]] std::string projector_in_use() const {
     if (live_) return projector_name(live_->projector().value("driver", ""), live_->projector().value("device", ""));
     const auto projector = make_projector(configuration_.projector);
@@ -447,7 +447,7 @@ class Check {
   Findings& findings_;
   std::optional<Pattern> pattern_;
   std::optional<Calibration> calibration_;
-  std::optional<LiveService> live_;  ///< with this configuration
+  std::optional<LiveService> live_;  ///< one with this configuration
   bool held_ = false;                ///< the devices, by a service that cannot be asked
   std::string monitor_;              ///< seen; empty: none
 };

@@ -42,12 +42,12 @@ namespace slsd {
 /// @errors those of read_file() and read_bundle(); kMismatch: a cloud differs; of the folder
 [[nodiscard]] Result<> replay_bundle(const std::filesystem::path& bundle, const std::filesystem::path& folder);
 
-/// What --print-board is to write.
+/// The options of --print-board.
 struct PrintRequest {
   std::filesystem::path file;  ///< .pdf, .svg or .png
-  std::string board;           ///< as parse_board() reads it; empty: that which fills the paper
-  std::string paper = "A4";    ///< as parse_paper() reads it
-  double dpi = 300;            ///< of a PNG, 20 to 2400
+  std::string board;           ///< see parse_board(); empty: the board that fills the paper
+  std::string paper = "A4";    ///< see parse_paper()
+  double dpi = 300;            ///< resolution of a PNG, 20 to 2400
 };
 
 /// Writes a board for calibrating, to be printed to true scale.

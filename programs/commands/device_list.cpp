@@ -67,7 +67,7 @@ std::string camera_text(const ListedCamera& camera, const CameraOptions* configu
   return text.str();
 }
 
-/// What is to say of a camera that the configuration names and nobody sees.
+/// The message about a camera that the configuration names and nobody sees.
 std::string unseen_text(const CameraOptions& camera) {
   std::ostringstream text;
   text << "configured camera \"" << camera.name() << "\", driver " << camera.driver() << ": ";

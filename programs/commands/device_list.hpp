@@ -22,11 +22,11 @@ class CameraList {
   /// @param configuration  outlives this
   CameraList(const Configuration& configuration, CameraListing listing);
 
-  /// For people: several lines to a camera; where there is none, what was looked at.
+  /// The list for people: several lines to a camera. Without any camera it tells what was looked at.
   [[nodiscard]] std::string text() const;
   /// `cameras`, `configured` and `looked_at`, as slsd(8) says.
   [[nodiscard]] nlohmann::json json() const;
-  /// What to choose in the place of a camera that is absent: the names of those of its driver.
+  /// The suggestions for a camera that is absent: the names of those of its driver.
   [[nodiscard]] std::string similar_to(const CameraOptions& absent) const;
 
  private:
@@ -47,7 +47,7 @@ class MonitorList {
   [[nodiscard]] static MonitorList look() { return MonitorList(list_outputs()); }
   explicit MonitorList(Result<std::vector<RandrOutput>> outputs) : outputs_(std::move(outputs)) {}
 
-  /// For people: a line to a monitor; where there is none, why.
+  /// The list for people: a line to a monitor. Without any monitor it tells why.
   [[nodiscard]] std::string text() const;
   /// An array of monitors, as slsd(8) says.
   [[nodiscard]] nlohmann::json json() const;

@@ -14,29 +14,30 @@
 
 namespace slsd {
 
-/// What slsd --calibrate --latency keeps.
+/// The latencies that slsd --calibrate --latency writes.
 struct LatencyReport {
   std::string date;       ///< ISO 8601, UTC
-  std::string projector;  ///< as projector_name()
+  std::string projector;  ///< see projector_name()
   std::vector<CameraLatency> cameras;
 };
 
-/// Where it is kept unless told otherwise: "latency.toml" beside the calibration, or beside the configuration where
-/// that names no calibration.
+/// The default file of the latencies: "latency.toml" beside the calibration. Without a configured calibration it is
+/// beside the configuration.
 [[nodiscard]] std::filesystem::path latency_file(const Configuration& configuration,
                                                  const std::filesystem::path& configuration_file);
 
 /// A projector as the report names it, "glfw HDMI-1". @thread reentrant
 [[nodiscard]] std::string projector_name(const std::string& driver, const std::string& monitor);
 
-/// What does not go with what was measured, a sentence each: a [scan] projector_latency_ms that is too short, cameras
-/// that were not measured or were overexposed, another projector. Nothing where all is well.
+/// Warnings about what does not suit the measured latencies, one sentence each. Examples are a [scan]
+/// projector_latency_ms that is too short, cameras that were not measured or were overexposed, and another projector.
+/// Empty if all is well.
 /// @param projector  the one in use, as projector_name(); empty where that cannot be told
 /// @thread reentrant
 [[nodiscard]] std::vector<std::string> latency_warnings(const Configuration& configuration, const LatencyReport& report,
                                                         const std::string& projector);
 
-/// As TOML. @thread reentrant
+/// Writes the report as TOML. @thread reentrant
 [[nodiscard]] std::string write_latency(const LatencyReport& report);
 /// @errors kMalformed, kInvalidArgument: the place is file:line:column @thread reentrant
 [[nodiscard]] Result<LatencyReport> read_latency(std::string_view text, const std::filesystem::path& file);

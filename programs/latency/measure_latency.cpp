@@ -49,7 +49,7 @@ class FlashPixels {
   /// @errors kNotFound: no flash is seen; kMismatch: frames of different sizes
   [[nodiscard]] static Result<FlashPixels> find(const Samples& dark, const Samples& dark_again, const Samples& lit);
 
-  /// How much of the white is there. @param frame  of the same size @return about 0 for black, 1 for white
+  /// The share of the white that is there. @param frame  of the same size @return about 0 for black, 1 for white
   [[nodiscard]] double share_of_white(const Samples& frame) const;
 
   /// Most of the pixels are saturated: a part of the white is enough for all of it, and an onset looks early.
@@ -113,7 +113,7 @@ bool only_this_frame(ErrorCode code) {
          code == ErrorCode::kFrameLate || code == ErrorCode::kMismatch;
 }
 
-/// What one flash told.
+/// The times of one flash.
 struct Flash {
   std::optional<nanoseconds> last_incomplete;
   nanoseconds first_whole{};

@@ -16,18 +16,17 @@ namespace slsd {
 struct LatencyOptions {
   int flashes = 20;                          ///< 3 to 1000
   std::chrono::milliseconds settle{300};     ///< after which black, or white, is there for certain
-  std::chrono::milliseconds patience{2000};  ///< for a frame, and for a flash to be seen whole
-  std::uint32_t seed = 1;  ///< of the pauses, which vary so that flashes meet every phase of the camera
+  std::chrono::milliseconds patience{2000};  ///< limit for a frame, and for a flash to be seen whole
+  std::uint32_t seed = 1;  ///< seed of the pauses, which vary so that flashes meet every phase of the camera
 };
 
-/// How late a camera sees what the projector shows. Times count from what Projector::show() returned to the start of a
-/// frame's exposure.
+/// The delay until a camera sees what the projector shows. Times count from the moment that Projector::show() returned
+/// to the start of a frame's exposure.
 struct CameraLatency {
   std::string camera;
   int flashes = 0;
   std::chrono::microseconds latency{};  ///< every frame that began so late, or later, was whole
-  std::chrono::microseconds median{};   ///< of the first whole frame of each flash, its wait for the camera's own pace
-                                        ///< included
+  std::chrono::microseconds median{};   ///< of each flash's first whole frame, with its wait for the camera's own pace
   std::chrono::microseconds p05{};      ///< the twentieth part of the flashes is earlier
   std::chrono::microseconds p95{};      ///< the twentieth part is later
   bool clipped = false;                 ///< frames were overexposed: the times may be too short, by an exposure at most

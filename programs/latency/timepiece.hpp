@@ -10,7 +10,7 @@
 
 namespace slsd {
 
-/// Where time comes from: the host's clock, or a test's own.
+/// The source of time: the host's clock, or a test's own.
 struct Timepiece {
   std::function<MonotonicTime()> now = [] { return std::chrono::steady_clock::now(); };
   std::function<void(std::chrono::nanoseconds)> sleep = [](auto time) { std::this_thread::sleep_for(time); };

@@ -8,13 +8,13 @@
 
 namespace slsd {
 
-/// What one look says of the calibration, for a person at a terminal: a line, with PASS or FAIL at its end.
+/// The verdict of one look on the calibration, for a person at a terminal: a line, with PASS or FAIL at its end.
 [[nodiscard]] std::string check_text(const ViewCheck& check, const VerifyLimits& limits);
 
 /// All looks together.
 [[nodiscard]] std::string summary_text(const VerifySummary& summary, const VerifyLimits& limits);
 
-/// What to do, a sentence to each fault.
+/// The advice on the faults, a sentence to each.
 [[nodiscard]] std::string advice(const VerifySummary& summary);
 
 }  // namespace slsd

@@ -18,14 +18,14 @@ namespace slsd {
 struct CaptureFiles {
   std::filesystem::path white;              ///< empty where there is none and none is needed
   std::filesystem::path pattern;            ///< empty where there is none
-  std::vector<std::filesystem::path> gray;  ///< in order; empty where there are none
+  std::vector<std::filesystem::path> gray;  ///< in the code's order; empty without a Gray code
   std::filesystem::path black;              ///< empty where there is none
-  std::optional<Error> lack;                ///< what is missing, without which this look is of no use
+  std::optional<Error> lack;                ///< a missing file without which this look is of no use
 };
 
 struct CapturedPose {
   std::string name;                             ///< "pose_00"
-  std::map<std::string, CaptureFiles> cameras;  ///< by folder's name; "" where the pose has no folders
+  std::map<std::string, CaptureFiles> cameras;  ///< files by folder's name; "" if the pose has no folders
   PoseSubject subject = PoseSubject::kBoard;
 };
 
@@ -48,10 +48,10 @@ enum class WhitePicture { kNeeded, kOptional };
 [[nodiscard]] Result<std::vector<CapturedPose>> list_captures_with_planes(const std::filesystem::path& folder,
                                                                           bool knows_plane);
 
-/// Of a picture, in small letters: cameras write .JPG as well.
+/// The extension of a picture's file, in lower case: cameras write .JPG as well.
 [[nodiscard]] std::string extension_of(const std::filesystem::path& file);
 
-/// What the folders' names begin with: "pose_" or "plane_".
+/// The beginning of the folders' names: "pose_" or "plane_".
 [[nodiscard]] std::string_view folder_prefix(PoseSubject subject);
 
 }  // namespace slsd

@@ -31,9 +31,9 @@ class PoseCollection {
 
   /// The pose that shows the board just so, to every camera that sees it now; empty where none does.
   [[nodiscard]] std::string same_as(const BoardSightings& sightings) const;
-  /// Of the blurs of a camera's views the middle one, px; 0 below three views.
+  /// The median blur of a camera's views, px; 0 below three views.
   [[nodiscard]] double usual_blur_px(std::size_t camera) const;
-  /// What the next pose should be to help most: "tilt the board ...".
+  /// The advice for the next pose, to help most: "tilt the board ...".
   [[nodiscard]] std::string most_helpful() const;
 
  private:

@@ -14,7 +14,7 @@
 
 namespace slsd {
 
-/// What the poses show, camera by camera.
+/// The observer of the poses' pictures, camera by camera.
 /// @thread thread-bound
 class PoseObserver {
  public:
@@ -24,7 +24,7 @@ class PoseObserver {
   /// @errors what observe_board(), observe_pattern() and observe_gray_code() say
   [[nodiscard]] Result<PoseView> observe(std::size_t camera, const PosePictures& pictures);
 
-  /// How much of the white picture's print is in a pattern's picture, and where.
+  /// The share of the white picture's print that is in a pattern's picture, and its place there.
   /// @return a significance of 0 where the board is not found
   [[nodiscard]] PrintShift print_shift(const GreyView& white, const GreyView& pattern) const;
 

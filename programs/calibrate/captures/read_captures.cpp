@@ -88,7 +88,8 @@ class CaptureReader {
     return {};
   }
 
-  /// What only all poses together tell: the size of a camera's pictures, and patterns that belong to other poses.
+  /// Checks what only all poses together show: the size of a camera's pictures, and patterns that belong to other
+  /// poses.
   void compare() {
     take_usual_sizes();
     name_swapped();
@@ -130,7 +131,7 @@ class CaptureReader {
     refused.name = pose.name, refused.subject = pose.subject, refused.fault = fault, refused.reason = reason;
   }
 
-  /// For a reason that goes before all that the pose may have been refused for.
+  /// Rules a pose out, for a reason that replaces any earlier one.
   void rule_out(const std::string& name, PoseFault fault, const std::string& reason) {
     const auto refused = std::ranges::find(captures.refused, name, &PoseReport::name);
     if (refused != captures.refused.end()) refused->fault = fault, refused->reason = reason;
@@ -169,7 +170,8 @@ class CaptureReader {
     }
   }
 
-  /// Whose pattern's picture shows the print where another pose's white one has it.
+  /// Rules out poses whose pattern's picture belongs to another doubtful pose: its print lies where that one's white
+  /// picture has it.
   void name_swapped() {
     if (doubts_.size() < 2 || doubts_.size() > kDoubtsMax) return;
     for (const Look& doubt : doubts_) {
@@ -187,7 +189,8 @@ class CaptureReader {
     }
   }
 
-  /// Whose pattern's picture shows the print where another pose, with a pattern of its own, has it.
+  /// Rules out poses whose pattern's picture is a copy: its print lies where another pose, with a pattern of its own,
+  /// has it.
   void name_copied() {
     if (doubts_.size() > kDoubtsMax) return;
     for (const Look& doubt : doubts_) {

@@ -12,7 +12,7 @@
 
 namespace slsd {
 
-/// What captures on disk show, and the poses that show nothing of use.
+/// The observations in captures on disk, and the poses that show nothing of use.
 struct ReadCaptures {
   Observations observations;
   std::vector<PoseReport> refused;

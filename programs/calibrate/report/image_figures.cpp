@@ -23,7 +23,7 @@ constexpr const char* kOutlying = "#d00";
 
 struct DrawnPoint {
   Eigen::Vector2d pixel;
-  Eigen::Vector2d residual_px;  ///< where the model sees it, less where it was seen
+  Eigen::Vector2d residual_px;  ///< the model's pixel less the seen one
   std::size_t pose;
   bool outlying;
 };

@@ -88,7 +88,7 @@ std::string plane_cells(const std::optional<ViewCheck>& check) {
   return fmt::format("<td>{:.3f}</td><td>{:.3f}</td>", check->plane_rms_mm, check->plane_sigma_mm) + distances;
 }
 
-/// What the looks at the reference plane say, before they took part and after.
+/// The results of the looks at the reference plane, before they took part and after.
 std::string planes_of(const CalibrationOutcome& outcome) {
   if (outcome.planes.empty()) return {};
   std::string html =
@@ -165,7 +165,8 @@ std::string poses_of(const CalibrationOutcome& outcome) {
          table_of(html);
 }
 
-/// Of a parameter's name: "fx" and "cy" are pixels, "k1" and "p1" nothing, turns radians, places mm.
+/// The unit of a parameter, by its name: "fx" and "cy" are pixels, "k1" and "p1" have none, turns are radians, places
+/// mm.
 std::string_view unit_of(std::string_view parameter) {
   if (parameter.starts_with("f") || parameter.starts_with("c")) return "px";
   if (parameter.starts_with("turn")) return "rad";
@@ -183,7 +184,7 @@ std::string parameters_of(const CalibrationOutcome& outcome) {
   return "<h2>Parameters</h2>\n" + table_of(html);
 }
 
-/// Of what the calibration is: date, board, devices, program.
+/// The head of the report: date, board, devices, program.
 std::string head_of(const CalibrationOutcome& outcome) {
   const CalibrationReport& report = outcome.calibration.report;
   const auto device = [](std::string_view name, int width_px, int height_px) {

@@ -18,7 +18,7 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] std::string board_figure(const CalibrationOutcome& outcome);
 
-/// How far a depth may be off, over the working range.
+/// Draws the possible error of a depth, over the working range.
 /// @return empty where it is not known
 /// @thread reentrant
 [[nodiscard]] std::string depth_figure(const CalibrationOutcome& outcome);

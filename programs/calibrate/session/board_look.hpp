@@ -9,10 +9,10 @@
 
 namespace slsd {
 
-/// What each camera sees of the board, or why it sees none.
+/// The sighting of the board by each camera, or the reason for seeing none.
 using BoardSightings = std::vector<Result<BoardSighting>>;
 
-/// What the cameras see at one moment, one entry to a camera.
+/// The sight of all cameras at one moment, one entry to a camera.
 struct BoardLook {
   std::vector<GreyImage> pictures;
   BoardSightings sightings;
@@ -24,8 +24,8 @@ struct BoardLook {
 /// Whether any camera sees the board.
 [[nodiscard]] bool is_seen(const BoardSightings& sightings);
 
-/// How far the board's points moved in the image: root mean square over the points seen both times, in the camera where
-/// they moved most.
+/// The movement of the board's points in the image: root mean square over the points seen both times, in the camera
+/// where they moved most.
 /// @return px; infinite where no camera sees the board both times
 /// @thread reentrant
 [[nodiscard]] double moved_px(const BoardSightings& before, const BoardSightings& after);

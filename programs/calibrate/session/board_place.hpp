@@ -15,13 +15,13 @@
 
 namespace slsd {
 
-/// How a board is held before a camera that is not calibrated yet: its focal length is guessed, so that angles and
-/// distances serve to compare poses, and no more.
+/// The place of a board before a camera that is not calibrated yet. Its focal length is guessed, so that angles and
+/// distances serve only to compare poses.
 struct BoardPlace {
-  Eigen::Vector2d centre;  ///< of the board, as a share of the image's width and height
-  Eigen::Vector3d normal;  ///< of the board, away from the camera, in the camera's frame, of length 1
-  double distance_mm = 0;  ///< of the board's centre
-  double turn_rad = 0;     ///< of the board's x axis in the image, from x towards y
+  Eigen::Vector2d centre;  ///< the board's centre, as a share of the image's width and height
+  Eigen::Vector3d normal;  ///< the board's normal, away from the camera, in the camera's frame, of length 1
+  double distance_mm = 0;  ///< distance of the board's centre
+  double turn_rad = 0;     ///< angle of the board's x axis in the image, from x towards y
 
   /// Between the board and the image plane, 0 to 90 degrees.
   [[nodiscard]] double tilt_deg() const;

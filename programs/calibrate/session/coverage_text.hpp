@@ -8,7 +8,7 @@
 
 namespace slsd {
 
-/// What of each camera's picture and of the projector's image the poses cover, drawn with letters side by side:
+/// Draws the poses' coverage of each camera's picture and of the projector's image, with letters side by side:
 ///
 ///     camera left       projector
 ///     . . o # # o . .   . o # # # # o .

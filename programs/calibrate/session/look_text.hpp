@@ -15,7 +15,7 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] std::string look_text(const BoardSightings& sightings, const std::vector<std::string>& cameras);
 
-/// Why cameras see no board, a line to each, begun by a line end.
+/// The reasons why cameras see no board, a line to each, begun by a line end.
 /// @thread reentrant
 [[nodiscard]] std::string unseen_text(const BoardSightings& sightings, const std::vector<std::string>& cameras);
 

@@ -15,7 +15,7 @@ namespace {
 constexpr double kStillPx = 0.3;  // between two looks
 constexpr double kGonePx = 5;     // from where a pose was handled: it is another one
 
-/// Where the board is in the projector's image, which is where the operator looks.
+/// The board's place in the projector's image: the operator looks at the board.
 std::optional<Eigen::Vector2d> lit_place(const std::vector<PoseView>& views) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   std::size_t count = 0;

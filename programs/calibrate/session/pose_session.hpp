@@ -19,25 +19,24 @@
 namespace slsd {
 
 struct PoseSessionOptions {
-  std::size_t poses = 12;                         ///< at which the session ends, those of before among them
-  std::chrono::milliseconds sign{500};            ///< how long a sign is shown
+  std::size_t poses = 12;                         ///< number at which the session ends, with earlier poses
+  std::chrono::milliseconds sign{500};            ///< time for which a sign is shown
   std::chrono::milliseconds after_refusal{2000};  ///< before a board that is still there is tried again
-  std::chrono::seconds patience{60};     ///< without a board until the operator is told what to do; without the devices
-                                         ///< until the session ends
-  std::chrono::milliseconds retry{500};  ///< between two tries of devices that fail
-  bool begun = false;                    ///< the devices have given a picture before: they are worth patience at once
+  std::chrono::seconds patience{60};              ///< until advice, without a board; until the end, without the devices
+  std::chrono::milliseconds retry{500};           ///< between two tries of devices that fail
+  bool begun = false;  ///< the devices have given a picture before: they are worth patience at once
 };
 
-/// What a session is at, for who shows it in another way than a terminal does.
+/// The progress of a session, for displays other than a terminal.
 struct PoseProgress {
   std::string_view state;  ///< "no board", "moving", "still", "done", "hold", "taken" or "again"
-  std::string text;        ///< why a pose was not taken; else empty
+  std::string text;        ///< reason for refusing a pose; else empty
   std::size_t wanted = 0;
   const PoseCollection& poses;
   const BoardSightings& sightings;
 };
 
-/// What a session works with; all of it outlives it.
+/// The objects that a session works with; each outlives it.
 struct PoseSessionParts {
   PoseSource& source;
   PoseTaker& taker;
@@ -61,7 +60,7 @@ class PoseSession {
  public:
   PoseSession(PoseSessionParts parts, const PoseSessionOptions& options);
 
-  /// Until there are poses enough, or it is interrupted.
+  /// Runs the session until there are poses enough, or it is interrupted.
   /// @errors of the recorder; those of the devices: at once where they do not begin, else after their patience;
   ///         kMismatch: the cameras are not those of the poses so far
   [[nodiscard]] Result<> run();

@@ -16,10 +16,10 @@ namespace slsd {
 
 /// A pose that was tried.
 struct PoseTrial {
-  std::vector<PoseView> views;             ///< of the cameras that saw enough; empty: the pose is refused
+  std::vector<PoseView> views;             ///< one for each camera that saw enough; empty: the pose is refused
   std::vector<CapturedPictures> pictures;  ///< one to a camera
-  std::vector<std::string> lacks;          ///< why a camera's view does not count, a sentence each
-  std::vector<std::string> advice;         ///< what could be better
+  std::vector<std::string> lacks;          ///< reasons why a camera's view does not count, a sentence each
+  std::vector<std::string> advice;         ///< possible improvements
   std::chrono::nanoseconds work{};         ///< the machine's own, without waiting for devices
 
   [[nodiscard]] bool refused() const { return views.empty(); }

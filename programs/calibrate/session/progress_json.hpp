@@ -12,8 +12,8 @@
 
 namespace slsd {
 
-/// What a page draws of a session: how many poses there are, what each camera sees now, and where in its picture, and
-/// in the projector's, points were seen so far, as counts in a grid.
+/// The progress of a session for a page that draws it: the number of poses, and each camera's present view of the
+/// board. Grids count the points seen so far in the cameras' pictures and in the projector's.
 [[nodiscard]] nlohmann::json progress_json(const PoseProgress& progress);
 
 /// The verdict on a calibration, with its reasons and what to do.

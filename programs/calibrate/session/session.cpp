@@ -30,7 +30,7 @@ using std::filesystem::path;
 
 constexpr int kPosesMin = 3, kPosesMax = 99, kPlanesMin = 1;
 
-/// What is decided before a device is opened.
+/// The decisions made before a device is opened.
 struct Preparation {
   Configuration configuration;
   Board board;

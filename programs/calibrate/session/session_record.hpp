@@ -16,7 +16,7 @@
 
 namespace slsd {
 
-/// Where a session's pictures go: as asked for, or into calibration-TIME beside the calibration file.
+/// The folder of a session's pictures: the requested one, or calibration-TIME beside the calibration file.
 [[nodiscard]] std::filesystem::path record_folder(const CalibrateRequest& request, const std::filesystem::path& file);
 
 /// Whether the folder holds poses, so that a session goes on with them.
@@ -26,7 +26,7 @@ namespace slsd {
 /// @errors of the files; kMismatch: the pattern recorded is not of the configured projector's size
 [[nodiscard]] Result<Pattern> session_pattern(const std::filesystem::path& folder, const Configuration& configuration);
 
-/// What the poses so far show, and the looks at the reference plane; nothing where there are none.
+/// Reads the observations of the poses so far, and of the looks at the reference plane. Empty if there are none.
 /// @errors of list_captures_with_planes() and read_captures(); kMismatch: the poses so far are of the other code
 [[nodiscard]] Result<ReadCaptures> read_record(const std::filesystem::path& folder,
                                                const std::vector<std::string>& cameras, const ImageSize& projector,

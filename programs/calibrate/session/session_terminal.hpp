@@ -10,8 +10,8 @@
 
 namespace slsd {
 
-/// Where a session speaks to a person: lines that stay, and below them one that is rewritten. Into a pipe or a file,
-/// that one is written as a line of its own when its state changes, every two seconds at most.
+/// The output of a session to a person: lines that stay, and below them one that is rewritten. A pipe or a file gets
+/// that one as a line of its own when its state changes, every two seconds at most.
 /// @thread thread-bound
 class SessionTerminal {
  public:
@@ -22,7 +22,7 @@ class SessionTerminal {
 
   static constexpr int kNoLive = -1;
 
-  /// Of the standard output: 0 where it is no terminal.
+  /// The width of the standard output; 0 if it is no terminal.
   [[nodiscard]] static int columns_of_stdout();
 
   /// @param state  what of the text is worth a line of its own

@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// What the projector tells the operator, who looks at the board and not at the terminal.
+/// The projector's signs to the operator, who looks at the board and not at the terminal.
 enum class Sign {
   kHold,   ///< two bars: keep it still
   kTaken,  ///< a tick: the pose is taken, go on to the next

@@ -30,7 +30,7 @@ class SocketSource final : public PoseSource {
   [[nodiscard]] const std::string& pattern() const { return pattern_; }
   /// The calibration file that is in force; empty: none.
   [[nodiscard]] const std::filesystem::path& calibration() const { return calibration_; }
-  /// Which devices they are.
+  /// The status of the devices.
   [[nodiscard]] const RigStatus& status() const { return status_; }
 
  private:
@@ -46,7 +46,7 @@ class SocketSource final : public PoseSource {
   std::filesystem::path calibration_;
   RigStatus status_;
   Grey8 wanted_;
-  bool shown_ = false;  ///< what is wanted
+  bool shown_ = false;  ///< the projector shows wanted_
 };
 
 }  // namespace slsd
