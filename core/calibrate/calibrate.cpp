@@ -94,7 +94,7 @@ std::vector<PoseObservation> set_planes_aside(Observations& observations) {
   return planes;
 }
 
-/// What looks that were left out say of distances, as a print of another scale contradicts the poses too.
+/// Explains distances on planes that were left out: a print of another scale contradicts the poses too.
 void explain_distances(const std::vector<PlaneCheck>& checks, PoseList& poses) {
   constexpr double kWorthTellingPercent = 0.1;
   for (const PlaneCheck& check : checks) {

@@ -98,7 +98,7 @@ std::string rig_doubt(const CameraRig& rig, const DepthRange& range) {
          ". Look at the calibration, and at depth_min_mm and depth_max_mm; slsd --calibrate makes a new one";
 }
 
-/// How far two motions are apart.
+/// Difference between two motions.
 struct Disagreement {
   double degrees, mm;
 
@@ -113,7 +113,8 @@ Disagreement compare(const RigidTransform& a, const RigidTransform& b) {
   return {turn * 180 / std::numbers::pi, (a.translation - b.translation).norm()};
 }
 
-/// Of a further camera: R and T lead to the projector straight, and rig_from_camera by way of the first camera.
+/// Doubt about a further camera: R and T lead to the projector directly, and rig_from_camera by way of the first
+/// camera.
 std::string detour_doubt(const CalibratedCamera& first, const CalibratedCamera& camera) {
   const RigidTransform &straight = camera.projector_from_camera, &given = camera.rig_from_camera;
   const double length_mm = std::max(first.projector_from_camera.translation.norm(), straight.translation.norm());
@@ -143,11 +144,11 @@ std::string about(const CalibratedCamera& camera, const std::string& doubt) {
 
 // ---- by symbols ----
 
-/// What a calibration makes of symbols.
+/// Results of a calibration for a set of symbols.
 struct Explained {
   double on_line_share = 0, points_share = 0;
   std::vector<double> residuals_px{};
-  std::vector<double> depths_mm{};  ///< of those on their lines; sorted
+  std::vector<double> depths_mm{};  ///< depths of those on their lines; sorted
 };
 
 Explained explain(std::span<const Match> matches, const CameraRig& rig, const DepthRange& range, double gate_px) {

@@ -11,7 +11,7 @@
 
 namespace slsd {
 
-/// What makes a calibration implausible within a range of depths, a sentence for each fault, with what to change.
+/// Faults that make a calibration implausible within a range of depths: one sentence for each, with what to change.
 /// Empty for any rig that somebody would build. A rig and its mirror image are alike here: only symbols tell them
 /// apart, see symbol_doubt().
 /// @thread reentrant

@@ -17,9 +17,9 @@ struct CameraRig {
 
 /// Another convention in which a calibration may have been written.
 struct Misreading {
-  std::string advice;  ///< what it looks like, and what to change: "T looks like metres: multiply it by 1000"
+  std::string advice;  ///< likely cause and remedy: "T looks like metres: multiply it by 1000"
   double log_prior;    ///< the natural logarithm of how often this is met
-  CameraRig rig;       ///< as it would be meant
+  CameraRig rig;       ///< the rig in that convention
 };
 
 /// Every convention that is tried: units of T, directions of R and T, axes, matrices swapped or of another image size.

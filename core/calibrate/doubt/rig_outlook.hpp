@@ -11,25 +11,25 @@ struct DepthRange {
   double min_mm, max_mm;
 
   [[nodiscard]] bool holds(double depth_mm) const { return depth_mm >= min_mm && depth_mm <= max_mm; }
-  [[nodiscard]] double middle_mm() const;  ///< by ratio
+  [[nodiscard]] double middle_mm() const;  ///< geometric mean
 };
 
-/// What a rig as calibrated could measure within a range of depths.
+/// Expected performance of a rig, as calibrated, within a range of depths.
 struct RigOutlook {
-  double lit_share;       ///< of the camera's picture, or of the projector's, what the other reaches; at the best depth
+  double lit_share;       ///< share of either picture that the other device reaches; at the best depth
   double baseline_mm;     ///< between the two, across the camera's line of sight
-  double baseline_share;  ///< of the depth in the middle of the range
-  double parallax_px;     ///< from the nearest to the farthest depth, in the projector
-  double sigma_mm;        ///< of a depth in the middle of the range, for a tenth of a pixel of error
+  double baseline_share;  ///< share of the depth in the middle of the range
+  double parallax_px;     ///< shift from the nearest to the farthest depth, in the projector
+  double sigma_mm;        ///< deviation of a depth in the middle of the range, for a tenth of a pixel
 
-  /// How likely such a rig is, as a natural logarithm; 0: as likely as any.
+  /// Likelihood of such a rig, natural logarithm; 0: as likely as any.
   [[nodiscard]] double log_likelihood() const;
 };
 
 /// @thread reentrant
 [[nodiscard]] RigOutlook look_at_rig(const CameraRig& rig, const DepthRange& range);
 
-/// How likely the numbers of a lens are, as natural logarithms; 0: as likely as any.
+/// Likelihood of a lens's numbers, natural logarithms; 0: as likely as any.
 struct LensLikelihood {
   double principal_point;
   double focal_length;

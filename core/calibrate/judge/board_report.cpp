@@ -63,7 +63,7 @@ double rms_of(const std::vector<Point>& points, std::vector<Eigen::Vector2d> res
   return rms_px(residuals);
 }
 
-/// By how much each place of the board is seen off the shape.
+/// Measures the height of each place of the board above the shape.
 HeightMap heights_of(const PoseObservation& pose, const RigModel& rig, const MotionVector& rig_from_board,
                      const Eigen::AlignedBox2d& sheet) {
   const RigidTransform place = to_motion(rig_from_board);

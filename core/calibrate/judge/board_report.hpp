@@ -12,11 +12,11 @@
 
 namespace slsd {
 
-/// How flat the board of a session is.
+/// Flatness of a session's board.
 struct BoardReport {
-  Eigen::AlignedBox2d sheet_mm;  ///< what it is judged over, in the board's frame
+  Eigen::AlignedBox2d sheet_mm;  ///< the area that is judged, in the board's frame
   BoardShape shape;              ///< alike in all poses; the calibration is corrected for it
-  double bend_mm = 0;            ///< of the shape, from its lowest to its highest place
+  double bend_mm = 0;            ///< height of the shape, from its lowest to its highest place
   double bend_sigma_mm = 0;      ///< one standard deviation of that
   double uneven_mm = 0;          ///< root mean square of what the shape leaves, alike in all poses
   double uneven_times = 0;       ///< its square over what chance lets expect
@@ -25,13 +25,13 @@ struct BoardReport {
   [[nodiscard]] double size_mm() const { return sheet_mm.isEmpty() ? 0 : sheet_mm.sizes().maxCoeff(); }
   /// Beyond doubt, and by more than a good print is.
   [[nodiscard]] bool is_bent() const;
-  /// Whether the poses tell whether it is bent.
+  /// Tells whether the poses show if the board is bent.
   [[nodiscard]] bool is_told() const;
-  /// Whether it has a shape that the adjustment does not describe.
+  /// Tells whether the board has a shape that the adjustment does not describe.
   [[nodiscard]] bool is_uneven() const;
 };
 
-/// What is seen of the board, from corner to corner.
+/// Finds the area of the board that is seen, from corner to corner.
 /// @thread reentrant
 [[nodiscard]] Eigen::AlignedBox2d seen_of_board(const Observations& observations);
 
@@ -42,13 +42,13 @@ struct BoardReport {
                                       const std::vector<SharedParameter>& shared, const PoseInfluence& influence,
                                       const Eigen::AlignedBox2d& sheet_mm);
 
-/// For a person: "bent by 0.53 +- 0.02 mm over its 336 mm".
+/// Describes the bend for a person: "bent by 0.53 +- 0.02 mm over its 336 mm".
 [[nodiscard]] std::string bend_text(const BoardReport& board);
 
-/// How flat it is and what was done about it, for a person.
+/// Describes for a person the board's flatness and what was done about it.
 [[nodiscard]] std::string board_text(const BoardReport& board);
 
-/// What of the board keeps a calibration from being good.
+/// Lists the faults of the board that keep a calibration from being good.
 [[nodiscard]] std::vector<std::string> board_warnings(const BoardReport& board);
 
 }  // namespace slsd

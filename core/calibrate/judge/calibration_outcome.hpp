@@ -34,7 +34,7 @@ struct CalibrationOutcome {
   double projector_rms_px = 0;                            ///< symbols, in the projector
   double symbol_rms_px = 0;                               ///< symbols, in the cameras
   double epipolar_rms_px = 0;                             ///< symbols off their epipolar line, in the projector
-  double held_out_corner_px = 0, held_out_symbol_px = 0;  ///< of poses that were left out in turn, in the cameras
+  double held_out_corner_px = 0, held_out_symbol_px = 0;  ///< poses left out in turn, in the cameras
   std::vector<DepthUncertainty> depth;                    ///< near, middle, far
   BoardReport board;
   std::vector<PlaneCheck> planes;  ///< one to a camera's look at the reference plane

@@ -13,12 +13,12 @@ namespace slsd {
 
 inline constexpr int kCoverageColumns = 8, kCoverageRows = 6;
 
-/// Where in a device's image points were seen: how many in each cell of a coarse grid.
+/// Distribution of points over a device's image: their number in each cell of a coarse grid.
 struct Coverage {
   std::array<int, kCoverageColumns * kCoverageRows> counts{};
 
   void add(const Eigen::Vector2d& pixel, const ImageSize& size);
-  /// Of the cells, those with any point: 0 to 1.
+  /// Share of the cells with any point: 0 to 1.
   [[nodiscard]] double share() const;
   /// "the upper left", "the right": the region with the fewest points, or empty where all have some.
   [[nodiscard]] std::string emptiest() const;

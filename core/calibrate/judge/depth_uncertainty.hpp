@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// How far a measured depth may be off at a distance: root mean square over the field of the first camera.
+/// Uncertainty of a measured depth at a distance: root mean square over the field of the first camera.
 struct DepthUncertainty {
   double depth_mm = 0;
   double calibration_mm = 0;  ///< one standard deviation, from the uncertainty of the calibration

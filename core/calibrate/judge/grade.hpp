@@ -23,15 +23,15 @@ inline constexpr Bounds kHeldOutPx{0.3, 1.0};   ///< each pose under the calibra
 inline constexpr Bounds kEpipolarPx{0.3, 1.0};  ///< symbols off their epipolar lines, in the projector
 inline constexpr Bounds kDepthShare{0.001,
                                     0.005};   ///< the depth's deviation, of the distance, in the middle of the range
-inline constexpr double kCoverageGood = 0.5;  ///< of an image
-inline constexpr double kTiltGoodDeg = 15;    ///< of the most tilted pose
+inline constexpr double kCoverageGood = 0.5;  ///< share of an image
+inline constexpr double kTiltGoodDeg = 15;    ///< tilt of the most tilted pose
 inline constexpr std::size_t kPosesGood = 8;
 
 /// One word on a calibration, why, and what to shoot next.
 struct Verdict {
   Grade grade = Grade::kBad;
-  std::vector<std::string> reasons;  ///< what keeps it from a better grade; empty for a good one
-  std::vector<std::string> advice;   ///< what would help most
+  std::vector<std::string> reasons;  ///< faults that keep it from a better grade; empty for a good one
+  std::vector<std::string> advice;   ///< steps that would help most
 };
 
 }  // namespace slsd

@@ -8,15 +8,15 @@ namespace slsd {
 
 /// The surface that the symbols of a pose were seen on, against the plane that its corners say.
 struct LitSurface {
-  double offset_mm = 0;     ///< of the middle of the symbols, along the plane's normal
+  double offset_mm = 0;     ///< place of the symbols' middle, along the plane's normal
   double tilt_deg = 0;      ///< between the symbols' own plane and the board's
-  double bow_mm = 0;        ///< of the smooth bend over the symbols, from the lowest to the highest place
-  double bow_share = 0;     ///< of the variance off their own plane, what the bend explains: 0 to 1
+  double bow_mm = 0;        ///< height of the smooth bend over the symbols, lowest to highest
+  double bow_share = 0;     ///< share of the variance off their own plane that the bend explains: 0 to 1
   double flatness_mm = 0;   ///< root mean square off their own plane
-  double before_share = 0;  ///< of the symbols, those that lie before the board, less those as far behind it
+  double before_share = 0;  ///< share of the symbols before the board, less those as far behind it
   double before_mm = 0;     ///< half of those lie farther before it
 
-  /// How far the board's edge moved, at the most.
+  /// Largest distance that the board's edge moved.
   [[nodiscard]] double shift_mm(double half_size_mm) const;
 };
 

@@ -12,14 +12,14 @@ namespace slsd {
 
 /// A plane through points of which some lie elsewhere.
 struct PlaneFit {
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();   ///< of the points on it
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();   ///< mean of the points on it
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit length, away from the origin
   std::vector<std::size_t> on_plane;                  ///< indices of the points that it was fitted to
-  double rms_mm = 0;                                  ///< of these, off the plane
+  double rms_mm = 0;                                  ///< distance of these from the plane
 
-  /// How far a point is off the plane, along its normal.
+  /// Signed distance of a point from the plane, along its normal.
   [[nodiscard]] double off_mm(const Eigen::Vector3d& point) const { return normal.dot(point - middle); }
-  /// Where the ray from the origin in a normalised direction (x/z, y/z) meets the plane.
+  /// Point at which the ray from the origin in a normalised direction (x/z, y/z) meets the plane.
   [[nodiscard]] Eigen::Vector3d meet(const Eigen::Vector2d& direction) const;
 };
 

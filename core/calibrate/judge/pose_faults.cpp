@@ -24,7 +24,7 @@ constexpr double kContradictionMinPx = 0.1;
 /// The same in standard deviations of what the poses say of the rig: about 1 of poses that agree, and one that turned
 /// by 0.1 degrees before the pattern came is at 4, and moves the principal point by 3 px.
 constexpr double kDisagreementMin = 3;
-/// Of a pose's points, those that lie off the rest: above this share they are no wrong points but a wrong pose.
+/// Share of a pose's points that lie off the rest: above it they are no wrong points but a wrong pose.
 constexpr double kOutlyingShare = 0.15, kUsualOutlyingShare = 0.05;
 /// A bend or a shift this much above that of the other poses is what explains an error.
 constexpr double kExplains = 3;
@@ -33,7 +33,7 @@ constexpr double kBowShareMin = 0.4;
 constexpr double kBowOfShiftMin = 0.3;
 /// Symbols whose pattern was divided by a print that lay elsewhere scatter, the less the smaller the move.
 constexpr double kUnevenOfShiftMin = 0.3;
-/// Of half the board's size: root mean square off a plane beyond which it is no board.
+/// Root mean square off a plane beyond which it is no board, as a share of half the board's size.
 constexpr double kUnevenShareMax = 0.1;
 /// The print lies this much elsewhere under the pattern: the picture of the board tells nothing of it.
 constexpr double kShiftMaxPx = 1;
@@ -42,11 +42,11 @@ constexpr double kShiftMaxPx = 1;
 constexpr double kShownByPrintPx = 5;
 /// Corners that are this near those of an earlier pose, as a share of the picture's width, say what those said.
 constexpr double kSamePlaceShare = 0.005;
-/// Of a pose's symbols, those that something stands before; of more it is the board that moved.
+/// Share of a pose's symbols with something before them; of more it is the board that moved.
 constexpr double kCoveredShare = 0.08, kUncoveredShare = 0.5;
 /// Times the usual error from which on the figure tells nothing more.
 constexpr double kTimesTelling = 100;
-/// Of a pose's points, those that lie off, of which nothing else needs to be said.
+/// Share of a pose's points that lie off, from which on nothing else needs to be said.
 constexpr double kHardlyAnyShare = 0.9;
 constexpr char kHardlyAny[] = "hardly a point of it agrees with them";
 
@@ -65,7 +65,7 @@ double usual_blur_of(PoseSubject subject, const Observations& observations) {
   return median_of(std::move(blurs));
 }
 
-/// What the view with the most corners lacks of them, where all views lack some.
+/// Describes the lack of corners in the view that has the most, if all views lack some.
 std::string least_lack_of_corners(const PoseObservation& pose) {
   std::string lack = "the board was not found";
   std::size_t most = 0;
@@ -77,7 +77,7 @@ std::string least_lack_of_corners(const PoseObservation& pose) {
   return lack;
 }
 
-/// Of views that have corners enough.
+/// Describes the lack of symbols among views with enough corners.
 std::string least_lack_of_symbols(const PoseObservation& pose) {
   std::size_t most = 0;
   for (const PoseView& view : pose.views) {
@@ -98,7 +98,7 @@ double shift_of(const PoseObservation& pose) {
   return shift;
 }
 
-/// How far the corners that both views have are apart, root mean square; nothing where hardly any are.
+/// Distance between the corners that both views have, root mean square; nothing if they share hardly any.
 std::optional<double> apart_px(const PoseView& one, const PoseView& other) {
   constexpr std::size_t kCommonMin = 4;
   std::map<std::pair<double, double>, Eigen::Vector2d> places;
@@ -113,7 +113,7 @@ std::optional<double> apart_px(const PoseView& one, const PoseView& other) {
   return std::sqrt(sum / static_cast<double>(count));
 }
 
-/// Whether all views of the later pose show the board where the earlier one's do.
+/// Tells whether all views of the later pose show the board at the earlier one's place.
 bool repeats(const PoseObservation& earlier, const PoseObservation& later, const Observations& observations) {
   if (earlier.subject != later.subject) return false;
   bool any = false;
@@ -128,7 +128,7 @@ bool repeats(const PoseObservation& earlier, const PoseObservation& later, const
   return any;
 }
 
-/// Of the corners or of the symbols of a pose, whichever is more.
+/// Share of outlying points among the corners or the symbols of a pose, whichever is larger.
 double outlying_share(const PoseObservation& pose) {
   double corners = 0, outlying_corners = 0, symbols = 0, outlying_symbols = 0;
   for (const PoseView& view : pose.views) {
@@ -138,7 +138,7 @@ double outlying_share(const PoseObservation& pose) {
   return std::max(outlying_corners / std::max(corners, 1.0), outlying_symbols / std::max(symbols, 1.0));
 }
 
-/// Of the poses that show the same.
+/// Median over the poses of the same subject.
 double usual(const std::vector<double>& values, PoseSubject subject, const Observations& observations) {
   std::vector<double> same;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -154,8 +154,8 @@ LitSurface surface_of(std::size_t pose, const Observations& observations, const 
   return measure_lit_surface(observations.poses[pose], rig, by_corners.value_or(joint));
 }
 
-/// By how much the print would lie elsewhere under the pattern if the board had moved along its normal: the view that
-/// would show it most, of those whose print is seen to lie where it was; root mean square over the corners.
+/// Shift of the print under the pattern that a move of the board along its normal would cause. It is that of the view
+/// that would show it most, among views whose print stayed; root mean square over the corners.
 double unshown_px(const PoseObservation& pose, const RigModel& rig, const MotionVector& place, double along_normal_mm) {
   double most = 0;
   for (const PoseView& view : pose.views) {
@@ -179,14 +179,14 @@ struct Explanation {
   LitSurface surface;
   double shift_mm = 0;
   double bow_factor = 0, shift_factor = 0, flatness_factor = 0;
-  double believable_mm = 0;  ///< what lies off farther than this is no board that was held
+  double believable_mm = 0;  ///< limit beyond which it is no board that was held
 
-  /// Of second order, like a print that is mounted on cardboard.
+  /// Tells whether the board has a bend of second order, like a print that is mounted on cardboard.
   [[nodiscard]] bool is_bowed() const {
     return surface.bow_share > kBowShareMin && bow_factor > kExplains && surface.bow_mm > kBowOfShiftMin * shift_mm &&
            surface.bow_mm < believable_mm;
   }
-  /// Of any shape: the symbols lie on no plane, as far as the print that a move leaves in them does not explain.
+  /// Tells whether the symbols lie on no plane, beyond the error that a moved print leaves in them.
   [[nodiscard]] bool is_uneven() const {
     return flatness_factor > kExplains && surface.flatness_mm < kUnevenShareMax * believable_mm &&
            surface.flatness_mm > kUnevenOfShiftMin * shift_mm;

@@ -13,9 +13,9 @@
 
 namespace slsd {
 
-/// Why a pose is left out.
+/// Reason why a pose is left out.
 enum class PoseFault {
-  kNotSeen,  ///< the board or the pattern, or a file cannot be read
+  kNotSeen,  ///< no board, no pattern, or an unreadable file
   kTooFewCorners,
   kTooFewSymbols,
   kBlurred,
@@ -32,7 +32,7 @@ enum class PoseFault {
 struct FaultyPose {
   std::size_t pose;
   PoseFault fault;
-  std::string reason;  ///< for a person: what was seen, with the figure, and what to do
+  std::string reason;  ///< for a person: the observation, with the figure, and what to do
 };
 
 /// Poses that cannot take part whatever the others say: too little in them, or blurred against the others.

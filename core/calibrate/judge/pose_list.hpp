@@ -12,21 +12,21 @@
 
 namespace slsd {
 
-/// What became of one pose.
+/// Report on one pose.
 struct PoseReport {
   std::string name;
   PoseSubject subject = PoseSubject::kBoard;
-  std::optional<PoseFault> fault;    ///< why it was left out
+  std::optional<PoseFault> fault;    ///< the reason if it was left out
   std::string reason;                ///< the same for a person, with the figure; empty where it was used
-  std::vector<std::string> without;  ///< of a pose that was used: cameras whose view was left out, and why
-  std::vector<std::string> remarks;  ///< of a pose that was used: what is not as it should be
+  std::vector<std::string> without;  ///< for a used pose: cameras whose view was left out, and why
+  std::vector<std::string> remarks;  ///< for a used pose: its lesser faults
   std::size_t corners = 0, symbols = 0;
   std::size_t outlying_corners = 0, outlying_symbols = 0;
-  double corner_rms_px = 0, symbol_rms_px = 0;  ///< in the camera
+  double corner_rms_px = 0, symbol_rms_px = 0;  ///< errors in the camera
   HeldOut held_out;                             ///< under the rig that the other poses give
 };
 
-/// Which poses of the input take part, and why the others do not.
+/// List of the input's poses: those that take part, and the reasons why the others do not.
 /// @thread thread-bound
 class PoseList {
  public:
@@ -41,9 +41,9 @@ class PoseList {
   /// Adds to why a pose was left out, where it was.
   void explain(const std::string& pose, const std::string& more);
 
-  /// Whether there were any of a subject, and all of them were left out.
+  /// Tells whether there were any poses of a subject, and all of them were left out.
   [[nodiscard]] bool lacks(PoseSubject subject) const;
-  /// By its index among those that take part.
+  /// Returns the report of a pose, by its index among those that take part.
   [[nodiscard]] PoseReport& used(std::size_t pose) { return reports_[used_[pose]]; }
   /// All, in the order of the input.
   [[nodiscard]] const std::vector<PoseReport>& reports() const { return reports_; }

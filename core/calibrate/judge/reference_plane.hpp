@@ -12,8 +12,8 @@
 
 namespace slsd {
 
-/// What one camera's look at the reference plane says of a calibration, before and after the plane took part in it.
-/// Before is a check by what was not used; after is a residual.
+/// Check of a calibration by one camera's look at the reference plane, before and after the plane took part in it. The
+/// first is a check by unused data; the second is a residual.
 struct PlaneCheck {
   std::string name;                        ///< the look's, "plane_00"
   std::string camera;                      ///< its name

@@ -37,7 +37,7 @@ double sigma_of_three(const CalibrationOutcome& outcome, const std::string& devi
   return std::sqrt(sum);
 }
 
-/// How a lens differs, in words; empty: it does not.
+/// Describes a lens's change in words; empty without one.
 std::string lens_change(const CalibrationOutcome& outcome, const std::string& device, const std::string& text,
                         const Lens& now, const Lens& then, const Sigmas& then_sigmas) {
   const auto differs = [&](std::size_t index, std::string_view name, double is, double was, double least) {
@@ -73,7 +73,7 @@ struct Pair {
   }
   [[nodiscard]] double longer() const { return now.translation.norm() / then.translation.norm() - 1; }
   [[nodiscard]] double longer_sigma() const { return std::sqrt(2.0) * place_sigma_mm / then.translation.norm(); }
-  /// What is left of a move when distances all became longer by one factor.
+  /// Rest of a move after all distances became longer by one factor.
   [[nodiscard]] double sideways_mm() const { return (now.translation - (1 + longer()) * then.translation).norm(); }
 
   [[nodiscard]] bool turned() const { return turn_deg() > std::max(kTurnMinDeg, kSurelySigmas * turn_sigma_deg); }
@@ -85,7 +85,7 @@ struct Pair {
   }
 };
 
-/// Of principal points that are not known, as of turns that are taken for them.
+/// Uncertainty of the principal point, as the turn that it could be mistaken for.
 double unknown_turn_deg(const Lens& lens, const Sigmas& sigmas) {
   if (sigmas.size() < 4) return 0;
   return std::hypot(sigmas[2] / lens.fx, sigmas[3] / lens.fy) * kDegreesOfRadian;
@@ -162,7 +162,7 @@ class Comparison {
                                      device == name ? 0 : sigma_of_three(outcome_, name, "place"));
   }
 
-  /// Which devices are elsewhere.
+  /// Names the devices that have moved.
   [[nodiscard]] std::string places() const {
     const Pair projector = of_projector(0);
     std::vector<std::size_t> moved;

@@ -10,11 +10,11 @@ namespace slsd {
 
 /// A new calibration against an earlier one of the same devices.
 struct RigComparison {
-  /// How the rig has changed since, for a person: "the projector turned by 0.30 degrees". Empty: it has not, as far as
-  /// the deviations of both tell.
+  /// Change of the rig since, for a person: "the projector turned by 0.30 degrees". Empty: it has not changed, within
+  /// the deviations of both.
   std::string change;
-  /// By how much the distances between the devices are longer now, per cent. In a rig that has not changed, what was
-  /// said of the board's size makes all of them longer by one factor, and nothing else does.
+  /// Growth of the distances between the devices, per cent. In a rig that has not changed, only the stated size of the
+  /// board makes all of them longer by one factor.
   double longer_percent = 0;
   double longer_sigma_percent = 0;
 };

@@ -11,12 +11,12 @@
 
 namespace slsd {
 
-/// How true measured distances between a board's points are. Per cent; positive: measured too long.
+/// Trueness of measured distances between a board's points, per cent; positive: measured too long.
 struct Trueness {
   std::size_t corners = 0;
-  double scale_percent = 0;     ///< of all distances together: a common factor
+  double scale_percent = 0;     ///< common factor of all distances
   double long_rms_percent = 0;  ///< root mean square over the distances of at least half the longest
-  double worst_percent = 0;     ///< of these, the one that is farthest off
+  double worst_percent = 0;     ///< the largest error among these
 };
 
 /// Carries a board's points to where the camera's rays meet the plane that the symbols were measured on, so that camera

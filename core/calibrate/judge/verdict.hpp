@@ -7,7 +7,8 @@
 
 namespace slsd {
 
-/// By the errors on poses held out, by how sure the depth is, and by how much of both images the poses cover.
+/// Judges a calibration by its errors on held-out poses, by the uncertainty of depth, and by the poses' cover of both
+/// images.
 /// @thread reentrant
 [[nodiscard]] Verdict judge(const CalibrationOutcome& outcome);
 

@@ -33,7 +33,7 @@ struct MeasuredSymbol {
   Match match;
 };
 
-/// Without a calibration to check them by, some symbols are misread: they lie far from the others, wherever those are.
+/// Removes misread symbols, which no calibration has checked yet: they lie far from the others, wherever those are.
 std::vector<MeasuredSymbol> without_misread(std::vector<MeasuredSymbol> symbols) {
   std::vector<double> residuals;
   for (const MeasuredSymbol& symbol : symbols) residuals.push_back(symbol.epipolar_px);
@@ -57,8 +57,8 @@ std::vector<MeasuredSymbol> measure(const PoseView& view, const CalibratedCamera
   return out.empty() ? out : without_misread(std::move(out));
 }
 
-/// How much noisier the symbols of this look are than they were taken to be, as those on a printed board are: what is
-/// left off the plane when a smooth bend is taken out, over what was expected.
+/// Ratio of the symbols' noise in this look to the assumed noise, as on a printed board. It compares the residuals off
+/// the plane, without a smooth bend, with the expected ones.
 double noise_factor(const std::vector<MeasuredSymbol>& symbols, const PlaneFit& plane) {
   const auto rows = static_cast<Eigen::Index>(plane.on_plane.size());
   const Eigen::Vector3d right = plane.normal.unitOrthogonal(), down = plane.normal.cross(right);
@@ -76,7 +76,7 @@ double noise_factor(const std::vector<MeasuredSymbol>& symbols, const PlaneFit& 
   return std::max(1.0, std::sqrt(rough.squaredNorm() / std::max(expected.squaredNorm(), 1e-12)));
 }
 
-/// What the symbols' noise lets expect off the plane.
+/// Root mean square off the plane that the symbols' noise explains.
 double expected_rms_mm(const std::vector<MeasuredSymbol>& symbols, const PlaneFit& plane) {
   double sum = 0;
   for (const std::size_t i : plane.on_plane) {

@@ -15,22 +15,22 @@ namespace slsd {
 
 /// Up to which figures a calibration still holds.
 struct VerifyLimits {
-  double trueness_percent = 0.2;  ///< of the common factor, and of the long distances' errors
+  double trueness_percent = 0.2;  ///< limit of the common factor, and of the long distances' errors
   double plane_sigmas = 3;        ///< off the plane, times what the noise of the symbols explains
   double plane_percent = 0.1;     ///< off the plane, of the distance
   double epipolar_px = epipolar_limit_px(std::nullopt);  ///< off the epipolar lines, in the projector
-  double turn_deg = 0.03;  ///< by which projector and camera seem to have turned against each other
+  double turn_deg = 0.03;                                ///< apparent turn of projector and camera against each other
 };
 
-/// What one camera's look at a flat thing says of the calibration. Root mean squares.
+/// Check of the calibration by one camera's look at a flat thing. Root mean squares.
 struct ViewCheck {
-  std::size_t symbols = 0;                    ///< that took part
+  std::size_t symbols = 0;                    ///< symbols that took part
   std::size_t left_out = 0;                   ///< misread, or beside the plane
-  double distance_mm = 0;                     ///< of the plane's middle from the camera
+  double distance_mm = 0;                     ///< distance of the plane's middle from the camera
   double epipolar_rms_px = 0;                 ///< symbols off their epipolar lines, in the projector
-  double turn_deg = 0;                        ///< of the projector against the camera, as the epipolar lines show it
+  double turn_deg = 0;                        ///< turn of the projector against the camera, from the epipolar lines
   double turn_sigma_deg = 0;                  ///< one standard deviation of that
-  std::optional<Eigen::Vector3d> blind_axis;  ///< of the projector: a turn about it does not show in this look
+  std::optional<Eigen::Vector3d> blind_axis;  ///< projector's axis about which a turn does not show here
   double plane_rms_mm = 0;                    ///< symbols off their plane
   double plane_sigma_mm = 0;                  ///< the same, as the noise of the symbols in this look lets expect
   std::optional<Trueness> trueness;           ///< nothing without a board
@@ -46,7 +46,7 @@ struct ViewCheck {
 
 enum class VerifyFault {
   kEpipolar,   ///< the devices moved against each other, or a lens did
-  kPlane,      ///< what is flat is measured bent
+  kPlane,      ///< flat things are measured bent
   kScale,      ///< all distances are wrong by the same factor
   kDistances,  ///< distances are wrong, each by its own share
 };
@@ -62,7 +62,7 @@ struct VerifySummary {
   double plane_percent = 0;         ///< root mean square off the planes, of the distance
   double scale_percent = 0;         ///< the mean over the boards
   double long_rms_percent = 0;      ///< over the boards' long distances
-  std::vector<VerifyFault> faults;  ///< those of any view, each once
+  std::vector<VerifyFault> faults;  ///< faults of any view, each once
 };
 
 /// @thread reentrant

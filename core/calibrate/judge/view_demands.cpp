@@ -13,13 +13,13 @@ namespace {
 
 constexpr std::size_t kCornersMin = 8;
 constexpr std::size_t kSymbolsMin = 30;
-/// Of the board's pixels: from here on what is left of its edges and of the symbols is not where it was.
+/// Share of the board's pixels at full level, above which its edges and the symbols look displaced.
 constexpr double kClippedMax = 0.25;
 constexpr std::ptrdiff_t kLinesMin = 2;  // rows, and columns, with two corners or more
-/// As a factor and in px, both.
+/// Limits of blur as a factor and in px: both must be exceeded.
 constexpr double kBlurFactor = 1.5, kBlurMorePx = 0.35;
 
-/// Of lines along one axis of the board, those with two corners or more.
+/// Counts the lines along one axis of the board that have two corners or more.
 std::ptrdiff_t lines(const PoseView& view, Eigen::Index axis) {
   constexpr double kSameMm = 1e-3;
   std::map<long, int> counts;

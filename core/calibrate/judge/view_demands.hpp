@@ -8,8 +8,8 @@
 
 namespace slsd {
 
-/// What a view lacks to take part, whatever others show: the same for a session, which takes the pose again, and for a
-/// calibration, which leaves it out. For a person, with the figure and what to do; empty where it lacks nothing.
+/// Lacks that keep a view from taking part, whatever others show. A session uses them to take the pose again, and a
+/// calibration to leave it out. They are for a person, with the figure and what to do; empty if the view lacks nothing.
 
 /// Corners: enough of them, in two rows and two columns of two or more each, without which they fit any pose.
 /// @thread reentrant
@@ -23,7 +23,7 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] std::string excess_of_light(double clipped_share);
 
-/// Whether a blur is so far above that of the other poses that it moves corners and symbols.
+/// Tells whether a blur is so far above that of the other poses that it moves corners and symbols.
 /// @param usual_px  0: there are none
 /// @thread reentrant
 [[nodiscard]] bool is_blurred(double blur_px, double usual_px);

@@ -10,9 +10,9 @@
 namespace slsd {
 namespace {
 
-/// Of the board's pitch: as much of the border as is white for certain.
+/// Width of the border that is white for certain, of the board's pitch.
 constexpr double kBorder = 0.8;
-/// Of the board's pitch: a symbol that is larger than a square of the board is too large to be read among its edges.
+/// Reach of a symbol, of the board's pitch: one larger than a square of the board cannot be read among its edges.
 constexpr double kNear = kBorder + 1;
 
 Homography board_from_camera(const Board& board, const BoardSighting& sighting) {

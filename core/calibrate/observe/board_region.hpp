@@ -10,23 +10,22 @@
 
 namespace slsd {
 
-/// Of the pixels of a board's print, those at the level of a saturated one: also where a reflection leaves no point of
-/// it.
+/// Share of the pixels of a board's print at the level of a saturated one, even if a reflection leaves no point of it.
 /// @return 0 to 1
 /// @thread reentrant
 [[nodiscard]] double full_share_of_print(const GreyView& image, const Board& board, const BoardSighting& sighting);
 
-/// Where the board is in an image: what the projector lights elsewhere is not on its plane.
+/// Region of the board in an image: light of the projector elsewhere is not on its plane.
 /// @thread reentrant
 class BoardRegion {
  public:
   BoardRegion(const Board& board, const BoardSighting& sighting);
 
-  /// Whether a pixel lies on what is printed, or on the white border that has to be around it.
+  /// Tells whether a pixel lies on the print, or on the white border that has to be around it.
   [[nodiscard]] bool contains(const Eigen::Vector2d& camera_px) const;
-  /// Whether a symbol that lies on the board may reach there.
+  /// Tells whether a symbol that lies on the board may reach there.
   [[nodiscard]] bool is_near(const Eigen::Vector2d& camera_px) const;
-  /// Whether it lies on what is printed.
+  /// Tells whether a pixel lies on the print.
   [[nodiscard]] bool is_printed(const Eigen::Vector2d& camera_px) const;
 
  private:

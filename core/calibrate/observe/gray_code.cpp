@@ -67,8 +67,8 @@ struct Square {
   Eigen::Vector2d bin_px{1, 1};
 };
 
-/// How far the members lie off the affine map from projector to camera over their square (least squares), less what
-/// is due to their places in their bins.
+/// Distances of the members from the affine map from projector to camera over their square (least squares). The part
+/// due to their places in their bins is taken off.
 std::vector<double> distances_from_affine(const Square& square) {
   const std::vector<Member>& members = square.members;
   Eigen::Matrix3d normal = Eigen::Matrix3d::Identity() * 1e-9;

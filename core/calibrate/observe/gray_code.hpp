@@ -17,7 +17,7 @@ namespace slsd {
 [[nodiscard]] std::vector<Grey8> draw_gray_code(const ImageSize& projector);
 [[nodiscard]] std::size_t gray_code_images(const ImageSize& projector);
 
-/// What a camera saw of them.
+/// One camera's images of the code.
 struct GrayCapture {
   GreyView white, black;
   std::vector<GreyView> code;  ///< gray_code_images() of them

@@ -11,7 +11,7 @@
 
 namespace slsd {
 
-/// What a camera saw of a thing that is known: a point of the board or a pixel of the projector.
+/// A camera's observation of a known thing: a point of the board or a pixel of the projector.
 struct BoardPoint {
   Eigen::Vector2d camera_px;  ///< distorted, as seen
   Eigen::Vector2d board_mm;
@@ -32,14 +32,14 @@ struct PoseView {
   /// Noise of this view's points over that of all, as the adjustment finds it: pictures differ in sharpness and light.
   double corner_noise = 1, symbol_noise = 1;
   double blur_px = 0;              ///< one standard deviation of the blur at the board's edges; 0: not known
-  double clipped_share = 0;        ///< of the board's pixels, those at full level
-  std::size_t hidden_symbols = 0;  ///< in one place on the board, where the pattern should be seen
+  double clipped_share = 0;        ///< share of the board's pixels at full level
+  std::size_t hidden_symbols = 0;  ///< unseen symbols in one place on the board, where the pattern should be
   bool hidden_clipped = false;     ///< and the white picture is at full level there
   std::optional<Eigen::Vector2d>
-      shift_px;  ///< of the print from the white picture to the pattern's, where both show it
+      shift_px;  ///< shift of the print from the white picture to the pattern's, if both show it
 };
 
-/// What is shown to the cameras.
+/// The subject that is shown to the cameras.
 enum class PoseSubject {
   kBoard,  ///< the board that is calibrated by
   kPlane,  ///< the reference plane, for the second step: its print is taken for true

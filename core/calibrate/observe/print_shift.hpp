@@ -9,12 +9,12 @@
 
 namespace slsd {
 
-/// Where the board's print is in the pattern's picture, against the white one. The edges of the print show there too,
+/// Shift of the board's print in the pattern's picture, against the white one. The print's edges show there too,
 /// wherever the pattern lights them.
 struct PrintShift {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
-  double significance = 0;  ///< how far it stands out of all other shifts, in their deviations: about 10 of pictures of
-                            ///< one pose, below 4 of those of two
+  double significance = 0;  ///< its distance from all other shifts, in their deviations: about 10 for pictures of
+                            ///< one pose, below 4 for those of two
 
   [[nodiscard]] bool certain() const { return significance > 6; }
 };

@@ -17,16 +17,16 @@ constexpr std::size_t kFoundMin = 20;  // of fewer nobody can say where the othe
 /// as on paper.
 constexpr std::size_t kBrightnesses = 8;
 constexpr int kWindow = 5;  // cells across and down, wider than the ink of most squares
-/// Of a window: of the symbols that should be seen, those that are at most; how many should; and by how many deviations
-/// of chance fewer are.
+/// Limits of a window with a gap: the largest seen share of the expected symbols, the least number of expected symbols,
+/// and the least lack in standard deviations of chance.
 constexpr double kSeenShare = 0.2, kExpectedMin = 8, kDeviations = 4;
 constexpr double kClippedShare = 0.5;
 
 /// A symbol of the pattern that falls on the board.
 struct Cell {
   bool on_board = false, seen = false, in_gap = false;
-  double level = 0;   ///< of the white picture there
-  double likely = 0;  ///< to be seen
+  double level = 0;   ///< grey level of the white picture there
+  double likely = 0;  ///< chance to be seen
 };
 
 /// The pattern's, row by row.

@@ -14,7 +14,7 @@ namespace slsd {
 
 /// A place on the board where the pattern should be seen, as the projector lights it there, and is not.
 struct SymbolGap {
-  std::size_t symbols = 0;  ///< that are not seen; 0: there is no such place
+  std::size_t symbols = 0;  ///< number of unseen symbols; 0: there is no such place
   bool clipped = false;     ///< the white picture is at full level there
 };
 

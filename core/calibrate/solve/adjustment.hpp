@@ -36,7 +36,7 @@ class Adjustment {
   /// not.
   [[nodiscard]] Result<> compare_prints(Observations& observations);
 
-  /// Whether the session is one rig.
+  /// Looks for a change of the rig during the session.
   [[nodiscard]] std::optional<RigChange> find_change(const Observations& observations) const {
     return find_rig_change(observations, options_, rig_);
   }

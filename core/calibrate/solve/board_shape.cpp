@@ -8,10 +8,10 @@ namespace slsd {
 namespace {
 
 constexpr std::size_t kOrders = 5;
-/// From the middle, in halves of the longer side: beyond it, a polynomial soon is higher than any board.
+/// Reach from the middle, in halves of the longer side: beyond it, a polynomial soon is higher than any board.
 constexpr double kReach = 2;
 
-/// Of u and v, in each term.
+/// Powers of u and v in each term.
 struct Powers {
   std::size_t u, v;
 };

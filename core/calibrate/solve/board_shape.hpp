@@ -11,7 +11,7 @@
 
 namespace slsd {
 
-/// How a board that is not flat lies off its plane, alike in all poses: a polynomial of orders two to four, as a plane
+/// Shape of a board that is not flat, alike in all poses: a polynomial of orders two to four over its plane. A plane
 /// would be part of the pose. Each term is the height (mm) that it adds where its powers of u and v are one,
 ///
 ///     u = (x - middle_x) / half,  v = (y - middle_y) / half
@@ -20,7 +20,7 @@ namespace slsd {
 inline constexpr std::size_t kShapeTerms = 12, kSecondOrderTerms = 3;
 using ShapeVector = std::array<double, kShapeTerms>;
 
-/// Where a shape has its middle, and how large it is.
+/// Middle and size of a shape.
 struct ShapeFrame {
   Eigen::Vector2d middle_mm = Eigen::Vector2d::Zero();
   double half_mm = 1;  ///< half of the longer side
@@ -29,8 +29,8 @@ struct ShapeFrame {
 /// A shape at one place of the board.
 struct ShapeAt {
   double height_mm = 0;                                             ///< off the board's plane, along its z axis
-  Eigen::Vector2d slope = Eigen::Vector2d::Zero();                  ///< of the height along x and y
-  Eigen::Matrix<double, 1, static_cast<int>(kShapeTerms)> by_term;  ///< of the height by the terms
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();                  ///< slope of the height along x and y
+  Eigen::Matrix<double, 1, static_cast<int>(kShapeTerms)> by_term;  ///< derivative of the height by the terms
 };
 
 /// Beyond two halves of the longer side from its middle, a shape goes on level, so that rays to anywhere meet it.
@@ -53,8 +53,8 @@ struct BoardShape {
   }
 };
 
-/// How large each term may be before anything of it was seen: one standard deviation. Prints on foam board are bent by
-/// some mm; what is not of second order is a small part of that.
+/// Size that each term may have before any observation: one standard deviation. Prints on foam board are bent by some
+/// mm; terms above the second order are a small part of that.
 [[nodiscard]] ShapeVector plausible_shape(const ShapeFrame& frame);
 
 }  // namespace slsd

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kHuberSigmas = 3;
 
-/// By how much the symbols of a view, in camera pixels, are seen shifted: a block of the adjustment.
+/// Shift of all symbols of a view, camera px: a block of the adjustment.
 using Shift = std::array<double, 2>;
 
 /// The problem of Ceres, and which of its blocks belong to what.
@@ -38,10 +38,10 @@ class Problem {
   }
   [[nodiscard]] std::size_t corners_of(std::size_t pose) const { return corners_[pose]; }
   [[nodiscard]] const std::vector<double>& sigmas_of(std::size_t pose) const { return sigmas_px_[pose]; }
-  /// Of the pose's views that symbols were seen in.
+  /// Returns the shifts of the pose's views in which symbols were seen.
   [[nodiscard]] const std::vector<double*>& shifts_of(std::size_t pose) const { return shifts_of_[pose]; }
   double* pose_block(std::size_t pose) { return rig_.rig_from_board[pose].data(); }
-  /// Of a camera, by its index, or of the projector: -1.
+  /// Returns the place of a camera, by its index, or of the projector: -1.
   double* place_block(int device, std::size_t pose) {
     const bool moved = rig_.moved && pose >= rig_.moved->first_pose && device != 0;
     if (device < 0) return moved ? rig_.moved->projector.data() : rig_.projector.device_from_rig.data();

@@ -19,15 +19,15 @@ struct BundleOptions {
   bool with_symbols = true;  ///< otherwise the cameras and poses alone are adjusted
   bool scale = false;        ///< whether the board's scale is adjusted too, against that of the reference plane
   bool stretch = false;      ///< whether the board's aspect is adjusted too
-  /// How far the board may be bent before anything of it was seen: one standard deviation of each term of its shape;
-  /// nothing: the shape is held as it is.
+  /// Bend that the board may have before any observation: one standard deviation of each term of its shape. Nothing:
+  /// the shape is held as it is.
   std::optional<ShapeVector> shape_sigma_mm = {};
   int iterations_max = 60;
   double corner_sigma_px = 0.1;
-  double plane_corner_sigma_px = 0.1;  ///< of the reference plane's corners
-  double symbol_sigma_factor = 1;      ///< of ProjectedPoint::sigma_px
-  /// Of what all symbols of a view are off by alike, which no count of symbols makes less: light that is skewed out of
-  /// focus, an exposure that moved. docs/notes/2026-11-calibration.md has what was seen of it.
+  double plane_corner_sigma_px = 0.1;  ///< for the reference plane's corners
+  double symbol_sigma_factor = 1;      ///< factor of ProjectedPoint::sigma_px
+  /// Error that all symbols of a view share, which no number of symbols lessens: skewed light out of focus, or an
+  /// exposure that moved. docs/notes/2026-11-calibration.md has the measurements.
   double symbol_shift_px = 0.005;
 
   [[nodiscard]] double corner_sigma_of(PoseSubject subject) const {
@@ -35,9 +35,9 @@ struct BundleOptions {
   }
 };
 
-/// How an adjustment ended.
+/// Result of an adjustment.
 struct Adjusted {
-  bool settled = false;  ///< within its iterations; where not, the rig is the best so far
+  bool settled = false;  ///< within its iterations; if not, the rig is the best so far
   double cost = 0;       ///< half of the sum of all squared residuals, lessened by the loss
 };
 

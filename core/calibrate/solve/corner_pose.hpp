@@ -8,7 +8,8 @@
 
 namespace slsd {
 
-/// Where a board was when its corners were seen, by them alone: symbols that were seen on it later have no part.
+/// Pose of a board at the moment its corners were seen, from these alone: symbols that were seen on it later have no
+/// part.
 /// @param rig    whose camera sees the corners; that with the most of them is asked
 /// @param begin  rig from board, near it
 /// @return       rig from board; none where fewer than 4 corners were seen

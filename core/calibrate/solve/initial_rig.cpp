@@ -95,7 +95,7 @@ std::optional<RigidTransform> pose_of(const PoseView& view, const LensVector& le
   return to_motion({turn[0], turn[1], turn[2], shift[0], shift[1], shift[2]});
 }
 
-/// By how much the corners are off the pose that suits them best under a lens without distortion.
+/// Error of the corners in the pose that fits them best under a lens without distortion.
 double error_px(const PoseView& view, const LensVector& lens, const ImageSize& size) {
   const auto camera_from_board = pose_of(view, lens);
   if (!camera_from_board) return std::numeric_limits<double>::infinity();
@@ -287,7 +287,7 @@ std::vector<SpacePoint> space_points(const PoseObservation& pose, const RigModel
   return points;
 }
 
-/// Of each pose: half of its symbols are off by less, in the projector.
+/// Median error of each pose's symbols, in the projector.
 std::vector<double> errors_px(const std::vector<std::vector<SpacePoint>>& poses, const Resection& projector) {
   std::vector<double> errors;
   for (const auto& points : poses) {
@@ -320,8 +320,8 @@ std::vector<std::size_t> far_off(const std::vector<double>& errors) {
   return far;
 }
 
-/// By all poses or, where some are far off by these, by the run of poses that suits most of them best: one that is
-/// wholly wrong, and a device that moved during the session, leave some run right.
+/// Resects from all poses or, if some are far off by these, from the run of poses that suits most of them best. A
+/// wholly wrong pose, and a device that moved during the session, leave some run right.
 Result<Resection> resect_most(const std::vector<std::vector<SpacePoint>>& poses) {
   const auto resect_but = [](const std::vector<std::vector<SpacePoint>>& some, const std::vector<std::size_t>& wrong) {
     std::vector<SpacePoint> points;

@@ -12,7 +12,7 @@
 namespace slsd {
 
 struct InitialRig {
-  RigModel rig;                    ///< with a pose to each of the observations
+  RigModel rig;                    ///< has a pose for each of the observations
   std::vector<FaultyPose> faulty;  ///< ascending: poses that no camera can have seen; in the rig they lie anywhere
 };
 

@@ -12,17 +12,18 @@
 namespace slsd {
 
 inline constexpr std::string_view kLensParameterNames[] = {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"};
-inline constexpr std::size_t kFirstTerm = 4;  ///< of distortion, in LensVector
+inline constexpr std::size_t kFirstTerm = 4;  ///< first term of distortion in LensVector
 
-/// How large each term of a lens's distortion may be before anything of it was seen: one standard deviation about 0, of
-/// k1 k2 p1 p2 k3.
+/// Size that each term of a lens's distortion may have before any observation: one standard deviation about 0, for k1
+/// k2 p1 p2 k3.
 using DistortionPrior = std::array<double, 5>;
-inline constexpr DistortionPrior kUsualDistortion{0.3, 0.2, 1e-3, 1e-3, 0.1};  ///< of wide lenses
+inline constexpr DistortionPrior kUsualDistortion{0.3, 0.2, 1e-3, 1e-3, 0.1};  ///< for wide lenses
 
-/// What lenses have: in wide ones the coefficients themselves are about so large; in long ones, which see small angles
-/// only, what they move the outermost pixel by, as a share of its distance from the middle. All terms are adjusted. One
-/// that the poses do not tell stays at 0 with this deviation, and what depends on it is as uncertain as it makes it:
-/// held at 0 instead it would pull focal lengths and principal points away by many of their deviations.
+/// Distortion that lenses plausibly have. In wide ones the coefficients themselves have about this size. In long ones,
+/// which see small angles only, the shift of the outermost pixel has it, as a share of its distance from the middle.
+/// All terms are adjusted. One that the poses do not tell stays at 0 with this deviation, and what depends on it
+/// becomes as uncertain. Held at 0 instead, it would pull focal lengths and principal points away by many of their
+/// deviations.
 [[nodiscard]] inline DistortionPrior plausible_distortion(const ImageSize& size, double focal_px) {
   const double half_px = 0.5 * std::hypot(size.width_px, size.height_px);
   const double radius = std::max(half_px / std::max(focal_px, 1.0), 1e-3);

@@ -15,22 +15,22 @@
 
 namespace slsd {
 
-/// Where a scanner's cloud has a board: the corners' rays, ended by the plane of the cloud on it. A scale of the print
-/// has no part in it, and what is matched is what will be merged.
+/// Place of a board in a scanner's cloud: the corners' rays, ended by the plane of the cloud on it. A scale of the
+/// print has no part in it, and the matched data is the data that will be merged.
 struct CloudLook {
   struct Corner {
-    int id = 0;                ///< of Board::point()
+    int id = 0;                ///< id as in Board::point()
     Eigen::Vector3d point_mm;  ///< in the scanner's frame
   };
   std::size_t scanner = 0;
   std::vector<Corner> corners;
-  Eigen::Vector3d normal;         ///< of the plane, away from the scanner
-  Eigen::Vector3d along, across;  ///< in the plane, at right angles
+  Eigen::Vector3d normal;         ///< normal of the plane, away from the scanner
+  Eigen::Vector3d along, across;  ///< axes in the plane, at right angles
   Eigen::Vector3d middle_mm;
-  /// Of how far the plane is off along its normal at its middle, mm, and of its slopes along and across.
+  /// Covariance of the plane's offset along its normal at its middle, mm, and of its slopes along and across.
   Eigen::Matrix3d covariance;
   double bend_mm = 0;        ///< root mean square of the cloud's parts off their plane
-  double scale_percent = 0;  ///< by how much the board is larger in the cloud than it is said to be
+  double scale_percent = 0;  ///< excess of the board's size in the cloud over the stated size
 };
 
 /// @param cloud  of one camera, in its frame, mm
@@ -42,7 +42,7 @@ struct CloudLook {
 
 struct PlacedScanner {
   RigidTransform first_from_scanner;
-  std::size_t places = 0;   ///< of the board that it saw together with another
+  std::size_t places = 0;   ///< number of the board's places that it saw together with another
   double sigma_mm = 0;      ///< one standard deviation of where a point in the middle of these is put
   double sigma_far_mm = 0;  ///< the same at the board's corner that is worst
 };
@@ -52,7 +52,7 @@ struct PlacedScanners {
   std::vector<double> off_mm;  ///< place by place: root mean square of its corners off their means; 0: not used
 };
 
-/// Where several scanners stand, by a board that two or more of them saw at each place.
+/// Places several scanners, from a board that two or more of them saw at each place.
 /// @param places  looks at the same board at the same place, one a scanner
 /// @param names   of the scanners
 /// @errors kNotFound: a scanner shares no place with those that reach the first

@@ -12,13 +12,13 @@
 namespace slsd {
 namespace {
 
-/// Of the smallest to the largest eigenvalue of the correlations.
+/// Least ratio of the smallest to the largest eigenvalue of the correlations.
 constexpr double kInvertTolerance = 1e-13;
-/// Of what all poses say of a parameter: of less a pose says nothing.
+/// Share of all poses' information on a parameter below which a pose says nothing.
 constexpr double kShareMin = 1e-4;
 /// Points below which a pose that fits them tells nothing.
 constexpr Eigen::Index kPointsOfPose = 4;
-/// Of the smallest to the largest eigenvalue of the correlations between a pose's own six parameters.
+/// Least ratio of the smallest to the largest eigenvalue of the correlations between a pose's own six parameters.
 constexpr double kPlacedTolerance = 1e-12;
 
 /// The equations of one pose with what is its own eliminated (Schur's complement).
@@ -27,7 +27,7 @@ struct Reduced {
   Eigen::VectorXd gradient;  // shared
 };
 
-/// What is the pose's own.
+/// Normal equations of the pose's own parameters.
 Eigen::LLT<Eigen::MatrixXd> pose_normal(const PoseEquations& pose) {
   Eigen::MatrixXd normal = pose.by_pose.transpose() * pose.by_pose;
   normal.diagonal() += pose.pose_weight;
@@ -43,7 +43,7 @@ Reduced reduce(const PoseEquations& pose, Eigen::Index shared) {
               cross * own.solve(Eigen::VectorXd(pose.by_pose.transpose() * pose.residuals))};
 }
 
-/// Of the points' distances, from their components in px.
+/// Root mean square of the points' distances, from their components in px.
 double rms(const Eigen::Ref<const Eigen::VectorXd>& components) {
   return components.size() == 0 ? 0 : std::sqrt(2 * components.squaredNorm() / static_cast<double>(components.size()));
 }
@@ -56,9 +56,9 @@ HeldOut hold_out(const PoseEquations& pose, const Eigen::VectorXd& change) {
   return {rms(left_px.head(pose.corner_residuals)), rms(left_px.tail(left_px.size() - pose.corner_residuals))};
 }
 
-/// What a pose asks to be changed, against what the others leave open. In coordinates in which all poses together have
-/// the unit matrix for their normal equations and this one diag(share), the difference of its own solution to that of
-/// the others is gradient / (share (1 - share)), its variance 1 / share + 1 / (1 - share).
+/// Compares the change that a pose asks for with the freedom that the others leave. In coordinates in which all poses
+/// together have the unit matrix for their normal equations, this one has diag(share). The difference of its own
+/// solution to that of the others is gradient / (share (1 - share)); its variance is 1 / share + 1 / (1 - share).
 void compare(const Reduced& pose, const Eigen::MatrixXd& normal, HeldOut& held_out) {
   const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(

@@ -21,7 +21,7 @@ using Normal = Eigen::Matrix<double, 12, 12>;
 
 constexpr std::size_t kPointsMin = 24;
 constexpr int kRounds = 8;
-/// Of the second smallest to the largest eigenvalue: below it more than one solution fits.
+/// Ratio of the second smallest to the largest eigenvalue: below it more than one solution fits.
 constexpr double kRankTolerance = 1e-12;
 
 /// Coordinates with their middle at the origin and a spread of one.
@@ -93,7 +93,7 @@ Resection decompose(Projection projection) {
   return {{k(0, 0), k(1, 1), k(0, 2), k(1, 2), 0, 0, 0, 0, 0}, {rotation, translation}};
 }
 
-/// Of a mirrored picture the rotation that does not mirror has the points behind the device.
+/// Tells whether the points lie behind the device. In a mirrored picture they do, as the rotation does not mirror.
 bool lie_behind(std::span<const SpacePoint> points, const RigidTransform& device_from_points) {
   std::vector<double> depths;
   for (const SpacePoint& point : points) depths.push_back((device_from_points * point.point_mm).z());

@@ -46,9 +46,9 @@ class Turn {
   }
 
   [[nodiscard]] const Eigen::Matrix3d& matrix() const { return matrix_; }
-  /// Of a point that was turned to here, by the angle-axis vector.
+  /// Derivatives of a point that was turned to here, by the angle-axis vector.
   [[nodiscard]] Eigen::Matrix3d slopes_at(const Eigen::Vector3d& turned) const { return -cross(turned) * turned_on_; }
-  /// Of one that was turned back to here.
+  /// Derivatives of a point that was turned back to here.
   [[nodiscard]] Eigen::Matrix3d slopes_back_at(const Eigen::Vector3d& turned) const {
     return cross(turned) * turned_on_.transpose();
   }
@@ -63,7 +63,7 @@ Lens lens_of(const double* block) {
   return to_lens(values, {});
 }
 
-/// Of Lens::distort() by the lens (Elahi et al. 2020, equations (24) to (28)).
+/// Derivatives of Lens::distort() by the lens (Elahi et al. 2020, equations (24) to (28)).
 Slopes<9> slopes_by_lens(const Lens& lens, const Eigen::Vector2d& direction) {
   const auto& [k1, k2, p1, p2, k3] = lens.distortion;
   const double x = direction.x(), y = direction.y(), r2 = x * x + y * y;
@@ -100,7 +100,7 @@ class Sight {
   void put_residual(const Eigen::Vector2d& seen_px, double sigma_px, double* residual) const {
     Eigen::Map<Eigen::Vector2d>(residual, 2) = (lens_.distort(direction()) - seen_px) / sigma_px;
   }
-  /// Those by the camera; returns those by the point.
+  /// Puts the derivatives by the camera; returns those by the point.
   Slopes<3> put_slopes(double sigma_px, double** slopes) const {
     const double depth = at_.z();
     Slopes<3> projection;

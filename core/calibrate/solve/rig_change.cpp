@@ -32,10 +32,10 @@ constexpr double kNoticedPx = 0.1;
 /// Poses with errors this much above the usual are wrong by themselves. They have no say.
 constexpr double kWrongPose = 3;
 constexpr double kWrongShare = 0.34;  // of the poses, that may be
-/// By how much more one of two explanations must leave unexplained to be dismissed.
+/// Unexplained excess of one of two explanations from which on it is dismissed.
 constexpr double kClearlyWorse = 12;
 
-/// With every nth symbol, and nothing marked as outlying: what lies off tells of the change.
+/// Keeps every nth symbol, and marks nothing as outlying: points that lie off tell of the change.
 Observations thinned(const Observations& observations) {
   Observations few = observations;
   std::erase_if(few.poses, [](const PoseObservation& pose) { return pose.subject != PoseSubject::kBoard; });
@@ -58,7 +58,7 @@ struct Model {
   double cost = std::numeric_limits<double>::infinity();
 };
 
-/// Of its symbols: half of them are off by less, in their own deviations.
+/// Median error of its symbols, in their own deviations.
 double usual_error(const PoseObservation& pose, const RigModel& rig, std::size_t index) {
   std::vector<double> errors;
   const RigModel then = rig.as_of(index);
@@ -192,7 +192,7 @@ std::string camera_text(const Observations& seen, std::size_t camera) {
   return seen.cameras.size() == 1 ? "the camera" : "camera " + seen.cameras[camera].name;
 }
 
-/// Which device it was, by what stays where it is.
+/// Names the device that moved, from those that stay in place.
 std::string device_text(const std::vector<Difference>& all, const Observations& seen, const RigModel& rig) {
   if (all.size() == 1) {
     const MotionVector& was = rig.projector.device_from_rig;
@@ -225,7 +225,7 @@ std::string size_text(const Difference& difference, const MotionVector& was) {
                                        : fmt::format("{:.2f} degrees", degrees);
 }
 
-/// By how much symbols of the second part are off, in the projector, under the first part's rig: half of them by more.
+/// Median error of the second part's symbols, in the projector, under the first part's rig.
 double moved_symbols_px(const Observations& seen, const Model& model) {
   RigModel before = model.rig;
   before.moved.reset();
@@ -241,8 +241,8 @@ double moved_symbols_px(const Observations& seen, const Model& model) {
   return median_of(std::move(off));
 }
 
-/// Whether boards that moved between their two pictures explain the smaller part better than a device that did: each
-/// has a plane of its own for its symbols, three numbers a pose, in place of the device's six.
+/// Tells whether boards that moved between their two pictures explain the smaller part better than a moved device. Each
+/// board has its own plane for its symbols, three numbers a pose, in place of the device's six.
 bool boards_explain_better(const Observations& seen, const Model& split, const RigModel& one_rig) {
   const std::size_t first = split.rig.moved->first_pose, count = seen.poses.size();
   const bool second_part = count - first <= first;

@@ -13,7 +13,7 @@ namespace slsd {
 /// A moment from which on a session is another rig.
 struct RigChange {
   std::size_t first_pose = 0;  ///< the first one after it
-  std::string text;            ///< for a person: which device moved, when, by how much
+  std::string text;            ///< for a person: the moved device, the moment and the amount
 };
 
 /// Tests whether the poses before and after any moment agree on one rig: the places of all devices are let free from

@@ -30,7 +30,7 @@ struct DeviceModel {
   MotionVector device_from_rig{};
 };
 
-/// Where the devices are from a pose on, for the question whether a session is one rig.
+/// Places of the devices from a pose on, for the question whether a session is one rig.
 struct MovedDevices {
   std::size_t first_pose = 0;
   std::vector<MotionVector> cameras;  ///< the first one's, which is the rig's frame, has no part
@@ -43,18 +43,18 @@ struct RigModel {
   std::vector<DeviceModel> cameras;
   DeviceModel projector;
   std::vector<MotionVector> rig_from_board;  ///< one to a pose
-  double board_stretch = 0;                  ///< by how much the print is longer along y than it should be against x
-  double board_scale = 0;                    ///< by how much the board's print is larger than it should be, by the
+  double board_stretch = 0;                  ///< excess of the print's length along y over that along x
+  double board_scale = 0;                    ///< excess of the board's print over its stated size, by the
                                              ///< reference plane's measure
-  BoardShape shape;                          ///< of the board; the reference plane is taken for flat
+  BoardShape shape;                          ///< the board's shape; the reference plane is taken for flat
   std::optional<MovedDevices> moved;         ///< nothing: the session is one rig
   std::map<std::size_t, MotionVector>
-      rig_from_lit;  ///< of poses whose symbols lie on a plane of their own, where it is
+      rig_from_lit;  ///< place of the symbols, for poses whose symbols lie on a plane of their own
 
-  /// Where a point is on the print: on that of the board with its scale, stretch and shape.
+  /// Place of a point on the print: on that of the board with its scale, stretch and shape.
   /// @param nominal_mm  where it should be
   [[nodiscard]] Eigen::Vector3d printed_mm(const Eigen::Vector2d& nominal_mm, PoseSubject subject) const;
-  /// Where a device's pixel meets what is shown, mm in the rig's frame; nothing if it misses.
+  /// Point at which a device's pixel meets the subject, mm in the rig's frame; nothing if it misses.
   [[nodiscard]] std::optional<Eigen::Vector3d> meet(const DeviceModel& device, const RigidTransform& rig_from_subject,
                                                     const Eigen::Vector2d& pixel, PoseSubject subject) const;
   /// The rig as it was at a pose.

@@ -13,10 +13,10 @@
 
 namespace slsd {
 
-/// What the scans say of one camera's calibration.
+/// Evidence of the scans about one camera's calibration.
 struct DriftState {
-  std::uint64_t scans = 0;  ///< that had enough points to say something
-  double epipolar_px = 0;   ///< how far off the epipolar lines the points of recent scans lie, in the
+  std::uint64_t scans = 0;  ///< scans with enough points to say something
+  double epipolar_px = 0;   ///< distance of recent scans' points from their epipolar lines, in the
                             ///< projector: the median of the quarter of the picture that is farthest off
   double limit_px = 0;      ///< up to here it is as it was calibrated
   std::optional<std::uint64_t> off_since_scan;  ///< the number of the first scan of a rig that was knocked out
@@ -38,7 +38,7 @@ class DriftWatch {
   /// @param expected_px  what the calibration says of itself; nothing: learnt from the first 20 scans
   DriftWatch(const CalibratedCamera& camera, const Lens& projector, std::optional<double> expected_px);
 
-  /// What became of a scan's state.
+  /// Change of a scan's state.
   enum class Change { kNone, kOff, kFineAgain };
 
   /// Takes a scan's points; a part of them, evenly, where they are many. Allocates nothing.
