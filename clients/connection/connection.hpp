@@ -47,7 +47,7 @@ class Connection {
   /// @errors kNotFound: no service answers at this path; kPermissionDenied; kInvalidArgument: too long a path; kIo
   [[nodiscard]] static Result<Connection> open(const std::filesystem::path& socket);
 
-  /// From now on at most so long for each message, to be sent or received; then kTimeout.
+  /// Limits the time to send or receive each message, from now on; then kTimeout.
   void set_patience(std::chrono::seconds patience) { patience_ = patience; }
   /// Calls this a few times a second while an answer is awaited, with the time since the waiting began.
   void set_waiting(Waiting waiting) { waiting_ = std::move(waiting); }

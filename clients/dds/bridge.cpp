@@ -51,7 +51,7 @@ Result<std::string> calibration_in_force(const std::string& socket) {
 
 /// A camera of the scanner in the network.
 struct Camera {
-  std::string name;  ///< as slsd has it
+  std::string name;  ///< the name in slsd's configuration
   std::string frame_id;
   std::optional<CalibratedCamera> calibrated;
   Writer info, image, compressed, depth, depth_info;
@@ -291,7 +291,7 @@ class Running : public Bridge {
   std::string frame_id_;
   Writer points_, transforms_, description_, diagnostics_;
   Trigger trigger_;
-  std::mutex mutex_;           ///< of what is below, up to the threads
+  std::mutex mutex_;           ///< guards the members below, up to the threads
   std::list<Camera> cameras_;  ///< changed by the thread of the state alone, as is the next
   std::vector<CalibratedCamera> calibrated_;
   std::string calibration_text_, calibration_date_, said_;

@@ -13,14 +13,14 @@
 namespace slsd::dds {
 
 struct BridgeOptions {
-  std::string name = "scanner";      ///< of the scanner in the network: its topics begin with it
-  std::string socket;                ///< of its service; empty: the usual place
+  std::string name = "scanner";      ///< the scanner's name in the network: its topics begin with it
+  std::string socket;                ///< the service's socket; empty: the usual place
   std::optional<double> rate_hz;     ///< clouds; 0: only those that are triggered; nothing: every frame
   std::string density;               ///< "symbols" or "pixels"; empty: as configured
-  Thinning thinning;                 ///< of clouds, and of depth images
+  Thinning thinning;                 ///< thins clouds and depth images
   double image_rate_hz = 0;          ///< images of every camera; 0: none
   bool transforms = true;            ///< false: a robot's own description has the scanner's frames
-  std::filesystem::path extrinsics;  ///< where the scanner stands; empty: told by nobody
+  std::filesystem::path extrinsics;  ///< file with the scanner's place; empty: nobody tells it
 };
 
 /// The robot description (URDF) of a scanner: by the calibration in that file, or that of the service if it is empty.

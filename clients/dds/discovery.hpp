@@ -11,8 +11,8 @@ namespace slsd::dds {
 /// The range of discovery, as ROS 2's environment says it (Jazzy and later).
 struct Discovery {
   enum class Range {
-    kSystemDefault,  ///< as Fast DDS is configured; peers are ignored
-    kSubnet,         ///< by multicast, and the peers
+    kSystemDefault,  ///< Fast DDS's own configuration; peers are ignored
+    kSubnet,         ///< multicast, and the peers
     kLocalhost,      ///< this host, and the peers
     kOff,            ///< nobody
   };

@@ -11,7 +11,7 @@
 
 namespace slsd::dds {
 
-/// What a scanner and a merged cloud have in common in a ROS 2 network, beside their clouds.
+/// The endpoints that a scanner and a merged cloud share in a ROS 2 network, beside their clouds.
 
 /// Said once when clouds come faster than they may leave.
 inline constexpr const char* kOvertaken =
@@ -40,7 +40,7 @@ class Trigger {
   Writer replies_;
 };
 
-/// As ROS has them.
+/// The levels of ROS diagnostics.
 enum class Level : std::uint8_t { kOk = 0, kWarn = 1, kError = 2 };
 
 /// A state, and the worst that is to be said of it, for /diagnostics.

@@ -10,11 +10,11 @@
 
 namespace slsd::dds {
 
-/// Where a scanner stands in a cell of several.
+/// The place of a scanner in a cell of several.
 struct Extrinsics {
   std::string parent;                  ///< the frame of all
   RigidTransform parent_from_scanner;  ///< millimetres
-  std::string calibration_date;        ///< of the calibration that it was measured with; empty: not known
+  std::string calibration_date;        ///< date of the calibration that it was measured with; empty: not known
 };
 
 /// A scanner's place in a file of several:

@@ -38,7 +38,7 @@ double seconds_of(const ros::Time& stamp) {
   return stamp.sec + 1e-9 * stamp.nanosec;
 }
 
-/// Where a foreign cloud has what is merged.
+/// The offsets of the merged fields in a foreign cloud's point.
 struct Layout {
   std::uint32_t x = 0, y = 0, z = 0;
   std::optional<std::uint32_t> sigma, intensity, byte_intensity, camera;
@@ -83,13 +83,13 @@ struct Source {
   std::string name, frame_id;
   Reader reader;
   Extrinsics extrinsics;
-  std::optional<std::string> calibration_date;  ///< as its diagnostics tell; nothing: not heard yet
-  std::string problem;                          ///< of the newest cloud; empty: none
-  std::vector<std::uint8_t> points;             ///< in the frame of all, as they are published
+  std::optional<std::string> calibration_date;  ///< the date in its diagnostics; empty: not heard yet
+  std::string problem;                          ///< problem of the newest cloud; empty: none
+  std::vector<std::uint8_t> points;             ///< published points, in the frame of all
   ros::Time stamp{};
-  Clock::time_point arrived{};  ///< of the newest cloud, placed or not
+  Clock::time_point arrived{};  ///< arrival of the newest cloud, placed or not
   bool fresh = false;           ///< there is one that was not merged yet
-  std::uint64_t clouds = 0;     ///< that could be placed
+  std::uint64_t clouds = 0;     ///< clouds that could be placed
 
   [[nodiscard]] std::string why_not_placed() const {
     if (extrinsics.calibration_date.empty()) return {};
@@ -364,12 +364,12 @@ class Running : public Merge {
   Reader heard_;
   std::vector<Writer> triggers_of_;  ///< one to a source
   Trigger trigger_;
-  std::filesystem::file_time_type extrinsics_written_;  ///< of the thread of the state alone, as are these two
+  std::filesystem::file_time_type extrinsics_written_;  ///< only the thread of the state uses this and the two below
   std::string extrinsics_problem_, said_;
-  std::mutex mutex_;  ///< of what is below, up to the threads
+  std::mutex mutex_;  ///< guards the members below, up to the threads
   std::condition_variable changed_;
   std::vector<Source> sources_;
-  std::size_t point_count_ = 0;  ///< of the newest merged cloud
+  std::size_t point_count_ = 0;  ///< points of the newest merged cloud
   bool triggered_ = false;
   bool overtaken_ = false;  ///< a cloud was not published
   std::uint64_t published_ = 0;

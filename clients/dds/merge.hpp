@@ -13,8 +13,8 @@
 namespace slsd::dds {
 
 struct MergeOptions {
-  std::string name = "merged";        ///< of the merged cloud: its topics begin with it
-  std::filesystem::path extrinsics;   ///< where the scanners stand
+  std::string name = "merged";        ///< the merged cloud's name: its topics begin with it
+  std::filesystem::path extrinsics;   ///< file with the scanners' places
   std::vector<std::string> scanners;  ///< empty: all that the file names
   /// A cloud that is so much older than the newest is left out, and a scanner that sends none for so long is not waited
   /// for.

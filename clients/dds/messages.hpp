@@ -14,7 +14,7 @@
 
 namespace slsd::dds {
 
-/// By which of their values a scanner's diagnostics tell when it was calibrated.
+/// The key of a scanner's diagnostics that tells when it was calibrated.
 inline constexpr const char* kCalibrationDate = "calibration date";
 
 /// The time that a description tells ("2026-01-31T12:00:00.250Z"); now if it tells none. @thread reentrant
@@ -28,7 +28,7 @@ inline constexpr std::uint32_t kPointStep = 24;
 /// Sets all but the header and the fields: points in one array, unorganised.
 void set_points(ros::PointCloud2& message, std::vector<std::uint8_t> data);
 
-/// Which points of a cloud are published.
+/// The choice of a cloud's points that are published.
 struct Thinning {
   int stride = 2;       ///< dense clouds: of every so many pixels of a row, and of every so many rows
   double voxel_mm = 0;  ///< one point to each cube of this size; 0: all
@@ -57,7 +57,7 @@ struct Thinning {
 /// The same as JPEG, of 8 bits. @errors kIo: the frame has no pixels
 [[nodiscard]] Result<ros::CompressedImage> compressed_image(const client::Frame& frame, const ros::Header& header);
 
-/// Where the child stands in the parent, in millimetres, as ROS has it: metres and a quaternion.
+/// The transform of the child in the parent, from millimetres to ROS's metres and quaternion.
 [[nodiscard]] ros::TransformStamped transform(const std::string& parent, const std::string& child,
                                               const RigidTransform& parent_from_child, ros::Time stamp);
 

@@ -133,7 +133,7 @@ struct Events {
   std::condition_variable changed;
 };
 
-/// When the clouds and images that were written have left.
+/// The time until the written clouds and images have left.
 class Backlog {
  public:
   explicit Backlog(double bytes_per_s) : bytes_per_s_(bytes_per_s) {}
@@ -168,7 +168,7 @@ struct Writer::State : fast::DataWriterListener {
   Events& events;
   std::shared_mutex& use;
   const bool& left;
-  Backlog* backlog;  ///< of a topic of sensors
+  Backlog* backlog;  ///< set for a topic of sensors
   fast::DataWriter* writer = nullptr;
   std::set<std::array<std::uint8_t, 16>> readers;
 };
@@ -240,11 +240,11 @@ struct Network::State : fast::DomainParticipantListener {
   bool left = false;
   bool best_effort;
   Backlog backlog;
-  std::mutex making;  ///< of endpoints: what is below, up to the others
+  std::mutex making;  ///< guards the endpoints below, up to the others
   std::map<std::string, fast::Topic*> topics;
   std::list<Writer::State> writers;
   std::list<Reader::State> readers;
-  ros::NodeEntitiesInfo node;  ///< without a name: not shown yet
+  ros::NodeEntitiesInfo node;  ///< not shown yet while it has no name
   fast::DataWriter* node_writer = nullptr;
   fast::DomainParticipant* participant = nullptr;
   fast::Publisher* publisher = nullptr;

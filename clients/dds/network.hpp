@@ -26,9 +26,9 @@ enum class Quality {
 
 /// The writer of a sample, and what a reply to it is related by.
 struct Requester {
-  std::array<std::uint8_t, 16> guid{};  ///< of the reader that waits for the reply, or of the writer
+  std::array<std::uint8_t, 16> guid{};  ///< GUID of the reader that waits for the reply, or of the writer
   std::uint64_t sequence_number = 0;
-  bool is_cyclone = false;  ///< by the vendor in the writer's GUID
+  bool is_cyclone = false;  ///< known by the vendor in the writer's GUID
 };
 
 struct Sample {
@@ -57,7 +57,7 @@ class Writer {
 
  private:
   bool write_bytes(const Bytes& bytes, const Requester* to) const;
-  State* state_;  ///< of the network, which outlives it
+  State* state_;  ///< belongs to the network, which outlives it
 };
 
 /// Reads one topic. @thread thread-bound
@@ -72,7 +72,7 @@ class Reader {
   [[nodiscard]] bool has_news() const;
 
  private:
-  State* state_;  ///< of the network, which outlives it
+  State* state_;  ///< belongs to the network, which outlives it
 };
 
 /// A node of ROS 2: a participant of a DDS domain with ROS's names and qualities of service. What it writes never waits
@@ -93,7 +93,7 @@ class Network {
   [[nodiscard]] Result<Writer> writer(const ros::Type& type, const std::string& topic, Quality quality) const;
   [[nodiscard]] Result<Reader> reader(const ros::Type& type, const std::string& topic, Quality quality) const;
 
-  /// How many others write this topic by now.
+  /// The number of other writers of this topic so far.
   [[nodiscard]] int other_writers(const std::string& topic) const;
   /// Waits until one of these readers has a sample that was not taken, or the time is over.
   bool wait_for(const std::vector<Reader>& readers, std::chrono::milliseconds time) const;
@@ -108,7 +108,7 @@ class Network {
 /// Tells the others that this process leaves: all of its networks. Whoever writes or reads afterwards does nothing.
 void leave_networks();
 
-/// What to do where this host's sockets cannot hold a dense cloud; empty: nothing. @thread reentrant
+/// The advice if this host's sockets cannot hold a dense cloud; empty: none is needed. @thread reentrant
 [[nodiscard]] std::string receive_buffer_warning();
 
 }  // namespace slsd::dds

@@ -10,14 +10,14 @@
 
 namespace slsd::dds {
 
-/// How to reach the others.
+/// The ways to reach the other participants.
 struct NetworkOptions {
   std::uint32_t domain = 0;        ///< ROS_DOMAIN_ID
   std::string interface;           ///< "eth0", "lo", or an address; empty: all
   std::vector<std::string> peers;  ///< addresses of the others, without multicast; empty: as `discovery` says
   bool best_effort = false;        ///< clouds and images that are lost on the way are not sent again
   double rate_max_mb = 16;         ///< clouds and images leave at no more megabytes a second than this
-  Discovery discovery;             ///< of ROS's environment
+  Discovery discovery;             ///< settings of ROS's environment
 };
 
 }  // namespace slsd::dds

@@ -196,7 +196,7 @@ struct NodeEntitiesInfo {
   static void fields(auto& m, auto&& each) { each(m.node_namespace, m.node_name, m.reader_gid_seq, m.writer_gid_seq); }
 };
 
-/// Which nodes a participant has, as `ros2 node list` reads it.
+/// The nodes of a participant, as `ros2 node list` reads them.
 struct ParticipantEntitiesInfo {
   static constexpr Type kType{"rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_",
                               "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"};

@@ -14,7 +14,7 @@
 
 namespace slsd {
 
-/// Why a command failed: the daemon's own error, or one of this side, with the exit status that it means.
+/// The cause of a command's failure: the daemon's own error, or one of this side. It has the exit status that it means.
 struct Failure {
   int exit_status;
   RpcError error;

@@ -36,7 +36,7 @@ json parameters(const ClientOptions& options) {
   return params;
 }
 
-/// What a session says to a person, each line once, though the service tells the last few hundred each time.
+/// The lines of a session for a person, each once. The service repeats the last few hundred each time.
 class Log {
  public:
   void show(const json& told) {
@@ -68,7 +68,7 @@ std::string state_line(const json& told) {
          (error.is_string() ? ": " + printable(error.get<std::string>(), 2 * kLineBytes) : "") + "\n";
 }
 
-/// How one that was followed ended.
+/// Reports the end of a session that was followed. @return the exit status
 int conclude(const ClientOptions& options, const json& told) {
   const json error = told.value("error", json());
   if (error.is_string())

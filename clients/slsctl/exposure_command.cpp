@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-/// What was looked at, and what came of it.
+/// The inspected camera, and the results of the look.
 struct Look {
   json camera;
   std::optional<ExposureSetting> present;

@@ -21,14 +21,14 @@ namespace slsd {
 /// The files that a command line names to be written.
 [[nodiscard]] std::vector<std::filesystem::path> outputs_of(const ClientOptions& options);
 
-/// Where words go: standard output, or standard error if the result itself goes to standard output.
+/// The stream for words: standard output, or standard error if the result itself goes to standard output.
 [[nodiscard]] std::ostream& words(const ClientOptions& options);
 
 /// The format of a scan's cloud, by --format or the end of the file's name: "ply", "pcd" or "tiff"; "ply" for standard
 /// output, and if there is no file. Empty: the name ends in none of them.
 [[nodiscard]] std::string cloud_format(const ClientOptions& options);
 
-/// What is wrong with the names of the files to write, before anything is done; empty: nothing.
+/// The fault in the names of the files to write, before anything is done; empty: none.
 [[nodiscard]] std::string wrong_outputs(const ClientOptions& options, const std::string& command);
 
 /// Whether the files could be written now; a scan that cannot be kept is not begun.

@@ -92,7 +92,7 @@ std::string counts_table(const json& scans, const std::string& what) {
   return text;
 }
 
-/// How to find the service that does not answer: other sockets beside the one that was tried are those of instances.
+/// Advises how to find the service that does not answer: other sockets beside the tried one are those of instances.
 std::string way_to_service(const std::filesystem::path& socket) {
   std::string others;
   std::error_code error;

@@ -18,13 +18,13 @@ namespace slsd {
 /// status's answer as a table for people.
 [[nodiscard]] std::string status_table(const nlohmann::json& status);
 
-/// Why regions gave no point, a line to each rule; empty where nobody asked.
+/// The reasons why regions gave no point, a line to each rule. Empty if nobody asked.
 [[nodiscard]] std::string reason_lines(const nlohmann::json& scan);
 
 /// A scan in one line: "scan 1a2b3c4d-7: 2345 points of 2390 regions, capture 4.2 ms, decode 51.0 ms".
 [[nodiscard]] std::string scan_line(const nlohmann::json& scan);
 
-/// Why a scan, or the last one of status's `scans`, gave no points, in a line; empty if it gave some.
+/// The reason why a scan, or the last one of status's `scans`, gave no points, in a line. Empty if it gave some.
 [[nodiscard]] std::string empty_line(const nlohmann::json& scan);
 
 }  // namespace slsd

@@ -132,7 +132,7 @@ tl::expected<void, Failure> write_files(const ClientOptions& options, const Answ
   return written;
 }
 
-/// What to ask for; empty: as the service is configured. A picture's format depends on it.
+/// The density to ask for; empty: the service's configured one. A picture's format depends on it.
 tl::expected<std::string, Failure> asked_density(const ClientOptions& options, Connection& connection) {
   if (!options.density.empty()) return options.density;
   if (options.normals || cloud_format(options) == "tiff") return "pixels";

@@ -44,7 +44,7 @@ Series read_series(std::string_view text) {
   return series;
 }
 
-/// What happened between two looks.
+/// The change of the metrics between two looks.
 class Change {
  public:
   Change(const Series& before, const Series& now, double seconds) : before_(before), now_(now), seconds_(seconds) {}
@@ -53,7 +53,7 @@ class Change {
     const auto found = now_.find(series);
     return found == now_.end() ? 0 : found->second;
   }
-  /// By how much it grew; all of it where it was counted anew.
+  /// The growth of a counter; its whole value if it was counted anew.
   [[nodiscard]] double grown(const std::string& series) const {
     const auto found = before_.find(series);
     const double now = value(series), was = found == before_.end() ? 0 : found->second;
@@ -78,7 +78,7 @@ class Change {
     const double count = grown(family + "_count" + of);
     return count > 0 ? 1000 * grown(family + "_sum" + of) / count : kNone;
   }
-  /// Where that part of its new values lies below, by a line through the bucket; NaN where there are none.
+  /// The quantile of a histogram's new values, in milliseconds, by a line through the bucket; NaN if there are none.
   [[nodiscard]] double quantile_ms(const std::string& family, const std::string& labels, double part) const {
     std::vector<std::pair<double, double>> buckets;
     const std::string begin = family + "_bucket{" + (labels.empty() ? "" : labels + ",") + "le=\"";

@@ -19,10 +19,10 @@ namespace slsd::web {
 /// The reply to a request.
 struct Answer {
   int status = 200;
-  std::string type;                                          ///< of the body; empty: no body
+  std::string type;                                          ///< the body's type; empty: no body
   client::Bytes body;                                        ///< sent in pieces of 1 MiB
   std::vector<std::pair<std::string, std::string>> headers;  ///< beside those that every answer has
-  std::function<void(std::string_view)> on_sent;             ///< of each piece, when it is sent; may be empty
+  std::function<void(std::string_view)> on_sent;             ///< called with each piece when it is sent; may be empty
 };
 
 /// A refusal as the page reads it.
@@ -34,7 +34,7 @@ struct Handlers {
   std::function<std::optional<Answer>(const Request&)> refuse;
   /// Answers an admitted request; may block. @thread one of many
   std::function<Answer(const Request&)> answer;
-  std::vector<std::pair<std::string, std::string>> headers;  ///< of every answer
+  std::vector<std::pair<std::string, std::string>> headers;  ///< sent with every answer
   std::size_t body_bytes_max;
 };
 

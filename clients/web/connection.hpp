@@ -57,7 +57,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {  //
   std::string received_;  ///< and not read yet
   Request request_;
   Answer answer_;
-  std::string head_;  ///< of the answer
+  std::string head_;  ///< the answer's
   int served_ = 0;
   std::size_t thrown_away_ = 0;
   bool waiting_ = false, close_ = false, body_unread_ = false;

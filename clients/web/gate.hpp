@@ -18,7 +18,7 @@ namespace slsd::web {
 /// The secret that lets browsers and scripts in.
 struct Token {
   std::string text;
-  bool chosen = false;  ///< by a person: it might be guessed, and outlives this run
+  bool chosen = false;  ///< a person chose it: it might be guessed, and outlives this run
 };
 
 /// A token of this run, from the kernel's random numbers: 192 bits.
@@ -48,9 +48,9 @@ class Gate {
       : names_(std::move(names)), token_(std::move(token)), cookie_name_(std::move(cookie_name)) {}
 
   [[nodiscard]] std::optional<Refusal> check_host(const Request& request) const;
-  /// Of a request that shows data or acts.
+  /// Judges a request that shows data or acts. @return the refusal, if any
   [[nodiscard]] std::optional<Refusal> check(const Request& request, Clock::time_point now = Clock::now());
-  /// Of a request that brings a token: whether another origin sent it.
+  /// Judges the origin of a request that brings a token. @return a refusal if another origin sent it
   [[nodiscard]] std::optional<Refusal> check_origin(const Request& request) const;
   /// @return a session for the right token
   [[nodiscard]] tl::expected<Session, Refusal> log_in(const std::string& address, std::string_view token,

@@ -84,7 +84,7 @@ Answer cloud_answer(client::Bytes bytes, const json& about) {
           }};
 }
 
-/// What the page shows of a scan.
+/// The part of a scan's description that the page shows.
 json brief(const json& about) {
   json result = json::object();
   for (const char* key : {"scan", "time", "points", "density", "capture_ms", "decode_ms", "latency_ms", "lost", "tries",

@@ -28,8 +28,8 @@ struct PageOptions {
   std::filesystem::path socket = client::default_socket();
   std::string listen = "127.0.0.1";
   int port = 8384;
-  std::vector<std::string> names = {};                          ///< by which the page is asked for, besides the address
-  std::filesystem::path token_file = {};                        ///< empty: a token of this run
+  std::vector<std::string> names = {};    ///< names that the page is asked for by, besides the address
+  std::filesystem::path token_file = {};  ///< empty: a token of this run
   std::filesystem::path three = "/usr/share/javascript/three";  ///< Debian's libjs-three
 };
 
@@ -58,7 +58,7 @@ class PageServer {
   /// One address: its method, its secret, its answer.
   struct Route {
     std::string method;  ///< GET, which is HEAD too, or POST
-    bool open;           ///< to those without a secret: it shows no data and does nothing
+    bool open;           ///< true for those without a secret: it shows no data and does nothing
     std::function<Answer(const Request&)> answer;
   };
   using Handle = std::function<Answer(const Request&)>;

@@ -15,17 +15,17 @@ namespace slsd::web {
 inline constexpr std::size_t kHeadBytesMax = 16 << 10;
 inline constexpr std::size_t kRequestLineBytesMax = 8 << 10;
 
-/// Why a request is not answered.
+/// The refusal to answer a request, with its cause.
 struct Refusal {
-  int status;  ///< of HTTP
+  int status;  ///< HTTP's status
   std::string name;
-  std::string message;  ///< what to do
+  std::string message;  ///< the remedy
 };
 
 /// A request whose framing has one meaning only.
 struct Request {
   std::string method;
-  std::string path;  ///< as it was sent, without the query; begins with '/'
+  std::string path;  ///< the sent path without the query; begins with '/'
   std::map<std::string, std::string> query;
   std::string host, origin, cookie, authorization;  ///< headers; empty: none
   std::string site, destination;                    ///< headers Sec-Fetch-Site and Sec-Fetch-Dest
@@ -35,13 +35,13 @@ struct Request {
   bool expects_continue = false;
   std::size_t body_bytes = 0;
   std::string body;
-  std::string address;        ///< who asks
-  std::string local_address;  ///< by which of this machine's addresses
+  std::string address;        ///< the client's address
+  std::string local_address;  ///< this machine's address that the request came to
 };
 
-/// Where a head ends, or why it cannot become one.
+/// The end of a head, or the reason why it cannot become one.
 struct HeadEnd {
-  std::size_t bytes = 0;  ///< with the empty line; 0: more is to come
+  std::size_t bytes = 0;  ///< length with the empty line; 0: more is to come
   std::optional<Refusal> refusal;
 };
 

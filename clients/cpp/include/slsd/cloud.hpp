@@ -18,7 +18,7 @@
 
 namespace slsd::client {
 
-/// What every point has.
+/// The fields of every point.
 struct Point {
   float x, y, z;           ///< mm, rig frame: x right, y down, z forward
   float sigma_mm;          ///< one standard deviation along the ray
@@ -57,7 +57,7 @@ struct Frame {
   int height_px = 0;
   int bits = 8;
   Bytes pixels;
-  std::string description;  ///< what the service says of it, as JSON
+  std::string description;  ///< the service's description of it, as JSON
 
   [[nodiscard]] unsigned at(int x, int y) const {
     const std::size_t i =
@@ -134,18 +134,18 @@ class Cloud {
   [[nodiscard]] std::size_t record_bytes() const { return record_bytes_; }
   /// The whole file.
   [[nodiscard]] const Bytes& bytes() const { return bytes_; }
-  /// Of the header, by their first words: scan_id, time, units, ...
+  /// The comments of the header, by their first words: scan_id, time, units, ...
   [[nodiscard]] const std::map<std::string, std::string>& comments() const { return comments_; }
 
-  std::string description = "{}";  ///< what the service says of the scan, as JSON: docs/protocol.md
+  std::string description = "{}";  ///< the service's description of the scan, as JSON: docs/protocol.md
   std::string scan;                ///< its id
-  std::string why_empty;           ///< why a cloud without a point has none, in words
+  std::string why_empty;           ///< reason for having no points, in words; empty: it has some
   std::uint64_t lost = 0;          ///< clouds that a stream lost since the one before, as it read too slowly
   std::optional<double>
-      sigma_calibration_mm;  ///< of the depth, from the calibration alone: it moves all points together
-  std::chrono::steady_clock::time_point received{};  ///< when the last byte of its frames was there
+      sigma_calibration_mm;  ///< error of the depth from the calibration alone: it moves all points together
+  std::chrono::steady_clock::time_point received{};  ///< time when the last byte of its frames had arrived
   Bytes picture;                                     ///< a PNG, where it was asked for
-  std::vector<Frame> frames;                         ///< where they were asked for
+  std::vector<Frame> frames;                         ///< if they were asked for
 
  private:
   [[nodiscard]] const Field* find(std::string_view name) const;

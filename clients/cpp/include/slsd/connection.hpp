@@ -88,9 +88,9 @@ class Connection {
   std::string path_;
   int socket_ = -1;
   std::string buffer_;
-  std::vector<int> descriptors_;  ///< that came and are not mapped yet
+  std::vector<int> descriptors_;  ///< received and not mapped yet
   std::int64_t last_id_ = 0;
-  int process_ = 0;  ///< that opened it
+  int process_ = 0;  ///< the process that opened it
 };
 
 }  // namespace slsd::client

@@ -14,11 +14,11 @@ class ScannerError : public std::runtime_error {
   explicit ScannerError(const std::string& message, std::string name = {}, std::string where = {}, int code = 0)
       : std::runtime_error(message), name_(std::move(name)), where_(std::move(where)), code_(code) {}
 
-  /// By the protocol: "frame_late".
+  /// The error's name in the protocol: "frame_late".
   [[nodiscard]] const std::string& name() const { return name_; }
   /// A file's line, a camera, a key, a socket, or empty.
   [[nodiscard]] const std::string& where() const { return where_; }
-  /// By the protocol: -32018. 0 where the service did not answer it.
+  /// The error's code in the protocol: -32018. 0 if the service did not answer it.
   [[nodiscard]] int code() const { return code_; }
 
  private:
@@ -66,7 +66,7 @@ class ConnectionLost : public ScannerError {
 class NoService : public ConnectionLost {
   using ConnectionLost::ConnectionLost;
 };
-/// What came is not what the protocol says: another program, or another version, listens there.
+/// The answer breaks the protocol: another program, or another version, listens there.
 class ProtocolError : public ScannerError {
   using ScannerError::ScannerError;
 };

@@ -16,23 +16,22 @@
 namespace slsd::client {
 
 struct ScanOptions {
-  std::chrono::milliseconds timeout{5000};  ///< for devices and frames
+  std::chrono::milliseconds timeout{5000};  ///< limit for devices and frames
   std::string density;                      ///< "symbols" or "pixels"; empty: as the service is configured
-  bool normals = false;                     ///< of pixels
+  bool normals = false;                     ///< normals of pixels' points
   bool texture = false;                     ///< the intensity of each point, by a second frame under white light
   bool ambient = false;                     ///< less the light of the room, by a third
   bool picture = false;                     ///< the frame with what was decoded drawn in
   bool frames = false;                      ///< the frames themselves
-  bool why = false;                         ///< which rules rejected regions, in `reasons` of the
-                                            ///< description; the picture marks each region by its rule
+  bool why = false;  ///< the rules that rejected regions, in `reasons` of the description; the picture marks each
+                     ///< region by its rule
 };
 
 struct StreamOptions {
-  std::optional<double> rate_hz;                  ///< at most so many; nothing: every frame
-  std::string density;                            ///< as for a scan
-  bool normals = false;                           ///< of pixels
-  bool shared = false;                            ///< in memory that is shared with the service, without a copy; while
-                                                  ///< two clouds are kept, those that come are lost
+  std::optional<double> rate_hz;  ///< maximum rate; empty: every frame
+  std::string density;            ///< see ScanOptions
+  bool normals = false;           ///< normals of pixels' points
+  bool shared = false;            ///< shared memory, without a copy; while two clouds are kept, new ones are lost
   std::optional<std::chrono::milliseconds> idle;  ///< next() throws TimedOut where no cloud came for so long
 };
 
@@ -55,7 +54,7 @@ class Stream {
    private:
     Stream* stream_;
   };
-  /// For `for (const Cloud& cloud : stream)`, which ends by `break` or by what next() throws.
+  /// The start of `for (const Cloud& cloud : stream)`, which ends by `break` or by an exception of next().
   [[nodiscard]] Iterator begin() { return Iterator(this); }
   [[nodiscard]] Iterator end() { return Iterator(this); }
 
@@ -103,7 +102,7 @@ class Scanner {
 
   /// The service, its devices, and what all scans came to, as JSON.
   [[nodiscard]] std::string status();
-  /// What clouds depend on: pattern, calibration, projector, cameras, configuration, as JSON.
+  /// The settings that clouds depend on: pattern, calibration, projector, cameras, configuration, as JSON.
   [[nodiscard]] std::string settings();
   /// "observe", "scan" or "administer": what this user may.
   [[nodiscard]] std::string role();
