@@ -59,7 +59,7 @@ struct Bench {
   }
 };
 
-/// Of a scene that stands still: every frame but the first two goes on from the one before.
+/// Measures the stream of a scene that stands still: every frame but the first two goes on from the one before.
 void measure_stream(Bench& bench, Executor& executor, benchmark::State& state) {
   const auto next = [&] {
     return bench.mapper.measure_next(bench.frame.view(), 255, bench.decoder.symbols(), executor)

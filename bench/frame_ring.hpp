@@ -13,8 +13,8 @@ namespace slsd {
 
 inline constexpr std::size_t kRingFrames = 8;
 
-/// What the paper's rig sees of a pattern on planes that differ in distance and tilt, 1600x1200, one after the other
-/// and then from the start: no frame is in the caches of the processor core when it comes round again.
+/// Frames of a pattern on planes that differ in distance and tilt, as the paper's rig sees them, 1600x1200. They follow
+/// one another and start again: no frame is in the caches of the processor core when it comes round again.
 class FrameRing {
  public:
   /// The default symbols at this size on the paper's projector, 2 px apart.

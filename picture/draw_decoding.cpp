@@ -79,7 +79,7 @@ class Marker {
     canvas_.disc(place(region), 0.2 * pitch_ + 1.0, kRim);
     canvas_.disc(place(region), 0.2 * pitch_, letter_colour(region.letter));
   }
-  /// Of which nothing has to be said.
+  /// Draws a decoded region about which there is nothing to say.
   void settled(const RegionSeen& region) { canvas_.disc(place(region), 0.12 * pitch_, kSettledColour); }
   void undecoded(const RegionSeen& region) {
     canvas_.plus(place(region), 0.27 * pitch_, kUndecodedColour, stroke() + 1);
@@ -121,7 +121,7 @@ bool rejects(const Decoding& decoding, DecodeRule rule) {
   return text_of(rule).kind == RuleKind::kRejects && decoding.rules[static_cast<std::size_t>(rule)] > 0;
 }
 
-/// How many regions each rule rejected, by its number.
+/// Adds the number of regions that each rule rejected, by the rule's number.
 void add_rules(Legend& legend, const Decoding& decoding) {
   legend.disc(kSettledColour, "decoded: " + std::to_string(decoding.count(RegionStatus::kDecoded)));
   for (std::size_t i = 0; i < kDecodeRuleCount; ++i) {
@@ -162,7 +162,7 @@ void draw_legend(ColourImage& picture, int top, double text_px, const Decoding& 
   legend.dashes(kBrokenLinkColour, "broken link");
 }
 
-/// Of the legend, in heights of its letters.
+/// The height of the legend, in heights of its letters.
 double footer_lines(const Decoding& decoding, DecodingLook look) {
   constexpr double kUsual = 8.5, kForARule = 0.7;
   double lines = kUsual;
@@ -177,7 +177,7 @@ Rgb letter_colour(int letter) {
   return kLetterColours[static_cast<std::size_t>(letter) % kLetterColours.size()];
 }
 
-/// In steps of the golden angle, so that no two that are near in the list are alike.
+/// The colour of a rule, in steps of the golden angle, so that neighbours in the list differ.
 Rgb rule_colour(DecodeRule rule) {
   constexpr double kGoldenAngle = 137.508, kThird = 120;
   const double hue = std::fmod(kGoldenAngle * number_of(rule), 360.);

@@ -8,14 +8,14 @@
 
 namespace slsd {
 
-/// What the picture of a decoding dwells on.
+/// The emphasis of the picture of a decoding.
 enum class DecodingLook : std::uint8_t { kSymbols, kReasons };
 
-/// What the decoder saw (Elahi et al. 2020, figure 9): the frame dimmed; decoded symbols as discs, a colour to each
-/// letter; every other region as a pink plus; links as thin lines, broken ones as red dashes; a legend with counts
-/// below. Enlarged by 2 or 3 where the symbols are small.
-/// With kReasons every undecoded region is a plus in the colour of the rule that rejected it, with the rule's number
-/// where there is room; the legend names the rules, what is decoded is small and grey, and there are no links.
+/// Draws the decoder's results (Elahi et al. 2020, figure 9): the frame dimmed; decoded symbols as discs, a colour to
+/// each letter; every other region as a pink plus. Links are thin lines, broken ones red dashes; a legend with counts
+/// is below. Enlarged by 2 or 3 if the symbols are small. With kReasons every undecoded region is a plus in the colour
+/// of the rule that rejected it, with the rule's number if there is room. Then the legend names the rules, what is
+/// decoded is small and grey, and there are no links.
 /// @param decoding  of this frame; regions outside it are cut
 /// @param pattern   whose letters the regions carry
 /// @thread reentrant

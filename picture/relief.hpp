@@ -15,8 +15,8 @@ namespace slsd {
 struct ReliefVertex {
   Eigen::Vector3d place;   ///< picture px, and depth in the same scale, growing away from the viewer
   Eigen::Vector3d normal;  ///< towards the viewer or away; of any length
-  double colour_share;     ///< for depth_colour()
-  double brightness = 1;   ///< of a disc: 0 is black
+  double colour_share;     ///< argument of depth_colour()
+  double brightness = 1;   ///< brightness of a disc: 0 is black
 };
 
 /// Direction to the light, rig frame: from the upper left, behind the viewer.

@@ -15,7 +15,7 @@ namespace slsd {
 /// A cloud joined to a surface: neighbours of the pattern's lattice whose distance is that of a smooth surface.
 struct Surface {
   std::vector<Eigen::Vector3d> points;   ///< mm, rig frame; those of the cloud, in its order
-  std::vector<Eigen::Vector3d> normals;  ///< of unit length, towards the first camera; zero where nothing is joined
+  std::vector<Eigen::Vector3d> normals;  ///< unit length, towards the first camera; zero if nothing is joined
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 

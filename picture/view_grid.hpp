@@ -11,7 +11,7 @@
 
 namespace slsd {
 
-/// Where the border of a camera's image lies in the projector's, for what stands at one depth.
+/// The border of a camera's image in the projector's, for a surface at one depth.
 /// @param depth_mm  along the camera's axis, above 0
 /// @param step_px   of the camera, from one place to the next along the border
 /// @return          projector px, distorted, around the border and back to its beginning; without what lies behind the
