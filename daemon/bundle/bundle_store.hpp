@@ -29,8 +29,8 @@ class BundleStore {
   BundleStore(std::filesystem::path folder, std::size_t bytes_max)
       : folder_(std::move(folder)), bytes_max_(bytes_max) {}
 
-  /// Whether this is to be bundled: it is no fault of who asked, is new, and the last one was long ago. One who is told
-  /// so is to call put().
+  /// Tells whether this error is to be bundled: the client did not cause it, it is new, and the last bundle is old
+  /// enough. A caller that gets true has to call put().
   [[nodiscard]] bool claim(const Error& error, std::chrono::system_clock::time_point now);
   /// Writes it, whole or not at all, and removes the oldest of those beyond the bounds.
   /// @errors kNoSpace: it alone is larger than all may be; those of write_file_atomically()

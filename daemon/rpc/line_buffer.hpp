@@ -26,7 +26,7 @@ class LineBuffer {
   /// next call.
   [[nodiscard]] std::optional<std::string_view> rest();
 
-  /// Whether the line that has begun is longer than the limit.
+  /// Tells whether the line that has begun is longer than the limit.
   [[nodiscard]] bool overflown() const { return bytes_.size() - begin_ > limit_bytes_ && searched_ == bytes_.size(); }
   /// The number of bytes that wait to be read as lines.
   [[nodiscard]] std::size_t size() const { return bytes_.size() - begin_; }

@@ -26,11 +26,11 @@ class ParamReader {
 
   [[nodiscard]] bool boolean(const char* name, bool otherwise);
   [[nodiscard]] int integer(const char* name, int otherwise, int low, int high);
-  /// Nothing where it is not there.
+  /// The number of that name; empty if it is not there.
   [[nodiscard]] std::optional<double> number(const char* name, double low, double high);
   /// Any text of so many bytes, control characters with it: printable() before it is quoted.
   [[nodiscard]] std::string text(const char* name, std::size_t bytes_max = kMaxTextBytes);
-  /// One of the words; the first where it is not there.
+  /// One of the words; the first if it is not there.
   [[nodiscard]] std::string choice(const char* name, std::initializer_list<std::string_view> words);
 
   /// The first thing wrong: a type, a range, a name that nobody asked for.

@@ -19,7 +19,7 @@ class BoundedQueue {
  public:
   explicit BoundedQueue(std::size_t capacity) : capacity_(capacity) {}
 
-  /// Whether there was room; where there was none the item is left as it is.
+  /// Pushes the item if there is room, and tells whether there was; else leaves the item as it is.
   [[nodiscard]] bool try_push(Item&& item) {
     {
       const std::lock_guard lock(mutex_);

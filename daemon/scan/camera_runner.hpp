@@ -63,7 +63,7 @@ class CameraRunner {
 
   /// Ends what waits, and the thread, soon. What is asked afterwards fails with kCancelled.
   void request_stop();
-  /// Whether the thread has ended and the camera is closed.
+  /// Tells whether the thread has ended and the camera is closed.
   [[nodiscard]] bool stopped() const { return ended_; }
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -71,7 +71,7 @@ class CameraRunner {
   /// The number of times the camera was opened.
   [[nodiscard]] std::uint64_t openings() const;
   [[nodiscard]] const Heartbeat& heartbeat() const { return heartbeat_; }
-  /// Whether it replays recorded images.
+  /// Tells whether it replays recorded images.
   [[nodiscard]] bool replays() const { return replays_; }
   /// The frame rate of a camera that runs freely; 0 for any other.
   [[nodiscard]] double rate_hz() const { return rate_hz_; }

@@ -54,7 +54,7 @@ class CloudFormats {
     return formats;
   }
   [[nodiscard]] bool has(CloudForm form) const { return (bits_ >> form.index() & 1U) != 0; }
-  /// Whether a point for each pixel is wanted.
+  /// Tells whether a point for each pixel is wanted.
   [[nodiscard]] bool dense() const { return (bits_ & 0b111000'111000U) != 0; }
   friend CloudFormats operator|(CloudFormats a, CloudFormats b) {
     a.bits_ = static_cast<std::uint16_t>(a.bits_ | b.bits_);

@@ -19,7 +19,7 @@ namespace slsd {
 /// @thread thread-safe
 class Crew final : public Executor {
  public:
-  /// While it lives, its thread computes, and the helpers leave it a processor.
+  /// A caller's turn. While it lives, its thread computes, and the helpers leave it a processor.
   class Turn {
    public:
     explicit Turn(Crew& crew) : crew_(crew) { ++crew_.turns_; }
@@ -44,7 +44,7 @@ class Crew final : public Executor {
 
  private:
   void help(int worker, const std::stop_token& stop);
-  /// Whether there are parts that a helper has not been at, and a processor for it besides those that help.
+  /// Tells whether there are parts that a helper has not been at, and a processor for it besides those that help.
   [[nodiscard]] bool wants(std::uint64_t done) const {
     const std::uint64_t call = on_offer_;
     return call != 0 && call != done && std::max(turns_.load(), 1) + helping_ < workers();

@@ -43,7 +43,7 @@ class DecodeLanes {
   /// The longest wait of an offered job when more jobs come. A lane that is late once loses nothing. Lanes that are
   /// slower than the cameras make no cloud older than this.
   static constexpr std::chrono::milliseconds kTurn{20};
-  /// One where there is but one processor.
+  /// The number of lanes for this machine: one if there is but one processor.
   [[nodiscard]] static std::size_t lanes_here();
 
   explicit DecodeLanes(std::size_t lanes);
@@ -64,7 +64,7 @@ class DecodeLanes {
   /// Jobs delivered or destroyed so far.
   [[nodiscard]] std::uint64_t done() const;
 
-  /// Whether the lanes keep their promises to the watchdog.
+  /// Tells whether the lanes keep their promises to the watchdog.
   [[nodiscard]] bool kept() const;
   /// Ends soon: what has not been computed is delivered without. Pushing afterwards delivers at once.
   void request_stop();

@@ -12,8 +12,8 @@ namespace slsd {
 
 /// The frames that a scan takes besides those of the pattern.
 struct LightFrames {
-  bool white = false;  ///< while the projector shows white
-  bool dark = false;   ///< while it shows black
+  bool white = false;  ///< a frame under the projector's white
+  bool dark = false;   ///< a frame under the projector's black
 };
 
 /// One frame of each camera, all of one exposure; and where they were asked for, as many in other light.

@@ -19,7 +19,7 @@ namespace slsd {
 /// @param calibration  gets the serials of its report
 void note_hardware(const RigStatus& rig, Calibration& calibration);
 
-/// Whether a device is the one that was calibrated. Where either is not known, it is taken to be.
+/// Checks that a device is the one that was calibrated. If either is unknown, it is taken to be.
 /// @param who  for the message: "camera left"
 /// @errors kMismatch: it is another one; the message says what to do
 [[nodiscard]] Result<> check_hardware(const std::string& who, const std::string& calibrated,

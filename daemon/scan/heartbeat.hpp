@@ -20,7 +20,7 @@ class Heartbeat {
   /// Promises a sign of life within this time from now.
   void promise(Clock::duration within) { until_ = (Clock::now() + within).time_since_epoch().count(); }
 
-  /// Nothing is promised until the next promise.
+  /// Promises nothing until the next promise.
   void rest() { until_ = Clock::time_point::max().time_since_epoch().count(); }
 
   [[nodiscard]] bool kept(Clock::time_point now = Clock::now()) const {

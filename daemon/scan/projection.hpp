@@ -57,7 +57,7 @@ class Projection {
   /// Returns when what is due is visible. @errors as show()
   [[nodiscard]] Result<> show_due(MonotonicTime deadline, const std::stop_token& stop);
 
-  /// Whether what was shown still is. Asked after each capture; comes back 0.3 s after the deadline, or after now, at
+  /// Checks that what was shown still is. Called after each capture. Returns 0.3 s after the deadline, or after now, at
   /// the latest. @errors kDisconnected
   [[nodiscard]] Result<> check(MonotonicTime deadline);
   /// The time from which every exposure sees the current picture alone, and nothing of the one before.

@@ -80,9 +80,9 @@ class Rig {
   }
 
   void request_stop();
-  /// Whether the cameras are closed, after request_stop().
+  /// Tells whether the cameras are closed, after request_stop().
   [[nodiscard]] bool stopped() const;
-  /// Whether the cameras' threads keep their promises to the watchdog.
+  /// Tells whether the cameras' threads keep their promises to the watchdog.
   [[nodiscard]] bool kept(MonotonicTime now = std::chrono::steady_clock::now()) const;
   [[nodiscard]] DeviceStatus projector_status() const { return projection_.status(); }
   [[nodiscard]] std::vector<DeviceStatus> camera_statuses() const;

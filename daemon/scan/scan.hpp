@@ -80,7 +80,7 @@ class FrameTask final : public TaskOf<FrameImage>, public FrameJob {
   Result<FrameImage> result_;
 };
 
-/// Whether such a frame may be whole the next time: it was lost, torn or late on its way.
+/// Tells whether such a frame may be whole the next time: it was lost, torn or late on its way.
 [[nodiscard]] bool may_be_taken_again(const Error& error);
 
 }  // namespace slsd

@@ -77,7 +77,7 @@ struct FrameRequest {
   MonotonicTime deadline;
   std::string camera;         ///< empty: the first
   bool as_png = true;         ///< else row by row
-  bool as_shown = false;      ///< while the projector shows what it does; else the pattern
+  bool as_shown = false;      ///< leaves the projector's picture as it is; else shows the pattern
   std::stop_token gone = {};  ///< requested when nobody waits for the outcome any more
 };
 

@@ -69,7 +69,7 @@ class FullLevels {
 /// @thread thread-safe; what it lends belongs to the lane's thread
 class DenseMappers {
  public:
-  /// Nobody wants a stream any more: what was kept of its frames, and maps that wait, are given back.
+  /// Ends the stream that nobody wants any more: gives back what was kept of its frames, and maps that wait.
   void end_stream();
   /// A cloud whose maps come back, for the next ones, when nobody holds it any more: new ones would be tens of
   /// megabytes that the kernel has to fill with zeros.
@@ -117,7 +117,7 @@ struct ScanSetup {
   [[nodiscard]] static Result<ScanSetup> of(Pattern pattern, std::optional<Calibration> calibration,
                                             const Configuration& configuration, std::size_t lanes);
 
-  /// Whether a scan is possible. @errors kNotFound: no calibration, or no camera of the name
+  /// Checks that a scan is possible. @errors kNotFound: no calibration, or no camera of the name
   [[nodiscard]] Result<> check(const ScanRequest& request) const;
   /// @errors kNotFound: no camera of the name
   [[nodiscard]] Result<> check_camera(const std::string& name) const;

@@ -92,7 +92,7 @@ class Scanner {
     failure_listener_ = std::move(listener);
   }
 
-  /// Whether all its threads keep their promises to the watchdog.
+  /// Tells whether all its threads keep their promises to the watchdog.
   [[nodiscard]] bool kept() const;
   [[nodiscard]] ScanTotals totals() const { return statistics_.totals(); }
   /// A scan's cloud was handed to a client's socket, so long after the last byte of its frames was there.
@@ -104,7 +104,7 @@ class Scanner {
 
   /// Ends what is under way, soon, and the threads; requests that wait are answered kCancelled.
   void request_stop();
-  /// Whether the threads came to their ends, and the cameras are closed, within the time.
+  /// Tells whether the threads came to their ends, and the cameras are closed, within the time.
   [[nodiscard]] bool wait_stopped(std::chrono::milliseconds time);
 
  private:

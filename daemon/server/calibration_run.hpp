@@ -42,7 +42,7 @@ class CalibrationRun {
   void end();
   /// Gives it up.
   void cancel();
-  /// Whether what it wrote is in force.
+  /// Notes whether the calibration that it wrote is in force.
   void conclude(const Result<>& in_force);
 
   [[nodiscard]] bool under_way() const { return phase_ != Phase::kNone; }

@@ -37,10 +37,10 @@ class ListeningSocket {
 
   FileDescriptor socket_;
   std::filesystem::path path_;  ///< empty once moved from, and where it is systemd's
-  ino_t inode_;                 ///< so that another daemon's socket at the path is left alone
+  ino_t inode_;                 ///< tells our socket from another daemon's at the path, which is left alone
 };
 
-/// Whether a socket can be opened at the path; opens none. @errors as ListeningSocket::open()
+/// Checks that a socket can be opened at the path; opens none. @errors as ListeningSocket::open()
 [[nodiscard]] Result<> check_socket_path(const std::filesystem::path& path);
 
 }  // namespace slsd

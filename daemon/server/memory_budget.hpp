@@ -58,8 +58,8 @@ class MemoryAccount {
   MemoryAccount(const MemoryAccount&) = delete;
   MemoryAccount& operator=(const MemoryAccount&) = delete;
 
-  /// Whether the part may be so large from now on. Where it may not, it stays as it was. To become smaller, and to
-  /// have up to 20 kB, is always granted.
+  /// Changes the part's size, and tells whether it may be so large; else it stays as it was. A smaller size, or one up
+  /// to 20 kB, is always granted.
   [[nodiscard]] bool resize(Part part, std::size_t bytes);
   void release(Part part) { set(part, 0); }
   [[nodiscard]] std::size_t held() const;

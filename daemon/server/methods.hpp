@@ -20,7 +20,7 @@ struct RpcMethod {
   std::string_view name;
   Role role;  ///< role that a client needs
   void (*run)(ServiceState& state, const nlohmann::json& params, Session& session, Respond respond);
-  /// Whether a request with these parameters changes the light, or what a scan gives. Null: none does.
+  /// Tells whether a request with these parameters changes the light, or the outcome of a scan. Null: none does.
   bool (*disturbs)(const nlohmann::json& params) = nullptr;
 };
 

@@ -40,7 +40,7 @@ class Server {
   /// Takes no more clients, and no more requests of those that are there; the socket disappears. Each client's
   /// connection ends when what is under way for it is sent.
   void wind_down();
-  /// Whether a client took bytes of what is being sent to it since the time.
+  /// Tells whether a client took bytes of what is being sent to it since the time.
   [[nodiscard]] bool is_sending_since(std::chrono::steady_clock::time_point time) const;
   /// Hangs up on everyone.
   void end_all();

@@ -84,7 +84,7 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
 
   [[nodiscard]] const Peer& peer() const { return peer_; }
   [[nodiscard]] Role role() const { return role_; }
-  /// Whether nothing was refused to it before: the log tells once.
+  /// Tells whether nothing was refused to it before: the log tells once.
   [[nodiscard]] bool is_first_refusal() { return !std::exchange(refused_, true); }
   [[nodiscard]] const std::string& way_to(Role role) const { return room_.access.way_to(role); }
 
@@ -108,7 +108,7 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
   /// A free scan's outcome, for those who subscribed.
   void publish(const SharedPublication& publication, std::uint64_t lost);
 
-  /// Whether something is being sent, and bytes of it were taken since the time.
+  /// Tells whether something is being sent, and bytes of it were taken since the time.
   [[nodiscard]] bool is_sending_since(std::chrono::steady_clock::time_point time) const;
 
  private:

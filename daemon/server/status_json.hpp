@@ -18,7 +18,7 @@ namespace slsd {
 /// The answer to `status`: the service, its devices, and the totals of all scans.
 [[nodiscard]] nlohmann::json status_json(const ServiceState& state);
 
-/// Whether all devices are open, and there is a calibration.
+/// Tells whether all devices are open, and there is a calibration.
 [[nodiscard]] bool is_ready(const ServiceState& state);
 
 /// Memory of this process.

@@ -26,7 +26,7 @@ class Publication {
 
   [[nodiscard]] const Result<ScanResult>& scan() const { return *scan_; }
   [[nodiscard]] SharedBytes cloud(CloudForm form) { return files_.file((*scan_)->cloud, (*scan_)->dense.get(), form); }
-  /// Whether it is a cloud of that density: a scan that was taken before somebody asked for pixels has none.
+  /// Tells whether it is a cloud of that density: a scan that was taken before somebody asked for pixels has none.
   [[nodiscard]] bool fits(CloudForm form) const { return !*scan_ || !form.dense() || (*scan_)->dense; }
   /// The memory it holds, in bytes: the cloud, and its files so far.
   [[nodiscard]] std::size_t bytes() const {
@@ -50,7 +50,7 @@ class Subscription {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kWaitingMax = 4;
-  static constexpr std::chrono::milliseconds kTurn{100};  ///< after which a newer one takes its place
+  static constexpr std::chrono::milliseconds kTurn{100};  ///< time after which a newer one takes its place
 
   /// @param as_memfd  each cloud comes as a sealed memfd, not inline
   Subscription(CloudForm form, std::optional<double> rate_hz, bool as_memfd = false)

@@ -50,7 +50,8 @@ std::string time_and_level(const log_msg& message) {
   return fmt::format("{} {:<7} ", utc_text_ms(message.time), std::string_view(level.data(), level.size()));
 }
 
-/// Whether systemd reads standard error, as systemd.exec(5) says of JOURNAL_STREAM: another program's may be inherited.
+/// Tells whether systemd reads standard error, as systemd.exec(5) says of JOURNAL_STREAM: another program's may be
+/// inherited.
 bool journal_reads_stderr() {
   const char* const stream = std::getenv("JOURNAL_STREAM");
   struct stat status {};

@@ -18,7 +18,8 @@ namespace slsd {
 inline constexpr std::size_t kLogLineBytesMax = 2048;
 /// The longest wait for the log's reader at the end of the program.
 inline constexpr std::chrono::milliseconds kLogPatience{300};
-/// So many lines wait for whoever reads the log; what comes then is dropped and counted, until half of them are read.
+/// The greatest number of lines that wait for the log's reader. Later lines are dropped and counted, until half of them
+/// are read.
 inline constexpr std::size_t kLogLinesMax = 1024;
 
 /// Writes each line of the log so that nothing in it can be taken for another: printable, and at most kLogLineBytesMax.
@@ -64,7 +65,7 @@ class LogSink final : public spdlog::sinks::sink {
 void start_logging(spdlog::level::level_enum level);
 /// Queues the log's lines from now on, so that no line holds up anybody. For the service.
 void queue_log();
-/// Before the program ends: gives the log's reader so long to take what is left.
+/// Gives the log's reader so long to take what is left, before the program ends.
 void flush_log(std::chrono::milliseconds patience);
 /// Lines that nobody took in time, since queue_log().
 [[nodiscard]] std::uint64_t log_lines_dropped();
