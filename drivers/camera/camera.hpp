@@ -86,7 +86,7 @@ class Camera {
   /// images by it.
   virtual void expect(Picture) {}
 
-  /// Whether the open device is still there, as far as can be told without a frame and without waiting.
+  /// Checks that the open device is still there, as far as can be told without a frame and without waiting.
   /// @errors kDisconnected: it needs open()
   [[nodiscard]] virtual Result<> check() { return {}; }
 

@@ -31,7 +31,7 @@ class FramePool {
 
   [[nodiscard]] const FrameFormat& format() const;
 
-  /// Whether lend() has no buffer left; one that ends meanwhile on another thread may count or not.
+  /// Tells whether lend() has no buffer left; one that ends meanwhile on another thread may count or not.
   [[nodiscard]] bool all_lent() const;
 
   /// A copy of the pixels in a free buffer, or nothing if all are lent.

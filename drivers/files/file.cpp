@@ -76,7 +76,7 @@ mode_t mode_of(const fs::path& path) {
   return ::stat(path.c_str(), &status) == 0 ? status.st_mode : S_IFREG;
 }
 
-/// Its name does not grow with the file's, which may be as long as names can be.
+/// A name for a temporary file. It does not grow with the file's, which may be as long as names can be.
 fs::path temporary_beside(const fs::path& path) {
   static std::atomic<unsigned> count{0};
   return path.parent_path() / (".slsd-" + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".part");

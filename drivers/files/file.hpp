@@ -28,8 +28,8 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] Result<> write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
 
-/// Whether write_file_atomically() would find a place there now, for those who work long before they write: it writes a
-/// temporary file of 64 KiB. What is there stays as it is.
+/// Checks that write_file_atomically() would find a place there now, for those who work long before they write. It
+/// writes a temporary file of 64 KiB. What is there stays as it is.
 /// @errors as write_file_atomically(); a disk may still be too full for what is longer
 [[nodiscard]] Result<> check_writable(const std::filesystem::path& path);
 

@@ -22,8 +22,8 @@ struct TarFile {
   std::string_view bytes;
 };
 
-/// Whether a file may have this name in an archive of ours: parts of letters, digits, '.', '-' and '_', none of which
-/// begins with '.', with '/' between them. Such a name stays below the folder that it is unpacked into.
+/// Tells whether a file may have this name in an archive of ours: parts of letters, digits, '.', '-' and '_' with '/'
+/// between them. No part begins with '.'. Such a name stays below the folder that it is unpacked into.
 [[nodiscard]] bool plain_tar_name(std::string_view name);
 
 /// Writes a tar archive (POSIX ustar) of regular files.

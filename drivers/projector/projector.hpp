@@ -41,7 +41,7 @@ class Projector {
   /// @errors kMismatch: not of the projector's size; kDisconnected, kTimeout, kIo
   [[nodiscard]] virtual Result<MonotonicTime> show(const Grey8& image, MonotonicTime deadline) = 0;
 
-  /// Whether it still shows what it was told to, now; waits for no refresh. Asked before and after each frame of a
+  /// Checks that it still shows what it was told to, now; waits for no refresh. Called before and after each frame of a
   /// scan, and while nobody scans. @errors kDisconnected, kTimeout, kIo
   [[nodiscard]] virtual Result<> check(MonotonicTime deadline) = 0;
 

@@ -27,7 +27,7 @@ class WakeEvent {
   WakeEvent(const WakeEvent&) = delete;
   WakeEvent& operator=(const WakeEvent&) = delete;
 
-  /// Before the first wait. Nothing to do where it is open already.
+  /// Opens the event, before the first wait. Does nothing if it is open already.
   /// @errors kNoSpace: no descriptor is left
   [[nodiscard]] Result<> open();
 

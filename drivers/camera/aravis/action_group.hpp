@@ -45,7 +45,7 @@ class ActionGroup {
     std::shared_ptr<ActionGroup> group_;
     std::string address_;
     std::string interface_;
-    const ActionTime* asks_ = nullptr;  ///< while it waits for the command
+    const ActionTime* asks_ = nullptr;  ///< set while it waits for the command
   };
 
   /// The group of this process that has these keys; it ends with its last member.

@@ -58,7 +58,7 @@ struct AravisCameraOptions {
   int missed_frames_max = 2;     ///< so many in a row missing: the camera is gone
   int frames_held_max = 8;       ///< number of frames that may be held at once, 2 to 64
 
-  /// Whether `id` is an address.
+  /// Tells whether `id` is an address.
   [[nodiscard]] bool names_address() const;
   /// @errors kInvalidArgument: the message begins with the key
   [[nodiscard]] Result<> validate() const;
@@ -71,7 +71,7 @@ struct AravisCameraOptions {
 /// @thread reentrant
 [[nodiscard]] std::chrono::nanoseconds frame_patience(const AravisCameraOptions& options);
 
-/// So many streams are tried until one gives a frame.
+/// The number of streams that are tried until one gives a frame.
 inline constexpr int kFirstFrameTries = 3;
 
 /// The wait for the first frame of a stream before a new stream is tried; most cameras need less.

@@ -54,7 +54,7 @@ class AravisSession {
   bool note_clock();
   /// Looks for fragments; call it after a frame that did not come whole. @return whether there is a new warning
   bool note_fragments();
-  /// Whether the device still answers; waits a little for a trigger under way.
+  /// Tells whether the device still answers; waits a little for a trigger under way.
   [[nodiscard]] bool answers();
   /// @errors kDisconnected: it was lost while nobody asked for a frame
   [[nodiscard]] Result<> check();

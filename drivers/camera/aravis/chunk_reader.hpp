@@ -23,7 +23,7 @@ class ChunkReader {
   /// @param apart_max    how far a frame's own time stamp may be from its exposure's start
   ChunkReader(ArvCamera* camera, const ChunkSelection& selection, std::size_t image_bytes,
               std::chrono::nanoseconds apart_max);
-  /// Before the buffer that was read last: Aravis keeps an eye on it.
+  /// Has to end before the buffer that was read last: Aravis keeps an eye on it.
   ~ChunkReader() = default;
   ChunkReader(const ChunkReader&) = delete;
   ChunkReader& operator=(const ChunkReader&) = delete;

@@ -99,7 +99,7 @@ std::chrono::nanoseconds period_of(const DeviceFeatures& features, const AravisC
   return from_us(1e6 / rate_hz);
 }
 
-/// Whether the chunk is on now, and can be read.
+/// Tells whether the chunk is on now, and can be read.
 Result<bool> turn_on(const DeviceFeatures& features, const char* chunk, const char* value) {
   if (!features.has_entry("ChunkSelector", chunk)) return false;
   Result<> done = features.choose("ChunkSelector", chunk);

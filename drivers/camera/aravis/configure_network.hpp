@@ -27,19 +27,19 @@ struct HostInterface {
   std::optional<int> link_mbps = {};
   std::optional<int> mtu_bytes = {};
 
-  /// Whether the address is in its network, so that it is reached without a router.
+  /// Tells whether the address is in its network, so that it is reached without a router.
   [[nodiscard]] bool reaches(in_addr other) const;
   /// "eth1 (10.0.0.1/24)"
   [[nodiscard]] std::string text() const;
 };
 
-/// One for each address.
+/// The interfaces of this host, one for each address.
 [[nodiscard]] std::vector<HostInterface> list_host_interfaces();
 
 /// "10.0.0.1"
 [[nodiscard]] std::string address_text(in_addr address);
 
-/// Whether this process may take packets before the UDP socket (CAP_NET_RAW).
+/// Tells whether this process may take packets before the UDP socket (CAP_NET_RAW).
 /// @thread reentrant
 [[nodiscard]] bool packet_socket_allowed();
 
@@ -79,7 +79,7 @@ struct NetworkWarning {
 
 /// Has streams of a GigE Vision camera take packets before the UDP socket, or not. To be called before they are made.
 void choose_socket(ArvCamera* camera, const AravisCameraOptions& options);
-/// Whether this stream takes them so.
+/// Tells whether this stream takes packets before the UDP socket.
 [[nodiscard]] bool takes_packet_socket(ArvStream* stream, const AravisCameraOptions& options);
 
 /// Sets receive buffer and resend of a GigE Vision stream; nothing for another.

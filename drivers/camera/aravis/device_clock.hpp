@@ -19,7 +19,7 @@ struct ClockReading {
   MonotonicTime after;
 };
 
-/// So many ticks of a device's clock as a time since it began.
+/// Turns ticks of a device's clock into the time since it began.
 /// @param frequency_hz  above 0
 /// @thread reentrant
 [[nodiscard]] std::chrono::nanoseconds from_ticks(std::uint64_t ticks, std::uint64_t frequency_hz);
@@ -41,14 +41,14 @@ class DeviceClock {
   [[nodiscard]] bool was_read() const { return count_ > 0; }
   /// The reason for not trusting the clock; empty while it is trusted.
   [[nodiscard]] std::string_view fault() const { return fault_; }
-  /// Whether it can be read, and trusted.
+  /// Tells whether the clock can be read, and trusted.
   [[nodiscard]] bool ready() const { return was_read() && fault_.empty(); }
-  /// Since when all readings were of one course of the clock. Precondition: ready().
+  /// The time since when all readings were of one course of the clock. Precondition: ready().
   [[nodiscard]] MonotonicTime steady_since() const { return steady_since_; }
-  /// Whether the device's clock can have shown so much before a time. What it shows only later was shown before it was
-  /// set back. Precondition: ready().
+  /// Tells whether the device's clock can have shown `device` before a time. What it shows only later was shown before
+  /// it was set back. Precondition: ready().
   [[nodiscard]] bool may_have_shown(std::chrono::nanoseconds device, MonotonicTime before) const;
-  /// Whether it can have shown so much between two times. Precondition: ready().
+  /// Tells whether it can have shown `device` between two times. Precondition: ready().
   [[nodiscard]] bool may_have_shown(std::chrono::nanoseconds device, MonotonicTime after, MonotonicTime before) const;
   /// The host's time when the device's clock showed `device`. Precondition: ready().
   [[nodiscard]] MonotonicTime host_time(std::chrono::nanoseconds device) const;
@@ -70,7 +70,7 @@ class DeviceClock {
   bool may_be_set_;
   std::string_view fault_;
   int steps_ = 0;                          ///< recent steps
-  int fits_ = 0;                           ///< since the last of them
+  int fits_ = 0;                           ///< fits since the last of them
   std::array<ClockReading, 32> readings_;  ///< a ring
   std::size_t count_ = 0;
   MonotonicTime steady_since_;

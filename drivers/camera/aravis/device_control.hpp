@@ -50,7 +50,7 @@ class DeviceFeatures {
   ArvCamera* camera_;
 };
 
-/// Whether a device's clock is the network's (IEEE 1588). It takes seconds from opening until it is.
+/// The lock of a device's clock to the network's (IEEE 1588). It takes seconds after opening.
 enum class PtpLock {
   kUnknown,  ///< the device does not tell
   kOpen,     ///< it has a clock of its own, or is about to set it
@@ -82,7 +82,7 @@ class DeviceControl {
 
   void trigger();
   [[nodiscard]] DeviceClock clock() const;
-  /// Whether the device's clock is the network's: as it says itself, or because it was not set for a while.
+  /// Tells whether the device's clock is the network's: as it says itself, or because it was not set for a while.
   [[nodiscard]] bool follows_network() const;
 
  private:

@@ -8,8 +8,9 @@
 
 namespace slsd {
 
-/// Whether packets of a camera arrive in pieces (IP fragments), because they are larger than the way to this host lets
-/// through. A packet socket sees no such packet whole, and without one a frame is lost with any of its pieces.
+/// The watch for a camera's packets that arrive in pieces (IP fragments), because they are larger than the way to this
+/// host lets through. A packet socket sees no such packet whole, and without one a frame is lost with any of its
+/// pieces.
 /// @thread thread-bound
 class FragmentWatch {
  public:

@@ -14,8 +14,8 @@
 
 namespace slsd {
 
-/// Whether a frame is one image with chunks behind it and nothing else, as GigE Vision and USB3 Vision lay them out:
-/// each is followed by what tells its end only, and so they are read from the last to the first, which is the image.
+/// Tells whether a frame is one image with chunks behind it and nothing else, as GigE Vision and USB3 Vision lay them
+/// out. Each is followed by what tells its end only. So they are read from the last to the first, which is the image.
 ///
 ///     | image | id length | chunk | id length | chunk | id length |      id and length: 4 bytes each
 ///

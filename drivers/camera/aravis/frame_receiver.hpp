@@ -80,7 +80,7 @@ class FrameReceiver {
   /// Discards as discard() does. @return false if it is a frame whose chunks cannot be read
   [[nodiscard]] bool discard_readable(const DeviceClock& clock);
 
-  /// Whether exposures are told by the arrival of frames.
+  /// Tells whether exposures are told by the arrival of frames.
   [[nodiscard]] bool goes_by_arrival(const DeviceClock& clock) const;
   /// The first frame was stamped by another clock than the one that can be read.
   [[nodiscard]] bool stamps_are_foreign() const { return foreign_stamps_; }

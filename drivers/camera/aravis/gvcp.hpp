@@ -32,13 +32,13 @@ struct GigeDevice {
 /// The question who a device is.
 /// @param id  of this question, any but 0
 [[nodiscard]] std::array<std::uint8_t, 8> gvcp_discovery(std::uint16_t id);
-/// Its answer, without the addresses; nothing if the bytes are something else, or answer another question.
+/// Reads the answer, without the addresses. Empty if the bytes are something else, or answer another question.
 [[nodiscard]] std::optional<GigeDevice> read_gvcp_discovery(std::span<const std::uint8_t> answer, std::uint16_t id);
 
 /// The question for a register's value.
 /// @param id  of this question, any but 0
 [[nodiscard]] std::array<std::uint8_t, 12> gvcp_read(std::uint32_t address, std::uint16_t id);
-/// Nothing if the bytes are something else, or answer another question.
+/// Reads the value in the answer. Empty if the bytes are something else, or answer another question.
 [[nodiscard]] std::optional<std::uint32_t> read_gvcp_value(std::span<const std::uint8_t> answer, std::uint16_t id);
 
 /// The addressees of an action: devices with the device key and the group key, and a bit of the mask in common.

@@ -54,7 +54,7 @@ struct PixelLayout {
 /// @thread reentrant
 [[nodiscard]] std::optional<PixelLayout> find_pixel_layout(std::string_view name);
 
-/// Their names, with commas.
+/// The names of the pixel formats, with commas.
 [[nodiscard]] std::string pixel_format_names();
 
 }  // namespace slsd

@@ -36,7 +36,7 @@ class ExposureClock {
   /// Looks at the stamp of each buffer that is taken, in their order: one that cannot be makes all worthless.
   /// @param received  when it was taken from the driver
   void note(const v4l2_buffer& buffer, MonotonicTime received);
-  /// Nothing was found wrong with the driver's clock.
+  /// Tells whether nothing was found wrong with the driver's clock.
   [[nodiscard]] bool is_trusted() const { return trusted_; }
 
   /// The buffer carries a stamp that tells.

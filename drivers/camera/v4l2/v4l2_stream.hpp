@@ -60,7 +60,7 @@ class V4l2Stream {
   /// Lends a buffer that the driver does not have.
   [[nodiscard]] FrameLease lend(std::size_t buffer) { return buffers_->lend(buffer); }
 
-  /// Since when the driver has had buffers to fill and has filled none; never, where it has none.
+  /// The time since when the driver has had buffers to fill and has filled none; never, if it has none.
   [[nodiscard]] MonotonicTime quiet_since() const { return queued_ > 0 ? quiet_since_ : MonotonicTime::max(); }
 
   /// The number of buffers that the driver has.

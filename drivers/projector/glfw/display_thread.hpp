@@ -28,7 +28,7 @@ class DisplayThread {
   DisplayThread(const DisplayThread&) = delete;
   DisplayThread& operator=(const DisplayThread&) = delete;
 
-  /// Nothing to do where it runs already. @errors kNoSpace: no descriptor or no thread is left
+  /// Starts the thread, unless it runs already. @errors kNoSpace: no descriptor or no thread is left
   [[nodiscard]] Result<> start();
 
   /// Begins the work; what came before has ended. @param work  keeps alive what it uses
@@ -38,7 +38,7 @@ class DisplayThread {
   /// The start of the work under way, or of the last.
   [[nodiscard]] MonotonicTime begun() const;
 
-  /// Whether the screen was open when the thread last looked.
+  /// Tells whether the screen was open when the thread last looked.
   [[nodiscard]] bool screen_open() const;
 
  private:

@@ -30,7 +30,7 @@ class GlfwSession {
   [[nodiscard]] _XDisplay* display() const { return display_; }
   /// Readable when there are events.
   [[nodiscard]] int descriptor() const;
-  /// Whether the X server is gone; then the session can only be ended.
+  /// Tells whether the X server is gone; then the session can only be ended.
   [[nodiscard]] bool lost() const { return lost_; }
   /// Lets GLFW handle what has come; does not wait.
   void handle_events();
@@ -59,9 +59,9 @@ class FullscreenWindow {
   FullscreenWindow& operator=(const FullscreenWindow&) = delete;
 
   [[nodiscard]] std::uint32_t id() const;
-  /// Whether it is on the screen, exactly there; asks the X server.
+  /// Tells whether it is on the screen, exactly there; asks the X server.
   [[nodiscard]] bool covers(const DesktopArea& area) const;
-  /// Whether what was shown was damaged since this was asked last, and has to be drawn anew.
+  /// Tells whether what was shown was damaged since the last call, and has to be drawn anew.
   [[nodiscard]] bool take_damage() { return std::exchange(damaged_, false); }
   /// Shows what was drawn; returns when the X server has it.
   void swap();

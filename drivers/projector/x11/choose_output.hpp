@@ -23,7 +23,7 @@ namespace slsd {
 [[nodiscard]] Result<RandrOutput> choose_output(std::span<const RandrOutput> outputs, const std::string& wanted,
                                                 const std::string& last, bool enable = false);
 
-/// Whether the monitor shows an image of that size pixel for pixel.
+/// Checks that the monitor shows an image of that size pixel for pixel.
 /// @errors kMismatch, with the remedy
 /// @thread reentrant
 [[nodiscard]] Result<> check_fit(const RandrOutput& output, int width_px, int height_px);

@@ -37,7 +37,7 @@ class RefreshClock {
   RefreshClock(const RefreshClock&) = delete;
   RefreshClock& operator=(const RefreshClock&) = delete;
 
-  /// Whether the driver's own times are used.
+  /// Tells whether the driver's own times are used.
   [[nodiscard]] bool is_exact() const { return events_ != nullptr; }
 
   /// Forgets what was before. Called before each swap.

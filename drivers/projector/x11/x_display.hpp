@@ -34,8 +34,8 @@ void survive_loss(_XDisplay* display, std::atomic<bool>& lost);
 /// The error kIo that the X server hangs, with its remedy.
 [[nodiscard]] tl::unexpected<Error> no_answer();
 
-/// Whether the X server that DISPLAY names belongs to the scanner alone, as that of slsd-display.service does: the
-/// unit of slsd says so, by the folder that SLSD_OWN_DISPLAY names and that is there while that server runs.
+/// Tells whether the X server that DISPLAY names belongs to the scanner alone, as that of slsd-display.service does.
+/// The unit of slsd says so by the folder that SLSD_OWN_DISPLAY names, which is there while that server runs.
 [[nodiscard]] bool owns_display();
 
 /// Keeps the monitors of an X server lit (DPMS off) for as long as it lives; then power saving is as it was.
