@@ -31,7 +31,7 @@ struct CommandLine {
   PrintRequest print;
   ExtrinsicsRequest extrinsics;
 
-  /// Whether slsd-calibrate carries it out.
+  /// Tells whether slsd-calibrate carries it out.
   [[nodiscard]] bool calibrates() const {
     return calibrate || verify || !print.file.empty() || !extrinsics.file.empty();
   }

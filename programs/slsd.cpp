@@ -29,8 +29,8 @@ namespace {
 constexpr int kWrongConfiguration = 78;  // EX_CONFIG; the unit does not start the service again
 constexpr int kOwnPagesBytes = 1 << 20;
 
-/// Whether the same start may succeed later, with nobody having changed anything: when a volume is mounted, or another
-/// daemon ends.
+/// Tells whether the same start may succeed later, with nobody having changed anything: when a volume is mounted, or
+/// another daemon ends.
 bool may_pass(slsd::ErrorCode code) {
   using slsd::ErrorCode;
   constexpr std::array kLasting{ErrorCode::kInvalidArgument, ErrorCode::kMalformed,   ErrorCode::kMismatch,

@@ -49,12 +49,12 @@ Result<> write_report(const path& report, const std::string& html) {
   return written;
 }
 
-/// Beside the calibration in force, whose own report stays.
+/// The report of a refused calibration, beside the one in force, whose own report stays.
 path report_of_refused(const path& file) {
   return file.parent_path() / (file.stem().string() + "-refused.html");
 }
 
-/// Whether a calibration may replace the one in force without being asked to.
+/// Checks that a calibration may replace the one in force without being asked to.
 Result<> check_gain(const CalibrateRequest& request, const CalibrationOutcome& outcome, const Board& board,
                     const path& in_force) {
   const std::string nevertheless =

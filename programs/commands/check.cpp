@@ -141,7 +141,7 @@ class LiveService {
   json settings_;
 };
 
-/// One after the other, what a scan needs.
+/// The checks of what a scan needs, one after the other.
 class Check {
  public:
   Check(Configuration configuration, const path& file, Findings& findings)

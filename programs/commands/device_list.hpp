@@ -37,7 +37,7 @@ class CameraList {
   CameraListing listing_;
 };
 
-/// Whether this is the camera that the options name.
+/// Tells whether this is the camera that the options name.
 [[nodiscard]] bool names(const CameraOptions& options, const ListedCamera& camera);
 
 /// The monitors of the X server that DISPLAY names.

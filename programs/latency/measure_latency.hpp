@@ -15,7 +15,7 @@ namespace slsd {
 
 struct LatencyOptions {
   int flashes = 20;                          ///< 3 to 1000
-  std::chrono::milliseconds settle{300};     ///< after which black, or white, is there for certain
+  std::chrono::milliseconds settle{300};     ///< time after which black, or white, is there for certain
   std::chrono::milliseconds patience{2000};  ///< limit for a frame, and for a flash to be seen whole
   std::uint32_t seed = 1;  ///< seed of the pauses, which vary so that flashes meet every phase of the camera
 };

@@ -29,7 +29,7 @@ std::vector<path> sorted_entries(const path& folder, bool folders) {
 
 constexpr std::array kExtensions{".png", ".tif", ".tiff", ".pgm", ".ppm", ".bmp", ".jpg", ".jpeg"};
 
-/// Its place among those that are read; their number where it is none.
+/// The rank of the file's extension among those that are read; their number if it is not among them.
 std::size_t rank_of(const path& file) {
   return static_cast<std::size_t>(std::ranges::find(kExtensions, extension_of(file)) - kExtensions.begin());
 }

@@ -29,7 +29,7 @@ struct CapturedPose {
   PoseSubject subject = PoseSubject::kBoard;
 };
 
-/// Whether a pose without white.png is an error: without it there is no board, but a plane can be measured.
+/// The need for white.png in a pose. Without it there is no board, but a plane can be measured.
 enum class WhitePicture { kNeeded, kOptional };
 
 /// Looks through a folder of captures:

@@ -16,7 +16,7 @@ namespace slsd {
 /// @errors of the file, read_pattern() and configured_pattern()
 [[nodiscard]] Result<Pattern> captured_pattern(const std::filesystem::path& folder, const Configuration& configuration);
 
-/// Whether there is no picture of the pattern, but of a Gray code.
+/// Tells whether there is no picture of the pattern, but of a Gray code.
 [[nodiscard]] bool captured_in_gray(const std::vector<CapturedPose>& poses);
 
 }  // namespace slsd

@@ -101,7 +101,7 @@ std::string PoseCollection::most_helpful() const {
   return "any pose unlike those before";
 }
 
-/// While fewer than half of the poses are tilted: the side to which fewest are.
+/// The advice to tilt the board to the rarest side; empty if half of the poses are tilted.
 std::string PoseCollection::missing_tilt() const {
   static constexpr std::array kSides{"left", "right", "upper edge", "lower edge"};
   std::array<std::size_t, kSides.size()> counts{};

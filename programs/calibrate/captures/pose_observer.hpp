@@ -40,10 +40,10 @@ class PoseObserver {
   std::map<std::size_t, PatternReader> readers_;  // one to a camera: each keeps where its pattern lies
 };
 
-/// One for each print.
+/// The observers, one for each print.
 struct PoseObservers {
   PoseObserver board;
-  std::optional<PoseObserver> plane;  ///< nothing without a reference plane, of which nothing may be observed then
+  std::optional<PoseObserver> plane;  ///< empty without a reference plane, of which nothing may be observed then
 
   [[nodiscard]] PoseObserver& of(PoseSubject subject) { return subject == PoseSubject::kPlane ? plane.value() : board; }
 };

@@ -21,7 +21,7 @@ struct BoardLook {
 /// @thread reentrant
 [[nodiscard]] BoardLook look_for_board(std::vector<GreyImage> pictures, const Board& board);
 
-/// Whether any camera sees the board.
+/// Tells whether any camera sees the board.
 [[nodiscard]] bool is_seen(const BoardSightings& sightings);
 
 /// The movement of the board's points in the image: root mean square over the points seen both times, in the camera

@@ -23,7 +23,7 @@ struct BoardPlace {
   double distance_mm = 0;  ///< distance of the board's centre
   double turn_rad = 0;     ///< angle of the board's x axis in the image, from x towards y
 
-  /// Between the board and the image plane, 0 to 90 degrees.
+  /// The angle between the board and the image plane, 0 to 90 degrees.
   [[nodiscard]] double tilt_deg() const;
 };
 
@@ -32,8 +32,8 @@ struct BoardPlace {
 /// @thread reentrant
 [[nodiscard]] std::optional<BoardPlace> place_of(std::span<const Tie> ties, const Board& board, const ImageSize& size);
 
-/// Whether two poses are so near each other that the second tells nothing new: the centre within a sixth of the image,
-/// and tilt, turn and distance alike.
+/// Tells whether two poses are so near each other that the second tells nothing new: the centre within a sixth of the
+/// image, and tilt, turn and distance alike.
 /// @thread reentrant
 [[nodiscard]] bool are_alike(const BoardPlace& a, const BoardPlace& b);
 

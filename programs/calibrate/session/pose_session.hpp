@@ -21,9 +21,9 @@ namespace slsd {
 struct PoseSessionOptions {
   std::size_t poses = 12;                         ///< number at which the session ends, with earlier poses
   std::chrono::milliseconds sign{500};            ///< time for which a sign is shown
-  std::chrono::milliseconds after_refusal{2000};  ///< before a board that is still there is tried again
+  std::chrono::milliseconds after_refusal{2000};  ///< pause before a board that is still there is tried again
   std::chrono::seconds patience{60};              ///< until advice, without a board; until the end, without the devices
-  std::chrono::milliseconds retry{500};           ///< between two tries of devices that fail
+  std::chrono::milliseconds retry{500};           ///< pause between two tries of devices that fail
   bool begun = false;  ///< the devices have given a picture before: they are worth patience at once
 };
 

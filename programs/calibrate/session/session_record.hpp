@@ -19,7 +19,7 @@ namespace slsd {
 /// The folder of a session's pictures: the requested one, or calibration-TIME beside the calibration file.
 [[nodiscard]] std::filesystem::path record_folder(const CalibrateRequest& request, const std::filesystem::path& file);
 
-/// Whether the folder holds poses, so that a session goes on with them.
+/// Tells whether the folder holds poses, so that a session goes on with them.
 [[nodiscard]] bool holds_poses(const std::filesystem::path& folder);
 
 /// The pattern that the poses so far were taken with, or the configured one.

@@ -27,7 +27,7 @@ class SessionTerminal {
 
   /// @param state  what of the text is worth a line of its own
   void live(const std::string& text, const std::string& state);
-  /// One line or more, without the last line's end.
+  /// Writes one line or more, without the last line's end.
   void say(const std::string& text);
 
  private:
