@@ -70,7 +70,7 @@ template <Message Value>
   return {begin, begin + cdr.getSerializedDataLength()};
 }
 
-/// Nothing if the bytes are no such message. Bytes behind it are passed over. @thread reentrant
+/// Decodes a message; empty if the bytes are none. Bytes behind it are passed over. @thread reentrant
 template <Message Value>
 [[nodiscard]] std::optional<Value> decode(const Bytes& bytes) {
   using eprosima::fastcdr::Cdr;

@@ -18,7 +18,7 @@ inline constexpr const char* kOvertaken =
     "clouds come faster than they may leave, and some are not published: lower --rate, thin them by --stride or "
     "--voxel, or raise --rate-max";
 
-/// Whether ROS takes it for a topic's name: letters, digits and _, a letter first.
+/// Tells whether ROS takes it for a topic's name: letters, digits and _, a letter first.
 [[nodiscard]] bool is_ros_name(const std::string& name);
 
 /// std_msgs/Empty on NAME/trigger, and the service NAME/trigger (std_srvs/Trigger) for clients of any middleware: Fast

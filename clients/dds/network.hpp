@@ -39,7 +39,8 @@ struct Sample {
 /// Writes to one topic, and waits for no reader. @thread thread-safe
 class Writer {
  public:
-  /// False if what was written before will not leave within a second: clouds and images come too fast.
+  /// Writes the message. @return false if what was written before will not leave within a second: clouds and images
+  /// come too fast
   template <Message Value>
   bool write(const Value& message) const {
     return write_bytes(encode(message), nullptr);

@@ -26,11 +26,11 @@ struct Failure {
 /// A call's outcome; a JSON-RPC error is a failure.
 [[nodiscard]] tl::expected<Answered, Failure> judge(Result<Answered> answered);
 
-/// One call; a JSON-RPC error is a failure.
+/// Makes one call; a JSON-RPC error is a failure.
 [[nodiscard]] tl::expected<Answered, Failure> ask(Connection& connection, std::string_view method,
                                                   const nlohmann::json& params);
 
-/// One call on a connection of its own.
+/// Makes one call on a connection of its own.
 [[nodiscard]] tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_view method,
                                                   const nlohmann::json& params);
 

@@ -15,7 +15,7 @@
 
 namespace slsd {
 
-/// Whether a file to write is "-".
+/// Tells whether a file to write is "-".
 [[nodiscard]] bool is_standard_output(const std::filesystem::path& file);
 
 /// The files that a command line names to be written.
@@ -31,7 +31,7 @@ namespace slsd {
 /// The fault in the names of the files to write, before anything is done; empty: none.
 [[nodiscard]] std::string wrong_outputs(const ClientOptions& options, const std::string& command);
 
-/// Whether the files could be written now; a scan that cannot be kept is not begun.
+/// Checks that the files could be written now; a scan that cannot be kept is not begun.
 [[nodiscard]] tl::expected<void, Failure> check_outputs(const ClientOptions& options);
 
 /// Writes a file, whole or not at all, or to standard output. If that fails the request failed; it never means that

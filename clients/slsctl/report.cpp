@@ -24,7 +24,7 @@ std::string text_of(const json& about, const char* key) {
   return printable(about.value(key, ""), kLongestText);
 }
 
-/// Nothing while a camera is as it was calibrated.
+/// A line about a camera that was knocked out of its calibration; empty while it is as it was calibrated.
 std::string drift_line(const json& camera) {
   const json drift = camera.value("calibration", json());
   if (!drift.is_object() || !drift.value("off_since_scan", json()).is_number()) return {};

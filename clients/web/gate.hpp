@@ -39,7 +39,7 @@ class Gate {
   using Clock = std::chrono::steady_clock;
   static constexpr int kWrongMax = 5;  ///< wrong tokens of one address, before it has to wait; of chosen tokens
   static constexpr std::chrono::seconds kWait{30};
-  static constexpr std::chrono::hours kSession{24 * 14};  ///< since it was last used
+  static constexpr std::chrono::hours kSession{24 * 14};  ///< lifetime since its last use
   static constexpr std::size_t kSessionsMax = 64, kAddressesMax = 1024;
 
   /// @param names        by which the page may be asked for, without ports; an address at which it listens may always

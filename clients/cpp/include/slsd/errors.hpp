@@ -34,7 +34,7 @@ class InvalidRequest : public ScannerError {
 class NotFound : public ScannerError {
   using ScannerError::ScannerError;
 };
-/// Whoever asks may not.
+/// The client has no right to ask for this.
 class PermissionDenied : public ScannerError {
   using ScannerError::ScannerError;
 };
