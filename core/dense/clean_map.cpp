@@ -18,7 +18,7 @@
 namespace slsd {
 namespace {
 
-/// Of the distance from the projector: what lies farther behind is another surface.
+/// Ratio of distances from the projector: a point farther behind is on another surface.
 constexpr float kBehind = 1.01F;
 /// Growth that has crossed an edge can go on over a surface that is not there, in scraps: what bears no decoded symbol
 /// has to hang together with so many times more pixels.
@@ -224,7 +224,7 @@ void MapCleaner::drop_unlit_rims(DenseMap& map, int reach_px) {
   }
 }
 
-/// Which pixels are measured, and which are on one surface with the next to the right, and below.
+/// Finds the measured pixels, and those on one surface with the next to the right, and below.
 void MapCleaner::find_joined(const DenseMap& map) {
   const std::size_t words = static_cast<std::size_t>(map.width + 63) / 64, all = words * map.height;
   measured_.assign(all, 0), right_.assign(all, 0), below_.assign(all, 0);

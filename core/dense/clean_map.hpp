@@ -23,21 +23,21 @@ class MapCleaner {
  public:
   MapCleaner(const CalibratedCamera& camera, const Lens& projector, std::shared_ptr<const RayGrid> rays);
 
-  /// A projector pixel lights one point: what lies behind another surface on its ray goes.
+  /// Drops points that lie behind another surface on their projector ray: a projector pixel lights one point.
   void drop_occluded(DenseMap& map, Executor& executor);
-  /// What the projector's image does not reach goes: it is no edge, so this comes last. Of the map that drop_occluded()
-  /// has seen.
+  /// Drops points that the projector's image does not reach. The drop makes no edge, so this comes last. The map is the
+  /// one that drop_occluded() has seen.
   void drop_beyond_the_light(DenseMap& map);
-  /// Where the pattern is dark, a surface looks like a shadow: such a pixel stays where firm ones enclose it, which is
-  /// within their closing (dilated, then eroded as much), and goes at a rim.
+  /// Drops unlit pixels at rims: where the pattern is dark, a surface looks like a shadow. Such a pixel stays if firm
+  /// ones enclose it, that is within their closing (dilated, then eroded as much).
   void drop_unlit_rims(DenseMap& map, int reach_px);
-  /// What hangs together without a jump, and has fewer pixels than a patch, goes: so little can be anything. What bears
-  /// none of the seeds goes unless it has far more.
+  /// Drops areas without a jump inside that have fewer pixels than a patch: so little can be anything. An area without
+  /// any of the seeds goes unless it has far more.
   void drop_islands(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds);
-  /// What is nearer than that to a hole or to a jump goes; but for holes of so few pixels that one surface is all
-  /// around.
+  /// Drops pixels nearer than that to a hole or to a jump. Holes of so few pixels that one surface is all around do not
+  /// count.
   void prune(DenseMap& map, double reach_px, std::size_t hole_most);
-  [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory
+  [[nodiscard]] std::size_t bytes() const;  ///< memory that it holds
 
  private:
   CalibratedCamera camera_;

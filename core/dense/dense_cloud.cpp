@@ -22,7 +22,7 @@ static_assert(std::endian::native == std::endian::little, "the records are copie
 
 constexpr std::size_t kPlyBytes = 18, kPcdBytes = 21, kNormalBytes = 12;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-/// Of full: noise and the sensor's own unevenness keep some pixels below.
+/// Share of the full level from which a pixel is saturated: noise and the sensor's own unevenness keep some below.
 constexpr double kSaturated = 0.985;
 /// Print and shading change white by less within the window of a fit, at most pixels.
 constexpr double kWhiteOff = 0.3;
@@ -92,7 +92,7 @@ inline __attribute__((always_inline)) void place_lanes(const RowPiece& in, float
   }
 }
 
-/// Where the points of a view's row are, in the rig's frame: the same for every format.
+/// Places of the points of a view's row, in the rig's frame: the same for every format.
 class RowPlaces {
  public:
   static_assert(RayGrid::kPitchPx == kLanes);  // rays between those that are known lie on a line

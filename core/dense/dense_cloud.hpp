@@ -14,14 +14,14 @@
 
 namespace slsd {
 
-/// What one camera measured, and how its pixels lie in the rig.
+/// One camera's measurement, and the place of its pixels in the rig.
 struct DenseView {
   DenseMap map;
   std::shared_ptr<const RayGrid> rays;  ///< shared: the same for every frame
   RigidTransform rig_from_camera;
   std::uint8_t camera = 0;  ///< index in the calibration
   std::string camera_name;
-  float epipolar_px = 0;     ///< how far off its epipolar lines the frame has the pattern, projector px
+  float epipolar_px = 0;     ///< distance of the frame's pattern from its epipolar lines, projector px
   double white_differs = 0;  ///< share of the points whose white frame is not as bright as the pattern's frame says
 };
 
@@ -33,7 +33,7 @@ struct DenseCloud {
   std::uint64_t frame = 0;  ///< sequence number of the first camera's frame
 
   [[nodiscard]] std::size_t points() const;
-  [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory
+  [[nodiscard]] std::size_t bytes() const;  ///< memory that it holds
 };
 
 /// Gives measured pixels the intensity of the white frame, as shade_points() does for symbols.

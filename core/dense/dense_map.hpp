@@ -12,37 +12,37 @@
 
 namespace slsd {
 
-/// What became of a camera pixel. Everything but kMeasured is a reason why it has no point.
+/// Status of a camera pixel. Everything but kMeasured is a reason why it has no point.
 enum class DensePixel : std::uint8_t {
   kMeasured,
   kNotReached,  ///< no patch near it fits the pattern: shadow, background, or a surface that no symbol is decoded on
-  kNoSupport,   ///< what is around it speaks against every surface beside it
+  kNoSupport,   ///< its surroundings speak against every surface beside it
   kSaturated,   ///< it is as bright as the camera can tell
   kOutOfDepthRange,
   kOccluded,  ///< another surface, nearer to the projector, takes the light of its projector pixel
   kUnlit,     ///< dark where it should be dark, at a rim: nothing tells that the surface is there
   kIsland,    ///< too few around it
-  kAtAnEdge,  ///< as near to a hole or a jump as dense_prune_px says
+  kAtAnEdge,  ///< nearer to a hole or a jump than dense_prune_px
 };
 inline constexpr int kDensePixelCount = 9;
-/// Of the depth, from a pixel to the next: more is a jump, to another surface.
+/// Change from a pixel to the next, as a share of the depth, above which there is a jump to another surface.
 inline constexpr float kDepthJump = 0.004F;
 
 /// "no_support", as in the counters of a reply.
 [[nodiscard]] std::string_view to_string(DensePixel pixel);
 
-/// What a camera measured: a value for each of its pixels, row by row; NaN depth and sigma, and intensity 0, where
-/// there is none.
+/// A camera's measurement: a value for each of its pixels, row by row. A pixel without one has depth and sigma NaN, and
+/// intensity 0.
 struct DenseMap {
   int width = 0, height = 0;
   std::vector<float> depth_mm;          ///< along the camera's z axis
   std::vector<float> sigma_mm;          ///< one standard deviation along the pixel's ray
-  std::vector<std::uint8_t> intensity;  ///< what the surface sends back where the projector shows white
+  std::vector<std::uint8_t> intensity;  ///< light that the surface sends back under projector white
   std::vector<DensePixel> pixels;
   std::vector<std::uint8_t> firm;  ///< 1 where a pixel itself shows the light that falls there, or all around it does
-  std::array<std::uint32_t, kDensePixelCount> counts{};  ///< of pixels
+  std::array<std::uint32_t, kDensePixelCount> counts{};  ///< pixels by their status
 
-  /// What is in it then means nothing.
+  /// Resizes the map; its contents are then undefined.
   void resize(int to_width, int to_height) {
     width = to_width, height = to_height;
     const std::size_t count = static_cast<std::size_t>(width) * height;

@@ -18,7 +18,7 @@ namespace {
 constexpr double kWindowOfPitch = 0.86, kWindowLessPx = 3;
 constexpr int kWindowLeastPx = 11, kWindowMostPx = 21;
 
-/// Of the blurs, from the sharpest on: what a projector and a camera in focus come to.
+/// Number of the sharpest blurs that a projector and a camera in focus reach.
 constexpr int kUsualBlurs = 4;
 
 /// No smaller than the stride: every pixel is seen by some node.
@@ -154,7 +154,7 @@ void DenseMapper::find_blur(const DenseFrame& frame) {
   }
 }
 
-/// How far off its epipolar lines the frame is, and how blurred.
+/// Finds the frame's offset from its epipolar lines, and its blur.
 const PatternField& DenseMapper::find_field(const DenseFrame& frame) {
   blur_ = 1;
   // What is off looks blurred, and with the wrong blur less of it is found: one after the other, and again.

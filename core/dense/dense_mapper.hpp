@@ -37,7 +37,7 @@ class DenseMapper {
   /// @param camera_index  in the calibration; the calibration's projector is of the pattern's size
   DenseMapper(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
               const DecodeOptions& decode);
-  /// Of the same, for another thread.
+  /// Makes a mapper of the same kind for another thread.
   [[nodiscard]] DenseMapper another() const;
 
   /// @param symbols  those that the decoder has found in this frame
@@ -57,9 +57,9 @@ class DenseMapper {
   /// Gives back what measure_next() keeps of frames. @thread reentrant, also while another measures
   void end_stream() { follower_.forget(); }
 
-  /// What it holds of memory, but for what it shares with others; bytes_of_fields() is that.
+  /// Memory that it holds, without what it shares with others: that is bytes_of_fields().
   [[nodiscard]] std::size_t bytes() const;
-  /// Of the pattern's fields, at most: one to a blur.
+  /// Memory of the pattern's fields at most, one for each blur.
   [[nodiscard]] static std::size_t bytes_of_fields(const Lens& projector);
   /// The stride that a frame is measured with: as dense_stride_px says, but for frames so large that it would take more
   /// than kNodesMost nodes, some 300 MB.
@@ -69,18 +69,18 @@ class DenseMapper {
   /// Makes beforehand what the first frame would wait for.
   void warm_up(Executor& executor);
 
-  /// Of the camera's pixels.
+  /// Returns the rays of the camera's pixels.
   [[nodiscard]] const std::shared_ptr<const RayGrid>& rays() const;
   /// The side of the patches that the surface is fitted to.
   [[nodiscard]] int window_px() const;
-  /// Of the last frame: where growth began, and what it came to.
+  /// Returns the places at which growth began in the last frame, and the surface that grew.
   [[nodiscard]] std::span<const SurfaceSeed> seeds() const { return seeds_; }
   [[nodiscard]] const SurfaceGrid& grid() const { return grid_; }
-  /// Of the last frame: how many nodes of the surface went on from the frame before.
+  /// Number of the surface's nodes that the last frame took over from the frame before.
   [[nodiscard]] std::size_t followed_nodes() const { return followed_; }
-  /// Of the last frame: the blur of the pattern, projector px.
+  /// Blur of the pattern in the last frame, projector px.
   [[nodiscard]] float blur_sigma_px() const { return PatternFields::kBlursPx[blur_]; }
-  /// Of the last frame: how far off its epipolar lines it had the pattern in the frame's middle, projector px.
+  /// Offset of the pattern from its epipolar lines in the middle of the last frame, projector px.
   [[nodiscard]] float epipolar_offset_px() const { return grid_.epipolar_offset().middle + across_px_; }
 
  private:

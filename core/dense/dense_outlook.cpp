@@ -14,10 +14,10 @@
 namespace slsd {
 namespace {
 
-/// Of an upright part of that width half is measured, and its rims are pruned.
+/// Width of an upright part, in windows, of which half is measured; its rims are pruned.
 constexpr double kThinnestWindows = 1.3;
 constexpr double kHalfTransferWindows = 1.3;
-/// With less of a cell in a window there is one without an edge in every pattern.
+/// Share of a cell in a window below which every pattern has a window without an edge.
 constexpr double kWindowOfPitchLeast = 0.45;
 
 constexpr float kBlurPx = 0.55F;

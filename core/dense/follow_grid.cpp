@@ -12,22 +12,22 @@
 namespace slsd {
 namespace {
 
-/// Of the squares that the noise of both frames does in a window: more is a change. Chance does as much to one of
-/// many thousands, and the noise is measured to some tenths of that.
+/// Ratio of a window's squares to those that the noise of both frames makes: more is a change. Chance reaches it in one
+/// of many thousands; the noise is measured to some tenths of that.
 constexpr float kStill = 1.6F;
-/// How far a plane may move, projector px anywhere in its window: the model is linear there.
+/// Largest move of a plane, projector px anywhere in its window: the model is linear there.
 constexpr float kFollowPx = 0.1F;
 /// The planes of a block of so many nodes to a side move by chance, each its own way: squares that are this much more
 /// than noise makes them are a move of the surface, which is aligned: the derivatives are not exact enough for it.
 constexpr int kBlockNodes = 8;
 constexpr float kMovedTogether = 2;
-/// Of the gain: how much the light may change.
+/// Largest change of the light, as a share of the gain.
 constexpr float kGainChange = 0.1F;
-/// Of the window's pixels: the others are saturated.
+/// Least share of the window's pixels that are not saturated.
 constexpr float kSeenMin = 0.7F;
-/// Of a frame's nodes: fewer, and the next frame begins from nothing.
+/// Least share of a frame's nodes that go on; with fewer, the next frame begins from nothing.
 constexpr double kFollowedMin = 0.5;
-/// So many more than went on have to stand still before another frame is kept, which takes some time itself.
+/// Excess of still nodes over those that went on from which another frame is kept, which takes some time itself.
 constexpr double kStillMore = 0.2;
 /// Windows of one in so many nodes are looked at for that.
 constexpr std::size_t kSampled = 37;
@@ -90,7 +90,7 @@ void call_sums(const ColumnsOf<std::uint16_t>& in, float* to) {
   Cloned<sum_words>::call(in, to);
 }
 
-/// How far a node moves, by the sums of its window.
+/// Move of a node, from the sums of its window.
 struct Move {
   float step[kFitted];           // in levels and, but for the last, gain times px
   float squares, left, counted;  // of d: all, and what the step leaves

@@ -33,7 +33,7 @@ class GridFollower {
  public:
   /// @param window_px  of a node, as GridOptions has it
   explicit GridFollower(int window_px) : window_px_(window_px), shared_(std::make_shared<Shared>()) {}
-  /// For another thread that measures frames of the same camera.
+  /// Makes a follower for another thread that measures frames of the same camera.
   [[nodiscard]] GridFollower another() const { return {window_px_, shared_}; }
 
   /// Begins a frame: gives the grid those nodes that go on, and closes those that have been tried on the same pixels
@@ -42,8 +42,8 @@ class GridFollower {
   [[nodiscard]] std::shared_ptr<const FollowedFrame> follow(const DenseFrame& frame, SurfaceGrid& grid,
                                                             Executor& executor);
 
-  /// When the grid has grown and is not fused yet: where more stands still since the frame before than went on, this
-  /// frame is what others are to be held against.
+  /// Keeps a frame, once the grid has grown and is not fused yet. It does so if more stands still since the frame
+  /// before than went on; the next frames are then compared with this one.
   /// @param blur, found  see FollowedFrame
   void keep(const DenseFrame& frame, const PatternField& field, std::size_t blur, const SurfaceGrid& grid,
             std::span<const SurfaceSeed> found, Executor& executor);
@@ -56,11 +56,11 @@ class GridFollower {
     const std::lock_guard lock(shared_->mutex);
     shared_->frame.reset();
   }
-  /// Of the last frame, how many nodes went on.
+  /// Number of nodes that went on in the last frame.
   [[nodiscard]] std::size_t followed() const { return followed_; }
-  /// Of the last frame, the mean of how far across the epipolar lines they went, projector px; 0 where none did.
+  /// Mean move of the last frame's nodes across the epipolar lines, projector px; 0 if none went on.
   [[nodiscard]] float across_px() const { return across_px_; }
-  [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory, with what is shared
+  [[nodiscard]] std::size_t bytes() const;  ///< memory that it holds, with what is shared
 
  private:
   struct Shared {

@@ -15,7 +15,7 @@ namespace {
 using enum FollowedFrame::Unknown;
 constexpr float kOfSlopeUnit = 1.F / 16;  // of the field's: slopes along a line are no multiples of it
 
-/// Of the derivatives' products.
+/// Sums of the derivatives' products.
 enum NormalSum {
   kGG,
   kYGG,
@@ -42,7 +42,7 @@ enum NormalSum {
 constexpr int kNormalLanes = 3;
 static_assert(kNormalSums <= kNormalLanes * kLanes);
 
-/// Where a node's plane sends the pixels around it, in plain numbers.
+/// Map of a node's plane for the pixels around it, in plain numbers.
 struct BlockOf {
   float warp[9];  // by rows
   float origin_u, origin_v, along_u, along_v;
@@ -159,7 +159,7 @@ struct EightNormals {
   Lanes of[kFitted][kFitted];
 };
 
-/// By Gauss and Jordan, in place: what is positive definite needs no pivots.
+/// Inverts by Gauss and Jordan, in place: a positive definite matrix needs no pivots.
 inline __attribute__((always_inline)) void invert_eight(EightNormals& normals) {
   auto& m = normals.of;
   const Lanes one = Lanes{} + 1;

@@ -17,21 +17,21 @@ namespace slsd {
 struct FollowedFrame {
   std::vector<std::uint16_t> pixels;
   double full = 0;
-  std::size_t blur = 0;  ///< of the field that the nodes were aligned with
+  std::size_t blur = 0;  ///< blur of the field that the nodes were aligned with
   EpipolarOffset epipolar;
   std::vector<SurfaceNode> nodes;                  ///< good are those that bore points
-  std::vector<char> tried;                         ///< of them: nothing fitted
-  std::size_t good = 0;                            ///< of them
+  std::vector<char> tried;                         ///< nodes that nothing fitted
+  std::size_t good = 0;                            ///< number of good nodes
   std::vector<SurfaceSeed> found;                  ///< see SurfaceSearch
   std::vector<std::int16_t> along, across, light;  ///< per pixel: the derivatives of the light, and the light
-  float slope_unit = 0;                            ///< of a step of the derivatives
+  float slope_unit = 0;                            ///< slope of one step of the derivatives
   std::vector<float> inverses;                     ///< N^-1 of each node, its upper triangle by rows
 
-  [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory
+  [[nodiscard]] std::size_t bytes() const;  ///< memory that it holds
 
-  /// From the nodes: `along`, `across` and `light`.
+  /// Finds `along`, `across` and `light` from the nodes.
   void find_derivatives(const PatternField& field, const SurfaceGrid& grid, Executor& executor);
-  /// From these: `inverses`.
+  /// Finds `inverses` from these.
   void find_inverses(const DenseFrame& frame, const SurfaceGrid& grid, int window_px, Executor& executor);
 
   /// The unknowns in the order of their sums; how many numbers an upper triangle has; and the light of a step.
@@ -40,7 +40,7 @@ struct FollowedFrame {
   static constexpr float kLightUnit = 1.F / 16384;
 };
 
-/// Whether a window around there lies within the frame.
+/// Tells whether a window around this place lies within the frame.
 inline bool within(int middle, int half, int size) {
   return middle >= half && middle + half < size;
 }

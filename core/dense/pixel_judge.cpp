@@ -14,7 +14,7 @@
 namespace slsd {
 namespace {
 
-/// How far the planes of nodes beside each other may differ where they are blended, px, and in standard deviations.
+/// Largest difference between the planes of adjacent nodes that are blended, px, and in standard deviations.
 constexpr float kAgreePx = 0.12F, kAgreeSigmas = 4;
 /// The share of a node's window that agrees, from which on what does not is noise.
 constexpr float kCleanSupport = 0.9F;
@@ -23,7 +23,7 @@ constexpr float kCleanSupport = 0.9F;
 constexpr float kEvidenceMin = 20, kHalfMin = -3, kEnclosedHalfMin = -5;
 /// The same between nodes that are one surface: nothing may speak against it.
 constexpr float kEnclosedMin = -2;
-/// Of a pixel by itself: that it is lit, and as it should be.
+/// Evidence of a pixel by itself, from which on it is firm: it is lit, and as it should be.
 constexpr float kFirmMin = 2;
 /// One standard deviation that a plane adds where it is continued beyond its node to an edge, px.
 constexpr float kEdgePx = 0.03F;
@@ -113,7 +113,7 @@ struct Weighing {
   const std::uint32_t* entries;
 };
 
-/// What each pixel says for the plane: two numbers to a pixel, see Evidence.
+/// Weighs the evidence of each pixel for the plane: two numbers to a pixel, see Evidence.
 inline __attribute__((always_inline)) void weigh_lanes(const Weighing& in, float* to) {
   constexpr float kScale = PatternField::kSamplesPerPx;
   constexpr int kBits = PatternField::kSlopeBits;
@@ -179,8 +179,8 @@ struct Summing {
   float of_half;          // is added to what a half has
 };
 
-/// For each pixel of a cell the least that its surroundings say: the whole, and the halves to each side, the pixel's
-/// own line in both. What goes on on one side alone ends here, or before.
+/// Finds for each pixel of a cell the least evidence of its surroundings: of the whole, and of the halves to each side.
+/// The pixel's own line is in both. A surface that goes on on one side alone ends here, or before.
 /// @param evidence  two numbers for each of side x side pixels
 /// @param columns   room for 8 (side + 1) numbers
 inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const float* evidence, float* columns,
@@ -221,7 +221,7 @@ inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const fl
   }
 }
 
-/// What lies between four nodes that are one surface: the blend of their planes.
+/// Blend of the planes of four nodes that are one surface.
 struct Blending {
   float value[4], slope_x[4], slope_y[4];  // inverse depth at the cell's first pixel
   float sigma_px[4], light[4];
@@ -305,7 +305,7 @@ struct PixelJudge::Cell {
       }
     }
   }
-  /// Whether the nodes at the corners are.
+  /// Tells whether the nodes at the corners are one surface.
   [[nodiscard]] bool one_surface() const {
     if (count != 4) return false;
     const float x = 0.5F * static_cast<float>(left + right - 1), y = 0.5F * static_cast<float>(top + bottom - 1);
@@ -409,7 +409,7 @@ void PixelJudge::see(const Cell& cell, Scratch& scratch) const {
       cell.frame.pixels);
 }
 
-/// What each pixel's surroundings say for a node's plane.
+/// Weighs the evidence of each pixel's surroundings for a node's plane.
 void PixelJudge::weigh(const Cell& cell, const SurfaceNode& node, int candidate, int as, Scratch& scratch) const {
   const PatchMap map = cell.grid.map_at(cell.nodes[candidate].x(), cell.nodes[candidate].y(),
                                         static_cast<double>(node.plane.inverse_depth));
@@ -441,7 +441,7 @@ void PixelJudge::weigh(const Cell& cell, const SurfaceNode& node, int candidate,
                           scratch.own[at].data());
 }
 
-/// For each pixel the plane that most speaks for.
+/// Chooses for each pixel the plane with the most evidence.
 void PixelJudge::choose(const Cell& cell, const Scratch& scratch) const {
   const int stride = cell.grid.stride_px();
   const auto depth_min = static_cast<float>(options_.depth_min_mm),

@@ -12,9 +12,9 @@
 
 namespace slsd {
 
-/// What a pixel says for a surface, against two others that could be there: one that lies elsewhere, on which dark and
-/// light are as likely as each other, and one that is not lit. Natural logarithms of how much likelier the pixel's
-/// level is.
+/// Evidence of a pixel for a surface, against two others that could be there. One lies elsewhere, and dark and light
+/// are equally likely on it; the other is not lit. Each is the natural logarithm of how much likelier the pixel's level
+/// is.
 struct Evidence {
   float against_another = 0, against_unlit = 0;
 
@@ -41,8 +41,8 @@ class EvidenceTable {
   /// @param noise     one standard deviation of a pixel
   [[nodiscard]] Evidence at(float expected, float seen, float slope, float noise) const;
 
-  /// For a noise: the entries at kSeen to a row, kExpected rows to a slope; the upper half of each against another, the
-  /// lower against none, both signed and in steps of kUnit.
+  /// Returns the entries for a noise: kSeen to a row, kExpected rows to a slope. The upper half of each is against
+  /// another surface, the lower against none, both signed and in steps of kUnit.
   [[nodiscard]] const std::uint32_t* entries(float noise) const;
 
   static constexpr float kUnit = 1.F / 1024;
@@ -63,8 +63,8 @@ class EvidenceTable {
 class PixelJudge {
  public:
   struct Options {
-    int reach_px = 3;    ///< of a pixel's surroundings, to each side
-    int window_px = 11;  ///< of a node: no plane is continued farther
+    int reach_px = 3;    ///< reach of a pixel's surroundings, to each side
+    int window_px = 11;  ///< a node's window: no plane is continued farther
     double depth_min_mm, depth_max_mm;
   };
   explicit PixelJudge(const Options& options) : options_(options) {}

@@ -28,7 +28,7 @@ class RayGrid {
            below * ((1 - right) * node[columns_] + right * node[columns_ + 1]);
   }
 
-  /// Of the last pixel before the next eighth one: all between lie on the line to it.
+  /// Ray of the last pixel before the next eighth one: all between lie on the line to it.
   [[nodiscard]] Eigen::Vector2f before_next(int x, int y) const { return at(x + kPitchPx - 1, y); }
 
  private:

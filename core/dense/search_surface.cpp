@@ -12,9 +12,9 @@
 namespace slsd {
 namespace {
 
-/// Of a window so many pixels are looked at, all over it.
+/// Largest number of pixels that are compared in a window, spread all over it.
 constexpr int kPixelsMost = 64;
-/// How far beyond the depths that are known it looks, projector px, and how many depths at most.
+/// Reach of the search beyond the known depths, projector px, and the largest number of depths.
 constexpr double kBeyondPx = 32;
 constexpr int kLevelsMost = 320;
 /// Nodes that tell what likeness says: as many as that, and no fewer than this.
@@ -27,7 +27,7 @@ constexpr double kPartly = 0.2;
 constexpr float kTotalEvidenceMin = 20;
 /// So much more than any other depth, a thousand to one.
 constexpr float kGapMin = 7;
-/// From line to line the depth stays, or goes on by a level: one of three.
+/// Evidence that a step to the next line costs: the depth stays, or moves by a level, one case of three.
 constexpr float kOfStep = 1.1F;
 /// A window that has no more contrast than so many times the noise has nothing to compare.
 constexpr float kNoiseMultipleMin = 4;
@@ -47,7 +47,7 @@ struct Comparing {
   int depths;
 };
 
-/// How alike they are: the correlation.
+/// Computes the likeness of both: the correlation.
 inline __attribute__((always_inline)) void compare_lanes(const Comparing& in, float* to) {
   constexpr float kScale = PatternField::kSamplesPerPx;
   constexpr int kBits = PatternField::kSlopeBits;
@@ -131,7 +131,7 @@ bool SurfaceSearch::choose_levels(const SurfaceGrid& grid) {
   return levels_.count > 2 * kNearLevels;
 }
 
-/// How alike the window is to the pattern at each depth; false where it has nothing to compare.
+/// Computes the likeness of the window to the pattern at each depth; false if it has nothing to compare.
 bool SurfaceSearch::compare(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
                             const Eigen::Vector2i& place, Scratch& scratch) const {
   const auto [width, height] = grid.frame_px();
@@ -194,7 +194,7 @@ bool SurfaceSearch::compare(const DenseFrame& frame, const PatternField& field, 
   return true;
 }
 
-/// What likeness says, by windows whose depth is known: there, and at all others.
+/// Learns the evidence of a likeness from windows of known depth: at that depth, and at all others.
 bool SurfaceSearch::learn(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid) {
   std::array<double, kBins> there{}, elsewhere{};
   double all_there = 0, all_elsewhere = 0;
@@ -241,7 +241,7 @@ void SurfaceSearch::find_open(const SurfaceGrid& grid, const Lines& lines) {
   }
 }
 
-/// What each of them says at each depth.
+/// Weighs the evidence of each place at each depth.
 void SurfaceSearch::weigh(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
                           Executor& executor) {
   constexpr std::size_t kInPart = 32;
@@ -289,7 +289,7 @@ void SurfaceSearch::add_up(const Lines& lines, bool forwards, std::vector<float>
   }
 }
 
-/// Where one depth has enough to say, and far more than any other.
+/// Takes seeds at places with enough evidence for one depth, and far more than for any other.
 void SurfaceSearch::take_seeds() {
   const int count = levels_.count;
   for (std::size_t i = 0; i < places_.size(); ++i) {

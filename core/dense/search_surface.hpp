@@ -27,11 +27,11 @@ class SurfaceSearch {
   /// @param letters  of the pattern: a window sees no more than one symbol
   SurfaceSearch(int letters, int window_px);
 
-  /// Where nodes of the grid are neither good nor closed.
+  /// Searches at nodes of the grid that are neither good nor closed.
   /// @return seeds to grow from; until the next call
   [[nodiscard]] std::span<const SurfaceSeed> find(const DenseFrame& frame, const PatternField& field,
                                                   const SurfaceGrid& grid, Executor& executor);
-  [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory
+  [[nodiscard]] std::size_t bytes() const;  ///< memory that it holds
 
  private:
   /// The depths that are tried: inverses of them in equal steps, of one projector px in the middle of the frame.

@@ -17,7 +17,7 @@ namespace {
 constexpr float kSettledPx = 0.1F;
 constexpr int kStepsMost = 4;
 
-/// What makes a fit one: docs/notes/2026-11-dense.md has what each is for.
+/// Conditions of a good fit: docs/notes/2026-11-dense.md has the reason for each.
 constexpr float kSupportMin = 0.6F;   // of the window's pixels agree
 constexpr float kSeenMin = 0.7F;      // of them are in the frame and not saturated
 constexpr float kResidualMax = 0.3F;  // of the gain
@@ -29,12 +29,12 @@ constexpr float kContrastMin = 4;       // of the gain over the noise of a pixel
 
 /// Parts of sigma, as for symbols (docs/notes/2026-11-decoder.md).
 constexpr float kLeastPx = 0.003F, kOfScatter = 0.8F;
-/// Of the share of the window that is saturated: its rims are wrong too.
+/// Factor of the window's saturated share: its rims are wrong too.
 constexpr float kOfUnseen = 4;
 
 /// The epipolar offset: how many seeds tell of it, how many at least of its middle, and of its slopes.
 constexpr std::size_t kOffsetSeeds = 256, kOffsetSeedsLeast = 8, kOffsetSlopeSeeds = 48;
-/// What is off across the lines by more is likely to be as far off along them, where it is depth.
+/// Offset across the lines above which the excess is likely to be as large along them, and so in depth.
 constexpr float kUsualOffsetPx = 0.2F;
 constexpr float kOffsetPx = 0.05F;      // how far relief and noise put a seed off
 constexpr float kOffsetSlope = 0.001F;  // for one camera px: more is no knock that the symbols would decode after
@@ -316,33 +316,34 @@ void SurfaceGrid::grow_fronts(const DenseFrame& frame, const PatternField& field
 
 namespace {
 
-/// How far a node looks, in nodes.
+/// Reach of a node in fusing, in nodes.
 constexpr int kFuseReach = 2;
 constexpr float kFusePx = 0.015F;  // what the pattern's model leaves out, in each node
 constexpr float kFuseSigmas = 3;
-/// Of the scatter of the nodes around over what noise does: beyond it there is relief, and the mean is of fewer. So it
-/// is where the bend moves a node by so much of its noise.
+/// Limits up to which a mean holds: the surrounding nodes' scatter over their noise, and a node's move by the bend over
+/// its noise. Beyond them there is relief, and the mean is of fewer.
 constexpr float kFuseExcess = 0.8F, kFlat = 0.7F;
-/// What no mean takes away, px: focus and lenses are not quite as the pattern's blur has them.
+/// Error that no mean takes away, px: focus and lenses are not quite as the pattern's blur has them.
 constexpr float kFloorPx = 0.008F;
-/// Over a bend the neighbours' planes, continued by a stride, are off by half its square, and the window's plane by a
-/// 24th of its own: so much of the one stands for the other.
+/// Factors of the neighbours' disagreement over a bend. Their planes, continued by a stride, are off by half its
+/// square, and the window's plane by a 24th of its own: so much of the one stands for the other.
 constexpr float kOfBendLeft = 1.6F, kOfDisagreementLeast = 0.5F, kOfDisagreementMost = 4;
-/// Of that disagreement's square this much of what noise does is no relief.
+/// Share of the noise in that disagreement's square that is no relief.
 constexpr float kOfNoise = 0.6F;
-/// Of the variance, where the mean is of this reach and those smaller.
+/// Share of the variance that remains if the mean is of this reach and those smaller.
 constexpr float kLeftOfVariance[kFuseReach] = {0.75F, 0.27F};
 
-/// How much slopes beside each other are wrong together, as their windows overlap: over the smaller reach, the larger.
+/// Factor for the shared errors of adjacent slopes, as their windows overlap: over the smaller reach, the larger.
 constexpr float kOverlap[kFuseReach] = {9, 3};
 
-/// Of waves of wave number k a regression over n slopes, a stride s apart, sees the bend less by k^2 s^2 / 6 times the
-/// mean of the fourth power of their places over that of the square (1 for three slopes, 3.4 for five), and each slope
-/// is less by k^2 w^2 / 40. Three slopes are short of the truth by so much of what five are short of them, plus so much
-/// by w^2 / s^2; at most this, as far wider windows than strides leave the series.
+/// Corrections of a bend that waves of wave number k show too small. A regression over n slopes, a stride s apart,
+/// loses k^2 s^2 / 6 times a ratio. That ratio is the mean fourth power of the slopes' places over the mean square (1
+/// for three slopes, 3.4 for five). Each slope also loses k^2 w^2 / 40. The lack of three slopes is their difference
+/// from five times a factor, kBendBeyond + kWindowBeyond w^2 / s^2. The factor is limited, as far wider windows than
+/// strides leave the series.
 constexpr float kBendBeyond = 1 / 2.4F, kWindowBeyond = 6 / (2.4F * 40), kBeyondMost = 1.2F;
 
-/// What fuse_lanes() knows of eight nodes of a row, and of all around them, in the order of Around.
+/// Inputs of fuse_lanes(): eight nodes of a row, and all around them, in the order of Around.
 struct Fusing {
   const float* around[7];
   std::ptrdiff_t row;  // from a row to the next
@@ -351,8 +352,8 @@ struct Fusing {
 };
 enum Around { kInverseDepth, kSlopeX, kSlopeY, kPxPer, kNoisePx, kSlopeNoise, kGood, kVariance };
 
-/// What comes of them: their planes, in projector px, from their own; what is added to sigma's
-/// square, and the share of it that stays.
+/// Results of fuse_lanes(): planes in projector px from the nodes' own, the addition to sigma's square, and the share
+/// of it that stays.
 struct Fused {
   Lanes off, slope_x, slope_y, left, more;
 };

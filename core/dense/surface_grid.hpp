@@ -37,18 +37,18 @@ struct SurfaceSeed {
 struct SurfaceNode {
   SurfacePlane plane;
   float per_px = 0;                                    ///< 1/mm: what moves the pattern by one projector px there
-  float across = 0;                                    ///< how far off the epipolar line the pattern lies, projector px
+  float across = 0;                                    ///< offset of the pattern from its epipolar line, projector px
   float gain = 0, gain_x = 0, gain_y = 0, offset = 0;  ///< grey levels, for one camera px
   float support = 0;                                   ///< the share of its window that agrees with the pattern
   float noise_px = 0, slope_noise = 0;                 ///< one standard deviation that the frame's noise leaves
-  float sigma_px = 0;                                  ///< of everything, projector px
+  float sigma_px = 0;                                  ///< all errors together, projector px
   float residual = 0;                                  ///< root mean square, of the gain
   bool good = false;
 };
 
-/// How far off its epipolar lines the pattern lies, projector px, over the frame: the calibration's error, or a knock.
+/// Offset of the pattern from its epipolar lines, projector px, over the frame: the calibration's error, or a knock.
 struct EpipolarOffset {
-  Eigen::Vector2f middle_px = Eigen::Vector2f::Zero();  ///< of the frame
+  Eigen::Vector2f middle_px = Eigen::Vector2f::Zero();  ///< middle of the frame
   float middle = 0, slope_x = 0, slope_y = 0;           ///< there, and its change for one camera px
 
   [[nodiscard]] float at(const Eigen::Vector2f& camera_px) const {
@@ -63,7 +63,7 @@ struct DenseFrame {
   FrameNoise noise;
 };
 
-/// How a camera and its projector lie, for patches anywhere in the frame.
+/// Geometry of a camera and its projector, for patches anywhere in the frame.
 /// @thread reentrant
 struct PatchGeometry {
   CalibratedCamera camera;
@@ -104,7 +104,7 @@ class SurfaceGrid {
     return node.good ? &node : nullptr;
   }
 
-  /// How the pattern falls around a node, as far off its epipolar line as this frame has it there.
+  /// Map of the pattern around a node, with this frame's offset from its epipolar line.
   [[nodiscard]] PatchMap map_at(int column, int row, double inverse_depth) const {
     return map_of(turned_[static_cast<std::size_t>(row) * columns_ + column].cast<double>(),
                   Eigen::Vector2d(x_of(column), y_of(row)), inverse_depth);
@@ -115,14 +115,14 @@ class SurfaceGrid {
                   inverse_depth);
   }
 
-  /// How badly the pattern at a blur fits the seeds: the median of residual over gain; 1 where nothing fits.
+  /// Misfit of the pattern at a blur to the seeds: the median of residual over gain; 1 if nothing fits.
   [[nodiscard]] float misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
 
   /// Measures at some of the seeds how far off its epipolar lines the frame has the pattern; what follows starts there.
   void find_epipolar_offset(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
   [[nodiscard]] const EpipolarOffset& epipolar_offset() const { return epipolar_; }
   void set_epipolar_offset(const EpipolarOffset& offset) { epipolar_ = offset; }
-  [[nodiscard]] std::size_t bytes() const;  ///< what it holds of memory
+  [[nodiscard]] std::size_t bytes() const;  ///< memory that it holds
 
   /// Forgets every node.
   void clear();
@@ -131,12 +131,12 @@ class SurfaceGrid {
   [[nodiscard]] std::span<const SurfaceNode> nodes() const { return nodes_; }
   /// This node need not be tried.
   void close(std::size_t node) { attempts_[node] = kClosed; }
-  /// Whether the node there is good.
+  /// Tells whether the node there is good.
   [[nodiscard]] bool good_at(const Eigen::Vector2f& camera_px) const {
     const std::int32_t node = node_at(camera_px);
     return node >= 0 && nodes_[node].good;
   }
-  /// Whether it is neither good nor closed.
+  /// Tells whether the node there is neither good nor closed.
   [[nodiscard]] bool open_at(const Eigen::Vector2f& camera_px) const {
     const std::int32_t node = node_at(camera_px);
     return node >= 0 && !nodes_[node].good && attempts_[node] != kClosed;
@@ -149,17 +149,17 @@ class SurfaceGrid {
     return {geometry_->camera.lens.width_px, geometry_->camera.lens.height_px};
   }
 
-  /// How nodes are aligned: light and colour change by some 2 % of the gain for one camera px on most of what is
-  /// scanned.
+  /// Options by which nodes are aligned: light and colour change by some 2 % of the gain for one camera px on most of
+  /// what is scanned.
   static constexpr AlignOptions kAlign{.gain_slope_sigma = 0.02F};
 
-  /// From the seeds and what is good already, since clear().
+  /// Grows from the seeds and from nodes that are good already, since clear().
   void grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds, Executor& executor);
   /// Goes on from more seeds: what could not be reached from elsewhere is tried again.
   void grow_on(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
                Executor& executor);
-  /// Where a node and those around it agree to within their noise they are one smooth surface, and their mean is more
-  /// exact than each: wide windows where it is flat. Where they differ by more, that is what sigma is made of.
+  /// Fuses each node with those around it if they agree to within their noise: they are one smooth surface, and their
+  /// mean is more exact than each. Flat surfaces thus get wide windows. A larger difference adds to sigma.
   void fuse(Executor& executor);
 
  private:
