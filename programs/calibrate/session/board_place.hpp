@@ -32,8 +32,8 @@ struct BoardPlace {
 /// @thread reentrant
 [[nodiscard]] std::optional<BoardPlace> place_of(std::span<const Tie> ties, const Board& board, const ImageSize& size);
 
-/// Tells whether two poses are so near each other that the second tells nothing new: the centre within a sixth of the
-/// image, and tilt, turn and distance alike.
+/// Tells whether two poses are so near each other that the second tells nothing new. Their centres are within a sixth
+/// of the image, and tilt, turn and distance are alike.
 /// @thread reentrant
 [[nodiscard]] bool are_alike(const BoardPlace& a, const BoardPlace& b);
 
