@@ -8,18 +8,19 @@
 
 namespace slsd {
 
-/// What core's inner loops are compiled for. One package serves every machine of an architecture: each loop is there
-/// several times, and the machine that it runs on chooses. On arm64 the plain code is NEON, which all of these have.
+/// Instruction sets that core's inner loops are compiled for. One package serves every machine of an architecture: each
+/// loop is there several times, and the machine that it runs on chooses. On arm64 the plain code is NEON, which all of
+/// these have.
 enum class Clone : std::uint8_t {
   kPlain,    ///< the least that the architecture has: SSE2, NEON
   kAvx2,     ///< the same numbers
   kAvx2Fma,  ///< the same but for rounding, as products are not rounded before they are added to
 };
 
-/// Those that this machine can run, the plain one first and the fastest last.
+/// Lists the clones that this machine can run, the plain one first and the fastest last.
 [[nodiscard]] std::vector<Clone> clones_here();
 
-/// Which one runs: the fastest, but where a test asks for another. Core's only variable.
+/// Clone that runs: the fastest, unless a test asks for another. Core's only variable.
 extern std::atomic<Clone> clone_in_use;
 
 /// A loop that is there once for each clone: Cloned<body>::call(...) calls that in use.

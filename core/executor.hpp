@@ -16,7 +16,7 @@ class Executor {
   Executor& operator=(const Executor&) = delete;
   virtual ~Executor() = default;
 
-  /// How many parts may run beside each other.
+  /// Number of parts that may run at the same time.
   [[nodiscard]] virtual int workers() const = 0;
 
   /// @param work  called as work(part, worker) for each part from 0 on; no two at once have the same worker

@@ -18,7 +18,7 @@ struct ImageView {
   const T* pixels = nullptr;
   int width = 0;
   int height = 0;
-  std::ptrdiff_t stride = 0;  ///< from one row to the next, in pixels
+  std::ptrdiff_t stride = 0;  ///< distance from one row to the next, in pixels
 
   [[nodiscard]] const T* row(int y) const { return pixels + y * stride; }
   [[nodiscard]] const T& at(int x, int y) const { return row(y)[x]; }

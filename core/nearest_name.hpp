@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// How many characters must be inserted, deleted or replaced to turn one word into the other (Levenshtein).
+/// Counts the characters to insert, delete or replace to turn one word into the other (Levenshtein).
 /// @thread reentrant
 [[nodiscard]] int edit_distance(std::string_view a, std::string_view b);
 

@@ -12,8 +12,8 @@ namespace {
 constexpr std::string_view kEllipsis = "\u2026";
 
 struct Character {
-  char32_t code;     ///< of a byte that is no UTF-8: that byte
-  std::size_t size;  ///< in bytes
+  char32_t code;     ///< code point; for a byte that is no UTF-8, that byte
+  std::size_t size;  ///< size in bytes
   bool valid;
 };
 

@@ -10,13 +10,13 @@
 
 namespace slsd {
 
-/// What failed. A caller may act on the code; a person acts on the message. A new one goes to the end: clients know
-/// each by its number.
+/// Kind of a failure. A caller may act on the code; a person acts on the message. A new one goes to the end: clients
+/// know each by its number.
 enum class ErrorCode {
   kInvalidArgument,  ///< a value outside its range: a configuration key, an option, a request's parameter
   kMalformed,        ///< a file or message that does not parse, or lacks a required part
   kMismatch,         ///< two things that are each right and do not belong together
-  kImpossible,       ///< what was asked for cannot exist; the message names the bound that forbids it
+  kImpossible,       ///< the request cannot exist; the message names the bound that forbids it
   kNotFound,
   kPermissionDenied,
   kAlreadyExists,

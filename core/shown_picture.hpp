@@ -10,7 +10,7 @@
 
 namespace slsd {
 
-/// What a projector shows.
+/// Picture that a projector shows.
 enum class Picture {
   kPattern,
   kWhite,
@@ -18,8 +18,8 @@ enum class Picture {
   kFocus,  ///< a chart to focus by
   kGrid,   ///< each camera's view
   kImage,  ///< a client's own
-  kIdle,   ///< what the configuration says for when nobody scans: one of the first three
-  kHeld,   ///< what a client has it show until the next scan: any of the above
+  kIdle,   ///< the configuration's choice while nobody scans: one of the first three
+  kHeld,   ///< a client's choice until the next scan: any of the above
 };
 
 inline constexpr std::array kPictureNames{
@@ -42,7 +42,7 @@ inline constexpr std::array kPictureNames{
   return found == kPictureNames.end() ? std::nullopt : std::optional(found->second);
 }
 
-/// What a frame that was exposed under the picture is called: in black there is only the light of the room.
+/// Name of a frame that was exposed under the picture: in black there is only the light of the room.
 [[nodiscard]] constexpr std::string_view light_name(Picture picture) {
   return picture == Picture::kBlack ? "dark" : to_string(picture);
 }

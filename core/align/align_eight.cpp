@@ -19,7 +19,7 @@ using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
 /// inverse.
 enum Unknown { kOffset, kGain, kGainX, kGainY, kAcross, kSlopeX, kSlopeY, kDisparity };
 
-/// What is known of eight patches, and what a step finds: a patch to each lane.
+/// Inputs and results of one step for eight patches: a patch in each lane.
 struct Eight {
   Lanes constant[3], x[3], y[3];  // of q, see PatchMap
   Lanes across_u, across_v, along_u, along_v;
@@ -40,7 +40,7 @@ struct EightWindows {
   float slope_unit;
 };
 
-/// What pixels of a row show, found and summed up step by step, so that each step's numbers stay in registers.
+/// Values of a row's pixels, found and summed up step by step, so that each step's numbers stay in registers.
 struct RowPixels {
   static constexpr int kMost = 32;
   Lanes level[kMost];
@@ -51,7 +51,7 @@ struct RowPixels {
   Lanes wg[kMost], wp[kMost];
 };
 
-/// Of pixels beside each other, each factor by its name above; x is the column.
+/// Sums over adjacent pixels, each factor by its name above; x is the column.
 struct NinthSums {
   Lanes gg, gp, g, gr;
 };
@@ -71,7 +71,7 @@ struct RowSums {
   RestSums rest;
 };
 
-/// Where the pixels of a row are, and how the light falls on them.
+/// Places of a row's pixels, and the light on them.
 template <class T>
 struct Row {
   const T* pixels[kLanes];  // in the middle column
@@ -85,7 +85,7 @@ inline __attribute__((always_inline)) void clamp_to(IntLanes& lanes, int last) {
   lanes = lanes > zero ? lanes : zero;
 }
 
-/// Where the pixels lie in the pattern.
+/// Finds the places of the pixels in the pattern.
 template <class T>
 inline __attribute__((always_inline)) void look_up(const Row<T>& row, int first, int count, const EightWindows& of,
                                                    const Eight& e, RowPixels& seen) {

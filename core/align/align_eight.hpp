@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// How many patches are aligned beside each other.
+/// Number of patches that are aligned at once.
 inline constexpr int kEight = 8;
 
 /// A square window of the frame, to be aligned around its middle pixel.
@@ -20,17 +20,17 @@ struct PatchTask {
   PatchState state;          ///< the start, and then what was found; gain 0: not known. Bends are not looked at
   bool settled = false;      ///< the caller's: whether a step that moves little is the last
   bool failed = false;       ///< nothing follows from what is seen there; the rest is then as it was
-  float moved = 0;           ///< by the last step: the disparity, projector px
+  float moved = 0;           ///< the last step's change of the disparity, projector px
   float residual = 0;        ///< root mean square, grey levels, as the last step leaves it
-  float pixels = 0;          ///< how many there were
+  float pixels = 0;          ///< number of pixels
   float support = 0;         ///< the share of them that agreed with the pattern at the last step's start
-  float scatter = 0;         ///< of the ninths about the plane, px, beyond what noise does
-  float variance = 0;        ///< of the disparity, for a noise of one grey level in each pixel
-  float slope_variance = 0;  ///< of its slopes, the mean of both
+  float scatter = 0;         ///< scatter of the ninths about the plane, px, beyond the share of noise
+  float variance = 0;        ///< variance of the disparity, for a noise of one grey level in each pixel
+  float slope_variance = 0;  ///< variance of its slopes, the mean of both
 };
 
-/// What is known beforehand of `across` and of each of the gain's slopes, as what it adds to the diagonal of the normal
-/// matrix, whose unknowns are in units of gain times px and of levels.
+/// Prior knowledge of `across` and of each of the gain's slopes: the amounts added to the diagonal of the normal
+/// matrix. Its unknowns are in units of gain times px and of levels.
 struct AlignPriors {
   float across, gain_slope;
 };

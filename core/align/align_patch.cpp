@@ -31,7 +31,7 @@ struct Warp {
   float along_u, along_v;
 };
 
-/// What one pass over the patch needs, in plain numbers.
+/// Inputs of one pass over the patch, in plain numbers.
 struct Pass {
   Warp warp;
   const float* patch;
@@ -54,7 +54,7 @@ struct Sums {
   float gg[6], gp[6], pp[6];
   float g[3], p[3], gc[3], pc[3], ig[3], ip[3];
   float w, c, cc, ic, i, ii;
-  float pixels;                  ///< in the square, whether they count less or not
+  float pixels;                  ///< pixels in the square, whether they count less or not
   float part_gr[9], part_gg[9];  ///< g times the residual, and g squared, of the window's ninths
 };
 
@@ -198,7 +198,7 @@ inline __attribute__((always_inline)) void sum_patch(const Pass& pass, Sums& sum
   sums.i = sum_of(total[kI]), sums.ii = sum_of(total[kII]), sums.pixels = sum_of(total[kPixels]);
 }
 
-/// How far the disparities of the patch's ninths are from the plane, root mean square, beyond what noise does.
+/// Distance of the patch's ninths from the plane by their disparities, root mean square, beyond the share of noise.
 float scatter_of(const Sums& sums, float gain, float noise) {
   float squares = 0, expected = 0, weight = 0;
   for (int part = 0; part < 9; ++part) {

@@ -13,17 +13,17 @@
 
 namespace slsd {
 
-/// How the pattern falls on what a small window of the camera sees, for any plane there. With (x, y) camera px from the
-/// window's middle, the ray there is (r + T (x, y), 1), the inverse of its depth rho, and the projector sees the point
-/// in the direction R (r + T (x, y), 1) + rho t: linear in x and y on a plane, whose inverse depth is so too. With the
-/// projector's lens made linear around the middle, its pixel is
+/// Map of the pattern in a small window of the camera, for any plane there. Let (x, y) be camera px from the window's
+/// middle. The ray there is (r + T (x, y), 1), and rho is the inverse of its depth. The projector sees the point in the
+/// direction R (r + T (x, y), 1) + rho t. This is linear in x and y on a plane, whose inverse depth is linear too. With
+/// the projector's lens made linear around the middle, its pixel is
 ///
 ///     p = (q0 / q2, q1 / q2),  q = (base + shift (disparity, its slopes)) (1, x, y)
 ///
 /// disparity being the inverse depth in units that move p by one projector px in the middle, from the reference.
 struct PatchMap {
   Eigen::Matrix3f base;       ///< columns: of x, of y, of 1; at the reference depth
-  Eigen::Vector3f shift;      ///< what a disparity of 1 adds to q
+  Eigen::Vector3f shift;      ///< change of q by a disparity of 1
   Eigen::Vector2f middle_px;  ///< in the camera
   Eigen::Vector2i origin_px;  ///< p is taken from there: floats are exact enough near it
   Eigen::Vector2f along;      ///< unit vector in which p moves with the disparity
@@ -36,18 +36,18 @@ struct PatchMap {
                                       const RigidTransform& projector_from_camera, const Lens& projector,
                                       double reference_depth_mm);
 
-/// What of it depends on the pixel alone, for many depths: R (T, r), T and r as columns.
+/// Part of it that depends on the pixel alone, for many depths: R (T, r), T and r as columns.
 [[nodiscard]] Eigen::Matrix3d turned_by(const PixelRay& ray, const RigidTransform& projector_from_camera);
 /// @param translation  of projector_from_camera
 [[nodiscard]] PatchMap make_patch_map(const Eigen::Matrix3d& turned, const Eigen::Vector2d& middle_px,
                                       const Eigen::Vector3d& translation, const Lens& projector,
                                       double reference_inverse_depth);
 
-/// Where a patch of the surface lies, and how the light falls on it.
+/// Place of a patch of the surface, and the light on it.
 struct PatchState {
   float disparity = 0;                          ///< projector px from the reference
   float slope_x = 0, slope_y = 0;               ///< its change for one camera px
-  float across = 0;                             ///< how far off the epipolar line the pattern lies, projector px
+  float across = 0;                             ///< offset of the pattern from its epipolar line, projector px
   float bend_xx = 0, bend_xy = 0, bend_yy = 0;  ///< second derivatives of the disparity: given, not fitted
   float gain = 0, gain_x = 0, gain_y = 0;  ///< grey levels for light 1 in the middle, and its change for one camera px
   float offset = 0;                        ///< grey level where it is dark
@@ -62,12 +62,12 @@ struct PatchWindow {
 };
 
 struct AlignOptions {
-  float across_sigma_px = 0.15F;  ///< how far off the epipolar lines the pattern may lie; 0: not at all
-  /// How much of the gain it may change by for one camera px; 0: by any. Small windows need it: a light that fades
-  /// within them can stand for many a displacement.
+  float across_sigma_px = 0.15F;  ///< deviation of the pattern from the epipolar lines; 0: none
+  /// Deviation of the gain's change for one camera px, as a share of the gain; 0: any. Small windows need it: a light
+  /// that fades within them looks like many a displacement.
   float gain_slope_sigma = 0;
   int steps = 4;
-  /// What the model leaves out where it fits, as a share of the gain.
+  /// Error that the model leaves in a good fit, as a share of the gain.
   float misfit_share = 0.02F;
   /// Standard deviations of noise and misfit at which a pixel counts half: the surface ends there, or bears print.
   float outlier_sigmas = 4;
@@ -79,10 +79,10 @@ inline constexpr int kFitted = 8;
 struct PatchFit {
   PatchState state;
   float residual = 0;  ///< root mean square, grey levels
-  float pixels = 0;    ///< how many there were
+  float pixels = 0;    ///< number of pixels
   float support = 0;   ///< the share of them that agrees with the pattern
-  float scatter = 0;   ///< of the disparities of the patch's ninths about the plane, px, beyond what noise does
-  /// Of disparity, its slopes and across, for a noise of one grey level in each pixel.
+  float scatter = 0;   ///< scatter of the patch's ninths about the plane, px, beyond the share of noise
+  /// Covariance of disparity, its slopes and across, for a noise of one grey level in each pixel.
   Eigen::Matrix4f covariance = Eigen::Matrix4f::Zero();
   bool solved = false;  ///< the pattern is there, and its place follows from it
 };

@@ -12,7 +12,7 @@ namespace {
 constexpr int kPhases = PatternField::kSamplesPerPx;
 constexpr int kSlopeMax = (1 << (PatternField::kSlopeBits - 1)) - 1;
 
-/// What each pixel, a square of side 1, adds to a sample and to its slope; of the pixels from -reach to reach.
+/// Weights of each pixel, a square of side 1, in a sample and in its slope, for the pixels from -reach to reach.
 struct Weights {
   std::vector<float> value, slope;
 };

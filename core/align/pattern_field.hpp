@@ -55,7 +55,7 @@ class PatternField {
 
   /// A sample: 10 bits of the value, 11 of each slope.
   [[nodiscard]] const std::uint32_t* samples() const { return samples_.data(); }
-  [[nodiscard]] int width() const { return width_; }  ///< in samples
+  [[nodiscard]] int width() const { return width_; }  ///< samples
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] float slope_unit() const { return slope_unit_; }  ///< per projector px, of one step of a slope's bits
   [[nodiscard]] float blur_sigma_px() const { return blur_sigma_px_; }
@@ -76,7 +76,7 @@ class PatternFields {
   static constexpr std::array<float, 7> kBlursPx{0.42F, 0.55F, 0.72F, 0.95F, 1.25F, 1.65F, 2.15F};
   explicit PatternFields(Grey8 pattern) : pattern_(std::move(pattern)) {}
   [[nodiscard]] const PatternField& at(std::size_t blur) const;
-  /// That whose blur is the nearest, of a standard deviation in projector px.
+  /// Returns the field with the nearest blur, a standard deviation in projector px.
   [[nodiscard]] const PatternField& nearest(float blur_px) const;
 
  private:

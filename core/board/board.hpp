@@ -39,7 +39,7 @@ struct Board {
 
   /// The same board where a length on the print is `factor` times what it should be.
   [[nodiscard]] Board scaled(double factor) const;
-  /// How many points the board has; their ids are 0 to this less one.
+  /// Number of points on the board; their ids are 0 to this less one.
   [[nodiscard]] int point_count() const;
   /// Markers, of ids 0 to this less one; 0 for a chessboard and circles.
   [[nodiscard]] int marker_count() const;
@@ -49,7 +49,7 @@ struct Board {
   [[nodiscard]] Eigen::Vector3d point(int id) const;
   /// point(0), point(1) ...
   [[nodiscard]] std::vector<Eigen::Vector3d> points() const;
-  /// What is printed spans x from 0 to this, and y likewise; a white border of a square, at least, belongs around it.
+  /// Extent of the print: x from 0 to this, and y likewise. A white border of at least a square belongs around it.
   [[nodiscard]] double width_mm() const;
   [[nodiscard]] double height_mm() const;
   /// The print with that border.
@@ -73,11 +73,11 @@ struct Board {
 /// @thread reentrant
 [[nodiscard]] std::optional<Board> rows_by_columns(const Board& board);
 
-/// What parse_board() reads.
+/// Writes the text that parse_board() reads.
 /// @thread reentrant
 [[nodiscard]] std::string to_string(const Board& board);
 
-/// That with the words around it by which messages name a board.
+/// Describes a board as messages name it: that text, and words around it.
 /// @thread reentrant
 [[nodiscard]] std::string describe(const Board& board);
 

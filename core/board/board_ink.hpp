@@ -18,12 +18,12 @@ struct InkRectangle {
 
 /// A black disc on a board, mm in the board's frame.
 struct InkDisc {
-  double x_mm = 0;  ///< of its centre
+  double x_mm = 0;  ///< centre of the disc
   double y_mm = 0;
   double diameter_mm = 0;
 };
 
-/// What is black on a board. Shapes do not overlap; those of a marker have sides in common.
+/// Black shapes on a board. Shapes do not overlap; those of a marker have sides in common.
 struct BoardInk {
   std::vector<InkRectangle> rectangles;
   std::vector<InkDisc> discs;

@@ -8,7 +8,7 @@ namespace slsd {
 
 /// An image in the two forms that boards are looked for in.
 struct BoardPhoto {
-  Image<float> light;  ///< in the image's own levels, to measure in
+  Image<float> light;  ///< levels of the image itself, to measure in
   Grey8 grey;          ///< stretched from its darkest to its brightest hundredth, to search in
   double full = 255;   ///< level of a saturated pixel
 };

@@ -23,7 +23,7 @@ constexpr double kOwnVariancePx2 = 0.25;  // what reading between pixels, a pixe
 struct Pixel {
   Eigen::Vector2d at;
   double level;
-  double distance;  ///< from the centre on the board, of the radius
+  double distance;  ///< distance from the centre on the board, of the radius
 };
 
 std::vector<Pixel> pixels_about(const Image<float>& light, const Homography& local, const Eigen::Vector2d& centre_mm,

@@ -13,7 +13,7 @@ namespace slsd {
 
 /// A black disc on white, as seen.
 struct Disc {
-  Eigen::Vector2d centroid;  ///< of the ellipse, by grey levels
+  Eigen::Vector2d centroid;  ///< centroid of the ellipse, by grey levels
   double step = 0;           ///< white less black, levels
   double blur_px = 0;        ///< one standard deviation at its edge
 };
@@ -25,7 +25,7 @@ struct Disc {
 [[nodiscard]] std::optional<Disc> measure_disc(const Image<float>& light, const Homography& local,
                                                const Eigen::Vector2d& centre_mm, double radius_mm, double clear_mm);
 
-/// Where the centre of the ellipse lies that a disc is seen as, less where the disc's centre is seen.
+/// Vector from the image of a disc's centre to the centre of the ellipse that is its outline.
 /// @return px
 /// @thread reentrant
 [[nodiscard]] Eigen::Vector2d perspective_bias(const Homography& local, const Eigen::Vector2d& centre_mm,

@@ -16,7 +16,7 @@ namespace slsd {
 namespace {
 
 constexpr int kLeastSidePx = 16;
-/// Of a picture's pixels at full level: a reflection on a board is some of them at least.
+/// Share of a picture's pixels at full level that a reflection on a board makes at least.
 constexpr double kClippedShare = 0.01;
 
 double full_share(const BoardPhoto& photo) {

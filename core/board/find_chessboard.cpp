@@ -41,8 +41,8 @@ cv::Mat reduced(const cv::Mat& image, double scale) {
   return small;
 }
 
-/// Whether there are far more bright patches than a board has squares, as of the projected pattern. The search by
-/// squares does not come to an end with them in any time.
+/// Tells whether there are far more bright patches than a board has squares, as in the projected pattern. The search by
+/// squares would not end with them in any reasonable time.
 bool is_crowded(const Grey8& image, const Board& board) {
   constexpr int kAround = 31, kBrighter = 5, kLeastPx = 12, kOthersMax = 200;
   cv::Mat bright, labels, statistics, centres;
@@ -83,7 +83,7 @@ std::vector<Eigen::Vector2d> search(const Grey8& image, const Board& board, bool
 struct Part {
   int columns = 0;
   int rows = 0;
-  bool at_edge = false;  ///< of the image
+  bool at_edge = false;  ///< touches the edge of the image
 };
 
 // The largest chessboard of any size that is seen.

@@ -18,13 +18,13 @@ using Quad = std::array<Eigen::Vector2d, 4>;
 
 struct SeenMarker {
   int id = 0;
-  Quad corners;  ///< from the marker's own top left
+  Quad corners;  ///< first the marker's own top left
 
-  [[nodiscard]] double side_px() const;  ///< of its shortest side
+  [[nodiscard]] double side_px() const;  ///< length of its shortest side
 };
 
 struct SeenMarkers {
-  std::vector<SeenMarker> markers;  ///< by ascending id, each id once
+  std::vector<SeenMarker> markers;  ///< ascending ids, each id once
   std::vector<Quad> unknown;        ///< dark quadrangles that are none of the family's markers
 };
 

@@ -11,8 +11,8 @@ namespace slsd {
 struct MarkerFamily {
   std::string_view name;
   int opencv_number;  ///< cv::aruco::PREDEFINED_DICTIONARY_NAME
-  int bits;           ///< to a side, without the black border of one cell
-  int count;          ///< of markers
+  int bits;           ///< bits to a side, without the black border of one cell
+  int count;          ///< number of markers
 
   /// Cells to a marker's side, its black border with it.
   [[nodiscard]] constexpr int cells() const { return bits + 2; }
@@ -26,7 +26,7 @@ struct MarkerFamily {
 /// @thread reentrant
 [[nodiscard]] const MarkerFamily* find_marker_family(std::string_view name);
 
-/// Whether a cell of a marker is black; cell (0, 0) is the top left of its border.
+/// Tells whether a cell of a marker is black; cell (0, 0) is the top left of its border.
 /// @param id      0 to family.count - 1
 /// @param column  0 to family.cells() - 1, as is row
 /// @thread reentrant

@@ -22,7 +22,7 @@ struct MeasuredPoint {
 /// @thread reentrant
 [[nodiscard]] BoardSighting summarise(std::vector<MeasuredPoint> points, const BoardPhoto& photo, const Board& board);
 
-/// Whether points are at least `least` and span the plane: not all in one row or one column of it.
+/// Tells whether points are at least `least` and span the plane: not all in one row or one column of it.
 /// @thread reentrant
 [[nodiscard]] bool span_a_plane(const std::vector<MeasuredPoint>& points, const Board& board, std::size_t least);
 

@@ -82,7 +82,7 @@ double model(const Vector& p, const Eigen::Vector2d& at, Vector& gradient) {
   return albedo * light;
 }
 
-/// What the model leaves of each sample, by the root of its weight: as Ceres' small solver asks for it.
+/// Residuals of the model at each sample, times the root of its weight: as Ceres' small solver asks for it.
 struct Residuals {
   using Scalar = double;
   enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = kParameters };  // NOLINT: Ceres' names

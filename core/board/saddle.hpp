@@ -10,11 +10,11 @@
 
 namespace slsd {
 
-/// Where a chessboard's inner corner is thought to be, with the steps to the next corners on the board.
+/// Expected place of a chessboard's inner corner, with the steps to the next corners on the board.
 struct SaddleGuess {
   Eigen::Vector2d pixel;
-  Eigen::Vector2d right;  ///< to the next corner to the right on the board, px
-  Eigen::Vector2d down;   ///< to the next corner below, px
+  Eigen::Vector2d right;  ///< step to the next corner to the right on the board, px
+  Eigen::Vector2d down;   ///< step to the next corner below, px
 
   /// Distance from the corner to the nearer of the next edges, px.
   [[nodiscard]] double square_px() const;

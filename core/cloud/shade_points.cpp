@@ -11,10 +11,10 @@ namespace {
 
 constexpr double kSaturated = 0.985;  // of full: noise and the sensor's own unevenness keep some pixels below
 
-/// What an image has at a place between four pixels.
+/// Levels of an image at a place between four pixels.
 struct Sample {
   double level = 0;    ///< between them
-  double highest = 0;  ///< of the four
+  double highest = 0;  ///< highest of the four
 };
 
 template <class T>

@@ -11,7 +11,7 @@
 
 namespace slsd {
 
-/// What a camera saw besides the pattern. Of the size and depth of its other frames.
+/// Frames of a camera without the pattern, of the size and depth of its other frames.
 struct SceneLight {
   std::optional<GreyView> white;  ///< while the projector showed white
   std::optional<GreyView> dark;   ///< and black: the light of the room alone

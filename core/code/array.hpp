@@ -23,10 +23,10 @@ struct CodeArray {
   int columns = 0;
   int letters = 0;
   std::vector<std::uint8_t> cells;
-  /// What minimum_window_distance() found when the array was made or read, turned windows included where they were
-  /// asked for; 0 where nobody looked. Computing it takes seconds for the largest arrays.
+  /// Result of minimum_window_distance() when the array was made or read, with turned windows if they were asked for; 0
+  /// if it was not computed. Computing it takes seconds for the largest arrays.
   int minimum_distance = 0;
-  /// What repeat_free_reach() found along rows, in columns, and along columns, in rows; 0 unless the array was made or
+  /// Results of repeat_free_reach() along rows, in columns, and along columns, in rows. 0 unless the array was made or
   /// read as ArrayMethod::kNoRepeats.
   int row_reach = 0, column_reach = 0;
 
@@ -40,7 +40,7 @@ enum class ArrayMethod {
   kNoRepeats,     ///< the same, and no run of letters recurs nearby in its row or column (core/code/runs.hpp)
 };
 
-/// As in a pattern file or the configuration: "paper", "constructive", "no_repeats".
+/// Names a method as in a pattern file or the configuration: "paper", "constructive", "no_repeats".
 [[nodiscard]] std::string_view to_string(ArrayMethod method);
 
 struct ArrayOptions {

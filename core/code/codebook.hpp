@@ -25,7 +25,7 @@ class Codebook {
  public:
   struct Entry {
     std::uint32_t key;
-    std::int16_t row, column;  ///< of the window's middle cell; row -1: an empty slot
+    std::int16_t row, column;  ///< cell in the window's middle; row -1: an empty slot
   };
 
   /// @param rows, columns  the part of the array that is shown

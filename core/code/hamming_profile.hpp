@@ -14,7 +14,7 @@ enum class Windows {
   kOverlapping,  ///< at every cell, as the decoder meets them
 };
 
-/// How many pairs of an array's windows differ in how many cells.
+/// Numbers of an array's pairs of windows by the number of cells that differ.
 struct HammingProfile {
   std::array<std::int64_t, kWindowCells + 1> pairs{};  ///< by distance, 0 to 9
 

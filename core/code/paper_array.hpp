@@ -17,7 +17,8 @@ namespace slsd {
 [[nodiscard]] std::optional<CodeArray> draw_paper_array(int rows, int columns, int letters, std::uint32_t seed,
                                                         int draws);
 
-/// Whether the aligned, non-overlapping 3x3 windows of an array differ pairwise: all that the paper's method promises.
+/// Tells whether the aligned, non-overlapping 3x3 windows of an array differ pairwise: all that the paper's method
+/// promises.
 /// @thread reentrant
 [[nodiscard]] bool aligned_windows_differ(const CodeArray& array);
 

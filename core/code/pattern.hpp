@@ -20,7 +20,7 @@ inline constexpr int kMinProjectorHeightPx = 360;
 inline constexpr int kMaxProjectorHeightPx = 2160;
 inline constexpr int kMaxSpacingPx = 16;
 
-/// What determines a pattern. The keys of the configuration's [pattern] table, and the projector's size.
+/// Options that determine a pattern: the keys of the configuration's [pattern] table, and the projector's size.
 struct PatternOptions {
   int projector_width_px = 1280;  ///< 640 to 3840
   int projector_height_px = 800;  ///< 360 to 2160

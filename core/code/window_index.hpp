@@ -16,7 +16,7 @@ using PackedWindow = std::uint64_t;
 /// The window turned by 180 degrees.
 [[nodiscard]] PackedWindow half_turned(PackedWindow window);
 
-/// In how many cells two windows differ.
+/// Counts the cells in which two windows differ.
 [[nodiscard]] int cells_that_differ(PackedWindow a, PackedWindow b);
 
 /// Windows, kept so that "is any of them closer than d?" is quick. Two words of nine letters that differ in fewer than

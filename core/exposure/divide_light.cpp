@@ -18,7 +18,8 @@
 namespace slsd {
 namespace {
 
-/// What light is trusted: of the brightest of the white image, and in standard deviations of its noise.
+/// Limits of the light that is trusted: as a share of the white image's brightest, in standard deviations of its noise,
+/// and in levels.
 constexpr float kFaintShare = 0.02F, kFaintSigma = 4, kFaintLevels = 2;
 
 float full_of(const GreyView& image) {
@@ -118,7 +119,7 @@ Result<> check_sizes(const GreyView& pattern, const GreyView& white, const std::
   return {};
 }
 
-/// What light is trusted, in levels of the white image.
+/// Limit of the light that is trusted, in levels of the white image.
 float faint_light(const GreyView& white, const FrameNoise& noise) {
   return std::max({kFaintLevels, kFaintShare * brightest(white), kFaintSigma * noise.at(0)});
 }
@@ -160,7 +161,7 @@ struct DividedRow {
   std::vector<float> light, share;
 };
 
-/// Where the quotient of a pixel comes from, moved back along one axis; by half the differences of its neighbours.
+/// Change of a pixel's quotient when its place moves back along one axis, by half the differences of its neighbours.
 float moved_back(float variance, float light, float light_before, float light_after, float before, float after,
                  float faint) {
   if (light_before < faint || light_after < faint) return 0;

@@ -25,7 +25,7 @@ inline constexpr double kAsBrightAsWhite = 50000, kQuotientFull = 65535;
 [[nodiscard]] Result<Grey16> divide_light(const GreyView& pattern, const GreyView& white,
                                           const std::optional<GreyView>& dark = std::nullopt);
 
-/// What is known of a surface with a print on it, whose edges are sharp.
+/// Known properties of a surface with a print on it, whose edges are sharp.
 struct PrintedSurface {
   std::function<bool(int x, int y)> contains;  ///< the pixels that show it
   double blur_px = 0;  ///< one standard deviation of the blur at the print's edges; 0: not known
@@ -33,8 +33,8 @@ struct PrintedSurface {
 
 struct DividedPrint {
   Grey16 quotient;
-  /// Of the quotient on the print's ink. On paper there is less at the same level: it cannot be measured in the
-  /// quotient by its levels.
+  /// Noise of the quotient on the print's ink. On paper there is less at the same level: the quotient's levels cannot
+  /// show it.
   FrameNoise noise;
 };
 

@@ -12,7 +12,7 @@
 
 namespace slsd {
 
-/// What another exposure or gain cannot mend.
+/// Troubles that another exposure or gain cannot mend.
 enum class Trouble {
   kNoPattern,       ///< the pattern is not seen
   kTooMuchLight,    ///< clipped even with the shortest exposure that suits the projector, and no gain
@@ -20,17 +20,17 @@ enum class Trouble {
   kAmbient,         ///< between the symbols it is nearly as bright as on them
   kBlurred,         ///< the symbols' edges run into one another
   kNoisy,           ///< between frames pixels change nearly as much as the symbols stand out
-  kUneven,          ///< what is near is clipped, or what is far is dark: no exposure suits both
+  kUneven,          ///< near parts are clipped, or far parts are dark: no exposure suits both
   kMoves,           ///< the scene moves, so that a longer exposure blurs it
   kFlickers,        ///< the brightness changes from frame to frame
 };
 
 /// "ambient", as in the JSON of slsctl exposure.
 [[nodiscard]] std::string_view to_string(Trouble trouble);
-/// What to do about it, a sentence or two.
+/// Remedy for a trouble, in a sentence or two.
 [[nodiscard]] std::string_view remedy(Trouble trouble);
 
-/// What a camera exposed with.
+/// Setting with which a camera exposed.
 struct ExposureSetting {
   double exposure_us = 0;
   double gain_db = 0;
@@ -38,15 +38,15 @@ struct ExposureSetting {
 
 struct ExposureLimits {
   LightPeriods periods;
-  double exposure_max_us = 100'000;  ///< what moves is smeared over that time
+  double exposure_max_us = 100'000;  ///< longest exposure: moving things are smeared over that time
   double gain_max_db = 24;           ///< noise grows with it
 };
 
-/// What to set.
+/// Advice on the setting.
 struct ExposureAdvice {
-  double brighter = 1;      ///< how much more light, or gain, brings the symbols to where they belong
+  double brighter = 1;      ///< factor of light, or gain, that brings the symbols to their right level
   bool look_again = false;  ///< clipped: how far above cannot be seen, so set this and look again
-  std::optional<ExposureSetting> setting = {};  ///< where the present one is known
+  std::optional<ExposureSetting> setting = {};  ///< new setting, if the present one is known
   std::vector<Trouble> troubles = {};
 };
 

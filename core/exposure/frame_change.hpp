@@ -6,13 +6,13 @@
 
 namespace slsd {
 
-/// What changed between two frames of a scene that should have stayed.
+/// Changes between two frames of a scene that should have stayed.
 struct FrameChange {
   double noise = 0;        ///< one standard deviation of a pixel, where nothing moved
-  double moved_share = 0;  ///< of the tiles, 64 px wide, those in which more than noise changed; 0 to 1
-  double brighter = 1;     ///< how much brighter the second is than the first, over the whole frame
+  double moved_share = 0;  ///< share of the tiles, 64 px wide, that changed beyond noise; 0 to 1
+  double brighter = 1;     ///< brightness of the second over the first, over the whole frame
 
-  /// How far apart the brightness of both is, as a share. @return 0 and more
+  /// Difference between the brightness of both, as a share. @return 0 and more
   [[nodiscard]] double flicker() const { return brighter > 1 ? brighter - 1 : 1 / brighter - 1; }
 };
 

@@ -17,7 +17,7 @@ struct FrameNoise {
   [[nodiscard]] __attribute__((always_inline)) float at(float level) const {
     return std::sqrt(dark_variance + variance_per_level * (level > 0 ? level : 0));
   }
-  /// Of a frame with that many of its levels to one of this, and so much of the noise.
+  /// Scales to a frame with that many levels for one of this frame, and with this share of the noise.
   [[nodiscard]] FrameNoise scaled(float levels, float share = 1) const {
     return {dark_variance * levels * levels * share * share, variance_per_level * levels * share * share};
   }

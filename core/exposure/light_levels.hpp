@@ -8,7 +8,7 @@
 
 namespace slsd {
 
-/// How the pattern's light arrives in a frame. Levels are the frame's own, 0 to `full`.
+/// Levels of the pattern's light in a frame, in the frame's own units, 0 to `full`.
 ///
 ///     full  ------------------------------------
 ///     lit   ......_____......._____.............   symbols; where clipped, at full
@@ -16,15 +16,15 @@ namespace slsd {
 ///     dark  _____|     |_____|     |____________   between them: light of the room, and what the scene scatters
 ///     0     ------------------------------------
 struct LightLevels {
-  double full = 255;           ///< of a saturated pixel
+  double full = 255;           ///< level of a saturated pixel
   double dark = 0;             ///< between the symbols, in the middle of all tiles
-  double lit = 0;              ///< of the symbols, in the middle of all tiles
-  double lit_brightest = 0;    ///< of the symbols in the brightest twentieth of the tiles
-  double lit_faintest = 0;     ///< of the symbols in the faintest twentieth
-  double clipped_share = 0;    ///< of the tiles, those whose symbols are clipped; 0 to 1
+  double lit = 0;              ///< level of the symbols, in the middle of all tiles
+  double lit_brightest = 0;    ///< level of the symbols in the brightest twentieth of the tiles
+  double lit_faintest = 0;     ///< level of the symbols in the faintest twentieth
+  double clipped_share = 0;    ///< share of the tiles whose symbols are clipped; 0 to 1
   double edge_px = 0;          ///< one standard deviation of the blur at the symbols' edges; a sharp edge has about 0.8
-  double period_px = 0;        ///< from one symbol's edge to the next's on the same side, along rows
-  double patterned_share = 0;  ///< of the tiles, those in which the pattern is seen; 0 to 1. Where it is 0 nothing
+  double period_px = 0;        ///< distance from one symbol's edge to the next's on the same side, along rows
+  double patterned_share = 0;  ///< share of the tiles in which the pattern is seen; 0 to 1. If it is 0, nothing
                                ///< above but `full` is known
 
   [[nodiscard]] double contrast() const { return lit - dark; }

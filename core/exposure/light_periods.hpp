@@ -7,18 +7,19 @@
 
 namespace slsd {
 
-/// What changes in the light while a camera exposes.
+/// Periods of the light that changes while a camera exposes.
 struct LightPeriods {
-  double refresh_hz = 60.0;  ///< of the projector, whose micromirrors write grey and colour one after the other within
-                             ///< a frame; 0: it lights steadily
-  double power_line_hz = 0.0;  ///< of the lamps around, which are brightest twice a period; 0: none, or not known
+  double refresh_hz = 60.0;    ///< rate of the projector: its micromirrors write grey and colour in turn within
+                               ///< a frame; 0: it lights steadily
+  double power_line_hz = 0.0;  ///< frequency of the mains for the lamps, which are brightest twice
+                               ///< a period; 0: none, or not known
 
   [[nodiscard]] double projector_us() const { return refresh_hz > 0 ? 1e6 / refresh_hz : 0.0; }  ///< 0: none
   [[nodiscard]] double lamps_us() const { return power_line_hz > 0 ? 0.5e6 / power_line_hz : 0.0; }
 };
 
-/// How an exposure suits the light. Where it lasts n whole periods and a part, the light that the part catches depends
-/// on when the exposure began, and so the brightness varies from frame to frame. Up to 1 % is borne.
+/// Fit of an exposure to the light. If it lasts n whole periods and a part, the light in that part depends on when the
+/// exposure began. The brightness then varies from frame to frame. Up to 1 % is accepted.
 struct ExposureFit {
   bool projector = true;
   bool lamps = true;

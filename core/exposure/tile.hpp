@@ -11,7 +11,7 @@ namespace slsd {
 
 inline constexpr int kTilePx = 64;
 
-/// What a tile of a frame shows of the pattern. Levels as in LightLevels.
+/// Levels of the pattern in a tile of a frame, as in LightLevels.
 struct TileLevels {
   double dark = 0;
   double lit = 0;

@@ -34,11 +34,11 @@ struct CalibratedCamera {
   RigidTransform rig_from_camera;  ///< the identity for the first camera
 };
 
-/// What calibrating found out about itself; all of it optional in the file.
+/// Results of calibrating that describe its quality; all of them optional in the file.
 struct CalibrationReport {
   std::optional<double> reprojection_error_camera_px;
   std::optional<double> reprojection_error_projector_px;
-  std::optional<double> held_out_error_px;  ///< of symbols in poses held out, root mean square, in the camera
+  std::optional<double> held_out_error_px;  ///< error of symbols in held-out poses, root mean square, in the camera
   std::optional<std::string> verdict;       ///< "good", "usable" or "bad"
   /// One standard deviation of fx fy cx cy k1 k2 p1 p2 k3, 0 where a term took no part; 9, or empty.
   std::vector<double> projector_sigma;

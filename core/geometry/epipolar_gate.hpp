@@ -12,9 +12,9 @@
 
 namespace slsd {
 
-/// Where a camera pixel's point may be seen by the projector: the part of the epipolar line within the working depth.
-/// In undistorted, normalised projector coordinates it is exactly straight; distances are in projector px, scaled by
-/// the focal lengths (not by the distortion's local magnification, a few percent at the border).
+/// Segment in which the projector may see a camera pixel's point: the part of the epipolar line within the working
+/// depth. In undistorted, normalised projector coordinates it is exactly straight. Distances are in projector px,
+/// scaled by the focal lengths (not by the distortion's local magnification, a few percent at the border).
 ///
 ///     depth_max ───┬──────────●───────┬─── depth_min     residual_px: signed distance of ● from the line
 ///                  far end          near end              along_px: place on the line
@@ -28,7 +28,7 @@ class EpipolarSegment {
   [[nodiscard]] double along_px(const Eigen::Vector2d& projector_direction) const {
     return axis_.dot(projector_direction);
   }
-  /// Whether a projector direction lies within tolerance_px of the segment's line, and between its ends.
+  /// Tells whether a projector direction lies within tolerance_px of the segment's line, and between its ends.
   [[nodiscard]] bool passes(const Eigen::Vector2d& projector_direction, double tolerance_px) const {
     const double residual = residual_px(projector_direction);
     const double along = along_px(projector_direction);
@@ -51,7 +51,7 @@ struct RayPairs {
   PixelRays::Column camera_x, camera_y, projector_x, projector_y;
 };
 
-/// What segments are made from.
+/// Quantities that segments are made from.
 struct EpipolarRig {
   RigidTransform projector_from_camera;
   Eigen::Matrix3d line_from_camera;  ///< the essential matrix

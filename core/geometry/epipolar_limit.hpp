@@ -7,7 +7,7 @@
 
 namespace slsd {
 
-/// From how far off their epipolar lines on, in projector px, symbols say that the rig is not as it was calibrated.
+/// Distance of symbols from their epipolar lines, projector px, from which on the rig is not as it was calibrated.
 /// @param expected_px  what the calibration says of itself; nothing: it does not
 /// @thread reentrant
 [[nodiscard]] constexpr double epipolar_limit_px(std::optional<double> expected_px) {
@@ -22,9 +22,9 @@ namespace slsd {
   return std::max(kLeastPx, kTimes * expected_px.value_or(0));
 }
 
-/// How far off its epipolar line a symbol is still taken for what it seems: as far as a rig may be off that is as it
-/// was calibrated, and as a symbol may be off by itself. Wider than the limit, so that a rig beyond it still gives
-/// points that show it.
+/// Largest distance from its epipolar line at which a symbol is still accepted, projector px. It is the sum of the
+/// error that a calibrated rig may have and of a symbol's own error. It exceeds the limit, so that a rig beyond the
+/// limit still gives points that show it.
 /// @thread reentrant
 [[nodiscard]] constexpr double epipolar_gate_px(std::optional<double> expected_px) {
   constexpr double kSymbolPx = 1;

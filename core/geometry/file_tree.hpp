@@ -20,12 +20,12 @@ struct FileNode {
   std::vector<std::pair<std::string, FileNode>> entries{};
   std::vector<FileNode> items{};
 
-  /// What the key of this map holds; null if it is not there or holds nothing.
+  /// Value of this map's key; null if it is not there or holds nothing.
   [[nodiscard]] const FileNode* find(std::string_view key) const;
 };
 
 struct SyntaxProblem {
-  int line;  ///< from 1
+  int line;  ///< first line is 1
   std::string message;
 };
 

@@ -11,7 +11,7 @@ namespace slsd {
 /// The perspective map of one plane onto another: px or mm on either.
 /// @thread reentrant
 struct Homography {
-  Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();  ///< of homogeneous points
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();  ///< maps homogeneous points
 
   [[nodiscard]] Eigen::Vector2d map(const Eigen::Vector2d& point) const;
   /// The map's derivative there: one column for x and one for y.

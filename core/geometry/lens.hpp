@@ -44,7 +44,7 @@ struct Lens {
   [[nodiscard]] Eigen::Matrix2d distort_jacobian(const Eigen::Vector2d& normalised) const;
   /// Normalised, undistorted direction of a pixel: Newton's method to 1e-12.
   [[nodiscard]] Eigen::Vector2d undistort(const Eigen::Vector2d& pixel) const;
-  /// Whether the distortion can be inverted everywhere in the image.
+  /// Tells whether the distortion can be inverted everywhere in the image.
   [[nodiscard]] bool invertible() const;
 
   friend bool operator==(const Lens&, const Lens&) = default;

@@ -24,7 +24,7 @@ struct PixelRays {
   using Column = std::array<double, kAtOnce>;
   Column u, v;            ///< pixels
   Column x, y;            ///< directions
-  Column xx, xy, yx, yy;  ///< how they turn
+  Column xx, xy, yx, yy;  ///< turns of the directions
 
   [[nodiscard]] PixelRay at(std::size_t i) const {
     Eigen::Matrix2d turn;

@@ -61,7 +61,7 @@ RayTable::RayTable(const Lens& lens)
   refines_ = error_between_nodes() > kErrorMax;
 }
 
-/// Of one step, at the places farthest from the nodes, where the estimate is worst.
+/// Error of one step, at the places farthest from the nodes: there the estimate is worst.
 double RayTable::error_between_nodes() const {
   double error = 0;
   for (int row = 0; row + 1 < rows_; ++row) {

@@ -157,7 +157,7 @@ std::optional<Error> read_cameras(const std::vector<FileNode>& items, std::strin
   return std::nullopt;
 }
 
-/// Of which other kind of calibration the file is, and what to do; empty: of none that is known.
+/// Names the other kind of calibration that the file is, and what to do; empty: no known kind.
 std::string other_kind(const FileNode& root) {
   constexpr const char* kWanted =
       ": slsd takes one calibration of camera and projector together, in OpenCV's YAML with k1 k2 p1 p2 k3, which slsd "
@@ -175,7 +175,7 @@ std::string other_kind(const FileNode& root) {
   return of_opencv ? std::string("is a calibration of cameras alone") + kWanted : std::string();
 }
 
-/// What the file holds that is not read as YAML, by its first character; null if it may be YAML.
+/// Names the syntax of a file that is no YAML, by its first character; null if it may be YAML.
 const char* other_syntax(std::string_view text) {
   const std::size_t first = text.find_first_not_of(" \t\r\n\xef\xbb\xbf");
   if (first == text.npos) return "nothing";

@@ -29,7 +29,7 @@ template <std::ranges::random_access_range Values>
   return median_in_place(values);
 }
 
-/// What is usual among many values: the median of a thousand of them at the most, evenly taken.
+/// Usual value among many: the median of at most a thousand of them, evenly taken.
 /// @param value_at  from a place, 0 to count - 1, to its value
 /// @thread reentrant
 template <class ValueAt>
@@ -45,7 +45,7 @@ template <class ValueAt>
 /// A normal distribution's standard deviation over the median of its absolute values.
 inline constexpr double kSigmaOfMedian = 1.4826;
 
-/// What counts of a value that is so far off, 1 to 0: a quarter at the scale, next to nothing far beyond it.
+/// Weight of a value at a distance, 1 to 0: a quarter at the scale, next to nothing far beyond it.
 [[nodiscard]] inline double robust_weight(double off, double scale) {
   const double ratio = off / scale, by = 1 + ratio * ratio;
   return 1 / (by * by);

@@ -10,7 +10,7 @@
 
 namespace slsd {
 
-/// What points are made from.
+/// Quantities that points are made from.
 struct TriangulationRig {
   RigidTransform projector_from_camera;
   Eigen::Array2d camera_focal_px, per_camera_focal_px, projector_focal_px;

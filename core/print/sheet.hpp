@@ -28,8 +28,8 @@ namespace slsd {
 struct Sheet {
   Board board;
   Paper paper;
-  Eigen::Vector2d origin_mm = Eigen::Vector2d::Zero();  ///< of the board's frame, from the paper's top left
-  double clear_mm = 0;                                  ///< of white between the board and the rulers
+  Eigen::Vector2d origin_mm = Eigen::Vector2d::Zero();  ///< origin of the board's frame, from the paper's top left
+  double clear_mm = 0;                                  ///< width of white between the board and the rulers
 };
 
 /// Lays a board out on paper, on whichever side it fits; true to scale always.
