@@ -316,7 +316,7 @@ void call_step(const std::uint16_t* const* pixels, const EightWindows& of, Eight
   Cloned<step_of_words>::call(pixels, of, eight);
 }
 
-/// Near the mean of what a window sees, from its diagonals.
+/// Estimates the mean of a window from its diagonals.
 template <class T>
 float level_of(const ImageView<T>& frame, const PatchTask& task, int half) {
   float sum = 0;

@@ -24,7 +24,7 @@ namespace slsd {
 struct PatchMap {
   Eigen::Matrix3f base;       ///< columns: of x, of y, of 1; at the reference depth
   Eigen::Vector3f shift;      ///< change of q by a disparity of 1
-  Eigen::Vector2f middle_px;  ///< in the camera
+  Eigen::Vector2f middle_px;  ///< middle of the window in the camera
   Eigen::Vector2i origin_px;  ///< p is taken from there: floats are exact enough near it
   Eigen::Vector2f along;      ///< unit vector in which p moves with the disparity
   double reference_inverse_depth = 0, inverse_depth_per_px = 0;  ///< 1/mm
@@ -56,7 +56,7 @@ struct PatchState {
 /// Pixels of the camera to align.
 struct PatchWindow {
   int left, top, width, height;
-  /// Only what lies this near to the square's middle counts, in projector px along both axes.
+  /// Square of the pattern that counts, around this middle and with this half side, in projector px along both axes.
   Eigen::Vector2f square_middle_px = Eigen::Vector2f::Zero();
   float square_half_px = 1e6F;
 };

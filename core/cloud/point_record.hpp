@@ -37,7 +37,7 @@ inline constexpr std::array<PointField, 13> kPointFields{{{"x", "float", 4, 'F',
 
 /// Bytes of one point in a PLY: the fields in their order, little endian, nothing between them.
 inline constexpr std::size_t kPointBytes = 43;
-/// And in a PCD, where intensity is a float: PCL's PointXYZI takes no other.
+/// Bytes of one point in a PCD, where intensity is a float: PCL's PointXYZI takes no other.
 inline constexpr std::size_t kPcdPointBytes = 46;
 
 /// Appends the kPointBytes of a point.

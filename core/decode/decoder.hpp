@@ -27,7 +27,7 @@ struct DecodedSymbols {
   const Lattice* lattice;
   std::span<const PixelRay> rays;     ///< one to a symbol: that of its centre
   std::span<const double> depths_mm;  ///< one to a symbol, along the camera's z axis, as triangulated from its centre
-  FrameNoise noise;                   ///< of the frame
+  FrameNoise noise;                   ///< noise of the frame
 };
 
 /// Reads frames of one camera that see one pattern. Keeps its buffers from frame to frame: nothing is allocated once

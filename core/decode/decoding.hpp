@@ -85,7 +85,7 @@ struct Decoding {
   [[nodiscard]] std::uint32_t count(RegionStatus status) const { return counts[static_cast<std::size_t>(status)]; }
 };
 
-/// Is told of each stage as it ends; the daemon times stages with it, as core has no clocks.
+/// Observer of a decoder's stages, called as each ends. The daemon times stages with it, as core has no clocks.
 class StageObserver {
  public:
   virtual ~StageObserver() = default;

@@ -24,7 +24,8 @@ constexpr int kTurns = 12;
 /// A scale is likely where shapes of a symbol's size cover this part at least of what they cover at the best of all:
 /// specks are many, but small.
 constexpr double kFewOfMany = 4;
-/// So many symbols on one plane do not agree by chance; of another pattern some in a hundred are read, all over.
+/// Numbers of symbols on one plane that do not agree by chance; of another pattern some in a hundred are read, all
+/// over.
 constexpr std::size_t kCertain = 40, kLeast = 12;
 /// The share of symbols that has to lie within this part of a cell from where the plane of the others puts them.
 constexpr double kAgreeingShare = 0.6, kAgreeingCells = 0.6;
@@ -34,7 +35,7 @@ constexpr double kWrongCellsMax = 0.075;
 /// Ratio to the scale that a reader was made for up to which it is still used.
 constexpr double kSameScale = 1.12;
 
-/// Nothing needs the projector's lens before there is a calibration; the cells' pixels do not depend on it.
+/// Makes a lens that stands for the projector's before there is a calibration; the cells' pixels do not depend on it.
 Lens any_lens(const PatternOptions& options) {
   return {.width_px = options.projector_width_px,
           .height_px = options.projector_height_px,

@@ -48,7 +48,7 @@ struct DenseMap {
     const std::size_t count = static_cast<std::size_t>(width) * height;
     depth_mm.resize(count), sigma_mm.resize(count), intensity.resize(count), pixels.resize(count), firm.resize(count);
   }
-  /// Nothing is measured in these rows. @param end  beyond the last
+  /// Clears these rows: nothing is measured there. @param end  beyond the last
   void clear_rows(int first, int end) {
     const auto clear = [&](auto& values, auto none) {
       std::fill(values.begin() + static_cast<std::ptrdiff_t>(first) * width,

@@ -21,7 +21,7 @@ constexpr int kWindowLeastPx = 11, kWindowMostPx = 21;
 /// Number of the sharpest blurs that a projector and a camera in focus reach.
 constexpr int kUsualBlurs = 4;
 
-/// No smaller than the stride: every pixel is seen by some node.
+/// Side of a window. It is no smaller than the stride: every pixel is seen by some node.
 int window_px(double pitch_in_camera_px, int stride_px) {
   const int px = static_cast<int>(std::lround(kWindowOfPitch * pitch_in_camera_px - kWindowLessPx));
   return std::clamp(px, std::max(kWindowLeastPx, stride_px), kWindowMostPx) | 1;

@@ -23,7 +23,7 @@ enum class DenseStage : std::uint8_t { kFindBlur, kGrow, kSearch, kFuse, kJudge,
 inline constexpr int kDenseStageCount = 6;
 [[nodiscard]] std::string_view to_string(DenseStage stage);
 
-/// Is told of each stage as it ends.
+/// Observer of a mapper's stages, called as each ends.
 class DenseObserver {
  public:
   virtual ~DenseObserver() = default;

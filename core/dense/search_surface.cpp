@@ -19,13 +19,13 @@ constexpr double kBeyondPx = 32;
 constexpr int kLevelsMost = 320;
 /// Nodes that tell what likeness says: as many as that, and no fewer than this.
 constexpr std::size_t kKnownMost = 256, kKnownLeast = 32;
-/// Nearer to the true depth a window is alike for a reason.
+/// Number of levels around the true depth within which a window is alike for a reason.
 constexpr int kNearLevels = 4;
 /// The share of the windows on a surface that it only touches.
 constexpr double kPartly = 0.2;
 /// All windows at all depths are some e^13 tries, of which one in a thousand frames may be wrong.
 constexpr float kTotalEvidenceMin = 20;
-/// So much more than any other depth, a thousand to one.
+/// Lead over any other depth that a seed needs: a thousand to one.
 constexpr float kGapMin = 7;
 /// Evidence that a step to the next line costs: the depth stays, or moves by a level, one case of three.
 constexpr float kOfStep = 1.1F;

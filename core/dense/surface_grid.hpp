@@ -97,7 +97,7 @@ class SurfaceGrid {
   [[nodiscard]] int stride_px() const { return options_.stride_px; }
   [[nodiscard]] int x_of(int column) const { return first_ + column * options_.stride_px; }
   [[nodiscard]] int y_of(int row) const { return first_ + row * options_.stride_px; }
-  /// Null outside the grid, and where nothing was fitted.
+  /// Returns a good node; null outside the grid, and if nothing was fitted.
   [[nodiscard]] const SurfaceNode* good(int column, int row) const {
     if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return nullptr;
     const SurfaceNode& node = nodes_[static_cast<std::size_t>(row) * columns_ + column];
@@ -129,7 +129,7 @@ class SurfaceGrid {
   /// Row by row. What is good before grow() stays, and is grown from.
   [[nodiscard]] std::span<SurfaceNode> nodes() { return nodes_; }
   [[nodiscard]] std::span<const SurfaceNode> nodes() const { return nodes_; }
-  /// This node need not be tried.
+  /// Marks a node that need not be tried.
   void close(std::size_t node) { attempts_[node] = kClosed; }
   /// Tells whether the node there is good.
   [[nodiscard]] bool good_at(const Eigen::Vector2f& camera_px) const {

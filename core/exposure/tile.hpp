@@ -26,7 +26,8 @@ class Tile {
   /// Takes the tile whose first pixel is (left, top) and which lies inside the frame.
   void take(const GreyView& frame, int left, int top);
 
-  /// Nothing where no pattern is seen: too little contrast, fewer edges than symbols have, or as many as noise has.
+  /// Measures the levels; nothing if no pattern is seen: too little contrast, fewer edges than symbols have, or as many
+  /// as noise has.
   [[nodiscard]] std::optional<TileLevels> measure(double full);
 
  private:

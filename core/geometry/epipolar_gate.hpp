@@ -35,7 +35,7 @@ class EpipolarSegment {
     return (residual <= tolerance_px) & (residual >= -tolerance_px) & (along >= along_min_px_) &
            (along <= along_max_px_);
   }
-  /// No depth of the working range lies in front of the projector.
+  /// Tells whether no depth of the working range lies in front of the projector.
   [[nodiscard]] bool empty() const { return !(along_min_px_ <= along_max_px_); }
 
  private:

@@ -16,7 +16,7 @@ struct TriangulationRig {
   Eigen::Array2d camera_focal_px, per_camera_focal_px, projector_focal_px;
 };
 
-/// Up to PixelRays::kAtOnce camera rays and what each meets, each number in a column.
+/// Matches of up to PixelRays::kAtOnce camera rays, each number in a column.
 struct RayMatches {
   PixelRays camera;                            ///< the pixels have no part
   PixelRays::Column projector_x, projector_y;  ///< directions

@@ -23,7 +23,7 @@ struct BoardReport {
 
   /// The longer side.
   [[nodiscard]] double size_mm() const { return sheet_mm.isEmpty() ? 0 : sheet_mm.sizes().maxCoeff(); }
-  /// Beyond doubt, and by more than a good print is.
+  /// Tells whether the board is bent beyond doubt, and by more than a good print is.
   [[nodiscard]] bool is_bent() const;
   /// Tells whether the poses show if the board is bent.
   [[nodiscard]] bool is_told() const;

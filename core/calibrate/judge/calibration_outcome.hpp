@@ -26,8 +26,8 @@ struct ParameterReport {
 /// A calibration, and how good it is.
 struct CalibrationOutcome {
   Calibration calibration;
-  RigModel rig;               ///< with the poses that were used
-  Observations observations;  ///< those that were used, with the outlying points marked
+  RigModel rig;               ///< holds the used poses
+  Observations observations;  ///< used ones, with the outlying points marked
   std::vector<PoseReport> poses;
   std::vector<ParameterReport> parameters;
   double camera_rms_px = 0;                               ///< board corners in the cameras

@@ -12,10 +12,10 @@ namespace slsd {
 
 enum class Grade { kGood, kUsable, kBad };
 [[nodiscard]] std::string_view to_string(Grade grade);
-/// Nothing: it is the name of none.
+/// Finds the grade of a name; nothing if no grade has it.
 [[nodiscard]] std::optional<Grade> parse_grade(std::string_view name);
 
-/// Up to where a figure is good, and up to where usable.
+/// Limits up to which a figure is good, and up to which it is usable.
 struct Bounds {
   double good, usable;
 };

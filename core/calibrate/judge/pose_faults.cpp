@@ -44,7 +44,7 @@ constexpr double kShownByPrintPx = 5;
 constexpr double kSamePlaceShare = 0.005;
 /// Share of a pose's symbols with something before them; of more it is the board that moved.
 constexpr double kCoveredShare = 0.08, kUncoveredShare = 0.5;
-/// Times the usual error from which on the figure tells nothing more.
+/// Multiple of the usual error from which on the figure tells nothing more.
 constexpr double kTimesTelling = 100;
 /// Share of a pose's points that lie off, from which on nothing else needs to be said.
 constexpr double kHardlyAnyShare = 0.9;

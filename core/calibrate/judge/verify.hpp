@@ -13,7 +13,7 @@
 
 namespace slsd {
 
-/// Up to which figures a calibration still holds.
+/// Limits of the figures up to which a calibration still holds.
 struct VerifyLimits {
   double trueness_percent = 0.2;  ///< limit of the common factor, and of the long distances' errors
   double plane_sigmas = 3;        ///< off the plane, times what the noise of the symbols explains

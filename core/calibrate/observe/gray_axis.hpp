@@ -24,7 +24,7 @@ class GrayAxis {
   /// The middle of the bin that lights a camera pixel, projector px, 0 to a power of two; none where a bit is
   /// uncertain.
   [[nodiscard]] std::optional<double> place_px(const cv::Point& pixel) const;
-  /// Its width, projector px.
+  /// Width of a bin, projector px.
   [[nodiscard]] int bin_px() const;
 
  private:

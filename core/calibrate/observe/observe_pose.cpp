@@ -17,7 +17,7 @@ namespace {
 
 /// Regions of the size of symbols from which on it is a pattern that is seen, though not this one.
 constexpr std::size_t kPatternRegions = 60;
-/// So few symbols of so many shapes agree by chance.
+/// Number of symbols from which on the pattern is certain: fewer of so many shapes agree by chance.
 constexpr std::size_t kSymbolsCertain = 20;
 
 /// Leaves the board and what is near it. Where the projector lights nothing, the quotient is that of two noises, as

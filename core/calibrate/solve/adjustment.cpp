@@ -15,7 +15,7 @@ namespace {
 
 /// Standard deviations from which a point is no part of the rest.
 constexpr double kOutlyingSigmas = 5;
-/// No estimator is better than this, whatever little noise a few points show.
+/// Least deviation of a point: no estimator is better than this, whatever little noise a few points show.
 constexpr double kSigmaMinPx = 0.005;
 /// A print longer one way than the other by this share, beyond doubt.
 constexpr double kStretchMin = 0.001, kStretchSigmas = 5;

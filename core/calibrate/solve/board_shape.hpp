@@ -33,8 +33,8 @@ struct ShapeAt {
   Eigen::Matrix<double, 1, static_cast<int>(kShapeTerms)> by_term;  ///< derivative of the height by the terms
 };
 
-/// Beyond two halves of the longer side from its middle, a shape goes on level, so that rays to anywhere meet it.
-/// A print that is bent by 1.5 mm over 336 mm is 0.003 % shorter than a flat one: that is left out.
+/// Evaluates a shape at a place. Beyond two halves of the longer side from its middle it goes on level, so that rays to
+/// anywhere meet it. A print that is bent by 1.5 mm over 336 mm is 0.003 % shorter than a flat one: that is left out.
 /// @thread reentrant
 [[nodiscard]] ShapeAt shape_at(const double* terms_mm, const ShapeFrame& frame, const Eigen::Vector2d& board_mm);
 

@@ -32,7 +32,7 @@ constexpr double kJudgingShare = 0.6, kNearlyBest = 2;
 /// off still, when its camera's distortion is known, shows no board; a bent or a moved one is off by less, and is told
 /// apart later.
 constexpr double kGrossFactor = 8, kDoubtfulPx = 4, kNoBoardPx = 20;
-/// Between the two boards that face ways the farthest apart.
+/// Least angle between the two boards whose tilts differ most.
 constexpr double kTiltsApartMinDeg = 8;
 constexpr char kTilt[] =
     "hold the board at an angle of 20 to 40 degrees to the camera in most poses, each time towards another side";

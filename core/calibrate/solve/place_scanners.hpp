@@ -20,7 +20,7 @@ namespace slsd {
 struct CloudLook {
   struct Corner {
     int id = 0;                ///< id as in Board::point()
-    Eigen::Vector3d point_mm;  ///< in the scanner's frame
+    Eigen::Vector3d point_mm;  ///< place in the scanner's frame
   };
   std::size_t scanner = 0;
   std::vector<Corner> corners;

@@ -18,7 +18,7 @@ struct SpacePoint {
 };
 
 struct Resection {
-  LensVector lens;  ///< without distortion
+  LensVector lens;  ///< has no distortion
   RigidTransform device_from_points;
 };
 

@@ -55,7 +55,7 @@ struct LetterPlace {
 
 /// One letter in its cell, and what aligning has found.
 struct AskedLetter {
-  std::int32_t node;  ///< in Sightings
+  std::int32_t node;  ///< index in Sightings
   LetterPlace place;
   PatchTask task;
   /// Measured middle of the letter's square, and its centroid, camera px.
@@ -106,10 +106,10 @@ class LetterAligner {
   std::vector<AskedLetter> asked_;
 };
 
-/// Off its epipolar line, projector px, and by the last step along it: what is farther off, or moves on, lies there by
-/// chance.
+/// Limits off its epipolar line, projector px, and of the last step along it: a symbol farther off, or still moving,
+/// lies there by chance.
 inline constexpr float kAlignedAcrossMaxPx = 0.4F, kAlignedSettledPx = 0.05F;
-/// Parts of two surfaces look tilted more, and the place is then on neither.
+/// Largest tilt of an aligned letter. Parts of two surfaces look tilted more, and the place is then on neither.
 inline constexpr float kAlignedTiltMaxPx = 0.5F;
 /// Share of a cell that agrees at least, without pixels that print darkens, unless an edge runs through the cell.
 inline constexpr float kWholeBesidePrintMin = 0.85F;

@@ -29,7 +29,7 @@ constexpr float kUnknownBendPx = 0.015F;
 /// Factors for shapes that are cut, not only worn.
 constexpr float kDamageOfAcross = 0.35F;
 constexpr float kDamageOfMisfitSquared = 0.018F;  // px
-/// Beyond this a neighbour's residual is a fault of its own.
+/// Limit of a neighbour's residual: beyond it the neighbour has a fault of its own.
 constexpr float kAroundMaxPx = 0.3F;
 
 float square(float x) {

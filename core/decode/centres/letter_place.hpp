@@ -10,7 +10,7 @@
 
 namespace slsd {
 
-/// Beside so few a surface may end, or turn away from them.
+/// Number of holders up to which a surface may end beside them, or turn away from them.
 inline constexpr int kFewHolders = 2;
 
 /// The neighbour in a direction that stands for now, on the cell that lies there; -1: none. Its link may be broken, as

@@ -38,7 +38,7 @@ bool is_worn(const CellGate& gate, const Sightings& seen, std::int32_t node) {
   return seen.misfits[node] > kDoubtfulDistance || gate.off_line_px(node, claim.row, claim.column) > kDoubtfulAcrossPx;
 }
 
-/// It lies where those that hold it put it.
+/// Mends the links of a symbol that lies at the place which its holders predict.
 void mend_links(Sightings& seen, std::int32_t node) {
   for (const Direction d : kDirections)
     if (const std::int32_t other = holder_of(seen, node, d); other >= 0)

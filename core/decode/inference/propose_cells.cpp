@@ -51,7 +51,7 @@ CellProposer::Proposal CellProposer::weigh(std::int32_t node, std::int32_t cell)
   return {cell, nats, there >= kCertainLetters && nats >= kCertainShare * log_letters_ * static_cast<float>(there)};
 }
 
-/// Beside the certain cell of a neighbour there is little else to compare.
+/// Proposes the cell beside the certain cell of a neighbour: there is little else to compare.
 /// @param first  from which node on there are proposals
 CellProposer::Proposal CellProposer::continued(const Frame& frame, std::int32_t node, std::int32_t first) const {
   for (const Direction d : {kLeft, kUp}) {

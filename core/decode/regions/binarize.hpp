@@ -45,7 +45,7 @@ class Binarizer {
   void binarize(const GreyView& frame, double full, std::optional<FrameNoise> noise, Mask& mask, Executor& executor);
 
   [[nodiscard]] const BinarizeOptions& options() const { return options_; }
-  /// Between light and dark of what was taken for the pattern in the last frame where the grey level midway was that.
+  /// Least difference between light and dark that counted as the pattern in the last frame, at this grey level midway.
   [[nodiscard]] float contrast_min(float level) const {
     return std::max(contrast_floor_, options_.contrast_min_sigma * noise_.at(level));
   }
@@ -54,8 +54,8 @@ class Binarizer {
   /// One standard deviation of the blur at the sharpest edges of the last frame, from how steep they are between its
   /// tiles' least and greatest values; 0 where there are none.
   [[nodiscard]] float edge_blur_px() const { return edge_blur_px_; }
-  /// Between light and dark of most of what was taken for the pattern in the last frame, in standard deviations of the
-  /// noise midway; 0 if there was none.
+  /// Usual difference between light and dark of the pattern in the last frame, in standard deviations of the noise
+  /// midway; 0 if there was none.
   [[nodiscard]] float usual_contrast_sigma() const { return usual_contrast_sigma_; }
 
  private:

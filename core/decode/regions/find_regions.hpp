@@ -22,7 +22,7 @@ struct alignas(8) Run {
 struct Region {
   int left, top, right, bottom;  ///< its box, the last column and row inside
   int area_px;
-  int first_run, run_count;  ///< in Regions::runs, in raster order
+  int first_run, run_count;  ///< runs in Regions::runs, in raster order
 
   [[nodiscard]] Eigen::Vector2f middle_px() const {
     return {0.5F * static_cast<float>(left + right), 0.5F * static_cast<float>(top + bottom)};

@@ -32,7 +32,7 @@ struct Look {
   bool whole;  ///< no other region in its cell
 };
 
-/// Between light and dark of what is taken apart, of 255 levels.
+/// Least difference between light and dark that is taken apart, of 255 levels.
 constexpr float kContrastMin = 8;
 
 /// Looks at views as the decoder does.

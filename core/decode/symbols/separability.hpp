@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// Under what circumstances symbols are looked at.
+/// Conditions under which symbols are looked at.
 struct LookOptions {
   int symbol_size_px = 16;
   int spacing_px = 2;
@@ -34,12 +34,12 @@ struct SymbolLoss {
   double share;  ///< share of the looks in which it broke into pieces or grew together with a neighbour, 0 to 1
 };
 
-/// Below this a pair is risky. At 4 the Gaussian error is 1 in 30,000, so that even tails ten times as heavy stay
-/// far below the 2 % of symbols misread that a pattern of minimum distance 3 survives.
+/// Distance below which a pair is risky. At 4 the Gaussian error is 1 in 30,000. Even tails ten times as heavy stay far
+/// below the 2 % of symbols misread that a pattern of minimum distance 3 survives.
 inline constexpr double kRiskyDistance = 4.0;
 
-/// Above this a symbol is risky: what is lost is missing in the nine windows around it. The looks are of every tilt
-/// that occurs; a pattern of which each symbol is lost in one of ten still decodes to nine tenths on a sculpture.
+/// Loss above which a symbol is risky: a lost one is missing in the nine windows around it. The looks are of every tilt
+/// that occurs. A pattern of which each symbol is lost in one of ten still decodes to nine tenths on a sculpture.
 inline constexpr double kRiskyLoss = 0.15;
 
 /// Distances between the members of a set of symbols.
