@@ -22,7 +22,7 @@ PAGES = {
             "docs/fleet.md": "Many scanners"},
     "Run": {"docs/supervision.md": "Supervision", "docs/metrics.md": "Metrics"},
     "Understand": {"docs/decoder.md": "The decoder", "docs/reasons.md": "Reasons", "docs/alphabet.md": "The alphabet", "docs/arrays.md": "The arrays",
-                   "docs/architecture.md": "Architecture", "docs/developing.md": "Developing",
+                   "docs/architecture.md": "Architecture", "docs/glossary.md": "Glossary", "docs/developing.md": "Developing",
                    "tests/corpus/README.md": "The corpus", "CHANGELOG.md": "Changes"},
 }
 TEXT_ENDINGS = {".toml", ".hpp", ".cpp", ".py", ""}  # shown as they are
