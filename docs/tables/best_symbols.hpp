@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// What the simulated camera says of all 25 symbols at a size, over blurs of 0.8, 1.1 and 1.4 camera px.
+/// Measurements of the simulated camera on all 25 symbols at a size, over blurs of 0.8, 1.1 and 1.4 camera px.
 struct AlphabetSurvey {
   std::map<std::pair<int, int>, double> distances;  ///< of each pair, at the blur that brings them closest
   std::map<int, double> losses;                     ///< of each symbol, the mean over the blurs
@@ -22,8 +22,8 @@ struct RankedSymbols {
   double smallest_distance;  ///< standard deviations
   double mean_loss;          ///< 0 to 1
 
-  /// What sets are ranked by: the distance of the closest pair less one for each per cent of views in which a symbol is
-  /// lost.
+  /// The merit that ranks sets: the distance of the closest pair less one for each per cent of views in which a symbol
+  /// is lost.
   [[nodiscard]] double merit() const { return smallest_distance - 100 * mean_loss; }
 };
 
@@ -31,7 +31,7 @@ struct RankedSymbols {
 
 [[nodiscard]] RankedSymbols rank(const AlphabetSurvey& survey, std::vector<int> symbols);
 
-/// Of all sets of `count` symbols the ones with the most merit, best first.
+/// Finds the sets of `count` symbols with the most merit, best first.
 [[nodiscard]] std::vector<RankedSymbols> best_symbols(const AlphabetSurvey& survey, int count, std::size_t how_many);
 
 }  // namespace slsd
