@@ -13,7 +13,7 @@ namespace slsd {
 namespace {
 
 constexpr std::size_t kScansMax = 256;
-constexpr std::size_t kScanBytes = 2048;  // what is kept of one besides frames and points, and more than that
+constexpr std::size_t kScanBytes = 2048;  // an upper bound of a kept scan's size without frames and points
 
 std::size_t bytes_of(const Frame& frame) {
   return std::visit(
@@ -23,8 +23,8 @@ std::size_t bytes_of(const Frame& frame) {
       frame.image());
 }
 
-// What is kept of a result: neither another client's pictures, nor what is as large as the frames. The result itself
-// is only borrowed from, as a copy of it all would cost more than the decoding of a small frame.
+// Leaves out of a kept result another client's pictures, and all data as large as frames. The result itself is only
+// borrowed: a full copy would cost more than decoding a small frame.
 ScanResult without_pictures(ScanResult& result) {
   auto dense = std::exchange(result.dense, nullptr);
   auto files = std::exchange(result.files, {});
@@ -56,7 +56,7 @@ std::vector<KeptScan> BlackBox::scans() const {
   return scans;
 }
 
-// From the newest back: it is one of the last.
+// Searches from the newest: the scan is one of the last.
 BlackBox::Entry* BlackBox::find(const std::string& id) {
   const auto found = std::find_if(entries_.rbegin(), entries_.rend(), [&](const Entry& e) { return e.scan.id == id; });
   return found == entries_.rend() ? nullptr : &*found;
@@ -87,7 +87,7 @@ void BlackBox::grow(Entry& entry, std::size_t bytes) {
   bytes_ += bytes;
 }
 
-// The one of this id stays.
+// Drops the oldest scans, but never the one with this id.
 void BlackBox::make_room(const std::string& id) {
   while (entries_.size() > 1 && (bytes_ > bytes_max_ || entries_.size() > kScansMax)) {
     const std::size_t oldest = entries_.front().scan.id == id ? 1 : 0;
@@ -117,7 +117,7 @@ void BlackBox::keep_frames(const std::string& id, const FrameSet& set, const Sha
     make_room(id);
     memory = std::exchange(spare_, {});
   }
-  // Copied meanwhile, so that nobody waits for it.
+  // Copied without the lock, so that nobody waits for it.
   auto kept = std::make_shared<KeptFrames>();
   const auto keep = [&](const std::vector<Frame>& frames, Picture light) {
     for (std::size_t i = 0; i < frames.size(); ++i) {

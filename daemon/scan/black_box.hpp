@@ -30,25 +30,25 @@ struct KeptSettings {
   std::vector<std::string> camera_formats;
 };
 
-/// The frames of a kept scan, as raw pixels: those of the pattern, of white, of dark.
+/// The frames of a kept scan as raw pixels: first the pattern, then white, then dark.
 using KeptFrames = std::vector<FrameImage>;
 
-// Shared below: the box lets go of a scan while a bundle of it is still being written.
+// Shared below: a bundle may still be writing a scan that the box has dropped.
 
-/// One scan, as far as it is known: one that ended before it had frames has none.
+/// One scan with all that is known of it. A scan that ended before it had frames has none.
 struct KeptScan {
   std::string id;
   std::chrono::system_clock::time_point time;         ///< time of the first such scan
-  std::shared_ptr<const KeptSettings> settings;       ///< null where it had no turn
-  std::shared_ptr<const KeptFrames> frames;           ///< null: none, or too large
-  bool too_large = false;                             ///< its frames alone are more than may be kept
-  Density density = Density::kSymbols;                ///< the requested cloud's
-  std::shared_ptr<const Result<ScanResult>> outcome;  ///< null while it is decoded; without pictures and dense points
-  std::uint64_t times = 1;                            ///< such failures without frames, one after the other
+  std::shared_ptr<const KeptSettings> settings;       ///< null if the scan never had its turn
+  std::shared_ptr<const KeptFrames> frames;           ///< null: none, or too large to keep
+  bool too_large = false;                             ///< its frames alone exceed the memory limit
+  Density density = Density::kSymbols;                ///< density of the requested cloud
+  std::shared_ptr<const Result<ScanResult>> outcome;  ///< null until decoded; no pictures or dense points
+  std::uint64_t times = 1;                            ///< number of successive failures like this one without frames
 };
 
-/// The last scans: their frames, what they were decoded by, and what came of them, in so many bytes. What a scan costs
-/// is a copy of its frames into memory that an older one had.
+/// Keeps the last scans within a memory limit: their frames, the settings that decoded them, and their outcomes. A scan
+/// costs one copy of its frames, into the memory of a dropped scan.
 /// @thread thread-safe
 class BlackBox {
  public:
@@ -60,7 +60,7 @@ class BlackBox {
   [[nodiscard]] std::size_t bytes() const;
 
   void keep_frames(const std::string& id, const FrameSet& set, const SharedSetup& setup, Density density);
-  /// @param result  what the scan's client gets; the same afterwards
+  /// @param result  the outcome for the scan's client; unchanged after the call
   void keep_outcome(const std::string& id, const SharedSetup& setup, Result<ScanResult>& result);
 
   /// Oldest first.
@@ -69,7 +69,7 @@ class BlackBox {
  private:
   struct Entry {
     KeptScan scan;
-    std::shared_ptr<KeptFrames> frames;  // scan.frames, to be used again
+    std::shared_ptr<KeptFrames> frames;  // scan.frames, whose memory will be reused
     std::size_t bytes = 0;
   };
   [[nodiscard]] Entry* find(const std::string& id);
@@ -82,8 +82,8 @@ class BlackBox {
   mutable std::mutex mutex_;
   std::deque<Entry> entries_;
   std::size_t bytes_ = 0;
-  std::vector<std::string> spare_;  // memory of frames that went
-  std::weak_ptr<ScanSetup> setup_;  // that settings_ were taken from
+  std::vector<std::string> spare_;  // image memory of dropped scans
+  std::weak_ptr<ScanSetup> setup_;  // the setup that settings_ describes
   std::shared_ptr<const KeptSettings> settings_;
 };
 

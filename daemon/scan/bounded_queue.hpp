@@ -19,7 +19,7 @@ class BoundedQueue {
  public:
   explicit BoundedQueue(std::size_t capacity) : capacity_(capacity) {}
 
-  /// Pushes the item if there is room, and tells whether there was; else leaves the item as it is.
+  /// Pushes the item if there is room, and returns whether there was. Otherwise the item stays as it is.
   [[nodiscard]] bool try_push(Item&& item) {
     {
       const std::lock_guard lock(mutex_);
@@ -30,7 +30,7 @@ class BoundedQueue {
     return true;
   }
 
-  /// The oldest item; nothing when the time came or a stop was requested first.
+  /// Takes the oldest item. Returns nothing if the time comes or a stop is requested first.
   template <class TimePoint>
   [[nodiscard]] std::optional<Item> pop_until(TimePoint time, const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
@@ -43,14 +43,14 @@ class BoundedQueue {
     return take();
   }
 
-  /// Takes those out that nobody needs any more.
+  /// Removes the items that nobody needs any more.
   template <class Needless>
   void erase_if(Needless needless) {
     const std::lock_guard lock(mutex_);
     std::erase_if(items_, needless);
   }
 
-  /// Ends the present pop_until(), or the next, with nothing.
+  /// Ends the current pop_until(), or the next one, with nothing.
   void wake() {
     {
       const std::lock_guard lock(mutex_);

@@ -13,27 +13,27 @@
 
 namespace slsd {
 
-/// A DriftWatch to each configured camera, begun anew with each setup, and a line in the log as one changes its mind.
+/// Keeps a DriftWatch for each configured camera and logs each change of its verdict. Every setup starts new watches.
 /// @thread thread-safe
 class CalibrationWatch {
  public:
-  /// @param setup  that the scan was decoded by
-  /// @param scan   its number
+  /// @param setup  the setup that decoded the scan
+  /// @param scan   the scan's number
   void note(const SharedSetup& setup, const ScanResult& result, std::uint64_t scan);
 
-  /// One to a configured camera; empty before the first scan.
+  /// The drift of each configured camera; empty before the first scan.
   [[nodiscard]] std::vector<DriftState> states() const;
 
  private:
   struct Watched {
     std::string name;
-    std::uint8_t index;  // in the calibration
+    std::uint8_t index;  // index of the camera in the calibration
     DriftWatch watch;
   };
   void begin(const SharedSetup& setup);
 
   mutable std::mutex mutex_;
-  std::weak_ptr<ScanSetup> setup_;  // whose scans are watched; weak: a setup that a reload replaced may go
+  std::weak_ptr<ScanSetup> setup_;  // the setup whose scans are watched; weak, so that a replaced setup can go
   std::vector<Watched> cameras_;
 };
 

@@ -18,7 +18,7 @@ using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
 constexpr auto kLookPeriod = 200ms;
-constexpr auto kPromise = 3s;  // of a step that takes no time
+constexpr auto kPromise = 3s;  // for a step that is quick
 constexpr auto kPausePromise = 10s;
 
 }  // namespace
@@ -114,7 +114,7 @@ Result<Frame> CameraRunner::end_capture() {
   if (stopped_) return fail(ErrorCode::kCancelled, "the service is stopping", "camera " + name_);
   if (status_.state != DeviceState::kCapturing) return fail_not_ready();
   given_up_ = true;
-  const LogField about("SLSD_CAMERA", name_);  // another's thread
+  const LogField about("SLSD_CAMERA", name_);  // the caller may be another thread
   const Error error{ErrorCode::kDisconnected, "the camera's driver does not answer; it is opened again when it does",
                     "camera " + name_};
   note_lost(error, std::move(lock));
@@ -147,7 +147,7 @@ Result<> CameraRunner::replace(std::unique_ptr<Camera> next, std::unique_ptr<Cam
   changed_.notify_all();
   changed_.wait_until(lock, deadline, [this] { return stopped_ || replaced_.has_value(); });
   if (replaced_) return *replaced_;
-  replacement_.reset();  // where it was not begun; else what it put there is taken back
+  replacement_.reset();  // if it has not begun; else its result is dropped
   ++replacements_;
   if (stopped_) return fail(ErrorCode::kCancelled, "the service is stopping", "camera " + name_);
   return fail(ErrorCode::kTimeout, "the camera does not take other settings in time: look at its status",
@@ -177,7 +177,7 @@ void CameraRunner::exchange(Replacement replacement) {
     const std::lock_guard lock(mutex_);
     const bool awaited = replacement.number == replacements_;
     if (!awaited) outcome = fail(ErrorCode::kTimeout, "nobody waits for it any more");
-    if (outcome) replaced_ = Result<>();  // from here on nobody gives it up
+    if (outcome) replaced_ = Result<>();  // from here on no caller abandons it
   }
   if (!outcome) opened = open(std::move(replacement.otherwise));
   heartbeat_.promise(kPromise);
@@ -187,7 +187,7 @@ void CameraRunner::exchange(Replacement replacement) {
   changed_.notify_all();
 }
 
-// The device belongs to one camera at a time: the one before ends first.
+// One camera at a time owns the device: the old one ends first.
 void CameraRunner::put(std::unique_ptr<Camera> camera) {
   camera->set_found([this] { note_found(); });
   std::unique_ptr<Camera> before;
@@ -228,7 +228,7 @@ void CameraRunner::open_or_pause(const std::stop_token& stop) {
   changed_.wait_for(lock, stop, pause, [] { return false; });
 }
 
-// While nothing answers the camera stays absent, however often it is looked for.
+// If nothing answers, the camera stays absent, however often the search repeats.
 void CameraRunner::note_found() {
   const std::lock_guard lock(mutex_);
   status_.state = DeviceState::kOpening;
@@ -305,8 +305,8 @@ void CameraRunner::take_frame(const Order& order) {
   }
 }
 
-// A cancel() that came as a capture ended ends the next one, which nobody meant. And a line that was silent for the
-// longest time that a frame may take has lost none: the driver is only asked anew, so that one that hangs is noticed.
+// A cancel() that comes as a capture ends would end the next one by mistake. And a line that was silent for a frame's
+// longest time has lost no frame. So only ask the driver again; that also detects one that hangs.
 bool CameraRunner::goes_on(const Order& order, const Error& error) const {
   if (steady_clock::now() >= order.deadline) return false;
   const std::lock_guard lock(mutex_);

@@ -23,17 +23,17 @@ namespace slsd {
 
 /// The choice of the frame that a capture takes.
 enum class Exposure {
-  kFresh,  ///< the first whose exposure begins after the capture
-  kNext,   ///< the one after the last, where the camera runs freely
+  kFresh,  ///< the first frame whose exposure begins after the capture
+  kNext,   ///< the next frame, if the camera runs freely
 };
 
-/// Counts frames that are missing between those delivered and that no error has told of.
+/// Counts frames that are missing from the sequence and that no error has reported.
 /// @thread thread-bound
 class SequenceGaps {
  public:
-  /// The device counts anew.
+  /// Begins again when the device restarts its count.
   void restart() { *this = {}; }
-  /// A frame was told to be lost.
+  /// Notes that an error reported a lost frame.
   void note_failure() { ++failures_; }
   /// @return how many frames before this one were lost without an error
   [[nodiscard]] std::uint64_t note_frame(std::uint64_t sequence) {
@@ -49,19 +49,19 @@ class SequenceGaps {
   std::uint64_t failures_ = 0;
 };
 
-/// A camera and the thread that it lives on, its supervisor: opens it, opens it again after it was lost, with growing
-/// pauses and for ever, looks after it while nobody asks for frames, and takes a frame when told. The first failure and
-/// the recovery are logged, not each attempt. docs/supervision.md draws the states.
+/// Runs and supervises one camera on a thread of its own. Opens the camera, and reopens a lost one for ever, with
+/// growing pauses. Looks after it between captures, and takes a frame on request. Logs the first failure and the
+/// recovery, not each attempt. docs/supervision.md draws the states.
 /// @thread thread-safe, but for the captures, which belong to one thread
 class CameraRunner {
  public:
   CameraRunner(std::unique_ptr<Camera> camera, const ScanOptions& options);
-  /// Waits for the thread: while a device that is gone is being closed, for seconds.
+  /// Waits for the thread. If the device is gone, closing it may take seconds.
   ~CameraRunner();
   CameraRunner(const CameraRunner&) = delete;
   CameraRunner& operator=(const CameraRunner&) = delete;
 
-  /// Ends what waits, and the thread, soon. What is asked afterwards fails with kCancelled.
+  /// Ends waits and the thread soon. Later requests fail with kCancelled.
   void request_stop();
   /// Tells whether the thread has ended and the camera is closed.
   [[nodiscard]] bool stopped() const { return ended_; }
@@ -71,30 +71,30 @@ class CameraRunner {
   /// The number of times the camera was opened.
   [[nodiscard]] std::uint64_t openings() const;
   [[nodiscard]] const Heartbeat& heartbeat() const { return heartbeat_; }
-  /// Tells whether it replays recorded images.
+  /// Tells whether the camera replays recorded images.
   [[nodiscard]] bool replays() const { return replays_; }
   /// The frame rate of a camera that runs freely; 0 for any other.
   [[nodiscard]] double rate_hz() const { return rate_hz_; }
 
   /// Waits until the camera is open.
-  /// @errors kTimeout, with the reason why it is not open; kCancelled
+  /// @errors kTimeout, with the reason why the camera is not open; kCancelled
   [[nodiscard]] Result<> wait_ready(const Patience& patience);
 
-  /// Puts another camera in the place of this one, with other settings of the same device: closes it, and opens that.
-  /// Where the device was open and refuses them, `otherwise` is opened: the same as before, made anew; also
-  /// where it takes longer than the deadline. Where it was not open, the other is opened when it can be.
-  /// @errors of Camera::open(): why it refuses; kTimeout: its thread did not get to it; kCancelled
+  /// Replaces this camera by one with other settings of the same device: closes this one and opens the next. If the
+  /// device was open and refuses the settings, or takes longer than the deadline, opens `otherwise`, a new copy of the
+  /// old camera. If the device was not open, `next` is opened as soon as possible.
+  /// @errors of Camera::open(): why it refuses; kTimeout: the camera's thread was not free in time; kCancelled
   [[nodiscard]] Result<> replace(std::unique_ptr<Camera> next, std::unique_ptr<Camera> otherwise,
                                  MonotonicTime deadline);
 
-  /// Lets the camera expose one frame, now; wait_captured() and end_capture() belong to it.
+  /// Starts the exposure of one frame now. wait_captured() and end_capture() finish the capture.
   void begin_capture(MonotonicTime deadline, Exposure exposure = Exposure::kFresh, Picture light = Picture::kPattern);
-  /// Waits for the driver's answer. @return whether it is there, or never will be
+  /// Waits for the driver's answer. @return whether it has come, or will never come
   [[nodiscard]] bool wait_captured(const Patience& patience, MonotonicTime until);
-  /// Tells a driver that has not answered yet to do so, now.
+  /// Makes a driver that has not answered yet do so now.
   void cancel_capture();
-  /// Takes the answer. A driver that has none is left alone: it is opened anew when it answers.
-  /// @errors as Camera::capture(); kCancelled, kTimeout: it was not ready any more
+  /// Takes the driver's answer. Abandons a driver that has none; when it answers, the camera is reopened.
+  /// @errors as Camera::capture(); kCancelled, kTimeout: the camera is no longer ready
   [[nodiscard]] Result<Frame> end_capture();
 
  private:
@@ -135,15 +135,15 @@ class CameraRunner {
   std::atomic<double> rate_hz_{0};
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::unique_ptr<Camera> camera_;  ///< used by its thread; from others only to cancel, under the mutex
+  std::unique_ptr<Camera> camera_;  ///< used by the camera's thread; other threads only cancel it, under the mutex
   DeviceStatus status_;
   SequenceGaps gaps_;
   std::optional<Order> order_;
   std::optional<Result<Frame>> answer_;
-  std::optional<Replacement> replacement_;  ///< waits until the camera's thread begins it
-  std::uint64_t replacements_ = 0;          ///< begun and given up: one of another number is not awaited
+  std::optional<Replacement> replacement_;  ///< waits for the camera's thread to begin it
+  std::uint64_t replacements_ = 0;          ///< the latest replacement; older numbers were abandoned
   std::optional<Result<>> replaced_;        ///< outcome of the last replacement
-  bool given_up_ = false;                   ///< the driver is over its time; its answer is thrown away
+  bool given_up_ = false;                   ///< the driver exceeded its time; its answer will be dropped
   bool stopped_ = false;
   std::atomic<bool> ended_{false};
   std::jthread thread_;

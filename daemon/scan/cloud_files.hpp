@@ -45,7 +45,7 @@ struct CloudForm {
   }
 };
 
-/// The forms that somebody wants a cloud in.
+/// The set of forms in which somebody wants a cloud.
 class CloudFormats {
  public:
   [[nodiscard]] static CloudFormats only(CloudForm form) {
@@ -54,7 +54,7 @@ class CloudFormats {
     return formats;
   }
   [[nodiscard]] bool has(CloudForm form) const { return (bits_ >> form.index() & 1U) != 0; }
-  /// Tells whether a point for each pixel is wanted.
+  /// Tells whether a form needs a point for each pixel.
   [[nodiscard]] bool dense() const { return (bits_ & 0b111000'111000U) != 0; }
   friend CloudFormats operator|(CloudFormats a, CloudFormats b) {
     a.bits_ = static_cast<std::uint16_t>(a.bits_ | b.bits_);
@@ -66,15 +66,15 @@ class CloudFormats {
   std::uint16_t bits_ = 0;  // by CloudForm::index()
 };
 
-/// Bytes that may go to several clients, which send them at their own pace: hence shared.
+/// Bytes that several clients may send, each at its own pace; hence shared.
 using SharedBytes = std::shared_ptr<const std::string>;
 
 /// A cloud's files, each written once.
-/// @thread thread-bound; the bytes are read from any
+/// @thread thread-bound; any thread may read the bytes
 class CloudFiles {
  public:
   CloudFiles() = default;
-  /// @param dense  null where no form wants it
+  /// @param dense  null if no form needs it
   CloudFiles(const Cloud& cloud, const DenseCloud* dense, CloudFormats formats) {
     for (const CloudFormat format : {CloudFormat::kPly, CloudFormat::kPcd, CloudFormat::kTiff}) {
       for (const CloudForm form :
@@ -84,7 +84,7 @@ class CloudFiles {
     }
   }
 
-  /// Writes it where it is not there yet. @param cloud, dense  the same as before
+  /// Writes the file unless it exists already. @param cloud, dense  the same at each call
   [[nodiscard]] const SharedBytes& file(const Cloud& cloud, const DenseCloud* dense, CloudForm form) {
     SharedBytes& bytes = files_[form.index()];
     if (!bytes) bytes = std::make_shared<const std::string>(write(cloud, dense, form));

@@ -53,7 +53,7 @@ void Crew::run_parts(int parts, Part part, const void* work) {
     const std::lock_guard lock(mutex_);
     on_offer_ = 0;
   }
-  // For as long as the last part takes.
+  // Stay awake while helpers end their last parts.
   stay_awake([this] { return helping_ == 0; });
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return helping_ == 0; });

@@ -14,12 +14,12 @@
 
 namespace slsd {
 
-/// Threads that help the one that calls with the parts of a stage. Whoever comes while they help another does its parts
-/// alone, and so does whoever's helpers sleep too long: nobody waits for a thread that has not begun.
+/// Threads that help a caller to compute the parts of a stage. If they help another caller, or sleep too long, the
+/// caller computes its parts alone. So nobody waits for a thread that has not begun.
 /// @thread thread-safe
 class Crew final : public Executor {
  public:
-  /// A caller's turn. While it lives, its thread computes, and the helpers leave it a processor.
+  /// A caller's turn. While it lives, its thread computes, and the helpers leave a processor to it.
   class Turn {
    public:
     explicit Turn(Crew& crew) : crew_(crew) { ++crew_.turns_; }
@@ -31,7 +31,7 @@ class Crew final : public Executor {
     Crew& crew_;
   };
 
-  /// @param helpers  threads besides the caller's: with it, one to a processor
+  /// @param helpers  threads besides the caller's; together they should be one for each processor
   explicit Crew(int helpers);
   ~Crew() override;
   /// The number of helpers that, with the caller, gives every processor a thread.
@@ -44,21 +44,21 @@ class Crew final : public Executor {
 
  private:
   void help(int worker, const std::stop_token& stop);
-  /// Tells whether there are parts that a helper has not been at, and a processor for it besides those that help.
+  /// Tells whether parts remain that no helper has tried, and whether a processor is free for one more helper.
   [[nodiscard]] bool wants(std::uint64_t done) const {
     const std::uint64_t call = on_offer_;
     return call != 0 && call != done && std::max(turns_.load(), 1) + helping_ < workers();
   }
 
-  std::mutex in_use_;  // by one caller at a time
+  std::mutex in_use_;  // held by one caller at a time
   std::mutex mutex_;
   std::condition_variable_any changed_;
   Part part_ = nullptr;
   const void* work_ = nullptr;
   int parts_ = 0;
   std::uint64_t call_ = 0;
-  // What helpers look at before they take the mutex.
-  std::atomic<std::uint64_t> on_offer_ = 0;  // the call whose parts there are; 0: nothing to help with
+  // Helpers look at these before they take the mutex.
+  std::atomic<std::uint64_t> on_offer_ = 0;  // the call that offers parts; 0: none
   std::atomic<int> helping_ = 0, turns_ = 0;
   std::atomic<int> next_ = 0;
   std::vector<std::jthread> threads_;

@@ -14,15 +14,14 @@
 
 namespace slsd {
 
-/// The thread that ends tasks whose time is over, whatever the threads that work on them are doing. One that waits for
-/// its turn ends at its deadline; one that is under way has a little longer, as those who wait for its device know best
-/// why it is late.
+/// The thread that ends tasks at their deadlines, whatever other threads do. A waiting task ends at its deadline. A
+/// task under way has a little longer, because its waits know best which device is late.
 /// @thread thread-safe
 class Deadlines {
  public:
   static constexpr std::chrono::milliseconds kGrace{800};
 
-  /// @param reason  why a task was not done in time; called on the thread
+  /// @param reason  tells why a task was late; called on this thread
   explicit Deadlines(std::function<Error(const Task&)> reason);
   Deadlines(const Deadlines&) = delete;
   Deadlines& operator=(const Deadlines&) = delete;
@@ -36,7 +35,7 @@ class Deadlines {
   std::function<Error(const Task&)> reason_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::vector<std::weak_ptr<Task>> tasks_;  ///< weak: they belong to those who work on them
+  std::vector<std::weak_ptr<Task>> tasks_;  ///< weak: the tasks belong to the threads that work on them
   MonotonicTime next_ = MonotonicTime::max();
   std::jthread thread_;
 };

@@ -67,7 +67,7 @@ void DecodeLanes::offer(std::shared_ptr<FrameJob> job, MonotonicTime now) {
   append({std::move(job), true, now}, lock);
 }
 
-// There is some, as only one of those that wait may have been pushed.
+// Always makes room: at most one waiting job was pushed, and the others may be skipped.
 void DecodeLanes::make_room(MonotonicTime now) {
   for (;;) {
     const auto oldest = std::ranges::find_if(waiting_, &Waiting::may_be_skipped);
@@ -79,7 +79,7 @@ void DecodeLanes::make_room(MonotonicTime now) {
   }
 }
 
-// After the last lane's end nobody else delivers.
+// After the last lane's end nobody else delivers jobs.
 void DecodeLanes::append(Waiting waiting, std::unique_lock<std::mutex>& lock) {
   if (running_ == 0) {
     lock.unlock();

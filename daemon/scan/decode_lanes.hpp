@@ -19,18 +19,19 @@
 
 namespace slsd {
 
-/// A computation on frames whose result is then delivered. The lanes share it with those who may end it meanwhile.
+/// A computation on frames, whose result is then delivered. The lanes share it with those who may end it early.
 class FrameJob {
  public:
   virtual ~FrameJob() = default;
-  /// The long part; other jobs run at the same time in other lanes.
+  /// The long part. Other lanes run other jobs at the same time.
   virtual void compute(std::size_t lane) = 0;
-  /// Called once, after compute(), or without it where the service stops; one job at a time, in the order of arrival.
+  /// Delivers the result once. Follows compute(), or replaces it if the service stops. Runs for one job at a time, in
+  /// order of arrival.
   virtual void deliver() = 0;
 };
 
-/// The threads that decode while the next frames are taken: a few that wait, and a lane or two behind them. What is
-/// delivered keeps the order in which it came, whichever lane was quicker.
+/// The threads that decode while the next frames are taken. A few jobs wait in front of one or two lanes. Results are
+/// delivered in order of arrival, even if a later job ends first.
 ///
 ///     capture --> [ ] +--> lane 0 --+--> deliver, in order
 ///                     +--> lane 1 --+
@@ -51,22 +52,22 @@ class DecodeLanes {
   DecodeLanes(const DecodeLanes&) = delete;
   DecodeLanes& operator=(const DecodeLanes&) = delete;
 
-  /// Waits until no other waits. The job will be delivered.
+  /// Waits until no other job waits. The job is certain to be delivered.
   void push(std::shared_ptr<FrameJob> job);
-  /// The newest wins: where too many wait, or the oldest that was offered has waited for too long, that one is
-  /// destroyed undelivered.
+  /// Offers a job that may be skipped; the newest wins. If too many jobs wait, or the oldest offered one has waited too
+  /// long, that one is destroyed undelivered.
   void offer(std::shared_ptr<FrameJob> job, MonotonicTime now = std::chrono::steady_clock::now());
   /// The number of offered jobs destroyed undelivered since the start.
   [[nodiscard]] std::uint64_t skipped() const;
 
-  /// Waits until one more job is done than `done` of them. @return false: none is under way, or patience ended first
+  /// Waits until more than `done` jobs are done. @return false: no job is under way, or patience ended first
   [[nodiscard]] bool wait_done(std::uint64_t done, const Patience& patience);
-  /// Jobs delivered or destroyed so far.
+  /// The number of jobs delivered or destroyed so far.
   [[nodiscard]] std::uint64_t done() const;
 
   /// Tells whether the lanes keep their promises to the watchdog.
   [[nodiscard]] bool kept() const;
-  /// Ends soon: what has not been computed is delivered without. Pushing afterwards delivers at once.
+  /// Stops soon: delivers waiting jobs without computing them. Later pushes deliver at once.
   void request_stop();
   [[nodiscard]] bool stopped() const;
 

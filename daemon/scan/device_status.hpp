@@ -15,11 +15,11 @@ namespace slsd {
 
 /// The state of a camera or the projector. docs/supervision.md draws the transitions.
 enum class DeviceState {
-  kAbsent,     ///< nothing of its name answers; it is looked for again
+  kAbsent,     ///< no device of that name answers; searched for again
   kOpening,    ///< being opened and configured
-  kReady,      ///< open, and waits for a trigger
+  kReady,      ///< open, waiting for a trigger
   kCapturing,  ///< a frame is under way
-  kFaulted,    ///< it failed, or is there and does not open; it is opened again
+  kFaulted,    ///< failed, or present but does not open; will be reopened
 };
 
 [[nodiscard]] constexpr std::string_view to_string(DeviceState state) {
@@ -42,23 +42,23 @@ struct DeviceStatus {
   std::string name;
   std::string driver;
   std::string device;
-  std::string hardware;  ///< tells it from others of its kind, wherever it is plugged in; empty: nothing does
+  std::string hardware;  ///< identifies the device wherever it is plugged in; empty: unknown
   int width_px = 0;
   int height_px = 0;
   DeviceState state = DeviceState::kOpening;
-  std::string problem;            ///< cause of its not being open; empty while it is open
+  std::string problem;            ///< why it is not open; empty while it is open
   std::string shows;              ///< a projector's picture: "pattern", "white", "black", "idle" or "held"; empty: none
-  std::uint64_t opened = 0;       ///< times
-  std::uint64_t frames = 0;       ///< delivered
-  std::uint64_t frames_lost = 0;  ///< asked for and not delivered, or missing between two that were
+  std::uint64_t opened = 0;       ///< number of times that it was opened
+  std::uint64_t frames = 0;       ///< frames delivered
+  std::uint64_t frames_lost = 0;  ///< frames requested but not delivered, or missing between two delivered ones
   std::map<ErrorCode, std::uint64_t> frames_failed;  ///< lost frames that an error reported
-  std::vector<DriverFigure> figures;                 ///< the driver's own
+  std::vector<DriverFigure> figures;                 ///< figures of the driver itself
 };
 
-/// All of a rig's.
+/// The statuses of all devices of a rig.
 struct RigStatus {
   DeviceStatus projector;
-  std::vector<DeviceStatus> cameras;  ///< in the configuration's order
+  std::vector<DeviceStatus> cameras;  ///< in the order of the configuration
 };
 
 }  // namespace slsd

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-// For a build without device drivers (SLSD_DEVICES=OFF): recorded frames, and a projector that is none.
+// For a build without device drivers (SLSD_DEVICES=OFF): recorded frames, and a virtual projector.
 #include <utility>
 
 #include "daemon/scan/devices.hpp"

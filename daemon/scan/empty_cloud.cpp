@@ -18,7 +18,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr int kRarely = 10;  // a tenth of the time at the most
+constexpr int kRarely = 10;  // looks take at most a tenth of the time
 constexpr const char* kLook =
     "look at a picture of one (slsctl preview), whether the projector shows this pattern (slsd --pattern), and whether "
     "light and focus suffice";
@@ -83,7 +83,7 @@ std::string EmptyClouds::doubt(const ScanBasis& basis, const FrameSet& set, cons
       };
       try {
         doubt_ = std::async(std::launch::async, std::move(look));
-      } catch (const std::system_error&) {  // no thread is left: the counters have to do
+      } catch (const std::system_error&) {  // no thread available: the counters must suffice
         return {};
       }
     }

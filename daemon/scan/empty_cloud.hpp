@@ -18,28 +18,29 @@
 
 namespace slsd {
 
-/// Reads the pattern without a calibration, and compares the symbols with it. Takes a second or so.
-/// @param camera  an index in the calibration
-/// @param read    out: how many symbols were read
-/// @return a sentence about the calibration; empty if it explains the symbols, or too few were read
+/// Reads the pattern without a calibration and compares the symbols with the calibration. Takes about a second.
+/// @param camera  index in the calibration
+/// @param read    out: number of symbols read
+/// @return a sentence about the calibration; empty if it explains the symbols, or if too few were read
 /// @thread reentrant
 [[nodiscard]] std::string doubt_by_frame(const GreyView& frame, const Pattern& pattern, const Calibration& calibration,
                                          std::size_t camera, const DepthRange& range, std::size_t& read);
 
-/// Pattern, calibration and working range of a scan, by which an empty cloud is explained. Borrows.
+/// The pattern, calibration and working range of a scan, which explain an empty cloud. Borrows all three.
 struct ScanBasis {
   const Pattern& pattern;
   const std::optional<Calibration>& calibration;
   DepthRange range;
-  const std::vector<std::string>& doubts;  ///< about the calibration, as calibration_doubts() has them
+  const std::vector<std::string>& doubts;  ///< doubts about the calibration, from calibration_doubts()
 };
 
 /// Says why scans gave no points.
-/// @thread thread-safe: lanes share it. Frames are read in a thread of its own, so that no scan is late for it
+/// @thread thread-safe: lanes share it. A separate thread reads the frames, so that no scan is delayed
 class EmptyClouds {
  public:
-  /// @param cameras  of the calibration, one to a frame
-  /// @param until    how long it may wait for what the frames say of the calibration; the next empty cloud has it
+  /// @param cameras  the calibration's cameras, one for each frame
+  /// @param until    the end of its wait for what the frames tell about the calibration; a later result serves the next
+  ///                 empty cloud
   [[nodiscard]] std::string explain(const ScanBasis& basis, const FrameSet& set,
                                     const std::vector<std::size_t>& cameras, const ScanResult& result,
                                     MonotonicTime until);
@@ -47,7 +48,7 @@ class EmptyClouds {
  private:
   struct Doubt {
     std::string text;
-    MonotonicTime next;  ///< it is not worth to look again before
+    MonotonicTime next;  ///< no new look before this time
   };
   [[nodiscard]] std::string doubt(const ScanBasis& basis, const FrameSet& set, const std::vector<std::size_t>& cameras,
                                   MonotonicTime until);

@@ -16,16 +16,16 @@ struct LightFrames {
   bool dark = false;   ///< a frame under the projector's black
 };
 
-/// One frame of each camera, all of one exposure; and where they were asked for, as many in other light.
+/// One frame of each camera, all from one exposure. Also has one per camera under white and under black, if requested.
 /// @thread thread-bound; may be moved between threads
 struct FrameSet {
-  std::vector<Frame> frames;  ///< one per camera, in the cameras' order; at least one
+  std::vector<Frame> frames;  ///< one per camera, in the order of the cameras; at least one
   std::vector<Frame> white;   ///< one per camera, or none
   std::vector<Frame> dark;
   std::chrono::nanoseconds capture_time{};  ///< time from the request to the last frame
-  std::chrono::nanoseconds skew{};          ///< time from the first camera's exposure of the pattern to the last one's
+  std::chrono::nanoseconds skew{};          ///< time between the first and the last camera's exposure of the pattern
 
-  /// The time when the last byte of the last frame had arrived.
+  /// The time when the last byte of the last frame arrived.
   [[nodiscard]] MonotonicTime received() const {
     MonotonicTime last{};
     for (const auto* each : {&frames, &white, &dark}) {
@@ -33,7 +33,7 @@ struct FrameSet {
     }
     return last;
   }
-  /// Back to the drivers.
+  /// Returns the frames to the drivers.
   void give_back() {
     for (auto* each : {&frames, &white, &dark}) each->clear();
   }

@@ -9,7 +9,7 @@
 namespace slsd {
 
 std::string projector_hardware(const std::string& model, const std::string& serial) {
-  if (serial.empty()) return {};  // the model alone would let any other of its kind pass for it
+  if (serial.empty()) return {};  // the model alone would also match other devices of its kind
   return printable(model.empty() ? serial : model + " " + serial);
 }
 

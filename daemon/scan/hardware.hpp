@@ -10,25 +10,25 @@
 
 namespace slsd {
 
-/// The identity of a projector, from its EDID: maker and model with the serial number. Empty if the EDID does not tell.
-/// See CameraDescription::hardware.
+/// The identity of a projector from its EDID: maker and model with the serial number. Empty if the EDID does not
+/// contain them. See CameraDescription::hardware.
 [[nodiscard]] std::string projector_hardware(const std::string& model, const std::string& serial);
 
-/// Writes down what a calibration was made with, as far as it can be told.
-/// @param rig          all open; the cameras in the order of the calibration's
-/// @param calibration  gets the serials of its report
+/// Records the devices that a calibration was made with, as far as they can be identified.
+/// @param rig          all open; cameras in the calibration's order
+/// @param calibration  receives the serial numbers in its report
 void note_hardware(const RigStatus& rig, Calibration& calibration);
 
-/// Checks that a device is the one that was calibrated. If either is unknown, it is taken to be.
-/// @param who  for the message: "camera left"
-/// @errors kMismatch: it is another one; the message says what to do
+/// Checks that a device is the calibrated one. Accepts it if either identity is unknown.
+/// @param who  the device's name in the message: "camera left"
+/// @errors kMismatch: another device; the message says what to do
 [[nodiscard]] Result<> check_hardware(const std::string& who, const std::string& calibrated,
                                       const std::string& connected);
 
-/// The same of all devices of a scan. @param rig  all open
+/// Checks all devices of a scan. @param rig  all open
 [[nodiscard]] Result<> check_hardware(const Calibration& calibration, const RigStatus& rig);
 
-/// The calibrated one's id; empty where the file does not say.
+/// The hardware id of the calibrated device; empty if the file does not have one.
 [[nodiscard]] std::string calibrated_hardware(const Calibration& calibration, const CalibratedCamera& camera);
 
 }  // namespace slsd

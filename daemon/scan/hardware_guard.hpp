@@ -11,17 +11,17 @@
 
 namespace slsd {
 
-/// Keeps a calibration to the projector and the cameras that it was made with: compares them as one was opened, or the
-/// setup replaced.
+/// Ties a calibration to the projector and the cameras that it was made with. Compares them whenever a device was
+/// opened or the setup replaced.
 /// @thread thread-bound
 class HardwareGuard {
  public:
-  /// @param rig  its devices are open, the cameras in the order of the setup's
-  /// @errors kMismatch: another device, unless the configuration only wants a warning; that is logged once
+  /// @param rig  its devices are open, the cameras in the setup's order
+  /// @errors kMismatch: another device. If the configuration wants only a warning, logs that once instead
   [[nodiscard]] Result<> check(const std::shared_ptr<ScanSetup>& setup, const Rig& rig);
 
  private:
-  std::weak_ptr<ScanSetup> setup_;  // what was checked last; weak: a setup that a reload replaced may go
+  std::weak_ptr<ScanSetup> setup_;  // the setup checked last; weak, so that a replaced setup can go
   std::uint64_t openings_ = 0;
   Result<> verdict_;
 };

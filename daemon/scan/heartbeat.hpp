@@ -7,20 +7,19 @@
 
 namespace slsd {
 
-/// The time within which one piece of work is done: decoding a frame, drawing a picture, making a pattern and its
-/// decoders.
+/// The time limit for one piece of work: decoding a frame, drawing a picture, or making a pattern and its decoders.
 inline constexpr auto kWorkPromise = std::chrono::seconds(60);
 
-/// A thread's promise to be heard of again before a certain time, for the watchdog of another thread.
+/// A thread's promise of a sign of life before a certain time. A watchdog on another thread checks it.
 /// @thread thread-safe
 class Heartbeat {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Promises a sign of life within this time from now.
+  /// Promises the next sign of life within this time from now.
   void promise(Clock::duration within) { until_ = (Clock::now() + within).time_since_epoch().count(); }
 
-  /// Promises nothing until the next promise.
+  /// Promises nothing until the next promise().
   void rest() { until_ = Clock::time_point::max().time_since_epoch().count(); }
 
   [[nodiscard]] bool kept(Clock::time_point now = Clock::now()) const {

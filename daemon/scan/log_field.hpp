@@ -9,12 +9,12 @@
 
 namespace slsd {
 
-/// The subject of the lines that this thread logs from now on, to the end of the block. The journal keeps it beside
-/// each line, so that `journalctl SLSD_CAMERA=left` has them all. Other readers find it in the line's own text.
+/// The subject of all lines that this thread logs until the end of the block. The journal stores it as a field of each
+/// line: `journalctl SLSD_CAMERA=left` finds them all. Readers without the journal find it in the line's text.
 /// @thread thread-bound
 class LogField {
  public:
-  /// @param name  as the journal has it: capitals and underscores, "SLSD_" before
+  /// @param name  the journal's field name: capitals and underscores, after "SLSD_"
   LogField(std::string_view name, std::string value)
       : name_(name), value_(std::move(value)), before_(std::exchange(newest_, this)) {}
   ~LogField() { newest_ = before_; }
@@ -23,7 +23,7 @@ class LogField {
 
   [[nodiscard]] std::string_view name() const { return name_; }
   [[nodiscard]] const std::string& value() const { return value_; }
-  /// The fields of the calling thread, the newest first.
+  /// The fields of the calling thread, newest first.
   [[nodiscard]] static std::vector<const LogField*> here() {
     std::vector<const LogField*> fields;
     for (const LogField* field = newest_; field != nullptr; field = field->before_) fields.push_back(field);

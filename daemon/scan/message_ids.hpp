@@ -9,9 +9,9 @@
 
 namespace slsd {
 
-/// The kind of a log line, by an id that stays as it is while texts change. Use it with `journalctl MESSAGE_ID=...`;
-/// systemd/slsd.catalog explains each.
-/// @thread thread-bound, as LogField
+/// The kind of a log line, as an id that stays the same when texts change. Find lines with `journalctl MESSAGE_ID=...`;
+/// systemd/slsd.catalog explains each id.
+/// @thread thread-bound, like LogField
 class MessageId {
  public:
   explicit MessageId(std::string_view id) : field_("MESSAGE_ID", std::string(id)) {}

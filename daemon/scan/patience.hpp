@@ -17,8 +17,8 @@
 
 namespace slsd {
 
-/// The limits of a wait for devices: its deadline, what ends it sooner, and who hears of it meanwhile. Waiters wait in
-/// steps of a second at most, however far the deadline is.
+/// The limits of a wait for devices: its deadline, what ends it sooner, and who is notified meanwhile. Waits proceed in
+/// steps of at most one second, however far the deadline is.
 /// @thread thread-bound
 struct Patience {
   static constexpr std::chrono::milliseconds kStep{1000};
@@ -27,22 +27,22 @@ struct Patience {
 
   MonotonicTime deadline;
   std::stop_token over;                               ///< requested: nobody waits any more
-  std::function<void(const std::string&)> waits_for;  ///< before each device that is waited for: "camera left"
-  std::function<void()> alive;                        ///< before each step
-  std::function<bool(const Error&)> again;  ///< whether lost frames are worth another try; empty: they are not
+  std::function<void(const std::string&)> waits_for;  ///< called with each device waited for: "camera left"
+  std::function<void()> alive;                        ///< called before each step
+  std::function<bool(const Error&)> again;            ///< whether lost frames deserve another try; empty: they do not
 
-  /// Tells of the device that is waited for from now on.
+  /// Reports the device that is waited for from now on.
   void note(const std::string& device) const {
     if (waits_for) waits_for(device);
   }
 
-  /// The end of the present step.
+  /// The end of the current step.
   [[nodiscard]] MonotonicTime step(MonotonicTime until) const {
     if (alive) alive();
     return std::min<MonotonicTime>(until, std::chrono::steady_clock::now() + kStep);
   }
 
-  /// Waits until the condition holds. @return whether it does; else the time came, or nobody waits any more
+  /// Waits until the condition holds. @return whether it does; false: the time came, or nobody waits any more
   template <class Holds>
   bool wait_until(MonotonicTime until, std::condition_variable_any& changed, std::unique_lock<std::mutex>& lock,
                   Holds holds) const {
@@ -54,7 +54,7 @@ struct Patience {
   }
 };
 
-/// The pauses between attempts to open a device: each twice as long as the one before, up to the longest.
+/// The pauses between attempts to open a device. Each is twice as long as the one before, up to a maximum.
 /// @thread thread-bound
 class Backoff {
  public:

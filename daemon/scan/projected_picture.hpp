@@ -16,24 +16,24 @@
 
 namespace slsd {
 
-/// A picture is to be shown.
+/// A request to show a picture.
 struct ProjectRequest {
   Picture picture = Picture::kIdle;  ///< not kHeld
-  std::string png;                   ///< the image for kImage
+  std::string png;                   ///< the image, if the picture is kImage
   MonotonicTime deadline;            ///< end of the wait for the projector
   std::stop_token gone = {};         ///< requested when nobody waits for the outcome any more
 };
 
-/// The picture in the projector's size; nothing for the pattern.
+/// Draws the picture in the projector's size; nothing for the pattern.
 /// @param picture  neither kIdle nor kHeld
-/// @param png      for kImage, of that size; decoded by a process without rights
-/// @param until    the end of the time for that
-/// @errors those of decode_apart(); kNotFound: a grid, and no calibration
+/// @param png      for kImage, in the projector's size; an unprivileged process decodes it
+/// @param until    the end of the time for decoding
+/// @errors those of decode_apart(); kNotFound: a grid without a calibration
 /// @thread reentrant
 [[nodiscard]] Result<std::optional<Grey8>> draw_projected(Picture picture, std::string_view png, const ScanSetup& setup,
                                                           MonotonicTime until);
 
-/// The configured idle picture, shown when nobody scans. Empty for the pattern. @thread reentrant
+/// Draws the configured idle picture, shown when nobody scans. Empty for the pattern. @thread reentrant
 [[nodiscard]] std::optional<Grey8> draw_idle(const ProjectorOptions& options);
 
 }  // namespace slsd

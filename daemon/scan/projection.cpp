@@ -18,8 +18,8 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr auto kSlice = 100ms;  // after which a wait for the projector looks whether it still makes sense
-constexpr auto kGrace = 300ms;  // beyond the deadline of a scan
+constexpr auto kSlice = 100ms;  // interval at which a wait for the projector checks whether to go on
+constexpr auto kGrace = 300ms;  // past a scan's deadline
 
 void sleep_until(MonotonicTime time, const std::stop_token& stop) {
   std::mutex mutex;
@@ -101,7 +101,7 @@ void Projection::attempt(Picture which, MonotonicTime until) {
   if (shown_ == which || steady_clock::now() < next_attempt_) return;
   const Result<> outcome = open_and_show(which, until);
   shown_.reset();
-  if (!outcome && outcome.error().code == ErrorCode::kTimeout) return;  // it goes on
+  if (!outcome && outcome.error().code == ErrorCode::kTimeout) return;  // the task continues
   if (outcome) shown_ = which;
   open_ = outcome.has_value();
   note(outcome);
@@ -112,7 +112,7 @@ void Projection::attempt(Picture which, MonotonicTime until) {
   }
 }
 
-// Whether it is known by then that what was shown still is, or why not.
+// Tells whether the projector answers by then. If it no longer shows the picture, notes the loss.
 bool Projection::look(MonotonicTime until) {
   const auto there = shown_ ? projector_->check(until) : Result<>();
   looking_ = !there && there.error().code == ErrorCode::kTimeout;

@@ -18,51 +18,51 @@
 
 namespace slsd {
 
-/// The projector and what it shows. Opens it, opens it again after it was lost, with growing pauses; the first failure
-/// and the recovery are logged, not each attempt. Comes back from every call in time, whatever the projector does.
+/// The projector and what it shows. Opens the projector, and reopens it when lost, with growing pauses. Logs the first
+/// failure and the recovery, not each attempt. Every call returns in time, whatever the projector does.
 ///
 ///             a scan                    idle_after without a scan
 ///     any ------------> pattern (white, black) ------------> idle picture
 ///      |                   ^
 ///      +--hold()--> held --+ a scan, or release()
 ///
-/// @thread thread-bound, but for status()
+/// @thread thread-bound, except status()
 class Projection {
  public:
-  /// @param pattern  of the projector's size
+  /// @param pattern  in the projector's size
   Projection(std::unique_ptr<Projector> projector, Grey8 pattern, const ScanOptions& options);
 
-  /// Sets the pattern of the scans from the next one on.
+  /// Sets the pattern for the next scans.
   void set_pattern(Grey8 pattern);
   /// Sets the picture shown when nobody has scanned for a while. Without a picture the pattern stays.
   void set_idle(std::optional<Grey8> picture, std::chrono::milliseconds after);
 
-  /// Shows a picture until a scan, another hold() or release(); returns when it is visible.
+  /// Shows a picture until a scan, another hold() or release(). Returns when the picture is visible.
   /// @param picture  nothing: the pattern
-  /// @errors as show(); what was held before then still is
+  /// @errors as show(); the previously held picture then stays
   [[nodiscard]] Result<> hold(std::optional<Grey8> picture, MonotonicTime deadline, const std::stop_token& stop);
-  /// Goes on to the idle picture, at once. @errors as hold()
+  /// Returns to the idle picture at once. @errors as hold()
   [[nodiscard]] Result<> release(MonotonicTime deadline, const std::stop_token& stop);
 
-  /// Opens the projector and shows what is due; notices that it is gone, or hangs. Takes a tenth of a second at most:
-  /// what takes longer goes on, and the next call looks after it.
+  /// Opens the projector and shows the current picture; notices a lost or hung projector. Takes at most a tenth of a
+  /// second. Slower work continues, and the next call checks it.
   void supervise();
-  /// The time when supervise() next changes the picture; the end of time if it will not.
+  /// The time when supervise() next changes the picture; the end of time if never.
   [[nodiscard]] MonotonicTime next_change() const;
 
-  /// Returns when the picture is visible, whatever was shown before.
-  /// @param picture  the pattern, and for the light of each point all white and all black
+  /// Shows a picture, whatever was shown before. Returns when it is visible.
+  /// @param picture  the pattern, or all white or all black to measure the light of each point
   /// @errors kTimeout, with the reason; kCancelled
   [[nodiscard]] Result<> show(Picture picture, MonotonicTime deadline, const std::stop_token& stop);
-  /// Returns when what is due is visible. @errors as show()
+  /// Shows the picture that is due now. Returns when it is visible. @errors as show()
   [[nodiscard]] Result<> show_due(MonotonicTime deadline, const std::stop_token& stop);
 
-  /// Checks that what was shown still is. Called after each capture. Returns 0.3 s after the deadline, or after now, at
-  /// the latest. @errors kDisconnected
+  /// Checks that the picture is still shown. Called after each capture. Returns at most 0.3 s after the deadline, or
+  /// after now if that is later. @errors kDisconnected
   [[nodiscard]] Result<> check(MonotonicTime deadline);
-  /// The time from which every exposure sees the current picture alone, and nothing of the one before.
+  /// The time from which every exposure sees only the current picture, and nothing of the one before.
   [[nodiscard]] MonotonicTime visible() const { return visible_; }
-  /// The number of picture changes. Frames of different counts do not belong together.
+  /// The number of picture changes. Frames belong together only if their counts are equal.
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
 
   /// @thread thread-safe
@@ -86,7 +86,7 @@ class Projection {
 
   std::unique_ptr<Projector> projector_;
   Grey8 pattern_;
-  Grey8 plain_;  ///< white or black, kept for its memory
+  Grey8 plain_;  ///< white or black; kept to reuse its memory
   std::optional<Grey8> idle_;
   std::optional<Held> held_;
   std::chrono::milliseconds idle_after_{0};
@@ -97,7 +97,7 @@ class Projection {
   MonotonicTime visible_{};
   std::optional<Picture> shown_;  ///< nothing: unknown
   bool open_ = false;
-  bool looking_ = false;  ///< whether it is still shown, it has not answered yet
+  bool looking_ = false;  ///< still waits for the answer whether the picture is shown
   std::uint64_t changes_ = 0;
   mutable std::mutex mutex_;  ///< guards status_
   DeviceStatus status_;

@@ -67,8 +67,7 @@ Result<> keep_frames(const FrameSet& set, const ScanSetup& setup, FrameCoding co
   return kept;
 }
 
-// The level of a saturated pixel of a camera, one for all its frames: what is guessed of a dark one alone would be
-// lower.
+// The saturation level of a camera, for all its frames: a guess from a dark frame alone would be too low.
 double full_level_of(const FrameSet& set, const ScanSetup& setup, std::size_t camera) {
   const std::string format = camera < setup.camera_formats.size() ? setup.camera_formats[camera] : "";
   double full = 0;
@@ -86,7 +85,7 @@ SceneLight light_of(const FrameSet& set, std::size_t camera, double full) {
   return light;
 }
 
-// The light of the points of one camera.
+// Measures the light of one camera's points.
 void shade(std::span<CloudPoint> points, const SceneLight& light, ScanResult& result) {
   if (!light.white && !light.dark) return;
   const std::size_t saturated = shade_points(points, light);
@@ -98,7 +97,7 @@ DenseView measure_pixels(const GreyView& frame, Decoder& decoder, ScanSetup& set
                          std::size_t camera, const SceneLight& light, bool next_of_stream, ScanResult& result) {
   DenseMapper& mapper = setup.dense->of(lane, camera, decoder, setup.pattern, *setup.calibration, setup.decode);
   DecodedSymbols symbols = decoder.symbols();
-  if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may be those of the quotient
+  if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may come from the quotient image
   const CalibratedCamera& calibrated = setup.calibration->cameras[decoder.camera_index()];
   DenseMap& map = next_of_stream ? mapper.measure_next(frame, light.full, symbols, *setup.crew)
                                  : mapper.measure(frame, light.full, symbols, *setup.crew);
@@ -115,7 +114,7 @@ DenseView measure_pixels(const GreyView& frame, Decoder& decoder, ScanSetup& set
   return view;
 }
 
-// Half of the time that is left; a stream does not wait, as its next cloud has the answer.
+// Waits for half of the time left. A stream does not wait: its next cloud carries the answer.
 std::string why_empty(const FrameSet& set, const ScanSetup& setup, std::size_t lane, const ScanRequest& request,
                       const ScanResult& result) {
   const auto now = steady_clock::now();

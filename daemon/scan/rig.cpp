@@ -13,10 +13,10 @@ using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
 constexpr std::size_t kAlignTriesMax = 32;
-// A driver answers by its deadline. One that does not is told to a little later, and then left alone.
+// A driver answers by its deadline. One that does not is cancelled a little later, and then abandoned.
 constexpr auto kLate = 300ms;
 constexpr auto kCancelTime = 400ms;
-constexpr auto kHangUpTime = 1s;  // where nobody waits for it any more
+constexpr auto kHangUpTime = 1s;  // if nobody waits for the frame any more
 
 std::string milliseconds_text(std::chrono::nanoseconds time) {
   char text[32];
@@ -33,7 +33,7 @@ std::chrono::nanoseconds skew_of(const std::vector<Frame>& frames) {
   return last->exposure_start() - first->exposure_start();
 }
 
-// One camera's error is the set's.
+// An error of one camera is the error of the set.
 Error incomplete(Error error, std::size_t cameras) {
   if (cameras > 1 && error.code != ErrorCode::kCancelled) {
     error.message = "the set of " + std::to_string(cameras) + " frames is incomplete: " + error.message;
@@ -77,7 +77,7 @@ std::uint64_t Rig::openings() const {
   return openings;
 }
 
-// The projection waits in steps, as the deadline may be far.
+// Waits for the projection in steps, because the deadline may be far.
 template <class Show>
 Result<> Rig::show(const Patience& patience, Show show) {
   patience.note("projector");
@@ -184,8 +184,8 @@ Result<Frame> Rig::capture_one(std::size_t camera, const Patience& patience, boo
   }
 }
 
-// Cameras that run freely begin at any moment of their period: where one has begun too early for the others, its next
-// frame is nearer to theirs.
+// Cameras in free run begin at any moment of their period. If one began too early for the others, its next frame is
+// closer to theirs.
 Result<> Rig::align(std::vector<Frame>& frames, const Shot& shot) {
   for (std::size_t tries = 0; frames.size() > 1 && tries < kAlignTriesMax; ++tries) {
     const auto first = static_cast<std::size_t>(exposures(frames).min - frames.begin());
@@ -197,8 +197,7 @@ Result<> Rig::align(std::vector<Frame>& frames, const Shot& shot) {
   return {};
 }
 
-/// The longest time by which the camera may begin before the last of the others, while none of its later frames is
-/// nearer.
+/// The longest time by which this camera may begin before the last of the others while no later frame of it is closer.
 std::chrono::nanoseconds Rig::slack(const CameraRunner& camera) const {
   if (camera.rate_hz() <= 0) return std::chrono::nanoseconds::max();
   return std::chrono::nanoseconds(static_cast<std::int64_t>(0.5e9 / camera.rate_hz()));

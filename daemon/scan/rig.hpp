@@ -22,43 +22,42 @@
 
 namespace slsd {
 
-/// The projector and the cameras, and a capture with them as a transaction: the pattern is shown and visible, every
-/// camera exposes one frame after that, all at the same time: one set of frames, or one error. Where a scan wants them,
-/// the same follows with white and with black.
+/// The projector and the cameras. A capture is a transaction: once the pattern is visible, every camera exposes one
+/// frame, all at the same time. It gives one set of frames, or one error. If a scan wants them, exposures under white
+/// and under black follow.
 ///
 ///     trigger        exposure_start (each camera)          received        deadline
 ///     --|-----------------|-----------------------------------|---------------|-->
 ///     pattern visible     within exposure_skew_ms of one another
 ///
-/// @thread thread-bound, but for request_stop(), stopped(), kept() and the statuses
+/// @thread thread-bound, except request_stop(), stopped(), kept() and the statuses
 class Rig {
  public:
-  /// @param image  the pattern, which the projector shows while scans go on
+  /// @param image  the pattern that the projector shows during scans
   Rig(std::unique_ptr<Projector> projector, std::vector<std::unique_ptr<Camera>> cameras, Grey8 image,
       const ScanOptions& options);
 
-  /// Opens the projector and shows what is due; notices that it is gone.
+  /// Opens the projector and shows the current picture; notices a lost projector.
   void supervise() { projection_.supervise(); }
-  /// The time when supervise() next has work, unless a device is lost; the end of time if it has none.
+  /// The time when supervise() next has work while no device is lost; the end of time if it has none.
   [[nodiscard]] MonotonicTime next_change() const { return projection_.next_change(); }
 
-  /// All cameras replay images at the trigger: nothing but the processor limits how often.
+  /// Tells whether all cameras replay images at the trigger. Then only the processor limits the rate.
   [[nodiscard]] bool only_replays() const;
 
-  /// One frame of each camera. Of cameras that run freely those whose exposures are nearest to one another. Where the
-  /// frames of one light are lost and patience says so, they are taken again.
-  /// @param exposure  kNext: the frames need not have begun after the call, only after the pattern was visible, and
-  ///                  after those of the capture before
-  /// @param light     exposed after those of the pattern, white first, each after its own picture was visible
+  /// Takes one frame of each camera. If cameras run freely, takes the frames with the closest exposures. Takes lost
+  /// frames again if patience allows.
+  /// @param exposure  kNext: a frame may have begun before the call, but after the pattern was visible and after the
+  ///                  previous capture's frames
+  /// @param light     exposed after the pattern's frames, white first, each once its own picture is visible
   /// @errors kTimeout: a device is not ready; kFrameDropped, kFrameTorn, kFrameStale, kFrameLate, kMismatch,
-  /// kDisconnected, kBusy:
-  ///         of one camera; kFrameSkewed: exposures apart; kCancelled
+  ///         kDisconnected, kBusy: of one camera; kFrameSkewed: exposures too far apart; kCancelled
   [[nodiscard]] Result<FrameSet> capture(const Patience& patience, Exposure exposure = Exposure::kFresh,
                                          LightFrames light = {});
 
-  /// One frame of one camera while the pattern is visible. @errors as capture()
+  /// Takes one frame of one camera while the pattern is visible. @errors as capture()
   /// @param camera    its index
-  /// @param as_shown  leave what the projector shows, whatever that is, in the pattern's place
+  /// @param as_shown  keep the projector's picture, whatever it is, instead of the pattern
   [[nodiscard]] Result<Frame> capture_one(std::size_t camera, const Patience& patience, bool as_shown = false);
 
   /// Shows another pattern from the next capture on.
@@ -67,10 +66,10 @@ class Rig {
   void set_idle(std::optional<Grey8> picture, std::chrono::milliseconds after) {
     projection_.set_idle(std::move(picture), after);
   }
-  /// Shows a picture, at once, until the next capture, hold() or release(). @param picture  nothing: the pattern
-  /// @errors kTimeout: the projector is not ready; kCancelled; what was shown before then stays due
+  /// Shows a picture at once, until the next capture, hold() or release(). @param picture  nothing: the pattern
+  /// @errors kTimeout: the projector is not ready; kCancelled; the previous picture then stays
   [[nodiscard]] Result<> hold(const std::optional<Grey8>& picture, const Patience& patience);
-  /// Shows the idle picture, at once. @errors as hold()
+  /// Shows the idle picture at once. @errors as hold()
   [[nodiscard]] Result<> release(const Patience& patience);
 
   /// Replaces a camera as CameraRunner::replace() does. @param camera  its index @thread thread-safe
@@ -80,15 +79,14 @@ class Rig {
   }
 
   void request_stop();
-  /// Tells whether the cameras are closed, after request_stop().
+  /// Tells whether the cameras are closed after request_stop().
   [[nodiscard]] bool stopped() const;
   /// Tells whether the cameras' threads keep their promises to the watchdog.
   [[nodiscard]] bool kept(MonotonicTime now = std::chrono::steady_clock::now()) const;
   [[nodiscard]] DeviceStatus projector_status() const { return projection_.status(); }
   [[nodiscard]] std::vector<DeviceStatus> camera_statuses() const;
   [[nodiscard]] RigStatus status() const { return {projector_status(), camera_statuses()}; }
-  /// The number of times that devices were opened, all together. When it grows, a device may be another one than
-  /// before.
+  /// How often all devices together were opened. When it grows, a device may have been replaced.
   [[nodiscard]] std::uint64_t openings() const;
 
  private:
@@ -114,7 +112,7 @@ class Rig {
   std::vector<std::unique_ptr<CameraRunner>> runners_;
   std::vector<CameraRunner*> cameras_;
   ScanOptions options_;
-  std::uint64_t changes_before_ = 0;  ///< the projection's at the last set of frames
+  std::uint64_t changes_before_ = 0;  ///< the projection's count of changes at the last set of frames
   std::stop_source stopping_;
 };
 

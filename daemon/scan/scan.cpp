@@ -16,7 +16,7 @@ tl::unexpected<Error> fail_stopping() {
   return fail(ErrorCode::kCancelled, "the service is stopping");
 }
 
-// What came of all tries. One that the deadline cut short says less than those before it.
+// The outcome of all tries. A try that the deadline cut short says less than the tries before it.
 Error after_tries(Error error, const LostTries& lost) {
   if (lost.count == 0) return error;
   const bool cut_short = error.code == ErrorCode::kFrameLate || error.code == ErrorCode::kTimeout;
@@ -75,7 +75,7 @@ void Scan::compute(std::size_t lane) {
   if (set_ && in_time) result_ = reconstruct(*set_, *setup_, lane, request_, id_);
   if (!set_) result_ = tl::unexpected(set_.error());
   if (set_ && keep_) keep_(*this, *set_);
-  if (set_) set_->give_back();  // back to the driver before others have had their turn
+  if (set_) set_->give_back();  // back to the driver before other jobs have their turn
   if (!result_ || !in_time) return;
   result_->lost = std::move(lost_);
   result_->files = CloudFiles(result_->cloud, result_->dense.get(), request_.formats);

@@ -17,8 +17,8 @@
 
 namespace slsd {
 
-/// One scan, from its request to its outcome: waits for its turn, takes the frames, again where some are lost and there
-/// is time, decodes them, writes the cloud, and answers in its turn.
+/// One scan, from its request to its outcome. Waits for its turn, takes the frames (again if some are lost and time is
+/// left), decodes them, writes the cloud, and answers in order.
 ///
 ///     waiting --> expose() --> compute() --> deliver() --> over
 ///                 scanner      a lane        in order
@@ -28,10 +28,10 @@ class Scan final : public TaskOf<ScanResult>, public FrameJob {
  public:
   using Told = std::function<void(const Scan&, Result<ScanResult>)>;
   using Keep = std::function<void(const Scan&, const FrameSet&)>;
-  /// @param number  counts the scans of this run
+  /// @param number  number of the scan since the start
   /// @param id      its name for clients
   /// @param told    called once, with the outcome
-  /// @param keep    called with its frames, before they go back to the drivers; may be empty
+  /// @param keep    called with the frames before they return to the drivers; may be empty
   Scan(ScanRequest request, std::uint64_t number, std::string id, Told told, Keep keep = {});
 
   [[nodiscard]] const ScanRequest& request() const { return request_; }
@@ -41,12 +41,12 @@ class Scan final : public TaskOf<ScanResult>, public FrameJob {
   [[nodiscard]] const SharedSetup& setup() const { return setup_; }
   [[nodiscard]] bool exposed() const { return set_.has_value(); }
 
-  /// Takes the frames, or finds out why there are none.
-  /// @param patience  this task's
-  /// @param formats   those that subscribers want besides the request's
+  /// Takes the frames, or finds out why it cannot.
+  /// @param patience  this task's own
+  /// @param formats   the forms that subscribers want in addition to the request's
   void expose(Rig& rig, HardwareGuard& hardware, SharedSetup setup, const Patience& patience, Exposure exposure,
               CloudFormats formats);
-  /// A try lost its frames, and another one follows: the outcome tells.
+  /// Notes a try that lost its frames and is repeated; the outcome reports it.
   void note_lost(const Error& error);
 
   void compute(std::size_t lane) override;
@@ -80,7 +80,7 @@ class FrameTask final : public TaskOf<FrameImage>, public FrameJob {
   Result<FrameImage> result_;
 };
 
-/// Tells whether such a frame may be whole the next time: it was lost, torn or late on its way.
+/// Tells whether another try may give a whole frame: this one was lost, torn or late.
 [[nodiscard]] bool may_be_taken_again(const Error& error);
 
 }  // namespace slsd

@@ -48,8 +48,8 @@ Result<std::vector<std::size_t>> calibrated_cameras(const Calibration& calibrati
   return indices;
 }
 
-// The decoder's buffers grow with its first frame. One with the whole pattern, of which no frame shows more, makes the
-// first scan as quick as the others, and the service as large when it starts as it will be.
+// The decoder's buffers grow with its first frame. Warm up with the whole pattern, because no frame shows more. Then
+// the first scan is as quick as later ones, and the service has its full size at start.
 Result<> warm_up(Decoder& decoder, const Lens& lens, const Grey8& symbols, Crew& crew) {
   Grey8 frame(lens.width_px, lens.height_px);
   for (int y = 0; y < std::min(frame.height(), symbols.height()); ++y) {
@@ -59,7 +59,7 @@ Result<> warm_up(Decoder& decoder, const Lens& lens, const Grey8& symbols, Crew&
   return decoded ? Result<>() : tl::unexpected(decoded.error());
 }
 
-// Each in a thread of its own, as each takes some hundredths of a second.
+// Each gets its own thread, because each takes some hundredths of a second.
 Result<std::vector<Decoder>> make_lane(const ScanSetup& setup, const std::vector<std::size_t>& cameras,
                                        const DecodeOptions& options) {
   const IndexedPattern pattern(setup.pattern);
@@ -167,7 +167,7 @@ double FullLevels::raise(std::size_t camera, double level) {
 }
 
 void DenseMappers::end_stream() {
-  // Whoever makes a mapper takes a while; he has nothing to give back yet.
+  // If another thread is making a mapper, that takes a while, and there is nothing to free yet.
   if (const std::unique_lock lock(mutex_, std::try_to_lock); lock) {
     for (auto& [lane, mapper] : mappers_)
       if (mapper) mapper->end_stream();
@@ -201,7 +201,7 @@ DenseMapper& DenseMappers::of(std::size_t lane, std::size_t camera, const Decode
   const std::lock_guard lock(mutex_);
   auto& mapper = mappers_[{camera, lane}];
   if (mapper) return *mapper;
-  const auto other = mappers_.lower_bound({camera, 0});  // of another lane, or this one
+  const auto other = mappers_.lower_bound({camera, 0});  // of another lane, or of this one
   mapper = other->second ? std::make_unique<DenseMapper>(other->second->another())
                          : std::make_unique<DenseMapper>(pattern, calibration, decoder.camera_index(), options);
   return *mapper;
@@ -235,7 +235,7 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
   for (std::size_t lane = 1; lane < lanes; ++lane) setup.lanes.push_back(another_lane(*first));
   if (lanes > 0) setup.lanes.push_back(std::move(*first));
   if (setup.decode.density != Density::kPixels) return setup;
-  // The first scan is to be as quick as the others.
+  // Makes the first scan as quick as later ones.
   for (std::size_t lane = 0; lane < setup.lanes.size(); ++lane) {
     for (std::size_t camera = 0; camera < cameras->size(); ++camera) {
       setup.dense->of(lane, camera, setup.lanes[lane][camera], setup.pattern, *setup.calibration, setup.decode)

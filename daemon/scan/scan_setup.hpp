@@ -28,35 +28,34 @@ namespace slsd {
 /// @errors of make_pattern(), read_file() and read_pattern(); kMismatch: not of the projector's size
 [[nodiscard]] Result<Pattern> configured_pattern(const Configuration& configuration);
 
-/// Camera px for one projector px, of the calibrated camera that sees the pattern smallest; of the paper's rig without
-/// a calibration.
+/// Camera pixels for one projector pixel, in the calibrated camera that sees the pattern smallest. Without a
+/// calibration, of the paper's rig.
 [[nodiscard]] double pattern_scale(const std::optional<Calibration>& calibration, const DecodeOptions& options);
 
-/// Warnings about the pattern's choice of symbols at a scale, one sentence each. Empty if there is no risk. Takes a
-/// part of a second of computing.
+/// Warnings about the pattern's choice of symbols at this scale, one sentence each. Empty if there is no risk. Computes
+/// for a fraction of a second.
 [[nodiscard]] std::vector<std::string> symbol_warnings(const PatternOptions& pattern, double scale);
 
-/// The calibration that the configuration names; empty where it names none.
-/// @errors of read_file() and read_calibration(); kMismatch: not of this projector's size, or without one of the
-/// cameras
+/// The calibration that the configuration names; empty if it names none.
+/// @errors of read_file() and read_calibration(); kMismatch: for another projector size, or without one of the cameras
 [[nodiscard]] Result<std::optional<Calibration>> configured_calibration(const Configuration& configuration);
 
-/// The files that a scan's cloud depends on besides its frames, as text that can be read again.
+/// The files that determine a scan's cloud together with its frames, as text that can be read again.
 struct ScanFiles {
   std::string pattern;      ///< a pattern file
   std::string calibration;  ///< a calibration file; empty: none
 };
 
-/// Warnings about the effect of the calibration's own error, as its report has it, on dense clouds. Each tells what to
-/// do. Empty if the error is unknown or small beside what the clouds measure.
+/// Warnings about the effect of the calibration's reported error on dense clouds. Each says what to do. Empty if the
+/// error is unknown, or small beside the clouds' own error.
 [[nodiscard]] std::vector<std::string> calibration_error_warnings(const Calibration& calibration);
 
-/// The levels of saturated pixels that the cameras' frames have shown: where no format says, a faint frame after a
-/// bright one is not of fewer bits.
+/// The saturation levels that the cameras' frames have shown so far. If no format gives the bit depth, a faint frame
+/// after a bright one must not seem to have fewer bits.
 /// @thread thread-safe: lanes share it
 class FullLevels {
  public:
-  /// The greatest level that was told of this camera.
+  /// Raises the camera's level if this one is higher. Returns the highest so far.
   [[nodiscard]] double raise(std::size_t camera, double level);
 
  private:
@@ -64,17 +63,17 @@ class FullLevels {
   std::vector<double> greatest_;
 };
 
-/// The mappers that measure a point for each pixel. They are made on the first request, as they take more memory than
-/// all else.
+/// The mappers that measure a point for each pixel. They are made on the first request, because they take more memory
+/// than everything else.
 /// @thread thread-safe; what it lends belongs to the lane's thread
 class DenseMappers {
  public:
-  /// Ends the stream that nobody wants any more: gives back what was kept of its frames, and maps that wait.
+  /// Ends the stream when nobody wants it any more. Frees what was kept of its frames, and spare maps.
   void end_stream();
-  /// A cloud whose maps come back, for the next ones, when nobody holds it any more: new ones would be tens of
-  /// megabytes that the kernel has to fill with zeros.
+  /// A cloud that reuses the maps of clouds that nobody holds any more. New maps would be tens of megabytes that the
+  /// kernel must fill with zeros.
   [[nodiscard]] std::shared_ptr<DenseCloud> cloud();
-  /// A map that came back; an empty one where none has.
+  /// A map that came back; an empty one if there is none.
   [[nodiscard]] DenseMap spare_map();
   /// The mapper of a lane for the camera of a decoder.
   [[nodiscard]] DenseMapper& of(std::size_t lane, std::size_t camera, const Decoder& decoder, const Pattern& pattern,
@@ -91,7 +90,7 @@ class DenseMappers {
 };
 
 /// Everything about a scan that a reload replaces at once.
-/// @thread a lane belongs to one thread at a time; the rest does not change, but for the full levels
+/// @thread a lane belongs to one thread at a time; the rest is constant, except the full levels
 struct ScanSetup {
   Pattern pattern;
   Grey8 image;  ///< the projector's picture of the pattern
@@ -99,36 +98,36 @@ struct ScanSetup {
   std::vector<std::string> camera_names;    ///< names of the configured cameras
   std::vector<std::vector<Decoder>> lanes;  ///< by decoding thread, then by configured camera; none without calibration
   OtherHardware other_hardware = OtherHardware::kError;
-  std::vector<std::string> camera_formats = {};  ///< configured formats, such as "Mono12"; empty texts if left open
+  std::vector<std::string> camera_formats = {};  ///< configured formats, such as "Mono12"; an empty text if not set
   std::unique_ptr<FullLevels> full_levels = std::make_unique<FullLevels>();
   DecodeOptions decode = {};
   std::unique_ptr<DenseMappers> dense = std::make_unique<DenseMappers>();
   std::unique_ptr<Crew> crew = std::make_unique<Crew>(Crew::helpers_here());  ///< helps the lanes
   std::unique_ptr<EmptyClouds> empty_clouds = std::make_unique<EmptyClouds>();
-  std::vector<std::string> doubts = {};                ///< about the calibration, as calibration_doubts() has them
-  double depth_min_mm = DecodeOptions{}.depth_min_mm;  ///< nearest depth of the scene, along the cameras' axes
+  std::vector<std::string> doubts = {};                ///< doubts about the calibration, from calibration_doubts()
+  double depth_min_mm = DecodeOptions{}.depth_min_mm;  ///< nearest depth of the scene along the cameras' axes
   double depth_max_mm = DecodeOptions{}.depth_max_mm;
 
-  /// @param lanes  how many threads decode
+  /// @param lanes  number of decoding threads
   /// @errors of the two above; of Decoder::create()
   [[nodiscard]] static Result<ScanSetup> create(const Configuration& configuration, std::size_t lanes);
 
-  /// The same of a pattern and a calibration that are there already. @errors kMismatch; of Decoder::create()
+  /// Makes a setup from an existing pattern and calibration. @errors kMismatch; of Decoder::create()
   [[nodiscard]] static Result<ScanSetup> of(Pattern pattern, std::optional<Calibration> calibration,
                                             const Configuration& configuration, std::size_t lanes);
 
-  /// Checks that a scan is possible. @errors kNotFound: no calibration, or no camera of the name
+  /// Checks that a scan is possible. @errors kNotFound: no calibration, or no camera of this name
   [[nodiscard]] Result<> check(const ScanRequest& request) const;
-  /// @errors kNotFound: no camera of the name
+  /// @errors kNotFound: no camera of this name
   [[nodiscard]] Result<> check_camera(const std::string& name) const;
   /// @param name  of a camera; empty: the first
-  /// @return the number of cameras where there is none of the name
+  /// @return the camera's index; the number of cameras if none has this name
   [[nodiscard]] std::size_t camera_index(const std::string& name) const;
 
   [[nodiscard]] ScanFiles files() const;
 };
 
-// The decoders of the scans under way; shared, as a reload may replace them meanwhile.
+// The setup of the scans under way; shared, because a reload may replace it meanwhile.
 using SharedSetup = std::shared_ptr<ScanSetup>;
 
 }  // namespace slsd

@@ -15,7 +15,7 @@
 
 namespace slsd {
 
-/// The upper bounds of a Duration's histogram, in seconds; beyond the last there is one bucket more.
+/// The upper bounds of a Duration's histogram buckets, in seconds. One more bucket follows the last bound.
 inline constexpr std::array kDurationBounds{0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05,
                                             0.1,    0.2,   0.5,   1.0,   2.0,  5.0};
 
@@ -39,26 +39,26 @@ struct ScanTotals {
   std::map<ErrorCode, std::uint64_t> failed;
   std::optional<Error> last_error;
   std::uint64_t points = 0;      ///< points of the last scan
-  std::string empty;             ///< cause of the last scan's empty cloud; empty: it had points
-  std::uint64_t all_points = 0;  ///< points of symbols, of all scans
-  std::uint64_t lost_tries = 0;  ///< lost tries of the scans that succeeded
+  std::string empty;             ///< why the last scan's cloud was empty; empty: it had points
+  std::uint64_t all_points = 0;  ///< points of symbols in all scans
+  std::uint64_t lost_tries = 0;  ///< failed tries of scans that then succeeded
   std::array<std::uint64_t, kRegionStatusCount> regions{};
   RegionCounts regions_of_last{};
   std::array<std::uint64_t, kDecodeRuleCount> rules{};
   RuleCounts rules_of_last{};
-  std::uint64_t skipped = 0;  ///< sets of frames taken in free run and not decoded: newer ones came
+  std::uint64_t skipped = 0;  ///< sets of frames in free run that were skipped for newer ones
   Duration capture;
   Duration decode;
   Duration latency;  ///< time from the last byte of a scan's frames to its cloud at a client's socket
   std::array<Duration, kStageCount> stages{};
-  Duration dense;  ///< time for the points of pixels, of the scans that have them
+  Duration dense;  ///< time for the points of pixels, in scans that have them
   std::array<std::uint64_t, kDensePixelCount> pixels{};
 };
 
 /// Counts scans. @thread thread-safe
 class ScanStatistics {
  public:
-  /// @param skipped  sets of frames since the scan before
+  /// @param skipped  sets of frames since the previous scan
   void note(const Result<ScanResult>& scan, std::uint64_t skipped);
   void note_latency(std::chrono::nanoseconds time);
   [[nodiscard]] ScanTotals totals() const;

@@ -24,15 +24,15 @@ using std::chrono::steady_clock;
 constexpr std::size_t kMaxWaiting = 64;
 constexpr std::size_t kMaxChores = 16;
 constexpr auto kIdleWake = 1s;
-constexpr auto kStepPromise = 7s;  // waiting goes by steps of a second
+constexpr auto kStepPromise = 7s;  // waits go by steps of one second
 constexpr auto kFreeScanTimeout = 5s;
 constexpr auto kPauseAfterFailure = 500ms;
 constexpr int kFailuresToPause = 2;
-constexpr double kReplayRateHz = 10;  // of recorded frames, if nobody says: else they take a whole processor
+constexpr double kReplayRateHz = 10;  // rate of recorded frames if not configured: otherwise they use a whole processor
 constexpr auto kTryPauseFirst = 5ms;
 constexpr auto kTryPauseLongest = 200ms;
 
-// Tells the scans of one run of the service from those of another.
+// Distinguishes the scans of this run of the service from those of other runs.
 std::string make_run_id() {
   std::random_device source;
   char text[9];
@@ -106,7 +106,7 @@ void Scanner::run(const std::stop_token& stop) {
     heartbeat_.promise(kStepPromise);
     adopt_setup();
     if (!free_scan_due()) {
-      every_frame_ = false;  // by the next free scan the cameras' frames may be of long ago
+      every_frame_ = false;  // by the next free scan the cameras' frames may be old
       rig_->supervise();     // not before a scan: the idle picture would only flash
     }
     if (const auto turn = queue_.pop_until(next_wake(), stop)) {
@@ -135,7 +135,7 @@ void Scanner::take_turn(const Turn& turn) {
     const std::lock_guard lock(mutex_);
     under_way_ = turn.task;
   }
-  // A stop that came before could not see it.
+  // A stop before this line could not see the task.
   if (thread_.get_stop_token().stop_requested()) turn.task->fail_with(stopping());
   heartbeat_.promise(kStepPromise);
   turn.take();
@@ -181,7 +181,7 @@ Patience Scanner::patience_of(Task& task) {
   return patience;
 }
 
-// Where the frames under way are all that a camera lends, its next waits for one of them.
+// If the frames under way are all that the camera lends, its next capture waits for one of them.
 std::function<bool(const Error&)> Scanner::wait_for_frames(Task& task) {
   return [this, &task, done = lanes_.done()](const Error& error) mutable {
     if (error.code != ErrorCode::kBusy || !lanes_.wait_done(done, patience_of(task))) return false;
@@ -190,8 +190,7 @@ std::function<bool(const Error&)> Scanner::wait_for_frames(Task& task) {
   };
 }
 
-// Frames that were lost are taken again. The pauses keep a camera that loses everything at once from using a whole
-// processor.
+// Takes lost frames again. The pauses keep a camera that loses every frame at once from using a whole processor.
 std::function<bool(const Error&)> Scanner::try_again(Task& task, std::function<void(const Error&)> note) {
   return [&task, lent = wait_for_frames(task), note = std::move(note),
           pause = std::chrono::milliseconds::zero()](const Error& error) mutable {
@@ -210,7 +209,7 @@ void Scanner::submit(Turn turn, const std::stop_token& gone) {
   const std::shared_ptr<Task> task = turn.task;
   deadlines_.watch(task);
   task->end_with(gone);
-  // Those that are over give their place to others.
+  // Removes finished requests to make room.
   queue_.erase_if([](const Turn& each) { return each.task->over(); });
   if (queue_.try_push(std::move(turn))) {
     if (thread_.get_stop_token().stop_requested()) task->fail_with(stopping());
@@ -256,7 +255,7 @@ std::shared_ptr<Scan> Scanner::make_scan(ScanRequest request, bool listened, Ans
         if (answer) answer(result);
         const bool for_all = listened && (result || result.error().code != ErrorCode::kCancelled);
         if (!for_all || !listener_) return;
-        if (result) result->frames = {}, result->picture_png = {};  // one client's alone, and large
+        if (result) result->frames = {}, result->picture_png = {};  // large, and for one client alone
         listener_(std::make_shared<Result<ScanResult>>(std::move(result)));
       },
       std::move(keep));
@@ -330,7 +329,7 @@ void Scanner::submit_chore(Chore chore) {
     // What found no room was not moved. NOLINTNEXTLINE(bugprone-use-after-move)
     return chore(fail(ErrorCode::kBusy, std::to_string(kMaxChores) + " such requests wait already: ask again later"));
   }
-  if (chores_thread_.get_stop_token().stop_requested()) refuse_chores();  // its thread may have ended before
+  if (chores_thread_.get_stop_token().stop_requested()) refuse_chores();  // its thread may already have ended
 }
 
 void Scanner::pattern(Answer<std::string> answer) {
@@ -340,7 +339,7 @@ void Scanner::pattern(Answer<std::string> answer) {
   });
 }
 
-// All cameras take theirs, or each is as before.
+// Either all cameras take their new settings, or each keeps its old ones.
 Result<> Scanner::set_exposures(const std::vector<CameraOptions>& running, const std::vector<CameraOptions>& wanted) {
   constexpr auto kTime = 20s;
   const auto exchange = [&](std::size_t i, const CameraOptions& to, const CameraOptions& from) -> Result<> {

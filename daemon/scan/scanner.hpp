@@ -27,36 +27,35 @@
 
 namespace slsd {
 
-/// The outcome of a scan in free run: a cloud, or the reason for having none.
+/// The outcome of a scan in free run: a cloud, or the reason why there is none.
 using FreeScan = std::shared_ptr<const Result<ScanResult>>;  // shared: every subscriber reads it at its own pace
 
 /// The combined wishes of the subscribers.
 struct FreeRun {
-  double rate_hz = 0;  ///< maximum rate; infinity: as fast as frames come
+  double rate_hz = 0;  ///< maximum rate; infinity: every frame
   CloudFormats formats;
 };
 
-/// The threads between clients and devices: one that takes frames, task by task, the lanes that decode meanwhile, one
-/// that ends tasks whose time is over, and one for what needs no device. While somebody subscribes it scans by itself
-/// between the tasks. A scan that was asked for is always decoded; of those in free run the newest are, where decoding
-/// is slower than the cameras, and the rest are counted.
-/// @thread thread-safe; each answer is called exactly once, on one of the scanner's own threads, on the one that ends
-///         its request, or, where there is no room for it, at once. What scans give is told in their order.
+/// The threads between clients and devices: one takes frames, task by task; lanes decode meanwhile; one ends overdue
+/// tasks; one works without devices. While somebody subscribes, it also scans freely between tasks. A requested scan is
+/// always decoded. If decoding is slower than the cameras, only the newest free scans are decoded, and the skipped ones
+/// are counted.
+/// @thread thread-safe; each answer is called exactly once: on a thread of the scanner, on the thread that ends its
+///         request, or at once if the queue is full. Outcomes of scans are delivered in order
 class Scanner {
  public:
   template <class Value>
   using Answer = std::function<void(const Result<Value>&)>;
 
-  /// @param black_box_bytes  as BlackBox has it
+  /// @param black_box_bytes  as for BlackBox
   Scanner(std::unique_ptr<Rig> rig, ScanSetup setup, std::size_t black_box_bytes = 0);
   ~Scanner();
   Scanner(const Scanner&) = delete;
   Scanner& operator=(const Scanner&) = delete;
 
-  // Each of these is over soon after its deadline, whatever a device does, and when its client is gone.
+  // Each of these ends soon after its deadline, or when its client is gone, whatever a device does.
 
-  /// @errors (as an answer) kBusy: too many requests wait; kTimeout: its time was over, with the device that held it
-  /// up;
+  /// @errors (as an answer) kBusy: too many requests wait; kTimeout: its time is over, with the device that delayed it;
   ///         kCancelled: the client is gone, or the service is stopping; those of Rig::capture() and reconstruct()
   void scan(ScanRequest request, Answer<ScanResult> answer);
   void frame(FrameRequest request, Answer<FrameImage> answer);
@@ -64,27 +63,26 @@ class Scanner {
   /// Rig::hold()
   void project(ProjectRequest request, Answer<void> answer);
 
-  // These wait for no device.
+  // These do not wait for a device.
 
   /// The setup that decodes the next scan.
   [[nodiscard]] SharedSetup setup() const;
   /// The pattern's image as a PNG.
   void pattern(Answer<std::string> answer);
-  /// Reads the configuration anew, makes what follows from its pattern, calibration and decoder options, and puts that
-  /// in force for the next scan; where something is wrong nothing changes.
-  /// @param running  the configuration whose projector and cameras are in use, and stay
-  /// @param settings  set over the socket, over the file's: those of the cameras are in force at once, too, where no
-  ///                  camera refuses them
+  /// Reads the configuration again and rebuilds all that depends on its pattern, calibration and decoder options. The
+  /// next scan uses the result. On an error nothing changes.
+  /// @param running  the configuration whose projector and cameras stay in use
+  /// @param settings  set over the socket; they override the file. Camera settings take effect at once, unless a camera
+  ///                  refuses them
   void reload(const std::filesystem::path& file, const Configuration& running, nlohmann::json settings,
               Answer<Configuration> answer);
 
-  /// The last scans, on a thread that has time to write them.
+  /// The last scans, delivered on a thread that has time to write them.
   void last_scans(Answer<std::vector<KeptScan>> answer);
 
-  /// Scans by itself from now on, or no longer. Results go to the listener.
+  /// Starts or stops free scans. Results go to the listener.
   void run_freely(std::optional<FreeRun> demand);
-  /// Called on one of the scanner's threads with each free scan and each asked-for one, in their order. Set before the
-  /// first request.
+  /// Called on a thread of the scanner with each free and each requested scan, in order. Set before the first request.
   void set_listener(std::function<void(FreeScan)> listener) { listener_ = std::move(listener); }
 
   /// Called with each scan that failed, on one of the scanner's threads. Set before the first request.
@@ -92,28 +90,28 @@ class Scanner {
     failure_listener_ = std::move(listener);
   }
 
-  /// Tells whether all its threads keep their promises to the watchdog.
+  /// Tells whether all threads keep their promises to the watchdog.
   [[nodiscard]] bool kept() const;
   [[nodiscard]] ScanTotals totals() const { return statistics_.totals(); }
-  /// A scan's cloud was handed to a client's socket, so long after the last byte of its frames was there.
+  /// Records the time from the last byte of a scan's frames to its cloud at a client's socket.
   void note_latency(std::chrono::nanoseconds time) { statistics_.note_latency(time); }
-  /// The drift of the calibration that the scans show, one per configured camera; empty before the first scan.
+  /// The drift of the calibration according to the scans, one for each configured camera; empty before the first scan.
   [[nodiscard]] std::vector<DriftState> drifts() const { return watch_.states(); }
-  [[nodiscard]] const BlackBox& black_box() const { return black_box_; }  ///< its figures are for metrics
-  [[nodiscard]] const Rig& rig() const { return *rig_; }                  ///< its statuses are for clients
+  [[nodiscard]] const BlackBox& black_box() const { return black_box_; }  ///< metrics read its figures
+  [[nodiscard]] const Rig& rig() const { return *rig_; }                  ///< clients read its statuses
 
-  /// Ends what is under way, soon, and the threads; requests that wait are answered kCancelled.
+  /// Soon ends the work under way and the threads; answers waiting requests with kCancelled.
   void request_stop();
-  /// Tells whether the threads came to their ends, and the cameras are closed, within the time.
+  /// Tells whether the threads ended and the cameras closed within the time.
   [[nodiscard]] bool wait_stopped(std::chrono::milliseconds time);
 
  private:
-  /// A task and what is to be done when its turn comes.
+  /// A task and the work for its turn.
   struct Turn {
     std::shared_ptr<Task> task;
     std::function<void()> take;
   };
-  /// Called once with permission to work, or with the reason why there is none.
+  /// Called once, with permission to work or the reason why not.
   using Chore = std::function<void(const Result<>& permission)>;
 
   void run(const std::stop_token& stop);
@@ -154,14 +152,14 @@ class Scanner {
   HardwareGuard hardware_;
   std::string run_id_;
   std::atomic<std::uint64_t> scans_{0};
-  std::mutex concluding_;  ///< guards skipped_told_, and keeps the log's lines in the order of the totals
+  std::mutex concluding_;  ///< guards skipped_told_, and keeps the log in the order of the totals
   std::uint64_t skipped_told_ = 0;
   std::atomic<int> failures_in_a_row_{0};
-  std::atomic<bool> empty_told_{false};  ///< the log has the cause of empty clouds
-  std::atomic<double> free_rate_hz_{0};  ///< 0: only when asked
+  std::atomic<bool> empty_told_{false};  ///< the log has the cause of the empty clouds
+  std::atomic<double> free_rate_hz_{0};  ///< 0: only on request
   std::atomic<CloudFormats> free_formats_{};
   MonotonicTime next_free_scan_{};
-  bool every_frame_ = false;  ///< the next free scan is due when the one before is captured
+  bool every_frame_ = false;  ///< the next free scan is due as soon as the previous one is captured
   std::atomic<int> running_{2};
   DecodeLanes lanes_;
   Deadlines deadlines_;

@@ -15,14 +15,14 @@
 
 namespace slsd {
 
-/// A client's request to the devices, from its arrival to its one outcome. The first to end it wins: the work that is
-/// done, the deadline, the client that hung up, or the service that stops. Later outcomes are thrown away.
+/// A client's request to the devices, from its arrival to its single outcome. The first to end it wins: finished work,
+/// the deadline, a client that hung up, or a stop of the service. Later outcomes are dropped.
 ///
 ///     waiting --its turn--> under way --done--> over
 ///        \______________________\____ deadline, hang-up, stop ____/
 ///
 /// @thread thread-safe
-class Task : public std::enable_shared_from_this<Task> {  // shared: whoever ends it may be the last to know it
+class Task : public std::enable_shared_from_this<Task> {  // shared: whoever ends it may be its last owner
  public:
   explicit Task(MonotonicTime deadline) : deadline_(deadline) {}
   virtual ~Task() = default;
@@ -32,7 +32,7 @@ class Task : public std::enable_shared_from_this<Task> {  // shared: whoever end
   [[nodiscard]] MonotonicTime deadline() const { return deadline_; }
   [[nodiscard]] bool over() const { return over_.stop_requested(); }
 
-  /// The limits of its work's wait. The wait reports whom it waits for.
+  /// The limits of the wait for its work. The wait reports the devices that it waits for.
   [[nodiscard]] Patience patience() {
     Patience patience(deadline_, over_.get_token());
     patience.waits_for = [this](const std::string& device) {
@@ -47,7 +47,7 @@ class Task : public std::enable_shared_from_this<Task> {  // shared: whoever end
     return waits_for_;
   }
 
-  /// Waits, until it is over at most.
+  /// Sleeps for the time, or until the task is over.
   void pause(std::chrono::milliseconds time) const {
     std::mutex none;
     std::unique_lock lock(none);
@@ -55,14 +55,14 @@ class Task : public std::enable_shared_from_this<Task> {  // shared: whoever end
     never.wait_for(lock, over_.get_token(), time, [] { return false; });
   }
 
-  /// Ends it without what was asked for.
+  /// Ends it with an error.
   virtual void fail_with(Error error) = 0;
 
   /// Ends it when its client hangs up.
   void end_with(const std::stop_token& gone) { hung_up_.emplace(gone, HungUp{weak_from_this()}); }
 
  protected:
-  /// @return whether it was not over yet: then the caller answers
+  /// @return whether this call ended it; if so, the caller answers
   [[nodiscard]] bool finish() { return over_.request_stop(); }
 
  private:
