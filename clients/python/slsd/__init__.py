@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Scans of slsd as numpy arrays.
+"""3D scans from slsd as numpy arrays.
 
     import slsd
 

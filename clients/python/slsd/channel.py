@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Requests and their answers, over one connection to each process."""
+"""Requests and their answers. Each process has one connection."""
 from __future__ import annotations
 
 import mmap
@@ -12,7 +12,7 @@ from typing import Any, Generator, Optional, Tuple, Union
 from .connection import Connection, Process, clouds_held, this_process
 from .errors import Busy, ProtocolError, ScannerError, error_of
 
-GRACE_S = 5.0  # beyond the timeout that the service keeps by itself
+GRACE_S = 5.0  # in addition to the timeout that the service itself keeps
 
 Body = Optional[Union[bytearray, mmap.mmap]]
 Message = dict[str, Any]
@@ -29,7 +29,7 @@ class Answer:
 
 
 class _Own:
-    """What one process has: nobody else's lock, which a thread of the parent may hold, and nobody else's connection."""
+    """The lock and the connection of one process. A thread of the parent may hold the parent's lock."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
@@ -42,7 +42,7 @@ class _Own:
 
 
 class Channel:
-    """Sends requests one after the other. Threads may share it, and so may processes: each connects by itself."""
+    """Sends requests one after the other. Threads and processes may share it: each process connects by itself."""
 
     def __init__(self, path: str):
         self.path = path
@@ -63,7 +63,7 @@ class Channel:
             try:
                 message, body, events = _answer(connection, method, params, time.monotonic() + timeout_s + GRACE_S)
             except BaseException:
-                own.hang_up()  # what comes later would be taken for the answer to the next request
+                own.hang_up()  # else a late answer would pass for that of the next request
                 raise
         if "error" in message:
             raise _explained(error_of(message["error"]), params)
@@ -81,7 +81,7 @@ class Channel:
 
 
 def subscribed(path: str, params: dict[str, Any], idle_s: float | None) -> Generator[Event, None, None]:
-    """Events of a subscription over a connection of its own; a child made by fork that goes on reading gets another."""
+    """Events of a subscription over its own connection. A forked child that goes on reading gets another one."""
     connection = Connection(path)
     try:
         ident = connection.send("subscribe", params)
@@ -119,7 +119,7 @@ def _answer(connection: Connection, method: str, params: dict[str, Any], deadlin
 
 
 def _explained(error: ScannerError, params: dict[str, Any]) -> ScannerError:
-    """Adds to `busy` how this program gives memory back, if it holds any."""
+    """Adds to a `Busy` error how this program can release shared memory, if it holds any."""
     held = clouds_held()
     if not isinstance(error, Busy) or params.get("transport") != "memfd" or held == 0:
         return error

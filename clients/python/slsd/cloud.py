@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Clouds: the points of a scan as a structured array."""
+"""Point clouds: a scan's points as a structured array."""
 from __future__ import annotations
 
 import mmap
@@ -29,17 +29,17 @@ Buffer = Union[bytes, bytearray, memoryview, mmap.mmap]
 
 
 class Cloud:
-    """One scan.
+    """The point cloud of one scan.
 
-    points       structured array, a record to a point: x y z (mm, rig frame), sigma_mm, intensity, camera, and with
-                 symbols also camera_u camera_v projector_u projector_v (px), symbol, column, row
-    description  what the reply says of the scan: its id, times, counts of regions, ...
-    comments     of the file's header
-    lost         clouds that a subscriber lost since the one before, because it read too slowly
-    picture, frames   what was asked for with it
+    points       structured array, one record for each point: x y z (mm, rig frame), sigma_mm, intensity, camera; clouds
+                 of symbols also have camera_u camera_v projector_u projector_v (px), symbol, column, row
+    description  the scan's description in the reply: its id, times, counts of regions, ...
+    comments     the comments of the file's header
+    lost         how many clouds a subscriber lost since the previous one, because it read too slowly
+    picture, frames   the picture and the frames, if the scan asked for them
 
-    Points of `shared` scans lie in the service's memory, which is given back when the cloud and all views of its points
-    are gone, in children made by fork as well. A pickled cloud is a copy.
+    Points of `shared` scans lie in the service's memory. It is released once the cloud and all views of its points are
+    gone, in forked children as well. A pickled cloud is a copy.
     """
 
     def __init__(self, points: npt.NDArray[Any], comments: Mapping[str, str], description: Mapping[str, Any]):
@@ -59,18 +59,18 @@ class Cloud:
 
     @property
     def why_empty(self) -> str | None:
-        """Why a cloud without a point has none, in words; None if it has some."""
+        """Why the cloud is empty, in words; None if it has points."""
         why = self.description.get("empty")
         return None if why is None else str(why)
 
     @property
     def xyz(self) -> npt.NDArray[np.float32]:
-        """The coordinates, mm, as an array of N x 3 float32: a copy."""
+        """The coordinates in mm, as a copy: an N x 3 array of float32."""
         return np.stack([self.points[axis] for axis in "xyz"], axis=1)
 
     @property
     def normals(self) -> npt.NDArray[np.float32] | None:
-        """The unit normals towards the camera, N x 3, if they were asked for."""
+        """The unit normals towards the camera, N x 3, if the scan asked for them; else None."""
         if "nx" not in (self.points.dtype.names or ()):
             return None
         normals: npt.NDArray[np.float32] = np.stack([self.points[name] for name in ("nx", "ny", "nz")], axis=1)
@@ -78,14 +78,14 @@ class Cloud:
 
     @property
     def sigma_calibration_mm(self) -> float | None:
-        """One standard deviation of the depth from the calibration alone: it moves all points together."""
+        """The standard deviation of the depth from the calibration alone, which moves all points together."""
         value = self.description.get("sigma_calibration_mm", self.comments.get("sigma_calibration_mm"))
         return None if value is None else float(value)
 
     def save(self, file: str | os.PathLike[str]) -> None:
-        """Writes the points, as they are now, as a binary PLY file, which appears whole or not at all.
+        """Writes the points, as they are now, to a binary PLY file. The file appears whole or not at all.
 
-        `Scanner.save` takes a scan into the other formats, PCD and TIFF.
+        `Scanner.save` takes a scan into PCD and TIFF files.
         """
         target = pathlib.Path(file)
         if target.suffix.lower() != ".ply":
@@ -108,9 +108,9 @@ class Cloud:
 
 
 def read_ply(data: Buffer, description: Mapping[str, Any] | None = None) -> Cloud:
-    """The cloud in the bytes of a binary PLY file. The points are a view of them: nothing is copied.
+    """Reads a cloud from the bytes of a binary PLY file. The points are a view of the bytes, not a copy.
 
-    Raises ProtocolError if the header promises what is not there.
+    Raises ProtocolError if the header does not match the data.
     """
     view = memoryview(data)
     head = bytes(view[:_HEADER_MAX])

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""One connection to the service: JSON-RPC lines, the bytes behind them, and descriptors."""
+"""A connection to the service: JSON-RPC lines, the bytes after them, and file descriptors."""
 from __future__ import annotations
 
 import array
@@ -19,22 +19,22 @@ from .errors import ConnectionLost, InvalidRequest, PermissionDenied, ProtocolEr
 
 _LINE_MAX = 1 << 20
 _BYTES_MAX = 1 << 32
-_SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_WRITE  # one that may still shrink would end this process later
+_SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_WRITE  # a memfd that may still shrink could end this process later
 
 Process = tuple[int, int]
 _forks = 0
 
 
 def this_process() -> Process:
-    """Tells this process from its parents and children: a number may come back, after so many forks it is another."""
+    """Identifies this process among its parents and children. The count of forks tells reused ids apart."""
     return os.getpid(), _forks
 
 
 class Connection:
-    """One connection, which belongs to the process that opened it.
+    """A connection, which belongs to the process that opened it.
 
-    A child made by fork shares the parent's socket: what it reads is missing there. So its copy is closed at once, and
-    using it raises ConnectionLost.
+    A forked child shares the parent's socket, and the parent would miss what the child reads. The child therefore closes
+    its copy at once, and using it raises ConnectionLost.
     """
 
     def __init__(self, path: str | os.PathLike[str]):
@@ -52,7 +52,7 @@ class Connection:
             self.close()
             raise PermissionDenied(f"{self.path}: you may not use this scanner; join the group that owns the socket",
                                    "permission_denied", self.path) from error
-        except (BlockingIOError, TimeoutError) as error:  # its queue is full: it accepts nobody any more
+        except (BlockingIOError, TimeoutError) as error:  # the queue is full: the service accepts no connections
             self.close()
             raise TimedOut(f"{self.path}: the service accepts nobody; systemctl restart slsd", "timeout", self.path) from error
         except OSError as error:
@@ -62,14 +62,14 @@ class Connection:
 
     @property
     def is_own(self) -> bool:
-        """Whether this process opened it."""
+        """Whether this process opened the connection."""
         return self._process == this_process()
 
     def close(self) -> None:
-        """Hangs up. In a child made by fork the parent's connection stays open."""
+        """Closes the connection. If a forked child calls this, the parent's connection stays open."""
         if self.is_own:
             try:
-                self._socket.shutdown(socket.SHUT_RDWR)  # also where a child still holds a copy, or a thread waits
+                self._socket.shutdown(socket.SHUT_RDWR)  # even if a child still holds a copy, or a thread waits
             except OSError:
                 pass
         self._socket.close()
@@ -77,7 +77,7 @@ class Connection:
             os.close(self._descriptors.pop())
 
     def send(self, method: str, params: dict[str, Any]) -> int:
-        """Sends a request. Returns its id."""
+        """Sends a request and returns its id."""
         self._refuse_others()
         self._last_id += 1
         request = {"jsonrpc": "2.0", "id": self._last_id, "method": method, "params": params}
@@ -93,9 +93,9 @@ class Connection:
         return self._last_id
 
     def receive(self, deadline: float | None) -> tuple[dict[str, Any], bytearray | mmap.mmap | None]:
-        """The next message, and what comes with it: bytes, or a memfd mapped for reading.
+        """Waits for the next message. Returns it with its bytes, or with its memfd mapped for reading.
 
-        deadline: of time.monotonic(); None waits for ever.
+        deadline: a time of time.monotonic(); None waits for ever.
         """
         self._refuse_others()
         while (end := self._buffer.find(b"\n")) < 0:
@@ -192,7 +192,7 @@ _lent: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
 
 def clouds_held() -> int:
-    """How many clouds this process holds in memory that is shared with the service."""
+    """How many clouds this process holds in memory shared with the service."""
     return len(_lent)
 
 

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""What can go wrong, by the names of the protocol."""
+"""Exceptions for the errors of the protocol."""
 from __future__ import annotations
 
 from typing import Any, Mapping
 
 
 class ScannerError(Exception):
-    """An error that the service answered, or one of the connection to it.
+    """An error from the service, or of the connection to it.
 
-    name: of the protocol, as "frame_late"; where: a file's line, a camera, a key, or empty.
+    name: the protocol's name for it, such as "frame_late"; where: a file's line, a camera, a key, or empty.
     """
 
     def __init__(self, message: str, name: str = "", where: str = ""):
@@ -27,11 +27,11 @@ class NotFound(ScannerError):
 
 
 class PermissionDenied(ScannerError):
-    """Whoever asks may not."""
+    """This user may not do that."""
 
 
 class Busy(ScannerError):
-    """Too many requests or clients, or too little memory: ask again later, or for less."""
+    """There are too many requests or clients, or too little memory. Ask again later, or for less."""
 
 
 class TimedOut(ScannerError):
@@ -43,19 +43,19 @@ class Cancelled(ScannerError):
 
 
 class DeviceError(ScannerError):
-    """The camera or the projector is gone, or does not fit to configuration and calibration."""
+    """The camera or the projector is gone, or does not match configuration and calibration."""
 
 
 class FrameError(ScannerError):
-    """A frame was lost, torn, late, stale or skewed, in every try that the time allowed."""
+    """A frame was lost, torn, late, stale or skewed, in every attempt that the time allowed."""
 
 
 class ConnectionLost(ScannerError):
-    """Nobody listens at the socket, or the service hung up."""
+    """No service listens at the socket, or the service closed the connection."""
 
 
 class ProtocolError(ScannerError):
-    """What came is not what the protocol says: another program, or another version, listens there."""
+    """An answer breaks the protocol: another program, or another version, listens at the socket."""
 
 
 _BY_NAME = {
@@ -68,7 +68,7 @@ _BY_NAME = {
 
 
 def error_of(answer: Any) -> ScannerError:
-    """The exception for the `error` of a reply."""
+    """Makes the exception for the `error` of a reply."""
     if not isinstance(answer, Mapping):
         return ProtocolError("the service answered an error that is no object")
     data = answer.get("data")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Types of the options, by which a type checker finds a misspelled one."""
+"""Types of the options, so that a type checker finds misspelled ones."""
 from __future__ import annotations
 
 from typing import List, Literal, Optional, TypedDict
@@ -9,16 +9,16 @@ Density = Literal["symbols", "pixels"]
 """A point for each symbol of the pattern, or for each camera pixel."""
 
 Picture = Literal["pattern", "idle", "black", "white", "focus", "grid", "image"]
-"""What the projector can show."""
+"""The pictures that the projector can show."""
 
 Code = Literal["pattern", "gray"]
-"""What a calibration projects onto the board."""
+"""The pictures that a calibration projects onto the board."""
 
 _Method = Optional[Literal["default", "paper"]]
 
 
 class DecodeSettings(TypedDict, total=False):
-    """Keys of the table [decode]; None takes a value back that was set. slsd.toml(5) explains each."""
+    """Keys of the table [decode]; None takes a setting back. slsd.toml(5) explains each."""
 
     depth_min_mm: Optional[float]
     depth_max_mm: Optional[float]
@@ -37,14 +37,14 @@ class DecodeSettings(TypedDict, total=False):
 
 
 class CalibrationSettings(TypedDict, total=False):
-    """Keys of the table [calibration]. The file lies on the scanner, and the service reads it with its own rights."""
+    """Keys of the table [calibration]. The file is on the scanner's machine, and the service reads it as its user."""
 
     file: Optional[str]
     other_hardware: Optional[Literal["error", "warn"]]
 
 
 class PatternSettings(TypedDict, total=False):
-    """Keys of the table [pattern], which belong together: they replace the whole table."""
+    """Keys of the table [pattern]. They replace the whole table."""
 
     file: Optional[str]
     symbol_size_px: Optional[int]
@@ -59,7 +59,7 @@ class PatternSettings(TypedDict, total=False):
 
 
 class CameraSettings(TypedDict, total=False):
-    """What can be set of a camera: how long it exposes, and its gain in dB or in its own steps."""
+    """Settings of a camera: its exposure time, and its gain in dB or in the camera's own steps."""
 
     exposure_us: Optional[float]
     gain_db: Optional[float]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""A scanner, as slsd serves it."""
+"""The scanner, as a client of the service slsd."""
 from __future__ import annotations
 
 import base64
@@ -29,7 +29,7 @@ _FILES = {".ply": "ply", ".pcd": "pcd", ".tiff": "tiff", ".tif": "tiff"}
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What a camera saw: height x width, uint8 or uint16; and what the service says of it."""
+    """A camera's image (height x width, uint8 or uint16), and the service's description of it."""
 
     image: npt.NDArray[Any]
     description: dict[str, Any]
@@ -37,7 +37,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Exposure:
-    """How a camera is configured to expose; None is what the configuration leaves to the camera."""
+    """A camera's configured exposure; None if the configuration leaves a value to the camera."""
 
     camera: str
     exposure_us: float | None
@@ -45,15 +45,15 @@ class Exposure:
 
 
 class Scanner:
-    """A connection to slsd. Requests are answered one after the other; threads may share it.
+    """A connection to slsd. It answers requests one after the other, and threads may share it.
 
-    After a fork, parent and child have a connection each; a pickled scanner connects where it is unpickled.
-    If the connection breaks, the request that waits raises ConnectionLost, and the next one connects anew.
+    After a fork, parent and child have a connection each. A pickled scanner connects in the process that unpickles it.
+    If the connection breaks, the pending request raises ConnectionLost, and the next one connects anew.
 
-    path  its socket; SLSD_SOCKET in the environment, or the usual place
+    path  the service's socket; None: SLSD_SOCKET in the environment, else /run/slsd/slsd.sock
 
-    `timeout_s` of a method is how long the service may wait for its devices and frames: 0.001 to 600 seconds, or None
-    for the time that its configuration says.
+    `timeout_s` of a method limits how long the service waits for devices and frames: 0.001 to 600 seconds. None means
+    the time in the service's configuration.
     """
 
     def __init__(self, path: str | os.PathLike[str] | None = None):
@@ -74,7 +74,7 @@ class Scanner:
         self._channel = Channel(path)
 
     def close(self) -> None:
-        """Hangs up. The service gives up what was waited for."""
+        """Closes the connection. The service cancels the pending request."""
         self._channel.close()
 
     def scan(self, *, timeout_s: float | None = 5.0, density: Density | None = None, normals: bool = False,
@@ -82,17 +82,18 @@ class Scanner:
              frames: bool = False, shared: bool = True, why: bool = False) -> Cloud:
         """Takes one scan.
 
-        density  a point for each "symbols" of the pattern or for each of the camera's "pixels"; None: as configured
-        normals  with pixels, the normal of each point
-        texture  the intensity of each point, by a second frame under white light
-        ambient  less the light of the room, by a third
-        picture  the frame with what was decoded drawn in, as PNG, in `picture`
-        camera   whose picture; None: the first
-        frames   the frames themselves, in `frames`
-        shared   the points lie in memory that is shared with the service until the cloud is released: nothing is
-                 copied. The service lends a few dense clouds at once; False copies
-        why      in `description["reasons"]`, the rules that rejected regions, with remedies; the picture marks each region
-                 by its rule
+        density  "symbols": a point for each symbol of the pattern; "pixels": one for each camera pixel; None: as
+                 configured
+        normals  adds the normal of each point; needs pixels
+        texture  measures the intensity of each point, with a second frame under white light
+        ambient  subtracts the light of the room, with a third frame
+        picture  returns the frame with decoded symbols drawn in, as PNG, in `picture`
+        camera   the camera of the picture; None: the first
+        frames   returns the frames themselves, in `frames`
+        shared   the points lie in memory shared with the service until the cloud is released: nothing is copied. The
+                 service lends a few dense clouds at once. False copies
+        why      lists the rules that rejected regions, with remedies, in `description["reasons"]`; the picture marks
+                 each region by its rule
         """
         params = _params(format="ply", transport="memfd" if shared else "inline", timeout_ms=_milliseconds(timeout_s),
                          density=density, normals=normals, texture=texture, ambient=ambient, picture=picture,
@@ -108,11 +109,11 @@ class Scanner:
 
     def save(self, file: str | os.PathLike[str], *, timeout_s: float | None = 5.0, density: Density | None = None,
              normals: bool = False, texture: bool = False, ambient: bool = False) -> dict[str, Any]:
-        """Takes one scan into a file, in the format of its name: .ply, .pcd, or with pixels .tiff (a depth map).
+        """Takes one scan into a file. Its name gives the format: .ply, .pcd, or with pixels .tiff (a depth map).
 
-        file  appears whole or not at all
+        file  the file to write; it appears whole or not at all
         The other options are those of `scan`. Returns the scan's description.
-        `Cloud.save` writes a cloud that was scanned before.
+        `Cloud.save` writes a cloud that you already have.
         """
         target = pathlib.Path(file)
         kind = _FILES.get(target.suffix.lower())
@@ -121,7 +122,7 @@ class Scanner:
         params = _params(format=kind, timeout_ms=_milliseconds(timeout_s), density=density, normals=normals,
                          texture=texture, ambient=ambient)
         part = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-        with open(part, "wb") as out:  # a place that cannot be written is told before the scan
+        with open(part, "wb") as out:  # fails before the scan if the place cannot be written
             try:
                 answer = self._call("scan", params, timeout_s)
                 out.write(_need(answer, "the cloud"))
@@ -134,15 +135,16 @@ class Scanner:
 
     def stream(self, *, rate_hz: float | None = None, density: Density | None = None, normals: bool = False,
                shared: bool = False, idle_s: float | None = None) -> Generator[Cloud, None, None]:
-        """Clouds as they come, the newest first: what this reader was too slow for is counted in `lost`.
+        """Yields clouds as they come, the newest first. `lost` counts those that the reader was too slow for.
 
-        Runs over a connection of its own until the iterator is closed. A scan that failed is raised if the service
-        gives up; those that it repeats are passed over.
+        The stream has its own connection until the iterator is closed. If a scan fails, the service repeats it; if the
+        service gives up, the stream raises the error.
 
-        rate_hz  at most so many a second, 0.001 to 1000; None: every frame
+        rate_hz  clouds a second at most, 0.001 to 1000; None: every frame
         density, normals   as in `scan`
-        shared   in memory that is shared with the service, without a copy; while two clouds are kept, others are lost
-        idle_s   raise TimedOut if no cloud came for so long, more than 0; None waits for ever
+        shared   the points lie in memory shared with the service, without a copy; while you keep two clouds, others are
+                 lost
+        idle_s   raises TimedOut if no cloud comes for so many seconds, more than 0; None waits for ever
         """
         if idle_s is not None and not idle_s > 0:
             raise InvalidRequest(f"idle_s must be more than 0 seconds, or None to wait for ever; it is {idle_s!r}",
@@ -151,73 +153,73 @@ class Scanner:
                                     transport="memfd" if shared else None), idle_s)
 
     def frame(self, camera: str | None = None, *, as_shown: bool = False, timeout_s: float | None = 5.0) -> Frame:
-        """A camera's frame, under the pattern.
+        """Takes a camera's frame under the pattern.
 
-        camera    its name; None: the first
-        as_shown  under what the projector shows by now
+        camera    the camera's name; None: the first
+        as_shown  takes the frame under the picture that the projector already shows
         """
         params = _params(format="raw", timeout_ms=_milliseconds(timeout_s), as_shown=as_shown, camera=camera)
         answer = self._call("frame", params, timeout_s)
         return _frame(answer.result, _need(answer, "the frame"))
 
     def preview(self, camera: str | None = None, *, timeout_s: float | None = 5.0) -> bytes:
-        """A frame with what was decoded drawn in, as PNG.
+        """Takes a frame and draws the decoded symbols in, as PNG.
 
-        camera  its name; None: the first
+        camera  the camera's name; None: the first
         """
         params = _params(timeout_ms=_milliseconds(timeout_s), camera=camera)
         return bytes(_need(self._call("preview", params, timeout_s), "the picture"))
 
     def project(self, picture: Picture, png: bytes | None = None, *, timeout_s: float | None = 5.0) -> None:
-        """Shows a picture, and returns when it is visible.
+        """Projects a picture, and returns once it is visible.
 
         picture  "pattern", "idle", "black", "white", "focus", "grid", or an "image" of the projector's size
-        png      with "image" alone: its PNG file
+        png      only with "image": the bytes of its PNG file
         """
         self._call("project", _params(picture=picture, timeout_ms=_milliseconds(timeout_s),
                                       png=None if png is None else base64.b64encode(png).decode()), timeout_s)
 
     def pattern(self) -> bytes:
-        """The pattern's image, as PNG."""
+        """Returns the pattern's image, as PNG."""
         return bytes(_need(self._call("pattern", {}, GRACE_S), "the pattern"))
 
     def status(self) -> dict[str, Any]:
-        """The service, its devices, and what all scans came to."""
+        """Returns the state of the service and its devices, and the counts of all scans."""
         return self._call("status", {}, GRACE_S).result
 
     def metrics(self) -> str:
-        """What the service counts, as OpenMetrics text."""
+        """Returns the service's metrics, as OpenMetrics text."""
         return bytes(_need(self._call("metrics", {}, GRACE_S), "the metrics")).decode()
 
     def bundle(self) -> bytes:
-        """The last scans with their frames, as the tar archive that `slsd --replay` decodes again."""
+        """Returns the last scans with their frames, as a tar archive. `slsd --replay` decodes it again."""
         return bytes(_need(self._call("bundle", {}, _RELOAD_MAX_S), "the bundle"))
 
     def settings(self) -> dict[str, Any]:
-        """What clouds depend on: pattern, calibration, projector, cameras, configuration."""
+        """Returns the settings that clouds depend on: pattern, calibration, projector, cameras, configuration."""
         return self._call("settings", {}, GRACE_S).result
 
     def set(self, *, decode: DecodeSettings | None = None, calibration: CalibrationSettings | None = None,
             pattern: PatternSettings | None = None, camera: Mapping[str, CameraSettings] | None = None
             ) -> dict[str, Any]:
-        """Puts settings in force at once and keeps them over restarts; a value of None takes one back.
+        """Changes settings at once, and keeps them over restarts. A value of None takes a setting back.
 
         decode, calibration, pattern   keys of these tables of the configuration
-        camera   by a camera's name, its exposure and gain
+        camera   exposure and gain of each camera, by its name
 
-        Returns `set` (all that is set now), `not_kept` (None, or why a restart forgets it) and `needs_restart`.
-        If anything is refused, everything stays as it was.
+        Returns `set` (all settings now set), `not_kept` (None, or why a restart forgets them) and `needs_restart`.
+        If the service refuses any setting, all stay as they were.
         """
         return self._call("set", _params(decode=decode, calibration=calibration, pattern=pattern, camera=camera),
                           _RELOAD_MAX_S).result
 
     def exposure(self, camera: str | None = None, *, exposure_us: float | None = None, gain_db: float | None = None
                  ) -> Exposure:
-        """How a camera exposes, after setting what is given. `slsctl exposure` measures the light and gives advice.
+        """Sets a camera's exposure and gain if given, and returns both. `slsctl exposure` measures the light and advises.
 
-        camera       its name; None: the first
-        exposure_us  how long it exposes, in microseconds
-        gain_db      its gain above the camera's least
+        camera       the camera's name; None: the first
+        exposure_us  the exposure time, in microseconds
+        gain_db      the gain above the camera's least
         """
         cameras: list[dict[str, Any]] = self.settings().get("cameras", [])
         about = next((each for each in cameras if camera in (None, each.get("name"))), None)
@@ -239,14 +241,14 @@ class Scanner:
                   ) -> dict[str, Any]:
         """Calibrates with a board that somebody moves, and returns when the calibration is in force.
 
-        board, ruler   as `slsd --calibrate` has them; None: its defaults
-        code     what is projected onto the board
-        poses    how many, 3 to 99
-        resume   the pictures of the last session count
-        told     called with what the session is at whenever that changed: its `progress` and `log`
+        board, ruler   as for `slsd --calibrate`; None: its defaults
+        code     the pictures to project onto the board: "pattern" or "gray"
+        poses    how many poses to take, 3 to 99
+        resume   keeps the pictures of the last session
+        told     called with the session's state (its `progress` and `log`) whenever it changes
 
-        Returns the same, with `outcome` (grade, reasons, errors in pixels). Raises ScannerError if it came to nothing.
-        An exception in the meantime (Ctrl-C, or one of `told`) cancels the session.
+        Returns the last state, with `outcome` (grade, reasons, errors in pixels). Raises ScannerError if calibration
+        fails. An exception in the meantime (Ctrl-C, or one of `told`) cancels the session.
         """
         params = _params(action="begin", board=board, ruler=ruler, code=code, poses=poses, resume=resume)
         state = self._call("calibrate", params, GRACE_S).result
@@ -271,22 +273,22 @@ class Scanner:
         return state
 
     def calibration(self, action: Literal["look", "end", "cancel"] = "look") -> dict[str, Any]:
-        """What the calibration is at.
+        """Returns the state of the calibration session.
 
-        action  "end" it with the poses that are there, "cancel" it, or only "look"
+        action  "end": finish with the poses taken so far; "cancel": cancel the session; "look": change nothing
         """
         return self._call("calibrate", {"action": action}, GRACE_S).result
 
     @property
     def role(self) -> str:
-        """What this user may: "observe", "scan" (that too) or "administer" (everything)."""
+        """The role of this user: "observe", "scan" (which includes observing) or "administer" (everything)."""
         role = self.status().get("role")
         if not isinstance(role, str):
             raise ProtocolError("the service tells no role: it is older than this package")
         return role
 
     def reload(self) -> list[str]:
-        """Reads the configuration anew. Returns the tables that need a restart."""
+        """Reads the configuration again. Returns the names of tables that need a restart."""
         return list(self._call("reload", {}, _RELOAD_MAX_S).result.get("needs_restart", []))
 
     def _call(self, method: str, params: dict[str, Any], timeout_s: float | None) -> Answer:
