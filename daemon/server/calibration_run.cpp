@@ -119,7 +119,7 @@ void CalibrationRun::take_line(const std::string& line) {
   if (log_.size() > kLogLines) log_.pop_front();
 }
 
-// Its output has ended, and so has it, or is about to.
+// The process's output has ended, so it has ended, or will soon.
 void CalibrationRun::await_exit() {
   int status = 0;
   if (::waitpid(process_, &status, WNOHANG) == process_) return on_exit(status);

@@ -21,35 +21,35 @@
 
 namespace slsd {
 
-/// A session of calibrating: slsd-calibrate as a process of its own, which shows and takes its pictures over the
-/// service's socket and tells on its standard output what it sees. One at a time.
+/// A calibration session: runs slsd-calibrate as a separate process. It shows and takes its pictures over the service's
+/// socket, and reports what it sees on its standard output. There is one session at a time.
 ///
 ///     none --begin()--> under way --its process ends well--> taking force --conclude()--> none
 ///                           \-----it fails, or cancel()------------------------------------^
 ///
-/// @thread thread-bound: the event loop's
+/// @thread thread-bound to the event loop's
 class CalibrationRun {
  public:
-  /// @param ended  called when its process has ended: whether it made a calibration, and then conclude() is due
+  /// @param ended  called when the process has ended: whether it made a calibration; if so, call conclude()
   CalibrationRun(asio::io_context& events, std::function<void(bool made)> ended);
   ~CalibrationRun();
   CalibrationRun(const CalibrationRun&) = delete;
   CalibrationRun& operator=(const CalibrationRun&) = delete;
 
-  /// @errors kBusy: one is under way; kIo: it cannot be started
+  /// @errors kBusy: a session is under way; kIo: the process cannot be started
   [[nodiscard]] Result<> begin(const std::filesystem::path& program, const std::vector<std::string>& arguments);
-  /// Calibrates from the poses that are there.
+  /// Calibrates from the poses taken so far.
   void end();
-  /// Gives it up.
+  /// Cancels the session.
   void cancel();
-  /// Notes whether the calibration that it wrote is in force.
+  /// Notes whether the calibration that the process wrote is in force.
   void conclude(const Result<>& in_force);
 
   [[nodiscard]] bool under_way() const { return phase_ != Phase::kNone; }
-  /// The process whose requests are the session's own; 0: none.
+  /// The process whose requests belong to the session; 0: none.
   [[nodiscard]] pid_t process() const { return process_; }
-  /// The session's state, and the outcome of the last one. Clients that show a session call this again and again: a
-  /// session that nobody looks at any more is given up.
+  /// The session's state, and the outcome of the last session. Clients that show a session call this repeatedly. A
+  /// session that nobody looks at any more is cancelled.
   [[nodiscard]] nlohmann::json look();
 
  private:
@@ -69,12 +69,12 @@ class CalibrationRun {
   pid_t process_ = 0;
   Phase phase_ = Phase::kNone;
   bool cancelled_ = false;
-  std::uint64_t number_ = 0;  ///< grows with everything that is told
+  std::uint64_t number_ = 0;  ///< grows with each new report
   std::chrono::steady_clock::time_point looked_{};
   nlohmann::json progress_;
   nlohmann::json outcome_;
   nlohmann::json error_;
-  std::deque<std::string> log_;  ///< its last lines for a person
+  std::deque<std::string> log_;  ///< the last lines meant for a person
 };
 
 }  // namespace slsd

@@ -21,8 +21,8 @@ FileDescriptor open_to_read(const FileDescriptor& memory) {
   return FileDescriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
 }
 
-// The kernel grants a lease for writing to the only one who has a file open, and a mapping counts as open. Where it
-// grants none at all (another error than EAGAIN) nobody is watched.
+// The kernel grants a write lease only to the sole opener of a file, and a mapping counts as an opening. If it grants
+// no lease at all (an error other than EAGAIN), the memory is not watched.
 bool is_held_by_others(const FileDescriptor& kept) {
   if (::fcntl(kept.number(), F_SETLEASE, F_WRLCK) != 0) return errno == EAGAIN;
   ::fcntl(kept.number(), F_SETLEASE, F_UNLCK);
@@ -43,7 +43,7 @@ Result<SealedMemory> sealed_memory(std::string_view bytes) {
   if (::fcntl(memory.number(), F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL) != 0) {
     return fail_system(errno, "cannot seal a memfd");
   }
-  // Two openings of their own, as the first one's writing would stand against the lease.
+  // Opens the file twice more, because the first descriptor, open for writing, would prevent the lease.
   SealedMemory sealed{open_to_read(memory), open_to_read(memory), bytes.size()};
   if (!sealed.given || !sealed.kept) return fail_system(errno, "cannot open a memfd to read");
   return sealed;

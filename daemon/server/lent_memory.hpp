@@ -12,23 +12,23 @@
 
 namespace slsd {
 
-/// A memfd that holds bytes and can neither change nor shrink nor grow.
+/// A memfd whose bytes and size can no longer change.
 struct SealedMemory {
-  FileDescriptor given;  ///< the client's descriptor, to be read and mapped
-  FileDescriptor kept;   ///< our descriptor, which shows whether anybody still has the memory
+  FileDescriptor given;  ///< the client's descriptor, for reading and mapping
+  FileDescriptor kept;   ///< our descriptor, which shows whether anybody still uses the memory
   std::size_t bytes = 0;
 };
 
-/// @errors kNoSpace: out of memory or of descriptors; kIo
+/// @errors kNoSpace: out of memory or descriptors; kIo
 /// @thread reentrant
 [[nodiscard]] Result<SealedMemory> sealed_memory(std::string_view bytes);
 
-/// The memfds that clients have. They count as this process's memory until the last client has closed and unmapped
-/// them, which it need not tell us, and which a client that means harm never does.
+/// The memfds that clients use. They count as this process's memory until the last client has closed and unmapped them.
+/// Clients need not report that, and a malicious client never does.
 /// @thread thread-bound
 class LentMemory {
  public:
-  /// More would take all descriptors.
+  /// More memfds would use up the descriptors.
   static constexpr std::size_t kMemoriesMax = 256;
 
   explicit LentMemory(MemoryBudget& budget) : budget_(budget) {}
@@ -36,14 +36,14 @@ class LentMemory {
   LentMemory(const LentMemory&) = delete;
   LentMemory& operator=(const LentMemory&) = delete;
 
-  /// Counts it from now on, before it is sent. @param kept  of sealed_memory()
+  /// Counts a memfd from now on; call it before sending. @param kept  of sealed_memory()
   /// @errors kBusy: too much is lent already
-  /// @param to  who it is lent to; null: nobody in particular
+  /// @param to  who gets the memory; null: nobody in particular
   [[nodiscard]] Result<> add(FileDescriptor kept, std::size_t bytes, const void* to = nullptr);
-  /// Forgets those that nobody has any more.
+  /// Forgets memfds that nobody uses any more.
   void sweep();
   [[nodiscard]] std::size_t count() const { return lent_.size(); }
-  /// The number of pieces that somebody still has.
+  /// The number of memfds that somebody still uses.
   [[nodiscard]] std::size_t count_of(const void* to);
 
  private:

@@ -23,7 +23,7 @@ namespace {
 
 using std::filesystem::path;
 
-constexpr int kBacklog = 4096;  // many short connections at once find the loop busy; the kernel may allow fewer
+constexpr int kBacklog = 4096;  // room for many short connections while the loop is busy; the kernel may allow fewer
 
 sockaddr_un address_of(const path& path) {
   sockaddr_un address{};
@@ -40,7 +40,7 @@ FileDescriptor new_socket() {
   return FileDescriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
 }
 
-// Whether the path is free to take: nothing there, or the socket of a daemon that is dead.
+// Checks that the path is free: it has no file, or the socket of a dead daemon.
 Result<> check_free(const path& path) {
   struct stat status {};
   if (::lstat(path.c_str(), &status) != 0) {
@@ -62,9 +62,9 @@ Result<> check_free(const path& path) {
                                : fail_system(errno, "cannot tell whether a daemon answers there", path.string());
 }
 
-constexpr std::string_view kTemporary = ".slsd-";  // and the process
+constexpr std::string_view kTemporary = ".slsd-";  // the process id follows
 
-// What daemons left that were killed in the middle of listen_in(). Of those that live nothing is touched.
+// Removes temporary sockets of daemons that were killed during listen_in(). Leaves those of living daemons alone.
 void remove_left_behind(const path& folder) {
   std::error_code error;
   std::error_code ignored;
@@ -80,8 +80,8 @@ void remove_left_behind(const path& folder) {
   }
 }
 
-// Binds under a name of its own and renames when connections are taken. By way of /proc, as a temporary name may not
-// fit where the path just fits.
+// Binds to a temporary name and renames it once connections are accepted. Binds through /proc, because a temporary name
+// may be too long if the path just fits.
 Result<> listen_in(const FileDescriptor& socket, const FileDescriptor& folder, const path& path, mode_t mode) {
   const std::string temporary = std::string(kTemporary) + std::to_string(::getpid());
   const sockaddr_un address = address_of("/proc/self/fd/" + std::to_string(folder.number()) + "/" + temporary);
@@ -98,7 +98,7 @@ Result<> listen_in(const FileDescriptor& socket, const FileDescriptor& folder, c
   return failed;
 }
 
-// std::filesystem::equivalent() knows nothing of sockets.
+// std::filesystem::equivalent() does not support sockets.
 bool same_file(const path& one, const path& other) {
   struct stat a {
   }, b{};
@@ -107,12 +107,12 @@ bool same_file(const path& one, const path& other) {
 
 path path_of(int socket) {
   sockaddr_un address{};
-  socklen_t size = sizeof address - 1;  // a path that fills it has no end otherwise
+  socklen_t size = sizeof address - 1;  // a path of full length has no terminator otherwise
   if (::getsockname(socket, reinterpret_cast<sockaddr*>(&address), &size) != 0) return {};
   return address.sun_family == AF_UNIX ? path(address.sun_path) : path();
 }
 
-// The one at the path, of those that systemd listens at and hands over; nothing where it hands over none.
+// Finds the socket at the path among those that systemd handed over; nothing if there are none.
 Result<std::optional<FileDescriptor>> handed_over(const path& path) {
   const int count = ::sd_listen_fds(0);
   if (count <= 0) return std::nullopt;

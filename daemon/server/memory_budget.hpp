@@ -10,18 +10,18 @@
 
 namespace slsd {
 
-/// Bounds the memory of all clients together: requests that are being collected, replies and events that are being made
-/// or sent, clouds that wait for their subscribers, and those that were lent as memfds. Bytes that several clients
-/// share count for each of them, so that what is counted is never less than what is held.
+/// Bounds the memory of all clients together: requests being received, replies and events being made or sent, clouds
+/// waiting for subscribers, and lent memfds. Bytes that several clients share count for each of them, so the count is
+/// never less than the memory held.
 ///
-/// It is shared by one rule (dynamic thresholds: Choudhury and Hahne 1998): no client may come to hold more than is
-/// then free for all the others. One alone gets a half, two that take all they can a third each, and a hundred and one
-/// leave a hundredth free: who asks for more waits, and who asks for little is served as if nobody else were there.
+/// One rule shares it (dynamic thresholds: Choudhury and Hahne 1998): no client may hold more than is then free for all
+/// others. One client alone gets a half; two greedy clients get a third each; a hundred get about a hundredth each, and
+/// leave as much free. So clients that ask for much wait, and clients that ask for little are served at once.
 ///
-/// The connections of one user may count as one client, so that nobody gets more by opening many.
+/// The connections of one user may count as one client, so that opening many gains nothing.
 ///
-/// A few bytes are always granted, as each request is to have a reply: they come on top, at most 20 kB for each part of
-/// a client's.
+/// A few bytes are always granted, because every request must get a reply. They come on top: at most 20 kB for each
+/// part of a client's memory.
 /// @thread thread-bound
 class MemoryBudget {
  public:
@@ -29,10 +29,10 @@ class MemoryBudget {
 
   [[nodiscard]] std::size_t limit() const { return limit_bytes_; }
   [[nodiscard]] std::size_t held() const { return held_; }
-  /// The limit of one client while no other holds anything.
+  /// The limit of one client when no other holds anything.
   [[nodiscard]] std::size_t limit_of_one() const { return limit_bytes_ / 2; }
 
-  /// Memory that outlives its client, as clouds that are lent: all of it together at most a half.
+  /// Grants memory that outlives its client, such as lent clouds: at most a half in all.
   [[nodiscard]] bool lend(std::size_t bytes);
   void give_back(std::size_t bytes);
   [[nodiscard]] std::size_t lent() const { return lent_; }
@@ -51,15 +51,15 @@ class MemoryAccount {
  public:
   enum class Part { kRequest, kReply, kEvent, kWaiting };
 
-  /// @param user  whose accounts count as one client; without one this account is a client
+  /// @param user  accounts of the same user count as one client; without a user, this account is a client of its own
   explicit MemoryAccount(MemoryBudget& budget, std::optional<std::uint32_t> user = std::nullopt)
       : budget_(budget), user_(user) {}
   ~MemoryAccount();
   MemoryAccount(const MemoryAccount&) = delete;
   MemoryAccount& operator=(const MemoryAccount&) = delete;
 
-  /// Changes the part's size, and tells whether it may be so large; else it stays as it was. A smaller size, or one up
-  /// to 20 kB, is always granted.
+  /// Changes the part's size and returns whether that is allowed; if not, the size stays. A smaller size, or one up to
+  /// 20 kB, is always allowed.
   [[nodiscard]] bool resize(Part part, std::size_t bytes);
   void release(Part part) { set(part, 0); }
   [[nodiscard]] std::size_t held() const;

@@ -42,7 +42,7 @@ SharedBytes share(std::string bytes) {
   return std::make_shared<const std::string>(std::move(bytes));
 }
 
-// An answer of the scanner's thread, made into a reply there and carried to the event loop's.
+// Makes an answer into a reply on the scanner's thread and carries it to the event loop's thread.
 template <class Value, class MakeReply>
 Scanner::Answer<Value> carry(ServiceState& state, Respond respond, MakeReply make_reply) {
   return [&events = state.events, respond = std::move(respond), make_reply](Result<Value> value) {
@@ -51,7 +51,7 @@ Scanner::Answer<Value> carry(ServiceState& state, Respond respond, MakeReply mak
   };
 }
 
-// As carry(); the reply tells how long after the last byte of its frames it was handed to the socket.
+// Like carry(); the reply also reports the time from the last byte of its frames to the socket.
 template <class MakeReply>
 Scanner::Answer<ScanResult> carry_scan(ServiceState& state, Respond respond, MakeReply make_reply) {
   return [&state, respond = std::move(respond), make_reply](const Result<ScanResult>& scan) {
@@ -66,8 +66,8 @@ Scanner::Answer<ScanResult> carry_scan(ServiceState& state, Respond respond, Mak
   };
 }
 
-// At most what the pixels of a picture take, however it is coded, before its camera took it. 0: no camera of the name,
-// or one whose size is not known, as it was not open yet; what it gives is weighed when it is there.
+// An upper bound of a camera picture's bytes in any coding, known before the capture. 0: no such camera, or its size is
+// unknown because it was not open yet; then the picture is counted when it exists.
 std::size_t picture_bytes(const ServiceState& state, const std::string& camera, std::size_t bytes_a_pixel) {
   for (const DeviceStatus& each : state.scanner.rig().camera_statuses()) {
     if (!camera.empty() && each.name != camera) continue;
@@ -76,10 +76,10 @@ std::size_t picture_bytes(const ServiceState& state, const std::string& camera, 
   return 0;
 }
 
-constexpr std::size_t kFrameBytes = 2;    // a pixel's: grey, as deep as it comes
-constexpr std::size_t kPictureBytes = 3;  // a pixel's: what was decoded is drawn in colours
+constexpr std::size_t kFrameBytes = 2;    // per pixel: grey, at full bit depth
+constexpr std::size_t kPictureBytes = 3;  // per pixel: decoded symbols are drawn in colour
 
-// What a scan gives at most, but for a cloud of symbols, of which nobody knows how large it will be.
+// An upper bound of a scan's bytes, without a cloud of symbols: nobody knows its size in advance.
 std::size_t expected_bytes(const ServiceState& state, const ScanRequest& request, CloudForm form = {}) {
   std::size_t bytes = request.picture ? picture_bytes(state, request.camera, kPictureBytes) : 0;
   if (form.dense()) {
@@ -124,7 +124,7 @@ Outgoing frame_event(const std::string& scan_id, const FrameImage& frame, FrameC
   return event;
 }
 
-// A cloud as a request has it; where no density is named the configuration's.
+// The form of cloud that a request asks for; without a density, the configured one.
 CloudForm read_form(ParamReader& reader, const ServiceState& state) {
   CloudForm form(cloud_format(reader.choice("format", {"ply", "pcd", "tiff"})));
   const bool pixels = state.configuration.decode.density == Density::kPixels;
@@ -135,7 +135,7 @@ CloudForm read_form(ParamReader& reader, const ServiceState& state) {
   return form;
 }
 
-// What does not go together.
+// Refuses parameters that exclude each other.
 std::optional<RpcError> refused_form(CloudForm form) {
   const bool tiff = form.format == CloudFormat::kTiff;
   if (tiff && !form.dense()) return invalid_params("\"tiff\" is a depth map: ask for \"density\": \"pixels\" with it");
@@ -271,8 +271,8 @@ void run_pattern(ServiceState& state, const json& params, Session&, Respond resp
   }));
 }
 
-// A user's pictures, each of which is decoded and changes the light: so many a second, and as many at once. No camera
-// takes more of them. Root and the service's own user, as whom slsd-calibrate runs, are not counted.
+// Limits a user's pictures per second and at once, because each is decoded and changes the light. No camera needs more.
+// Root and the service's own user, which runs slsd-calibrate, are exempt.
 constexpr double kPicturesPerSecond = 30.0;
 
 std::optional<RpcError> refused_picture(ServiceState& state, const Session& session) {
@@ -361,7 +361,7 @@ void run_set(ServiceState& state, const json& params, Session&, Respond respond)
   });
 }
 
-// Where the calibrations that were made over the socket are kept, beside the settings.
+// The folder of the calibrations made over the socket, beside the settings.
 std::filesystem::path made_calibration(const ServiceState& state) {
   const auto settings = kept_settings_file(state.configuration_file);
   if (settings.empty()) return {};
@@ -448,7 +448,7 @@ RpcError not_for(Session& session, const RpcMethod& method) {
                     {}});
 }
 
-// While somebody holds a board into the light no other client changes it.
+// While somebody holds a calibration board in the light, no other client may change the light.
 bool would_disturb(const ServiceState& state, const RpcMethod& method, const json& params, const Session& session) {
   if (!state.calibration || !state.calibration->under_way()) return false;
   if (session.peer().process == state.calibration->process()) return false;

@@ -18,19 +18,19 @@ namespace slsd {
 /// One method of the socket's protocol.
 struct RpcMethod {
   std::string_view name;
-  Role role;  ///< role that a client needs
+  Role role;  ///< the role that a client needs
   void (*run)(ServiceState& state, const nlohmann::json& params, Session& session, Respond respond);
-  /// Tells whether a request with these parameters changes the light, or the outcome of a scan. Null: none does.
+  /// Tells whether a request with these parameters changes the light or a scan's outcome. Null: no request does.
   bool (*disturbs)(const nlohmann::json& params) = nullptr;
 };
 
 /// All methods, by name.
 [[nodiscard]] std::span<const RpcMethod> methods();
 
-/// Acts on the end of slsd-calibrate: the calibration it made comes into force as `set` does it, and scans go on.
+/// Handles the end of slsd-calibrate: puts its calibration into force as `set` does, and resumes scans.
 void calibrated(ServiceState& state, bool made);
 
-/// Carries a request out. @thread thread-bound to the event loop's
+/// Carries out a request. @thread thread-bound to the event loop's
 void dispatch(ServiceState& state, const Request& request, Session& session, Respond respond);
 
 }  // namespace slsd

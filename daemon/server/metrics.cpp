@@ -25,12 +25,12 @@ std::string escaped(std::string_view value) {
   return text;
 }
 
-/// Writes metric families, each in one piece.
+/// Writes metric families one after another.
 class Exposition {
  public:
   explicit Exposition(MetricsFormat format) : older_(format == MetricsFormat::kPrometheus) {}
 
-  /// @param name  where it has a unit, that comes last, after "_"
+  /// @param name  ends with "_" and the unit, if there is one
   void family(std::string_view name, std::string_view type, std::string_view help, std::string_view unit = {}) {
     name_ = name;
     counter_ = type == "counter";

@@ -8,8 +8,8 @@
 
 namespace slsd {
 
-/// OpenMetrics 1.0 (openmetrics.io), or the older text format of Prometheus (0.0.4), which node_exporter reads. There
-/// the type and the help of a counter are those of its name with "_total".
+/// OpenMetrics 1.0 (openmetrics.io), or the older text format of Prometheus (0.0.4), which node_exporter reads. In the
+/// older format, a counter's type and help name it with "_total".
 enum class MetricsFormat { kOpenMetrics, kPrometheus };
 
 /// The answer to `metrics`: the service, its devices, clients and scans. docs/metrics.md lists the metrics.

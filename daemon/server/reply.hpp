@@ -17,20 +17,20 @@
 
 namespace slsd {
 
-/// One piece of output to a client: a line, the bytes that follow it, and a descriptor that comes with the line.
+/// One piece of output to a client: a line, the bytes that follow it, and the descriptor sent with it.
 struct Outgoing {
   enum class Kind { kReply, kEvent };
   Kind kind = Kind::kReply;
   std::string line;
   SharedBytes bytes;          ///< null: none
   FileDescriptor descriptor;  ///< sent with the line's first byte
-  FileDescriptor kept;        ///< the other descriptor of a SealedMemory, to be counted as lent
+  FileDescriptor kept;        ///< the second descriptor of a SealedMemory, which counts it as lent
   std::size_t lent_bytes = 0;
 
   [[nodiscard]] std::size_t size() const { return line.size() + (bytes ? bytes->size() : 0); }
 };
 
-/// The outcome of a method: its result, the bytes that follow the reply or a memfd, and events that go out before it.
+/// The outcome of a method: its result, the bytes or memfd that follow the reply, and the events sent before it.
 struct Reply {
   nlohmann::json result;
   SharedBytes bytes = nullptr;
@@ -40,7 +40,7 @@ struct Reply {
 
 using Outcome = tl::expected<Reply, RpcError>;
 
-/// Answers one request: called once, on the main thread. Where the client is gone it does nothing.
+/// Answers one request: called once, on the main thread. Does nothing if the client is gone.
 using Respond = std::function<void(Outcome)>;
 
 }  // namespace slsd

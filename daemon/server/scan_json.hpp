@@ -8,17 +8,17 @@
 
 namespace slsd {
 
-/// The description of a scan for clients, besides its cloud: id, time, number of points, regions by status, times.
+/// Describes a scan for clients, without its cloud: id, time, number of points, regions by status, times.
 [[nodiscard]] nlohmann::json scan_json(const ScanResult& scan, Density density = Density::kSymbols);
 
-/// The rules that rejected regions of a scan or kept them from being brought back, the commonest first: each with its
-/// count, its status, what it means and what a user may do.
+/// The rules that rejected regions of a scan, or prevented their restoration, most frequent first. Each comes with its
+/// count, its status, its meaning and a remedy.
 [[nodiscard]] nlohmann::json reasons_json(const ScanResult& scan);
 
 /// The time since the last byte of a scan's frames, in milliseconds, for its `latency_ms`.
 [[nodiscard]] double latency_ms(MonotonicTime received);
 
-/// A frame's size, depth, number and times. The camera only where the image names it.
+/// A frame's size, bit depth, number and times. Includes the camera only if the image names it.
 [[nodiscard]] nlohmann::json frame_json(const FrameImage& frame);
 
 }  // namespace slsd

@@ -20,7 +20,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kRetryAccept = 200ms;
-constexpr std::size_t kWaitingMax = 4;  // lanes that finish together give more than one
+constexpr std::size_t kWaitingMax = 4;  // lanes that finish together deliver more than one
 
 }  // namespace
 
@@ -110,8 +110,8 @@ void Server::on_accepted(const std::error_code& error, Session::Socket socket) {
   accept();
 }
 
-// Why somebody is not taken in. One user who does not administer the scanner gets no more places than are then left for
-// all the others, which is half of them.
+// Tells why a client is refused. A user who is not an administrator gets at most as many places as are left for all
+// others, so at most half.
 std::optional<Error> Server::refuses(const Peer& peer) const {
   const auto places = static_cast<std::size_t>(room_->options.clients_max);
   if (sessions_.size() >= places)
@@ -137,7 +137,7 @@ void Server::turn_away(Session::Socket socket, const Error& error) {
   ::send(socket.native_handle(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
-// Out of descriptors or memory: the kernel keeps who waits, and accept() would fail again at once.
+// Without descriptors or memory the kernel keeps the client waiting, and accept() would fail again at once.
 void Server::retry_later(const std::error_code& error) {
   if (!std::exchange(retrying_, true)) spdlog::warn("cannot take another client: {}", error.message());
   retry_.expires_after(kRetryAccept);

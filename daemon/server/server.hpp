@@ -20,14 +20,14 @@
 
 namespace slsd {
 
-/// Takes clients in and tells the subscribers among them of free scans.
-/// @thread thread-bound to the event loop's, but for publish()
+/// Accepts clients and sends free scans to the subscribers.
+/// @thread thread-bound to the event loop's, except publish()
 class Server {
  public:
   /// Called with the combined wishes of the subscribers; without a value if there are none.
   using DemandChanged = std::function<void(std::optional<FreeRun> demand)>;
 
-  /// Carries a request out; answers through respond, now or later.
+  /// Carries out a request; answers through respond, now or later.
   using Handler = std::function<void(const Request&, Session&, Respond respond)>;
 
   Server(asio::io_context& events, const ServerOptions& options, Handler handler, DemandChanged demand_changed);
@@ -37,12 +37,12 @@ class Server {
 
   /// Listens; the socket appears. @errors of ListeningSocket::open()
   [[nodiscard]] Result<> open();
-  /// Takes no more clients, and no more requests of those that are there; the socket disappears. Each client's
-  /// connection ends when what is under way for it is sent.
+  /// Accepts no more clients, and no more requests from connected ones; the socket disappears. Each connection ends
+  /// when the client's work under way is sent.
   void wind_down();
-  /// Tells whether a client took bytes of what is being sent to it since the time.
+  /// Tells whether a client has read bytes since the time, while being sent more.
   [[nodiscard]] bool is_sending_since(std::chrono::steady_clock::time_point time) const;
-  /// Hangs up on everyone.
+  /// Ends all connections.
   void end_all();
 
   [[nodiscard]] std::size_t clients() const { return sessions_.size(); }
@@ -51,13 +51,13 @@ class Server {
   [[nodiscard]] std::uint64_t dropped() const { return room_->traffic.dropped; }
   [[nodiscard]] const Traffic& traffic() const { return room_->traffic; }
   [[nodiscard]] const MemoryBudget& memory() const { return room_->memory; }
-  /// Recomputes the demand. Call it when a session's subscription changed.
+  /// Recomputes the demand. Call it whenever a session's subscription changed.
   void update_demand();
 
-  /// Hands a free scan over; of those that the event loop did not get to yet the oldest are lost, and counted.
+  /// Hands over a free scan. If several wait for the event loop, the oldest are dropped and counted.
   /// @thread thread-safe
   void publish(FreeScan scan);
-  /// Called with each free scan that was handed to the subscribers' sockets. Set before the first.
+  /// Called with each free scan after it went to the subscribers' sockets. Set before the first scan.
   void set_delivered(std::function<void(const ScanResult&)> delivered) { delivered_ = std::move(delivered); }
 
  private:

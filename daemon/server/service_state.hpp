@@ -28,13 +28,13 @@ struct RequestCounts {
   std::map<std::string, std::uint64_t> failed;          ///< failed requests, by the error's name
 };
 
-/// The number of pictures that one user may have shown at a time. It fills up again as time goes by.
+/// The number of pictures that one user may still show. It refills over time.
 struct PictureAllowance {
   double left;
   std::chrono::steady_clock::time_point since;
 };
 
-/// The state that the methods act on. Everything outlives the server's sessions.
+/// The state that the methods act on. Everything in it outlives the server's sessions.
 struct ServiceState {
   asio::io_context& events;
   Scanner& scanner;
@@ -43,14 +43,14 @@ struct ServiceState {
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   Server* server = nullptr;
   std::function<std::uint64_t()> log_lines_dropped = {};
-  /// Reads the configuration anew, with these settings over it, then answers.
+  /// Reads the configuration again, overlays these settings, then answers.
   std::function<void(nlohmann::json settings, Respond)> reload = {};
-  nlohmann::json settings = nlohmann::json::object();  ///< set over the socket, as merge_settings() has them
+  nlohmann::json settings = nlohmann::json::object();  ///< set over the socket, in the form of merge_settings()
   /// Writes a bundle of the last scans, then answers with its bytes.
   std::function<void(Scanner::Answer<std::string>)> bundle = {};
-  std::function<std::uint64_t()> bundles_written = {};  ///< number of bundles that the service wrote by itself
+  std::function<std::uint64_t()> bundles_written = {};  ///< number of bundles that the service wrote on its own
   RequestCounts requests = {};
-  std::map<std::uint32_t, PictureAllowance> pictures = {};  ///< allowances by user; a user without an entry has all
+  std::map<std::uint32_t, PictureAllowance> pictures = {};  ///< by user; full for a user without an entry
   std::filesystem::path calibrator = {};                    ///< slsd-calibrate; empty: not found
   std::unique_ptr<CalibrationRun> calibration = {};
 };

@@ -22,10 +22,10 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kTurn = 250us;            // so that a round of 64 takes 16 ms
-constexpr auto kByteCost = 10ns;         // to parse, of a long line
-constexpr std::size_t kSlice = 1 << 20;  // to be taken within the send timeout
-constexpr auto kGlance = 200ms;          // between two looks whether the client is gone, where it sends urgent bytes
+constexpr auto kTurn = 250us;            // so a round of 64 clients takes 16 ms
+constexpr auto kByteCost = 10ns;         // to parse a long line
+constexpr std::size_t kSlice = 1 << 20;  // must be read within the send timeout
+constexpr auto kGlance = 200ms;          // interval between checks whether a client that sends urgent bytes is gone
 constexpr std::size_t kMiB = 1 << 20;
 
 bool blank(std::string_view line) {
@@ -36,7 +36,7 @@ bool is_event(const Outgoing& outgoing) {
   return outgoing.kind == Outgoing::Kind::kEvent;
 }
 
-// As sendmsg(), what is left of a message; the descriptor with its first byte.
+// Like sendmsg(): sends the rest of a message, with the descriptor at its first byte.
 ssize_t send_part(int socket, const Outgoing& outgoing, std::size_t sent) {
   const std::size_t line_sent = std::min(sent, outgoing.line.size());
   std::array<iovec, 2> parts{};
@@ -74,7 +74,7 @@ Session::Session(Socket socket, std::shared_ptr<SessionRoom> room)
       room_(*shared_room_),
       peer_(peer_of(socket_.native_handle())),
       role_(room_.access.role_of(peer_)),
-      // Who administers may use several programs at once, each of which is a client.
+      // An administrator may use several programs at once; each is a client.
       memory_(room_.memory, role_ == Role::kAdminister ? std::nullopt : std::optional(peer_.user)),
       progress_(socket_.get_executor()),
       glance_(socket_.get_executor()),
@@ -119,7 +119,7 @@ void Session::await_input() {
 
 void Session::ask_turn() {
   if (taker_.asked) return;
-  const auto cost = kByteCost * lines_.size();  // where a long line is about to be whole
+  const auto cost = kByteCost * lines_.size();  // a long line may be about to be complete
   room_.turns.ask(taker_, cost, [self = shared_from_this()] { self->take_turn(); });
 }
 
@@ -145,7 +145,7 @@ std::optional<std::string_view> Session::next_line() {
   return line;
 }
 
-// Whether there may be a line now.
+// Tells whether a line may be ready.
 bool Session::receive() {
   if (lines_.overflown()) {
     closing_ = true;
@@ -184,7 +184,7 @@ bool Session::receive() {
 
 // ---- Whether it is there ----
 
-// EPOLLHUP alone says that the client is gone; bytes that it sends as urgent wake this up, too, and would for ever.
+// Only EPOLLHUP means that the client is gone. Urgent bytes from it wake this wait too, and would do so for ever.
 void Session::await_hang_up() {
   socket_.async_wait(Socket::wait_error, [self = shared_from_this()](const std::error_code& error) {
     if (error || self->over_) return;
@@ -200,8 +200,8 @@ void Session::await_hang_up() {
 void Session::on_hang_up() {
   gone_.request_stop();
   if (!outgoing_.empty() || input_ == Input::kShut) return end();
-  if (!answering_ || !wanted_) return;  // what is unread still: await_input() sees the end, too
-  ++number_;                            // what comes of the request goes nowhere
+  if (!answering_ || !wanted_) return;  // unread input remains: await_input() sees the end too
+  ++number_;                            // the request's outcome goes nowhere
   on_answered();
 }
 
@@ -269,7 +269,7 @@ void Session::reply(std::uint64_t number, Outcome outcome) {
 void Session::on_answered() {
   answering_ = false;
   memory_.release(MemoryAccount::Part::kReply);
-  if (over_ || in_turn_) return;  // the turn goes on by itself
+  if (over_ || in_turn_) return;  // the turn continues by itself
   if (input_ == Input::kShut) return end_where_done();
   ask_turn();
 }
@@ -285,7 +285,7 @@ void Session::publish(const SharedPublication& publication, std::uint64_t lost) 
   if (subscription_) room_.traffic.clouds_lost += subscription_->take_uncounted();
 }
 
-// What does not fit is lost, the oldest first: the next event tells.
+// Clouds that do not fit are lost, oldest first; the next event reports them.
 void Session::weigh_waiting() {
   while (!memory_.resize(MemoryAccount::Part::kWaiting, subscription_->waiting_bytes())) subscription_->lose_oldest();
 }
@@ -293,14 +293,14 @@ void Session::weigh_waiting() {
 void Session::send_waiting_event() {
   constexpr std::size_t kMemfdsOfOne = 2;
   if (over_ || closing_ || !subscription_ || std::ranges::any_of(outgoing_, is_event)) return;
-  // Descriptors wait in the socket for nothing: one that is read, and one to come.
+  // One descriptor is being read and one is to come; more would only wait in the socket.
   if (subscription_->as_memfd() && room_.lent.count_of(this) >= kMemfdsOfOne) return;
   auto event = subscription_->take(Subscription::Clock::now());
   weigh_waiting();
   if (!event) return;
   const bool granted = !event->kept || room_.lent.add(std::move(event->kept), event->lent_bytes, this);
   if (granted && memory_.resize(MemoryAccount::Part::kEvent, event->size())) return send(std::move(*event));
-  subscription_->note_lost(1);  // the next one tells
+  subscription_->note_lost(1);  // the next event reports it
 }
 
 void Session::send(Outgoing outgoing) {
@@ -309,7 +309,7 @@ void Session::send(Outgoing outgoing) {
   if (!writing_) write();
 }
 
-// Sends what the socket takes now, and comes back when it takes more. A message that it takes whole costs no round of
+// Sends what the socket accepts now, and continues when it accepts more. A message that fits at once costs no round of
 // the event loop.
 void Session::write() {
   writing_ = true;
@@ -353,8 +353,8 @@ void Session::finish_message() {
   send_waiting_event();
 }
 
-// A message may take the time for each megabyte that it has, and for what is left of it. By bytes alone, one a second
-// would do.
+// A message may take the full time for each megabyte, and for the remainder. A limit in bytes alone would allow one
+// byte a second.
 void Session::watch_progress() {
   timed_ = sent_;
   timing_ = true;
@@ -362,7 +362,7 @@ void Session::watch_progress() {
   progress_.async_wait([weak = weak_from_this()](const std::error_code& error) {
     const auto self = weak.lock();
     if (error || !self || self->over_ || !self->timing_) return;
-    if (self->progress_.expiry() <= Clock::now()) self->drop();  // else it was set anew when this was on its way
+    if (self->progress_.expiry() <= Clock::now()) self->drop();  // else the timer was set again meanwhile
   });
 }
 
@@ -370,8 +370,8 @@ bool Session::is_sending_since(Clock::time_point time) const {
   return !over_ && !outgoing_.empty() && sent_at_ >= time;
 }
 
-// In the middle of a message nothing can be told: it would be taken for the message's own bytes. That it is cut short
-// tells, and the log and the status do.
+// In the middle of a message no error can be sent: the client would take it for the message's own bytes. The cut
+// message shows the failure, as do the log and the status.
 void Session::drop() {
   ++room_.traffic.dropped;
   const MessageId id(MessageId::kClientDropped);

@@ -33,7 +33,7 @@ class Session;
 /// The traffic between a server and all its clients so far.
 struct Traffic {
   std::uint64_t accepted = 0;     ///< clients
-  std::uint64_t refused = 0;      ///< connections refused for want of places or of a role
+  std::uint64_t refused = 0;      ///< connections refused because places or the role were missing
   std::uint64_t dropped = 0;      ///< clients dropped because they read too slowly
   std::uint64_t clouds_lost = 0;  ///< clouds lost because a subscriber read too slowly
   std::uint64_t bytes_received = 0;
@@ -56,24 +56,24 @@ struct SessionRoom {
   Turns turns;
   std::array<char, 65536> chunk{};  ///< input of the session whose turn it is
   Traffic traffic;
-  /// Carries a request out; answers through respond, now or later.
+  /// Carries out a request; answers through respond, now or later.
   std::function<void(const Request&, Session&, Respond respond)> handler = {};
   std::function<void(Session&, bool subscribed)> ended = {};
 };
 
-/// One client. Requests are answered one after the other: the next is read when the reply to the one before is sent, so
-/// that what waits for a client is at most one reply, one event and what its subscription holds.
+/// One client. Requests are answered one at a time: the next is read when the previous reply is sent. So at most one
+/// reply, one event and the subscription's clouds wait for a client.
 ///
 ///     request   none --a line--> under way --respond()--> being sent --all of it sent--> none
 ///     input     open --shutdown(SHUT_WR)--> ended --the last line was read--> shut
 ///               open --a line too long, wind_down()-----------------------> shut
 ///
-/// Events go out before, between and after, and are no reply. The connection ends when the input is shut, no request is
-/// under way and all is sent; but who shut down its writing and is subscribed still gets its events. It ends at once
-/// when the client takes what is sent to it too slowly, or is gone.
+/// Events go out before, between and after replies. The connection ends when the client has shut its output, no request
+/// is under way and all is sent. But a subscriber that shut only its output still gets its events. The connection ends
+/// at once if the client reads too slowly, or is gone.
 ///
-/// A client is gone when it closed its socket, or shut down both ways, which is seen while a request is under way, too:
-/// gone() is requested, and nobody waits for the reply. What it sent before without an id is carried out still.
+/// A client is gone when it closed its socket or shut down both directions. That is detected during a request too:
+/// gone() is requested, and nobody waits for the reply. Earlier requests without an id are still carried out.
 ///
 /// @thread thread-bound
 class Session : public std::enable_shared_from_this<Session> {  // shared with the operations under way
@@ -84,19 +84,19 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
 
   [[nodiscard]] const Peer& peer() const { return peer_; }
   [[nodiscard]] Role role() const { return role_; }
-  /// Tells whether nothing was refused to it before: the log tells once.
+  /// Tells whether this is the client's first refusal: only that one is logged.
   [[nodiscard]] bool is_first_refusal() { return !std::exchange(refused_, true); }
   [[nodiscard]] const std::string& way_to(Role role) const { return room_.access.way_to(role); }
 
   void start();
-  /// Takes no further request, and ends when all that is under way is sent.
+  /// Accepts no more requests, and ends when all work under way is sent.
   void wind_down();
   void end();
 
-  /// Sets memory aside for what the request under way will give, before it is made.
-  /// @return  the error to answer with where there is too little
+  /// Reserves memory for the result of the request under way, before it is made.
+  /// @return  the error to answer with if too little is free
   [[nodiscard]] std::optional<RpcError> reserve(std::size_t bytes);
-  /// Requested when nobody waits for the outcome of the request under way any more; never for one without an id.
+  /// Requested when nobody waits for the current request's outcome any more; never for a request without an id.
   [[nodiscard]] std::stop_token gone() const { return wanted_ ? gone_.get_token() : std::stop_token(); }
 
   void subscribe(const Subscription& subscription) { subscription_ = subscription; }
@@ -105,10 +105,10 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
     memory_.release(MemoryAccount::Part::kWaiting);
   }
   [[nodiscard]] const std::optional<Subscription>& subscription() const { return subscription_; }
-  /// A free scan's outcome, for those who subscribed.
+  /// Sends a free scan's outcome if the client subscribed.
   void publish(const SharedPublication& publication, std::uint64_t lost);
 
-  /// Tells whether something is being sent, and bytes of it were taken since the time.
+  /// Tells whether a message is being sent, and the client has read bytes of it since the time.
   [[nodiscard]] bool is_sending_since(std::chrono::steady_clock::time_point time) const;
 
  private:
@@ -152,13 +152,13 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
   std::uint64_t number_ = 0;
   bool in_turn_ = false;
   std::deque<Outgoing> outgoing_;
-  bool writing_ = false;   ///< or waits until more can be sent
-  std::size_t sent_ = 0;   ///< bytes of the first outgoing
+  bool writing_ = false;   ///< or waiting until more can be sent
+  std::size_t sent_ = 0;   ///< bytes sent of the first outgoing message
   std::size_t timed_ = 0;  ///< bytes sent when the timer was set
   bool timing_ = false;
   std::chrono::steady_clock::time_point sent_at_{};
   std::optional<Subscription> subscription_;
-  bool closing_ = false;  ///< also for a subscriber, once all is sent
+  bool closing_ = false;  ///< set for a subscriber too, once all is sent
   bool over_ = false;
 };
 

@@ -45,7 +45,7 @@ json totals_json(const ScanTotals& totals) {
   return result;
 }
 
-constexpr std::size_t kMaxProblemBytes = 1000;  // as an error's: it may quote what a device says of itself
+constexpr std::size_t kMaxProblemBytes = 1000;  // as for errors: it may quote the device's own text
 
 json device_json(const DeviceStatus& device) {
   return {{"name", device.name},

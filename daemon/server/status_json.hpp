@@ -11,8 +11,8 @@
 
 namespace slsd {
 
-/// The answer to `settings` besides the pattern and the calibration: version, projector, cameras, and the keys of the
-/// configuration in force.
+/// The answer to `settings` without the pattern and the calibration: version, projector, cameras, and the configuration
+/// keys in force.
 [[nodiscard]] nlohmann::json settings_json(const Configuration& configuration);
 
 /// The answer to `status`: the service, its devices, and the totals of all scans.

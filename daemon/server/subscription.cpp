@@ -13,7 +13,7 @@ void Subscription::offer(SharedPublication publication, Clock::time_point now) {
   if (!publication->fits(form_)) return;
   if (rate_hz_) {
     const auto period = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / *rate_hz_));
-    // Scans made at this very rate come a little early as often as late.
+    // Scans at exactly this rate arrive a little early as often as late.
     if (now + period / 10 < next_) return;
     next_ = next_ + period > now ? next_ + period : now + period;
   }
@@ -55,7 +55,7 @@ std::optional<Outgoing> Subscription::take(Clock::time_point now) {
   if (as_memfd_) {
     auto memory = sealed_memory(*cloud);
     if (!memory) {
-      ++lost_;  // the next one tells
+      ++lost_;  // the next event reports it
       event.line = to_line(event_message("scan_failed", {{"error", rpc_error(memory.error()).to_json()}}));
       return event;
     }

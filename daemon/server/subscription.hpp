@@ -15,8 +15,8 @@
 
 namespace slsd {
 
-/// A free scan on its way to the subscribers: written once in each format that somebody wants, mostly where it was
-/// decoded.
+/// A free scan on its way to the subscribers. Each wanted format is written once, usually on the thread that decoded
+/// it.
 /// @thread thread-bound
 class Publication {
  public:
@@ -26,9 +26,9 @@ class Publication {
 
   [[nodiscard]] const Result<ScanResult>& scan() const { return *scan_; }
   [[nodiscard]] SharedBytes cloud(CloudForm form) { return files_.file((*scan_)->cloud, (*scan_)->dense.get(), form); }
-  /// Tells whether it is a cloud of that density: a scan that was taken before somebody asked for pixels has none.
+  /// Tells whether the cloud has that density. A scan taken before anybody asked for a point for each pixel has none.
   [[nodiscard]] bool fits(CloudForm form) const { return !*scan_ || !form.dense() || (*scan_)->dense; }
-  /// The memory it holds, in bytes: the cloud, and its files so far.
+  /// The memory of the cloud and its files so far, in bytes.
   [[nodiscard]] std::size_t bytes() const {
     if (!*scan_) return 0;
     return (*scan_)->cloud.points.size() * sizeof(CloudPoint) + files_.bytes() +
@@ -42,15 +42,15 @@ class Publication {
 
 using SharedPublication = std::shared_ptr<Publication>;  // shared: clients send it at their own pace
 
-/// One client's subscription to the free scans. Clouds that could not be sent yet keep their turn, so that those that
-/// come together all arrive. The newest wins: the oldest are lost and counted if there are too many or they have waited
-/// too long.
+/// One client's subscription to the free scans. Clouds that cannot be sent yet wait for a turn, so that clouds that
+/// arrive together are all sent. The newest wins: if too many wait, or one waits too long, the oldest are lost and
+/// counted.
 /// @thread thread-bound
 class Subscription {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kWaitingMax = 4;
-  static constexpr std::chrono::milliseconds kTurn{100};  ///< time after which a newer one takes its place
+  static constexpr std::chrono::milliseconds kTurn{100};  ///< time after which a newer cloud replaces a waiting one
 
   /// @param as_memfd  each cloud comes as a sealed memfd, not inline
   Subscription(CloudForm form, std::optional<double> rate_hz, bool as_memfd = false)
@@ -60,19 +60,19 @@ class Subscription {
   [[nodiscard]] CloudForm form() const { return form_; }
   [[nodiscard]] bool as_memfd() const { return as_memfd_; }
 
-  /// Takes a scan in, unless it comes sooner than the client wants one.
+  /// Accepts a scan, unless it comes sooner than the client's rate allows.
   void offer(SharedPublication publication, Clock::time_point now);
-  /// Clouds that were replaced before this client's session saw them.
+  /// Counts clouds that were replaced before this client's session saw them.
   void note_lost(std::uint64_t count) {
-    if (!rate_hz_) lost_ += count, uncounted_ += count;  // else the next cloud is as good
+    if (!rate_hz_) lost_ += count, uncounted_ += count;  // with a rate, the next cloud is as good
   }
-  /// Clouds lost since this was asked before.
+  /// The clouds lost since the last call.
   [[nodiscard]] std::uint64_t take_uncounted() { return std::exchange(uncounted_, 0); }
   /// The memory that the waiting clouds hold, in bytes.
   [[nodiscard]] std::size_t waiting_bytes() const;
-  /// Loses the one that has waited longest.
+  /// Drops the cloud that has waited longest.
   void lose_oldest();
-  /// The event to send next, with the number of clouds lost since the one before; nothing where none waits.
+  /// The event to send next, with the number of clouds lost since the previous event; nothing if none waits.
   [[nodiscard]] std::optional<Outgoing> take(Clock::time_point now);
 
  private:

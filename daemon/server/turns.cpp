@@ -11,7 +11,7 @@
 namespace slsd {
 namespace {
 
-constexpr int kForgiven = 16;  // of the time that a client left to others, this part
+constexpr int kForgiven = 16;  // fraction of the time that a client left to others
 
 }  // namespace
 
@@ -35,12 +35,13 @@ void Turns::ask(Taker& taker, std::chrono::nanoseconds cost, std::function<void(
   if (waiting_.size() == 1) post_next();
 }
 
-// By way of another round of the event loop: who asks while a turn is under way is heard before the next is given.
+// Gives the turn in another round of the event loop. So requests made during a turn count before the next turn is
+// given.
 void Turns::post_next() {
   asio::post(events_, [this] { asio::post(events_, [this] { take_next(); }); });
 }
 
-// One turn to a round of the event loop: what else it has to do comes in between.
+// Gives one turn in each round of the event loop, so that its other work comes in between.
 void Turns::take_next() {
   if (waiting_.empty()) return;
   auto next = waiting_.extract(waiting_.begin());

@@ -13,14 +13,14 @@
 
 namespace slsd {
 
-/// Shares the event loop's time among the clients: next is whoever would have used the least of it after the turn, so
-/// that a client that asks for little does not wait for all those who flood. Self-clocked fair queueing (Golestani
-/// 1994), with the processor's time that a turn took as its cost: a long line to parse costs more than a short one,
-/// whatever is in it. By the clock, who was served when another program had its turn would pay for that. By the start
-/// of the turns in the place of their end, two quick ones of a client would wait for a long one of each other.
+/// Shares the event loop's time among the clients. The next turn goes to the client whose total use after it would be
+/// smallest. So a client that asks for little does not wait for those that flood. Self-clocked fair queueing (Golestani
+/// 1994); the cost of a turn is its processor time, so a long line to parse costs more than a short one. Wall-clock
+/// time would charge a client for other programs' turns. Sorting by the start of turns, not their end, would make a
+/// client's two quick turns wait for long turns of others.
 ///
-/// Who leaves the loop to others between its turns is forgiven a sixteenth of that time: of 65 clients one that asks
-/// for the status 50 times a second would else have used its share up, and waited as long as those who flood.
+/// A client that leaves the loop to others between its turns is forgiven a sixteenth of that time. Otherwise, of 65
+/// clients, one that asks for the status 50 times a second would use up its share and wait as long as those that flood.
 ///
 ///     time     a turn begins where the client's turn before ended, but not before now; now is the start of the latest
 ///              turn under way, and goes on by the share that each of those who wait had in it
@@ -31,7 +31,7 @@ namespace slsd {
 /// @thread thread-bound
 class Turns {
  public:
-  /// One who takes turns. Outlives those that it asked for.
+  /// A client that takes turns. Must outlive the turns that it asks for.
   struct Taker {
     std::chrono::nanoseconds used_until{};
     std::chrono::nanoseconds last_cost{};
@@ -43,15 +43,15 @@ class Turns {
   /// The processor time that this thread has used.
   [[nodiscard]] static std::chrono::nanoseconds processor_time();
 
-  /// @param time  another one is for tests
+  /// @param time  replaceable for tests
   explicit Turns(asio::io_context& events, Time time = processor_time) : events_(events), time_(time) {}
   Turns(const Turns&) = delete;
   Turns& operator=(const Turns&) = delete;
 
-  /// Calls later. @param turn  a part of a millisecond of work; one asks again for more
-  /// @param cost  what it will take at least, as far as that is known; as much as the last one, too, is expected
+  /// Calls a turn later. @param turn  a fraction of a millisecond of work; asks again for more
+  /// @param cost  a lower bound of the cost, if known; at least the last turn's cost is expected
   void ask(Taker& taker, std::chrono::nanoseconds cost, std::function<void()> turn);
-  /// Forgets who asked.
+  /// Forgets all requests.
   void clear();
 
  private:
@@ -71,7 +71,7 @@ class Turns {
   asio::io_context& events_;
   Time time_;
   std::multimap<std::chrono::nanoseconds, Waiting> waiting_;  ///< sorted by expected end; equals in the order of asking
-  std::chrono::nanoseconds now_{};                            ///< earliest start of a taker's turn
+  std::chrono::nanoseconds now_{};                            ///< the earliest start of a turn
 };
 
 }  // namespace slsd
