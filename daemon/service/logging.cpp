@@ -35,7 +35,7 @@ using spdlog::level::level_enum;
 constexpr const char* kJournalSocket = "/run/systemd/journal/socket";
 constexpr std::size_t kFieldBytesMax = 256;
 
-std::shared_ptr<LogSink> log_sink;  // of this program
+std::shared_ptr<LogSink> log_sink;  // this program's only sink
 
 /// The prefix of a log level for the journal, as in sd-daemon(3).
 std::string_view journal_prefix(level_enum level) {
@@ -50,8 +50,8 @@ std::string time_and_level(const log_msg& message) {
   return fmt::format("{} {:<7} ", utc_text_ms(message.time), std::string_view(level.data(), level.size()));
 }
 
-/// Tells whether systemd reads standard error, as systemd.exec(5) says of JOURNAL_STREAM: another program's may be
-/// inherited.
+/// Tells whether systemd reads standard error. systemd.exec(5) explains JOURNAL_STREAM; it may be inherited from
+/// another program.
 bool journal_reads_stderr() {
   const char* const stream = std::getenv("JOURNAL_STREAM");
   struct stat status {};
@@ -59,13 +59,13 @@ bool journal_reads_stderr() {
   return stream == fmt::format("{}:{}", status.st_dev, status.st_ino);
 }
 
-// Not by stdio: its lock would be held while the reader stands still, and whoever else writes there would wait, too.
+// Without stdio: its lock would be held while the reader stalls, and every other writer would wait too.
 void write_stderr(std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t written = ::write(STDERR_FILENO, bytes.data(), bytes.size());
     if (written >= 0) {
       bytes.remove_prefix(static_cast<std::size_t>(written));
-    } else if (errno == EAGAIN) {  // whoever shares it has made it so
+    } else if (errno == EAGAIN) {  // another process that shares it made it non-blocking
       pollfd writable{STDERR_FILENO, POLLOUT, 0};
       ::poll(&writable, 1, -1);
     } else if (errno != EINTR) {
@@ -78,7 +78,7 @@ LogSink::Output standard_error(std::function<std::string(const log_msg&)> prefix
   return {std::move(prefix), [](const LogSink::Line& line) { write_stderr(line.text + "\n"); }};
 }
 
-// Itself, as spdlog's sink for the journal sends no fields but its own.
+// Writes to the journal directly, because spdlog's journal sink sends no fields except its own.
 bool send_to_journal(const LogSink::Line& line) {
   std::vector<std::string> entries{"MESSAGE=" + line.text, fmt::format("PRIORITY={}", journal_prefix(line.level)[1]),
                                    "SYSLOG_IDENTIFIER=slsd"};
@@ -91,7 +91,7 @@ bool send_to_journal(const LogSink::Line& line) {
 LogSink::Output journal() {
   return {[](const log_msg&) { return std::string(); },
           [](const LogSink::Line& line) {
-            // The journal reads that, too.
+            // The journal reads standard error too.
             if (!send_to_journal(line)) write_stderr(fmt::format("{}{}\n", journal_prefix(line.level), line.text));
           }};
 }
@@ -109,14 +109,14 @@ struct LogSink::Queue {
   mutable std::mutex mutex;
   mutable std::condition_variable changed;
   std::deque<Line> lines;
-  bool queued = false;   // else lines are written by those who log
-  bool writing = false;  // a line that is no longer in the queue
+  bool queued = false;   // else each logging thread writes its own lines
+  bool writing = false;  // a line taken from the queue
   bool dropping = false;
   bool ends = false;
   std::uint64_t dropped = 0;
-  std::uint64_t told = 0;  // of these
+  std::uint64_t told = 0;  // dropped lines reported so far
 
-  // One line for all that was dropped, where they are missing.
+  // Writes one line for all dropped lines, at the place where they are missing.
   void take_up_again() {
     const auto missing = std::exchange(told, dropped);
     dropping = false;
@@ -170,7 +170,7 @@ void LogSink::queue_lines() {
     const std::lock_guard lock(queue_->mutex);
     if (std::exchange(queue_->queued, true)) return;
   }
-  // Left to itself, as a write to a reader that stands still can neither be ended nor waited for.
+  // Leaves the thread alone: a write to a stalled reader can neither be ended nor waited for.
   std::thread([queue = queue_, output = output_] {
     name_this_thread("log");
     queue->write_lines(output);

@@ -14,7 +14,7 @@
 
 namespace slsd {
 
-/// The longest line of the log, with its end. What would be longer ends in an ellipsis.
+/// The longest line of the log, with its end. Longer lines end in an ellipsis.
 inline constexpr std::size_t kLogLineBytesMax = 2048;
 /// The longest wait for the log's reader at the end of the program.
 inline constexpr std::chrono::milliseconds kLogPatience{300};
@@ -22,10 +22,10 @@ inline constexpr std::chrono::milliseconds kLogPatience{300};
 /// are read.
 inline constexpr std::size_t kLogLinesMax = 1024;
 
-/// Writes each line of the log so that nothing in it can be taken for another: printable, and at most kLogLineBytesMax.
-/// Writes at once, or, after queue_lines(), through a bounded queue and a thread of its own, so that nobody who logs
-/// waits for whoever reads. spdlog's own queue holds lines whole before they are cut, and its thread cannot be left
-/// behind: at exit it would wait for a reader that stands still.
+/// Writes each log line so that its text cannot imitate another line: printable, and at most kLogLineBytesMax. Writes
+/// at once, or, after queue_lines(), through a bounded queue and a thread of its own. Then a slow reader delays nobody
+/// who logs. spdlog's own queue holds lines before they are cut, and its thread cannot be abandoned: at exit it would
+/// wait for a stalled reader.
 /// @thread thread-safe
 class LogSink final : public spdlog::sinks::sink {
  public:
@@ -38,7 +38,7 @@ class LogSink final : public spdlog::sinks::sink {
   /// The prefix and the destination of a line.
   struct Output {
     std::function<std::string(const spdlog::details::log_msg&)> prefix;
-    std::function<void(const Line&)> write;  ///< may wait for its reader
+    std::function<void(const Line&)> write;  ///< may wait for the reader
   };
   explicit LogSink(Output output);
   ~LogSink() override;
@@ -50,24 +50,24 @@ class LogSink final : public spdlog::sinks::sink {
 
   /// Queues every line from now on.
   void queue_lines();
-  /// Waits until all is written that was logged before, at most so long. @return whether it is
+  /// Waits until all earlier lines are written, at most this long. @return whether they are
   [[nodiscard]] bool wait_written(std::chrono::milliseconds patience) const;
   [[nodiscard]] std::uint64_t dropped() const;
 
  private:
   struct Queue;
   Output output_;
-  std::shared_ptr<Queue> queue_;  // shared with the thread, which may outlive this in a write that does not end
+  std::shared_ptr<Queue> queue_;  // shared with the thread, which may outlive this object in an endless write
 };
 
-/// Sends the log to the journal where systemd reads standard error, with each line's priority; elsewhere to standard
-/// error, with time and level. At once; a command's log and its output come in the order in which they are told.
+/// Sends the log to the journal if systemd reads standard error, with each line's priority. Otherwise sends it to
+/// standard error, with time and level. Writes at once, so that a command's log and output keep their order.
 void start_logging(spdlog::level::level_enum level);
-/// Queues the log's lines from now on, so that no line holds up anybody. For the service.
+/// Queues the log's lines from now on, so that no line delays any thread. For the service.
 void queue_log();
-/// Gives the log's reader so long to take what is left, before the program ends.
+/// Gives the log's reader this long to read the rest before the program ends.
 void flush_log(std::chrono::milliseconds patience);
-/// Lines that nobody took in time, since queue_log().
+/// Lines dropped since queue_log() because the reader was too slow.
 [[nodiscard]] std::uint64_t log_lines_dropped();
 
 }  // namespace slsd

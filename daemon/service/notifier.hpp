@@ -8,11 +8,12 @@
 
 namespace slsd {
 
-/// Tells the service manager how the service is, by sd_notify(3). Without NOTIFY_SOCKET it does nothing.
+/// Reports the service's state to the service manager with sd_notify(3). Does nothing without NOTIFY_SOCKET.
 /// @thread thread-bound
 class Notifier {
  public:
-  /// It is not ready yet, and takes at most so long for what comes next, whatever TimeoutStartSec= says.
+  /// Reports that the service is not ready yet, and that the next step takes at most this long, whatever
+  /// TimeoutStartSec= says.
   void starting(const std::string& status, std::chrono::microseconds time_max) const;
   void ready(const std::string& status) const;
   void status(const std::string& status) const;
@@ -20,7 +21,7 @@ class Notifier {
   void stopping() const;
   void ping_watchdog() const;
 
-  /// The time within which the manager expects a ping before it acts. Empty if it does not watch.
+  /// The interval within which the manager expects a ping. Empty if it does not watch.
   [[nodiscard]] static std::optional<std::chrono::microseconds> watchdog_time();
 };
 

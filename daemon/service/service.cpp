@@ -28,13 +28,13 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kStopTime = 700ms;  // for the devices
-constexpr auto kSendTime = 2s;     // for what is being sent, as long as it is taken
-constexpr auto kSilence = 300ms;   // after which nobody seems to take it
+constexpr auto kSendTime = 2s;     // for messages being sent, while the clients read them
+constexpr auto kSilence = 300ms;   // after which no client seems to read
 constexpr auto kEndGlance = 5ms;
 constexpr auto kStatusPeriod = 5s;
-constexpr auto kPrepareTime = 5min;  // half a second of computing, on a host that has none to spare
+constexpr auto kPrepareTime = 5min;  // half a second of computing, on a heavily loaded host
 
-// The default sets are known to be good where they are seen large enough, and looking takes a while.
+// The default symbol sets are known to be good at a sufficient scale, and the check takes a while.
 void warn_of_symbols(const PatternOptions& pattern, double scale) {
   constexpr double kKnownScale = 1.3;
   if (pattern.symbols == default_symbols(pattern.symbol_size_px) && scale >= kKnownScale) return;
@@ -48,13 +48,13 @@ nlohmann::json tables_that_need_restart(const Configuration& now, const Configur
   if (!(with_exposures_of(now.cameras, next.cameras) == next.cameras)) tables.push_back("camera");
   if (!(now.server == next.server)) tables.push_back("server");
   ScanOptions in_force = now.scan;
-  in_force.timeout_ms = next.scan.timeout_ms;  // taken at once
+  in_force.timeout_ms = next.scan.timeout_ms;  // takes effect at once
   if (!(in_force == next.scan)) tables.push_back("scan");
   if (!(now.black_box == next.black_box)) tables.push_back("black_box");
   return tables;
 }
 
-// Of the cameras' tables only these keys come into force.
+// Only these keys of the camera tables take effect.
 void note_exposures(nlohmann::json& given, const nlohmann::json& next) {
   if (!given.contains("camera") || !next.contains("camera")) return;
   for (nlohmann::json& camera : given["camera"]) {
@@ -184,7 +184,7 @@ void Service::stop() {
   await_end(std::chrono::steady_clock::now());
 }
 
-// Meanwhile the event loop sends: the answers of what was cancelled, and clouds and images to their end.
+// Meanwhile the event loop sends the answers of cancelled requests, and clouds and images to their end.
 void Service::await_end(std::chrono::steady_clock::time_point began) {
   const auto now = std::chrono::steady_clock::now();
   const bool stopped = scanner_.wait_stopped(0ms);
@@ -199,14 +199,15 @@ void Service::await_end(std::chrono::steady_clock::time_point began) {
   server_->end_all();
   events_.stop();
   if (stopped) return spdlog::info("stopped");
-  // A driver or a long computation that cannot be interrupted. Nothing is half written: a bundle is there whole or not
-  // at all.
+  // A driver or a long computation may be impossible to interrupt. No file is half written: a bundle is whole or
+  // absent.
   spdlog::warn("stopped without waiting for a device or a computation");
   flush_log(kLogPatience);
   std::_Exit(EXIT_SUCCESS);
 }
 
-// Of two that set something at once the later would know nothing of the other's.
+// Refuses a change of settings while another reload is under way: the later one would not know the earlier one's
+// settings.
 void Service::reload(const nlohmann::json& settings, Respond answered) {
   const bool sets = settings != state_.settings;
   if (setting_ || (sets && reloads_ > 0)) {
@@ -249,7 +250,7 @@ void Service::on_reloaded(const Result<Configuration>& configuration, nlohmann::
     state_.configuration.given[table] = configuration->given.value(table, nlohmann::json::object());
   }
   note_exposures(state_.configuration.given, configuration->given);
-  // What next start reads: the configuration itself is the administrator's.
+  // The next start reads this file; the configuration itself belongs to the administrator.
   const bool changed = settings != state_.settings;
   const std::filesystem::path kept = kept_settings_file(state_.configuration_file);
   nlohmann::json why_not_kept;
@@ -274,7 +275,7 @@ void Service::bundle(nlohmann::json reason, Scanner::Answer<std::string> answer)
   });
 }
 
-// On one of the scanner's threads. What the status says is known to the event loop's alone.
+// Runs on a thread of the scanner. Only the event loop's thread may read the state that a bundle describes.
 void Service::on_failure(const std::string& scan_id, const Error& error) {
   if (!bundles_.claim(error, std::chrono::system_clock::now())) return;
   asio::post(events_, [this, scan_id, error] {

@@ -22,29 +22,27 @@
 
 namespace slsd {
 
-/// The composition root: owns everything, in the order in which it is made. The threads, and why each is one:
+/// The composition root: owns everything, in order of creation. The threads, and the reason for each:
 ///
-///   main     the event loop: socket, signals, watchdog. Never waits for a device, never computes for long.
-///   scanner  the projector, and each scan's frames: waits for devices.
-///   display  the projector's window: an X server that hangs holds whatever talks to it.
-///   cam NAME one to a camera: cameras expose at the same time, and opening one may take seconds.
-///   log      writes the log: whoever reads that may stand still.
-///   decode N one or two, from frames to clouds and pictures: each uses a processor fully while the next frames come.
-///   helper N help those with the parts of a frame or a dense cloud, one to each processor but one, as far as lanes
-///   that
-///            compute leave processors free.
-///   deadlines  ends requests whose time is over, whatever the others wait for.
-///   chores   what needs no device and takes long: a reload's pattern and decoders, the pattern as a PNG.
+///   main       the event loop: socket, signals, watchdog. Never waits for a device, never computes for long.
+///   scanner    the projector, and each scan's frames: waits for devices.
+///   display    the projector's window: a hung X server blocks every thread that talks to it.
+///   cam NAME   one for each camera: cameras expose at the same time, and opening one may take seconds.
+///   log        writes the log: its reader may stall.
+///   decode N   one or two, from frames to clouds and pictures: each fully uses a processor during the next capture.
+///   helper N   compute parts of a frame or a dense cloud for those; one for each processor but one, less busy lanes.
+///   deadlines  ends requests whose time is over, whatever the other threads wait for.
+///   chores     long work without devices: a reload's pattern and decoders, the pattern as a PNG.
 ///
-/// Between them stand the scanner's bounded queue, the lanes' few sets of frames, the server's few newest clouds, and
-/// the event loop's own queue, which holds at most one answer to a client.
+/// The threads exchange data through bounded queues: the scanner's requests, the lanes' few sets of frames, and the
+/// server's few newest clouds. The event loop's own queue holds at most one answer for each client.
 /// @thread thread-bound: main
 class Service {
  public:
   /// Makes everything from the configuration; nothing answers yet.
-  /// @param file  the configuration's, to be read again by a reload
+  /// @param file  the configuration file, which a reload reads again
   /// @errors of ScanSetup::create(), make_projector() and make_camera()
-  /// @param settings  set over the socket before, which the configuration has in it
+  /// @param settings  settings made earlier over the socket; the configuration includes them
   [[nodiscard]] static Result<std::unique_ptr<Service>> create(Configuration configuration,
                                                                const std::filesystem::path& file,
                                                                nlohmann::json settings);
@@ -70,9 +68,9 @@ class Service {
   void watch();
   void update_status();
 
-  int reloads_ = 0;            ///< under way, one after the other
-  bool setting_ = false;       ///< the last of them has other settings than those in force
-  bool reload_again_ = false;  ///< a signal came meanwhile
+  int reloads_ = 0;            ///< under way, one after another
+  bool setting_ = false;       ///< the last reload has other settings than those in force
+  bool reload_again_ = false;  ///< a signal came during a reload
   Notifier notifier_;
   asio::io_context events_;
   asio::signal_set signals_;
