@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""A scan of every part on a conveyor, when a light barrier says that it is there.
+"""Scans every part on a conveyor, triggered by a light barrier.
 
-CHIP and LINE name a GPIO line whose rising edge is a part ("/dev/gpiochip0" 17; needs libgpiod's package gpiod). Without
-them each line of standard input is one. Any recorded frame will do:
+CHIP and LINE name a GPIO line, such as "/dev/gpiochip0" 17. Each rising edge means a part (needs libgpiod's package gpiod).
+Without them, each line of standard input means a part. Any recorded frame will do:
 slsd --config tests/clients/recorded/gap/slsd.toml, with SLSD_SOCKET=/tmp/slsd-example.sock
 """
 import argparse

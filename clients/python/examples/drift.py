@@ -2,8 +2,8 @@
 # Copyright the slsd authors
 """Records for a day, and looks for drift: drift.py FILE.csv [EVERY_S [SCANS]], then drift.py FILE.csv look
 
-Something that stands still is in view. Every so often (600 s) the median depth of each ninth of the picture is kept as a line, until SCANS
-(144) are done. `look` fits each ninth's change over time. Any recorded frame will do, which does not drift:
+Put something that stands still in view. Every EVERY_S seconds (600) the program writes a line with the median depth of each ninth of the
+picture, until SCANS (144) are done. `look` fits each ninth's change over time. Any recorded frame will do, but shows no drift:
 slsd --config tests/clients/recorded/gap/slsd.toml, with SLSD_SOCKET=/tmp/slsd-example.sock
 """
 import argparse
@@ -17,7 +17,7 @@ import numpy as np
 import slsd
 
 PARTS = 3
-LEAST_MM = 0.001  # what is less is no drift, however sure
+LEAST_MM = 0.001  # a smaller change is no drift, however certain
 COLUMNS = ["time", "scan", "points", *(f"z{i}_mm" for i in range(PARTS**2))]
 
 
@@ -30,7 +30,7 @@ def depths(points):
 
 def record(file, every_s=600.0, scans=144):
     done = 0
-    slsd.Scanner().close()  # no service at all is told at once
+    slsd.Scanner().close()  # fails at once if there is no service
     with open(file, "a", newline="", encoding="utf-8") as out:
         lines = csv.writer(out)
         if out.tell() == 0:
@@ -41,7 +41,7 @@ def record(file, every_s=600.0, scans=144):
                 with slsd.Scanner() as scanner:
                     cloud = scanner.scan(timeout_s=30)
                 lines.writerow([cloud.description["time"], cloud.description["scan"], len(cloud), *depths(cloud.points)])
-                out.flush()  # a day is long: what was measured is kept
+                out.flush()  # keeps each line, because a day is long
                 done += 1
             except slsd.ScannerError as error:  # a night's restart costs a line, not the day
                 print(f"{error.name}: {error}", file=sys.stderr)

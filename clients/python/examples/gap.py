@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""How far one face stands before another, with its uncertainty.
+"""Measures how far one face stands in front of another, with the uncertainty.
 
-Two rectangles in x and y (mm, the scanner's frame), one on each face, clear of its edges. The first face is the plane that distances
-count from. Several scans (5) average the noise of the frames, and show it. The recorded frame with two such faces:
+Give two rectangles in x and y (mm, the scanner's frame), one on each face, clear of its edges. Distances start at the plane of the first
+face. Several scans (5) average the noise of the frames, and show it. The recorded frame with two such faces:
 slsd --config tests/clients/recorded/gap/slsd.toml, then with SLSD_SOCKET=/tmp/slsd-example.sock
 gap.py 160,110,240,230 98,148,142,192
 """
@@ -14,7 +14,7 @@ import numpy as np
 
 import slsd
 
-PARTS = 4  # the face is looked at in so many parts by as many: what they disagree in is no noise of pixels
+PARTS = 4  # divides the face into so many parts by as many; their disagreement is no noise of pixels
 
 
 def face(points, rectangle):
@@ -25,7 +25,7 @@ def face(points, rectangle):
     if len(xyz) < 20 * PARTS**2:
         raise ValueError(f"{len(xyz)} points in the rectangle: is it on the face, and lit?")
     middle = np.median(xyz, axis=0)
-    for _ in range(3):  # without what lies elsewhere
+    for _ in range(3):  # leaves out points off the plane
         design = np.column_stack([np.ones(len(xyz)), xyz[:, :2] - middle[:2]])
         plane, *_ = np.linalg.lstsq(design, xyz[:, 2], rcond=None)
         off = xyz[:, 2] - design @ plane
@@ -40,10 +40,10 @@ def face(points, rectangle):
 
 
 def gap(points, behind, before):
-    """How far the middle of `before` stands before the plane of `behind`, mm, and one standard deviation of it."""
+    """Distance of the middle of `before` from the plane of `behind`, mm, and its standard deviation."""
     middle, normal, covariance = face(points, behind)
     other, _, covariance_other = face(points, before)
-    lever = np.append(1, (other - middle)[:2])  # a slope of the first face counts by how far away the second is
+    lever = np.append(1, (other - middle)[:2])  # a slope of the first face counts by the distance to the second
     return (middle - other) @ normal, np.sqrt(lever @ covariance @ lever + covariance_other[0, 0])
 
 
@@ -58,11 +58,11 @@ def main(behind, before, scans):
     with slsd.Scanner() as scanner:
         clouds = [scanner.scan(density="pixels", timeout_s=60) for _ in range(scans)]
     each = np.array([gap(cloud.points, behind, before) for cloud in clouds])
-    # The parts' disagreement stays the same from scan to scan: averaging takes the frames' noise out of the gap, not that.
+    # The parts' disagreement stays the same from scan to scan. Averaging reduces the frames' noise, not the disagreement.
     sigma = np.hypot(np.median(each[:, 1]), each[:, 0].std() / np.sqrt(len(each)))
     print(f"gap {each[:, 0].mean():.3f} mm, one standard deviation {sigma:.3f} mm ({len(each)} scans, which differ by "
           f"{each[:, 0].std():.3f})")
-    # Both faces move together where the calibration is off: of that, the gap has its share by depth.
+    # An error of the calibration moves both faces together. The gap gets its share of it, by depth.
     if clouds[0].sigma_calibration_mm is not None:
         depth = clouds[0].points["z"].mean()
         print(f"and {clouds[0].sigma_calibration_mm * 2 * abs(each[:, 0].mean()) / depth:.3f} mm from the calibration")

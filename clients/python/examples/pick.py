@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Where to set a suction cup on the topmost part of a bin.
+"""Finds a place for a suction cup on the topmost part in a bin.
 
-Prints the point (mm, the scanner's frame), the direction to come from, and how sure the place is. Of the places where a cup of this
-diameter (40) finds a plane, the nearest. The recorded frame with boxes:
+It chooses the nearest place that is flat enough for a cup of this diameter in mm (40). It prints the point (mm, the scanner's frame), the
+direction to come from, and how certain the place is. The recorded frame with boxes:
 slsd --config tests/clients/cell/left/slsd.toml, then with SLSD_SOCKET=/tmp/slsd-example.sock pick.py 80
 """
 import argparse
@@ -14,7 +14,7 @@ import numpy as np
 import slsd
 
 FLAT_MM = 0.5    # how far a surface may be off a plane for the cup to hold
-COVERED = 0.9    # of the cup's area, where points must be
+COVERED = 0.9    # the share of the cup's area that must have points
 
 
 def patches(xyz, cup_mm):
@@ -29,7 +29,7 @@ def patches(xyz, cup_mm):
 
 
 def plane_of(points):
-    """Middle, unit normal towards the scanner, root mean square off the plane."""
+    """Middle, unit normal towards the scanner, root mean square distance from the plane."""
     middle = points.mean(axis=0)
     _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
     normal = axes[2] if axes[2] @ middle < 0 else -axes[2]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""One scan as a point cloud of Open3D (pip install open3d), cleaned of what stands alone.
+"""Saves a scan as a point cloud with Open3D (pip install open3d), without isolated points.
 
 Any recorded frame will do: slsd --config tests/clients/recorded/gap/slsd.toml, with SLSD_SOCKET=/tmp/slsd-example.sock
 """

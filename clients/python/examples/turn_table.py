@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Views of a turn-table in one frame: Enter after each turn by 360/VIEWS degrees.
+"""Merges views of a turn-table in one frame: press Enter after each turn by 360/VIEWS degrees.
 
-Its axis is measured once, as a point (mm) and a direction in the scanner's frame: with a sphere on the table, the circle that
-its centres describe (axis_of). The recorded frames of six views: slsd --config tests/clients/recorded/turn_table/slsd.toml,
+Measure the table's axis once, as a point (mm) and a direction in the scanner's frame. Put a sphere on the table: its centres lie on a
+circle about the axis (axis_of). The recorded frames of six views: slsd --config tests/clients/recorded/turn_table/slsd.toml,
 then with SLSD_SOCKET=/tmp/slsd-example.sock turn_table.py all.npy 6 0,0,2010 0,1,0
 """
 import argparse
@@ -23,7 +23,7 @@ def turned(points, angle_rad, point_on_axis_mm, axis):
 
 
 def axis_of(centres):
-    """The axis about which these points turn: a point on it and its direction. At least three, not too near each other."""
+    """The axis about which these points turn: a point on it and its direction. It needs three points or more, not too close."""
     centres = np.asarray(centres, float)
     middle = centres.mean(axis=0)
     _, spread, directions = np.linalg.svd(centres - middle)
