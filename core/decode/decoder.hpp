@@ -22,27 +22,28 @@
 
 namespace slsd {
 
-/// The symbols of a frame in space: where a dense cloud begins. Stands as long as the decoding.
+/// The symbols of a frame in space, from which a dense cloud starts. Valid as long as the decoding.
 struct DecodedSymbols {
   const Lattice* lattice;
-  std::span<const PixelRay> rays;     ///< one to a symbol: that of its centre
-  std::span<const double> depths_mm;  ///< one to a symbol, along the camera's z axis, as triangulated from its centre
+  std::span<const PixelRay> rays;     ///< one for each symbol: the ray of its centre
+  std::span<const double> depths_mm;  ///< one for each symbol, along the camera's z axis, as triangulated from its
+                                      ///< centre
   FrameNoise noise;                   ///< noise of the frame
 };
 
-/// Reads frames of one camera that see one pattern. Keeps its buffers from frame to frame: nothing is allocated once
-/// they have grown to a frame's size.
+/// Decodes frames of one camera that sees one pattern. Keeps its buffers from frame to frame, and allocates nothing
+/// once they have grown to a frame's size.
 /// @thread thread-bound: one decoder to a thread
 class Decoder {
  public:
   /// Prepares the prototypes and the rays of the pattern's cells.
-  /// @param pattern  one for all cameras that see it: what it holds is shared
-  /// @errors kMismatch: the calibration's projector is not of the pattern's size; kInvalidArgument; kUnsupported: the
-  ///         camera's images are too large
+  /// @param pattern  one for all cameras that see it, which share its contents
+  /// @errors kMismatch: the calibration's projector differs in size from the pattern; kInvalidArgument; kUnsupported:
+  ///         the camera's images are too large
   [[nodiscard]] static Result<Decoder> create(const IndexedPattern& pattern, const Calibration& calibration,
                                               std::size_t camera_index, const DecodeOptions& options);
-  /// A decoder of the same for another thread, in a hundredth of the time: it shares what never changes, and its
-  /// buffers are as large as these have grown.
+  /// Makes an equal decoder for another thread, in a hundredth of the time. It shares constant data, and its buffers
+  /// start at the size of these.
   [[nodiscard]] Decoder another() const;
 
   Decoder(Decoder&&) noexcept;
@@ -51,10 +52,11 @@ class Decoder {
 
   [[nodiscard]] std::uint8_t camera_index() const;  ///< index in the calibration
 
-  /// Image to points. The result stands until the next call. Nothing found is an empty result with its counters.
-  /// @param full      the level of a saturated pixel: 255, 1023, 65535...; without it as HeldFullLevel has it
-  /// @param executor  helps with the stages, and changes nothing of what they give; null: this thread alone
-  /// @errors kMismatch: the frame is not of the calibration's size
+  /// Decodes an image to points. The result is valid until the next call. If nothing is found, the result is empty,
+  /// with its counters.
+  /// @param full      the level of a saturated pixel: 255, 1023, 65535...; if missing, HeldFullLevel estimates it
+  /// @param executor  helps with the stages without changing their results; null: this thread alone
+  /// @errors kMismatch: the frame's size differs from the calibration's
   [[nodiscard]] Result<const Decoding*> decode(const GreyView& frame, std::optional<double> full = std::nullopt,
                                                StageObserver* observer = nullptr, Executor* executor = nullptr);
   /// Returns the symbols of the last decoded frame.
@@ -67,11 +69,11 @@ class Decoder {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Decodes a frame, or where there is one in white light too, what is left when that is divided out: print and wood
-/// have edges of their own, which then do not count. Where the scene has moved between the two, and the frame by itself
-/// gives more points, these: white light costs no point.
-/// @errors as Decoder::decode(); kMismatch: the frames are not of one size
-/// @thread thread-bound, as the decoder
+/// Decodes a frame. If there is also a frame in white light, it divides that light out first, which removes the edges
+/// of print and wood. If the scene moved between the two frames, and the frame alone gives more points, that result
+/// counts: the white frame never costs points.
+/// @errors as Decoder::decode(); kMismatch: the frames differ in size
+/// @thread thread-bound, like the decoder
 [[nodiscard]] Result<const Decoding*> decode_in_light(Decoder& decoder, const GreyView& frame, const SceneLight& light,
                                                       StageObserver* observer = nullptr, Executor* executor = nullptr);
 

@@ -35,7 +35,7 @@ inline constexpr int kStageCount = 10;
 /// Directions of the grid's links, along the pattern's axes: u to the right, v down.
 enum Direction : std::uint8_t { kRight, kDown, kLeft, kUp };
 
-/// All four. Counted, not kept in memory: so a loop's body is made for each of them.
+/// All four. Computed rather than stored, so that the compiler unrolls loops over them.
 struct Directions {
   class Iterator {
    public:
@@ -59,28 +59,28 @@ struct Directions {
 };
 inline constexpr Directions kDirections;
 
-/// One region of the frame, whatever became of it. The trace from which pictures are drawn.
+/// One region of the frame, accepted or not: the data from which pictures are drawn.
 struct RegionSeen {
   Eigen::Vector2f centre_px;  ///< place in the camera's image
   RegionStatus status;
   std::int8_t letter;                              ///< index in the pattern's symbols, or -1
   std::array<std::int32_t, 4> links;               ///< by Direction: index of the neighbour's region, or -1
-  std::array<bool, 4> broken;                      ///< a link that was there and disagreed with its neighbours
-  std::int16_t column, row;                        ///< cell of the pattern, where decoded; else -1
+  std::array<bool, 4> broken;                      ///< a link that was removed because it disagreed with its neighbours
+  std::int16_t column, row;                        ///< cell of the pattern; -1 unless decoded
   DecodeRule rule = DecodeRule::kCertain;          ///< the rule that decided on its status
-  std::optional<DecodeRule> guard = std::nullopt;  ///< the last that kept it from being mended
-  float margin_nats = 0;                           ///< lead of its cell over any other, up to the margin that it needs
+  std::optional<DecodeRule> guard = std::nullopt;  ///< the last guard that kept it from being mended
+  float margin_nats = 0;                           ///< margin of its cell over any other, up to the required margin
 };
 
 /// Results of one frame: its points, and the status of every region.
 struct Decoding {
   std::vector<CloudPoint> points;
   std::vector<RegionSeen> regions;
-  /// Symbols whose cells are certain, and that lie off their epipolar lines: of a rig that was knocked out of its
-  /// calibration, or of another projector's light.
+  /// Symbols whose cells are certain but lie off their epipolar lines. The rig has lost its calibration, or another
+  /// projector lights them.
   std::vector<SymbolMatch> off_line;
   std::array<std::uint32_t, kRegionStatusCount> counts{};  ///< regions by status
-  RuleCounts rules{};                                      ///< regions by rule, and those that a guard kept out
+  RuleCounts rules{};                                      ///< regions by rule, and regions that each guard rejected
 
   [[nodiscard]] std::uint32_t count(RegionStatus status) const { return counts[static_cast<std::size_t>(status)]; }
 };

@@ -21,19 +21,19 @@ struct DenseOptions {
   friend bool operator==(const DenseOptions&, const DenseOptions&) = default;
 };
 
-/// The [decode] table of the configuration. Every stage can be run the paper's way, so that both can be measured side
-/// by side.
+/// The [decode] table of the configuration. Each stage can run by the paper's method, so that both methods can be
+/// compared.
 struct DecodeOptions {
-  double depth_min_mm = 400.0;  ///< working range along the camera's z axis; cuts the candidates of a codeword
+  double depth_min_mm = 400.0;  ///< working range along the camera's z axis; limits the candidate cells of a codeword
   double depth_max_mm = 2500.0;
   /// Mean number of wrong cells allowed in a frame that is made to mislead: sets the margin; 1e-9 to 1.
   double wrong_cells_max = 0.005;
   /// Alignment with the pattern: kFine aligns each decoded symbol's patch, which takes several times as long.
   Precision precision = Precision::kStandard;
-  Density density = Density::kSymbols;  ///< unless a request says
+  Density density = Density::kSymbols;  ///< unless a request sets it
   DenseOptions dense = {};
   Method binarize = Method::kDefault;
-  Method find_regions = Method::kDefault;  ///< the paper's way leaves regions merged that ran together
+  Method find_regions = Method::kDefault;  ///< the paper's method keeps regions that ran together merged
   Method classify = Method::kDefault;
   Method centre = Method::kDefault;
   Method link_grid = Method::kDefault;
@@ -42,7 +42,7 @@ struct DecodeOptions {
   RuleTrial* trial = nullptr;  ///< only for tools and tests; outlives the decoder
 
   [[nodiscard]] Result<> validate() const;
-  /// Middle of the working range, by ratio: 1000 for 500 and 2000.
+  /// Geometric middle of the working range: 1000 for 500 and 2000.
   [[nodiscard]] double middle_depth_mm() const;
   /// Tells whether any stage uses the paper's method.
   [[nodiscard]] bool any_paper() const;

@@ -14,28 +14,29 @@
 namespace slsd {
 namespace {
 
-/// Camera px per projector px that are tried, in this order around 1.
+/// Scales to try, camera px per projector px, in this order around 1.
 constexpr double kScaleMin = 0.35, kScaleMax = 16, kScaleStep = 1.3;
-/// Symbols that are larger in the camera than the first are read in a frame where they are as large as the second, at
-/// least.
+/// If symbols are larger in the camera than the first value, the frame is shrunk. They stay at least as large as the
+/// second.
 constexpr double kLargePx = 48, kLargeEnoughPx = 24;
-/// Turns of the pattern in the camera's image that are tried, of a full turn.
+/// Number of rotations of the pattern in the camera's image to try, over a full turn.
 constexpr int kTurns = 12;
-/// A scale is likely where shapes of a symbol's size cover this part at least of what they cover at the best of all:
+/// A scale is likely if shapes of a symbol's size cover at least one part in so many of their area at the best scale:
 /// specks are many, but small.
 constexpr double kFewOfMany = 4;
-/// Numbers of symbols on one plane that do not agree by chance; of another pattern some in a hundred are read, all
-/// over.
+/// Numbers of symbols on one plane that do not agree by chance. In a frame of another pattern, some in a hundred are
+/// read, scattered everywhere.
 constexpr std::size_t kCertain = 40, kLeast = 12;
-/// The share of symbols that has to lie within this part of a cell from where the plane of the others puts them.
+/// Share of the symbols that must lie within this fraction of a cell from the place that the plane of the others
+/// predicts.
 constexpr double kAgreeingShare = 0.6, kAgreeingCells = 0.6;
-/// Wrong cells that a frame may have: cells that agree with a plane are kept, and the bundle adjustment leaves out the
+/// Wrong cells that a frame may have: cells that agree with a plane are kept, and the bundle adjustment rejects the
 /// rest.
 constexpr double kWrongCellsMax = 0.075;
-/// Ratio to the scale that a reader was made for up to which it is still used.
+/// Largest ratio to the scale that a reader was made for, at which it is still used.
 constexpr double kSameScale = 1.12;
 
-/// Makes a lens that stands for the projector's before there is a calibration; the cells' pixels do not depend on it.
+/// Makes a substitute for the projector's lens while there is no calibration; the cells' pixels do not depend on it.
 Lens any_lens(const PatternOptions& options) {
   return {.width_px = options.projector_width_px,
           .height_px = options.projector_height_px,
@@ -60,7 +61,7 @@ Homography turned_and_scaled(double angle, double scale) {
   return homography;
 }
 
-/// Means of squares of pixels; what is left over at the right and at the bottom is left out.
+/// Means over squares of pixels; leaves out incomplete squares at the right and at the bottom.
 template <class T>
 Image<T> shrink(const ImageView<T>& frame, int factor) {
   Image<T> small(frame.width / factor, frame.height / factor);
@@ -135,7 +136,7 @@ std::vector<SymbolMatch> PatternReader::attempt(const Homography& camera_from_pr
   const auto& [frame, factor] = shrunk;
   const auto [width, height] = size_of(frame);
   Eigen::Matrix3d shrinking = Eigen::Matrix3d::Identity();
-  const double middle = 0.5 * (factor - 1);  // of a square of pixels, from the first of them
+  const double middle = 0.5 * (factor - 1);  // offset of a square's centre from its first pixel
   shrinking.topLeftCorner<2, 2>() /= factor;
   shrinking.topRightCorner<2, 1>().setConstant(-middle / factor);
   ExpectedFrames frames(shrinking * camera_from_projector.matrix, width, height);
@@ -158,8 +159,8 @@ std::vector<SymbolMatch> PatternReader::attempt(const Homography& camera_from_pr
   return matches;
 }
 
-/// Finds the scales at which shapes have a symbol's size, on nearly as many pixels as at any other scale. Prototypes
-/// are made for these alone.
+/// Finds the scales at which shapes of a symbol's size cover enough pixels compared with the best scale. Prototypes are
+/// made for these alone.
 std::vector<double> PatternReader::likely_scales(const GreyView& whole) {
   const std::vector<double> scales = scales_to_try();
   std::vector<double> lit_px;
@@ -189,7 +190,7 @@ std::vector<double> PatternReader::likely_scales(const GreyView& whole) {
   return likely;
 }
 
-/// Searches as the camera stands, then at every turn.
+/// Searches with the camera upright, then at every rotation.
 std::vector<SymbolMatch> PatternReader::search(const GreyView& frame) {
   std::vector<SymbolMatch> best;
   const auto found_at = [&](double angle, double scale) {
@@ -207,7 +208,7 @@ std::vector<SymbolMatch> PatternReader::search(const GreyView& frame) {
   return best;
 }
 
-/// Again with the frames that the symbols found show, until that finds no more.
+/// Repeats with the frames that the found symbols show, until no more are found.
 std::vector<SymbolMatch> PatternReader::refine(std::vector<SymbolMatch> found, const GreyView& frame) {
   constexpr int kRounds = 3;
   constexpr double kWorthwhile = 1.03;

@@ -21,9 +21,9 @@
 
 namespace slsd {
 
-/// Reads the pattern on one plane, at most a little bent, without any calibration: the scale and the turn of the
-/// pattern in the frame are searched for, and what was found in one frame is where the search begins in the next.
-/// Without the epipolar line to check a symbol by, some in a thousand are wrong.
+/// Reads the pattern on one plane, or on a slightly bent one, without a calibration. It searches for the scale and the
+/// rotation of the pattern in the frame, and starts with those of the previous frame. Without the epipolar line as a
+/// check, some symbols in a thousand are wrong.
 /// @thread thread-bound
 class PatternReader {
  public:
@@ -32,27 +32,29 @@ class PatternReader {
   PatternReader& operator=(PatternReader&&) noexcept;
   ~PatternReader();
 
-  /// @param frame  best with the light of the surface divided out
-  /// @param noise  of the frame, if it cannot be measured: where light was divided out, it does not follow the level
-  /// @return empty where the pattern is not seen
+  /// @param frame  preferably with the light of the surface divided out
+  /// @param noise  noise of the frame if it cannot be measured: after division by the light it no longer follows the
+  ///               level
+  /// @return empty if the pattern is not seen
   /// @errors kUnsupported: the frame is too large
   [[nodiscard]] Result<std::vector<SymbolMatch>> read(const GreyView& frame,
                                                       const std::optional<FrameNoise>& noise = std::nullopt);
 
   [[nodiscard]] const Pattern& pattern() const { return pattern_.pattern(); }
-  /// Number of shapes of a symbol's size in the last frame. Many shapes of which none was read show another pattern.
+  /// Number of shapes of a symbol's size in the last frame. If there are many and none was read, the frame shows
+  /// another pattern.
   [[nodiscard]] std::size_t shapes() const { return shapes_; }
 
  private:
   struct Trial;
-  /// A frame, and how many times smaller it is than the one that is read.
+  /// A frame, and the factor by which it was shrunk.
   struct Shrunk {
     GreyView frame;
     int factor;
   };
-  /// The frame in which symbols of a scale have a size that is quick to read, and no larger than needed to be exact.
+  /// The frame in which symbols of a scale are small enough to read quickly and large enough to be exact.
   [[nodiscard]] Shrunk frame_for(double scale, const GreyView& frame);
-  /// Noise of a shrunk frame, as far as it is known.
+  /// Noise of a shrunk frame, if known.
   [[nodiscard]] std::optional<FrameNoise> noise_of(const Shrunk& frame) const;
   [[nodiscard]] std::vector<SymbolMatch> attempt(const Homography& camera_from_projector, const GreyView& frame,
                                                  bool is_there);
@@ -61,12 +63,13 @@ class PatternReader {
   [[nodiscard]] std::vector<SymbolMatch> refine(std::vector<SymbolMatch> found, const GreyView& frame);
 
   IndexedPattern pattern_;                                                         // shared with its trials
-  std::vector<std::unique_ptr<Trial>> trials_;                                     // one to a scale
-  std::optional<Homography> last_;                                                 // camera from projector
+  std::vector<std::unique_ptr<Trial>> trials_;                                     // one for each scale
+  std::optional<Homography> last_;                                                 // camera from projector, of the last
+                                                                                   // frame
   std::map<int, std::variant<Image<std::uint8_t>, Image<std::uint16_t>>> shrunk_;  // of this frame, by their factors
   HeldFullLevel full_level_;
-  double full_ = 255;                // of the frame that is read
-  std::optional<FrameNoise> noise_;  // the same
+  double full_ = 255;                // saturated level of the frame that is read
+  std::optional<FrameNoise> noise_;  // noise of the frame that is read
   std::size_t shapes_ = 0;
 };
 

@@ -18,24 +18,24 @@ enum class RegionStatus : std::uint8_t {
   kTooLarge,
   kTouchesBorder,
   kLowContrast,
-  kUnknownShape,        ///< like none of the pattern's symbols
+  kUnknownShape,        ///< resembles none of the pattern's symbols
   kNoNeighbour,         ///< too few links to read a codeword
-  kNoCodeword,          ///< no window around it is in the pattern, within the distance that can be corrected
+  kNoCodeword,          ///< no window around it is in the pattern, within the correctable distance
   kAmbiguousCodeword,   ///< the windows around it disagree
-  kClassDisagrees,      ///< its shape is not that of the cell which its windows name
-  kNeighboursDisagree,  ///< its neighbours' shapes are not those of the cells around that cell
+  kClassDisagrees,      ///< its shape differs from that of the cell which its windows name
+  kNeighboursDisagree,  ///< its neighbours' shapes differ from those of the cells around that cell
   kDamagedShape,        ///< its shape is that of its cell, but cut or disturbed: its centre would be wrong
   kOffEpipolarLine,
   kOutOfDepthRange,
-  kDuplicateCell,  ///< another region claims the cell, too
+  kDuplicateCell,  ///< another region also claims the cell
 };
 inline constexpr int kRegionStatusCount = 15;
 
 /// "too_small", as in the counters of `status`.
 [[nodiscard]] std::string_view to_string(RegionStatus status);
 
-/// Rules that decide on a symbol: the ways to accept it, each test that rejects it, and each guard that keeps it from
-/// being mended. Their texts are in rules.cpp, in this order.
+/// Rules that decide on a symbol: the ways to accept it, each test that rejects it, and each guard that prevents
+/// mending. Their texts are in rules.cpp, in this order.
 enum class DecodeRule : std::uint8_t {
   kCertain,
   kMended,
@@ -75,7 +75,7 @@ inline constexpr std::size_t kDecodeRuleCount = static_cast<std::size_t>(DecodeR
 enum class RuleKind : std::uint8_t {
   kAccepts,
   kRejects,
-  kGuards,  ///< keeps a symbol from being mended; another rule decides on it
+  kGuards,  ///< prevents mending; another rule decides on the symbol
 };
 
 /// "rejects", as in the metrics.
@@ -107,8 +107,8 @@ using RuleCounts = std::array<std::uint32_t, kDecodeRuleCount>;
 
 using RuleSet = std::bitset<kDecodeRuleCount>;
 
-/// Trial of a decoder's rules, for tools and tests. It names the rules to leave out, collects those that came to apply,
-/// and may ask for margins beyond what a cell needs. It changes from frame to frame while decoders use it.
+/// Trial of a decoder's rules, for tools and tests. It names the rules to leave out, collects those that applied, and
+/// may ask for margins beyond the required one. It may change between frames.
 /// @thread set and read while no decoder runs
 struct RuleTrial {
   RuleSet off;
@@ -120,7 +120,7 @@ struct RuleTrial {
   }
 };
 
-/// Access of a stage to its rules. A service has no trial, and leaves none of them out.
+/// Access of a stage to its rules. A service has no trial and leaves no rule out.
 class Rules {
  public:
   Rules() = default;

@@ -14,12 +14,12 @@
 namespace slsd {
 namespace {
 
-/// A shape this near to its prototype, and this much likelier than any other, need not be looked at in the measured
-/// frame.
+/// A shape this near to its prototype, and this much likelier than any other letter, needs no second look in the
+/// measured frame.
 constexpr float kDecidedDistance = 3;
 constexpr float kDecidedLogProbability = -0.01F;
 
-/// The centroids that the estimator in use finds: the paper's are those of the symbols as they are drawn.
+/// Prototypes with the centroids that the current estimator finds: the paper's are those of the drawn symbols.
 std::vector<Prototype> with_centroids_of(Method centre, const Pattern& pattern, std::vector<Prototype> prototypes) {
   if (centre == Method::kDefault) return prototypes;
   for (std::size_t i = 0; i < prototypes.size(); ++i) {
@@ -141,7 +141,7 @@ void SymbolReader::classify_in_measured_frames(Executor& executor) {
   });
 }
 
-/// Infers the cells, and mends worn symbols in between: these are evidence then, too.
+/// Infers the cells, and mends worn symbols in between, so that these become evidence too.
 void SymbolReader::infer_cells(const GreyView& frame, EpipolarView* view, Executor& executor) {
   if (options_.decode_windows == Method::kPaper) {
     paper_->decode_windows(pattern().whole_rows(), pattern().whole_columns(), seen_);
@@ -163,7 +163,7 @@ float SymbolReader::blur_px() const {
   return look_->blur_px.value_or(expected_scale()) / expected_scale();
 }
 
-/// Needs the default way of all stages.
+/// Requires the default method in all stages.
 void SymbolReader::mend(const GreyView& frame, const CellGate& gate, EpipolarView* view) {
   if (options_.any_paper()) return;
   const LetterScene scene{
@@ -192,7 +192,7 @@ void SymbolReader::correspond(const EpipolarView* view, Executor& executor) {
 void SymbolReader::fit_lattice(const GreyView& frame, double full, const EpipolarView* view, Executor& executor) {
   centre_correction_.correct(seen_.nodes, seen_.moments, seen_.claims, pattern().array, executor, lattice_,
                              seen_.misfits);
-  // The paper knows no correction, and what was aligned needs none.
+  // The paper has no correction, and aligned symbols need none.
   for (LatticeSymbol& symbol : lattice_.symbols) {
     if (options_.centre == Method::kDefault && !is_aligned(seen_.aligned[symbol.sighting])) continue;
     const GreyMoments& moments = seen_.moments[symbol.sighting];
@@ -203,13 +203,13 @@ void SymbolReader::fit_lattice(const GreyView& frame, double full, const Epipola
   refuse_cut();
   const float scale = static_cast<float>(full / 255) / finder_.frame_levels();
   if (scale == 1) return;
-  // Sharpening makes noise; from here on it is the frame that counts.
+  // Sharpening adds noise; from here on, use the frame's own.
   for (LatticeSymbol& symbol : lattice_.symbols) symbol.background *= scale, symbol.gain *= scale;
   noise_ = measure_noise(frame, full);
 }
 
-/// Refuses symbols that an edge cuts. The rest of one may still look like it, but its centre lies elsewhere. At a rim,
-/// symbols an order less certain than the median go.
+/// Rejects symbols that an edge cuts. The rest of one may still resemble it, but its centre is displaced. At a rim,
+/// this rejects symbols whose error is an order larger than the median.
 void SymbolReader::refuse_cut() {
   constexpr float kOfMedian = 13;
   std::vector<LatticeSymbol>& symbols = lattice_.symbols;

@@ -28,36 +28,37 @@
 
 namespace slsd {
 
-/// The way of a frame through the stages, from its grey values to the lattice of its symbols. A copy is for another
-/// thread: what is large and never changes is shared.
+/// The stages of a frame, from its grey values to the lattice of its symbols. A copy is for another thread; it shares
+/// large constant data.
 /// @thread thread-bound: keeps its buffers
 class SymbolReader {
  public:
-  /// @param expected   how the pattern lies in the frame, to half a step of the grid
-  /// @param projector  whose pixels the symbols are
-  /// @param paper      there where a stage is asked for the paper's way
+  /// @param expected   local frames of the pattern, to half a step of the grid
+  /// @param projector  the projector whose pixels the symbols are
+  /// @param paper      null unless a stage uses the paper's method
   SymbolReader(const IndexedPattern& pattern, const Lens& projector, ExpectedFrames expected,
                const DecodeOptions& options, std::optional<PaperWay> paper);
 
-  /// Sets expected frames of the same scale, to an eighth.
+  /// Replaces the expected frames by others of the same scale, to an eighth.
   void expect(ExpectedFrames expected) { finder_.expect(std::move(expected)); }
   [[nodiscard]] float expected_scale() const { return finder_.expected().in_the_middle().scale; }
 
-  /// All stages in their order.
+  /// Runs all stages in order.
   /// @param full  the level of a saturated pixel of the frame
-  /// @param view  what the calibration knows; null: symbols may lie anywhere, and without their epipolar lines to check
-  ///              them by, some in a thousand are wrong
-  /// @return      stands until the next call
+  /// @param view  from the calibration; null: symbols may lie anywhere, and without their epipolar lines as a check,
+  ///              some in a thousand are wrong
+  /// @return      valid until the next call
   const Lattice& read(const GreyView& frame, double full, EpipolarView* view, Executor& executor,
                       StageObserver* observer = nullptr);
-  /// The same as pairs of pixels, wherever the symbols lie.
-  /// @param is_there  whether the pattern is likely to be seen: otherwise it is not worth to find out how blurred it is
+  /// The same as pairs of pixels, for symbols anywhere.
+  /// @param is_there  whether the pattern is likely visible; otherwise measuring its blur is not worth the time
   [[nodiscard]] std::vector<SymbolMatch> read_anywhere(const GreyView& frame, double full,
                                                        const std::optional<FrameNoise>& noise, bool is_there = true);
 
-  /// The symbols of the last frame whose cells are certain and not on their epipolar lines, where they are seen.
+  /// Lists symbols of the last frame whose cells are certain but that lie off their epipolar lines, with their places
+  /// in the frame.
   void list_off_line(std::vector<SymbolMatch>& matches) const;
-  /// The symbol turned out to be no point.
+  /// Marks a symbol that turned out to be no point.
   void reject(const LatticeSymbol& symbol, DecodeRule by) { seen_.claims[symbol.sighting].decide(by); }
   /// Reports the status of every region, with the counters.
   void report(Decoding& decoding) const;
@@ -105,13 +106,13 @@ class SymbolReader {
   CentreJudge centre_judge_;
 
   bool is_there_ = true;
-  const Appearance* look_ = nullptr;  // of this frame's symbols
+  const Appearance* look_ = nullptr;  // for this frame's symbols
   std::vector<ShapeFeatures> sample_;
-  std::vector<std::int32_t> kept_;  // of the lattice's symbols: where they are then
+  std::vector<std::int32_t> kept_;  // indices of the lattice's symbols after rejection
   Sightings seen_;
   Lattice lattice_;
   std::optional<FrameNoise> known_noise_;
-  FrameNoise noise_;  // of the frame, though it may have been sharpened
+  FrameNoise noise_;  // noise of the original frame, not of the sharpened one
 };
 
 }  // namespace slsd

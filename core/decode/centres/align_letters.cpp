@@ -20,7 +20,7 @@ constexpr int kSteps = 5;
 /// A shape's misfit squared says that its centre is off by a hundredth of it, camera px: see CentreJudge.
 constexpr float kMisfitSquaredPerPx = 100;
 
-/// One standard deviation of an aligned letter's place, projector px.
+/// One standard deviation of an aligned letter's position, projector px.
 float sigma_px(const PatchTask& task) {
   return aligned_sigma_px(task.residual * task.residual * task.variance, task.scatter, task.support);
 }
@@ -43,14 +43,14 @@ Grey8 draw_letters(const PatternOptions& pattern) {
 /// @param reach  px from the middle to the square's sides
 LightShares shares_of_square(const LetterScene& scene, const AskedLetter& asked, const Eigen::Vector2f& middle_px,
                              int reach) {
-  constexpr float kInk = 0.2F;                // of the light of what is not printed on, at least
-  constexpr float kDark = 0.4F, kLit = 0.3F;  // of the letter's light; of that around it
+  constexpr float kInk = 0.2F;                // smallest share of the unprinted light that print leaves
+  constexpr float kDark = 0.4F, kLit = 0.3F;  // shares of the letter's light; of the light around it
   const PatchTask& task = asked.task;
   const PatchState& state = task.state;
   const float limit = kAlign.outlier_sigmas * std::hypot(task.noise, kAlign.misfit_share * state.gain);
   const float usual_gain = asked.place.peak - asked.place.background;
   const Eigen::Vector2i middle = middle_px.array().round().matrix().cast<int>();
-  // The letter lies in a plane, as the grid around it does.
+  // The letter lies in the plane of the grid around it.
   const Eigen::Vector2f from = projector_offset(task.map, state, {0, 0}),
                         right = projector_offset(task.map, state, {1, 0}) - from,
                         down = projector_offset(task.map, state, {0, 1}) - from,
@@ -110,10 +110,10 @@ void LetterAligner::ask(const LetterScene& scene, std::int32_t node, const Lette
   PatchTask task;
   task.x = x, task.y = y;
   task.noise = scene.noise.at(0.5F * (place.background + place.peak));
-  // The light around it to begin with, so that what is printed there counts little from the first step on.
+  // Start with the light of the neighbours, so that print counts little from the first step on.
   task.state.gain = place.peak - place.background, task.state.offset = place.background;
-  // The letter lies as the place does; what depth moves it by is an offset along the epipolar line, which a tilt makes
-  // another from pixel to pixel.
+  // The letter starts in the plane of its place. Depth moves it along the epipolar line; a tilt makes that offset
+  // change from pixel to pixel.
   PatchMap& map = task.map;
   map.middle_px = {static_cast<float>(x), static_cast<float>(y)};
   map.origin_px = middle.cast<int>();
@@ -126,7 +126,7 @@ void LetterAligner::ask(const LetterScene& scene, std::int32_t node, const Lette
   asked_.push_back({.node = node, .place = place, .task = task});
 }
 
-/// Aligns in windows that lie within their cells: light from the neighbours falls beyond.
+/// Uses windows inside the cells: light from the neighbours falls farther out.
 void LetterAligner::align(const LetterScene& scene) {
   std::array<PatchTask*, kEight> eight;
   for (std::size_t first = 0; first < asked_.size(); first += kEight) {
@@ -184,7 +184,7 @@ void LetterAligner::take_over(const LetterScene& scene, const AskedLetter& asked
   const float camera_px = std::sqrt(std::abs(place.frame.determinant()));
   seen.misfits[node] = std::sqrt(kMisfitSquaredPerPx * sigma_px(task) * camera_px);
   seen.claims[node].decide(DecodeRule::kMended);
-  // What an edge leaves of a symbol may be the letter of either side.
+  // Near an edge in depth, the visible part of a symbol may fit the letter of either side.
   constexpr float kDistanceWhole = 2.5F, kDistanceAtEdge = 4;
   const bool at_edge = shows_other_light(scene, asked) || support_beside_print(scene, asked) < kWholeBesidePrintMin;
   seen.aligned[node] = at_edge ? Aligned::kAtEdge : Aligned::kWhole;

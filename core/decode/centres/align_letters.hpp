@@ -24,7 +24,7 @@ class LetterFields {
  public:
   explicit LetterFields(const PatternOptions& pattern);
   /// Returns the letters at the nearest blur.
-  /// @param blur_px  standard deviation, projector px
+  /// @param blur_px  Returns the centre of a letter's square in these fields.
   [[nodiscard]] const PatternField& at(float blur_px) const { return fields_.nearest(blur_px); }
   /// Returns the middle of a letter's square in these fields.
   [[nodiscard]] Eigen::Vector2f middle_px(int letter) const;
@@ -34,7 +34,7 @@ class LetterFields {
   PatternFields fields_;
 };
 
-/// A frame, and what is known of it when letters are aligned.
+/// A frame, and what the aligner needs to know about it.
 struct LetterScene {
   const GreyView& frame;
   double full;  ///< the level of a saturated pixel
@@ -45,43 +45,43 @@ struct LetterScene {
   Sightings& seen;
 };
 
-/// The expected place of a symbol, and the light there.
+/// Expected position of a symbol, and the light there.
 struct LetterPlace {
   Eigen::Vector2f centre_px = Eigen::Vector2f::Zero();  ///< middle of its square in the camera's image
   LatticeFrame frame = LatticeFrame::Zero();
   float background = 0, peak = 0;  ///< grey levels
-  int held_by = 0;                 ///< neighbours; none: there is no place
+  int held_by = 0;                 ///< number of neighbours that predict it; 0: there is no place
 };
 
-/// One letter in its cell, and what aligning has found.
+/// One letter in its cell, with the result of its alignment.
 struct AskedLetter {
   std::int32_t node;  ///< index in Sightings
   LetterPlace place;
   PatchTask task;
-  /// Measured middle of the letter's square, and its centroid, camera px.
+  /// Measured centre of the letter's square, and its centroid, camera px.
   Eigen::Vector2f centre_px = Eigen::Vector2f::Zero(), centroid_px = Eigen::Vector2f::Zero();
-  float tilt_px = 0;  ///< shift of the middles of its cell's sides by its tilt against the place's, projector px
+  float tilt_px = 0;  ///< shift of the centres of its cell's sides by its tilt relative to the place's, projector px
 };
 
-/// Shares of the pixels in a square: those that agree with the letter, those that are brighter than its light, and two
-/// more. `beside` counts lit pixels where the letter is dark. `darkened` counts pixels that are lit too weakly, as on
-/// print.
+/// Shares of the pixels in a square: pixels that agree with the letter, pixels brighter than its light, and two more.
+/// `beside` counts pixels that are lit although the letter is dark there. `darkened` counts pixels that are lit too
+/// weakly, as on print.
 struct LightShares {
   float agree, brighter, beside, darkened;
-  /// Share that agrees among the pixels that print leaves alone. It counts them as two fifths at least: fewer tell too
-  /// little.
+  /// Share of the pixels without print that agree. These pixels count as at least two fifths of the square, because
+  /// fewer are weak evidence.
   [[nodiscard]] float agree_beside_print() const;
 };
 
-/// Aligns letters, whose cells are known, with what there is of them in a frame: the equations of precision = "fine",
-/// eight at a time.
+/// Aligns letters of known cells with what the frame shows of them. Uses the equations of precision = "fine", eight
+/// letters at a time.
 /// @thread thread-bound: keeps its buffers; the letters are shared with copies
 class LetterAligner {
  public:
   LetterAligner(const Pattern& pattern, std::shared_ptr<const LetterFields> letters);
 
   void clear() { asked_.clear(); }
-  /// Looks for a symbol at a place, unless its cell reaches beyond the frame there.
+  /// Queues a symbol at a place, unless its cell reaches beyond the frame there.
   void ask(const LetterScene& scene, std::int32_t node, const LetterPlace& place);
   void align(const LetterScene& scene);
   /// Returns the letters in the order in which they were asked.
@@ -96,7 +96,7 @@ class LetterAligner {
   [[nodiscard]] bool shows_other_light(const LetterScene& scene, const AskedLetter& asked) const;
   /// Share of the window or of the cell that agrees, without pixels that print darkens. The larger of the two counts.
   [[nodiscard]] float support_beside_print(const LetterScene& scene, const AskedLetter& asked) const;
-  /// Gives the sighting what was found: it shows its letter then, and stands for now.
+  /// Writes the result to the sighting: it now shows its letter, and counts as decoded for now.
   void take_over(const LetterScene& scene, const AskedLetter& asked) const;
 
  private:
@@ -106,15 +106,15 @@ class LetterAligner {
   std::vector<AskedLetter> asked_;
 };
 
-/// Limits off its epipolar line, projector px, and of the last step along it: a symbol farther off, or still moving,
-/// lies there by chance.
+/// Limits on the distance from its epipolar line, projector px, and on the last step along it. A symbol farther off, or
+/// still moving, matches by chance.
 inline constexpr float kAlignedAcrossMaxPx = 0.4F, kAlignedSettledPx = 0.05F;
-/// Largest tilt of an aligned letter. Parts of two surfaces look tilted more, and the place is then on neither.
+/// Largest tilt of an aligned letter. A patch across two surfaces looks more tilted, and its place is on neither.
 inline constexpr float kAlignedTiltMaxPx = 0.5F;
-/// Share of a cell that agrees at least, without pixels that print darkens, unless an edge runs through the cell.
+/// Smallest share of a cell that must agree, without pixels that print darkens, unless an edge runs through the cell.
 inline constexpr float kWholeBesidePrintMin = 0.85F;
-/// Limits of a symbol with a single neighbour: it lies nearer to its line and agrees better, without pixels that print
-/// darkens.
+/// Limits for a symbol with a single neighbour: it must lie nearer to its line and agree better, without pixels that
+/// print darkens.
 inline constexpr float kLoneAcrossMaxPx = 0.2F, kLoneSupportMin = 0.85F;
 
 }  // namespace slsd

@@ -14,17 +14,17 @@ namespace {
 
 /// Width of a patch's rim beyond its cell, projector px: the neighbours' edges help to place it.
 constexpr float kBeyondCellPx = 1.5F;
-/// The share of a patch that agrees with the pattern, below which it is tried whether a neighbour's plane fits better.
+/// Share of the patch that agrees with the pattern. Below it, the aligner also tries the planes of the neighbours.
 constexpr float kSupportWeak = 0.94F;
-/// Further errors of a patch's place, fitted as for aligned_sigma_px: see AlignedSymbol::sigma_mm.
+/// Further errors of a patch's position, fitted as for aligned_sigma_px: see AlignedSymbol::sigma_mm.
 constexpr float kSamplingPx = 0.002F;     // sampling of the pattern, projector px
-constexpr float kOfDisagreement = 0.17F;  // with the neighbours' planes
-constexpr float kOfShading = 0.5F;        // of the relative change of the light for one px
+constexpr float kOfDisagreement = 0.17F;  // factor of the disagreement with the neighbours' planes
+constexpr float kOfShading = 0.5F;        // factor of the relative change of the light for one px
 
-/// Number of symbols from which the frame's blur is measured.
+/// Smallest number of symbols from which the frame's blur is measured.
 constexpr std::size_t kBlurSamples = 40;
 
-/// The inverse depth of a patch's plane at a camera pixel, from the patch's middle; and its change for one px.
+/// The inverse depth of a patch's plane at a camera pixel, given from the patch's centre.
 double inverse_depth(const PatchMap& map, const PatchState& state, const Eigen::Vector2f& at) {
   const float disparity = state.disparity + state.slope_x * at.x() + state.slope_y * at.y() +
                           0.5F * (state.bend_xx * at.x() * at.x() + state.bend_yy * at.y() * at.y()) +
@@ -32,12 +32,12 @@ double inverse_depth(const PatchMap& map, const PatchState& state, const Eigen::
   return map.reference_inverse_depth + disparity * map.inverse_depth_per_px;
 }
 
-/// Variance of the disparity in the patch's middle, from the residual that is left.
+/// Variance of the disparity at the patch's centre, from the remaining residual.
 float variance_of_noise(const PatchFit& fit) {
   return fit.covariance(0, 0) * fit.residual * fit.residual;
 }
 
-/// A neighbour's plane as a start in this patch.
+/// A neighbour's plane as the starting point of this patch.
 PatchState continued(const PatchMap& from_map, const PatchState& from, const PatchMap& map, const PatchState& light) {
   const Eigen::Vector2f at = map.middle_px - from_map.middle_px;
   const auto unit = static_cast<float>(from_map.inverse_depth_per_px / map.inverse_depth_per_px);
@@ -55,8 +55,8 @@ PatchState continued(const PatchMap& from_map, const PatchState& from, const Pat
 
 float aligned_sigma_px(float variance, float scatter, float support) {
   constexpr float kOfVariance = 1.1F, kOfScatter = 1.2F;
-  constexpr float kOfLack = 0.11F;        // px for all that disagrees with the pattern
-  constexpr float kSupportUsual = 0.95F;  // noise alone leaves that
+  constexpr float kOfLack = 0.11F;        // px for a pattern that disagrees completely
+  constexpr float kSupportUsual = 0.95F;  // noise alone leaves this support
   const auto square = [](float x) { return x * x; };
   return std::sqrt(square(kOfVariance) * variance + square(kOfScatter * scatter) +
                    square(kOfLack * std::max(0.F, kSupportUsual - support)));
@@ -75,14 +75,15 @@ SymbolAligner::Patch SymbolAligner::patch_of(const LatticeSymbol& symbol, const 
   patch.level = symbol.background + 0.5F * symbol.gain;
   patch.map = make_patch_map(ray, symbol.centre_px.cast<double>(), camera_.projector_from_camera, projector_, depth_mm);
   const PatchMap& map = patch.map;
-  // The slopes that make the map turn as the grid of symbols does.
+  // Slopes that make the patch map match the symbol's local frame.
   const Eigen::Matrix2f inverse = symbol.frame.inverse();
   const Eigen::Vector2f at = map.base.topRightCorner<2, 1>();
   const Eigen::Matrix2f flat = map.base.topLeftCorner<2, 2>() - at * map.base.bottomLeftCorner<1, 2>();
   const Eigen::RowVector2f slopes = map.along.transpose() * (inverse - flat);
   PatchState& start = patch.start;
   start.slope_x = slopes.x(), start.slope_y = slopes.y();
-  // The map from the pattern to the camera bends, and so does the disparity, but for what a plane's perspective does.
+  // The map from the pattern to the camera bends. The disparity bends with it, less the part that perspective gives a
+  // plane.
   const Bend& bend = symbol.bend;
   if (!bend.uu.isZero() || !bend.uv.isZero() || !bend.vv.isZero()) {
     const Eigen::RowVector2f along = map.along.transpose() * inverse,
@@ -119,7 +120,7 @@ PatchFit SymbolAligner::fit(const GreyView& frame, double full, const FrameNoise
       frame);
 }
 
-/// The blur that fits a sample of the symbols best, from the middle of those known downhill.
+/// Finds the blur that fits a sample of the symbols best, downhill from the middle of the available blurs.
 std::size_t SymbolAligner::find_blur(const GreyView& frame, double full, const FrameNoise& noise) {
   constexpr std::size_t kUnknown = std::numeric_limits<std::size_t>::max();
   const std::size_t step = std::max<std::size_t>(1, patches_.size() / kBlurSamples);
@@ -161,7 +162,8 @@ void SymbolAligner::try_neighbours(const GreyView& frame, double full, const Fra
   }
 }
 
-/// Median distance of a patch from its neighbours' planes, continued to it, projector px, less the share of the noise.
+/// Median distance of a patch from its neighbours' planes, continued to it, projector px, less the part that noise
+/// explains.
 float SymbolAligner::disagreement_px(const Lattice& lattice, std::size_t index) const {
   const Patch& own = patches_[index];
   std::array<float, 4> off;

@@ -16,36 +16,36 @@
 
 namespace slsd {
 
-/// A symbol's place after its patch was aligned with the pattern.
+/// A symbol's position after its patch was aligned with the pattern.
 struct AlignedSymbol {
-  Eigen::Vector3d point_in_camera;  ///< mm: what the symbol's centroid in the projector lights
-  Eigen::Vector2f centre_px;        ///< its place in the camera's image
+  Eigen::Vector3d point_in_camera;  ///< mm: the surface point that the symbol's centroid in the projector lights
+  Eigen::Vector2f centre_px;        ///< its image in the camera
   /// Standard deviation along the camera's ray. It covers noise, relief within the patch (its parts' disparities
   /// scatter), and disagreement with the neighbours' planes. It also covers missing parts of the pattern, and changes
   /// of light.
   float sigma_mm;
-  bool whole;  ///< the pattern is there as it should be
+  bool whole;  ///< the whole symbol is visible and agrees with the pattern
 };
 
-/// Standard deviation of an aligned patch's place from noise, from relief within it and from missing parts of it,
+/// Standard deviation of an aligned patch's position from noise, from relief within it, and from its missing parts,
 /// projector px. Fitted to rendered frames (docs/notes/2026-11-decoder.md).
-/// @param variance  of the disparity, from the residual that is left, px^2
-/// @param scatter   of the disparities of the patch's parts, px
+/// @param variance  variance of the disparity, from the residual, px^2
+/// @param scatter   scatter of the disparities of the patch's parts, px
 /// @param support   the share of the patch that agrees with the pattern
 [[nodiscard]] float aligned_sigma_px(float variance, float scatter, float support);
-/// The share below which a symbol is not there as a whole.
+/// Smallest share of the patch that agrees if the whole symbol is visible.
 inline constexpr float kWholeSupportMin = 0.55F;
 
-/// Aligns each symbol of a lattice with the pattern: its depth, its tilt, how the light falls on it.
+/// Aligns each symbol of a lattice with the pattern: its depth, its tilt, and the light on it.
 /// @thread thread-bound: keeps its buffers; the pattern is shared with copies
 class SymbolAligner {
  public:
   SymbolAligner(const Pattern& pattern, const CalibratedCamera& camera, const Lens& projector);
 
-  /// @param rays       one to a symbol: that of its centre
-  /// @param depths_mm  one to a symbol, along the camera's z axis, as triangulated from its centre
+  /// @param rays       one for each symbol: the ray of its centre
+  /// @param depths_mm  one for each symbol, along the camera's z axis, as triangulated from its centre
   /// @param noise      one standard deviation of a pixel, grey levels
-  /// @return           one to a symbol; stands until the next call
+  /// @return           one for each symbol; valid until the next call
   [[nodiscard]] const std::vector<AlignedSymbol>& align(const GreyView& frame, double full, const FrameNoise& noise,
                                                         const Lattice& lattice, std::span<const PixelRay> rays,
                                                         std::span<const double> depths_mm, const CellRays& cells);

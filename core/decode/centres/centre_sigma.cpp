@@ -19,7 +19,7 @@ namespace slsd {
 namespace {
 
 constexpr float kOfNoise = 0.55F;
-constexpr float kLeastPx = 0.01F;  // what is left of sampling and blur
+constexpr float kLeastPx = 0.01F;  // remaining error of sampling and blur
 constexpr float kOfAcross = 0.4F, kOfUneven = 0.4F;
 constexpr float kOfRoughness = 0.25F, kOfUnevenness = 0.25F;
 constexpr float kOfMisfitSquared = 0.01F;  // px
@@ -29,14 +29,14 @@ constexpr float kUnknownBendPx = 0.015F;
 /// Factors for shapes that are cut, not only worn.
 constexpr float kDamageOfAcross = 0.35F;
 constexpr float kDamageOfMisfitSquared = 0.018F;  // px
-/// Limit of a neighbour's residual: beyond it the neighbour has a fault of its own.
+/// Largest residual of a neighbour that counts: beyond it the neighbour itself is wrong.
 constexpr float kAroundMaxPx = 0.3F;
 
 float square(float x) {
   return x * x;
 }
 
-/// Pairs of directions that lead to opposite sides.
+/// Pairs of opposite directions.
 constexpr std::array<std::pair<Direction, Direction>, 2> kAcrossEachOther{{{kLeft, kRight}, {kUp, kDown}}};
 
 bool has_bend(const LatticeSymbol& symbol) {
@@ -45,7 +45,7 @@ bool has_bend(const LatticeSymbol& symbol) {
   });
 }
 
-/// Difference between a symbol's disparity and the line between its neighbours on opposite sides, mean of the pairs; 0
+/// Difference between a symbol's disparity and the mean of its neighbours on opposite sides, averaged over the pairs; 0
 /// without pairs. A plane's disparity is linear over the image.
 float off_neighbours(const std::vector<LatticeSymbol>& symbols, const std::vector<float>& disparities_px,
                      std::size_t i) {
@@ -62,10 +62,11 @@ float off_neighbours(const std::vector<LatticeSymbol>& symbols, const std::vecto
   return count > 0 ? sum / count : 0;
 }
 
-/// Difference between a symbol's value and the median of its neighbours', the upper one of two; 0 without neighbours.
+/// Difference between a symbol's value and the median of its neighbours', the upper median of an even number; 0 without
+/// neighbours.
 float off_those_around(const std::vector<float>& values, const std::array<std::int32_t, 4>& neighbours, std::size_t i) {
-  // Nothing here branches, as no processor foretells how values lie: those that are missing lie far below and far above
-  // by turns, and of four the middle is the second greatest.
+  // No branches: the processor cannot predict the values. Missing neighbours get -infinity and infinity in turn, and
+  // the median of four is the second greatest.
   float missing = -std::numeric_limits<float>::infinity();
   std::array<float, 4> around;
   bool any = false;
@@ -87,11 +88,11 @@ struct Columns {
   Column weight, background, gain, misfit;
   Column unbent;                                 // px^2
   Column across, uneven;                         // px
-  Column across_squares, uneven_squares, count;  // sums over a symbol and so many neighbours, and how many with itself
-  Column sigma_px, damage_px;                    // what comes of it
+  Column across_squares, uneven_squares, count;  // sums over a symbol and up to that many neighbours; number of terms
+  Column sigma_px, damage_px;                    // results
 };
 
-/// Sums up the squares of a symbol's neighbours. One that is far off has a fault of its own.
+/// Sums the squares of a symbol's neighbours. A neighbour with a large residual is itself wrong.
 /// @param own  the symbol
 void sum_around(const std::vector<float>& across_px, const std::vector<float>& uneven_px,
                 const std::array<std::int32_t, 4>& neighbours, std::size_t own, std::size_t i, Columns& columns) {

@@ -12,20 +12,20 @@
 
 namespace slsd {
 
-/// Makes correspondences of claims: each cell belongs to one node at most, on its epipolar line and within the working
-/// depth. Of several claims on one cell nothing says which is right, so none of them stands.
+/// Turns claims into correspondences. Each cell belongs to at most one node, on its epipolar line and within the
+/// working depth. If several nodes claim one cell, nothing tells which is right, so all of them are rejected.
 /// @thread thread-bound: keeps its buffers
 class Correspondence {
  public:
   explicit Correspondence(Rules rules = {}) : rules_(rules) {}
 
-  /// @param segments      one to a node
+  /// @param segments      one for each node
   /// @param tolerance_px  distance from the epipolar line, projector px: epipolar_gate_px()
   /// @param claims        in and out: rejected ones change their status
   void correspond(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px,
                   Executor& executor, std::vector<CellClaim>& claims);
 
-  /// The duplicates alone, where there is no calibration.
+  /// Rejects duplicates alone, for use without a calibration.
   void settle_duplicates(const CellRays& cells, std::vector<CellClaim>& claims);
 
  private:

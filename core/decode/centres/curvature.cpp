@@ -14,14 +14,14 @@
 namespace slsd {
 namespace {
 
-/// Step from a cell's number to that of the cell below. It exceeds the columns of any pattern, so no cell lies beside
-/// the end of another row.
+/// Step from a cell's number to that of the cell below. It exceeds the columns of any pattern, so the ends of two rows
+/// are never adjacent.
 constexpr std::int32_t kRowStep = 1 << 16;
 
-/// Bend over a symbol's size that moves its centre by a tenth of that: about as much as noise does.
+/// Bend over a symbol's size that moves its centre by a tenth of this value: about as much as noise does.
 constexpr float kSlightPx = 0.12F;
 
-/// Offset from the point that a symbol's centroid lights to the centroid of its image.
+/// Offset from the image of the point that a symbol's centroid lights to the centroid of its image.
 /// @param m  second moments of the symbol, projector px squared
 Eigen::Vector2f pull_of(const Bend& bend, const LatticeFrame& frame, const Eigen::Matrix2f& m) {
   const Eigen::Matrix2f inverse = frame.inverse();
@@ -120,7 +120,7 @@ Eigen::Vector2f CentreCorrection::median_around(const std::vector<GridNode>& nod
   return {median(x), median(y)};
 }
 
-/// The mean with the neighbours that hardly bend either: less noise than the bend itself.
+/// The mean with the neighbours that hardly bend either: it has less noise than the bend alone.
 Bend CentreCorrection::slight_bend_around(std::int32_t symbol) const {
   Bend sum = derivatives_[symbol].over_two;
   float count = 1;
@@ -134,7 +134,7 @@ Bend CentreCorrection::slight_bend_around(std::int32_t symbol) const {
 
 Bend CentreCorrection::bend_of(const std::vector<GridNode>& nodes, std::int32_t symbol) const {
   if (derivatives_[symbol].is_slight) return slight_bend_around(symbol);
-  // The median with the neighbours: less noise, a value where none could be measured, and none from across an edge in
+  // The median over the neighbours has less noise, fills in missing values, and ignores neighbours across an edge in
   // depth.
   return {median_around(nodes, symbol, &Derivatives::has_uu, &Bend::uu),
           median_around(nodes, symbol, &Derivatives::has_uv, &Bend::uv),

@@ -16,23 +16,23 @@
 namespace slsd {
 
 /// Finds the image of the point that a symbol's centroid in the projector lights. The centroid of the symbol's image is
-/// not that point: perspective and curvature show more of one half than of the other. The error is some hundredths of a
-/// pixel on planes, and half a pixel at the limb of a cylinder. With the map c(u) = c0 + F u + Q(u)/2
-/// around the centroid, M the symbol's second moments and J = det(dc/du),
+/// not that point: perspective and curvature enlarge one half. The error is some hundredths of a pixel on planes, and
+/// half a pixel at the limb of a cylinder. Let c(u) = c0 + F u + Q(u)/2 be the map around the centroid, M the symbol's
+/// second moments and J = det(dc/du). Then
 ///
 ///     centroid of the image = c0 + Q(M)/2 + F M grad(log J)
 ///
-/// and Q follows from the neighbours, whose second differences span a pitch, or two where they are slight: their noise
+/// Q follows from the second differences of the neighbours, over one pitch, or over two if they are slight. Their noise
 /// enters with a weight of some percent.
 /// @thread thread-bound: keeps its buffers
 class CentreCorrection {
  public:
   CentreCorrection(const std::vector<Prototype>& prototypes, float pitch_px, float symbol_size_px);
 
-  /// @param misfits  of the nodes, where they are known
-  /// @param array    of the pattern: tells the letters of the cells
-  /// @param lattice  becomes one symbol to each node that is decoded, in their order, with its place, map and
-  /// neighbours; what its centre's sigma is remains to be told
+  /// @param misfits  misfits of the nodes, if known
+  /// @param array    the pattern's array: the letters of the cells
+  /// @param lattice  becomes one symbol for each decoded node, in order, with its place, map and neighbours;
+  /// CentreSigma fills in the sigma
   void correct(const std::vector<GridNode>& nodes, const std::vector<GreyMoments>& moments,
                const std::vector<CellClaim>& claims, const CodeArray& array, Executor& executor, Lattice& lattice,
                std::span<const float> misfits = {});
@@ -42,7 +42,7 @@ class CentreCorrection {
     Bend bend;
     bool has_uu = false, has_uv = false, has_vv = false;
     bool is_slight = false;
-    Bend over_two;  // where slight, from twice as far: a quarter of the noise
+    Bend over_two;  // for slight bends, from twice as far: a quarter of the noise
   };
   using Neighbours = std::array<std::int32_t, 4>;  // symbols by Direction, or -1
   [[nodiscard]] Neighbours find_neighbours(const std::vector<GridNode>& nodes, std::int32_t node) const;

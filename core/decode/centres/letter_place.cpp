@@ -14,7 +14,7 @@
 namespace slsd {
 namespace {
 
-/// @param around  becomes the node, and those some links away whose cells lie beside each other as they do
+/// @param around  becomes the node and those up to a few links away whose cells lie beside each other as the nodes do
 void find_around(const Sightings& seen, std::int32_t node, std::vector<std::int32_t>& around) {
   constexpr std::size_t kAroundMax = 24;
   around.assign(1, node);
@@ -27,7 +27,7 @@ void find_around(const Sightings& seen, std::int32_t node, std::vector<std::int3
   }
 }
 
-/// Camera px of projector px from a symbol's middle, by least squares.
+/// Maps projector px from a symbol's centre to camera px, fitted by least squares.
 struct PlaneFit {
   Eigen::Matrix<float, 3, 2> map;  ///< maps (1, right, down), projector px, to camera px
   float rms_px = 0;                ///< distance of the nodes from it, camera px
@@ -90,7 +90,7 @@ LetterPlace place_by_neighbours(const Sightings& seen, std::int32_t node) {
 LetterPlace place_by_plane(const Sightings& seen, std::int32_t node, float pitch_px,
                            std::vector<std::int32_t>& around) {
   constexpr std::size_t kAroundMin = 8;
-  constexpr float kRmsMax = 0.08F;  // of the pitch: a limb bends away by more
+  constexpr float kRmsMax = 0.08F;  // of the pitch: the limb of a curved surface deviates more
   find_around(seen, node, around);
   if (around.size() < kAroundMin) return {};
   const PlaneFit fit = fit_plane(seen, seen.claims[node], pitch_px, around);
@@ -100,7 +100,7 @@ LetterPlace place_by_plane(const Sightings& seen, std::int32_t node, float pitch
     place.background += seen.moments[other].background, place.peak += seen.moments[other].peak;
   const auto count = static_cast<float>(around.size());
   place.background /= count, place.peak /= count;
-  place.held_by = kFewHolders + 1;  // on all its sides
+  place.held_by = kFewHolders + 1;  // counts as held on all its sides
   return place;
 }
 

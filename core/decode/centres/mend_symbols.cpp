@@ -14,21 +14,21 @@
 namespace slsd {
 namespace {
 
-/// Largest distance from the place that its neighbours predict, and from its measured place, of the pitch.
+/// Largest distances from the predicted and from the measured place, as a share of the pitch.
 constexpr float kMovedMax = 0.08F;
-/// Largest tilt against the neighbours, if few hold the symbol: towards a limb the surface turns away. Between
-/// neighbours on both sides it cannot.
+/// Largest tilt relative to the neighbours if few of them hold the symbol: towards a limb the surface turns away.
+/// Between neighbours on opposite sides it cannot.
 constexpr float kTiltBesideFewMaxPx = 1;
-/// Tilt that noise may make, in standard deviations of the disparity: that of the slope is sqrt(3) times as much at the
-/// sides.
+/// Tilt that noise may cause, in standard deviations of the disparity. The slope's deviation is sqrt(3) times as much
+/// at the sides.
 constexpr float kTiltSigmas = 5;
-/// Limits of a symbol that one alone holds.
+/// Limits of a symbol that a single neighbour holds.
 constexpr float kLoneTiltMaxPx = 0.25F, kLoneMovedMax = 0.008F;
-/// Distance from its letter, standard deviations, or from its line, projector px, from which a decoded symbol is
-/// aligned as well. Its patch must then agree well.
+/// Distance from its letter, standard deviations, or from its line, projector px, beyond which a decoded symbol is
+/// aligned too. Its patch must then agree well.
 constexpr float kDoubtfulDistance = 2.5F, kDoubtfulAcrossPx = 0.25F, kSupportGood = 0.65F;
 
-/// Light of a printed symbol against that of its neighbours, at most: print takes light.
+/// Largest ratio of a printed symbol's light to its neighbours' light: print absorbs light.
 constexpr float kPrintedLightMax = 1.2F;
 
 bool is_worn(const CellGate& gate, const Sightings& seen, std::int32_t node) {
@@ -38,16 +38,16 @@ bool is_worn(const CellGate& gate, const Sightings& seen, std::int32_t node) {
   return seen.misfits[node] > kDoubtfulDistance || gate.off_line_px(node, claim.row, claim.column) > kDoubtfulAcrossPx;
 }
 
-/// Mends the links of a symbol that lies at the place which its holders predict.
+/// Mends the links of a symbol that lies at the place its holders predict.
 void mend_links(Sightings& seen, std::int32_t node) {
   for (const Direction d : kDirections)
     if (const std::int32_t other = holder_of(seen, node, d); other >= 0)
       seen.nodes[node].broken[d] = seen.nodes[other].broken[opposite(d)] = false;
 }
 
-/// Tells whether the camera sees the symbol's centre, which another surface may hide. A surface is likelier to end
-/// beside few holders: the less of the patch agrees, the more of the middle has to agree. With more holders, pixels
-/// that print darkens do not count.
+/// Tells whether the camera sees the symbol's centre. Another surface may hide it, and few holders make that likelier:
+/// the less of the patch agrees, the more of its middle has to agree. With more holders, pixels that print darkens do
+/// not count.
 bool shows_centre(const AskedLetter& asked, const LightShares& middle) {
   constexpr float kMiddleMin = 0.67F, kBothBesideFewMin = 1.45F;
   if (asked.place.held_by > kFewHolders) return middle.agree_beside_print() >= kMiddleMin;
@@ -65,7 +65,7 @@ void SymbolMender::ask_all(const LetterScene& scene) {
     if (const auto node = static_cast<std::int32_t>(i); is_worn(scene.gate, scene.seen, node)) to_ask_.push_back(node);
 }
 
-/// Asks those beside what was mended, from one on.
+/// Queues the neighbours of the mended symbols, from the given one on.
 void SymbolMender::ask_beside(const LetterScene& scene, std::size_t first) {
   to_ask_.clear();
   for (std::size_t i = first; i < mended_.size(); ++i) {
@@ -87,7 +87,7 @@ bool SymbolMender::lies_there(Sightings& seen, const AskedLetter& asked) const {
   if (!claim.pass(rules_, DecodeRule::kMendOffLine, std::abs(task.state.across) <= across_max_px)) return false;
   const auto lies_near = [&] {
     if (std::abs(task.state.disparity) > (lone ? kLoneMovedMax : kMovedMax) * pitch_px_) return false;
-    // What is tilted out of all proportion lies anywhere.
+    // An extreme tilt can put the letter anywhere.
     if (!((asked.centre_px - task.map.middle_px).norm() < 0.5F * pitch_px_)) return false;
     if (claim.status != RegionStatus::kDecoded) return true;
     const GridNode& node = seen.nodes[asked.node];
@@ -127,7 +127,7 @@ void SymbolMender::mend_asked(const LetterScene& scene) {
     if (!brighter && !aligner_.shows_other_light(scene, asked)) scene.seen.aligned[asked.node] = Aligned::kPrinted;
   }
   aligner_.align(scene);
-  // All are asked before any is mended, so that their order decides nothing.
+  // Check all before mending any, so that their order has no effect.
   std::erase_if(aligner_.asked(), [&](const AskedLetter& asked) {
     return !lies_there(scene.seen, asked) || !shows_letter(scene, asked);
   });

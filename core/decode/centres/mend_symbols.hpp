@@ -9,17 +9,18 @@
 
 namespace slsd {
 
-/// Finds the places of symbols that print, relief or an edge has spoilt: a centroid goes with what is missing, and off
-/// its epipolar line. What there is of them is aligned with the letter of the cell that was proposed, from where their
-/// neighbours put them. This says where a symbol is, and that it shows its letter; CellInference decides on its cell.
+/// Finds the places of symbols that print, relief or an edge has damaged. A missing part displaces the centroid, also
+/// off its epipolar line. The mender aligns the visible part with the letter of the proposed cell, starting at the
+/// place that the neighbours predict. The result is a place, and that the symbol shows its letter; CellInference
+/// decides on its cell.
 /// @thread thread-bound: keeps its buffers; the letters are shared with copies
 class SymbolMender {
  public:
   SymbolMender(const Pattern& pattern, const std::shared_ptr<const LetterFields>& letters, Rules rules = {});
 
-  /// Mended symbols get another place, frame, light, shape and misfit, and hold those beside them.
+  /// Mended symbols get a new place, frame, light, shape and misfit, and then hold their neighbours.
   /// @param scene  whose claims are proposals
-  /// @return       the sightings that are mended, in their order; stands until the next call
+  /// @return       the mended sightings, in order; valid until the next call
   const std::vector<std::int32_t>& mend(const LetterScene& scene);
 
  private:

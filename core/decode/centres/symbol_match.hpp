@@ -6,10 +6,10 @@
 
 namespace slsd {
 
-/// A symbol whose cell is known: where the camera sees what the projector pixel lights.
+/// A symbol of known cell: a projector pixel, and the camera pixel that sees its light.
 struct SymbolMatch {
-  Eigen::Vector2d camera_px;     ///< distorted, as seen
-  Eigen::Vector2d projector_px;  ///< the same of the projector
+  Eigen::Vector2d camera_px;     ///< distorted, as in the frame
+  Eigen::Vector2d projector_px;  ///< the projector pixel, likewise
   double sigma_px;               ///< one standard deviation of the camera pixel in x and in y
 };
 

@@ -8,34 +8,35 @@
 
 namespace slsd {
 
-/// Distance of a symbol from where the steps beside it lead: off it, as near as on one surface, or so near that another
-/// surface hardly ever is.
+/// Distance of a symbol from the place that the steps beside it predict. It is off the grid, as near as on one surface,
+/// or so near that another surface is very unlikely.
 enum class GridFit : std::uint8_t { kNone, kLoose, kTight };
 
-/// Distance from there, in cells along the epipolar line, at which another surface lies in one of sixty cases at most.
+/// Distance from the predicted place, in cells along the epipolar line. Another surface lies within it in one of sixty
+/// cases at most.
 inline constexpr float kTightSlip = 0.008F;
-/// Slip from which on a symbol belongs to another surface, however much the frame's own surfaces bend.
+/// Slip above which a symbol belongs to another surface, even if the frame's surfaces bend strongly.
 inline constexpr float kOffGridSlip = 0.1F;
 
-/// A cell of the pattern that a node was found to be, and how well its surroundings speak for it.
+/// A cell of the pattern proposed for a node, and the evidence for it around the node.
 struct CellClaim {
   std::int16_t row = -1, column = -1;
-  float margin_nats = 0;  ///< nats by which its cell is likelier than any other, up to what it needs
+  float margin_nats = 0;  ///< nats by which its cell is likelier than any other, up to the required margin
   RegionStatus status = RegionStatus::kNoNeighbour;  ///< kDecoded, or why not; decide() alone writes it
   GridFit grid_fit = GridFit::kTight;                ///< fit of a node at a rim; nodes inside always fit
   DecodeRule rule = DecodeRule::kNoNeighbour;        ///< the rule that decided on the status
-  DecodeRule guard = DecodeRule::kCertain;           ///< the last that kept it from being mended, or kCertain
+  DecodeRule guard = DecodeRule::kCertain;           ///< the last guard that kept it from being mended, or kCertain
 
   struct Cell {
     int row, column;
-    /// The one beside it, one step on.
+    /// The adjacent cell in a direction.
     [[nodiscard]] Cell beyond(Direction d) const {
       return {row + (d == kDown) - (d == kUp), column + (d == kRight) - (d == kLeft)};
     }
   };
 
   void decide(DecodeRule by) { status = text_of(by).gives, rule = by; }
-  /// @return  whether the guard lets it be mended
+  /// @return  whether the guard allows mending
   bool pass(const Rules& rules, DecodeRule by, bool holds) {
     const bool stopped = rules.apply(by, !holds);
     if (stopped) guard = by;

@@ -13,16 +13,16 @@
 
 namespace slsd {
 
-/// The cells that a node can be: those on its epipolar line, within the working depth. Leaves one in 25 to 200.
+/// The candidate cells of a node: those on its epipolar line, within the working depth. This leaves one in 25 to 200.
 /// @thread reentrant
 class CellGate {
  public:
-  /// @param segments      one to a node; empty admits every cell (the paper has no gate)
+  /// @param segments      one for each node; empty admits every cell (the paper has no gate)
   /// @param tolerance_px  distance from the epipolar line, projector px
   CellGate(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px)
       : cells_(cells), segments_(segments), tolerance_px_(tolerance_px) {}
 
-  /// @param astray_px  how much farther from its line than others the node may lie
+  /// @param astray_px  additional distance from its line that this node may have
   [[nodiscard]] bool admits(std::int32_t node, int row, int column, double astray_px = 0) const {
     return segments_.empty() || segments_[node].passes(cells_.ray(row, column).direction, tolerance_px_ + astray_px);
   }
@@ -33,10 +33,10 @@ class CellGate {
   [[nodiscard]] double off_line_px(std::int32_t node, int row, int column) const {
     return std::abs(residual_px(node, row, column));
   }
-  /// Tells whether a node at this distance lies on its epipolar line, at whatever depth.
+  /// Tells whether a node at this distance lies on its epipolar line, at any depth.
   [[nodiscard]] bool on_line(double residual_px) const { return std::abs(residual_px) <= tolerance_px_; }
-  /// Direction of a node's epipolar line past a cell: cells to the right and down, of length one. Unknown lines are
-  /// taken for rows.
+  /// Direction of a node's epipolar line past a cell: towards cells to the right and down, of length one. Without known
+  /// lines it is the direction of the rows.
   [[nodiscard]] Eigen::Vector2f way_of_line(std::int32_t node, int row, int column) const {
     if (segments_.empty()) return {1, 0};
     const auto off_line = [&](int r, int c) { return segments_[node].residual_px(cells_.ray(r, c).direction); };
@@ -47,9 +47,9 @@ class CellGate {
         .cast<float>();
   }
   [[nodiscard]] bool knows_lines() const { return !segments_.empty(); }
-  /// Calls visit(row, column) for the cells that a node can be, one to each column, or to each row, that its epipolar
-  /// line crosses.
-  /// @param astray_px  how much farther from its line than others the node may lie
+  /// Calls visit(row, column) for the candidate cells of a node: one for each column, or for each row, that its
+  /// epipolar line crosses.
+  /// @param astray_px  additional distance from its line that this node may have
   template <class Visit>
   void visit_along(std::int32_t node, double astray_px, Visit&& visit) const {
     const EpipolarSegment& segment = segments_[static_cast<std::size_t>(node)];
@@ -67,7 +67,7 @@ class CellGate {
     };
     double across = -first / slope;
     for (int along = 0; along <= last_along; ++along) {
-      // From the row before, which a line that bends with the lens leaves little by little.
+      // Start at the previous row: lens distortion bends the line away from it only gradually.
       const int before = static_cast<int>(std::lround(std::clamp<double>(across, 0, last_across)));
       across = before - off_line_at(along, before) / slope;
       const auto nearest = static_cast<int>(std::lround(std::clamp<double>(across, -1, last_across + 1)));
@@ -76,7 +76,7 @@ class CellGate {
       if (admits(node, row, column, astray_px)) visit(row, column);
     }
   }
-  /// Distance from cell to cell, projector px.
+  /// Distance between adjacent cells, projector px.
   [[nodiscard]] double pitch_px() const {
     return cells_.rows() > 1 ? (cells_.pixel(1, 0) - cells_.pixel(0, 0)).y() : 0;
   }

@@ -10,8 +10,8 @@
 
 namespace slsd {
 
-/// Rays on which the cells' symbols leave the projector: each symbol's centroid as the camera's estimator sees it, and
-/// that pixel's ray.
+/// Projector rays of the cells' symbols: each symbol's centroid as the camera's estimator finds it, and the ray of that
+/// pixel.
 /// @thread reentrant
 class CellRays {
  public:

@@ -18,8 +18,8 @@
 
 namespace slsd {
 
-/// Epipolar geometry of a frame's sightings: the ray of each, and the part of the projector's epipolar line within the
-/// working depth.
+/// Epipolar geometry of a frame's sightings: the ray of each, and its segment of the projector's epipolar line within
+/// the working depth.
 /// @thread thread-bound: keeps its buffers
 class EpipolarView {
  public:
@@ -56,17 +56,17 @@ class EpipolarView {
     rays_[sighting] = camera_rays_.ray(pixels_[sighting].cast<double>());
     segments_[sighting] = gate_.prepare(rays_[sighting].direction);
   }
-  /// One to a sighting.
+  /// One for each sighting.
   [[nodiscard]] std::span<const EpipolarSegment> segments() const { return segments_; }
   [[nodiscard]] double tolerance_px() const { return tolerance_px_; }
-  /// The ray of a pixel that lies some tenths beside a sighting's: so far it turns evenly.
+  /// The ray of a pixel some tenths of a pixel from a sighting's. Over so short a distance, rays change linearly.
   [[nodiscard]] PixelRay ray_near(std::int32_t sighting, const Eigen::Vector2f& camera_px) const {
     PixelRay ray = rays_[sighting];
     ray.direction += ray.turn * (camera_px - pixels_[sighting]).cast<double>();
     return ray;
   }
-  /// Compares symbols, whose centres lie near their sightings, with their cells.
-  /// @param residuals_px    how far each cell lies off the epipolar line of its centre, projector px, signed
+  /// Compares symbols whose centres lie near their sightings with their cells.
+  /// @param residuals_px    signed distance of each cell from the epipolar line of its centre, projector px
   /// @param disparities_px  camera px
   void compare(std::span<const LatticeSymbol> symbols, const CellRays& cells, std::span<float> residuals_px,
                std::span<float> disparities_px) const {

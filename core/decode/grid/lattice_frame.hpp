@@ -23,14 +23,14 @@ struct ExpectedFrame {
   float scale;              ///< camera px for one projector px, geometric mean of both axes
 };
 
-/// The frames that the calibration lets one expect: those of a surface that faces the camera in the middle of the
-/// working range. They hardly depend on the depth; what turns them is the tilt of the surface.
+/// Local frames that the calibration predicts for a surface that faces the camera in the middle of the working range.
+/// They hardly depend on the depth; the tilt of the surface changes them.
 /// @thread reentrant
 class ExpectedFrames {
  public:
   ExpectedFrames(const CalibratedCamera& camera, const Lens& projector, double depth_mm);
 
-  /// Makes the frames of a plane from its homography alone.
+  /// Makes the frames of a plane from its homography.
   /// @param camera_from_projector  maps homogeneous projector px to camera px
   ExpectedFrames(const Eigen::Matrix3d& camera_from_projector, int camera_width_px, int camera_height_px);
 

@@ -15,9 +15,10 @@
 namespace slsd {
 namespace {
 
-/// Largest change of a measured step against the expected one, as a share; beyond it the link is wrong.
+/// Largest change of a measured step relative to the expected one, as a share; beyond it the link is wrong.
 constexpr float kFrameChangeMax = 0.5F;
-/// Distance from the expected place, of the pitch, within which a node is surely the neighbour: no other can be nearer.
+/// Distance from the expected place, of the pitch, within which a node is certainly the neighbour: no other can be
+/// nearer.
 constexpr float kEvident = 0.15F;
 
 /// Vector from a node to its neighbour, camera px.
@@ -25,7 +26,7 @@ Eigen::Vector2f link_vector(const std::vector<GridNode>& nodes, std::size_t from
   return nodes[nodes[from].links[direction]].centre_px - nodes[from].centre_px;
 }
 
-/// One step of the grid in a direction as the links beside a node show it, camera px.
+/// One step of the grid in a direction, from the links beside a node, camera px.
 std::optional<Eigen::Vector2f> measured_step(const std::vector<GridNode>& nodes,
                                              const std::vector<std::uint8_t>& trusted, std::size_t node,
                                              Direction forth) {
@@ -39,7 +40,7 @@ std::optional<Eigen::Vector2f> measured_step(const std::vector<GridNode>& nodes,
   const Direction inwards = leads(node, forth) ? forth : back;
   const Eigen::Vector2f first = link_vector(nodes, node, inwards);
   const auto next = static_cast<std::size_t>(nodes[node].links[inwards]);
-  // At the edge of a surface the steps shrink; the second one tells how fast.
+  // At the edge of a surface the steps shrink; a second step shows how fast.
   const Eigen::Vector2f step =
       leads(next, inwards) ? (1.5F * first - 0.5F * link_vector(nodes, next, inwards)).eval() : first;
   return inwards == forth ? step : (-step).eval();
@@ -55,7 +56,7 @@ void GridLinker::sort_into_buckets(const std::vector<GridNode>& nodes) {
     high = high.cwiseMax(node.centre_px);
     step_px = std::max({step_px, node.frame.col(0).norm(), node.frame.col(1).norm()});
   }
-  // A bucket as wide as a cell: what is near a place is in two by two of them at the most.
+  // Buckets as wide as a cell: the neighbourhood of a place covers at most two by two of them.
   per_bucket_px_ = 1 / std::max(4.F, options_.pitch_px * step_px);
   origin_px_ = low;
   columns_ = static_cast<int>((high.x() - low.x()) * per_bucket_px_) + 1;
@@ -83,7 +84,7 @@ std::int32_t GridLinker::nearest(const std::vector<GridNode>& nodes, std::size_t
   const auto squared_cells = [&](const Eigen::Vector2f& centre_px) {
     return (cells_from_camera * (centre_px - target)).squaredNorm();
   };
-  // Most lie where they are expected.
+  // Most nodes lie where they are expected.
   const Eigen::Array2f at = (target - origin_px_) * per_bucket_px_;
   if (at.x() >= 0 && at.y() >= 0 && at.x() < static_cast<float>(columns_) && at.y() < static_cast<float>(rows_)) {
     const int bucket = static_cast<int>(at.y()) * columns_ + static_cast<int>(at.x());
@@ -113,8 +114,7 @@ std::int32_t GridLinker::nearest(const std::vector<GridNode>& nodes, std::size_t
   return best;
 }
 
-/// Nodes that are likely to be the neighbours: those linked before, or those that the links beside lead to; -1 where
-/// none is.
+/// Likely neighbours of a node: those linked before, or those that the links beside lead to; -1: none.
 GridLinker::Links GridLinker::likely(const Range& range, std::int32_t from) const {
   Links likely = hints_[from];
   for (const Direction d : {kLeft, kRight, kDown}) {
@@ -161,7 +161,7 @@ void GridLinker::choose(const std::vector<GridNode>& nodes, const Range& range, 
 }
 
 void GridLinker::find_mutual(std::vector<GridNode>& nodes, float radius, Executor& executor) {
-  constexpr std::size_t kRange = 768;  // some rows of symbols: a row's help the next
+  constexpr std::size_t kRange = 768;  // several rows of symbols: each row's links help with the next
   chosen_.assign(nodes.size(), {-1, -1, -1, -1});
   hints_.resize(nodes.size());
   changed_.resize(nodes.size());
@@ -178,7 +178,7 @@ void GridLinker::find_mutual(std::vector<GridNode>& nodes, float radius, Executo
   executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
     for (std::size_t i = first; i < last; ++i) {
       relinked_[i] = 0;
-      // What was linked with each other and has chosen each other again still is.
+      // Links between nodes that have not changed are still mutual.
       if (changed_[i] == 0 && std::ranges::none_of(chosen_[i], has_changed)) continue;
       for (const Direction d : kDirections) {
         const std::int32_t other = chosen_[i][d];
@@ -204,7 +204,7 @@ void GridLinker::measure_frame(std::vector<GridNode>& nodes, const std::vector<s
   }
 }
 
-/// Measures the frames that use a changed link; a node that lost a link has changed as well.
+/// Measures the frames that use a changed link. A node that lost a link has changed as well.
 void GridLinker::measure_changed_frames(std::vector<GridNode>& nodes) {
   for (std::size_t node = 0; node < nodes.size(); ++node) {
     if (relinked_[node] == 0) continue;
@@ -233,10 +233,10 @@ void GridLinker::measure_steps(const std::vector<GridNode>& nodes, Executor& exe
   });
 }
 
-/// Finds links that disagree with the same step behind and before, or with most of those behind, before and on both
-/// sides. Along a straight edge in depth the links on both sides agree; those behind and before do not. Links of torn
-/// shapes are compared with links of torn shapes alone.
-/// @return a bit for the link to the right, and one for that down
+/// Finds links that disagree with the same step behind and ahead, or with most of the steps behind, ahead and on both
+/// sides. Along a straight edge in depth, the links on both sides agree; those behind and ahead do not. Links of torn
+/// shapes are compared only with each other.
+/// @return one bit for the link to the right, and one for the link down
 unsigned GridLinker::find_inconsistent(const GridNode& node, std::size_t index) const {
   const auto load = [](const std::vector<std::array<float, 4>>& from, std::size_t at) {
     return std::bit_cast<FourLanes>(from[at]);
@@ -247,7 +247,7 @@ unsigned GridLinker::find_inconsistent(const GridNode& node, std::size_t index) 
   const float xx = cells_from_camera(0, 0), xy = cells_from_camera(0, 1), yx = cells_from_camera(1, 0),
               yy = cells_from_camera(1, 1);
   const FourLanes from_x = {xx, yx, xx, yx}, from_y = {xy, yy, xy, yy};
-  FourIntLanes count{};  // negative, as all that follow: a comparison that holds is -1
+  FourIntLanes count{};  // negative, as a true comparison gives -1
   const auto find_against = [&](Direction d) -> FourIntLanes {
     const std::size_t other = node.links[d] < 0 ? steps_.size() - 1 : static_cast<std::size_t>(node.links[d]);
     const FourLanes difference = own - (is_torn ? load(steps_, other) : load(sound_steps_, other));
@@ -268,7 +268,7 @@ unsigned GridLinker::find_inconsistent(const GridNode& node, std::size_t index) 
 void GridLinker::break_inconsistent(std::vector<GridNode>& nodes, Executor& executor) {
   measure_steps(nodes, executor);
   inconsistent_.assign(nodes.size(), {});
-  // Each link is asked about once, as links are mutual, and by one of its ends.
+  // Ask about each link once, from one of its ends: links are mutual.
   executor.run_ranges(nodes.size(), [&](std::size_t first, std::size_t last, int) {
     for (std::size_t i = first; i < last; ++i) {
       const unsigned inconsistent = find_inconsistent(nodes[i], i);

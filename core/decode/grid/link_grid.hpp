@@ -14,29 +14,31 @@
 
 namespace slsd {
 
-/// A place on the grid as link_grid sees it.
+/// A node of the grid, as link_grid sees it.
 struct GridNode {
-  Eigen::Vector2f centre_px;  ///< middle of the symbol's square, in the camera
-  LatticeFrame frame;         ///< in: as expected; out: as measured from the neighbours, where there are some
+  Eigen::Vector2f centre_px;  ///< centre of the symbol's square, in the camera
+  LatticeFrame frame;         ///< in: as expected; out: as measured from the neighbours, if there are any
   std::array<std::int32_t, 4> links{-1, -1, -1, -1};  ///< by Direction
   std::array<bool, 4> broken{};
-  bool torn = false;                            ///< in: its links say nothing of those beside them
+  bool torn = false;                            ///< in: its links are no evidence about the links beside them
   bool measured_u = false, measured_v = false;  ///< steps of the frame that come from neighbours
 };
 
 struct LinkGridOptions {
-  float pitch_px = 18;           ///< projector px from cell to cell
-  float search_radius = 0.42F;   ///< largest distance of a first neighbour from its expected place, of the pitch
+  float pitch_px = 18;           ///< distance between adjacent cells, projector px
+  float search_radius = 0.42F;   ///< largest distance of a neighbour from its expected place in the first search, of
+                                 ///< the pitch
   float refined_radius = 0.28F;  ///< the same once the frame is measured
-  float deviation_max = 0.17F;   ///< largest difference of a link from those beside and behind it, of the pitch
+  float deviation_max = 0.17F;   ///< largest difference of a link from those beside and behind it, as a share of the
+                                 ///< pitch
 };
 
-/// The opposite way along a link.
+/// The opposite direction.
 [[nodiscard]] constexpr Direction opposite(Direction d) {
   return static_cast<Direction>((d + 2) % 4);
 }
 
-/// One of the two ways across a link, by 0 or 1.
+/// One of the two perpendicular directions, by 0 or 1.
 [[nodiscard]] constexpr Direction across(Direction d, int side) {
   return static_cast<Direction>((d + (side == 0 ? 1 : 3)) % 4);
 }
@@ -60,10 +62,10 @@ void visit_measured_with(const std::vector<GridNode>& nodes, std::int32_t node, 
   }
 }
 
-/// Links each symbol with its four neighbours on the grid. A neighbour is the nearest one to where the local frame puts
-/// it, and the choice has to be mutual. Frames are then measured from the links and the search repeated more narrowly;
-/// last, links whose step disagrees with those beside and behind them are broken: they were carried across an edge in
-/// depth.
+/// Links each symbol with its four neighbours on the grid. A neighbour is the symbol nearest to the place that the
+/// local frame predicts, and the choice has to be mutual. The linker then measures frames from the links and repeats
+/// the search with a smaller radius. Last, it breaks links whose step disagrees with those beside and behind them: they
+/// cross an edge in depth.
 ///
 ///        up
 ///         |          frame.col(0) = camera px for one projector px to the right
@@ -77,16 +79,16 @@ class GridLinker {
 
   void link(std::vector<GridNode>& nodes, Executor& executor);
 
-  /// Measures a node's frame again from those neighbours alone that are trusted: the fragment of a symbol at the edge
-  /// of a surface draws the frames beside it to itself.
-  /// @param trusted  one to a node, non-zero where it is
+  /// Measures a node's frame again, from trusted neighbours alone: the fragment of a symbol at the edge of a surface
+  /// distorts the frames beside it.
+  /// @param trusted  one for each node, non-zero if trusted
   void measure_frame(std::vector<GridNode>& nodes, const std::vector<std::uint8_t>& trusted, std::size_t node) const;
 
  private:
   void sort_into_buckets(const std::vector<GridNode>& nodes);
   [[nodiscard]] std::int32_t nearest(const std::vector<GridNode>& nodes, std::size_t from, Direction direction,
                                      const Eigen::Matrix2f& cells_from_camera, float radius) const;
-  /// Nodes that are looked at one after the other: what is known of one helps with the next.
+  /// Nodes that are searched one after the other: each result helps with the next.
   struct Range {
     std::int32_t first, last;
     [[nodiscard]] bool contains(std::int32_t node) const { return node >= first && node < last; }
@@ -113,9 +115,9 @@ class GridLinker {
   std::vector<std::int32_t> first_of_bucket_;
   std::vector<Place> in_buckets_;
   std::vector<Links> chosen_, hints_;
-  std::vector<std::uint8_t> changed_;  // of each node: whether it chose others than it was linked with
-  // The step right and the step down from each node, x, y, x, y, camera px, and one that is none: not a number where
-  // no link leads on; and where one does to or from what is torn.
+  std::vector<std::uint8_t> changed_;  // for each node: whether its links differ from its previous ones
+  // Steps right and down from each node, as x, y, x, y, camera px, with one spare entry at the end. NaN without a link;
+  // in sound_steps_, also NaN for links to or from torn symbols.
   std::vector<std::array<float, 4>> steps_, sound_steps_;
   std::vector<std::array<bool, 4>> inconsistent_;
   std::vector<std::uint8_t> relinked_;  // of each node: whether the last search changed its links

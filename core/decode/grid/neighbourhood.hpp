@@ -13,7 +13,8 @@
 
 namespace slsd {
 
-/// The nodes of the 3x3 window around a node, row by row, itself in the middle; -1 where the links do not lead to one.
+/// The nodes of the 3x3 window around a node, row by row, with the node in the middle; -1 if the links do not lead to
+/// one.
 using Neighbourhood = std::array<std::int32_t, kWindowCells>;
 
 /// The neighbour along a link that is not broken, or -1.
@@ -32,14 +33,13 @@ using Neighbourhood = std::array<std::int32_t, kWindowCells>;
   return claims[node].fits(claims[other], direction) ? other : -1;
 }
 
-/// A node's neighbours along links that are not broken, by Direction; -1 where there is none.
+/// A node's neighbours along unbroken links, by Direction; -1: none.
 using Beside = std::array<std::int32_t, 4>;
 
-/// @param beside  becomes one to a node: what many steps ask for, in a third of the memory
+/// @param beside  becomes one entry for each node: the data that many stages need, in a third of the memory
 void find_beside(const std::vector<GridNode>& nodes, std::vector<Beside>& beside);
 
-/// Follows the links around a node. A corner can be reached by two ways; where they lead to different nodes it is left
-/// out.
+/// Follows the links around a node. Two ways lead to each corner; if they reach different nodes, it is left out.
 [[nodiscard]] Neighbourhood neighbourhood(std::span<const Beside> beside, std::int32_t node);
 
 }  // namespace slsd

@@ -15,16 +15,16 @@ namespace slsd {
 /// The result of aligning a symbol's letter with the frame.
 enum class Aligned : std::uint8_t {
   kNot,
-  kPrinted,  ///< not aligned, but its cell is not lit where its letter is dark: print may have torn it
-  kWhole,    ///< aligned, and whole but for print
-  kAtEdge,   ///< aligned, but a part of it is missing, or lit where its letter is dark, as at an edge in depth
+  kPrinted,  ///< not aligned, but its cell is dark wherever its letter is: print may have torn it
+  kWhole,    ///< aligned, and whole apart from print
+  kAtEdge,   ///< aligned, but partly missing, or lit where its letter is dark, as at an edge in depth
 };
 
 [[nodiscard]] constexpr bool is_aligned(Aligned how) {
   return how == Aligned::kWhole || how == Aligned::kAtEdge;
 }
 
-/// The regions that may be symbols, and what the stages find out about them: one entry to each, at the same index.
+/// The regions that may be symbols, and the results of the stages: one entry for each, at the same index.
 struct Sightings {
   std::vector<std::int32_t> region;  ///< index in Regions
   std::vector<GreyMoments> moments;
@@ -32,7 +32,7 @@ struct Sightings {
   std::vector<GridNode> nodes;
   std::vector<CellClaim> claims;
   std::vector<Aligned> aligned;
-  std::vector<float> misfits;  ///< distances from their cells' letters, standard deviations, where review measured them
+  std::vector<float> misfits;  ///< distances from their cells' letters, standard deviations, if review measured them
 
   [[nodiscard]] std::size_t size() const { return region.size(); }
   void clear() {

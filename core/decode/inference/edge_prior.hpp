@@ -13,8 +13,8 @@
 
 namespace slsd {
 
-/// The prior of an edge in depth across a link, from how often links around it are broken or lead to another cell:
-/// along rows and along columns, each as the surroundings show.
+/// Prior probability of an edge in depth across a link. It follows from how often links nearby are broken or lead to a
+/// different cell, along rows and along columns.
 /// @thread thread-bound: keeps its buffers
 class EdgePrior {
  public:

@@ -8,7 +8,7 @@ namespace slsd {
 namespace {
 
 constexpr float kNothing = 1e-4F;  // nats
-/// Most nodes that a search reaches: what is farther away hardly adds to a margin that nearer ones lack.
+/// Largest number of nodes that a search reaches: nodes farther away hardly add to a margin that nearer ones lack.
 constexpr std::size_t kSearchedNodes = 80;
 constexpr std::uint8_t kFirst = 4;
 
@@ -42,7 +42,7 @@ void EvidenceFlow::restore() {
   touched_.clear(), touched_lines_.clear();
 }
 
-/// The most that can come from a source that the last search reached.
+/// The most that can flow from a source that the last search reached.
 float EvidenceFlow::most_from(std::int32_t source, std::int32_t node, float wanted, const Budget& budget) const {
   float most = std::min(supply_[source], wanted);
   if (source == node) return most;
@@ -75,7 +75,7 @@ void EvidenceFlow::push(std::int32_t source, float nats) {
   }
 }
 
-/// One search, the nearest supplies first.
+/// One search, nearest supplies first.
 float EvidenceFlow::draw_once(std::int32_t node, float wanted, Budget& budget) {
   ++search_;
   queue_.assign(1, node);

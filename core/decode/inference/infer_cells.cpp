@@ -11,14 +11,14 @@
 namespace slsd {
 namespace {
 
-constexpr float kMisreadNats = -2;  // nats: such a shape is none of the surface that its neighbours are on
-constexpr float kGoesOn = 0.5F;     // nats that hold a link beside a cut one: edges go on straight
+constexpr float kMisreadNats = -2;  // nats: a shape with less does not lie on the neighbours' surface
+constexpr float kGoesOn = 0.5F;     // nats that hold a link beside a cut one: edges continue straight
 constexpr float kLineMore = 0.1F;   // nats that each further link of a straight edge costs
-constexpr float kSideMore = 2;      // the same of each further side that is cut: edges turn corners and come in pairs
+constexpr float kSideMore = 2;      // nats that each further cut side costs: edges turn corners and come in pairs
 constexpr float kAgainstMax = 9;    // nats
-constexpr float kSlipKnown = 1;     // nats: the link beside shows that no edge comes that way
-constexpr int kSideLinks = 8;       // that a side counts at most
-constexpr float kUsualPlaces = 40;  // on an epipolar line, for which the threshold was measured
+constexpr float kSlipKnown = 1;     // nats: the link beside shows that no edge runs there
+constexpr int kSideLinks = 8;       // largest number of links that count for a side
+constexpr float kUsualPlaces = 40;  // candidate cells on an epipolar line for which the threshold was measured
 
 bool is_along_row(Direction d) {
   return d == kRight || d == kLeft;
@@ -60,7 +60,7 @@ void CellInference::set_capacities() {
       const std::int32_t there = grid_.beyond(proposed_[i], d);
       if (there >= 0 && labels_[other] == there) {
         capacity_[i][d] = trusted;
-      } else if (!is_torn) {  // what is torn contradicts nothing, and holds nothing: others hold it
+      } else if (!is_torn) {  // a torn symbol contradicts nothing and supports nothing: its neighbours support it
         const float against = there < 0 ? kAgainstMax : -letters_.of(other, there);
         const float rival = rival_nats(i, d);
         against_[i][d] = std::min(trusted, std::max({0.F, against, rival > 0 ? trusted : 0.F}));
@@ -71,13 +71,13 @@ void CellInference::set_capacities() {
   lower_beside_edges();
 }
 
-/// The nats of a node for the cell that a neighbour of another cell puts it on: their link holds then.
+/// The nats for the cell that a neighbour with a contradicting cell predicts for a node, as if their link held.
 float CellInference::rival_nats(std::size_t node, Direction d) const {
   const std::int32_t cell = grid_.beyond(labels_[static_cast<std::size_t>(beside_[node][d])], opposite(d));
   return cell < 0 || cell == labels_[node] ? 0 : std::max(0.F, letters_.of(static_cast<std::int32_t>(node), cell));
 }
 
-/// An edge that ends beside a link is likely to go on across it.
+/// An edge that ends beside a link is likely to continue across it.
 void CellInference::lower_beside_edges() {
   for (std::size_t i = 0; i < labels_.size(); ++i) {
     for (const Direction d : kDirections) {
@@ -97,7 +97,7 @@ void CellInference::lower_beside_edges() {
   }
 }
 
-/// A straight edge is one event: links side by side that it crosses share what one of them is trusted, and little more.
+/// A straight edge is one event: the parallel links that it crosses share little more than the capacity of one link.
 void CellInference::join_lines() {
   line_capacity_.clear();
   for (const Direction d : kDirections) {
@@ -144,7 +144,7 @@ void CellInference::draw_contradictions() {
   }
 }
 
-/// The first side that is cut counts in full, and each further one little, less what contradictions have drawn.
+/// The first cut side counts in full, each further one little, less what contradictions have used up.
 EvidenceFlow::Budget CellInference::budget_of(const EvidenceFlow& flow, std::size_t node) const {
   std::array<float, 4> side{}, drawn{};
   for (const Direction d : kDirections) {
@@ -185,7 +185,7 @@ void CellInference::measure_margins(Executor& executor) {
   });
 }
 
-/// Fit of a node at a rim; another surface fits tightly in one of sixty cases at most.
+/// Fit of a node at a rim. Another surface fits tightly in one of sixty cases at most.
 GridFit CellInference::grid_fit(std::size_t node) const {
   float most = 0;
   int held_by = 0, sides = 0;
@@ -202,7 +202,7 @@ GridFit CellInference::grid_fit(std::size_t node) const {
   return held_by >= kTightLinks && most <= kTightSlip ? GridFit::kTight : GridFit::kLoose;
 }
 
-/// Names the rule that accepts or rejects a node whose cell was proposed.
+/// Names the rule that accepts or rejects a node with a proposed cell.
 DecodeRule CellInference::rule_of(const CellGate& gate, const Sightings& seen, std::size_t node) const {
   const int row = grid_.row_of(proposed_[node]), column = grid_.column_of(proposed_[node]);
   const Classification& shape = seen.shapes[node];
@@ -241,8 +241,8 @@ void CellInference::find_component(std::int32_t first) {
   }
 }
 
-/// Rejects the symbols of a surface if most of its certain ones lie off their epipolar lines. Then the rig has moved,
-/// or another projector lights them. Symbols that lie on the lines by chance are no points either.
+/// Rejects all symbols of a surface if most of its certain ones lie off their epipolar lines. Then the rig has moved,
+/// or another projector lights them. The symbols that lie on their lines do so by chance, and are no points either.
 void CellInference::reject_off_line(Sightings& seen) {
   is_reached_.assign(proposed_.size(), 0);
   for (std::size_t first = 0; first < proposed_.size(); ++first) {
@@ -292,7 +292,7 @@ void CellInference::propose(const CellGate& gate, Executor& executor, Sightings&
 void CellInference::decide(const CellGate& gate, Executor& executor, Sightings& seen) {
   const float cells = static_cast<float>(grid_.rows) * static_cast<float>(grid_.columns);
   margin_needed_ = margin_min_ + (gate.knows_lines() ? 0 : std::log(std::max(1.F, cells / kUsualPlaces)));
-  find_beside(seen.nodes, beside_);  // what was mended has other links
+  find_beside(seen.nodes, beside_);  // mended symbols have new links
   labels_ = proposed_;
   nats_.resize(labels_.size());
   letters_.look_at(seen.shapes, seen.aligned);

@@ -24,24 +24,24 @@ namespace slsd {
 
 /// Finds the cells of a frame's nodes, and accepts those that are certain.
 ///
-/// The margin of a node is the number of nats by which the proposed cells are likelier than the likeliest others in
-/// which this node's is wrong. The others differ in a set of nodes that an edge in depth would part from the rest, so
-/// the margin is a least cut: each letter gives its evidence once, each link holds what it is trusted, and a straight
-/// edge counts once. What contradicts draws first. A node is accepted if its margin reaches a threshold.
+/// The margin of a node is a number of nats: how much likelier the proposed cells are than the best alternative in
+/// which this node's cell is wrong. The alternatives differ in a set of nodes that an edge in depth would separate from
+/// the rest. So the margin is a minimum cut: each letter gives its evidence once, each link has a capacity, and a
+/// straight edge counts once. Contradictions draw first. A node is accepted if its margin reaches a threshold.
 /// @thread thread-bound: keeps its buffers
 class CellInference {
  public:
-  /// @param codebook         of the part of the pattern's array that is shown
-  /// @param wrong_cells_max  how many a frame may have: sets the margin that a node needs
+  /// @param codebook         codebook of the visible part of the pattern's array
+  /// @param wrong_cells_max  wrong cells that a frame may have: sets the required margin
   CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max,
                 Rules rules = {});
 
-  /// Names a cell for each node that has one, and decides on none of them.
-  /// @param seen  in: nodes and shapes; out: claims, of which those stand for now that show their letters well
+  /// Proposes cells for the nodes, without deciding on any.
+  /// @param seen  in: nodes and shapes; out: claims; those whose symbols show their letters well count as decoded for
+  ///              now
   void propose(const CellGate& gate, Executor& executor, Sightings& seen);
-  /// Decides on what was proposed.
-  /// @param seen  in: nodes, shapes, moments, and what was aligned; out: claims, with their margins up to the
-  ///              threshold
+  /// Decides on the proposed cells.
+  /// @param seen  in: nodes, shapes, moments and alignments; out: claims, with their margins up to the threshold
   void decide(const CellGate& gate, Executor& executor, Sightings& seen);
 
  private:
@@ -69,12 +69,13 @@ class CellInference {
   SurfaceLinks links_;
   EdgePrior prior_;
   EvidenceFlow flow_;
-  std::vector<EvidenceFlow> helpers_;  // copies of it, one to each further worker
+  std::vector<EvidenceFlow> helpers_;  // copies of the flow, one for each further worker
   float margin_min_, margin_needed_ = 0;
   std::vector<Beside> beside_;
   std::vector<std::int32_t> proposed_, labels_;  // cells; labels without the misread ones
-  std::vector<float> rivals_;                    // of each node: the nats of another cell that a neighbour names
-  std::vector<float> nats_, margins_;            // of each node: of its own letter, and of its cell
+  std::vector<float> rivals_;                    // for each node: the nats of a contradicting cell that a neighbour
+                                                 // predicts
+  std::vector<float> nats_, margins_;            // for each node: the nats of its own letter, and of its cell
   std::vector<std::array<float, 4>> capacity_, against_;  // of each link, at the start
   std::vector<float> line_capacity_;
   std::vector<std::int32_t> component_;   // nodes whose links lead from cell to cell

@@ -14,7 +14,7 @@ struct Misread {
 };
 constexpr std::array kMisread{Misread{2, 0.001F}, Misread{3, 0.01F}, Misread{4, 0.05F},   Misread{6, 0.15F},
                               Misread{8, 0.5F},   Misread{12, 0.8F}, Misread{1e9F, 0.95F}};
-/// Shares of doubtful and of torn shapes among the symbols that an edge runs through.
+/// Shares of doubtful and of torn shapes among symbols that an edge cuts.
 constexpr float kDoubtfulAtEdges = 0.2F, kTornAtEdges = 0.5F;
 
 }  // namespace
@@ -69,7 +69,7 @@ float LetterEvidence::of(std::int32_t node, std::int32_t cell) const {
       std::ranges::find_if(kMisread, [&](const Misread& m) { return shape.distance < m.distance_max; })->share;
   const float torn = torn_nats_[wholeness_of(static_cast<std::size_t>(node))];
   const float nats = std::log((1 - misread) * share * letter_count_ + misread) + torn;
-  // What cannot be aligned where its neighbours put it may be another symbol.
+  // A symbol that cannot be aligned at its predicted place may be a different symbol.
   return aligned_[static_cast<std::size_t>(node)] == Aligned::kPrinted ? std::min(0.F, nats) : nats;
 }
 

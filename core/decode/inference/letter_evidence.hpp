@@ -15,22 +15,22 @@
 
 namespace slsd {
 
-/// The nats by which a shape speaks for a cell: how much likelier it is as the letter of that cell than by chance.
+/// The nats by which a shape supports a cell: how much likelier the shape is as the letter of that cell than by chance.
 ///
-/// Measured shares replace the doubt that a classification assumes: of shapes at each distance
-/// from their prototype, those that show another letter than their cell's. A torn shape also speaks for an edge through
-/// the symbol, the more, the fewer are torn amid the surfaces of the frame.
+/// The doubt that a classification assumes is replaced by measured shares: how many shapes at each distance from their
+/// prototype show another letter than their cell's. A torn shape is also evidence for an edge through the symbol. It is
+/// stronger if fewer shapes inside the frame's surfaces are torn.
 /// @thread thread-bound: keeps its buffers
 class LetterEvidence {
  public:
   LetterEvidence(const CodeArray& array, CellGrid grid);
 
-  /// Looks at a new frame, none of whose torn shapes speaks for an edge until measure_torn().
+  /// Starts a new frame. Until measure_torn(), torn shapes are no evidence for an edge.
   void look_at(std::span<const Classification> shapes, std::span<const Aligned> aligned);
   /// @param labels   cells, one to a node
   void measure_torn(std::span<const Beside> beside, std::span<const std::int32_t> labels);
 
-  /// Nats for a cell of the grid; below 0 against it.
+  /// Nats for a cell of the grid; negative if the shape contradicts it.
   [[nodiscard]] float of(std::int32_t node, std::int32_t cell) const;
   [[nodiscard]] int letter_of(std::int32_t cell) const { return letters_[static_cast<std::size_t>(cell)]; }
   [[nodiscard]] const CellGrid& grid() const { return grid_; }
@@ -47,7 +47,7 @@ class LetterEvidence {
   std::span<const Classification> shapes_;
   std::span<const Aligned> aligned_;
   std::array<float, kWholenesses> torn_nats_{};
-  std::vector<std::uint8_t> agrees_;  // of each node: whether its shape speaks for its label
+  std::vector<std::uint8_t> agrees_;  // for each node: whether its shape supports its label
 };
 
 }  // namespace slsd

@@ -14,7 +14,8 @@ float margin_for(double wrong_cells_max) {
 }
 
 double wrong_share(float margin_nats) {
-  constexpr double kAtNone = 2.75, kPerNat = 0.8;  // of the logarithm: chance alone would take 1 for each nat
+  constexpr double kAtNone = 2.75, kPerNat = 0.8;  // of the logarithm: if chance alone decided, it would fall by 1 for
+                                                   // each nat
   return std::exp(-kAtNone - kPerNat * static_cast<double>(margin_nats));
 }
 

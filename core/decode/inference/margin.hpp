@@ -4,16 +4,16 @@
 
 namespace slsd {
 
-/// The most that a margin can say, nats: a symbol inside a surface has so much.
+/// Largest margin, nats: that of a symbol inside a surface.
 inline constexpr float kMarginMax = 14;
 
 /// The margin that a cell needs, nats.
-/// @param wrong_cells_max  wrong cells that a frame may have on average, if it is made to mislead; over 0
+/// @param wrong_cells_max  mean number of wrong cells that a frame may have, if it is made to mislead; above 0
 [[nodiscard]] float margin_for(double wrong_cells_max);
 
-/// The share of cells of a margin that are wrong, in frames made to mislead. Both are fitted to docs/decoder.md's
-/// table.
-/// @param margin_nats  of the cell, on its epipolar line
+/// The share of wrong cells among those with a margin, in frames made to mislead. Both constants are fitted to the
+/// table in docs/decoder.md.
+/// @param margin_nats  margin of the cell, on its epipolar line
 [[nodiscard]] double wrong_share(float margin_nats);
 
 }  // namespace slsd

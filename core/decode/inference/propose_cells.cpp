@@ -9,12 +9,13 @@ namespace slsd {
 namespace {
 
 constexpr std::uint8_t kNoLetter = kMaxLetters;
-/// A window is certain with so many of its nine letters, and so much of the evidence that they can give.
+/// A window is certain if this many of its nine letters agree and give this much of their possible evidence.
 constexpr int kCertainLetters = 6;
 constexpr float kCertainShare = 0.85F;
-/// Evidence for the cell beside that of a certain neighbour, against some forty cells on an epipolar line, nats.
+/// Evidence for the cell adjacent to that of a certain neighbour, against some forty candidate cells on an epipolar
+/// line, nats.
 constexpr float kBesideCertain = 3.7F;
-/// Distance from its line at which a shape that is not whole may lie, of the pitch of the cells.
+/// Distance from its line that a damaged shape may have, of the pitch of the cells.
 constexpr double kAstrayShare = 0.2;
 
 }  // namespace
@@ -51,8 +52,8 @@ CellProposer::Proposal CellProposer::weigh(std::int32_t node, std::int32_t cell)
   return {cell, nats, there >= kCertainLetters && nats >= kCertainShare * log_letters_ * static_cast<float>(there)};
 }
 
-/// Proposes the cell beside the certain cell of a neighbour: there is little else to compare.
-/// @param first  from which node on there are proposals
+/// Proposes the cell adjacent to the certain cell of a neighbour, with few alternatives to compare.
+/// @param first  first node without proposals
 CellProposer::Proposal CellProposer::continued(const Frame& frame, std::int32_t node, std::int32_t first) const {
   for (const Direction d : {kLeft, kUp}) {
     const std::int32_t other = frame.beside[static_cast<std::size_t>(node)][d];
@@ -76,8 +77,8 @@ CellProposer::Proposal CellProposer::best_on_line(const Frame& frame, std::int32
   return best < 0 ? Proposal{} : weigh(node, best);
 }
 
-/// The cell whose whole window is read, wherever it lies: without a calibration, or of light that comes from elsewhere
-/// than the calibration says.
+/// Looks up the cell of a completely read window anywhere in the pattern: without a calibration, or for light that does
+/// not follow the calibration.
 CellProposer::Proposal CellProposer::looked_up(const Frame& frame, std::int32_t node) const {
   if (!unique_) return {};
   std::uint32_t key = 0;
@@ -100,13 +101,13 @@ void CellProposer::propose_range(const Frame& frame, std::int32_t first, std::in
   }
 }
 
-/// Offers each node the cells beside those of its neighbours.
+/// Offers each node the cells adjacent to those of its neighbours.
 void CellProposer::carry_on(const Frame& frame) {
   next_ = proposals_;
   for (std::size_t i = 0; i < proposals_.size(); ++i) {
     if (proposals_[i].certain) continue;
     const auto node = static_cast<std::int32_t>(i);
-    const bool is_worn = !frame.shapes[i].is_well_seen();  // its centroid may lie elsewhere, and break its links
+    const bool is_worn = !frame.shapes[i].is_well_seen();  // its centroid may be displaced, and break its links
     const double astray_px = is_worn ? kAstrayShare * frame.gate.pitch_px() : 0;
     for (const Direction d : kDirections) {
       const std::int32_t other = is_worn ? frame.nodes[i].links[d] : frame.beside[i][d];
@@ -126,8 +127,8 @@ void CellProposer::carry_on(const Frame& frame) {
 void CellProposer::propose(std::span<const GridNode> nodes, std::span<const Beside> beside,
                            std::span<const Classification> shapes, const CellGate& gate, Executor& executor,
                            std::vector<std::int32_t>& labels) {
-  constexpr std::size_t kRange = 768;  // some rows of windows: most continue one of their range
-  constexpr int kCarried = 3;          // links
+  constexpr std::size_t kRange = 768;  // several rows of windows: most continue a window of their range
+  constexpr int kCarried = 3;          // number of links
   const Frame frame{nodes, beside, shapes, gate};
   around_.resize(beside.size());
   proposals_.resize(beside.size());

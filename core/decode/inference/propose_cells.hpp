@@ -17,15 +17,16 @@
 
 namespace slsd {
 
-/// Proposes the cell of each node: the one whose 3x3 window its shapes and its neighbours' speak for most, among the
-/// cells that the calibration allows, and those beside the cells of its neighbours. Says nothing of how certain it is.
+/// Proposes a cell for each node: the one that the shapes of its 3x3 window support most. Candidates are the cells that
+/// the calibration allows, and those adjacent to the cells of its neighbours. It does not judge how certain a proposal
+/// is.
 /// @thread thread-bound: keeps its buffers
 class CellProposer {
  public:
-  /// @param codebook  of the part of the pattern's array that is shown
+  /// @param codebook  codebook of the visible part of the pattern's array
   CellProposer(const CodeArray& array, std::shared_ptr<const Codebook> codebook);
 
-  /// @param labels  becomes one cell to a node, or -1
+  /// @param labels  becomes one cell for each node, or -1
   void propose(std::span<const GridNode> nodes, std::span<const Beside> beside, std::span<const Classification> shapes,
                const CellGate& gate, Executor& executor, std::vector<std::int32_t>& labels);
 
@@ -36,11 +37,11 @@ class CellProposer {
     std::span<const Classification> shapes;
     const CellGate& gate;
   };
-  /// A cell, and the nats that its window has for it.
+  /// A cell, and the nats by which the window supports it.
   struct Proposal {
     std::int32_t cell = -1;
     float nats = 0;
-    bool certain = false;  ///< most letters of its window are there and agree
+    bool certain = false;  ///< most letters of its window are present and agree
   };
   [[nodiscard]] float window_nats(std::int32_t node, std::int32_t cell) const;
   [[nodiscard]] Proposal weigh(std::int32_t node, std::int32_t cell) const;
@@ -54,10 +55,11 @@ class CellProposer {
   std::shared_ptr<const Codebook> codebook_;
   bool unique_;
   float log_letters_;
-  std::vector<std::uint8_t> letters_;  // of each cell, with a border of one all round whose letter is kNoLetter
+  std::vector<std::uint8_t> letters_;  // for each cell, with a border of kNoLetter
   int stride_;
   std::vector<Neighbourhood> around_;
-  std::vector<std::array<float, kMaxLetters + 1>> nats_;  // of each node from the second on, by letter; none has 0
+  std::vector<std::array<float, kMaxLetters + 1>> nats_;  // for each node from the second on, by letter; 0 for no
+                                                          // letter
   std::vector<Proposal> proposals_, next_;
 };
 

@@ -16,12 +16,12 @@ namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 constexpr std::size_t kSamplesMin = 20;
-/// Slips on one surface, cells: without a sample, and what their width is at least and at most.
+/// Slips on one surface, cells: their usual width without a sample, and the limits of the width.
 constexpr float kUsualSlip = 0.008F, kSlipMin = 0.002F, kSlipMax = 0.02F, kSlipWidthMax = 0.1F;
-constexpr float kSlipRange = 0.6F;   // of a step across an edge, cells
-constexpr float kNatsMin = -4;       // what a slip says against a link at most
-constexpr float kLightNatsMin = -8;  // and what light says
-/// Light across an edge, standard deviation of its logarithm; and on one surface, its width at least and at most.
+constexpr float kSlipRange = 0.6F;   // largest slip across an edge, cells
+constexpr float kNatsMin = -4;       // strongest evidence of a slip against a link
+constexpr float kLightNatsMin = -8;  // strongest evidence of light against a link
+/// Ratio of light across an edge, standard deviation of its logarithm; and the limits of its width on one surface.
 constexpr float kLightAcross = 0.7F, kLightMin = 0.03F, kLightMax = 0.3F, kLightWidthMax = 0.5F;
 
 /// Density of Student's t with four degrees of freedom.
@@ -81,7 +81,7 @@ void SurfaceLinks::measure_slips(const NodesSeen& seen, float least) {
         const std::int32_t behind = seen.beside[from][opposite(way)];
         if (seen.nodes[behind].torn) return;
         float before = bends_[behind][way % 2].x();
-        if (before * bend.x() < 0) before = 0;  // one symbol that is out of place bends its neighbours the other way
+        if (before * bend.x() < 0) before = 0;  // one displaced symbol bends its neighbours the other way
         const float variance =
             least * least + 0.5F * bend.y() * bend.y() + (std::isnan(before) ? 0.F : 0.25F * before * before);
         const float width = std::min(std::sqrt(variance), kSlipWidthMax);
@@ -124,9 +124,9 @@ void SurfaceLinks::add_light(const NodesSeen& seen, const CellGrid& grid) {
     for (const Direction d : {kRight, kDown})
       if (const float by = difference(i, d); !std::isnan(by)) sample_.push_back(std::abs(by));
   if (sample_.size() < kSamplesMin) return;
-  constexpr float kWidthOfMedian = 1.35F;  // of Student's t with four degrees of freedom: 1 / its quartile
+  constexpr float kWidthOfMedian = 1.35F;  // for Student's t with four degrees of freedom: 1 / its quartile
   const float width = std::clamp(kWidthOfMedian * median_in_place(sample_), kLightMin, kLightMax);
-  constexpr float kOfBefore = 0.5F;  // towards a limb light falls faster from link to link
+  constexpr float kOfBefore = 0.5F;  // towards a limb, light falls faster from link to link
   for (std::size_t i = 0; i < seen.nodes.size(); ++i) {
     for (const Direction d : {kRight, kDown}) {
       const float by = difference(i, d);

@@ -15,7 +15,7 @@
 
 namespace slsd {
 
-/// Properties of a frame's nodes before any cell is certain, one entry for each node.
+/// Properties of a frame's nodes while no cell is certain yet, one entry for each node.
 struct NodesSeen {
   std::span<const GridNode> nodes;
   std::span<const Beside> beside;
@@ -24,14 +24,14 @@ struct NodesSeen {
   std::span<const std::int32_t> labels;  ///< cells, -1: none
 };
 
-/// The nats by which each link speaks for one surface on both its sides, against an edge in depth across it.
+/// The nats by which each link supports one surface on both its sides, against an edge in depth across it.
 ///
-/// - Slip: how far a step along a line differs from the step behind it, along the epipolar line. On one surface it is
-///   drawn from Student's t, as wide as what depth cannot move (the difference across the epipolar line) and how much
-///   the surface bent before; across an edge it is anywhere within the search.
-/// - Light: how much brighter one symbol is than the other, each compared with the mean of its letter. On one surface
-///   it is drawn from Student's t, as wide as the links of this frame; across an edge from a broad normal law. Light
-///   never speaks for one surface, as two surfaces may be lit alike.
+/// - Slip: difference between a step along a line and the step behind it, along the epipolar line. On one surface it
+///   follows Student's t. Its width comes from what depth cannot cause (the difference across the epipolar line) and
+///   from the surface's bend so far. Across an edge the slip is anywhere within the search.
+/// - Light: ratio of the brightness of the two symbols, each relative to the mean of its letter. On one surface it
+///   follows Student's t, as wide as among this frame's links; across an edge, a broad normal distribution. Light
+///   never supports one surface, as two surfaces may be lit alike.
 /// @thread thread-bound: keeps its buffers
 class SurfaceLinks {
  public:
@@ -41,7 +41,7 @@ class SurfaceLinks {
 
   /// Returns a node's links by Direction; 0 for links without evidence.
   [[nodiscard]] const std::array<float, 4>& of(std::size_t node) const { return nats_[node]; }
-  /// Difference between the step on and the step behind, along the epipolar line, cells; NaN unless both are there.
+  /// Difference between the step ahead and the step behind, along the epipolar line, cells; NaN unless both exist.
   [[nodiscard]] float slip(std::size_t node, Direction d) const { return bends_[node][d % 2].x(); }
 
  private:
@@ -52,9 +52,10 @@ class SurfaceLinks {
   void add_light(const NodesSeen& seen, const CellGrid& grid);
 
   float pitch_px_;
-  std::vector<std::array<Eigen::Vector2f, 2>> bends_;  // along rows and columns: along the epipolar line, and across
+  std::vector<std::array<Eigen::Vector2f, 2>> bends_;  // along rows and columns: components along the epipolar line,
+                                                       // and across
   std::vector<std::array<float, 4>> nats_;
-  std::vector<float> light_;  // of each node, logarithm, less its letter's mean; NaN where it is not known
+  std::vector<float> light_;  // for each node, logarithm, less its letter's mean; NaN if unknown
   std::vector<float> sample_;
 };
 

@@ -51,8 +51,8 @@ std::uint8_t median(std::uint8_t a, std::uint8_t b, std::uint8_t c) {
   return std::max(std::min(a, b), std::min(std::max(a, b), c));
 }
 
-// The median of nine is the median of: the greatest of the three columns' least, the median of their medians, the least
-// of their greatest.
+// Median of nine: the median of three values, which are the greatest of the columns' minima, the median of their
+// medians, and the least of their maxima.
 std::uint8_t median_around(const std::array<const std::uint8_t*, 3>& rows, const std::array<int, 3>& columns) {
   std::uint8_t greatest_least = 0, least_greatest = 255;
   std::array<std::uint8_t, 3> middle{};

@@ -12,18 +12,17 @@ namespace slsd {
 
 using Histogram = std::array<std::uint32_t, 256>;
 
-/// The grey value up to which pixels are dark, so that the variance between the dark and the lit is greatest; the
-/// lowest such value.
-/// Otsu 1979; Elahi et al. 2020, section III A.
-/// @return 0 where all pixels are equal
+/// Otsu's threshold: the highest grey value of dark pixels that gives the greatest variance between dark and lit; the
+/// lowest such value on a tie. Otsu 1979; Elahi et al. 2020, section III A.
+/// @return 0 if all pixels are equal
 /// @thread reentrant
 [[nodiscard]] int otsu_threshold(const Histogram& histogram);
 
-/// Separates lit from dark the paper's way: contrast stretched between the darkest and the lightest 0.1 %, noise
-/// removed by a 3x3 median, one threshold for the whole frame by Otsu's method. Fails where light falls off over the
+/// Separates lit from dark by the paper's method: stretches the contrast between the darkest and the lightest 0.1 %,
+/// removes noise by a 3x3 median, and applies one Otsu threshold to the whole frame. Fails if light falls off over the
 /// frame. Elahi et al. 2020, section III A.
 /// @param frame  8 or 16 bits a pixel
-/// @return all dark for a frame of one grey value
+/// @return all dark if all pixels of the frame are equal
 /// @thread reentrant
 [[nodiscard]] Mask binarize_paper(const GreyView& frame);
 

@@ -14,8 +14,7 @@ namespace {
 
 using std::numbers::pi;
 
-// How far the values of two symbols have to be apart for a descriptor to tell them apart: about what blur and the
-// raster of pixels do to it.
+// Smallest difference in a descriptor that separates two symbols: about the effect of blur and of the pixel grid.
 constexpr ComparedDescriptors kSeparation{0.15, 0.3, 0.2, 0.15, 1.0, 0.15, 0.15, 0.05, 0.5};
 constexpr double kSeparationRad = pi / 8;
 

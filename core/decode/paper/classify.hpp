@@ -12,7 +12,7 @@
 
 namespace slsd {
 
-/// The ten descriptors as they are compared with thresholds: free of scale.
+/// The ten descriptors as they are compared with thresholds, independent of scale.
 ///
 /// rectangularity, eccentricity, aspect ratio, convex to area, perimeter to area times equivalent diameter, area and
 /// equivalent diameter as shares of the cell's, filled area ratio, Euler number; the tenth, orientation, stands apart
@@ -31,12 +31,11 @@ struct LetterThresholds {
   };
   std::array<Interval, kComparedCount> intervals;
   double orientation_rad = 0;     ///< the symbol's orientation as it is drawn
-  double orientation_margin_rad;  ///< half the interval around it, modulo pi; pi where the symbol carries no direction
+  double orientation_margin_rad;  ///< half the interval around it, modulo pi; pi if the symbol has no direction
 };
 
-/// The thresholds of the paper's table 6 for any choice of symbols: between two that a descriptor tells apart, midway
-/// between their values as they are drawn.
-/// Elahi et al. 2020, sections III D and IV.
+/// The thresholds of the paper's table 6 for any choice of symbols. They lie midway between the values of two drawn
+/// symbols that a descriptor separates. Elahi et al. 2020, sections III D and IV.
 /// @param symbols  numbers 1 to 25; the letter is the index
 /// @param size_px  one of kSymbolSizesPx
 /// @errors kUnsupported: two of the symbols have the same descriptors; the message names them

@@ -18,14 +18,13 @@ struct ArrayCell {
   friend bool operator==(const ArrayCell&, const ArrayCell&) = default;
 };
 
-/// Finds each region's cell the paper's way: each region starts a 3x3 window to the right and down along the links; a
-/// window whose codeword is one of the array's, exactly, gives its nine regions their cells. The paper has no rule for
-/// a codeword that occurs several times, nor for windows that disagree: the first of the array, and the first window in
-/// the order of the regions, stand.
-/// Elahi et al. 2020, section III G.
+/// Finds each region's cell by the paper's method. Each region starts a 3x3 window to the right and down along the
+/// links. If the window's codeword is exactly one of the array's, its nine regions get their cells. The paper has no
+/// rule for repeated codewords or for windows that disagree. Here the array's first occurrence, and the first window in
+/// the order of the regions, count. Elahi et al. 2020, section III G.
 /// @param letters  of each region, or -1
-/// @param links    as of link_grid_paper, of the same length
-/// @return         one to a region, in its order; nothing where no window names it
+/// @param links    from link_grid_paper, of the same length
+/// @return         one for each region, in order; empty if no window names its cell
 /// @thread reentrant
 [[nodiscard]] std::vector<std::optional<ArrayCell>> decode_windows_paper(std::span<const int> letters,
                                                                          std::span<const Links> links,

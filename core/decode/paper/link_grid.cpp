@@ -23,7 +23,7 @@ struct Neighbourhood {
   std::optional<double> grid_px;
 };
 
-// Modulo pi, so that it is the upright one of the two that moments cannot tell apart.
+// Modulo pi: moments cannot distinguish the two directions, so take the upright one.
 double direction_of(const Descriptors& shape, const PaperGrid::Letter& letter) {
   return std::remainder(shape.orientation_rad - letter.orientation_rad, pi);
 }
@@ -45,7 +45,7 @@ std::vector<Neighbourhood> own_neighbourhoods(std::span<const PaperRegion> regio
   return own;
 }
 
-// The value of the closest region that has it, within the range (equation (10)).
+// The value of the closest region within the range that has one (equation (10)).
 template <class Member>
 std::optional<double> from_closest(std::span<const PaperRegion> regions, const std::vector<Neighbourhood>& own,
                                    std::size_t region, Member member, double range_px) {
@@ -64,7 +64,7 @@ void complete(std::span<const PaperRegion> regions, const PaperGrid& grid, std::
   const std::vector<Neighbourhood> own = all;
   for (std::size_t i = 0; i < regions.size(); ++i) {
     if (regions[i].letter < 0) continue;
-    // A symbol that does not fill its cell is smaller, so its own distance would cut the range short.
+    // A symbol that does not fill its cell is smaller, so its own grid distance would make the range too short.
     const double longest_px = 2 * grid_distance(regions[i].shape, grid.spacing_to_size);
     const double range_px = kCloseRange * own[i].grid_px.value_or(longest_px);
     if (!own[i].grid_px) all[i].grid_px = from_closest(regions, own, i, &Neighbourhood::grid_px, range_px);

@@ -9,7 +9,7 @@
 namespace slsd {
 namespace {
 
-/// All but certain of the letter that the thresholds name; what is like none of them is nothing at all.
+/// Classifies as the letter that the thresholds name, with near certainty; without a letter, as no symbol at all.
 Classification certain(int letter, int letters) {
   Classification shape;
   shape.letter = static_cast<std::int8_t>(letter);

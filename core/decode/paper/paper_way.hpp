@@ -13,16 +13,16 @@
 
 namespace slsd {
 
-/// The paper's way of the stages from the descriptors to the codewords, between the same inputs and outputs as the
-/// decoder's own.
+/// The paper's method for the stages from the descriptors to the codewords, with the inputs and outputs of the
+/// decoder's own stages.
 /// @thread thread-bound: keeps its buffers
 class PaperWay {
  public:
-  /// @errors kUnsupported: thresholds cannot tell two of the pattern's symbols apart
+  /// @errors kUnsupported: thresholds cannot separate two of the pattern's symbols
   [[nodiscard]] static Result<PaperWay> create(const Pattern& pattern);
 
   /// The ten descriptors of every sighting.
-  /// @param centre  kPaper: centroids of the masks too, equations (7) and (8)
+  /// @param centre  kPaper: also the centroids of the masks, equations (7) and (8)
   void describe(const Regions& regions, Sightings& seen, Method centre);
   /// Letters by thresholds.
   /// @param side_px  of a symbol's square in the camera
@@ -38,7 +38,7 @@ class PaperWay {
   Pattern pattern_;
   std::vector<LetterThresholds> thresholds_;
   PaperGrid grid_;
-  std::vector<PaperRegion> described_;  // one to a sighting
+  std::vector<PaperRegion> described_;  // one for each sighting
   Image<std::int32_t> labels_;
 };
 

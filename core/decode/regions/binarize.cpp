@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kRowsAlike = 4;
 
-/// Least and greatest of each column of a band of rows, one row more.
+/// Minimum and maximum of each column over a band of rows, updated with one more row.
 template <class T>
 inline __attribute__((always_inline)) void extend_columns(const T* pixels, int width, T* least, T* greatest) {
   for (int x = 0; x < width; ++x) {
@@ -52,8 +52,8 @@ inline __attribute__((always_inline)) T difference(T a, T b) {
   return static_cast<T>((a > b ? a : b) - (a > b ? b : a));
 }
 
-/// The greatest difference between the pixels two apart, across or down, of as many pixels from each on; the first and
-/// the last of the row have none.
+/// The greatest difference between pixels two apart, across or down, for each of `count` pixels; the row's first and
+/// last pixels have none.
 /// @param count  of those that are asked for; beyond the row there are none either
 template <class T>
 inline __attribute__((always_inline)) void find_steepest(const T* above, const T* row, const T* below, int width,
@@ -67,7 +67,7 @@ inline __attribute__((always_inline)) void find_steepest(const T* above, const T
   slide_greatest(steepest, count, length);
 }
 
-/// Binary places of a threshold; a line may run on for kLanes pixels beyond a tile without leaving 31 bits.
+/// Binary fraction digits of a threshold. A line may continue for kLanes pixels beyond a tile and stay within 31 bits.
 template <class T>
 constexpr int kFractionBits = sizeof(T) == 1 ? 20 : 12;
 
@@ -85,12 +85,12 @@ inline __attribute__((always_inline)) void store_pixels(const IntLanes& lanes, s
 }
 
 struct ThresholdLine {
-  const int *at_centre, *step;  // one to a tile
+  const int *at_centre, *step;  // one for each tile
   int tiles, tile_px;
 };
 
-/// Draws from the centre of the first tile to that of the last, kLanes pixels at a time. The last pixels of a tile may
-/// lie beyond its end, where the next tile's follow.
+/// Interpolates from the centre of the first tile to that of the last, kLanes pixels at a time. The last pixels may lie
+/// beyond a tile's end; the next tile overwrites them.
 template <class T>
 inline __attribute__((always_inline)) void draw_line(const ThresholdLine& line, T* threshold) {
   for (int tile = 0; tile + 1 < line.tiles; ++tile) {
@@ -101,7 +101,7 @@ inline __attribute__((always_inline)) void draw_line(const ThresholdLine& line, 
   }
 }
 
-/// Combines each tile with its eight neighbours. The tiles have a border of one all round, whose values do not count.
+/// Combines each tile with its eight neighbours. The tiles have a border one tile wide, whose values are ignored.
 template <class Operation>
 void combine_3x3(const std::vector<float>& tiles, int stride, Operation operation, std::vector<float>& across,
                  std::vector<float>& combined) {
@@ -242,12 +242,12 @@ float Binarizer::measure_edge_blur(const ImageView<T>& frame, std::vector<T>& st
   const auto sharp =
       steepness_.begin() + static_cast<std::ptrdiff_t>(kSharpShare * static_cast<float>(steepness_.size() - 1));
   std::ranges::nth_element(steepness_, sharp);
-  // A step blurred by a Gaussian is steepest with 1 / (sqrt(2 pi) sigma) of its height to a pixel.
+  // A step blurred by a Gaussian has its steepest slope, 1 / (sqrt(2 pi) sigma) of its height per pixel, at the middle.
   return *sharp > 0 ? 0.399F / *sharp : 0;
 }
 
-/// Tile centres carry the thresholds; between them they are interpolated in both directions, and rounded down: what is
-/// above the whole number is above the threshold.
+/// Interpolates thresholds bilinearly between tile centres, rounded down: a pixel above the whole number is above the
+/// threshold.
 template <class T>
 void Binarizer::interpolate_row(int y, int width, Buffers& buffers, T* threshold) const {
   constexpr float kUnit = 1 << kFractionBits<T>;
@@ -264,12 +264,12 @@ void Binarizer::interpolate_row(int y, int width, Buffers& buffers, T* threshold
   for (int column = 0; column < columns_; ++column) {
     at_centre[column] = static_cast<int>((upper[column] + fraction * (lower[column] - upper[column])) * kUnit);
   }
-  // Not divided by the tile in whole numbers, which takes longer than all the rest.
+  // Multiply by the inverse: an integer division takes longer than all the rest.
   const float per_px = 1 / static_cast<float>(tile);
   for (int column = 0; column + 1 < columns_; ++column) {
     step[column] = static_cast<int>(static_cast<float>(at_centre[column + 1] - at_centre[column]) * per_px);
   }
-  // Flat before the first centre and after the last.
+  // Constant before the first centre and after the last.
   const int first = tile / 2, last = first + (columns_ - 1) * tile;
   std::fill_n(threshold, std::min(first, width), static_cast<T>(at_centre.front() >> kFractionBits<T>));
   Cloned<draw_line<T>>::call({at_centre.data(), step.data(), columns_, tile}, threshold + first);

@@ -16,43 +16,44 @@
 namespace slsd {
 
 struct BinarizeOptions {
-  /// Side of a tile in camera pixels. A threshold is taken from 3x3 tiles, which have to hold a symbol and a gap: half
-  /// the pitch of the grid as the camera sees it.
+  /// Side of a tile in camera pixels. A threshold comes from 3x3 tiles, which have to contain a symbol and a gap: half
+  /// the pitch of the grid in the camera.
   int tile_px = 12;
   /// Threshold's place between dark and light. Below the middle, a symbol whose parts touch at a corner stays in one
   /// piece; at the middle, neighbours less than two pixels apart stay separate.
   float level = 0.5F;
-  /// Smallest difference between light and dark that is taken for the pattern, of 255 levels.
+  /// Smallest difference between light and dark that counts as the pattern, of 255 levels.
   int contrast_min = 5;
-  /// The same in standard deviations of the noise that the frame has midway between them: the range that plain noise
-  /// spans in a window, and some more.
+  /// The same in standard deviations of the noise midway between them: somewhat more than the range that noise alone
+  /// spans in a window.
   float contrast_min_sigma = 9;
 };
 
-/// Separates lit from dark by a threshold midway between the least and the greatest grey value around each pixel,
-/// interpolated between tiles: it follows light that falls off over the frame, where one threshold for all cannot.
+/// Separates lit from dark by a local threshold, midway between the least and the greatest grey value around each pixel
+/// and interpolated between tiles. Unlike one global threshold, it follows light that falls off over the frame.
 /// @thread thread-bound: keeps its buffers
 class Binarizer {
  public:
   explicit Binarizer(BinarizeOptions options) : options_(options) {}
 
   /// @param full  the level of a saturated pixel of the frame
-  /// @param mask  becomes of the frame's size
+  /// @param mask  resized to the frame
   void binarize(const GreyView& frame, double full, Mask& mask, Executor& executor) {
     binarize(frame, full, std::nullopt, mask, executor);
   }
-  /// @param noise  of the frame where it is known
+  /// @param noise  noise of the frame, if known
   void binarize(const GreyView& frame, double full, std::optional<FrameNoise> noise, Mask& mask, Executor& executor);
 
   [[nodiscard]] const BinarizeOptions& options() const { return options_; }
-  /// Least difference between light and dark that counted as the pattern in the last frame, at this grey level midway.
+  /// Smallest difference between light and dark that counted as the pattern in the last frame, if this grey level is
+  /// midway.
   [[nodiscard]] float contrast_min(float level) const {
     return std::max(contrast_floor_, options_.contrast_min_sigma * noise_.at(level));
   }
   /// Returns the noise of the last frame.
   [[nodiscard]] const FrameNoise& noise() const { return noise_; }
-  /// One standard deviation of the blur at the sharpest edges of the last frame, from how steep they are between its
-  /// tiles' least and greatest values; 0 where there are none.
+  /// Blur at the sharpest edges of the last frame, one standard deviation. It follows from their slope between the
+  /// tiles' least and greatest values; 0 if there are no edges.
   [[nodiscard]] float edge_blur_px() const { return edge_blur_px_; }
   /// Usual difference between light and dark of the pattern in the last frame, in standard deviations of the noise
   /// midway; 0 if there was none.
@@ -66,7 +67,7 @@ class Binarizer {
   /// Buffers of one worker.
   struct Buffers {
     std::tuple<RowBuffers<std::uint8_t>, RowBuffers<std::uint16_t>> rows;
-    std::vector<int> at_centre, step;  // of a row of thresholds, binary fractions
+    std::vector<int> at_centre, step;  // for a row of thresholds, binary fractions
   };
   template <class T>
   void binarize_as(const ImageView<T>& frame, double full, std::optional<FrameNoise> noise, Mask& mask,
@@ -85,8 +86,8 @@ class Binarizer {
   BinarizeOptions options_;
   FrameNoise noise_;
   float contrast_floor_ = 0, edge_blur_px_ = 0, usual_contrast_sigma_ = 0;
-  int columns_ = 0, rows_ = 0;  // of tiles
-  int stride_ = 0;              // of the tiles with a border of one all round
+  int columns_ = 0, rows_ = 0;  // number of tiles
+  int stride_ = 0;              // columns of the tiles with a border of one all round
   std::vector<float> least_, greatest_, across_, low_, high_, midway_, threshold_;
   std::vector<float> steepness_, contrasts_;
   std::vector<Buffers> buffers_;

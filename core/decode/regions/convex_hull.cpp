@@ -33,7 +33,7 @@ std::vector<Point> outer_corners(const ImageView<std::uint8_t>& mask) {
   return corners;
 }
 
-// Appends to a chain that turns one way only.
+// Appends to a chain that turns in one direction only.
 void extend(std::vector<Point>& chain, std::size_t fixed, const Point& point) {
   while (chain.size() > fixed + 1 && cross(chain.back() - chain[chain.size() - 2], point - chain.back()) <= 0) {
     chain.pop_back();

@@ -23,7 +23,7 @@ bool lit(const Mask& mask, int x, int y) {
 struct Moments {
   double m00 = 0;
   Eigen::Vector2d centroid{0, 0};
-  double mu20 = 0, mu11 = 0, mu02 = 0;  // over m00
+  double mu20 = 0, mu11 = 0, mu02 = 0;  // divided by m00
 };
 
 Moments measure_moments(const Mask& mask) {
@@ -56,7 +56,7 @@ double orientation_rad(const Moments& m) {
   return angle <= -std::numbers::pi / 2 ? angle + std::numbers::pi : angle;
 }
 
-// How many 2x2 neighbourhoods hold which number of lit pixels.
+// Counts of 2x2 neighbourhoods by their number of lit pixels.
 struct BitQuads {
   int one = 0, adjacent = 0, three = 0, diagonal = 0;
 
@@ -79,7 +79,7 @@ BitQuads count_quads(const Mask& mask) {
   return quads;
 }
 
-// Lit pixels and holes: what a flood from the outside, over 4-connected dark pixels, does not reach.
+// Lit pixels and holes: everything that a flood fill from outside over 4-connected dark pixels does not reach.
 double filled_area(const Mask& mask) {
   const int width = mask.width + 2, height = mask.height + 2;
   std::vector<char> outside(static_cast<std::size_t>(width) * height, 0);

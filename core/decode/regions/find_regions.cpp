@@ -11,13 +11,14 @@
 namespace slsd {
 namespace {
 
-/// Ends of runs that are written at once, whether there are as many or not: what lies beyond is written over.
+/// Number of run ends written at once, even if there are fewer: the next write overwrites the excess.
 constexpr int kEndsAtOnce = 6;
 
-/// Writes where the runs of a row begin and end, in turn; the caller has room for an end at every pixel and some more.
+/// Writes the starts and ends of the runs of a row, alternating. The caller has room for an end at every pixel and some
+/// more.
 /// @return the number of runs
 inline __attribute__((always_inline)) int find_ends(const std::uint64_t* words, int width, std::uint16_t* ends) {
-  constexpr std::uint64_t kLast = std::uint64_t{1} << (Mask::kWordPx - 1);  // so that there is always one to count to
+  constexpr std::uint64_t kLast = std::uint64_t{1} << (Mask::kWordPx - 1);  // so that there is always a bit to count to
   std::uint16_t* const first = ends;
   std::uint64_t last = 0;
   for (int x = 0; x < width; x += Mask::kWordPx) {
@@ -58,8 +59,7 @@ std::int32_t RegionFinder::join(Labels& labels, std::int32_t a, std::int32_t b) 
   return labels[std::max(first, second)].parent = std::min(first, second);
 }
 
-/// Gives each run the label of the runs that it touches in the row above, all made one; a new label where it touches
-/// none.
+/// Gives each run the merged label of the runs that it touches in the row above, or a new label if it touches none.
 /// @param first_above  the first run of the row above
 void RegionFinder::label_row(int y, int runs, const std::uint16_t* above_ends, const std::uint16_t* ends,
                              std::size_t first_above, Band& band) {
@@ -97,7 +97,7 @@ void RegionFinder::label_rows(const Mask& mask, int top, int bottom, Band& band)
   for (int y = top; y < bottom; ++y) {
     const int runs = Cloned<find_ends>::call(mask.row(y), mask.width(), row);
     row[2 * runs] = row[2 * runs + 1] = kBeyond;
-    // With one more, which is read and not used.
+    // One extra element, which is read but not used.
     if (band.runs.size() < band.run_count + row_max + 1) {
       band.runs.resize(2 * (band.run_count + row_max + 1));
       band.label_of_run.resize(band.runs.size());
@@ -110,7 +110,7 @@ void RegionFinder::label_rows(const Mask& mask, int top, int bottom, Band& band)
   }
 }
 
-/// Collects the labels in the order of the bands, and so of their first pixels.
+/// Collects the labels in the order of the bands, which is also the order of their first pixels.
 void RegionFinder::collect_labels(std::span<Band> bands) {
   labels_.clear();
   for (Band& band : bands) {
@@ -129,8 +129,8 @@ void RegionFinder::join_bands(const Band& above, const Band& below) {
   }
 }
 
-/// One region to each label that is its own parent, in the order of the labels: that of their first pixels. From here
-/// on a label's parent is the number of its region.
+/// Makes one region from each label that is its own parent, in the order of the labels, and so of their first pixels.
+/// From here on, a label's parent is the number of its region.
 void RegionFinder::number_regions(Regions& found) {
   found.regions.clear();
   for (std::size_t i = 0; i < labels_.size(); ++i) {
@@ -145,8 +145,8 @@ void RegionFinder::number_regions(Regions& found) {
   }
 }
 
-/// Places each band's runs of each region. From here on a label's parent is the first label of its region in its band,
-/// which keeps that place.
+/// Places each band's runs of each region. From here on, a label's parent is the first label of its region in its band,
+/// which stores the write position.
 void RegionFinder::place_runs(std::span<const Band> bands, Regions& found) {
   std::int32_t next = 0;
   cursor_.clear();

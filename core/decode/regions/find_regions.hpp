@@ -13,7 +13,7 @@
 
 namespace slsd {
 
-/// Lit pixels left to right - 1 of a row. Copied as one number.
+/// Lit pixels left to right - 1 of a row. Aligned so that it is copied as one number.
 struct alignas(8) Run {
   std::int16_t row, left, right;
 };
@@ -36,7 +36,7 @@ struct Regions {
   std::vector<Region> regions;
   std::vector<Run> runs;
 
-  /// Adds a region of another set.
+  /// Adds a region from another set.
   void append(const Region& region, std::span<const Run> region_runs) {
     regions.push_back(region);
     regions.back().first_run = static_cast<int>(runs.size());
@@ -48,8 +48,8 @@ struct Regions {
   }
 };
 
-/// Labels 8-connected regions by runs and union-find (Haralick and Shapiro's local table method, on runs), bands of
-/// rows by themselves, which are then joined.
+/// Labels 8-connected regions by runs and union-find (Haralick and Shapiro's local table method, on runs). Bands of
+/// rows are labelled separately and then joined.
 /// @thread thread-bound: keeps its buffers
 class RegionFinder {
  public:
@@ -61,18 +61,18 @@ class RegionFinder {
   }
 
  private:
-  /// A part of a region, found row by row; its parent is not above it: labels of one region have one root.
+  /// A part of a region, found row by row. Its parent has no higher number, so labels of one region share a root.
   struct Label {
     std::int32_t parent, runs;
   };
   using Labels = std::vector<Label>;
   struct Band {
-    std::vector<std::uint16_t> ends[2];  // of a row's runs, left and right in turn, then of one beyond every other
-    std::vector<Run> runs;               // run_count of them, then room for more
+    std::vector<std::uint16_t> ends[2];  // a row's runs, alternating left and right, then one run beyond all others
+    std::vector<Run> runs;               // run_count runs, then spare room
     std::vector<std::int32_t> label_of_run;
     Labels labels;
     std::size_t run_count = 0, first_row_runs = 0, first_of_last_row = 0;
-    std::int32_t first_label = 0;  // among those of all bands
+    std::int32_t first_label = 0;  // index among the labels of all bands
   };
   static void label_rows(const Mask& mask, int top, int bottom, Band& band);
   static void label_row(int y, int runs, const std::uint16_t* above_ends, const std::uint16_t* ends,
@@ -86,9 +86,9 @@ class RegionFinder {
   void gather(const Band& band, Regions& found);
 
   std::vector<Band> bands_;
-  Labels labels_;                              // of all bands
-  std::vector<std::int32_t> next_run_;         // of each label that is the first of its region in its band
-  std::vector<std::int32_t> holder_, cursor_;  // of each region
+  Labels labels_;                              // labels of all bands
+  std::vector<std::int32_t> next_run_;         // for each label that is the first of its region in its band
+  std::vector<std::int32_t> holder_, cursor_;  // for each region
 };
 
 }  // namespace slsd

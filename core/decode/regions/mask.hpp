@@ -16,7 +16,7 @@
 
 namespace slsd {
 
-/// The lit pixels of a frame, one bit for each: so small that it stays in the cache between the stages.
+/// The lit pixels of a frame, one bit each, so that the mask stays in the cache between stages.
 /// @thread reentrant
 class Mask {
  public:
@@ -26,7 +26,7 @@ class Mask {
   /// All dark.
   Mask(int width, int height)
       : words_(static_cast<std::size_t>(words_across(width)) * height), width_(width), height_(height) {}
-  /// Makes it all dark and of this size, in the memory that it has.
+  /// Resizes the mask and makes it all dark; reuses its memory.
   void clear(int width, int height) {
     words_.assign(static_cast<std::size_t>(words_across(width)) * height, 0);
     width_ = width, height_ = height;
@@ -38,7 +38,7 @@ class Mask {
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] bool at(int x, int y) const { return (row(y)[x / kWordPx] >> (x % kWordPx) & 1U) != 0; }
-  /// The first pixel is the lowest bit of the first word; what lies beyond the last one is dark.
+  /// The first pixel is the lowest bit of the first word; bits beyond the last pixel are dark.
   [[nodiscard]] std::uint64_t* row(int y) {
     return words_.data() + static_cast<std::ptrdiff_t>(y) * words_across(width_);
   }
@@ -54,7 +54,7 @@ class Mask {
   int width_ = 0, height_ = 0;
 };
 
-/// The top bits of as many bytes as a word of a mask has pixels, the first in the lowest bit.
+/// The top bits of as many bytes as a mask word has pixels, the first byte in the lowest bit.
 static inline __attribute__((always_inline)) std::uint64_t top_bits(const std::uint8_t* bytes) {
   std::uint64_t bits = 0;
 #ifdef __SSE2__
@@ -64,7 +64,7 @@ static inline __attribute__((always_inline)) std::uint64_t top_bits(const std::u
     bits |= static_cast<std::uint64_t>(static_cast<std::uint32_t>(tops)) << i;
   }
 #else
-  // The product moves the top bits of eight bytes side by side; the first byte in memory is the lowest.
+  // The multiplication gathers the top bits of eight bytes; the first byte in memory is the lowest.
   static_assert(std::endian::native == std::endian::little);
   constexpr int kAtOnce = 8;
   for (int i = 0; i < Mask::kWordPx; i += kAtOnce) {

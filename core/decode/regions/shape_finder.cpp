@@ -16,14 +16,14 @@ constexpr float kAreaMin = 0.08F;
 constexpr float kAreaMax = 1.1F;
 constexpr int kAreaMinPx = 6;
 constexpr float kExtentMax = 1.5F;  // of a cell's side
-/// Blur up to which the prototypes know how symbols look; what of more is undone, rather less than too much, as
-/// sharpening by too much makes ripples; and how much at the most, of a symbol's side.
+/// Blur that the prototypes still cover. Sharpening removes the excess, and rather too little than too much, as
+/// oversharpening causes ripples. The last limit is the largest amount, as a share of a symbol's side.
 constexpr float kBlurMinPx = 1.9F;
 constexpr float kBlurUndone = 0.85F;
 constexpr float kBlurMax = 0.2F;
 /// Usual contrast of the light, in standard deviations of the noise, below which noise hides half of it.
 constexpr float kFaintSigma = 18;
-/// Difference between a region's peak and its background, of 255 levels.
+/// Smallest difference between a region's peak and its background, of 255 levels.
 constexpr float kContrastMin = static_cast<float>(BinarizeOptions().contrast_min);
 
 BinarizeOptions binarize_options(const PatternOptions& pattern, float scale) {
@@ -58,7 +58,7 @@ GreyView ShapeFinder::binarize(const GreyView& frame, double full, Executor& exe
   binarizer_.binarize(frame, full, noise, mask_, executor);
   noise_ = binarizer_.noise();
   if (binarizer_.edge_blur_px() >= kBlurMinPx) return binarize_blurred(frame, full, executor);
-  // A frame without any contrast is empty, unless the reader knows that the noise may drown all of the pattern.
+  // A frame without contrast is empty, unless the reader knows that noise may hide the whole pattern.
   const float contrast_sigma = binarizer_.usual_contrast_sigma();
   const bool is_faint = contrast_sigma > 0 ? contrast_sigma < kFaintSigma : noise.has_value();
   return is_faint ? binarize_faint(frame, full, executor) : frame;
@@ -74,8 +74,8 @@ GreyView ShapeFinder::binarize_blurred(const GreyView& frame, double full, Execu
   return sharp;
 }
 
-/// Smooths and binarizes a faint frame. The noise that is left is correlated between pixels: stages that sum over a
-/// symbol get all of it, and the mask alone gets less.
+/// Smooths and binarizes a faint frame. The remaining noise is correlated between pixels: stages that sum over a symbol
+/// get all of it; the mask alone gets less.
 GreyView ShapeFinder::binarize_faint(const GreyView& frame, double full, Executor& executor) {
   const GreyView smooth = sharpener_.smooth(frame, full).view();
   frame_levels_ = kSharpenedFull / 255;

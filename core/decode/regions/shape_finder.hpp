@@ -19,37 +19,37 @@
 
 namespace slsd {
 
-/// The first stages of a frame, from the grey values to the shapes that may be symbols by their size and contrast:
-/// whatever symbols the pattern has.
+/// The first stages of a frame, from the grey values to the shapes whose size and contrast may be those of symbols.
+/// They do not depend on the pattern's choice of symbols.
 /// @thread thread-bound
 class ShapeFinder {
  public:
-  /// @param expected  how the pattern lies in the frame, to half a step of the grid
+  /// @param expected  local frames of the pattern, to half a step of the grid
   ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected, Method binarize, Method find_regions,
               Rules rules = {});
 
-  /// Sets expected frames of the same scale, to an eighth.
+  /// Replaces the expected frames by others of the same scale, to an eighth.
   void expect(ExpectedFrames expected) { expected_ = std::move(expected); }
   [[nodiscard]] const ExpectedFrames& expected() const { return expected_; }
 
-  /// A frame that is out of focus is sharpened before.
+  /// Sharpens a frame that is out of focus first.
   /// @param full  the level of a saturated pixel of the frame
-  /// @return      what the stages that follow have to look at, the frame itself or as it was sharpened; stands until
-  ///              the next call
-  /// @param noise  of the frame if it is known better than it can be measured
+  /// @return      the image for the later stages, which is the frame itself or its sharpened copy; valid until the next
+  ///              call
+  /// @param noise  noise of the frame, if it is known better than it can be measured
   GreyView binarize(const GreyView& frame, double full, Executor& executor,
                     const std::optional<FrameNoise>& noise = std::nullopt);
   void find_regions(const GreyView& frame, Executor& executor);
-  /// Puts the shapes that may be symbols into the sightings, in place of what was there.
+  /// Replaces the sightings by the shapes that may be symbols.
   void describe(const GreyView& frame, Executor& executor, Sightings& seen);
 
   [[nodiscard]] const Mask& mask() const { return mask_; }
   [[nodiscard]] const Regions& regions() const { return regions_; }
   /// Reason why a region is no sighting; kNoNeighbour for a sighting.
   [[nodiscard]] DecodeRule rule(std::size_t region) const { return rule_[region]; }
-  /// One to a worker.
+  /// One for each worker.
   [[nodiscard]] std::span<GreyMomentMeter> meters() { return meters_; }
-  /// Levels of the frame for one of 255.
+  /// Levels of the frame per level of 255.
   [[nodiscard]] float frame_levels() const { return frame_levels_; }
   /// Returns the noise of the frame that binarize() returned.
   [[nodiscard]] const FrameNoise& noise() const { return noise_; }

@@ -11,12 +11,12 @@
 namespace slsd {
 namespace {
 
-constexpr float kLeftPx = 1;  // of the blur, as a camera in focus has
+constexpr float kLeftPx = 1;  // remaining blur, as of a camera in focus
 constexpr float kNoiseShare = 0.1F;
-constexpr float kReach = 6;  // in standard deviations; cut off sooner, the filter is another
+constexpr float kReach = 6;  // in standard deviations; a shorter kernel would change the filter
 constexpr float kHighest = 65535;
 
-/// The filter's weights from its middle outwards; altogether they make 1.
+/// The filter's weights from its middle outwards; the whole kernel sums to 1.
 std::vector<float> wiener_weights(float blur_px) {
   constexpr int kSteps = 512;
   const int reach = static_cast<int>(std::ceil(kReach * blur_px)) + 1;
@@ -36,7 +36,7 @@ std::vector<float> wiener_weights(float blur_px) {
   return weights;
 }
 
-/// @param padded  as many pixels before the first of the row and after the last as the filter reaches
+/// @param padded  the row with a border on both sides as wide as the filter's reach
 inline __attribute__((always_inline)) void filter_row(const float* padded, const float* weights, int reach, int width,
                                                       float* filtered) {
   const float* middle = padded + reach;
@@ -61,7 +61,7 @@ void Sharpener::filter(const ImageView<T>& frame, float scale) {
   padded_.resize(width + 2 * static_cast<std::size_t>(reach));
   rows_.resize(static_cast<std::size_t>(kept) * width);
   sum_.resize(width);
-  // Filtered rows, of which as many are kept as a column's filter needs.
+  // Keeps as many filtered rows as a column's filter needs.
   const auto kept_row = [&](int y) {
     return rows_.data() + static_cast<std::ptrdiff_t>(std::clamp(y, 0, height - 1) % kept) * width;
   };

@@ -4,8 +4,8 @@
 
 namespace slsd {
 
-/// Replaces each value by the best of `length` from it on, by doubling: of one, two, four, and at last of two windows
-/// that overlap. The last ones, with fewer after them, are left unfinished.
+/// Replaces each value by the best of the next `length` values, by doubling: windows of one, two, four, and at last two
+/// overlapping windows. The last values, with fewer after them, stay incomplete.
 template <class T, class Better>
 inline __attribute__((always_inline)) void slide(T* values, int count, int length, Better better) {
   int window = 1;

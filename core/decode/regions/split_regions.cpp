@@ -13,7 +13,7 @@ constexpr float kNone = std::numeric_limits<float>::lowest();
 
 }  // namespace
 
-/// Appends the parts of a region, one or more, and empties it; leaves it alone where there is nothing to part it by.
+/// Appends the parts of a region, one or more, and empties it. Leaves the region alone if nothing separates it.
 void RegionSplitter::split(const GreyView& frame, float contrast_min, std::size_t index, Regions& regions) {
   const Region region = regions.regions[index];
   std::visit([&](const auto& view) { find_parts(view, region, regions.runs_of(region), contrast_min); }, frame);
@@ -49,7 +49,7 @@ void RegionSplitter::measure_tiles(const ImageView<T>& frame, const Region& regi
   }
 }
 
-/// Sets thresholds as binarize does: midway in three by three tiles, then the mean of three by three of these.
+/// Sets thresholds as binarize does: midway within 3x3 tiles, then the mean of 3x3 of these.
 void RegionSplitter::set_thresholds(float contrast_min) {
   midway_.assign(tiles_.size(), kNone);
   threshold_.assign(tiles_.size(), 0);
@@ -77,7 +77,7 @@ void RegionSplitter::set_thresholds(float contrast_min) {
   }
 }
 
-/// Lights what is above the thresholds, interpolated between the tiles' centres.
+/// Lights pixels above the thresholds, interpolated between the tiles' centres.
 template <class T>
 void RegionSplitter::compare(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
   const auto tile = static_cast<float>(options_.tile_px);

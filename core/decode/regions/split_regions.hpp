@@ -13,22 +13,22 @@ namespace slsd {
 struct SplitOptions {
   /// Side of a tile in camera pixels, as for binarize.
   int tile_px = 12;
-  /// Threshold's place between the least and the greatest grey value of the region's own pixels nearby.
+  /// Threshold's place between the least and the greatest grey value of the region's pixels nearby.
   float level = 0.35F;
-  /// Number of attempts on pieces that did not split; each accepts gaps that are less dark.
+  /// Number of attempts on pieces that did not split; each attempt accepts brighter gaps.
   int rounds = 4;
 };
 
-/// Takes apart regions in which symbols have run together: where blur has filled the gaps between them, or where a lit
-/// surface ends before a dark background and all that is on it is bright. The threshold is found anew from the
-/// region's own pixels, tile by tile, so that what is dark beside it has no part, and light may fall off over it.
+/// Splits regions in which symbols have run together: blur has filled the gaps, or a lit surface ends before a dark
+/// background and everything on it is bright. The splitter computes new thresholds from the region's own pixels, tile
+/// by tile. So darkness beside the region has no influence, and light may fall off over it.
 /// @thread thread-bound: keeps its buffers
 class RegionSplitter {
  public:
   explicit RegionSplitter(SplitOptions options) : options_(options) {}
 
-  /// Takes every region apart that is `merged`; a part that is merged still, again.
-  /// @param contrast_min  between light and dark of what is taken apart, levels of the frame
+  /// Splits every `merged` region, and its parts as long as they are merged.
+  /// @param contrast_min  smallest difference between light and dark inside a region, levels of the frame
   /// @param merged        bool(const Region&)
   template <class Merged>
   void split_all(const GreyView& frame, float contrast_min, Regions& regions, Merged&& merged) {
@@ -66,7 +66,7 @@ class RegionSplitter {
   void visit_around(int column, int row, Visit&& visit) const;
 
   SplitOptions options_;
-  int columns_ = 0, rows_ = 0;  // of tiles
+  int columns_ = 0, rows_ = 0;  // number of tiles
   std::vector<TileRange> tiles_;
   std::vector<float> midway_, threshold_, line_;
   Mask mask_;

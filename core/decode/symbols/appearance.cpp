@@ -10,10 +10,10 @@
 namespace slsd {
 namespace {
 
-/// Errors of local frames: an expected one ignores the tilt of the surface; a measured one has noise and curvature.
+/// Errors of local frames: an expected frame ignores the tilt of the surface; a measured one has noise and curvature.
 constexpr float kExpectedFrameError = 0.15F;
 constexpr float kMeasuredFrameError = 0.05F;
-/// Standard deviations from the nearest prototype beyond which a shape is none of the pattern's.
+/// Distance from the nearest prototype, in standard deviations, beyond which a shape is none of the pattern's symbols.
 constexpr float kExpectedDistanceMax = 25;
 constexpr float kMeasuredDistanceMax = 20;
 

@@ -15,9 +15,10 @@
 
 namespace slsd {
 
-/// The look of a pattern's symbols, in the frames that the calibration expects and in those that their neighbours show.
+/// Look of a pattern's symbols, in the frames that the calibration predicts and in those measured from their
+/// neighbours.
 struct Appearance {
-  std::optional<float> blur_px;  ///< blur of projector and camera together, camera px; without it all blurs that occur
+  std::optional<float> blur_px;  ///< blur of projector and camera together, camera px; if missing, all blurs that occur
   std::vector<Prototype> as_expected, as_measured;
   Classifier expected, measured;
 
@@ -27,9 +28,9 @@ struct Appearance {
   Appearance(std::optional<float> blur, std::vector<std::vector<Prototype>>&& made);
 };
 
-/// Appearances at each blur that occurs. A soft threshold low enough for the light that print leaves of a symbol takes
-/// in more of a blurred symbol, too. The look of a symbol therefore depends on the blur.
-/// @thread reentrant: each appearance is made when it is first asked for, once for all who share this
+/// Appearances at each blur that occurs. The soft threshold is low, so that it includes faint light on print. It also
+/// includes more of a blurred symbol, so the look depends on the blur.
+/// @thread reentrant: each appearance is made on first use, once for all who share this object
 class Appearances {
  public:
   Appearances(const PatternOptions& pattern, float camera_px_per_projector_px);
@@ -38,13 +39,12 @@ class Appearances {
   [[nodiscard]] const Appearance& usual() const { return usual_; }
 
   static constexpr std::size_t kShapesMax = 512;
-  /// Finds the appearance in which half of the shapes are the likeliest; the usual one if there are too few to tell.
-  /// @param shapes  a sample of a frame's, in measured frames; kShapesMax of them are looked at
+  /// Finds the appearance in which half of the shapes are the likeliest; the usual one if there are too few shapes.
+  /// @param shapes  a sample from the frame, in measured frames; at most kShapesMax of them are used
   [[nodiscard]] const Appearance& likeliest(std::span<const ShapeFeatures> shapes) const;
 
  private:
-  /// Standard deviations, camera px: first of a drawn frame, then of lenses. Where symbols are larger than usual, blurs
-  /// are, too.
+  /// Standard deviations, camera px: first of a drawn frame, then of lenses. Larger symbols come with larger blurs.
   static constexpr std::array kBlursPx{0.2F, 0.45F, 0.7F, 1.0F, 1.4F, 2.0F};
   static constexpr float kUsualSymbolPx = 24;
   [[nodiscard]] const Appearance& at(std::size_t blur) const;

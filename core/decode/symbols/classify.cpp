@@ -14,11 +14,11 @@ namespace {
 
 static_assert(kFeatureCount == 8);  // the powers of Student's t
 constexpr float kDegreesOfFreedom = 4;
-constexpr float kFarthestSquared = 1e5F;  // farther than that all are equally unlikely, and a float's range ends
+constexpr float kFarthestSquared = 1e5F;  // beyond it all letters are equally unlikely, and floats run out of range
 
-/// Probability that a shape is another letter than the likeliest, for reasons that the prototypes lack: cut at an edge,
-/// torn, run together, printed on. It grows with the distance from the nearest prototype. Measured on drawn and
-/// rendered frames: docs/notes/2026-11-decoder.md has the table.
+/// Probability that a shape is another letter than the likeliest one, for reasons that the prototypes lack: cut at an
+/// edge, torn, run together, printed on. It grows with the distance from the nearest prototype. Measured on drawn and
+/// rendered frames: see the table in docs/notes/2026-11-decoder.md.
 constexpr float kDoubtMin = 0.01F, kDoubtMax = 0.5F;
 constexpr float kDoubtFrom = 2, kDoubtSlope = 0.12F;
 
@@ -29,8 +29,8 @@ struct Verdicts {
   IntLanes likeliest;    // the letter that has it; -1 where none is likely at all
 };
 
-/// Natural logarithms of positive numbers to 1e-6: the exponent's, and the mantissa's, which lies within a root of two
-/// from one, by the series of 2 artanh.
+/// Natural logarithms of positive numbers to 1e-6: the exponent's logarithm plus the mantissa's. The mantissa lies
+/// within a factor sqrt(2) of one, and its logarithm is the series of 2 artanh.
 inline __attribute__((always_inline)) void take_logarithms(const Lanes& of, Lanes& logarithms) {
   constexpr int kRootOfHalf = 0x3F3504F3, kExponentUnit = 1 << 23;
   constexpr float kLogTwo = 0.69314718F;
@@ -42,7 +42,7 @@ inline __attribute__((always_inline)) void take_logarithms(const Lanes& of, Lane
                2 * s * (1 + ss * (1 / 3.F + ss * (1 / 5.F + ss * (1 / 7.F + ss * (1 / 9.F)))));
 }
 
-/// Vectors have none of their own; of such a loop the compiler makes it.
+/// Vectors have no square root of their own; the compiler vectorizes this loop.
 inline __attribute__((always_inline)) void take_roots(const Lanes& of, Lanes& roots) {
   alignas(Lanes) float numbers[kLanes];
   std::memcpy(numbers, &of, sizeof of);
@@ -50,7 +50,8 @@ inline __attribute__((always_inline)) void take_roots(const Lanes& of, Lanes& ro
   slsd::load(numbers, roots);
 }
 
-/// Adds the squares of the whitened features from one on. The triangle's rows differ in length, so none is a loop.
+/// Adds the squares of the whitened features from kRow on. The rows of the triangle differ in length, so templates
+/// unroll them.
 template <int kRow>
 inline __attribute__((always_inline)) void add_squares(const Classifier::Letter& letter, const Lanes* deviation,
                                                        Lanes& squared_distance) {

@@ -12,7 +12,8 @@
 
 namespace slsd {
 
-/// Distance from a letter's prototype, in standard deviations, beyond which a shape is torn: its centre lies anywhere.
+/// Distance from a letter's prototype, in standard deviations, beyond which a shape is torn: its centre is then
+/// unreliable.
 inline constexpr float kTornDistance = 6;
 
 /// Probabilities of the letters that a shape may show.
@@ -21,29 +22,29 @@ struct Classification {
       log_probability{};    ///< natural logarithm for each letter, given that the shape is one; 0 beyond the last
   float distance = 0;       ///< distance from the nearest prototype, in standard deviations
   float likelihood = 0;     ///< density of the features as the likeliest letter, up to a common factor
-  std::int8_t letter = -1;  ///< the likeliest, or -1: like none of them
+  std::int8_t letter = -1;  ///< the likeliest, or -1: like no letter
 
-  /// Makes the classification of a shape that is known to show a letter, as if at a given distance.
+  /// Makes the classification of a shape whose letter is known, as if at a given distance.
   [[nodiscard]] static Classification of_letter(int letter, int letters, float distance);
-  /// Tells whether the shape is whole, or nearly: its letter counts.
+  /// Tells whether the shape is whole, or nearly: then its letter counts as evidence.
   [[nodiscard]] bool is_well_seen() const {
     constexpr float kWellSeen = 3;  // standard deviations
     return letter >= 0 && distance < kWellSeen;
   }
   [[nodiscard]] bool is_torn() const { return distance >= kTornDistance; }
-  /// The probability of a letter, 0 to 1, if nothing but the letters can be there: without the doubt that is mixed in.
-  /// @param even  of one letter among all
+  /// The probability of a letter, 0 to 1, if only letters can be there. It excludes the assumed doubt.
+  /// @param even  probability of one letter if all are equally likely
   [[nodiscard]] float share_of(int of_letter, float even) const;
 };
 
 /// Compares features with prototypes, those of eight shapes at once.
 ///
-/// The likelihood is Student's t with few degrees of freedom rather than Gaussian: what real surfaces add to the
-/// simulated spread must not make one odd symbol outweigh eight good ones.
+/// The likelihood is Student's t with few degrees of freedom rather than Gaussian. Real surfaces add spread that the
+/// simulation lacks, and one odd symbol must not outweigh eight good ones.
 /// @thread reentrant
 class Classifier {
  public:
-  /// @param prototypes    one to a letter, kMaxLetters at most
+  /// @param prototypes    one for each letter, at most kMaxLetters
   /// @param distance_max  standard deviations from the nearest prototype beyond which a shape is rejected
   Classifier(const std::vector<Prototype>& prototypes, float distance_max);
 
@@ -65,7 +66,7 @@ class Classifier {
 
  private:
   std::vector<Letter> letters_;
-  float share_;  // of one letter among all
+  float share_;  // share of one letter if all are equally likely
   float distance_max_;
 };
 

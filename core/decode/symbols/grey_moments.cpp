@@ -17,7 +17,7 @@
 namespace slsd {
 namespace {
 
-/// Least share of the light at the dark end of a symbol.
+/// Smallest share of the light at the dark end of a symbol.
 constexpr float kLeastLight = 0.3F;
 
 struct PatchPlace {
@@ -42,7 +42,7 @@ inline __attribute__((always_inline)) Words load_pixels(const std::uint8_t* pixe
                                                          16, 2, 16, 3, 16, 4, 16, 5, 16, 6, 16, 7, 16));
 }
 
-/// Writes eight pixels of a patch, and widens its range by those that are not kOutside.
+/// Writes eight pixels of a patch, and extends its range by the pixels that are not kOutside.
 struct PatchWriter {
   float* patch;
   Lanes least = Lanes{} + PatchRange().least, greatest = Lanes{} + PatchRange().greatest;
@@ -67,8 +67,8 @@ inline __attribute__((always_inline)) void widen_pixels(const T* pixels, Lanes& 
   grey = __builtin_convertvector(__builtin_convertvector(load_pixels(pixels), IntLanes), Lanes);
 }
 
-/// Grey values between before[y] and after[y] of each row, kOutside elsewhere; the patch lies in the frame, padding and
-/// all.
+/// Copies grey values between before[y] and after[y] of each row, and kOutside elsewhere. The patch lies in the frame,
+/// padding included.
 template <class T>
 inline __attribute__((always_inline)) void copy_rows(const ImageView<T>& frame, const PatchPlace& place,
                                                      const PatchEdges& edges, float* patch, PatchRange& range) {
@@ -86,7 +86,7 @@ inline __attribute__((always_inline)) void copy_rows(const ImageView<T>& frame, 
   writer.tell(range);
 }
 
-/// A cell of the grid seen from a patch: its middle, from the first pixel, and the way from there in projector px.
+/// A cell of the grid in a patch's pixels: its centre from the first pixel, and the map from there to projector px.
 struct CellSquare {
   float middle_x, middle_y, half_px;
   Eigen::Matrix2f projector_from_camera;
@@ -97,7 +97,7 @@ struct CellSquare {
   }
 };
 
-/// Copies as copy_rows does, but the pixels in a cell.
+/// Copies like copy_rows, but the pixels of a cell.
 template <class T>
 inline __attribute__((always_inline)) void copy_square(const ImageView<T>& frame, const PatchPlace& place,
                                                        const CellSquare& cell, float* patch, PatchRange& range) {
@@ -119,12 +119,12 @@ inline __attribute__((always_inline)) void copy_square(const ImageView<T>& frame
   writer.tell(range);
 }
 
-/// Light that falls on a patch as 1 + x right + y down, camera px from its middle.
+/// Light on a patch as 1 + x right + y down, camera px from its centre.
 struct Slope {
   float middle_x, middle_y, x, y;
 };
 
-/// Divides the light out, of what is above the background.
+/// Divides values above the background by the light.
 inline __attribute__((always_inline)) void level_rows(int stride, int rows, const Slope& light, float background,
                                                       float* patch, PatchRange& range) {
   PatchWriter writer{patch};
@@ -135,7 +135,7 @@ inline __attribute__((always_inline)) void level_rows(int stride, int rows, cons
       here = here > kLeastLight ? here : Lanes{} + kLeastLight;
       slsd::load(writer.patch, value);
       value = background + (value - background) / here;
-      writer.write(value < 0 ? Lanes{} : value);  // kOutside is not below zero
+      writer.write(value < 0 ? Lanes{} : value);  // kOutside is NaN, which is not below zero
     }
   }
   writer.tell(range);
@@ -145,7 +145,7 @@ int padded(int width) {
   return (width + kLanes - 1) / kLanes * kLanes;
 }
 
-/// Raw moments about the patch's middle, to central ones over the weight.
+/// Converts raw moments about the patch's centre to central ones over the weight.
 GreyMoments central(const RawMoments& raw, const PatchLevels& levels, double middle_x, double middle_y) {
   const auto& m = raw.m;
   GreyMoments g;
@@ -186,9 +186,9 @@ GreyMomentMeter::GreyMomentMeter(int margin_px, float patch_px) : margin_px_(mar
   edges_.reserve(2 * side), rows_.reserve(side), patch_.reserve(side * side);
 }
 
-/// Marks, in each row of the patch, the leftmost to the rightmost pixel within the margin of the region.
+/// Marks, in each row of the patch, the first to the last pixel within the margin of the region.
 PatchEdges GreyMomentMeter::follow_edge(const Region& region, std::span<const Run> runs) {
-  // The edges of the region's rows, with as many empty rows above and below as the margin reaches twice.
+  // The first and last columns of the region's rows, with empty rows above and below, twice the margin each.
   const int reach = 2 * margin_px_, rows = height_ + reach;
   edges_.resize(2 * static_cast<std::size_t>(rows));
   std::int16_t* before = edges_.data();

@@ -20,10 +20,10 @@ namespace slsd {
 namespace {
 
 /// Effects that the model leaves out (uneven light, curvature, texture), as a standard deviation of each feature. They
-/// keep each direction as uncertain as it is.
+/// give every direction a minimum uncertainty.
 constexpr double kFeatureFloor[kFeatureCount] = {0.02, 0.003, 0.003, 0.003, 0.0008, 0.0006, 0.0006, 0.0008};
 
-/// Brings the densities to where floats have room on both sides.
+/// Scales the densities to the middle of the float range.
 constexpr double kLogVolumeScale = -40;
 
 struct Look {
@@ -32,10 +32,10 @@ struct Look {
   bool whole;  ///< no other region in its cell
 };
 
-/// Least difference between light and dark that is taken apart, of 255 levels.
+/// Smallest difference between light and dark at which regions are split, of 255 levels.
 constexpr float kContrastMin = 8;
 
-/// Looks at views as the decoder does.
+/// Reads views as the decoder does.
 /// @thread thread-bound: keeps its buffers
 class Observer {
  public:
@@ -51,7 +51,7 @@ class Observer {
     finder_.find(Mask(view.mask.view()), regions_);
     return measure(view);
   }
-  /// The same once what ran together in the last look is taken apart.
+  /// Reads a view again after splitting what ran together in the last look.
   std::optional<Look> look_closer(const SymbolView& view) {
     const float reach = reach_px(view);
     splitter_.split_all(view.image.view(), kContrastMin, regions_, [&](const Region& region) {
@@ -189,7 +189,7 @@ std::vector<std::vector<Prototype>> make_prototypes(const PrototypeOptions& opti
         }
       }
       const SymbolView& upright = viewer.view(static_cast<int>(letter), 0);
-      (void)viewer.frame_error();  // as for the tilted one, so that both see the same numbers of the series
+      (void)viewer.frame_error();  // also for the untilted view, so that both use the same random numbers
       if (const auto look = observer.look_at(upright)) {
         centroids.push_back(look->centroid_px);
         steady_centroids.push_back(look->steady_centroid_px);

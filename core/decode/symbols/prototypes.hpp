@@ -12,7 +12,7 @@
 
 namespace slsd {
 
-/// Look of a symbol: the distribution of its features over blur, tilt, noise and place on the pixel grid.
+/// Look of a symbol: the distribution of its features over blur, tilt, noise and position on the pixel grid.
 struct Prototype {
   ShapeFeatures mean;
   Eigen::Matrix<float, kFeatureCount, kFeatureCount>
@@ -37,46 +37,46 @@ struct PrototypeOptions {
   /// ignores the tilt of the surface; a frame measured from neighbours is off by a few hundredths.
   float frame_error = 0.05F;
   int samples = 120;  ///< simulated looks at each symbol
-  /// Standard deviation of the blur of projector and camera, camera px, to a third; without it all that occurs.
+  /// Standard deviation of the blur of projector and camera, camera px, to a third; if missing, all that occur.
   std::optional<float> blur_px{};
-  /// Standard deviation of the noise as a share of the contrast; without it all that occurs.
+  /// Standard deviation of the noise as a share of the contrast; if missing, all that occurs.
   std::optional<float> noise{};
 };
 
 using FeatureCovariance = Eigen::Matrix<double, kFeatureCount, kFeatureCount>;
 
-/// Distribution of one symbol's features, and how often there are none.
+/// Distribution of one symbol's features, and how often it has none.
 struct SymbolSpread {
   Eigen::Matrix<double, kFeatureCount, 1> mean;
   FeatureCovariance covariance;  ///< includes the effects that the model leaves out
   double lost;                   ///< share of the looks in which it broke into pieces or grew together with a neighbour
 };
 
-/// One to each symbol, from the looks that show it whole and by itself.
+/// One for each symbol, from the looks that show it whole and separate.
 /// @thread reentrant
 [[nodiscard]] std::vector<SymbolSpread> spread_of_symbols(const PrototypeOptions& options);
 
-/// Draws each symbol among random neighbours as a camera would see it, many times, reads it with the decoder's own
-/// stages, and keeps mean, covariance and centre. The same options give the same prototypes.
-/// @return one to a letter, in the order of `symbols`
+/// Draws each symbol among random neighbours many times as a camera would see it, and reads it with the decoder's own
+/// stages. Keeps mean, covariance and centre of the features. The same options give the same prototypes.
+/// @return one for each letter, in the order of `symbols`
 /// @thread reentrant
 [[nodiscard]] std::vector<Prototype> make_prototypes(const PrototypeOptions& options);
 
-/// The same for frames that are off by more than one amount, in hardly more time than for one: the looks are the same.
-/// @param frame_errors  in place of that of the options
-/// @return one set to each of them
+/// The same for several errors of the local frame, in little more time than for one: the looks are shared.
+/// @param frame_errors  replace that of the options
+/// @return one set for each error
 /// @thread reentrant
 [[nodiscard]] std::vector<std::vector<Prototype>> make_prototypes(const PrototypeOptions& options,
                                                                   std::span<const float> frame_errors);
 
-/// Largest margin that a region's edge can be followed by without reaching its neighbour.
+/// Largest margin that follows a region's edge without reaching its neighbour.
 [[nodiscard]] int margin_px(int spacing_px, float camera_px_per_projector_px);
 
-/// Side of the tiles that thresholds are taken from, three by three: half the pitch as the camera sees it.
+/// Side of the tiles for the 3x3 thresholds: half the pitch in the camera.
 [[nodiscard]] int threshold_tile_px(int pitch_px, float camera_px_per_projector_px);
 
-/// Place of the threshold between dark and light: below the middle if the gaps are wide enough for it. Then a symbol
-/// whose parts touch at a corner stays in one piece. It is less low for small symbols, of which more run together.
+/// Place of the threshold between dark and light. It is below the middle if the gaps are wide enough, so that a symbol
+/// whose parts touch at a corner stays in one piece. It is less low for small symbols, as more of them run together.
 [[nodiscard]] float threshold_level(int symbol_size_px, int spacing_px, float camera_px_per_projector_px);
 
 }  // namespace slsd

@@ -15,10 +15,10 @@
 namespace slsd {
 namespace {
 
-/// Distance that a symbol may gain from its letter by levelling the light: its centre improves even so.
+/// Increase of a symbol's distance from its letter that levelling the light may cause: its centre improves even so.
 constexpr float kLevellingTolerance = 0.3F;
 
-/// Tells whether review measures a node; an aligned one has its place from the alignment.
+/// Tells whether review measures a node. An aligned one already has its place.
 bool is_reviewed(const Sightings& seen, std::size_t node) {
   return seen.claims[node].status == RegionStatus::kDecoded && !is_aligned(seen.aligned[node]);
 }
@@ -27,8 +27,8 @@ float light_of(const Sightings& seen, std::int32_t node) {
   return seen.moments[node].peak - seen.moments[node].background;
 }
 
-/// Relative change of the light from one cell to the next along a direction, from the peaks of the neighbours. At the
-/// edge of a surface the change grows; the second neighbour tells how fast.
+/// Relative change of the light from one cell to the next in a direction, from the peaks of the neighbours. At the edge
+/// of a surface the change grows; a second neighbour shows how fast.
 float light_change(const Sightings& seen, std::size_t node, Direction direction) {
   const auto self = static_cast<std::int32_t>(node);
   const std::int32_t next = neighbour(seen.nodes, self, direction),
@@ -43,8 +43,8 @@ float light_change(const Sightings& seen, std::size_t node, Direction direction)
   return (inwards == direction ? change : -change) / own;
 }
 
-/// Centre that the neighbours predict for a node, by continuing the steps of those beside it. It is quadratic, as steps
-/// shrink towards a limb.
+/// Centre that the neighbours predict for a node, by continuing their steps quadratically, as steps shrink towards a
+/// limb.
 std::optional<Eigen::Vector2f> centre_from_neighbours(const std::vector<GridNode>& nodes, std::size_t node) {
   Eigen::Vector2f sum = Eigen::Vector2f::Zero();
   int count = 0;
@@ -97,8 +97,8 @@ float SymbolReview::distance_from_letter(const Sightings& seen, std::size_t node
   return nearer_around(seen, node, moments, distance_in(seen, node, moments, seen.nodes[node].frame));
 }
 
-/// Centres that print has moved make a symbol's own frame worse than the mean of those around it. Off the grid it is
-/// another surface that has, and the distance shows it.
+/// If print has displaced centres, a symbol's own frame is worse than the mean of those around it. A symbol off the
+/// grid lies on another surface with another frame, and the distance shows that.
 /// @param own  the distance in the symbol's own frame
 float SymbolReview::nearer_around(const Sightings& seen, std::size_t node, const GreyMoments& moments,
                                   float own) const {
@@ -107,7 +107,7 @@ float SymbolReview::nearer_around(const Sightings& seen, std::size_t node, const
   return around ? std::min(own, distance_in(seen, node, moments, *around)) : own;
 }
 
-/// distance_from_letter() of all that are trusted.
+/// distance_from_letter() of all trusted symbols.
 void SymbolReview::measure_distances(const Classifier& letters, Executor& executor, Sightings& seen) {
   executor.run_ranges(seen.size(), [&](std::size_t first, std::size_t last, int) {
     std::array<std::size_t, kLanes> asked;
@@ -142,14 +142,14 @@ bool SymbolReview::is_inside(const Sightings& seen, std::size_t node) const {
   });
 }
 
-/// Frames, and with them distances, are measured anew around those symbols that are no longer trusted.
+/// Measures frames, and with them distances, again around symbols that are no longer trusted.
 void SymbolReview::measure_around_distrusted(const GridLinker& linker, Sightings& seen) {
   const auto visit = [&](auto&& each) {
     for (const std::int32_t node : distrusted_)
       visit_measured_with(seen.nodes, node, [&](std::int32_t other) { each(static_cast<std::size_t>(other)); });
   };
   visit([&](std::size_t i) { linker.measure_frame(seen.nodes, trusted_, i); });
-  // All frames first: a distance may be measured in those around.
+  // Measure all frames first: a distance may use those around it.
   visit([&](std::size_t i) {
     if (is_reviewed(seen, i)) seen.misfits[i] = distance_from_letter(seen, i, seen.moments[i]);
   });
@@ -183,8 +183,8 @@ void SymbolReview::measure_light_changes(const Sightings& seen, Executor& execut
   });
 }
 
-/// The mean with those beside, across the direction of the change: small symbols blur to lower peaks, which is not the
-/// light's doing. Along it the change itself changes.
+/// The mean over the neighbours across the direction of the change. Small symbols blur to lower peaks, which is not due
+/// to the light. Along that direction the change itself varies.
 Eigen::Vector2f SymbolReview::light_change_around(const Sightings& seen, std::size_t node) const {
   const auto mean_with = [&](int axis, Direction one_side, Direction other_side) {
     float sum = light_changes_[node][axis], count = 1;
@@ -224,7 +224,7 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
     const Eigen::Vector2f centre = centre_from_neighbours(seen.nodes, node).value_or(own_centre);
     const float half_px = 0.25F * (size_px_ + pitch_px_);
     const GreyMoments again = meter.measure_cell(frame, centre, lattice_frame, half_px, shading());
-    // Beside an edge the neighbours may put it where another symbol is.
+    // Beside an edge the predicted place may be that of another symbol.
     const Eigen::Vector2f moved_px = Eigen::Vector2f(again.x, again.y) - centroid;
     if ((lattice_frame.inverse() * moved_px).norm() < options_.moved_max * pitch_px_) adopt_if_better(again, 0);
   }

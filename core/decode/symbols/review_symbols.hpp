@@ -14,29 +14,29 @@
 namespace slsd {
 
 struct ReviewOptions {
-  /// Change of the light from cell to cell from which on a symbol is measured again with the light levelled.
+  /// Change of the light from cell to cell above which a symbol is measured again with the light levelled.
   float shading_min = 0.04F;
-  /// The same from which on the centre is the steady one.
+  /// Change of the light above which the steady centre is used.
   float uneven_light = 0.1F;
-  /// Standard deviations from its letter's prototype from which on a symbol is measured again where its neighbours put
-  /// it.
+  /// Distance from its letter's prototype, standard deviations, above which a symbol is measured again at the place
+  /// that its neighbours predict.
   float doubtful_distance = 1.5F;
-  /// Largest distance from its region at which review may find the symbol, of the pitch.
+  /// Largest distance from its region at which review may find the symbol, as a share of the pitch.
   float moved_max = 0.25F;
-  /// Distance from its letter beyond which a symbol at the edge of the decoded area is damaged: an edge or a shadow may
+  /// Distance from its letter above which a symbol at the edge of the decoded area is damaged: an edge or a shadow may
   /// cut it.
   float damaged_distance = 2.5F;
-  /// The same limit for a symbol on the grid of its neighbours: it may have been printed on.
+  /// The same limit for a symbol on the grid of its neighbours, which print may distort.
   float damaged_distance_on_grid = 4;
-  /// The same limit for a symbol among named neighbours on all sides. Print and relief disturb its shape, but its cell
-  /// is certain; its sigma tells how much they may move its centre.
+  /// The same limit for a symbol among decoded neighbours on all sides. Print and relief disturb its shape, but its
+  /// cell is certain; its sigma covers the displacement of its centre.
   float damaged_distance_held = kTornDistance;
   Rules rules = {};
 };
 
-/// Looks again at every symbol whose cell is known: with the frame that its whole neighbours show, with the light
-/// levelled as their brightness tells, and, where its shape still is not that of its letter, inside its cell instead of
-/// inside its mask. What is far from whole then is rejected: its centre would be wrong.
+/// Measures every symbol of known cell again, with the frame of its whole neighbours and the light levelled by their
+/// brightness. If its shape still differs from its letter, review measures it inside its cell instead of inside its
+/// mask. Symbols that remain far from whole are rejected: their centres would be wrong.
 /// @thread thread-bound: keeps its buffers
 class SymbolReview {
  public:
@@ -47,7 +47,7 @@ class SymbolReview {
     const std::vector<Prototype>& prototypes;
     const Classifier& classifier;  ///< made from the prototypes
   };
-  /// @param meters  one to a worker
+  /// @param meters  one for each worker
   /// @param seen    in and out: moments, frames and claims change
   void review(const GreyView& frame, const Regions& regions, const GridLinker& linker, const Look& look,
               std::span<GreyMomentMeter> meters, Executor& executor, Sightings& seen);
@@ -73,11 +73,11 @@ class SymbolReview {
                    std::size_t node) const;
 
   CodeArray array_;
-  const std::vector<Prototype>* prototypes_ = nullptr;  // of this review
+  const std::vector<Prototype>* prototypes_ = nullptr;  // of the current review
   float size_px_, pitch_px_;
   ReviewOptions options_;
   std::vector<std::uint8_t> trusted_;
-  std::vector<std::uint8_t> decoded_;  // of each node, when the review began
+  std::vector<std::uint8_t> decoded_;  // for each node, at the start of the review
   std::vector<std::int32_t> distrusted_;
   std::vector<Eigen::Vector2f> light_changes_;  // from cell to cell along u and v, relative
 };

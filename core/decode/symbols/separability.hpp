@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// Conditions under which symbols are looked at.
+/// Conditions under which symbols are viewed.
 struct LookOptions {
   int symbol_size_px = 16;
   int spacing_px = 2;
@@ -17,11 +17,11 @@ struct LookOptions {
   double blur_px = 1.1;                     ///< standard deviation of the blur of projector and camera, camera px
   double noise = 0.02;                      ///< standard deviation, as a share of the contrast
   int looks = 160;                          ///< simulated looks at each symbol
-  double frame_error = 0.07;  ///< largest error of the grid vectors that a look is measured by, as a share of them
+  double frame_error = 0.07;                ///< largest error of the local frame of a look, as a share
 };
 
-/// A pair of symbols and how far apart they look: standard deviations from each one's mean to the boundary between them
-/// along the direction that parts them best (Fisher's). 3 means one of 740 on the wrong side, if all were Gaussian.
+/// A pair of symbols and their separation: standard deviations from each mean to the boundary between them along the
+/// direction that separates them best (Fisher's). At 3, one of 740 would be on the wrong side, if both were Gaussian.
 struct SymbolPair {
   int first;
   int second;
@@ -31,15 +31,15 @@ struct SymbolPair {
 /// Losses of one symbol in the simulated camera.
 struct SymbolLoss {
   int number;
-  double share;  ///< share of the looks in which it broke into pieces or grew together with a neighbour, 0 to 1
+  double share;  ///< share of the looks in which it broke into pieces or merged with a neighbour, 0 to 1
 };
 
 /// Distance below which a pair is risky. At 4 the Gaussian error is 1 in 30,000. Even tails ten times as heavy stay far
-/// below the 2 % of symbols misread that a pattern of minimum distance 3 survives.
+/// below 2 % of misread symbols, which a pattern of minimum distance 3 tolerates.
 inline constexpr double kRiskyDistance = 4.0;
 
-/// Loss above which a symbol is risky: a lost one is missing in the nine windows around it. The looks are of every tilt
-/// that occurs. A pattern of which each symbol is lost in one of ten still decodes to nine tenths on a sculpture.
+/// Loss above which a symbol is risky: a lost symbol is missing in nine windows. The looks cover every tilt that
+/// occurs. On a sculpture, a pattern that loses one in ten of each symbol still decodes to nine tenths.
 inline constexpr double kRiskyLoss = 0.15;
 
 /// Distances between the members of a set of symbols.
@@ -52,15 +52,15 @@ struct Separability {
   [[nodiscard]] std::vector<SymbolLoss> risky_symbols() const;
 };
 
-/// Looks at each of the symbols as the decoder's prototypes are made (core/decode/symbols/prototypes.hpp) and compares
-/// the distributions of their features. The same arguments give the same answer.
+/// Views each symbol as the decoder's prototypes are made (core/decode/symbols/prototypes.hpp) and compares the
+/// distributions of their features. The same arguments give the same answer.
 /// @param symbols  2 to 25 different symbol numbers
 /// @errors kInvalidArgument
 /// @thread reentrant
 [[nodiscard]] Result<Separability> assess_separability(const std::vector<int>& symbols, const LookOptions& options);
 
-/// The warnings for a person, one to a line, empty where nothing is risky: "symbols 7 (square) and 3 (frame) look alike
-/// at 8 px: ...".
+/// Warnings for the user, one to a line, empty if nothing is risky: "symbols 7 (square) and 3 (frame) look alike at 8
+/// px: ...".
 [[nodiscard]] std::vector<std::string> separability_warnings(const Separability& separability, int symbol_size_px);
 
 }  // namespace slsd

@@ -9,13 +9,13 @@
 namespace slsd {
 namespace {
 
-/// A direction in the image, for each unit of which something changes by one.
+/// A direction in the image, per unit of change.
 template <class Number>
 struct Along {
   Number x, y;
 };
 
-/// A symmetric tensor over the plane, by how many of its indices are y, taken along a direction: one index less.
+/// Contracts a symmetric tensor over the plane, stored by its number of y indices, with a direction: one index less.
 template <class Number, std::size_t kSize>
 struct Tensor {
   Number of[kSize];

@@ -12,17 +12,17 @@ namespace slsd {
 
 inline constexpr int kFeatureCount = 8;
 
-/// Area, second and third central moments of a symbol in units of its own size, as if seen head on:
-/// (area, m20, m11, m02, m30, m21, m12, m03). Moments of order k over the area go with size^k.
+/// Area, second and third central moments of a symbol in units of its own size, as if seen frontally: (area, m20, m11,
+/// m02, m30, m21, m12, m03). Moments of order k over the area scale with size^k.
 using ShapeFeatures = Eigen::Matrix<float, kFeatureCount, 1>;
 
-/// Takes a region's moments from the camera's image into the pattern's. Moments are tensors, so an affine map of the
-/// image is a linear map of them: nothing has to be resampled.
+/// Transforms a region's moments from the camera's image to the pattern. Moments are tensors, so an affine map of the
+/// image is a linear map of them, without resampling.
 /// @param pattern_from_camera  projector pixels for one camera pixel, the inverse of the lattice frame
 [[nodiscard]] ShapeFeatures shape_features(const GreyMoments& moments, const Eigen::Matrix2f& pattern_from_camera,
                                            float symbol_size_px);
 
-/// The same of eight regions at once, a lane to each.
+/// The same for eight regions at once, one for each lane.
 struct EightShapes {
   Lanes of[kFeatureCount]{};
 

@@ -15,8 +15,8 @@ namespace {
 constexpr int kCells = 3;
 constexpr int kSubpixels = 3;
 constexpr float kLight = 160, kDark = 20;
-/// Frames sharper than a lens makes them are drawn ones, whose pixels may well lie on the pattern's: one view in so
-/// many.
+/// Sharper frames than a lens makes are drawn ones, whose pixels may coincide with the pattern's: one view in so many
+/// does.
 constexpr float kDrawnBlurPx = 0.3F;
 constexpr int kDrawnOneIn = 4;
 
@@ -56,7 +56,7 @@ float SymbolViewer::uniform(float low, float high) {
 Eigen::Matrix2f FrameError::of_size(float size) const {
   const auto within = [](float reach, float share) { return between(-reach, reach, share); };
   Eigen::Matrix2f error;
-  // A tilted surface stretches and shears along the base line, which is mostly the pattern's u; the rest is smaller.
+  // Tilt stretches and shears along the base line, which is mostly the pattern's u; the other terms are smaller.
   error << 1 + within(size, shares[0]), within(size, shares[1]), within(0.5F * size, shares[2]),
       1 + within(0.5F * size, shares[3]);
   return error;
@@ -106,7 +106,7 @@ void SymbolViewer::expose(int side_px) {
     std::int32_t* const pixels = pixels_.data();
 #pragma omp simd
     for (int i = 0; i < across; ++i) {
-      // One further for the border, onto which everything outside falls.
+      // One more for the border, to which all points outside are clamped.
       const float u = columns_u[i] + row_u + middle_of_square, v = columns_v[i] + row_v + middle_of_square;
       const int right = u < 0 ? 0 : std::min(static_cast<int>(u) + 1, last);
       const int down = v < 0 ? 0 : std::min(static_cast<int>(v) + 1, last);
@@ -123,7 +123,7 @@ void SymbolViewer::expose(int side_px) {
   }
 }
 
-// The edge goes on beyond the image.
+// The border pixels continue beyond the image.
 void SymbolViewer::blur(float sigma_px) {
   const int side = view_.image.width(), reach = static_cast<int>(std::ceil(3 * sigma_px));
   const std::vector<float> weights = gaussian(sigma_px, reach);

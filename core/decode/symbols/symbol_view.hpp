@@ -21,8 +21,8 @@ struct SymbolViewOptions {
   int spacing_px;
   float camera_px_per_projector_px;
   float threshold_level;           ///< between dark and light
-  std::optional<float> blur_px{};  ///< standard deviation, to a third; without it all that occurs
-  std::optional<float> noise{};    ///< standard deviation, as a share of the contrast; without it all that occurs
+  std::optional<float> blur_px{};  ///< standard deviation, to a third; if missing, all that occur
+  std::optional<float> noise{};    ///< standard deviation, as a share of the contrast; if missing, all that occurs
 };
 
 /// One symbol among its neighbours, as a camera might see it.
@@ -30,7 +30,7 @@ struct SymbolView {
   Grey8 image;
   Grey8 mask;                 ///< above the threshold
   LatticeFrame frame;         ///< camera px for one projector px
-  Eigen::Vector2f middle_px;  ///< middle of the symbol's square, in the image
+  Eigen::Vector2f middle_px;  ///< centre of the symbol's square, in the image
 };
 
 /// The error of an assumed frame, up to its size.
@@ -41,13 +41,13 @@ struct FrameError {
   [[nodiscard]] Eigen::Matrix2f of_size(float size) const;
 };
 
-/// Draws symbols in random tilt, blur, noise and position on the pixels, the same in every run.
+/// Draws symbols in random tilt, blur, noise and position on the pixels, identical in every run.
 /// @thread thread-bound
 class SymbolViewer {
  public:
   explicit SymbolViewer(SymbolViewOptions options);
 
-  /// A new look at a letter. The result stands until the next call.
+  /// Draws a new look at a letter. The result is valid until the next call.
   /// @param tilt  0 for a surface that faces the devices, 1 for every tilt that occurs
   [[nodiscard]] const SymbolView& view(int letter, float tilt);
 
@@ -69,8 +69,8 @@ class SymbolViewer {
   std::vector<Grey8> drawings_;
   Grey8 cells_;  // three by three cells, with a dark border of one pixel
   std::vector<float> light_, blurred_, wide_row_;
-  std::vector<float> column_u_, column_v_;  // what a subpixel's column adds to its place among the cells
-  std::vector<std::int32_t> pixels_;        // that subpixels of a row see
+  std::vector<float> column_u_, column_v_;  // contribution of a subpixel's column to its place among the cells
+  std::vector<std::int32_t> pixels_;        // pattern pixels under a row's subpixels
   std::vector<int> lit_;                    // sums of a row's pixels
   SymbolView view_;
 };

@@ -22,7 +22,7 @@ inline __attribute__((always_inline)) void load_grey(const std::int16_t* from, L
   static_assert(std::endian::native == std::endian::little);
   Half shorts;
   std::memcpy(&shorts, from, sizeof shorts);
-  // None is below zero: widened by a shuffle, which is one instruction where a conversion is four.
+  // No value is negative, so one shuffle widens them; a conversion takes four instructions.
   const auto wide = __builtin_shufflevector(shorts, Half{}, 0, 8, 1, 8, 2, 8, 3, 8, 4, 8, 5, 8, 6, 8, 7, 8);
   grey = __builtin_convertvector(reinterpret_cast<IntLanes>(wide), Lanes);
 }
@@ -35,7 +35,8 @@ inline __attribute__((always_inline)) void clamp_weight(Lanes& weight) {
     weight = weight > zero ? weight : zero;
     weight = weight < one ? weight : one;
   } else {
-    // By the bits, which are in the numbers' order from zero on: an instruction each, where GCC makes two of floats.
+    // Compare the bits as integers, which have the order of the floats from zero on: one instruction, where GCC makes
+    // two for floats.
     const IntLanes zero{}, one = zero + std::bit_cast<int>(1.F);
     auto bits = reinterpret_cast<IntLanes>(weight);
     bits = bits > zero ? bits : zero;
@@ -50,7 +51,7 @@ inline __attribute__((always_inline)) void find_levels_of(const float* patch, in
   const Lanes low_limit = Lanes{} + (range.least + quarter), high_limit = Lanes{} + (range.greatest - quarter);
   const Lanes zero{};
   Lanes low_sum{}, high_sum{};
-  IntLanes low_count{}, high_count{};  // negative: a comparison that holds is -1
+  IntLanes low_count{}, high_count{};  // negative, as a true comparison gives -1
   for (int i = 0; i < count; i += kLanes) {
     Lanes value;
     load(patch + i, value);
@@ -83,7 +84,7 @@ inline __attribute__((always_inline)) void sum_moments_of(const Pixel* patch, in
               centre_start = zero + (levels.background + kCentreRampStart * range) * per_centre_range;
   const Lanes steady_scale = zero + (kCentreRampEnd - kCentreRampStart) / (kSteadyRampEnd - kCentreRampStart);
   Lanes centre{}, centre_x{}, centre_y{}, steady{}, steady_x{}, steady_y{};
-  // Sums over y stay in their columns, and are then taken over x; lanes are summed once at the end.
+  // Sum over y within columns, then over x; sum the lanes once at the end.
   Lanes m00{}, m01{}, m02{}, m03{}, m10{}, m11{}, m12{}, m20{}, m21{}, m30{};
   for (int left = 0; left < width; left += kLanes) {
     Lanes s0{}, s1{}, s2{}, s3{}, c0{}, t0{};
@@ -94,7 +95,7 @@ inline __attribute__((always_inline)) void sum_moments_of(const Pixel* patch, in
       pixels += stride;
       Lanes c = grey * centre_scale - centre_start, w = grey * scale - start;
       if constexpr (kSteady) {
-        // Both begin at one place.
+        // Both ramps begin at the same level.
         Lanes t = c * steady_scale;
         clamp_weight<Pixel>(t);
         t0 += t;
@@ -131,10 +132,10 @@ inline __attribute__((always_inline)) void sum_moments_of(const Pixel* patch, in
 constexpr int kShortLanes = 16;
 using Shorts [[gnu::vector_size(2 * kShortLanes)]] = std::int16_t;
 using WideShorts [[gnu::vector_size(4 * kShortLanes)]] = int;
-/// Registers of a patch, which holds a symbol of 40 px: sums of as many grey values stay within 15 bits.
+/// Limits of a patch in registers, for symbols up to 40 px: sums of that many grey values stay within 15 bits.
 constexpr int kShortsMax = 128, kPatchLanesMax = kShortsMax * kShortLanes;
 constexpr int kPatchRowsMax = kShortsMax, kEdgeRows = kPatchRowsMax + 2 * kShortLanes;
-/// Powers for patches of an odd number of rows, whose middle is that of a row, and of an even number.
+/// Powers for patches with an odd number of rows, whose middle is a row, and with an even number.
 constexpr auto kRowPowers = [] {
   std::array<std::array<RowPowers, kPatchRowsMax + 1>, 2> powers{};
   for (const int even : {0, 1}) {
@@ -197,12 +198,12 @@ struct ShortPatch {
   [[nodiscard]] int lanes() const { return blocks() * height * kShortLanes; }
 };
 
-/// Starts and ends of a patch's rows, with as many more as a register may reach beyond them.
+/// Starts and ends of a patch's rows, with padding that a register may reach.
 struct ShortEdges {
   std::int16_t before[kEdgeRows], after[kEdgeRows];
 };
 
-/// Marks the edges of the region itself, 2 margins down.
+/// Marks the edges of the region itself, shifted down by two margins.
 inline __attribute__((always_inline)) void mark_edges(const ShortPatch& place, const Region& region, const Run* runs,
                                                       ShortEdges& edges) {
   const int reach = 2 * place.margin;
@@ -237,7 +238,7 @@ inline __attribute__((always_inline)) void widen_edges(const ShortPatch& place, 
   }
 }
 
-/// Copies as copy_rows does; what is outside becomes 0.
+/// Copies like copy_rows; pixels outside become 0.
 inline __attribute__((always_inline)) void copy_shorts(const ImageView<std::uint8_t>& frame, const ShortPatch& place,
                                                        const ShortEdges& edges, std::int16_t* patch,
                                                        ShortRange& range) {
@@ -266,14 +267,14 @@ inline __attribute__((always_inline)) void copy_shorts(const ImageView<std::uint
   range.greatest = static_cast<std::int16_t>(-least_of(-greatest));
 }
 
-/// Finds levels as find_levels_of does, in whole numbers: what is outside is zero, and taken for dark.
+/// Finds levels like find_levels_of, in integers: pixels outside are zero, and count as dark.
 inline __attribute__((always_inline)) void find_short_levels(const std::int16_t* patch, int count,
                                                              const ShortRange& range, PatchLevels& levels) {
   const auto least = static_cast<float>(range.least), greatest = static_cast<float>(range.greatest);
   const float quarter = 0.25F * (greatest - least);
   const Shorts above_low = Shorts{} + static_cast<std::int16_t>(least + quarter + 1),
                below_high = Shorts{} + static_cast<std::int16_t>(std::ceil(greatest - quarter) - 1);
-  Shorts low_sum{}, high_sum{}, low_count{}, high_count{};  // counts: negative
+  Shorts low_sum{}, high_sum{}, low_count{}, high_count{};  // negative counts
   for (int i = 0; i < count; i += kShortLanes) {
     Shorts value;
     load(patch + i, value);
@@ -290,7 +291,7 @@ inline __attribute__((always_inline)) void find_short_levels(const std::int16_t*
   levels.peak = static_cast<float>(total_of(high_sum)) / static_cast<float>(highs);
 }
 
-/// Step by step: what one region waits for, the others do meanwhile.
+/// Works step by step on several regions at once: while one waits, the others proceed.
 template <bool kSteady>
 inline __attribute__((always_inline)) void weigh_regions_of(const ImageView<std::uint8_t>& frame, int margin_px,
                                                             std::span<WeighedRegion> regions) {
