@@ -18,22 +18,22 @@
 namespace slsd {
 namespace {
 
-/// Ratio of distances from the projector: a point farther behind is on another surface.
+/// Ratio of distances from the projector: a point farther away by more is on another surface.
 constexpr float kBehind = 1.01F;
-/// Growth that has crossed an edge can go on over a surface that is not there, in scraps: what bears no decoded symbol
-/// has to hang together with so many times more pixels.
+/// Growth that has crossed an edge may continue in scraps over a surface that does not exist. A connected area without
+/// a decoded symbol needs this many times more pixels.
 constexpr std::size_t kWithoutSymbol = 20;
 constexpr auto kMeasuredByte = static_cast<std::uint8_t>(DensePixel::kMeasured);
 
-/// Eight pixels of a row, and where the projector lights them.
+/// Eight pixels of a row, and the projector pixels that light them.
 struct Rays {
   float turned[3], per_px[3];  // R r of the first pixel, and its change for one px
   float translation[3];
   float fx, fy, cx, cy, distortion[5];
-  int width, height;  // of the projector
+  int width, height;  // size of the projector's image
 };
 
-/// @param to  the projector's pixel, -1 where there is none; and the distance from the projector along its z axis
+/// @param to  the projector's pixel, -1 if there is none, and the distance from the projector along its z axis
 inline __attribute__((always_inline)) void find_rays(const Rays& in, const float* depth_mm, std::int32_t* to,
                                                      float* distance_mm) {
   const Lanes zero{};
@@ -46,7 +46,7 @@ inline __attribute__((always_inline)) void find_rays(const Rays& in, const float
   const Lanes radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
   const Lanes u = in.fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + (in.cx + 0.5F),
               v = in.fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + (in.cy + 0.5F);
-  // What is no number is in no range.
+  // NaN is in no range.
   const IntLanes inside = (u >= zero) & (v >= zero) & (u < zero + static_cast<float>(in.width)) &
                           (v < zero + static_cast<float>(in.height)) & (q[2] > zero);
   const Lanes safe_u = inside ? u : zero, safe_v = inside ? v : zero;
@@ -55,7 +55,7 @@ inline __attribute__((always_inline)) void find_rays(const Rays& in, const float
   std::memcpy(to, &found, sizeof found), std::memcpy(distance_mm, &q[2], sizeof q[2]);
 }
 
-/// A bit for each of eight pixels that are on one surface with those beside them.
+/// One bit for each of eight pixels that lie on one surface with their neighbours.
 inline __attribute__((always_inline)) void find_joined(const float* depth_mm, const float* beside_mm,
                                                        std::uint64_t& joined) {
   const Lanes none{};
@@ -68,7 +68,7 @@ inline __attribute__((always_inline)) void find_joined(const float* depth_mm, co
   joined = bits;
 }
 
-/// A row of them.
+/// The same for a whole row.
 inline __attribute__((always_inline)) void join_row(const float* depth_mm, const float* beside_mm, int count,
                                                     std::uint64_t* bits) {
   for (int x = 0; x + kLanes <= count; x += kLanes) {
@@ -82,7 +82,7 @@ inline __attribute__((always_inline)) void join_row(const float* depth_mm, const
   }
 }
 
-/// A bit to each byte that is not 0, or is, of bytes of 0 and other small numbers.
+/// One bit for each byte that is zero, or nonzero, of bytes with small values.
 inline __attribute__((always_inline)) void pack_row(const std::uint8_t* bytes, int count, std::uint8_t wanted,
                                                     std::uint64_t* bits) {
   for (int first = 0; first < count; first += 64) {
@@ -98,7 +98,7 @@ struct BitRows {
   std::size_t words;
   int height;
 
-  /// Ors, or ands, each bit with those up to reach before and behind it in its row.
+  /// Ors, or ands, each bit with the bits up to `reach` before and after it in its row.
   template <class Combine>
   void along(std::uint64_t* rows, int reach, std::uint64_t beyond, Combine combine) const {
     for (int y = 0; y < height; ++y) {
@@ -127,7 +127,7 @@ struct BitRows {
   }
 };
 
-/// The first bit from there on that is as wanted; the end where there is none.
+/// The next bit with the wanted value; the end if there is none.
 int next_bit(const std::uint64_t* row, int from, int end, bool wanted) {
   if (from >= end) return end;
   const std::uint64_t turn = wanted ? 0 : ~std::uint64_t{0};
@@ -137,7 +137,7 @@ int next_bit(const std::uint64_t* row, int from, int end, bool wanted) {
   return left == 0 ? end : std::min(end, word * 64 + std::countr_zero(left));
 }
 
-/// Calls with each bit's place in its row.
+/// Calls with the position of each set bit in its row.
 template <class Take>
 void for_each_bit(const std::uint64_t* row, std::size_t words, const Take& take) {
   for (std::size_t w = 0; w < words; ++w)
@@ -224,7 +224,7 @@ void MapCleaner::drop_unlit_rims(DenseMap& map, int reach_px) {
   }
 }
 
-/// Finds the measured pixels, and those on one surface with the next to the right, and below.
+/// Finds the measured pixels, and those on one surface with the pixel to the right, and below.
 void MapCleaner::find_joined(const DenseMap& map) {
   const std::size_t words = static_cast<std::size_t>(map.width + 63) / 64, all = words * map.height;
   measured_.assign(all, 0), right_.assign(all, 0), below_.assign(all, 0);
@@ -243,15 +243,15 @@ std::int32_t MapCleaner::root(std::int32_t run) {
   return run;
 }
 
-/// Finds runs of pixels row by row, and joins them with those of the row before that they touch.
-/// @param first  (y, from): of the next run; the map's width where there is none
-/// @param end    (y, first): beyond the run's last
-/// @param touch  (y, from, to): whether a run of this row and one of the row before do, in those columns of both
+/// Finds runs of pixels row by row, and joins them with the runs of the previous row that they touch.
+/// @param first  (y, from): start of the next run; the map's width if there is none
+/// @param end    (y, first): one past the last pixel of the run
+/// @param touch  (y, from, to): whether the run touches one of the previous row in these columns
 template <class First, class End, class Touch>
 void MapCleaner::find_runs(int width, int height, const First& first, const End& end, const Touch& touch) {
   runs_.clear();
   first_runs_.clear();
-  std::size_t before = 0;  // the first run of the row before
+  std::size_t before = 0;  // the first run of the previous row
   for (int y = 0; y < height; ++y) {
     const std::size_t begin = runs_.size();
     first_runs_.push_back(begin);
@@ -314,7 +314,8 @@ std::size_t MapCleaner::bytes() const {
          of(holes_) + of(distance_) + of(nearest_);
 }
 
-/// Holes of at most so many pixels that one surface is all around: print or dust, as nothing so small is told from it.
+/// Finds holes of at most so many pixels that lie inside one surface. They are print or dust, as no object so small can
+/// be distinguished from these.
 void MapCleaner::find_small_holes(const DenseMap& map, std::size_t most) {
   const std::size_t words = static_cast<std::size_t>(map.width + 63) / 64;
   const auto row = [&](int y) { return measured_.data() + words * static_cast<std::size_t>(y); };
@@ -353,7 +354,7 @@ void MapCleaner::prune(DenseMap& map, double reach_px, std::size_t hole_most) {
   const BitRows rows{static_cast<std::size_t>(map.width + 63) / 64, map.height};
   const std::size_t words = rows.words;
   const auto either = [](std::uint64_t a, std::uint64_t b) { return a | b; };
-  // Both sides of whatever is not joined.
+  // Both sides of every broken joint.
   bits_.assign(measured_.size(), 0), rows_.assign(measured_.size(), 0);
   const std::uint64_t beyond = map.width % 64 == 0 ? 0 : ~std::uint64_t{0} << (map.width % 64);
   for (int y = 0; y < map.height; ++y) {
@@ -373,7 +374,7 @@ void MapCleaner::prune(DenseMap& map, double reach_px, std::size_t hole_most) {
       bits_[row + w] |= down, bits_[row + words + w] |= down;
     }
   }
-  // A disc around each: to every row the part of it that is as wide there.
+  // A disc around each: in every row, the bits within its width.
   const int reach = static_cast<int>(std::ceil(reach_px)) - 1;
   for (int y = 0; y < map.height; ++y) {
     std::uint64_t* const edge = bits_.data() + words * static_cast<std::size_t>(y);

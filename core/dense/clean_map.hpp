@@ -17,39 +17,38 @@
 
 namespace slsd {
 
-/// Takes out of a map what cannot be, by what all its pixels say together.
+/// Removes impossible points from a map, judging by all its pixels together.
 /// @thread thread-bound: keeps its buffers
 class MapCleaner {
  public:
   MapCleaner(const CalibratedCamera& camera, const Lens& projector, std::shared_ptr<const RayGrid> rays);
 
-  /// Drops points that lie behind another surface on their projector ray: a projector pixel lights one point.
+  /// Drops points that lie behind another surface on their projector ray: a projector pixel lights one point only.
   void drop_occluded(DenseMap& map, Executor& executor);
-  /// Drops points that the projector's image does not reach. The drop makes no edge, so this comes last. The map is the
-  /// one that drop_occluded() has seen.
+  /// Drops points outside the projector's image. These drops make no edges, so this comes last. Needs the map that
+  /// drop_occluded() has seen.
   void drop_beyond_the_light(DenseMap& map);
-  /// Drops unlit pixels at rims: where the pattern is dark, a surface looks like a shadow. Such a pixel stays if firm
-  /// ones enclose it, that is within their closing (dilated, then eroded as much).
+  /// Drops unlit pixels at rims: where the pattern is dark, a surface looks like a shadow. A pixel stays if firm ones
+  /// enclose it, that is within their closing (dilation, then erosion by the same radius).
   void drop_unlit_rims(DenseMap& map, int reach_px);
-  /// Drops areas without a jump inside that have fewer pixels than a patch: so little can be anything. An area without
-  /// any of the seeds goes unless it has far more.
+  /// Drops areas without a jump inside that have fewer pixels than a patch: so few are no evidence. An area without a
+  /// seed needs far more pixels.
   void drop_islands(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds);
-  /// Drops pixels nearer than that to a hole or to a jump. Holes of so few pixels that one surface is all around do not
-  /// count.
+  /// Drops pixels closer than that to a hole or to a jump. Small holes inside one surface do not count.
   void prune(DenseMap& map, double reach_px, std::size_t hole_most);
-  [[nodiscard]] std::size_t bytes() const;  ///< memory that it holds
+  [[nodiscard]] std::size_t bytes() const;  ///< memory in use
 
  private:
   CalibratedCamera camera_;
   Lens projector_;
-  std::shared_ptr<const RayGrid> rays_;  // shared: the same for all
-  /// Pixels of a row that hang together.
+  std::shared_ptr<const RayGrid> rays_;  // shared by all copies
+  /// A connected run of pixels in a row.
   struct Run {
     int y, first, end;
     std::int32_t parent;
-    // Of all that hang together, in the root:
+    // Totals of the connected area, in its root:
     std::uint32_t pixels;
-    bool borne = false;                                               // by a seed
+    bool borne = false;                                               // contains a seed
     float nearest = std::numeric_limits<float>::max(), farthest = 0;  // depth around a hole
   };
   [[nodiscard]] std::int32_t root(std::int32_t run);
@@ -60,7 +59,7 @@ class MapCleaner {
 
   std::vector<std::int32_t> label_;
   std::vector<Run> runs_;
-  std::vector<std::size_t> first_runs_;  // of each row, and the end of the last
+  std::vector<std::size_t> first_runs_;  // start of each row's runs, and the end of the last
   std::vector<std::uint64_t> bits_, rows_, measured_, right_, below_, holes_;
   std::vector<float> distance_, nearest_;
 };

@@ -22,9 +22,9 @@ static_assert(std::endian::native == std::endian::little, "the records are copie
 
 constexpr std::size_t kPlyBytes = 18, kPcdBytes = 21, kNormalBytes = 12;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-/// Share of the full level from which a pixel is saturated: noise and the sensor's own unevenness keep some below.
+/// Share of the full level above which a pixel is saturated: noise and uneven pixels keep some below the full level.
 constexpr double kSaturated = 0.985;
-/// Print and shading change white by less within the window of a fit, at most pixels.
+/// Largest change of white by print and shading that most pixels have within the window of a fit.
 constexpr double kWhiteOff = 0.3;
 
 /// The points of a view in the rig frame, pixel by pixel.
@@ -40,8 +40,7 @@ class ViewPoints {
     const Eigen::Vector2f ray = view_.rays->at(x, y);
     return rotation_ * Eigen::Vector3f(ray.x() * depth, ray.y() * depth, depth) + translation_;
   }
-  /// The unit normal towards the camera, from the neighbours on the same surface; the ray, reversed, where there are
-  /// none.
+  /// The unit normal towards the camera, from neighbours on the same surface; without these, the reversed ray.
   [[nodiscard]] Eigen::Vector3f normal(int x, int y) const {
     const Eigen::Vector3f here = at(x, y), to_camera = translation_ - here;
     const Eigen::Vector3f along = slope(x, y, 1, 0), down = slope(x, y, 0, 1);
@@ -74,7 +73,7 @@ void put(char*& to, const Eigen::Vector3f& vector) {
   to += 12;
 }
 
-/// Eight pixels of a row, or what is left of it.
+/// Up to eight pixels of a row.
 struct RowPiece {
   float turned[3], per_px[3];  // R r of the first pixel, and its change for one px
   float translation[3];
@@ -92,10 +91,10 @@ inline __attribute__((always_inline)) void place_lanes(const RowPiece& in, float
   }
 }
 
-/// Places of the points of a view's row, in the rig's frame: the same for every format.
+/// Positions of the points of a view's row in the rig's frame, the same for every format.
 class RowPlaces {
  public:
-  static_assert(RayGrid::kPitchPx == kLanes);  // rays between those that are known lie on a line
+  static_assert(RayGrid::kPitchPx == kLanes);  // rays between the stored ones lie on a line
 
   explicit RowPlaces(const DenseView& view) : view_(view), rotation_(view.rig_from_camera.rotation.cast<float>()) {
     Eigen::Map<Eigen::Vector3f>(piece_.translation) = view.rig_from_camera.translation.cast<float>();
@@ -126,8 +125,8 @@ void put(char*& to, Value value) {
   to += sizeof value;
 }
 
-/// @tparam Intensity  as the format stores it
-/// @param row         of y
+/// @tparam Intensity  type in which the format stores it
+/// @param row         row y
 template <class Intensity>
 void put_point(char*& to, const DenseView& view, const RowPlaces& row, const ViewPoints& points, int x, int y,
                bool normals) {
@@ -162,7 +161,8 @@ std::size_t shade_view(DenseView& view, const SceneLight& light) {
   const auto level = [](const GreyView& frame, int x, int y) {
     return std::visit([&](const auto& pixels) { return static_cast<double>(pixels.at(x, y)); }, frame);
   };
-  // What white is over what the pattern's frame makes of it, in steps of 1/32 up to 4: the usual one is the light's.
+  // Ratio of the white frame to what the pattern's frame predicts, in steps of 1/32 up to 4. The usual ratio is due to
+  // the light.
   constexpr int kSteps = 128, kPerUnit = 32;
   std::array<std::size_t, kSteps> ratios{};
   for (int y = 0; y < view.map.height; ++y) {
@@ -261,14 +261,14 @@ std::string write_dense_pcd(const DenseCloud& cloud, bool normals) {
 
 namespace {
 
-/// A baseline TIFF of pages of floats: TIFF 6.0, sections 2 and 19.
+/// A baseline TIFF with pages of floats: TIFF 6.0, sections 2 and 19.
 class FloatPages {
  public:
   void add(const std::vector<float>& pixels, int width, int height, const std::string& description) {
     const std::size_t data = bytes_.size();
     bytes_.append(reinterpret_cast<const char*>(pixels.data()), pixels.size() * sizeof(float));
     const std::size_t text = bytes_.size();
-    bytes_ += description + std::string(2 - description.size() % 2, '\0');  // ends in a zero, and on a word
+    bytes_ += description + std::string(2 - description.size() % 2, '\0');  // ends in a zero byte, on a word boundary
     const auto at = static_cast<std::uint32_t>(bytes_.size());
     std::memcpy(bytes_.data() + link_, &at, 4);
     constexpr std::uint16_t kShort = 3, kLong = 4, kAscii = 2;
@@ -297,7 +297,7 @@ class FloatPages {
   }
 
   std::string bytes_ = std::string("II*\0\0\0\0\0", 8);
-  std::size_t link_ = 4;  // where the offset of the next page goes
+  std::size_t link_ = 4;  // position of the next page's offset
 };
 
 }  // namespace

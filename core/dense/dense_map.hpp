@@ -12,20 +12,20 @@
 
 namespace slsd {
 
-/// Status of a camera pixel. Everything but kMeasured is a reason why it has no point.
+/// Status of a camera pixel. All but kMeasured are reasons why it has no point.
 enum class DensePixel : std::uint8_t {
   kMeasured,
-  kNotReached,  ///< no patch near it fits the pattern: shadow, background, or a surface that no symbol is decoded on
-  kNoSupport,   ///< its surroundings speak against every surface beside it
-  kSaturated,   ///< it is as bright as the camera can tell
+  kNotReached,  ///< no patch near it fits the pattern: shadow, background, or a surface without a decoded symbol
+  kNoSupport,   ///< its surroundings contradict every nearby surface
+  kSaturated,   ///< it is at the camera's full level
   kOutOfDepthRange,
-  kOccluded,  ///< another surface, nearer to the projector, takes the light of its projector pixel
-  kUnlit,     ///< dark where it should be dark, at a rim: nothing tells that the surface is there
-  kIsland,    ///< too few around it
-  kAtAnEdge,  ///< nearer to a hole or a jump than dense_prune_px
+  kOccluded,  ///< another surface, nearer to the projector, receives the light of its projector pixel
+  kUnlit,     ///< dark where the pattern is dark, at a rim: there is no evidence for the surface
+  kIsland,    ///< too few connected pixels
+  kAtAnEdge,  ///< closer to a hole or a jump than dense_prune_px
 };
 inline constexpr int kDensePixelCount = 9;
-/// Change from a pixel to the next, as a share of the depth, above which there is a jump to another surface.
+/// Change of depth between adjacent pixels, as a share of the depth, above which there is a jump to another surface.
 inline constexpr float kDepthJump = 0.004F;
 
 /// "no_support", as in the counters of a reply.
@@ -37,9 +37,9 @@ struct DenseMap {
   int width = 0, height = 0;
   std::vector<float> depth_mm;          ///< along the camera's z axis
   std::vector<float> sigma_mm;          ///< one standard deviation along the pixel's ray
-  std::vector<std::uint8_t> intensity;  ///< light that the surface sends back under projector white
+  std::vector<std::uint8_t> intensity;  ///< light that the surface reflects under projector white
   std::vector<DensePixel> pixels;
-  std::vector<std::uint8_t> firm;  ///< 1 where a pixel itself shows the light that falls there, or all around it does
+  std::vector<std::uint8_t> firm;  ///< 1 if the pixel itself shows the expected light, or all pixels around it do
   std::array<std::uint32_t, kDensePixelCount> counts{};  ///< pixels by their status
 
   /// Resizes the map; its contents are then undefined.
@@ -48,7 +48,7 @@ struct DenseMap {
     const std::size_t count = static_cast<std::size_t>(width) * height;
     depth_mm.resize(count), sigma_mm.resize(count), intensity.resize(count), pixels.resize(count), firm.resize(count);
   }
-  /// Clears these rows: nothing is measured there. @param end  beyond the last
+  /// Clears these rows: nothing is measured there. @param end one past the last row
   void clear_rows(int first, int end) {
     const auto clear = [&](auto& values, auto none) {
       std::fill(values.begin() + static_cast<std::ptrdiff_t>(first) * width,
@@ -67,7 +67,7 @@ struct DenseMap {
   }
   void count_pixels() {
     counts.fill(0);
-    // Four tallies: most pixels are as the one before, and would wait for its count.
+    // Four tallies: most pixels have the status of the previous one, and would wait for its count.
     std::array<std::array<std::uint32_t, kDensePixelCount>, 4> tallies{};
     for (std::size_t i = 0; i < pixels.size(); ++i) ++tallies[i % 4][static_cast<std::size_t>(pixels[i])];
     for (const auto& tally : tallies)

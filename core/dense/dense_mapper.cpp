@@ -13,15 +13,15 @@
 namespace slsd {
 namespace {
 
-/// The window of a node covers this share of a cell, less some pixels, within limits: less has too few edges, more
-/// bends. Small symbols have more edges to a cell.
+/// Share of a cell that a node's window covers, less some pixels, within limits. Smaller windows have too few edges,
+/// larger ones bend more. Small symbols have more edges to a cell.
 constexpr double kWindowOfPitch = 0.86, kWindowLessPx = 3;
 constexpr int kWindowLeastPx = 11, kWindowMostPx = 21;
 
 /// Number of the sharpest blurs that a projector and a camera in focus reach.
 constexpr int kUsualBlurs = 4;
 
-/// Side of a window. It is no smaller than the stride: every pixel is seen by some node.
+/// Side of a window. It is at least the stride, so that every pixel lies in some node's window.
 int window_px(double pitch_in_camera_px, int stride_px) {
   const int px = static_cast<int>(std::lround(kWindowOfPitch * pitch_in_camera_px - kWindowLessPx));
   return std::clamp(px, std::max(kWindowLeastPx, stride_px), kWindowMostPx) | 1;
@@ -31,7 +31,7 @@ int judge_reach_px(double pitch_in_camera_px) {
   return std::clamp(static_cast<int>(std::lround(0.17 * pitch_in_camera_px)), 3, 5);
 }
 
-/// Twice that bridges what is dark within a symbol and between two.
+/// Half the gap to bridge: dark areas within a symbol and between two.
 int close_px(double pitch_in_camera_px) {
   return std::max(2, static_cast<int>(std::lround(0.3 * pitch_in_camera_px)));
 }
@@ -121,7 +121,7 @@ void DenseMapper::warm_up(Executor& executor) {
   map_.resize(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
 }
 
-/// The plane of a symbol: its depth, and the slopes that make the map turn as the grid of symbols does.
+/// Computes the plane of each symbol: its depth, and the slopes that make the patch map match the grid of symbols.
 void DenseMapper::find_seeds(const DecodedSymbols& symbols) {
   seeds_.clear();
   for (std::size_t i = 0; i < symbols.lattice->symbols.size(); ++i) {
@@ -139,7 +139,7 @@ void DenseMapper::find_seeds(const DecodedSymbols& symbols) {
   }
 }
 
-/// The blur that fits best, from that of the frame before downhill.
+/// Finds the blur that fits best, downhill from that of the previous frame.
 void DenseMapper::find_blur(const DenseFrame& frame) {
   std::array<float, PatternFields::kBlursPx.size()> misfits;
   misfits.fill(-1);
@@ -157,7 +157,7 @@ void DenseMapper::find_blur(const DenseFrame& frame) {
 /// Finds the frame's offset from its epipolar lines, and its blur.
 const PatternField& DenseMapper::find_field(const DenseFrame& frame) {
   blur_ = 1;
-  // What is off looks blurred, and with the wrong blur less of it is found: one after the other, and again.
+  // An offset looks like blur, and a wrong blur hides part of the offset. So estimate them in turn, twice.
   grid_.find_epipolar_offset(frame, fixed_->fields.at(blur_), seeds_);
   if (!seeds_.empty()) find_blur(frame);
   grid_.find_epipolar_offset(frame, fixed_->fields.at(blur_), seeds_);

@@ -30,57 +30,57 @@ class DenseObserver {
   virtual void stage_done(DenseStage stage) = 0;
 };
 
-/// Measures the surface between decoded symbols, a point to a camera pixel: docs/dense.md.
-/// @thread thread-bound: keeps its buffers; what never changes is shared with those that another() makes
+/// Measures the surface between decoded symbols, with a point for each camera pixel: docs/dense.md.
+/// @thread thread-bound: keeps its buffers; shares constant data with mappers made by another()
 class DenseMapper {
  public:
-  /// @param camera_index  in the calibration; the calibration's projector is of the pattern's size
+  /// @param camera_index  index in the calibration, whose projector has the size of the pattern
   DenseMapper(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
               const DecodeOptions& decode);
   /// Makes a mapper of the same kind for another thread.
   [[nodiscard]] DenseMapper another() const;
 
-  /// @param symbols  those that the decoder has found in this frame
-  /// @return         stands until the next call, which writes over whatever is there: another map may be put in its
-  ///                 place, whose memory is then used
+  /// @param symbols  symbols decoded in this frame
+  /// @return         valid until the next call, which overwrites it. The caller may move another map there, whose
+  ///                 memory is then reused
   DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
                     DenseObserver* observer = nullptr) {
     return measure(frame, full, symbols, executor, observer, false);
   }
-  /// The same of the next frame of a stream: where the scene stands still since the frame before, this costs a part of
-  /// it, see GridFollower. The cloud is as exact, and not to the last bit that of measure().
+  /// Measures the next frame of a stream. If the scene stands still, this costs only a part of measure(): see
+  /// GridFollower. The cloud is as exact as that of measure(), but not identical to the last bit.
   DenseMap& measure_next(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
                          DenseObserver* observer = nullptr) {
     return measure(frame, full, symbols, executor, observer, true);
   }
 
-  /// Gives back what measure_next() keeps of frames. @thread reentrant, also while another measures
+  /// Frees what measure_next() keeps of frames. @thread reentrant, even during measurements
   void end_stream() { follower_.forget(); }
 
-  /// Memory that it holds, without what it shares with others: that is bytes_of_fields().
+  /// Memory in use, without the shared fields: see bytes_of_fields().
   [[nodiscard]] std::size_t bytes() const;
-  /// Memory of the pattern's fields at most, one for each blur.
+  /// Largest memory of the pattern's fields, one for each blur.
   [[nodiscard]] static std::size_t bytes_of_fields(const Lens& projector);
-  /// The stride that a frame is measured with: as dense_stride_px says, but for frames so large that it would take more
-  /// than kNodesMost nodes, some 300 MB.
+  /// The stride for a frame: dense_stride_px, unless the frame is so large that it would take more than kNodesMost
+  /// nodes, some 300 MB.
   [[nodiscard]] static int stride_px(const Lens& camera, const DenseOptions& options);
   static constexpr std::size_t kNodesMost = 2'000'000;
 
-  /// Makes beforehand what the first frame would wait for.
+  /// Prepares in advance what the first frame would otherwise wait for.
   void warm_up(Executor& executor);
 
   /// Returns the rays of the camera's pixels.
   [[nodiscard]] const std::shared_ptr<const RayGrid>& rays() const;
-  /// The side of the patches that the surface is fitted to.
+  /// The side of the patches to which the surface is fitted.
   [[nodiscard]] int window_px() const;
-  /// Returns the places at which growth began in the last frame, and the surface that grew.
+  /// Returns the seeds of the last frame, from which the surface grew.
   [[nodiscard]] std::span<const SurfaceSeed> seeds() const { return seeds_; }
   [[nodiscard]] const SurfaceGrid& grid() const { return grid_; }
-  /// Number of the surface's nodes that the last frame took over from the frame before.
+  /// Number of nodes that the last frame took over from the previous one.
   [[nodiscard]] std::size_t followed_nodes() const { return followed_; }
   /// Blur of the pattern in the last frame, projector px.
   [[nodiscard]] float blur_sigma_px() const { return PatternFields::kBlursPx[blur_]; }
-  /// Offset of the pattern from its epipolar lines in the middle of the last frame, projector px.
+  /// Offset of the pattern from its epipolar lines at the centre of the last frame, projector px.
   [[nodiscard]] float epipolar_offset_px() const { return grid_.epipolar_offset().middle + across_px_; }
 
  private:
@@ -92,12 +92,12 @@ class DenseMapper {
   DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
                     DenseObserver* observer, bool next);
 
-  std::shared_ptr<const Fixed> fixed_;  // shared: mappers of several threads use one
+  std::shared_ptr<const Fixed> fixed_;  // shared by mappers of several threads
   SurfaceGrid grid_;
   SurfaceSearch search_;
   GridFollower follower_;
-  std::size_t followed_ = 0;  // nodes, of the last frame
-  float across_px_ = 0;       // what these went
+  std::size_t followed_ = 0;  // nodes taken over in the last frame
+  float across_px_ = 0;       // their mean move across the epipolar lines
   PixelJudge judge_;
   MapCleaner cleaner_;
   std::vector<SurfaceSeed> seeds_;

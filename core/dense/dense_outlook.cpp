@@ -14,10 +14,10 @@
 namespace slsd {
 namespace {
 
-/// Width of an upright part, in windows, of which half is measured; its rims are pruned.
+/// Width of an upright part, in windows, at which half of it is measured; its rims are pruned.
 constexpr double kThinnestWindows = 1.3;
 constexpr double kHalfTransferWindows = 1.3;
-/// Share of a cell in a window below which every pattern has a window without an edge.
+/// Ratio of a window to a cell below which every pattern has a window without an edge.
 constexpr double kWindowOfPitchLeast = 0.45;
 
 constexpr float kBlurPx = 0.55F;

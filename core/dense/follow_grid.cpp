@@ -12,39 +12,39 @@
 namespace slsd {
 namespace {
 
-/// Ratio of a window's squares to those that the noise of both frames makes: more is a change. Chance reaches it in one
-/// of many thousands; the noise is measured to some tenths of that.
+/// Ratio of a window's sum of squares to that expected from the noise of both frames; more is a change. Chance exceeds
+/// it in one of many thousands; the noise is known to some tenths of that.
 constexpr float kStill = 1.6F;
-/// Largest move of a plane, projector px anywhere in its window: the model is linear there.
+/// Largest move of a plane, projector px anywhere in its window, for which the model is linear.
 constexpr float kFollowPx = 0.1F;
-/// The planes of a block of so many nodes to a side move by chance, each its own way: squares that are this much more
-/// than noise makes them are a move of the surface, which is aligned: the derivatives are not exact enough for it.
+/// Side of a block of nodes. By chance, its planes move independently. If the sum of squares is this much above the
+/// noise, the surface moves, and the block is aligned: the derivatives are not exact enough to follow it.
 constexpr int kBlockNodes = 8;
 constexpr float kMovedTogether = 2;
 /// Largest change of the light, as a share of the gain.
 constexpr float kGainChange = 0.1F;
 /// Least share of the window's pixels that are not saturated.
 constexpr float kSeenMin = 0.7F;
-/// Least share of a frame's nodes that go on; with fewer, the next frame begins from nothing.
+/// Smallest share of a frame's nodes that continue; with fewer, the next frame starts afresh.
 constexpr double kFollowedMin = 0.5;
-/// Excess of still nodes over those that went on from which another frame is kept, which takes some time itself.
+/// Excess of still nodes over continued ones above which a new frame is kept, which itself takes time.
 constexpr double kStillMore = 0.2;
-/// Windows of one in so many nodes are looked at for that.
+/// Samples one node's window in so many for that.
 constexpr std::size_t kSampled = 37;
 
 using enum FollowedFrame::Unknown;
 constexpr int kPacked = FollowedFrame::kPacked;
 
-/// Sums over the rows of a window, column by column, d being what the frame has more than the followed one.
+/// Sums over the rows of a window, column by column; d is the frame minus the followed frame.
 enum ColumnSum { kDG, kYDG, kDP, kYDP, kD, kDC, kDD, kCounted };
 /// A row of windows.
 template <class T>
 struct ColumnsOf {
-  const T* pixels;              // the windows' upper left pixel, of the frame
-  std::ptrdiff_t stride;        // of it
-  const std::uint16_t* before;  // the same, of the followed one
+  const T* pixels;              // the windows' upper left pixel in the frame
+  std::ptrdiff_t stride;        // stride of the frame
+  const std::uint16_t* before;  // the same pixel in the followed frame
   const std::int16_t *along, *across, *light;
-  std::ptrdiff_t width;  // of these
+  std::ptrdiff_t width;  // stride of the followed frame and of the derivatives
   int side, columns;
   float full, slope_unit;
 };
@@ -55,7 +55,7 @@ inline __attribute__((always_inline)) void sum_columns(const ColumnsOf<T>& in, f
   const Lanes zero{}, one = zero + 1;
   const int half = in.side / 2;
   for (int column = 0; column < in.columns; column += kLanes) {
-    // The last ones overlap those before.
+    // The last group overlaps the one before.
     const int x = std::min(column, in.columns - kLanes);
     Lanes sums[kLanes];
     for (Lanes& sum : sums) sum = zero;
@@ -92,11 +92,11 @@ void call_sums(const ColumnsOf<std::uint16_t>& in, float* to) {
 
 /// Move of a node, from the sums of its window.
 struct Move {
-  float step[kFitted];           // in levels and, but for the last, gain times px
-  float squares, left, counted;  // of d: all, and what the step leaves
+  float step[kFitted];           // in levels; all but the last are gain times px
+  float squares, left, counted;  // of d: all, and the rest after the step
 };
 
-/// @param columns  of the window's first column on
+/// @param columns  sums from the window's first column on
 inline __attribute__((always_inline)) void find_move(const float* columns, int side, const float* inverse, Move& to) {
   Lanes plain{}, by_x{};
   const int half = side / 2;
@@ -183,14 +183,14 @@ void GridFollower::follow_row(const DenseFrame& frame, const FollowedFrame& from
           node.across += across;
           node.offset += move.step[kOffset], node.gain += move.step[kGain];
           node.gain_x += move.step[kGainX], node.gain_y += move.step[kGainY];
-          const float least = from.inverses[kPacked * index + kPacked - 1];  // of the disparity's variance
+          const float least = from.inverses[kPacked * index + kPacked - 1];  // variance of the disparity
           moves_[index] = {move.step[kDisparity] * move.step[kDisparity], 2 * noise * noise * least, across};
         }
       },
       frame.pixels);
 }
 
-/// Takes blocks back whose planes move together, and counts what is left.
+/// Gives up blocks whose planes move together, and counts the rest.
 void GridFollower::stop_what_moves(SurfaceGrid& grid) {
   float across = 0;
   const auto each = [&](int top, int left, const auto& take) {
@@ -239,7 +239,7 @@ std::shared_ptr<const FollowedFrame> GridFollower::follow(const DenseFrame& fram
   return nullptr;
 }
 
-/// The share of the good nodes whose windows are as in the frame before, but for noise.
+/// The share of the good nodes whose windows equal those of the previous frame, apart from noise.
 double GridFollower::still_share(const DenseFrame& frame, const SurfaceGrid& grid) const {
   std::size_t looked_at = 0, still = 0;
   const int half = window_px_ / 2;

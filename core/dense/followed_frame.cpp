@@ -13,7 +13,7 @@ namespace slsd {
 namespace {
 
 using enum FollowedFrame::Unknown;
-constexpr float kOfSlopeUnit = 1.F / 16;  // of the field's: slopes along a line are no multiples of it
+constexpr float kOfSlopeUnit = 1.F / 16;  // relative to the field's unit: slopes along a line are no multiples of it
 
 /// Sums of the derivatives' products.
 enum NormalSum {
@@ -44,16 +44,16 @@ static_assert(kNormalSums <= kNormalLanes * kLanes);
 
 /// Map of a node's plane for the pixels around it, in plain numbers.
 struct BlockOf {
-  float warp[9];  // by rows
+  float warp[9];  // row by row
   float origin_u, origin_v, along_u, along_v;
   const std::uint32_t* samples;
   int field_width, field_height;
   float slope_unit;
-  const float *x, *y;  // of the pixels, from the node's
-  int count;           // a multiple of the lanes
+  const float *x, *y;  // pixels relative to the node's
+  int count;           // a multiple of kLanes
 };
 
-/// The derivatives of the light there, and the light, in the steps that are kept.
+/// Computes the derivatives of the light, and the light, in the units in which they are kept.
 inline __attribute__((always_inline)) void derive_lanes(const BlockOf& in, std::int16_t* along, std::int16_t* across,
                                                         std::int16_t* light) {
   constexpr float kScale = PatternField::kSamplesPerPx;
@@ -77,7 +77,7 @@ inline __attribute__((always_inline)) void derive_lanes(const BlockOf& in, std::
     v = v > zero ? v : zero, v = v < last_v ? v : last_v;
     const IntLanes at_u = __builtin_convertvector(u, IntLanes), at_v = __builtin_convertvector(v, IntLanes);
     const Lanes from_u = u - __builtin_convertvector(at_u, Lanes), from_v = v - __builtin_convertvector(at_v, Lanes);
-    // Between four samples: a derivative that is kept has to be more exact than one that is only a step's direction.
+    // Interpolate between four samples: a kept derivative has to be more exact than one that only directs a step.
     Lanes slope_u = zero, slope_v = zero, value = zero;
     for (int corner = 0; corner < 4; ++corner) {
       const int right = corner % 2, below = corner / 2;
@@ -100,7 +100,7 @@ inline __attribute__((always_inline)) void derive_lanes(const BlockOf& in, std::
   }
 }
 
-/// The sums of NormalSum, as sum_columns() makes those of a difference.
+/// The sums of NormalSum, as sum_columns() computes those of a difference.
 struct NormalColumns {
   const std::uint16_t* pixels;
   const std::int16_t *along, *across, *light;
@@ -154,12 +154,12 @@ inline __attribute__((always_inline)) void sum_moments(const float* columns, int
   }
 }
 
-/// A normal matrix to a lane, and then its inverse.
+/// One normal matrix for each lane, later its inverse.
 struct EightNormals {
   Lanes of[kFitted][kFitted];
 };
 
-/// Inverts by Gauss and Jordan, in place: a positive definite matrix needs no pivots.
+/// Inverts in place by Gauss and Jordan: a positive definite matrix needs no pivots.
 inline __attribute__((always_inline)) void invert_eight(EightNormals& normals) {
   auto& m = normals.of;
   const Lanes one = Lanes{} + 1;
@@ -212,7 +212,7 @@ void FollowedFrame::find_derivatives(const PatternField& field, const SurfaceGri
   slope_unit = kOfSlopeUnit * field.slope_unit();
   const auto count = static_cast<std::size_t>((stride * stride + kLanes - 1) / kLanes * kLanes);
   std::vector<float> xs(count, 0), ys(count, 0);
-  const int before = grid.x_of(0);  // pixels of a node's block left of it
+  const int before = grid.x_of(0);  // number of pixels of a node's block left of it
   for (int i = 0; i < stride * stride; ++i)
     xs[i] = static_cast<float>(i % stride - before), ys[i] = static_cast<float>(i / stride - before);
   executor.run(grid.rows(), [&](int row, int) {

@@ -13,28 +13,28 @@
 
 namespace slsd {
 
-/// A frame whose nodes were measured, and what follows from it for frames that differ from it by little.
+/// A frame with measured nodes, and the data that continues it in frames with small differences.
 struct FollowedFrame {
   std::vector<std::uint16_t> pixels;
   double full = 0;
   std::size_t blur = 0;  ///< blur of the field that the nodes were aligned with
   EpipolarOffset epipolar;
-  std::vector<SurfaceNode> nodes;                  ///< good are those that bore points
-  std::vector<char> tried;                         ///< nodes that nothing fitted
+  std::vector<SurfaceNode> nodes;                  ///< good if they gave points
+  std::vector<char> tried;                         ///< nodes that no plane fitted
   std::size_t good = 0;                            ///< number of good nodes
   std::vector<SurfaceSeed> found;                  ///< see SurfaceSearch
-  std::vector<std::int16_t> along, across, light;  ///< per pixel: the derivatives of the light, and the light
-  float slope_unit = 0;                            ///< slope of one step of the derivatives
-  std::vector<float> inverses;                     ///< N^-1 of each node, its upper triangle by rows
+  std::vector<std::int16_t> along, across, light;  ///< for each pixel: the derivatives of the light, and the light
+  float slope_unit = 0;                            ///< slope of one unit of the derivatives
+  std::vector<float> inverses;                     ///< N^-1 of each node: its upper triangle, row by row
 
-  [[nodiscard]] std::size_t bytes() const;  ///< memory that it holds
+  [[nodiscard]] std::size_t bytes() const;  ///< memory in use
 
   /// Finds `along`, `across` and `light` from the nodes.
   void find_derivatives(const PatternField& field, const SurfaceGrid& grid, Executor& executor);
   /// Finds `inverses` from these.
   void find_inverses(const DenseFrame& frame, const SurfaceGrid& grid, int window_px, Executor& executor);
 
-  /// The unknowns in the order of their sums; how many numbers an upper triangle has; and the light of a step.
+  /// The unknowns in the order of their sums; the size of an upper triangle; and the light of one unit.
   enum Unknown { kOffset, kGain, kGainX, kGainY, kAcross, kSlopeX, kSlopeY, kDisparity };
   static constexpr int kPacked = kFitted * (kFitted + 1) / 2;
   static constexpr float kLightUnit = 1.F / 16384;

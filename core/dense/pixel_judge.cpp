@@ -14,29 +14,30 @@
 namespace slsd {
 namespace {
 
-/// Largest difference between the planes of adjacent nodes that are blended, px, and in standard deviations.
+/// Largest difference between the planes of adjacent nodes for blending, px, and in standard deviations.
 constexpr float kAgreePx = 0.12F, kAgreeSigmas = 4;
-/// The share of a node's window that agrees, from which on what does not is noise.
+/// Share of a node's window that agrees, above which the rest counts as noise.
 constexpr float kCleanSupport = 0.9F;
-/// Logarithms: how much likelier the surface has to be than another, or none, by what is around a pixel. Blur makes
-/// neighbours alike, some three pixels to one that is independent; so this is a chance of one in a thousand.
+/// Limits of the evidence around a pixel, natural logarithms: how much likelier the surface has to be than another, or
+/// none. Blur makes neighbours alike, some three pixels to an independent one, so this is a chance of one in a
+/// thousand.
 constexpr float kEvidenceMin = 20, kHalfMin = -3, kEnclosedHalfMin = -5;
-/// The same between nodes that are one surface: nothing may speak against it.
+/// The same between nodes of one surface: nothing may contradict it.
 constexpr float kEnclosedMin = -2;
-/// Evidence of a pixel by itself, from which on it is firm: it is lit, and as it should be.
+/// Evidence of a single pixel above which it is firm: it is lit, as expected.
 constexpr float kFirmMin = 2;
-/// One standard deviation that a plane adds where it is continued beyond its node to an edge, px.
+/// Standard deviation to add if a plane is continued beyond its node to an edge, px.
 constexpr float kEdgePx = 0.03F;
-/// Planes that differ by less at a cell are one candidate, px.
+/// Planes that differ by less at a cell are the same candidate, px.
 constexpr float kSamePx = 0.08F;
 
-// What is known of a pixel's level where a surface is, in units of its gain.
-constexpr float kMisfit = 0.04F;                               // of the dark: light that the scene scatters
+// Model of a pixel's level on a surface, in units of its gain.
+constexpr float kMisfit = 0.04F;                               // of the dark: scattered light
 constexpr float kGainSpread = 0.12F;                           // of the light: print, relief
 constexpr float kPlaceSpread = 0.2F;                           // camera px
 constexpr float kOutliers = 0.05F;                             // of the pixels
 constexpr float kLevels = 1.6F;                                // over which outliers are spread
-constexpr float kDark = 0.4F, kLit = 0.35F, kBetween = 0.25F;  // of the pixels of another surface
+constexpr float kDark = 0.4F, kLit = 0.35F, kBetween = 0.25F;  // levels of a pixel on another surface
 
 float normal(float off, float sigma) {
   return std::exp(-0.5F * off * off / (sigma * sigma)) / (sigma * std::sqrt(2 * std::numbers::pi_v<float>));
@@ -101,10 +102,10 @@ using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
 
 /// A plane's patch, in plain numbers: what weigh_lanes() needs.
 struct Weighing {
-  const float *seen, *x, *y;  // of each pixel, from the map's middle as first_x and first_y say
-  int count;                  // a multiple of the lanes
+  const float *seen, *x, *y;  // for each pixel, relative to the map's centre, given by first_x and first_y
+  int count;                  // a multiple of kLanes
   float first_x, first_y;
-  float warp[9];  // by rows
+  float warp[9];  // row by row
   float origin_u, origin_v;
   const std::uint32_t* samples;
   int field_width, field_height;
@@ -113,7 +114,7 @@ struct Weighing {
   const std::uint32_t* entries;
 };
 
-/// Weighs the evidence of each pixel for the plane: two numbers to a pixel, see Evidence.
+/// Weighs each pixel's evidence for the plane: two numbers for each pixel, see Evidence.
 inline __attribute__((always_inline)) void weigh_lanes(const Weighing& in, float* to) {
   constexpr float kScale = PatternField::kSamplesPerPx;
   constexpr int kBits = PatternField::kSlopeBits;
@@ -164,7 +165,7 @@ inline __attribute__((always_inline)) void weigh_lanes(const Weighing& in, float
         __builtin_convertvector(step, IntLanes);
     BitLanes found;
     for (int lane = 0; lane < kLanes; ++lane) found[lane] = in.entries[entry[lane]];
-    const Lanes counted = seen > zero ? zero + Table::kUnit : zero;  // below: outside, or saturated
+    const Lanes counted = seen > zero ? zero + Table::kUnit : zero;  // negative: outside, or saturated
     const Lanes another = __builtin_convertvector(reinterpret_cast<IntLanes>(found) >> 16, Lanes) * counted;
     const Lanes unlit = __builtin_convertvector(reinterpret_cast<IntLanes>(found << 16) >> 16, Lanes) * counted;
     const Lanes low = __builtin_shufflevector(another, unlit, 0, 8, 1, 9, 2, 10, 3, 11),
@@ -175,19 +176,19 @@ inline __attribute__((always_inline)) void weigh_lanes(const Weighing& in, float
 }
 
 struct Summing {
-  int side, reach, cell;  // of the whole, around a pixel, of the cell
-  float of_half;          // is added to what a half has
+  int side, reach, cell;  // of the whole block, of a pixel's surroundings, of the cell
+  float of_half;          // added to the evidence of a half
 };
 
-/// Finds for each pixel of a cell the least evidence of its surroundings: of the whole, and of the halves to each side.
-/// The pixel's own line is in both. A surface that goes on on one side alone ends here, or before.
+/// Finds the least evidence around each pixel of a cell: of the whole surroundings, and of the half on each side. The
+/// pixel's own line is in both halves. A surface that continues on one side alone ends here, or earlier.
 /// @param evidence  two numbers for each of side x side pixels
-/// @param columns   room for 8 (side + 1) numbers
+/// @param columns   buffer for 8 (side + 1) numbers
 inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const float* evidence, float* columns,
                                                      float* least, float* own) {
   const int side = in.side, reach = in.reach;
   for (int y = 0; y < in.cell; ++y) {
-    // Sums of columns, all of it and its upper and lower half, then added up along the row.
+    // Sums over columns, of the whole and of its upper and lower half, then added along the row.
     Lanes total{};
     std::memcpy(columns, &total, sizeof total);
     for (int x = 0; x < side; ++x) {
@@ -226,10 +227,10 @@ struct Blending {
   float value[4], slope_x[4], slope_y[4];  // inverse depth at the cell's first pixel
   float sigma_px[4], light[4];
   float per_px, per_stride, of_full;
-  int first_x, first_y;  // of the cell, from the pixel of its first node
+  int first_x, first_y;  // of the cell, relative to the pixel of its first node
 };
 
-/// A row of them.
+/// Blends a row of pixels.
 inline __attribute__((always_inline)) void blend_lanes(const Blending& in, int row, int first, float* depth,
                                                        float* sigma, std::int32_t* light) {
   const Lanes x = kLane + static_cast<float>(in.first_x + first);
@@ -268,8 +269,8 @@ struct PixelJudge::Cell {
   const PatternField& field;
   const SurfaceGrid& grid;
   DenseMap& map;
-  int column, row;               // of the node at its top left
-  int left, top, right, bottom;  // its pixels, right and bottom beyond the last
+  int column, row;               // of its top left node
+  int left, top, right, bottom;  // its pixels; right and bottom are one past the last
   std::array<const SurfaceNode*, kCandidates> candidates{};
   std::array<Eigen::Vector2i, kCandidates> nodes{};  // column, row
   std::array<Eigen::Vector2f, kCandidates> places{};
@@ -286,7 +287,7 @@ struct PixelJudge::Cell {
     places[count] = {static_cast<float>(grid.x_of(at_column)), static_cast<float>(grid.y_of(at_row))};
     ++count;
   }
-  /// The same, where no candidate is like it, and it is not too far.
+  /// Adds a candidate, unless it equals another or lies too far away.
   void add_other(int at_column, int at_row, int window_px) {
     const int before = count;
     add(at_column, at_row);
@@ -320,7 +321,7 @@ struct PixelJudge::Cell {
     return std::all_of(candidates.begin(), candidates.begin() + 4,
                        [](const SurfaceNode* node) { return node->support >= kCleanSupport; });
   }
-  /// The mean of the corners, as a node at the place of the first.
+  /// The mean of the corners, as a node at the first corner.
   [[nodiscard]] SurfaceNode merged() const {
     SurfaceNode node = *candidates[0];
     node.plane = {0, 0, 0};
@@ -384,7 +385,7 @@ void PixelJudge::blend(const Cell& cell, const float* least, const float* own) c
   }
 }
 
-/// The pixels of the cell and around it; -1 where none counts.
+/// Reads the pixels in and around the cell; -1 for pixels that do not count.
 void PixelJudge::see(const Cell& cell, Scratch& scratch) const {
   std::visit(
       [&](const auto& pixels) {
@@ -398,7 +399,7 @@ void PixelJudge::see(const Cell& cell, Scratch& scratch) const {
           const auto* row = pixels.row(from_y + j);
           const int first = std::clamp(-from_x, 0, side_), end = std::clamp(pixels.width - from_x, 0, side_);
           std::fill(to, to + first, -1.F), std::fill(to + end, to + side_, -1.F);
-          // A tenth of a level: zero is seen, and is not -1.
+          // At least a tenth of a level: zero is a valid level, not the marker -1.
           const auto full = static_cast<float>(cell.frame.full);
           for (int i = first; i < end; ++i) {
             const auto level = static_cast<float>(row[from_x + i]);

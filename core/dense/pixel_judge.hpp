@@ -12,9 +12,8 @@
 
 namespace slsd {
 
-/// Evidence of a pixel for a surface, against two others that could be there. One lies elsewhere, and dark and light
-/// are equally likely on it; the other is not lit. Each is the natural logarithm of how much likelier the pixel's level
-/// is.
+/// Evidence of a pixel for a surface against two alternatives: another surface, on which dark and light are equally
+/// likely, and an unlit one. Each is the natural logarithm of how much likelier the pixel's level is.
 struct Evidence {
   float against_another = 0, against_unlit = 0;
 
@@ -29,42 +28,42 @@ struct Evidence {
   }
 };
 
-/// Evidence, worked out beforehand: by the light that the surface should have there, what the pixel has, the slope of
-/// the light, and the noise, all in units of the gain.
+/// Precomputed evidence, by a pixel's expected and observed light, the slope of the light and the noise. All are in
+/// units of the gain.
 /// @thread reentrant
 class EvidenceTable {
  public:
   EvidenceTable();
   /// @param expected  0 to 1
-  /// @param seen      of 0 for dark and 1 for lit
-  /// @param slope     of the light, for one camera px
+  /// @param seen      0 for dark, 1 for lit
+  /// @param slope     slope of the light, for one camera px
   /// @param noise     one standard deviation of a pixel
   [[nodiscard]] Evidence at(float expected, float seen, float slope, float noise) const;
 
-  /// Returns the entries for a noise: kSeen to a row, kExpected rows to a slope. The upper half of each is against
-  /// another surface, the lower against none, both signed and in steps of kUnit.
+  /// Returns the table for a noise: kSeen entries to a row, kExpected rows to a slope. The upper half of each entry is
+  /// the evidence against another surface, the lower against none, both signed and in steps of kUnit.
   [[nodiscard]] const std::uint32_t* entries(float noise) const;
 
   static constexpr float kUnit = 1.F / 1024;
   static constexpr int kExpected = 17, kSeen = 48, kSlopes = 4, kNoises = 6;
   static constexpr float kSeenFirst = -0.5F, kSeenStep = 0.05F, kSlopeStep = 0.1F, kNoiseFirst = 0.01F;
 
-  /// The same, not from the table.
+  /// The same, computed without the table.
   [[nodiscard]] static Evidence reckon(float expected, float seen, float slope, float noise);
 
  private:
   std::vector<std::uint32_t> table_;
 };
 
-/// Gives each camera pixel the surface between the grid's nodes: blended where they are one surface and all that is
-/// seen agrees; elsewhere, pixel by pixel, the plane of a node nearby for which the pixel's surroundings speak most, if
-/// they speak for it.
+/// Assigns each camera pixel a surface between the grid's nodes. If the nodes are one surface and all pixels agree, it
+/// is a blend of their planes. Otherwise each pixel gets the nearby plane that its surroundings support most, if they
+/// support any.
 /// @thread thread-bound: keeps its buffers
 class PixelJudge {
  public:
   struct Options {
-    int reach_px = 3;    ///< reach of a pixel's surroundings, to each side
-    int window_px = 11;  ///< a node's window: no plane is continued farther
+    int reach_px = 3;    ///< reach of a pixel's surroundings to each side
+    int window_px = 11;  ///< a node's window: planes are continued no farther
     double depth_min_mm, depth_max_mm;
   };
   explicit PixelJudge(const Options& options) : options_(options) {}
@@ -87,8 +86,8 @@ class PixelJudge {
 
   Options options_;
   EvidenceTable table_;
-  int side_ = 0;                // of a cell and what is around it
-  std::vector<float> xs_, ys_;  // of its pixels, from the cell's first
+  int side_ = 0;                // of the block around a cell
+  std::vector<float> xs_, ys_;  // pixels relative to the cell's first
   std::vector<Scratch> scratch_;
 };
 

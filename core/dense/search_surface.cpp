@@ -12,42 +12,42 @@
 namespace slsd {
 namespace {
 
-/// Largest number of pixels that are compared in a window, spread all over it.
+/// Largest number of compared pixels in a window, spread evenly.
 constexpr int kPixelsMost = 64;
 /// Reach of the search beyond the known depths, projector px, and the largest number of depths.
 constexpr double kBeyondPx = 32;
 constexpr int kLevelsMost = 320;
-/// Nodes that tell what likeness says: as many as that, and no fewer than this.
+/// Largest and smallest number of nodes of known depth from which the evidence is learnt.
 constexpr std::size_t kKnownMost = 256, kKnownLeast = 32;
-/// Number of levels around the true depth within which a window is alike for a reason.
+/// Number of levels around the true depth within which a window is similar for a reason.
 constexpr int kNearLevels = 4;
-/// The share of the windows on a surface that it only touches.
+/// Share of the windows that lie only partly on the surface.
 constexpr double kPartly = 0.2;
-/// All windows at all depths are some e^13 tries, of which one in a thousand frames may be wrong.
+/// All windows at all depths are some e^13 trials, of which one in a thousand frames may be wrong.
 constexpr float kTotalEvidenceMin = 20;
 /// Lead over any other depth that a seed needs: a thousand to one.
 constexpr float kGapMin = 7;
-/// Evidence that a step to the next line costs: the depth stays, or moves by a level, one case of three.
+/// Evidence that a step to the next line costs: the depth stays or moves by one level, which is one case of three.
 constexpr float kOfStep = 1.1F;
-/// A window that has no more contrast than so many times the noise has nothing to compare.
+/// A window needs at least so many times the noise as contrast.
 constexpr float kNoiseMultipleMin = 4;
-constexpr std::size_t kPlacesMost = 8192;  // of lines of one kind: thin parts are few
+constexpr std::size_t kPlacesMost = 8192;  // on lines of one kind: thin parts are few
 
 using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
 
 /// A window and the pattern at some depths.
 struct Comparing {
-  const float *levels, *weights, *x, *y;  // the frame's: without their mean
-  int count;                              // a multiple of the lanes
-  float warp[9], shift[3];                // by rows; and what a level adds to its last column
+  const float *levels, *weights, *x, *y;  // of the frame, without their mean
+  int count;                              // a multiple of kLanes
+  float warp[9], shift[3];                // row by row; and what a level adds to the last column
   float origin_u, origin_v;
   const std::uint32_t* samples;
   int field_width, field_height;
-  float pixels, squares;  // of the frame's levels
+  float pixels, squares;  // sums over the frame's levels
   int depths;
 };
 
-/// Computes the likeness of both: the correlation.
+/// Computes the correlation of window and pattern.
 inline __attribute__((always_inline)) void compare_lanes(const Comparing& in, float* to) {
   constexpr float kScale = PatternField::kSamplesPerPx;
   constexpr int kBits = PatternField::kSlopeBits;
@@ -77,7 +77,7 @@ inline __attribute__((always_inline)) void compare_lanes(const Comparing& in, fl
     constexpr float kUnit = PatternField::kValueUnit;
     const float light = sum_of(sum) * kUnit;
     const float spread = sum_of(squares) * kUnit * kUnit - light * light / in.pixels;
-    // A window of one light has nothing to be like.
+    // A window without contrast has no correlation.
     to[depth] = sum_of(product) * kUnit / std::sqrt((spread + 1e-3F * in.pixels) * in.squares);
   }
 }
@@ -105,7 +105,7 @@ std::size_t SurfaceSearch::bytes() const {
   return of(open_) + of(places_) + of(scores_) + of(before_) + of(after_) + of(ways_) + of(depths_) + of(seeds_);
 }
 
-/// The depths that are known, and some around.
+/// Chooses the known depths, and some around them.
 bool SurfaceSearch::choose_levels(const SurfaceGrid& grid) {
   depths_.clear();
   for (const SurfaceNode& node : grid.nodes())
@@ -131,7 +131,7 @@ bool SurfaceSearch::choose_levels(const SurfaceGrid& grid) {
   return levels_.count > 2 * kNearLevels;
 }
 
-/// Computes the likeness of the window to the pattern at each depth; false if it has nothing to compare.
+/// Correlates the window with the pattern at each depth; false if it has too little contrast.
 bool SurfaceSearch::compare(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
                             const Eigen::Vector2i& place, Scratch& scratch) const {
   const auto [width, height] = grid.frame_px();
@@ -174,7 +174,7 @@ bool SurfaceSearch::compare(const DenseFrame& frame, const PatternField& field, 
                       pixels,
                       squares,
                       0};
-  // The projector's lens is made linear anew every so many levels.
+  // The projector's lens is linearised again after so many levels.
   constexpr int kLinear = 32;
   for (int first = 0; first < levels_.count; first += kLinear) {
     comparing.depths = std::min(kLinear, levels_.count - first);
@@ -194,7 +194,7 @@ bool SurfaceSearch::compare(const DenseFrame& frame, const PatternField& field, 
   return true;
 }
 
-/// Learns the evidence of a likeness from windows of known depth: at that depth, and at all others.
+/// Learns the evidence of a correlation from windows of known depth: at that depth, and at all others.
 bool SurfaceSearch::learn(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid) {
   std::array<double, kBins> there{}, elsewhere{};
   double all_there = 0, all_elsewhere = 0;
@@ -221,13 +221,13 @@ bool SurfaceSearch::learn(const DenseFrame& frame, const PatternField& field, co
   for (int bin = 0; bin < kBins; ++bin) {
     const double by_chance = (elsewhere[bin] + 1) / (all_elsewhere + kBins),
                  known = (there[bin] + 0.1) / (all_there + 0.1 * kBins);
-    least = std::max(least, (1 - kPartly) * known / by_chance + kPartly);  // what is more alike says no less
+    least = std::max(least, (1 - kPartly) * known / by_chance + kPartly);  // a higher correlation is no weaker evidence
     says_[bin] = std::min(most_, static_cast<float>(std::log(least)));
   }
   return true;
 }
 
-/// The places that nothing has reached.
+/// Finds the places that nothing has reached.
 void SurfaceSearch::find_open(const SurfaceGrid& grid, const Lines& lines) {
   places_.clear();
   open_.assign(static_cast<std::size_t>(lines.lines) * lines.per_line, -1);
@@ -241,7 +241,7 @@ void SurfaceSearch::find_open(const SurfaceGrid& grid, const Lines& lines) {
   }
 }
 
-/// Weighs the evidence of each place at each depth.
+/// Computes the evidence of each place at each depth.
 void SurfaceSearch::weigh(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
                           Executor& executor) {
   constexpr std::size_t kInPart = 32;
@@ -261,13 +261,13 @@ void SurfaceSearch::weigh(const DenseFrame& frame, const PatternField& field, co
   });
 }
 
-/// The most that any way says that ends at a place at a depth.
+/// The greatest evidence of any path that ends at a place at a depth.
 /// @param forwards  from the first line on; otherwise from the last
 void SurfaceSearch::add_up(const Lines& lines, bool forwards, std::vector<float>& best) {
   const int count = levels_.count;
   best.resize(scores_.size());
   ways_.resize(static_cast<std::size_t>(count) + 2);
-  float* const from = ways_.data() + 1;  // by level: with one more at each end, where nothing speaks
+  float* const from = ways_.data() + 1;  // by level, with an empty entry at each end
   for (int nth = 0; nth < lines.lines; ++nth) {
     const int line = forwards ? nth : lines.lines - 1 - nth, before = forwards ? line - 1 : line + 1;
     for (int index = 0; index < lines.per_line; ++index) {
@@ -289,7 +289,7 @@ void SurfaceSearch::add_up(const Lines& lines, bool forwards, std::vector<float>
   }
 }
 
-/// Takes seeds at places with enough evidence for one depth, and far more than for any other.
+/// Takes seeds at places with enough evidence for one depth, and much more than for any other.
 void SurfaceSearch::take_seeds() {
   const int count = levels_.count;
   for (std::size_t i = 0; i < places_.size(); ++i) {

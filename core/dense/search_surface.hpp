@@ -10,37 +10,37 @@
 
 namespace slsd {
 
-/// Looks for surface that growth has not reached, as no symbol is decoded on it: parts narrower than a codeword.
-/// Windows where nothing grew are compared with the pattern at each depth, and those that follow on each other, along
-/// an upright or a lying part, speak together. Two letters alike are common, ten in a row are not:
+/// Looks for surfaces that growth has not reached because no symbol is decoded there: parts narrower than a codeword.
+/// Compares windows without a surface with the pattern at each depth, and adds up the evidence of windows along an
+/// upright or a horizontal part. Two letters in a row often match by chance, ten do not:
 ///
 ///     place   how much likelier each depth is
 ///       1      .  .  1  .  .  .  0  .
 ///       2      .  0  .  2  .  .  .  1
-///       3      1  .  .  2  .  0  .  .      a way: 1 2 2, by neighbouring depths
+///       3      1  .  .  2  .  0  .  .      a path: 1 2 2, by neighbouring depths
 ///
-/// How much a likeness says is measured in each frame: by how alike windows are where the depth is known, and at all
-/// the depths that are wrong there.
+/// The evidence of a correlation is learnt in each frame from windows of known depth: their correlations there, and at
+/// all wrong depths.
 /// @thread thread-bound: keeps its buffers
 class SurfaceSearch {
  public:
-  /// @param letters  of the pattern: a window sees no more than one symbol
+  /// @param letters  of the pattern: a window covers at most one symbol
   SurfaceSearch(int letters, int window_px);
 
   /// Searches at nodes of the grid that are neither good nor closed.
-  /// @return seeds to grow from; until the next call
+  /// @return seeds to grow from; valid until the next call
   [[nodiscard]] std::span<const SurfaceSeed> find(const DenseFrame& frame, const PatternField& field,
                                                   const SurfaceGrid& grid, Executor& executor);
-  [[nodiscard]] std::size_t bytes() const;  ///< memory that it holds
+  [[nodiscard]] std::size_t bytes() const;  ///< memory in use
 
  private:
-  /// The depths that are tried: inverses of them in equal steps, of one projector px in the middle of the frame.
+  /// The depths to try: their inverses are in equal steps of one projector px at the centre of the frame.
   struct Levels {
     double first = 0, step = 0;
     int count = 0;
     [[nodiscard]] double at(int level) const { return first + step * level; }
   };
-  /// Places on lines across which a part may be thin: close beside each other, a window from line to line.
+  /// Places on lines across a thin part: close together on a line, and a window from line to line.
   struct Lines {
     bool upright;  ///< followed from line to line downwards; otherwise from left to right
     int beside_px, next_px, per_line, lines;
@@ -64,13 +64,13 @@ class SurfaceSearch {
   void take_seeds();
 
   int window_px_;
-  float most_;                            // of what a window may say
-  std::vector<float> xs_, ys_, weights_;  // of the window's pixels that are looked at
+  float most_;                            // largest evidence of a window
+  std::vector<float> xs_, ys_, weights_;  // the window's sampled pixels
   Levels levels_;
-  std::array<float, kBins> says_{};  // by likeness: the logarithm of how much likelier the depth makes it
-  std::vector<std::int32_t> open_;   // of each place: its scores, or -1
+  std::array<float, kBins> says_{};  // by correlation: logarithm of how much likelier the depth becomes
+  std::vector<std::int32_t> open_;   // for each place: its scores, or -1
   std::vector<Eigen::Vector2i> places_;
-  std::vector<float> scores_, before_, after_;  // of the open places, by level
+  std::vector<float> scores_, before_, after_;  // for the open places, by level
   std::vector<float> ways_, depths_;
   std::vector<Scratch> scratch_;
   std::vector<SurfaceSeed> seeds_;

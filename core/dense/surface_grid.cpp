@@ -13,7 +13,7 @@
 namespace slsd {
 namespace {
 
-/// A start that the last step has moved by less stands: what is left is less than a hundredth of that.
+/// A start that the last step moved by less has settled: the rest is less than a hundredth of that.
 constexpr float kSettledPx = 0.1F;
 constexpr int kStepsMost = 4;
 
@@ -21,7 +21,7 @@ constexpr int kStepsMost = 4;
 constexpr float kSupportMin = 0.6F;   // of the window's pixels agree
 constexpr float kSeenMin = 0.7F;      // of them are in the frame and not saturated
 constexpr float kResidualMax = 0.3F;  // of the gain
-constexpr float kStepMaxPx = 0.8F;    // from the neighbour's plane: within the pull of the fit
+constexpr float kStepMaxPx = 0.8F;    // from the neighbour's plane: within the range in which the fit converges
 constexpr float kSlopeMax = 0.5F;     // projector px for one camera px: steeper faces show too little of the pattern
 constexpr float kSigmaMaxPx = 0.3F;
 constexpr float kGainSlopeMax = 0.08F;  // of the gain, for one camera px
@@ -29,15 +29,16 @@ constexpr float kContrastMin = 4;       // of the gain over the noise of a pixel
 
 /// Parts of sigma, as for symbols (docs/notes/2026-11-decoder.md).
 constexpr float kLeastPx = 0.003F, kOfScatter = 0.8F;
-/// Factor of the window's saturated share: its rims are wrong too.
+/// Factor of the window's saturated share: pixels at its rims are wrong too.
 constexpr float kOfUnseen = 4;
 
-/// The epipolar offset: how many seeds tell of it, how many at least of its middle, and of its slopes.
+/// Numbers of seeds for the epipolar offset: at most, at least for its middle, and at least for its slopes.
 constexpr std::size_t kOffsetSeeds = 256, kOffsetSeedsLeast = 8, kOffsetSlopeSeeds = 48;
-/// Offset across the lines above which the excess is likely to be as large along them, and so in depth.
+/// Usual offset across the epipolar lines. A larger one suggests an equal error along the lines, which changes depth:
+/// the excess adds to sigma.
 constexpr float kUsualOffsetPx = 0.2F;
-constexpr float kOffsetPx = 0.05F;      // how far relief and noise put a seed off
-constexpr float kOffsetSlope = 0.001F;  // for one camera px: more is no knock that the symbols would decode after
+constexpr float kOffsetPx = 0.05F;      // scatter of a seed's offset from relief and noise
+constexpr float kOffsetSlope = 0.001F;  // for one camera px: after a stronger knock, symbols would not decode
 
 }  // namespace
 
@@ -67,7 +68,7 @@ std::int32_t SurfaceGrid::node_at(const Eigen::Vector2f& camera_px) const {
   return column < 0 || row < 0 || column >= columns_ || row >= rows_ ? -1 : row * columns_ + column;
 }
 
-/// Sets the task up; false where nothing can be fitted.
+/// Sets up the task; false if nothing can be fitted.
 bool SurfaceGrid::begin(const DenseFrame& frame, const Attempt& attempt, PatchTask& task) const {
   const SurfacePlane& start = attempt.start;
   const double inverse_depth = static_cast<double>(start.inverse_depth);
@@ -75,7 +76,7 @@ bool SurfaceGrid::begin(const DenseFrame& frame, const Attempt& attempt, PatchTa
     return false;
   task.x = x_of(attempt.node % columns_), task.y = y_of(attempt.node / columns_);
   const int half = options_.window_px / 2;
-  // Half a window tells little of a slope: the frame's rim takes its planes from farther in.
+  // Half a window determines a slope poorly: the frame's rim takes its planes from farther inside.
   const Lens& lens = geometry_->camera.lens;
   if (task.x < half || task.y < half || task.x + half >= lens.width_px || task.y + half >= lens.height_px) return false;
   task.map = map_at(attempt.node % columns_, attempt.node / columns_, inverse_depth);
@@ -89,7 +90,7 @@ bool SurfaceGrid::begin(const DenseFrame& frame, const Attempt& attempt, PatchTa
   return true;
 }
 
-/// Steps until each has come to rest: from a neighbour's plane the first does for most.
+/// Steps until each fit has settled: from a neighbour's plane, one step is enough for most.
 void SurfaceGrid::align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t count) const {
   for (int step = 0; step < kStepsMost && count > 0; ++step) {
     for (std::size_t i = 0; i < count; i += kEight) {
@@ -133,7 +134,7 @@ bool SurfaceGrid::accept(const DenseFrame& frame, const PatchTask& task, Surface
   return true;
 }
 
-/// Aligns every so manieth seed, at most a batch of them. @return how many could be begun, at the batch's front
+/// Aligns every nth seed, at most a batch of them. @return number of tasks that began, at the batch's front
 std::size_t SurfaceGrid::align_some(const DenseFrame& frame, const PatternField& field,
                                     std::span<const SurfaceSeed> seeds, std::size_t first, std::size_t step,
                                     Batch& batch) {
@@ -178,7 +179,8 @@ void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const PatternFie
   epipolar_.middle_px = 0.5F * Eigen::Vector2f(static_cast<float>(lens.width_px), static_cast<float>(lens.height_px));
   const EpipolarOffset none = epipolar_;
   const std::size_t step = std::max<std::size_t>(1, seeds.size() / kOffsetSeeds);
-  // The aligner holds the pattern to its line by some; a second round, from what the first has found, takes that back.
+  // The aligner's prior holds the pattern near its line; a second round, from the first one's result, removes that
+  // bias.
   for (int round = 0; round < 2; ++round) {
     offsets_.clear();
     for (std::size_t first = step / 2; first < seeds.size(); first += step * kBatchNodes) {
@@ -197,8 +199,7 @@ void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const PatternFie
                      [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) { return a.z() < b.z(); });
     epipolar_.middle = middle->z(), epipolar_.slope_x = epipolar_.slope_y = 0;
     if (offsets_.size() < kOffsetSlopeSeeds) continue;
-    // A plane through them, those that are far off it counting less; what is known of its slopes is that they are
-    // small.
+    // Fit a plane through the offsets, with small weights for outliers and a prior of small slopes.
     for (int pass = 0; pass < 4; ++pass) {
       Eigen::Matrix3f normal = Eigen::Matrix3f::Zero();
       Eigen::Vector3f right = Eigen::Vector3f::Zero();
@@ -318,42 +319,43 @@ namespace {
 
 /// Reach of a node in fusing, in nodes.
 constexpr int kFuseReach = 2;
-constexpr float kFusePx = 0.015F;  // what the pattern's model leaves out, in each node
+constexpr float kFusePx = 0.015F;  // error of the pattern's model, in each node
 constexpr float kFuseSigmas = 3;
-/// Limits up to which a mean holds: the surrounding nodes' scatter over their noise, and a node's move by the bend over
-/// its noise. Beyond them there is relief, and the mean is of fewer.
+/// Limits for taking the mean: the scatter of the surrounding nodes over their noise, and a node's move by the bend
+/// over its noise. Beyond them there is relief, and the mean covers fewer nodes.
 constexpr float kFuseExcess = 0.8F, kFlat = 0.7F;
-/// Error that no mean takes away, px: focus and lenses are not quite as the pattern's blur has them.
+/// Error that no mean reduces, px: focus and lenses differ slightly from the pattern's modelled blur.
 constexpr float kFloorPx = 0.008F;
-/// Factors of the neighbours' disagreement over a bend. Their planes, continued by a stride, are off by half its
-/// square, and the window's plane by a 24th of its own: so much of the one stands for the other.
+/// Factors of the neighbours' disagreement on a bend. A plane continued by a stride is off by half the bend times the
+/// stride squared. A window's own plane is off by a 24th of the bend times the window squared. So the disagreement
+/// measures the error.
 constexpr float kOfBendLeft = 1.6F, kOfDisagreementLeast = 0.5F, kOfDisagreementMost = 4;
-/// Share of the noise in that disagreement's square that is no relief.
+/// Share of the noise in the squared disagreement that is no relief.
 constexpr float kOfNoise = 0.6F;
-/// Share of the variance that remains if the mean is of this reach and those smaller.
+/// Share of the variance that remains if the mean has this reach.
 constexpr float kLeftOfVariance[kFuseReach] = {0.75F, 0.27F};
 
-/// Factor for the shared errors of adjacent slopes, as their windows overlap: over the smaller reach, the larger.
+/// Factor for the shared errors of adjacent slopes, whose windows overlap: larger for the smaller reach.
 constexpr float kOverlap[kFuseReach] = {9, 3};
 
-/// Corrections of a bend that waves of wave number k show too small. A regression over n slopes, a stride s apart,
-/// loses k^2 s^2 / 6 times a ratio. That ratio is the mean fourth power of the slopes' places over the mean square (1
-/// for three slopes, 3.4 for five). Each slope also loses k^2 w^2 / 40. The lack of three slopes is their difference
-/// from five times a factor, kBendBeyond + kWindowBeyond w^2 / s^2. The factor is limited, as far wider windows than
-/// strides leave the series.
+/// Correction of a bend on waves of wave number k, which a regression over slopes underestimates. Over n slopes, a
+/// stride s apart, the bend loses the share k^2 s^2 / 6 times r. Here r is the mean fourth power of the slopes' places
+/// over their mean square (1 for three slopes, 3.4 for five). The window w of each slope takes another share, k^2 w^2 /
+/// 40. So three slopes lack kBendBeyond + kWindowBeyond w^2 / s^2 times their difference from five. kBeyondMost limits
+/// this factor: for windows much wider than strides, the series does not hold.
 constexpr float kBendBeyond = 1 / 2.4F, kWindowBeyond = 6 / (2.4F * 40), kBeyondMost = 1.2F;
 
-/// Inputs of fuse_lanes(): eight nodes of a row, and all around them, in the order of Around.
+/// Inputs of fuse_lanes(): eight nodes of a row and their neighbours, in the order of Around.
 struct Fusing {
   const float* around[7];
   std::ptrdiff_t row;  // from a row to the next
   float stride, of_bend, of_disagreement;
-  float beyond;  // see where bends are made
+  float beyond;  // factor of the bend correction
 };
 enum Around { kInverseDepth, kSlopeX, kSlopeY, kPxPer, kNoisePx, kSlopeNoise, kGood, kVariance };
 
-/// Results of fuse_lanes(): planes in projector px from the nodes' own, the addition to sigma's square, and the share
-/// of it that stays.
+/// Results of fuse_lanes(): planes in projector px relative to the nodes' own, the addition to sigma squared, and the
+/// share of sigma squared that remains.
 struct Fused {
   Lanes off, slope_x, slope_y, left, more;
 };
@@ -368,14 +370,14 @@ struct BendSums {
   }
 };
 
-/// A bend as far as noise could not be the cause.
+/// Reduces a bend by the part that noise may cause.
 inline __attribute__((always_inline)) void take_noise_off(float overlap, const Lanes& spread, Lanes& bend) {
   const Lanes zero{}, sure = (zero + 1) - overlap / (spread * bend * bend);
   bend = ((spread > zero) & (sure > zero)) ? bend * sure : zero;
 }
 
-// With a node's own slopes and its neighbour's, each by half, the neighbour's value is continued exactly over any
-// surface of the second order.
+// The mean of a node's and its neighbour's slopes continues the neighbour's value exactly over any surface of the
+// second order.
 inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& fused) {
   const Lanes zero{}, one = zero + 1;
   Lanes own[7], beside = zero, beside_count = zero;
@@ -424,9 +426,9 @@ inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& f
       }
     }
   }
-  // A plane over a window lies beside what bends there by the bend times the mean of the squared distance from the
-  // middle, by half. Slopes far apart see less of short waves than near ones do, and from both follows what none would
-  // miss; where that is lost in noise, many slopes see the bend of long ones.
+  // A plane fitted to a window lies off a bent surface by half the bend times the mean squared distance from the
+  // window's centre. Widely spaced slopes underestimate short waves more than close ones do; extrapolating from both
+  // removes the loss. If noise hides that, use the bend of the wider regression, which covers long waves.
   Lanes lift = zero;
   for (const auto& axis : along) {
     Lanes near, wide, near_spread, wide_spread;
@@ -458,7 +460,7 @@ inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& f
 }  // namespace
 
 void SurfaceGrid::fuse(Executor& executor) {
-  // All that is asked of the nodes around, a number of all nodes after the other, with a rim where none is good.
+  // The data of all nodes, one quantity after the other, with a border of nodes that are not good.
   const std::size_t row = static_cast<std::size_t>(columns_) + 2 * kFuseReach + kLanes,
                     plane = row * (static_cast<std::size_t>(rows_) + 2 * kFuseReach);
   if (around_.size() != 8 * plane) around_.assign(8 * plane, 0);
@@ -507,7 +509,7 @@ void SurfaceGrid::fuse(Executor& executor) {
       }
     }
   });
-  // A node's own variance is of few numbers, and itself uncertain: the mean with those around it is less so.
+  // A node's own variance comes from few numbers and is itself uncertain: average it with those around it.
   executor.run(rows_, [&](int at_row, int) {
     SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
     for (int column = 0; column < columns_; ++column) {

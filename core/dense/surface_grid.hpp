@@ -19,7 +19,7 @@
 
 namespace slsd {
 
-/// A piece of the surface around a camera pixel: on a plane the inverse of the depth is linear in the pixels.
+/// A piece of the surface around a camera pixel. On a plane, the inverse depth is linear in the pixels.
 struct SurfacePlane {
   float inverse_depth = 0;         ///< 1/mm, along the camera's z axis
   float slope_x = 0, slope_y = 0;  ///< its change for one camera px
@@ -27,7 +27,7 @@ struct SurfacePlane {
   [[nodiscard]] float at(float dx, float dy) const { return inverse_depth + slope_x * dx + slope_y * dy; }
 };
 
-/// A place on the surface that is known: growth begins there.
+/// A known place on the surface, at which growth begins.
 struct SurfaceSeed {
   Eigen::Vector2f camera_px;
   SurfacePlane plane;
@@ -36,20 +36,20 @@ struct SurfaceSeed {
 /// The plane that was fitted around one pixel of the grid.
 struct SurfaceNode {
   SurfacePlane plane;
-  float per_px = 0;                                    ///< 1/mm: what moves the pattern by one projector px there
+  float per_px = 0;                                    ///< 1/mm: the change that moves the pattern by one projector px
   float across = 0;                                    ///< offset of the pattern from its epipolar line, projector px
   float gain = 0, gain_x = 0, gain_y = 0, offset = 0;  ///< grey levels, for one camera px
   float support = 0;                                   ///< the share of its window that agrees with the pattern
-  float noise_px = 0, slope_noise = 0;                 ///< one standard deviation that the frame's noise leaves
+  float noise_px = 0, slope_noise = 0;                 ///< one standard deviation from the frame's noise
   float sigma_px = 0;                                  ///< all errors together, projector px
   float residual = 0;                                  ///< root mean square, of the gain
   bool good = false;
 };
 
-/// Offset of the pattern from its epipolar lines, projector px, over the frame: the calibration's error, or a knock.
+/// Offset of the pattern from its epipolar lines over the frame, projector px: the calibration's error, or a knock.
 struct EpipolarOffset {
   Eigen::Vector2f middle_px = Eigen::Vector2f::Zero();  ///< middle of the frame
-  float middle = 0, slope_x = 0, slope_y = 0;           ///< there, and its change for one camera px
+  float middle = 0, slope_x = 0, slope_y = 0;           ///< offset there, and its change for one camera px
 
   [[nodiscard]] float at(const Eigen::Vector2f& camera_px) const {
     return middle + slope_x * (camera_px.x() - middle_px.x()) + slope_y * (camera_px.y() - middle_px.y());
@@ -76,15 +76,15 @@ struct PatchGeometry {
 
 struct GridOptions {
   int stride_px;
-  int window_px;  ///< odd: the side of the patch that a node is fitted to
+  int window_px;  ///< odd: side of the patch to which a node is fitted
   double depth_min_mm, depth_max_mm;
 };
 
-/// The surface on a grid of camera pixels, grown from seeds: each node is aligned with the pattern from the plane of a
-/// neighbour that is known, front by front, so that which of them run beside each other changes nothing.
+/// The surface on a grid of camera pixels, grown from seeds. Each node is aligned with the pattern, starting from the
+/// plane of a known neighbour. Growth proceeds front by front, so the order of parallel work has no effect.
 ///
 ///     o   o   o   o   o      o  not reached yet
-///     o  (+)-(+)  o   o     (+) the front: from their best neighbours' planes, continued
+///     o  (+)-(+)  o   o     (+) the front: starts at its best neighbours' planes, continued
 ///    (+)-[#]-[#]-(+)  o     [#] fitted, and good
 ///
 /// @thread thread-bound: keeps its buffers
@@ -97,7 +97,7 @@ class SurfaceGrid {
   [[nodiscard]] int stride_px() const { return options_.stride_px; }
   [[nodiscard]] int x_of(int column) const { return first_ + column * options_.stride_px; }
   [[nodiscard]] int y_of(int row) const { return first_ + row * options_.stride_px; }
-  /// Returns a good node; null outside the grid, and if nothing was fitted.
+  /// Returns a good node; null outside the grid and if no plane fitted.
   [[nodiscard]] const SurfaceNode* good(int column, int row) const {
     if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return nullptr;
     const SurfaceNode& node = nodes_[static_cast<std::size_t>(row) * columns_ + column];
@@ -115,18 +115,18 @@ class SurfaceGrid {
                   inverse_depth);
   }
 
-  /// Misfit of the pattern at a blur to the seeds: the median of residual over gain; 1 if nothing fits.
+  /// Misfit of the pattern at a blur to the seeds: the median of residual over gain; 1 if no plane fits.
   [[nodiscard]] float misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
 
-  /// Measures at some of the seeds how far off its epipolar lines the frame has the pattern; what follows starts there.
+  /// Measures at some seeds how far the pattern lies off its epipolar lines; later alignments start there.
   void find_epipolar_offset(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
   [[nodiscard]] const EpipolarOffset& epipolar_offset() const { return epipolar_; }
   void set_epipolar_offset(const EpipolarOffset& offset) { epipolar_ = offset; }
-  [[nodiscard]] std::size_t bytes() const;  ///< memory that it holds
+  [[nodiscard]] std::size_t bytes() const;  ///< memory in use
 
   /// Forgets every node.
   void clear();
-  /// Row by row. What is good before grow() stays, and is grown from.
+  /// Row by row. Nodes that are good before grow() stay, and growth starts from them.
   [[nodiscard]] std::span<SurfaceNode> nodes() { return nodes_; }
   [[nodiscard]] std::span<const SurfaceNode> nodes() const { return nodes_; }
   /// Marks a node that need not be tried.
@@ -141,7 +141,7 @@ class SurfaceGrid {
     const std::int32_t node = node_at(camera_px);
     return node >= 0 && !nodes_[node].good && attempts_[node] != kClosed;
   }
-  /// 1/mm: the least and the most that are looked for.
+  /// 1/mm: limits of the search.
   [[nodiscard]] std::pair<double, double> inverse_depths() const {
     return {1 / options_.depth_max_mm, 1 / options_.depth_min_mm};
   }
@@ -149,16 +149,15 @@ class SurfaceGrid {
     return {geometry_->camera.lens.width_px, geometry_->camera.lens.height_px};
   }
 
-  /// Options by which nodes are aligned: light and colour change by some 2 % of the gain for one camera px on most of
-  /// what is scanned.
+  /// Options for aligning nodes: on most objects, light and colour change by some 2 % of the gain for one camera px.
   static constexpr AlignOptions kAlign{.gain_slope_sigma = 0.02F};
 
-  /// Grows from the seeds and from nodes that are good already, since clear().
+  /// Grows from the seeds and from nodes that have become good since clear().
   void grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds, Executor& executor);
-  /// Goes on from more seeds: what could not be reached from elsewhere is tried again.
+  /// Continues from more seeds; tries nodes again that failed from elsewhere.
   void grow_on(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
                Executor& executor);
-  /// Fuses each node with those around it if they agree to within their noise: they are one smooth surface, and their
+  /// Fuses each node with its neighbours if they agree within their noise: they are then one smooth surface, and their
   /// mean is more exact than each. Flat surfaces thus get wide windows. A larger difference adds to sigma.
   void fuse(Executor& executor);
 
@@ -169,9 +168,9 @@ class SurfaceGrid {
     std::int32_t node;
     float cost;
     SurfacePlane start;
-    float across, gain, gain_x, gain_y, offset;  // gain 0: not known
+    float across, gain, gain_x, gain_y, offset;  // gain 0: unknown
   };
-  /// Attempts that are aligned together, on one worker.
+  /// Attempts that one worker aligns together.
   struct Batch {
     std::array<PatchTask, kBatchNodes> tasks;
     std::array<PatchTask*, kBatchNodes> active;
@@ -200,17 +199,17 @@ class SurfaceGrid {
   const PatchGeometry* geometry_;
   GridOptions options_;
   int first_, columns_, rows_;
-  std::vector<Eigen::Matrix3f> turned_;  // of the nodes' pixels, see turned_by()
+  std::vector<Eigen::Matrix3f> turned_;  // for each node's pixel, see turned_by()
   std::vector<SurfaceNode> nodes_;
-  std::vector<float> around_;  // of the nodes, as fuse() reads them
+  std::vector<float> around_;  // data of the nodes, as fuse() reads them
   std::vector<Attempt> front_, next_;
-  std::vector<char> accepted_;          // of the front
-  std::vector<std::int32_t> pending_;   // of a node: its place in the next front, or -1
-  std::vector<std::uint8_t> attempts_;  // of a node
-  std::vector<Batch> batches_;          // one to a worker
+  std::vector<char> accepted_;          // for the front
+  std::vector<std::int32_t> pending_;   // for each node: its place in the next front, or -1
+  std::vector<std::uint8_t> attempts_;  // for each node
+  std::vector<Batch> batches_;          // one for each worker
   std::vector<float> misfits_;
   EpipolarOffset epipolar_;
-  std::vector<Eigen::Vector3f> offsets_;  // of seeds: camera px, off by
+  std::vector<Eigen::Vector3f> offsets_;  // for each seed: camera px, offset
 };
 
 }  // namespace slsd

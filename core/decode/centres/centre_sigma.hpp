@@ -28,7 +28,7 @@ namespace slsd {
 /// px and added in squares,
 ///
 ///     0.55 noise,  0.01,  0.4 across,  0.4 uneven,  0.25 roughness,  0.25 unevenness,
-///      sqrt(roughness unevenness),  0.01 misfit^2,  0.015 if no neighbours show its bend
+///     sqrt(roughness unevenness),  0.01 misfit^2,  0.015 if no neighbours show its bend
 ///
 /// across: the residual less the frame's median, which is the calibration's error. roughness: the root mean square of
 /// the residuals of the symbol and its neighbours, beyond noise and the 0.03 px of smooth surfaces. uneven: the
