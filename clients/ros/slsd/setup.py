@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""For colcon. By ament_python: the slsdConfig.cmake of ament_cmake would hide that of slsd's C++ library."""
+"""Setup for colcon, with ament_python: ament_cmake's slsdConfig.cmake would hide that of slsd's C++ library."""
 from glob import glob
 from xml.etree import ElementTree
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Shows a scanner of slsd to ROS 2: ros2 launch slsd scanner.launch.py.
+"""Publishes a scanner of slsd in ROS 2: ros2 launch slsd scanner.launch.py.
 
-slsd-dds publishes clouds, images, transforms and the robot description. The service is that which answers already, or
-one that this starts.
+slsd-dds publishes clouds, images, transforms and the robot description. It uses the service that answers at the socket.
+If none does, this file starts one.
 """
 import json
 import os
@@ -19,22 +19,22 @@ from launch_ros.actions import Node
 USUAL_SOCKET = '/run/slsd/slsd.sock'
 RVIZ_CONFIG = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), 'rviz', 'scanner.rviz')
 RESPAWN_S = 2.0
-WRONG_USAGE = (2, 78)  # as slsd and slsd-dds exit: starting them once more changes nothing
+WRONG_USAGE = (2, 78)  # exit codes of slsd and slsd-dds, if starting them again cannot help
 
-# Name, default, what it is; and what it may be.
+# Name, default, description, and allowed values.
 ARGUMENTS = (
-    ('name', 'scanner', 'of the scanner: its topics and frames begin with it'),
-    ('socket', '', f'of the service; default: that of config, else SLSD_SOCKET, else {USUAL_SOCKET}'),
-    ('start_service', 'auto', 'whether to start slsd; auto: if nobody answers at the socket', ('auto', 'true', 'false')),
-    ('config', '', 'configuration of the service that is started; default: /etc/slsd/slsd.toml'),
-    ('rate', '', 'clouds a second at most; 0: only those that are triggered; default: every frame'),
+    ('name', 'scanner', 'name of the scanner; its topics and frames begin with it'),
+    ('socket', '', f'socket of the service; default: that of config, else SLSD_SOCKET, else {USUAL_SOCKET}'),
+    ('start_service', 'auto', 'whether to start slsd; auto: if no service answers at the socket', ('auto', 'true', 'false')),
+    ('config', '', 'configuration of a service that this starts; default: /etc/slsd/slsd.toml'),
+    ('rate', '', 'clouds a second at most; 0: only triggered ones; default: every frame'),
     ('density', '', 'a point for each symbol, or for each camera pixel; default: as the service is configured',
      ('', 'symbols', 'pixels')),
-    ('stride', '', 'dense clouds have every so many pixels and rows of the camera; default: 2'),
-    ('voxel', '', 'millimetres: one point to each cube of this size; default: all points'),
+    ('stride', '', 'dense clouds use every so many pixels and rows of the camera; default: 2'),
+    ('voxel', '', 'millimetres: one point for each cube of this size; default: all points'),
     ('image_rate', '2', 'images a second of each camera, if somebody subscribes; 0: none'),
-    ('extrinsics', '', 'file that says where the scanner stands among others; default: NAME_link is its root'),
-    ('transforms', 'true', 'false: your robot description has the frames of the scanner', ('true', 'false')),
+    ('extrinsics', '', 'file with the places of several scanners; default: NAME_link is its root'),
+    ('transforms', 'true', 'false: your robot description places the scanner\'s frames', ('true', 'false')),
     ('rviz', 'false', 'whether to start RViz', ('true', 'false')),
 )
 OPTIONS = ('rate', 'density', 'stride', 'voxel', 'image_rate', 'extrinsics')
@@ -51,7 +51,7 @@ def socket_of(config):
     """The socket that a configuration names."""
     try:
         import tomllib
-    except ImportError:  # Python 3.10, of Humble
+    except ImportError:  # Python 3.10 in Humble
         raise RuntimeError(f'name the socket of {config}, too: socket:=PATH') from None
     with open(config, 'rb') as file:
         path = tomllib.load(file).get('server', {}).get('socket', USUAL_SOCKET)
@@ -59,7 +59,7 @@ def socket_of(config):
 
 
 def ask(path):
-    """The state of the service at a socket; empty if it is slow to answer; None if nobody listens."""
+    """The state of the service at a socket; empty if it answers too slowly; None if no service listens."""
     with socket.socket(socket.AF_UNIX) as connection:
         connection.settimeout(2)
         try:
@@ -76,7 +76,7 @@ def ask(path):
 
 
 def lasting(command):
-    """A program that is started again if it ends, unless it was called wrongly."""
+    """A program that restarts if it ends, unless its usage was wrong."""
     return ExecuteProcess(
         cmd=command, output='screen', respawn=True, respawn_delay=RESPAWN_S,
         on_exit=lambda event, _: [Shutdown(reason='wrong usage')] if event.returncode in WRONG_USAGE else None)
@@ -86,13 +86,13 @@ def service(wanted, config, path, state):
     if wanted == 'false' or (wanted == 'auto' and state is not None and not config):
         return []
     if state is not None:
-        raise RuntimeError(f'{path}: a service answers here already: stop it, or leave config and start_service away')
-    return [LogInfo(msg=f'nobody answers at {path}: starting slsd; or start that of the system: sudo systemctl start slsd'),
+        raise RuntimeError(f'{path}: a service answers here already: stop it, or leave out config and start_service')
+    return [LogInfo(msg=f'no service answers at {path}: starting slsd (or start it yourself: sudo systemctl start slsd)'),
             lasting([program('slsd'), *(['--config', config] if config else [])])]
 
 
 def rviz(name, placed, state):
-    """RViz, with the names in its configuration mapped to those of this scanner."""
+    """RViz, with the names in its configuration mapped to this scanner's names."""
     cameras = (state or {}).get('cameras') or [{'name': 'camera'}]
     camera = re.sub('[^A-Za-z0-9_]', '_', cameras[0]['name'])
     camera = camera if camera[:1].isalpha() else 'camera_' + camera
