@@ -22,27 +22,27 @@ struct CameraDescription {
   std::string device;  ///< stable name of the device: path, serial number
   int width_px = 0;
   int height_px = 0;
-  double rate_hz = 0.0;  ///< frame rate while it runs freely, after open(); 0: exposes at the trigger, or does not tell
-  std::string hardware = {};  ///< after open(): what tells the device from others of its kind, wherever it is plugged
-                              ///< in; printable, at most 200 bytes; empty where nothing does
-  bool external_trigger = false;  ///< exposes when a line outside of this host says so: it may be silent for long
+  double rate_hz = 0.0;       ///< frame rate in free run, after open(); 0: exposes at the trigger, or unknown
+  std::string hardware = {};  ///< after open(): identifies the device wherever it is plugged in; printable, at most 200
+                              ///< bytes; empty if unknown
+  bool external_trigger = false;  ///< an external signal triggers it, so it may be silent for long
 };
 
-/// A number that a driver keeps of its own: "packets_sent_again", "clock_drift_ppm".
+/// A figure that a driver keeps on its own: "packets_sent_again", "clock_drift_ppm".
 struct DriverFigure {
-  std::string_view name;  ///< lives as long as the program
+  std::string_view name;  ///< lives until the program ends
   double value = 0.0;
-  bool counts = true;  ///< only grows, until the device is opened anew; else it is what it is now
+  bool counts = true;  ///< a count that grows until the device is reopened; else a current value
 };
 
-/// A camera that takes one frame to a trigger. Backends: file, v4l2, aravis. Every backend passes the suite in
+/// A camera that takes one frame for each trigger. Backends: file, v4l2, aravis. Every backend passes the suite in
 /// tests/drivers. Frames may outlive the camera.
 ///
 ///     made --open()--> ready --capture(): kDisconnected--> gone --open()--> ready
 ///                      ready --check(): kDisconnected---> gone
 ///                      ready --capture(): any other-----> ready
 ///
-/// @thread thread-bound, but for cancel()
+/// @thread thread-bound, except cancel()
 class Camera {
  public:
   virtual ~Camera() = default;
@@ -50,20 +50,20 @@ class Camera {
   /// Width and height are known after open(), and zero before.
   [[nodiscard]] virtual const CameraDescription& description() const = 0;
 
-  /// Called by open() as soon as something of the camera's name answers, before it is configured. Set before the first
-  /// open(); a backend that opens at once need not call it.
+  /// Called by open() as soon as a device of the camera's name answers, before its configuration. Set before the first
+  /// open(). A backend that opens at once need not call it.
   virtual void set_found(std::function<void()> /*found*/) {}  // NOLINT: those that keep it take it over
 
-  /// Opens the device, again after a fault; configures everything anew and starts the sequence numbers at 0.
+  /// Opens the device, also after a fault. Configures everything again and restarts the sequence numbers at 0.
   /// @errors kNotFound, kPermissionDenied, kMalformed, kUnsupported, kDisconnected: the device's supervisor retries;
-  ///         kCancelled: a cancel() came meanwhile
+  ///         kCancelled: cancel() was called meanwhile
   [[nodiscard]] virtual Result<> open() = 0;
 
-  /// The longest time that open() may take, for the thread that watches over it.
+  /// The longest time that open() may take; its watchdog uses this.
   [[nodiscard]] virtual std::chrono::nanoseconds open_time_max() const { return std::chrono::minutes(1); }
 
-  /// The longest time that capture() may take if nothing is wrong, whatever its deadline. The thread that watches over
-  /// it asks again after that, and takes a driver that does not come back for stuck.
+  /// The longest time of a normal capture(), whatever its deadline. The watching thread asks again after that time, and
+  /// considers a driver that does not return stuck.
   [[nodiscard]] virtual std::chrono::nanoseconds frame_time_max() const {
     constexpr double kFloorS = 5;
     const double rate_hz = description().rate_hz;
@@ -71,31 +71,31 @@ class Camera {
     return std::chrono::nanoseconds(static_cast<std::int64_t>(std::min(seconds, 3600.0) * 1e9));
   }
 
-  /// Exposes one frame that begins after the call, and waits for it until the deadline at most.
-  /// @errors kFrameDropped, kFrameTorn, kFrameStale, kFrameLate: this frame is lost, the camera goes on;
-  ///         kBusy: too many frames are held, give one back; kDisconnected: it needs open(); kCancelled; any other: as
-  ///         the backend documents, this frame is lost
+  /// Exposes one frame after the call, and waits for it until the deadline at most.
+  /// @errors kFrameDropped, kFrameTorn, kFrameStale, kFrameLate: this frame is lost, the camera continues; kBusy: too
+  ///         many frames are held, give one back; kDisconnected: call open(); kCancelled; any other: as the backend
+  ///         documents, this frame is lost
   [[nodiscard]] virtual Result<Frame> capture(MonotonicTime deadline) = 0;
 
-  /// The frame after the one that was given last, for a rig that stands still and wants every frame: its exposure may
-  /// have begun before the call, but not before that of the one given last. After a pause of more than a few periods,
-  /// and of a camera that exposes at the trigger, as capture(). @errors as capture()
+  /// Captures the frame after the previous one, for a rig that stands still and needs every frame. Its exposure may
+  /// have begun before the call, but not before the previous frame's. Works as capture() after a pause of more than a
+  /// few periods, and for a triggered camera. @errors as capture()
   [[nodiscard]] virtual Result<Frame> capture_next(MonotonicTime deadline) { return capture(deadline); }
 
-  /// Tells the light of the captures that follow; the default is the pattern. A camera sees it, a replay chooses its
-  /// images by it.
+  /// Sets the light of the next captures; the default is the pattern. A camera sees the light itself; a replay chooses
+  /// its images accordingly.
   virtual void expect(Picture) {}
 
-  /// Checks that the open device is still there, as far as can be told without a frame and without waiting.
-  /// @errors kDisconnected: it needs open()
+  /// Checks that the open device is still present, as far as possible without a frame and without waiting.
+  /// @errors kDisconnected: call open()
   [[nodiscard]] virtual Result<> check() { return {}; }
 
-  /// Appends what the driver counts besides frames delivered and lost.
+  /// Appends the driver's own figures, beyond frames delivered and lost.
   virtual void tell_figures(std::vector<DriverFigure>& /*figures*/) const {}
 
-  /// Ends the capture() that waits on another thread, soon, with kCancelled; where none waits, ends the next one, so
-  /// that a cancel() that comes just before it is not lost. open() forgets it; one that comes while a backend waits
-  /// in open() may end that, too.
+  /// Soon ends a capture() that waits on another thread, with kCancelled. If none waits, ends the next one, so that a
+  /// cancel() just before it is not lost. open() clears it. A cancel() while a backend waits in open() may end that
+  /// too.
   /// @thread thread-safe
   virtual void cancel() = 0;
 };

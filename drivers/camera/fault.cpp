@@ -20,7 +20,7 @@ constexpr std::array<std::pair<std::string_view, FaultKind>, 7> kKinds{{{"drop",
 constexpr std::array<std::pair<std::string_view, double>, 3> kUnitsNs{{{"us", 1e3}, {"ms", 1e6}, {"s", 1e9}}};
 constexpr double kDurationMaxNs = 3600e9;
 
-/// The value that stands beside the name in the table.
+/// The value beside the name in the table.
 template <class Table>
 auto look_up(const Table& table, std::string_view name) -> std::optional<decltype(table.front().second)> {
   const auto found = std::find_if(table.begin(), table.end(), [&](const auto& entry) { return entry.first == name; });

@@ -85,7 +85,7 @@ Result<Frame> FaultyCamera::capture_sound(MonotonicTime deadline) {
   while (true) {
     auto frame = camera_->capture(deadline);
     if (frame || frame.error().code != ErrorCode::kCancelled) return frame;
-    // cancel() wakes both. Where ours was not woken, this one is left from a cancel() that was answered here.
+    // cancel() wakes both. If ours was not woken, this wake remains from a cancel() that was answered here.
     if (wake_.sleep_until(MonotonicTime::min())) return frame;
   }
 }

@@ -16,13 +16,13 @@
 
 namespace slsd {
 
-/// A camera with faults: passes everything on to the camera that it holds, but at the captures that the faults name
-/// does as they say. For the tests of everything above a camera.
-/// @thread thread-bound, but for cancel()
+/// A camera with simulated faults, for the tests of everything above a camera. Passes all calls to the camera that it
+/// holds, except at the captures that the faults name.
+/// @thread thread-bound, except cancel()
 class FaultyCamera final : public Camera {
  public:
   /// @param camera  not null
-  /// @param faults  in any order; of several at the same capture the first is used
+  /// @param faults  in any order; if several name the same capture, the first is used
   FaultyCamera(std::unique_ptr<Camera> camera, std::vector<Fault> faults);
 
   [[nodiscard]] const CameraDescription& description() const override { return camera_->description(); }

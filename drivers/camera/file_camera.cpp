@@ -18,7 +18,7 @@ std::string format_text(const FrameFormat& format) {
   return size_text(format.width_px, format.height_px) + " with " + std::to_string(8 * format.bytes_per_pixel) + " bits";
 }
 
-/// The first tick of the period, counted from the start, that is not before the time.
+/// The first tick at or after the time; ticks are periods counted from the start.
 MonotonicTime next_tick(MonotonicTime start, std::chrono::nanoseconds period, MonotonicTime time) {
   const auto ticks = (time - start + period - std::chrono::nanoseconds(1)) / period;
   return start + ticks * period;
@@ -115,7 +115,7 @@ Result<MonotonicTime> FileCamera::wait_for_exposure(MonotonicTime deadline) {
 }
 
 Result<Frame> FileCamera::deliver(MonotonicTime exposure_start) {
-  if (pool_->all_lent()) return fail_busy();  // first, so that no image is passed over
+  if (pool_->all_lent()) return fail_busy();  // checked first, so that no image is skipped
   const auto image = light_ == Picture::kPattern ? next_image() : image_in_light();
   if (!image) return tl::unexpected(image.error());
   const GreyView pixels = view(**image);
@@ -133,7 +133,7 @@ Result<const GreyImage*> FileCamera::next_image() {
   return folder_.image(patterns_++ % folder_.size());
 }
 
-// That which belongs to the frame of the pattern that was shown last.
+// Chooses the image that belongs to the last pattern frame.
 Result<const GreyImage*> FileCamera::image_in_light() {
   ImageFolder& folder = light_ == Picture::kWhite ? white_ : dark_;
   if (folder.size() == 0)

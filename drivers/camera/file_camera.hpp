@@ -24,29 +24,29 @@ struct FileCameraOptions {
   static constexpr std::string_view kDriver = "file";
   std::string name = "camera";
   std::filesystem::path path = {};  ///< a folder of PNG, TIFF, PGM, PPM or BMP images, or one image
-  bool loop = true;                 ///< after the last image from the first on again; else kNotFound
-  double rate_hz = 0.0;  ///< 0: exposes at the trigger; else runs freely and delivers the next frame, up to 1000
-  std::optional<std::pair<int, int>> size_px = {};  ///< width and height expected; without it those of the first image
-  BayerPattern bayer = BayerPattern::kNone;         ///< grey images are mosaics of this pattern
+  bool loop = true;                 ///< start again after the last image; else kNotFound
+  double rate_hz = 0.0;             ///< 0: exposes at the trigger; else delivers frames in free run, up to 1000
+  std::optional<std::pair<int, int>> size_px = {};  ///< expected width and height; empty: those of the first image
+  BayerPattern bayer = BayerPattern::kNone;         ///< grey images are Bayer mosaics of this pattern
   int frames_held_max = 8;                          ///< buffers, 2 to 64: how many frames may be held at once
-  std::size_t cache_bytes = 64u << 20;  ///< decoded images that are kept; what does not fit is decoded each time
+  std::size_t cache_bytes = 64u << 20;  ///< limit of the decoded images kept in memory; others are decoded each time
 
   [[nodiscard]] Result<> validate() const;
   friend bool operator==(const FileCameraOptions&, const FileCameraOptions&) = default;
 };
 
-/// A camera that replays images: one to a trigger, a folder's in the order of their names' bytes ("2.png" after
-/// "10.png": number with leading zeros). Hidden files, folders and other extensions are passed over. The list is read
-/// by open(); an image that is rewritten afterwards is read anew, so that one image may be kept up to date by others.
+/// A camera that replays images, one for each trigger. The images of a folder come in the byte order of their names
+/// ("2.png" after "10.png": use leading zeros). Skips hidden files, folders and other extensions. open() reads the
+/// list. An image that is rewritten later is read again, so another program can keep one image up to date.
 ///
-/// What the scene looks like in white and without the projector's light is replayed from the folders "white" and "dark"
-/// within the folder, or beside the one image: to the i-th frame of the pattern belongs the i-th image of each, and
-/// where there are fewer they begin anew. Without such a folder such a capture gives kNotFound.
+/// Replays white and dark frames from the folders "white" and "dark", within the folder or beside the single image. The
+/// i-th pattern frame has the i-th image of each; if there are fewer, they start again. Without such a folder, the
+/// capture gives kNotFound.
 ///
-/// Besides the errors of every camera, capture() gives kNotFound when loop is off and all images were shown;
-/// kMismatch for an image of another size or depth than the first; and what read_image() gives. That image's frame is
-/// lost and the camera goes on with the next. kDisconnected when the folder or file is gone.
-/// @thread thread-bound, but for cancel()
+/// Besides the errors of every camera, capture() gives: kNotFound if loop is off and all images were shown; kMismatch
+/// for an image of another size or depth than the first; errors of read_image(). That image's frame is lost, and the
+/// camera continues with the next. kDisconnected means that the folder or file is gone.
+/// @thread thread-bound, except cancel()
 class FileCamera final : public Camera {
  public:
   explicit FileCamera(FileCameraOptions options);
@@ -74,10 +74,10 @@ class FileCamera final : public Camera {
   CameraDescription description_;
   WakeEvent wake_;
   ImageFolder folder_;
-  ImageFolder white_;  ///< empty where there is none
+  ImageFolder white_;  ///< empty if there is none
   ImageFolder dark_;
   Picture light_ = Picture::kPattern;
-  std::uint64_t patterns_ = 0;  ///< frames of the pattern so far
+  std::uint64_t patterns_ = 0;  ///< pattern frames so far
   std::optional<FramePool> pool_;
   MonotonicTime opened_;
   std::uint64_t next_sequence_ = 0;

@@ -21,9 +21,9 @@ using MonotonicTime = std::chrono::time_point<std::chrono::steady_clock, std::ch
 
 class FrameLease;
 
-/// The buffers of a driver or a pool, each lent to one frame at a time. Shared by who lends and each frame, because
-/// frames may outlive their camera: the last of them frees the memory. Lending allocates nothing.
-/// @thread lend() and what it asks belong to one thread; a lease may end on any
+/// The buffers of a driver or a pool; each is lent to one frame at a time. The lender and the frames share them,
+/// because frames may outlive their camera: the last owner frees the memory. Lending allocates nothing.
+/// @thread lend() and its queries belong to one thread; a lease may end on any thread
 class LentBuffers : public std::enable_shared_from_this<LentBuffers> {
  public:
   explicit LentBuffers(std::size_t count) : lent_(count) {}
@@ -33,7 +33,7 @@ class LentBuffers : public std::enable_shared_from_this<LentBuffers> {
 
   [[nodiscard]] std::size_t size() const { return lent_.size(); }
   [[nodiscard]] bool is_lent(std::size_t buffer) const { return lent_[buffer].load(std::memory_order_acquire); }
-  /// The number of lent buffers. A lease that ends meanwhile on another thread may count or not.
+  /// The number of lent buffers. May or may not count a lease that ends on another thread during the call.
   [[nodiscard]] std::size_t lent() const {
     return static_cast<std::size_t>(
         std::ranges::count_if(lent_, [](const auto& lent) { return lent.load(std::memory_order_acquire); }));
@@ -44,7 +44,7 @@ class LentBuffers : public std::enable_shared_from_this<LentBuffers> {
     return std::nullopt;
   }
 
-  /// @param buffer  that is not lent
+  /// @param buffer  one that is not lent
   [[nodiscard]] FrameLease lend(std::size_t buffer);
 
  private:
@@ -53,14 +53,14 @@ class LentBuffers : public std::enable_shared_from_this<LentBuffers> {
     lent_[buffer].store(false, std::memory_order_release);
     take_back(buffer);
   }
-  /// Called with a buffer whose lease ended, for a driver that wants it back at once. Runs on the thread that ends the
+  /// Called with a buffer whose lease ended, for a driver that needs it back at once. Runs on the thread that ends the
   /// lease.
   virtual void take_back(std::size_t /*buffer*/) {}
 
   std::vector<std::atomic<bool>> lent_;
 };
 
-/// A buffer that is lent, until the end of this.
+/// The lease of a buffer; its end returns the buffer.
 class FrameLease {
  public:
   FrameLease() = default;  ///< holds no buffer
@@ -88,14 +88,14 @@ inline FrameLease LentBuffers::lend(std::size_t buffer) {
   return {shared_from_this(), buffer};
 }
 
-/// One frame of one camera: a lease on a buffer of the driver's, given back by the destructor.
+/// One frame of one camera: a lease on a buffer of the driver. The destructor returns the buffer.
 /// @thread thread-bound; may be moved between threads
 class Frame {
  public:
-  /// @param sequence        counts the device's frames from open() on; a gap tells of a lost frame
-  /// @param exposure_start  when its exposure began, as the device says; an old one tells of a stale frame
-  /// @param received        when its last byte was there
-  /// @param lease           on the buffer that the image lies in; nothing where it outlives every frame
+  /// @param sequence        counts the device's frames since open(); a gap shows a lost frame
+  /// @param exposure_start  the device's time of the exposure's start; an old one shows a stale frame
+  /// @param received        time when its last byte arrived
+  /// @param lease           on the buffer that contains the image; nothing if the image outlives every frame
   Frame(GreyView image, std::uint64_t sequence, MonotonicTime exposure_start, MonotonicTime received,
         FrameLease lease = {})
       : image_(image),

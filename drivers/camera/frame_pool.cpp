@@ -22,7 +22,7 @@ struct FramePool::Buffers final : LentBuffers {
 
   FrameFormat format;
   std::size_t words_each;
-  std::unique_ptr<std::uint16_t[]> memory;  // resident as far as it was lent: unwritten pages take nothing
+  std::unique_ptr<std::uint16_t[]> memory;  // unwritten pages use no memory, so only lent buffers are resident
 };
 
 namespace {

@@ -22,19 +22,19 @@ struct FrameFormat {
 
 [[nodiscard]] FrameFormat format_of(const GreyView& image);
 
-/// A fixed number of buffers, all allocated at the beginning, lent to frames. Frames may outlive the pool: the buffers
-/// go with the last of both.
-/// @thread thread-bound; the frames that it lends may end on any thread
+/// A fixed number of buffers for frames, all allocated at the start. Frames may outlive the pool: the last owner frees
+/// the buffers.
+/// @thread thread-bound; frames may end on any thread
 class FramePool {
  public:
   FramePool(FrameFormat format, int buffers);
 
   [[nodiscard]] const FrameFormat& format() const;
 
-  /// Tells whether lend() has no buffer left; one that ends meanwhile on another thread may count or not.
+  /// Tells whether no buffer is free. May or may not count a lease that ends on another thread during the call.
   [[nodiscard]] bool all_lent() const;
 
-  /// A copy of the pixels in a free buffer, or nothing if all are lent.
+  /// Copies the pixels into a free buffer; nothing if all are lent.
   /// @param image  of the pool's format
   [[nodiscard]] std::optional<Frame> lend(const GreyView& image, std::uint64_t sequence, MonotonicTime exposure_start);
 

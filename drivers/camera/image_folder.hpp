@@ -13,24 +13,24 @@
 
 namespace slsd {
 
-/// The images of a folder, or one image, one after the other in the order of their names' bytes. Decoded images are
-/// kept as far as the cache reaches: the first ones, since what comes round again is used the latest.
+/// The images of a folder, or one image, in the byte order of their names. Keeps decoded images up to the cache's size:
+/// the first ones, because in a cycle the most recent image is needed last.
 /// @thread thread-bound
 class ImageFolder {
  public:
-  /// Lists the images and begins anew.
+  /// Lists the images and starts from the first.
   /// @errors kNotFound (path, or no image in it), kPermissionDenied, kIo
   [[nodiscard]] Result<> open(const std::filesystem::path& path, const ReadImageOptions& options,
                               std::size_t cache_bytes);
 
   [[nodiscard]] std::size_t size() const { return images_.size(); }
 
-  /// The i-th image as it is on disk now; valid until the next call.
-  /// @errors as read_image(); kDisconnected where the folder itself, or the only image, is gone
+  /// The i-th image as currently on disk; valid until the next call.
+  /// @errors as read_image(); kDisconnected if the folder itself, or the only image, is gone
   [[nodiscard]] Result<const GreyImage*> image(std::size_t i);
 
  private:
-  /// Tells a file from what stood in its place before.
+  /// Distinguishes a file from an earlier one at the same path.
   struct Version {
     std::uint64_t node = 0;
     std::int64_t bytes = 0;

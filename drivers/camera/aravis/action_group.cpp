@@ -12,7 +12,7 @@
 namespace slsd {
 namespace {
 
-// By which the members' threads may begin apart; longer ones of a single camera would hold it up.
+// Covers the time between the members' threads; a longer wait would delay a single camera.
 constexpr std::chrono::milliseconds kWindow{5};
 
 }  // namespace
@@ -63,7 +63,8 @@ std::optional<std::uint64_t> ActionGroup::time() const {
   return latest;
 }
 
-// To each by itself, as no broadcast goes through a router. Those that did not ask expose too, and let the frame go.
+// Sends to each device separately, because routers forward no broadcasts. Members that did not ask expose too, and
+// ignore the frame.
 void ActionGroup::send() {
   const auto ticks = time();
   for (Member* member : members_) {

@@ -15,11 +15,11 @@
 
 namespace slsd {
 
-/// Gives the time to expose at, by the device's clock; without a value: at once. @thread any member's
+/// Returns the device time of the exposure; without a value: at once. @thread any member's
 using ActionTime = std::function<std::optional<std::uint64_t>()>;
 
-/// The GigE Vision cameras of this process that expose at one action command. Each member asks for its exposure, and
-/// when all have, or after a short wait for the others, the command goes to every member at once.
+/// The GigE Vision cameras of this process that expose at one action command. Each member requests its exposure. When
+/// all have, or after a short wait for the others, the command goes to every member at once.
 ///
 ///     left   --trigger()------->|
 ///     right  ------trigger()--->| command to both, at once or for a common time
@@ -35,9 +35,9 @@ class ActionGroup {
     Member(const Member&) = delete;
     Member& operator=(const Member&) = delete;
 
-    /// Waits for the others, for a few milliseconds at most, and sees to it that the command is sent.
-    /// @param time  asked for when the command is sent, of every member that asks: all expose at the latest of their
-    ///              times, by the clock that they share, or at once where one has none
+    /// Waits a few milliseconds at most for the other members, then makes sure that the command is sent.
+    /// @param time  asked of every waiting member when the command is sent. All expose at the latest of these times on
+    ///              their common clock, or at once if a member returns none
     void trigger(const ActionTime& time);
 
    private:
@@ -48,7 +48,7 @@ class ActionGroup {
     const ActionTime* asks_ = nullptr;  ///< set while it waits for the command
   };
 
-  /// The group of this process that has these keys; it ends with its last member.
+  /// The group of this process with these keys; it ends with its last member.
   [[nodiscard]] static std::shared_ptr<ActionGroup> of(const ActionKeys& keys);
   explicit ActionGroup(const ActionKeys& keys) : keys_(keys) {}
 

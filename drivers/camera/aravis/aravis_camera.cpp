@@ -46,7 +46,7 @@ Result<> AravisCamera::open() {
   return {};
 }
 
-// A device that is busy answers each of many questions late, before the first frame is asked for.
+// A busy device may answer many queries late before the first frame is requested.
 std::chrono::nanoseconds AravisCamera::open_time_max() const {
   return Camera::open_time_max() + first_frame_time_max(options_);
 }
@@ -63,7 +63,7 @@ void AravisCamera::log_warnings() {
   }
 }
 
-// A device that answers must be let go before it can be opened again; for one that does not, nobody waits.
+// A device that answers must be released before it can be opened again. Nobody waits for one that does not answer.
 void AravisCamera::end_session() {
   last_start_.reset();
   if (!session_) return;

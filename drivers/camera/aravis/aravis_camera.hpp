@@ -21,17 +21,17 @@ namespace slsd {
 class AravisSession;
 class CaptureEvents;
 
-/// A GigE Vision or USB3 Vision camera, by Aravis. A frame is a lease on the stream's own buffer; only mosaics are
-/// turned into grey in a buffer of this driver's.
+/// A GigE Vision or USB3 Vision camera through Aravis. A frame is a lease on the stream's own buffer. Only mosaics and
+/// packed pixels are converted, into a buffer of this driver.
 ///
-/// A frame is handed out only if it is whole, of the size configured, and its exposure began after capture() was
-/// called. When that was is told by the device's clock, which is read every second; many cameras stamp the exposure's
-/// start, some the start of its readout; one that has chunks tells the start in them. By its chunks too a frame is
-/// refused that was exposed with other settings than configured.
+/// Delivers only whole frames of the configured size whose exposure began after the call of capture(). The device's
+/// clock, read every second, tells when that was. Many cameras stamp the start of the exposure, some the start of the
+/// readout; chunks contain the start of the exposure. If chunks show other settings than configured, the frame is
+/// refused too.
 ///
-/// Threads of its own: "aravis control", which talks to the device so that a device which is gone holds up no capture;
-/// Aravis' own for stream and heartbeat; and one to close a session with a device that is gone, which takes seconds.
-/// @thread thread-bound, but for cancel()
+/// Has threads of its own. "aravis control" talks to the device, so that a lost device delays no capture. Aravis has
+/// its own threads for stream and heartbeat. One more closes a session with a lost device, which takes seconds.
+/// @thread thread-bound, except cancel()
 class AravisCamera final : public Camera {
  public:
   explicit AravisCamera(AravisCameraOptions options);
@@ -41,26 +41,26 @@ class AravisCamera final : public Camera {
 
   [[nodiscard]] const CameraDescription& description() const override { return description_; }
   void set_found(std::function<void()> found) override { found_ = std::move(found); }
-  /// Also proves that frames arrive. Warnings about the system are logged, each once.
-  /// @errors kInvalidArgument (an option), kNotFound, kPermissionDenied (another application controls it), kMismatch
-  ///         (it took another value than the one configured), kUnsupported, kDisconnected; kCancelled
+  /// Also verifies that frames arrive. Logs each warning about the system once.
+  /// @errors kInvalidArgument (an option), kNotFound, kPermissionDenied (another application controls the camera),
+  ///         kMismatch (the camera took another value than configured), kUnsupported, kDisconnected; kCancelled
   [[nodiscard]] Result<> open() override;
   [[nodiscard]] std::chrono::nanoseconds open_time_max() const override;
   [[nodiscard]] std::chrono::nanoseconds frame_time_max() const override;
-  /// kDisconnected also after missed_frames_max frames in a row did not come.
+  /// Also gives kDisconnected after missed_frames_max missing frames in a row.
   /// @errors kMismatch: the frame was exposed with other settings than configured, and is lost; as Camera::capture()
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
   [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override;
-  /// Tells what the camera's own clock, which is read every second, or its heartbeat found out.
+  /// Reports what the device's clock, read every second, or the heartbeat has detected.
   [[nodiscard]] Result<> check() override;
   void tell_figures(std::vector<DriverFigure>& figures) const override;
   void cancel() override;
 
-  /// The statistics of the open session, or of the one before.
+  /// The statistics of the open session, or of the previous one.
   [[nodiscard]] AravisStatistics statistics() const;
-  /// The rate by which the device's clock is faster than the host's; 0 until it is known.
+  /// How much faster the device's clock runs than the host's, in parts per million; 0 until known.
   [[nodiscard]] double clock_drift_ppm() const;
-  /// The names of what on this system may cost frames, or could not be made sure of: "receive_buffer", "packet_size",
+  /// The names of system properties that may cost frames, or could not be verified: "receive_buffer", "packet_size",
   /// "fragments", "packet_resend", "device_clock", "chunks", "first_frame".
   [[nodiscard]] std::vector<std::string> warnings() const;
 

@@ -29,11 +29,11 @@ bool is_address(const std::string& text) {
 }
 
 constexpr milliseconds kFirstFrame{250};   // readout and transfer
-constexpr milliseconds kLaterFrame{3000};  // of the slowest, over a busy network
+constexpr milliseconds kLaterFrame{3000};  // for the slowest camera on a busy network
 constexpr int kWaysToOpen = 2;             // with chunks, and without
 constexpr milliseconds kPeriodUnknown{100};
-constexpr int kPeriodsToNext = 5;         // one of them for readout and transfer
-constexpr milliseconds kPauseLeast{100};  // which a busy host makes without anyone's doing
+constexpr int kPeriodsToNext = 5;         // one period is for readout and transfer
+constexpr milliseconds kPauseLeast{100};  // a busy host may pause this long
 
 /// The longest time from the trigger to the end of the exposure.
 nanoseconds exposure_time(const AravisCameraOptions& options) {

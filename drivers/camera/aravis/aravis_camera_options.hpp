@@ -17,14 +17,14 @@ namespace slsd {
 enum class AravisTrigger {
   kSoftware,  ///< a command at each capture()
   kLine,      ///< a rising edge on an input line
-  kFreeRun,   ///< its own clock
+  kFreeRun,   ///< the camera's own clock
   kAction,    ///< GigE: one command to all cameras with the same keys
 };
 
 /// The clock that tells when an exposure began.
 enum class AravisClock {
-  kAuto,     ///< the device's clock, and the arrival of frames where that cannot be read or trusted
-  kDevice,   ///< the device's clock wherever it can be read
+  kAuto,     ///< the device's clock; the arrival of frames if the clock cannot be read or trusted
+  kDevice,   ///< the device's clock whenever it can be read
   kArrival,  ///< the arrival of frames
 };
 
@@ -32,30 +32,29 @@ enum class AravisClock {
 struct AravisCameraOptions {
   static constexpr std::string_view kDriver = "aravis";
   std::string name = "camera";
-  std::string id = {};         ///< serial number, "vendor-serial", or IPv4 address; an address is found soonest
-  std::string interface = {};  ///< IPv4 address of this host's interface; empty: the one that the route goes through
+  std::string id = {};         ///< serial number, "vendor-serial", or IPv4 address; an address is found fastest
+  std::string interface = {};  ///< IPv4 address of this host's interface; empty: the route's
   AravisTrigger trigger = AravisTrigger::kSoftware;
-  std::string trigger_line = "Line1";  ///< the input, where the trigger is a line
-  ActionKeys action = {};              ///< GigE, where the trigger is an action: the same for all cameras of a group
-  double action_lead_us = 0.0;  ///< GigE: so long after the command all expose, by their common clock; 0, and until
-                                ///< they have one: at once
-  bool ptp = false;             ///< the camera's clock follows the network's (IEEE 1588)
-  double rate_hz = 0.0;         ///< of a camera that runs freely, up to 10000; 0: the camera's own
+  std::string trigger_line = "Line1";  ///< the input line, if the trigger is a line
+  ActionKeys action = {};              ///< GigE, for an action trigger: the same for all cameras of a group
+  double action_lead_us = 0.0;         ///< GigE: all expose so long after the command; 0, or no common clock: at once
+  bool ptp = false;                    ///< the camera's clock follows the network's (IEEE 1588)
+  double rate_hz = 0.0;                ///< in free run, up to 10000; 0: the camera's own
   AravisClock device_clock = AravisClock::kAuto;
-  double readout_us = 0.0;  ///< used by arrival, not by command: the longest time from an exposure's end to the frame's
-                            ///< arrival, up to 10000000; 0: two periods
-  double exposure_us = 10000.0;                     ///< 1 to 10000000
-  double gain_db = 0.0;                             ///< 0 to 60
+  double readout_us = 0.0;       ///< used for frames timed by arrival, without a command: the longest time from an
+                                 ///< exposure's end to the frame's arrival, up to 10000000; 0: two periods
+  double exposure_us = 10000.0;  ///< 1 to 10000000
+  double gain_db = 0.0;          ///< 0 to 60
   std::string pixel_format = "Mono8";               ///< Mono8, Mono10, Mono12, Mono16, packed, or Bayer in 8 to 16 bits
-  std::optional<std::pair<int, int>> size_px = {};  ///< centred on the sensor; without it the whole sensor
-  bool chunks = true;            ///< if the camera has them: each frame's own exposure and gain are compared with these
-  int packet_bytes = 0;          ///< GigE: with headers, 576 to 16000; 0: the largest that gets through
-  double packet_delay_us = 0.0;  ///< GigE: between two packets, where several cameras share a link
+  std::optional<std::pair<int, int>> size_px = {};  ///< centred on the sensor; empty: the whole sensor
+  bool chunks = true;            ///< if available: compare each frame's own exposure and gain with these
+  int packet_bytes = 0;          ///< GigE: with headers, 576 to 16000; 0: the largest that arrives
+  double packet_delay_us = 0.0;  ///< GigE: between two packets, if several cameras share a link
   int receive_buffer_bytes = 0;  ///< GigE: of the socket; 0: two frames. net.core.rmem_max must allow it
-  bool packet_resend = true;     ///< GigE: lost packets are asked for again
-  bool packet_socket = true;     ///< GigE: where CAP_NET_RAW allows, packets are taken before the UDP socket
+  bool packet_resend = true;     ///< GigE: request lost packets again
+  bool packet_socket = true;     ///< GigE: take packets before the UDP socket, if CAP_NET_RAW allows it
   int frame_timeout_ms = 1000;   ///< longest time from the trigger, or from the frame before, to a frame: 10 to 60000
-  int missed_frames_max = 2;     ///< so many in a row missing: the camera is gone
+  int missed_frames_max = 2;     ///< the camera is gone after this many missing frames in a row
   int frames_held_max = 8;       ///< number of frames that may be held at once, 2 to 64
 
   /// Tells whether `id` is an address.
@@ -74,19 +73,18 @@ struct AravisCameraOptions {
 /// The number of streams that are tried until one gives a frame.
 inline constexpr int kFirstFrameTries = 3;
 
-/// The wait for the first frame of a stream before a new stream is tried; most cameras need less.
-/// @param trigger       kFreeRun or kSoftware, whichever proves that frames come
+/// The wait for a stream's first frame before a new stream is tried. Most cameras need less.
+/// @param trigger       kFreeRun or kSoftware, depending on how frames are verified
 /// @param tries_before  0 to kFirstFrameTries - 1
 /// @thread reentrant
 [[nodiscard]] std::chrono::nanoseconds first_frame_patience(const AravisCameraOptions& options, AravisTrigger trigger,
                                                             int tries_before);
 
-/// The longest time for all these tries together, with chunks and again without.
+/// The longest time for all these tries, with chunks and again without.
 /// @thread reentrant
 [[nodiscard]] std::chrono::nanoseconds first_frame_time_max(const AravisCameraOptions& options);
 
-/// The greatest age of an exposure after which the next frame is still current, for a camera that runs freely. A few
-/// periods.
+/// The greatest age of an exposure at which the next frame is still current, for a camera in free run: a few periods.
 /// @thread reentrant
 [[nodiscard]] std::chrono::nanoseconds next_frame_age_max(const AravisCameraOptions& options);
 

@@ -26,7 +26,7 @@ constexpr auto kReadoutMost = 1s;
 constexpr auto kClockPause = 3ms;
 constexpr auto kArming = 5ms;
 constexpr int kStreamsMax = 10;
-constexpr auto kRingRead = 20ms;  // the kernel hands over every 5 ms what a packet socket took
+constexpr auto kRingRead = 20ms;  // the kernel hands over a packet socket's data every 5 ms
 
 }  // namespace
 
@@ -39,7 +39,7 @@ AravisSession::AravisSession(const AravisCameraOptions& options, OpenedDevice de
 
 AravisSession::~AravisSession() {
   ArvDevice* device = arv_camera_get_device(device_.camera.get());
-  // Soon, so that the next session is not refused where the network comes back meanwhile.
+  // Gives up control first, so that the next session is not refused if the network returns meanwhile.
   if (abandoned_ && ARV_IS_GV_DEVICE(device)) (void)arv_gv_device_leave_control(ARV_GV_DEVICE(device), nullptr);
   control_.reset();
   if (control_lost_handler_ != 0) g_signal_handler_disconnect(device, control_lost_handler_);
@@ -70,7 +70,8 @@ Result<> AravisSession::check() {
 
 Result<> AravisSession::prepare() {
   const DeviceFeatures features(device_.camera.get());
-  (void)features.execute("AcquisitionStop");  // one that a former user left running, and most refuse where none runs
+  (void)features.execute(
+      "AcquisitionStop");  // a former user may have left one running; most cameras refuse if none runs
   auto layout = configure_image(features, options_);
   if (!layout) return tl::unexpected(layout.error());
   layout_ = *layout;
@@ -110,7 +111,7 @@ Result<> AravisSession::make_stream() {
   GErrorSlot error;
   receiver_.reset();
   stream_.reset();
-  while (events_.take_buffer()) continue;  // those buffers went with their stream
+  while (events_.take_buffer()) continue;  // those buffers ended with their stream
   stream_ = make_reporting_stream(device_.camera.get(), events_, number_, error);
   if (!stream_) return fail(error.code(), "the camera gives no stream: " + error.message(), options_.name);
   std::vector<NetworkWarning> warnings;
@@ -130,14 +131,14 @@ std::unique_ptr<ChunkReader> AravisSession::make_chunk_reader() const {
                                        from_us(options_.exposure_us) + kReadoutMost);
 }
 
-// The lock before the clock, which then was set already where it is locked.
+// Read the lock before the clock: a locked clock has already been set.
 void AravisSession::read_clock_first() {
   if (options_.ptp) first_ptp_ = read_ptp_lock(device_.camera.get());
   for (int i = 0; i < kFirstClockReadings; ++i)
     if (const auto reading = read_device_clock(device_.camera.get())) first_clock_.observe(*reading);
 }
 
-// One that does not go on as it began is looked at until it is known for what it is.
+// Observe an inconsistent clock until its fault is known.
 void AravisSession::read_clock_again() {
   for (int i = 0; i < kFirstClockReadings && first_clock_.ready(); ++i) {
     const auto reading = read_device_clock(device_.camera.get());
@@ -162,9 +163,9 @@ bool AravisSession::note_fragments() {
   return fragments_told_ = true;
 }
 
-// Software triggers and a camera that runs freely prove their way on the stream that stays. For a line or an action a
-// command proves it, and the camera must stop in between. Many then number their frames from 1 again, which Aravis
-// would discard as late ones of before: so what follows gets a stream of its own.
+// Software triggers and free run verify the final stream itself. For a line or an action, a command verifies the
+// stream, and the camera must stop in between. Many cameras then restart their frame numbers at 1, which Aravis would
+// discard as late frames. So the capture gets a new stream.
 Result<> AravisSession::begin() {
   const bool own = options_.trigger == AravisTrigger::kSoftware || options_.trigger == AravisTrigger::kFreeRun;
   const bool commanded = DeviceFeatures(device_.camera.get()).has_entry("TriggerSource", "Software");
@@ -181,7 +182,7 @@ Result<> AravisSession::begin() {
   return start(options_.trigger);
 }
 
-// Only a frame proves that the data's way is open, on each new stream anew.
+// Only a frame proves that the data path is open, for each new stream.
 Result<> AravisSession::warm_up(AravisTrigger trigger) {
   bool unreadable = false;
   for (int i = 0; i < kFirstFrameTries; ++i) {
@@ -233,9 +234,9 @@ bool AravisSession::heard_others() const {
   return arv_stream_get_info_uint64_by_name(stream_.get(), "n_received_packets") > 0;
 }
 
-// A packet socket hears every packet of the interface before it is narrowed to this stream, and by the number of
-// another camera's frame Aravis would discard this one's as late ones, or wait for the rest of it. Where the interface
-// is never silent for long enough, only the UDP socket is left.
+// A packet socket hears every packet of the interface until its filter is set. Because of another camera's frame
+// number, Aravis would discard this camera's frames as late, or wait for missing ones. If the interface is never silent
+// long enough, only the UDP socket remains.
 Result<> AravisSession::hear_camera_only() {
   for (int streams = 1; heard_others(); ++streams) {
     if (streams == kStreamsMax) {
@@ -248,7 +249,7 @@ Result<> AravisSession::hear_camera_only() {
   return {};
 }
 
-// Some cameras hear no trigger until a moment after they have begun.
+// Some cameras ignore triggers for a moment after they have started.
 Result<> AravisSession::start(AravisTrigger trigger) {
   const DeviceFeatures features(device_.camera.get());
   if (auto done = configure_trigger(features, options_, trigger); !done) return done;

@@ -26,20 +26,20 @@
 
 namespace slsd {
 
-/// A camera from the moment it is controlled, configured and sending, to its loss or end.
+/// A camera from the start of its control, through configuration and streaming, to its loss or end.
 /// @thread thread-bound; may be destroyed on another thread
 class AravisSession {
  public:
-  /// Opens and configures everything anew, and proves that frames arrive.
-  /// @param address  where the camera was found before, or empty
-  /// @param events   outlive the session
-  /// @param found    called once the camera is this host's, before it is configured; may be empty
-  /// @errors as open_device(), configure_image(), configure_packets(); kDisconnected: it answers, and no frame arrives;
-  ///         kCancelled
+  /// Opens and configures everything again, and verifies that frames arrive.
+  /// @param address  where the camera was found before; may be empty
+  /// @param events   must outlive the session
+  /// @param found    called once this host controls the camera, before configuration; may be empty
+  /// @errors as open_device(), configure_image(), configure_packets(); kDisconnected: the camera answers, but no frame
+  ///         arrives; kCancelled
   [[nodiscard]] static Result<std::unique_ptr<AravisSession>> open(const AravisCameraOptions& options,
                                                                    const std::string& address, CaptureEvents& events,
                                                                    const std::function<void()>& found);
-  /// Takes seconds where the device does not answer any more.
+  /// Takes seconds if the device no longer answers.
   ~AravisSession();
   AravisSession(const AravisSession&) = delete;
   AravisSession& operator=(const AravisSession&) = delete;
@@ -50,25 +50,25 @@ class AravisSession {
   [[nodiscard]] const std::vector<NetworkWarning>& warnings() const { return warnings_; }
   [[nodiscard]] AravisStatistics statistics() const { return receiver_->statistics(); }
   [[nodiscard]] DeviceClock clock() const { return control_->clock(); }
-  /// Looks whether the device's clock can still be trusted. @return whether there is a new warning
+  /// Checks whether the device's clock is still trustworthy. @return whether there is a new warning
   bool note_clock();
-  /// Looks for fragments; call it after a frame that did not come whole. @return whether there is a new warning
+  /// Checks for fragments; call it after an incomplete frame. @return whether there is a new warning
   bool note_fragments();
-  /// Tells whether the device still answers; waits a little for a trigger under way.
+  /// Tells whether the device still answers; waits briefly for a trigger under way.
   [[nodiscard]] bool answers();
-  /// @errors kDisconnected: it was lost while nobody asked for a frame
+  /// @errors kDisconnected: the camera was lost between captures
   [[nodiscard]] Result<> check();
-  /// Gives the device up: the session's end will not stop it.
+  /// Abandons the device: the session's end will not stop it.
   void abandon();
 
-  /// @errors as Camera::capture(); after kDisconnected only the session's end is left
+  /// @errors as Camera::capture(); after kDisconnected, end the session
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline);
-  /// Captures the first frame not yet taken whose exposure did not begin before `since`, from a camera that runs
-  /// freely. Works as capture() if `since` is long ago.
+  /// Captures from a camera in free run: the first frame not yet taken whose exposure began at or after `since`. Works
+  /// as capture() if `since` is long ago.
   [[nodiscard]] Result<Frame> capture_since(MonotonicTime since, MonotonicTime deadline);
 
  private:
-  /// The fate of the first frame of a stream.
+  /// The outcome of waiting for a stream's first frame.
   enum class FirstFrame { kCame, kUnreadable, kMissing };
 
   AravisSession(const AravisCameraOptions& options, OpenedDevice device, CaptureEvents& events);
@@ -97,17 +97,17 @@ class AravisSession {
   ChunkSelection chunks_;
   std::vector<NetworkWarning> warnings_;
   DeviceClock first_clock_;
-  std::optional<PtpLock> first_ptp_;  ///< set if the clock is to follow the network's
+  std::optional<PtpLock> first_ptp_;  ///< set if the device's clock should follow the network's
   GObjectPtr<ArvStream> stream_;
   std::unique_ptr<FrameReceiver> receiver_;
   std::unique_ptr<DeviceControl> control_;
   std::optional<ActionGroup::Member> action_;  ///< set if the trigger is an action
-  std::optional<FrameCapture> frame_capture_;  ///< once it is prepared, until it is abandoned
+  std::optional<FrameCapture> frame_capture_;  ///< set from its preparation until it is abandoned
   unsigned long control_lost_handler_ = 0;
   bool abandoned_ = false;
   FragmentWatch fragments_;
-  bool clock_told_ = false;      ///< the warning of it
-  bool fragments_told_ = false;  ///< and of these
+  bool clock_told_ = false;      ///< the clock warning was given
+  bool fragments_told_ = false;  ///< the fragment warning was given
 };
 
 }  // namespace slsd

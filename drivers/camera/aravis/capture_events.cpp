@@ -23,7 +23,7 @@ void free_signal_reporter(void* reporter, GClosure*) {
   free_reporter(reporter);
 }
 
-// Runs on the stream's thread. Aravis stamps with CLOCK_REALTIME, which jumps.
+// Runs on the stream's thread. Aravis stamps with CLOCK_REALTIME, which may jump.
 void note_stream(void* user, ArvStreamCallbackType type, ArvBuffer* buffer) {
   if (type != ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE || buffer == nullptr) return;
   const Reporter& reporter = *static_cast<Reporter*>(user);

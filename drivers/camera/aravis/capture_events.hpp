@@ -12,15 +12,15 @@
 
 namespace slsd {
 
-/// The events that a capture waits for: buffers that are done, the answer to a trigger, the loss of the camera, and
-/// cancel(). Ignores what an earlier session still reports while it is being closed.
+/// The events that a capture waits for: completed buffers, the answer to a trigger, the loss of the camera, and
+/// cancel(). Ignores reports of an earlier session that is still being closed.
 /// @thread thread-safe
 class CaptureEvents {
  public:
   enum class Wake { kBuffer, kTimeout, kCancelled, kLost };
 
-  /// Forgets everything, a cancel() too.
-  /// @return the number by which the new session reports
+  /// Forgets all events, including a cancel().
+  /// @return the number with which the new session reports
   std::uint64_t begin_session();
 
   void report_buffer(std::uint64_t session);
@@ -28,13 +28,13 @@ class CaptureEvents {
   void report_lost(std::uint64_t session, const std::string& reason);
   void cancel();
 
-  /// Waits for one buffer, which is then the caller's to take.
+  /// Waits for one buffer, which the caller may then take.
   [[nodiscard]] Wake wait_buffer(MonotonicTime until);
   [[nodiscard]] bool take_buffer();
   [[nodiscard]] bool take_cancel();
 
   void note_trigger_asked();
-  /// Waits until the trigger before is answered: then kBuffer.
+  /// Waits until the previous trigger is answered: then kBuffer.
   [[nodiscard]] Wake wait_trigger_answered(MonotonicTime until);
   [[nodiscard]] bool trigger_answered() const;
 
@@ -54,13 +54,13 @@ class CaptureEvents {
   std::string lost_;
 };
 
-/// Makes the camera's stream, which reports each buffer that is done, and stamps it with the time.
-/// @param events  outlive the stream
+/// Makes the camera's stream. It reports each completed buffer and stamps it with the time.
+/// @param events  must outlive the stream
 [[nodiscard]] GObjectPtr<ArvStream> make_reporting_stream(ArvCamera* camera, CaptureEvents& events,
                                                           std::uint64_t session, GErrorSlot& error);
 
-/// Has the device report when it does not answer any more, or another application took control.
-/// @return the handler, to be disconnected before the events end
+/// Makes the device report when it stops answering, or when another application takes control.
+/// @return the handler; disconnect it before the events end
 [[nodiscard]] unsigned long report_loss(ArvDevice* device, CaptureEvents& events, std::uint64_t session);
 
 }  // namespace slsd

@@ -44,7 +44,7 @@ std::optional<FrameChunks> ChunkReader::read(ArvBuffer* buffer) {
   return chunks.exposure_start || !same_clock_ ? std::optional(chunks) : std::nullopt;
 }
 
-// Aravis would find a chunk in any bytes at all.
+// Aravis would find chunks in arbitrary bytes.
 bool ChunkReader::is_laid_out(ArvBuffer* buffer) const {
   if (!arv_buffer_has_chunks(buffer)) return false;
   std::size_t bytes = 0;

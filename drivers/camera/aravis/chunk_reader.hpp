@@ -14,24 +14,24 @@
 
 namespace slsd {
 
-/// Reads what a camera appended to its frames, by the camera's own description of it. Nothing is allocated here; Aravis
-/// notes for each value which buffer it was read from, in a few small blocks that it frees again.
+/// Reads the chunks that a camera appends to its frames, according to the camera's own description. Allocates no
+/// memory. Aravis notes for each value the buffer that it was read from, in a few small blocks that it frees again.
 /// @thread thread-bound
 class ChunkReader {
  public:
   /// @param image_bytes  of each frame
-  /// @param apart_max    how far a frame's own time stamp may be from its exposure's start
+  /// @param apart_max    the greatest difference between a frame's own time stamp and its exposure's start
   ChunkReader(ArvCamera* camera, const ChunkSelection& selection, std::size_t image_bytes,
               std::chrono::nanoseconds apart_max);
-  /// Has to end before the buffer that was read last: Aravis keeps an eye on it.
+  /// Must end before the last buffer read, because Aravis observes that buffer.
   ~ChunkReader() = default;
   ChunkReader(const ChunkReader&) = delete;
   ChunkReader& operator=(const ChunkReader&) = delete;
 
-  /// The chunks of a buffer that is a success. A camera whose chunks are stamped by another clock than its frames has
-  /// no exposure start.
-  /// @return nothing if they are not laid out as the standards say, if one of the selection is missing, or if they are
-  ///         of another time than the frame
+  /// Reads the chunks of a successful buffer. If the camera stamps its chunks with another clock than its frames, they
+  /// have no exposure start.
+  /// @return nothing if the layout breaks the standards, a selected chunk is missing, or the chunks' time differs from
+  ///         the frame's
   [[nodiscard]] std::optional<FrameChunks> read(ArvBuffer* buffer);
 
  private:
@@ -51,7 +51,7 @@ class ChunkReader {
   std::endian order_ = std::endian::little;
   Number exposure_time_;
   Number gain_;
-  bool same_clock_ = false;  ///< both time stamps of some frame were of one time
+  bool same_clock_ = false;  ///< both time stamps of some frame agreed
 };
 
 }  // namespace slsd

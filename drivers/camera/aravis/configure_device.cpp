@@ -13,12 +13,12 @@ namespace slsd {
 namespace {
 
 constexpr double kExposureToleranceShare = 0.01;
-constexpr double kExposureToleranceUs = 20.0;  // sensors expose in whole lines
+constexpr double kExposureToleranceUs = 20.0;  // sensors expose whole lines
 constexpr double kGainToleranceDb = 0.1;
 constexpr double kRateToleranceShare = 0.01;
 constexpr double kRateUnknownHz = 10.0;
 
-/// Turns off the camera's automatic changes. They would make frames of one scene differ, and decoding with them.
+/// Turns off the camera's automatic adjustments. They would make frames of one scene differ, and so their decoding.
 Result<> turn_automatics_off(const DeviceFeatures& features) {
   for (const char* name : {"ExposureAuto", "GainAuto", "BlackLevelAuto", "BalanceWhiteAuto"})
     if (auto done = features.choose_if_there(name, "Off"); !done) return done;
@@ -35,7 +35,7 @@ Result<> set_extent(const DeviceFeatures& features, const char* size, const char
   if (!whole) return tl::unexpected(whole.error());
   const int extent = wanted.value_or(*whole);
   if (auto done = features.set(size, extent); !done) return done;
-  // A multiple of 16 suits the steps of every sensor known.
+  // Multiples of 16 suit the step size of all known sensors.
   const int middle = (*whole - extent) / 2 / 16 * 16;
   return movable && middle > 0 ? features.set(offset, middle) : Result<>();
 }
@@ -65,7 +65,7 @@ Result<> set_gain(const DeviceFeatures& features, const AravisCameraOptions& opt
   return fail(ErrorCode::kUnsupported, "the camera has no gain in decibels; remove gain_db", "Gain");
 }
 
-/// Every way to trigger is off, so that none of a former user's stays on.
+/// Turns off every trigger, so that none of a former user's remains.
 Result<> clear_triggers(const DeviceFeatures& features) {
   for (const char* selector : {"AcquisitionStart", "FrameBurstStart", "ExposureActive", "FrameStart"}) {
     if (features.has("TriggerSelector") && !features.has_entry("TriggerSelector", selector)) continue;
@@ -114,13 +114,13 @@ Result<ChunkSelection> turn_on_all(const DeviceFeatures& features) {
   if (!timestamp) return tl::unexpected(timestamp.error());
   const auto exposure_time = turn_on(features, "ExposureTime", "ChunkExposureTime");
   if (!exposure_time) return tl::unexpected(exposure_time.error());
-  // A camera without a gain in decibels tells it in steps.
+  // A camera without a gain in decibels reports it in steps.
   const auto gain = features.has("Gain") ? turn_on(features, "Gain", "ChunkGain") : Result<bool>(false);
   if (!gain) return tl::unexpected(gain.error());
   return ChunkSelection{*timestamp, *exposure_time, *gain};
 }
 
-constexpr std::size_t kChunkBytesMax = 1 << 16;  // of all that a camera may append by itself
+constexpr std::size_t kChunkBytesMax = 1 << 16;  // bound for everything that a camera may append
 
 }  // namespace
 
@@ -153,7 +153,7 @@ Result<> configure_trigger(const DeviceFeatures& features, const AravisCameraOpt
   if (auto done = features.choose_if_there("AcquisitionMode", "Continuous"); !done) return done;
   if (auto done = clear_triggers(features); !done) return done;
   if (trigger == AravisTrigger::kFreeRun) return set_rate(features, options);
-  // A rate would hold triggers back.
+  // A frame rate would delay triggers.
   if (auto done = features.turn_if_there("AcquisitionFrameRateEnable", false); !done) return done;
   if (auto done = features.choose("TriggerMode", "On"); !done) return done;
   if (trigger == AravisTrigger::kSoftware) return features.choose("TriggerSource", "Software");

@@ -35,7 +35,7 @@ std::optional<int> mtu(const std::string& name) {
   return first_number(std::filesystem::path("/sys/class/net") / name / "mtu");
 }
 
-// The kernel says -1 where a link has no speed, as the loopback.
+// The kernel returns -1 if a link has no speed, such as the loopback.
 std::optional<int> link_speed(const std::string& name) {
   const auto speed = first_number(std::filesystem::path("/sys/class/net") / name / "speed");
   return speed && *speed > 0 ? speed : std::nullopt;
@@ -43,7 +43,7 @@ std::optional<int> link_speed(const std::string& name) {
 
 constexpr int kJumboMtu = 9000;
 constexpr unsigned kJumboBytes = 8000;
-constexpr std::size_t kManyBytes = 500'000;  // frames from which small packets cost a whole core
+constexpr std::size_t kManyBytes = 500'000;  // for larger frames, small packets cost a whole core
 constexpr int kLeastBuffer = 1 << 20;
 constexpr double kRequestRatio = 1.0;  // each packet may be lost once on average; by default a quarter of them
 
@@ -62,7 +62,8 @@ int receive_buffer_wanted(const AravisCameraOptions& options, std::size_t frame_
   return static_cast<int>(std::clamp<std::size_t>(2 * frame_bytes, kLeastBuffer, 1u << 28));
 }
 
-/// Aravis asks for it with the first packet only, which is lost with its frame where the default is too small.
+/// Sets the buffer before the first packet. Aravis would do so only after it, and would lose that frame if the default
+/// is too small.
 void grow_receive_buffer(ArvGvStream* stream, int bytes) {
   const std::uint16_t port = arv_gv_stream_get_port(stream);
   std::error_code ignored;
@@ -81,7 +82,7 @@ void grow_receive_buffer(ArvGvStream* stream, int bytes) {
 
 Result<> set_packet_size(ArvCamera* camera, const AravisCameraOptions& options) {
   GErrorSlot error;
-  // The stream would otherwise try sizes again when it is made.
+  // The stream would otherwise try sizes again when it is created.
   arv_camera_gv_set_packet_size_adjustment(camera, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
   if (options.packet_bytes == 0) {
     arv_camera_gv_auto_packet_size(camera, error.out());
@@ -213,7 +214,7 @@ void configure_stream(ArvStream* stream, const AravisCameraOptions& options, std
                       std::vector<NetworkWarning>& warnings) {
   if (!ARV_IS_GV_STREAM(stream)) return;
   const int wanted = receive_buffer_wanted(options, frame_bytes);
-  // A frame with a hole is given up before a frame that does not come at all, so that it is known for what it is.
+  // An incomplete frame is given up earlier than one that does not come at all, so that it is reported as torn.
   g_object_set(stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size", wanted,
                "packet-request-ratio", kRequestRatio, "frame-retention",
                static_cast<guint>(options.frame_timeout_ms) * 500u, nullptr);

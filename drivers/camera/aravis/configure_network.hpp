@@ -27,7 +27,7 @@ struct HostInterface {
   std::optional<int> link_mbps = {};
   std::optional<int> mtu_bytes = {};
 
-  /// Tells whether the address is in its network, so that it is reached without a router.
+  /// Tells whether the address is in the interface's network, reachable without a router.
   [[nodiscard]] bool reaches(in_addr other) const;
   /// "eth1 (10.0.0.1/24)"
   [[nodiscard]] std::string text() const;
@@ -43,46 +43,46 @@ struct HostInterface {
 /// @thread reentrant
 [[nodiscard]] bool packet_socket_allowed();
 
-/// Something about the system that may cost frames, or that could not be made sure of, by name and with what to do.
+/// A system property that may cost frames, or could not be verified: its name and the remedy.
 struct NetworkWarning {
   std::string name;  ///< "receive_buffer", "packet_size", "packet_socket", "fragments", "packet_resend",
                      ///< "device_clock", "chunks" or "first_frame"
   std::string advice;
 };
 
-/// The camera's clock is of no use. @param fault  "cannot be read"
+/// The warning that the camera's clock cannot be used. @param fault  "cannot be read"
 [[nodiscard]] NetworkWarning device_clock_warning(std::string_view fault);
-/// The chunks of the first frames could not be read.
+/// The warning that the chunks of the first frames could not be read.
 [[nodiscard]] NetworkWarning chunks_warning();
-/// The camera can be made to expose by no means that this host has.
+/// The warning that this host has no way to trigger the camera.
 [[nodiscard]] NetworkWarning first_frame_warning();
 
-/// The warning about packets that are small for large frames, with its remedy.
-/// @param interface  of this host to the camera, as far as it is known
+/// The warning that packets are small for large frames, with the remedy.
+/// @param interface  of this host to the camera, if known
 [[nodiscard]] NetworkWarning packet_size_warning(unsigned packet_bytes, const std::optional<HostInterface>& interface);
 
-/// The warning about packets that arrive in pieces, with its remedy.
-/// @param packet_bytes  that were set; 0: the camera's packets were tried
+/// The warning that packets arrive in fragments, with the remedy.
+/// @param packet_bytes  the configured size; 0: the camera's own size was tried
 [[nodiscard]] NetworkWarning fragments_warning(int packet_bytes, const std::optional<HostInterface>& interface);
 
-/// Each packet socket heard other devices before it was narrowed to the camera.
-/// @param interface  of this host to the camera, as far as it is known
+/// The warning that each packet socket heard other devices before its filter was set.
+/// @param interface  of this host to the camera, if known
 [[nodiscard]] NetworkWarning packet_socket_warning(const std::optional<HostInterface>& interface);
 
-/// The interface of this host to the camera, as far as it is known. Empty for a camera that is not GigE Vision.
+/// The interface of this host to the camera, if known. Empty for a camera that is not GigE Vision.
 [[nodiscard]] std::optional<HostInterface> interface_of(ArvCamera* camera);
 
-/// Sets packet size and delay of a GigE Vision camera; nothing for another. To be called before the stream is made.
+/// Sets packet size and delay of a GigE Vision camera; does nothing for others. Call it before making the stream.
 /// @errors kMismatch, kUnsupported, kDisconnected
 [[nodiscard]] Result<> configure_packets(ArvCamera* camera, const AravisCameraOptions& options,
                                          std::vector<NetworkWarning>& warnings);
 
-/// Has streams of a GigE Vision camera take packets before the UDP socket, or not. To be called before they are made.
+/// Chooses whether streams of a GigE Vision camera take packets before the UDP socket. Call it before making them.
 void choose_socket(ArvCamera* camera, const AravisCameraOptions& options);
 /// Tells whether this stream takes packets before the UDP socket.
 [[nodiscard]] bool takes_packet_socket(ArvStream* stream, const AravisCameraOptions& options);
 
-/// Sets receive buffer and resend of a GigE Vision stream; nothing for another.
+/// Sets receive buffer and resend of a GigE Vision stream; does nothing for others.
 void configure_stream(ArvStream* stream, const AravisCameraOptions& options, std::size_t frame_bytes,
                       std::vector<NetworkWarning>& warnings);
 

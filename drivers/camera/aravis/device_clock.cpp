@@ -10,11 +10,11 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr double kCrystalError = 100e-6;  // what a clock may be off before its drift is known
-constexpr double kWander = 2e-6;          // by which a drift changes as the device warms up
+constexpr double kCrystalError = 100e-6;  // a clock's error before its drift is known
+constexpr double kWander = 2e-6;          // change of drift while the device warms up
 constexpr std::uint64_t kSecond = 1'000'000'000;
-constexpr nanoseconds kSlack = std::chrono::milliseconds(1);  // beyond what readings tell of each other
-constexpr int kStepsMax = 3;                                  // one may be an administrator's doing
+constexpr nanoseconds kSlack = std::chrono::milliseconds(1);  // beyond the readings' own uncertainty
+constexpr int kStepsMax = 3;                                  // a single step may be an administrator's doing
 constexpr int kFitsToForget = 60;
 constexpr nanoseconds kFarthest = std::chrono::hours(24 * 365 * 50);
 
@@ -26,7 +26,7 @@ MonotonicTime middle(const ClockReading& reading) {
   return reading.before + half_width(reading);
 }
 
-// A device may show any number, whose distance from another need not be one.
+// A device may report any number, so the difference of two may overflow.
 nanoseconds between(nanoseconds from, nanoseconds to) {
   std::int64_t since = 0;
   if (__builtin_sub_overflow(to.count(), from.count(), &since)) return to > from ? kFarthest : -kFarthest;
@@ -47,7 +47,7 @@ std::size_t DeviceClock::size() const {
   return std::min(count_, readings_.size());
 }
 
-// Readings of both sides of a step would be fitted by a drift that no clock has.
+// A fit across a step would give a drift that no clock has.
 bool DeviceClock::observe(const ClockReading& reading) {
   const bool first = !was_read();
   const bool stepped = !first && has_stepped(reading);
@@ -88,7 +88,7 @@ bool DeviceClock::may_have_shown(nanoseconds device, MonotonicTime after, Monoto
   return may_have_shown(device, before) && host_time(device) >= after - uncertainty(device) - kSlack;
 }
 
-// Least squares, each reading weighed by how well it is known.
+// Least squares; each reading is weighted by its precision.
 void DeviceClock::fit_drift() {
   const ClockReading& origin = newest();
   double weights = 0, x_sum = 0, y_sum = 0, xx_sum = 0, xy_sum = 0;

@@ -30,13 +30,13 @@ std::string text(double value) {
 }
 
 constexpr auto kClockPeriod = 1s;
-constexpr auto kSteady = 10s;  // a clock that is about to follow the network's is set before
+constexpr auto kSteady = 10s;  // a clock that will follow the network's is set before this
 constexpr std::uint64_t kControlRegister = 0x944;
 constexpr std::uint64_t kLatchedHigh = 0x948;
 constexpr std::uint64_t kLatchedLow = 0x94c;
 constexpr std::uint32_t kLatch = 2;
 
-// By the bootstrap registers, which the standard prescribes: features for it differ between cameras.
+// Uses the bootstrap registers, which the standard prescribes: cameras differ in their features for this.
 std::optional<ClockReading> latch_registers(ArvDevice* device) {
   GErrorSlot error;
   const std::uint64_t frequency = arv_gv_device_get_timestamp_tick_frequency(ARV_GV_DEVICE(device), error.out());
@@ -96,12 +96,12 @@ Result<> DeviceFeatures::choose(const char* name, const std::string& entry) cons
   return taken == entry ? Result<>() : fail_taken(name, entry, taken == nullptr ? "nothing" : printable(taken));
 }
 
-// Many a camera takes what lies beyond its range in silence, and exposes as it likes.
+// Many cameras silently accept values outside their range, and expose differently.
 Result<> DeviceFeatures::check_range(const char* name, double value, double tolerance) const {
   GErrorSlot error;
   double low = 0, high = 0;
   arv_camera_get_float_bounds(camera_, name, &low, &high, error.out());
-  if (error.failed() || !(low < high)) return {};  // it does not tell
+  if (error.failed() || !(low < high)) return {};  // the camera reports no range
   if (value >= low - tolerance && value <= high + tolerance) return {};
   return fail(ErrorCode::kInvalidArgument,
               "the camera goes from " + text(low) + " to " + text(high) + ", not to " + text(value), name);
@@ -162,7 +162,7 @@ Result<> DeviceFeatures::turn_if_there(const char* name, bool on) const {
   return has(name) ? turn(name, on) : Result<>();
 }
 
-// Where there is a latch, the status is of the moment when it was used last.
+// If the camera has a latch, the status dates from its last use.
 PtpLock read_ptp_lock(ArvCamera* camera) {
   const DeviceFeatures features(camera);
   for (const auto& [latch, name] :
@@ -237,7 +237,7 @@ void DeviceControl::send_trigger() {
   events_.report_trigger_answered(session_);
 }
 
-// The clock first, by which a device that is gone is known soonest; and once more, as it is set before it is locked.
+// Read the clock first, because it detects a lost device soonest; and once more, because it is set before it is locked.
 void DeviceControl::read_clock() {
   if (!readable_ || !observe_clock() || !ptp_) return;
   const PtpLock ptp = read_ptp_lock(camera_);

@@ -17,29 +17,30 @@
 
 namespace slsd {
 
-/// The settings of a camera by their names in the Standard Features Naming Convention. What is set is read back: many a
-/// camera rounds or refuses in silence.
+/// Sets a camera's features by their names in the Standard Features Naming Convention. Reads each value back, because
+/// many cameras silently round or refuse it.
 /// @thread thread-bound
 class DeviceFeatures {
  public:
-  /// @param camera  outlives this
+  /// @param camera  must outlive this object
   explicit DeviceFeatures(ArvCamera* camera) : camera_(camera) {}
 
   [[nodiscard]] bool has(const char* name) const;
   [[nodiscard]] bool has_entry(const char* name, const char* entry) const;
 
-  /// @errors for all of these: kUnsupported (lacking or refused), kMismatch (it took another value), kDisconnected
+  /// @errors for all of these: kUnsupported (missing or refused), kMismatch (the camera took another value),
+  ///         kDisconnected
   [[nodiscard]] Result<> choose(const char* name, const std::string& entry) const;
-  /// @errors also kInvalidArgument: beyond the range that the camera tells
+  /// @errors also kInvalidArgument: outside the range that the camera reports
   [[nodiscard]] Result<> set(const char* name, double value, double tolerance) const;
   [[nodiscard]] Result<> set(const char* name, std::int64_t value) const;
   [[nodiscard]] Result<> turn(const char* name, bool on) const;
   [[nodiscard]] Result<> execute(const char* name) const;
   [[nodiscard]] Result<int> integer(const char* name) const;
-  /// Frames a second where it runs freely; nothing where it does not say.
+  /// Frames per second in free run; empty if the camera does not report it.
   [[nodiscard]] std::optional<double> rate_hz() const;
 
-  /// The same where the camera has the feature, and nothing where it has not.
+  /// Does the same if the camera has the feature; otherwise nothing.
   [[nodiscard]] Result<> choose_if_there(const char* name, const std::string& entry) const;
   [[nodiscard]] Result<> turn_if_there(const char* name, bool on) const;
 
@@ -50,39 +51,40 @@ class DeviceFeatures {
   ArvCamera* camera_;
 };
 
-/// The lock of a device's clock to the network's (IEEE 1588). It takes seconds after opening.
+/// Whether a device's clock is locked to the network's (IEEE 1588). Locking takes seconds after opening.
 enum class PtpLock {
-  kUnknown,  ///< the device does not tell
-  kOpen,     ///< it has a clock of its own, or is about to set it
-  kLocked    ///< it follows a master's clock, or is the master
+  kUnknown,  ///< the device does not report it
+  kOpen,     ///< the device uses its own clock, or is about to set it
+  kLocked    ///< the device follows a master's clock, or is the master
 };
 
-/// Asks the device.
+/// Reads the state of the lock from the device.
 /// @thread thread-safe for GigE Vision, else thread-bound to the camera
 [[nodiscard]] PtpLock read_ptp_lock(ArvCamera* camera);
 
-/// Reads the device's clock, if it has one that can be read.
+/// Reads the device's clock, if it has a readable one.
 /// @thread thread-safe for GigE Vision, else thread-bound to the camera
 [[nodiscard]] std::optional<ClockReading> read_device_clock(ArvCamera* camera);
 
-/// The thread that talks to the device, "aravis control": a device that is gone answers a command after seconds only,
-/// and a capture may not wait for that. It triggers when asked, and reads the device's clock every second.
+/// The thread "aravis control", which talks to the device. A lost device answers a command only after seconds, and a
+/// capture must not wait for that. The thread triggers on request, and reads the device's clock every second.
 /// @thread thread-safe
 class DeviceControl {
  public:
-  /// @param camera  outlives this, and is used by nobody else meanwhile
-  /// @param clock   as read so far; never, where the device has none that can be read
-  /// @param ptp     as it is now, where the device's clock is to follow the network's; else nothing
+  /// @param camera  must outlive this object; nobody else uses it meanwhile
+  /// @param clock   its readings so far; never read if the device has no readable clock
+  /// @param ptp     its current state if the device's clock should follow the network's; else nothing
   DeviceControl(ArvCamera* camera, CaptureEvents& events, std::uint64_t session, const DeviceClock& clock,
                 std::optional<PtpLock> ptp);
-  /// Waits for the command under way, for seconds if the device is gone.
+  /// Waits for the command under way; for seconds if the device is gone.
   ~DeviceControl() = default;
   DeviceControl(const DeviceControl&) = delete;
   DeviceControl& operator=(const DeviceControl&) = delete;
 
   void trigger();
   [[nodiscard]] DeviceClock clock() const;
-  /// Tells whether the device's clock is the network's: as it says itself, or because it was not set for a while.
+  /// Tells whether the device's clock follows the network's: the device reports it, or its clock was not set for a
+  /// while.
   [[nodiscard]] bool follows_network() const;
 
  private:

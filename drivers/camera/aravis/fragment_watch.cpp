@@ -16,7 +16,7 @@ namespace slsd {
 namespace {
 
 constexpr std::uint32_t kFragment = IP_MF | IP_OFFMASK;
-constexpr std::uint32_t kFlagsAt = 6, kSourceAt = 12;  // bytes into the header of IP
+constexpr std::uint32_t kFlagsAt = 6, kSourceAt = 12;  // byte offsets in the IP header
 
 /// The filter for fragments of IP packets from this source. It keeps one byte of each.
 std::array<sock_filter, 6> pieces_of(in_addr source) {
@@ -28,8 +28,8 @@ std::array<sock_filter, 6> pieces_of(in_addr source) {
 
 }  // namespace
 
-// It hears nothing before it has a protocol, and by then it is narrowed. What it keeps unread is next to nothing; the
-// kernel counts what it drops too.
+// The socket hears nothing before it has a protocol, and its filter is set before that. It keeps almost no unread data;
+// the kernel counts dropped fragments too.
 FragmentWatch::FragmentWatch(in_addr camera) : socket_(::socket(PF_PACKET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
   auto filter = pieces_of(camera);
   const sock_fprog program{static_cast<unsigned short>(filter.size()), filter.data()};

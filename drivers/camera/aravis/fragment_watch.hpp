@@ -8,15 +8,14 @@
 
 namespace slsd {
 
-/// The watch for a camera's packets that arrive in pieces (IP fragments), because they are larger than the way to this
-/// host lets through. A packet socket sees no such packet whole, and without one a frame is lost with any of its
-/// pieces.
+/// Detects that a camera's packets arrive as IP fragments, because they are too large for the route to this host. A
+/// packet socket never sees such a packet whole. A UDP socket loses a frame with any one of its fragments.
 /// @thread thread-bound
 class FragmentWatch {
  public:
-  /// Watches nothing and sees no fragments.
+  /// Watches nothing and never sees fragments.
   FragmentWatch() = default;
-  /// Watches the camera's packets from now on. Without CAP_NET_RAW it sees no fragments.
+  /// Watches the camera's packets from now on. Sees no fragments without CAP_NET_RAW.
   explicit FragmentWatch(in_addr camera);
 
   [[nodiscard]] bool seen();

@@ -40,8 +40,8 @@ Result<> FrameCapture::may_capture(MonotonicTime deadline) {
   return {};
 }
 
-// Without a clock a frame that comes sooner than its exposure takes may be of an earlier command, or of a camera that
-// does not expose as long as it says. After it was quiet the second command tells.
+// Without a clock, a frame may come sooner than its exposure allows. It may answer an earlier command, or the camera
+// may expose for less time than it reports. After silence, the second command decides.
 Result<Frame> FrameCapture::capture(MonotonicTime deadline) {
   if (auto may = may_capture(deadline); !may) return tl::unexpected(may.error());
   auto frame = expose(deadline, false);
@@ -64,14 +64,14 @@ void FrameCapture::trigger(MonotonicTime now) {
   control_.trigger();
 }
 
-// A clock that follows the network's ticks in nanoseconds.
+// A clock that follows the network's counts nanoseconds.
 std::optional<std::uint64_t> FrameCapture::action_time() const {
   if (options_.action_lead_us == 0.0 || !control_.follows_network()) return std::nullopt;
   const MonotonicTime when = steady_clock::now() + from_us(options_.action_lead_us);
   return static_cast<std::uint64_t>(control_.clock().device_time(when).count());
 }
 
-// After a pause what waits is old, and the time that a frame may take is over.
+// After a pause, waiting frames are old, and the time limit of the frame is over.
 Result<Frame> FrameCapture::capture_since(MonotonicTime since, MonotonicTime deadline) {
   const auto age_max = std::min(next_frame_age_max(options_), frame_patience(options_) / 2);
   if (steady_clock::now() - since > age_max) return capture(deadline);
@@ -79,8 +79,8 @@ Result<Frame> FrameCapture::capture_since(MonotonicTime since, MonotonicTime dea
   return await_frame(since, deadline);
 }
 
-// Frames of captures that were cancelled or late must have come, or been given up, before the next trigger: a frame
-// tells which trigger it answers by its time only.
+// Frames of cancelled or late captures must have come, or been given up, before the next trigger. Only a frame's time
+// shows which trigger it answers.
 Result<> FrameCapture::settle(MonotonicTime deadline) {
   while (events_.take_buffer()) {
     receiver_.discard();
@@ -107,7 +107,7 @@ Result<> FrameCapture::settle(MonotonicTime deadline) {
   return {};
 }
 
-// After a frame of an earlier trigger each capture would else get the frame of the one before it, for ever.
+// Otherwise, after one frame of an earlier trigger, each capture would get the previous capture's frame for ever.
 Result<> FrameCapture::wait_until_quiet(MonotonicTime deadline) {
   const auto quiet = std::min<std::chrono::nanoseconds>(from_us(options_.exposure_us) + 2 * longest_wait_ + kQuietLeast,
                                                         frame_patience(options_));
@@ -139,7 +139,7 @@ Result<Frame> FrameCapture::await_frame(MonotonicTime asked, MonotonicTime deadl
         return missed(deadline);
       case CaptureEvents::Wake::kBuffer:
         if (auto judged = judge(asked, was_quiet)) return std::move(*judged);
-        // By arrival frames are passed over on a slow link, where the camera is there nevertheless.
+        // Frames timed by arrival are skipped on a slow link, although the camera is present.
         if (!paced || !goes_by_arrival()) continue;
         heard = steady_clock::now();
         limit = std::min(deadline, heard + frame_patience(options_));
@@ -147,7 +147,7 @@ Result<Frame> FrameCapture::await_frame(MonotonicTime asked, MonotonicTime deadl
   }
 }
 
-// Passed over is a stale frame of a line or clock that runs on, and what still comes of a trigger given up before.
+// Skips stale frames of a line or clock that continues, and late frames of an abandoned trigger.
 std::optional<Result<Frame>> FrameCapture::judge(MonotonicTime asked, bool was_quiet) {
   const DeviceClock clock = control_.clock();
   auto taken = receiver_.take({asked, clock, was_quiet});
@@ -158,7 +158,7 @@ std::optional<Result<Frame>> FrameCapture::judge(MonotonicTime asked, bool was_q
   if (frames_due_ > 0) --frames_due_;
   out_of_step_ = stale;
   stale_in_a_row_ = stale ? stale_in_a_row_ + 1 : 0;
-  // Getting in step did not help: the next session looks at the clock anew.
+  // Synchronizing again did not help: the next session checks the clock anew.
   if (stale_in_a_row_ >= kStaleMax) return Result<Frame>(lost("the camera answers with frames of before"));
   if (!taken) return Result<Frame>(tl::unexpected(taken.error()));
   if (!*taken) return std::nullopt;
@@ -172,7 +172,7 @@ tl::unexpected<Error> FrameCapture::missed(MonotonicTime deadline) {
     return lost("the camera does not answer a trigger");
   frames_due_ = 0;
   ++frames_missed_;
-  // Without the device's clock a frame that comes after all would be taken for the next.
+  // Without the device's clock, a late frame would be taken for the next one.
   const bool enough = frames_missed_ >= options_.missed_frames_max || goes_by_arrival();
   if (options_.trigger != AravisTrigger::kLine && enough) return lost("the camera answers, and sends no frames");
   if (steady_clock::now() >= deadline) return late();

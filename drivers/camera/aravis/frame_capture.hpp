@@ -17,18 +17,18 @@
 
 namespace slsd {
 
-/// Has a camera that is sending expose, and waits for the frame of that exposure: not for one of a trigger before,
+/// Triggers a streaming camera and waits for the frame of that exposure. Does not take the frame of an earlier trigger,
 /// whose capture was cancelled or late.
 /// @thread thread-bound
 class FrameCapture {
  public:
-  /// All outlive this.
-  /// @param device_name  by which the user knows it
-  /// @param action       null where the trigger is another
+  /// All parameters must outlive this object.
+  /// @param device_name  the user's name for it
+  /// @param action       null for other triggers
   FrameCapture(const AravisCameraOptions& options, const std::string& device_name, CaptureEvents& events,
                FrameReceiver& receiver, DeviceControl& control, ActionGroup::Member* action);
 
-  /// @errors kDisconnected: the camera was lost while nobody asked for a frame
+  /// @errors kDisconnected: the camera was lost between captures
   [[nodiscard]] Result<> check() const;
   /// @errors as Camera::capture()
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline);
@@ -56,12 +56,12 @@ class FrameCapture {
   FrameReceiver& receiver_;
   DeviceControl& control_;
   ActionGroup::Member* action_;
-  int frames_due_ = 0;     ///< triggers whose frame has not come
-  int frames_missed_ = 0;  ///< frames in a row that did not come; they may still come late
+  int frames_due_ = 0;     ///< triggers whose frame has not arrived
+  int frames_missed_ = 0;  ///< missing frames in a row; they may still arrive late
   MonotonicTime triggered_;
   int stale_in_a_row_ = 0;
-  int passed_over_ = 0;                       ///< stale frames of this capture
-  bool out_of_step_ = false;                  ///< the last frame was of an earlier trigger
+  int passed_over_ = 0;                       ///< stale frames skipped in this capture
+  bool out_of_step_ = false;                  ///< the last frame answered an earlier trigger
   std::chrono::nanoseconds longest_wait_{0};  ///< longest wait for a frame
 };
 

@@ -26,7 +26,7 @@ std::size_t length_before(std::span<const std::uint8_t> bytes, std::size_t end, 
   return length;
 }
 
-// Twice what configuring allows: sensors add a constant to what they were set to.
+// Twice the tolerance of configuring: sensors add a constant to their setting.
 constexpr double kExposureToleranceShare = 0.02;
 constexpr double kExposureToleranceUs = 40.0;
 constexpr double kGainToleranceDb = 0.2;
@@ -57,7 +57,7 @@ bool is_image_with_chunks(std::span<const std::uint8_t> frame, std::size_t image
 std::string unlike_configured(const FrameChunks& chunks, const AravisCameraOptions& options) {
   const double share = options.exposure_us * kExposureToleranceShare;
   const double tolerance = std::min(std::max(kExposureToleranceUs, share), options.exposure_us / 2);
-  // So that what is no number is refused.
+  // Written so that NaN is refused.
   if (chunks.exposure_us && !(std::abs(*chunks.exposure_us - options.exposure_us) <= tolerance))
     return difference("exposure", *chunks.exposure_us, options.exposure_us, "us");
   if (chunks.gain_db && !(std::abs(*chunks.gain_db - options.gain_db) <= kGainToleranceDb))
@@ -67,7 +67,7 @@ std::string unlike_configured(const FrameChunks& chunks, const AravisCameraOptio
 
 std::optional<nanoseconds> chunk_time(std::uint64_t value, nanoseconds frame_stamp, std::uint64_t tick_frequency_hz,
                                       nanoseconds apart_max) {
-  // What is no time at all would not fit.
+  // An impossible time would not fit.
   if (value > kLongest || frame_stamp < nanoseconds(0)) return std::nullopt;
   const nanoseconds plain(static_cast<nanoseconds::rep>(value));
   const bool ticks = tick_frequency_hz > 0 && value / tick_frequency_hz < kLongest / 1'000'000'000;

@@ -7,12 +7,13 @@
 
 namespace slsd {
 
-/// Follows a camera's frame identifiers and tells how many frames are missing between two. Identifiers of 16 bits go
-/// from 65535 to 1; those of 64 bits do not end.
+/// Follows a camera's frame identifiers and counts the frames missing between two. Identifiers of 16 bits wrap from
+/// 65535 to 1; those of 64 bits never wrap.
 /// @thread thread-bound
 class FrameIds {
  public:
-  /// Counts the frames missing between the last identifier and this one. 0 for the first, and for one that goes back.
+  /// Returns the number of frames missing between the previous identifier and this one. 0 for the first, and if the
+  /// identifiers go back.
   std::uint64_t note(std::uint64_t id) {
     const std::uint64_t before = last_.value_or(id);
     const bool first = !last_.has_value();
@@ -20,7 +21,7 @@ class FrameIds {
     if (first || id == before) return 0;
     if (id > before) return id - before - 1;
     const bool wrapped = before <= kLastOf16 && before - id > kLastOf16 / 2;
-    return wrapped ? kLastOf16 - before + (id > 0 ? id - 1 : 0) : 0;  // a camera that counts from 0 misses none by it
+    return wrapped ? kLastOf16 - before + (id > 0 ? id - 1 : 0) : 0;  // a camera that uses 0 misses no frame there
   }
 
   void forget() { last_.reset(); }
@@ -33,14 +34,14 @@ class FrameIds {
 
 /// The counts of a camera's frames since open().
 struct AravisStatistics {
-  std::uint64_t delivered = 0;   ///< handed out
-  std::uint64_t lost = 0;        ///< frames that never came or were torn, by the gaps of the frame identifiers
-  std::uint64_t torn = 0;        ///< came with holes, too short, of another size, or with broken chunks
-  std::uint64_t stale = 0;       ///< exposed before they were asked for, and passed over
-  std::uint64_t misexposed = 0;  ///< frames whose chunks tell another exposure or gain than configured
+  std::uint64_t delivered = 0;   ///< frames delivered
+  std::uint64_t lost = 0;        ///< frames that never arrived or were torn, from gaps in the identifiers
+  std::uint64_t torn = 0;        ///< frames with holes, too short, of another size, or with broken chunks
+  std::uint64_t stale = 0;       ///< frames skipped because they were exposed before the request
+  std::uint64_t misexposed = 0;  ///< frames whose chunks show another exposure or gain than configured
   std::uint64_t packets_sent_again = 0;
   std::uint64_t packets_missing = 0;
-  std::uint64_t underruns = 0;  ///< frames that came while no buffer was free
+  std::uint64_t underruns = 0;  ///< frames that arrived while no buffer was free
 };
 
 }  // namespace slsd

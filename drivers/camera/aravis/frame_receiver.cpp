@@ -17,9 +17,9 @@ namespace {
 using std::chrono::nanoseconds;
 
 constexpr std::uint64_t kHandOverUs = 100'000;
-constexpr int kSpareBuffers = 4;           // being filled, or done and not yet taken
+constexpr int kSpareBuffers = 4;           // being filled, or complete and not yet taken
 constexpr std::uint64_t kNear = 3;         // frames, of which some may be lost
-constexpr double kLeastOfExposure = 0.95;  // sensors take it a little shorter than they say
+constexpr double kLeastOfExposure = 0.95;  // sensors expose slightly shorter than they report
 
 /// The time of the frame's last byte; noted by the stream's callback.
 MonotonicTime received(ArvBuffer* buffer) {
@@ -119,8 +119,9 @@ void FrameReceiver::restart() {
   counted_ = {};
 }
 
-// The stream tells of a buffer before it hands it over. One that was not waited for would be taken for the next frame,
-// and each one after it too. For a packet that is of no frame it hands over an untouched buffer, and does not tell.
+// The stream reports a buffer before it hands it over, so this waits for it. Otherwise the buffer would be taken for
+// the next frame, and so would each later one. For a packet without a frame, the stream hands over an untouched buffer,
+// without a report.
 ArvBuffer* FrameReceiver::pop() {
   for (;;) {
     ArvBuffer* buffer = arv_stream_timeout_pop_buffer(stream_, kHandOverUs);
@@ -141,7 +142,7 @@ void FrameReceiver::discard() {
   if (ArvBuffer* buffer = pop()) return_unread(buffer);
 }
 
-// A frame with chunks that are more than the camera told is too large for its buffer.
+// A frame is too large for its buffer if it has more chunks than the camera reported.
 bool FrameReceiver::discard_readable(const DeviceClock& clock) {
   ArvBuffer* buffer = pop();
   if (buffer == nullptr) return true;
@@ -190,8 +191,8 @@ std::optional<FrameChunks> FrameReceiver::read_chunks(ArvBuffer* buffer) {
   return chunks_ ? chunks_->read(buffer) : FrameChunks{};
 }
 
-// The status first: what failed keeps the pixels, and often the size, of the frame before. A frame that ends too early
-// still counts as a success.
+// Check the status first: a failed buffer keeps the pixels, and often the size, of an earlier frame. A frame that ends
+// too early still counts as a success.
 std::string FrameReceiver::wrong_with(ArvBuffer* buffer) const {
   const ArvBufferStatus status = arv_buffer_get_status(buffer);
   if (status != ARV_BUFFER_STATUS_SUCCESS) return status_text(status);
@@ -211,8 +212,8 @@ std::string FrameReceiver::wrong_with(ArvBuffer* buffer) const {
   return same && x_padding == 0 ? "" : "its size or pixel format is not as configured";
 }
 
-// Where the stream ran out of buffers, nobody asked for the frames that are missing. They are missing behind those that
-// filled its buffers.
+// If the stream ran out of buffers, nobody requested the missing frames. They are missing after those that filled the
+// buffers.
 void FrameReceiver::note_identifier(ArvBuffer* buffer) {
   guint64 underruns = 0;
   arv_stream_get_statistics(stream_, nullptr, nullptr, &underruns);
@@ -221,16 +222,16 @@ void FrameReceiver::note_identifier(ArvBuffer* buffer) {
   if (missing > 0 && !std::exchange(ran_out_, false)) counted_.lost += missing;
 }
 
-// No frame can have been exposed before the camera began to acquire, nor after it was there: one that says so is
-// stamped by another clock than the one that is read. The first tells, before anything hangs on it.
+// No exposure can begin before the camera started to acquire, nor after the frame arrived. Such a stamp comes from
+// another clock than the readable one. The first frame decides, before anything depends on it.
 void FrameReceiver::judge_stamps(ArvBuffer* buffer, const FrameChunks& chunks, const DeviceClock& clock) {
   if (stamps_judged_ || options_.device_clock != AravisClock::kAuto || options_.ptp || !clock.ready()) return;
   stamps_judged_ = true;
   foreign_stamps_ = !clock.may_have_shown(stamp_of(buffer, chunks), began_, received(buffer));
 }
 
-// The longest of late: a link that is slower than the sensor makes it longer than the camera says, and what is held up
-// on its way comes in a burst. Where frames in between found no buffer nothing is known of their pace.
+// The longest recent period. A slow link makes it longer than the camera reports, and delayed frames come in a burst.
+// If frames in between found no buffer, their pace is unknown.
 void FrameReceiver::note_pace(ArvBuffer* buffer) {
   const std::uint64_t id = arv_buffer_get_frame_id(buffer);
   const MonotonicTime there = received(buffer);
@@ -249,8 +250,8 @@ std::optional<MonotonicTime> FrameReceiver::exposure_start(ArvBuffer* buffer, co
   if (goes_by_arrival(proof.clock)) return start_by_arrival(there, proof);
   const nanoseconds device = stamp_of(buffer, chunks);
   const MonotonicTime start = proof.clock.host_time(device);
-  // What a command of ours began cannot be older. A line or the camera's own clock begins frames at any time: what may
-  // have been sooner is passed over.
+  // A frame that answers our command cannot be older. A line or the camera's own clock begins frames at any time:
+  // frames that may have begun earlier are skipped.
   const bool commanded = options_.trigger == AravisTrigger::kSoftware || options_.trigger == AravisTrigger::kAction;
   const nanoseconds uncertain = proof.clock.uncertainty(device);
   if (start + (commanded ? uncertain : -uncertain) < proof.asked) return std::nullopt;
@@ -258,11 +259,11 @@ std::optional<MonotonicTime> FrameReceiver::exposure_start(ArvBuffer* buffer, co
   return std::clamp(start, std::min(proof.asked, there), there);
 }
 
-// At a command exactly one frame is due, all earlier ones have come, and what comes sooner than an exposure takes is
-// none that the command began: unless the camera was silent before for longer than a frame ever took. Without a command
-// frames follow each other all the time: the one that is there was exposed, then read out within a period, then sent
-// within another, or else they would pile up. The start that is reported is thus the earliest possible, and a frame
-// whose exposure began before it was asked for is passed over even where it came as late as it can.
+// With a command, exactly one frame is due, and all earlier ones have come. A frame that comes sooner than an exposure
+// takes does not answer the command, unless the camera was silent for longer than any frame took. Without a command,
+// frames follow each other. Each was exposed, read out within one period and sent within another; otherwise they would
+// pile up. So the reported start is the earliest possible one. A frame that may have begun before the request is
+// skipped.
 std::optional<MonotonicTime> FrameReceiver::start_by_arrival(MonotonicTime there, const Proof& proof) const {
   if (options_.trigger == AravisTrigger::kSoftware) {
     const bool took_its_time = there - proof.asked >= from_us(options_.exposure_us * kLeastOfExposure);

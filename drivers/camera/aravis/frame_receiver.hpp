@@ -24,22 +24,22 @@
 
 namespace slsd {
 
-/// The buffers of one stream, each with the stream or lent to a frame. Frames may outlive the stream: a buffer that is
-/// given back after its end is freed.
-/// @thread thread-bound; the frames that it lends may end on any thread
+/// The buffers of one stream. Each is either with the stream or lent to a frame. Frames may outlive the stream: a
+/// buffer returned after the stream's end is freed.
+/// @thread thread-bound; frames may end on any thread
 class StreamBuffers {
  public:
   /// Allocates the buffers and hands them to the stream.
   StreamBuffers(ArvStream* stream, std::size_t bytes_each, int buffers);
-  /// The stream is not used from then on.
+  /// Ends the use of the stream.
   ~StreamBuffers();
   StreamBuffers(const StreamBuffers&) = delete;
   StreamBuffers& operator=(const StreamBuffers&) = delete;
 
   [[nodiscard]] int lent() const;
-  /// A lease on a buffer that was taken from the stream.
+  /// Lends a buffer taken from the stream.
   [[nodiscard]] FrameLease lend(ArvBuffer* buffer);
-  /// Returns a buffer that was not lent.
+  /// Returns a buffer to the stream that was not lent.
   void return_unread(ArvBuffer* buffer);
 
  private:
@@ -47,44 +47,44 @@ class StreamBuffers {
   std::shared_ptr<Shared> shared_;  ///< shared with the frames
 };
 
-/// Turns the buffers of a stream into frames, and refuses those that are not what was asked for.
+/// Makes frames from a stream's buffers, and refuses those that do not match the request.
 /// @thread thread-bound
 class FrameReceiver {
  public:
-  /// @param stream         outlives this
-  /// @param payload_bytes  of a frame, with what the camera appends to it
-  /// @param chunks         of the camera; null where it appends none
+  /// @param stream         must outlive this object
+  /// @param payload_bytes  size of a frame, including chunks
+  /// @param chunks         of the camera; null if it appends none
   FrameReceiver(ArvStream* stream, const DeviceLayout& layout, const AravisCameraOptions& options,
                 std::size_t payload_bytes, std::unique_ptr<ChunkReader> chunks);
 
   /// Prepares for frames; call it before the camera begins to acquire.
   void begin();
-  /// Begins to count anew.
+  /// Starts counting again.
   void restart();
 
   [[nodiscard]] bool all_held() const { return buffers_.lent() >= options_.frames_held_max; }
 
-  /// The evidence that a frame was exposed after its request.
+  /// The evidence that a frame was exposed after the request.
   struct Proof {
-    MonotonicTime asked;  ///< frames exposed before are stale
+    MonotonicTime asked;  ///< frames exposed earlier are stale
     const DeviceClock& clock;
-    bool was_quiet = false;  ///< the camera was silent for so long that what comes now answers the command
+    bool was_quiet = false;  ///< the camera was silent long enough that the next frame answers the command
   };
 
-  /// Takes the next buffer of the stream, which is done.
-  /// @return nothing if the stream gave a buffer up without a frame
+  /// Takes the stream's next completed buffer.
+  /// @return nothing if the stream dropped a buffer without a frame
   /// @errors kFrameTorn, kFrameStale, kBusy; kMismatch: exposed with other settings than configured
   [[nodiscard]] Result<std::optional<Frame>> take(const Proof& proof);
-  /// Takes the next buffer and gives it back.
+  /// Takes the next buffer and returns it to the stream.
   void discard();
-  /// Discards as discard() does. @return false if it is a frame whose chunks cannot be read
+  /// Discards as discard() does. @return false if the frame's chunks cannot be read
   [[nodiscard]] bool discard_readable(const DeviceClock& clock);
 
-  /// Tells whether exposures are told by the arrival of frames.
+  /// Tells whether exposure times derive from the arrival of frames.
   [[nodiscard]] bool goes_by_arrival(const DeviceClock& clock) const;
-  /// The first frame was stamped by another clock than the one that can be read.
+  /// Tells whether another clock than the readable one stamped the first frame.
   [[nodiscard]] bool stamps_are_foreign() const { return foreign_stamps_; }
-  /// Gives back all that are done.
+  /// Returns all completed buffers to the stream.
   void discard_all();
 
   [[nodiscard]] AravisStatistics statistics() const;
@@ -110,18 +110,18 @@ class FrameReceiver {
   DeviceLayout layout_;
   const AravisCameraOptions& options_;
   StreamBuffers buffers_;
-  std::unique_ptr<ChunkReader> chunks_;  ///< ends before the buffers
+  std::unique_ptr<ChunkReader> chunks_;  ///< must end before the buffers
   FrameIds ids_;
   std::uint64_t underruns_ = 0;
-  bool ran_out_ = false;  ///< buffers ran out before a gap in the identifiers that has not come yet
+  bool ran_out_ = false;  ///< buffers ran out; the resulting gap in the identifiers has not come yet
   MonotonicTime began_;
   bool stamps_judged_ = false;
   bool foreign_stamps_ = false;
-  std::optional<std::pair<std::uint64_t, MonotonicTime>> last_;  ///< identifier and arrival of the frame before
-  bool paced_ = false;                                           ///< the frame before came before
-  std::chrono::nanoseconds period_;                              ///< longest recent frame period
+  std::optional<std::pair<std::uint64_t, MonotonicTime>> last_;  ///< identifier and arrival of the previous frame
+  bool paced_ = false;               ///< the previous frame is recent enough to measure the pace
+  std::chrono::nanoseconds period_;  ///< longest recent frame period
   AravisStatistics counted_;
-  std::optional<FramePool> greys_;  ///< for grey from mosaics, and for unpacked pixels
+  std::optional<FramePool> greys_;  ///< holds grey from mosaics, and unpacked pixels
   Grey8 grey8_;
   Grey16 grey16_;
   std::vector<std::uint32_t> sums_;

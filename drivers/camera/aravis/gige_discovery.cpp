@@ -57,7 +57,7 @@ FileDescriptor udp_socket() {
   return FileDescriptor(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
 }
 
-/// One device's port, connected, so that only the device is heard.
+/// One device's port. The socket is connected, so that it hears only the device.
 class ControlChannel {
  public:
   /// @errors as probe_gige_device()
@@ -69,12 +69,12 @@ class ControlChannel {
     if (!socket_) return fail_system(errno, "cannot open a socket", address);
     if (::bind(socket_.number(), generic(*from), sizeof(*from)) != 0)
       return fail(ErrorCode::kInvalidArgument, "no interface of this host has this address; see ip address", interface);
-    (void)::connect(socket_.number(), generic(*to), sizeof(*to));  // where it cannot, nothing will answer
+    (void)::connect(socket_.number(), generic(*to), sizeof(*to));  // if this fails, nothing will answer
     return {};
   }
 
-  /// Asks the question and gives the reader's result of its answer, if that comes in time. The answer to an earlier
-  /// question may come late.
+  /// Sends the query and returns the reader's result for its answer, if that comes in time. Answers to earlier queries
+  /// may come late.
   template <class Question, class Reader>
   [[nodiscard]] auto ask(Question question, Reader read, milliseconds timeout) -> decltype(read(Bytes(), 0)) {
     const std::uint16_t id = ++id_ == 0 ? ++id_ : id_;
@@ -107,10 +107,10 @@ class ControlChannel {
   std::vector<std::uint8_t> answer_ = std::vector<std::uint8_t>(1024);
 };
 
-constexpr int kQuestions = 2;             // one may be lost
-constexpr std::uint16_t kQuestionId = 1;  // of both: either answer will do
+constexpr int kQuestions = 2;             // one query may be lost
+constexpr std::uint16_t kQuestionId = 1;  // shared by both: either answer suffices
 
-/// Sends to everyone on the interface's network, whatever the routes say.
+/// Sends to every device on the interface's network, whatever the routes are.
 void ask_everyone(int socket, const HostInterface& interface) {
   auto question = gvcp_discovery(kQuestionId);
   iovec part{question.data(), question.size()};
@@ -134,10 +134,10 @@ void ask_everyone(int socket, const HostInterface& interface) {
   through.ipi_ifindex = static_cast<int>(interface.number);
   through.ipi_spec_dst = interface.address;
   std::memcpy(CMSG_DATA(header), &through, sizeof(through));
-  (void)::sendmsg(socket, &message, MSG_NOSIGNAL);  // an interface that takes nothing has no device to find
+  (void)::sendmsg(socket, &message, MSG_NOSIGNAL);  // if sending fails, no device can be found there
 }
 
-/// The kernel's index of the interface that a message came through.
+/// The kernel's index of the interface that received a message.
 unsigned interface_of(msghdr& message) {
   for (cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr; header = CMSG_NXTHDR(&message, header)) {
     if (header->cmsg_level != IPPROTO_IP || header->cmsg_type != IP_PKTINFO) continue;

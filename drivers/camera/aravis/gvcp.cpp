@@ -14,12 +14,12 @@ using Bytes = std::span<const std::uint8_t>;
 
 constexpr std::uint8_t kKey = 0x42;
 constexpr std::uint8_t kAnswerWanted = 0x01;
-constexpr std::uint8_t kMayBroadcast = 0x10;  // a device in another network answers no other way
+constexpr std::uint8_t kMayBroadcast = 0x10;  // without it, a device in another network cannot answer
 constexpr std::uint8_t kDiscovery = 0x02;
 constexpr std::uint8_t kAction = 0x01;  // 0x0100
 constexpr std::uint8_t kScheduled = 0x80;
 constexpr std::uint8_t kReadRegister = 0x80;
-constexpr std::uint8_t kActionId = 1;  // nothing answers it
+constexpr std::uint8_t kActionId = 1;  // actions get no answer
 constexpr std::size_t kHeaderBytes = 8;
 constexpr std::size_t kDiscoveryBytes = 0xf8;
 constexpr std::size_t kVendorAt = 0x48;

@@ -10,11 +10,12 @@
 
 namespace slsd {
 
-/// The GigE Vision cameras that answer, by broadcast on every network, and the USB3 Vision cameras on this host's
-/// buses. The pixel formats of a GigE Vision camera cannot be read without its control, which is taken for a moment of
-/// those named that are free, and of no other: it might be somebody else's.
+/// Lists the GigE Vision cameras that answer a broadcast on any network, and the USB3 Vision cameras on this host's
+/// buses. Reading the pixel formats of a GigE Vision camera requires its control. Takes control briefly, only of
+/// configured cameras that are free: others may belong to somebody else.
 /// @param sysfs      "/sys"
-/// @param configured  serial number, "vendor-serial" or address; an address is asked also where no broadcast reaches it
+/// @param configured  serial number, "vendor-serial" or address; an address is also asked directly, beyond the reach of
+///                    broadcasts
 /// @thread reentrant
 [[nodiscard]] std::vector<ListedCamera> list_vision_cameras(const std::filesystem::path& sysfs,
                                                             const std::vector<std::string>& configured);

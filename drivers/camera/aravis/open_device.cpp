@@ -17,11 +17,10 @@
 #include "core/printable.hpp"
 #include "drivers/camera/aravis/gige_discovery.hpp"
 
-// Aravis 0.8 parses descriptions, of devices and of their chunk data, in one state for the whole process, where no lock
-// protects it; and it parses in the same call that reads them from the device, so that a lock around that would have
-// all cameras wait for one that stops answering. These two functions are all that use the state. Aravis calls them
-// through its table of symbols, in which a program's own come first: so the lock is held while bytes are parsed, and
-// never while any are waited for.
+// Aravis 0.8 parses descriptions of devices and of their chunks in one state for the whole process, without a lock. It
+// parses in the same call that reads them from the device. A lock around that call would make all cameras wait for one
+// that stops answering. Only these two functions use the state. Aravis calls them through its symbol table, in which
+// the program's own functions come first. So the lock is held during parsing, and never while waiting for bytes.
 namespace {
 
 std::mutex& parsing() {
@@ -67,10 +66,10 @@ std::string text(const char* from) {
 }
 
 constexpr milliseconds kProbe{600};
-constexpr milliseconds kRelease{700};  // below a second, in which the service is to stop
+constexpr milliseconds kRelease{700};  // less than a second, the service's time to stop
 constexpr milliseconds kReleasePoll{30};
 constexpr std::uint64_t kHeartbeatRegister = 0x938;
-constexpr std::uint32_t kHeartbeatMs = 2000;  // Aravis is heard of every second
+constexpr std::uint32_t kHeartbeatMs = 2000;  // Aravis sends a heartbeat every second
 
 bool is_named(const std::string& id, const std::string& vendor, const std::string& serial) {
   return id == serial || id == vendor + "-" + serial;
@@ -87,7 +86,7 @@ tl::unexpected<Error> fail_controlled(const std::string& by, const std::string& 
               name);
 }
 
-// A device gives its controller up only when that was not heard for so long, three seconds by default.
+// A device releases its controller only after this long without a heartbeat; three seconds by default.
 void shorten_heartbeat(ArvDevice* device) {
   guint32 heartbeat_ms = 0;
   GErrorSlot error;
@@ -131,9 +130,10 @@ std::optional<GigeDevice> found_before(const AravisCameraOptions& options, const
 }  // namespace
 
 std::vector<Usb3Device> list_usb3_devices() {
-  static std::mutex mutex;  // Aravis keeps one list, whose entries a second call takes away
+  static std::mutex mutex;  // Aravis keeps one list; a second call removes its entries
   const std::lock_guard lock(mutex);
-  arv_disable_interface("GigEVision");  // asks each network for a second; discover_gige_devices() knows already
+  arv_disable_interface(
+      "GigEVision");  // it asks each network for a second; discover_gige_devices() has already done so
   arv_update_device_list();
   std::vector<Usb3Device> devices;
   for (unsigned i = 0; i < arv_get_n_devices(); ++i) {

@@ -26,18 +26,18 @@ struct Usb3Device {
 struct OpenedDevice {
   GObjectPtr<ArvCamera> camera;
   std::string name;     ///< "vendor-serial"
-  std::string address;  ///< IPv4, of GigE Vision; else empty
+  std::string address;  ///< IPv4 address of a GigE Vision device; else empty
 };
 
-/// Finds the device that the options name and takes control of it. Where another still has control, as the session
-/// before may have after a failure of the network, waits a little for its end.
-/// @param address  where it was found before; it is looked for there first, which is sooner; may be empty
+/// Finds the device that the options name and takes control of it. Waits briefly if another application has control,
+/// because a session before a network failure may still hold it.
+/// @param address  where the device was found before; tried first, which is faster; may be empty
 /// @errors kNotFound, kPermissionDenied (another application controls it), kDisconnected, kUnsupported,
 /// kInvalidArgument
 /// @thread thread-safe
 [[nodiscard]] Result<OpenedDevice> open_device(const AravisCameraOptions& options, const std::string& address);
 
-/// Takes control of a device that is known.
+/// Takes control of a known device.
 /// @errors as open_device()
 /// @thread thread-safe
 [[nodiscard]] Result<OpenedDevice> open_gige_device(const GigeDevice& found);

@@ -9,7 +9,7 @@
 namespace slsd {
 namespace {
 
-/// Pixel i of those that lie bit after bit.
+/// Pixel i of pixels packed bit after bit.
 template <unsigned bits>
 std::uint16_t lsb_pixel(const std::uint8_t* packed, std::size_t i) {
   const std::size_t bit = i * bits;
@@ -18,7 +18,7 @@ std::uint16_t lsb_pixel(const std::uint8_t* packed, std::size_t i) {
   return static_cast<std::uint16_t>(two >> bit % 8 & ((1u << bits) - 1));
 }
 
-/// Pixel i of those whose low bits share the middle one of three bytes: the even one has the lower half of it.
+/// Pixel i of pairs in three bytes, whose low bits share the middle byte: the even pixel has its lower half.
 template <unsigned bits>
 std::uint16_t gige_pixel(const std::uint8_t* packed, std::size_t i) {
   constexpr unsigned kLow = bits - 8;

@@ -14,16 +14,16 @@ namespace slsd {
 struct ListingPlaces {
   std::filesystem::path devices = "/dev";
   std::filesystem::path sysfs = "/sys";
-  std::vector<std::filesystem::path> configured_nodes = {};  ///< device nodes, wherever they are
+  std::vector<std::filesystem::path> configured_nodes = {};  ///< configured device nodes, wherever they are
   std::vector<std::string> configured_ids = {};              ///< GigE Vision and USB3 Vision
 };
 
 struct CameraListing {
   std::vector<ListedCamera> cameras;
-  std::vector<std::string> looked_at;  ///< where, in words
+  std::vector<std::string> looked_at;  ///< the places searched, in words
 };
 
-/// The cameras that this host can see. Takes a second or two.
+/// Lists the cameras that this host can see. Takes a second or two.
 /// @thread reentrant
 [[nodiscard]] CameraListing list_cameras(const ListingPlaces& places);
 

@@ -17,11 +17,11 @@ struct ListedFormat {
   friend bool operator==(const ListedFormat&, const ListedFormat&) = default;
 };
 
-/// A camera that this host can see. Fields that do not apply, or cannot be told, are empty.
+/// A camera that this host can see. Fields that do not apply, or are unknown, are empty.
 struct ListedCamera {
   std::string standard;  ///< "V4L2", "GigE Vision" or "USB3 Vision"
   std::string driver;    ///< the configuration's: "v4l2" or "aravis"
-  std::string name;      ///< the stable name, the configuration's `device` or `id`
+  std::string name;      ///< the stable name: `device` or `id` in the configuration
   std::string vendor;
   std::string model;
   std::string serial;
@@ -29,10 +29,10 @@ struct ListedCamera {
   std::string kernel_driver;     ///< "uvcvideo", ...
   std::string address;           ///< IPv4
   std::string interface;         ///< this host's interface with its network: "eth1 (10.0.0.1/24)"
-  std::optional<int> link_mbps;  ///< speed of USB, or of this host's interface
+  std::optional<int> link_mbps;  ///< speed of the USB link, or of this host's interface
   std::string user;              ///< the controlling program: "a program on this host", ...
   std::vector<ListedFormat> formats;
-  std::string problem;  ///< obstacle to its use, and the remedy
+  std::string problem;  ///< why it cannot be used, and the remedy
 };
 
 }  // namespace slsd

@@ -9,17 +9,17 @@
 
 namespace slsd {
 
-/// The first line of a file, printable: what a device says of itself stands there as it sent it. Empty where it cannot
-/// be read.
+/// The first line of a file, made printable: it may contain text exactly as the device sent it. Empty if the file
+/// cannot be read.
 [[nodiscard]] std::string first_line(const std::filesystem::path& file);
 
-/// The whole number that the first line begins with.
+/// The whole number at the start of the file's first line.
 [[nodiscard]] std::optional<int> first_number(const std::filesystem::path& file);
 
 /// The entries of a folder, sorted. Empty if it cannot be read.
 [[nodiscard]] std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder);
 
-/// A device on USB, by what the kernel tells of it in sysfs.
+/// A USB device according to sysfs.
 struct UsbDevice {
   std::string vendor;
   std::string model;
@@ -30,11 +30,11 @@ struct UsbDevice {
   bool usb3_vision = false;  ///< has an interface of that class
 };
 
-/// The device that something in sysfs is a part of; nothing if it is not on USB.
-/// @param part  a folder of sysfs, as /sys/class/video4linux/video0/device
+/// The USB device that a part in sysfs belongs to; nothing if it is not on USB.
+/// @param part  a folder of sysfs, such as /sys/class/video4linux/video0/device
 [[nodiscard]] std::optional<UsbDevice> usb_device_of(const std::filesystem::path& part);
 
-/// All that there are.
+/// Lists all USB devices.
 /// @param sysfs  "/sys"
 [[nodiscard]] std::vector<UsbDevice> list_usb_devices(const std::filesystem::path& sysfs);
 

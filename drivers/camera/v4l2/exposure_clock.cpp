@@ -12,9 +12,9 @@ namespace {
 
 constexpr std::chrono::milliseconds kPeriodUnknown{100};
 constexpr int kPeriodsToNext = 4;
-constexpr std::chrono::milliseconds kPauseLeast{100};     // which a busy host makes without anyone's doing
-constexpr std::chrono::milliseconds kSilenceLeast{1000};  // a bus that others use stalls for less
-constexpr std::chrono::milliseconds kFuture{1};           // no stamp is later than its frame; clocks are rounded
+constexpr std::chrono::milliseconds kPauseLeast{100};     // a busy host may pause this long
+constexpr std::chrono::milliseconds kSilenceLeast{1000};  // stalls of a shared bus are shorter
+constexpr std::chrono::milliseconds kFuture{1};           // a stamp is never later than its frame, except for rounding
 constexpr int kSameStampsMax = 3;
 
 std::chrono::nanoseconds nanoseconds(const timeval& time) {

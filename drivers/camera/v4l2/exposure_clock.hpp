@@ -14,18 +14,18 @@ struct v4l2_buffer;
 
 namespace slsd {
 
-/// Tells when a buffer's exposure began, from the driver's stamp and the flags that say what it stands for:
+/// Computes when a buffer's exposure began, from the driver's stamp and the flags that give its meaning:
 ///
 ///     exposure begins ----exposure----> ends, read-out begins ----readout----> last byte
 ///     TSTAMP_SRC_SOE                    uvcvideo's stamp                       TSTAMP_SRC_EOF
 ///
-/// uvcvideo claims the start of exposure and stamps a frame's first packet, which comes after it. What is not known
-/// counts as long as it can be, a frame's period: a frame may be taken for older than it is, never for younger.
+/// uvcvideo claims to stamp the start of exposure, but stamps a frame's first packet, which comes later. An unknown
+/// time counts as its maximum, one frame period. So a frame may seem older than it is, but never younger.
 ///
-/// Without a stamp of CLOCK_MONOTONIC only the order is left: when a frame is received says nothing, because who
-/// receives it may have slept. Then as many frames as may be in flight have to pass after the trigger. So it is where
-/// a driver claims CLOCK_MONOTONIC and stamps by another: uvcvideo with clock=realtime, which is far in the future, or
-/// a clock that stands still.
+/// Without a CLOCK_MONOTONIC stamp, only the order of frames remains. The time of receipt proves nothing, because the
+/// receiver may have slept. So after the trigger, all frames that may be in flight must pass first. The same holds if a
+/// driver claims CLOCK_MONOTONIC but uses another clock: uvcvideo with clock=realtime, which is far in the future, or a
+/// clock that stands still.
 /// @thread thread-bound
 class ExposureClock {
  public:
@@ -33,25 +33,26 @@ class ExposureClock {
   /// @param driver  as V4l2Device::driver()
   ExposureClock(const ExposureTiming& timing, const V4l2CameraOptions& options, const std::string& driver);
 
-  /// Looks at the stamp of each buffer that is taken, in their order: one that cannot be makes all worthless.
-  /// @param received  when it was taken from the driver
+  /// Checks the stamp of each taken buffer, in order. One impossible stamp makes all stamps untrusted.
+  /// @param received  when the buffer was taken from the driver
   void note(const v4l2_buffer& buffer, MonotonicTime received);
-  /// Tells whether nothing was found wrong with the driver's clock.
+  /// Tells whether the driver's clock has shown no fault.
   [[nodiscard]] bool is_trusted() const { return trusted_; }
 
-  /// The buffer carries a stamp that tells.
+  /// Tells whether the buffer carries a usable stamp.
   [[nodiscard]] bool is_stamped(const v4l2_buffer& buffer) const;
 
-  /// The start of the buffer's exposure; a guess without a stamp. @param received  when it was taken from the driver
+  /// The start of the buffer's exposure; an estimate without a stamp. @param received  when the buffer was taken from
+  /// the driver
   [[nodiscard]] MonotonicTime exposure_start(const v4l2_buffer& buffer, MonotonicTime received) const;
 
-  /// The greatest number of frames that are exposed or read out at a time.
+  /// The greatest number of frames in exposure or readout at a time.
   [[nodiscard]] int frames_in_flight() const;
 
-  /// The greatest age of an exposure after which the next frame is still current: a few periods.
+  /// The greatest age of an exposure at which the next frame is still current: a few periods.
   [[nodiscard]] std::chrono::nanoseconds next_frame_age_max() const;
 
-  /// The longest silence of a live stream that runs freely: so many frames, and a second at least.
+  /// The longest silence of a live stream in free run: this many frames, and at least one second.
   [[nodiscard]] std::chrono::nanoseconds silence_max(int missed_frames_max) const;
 
  private:

@@ -45,7 +45,7 @@ void add_range(const v4l2_frmsize_stepwise& range, const PixelFormat& format, co
     modes.push_back({format, options.size_px->first, options.size_px->second});
 }
 
-// A driver that cannot list its sizes is asked what it makes of the one wanted, or of the one that it has.
+// If a driver cannot list its sizes, try the wanted size, or else its current one.
 void add_tried(const V4l2Device& device, const PixelFormat& format, const V4l2CameraOptions& options,
                std::vector<FrameMode>& modes) {
   v4l2_format tried{};

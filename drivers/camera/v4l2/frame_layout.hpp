@@ -16,12 +16,12 @@
 
 namespace slsd {
 
-/// The way in which a pixel format holds its grey.
+/// How a pixel format stores grey.
 enum class GreyLayout {
-  kGrey8,     ///< a byte a pixel, row by row; what follows the rows is chroma
-  kGrey16,    ///< two bytes a pixel, little-endian
+  kGrey8,     ///< one byte per pixel, row by row; chroma follows the rows
+  kGrey16,    ///< two bytes per pixel, little-endian
   kMosaic8,   ///< a Bayer mosaic of bytes
-  kMosaic16,  ///< a Bayer mosaic of two bytes a pixel, little-endian
+  kMosaic16,  ///< a Bayer mosaic of two bytes per pixel, little-endian
   kYuyv,      ///< luma in the even bytes
   kUyvy,      ///< luma in the odd bytes
   kJpeg       ///< a JPEG image
@@ -35,8 +35,8 @@ struct PixelFormat {
   friend bool operator==(const PixelFormat&, const PixelFormat&) = default;
 };
 
-/// All of them, the best for decoding first: grey before Bayer, which costs resolution, before luma, which costs the
-/// bus twice the bytes, before JPEG, which costs detail.
+/// All formats, the best for decoding first. Grey comes before Bayer, which costs resolution; then luma, which doubles
+/// the bytes on the bus; then JPEG, which costs detail.
 [[nodiscard]] std::span<const PixelFormat> pixel_formats();
 
 [[nodiscard]] std::optional<PixelFormat> find_pixel_format(std::uint32_t fourcc);
@@ -45,16 +45,16 @@ struct PixelFormat {
 [[nodiscard]] std::uint32_t fourcc_from(std::string_view name);
 [[nodiscard]] std::string fourcc_name(std::uint32_t fourcc);
 
-/// The bytes from a row's first to its last pixel; 0 for JPEG.
+/// The bytes between a row's first and last pixel, inclusive; 0 for JPEG.
 [[nodiscard]] std::size_t row_bytes(GreyLayout layout, int width_px);
 
-/// The bytes of a grey pixel that it becomes: 1 or 2.
+/// The bytes of the resulting grey pixel: 1 or 2.
 [[nodiscard]] int bytes_per_pixel(GreyLayout layout);
 
-/// Frames are views of the driver's own buffers.
+/// Tells whether frames are views of the driver's own buffers.
 [[nodiscard]] bool is_zero_copy(GreyLayout layout);
 
-/// One way in which a device can deliver frames.
+/// One combination of format and size that a device offers.
 struct FrameMode {
   PixelFormat format;
   int width_px = 0;
@@ -67,23 +67,23 @@ struct FrameMode {
 struct FrameLayout {
   FrameMode mode;
   std::size_t stride_bytes = 0;
-  /// The least number of bytes of a whole frame; fewer are a torn one. For JPEG one.
+  /// The size of a whole frame in bytes; a smaller one is torn. 1 for JPEG.
   std::size_t bytes_min = 0;
 };
 
 /// "GREY 1600x1200".
 [[nodiscard]] std::string to_string(const FrameMode& mode);
 
-/// The device's modes that can be decoded. A range of sizes gives the smallest and the largest, and the wanted size if
-/// it lies within.
+/// The device's modes that slsd can decode. A range of sizes gives the smallest, the largest, and the wanted size if it
+/// lies within.
 [[nodiscard]] std::vector<FrameMode> list_modes(const V4l2Device& device, const V4l2CameraOptions& options);
 
-/// The best for decoding of those that fit the options: the order of pixel_formats(), then the largest.
-/// @errors kUnsupported, with the list of what there is
+/// Chooses the best mode for decoding that fits the options: first by the order of pixel_formats(), then the largest.
+/// @errors kUnsupported, with the list of available modes
 [[nodiscard]] Result<FrameMode> choose_mode(const std::vector<FrameMode>& modes, const V4l2CameraOptions& options);
 
-/// Sets the mode and reads back what the device made of it.
-/// @errors kMismatch where that is something else; kBusy, kDisconnected, kIo
+/// Sets the mode and reads back the device's choice.
+/// @errors kMismatch if the device chose another; kBusy, kDisconnected, kIo
 [[nodiscard]] Result<FrameLayout> set_mode(const V4l2Device& device, const FrameMode& mode);
 
 }  // namespace slsd

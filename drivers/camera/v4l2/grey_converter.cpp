@@ -22,7 +22,7 @@ std::string size_text(int width_px, int height_px) {
   return std::to_string(width_px) + "x" + std::to_string(height_px);
 }
 
-// What is wrong with one frame may be right with the next.
+// A fault of one frame need not affect the next.
 tl::unexpected<Error> as_torn(Error error) {
   if (error.code == ErrorCode::kMalformed) error = {ErrorCode::kFrameTorn, error.message + "; scan again", {}};
   return tl::unexpected(std::move(error));

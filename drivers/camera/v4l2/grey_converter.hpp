@@ -14,8 +14,8 @@
 
 namespace slsd {
 
-/// Turns buffers that are no grey image into one: luma of YUYV and UYVY, Bayer and MJPG as the file camera does it.
-/// Allocates nothing after it was made, but for MJPG.
+/// Converts buffers of other formats into grey images: luma of YUYV and UYVY, Bayer, and MJPG like the file camera.
+/// Only MJPG allocates memory after construction.
 /// @thread thread-bound
 class GreyConverter {
  public:
@@ -23,7 +23,7 @@ class GreyConverter {
 
   /// The frame's grey, valid until the next call.
   /// @param bytes  of a whole frame
-  /// @errors kFrameTorn: a JPEG image that is damaged, cut short or of another size; kUnsupported: of a rare kind
+  /// @errors kFrameTorn: a JPEG image that is damaged, cut short or of another size; kUnsupported: a rare kind of JPEG
   [[nodiscard]] Result<GreyView> convert(std::span<std::byte> bytes);
 
  private:

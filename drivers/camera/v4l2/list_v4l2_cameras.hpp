@@ -9,11 +9,11 @@
 
 namespace slsd {
 
-/// The cameras among a folder's videoN, in the order of their numbers, named as in its v4l/by-id where they are there.
-/// None is disturbed in what it does.
+/// Lists the cameras among a folder's videoN nodes, in the order of their numbers. Uses their names in its v4l/by-id if
+/// present. Does not disturb cameras in use.
 /// @param devices  "/dev"
 /// @param sysfs    "/sys"
-/// @param more     other device nodes to look at, as the configuration names them
+/// @param more     more device nodes, as the configuration names them
 [[nodiscard]] std::vector<ListedCamera> list_v4l2_cameras(const std::filesystem::path& devices,
                                                           const std::filesystem::path& sysfs,
                                                           const std::vector<std::filesystem::path>& more);

@@ -18,16 +18,16 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr int kBuffersBesideHeld = 3;  // being filled, waiting, and one on its way
+constexpr int kBuffersBesideHeld = 3;  // being filled, waiting, or returning
 constexpr int kFaultsInARowMax = 8;
-constexpr int kStaleToTell = 3;  // so many stale frames are no longer those in flight
+constexpr int kStaleToTell = 3;  // more stale frames than can be in flight
 constexpr std::uint32_t kHalfOfAllSequences = 1u << 31;
-constexpr std::size_t kQueuedWhileIdle = 3;  // some drivers need as many to run at all
-constexpr auto kFirstFrameLeast = 3s;        // many a camera of USB takes a second
-constexpr auto kFirstFrameMost = 10s;        // for a slower one nobody waits
+constexpr std::size_t kQueuedWhileIdle = 3;  // some drivers need this many to run at all
+constexpr auto kFirstFrameLeast = 3s;        // many USB cameras take a second
+constexpr auto kFirstFrameMost = 10s;        // slower cameras are refused
 
-/// A camera's name under /dev/v4l/by-id, with maker, model and serial number. Many a camera of USB Video Class has no
-/// serial number: then another of that model passes for it.
+/// A camera's name under /dev/v4l/by-id, with maker, model and serial number. Many USB Video Class cameras have no
+/// serial number; then another of the same model looks identical.
 std::string hardware_of(const std::string& device) {
   const auto link = find_stable_link(device, "/dev");
   return link ? printable(link->filename().string()) : std::string();
@@ -88,7 +88,7 @@ Result<> V4l2Camera::configure(V4l2Device device) {
   return wait_for_first_frame();
 }
 
-// A stream that starts and brings nothing would else be opened, found dead and opened again without end, and be called
+// Otherwise a stream that starts without frames would be opened, found dead and reopened without end, and be called
 // ready in between.
 Result<> V4l2Camera::wait_for_first_frame() {
   const auto longest =
@@ -108,7 +108,7 @@ Result<Frame> V4l2Camera::capture(MonotonicTime deadline) {
   return run({steady_clock::now(), deadline, clock_.frames_in_flight()});
 }
 
-// After a pause the buffers are full of what was to be seen when it began.
+// After a pause, the buffers contain the scene from its beginning.
 Result<Frame> V4l2Camera::capture_next(MonotonicTime deadline) {
   if (!last_start_ || steady_clock::now() - *last_start_ > clock_.next_frame_age_max()) return capture(deadline);
   Capture next{*last_start_ + std::chrono::nanoseconds(1), deadline};
@@ -124,8 +124,8 @@ Result<Frame> V4l2Camera::run(const Capture& capture) {
   return frame;
 }
 
-// The file answers for as long as it is open; a call into the driver does not. Filled buffers say nothing of now, and
-// what follows the last frame may still be asked for: only after a pause they are emptied, to see whether more come.
+// An open file always answers; a call into the driver does not. Filled buffers prove nothing about now, and the frame
+// after the last may still be requested. So only after a pause are they emptied, to see whether more come.
 Result<> V4l2Camera::check() {
   if (!stream_) return fail_here(ErrorCode::kDisconnected, "the camera is not open; open it");
   v4l2_capability capability{};
@@ -151,11 +151,11 @@ Result<Frame> V4l2Camera::capture_after(Capture capture) {
     auto frame = take(capture);
     if (!frame) return tl::unexpected(frame.error());
     if (*frame) return std::move(**frame);
-    if (steady_clock::now() > capture.deadline) return fail_late(capture);  // stale frames may come without a pause
+    if (steady_clock::now() > capture.deadline) return fail_late(capture);  // stale frames may come without end
   }
 }
 
-// What is filled already was exposed before anyone asked.
+// Buffers that are already filled were exposed before the request.
 Result<> V4l2Camera::drop_waiting() {
   const std::size_t had = stream_->queued();
   std::size_t taken = 0;
@@ -168,7 +168,7 @@ Result<> V4l2Camera::drop_waiting() {
     ++counts_.before_trigger;
     settling_ = std::max(settling_ - 1, 0);
   }
-  // With every buffer filled the driver had to drop frames, which nobody missed.
+  // When every buffer was full, the driver had to drop frames; nobody needed them.
   if (taken == had) last_sequence_.reset();
   return {};
 }
@@ -248,7 +248,7 @@ Result<std::optional<Frame>> V4l2Camera::judge(const v4l2_buffer& buffer, Captur
     return std::nullopt;
   }
   if (lost > 0 && capture.next) next_sequence_ += lost;
-  if (lost > 0 && !capture.next)  // one of them may have been the one that was asked for
+  if (lost > 0 && !capture.next)  // one of them may be the requested frame
     return lose(ErrorCode::kFrameDropped, lost, std::to_string(lost) + " frames were lost on their way; scan again");
   if (!is_whole(buffer)) {
     ++counts_.torn;
@@ -282,7 +282,7 @@ std::uint32_t V4l2Camera::note_order(const v4l2_buffer& buffer) {
   const auto last = std::exchange(last_sequence_, buffer.sequence);
   if (!last) return 0;
   const std::uint32_t missing = buffer.sequence - *last - 1;
-  return missing < kHalfOfAllSequences ? missing : 0;  // else the device counts anew, or not at all
+  return missing < kHalfOfAllSequences ? missing : 0;  // else the device restarted its count, or has none
 }
 
 bool V4l2Camera::is_whole(const v4l2_buffer& buffer) const {

@@ -21,34 +21,34 @@ namespace slsd {
 /// The counts of a device's frames since the camera was made.
 struct V4l2FrameCounts {
   std::uint64_t delivered = 0;
-  std::uint64_t before_trigger = 0;  ///< exposed before anyone asked, or while the camera settled
+  std::uint64_t before_trigger = 0;  ///< exposed before the request, or while the camera settled
   std::uint64_t dropped = 0;         ///< missing in the driver's sequence while buffers were free, or lost by a fault
   std::uint64_t torn = 0;            ///< flagged by the driver, too short, or not decodable
 };
 
-/// A camera of V4L2: runs freely from open() on, and each capture() waits for the first frame whose exposure began
-/// after the call. Grey frames are the driver's own buffers; others are converted into buffers of a pool. Frame
-/// numbers count the frames delivered and the frames lost, not those that nobody waited for.
+/// A V4L2 camera in free run since open(). Each capture() waits for the first frame whose exposure began after the
+/// call. Grey frames are the driver's own buffers; others are converted into pool buffers. Frame numbers count
+/// delivered and lost frames, but not frames that no capture waited for.
 ///
-/// A device that was unplugged is opened again by the same name, which therefore should be one of /dev/v4l/by-id.
-/// capture() gives kFrameStale where frames came and all their stamps lie before the trigger.
+/// Reopens an unplugged device by the same name, which should therefore be one of /dev/v4l/by-id. capture() gives
+/// kFrameStale if frames came but all their stamps lie before the trigger.
 ///
-/// A stream may die without a word: uvcvideo does not queue those transfers again that failed. One that brings nothing
-/// for missed_frames_max frames is closed, by capture() or check(), with kDisconnected; open() proves that frames come.
-/// @thread thread-bound, but for cancel()
+/// A stream may die silently: uvcvideo does not queue failed transfers again. If no frame comes for missed_frames_max
+/// periods, capture() or check() closes the stream with kDisconnected. open() verifies that frames arrive.
+/// @thread thread-bound, except cancel()
 class V4l2Camera final : public Camera {
  public:
   explicit V4l2Camera(V4l2CameraOptions options);
 
   [[nodiscard]] const CameraDescription& description() const override { return description_; }
   void set_found(std::function<void()> found) override { found_ = std::move(found); }
-  /// @errors kInvalidArgument (an option, or beyond the device's range), kNotFound, kPermissionDenied, kUnsupported,
-  ///         kMismatch (it did not take a setting), kBusy (another program has it), kNoSpace, kDisconnected, kIo,
-  ///         kTimeout (it sends no frame), kCancelled
+  /// @errors kInvalidArgument (an option, or outside the device's range), kNotFound, kPermissionDenied, kUnsupported,
+  ///         kMismatch (the device did not take a setting), kBusy (another program uses it), kNoSpace, kDisconnected,
+  ///         kIo, kTimeout (no frame arrives), kCancelled
   [[nodiscard]] Result<> open() override;
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
-  /// Frames that the driver dropped in between count as lost, and show as a gap in the numbers. Where the frame before
-  /// is older than a few periods, as capture().
+  /// Frames that the driver dropped in between count as lost, and show as a gap in the numbers. If the previous frame
+  /// is older than a few periods, works as capture().
   [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override;
   [[nodiscard]] Result<> check() override;
   void tell_figures(std::vector<DriverFigure>& figures) const override;
@@ -60,9 +60,9 @@ class V4l2Camera final : public Camera {
   struct Capture {
     MonotonicTime trigger;
     MonotonicTime deadline;
-    int in_flight = 0;  ///< unstamped frames still to pass
+    int in_flight = 0;  ///< unstamped frames that must pass first
     int stale = 0;
-    bool next = false;  ///< any frame after the one before will do
+    bool next = false;  ///< accept any frame after the previous one
   };
   [[nodiscard]] Result<Frame> run(const Capture& capture);
   void close();
@@ -102,7 +102,7 @@ class V4l2Camera final : public Camera {
   int faults_in_a_row_ = 0;
   std::uint64_t next_sequence_ = 0;
   std::optional<MonotonicTime> last_start_;     ///< start of the previous frame's exposure
-  std::optional<std::uint32_t> last_sequence_;  ///< the driver's; empty while a gap would mean nothing
+  std::optional<std::uint32_t> last_sequence_;  ///< the driver's number; empty while a gap has no meaning
 };
 
 }  // namespace slsd

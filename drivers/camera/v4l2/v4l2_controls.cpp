@@ -26,7 +26,7 @@ struct Setting {
   __u32 id;
 };
 
-/// Off for all of these is 0.
+/// 0 turns off each of these.
 constexpr std::array kAutomatic{__u32{V4L2_CID_EXPOSURE_AUTO_PRIORITY}, __u32{V4L2_CID_AUTOGAIN},
                                 __u32{V4L2_CID_AUTO_WHITE_BALANCE},     __u32{V4L2_CID_FOCUS_AUTO},
                                 __u32{V4L2_CID_AUTOBRIGHTNESS},         __u32{V4L2_CID_HUE_AUTO},
@@ -65,7 +65,7 @@ Result<> write_control(const V4l2Device& device, const v4l2_queryctrl& descripti
               device.path());
 }
 
-// 1 is manual; where a device lacks it, 2 (shutter priority) holds the exposure time too.
+// 1 is manual; without it, 2 (shutter priority) also fixes the exposure time.
 Result<> turn_automatic_exposure_off(const V4l2Device& device) {
   const auto control = query(device, V4L2_CID_EXPOSURE_AUTO);
   if (!control) return {};
@@ -147,7 +147,7 @@ tl::unexpected<Error> fail_unit(const V4l2Device& device) {
               device.path());
 }
 
-// Of the controls for gain only this one has a unit that V4L2 prescribes: ISO sensitivity times 1000.
+// Among the gain controls, V4L2 defines a unit only for this one: ISO sensitivity times 1000.
 Result<> set_gain_db(const V4l2Device& device, double gain_db) {
   const auto control = query(device, V4L2_CID_ISO_SENSITIVITY);
   const auto choices = control ? sensitivities(device, *control) : std::vector<Sensitivity>();

@@ -11,20 +11,20 @@
 
 namespace slsd {
 
-/// The device's exposure times, read back after everything was set.
+/// The device's exposure times, read back after all settings.
 struct ExposureTiming {
-  std::optional<std::chrono::nanoseconds> exposure;  ///< nothing where it has no such control, or sets it by itself
-  std::optional<std::chrono::nanoseconds> period;    ///< time from frame to frame; empty if it does not tell
+  std::optional<std::chrono::nanoseconds> exposure;  ///< empty if the device has no such control, or sets it itself
+  std::optional<std::chrono::nanoseconds> period;    ///< time from frame to frame; empty if unknown
 };
 
-/// Turns everything automatic off, then sets what the options name, and compares what the device took: V4L2's
-/// EXPOSURE_ABSOLUTE (units of 100 us), GAIN or ANALOGUE_GAIN, FOCUS_ABSOLUTE, POWER_LINE_FREQUENCY.
-/// @errors kUnsupported (it has no such control), kInvalidArgument (out of its range), kMismatch (it did not take the
+/// Turns automatic functions off, sets the options, and verifies the device's values. Uses EXPOSURE_ABSOLUTE (units of
+/// 100 us), GAIN or ANALOGUE_GAIN, FOCUS_ABSOLUTE, POWER_LINE_FREQUENCY.
+/// @errors kUnsupported (no such control), kInvalidArgument (out of range), kMismatch (the device did not take the
 ///         value), kDisconnected, kIo; each names the control
 [[nodiscard]] Result<> set_controls(const V4l2Device& device, const V4l2CameraOptions& options);
 
-/// Sets the frame rate, where the options name one, and compares.
-/// @errors kUnsupported (it cannot), kMismatch (it has another), kDisconnected, kIo
+/// Sets the frame rate if the options name one, and verifies it.
+/// @errors kUnsupported (the device has no such setting), kMismatch (it chose another), kDisconnected, kIo
 [[nodiscard]] Result<> set_frame_rate(const V4l2Device& device, const V4l2CameraOptions& options);
 
 [[nodiscard]] ExposureTiming read_timing(const V4l2Device& device);

@@ -11,14 +11,14 @@
 
 namespace slsd {
 
-/// The text in a driver's field, which may come from the device itself. It is printable, whatever bytes the device
-/// sent, and whether or not it ended them.
+/// The text in a driver's field, which may come from the device. Always printable, whatever bytes the device sent, even
+/// without a terminator.
 [[nodiscard]] std::string device_text(std::span<const unsigned char> field);
 
-/// The link of v4l/by-id that leads to a device node, which is the same wherever the camera is plugged in.
-/// @param node     by any of its names
+/// The link in v4l/by-id to a device node. It stays the same wherever the camera is plugged in.
+/// @param node     any of its names
 /// @param devices  "/dev"
-/// @return nothing where there is none
+/// @return nothing if there is no link
 /// @thread reentrant
 [[nodiscard]] std::optional<std::filesystem::path> find_stable_link(const std::filesystem::path& node,
                                                                     const std::filesystem::path& devices);
@@ -41,11 +41,11 @@ class V4l2Device {
   /// The camera's own name for itself.
   [[nodiscard]] const std::string& card() const { return card_; }
 
-  /// 0, or errno. Interrupted calls are made again.
+  /// Makes the call again if interrupted. Returns 0, or errno.
   [[nodiscard]] int call(unsigned long request, void* argument) const;
 
-  /// The error of a call that failed.
-  /// @param doing  what was tried, as in "cannot start"
+  /// The error of a failed call.
+  /// @param doing  the failed action, such as "cannot start"
   [[nodiscard]] tl::unexpected<Error> fail_call(int error_number, const std::string& doing) const;
 
  private:

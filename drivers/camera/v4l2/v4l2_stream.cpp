@@ -80,7 +80,7 @@ V4l2Stream::~V4l2Stream() {
   if (device_.descriptor() < 0) return;
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   [[maybe_unused]] const int stopped = device_.call(VIDIOC_STREAMOFF, &type);
-  // The descriptor's owner of the buffers must be none before another open(): lent ones keep the file itself open.
+  // The buffers must have no owner before another open(): lent buffers keep the file itself open.
   v4l2_requestbuffers none{};
   none.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   none.memory = V4L2_MEMORY_MMAP;

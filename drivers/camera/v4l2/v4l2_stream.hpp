@@ -17,11 +17,11 @@
 
 namespace slsd {
 
-/// The driver's buffers, mapped, and lent to frames. They stay mapped until the last frame is given back, also after
-/// the device was closed.
+/// The driver's mapped buffers, lent to frames. They stay mapped until the last frame is given back, even after the
+/// device was closed.
 class MappedBuffers final : public LentBuffers {
  public:
-  /// @param count  how many to ask the driver for, which may give more or fewer
+  /// @param count  number to request; the driver may give more or fewer
   /// @errors kUnsupported (no memory mapping, or fewer than 3), kBusy, kDisconnected, kIo
   [[nodiscard]] static Result<std::shared_ptr<MappedBuffers>> request(const V4l2Device& device, int count);
   explicit MappedBuffers(std::size_t count) : LentBuffers(count) {}
@@ -35,7 +35,7 @@ class MappedBuffers final : public LentBuffers {
   std::array<std::span<std::byte>, VIDEO_MAX_FRAME> mapped_{};
 };
 
-/// The buffers' way round between driver, camera and frames, while the device is streaming.
+/// Circulates the buffers between driver, camera and frames while the device streams.
 /// @thread thread-bound
 class V4l2Stream {
  public:
@@ -43,27 +43,27 @@ class V4l2Stream {
   [[nodiscard]] static Result<V4l2Stream> start(V4l2Device device, int buffers);
   V4l2Stream(V4l2Stream&&) = default;
   V4l2Stream& operator=(V4l2Stream&&) = delete;
-  /// Stops streaming and gives the buffers back to the driver; those that are lent live on by themselves.
+  /// Stops streaming and returns the buffers to the driver; lent buffers live on.
   ~V4l2Stream();
 
   [[nodiscard]] const V4l2Device& device() const { return device_; }
   [[nodiscard]] const MappedBuffers& buffers() const { return *buffers_; }
 
-  /// A buffer that the driver has done with, or nothing if there is none.
-  /// @errors kIo (passing: this frame is lost), kDisconnected
+  /// Takes a buffer that the driver has completed; nothing if there is none.
+  /// @errors kIo (temporary: this frame is lost), kDisconnected
   [[nodiscard]] Result<std::optional<v4l2_buffer>> take();
-  /// Gives it to the driver again. @errors kDisconnected
+  /// Returns the buffer to the driver. @errors kDisconnected
   [[nodiscard]] Result<> put_back(std::size_t buffer);
-  /// Gives the driver those that frames gave back, until it has so many. @errors kDisconnected
+  /// Queues buffers that frames returned, until the driver has this many. @errors kDisconnected
   [[nodiscard]] Result<> put_back_returned(std::size_t queued_max = VIDEO_MAX_FRAME);
 
-  /// Lends a buffer that the driver does not have.
+  /// Lends a buffer that is not queued at the driver.
   [[nodiscard]] FrameLease lend(std::size_t buffer) { return buffers_->lend(buffer); }
 
-  /// The time since when the driver has had buffers to fill and has filled none; never, if it has none.
+  /// The time since when the driver has had free buffers but completed none; the end of time if it has none.
   [[nodiscard]] MonotonicTime quiet_since() const { return queued_ > 0 ? quiet_since_ : MonotonicTime::max(); }
 
-  /// The number of buffers that the driver has.
+  /// The number of buffers queued at the driver.
   [[nodiscard]] std::size_t queued() const { return queued_; }
 
  private:
