@@ -70,8 +70,7 @@ Result<> AravisSession::check() {
 
 Result<> AravisSession::prepare() {
   const DeviceFeatures features(device_.camera.get());
-  (void)features.execute(
-      "AcquisitionStop");  // a former user may have left one running; most cameras refuse if none runs
+  (void)features.execute("AcquisitionStop");  // a former user's; most cameras refuse if none runs
   auto layout = configure_image(features, options_);
   if (!layout) return tl::unexpected(layout.error());
   layout_ = *layout;

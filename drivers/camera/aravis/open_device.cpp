@@ -132,8 +132,7 @@ std::optional<GigeDevice> found_before(const AravisCameraOptions& options, const
 std::vector<Usb3Device> list_usb3_devices() {
   static std::mutex mutex;  // Aravis keeps one list; a second call removes its entries
   const std::lock_guard lock(mutex);
-  arv_disable_interface(
-      "GigEVision");  // it asks each network for a second; discover_gige_devices() has already done so
+  arv_disable_interface("GigEVision");  // slow: discover_gige_devices() has already looked
   arv_update_device_list();
   std::vector<Usb3Device> devices;
   for (unsigned i = 0; i < arv_get_n_devices(); ++i) {
