@@ -20,13 +20,13 @@ constexpr std::uint32_t kFileHeaderBytes = 14;
 using Palette = std::array<std::array<std::uint8_t, 3>, 256>;
 
 struct Header {
-  ImageLayout layout;  ///< the stored one: one channel is an index
+  ImageLayout layout;  ///< the stored layout: one channel is an index
   bool top_down = false;
   std::uint32_t pixels_at = 0;
   std::uint32_t palette_at = 0;
   std::uint32_t palette_colours = 0;
 
-  /// Rows are filled up to four bytes.
+  /// The bytes of a row, padded to a multiple of four.
   [[nodiscard]] std::uint64_t row_bytes() const { return (layout.row_samples() + 3) / 4 * 4; }
 };
 
@@ -69,7 +69,7 @@ bool has_colour(const Palette& palette) {
   return false;
 }
 
-/// Red, green and blue of a row that stores indices, or blue, green, red (and what is not used).
+/// Converts a row of indices into red, green and blue; or reads blue, green, red (and an unused byte).
 void read_row(const char* row, int channels, const Palette& palette, std::vector<std::uint8_t>& samples) {
   for (std::size_t x = 0; 3 * x < samples.size(); ++x, row += channels)
     for (std::size_t c = 0; c < 3; ++c)

@@ -10,7 +10,7 @@
 
 namespace slsd {
 
-/// Reads unsigned numbers at any place of a file's bytes; nothing where they do not lie within.
+/// Reads unsigned numbers at any offset of a file's bytes; nothing if they lie outside.
 /// @thread reentrant
 class ByteReader {
  public:

@@ -14,7 +14,7 @@
 namespace slsd {
 namespace {
 
-// Frames are noisy: the higher levels take many times longer for a few percent.
+// Frames are noisy: higher levels take many times longer to save a few percent.
 constexpr int kCompressionLevel = 1;
 
 struct Rows {
@@ -27,7 +27,7 @@ struct Rows {
   double dpi = 0;  ///< 0: unknown
 };
 
-/// libpng reports errors by longjmp(): the function that calls setjmp() holds no objects that would need a destructor.
+/// libpng reports errors with longjmp(): the function that calls setjmp() must hold no objects with destructors.
 class PngWriter {
  public:
   PngWriter()

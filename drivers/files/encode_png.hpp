@@ -9,11 +9,11 @@
 
 namespace slsd {
 
-/// The bytes of a PNG file: 8 or 16 bits of grey, or 8 bits each of red, green and blue. Lossless.
+/// Encodes a PNG file: 8 or 16 bits of grey, or 8 bits each of red, green and blue. Lossless.
 /// @errors kInvalidArgument (an empty image), kIo (the encoder failed)
 /// @thread reentrant
 [[nodiscard]] Result<std::string> encode_png(const Grey8& image);
-/// @param dpi  pixels to an inch, as the file says
+/// @param dpi  pixels per inch, stored in the file
 [[nodiscard]] Result<std::string> encode_png(const Grey8& image, double dpi);
 [[nodiscard]] Result<std::string> encode_png(const Grey16& image);
 [[nodiscard]] Result<std::string> encode_png(const ColourImage& image);

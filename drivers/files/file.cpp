@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kProbeBytes = 64 << 10;  // more than file systems keep inside their own records
+constexpr std::size_t kProbeBytes = 64 << 10;  // more than file systems store inside their own records
 
 tl::unexpected<Error> fail_call(std::string_view doing, const fs::path& path) {
   return fail_system(errno, doing, path);
@@ -76,7 +76,7 @@ mode_t mode_of(const fs::path& path) {
   return ::stat(path.c_str(), &status) == 0 ? status.st_mode : S_IFREG;
 }
 
-/// A name for a temporary file. It does not grow with the file's, which may be as long as names can be.
+/// A name for a temporary file. Its length does not depend on the file's name, which may have the maximum length.
 fs::path temporary_beside(const fs::path& path) {
   static std::atomic<unsigned> count{0};
   return path.parent_path() / (".slsd-" + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".part");
@@ -93,7 +93,7 @@ Result<> write_temporary(const fs::path& temporary, const fs::path& path, mode_t
   return {};
 }
 
-/// Makes the new name last through a power cut; not every file system can, so that its failure is none.
+/// Makes the new name survive a power cut. Not every file system can, so a failure is not an error.
 void synchronise_folder_of(const fs::path& path) {
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   const FileDescriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
@@ -112,7 +112,7 @@ Result<> replace_file(const fs::path& path, mode_t mode, std::string_view bytes)
   return {};
 }
 
-/// The end of the links, be it there or not; in a ring of links one of them.
+/// The target of the links, whether it exists or not; for a cycle, one of the links.
 fs::path follow_links(fs::path path) {
   constexpr int kLinksMax = 40;
   for (int i = 0; i < kLinksMax; ++i) {
@@ -127,7 +127,7 @@ fs::path follow_links(fs::path path) {
 Result<> check_place(const fs::path& path, mode_t mode) {
   if (path.empty()) return fail(ErrorCode::kInvalidArgument, "the path of the file to write is empty");
   if (S_ISDIR(mode)) return fail(ErrorCode::kInvalidArgument, "is a folder; name a file in it", path.string());
-  // Renaming would get round a file's own write protection.
+  // Renaming would bypass the file's own write protection.
   const bool is_there = ::access(path.c_str(), F_OK) == 0;
   if (is_there && ::access(path.c_str(), W_OK) != 0) return fail_call("cannot write", path);
   return {};
@@ -149,7 +149,7 @@ std::string lower_extension(const fs::path& file) {
 }
 
 Result<std::string> read_file(const fs::path& path, std::size_t limit_bytes) {
-  // Without O_NONBLOCK a pipe that nobody writes would hold us here.
+  // Without O_NONBLOCK, opening a pipe without a writer would block.
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (!file) return fail_call("cannot read", path);
   if (auto readable = check_readable(file, path, limit_bytes); !readable) return tl::unexpected(readable.error());

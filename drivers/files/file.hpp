@@ -21,16 +21,16 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] Result<std::string> read_file(const std::filesystem::path& path, std::size_t limit_bytes);
 
-/// Writes a file so that a reader sees the old one or the new one, whole, whatever happens in between: a temporary file
-/// beside it, synchronised, then renamed. Where the write fails nothing new is left behind. A symbolic link is
-/// followed.
-/// @errors kNotFound (its folder), kPermissionDenied, kNoSpace, kInvalidArgument (a folder, not a regular file), kIo
+/// Writes a file so that a reader always sees the whole old one or the whole new one. Writes a temporary file beside
+/// it, synchronises it, then renames it. On failure, no new file remains. Follows a symbolic link.
+/// @errors kNotFound (no such folder), kPermissionDenied, kNoSpace, kInvalidArgument (a folder, not a regular file),
+///         kIo
 /// @thread reentrant
 [[nodiscard]] Result<> write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
 
-/// Checks that write_file_atomically() would find a place there now, for those who work long before they write. It
-/// writes a temporary file of 64 KiB. What is there stays as it is.
-/// @errors as write_file_atomically(); a disk may still be too full for what is longer
+/// Checks that write_file_atomically() would succeed now, for callers that work long before they write. Writes a
+/// temporary file of 64 KiB. Leaves an existing file unchanged.
+/// @errors as write_file_atomically(); a longer file may still not fit on the disk
 [[nodiscard]] Result<> check_writable(const std::filesystem::path& path);
 
 }  // namespace slsd

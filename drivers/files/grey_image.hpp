@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// An owned grey image of 8 or 16 bits a pixel.
+/// An owned grey image of 8 or 16 bits per pixel.
 using GreyImage = std::variant<Grey8, Grey16>;
 
 [[nodiscard]] inline GreyView view(const GreyImage& image) {

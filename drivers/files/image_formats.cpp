@@ -7,7 +7,7 @@
 namespace slsd {
 namespace {
 
-// In 1 / 2^15.
+// In units of 1 / 2^15.
 constexpr std::uint32_t kRed = 9798;
 constexpr std::uint32_t kGreen = 19235;
 constexpr std::uint32_t kBlue = 3735;
@@ -34,7 +34,7 @@ Result<> check_layout(std::string_view format, const ImageLayout& layout, std::s
     return fail(ErrorCode::kInvalidArgument,
                 "the " + std::string(format) + " image declares " + std::to_string(layout.width_px) + "x" +
                     std::to_string(layout.height_px) + " pixels, more than are read; save it smaller");
-  // Also keeps a small file from taking much memory.
+  // Also prevents a small file from using much memory.
   if (layout.bytes() > compression_max * static_cast<double>(file_bytes)) return fail_truncated(format);
   return {};
 }

@@ -11,14 +11,14 @@
 
 namespace slsd {
 
-/// The image in a file's bytes. The errors below have no place; the caller knows it.
+/// The image in a file's bytes. The errors below have no place, because the caller knows it.
 struct DecodedImage {
   GreyImage grey;
-  bool colour = false;  ///< the file had colours, so that it is no mosaic
+  bool colour = false;  ///< the file had colours, so it is not a mosaic
 };
 
-/// One function to a format; the bytes begin as that format does. A file that ends early, or is damaged where that can
-/// be told, is an error. The memory that its header asks for is checked before it is taken.
+/// One function for each format; the bytes begin with that format's signature. A file that ends early, or is visibly
+/// damaged, is an error. The memory that its header requires is checked before allocation.
 /// @param limit_bytes  of decoded samples
 /// @errors kMalformed, kUnsupported, kInvalidArgument (larger than the limit)
 /// @thread reentrant
@@ -37,23 +37,24 @@ struct ImageLayout {
 
   [[nodiscard]] std::size_t row_samples() const { return width_px * static_cast<std::size_t>(channels); }
   [[nodiscard]] bool colour() const { return channels > 2; }
-  /// The bytes of all samples, as a double, which does not overflow.
+  /// The size of all samples in bytes; a double, which cannot overflow.
   [[nodiscard]] double bytes() const {
     return static_cast<double>(width_px) * static_cast<double>(height_px) * channels * bytes_per_channel;
   }
 };
 
-/// @param file_bytes       how long the whole file is
-/// @param compression_max  how many bytes of samples a byte of the file can hold at most
-/// @errors kMalformed where the file is too short for what it declares, kInvalidArgument beyond the limit
+/// @param file_bytes       size of the whole file
+/// @param compression_max  greatest number of sample bytes in one byte of the file
+/// @errors kMalformed if the file is too short for its header, kInvalidArgument beyond the limit
 [[nodiscard]] Result<> check_layout(std::string_view format, const ImageLayout& layout, std::size_t file_bytes,
                                     double compression_max, std::size_t limit_bytes);
 
-/// A row of samples in the order of ImageLayout to a row of grey, by the weights of ITU-R BT.601 in OpenCV's rounding.
+/// Converts a row of samples in the order of ImageLayout into grey, with the weights of ITU-R BT.601 and OpenCV's
+/// rounding.
 void grey_row(const std::uint8_t* samples, int channels, std::uint8_t* grey, int width_px);
 void grey_row(const std::uint16_t* samples, int channels, std::uint16_t* grey, int width_px);
 
-/// The same words for every format.
+/// One message for all formats.
 [[nodiscard]] tl::unexpected<Error> fail_truncated(std::string_view format);
 [[nodiscard]] tl::unexpected<Error> fail_variant(std::string_view format, std::string_view what);
 

@@ -17,8 +17,8 @@ tl::unexpected<Error> fail_damaged(const char* how) {
   return fail(ErrorCode::kMalformed, std::string("the JPEG image is damaged: ") + how);
 }
 
-/// The one list of libjpeg's warnings that refuse a picture, each with what it means. libjpeg's other warnings are of
-/// headers, and of extraneous bytes, which count_blocks() judges.
+/// Lists libjpeg's warnings that refuse a picture, each with its meaning. The other warnings concern headers, and
+/// extraneous bytes, which count_blocks() judges.
 const char* meaning_of(int warning) {
   switch (warning) {
     case JWRN_HIT_MARKER:
@@ -35,7 +35,7 @@ const char* meaning_of(int warning) {
   }
 }
 
-// A band of a progressive image whose last bits never came was decoded without a warning.
+// libjpeg decodes a band of a progressive image without a warning if its last bits are missing.
 bool lacks_a_scan(const jpeg_decompress_struct& info) {
   if (info.coef_bits == nullptr) return false;
   for (int i = 0; i < info.num_components; ++i)
@@ -69,7 +69,7 @@ JpegDecoder::~JpegDecoder() {
 
 Result<> JpegDecoder::read_header() {
   if (!parse_header()) return fail_as_told();
-  // libjpeg goes on with zeros where such data ends early, and says nothing.
+  // If such data ends early, libjpeg continues with zeros, without a warning.
   if (info_.arith_code != FALSE) return fail_variant("JPEG", "arithmetic coding");
   if (info_.num_components == 4) return fail_variant("JPEG", "CMYK colours");
   if (info_.num_components != 1 && info_.num_components != 3)
@@ -80,9 +80,9 @@ Result<> JpegDecoder::read_header() {
 Result<> JpegDecoder::read_grey(Grey8& grey) {
   if (!start()) return fail_as_told();
   const bool counted = ::jpeg_has_multiple_scans(&info_) == FALSE;
-  const bool lacking = lacks_a_scan(info_);  // start() has read all scans, if there are several
+  const bool lacking = lacks_a_scan(info_);  // start() has read all scans if there are several
   const ScanBlocks blocks = counted ? count_blocks(info_, scan_) : ScanBlocks::kAgree;
-  if (!read_rows(grey)) return fail_damaged(meaning_of(JWRN_HUFF_BAD_CODE));  // a header within the data, say
+  if (!read_rows(grey)) return fail_damaged(meaning_of(JWRN_HUFF_BAD_CODE));  // for example, a header within the data
   if (blocks == ScanBlocks::kLeftOver || (failure_.extraneous && !counted))
     return fail_damaged("it has more data than blocks, so that a part before is missing");
   if (failure_.warning != 0) return fail_damaged(meaning_of(failure_.warning));
@@ -90,14 +90,14 @@ Result<> JpegDecoder::read_grey(Grey8& grey) {
   return {};
 }
 
-// Nothing with a destructor lives in the functions below, which libjpeg may jump out of.
+// The functions below hold no object with a destructor, because libjpeg may jump out of them.
 bool JpegDecoder::parse_header() {
   if (setjmp(failure_.back) != 0) return false;
   ::jpeg_create_decompress(&info_);
   ::jpeg_mem_src(&info_, reinterpret_cast<const unsigned char*>(bytes_.data()), bytes_.size());
   ::jpeg_read_header(&info_, TRUE);
   scan_ = bytes_.substr(bytes_.size() - std::min(info_.src->bytes_in_buffer, bytes_.size()));
-  failure_.extraneous = false;  // before a header, where it harms nothing
+  failure_.extraneous = false;  // before a header they do no harm
   return true;
 }
 

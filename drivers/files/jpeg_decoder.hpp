@@ -13,37 +13,37 @@
 
 namespace slsd {
 
-/// Decodes one JPEG image into grey, from a file or a camera, by libjpeg. A picture that lacks any of its data, or has
-/// blocks out of their place, is an error. These are none: bytes after the end marker, bytes before a marker that are
-/// no blocks, Huffman tables left out as in MJPG (the standard's are taken), oddities of headers.
+/// Decodes one JPEG image from a file or a camera into grey, with libjpeg. A picture with missing data or displaced
+/// blocks is an error. These are accepted: bytes after the end marker, bytes before a marker that form no blocks,
+/// unusual headers, and missing Huffman tables as in MJPG (the standard's tables apply).
 ///
-/// The errors end without a remedy, which the caller knows.
+/// The errors contain no remedy, because the caller knows it.
 /// @thread thread-bound
 class JpegDecoder {
  public:
-  /// @param bytes  outlive this
+  /// @param bytes  must outlive the decoder
   explicit JpegDecoder(std::string_view bytes);
   JpegDecoder(const JpegDecoder&) = delete;
   JpegDecoder& operator=(const JpegDecoder&) = delete;
   ~JpegDecoder();
 
-  /// @errors kMalformed, kUnsupported (a rare kind, with its remedy)
+  /// @errors kMalformed, kUnsupported (a rare variant, with its remedy)
   [[nodiscard]] Result<> read_header();
   /// The image's width, after its header was read.
   [[nodiscard]] int width_px() const { return static_cast<int>(info_.image_width); }
   [[nodiscard]] int height_px() const { return static_cast<int>(info_.image_height); }
   [[nodiscard]] bool colour() const { return info_.num_components > 1; }
-  /// Luma, after the header was read.
-  /// @param grey  of the image's size
+  /// Reads luma, after the header.
+  /// @param grey  in the image's size
   /// @errors kMalformed, kUnsupported
   [[nodiscard]] Result<> read_grey(Grey8& grey);
 
  private:
-  /// libjpeg's own errors leave by a long jump.
+  /// The target of libjpeg's long jumps for its own errors.
   struct Failure {
     jpeg_error_mgr manager;
     std::jmp_buf back;
-    int warning;  ///< the first that refuses the picture; 0: none
+    int warning;  ///< the first warning that refuses the picture; 0: none
     bool extraneous;
   };
 
@@ -55,7 +55,7 @@ class JpegDecoder {
   [[nodiscard]] Result<> fail_as_told() const;
 
   std::string_view bytes_;
-  std::string_view scan_;  ///< the bytes after the header of the first scan
+  std::string_view scan_;  ///< the bytes after the first scan's header
   Failure failure_{};
   jpeg_decompress_struct info_{};
 };

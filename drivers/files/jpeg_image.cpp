@@ -16,7 +16,7 @@ tl::unexpected<Error> with_remedy(Error error) {
 }  // namespace
 
 Result<DecodedImage> decode_jpeg(std::string_view bytes, std::size_t limit_bytes) {
-  constexpr double kRatioMax = 1200;  // a block of 64 samples takes a bit at the least
+  constexpr double kRatioMax = 1200;  // a block of 64 samples needs at least one bit
   JpegDecoder decoder(bytes);
   if (auto header = decoder.read_header(); !header) return with_remedy(std::move(header.error()));
   const ImageLayout layout{static_cast<std::uint64_t>(decoder.width_px()),

@@ -16,7 +16,7 @@ namespace {
 constexpr unsigned char kMark = 0xff;
 constexpr int kInvalid = -1;
 
-/// The bits of a segment up to the marker that ends it.
+/// The bits of a segment up to the marker at its end.
 class Bits {
  public:
   explicit Bits(std::string_view data)
@@ -28,21 +28,21 @@ class Bits {
     return static_cast<std::uint32_t>(bits_ >> 48);
   }
 
-  /// @return whether there were so many, which are at most 16
+  /// @return whether that many bits were left, at most 16
   bool skip(int count) {
     bits_ <<= count;
     count_ -= count;
     return count_ >= 0;
   }
 
-  /// A number of that many bits, which are at most 15, as T.81 writes differences. @pre skip() would succeed
+  /// Reads a difference of that many bits, at most 15, in T.81's form. @pre skip() would succeed
   int difference(int count) {
     if (count == 0) return 0;
     const int value = static_cast<int>(peek16() >> (16 - count));
     return value >> (count - 1) != 0 ? value : value - (1 << count) + 1;
   }
 
-  /// Begins the next segment. @return the marker before it; nothing where the data ends
+  /// Begins the next segment. @return the marker before it; nothing if the data ends
   std::optional<unsigned char> next_segment() {
     bits_ = 0, count_ = 0;
     for (; end_ - at_ >= 2; ++at_) {
@@ -67,11 +67,11 @@ class Bits {
 
   const unsigned char* at_;
   const unsigned char* end_;
-  std::uint64_t bits_ = 0;  ///< the next is the highest
+  std::uint64_t bits_ = 0;  ///< the next bit is the highest
   int count_ = 0;
 };
 
-/// A table of codes, the shortest looked up by eight bits.
+/// A table of codes; eight bits look up the short ones.
 class Codes {
  public:
   explicit Codes(const JHUFF_TBL& table) {
@@ -107,17 +107,17 @@ class Codes {
   };
   std::array<std::uint8_t, 256> values_;
   std::array<Short, 256> short_{};
-  std::array<std::uint32_t, 17> end_{};  ///< the first code beyond those of each length, as 16 bits
+  std::array<std::uint32_t, 17> end_{};  ///< the first code after those of each length, as 16 bits
   std::array<int, 17> offset_{};
 };
 
-/// A component's tables, and its mean level as it goes on from block to block.
+/// A component's tables, and its mean level, which each block changes.
 struct Component {
   const Codes *dc = nullptr, *ac = nullptr;
   int level = 0, level_max = 0;  ///< unit: steps of its quantization
 };
 
-// No picture is brighter than white by more than rounding. Data that was lost takes its differences of level with it.
+// No picture is brighter than white, except for rounding. Lost data leaves the level wrong by its differences.
 constexpr int kLevelMax = 1024, kLevelSlack = 128;
 
 bool pass_block(Bits& bits, Component& component) {
@@ -134,7 +134,7 @@ bool pass_block(Bits& bits, Component& component) {
   return true;
 }
 
-/// The blocks that follow one another in a scan (T.81: MCU).
+/// The smallest group of blocks in a scan (T.81: MCU).
 class Unit {
  public:
   explicit Unit(const jpeg_decompress_struct& info) {
@@ -144,7 +144,7 @@ class Unit {
     }
     for (int i = 0; i < info.comps_in_scan; ++i) {
       const jpeg_component_info& told = *info.cur_comp_info[i];
-      const int step = std::max<int>(told.quant_table->quantval[0], 1);  // libjpeg has made sure of the tables
+      const int step = std::max<int>(told.quant_table->quantval[0], 1);  // libjpeg has checked that the tables exist
       components_[i] = {&*dc_[told.dc_tbl_no], &*ac_[told.ac_tbl_no], 0, (kLevelMax + kLevelSlack) / step + 1};
     }
     for (int i = 0; i < info.blocks_in_MCU; ++i) blocks_.push_back(&components_[info.MCU_membership[i]]);

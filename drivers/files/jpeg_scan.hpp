@@ -9,18 +9,17 @@
 
 namespace slsd {
 
-/// The agreement of a JPEG scan's blocks with its size.
+/// Whether a JPEG scan's blocks match its size.
 enum class ScanBlocks {
   kAgree,
-  kMissing,  ///< data ends before the last block, a code is invalid, or a level is none that a picture has
-  kLeftOver  ///< data goes on with a whole further unit of blocks
+  kMissing,  ///< data ends before the last block, a code is invalid, or a level is outside any picture's range
+  kLeftOver  ///< data continues with at least one more unit of blocks
 };
 
-/// Walks through the Huffman codes of a sequential scan and counts its blocks, restart interval by restart interval.
-/// libjpeg says whether data is missing, but not what is left over. Bytes that some cameras put before a marker decode
-/// to no unit of blocks; what is left over where data before it was lost does, and then every block after the loss is
-/// out of its place.
-/// @param info  after jpeg_start_decompress(), of one scan
+/// Decodes the Huffman codes of a sequential scan and counts its blocks in each restart interval. libjpeg reports
+/// missing data, but not surplus data. Bytes that some cameras insert before a marker form no unit of blocks. Surplus
+/// data after a loss does form units, and then every block after the loss is displaced.
+/// @param info  after jpeg_start_decompress(), with one scan
 /// @param data  from the first byte after the scan's header
 /// @thread reentrant
 [[nodiscard]] ScanBlocks count_blocks(const jpeg_decompress_struct& info, std::string_view data);

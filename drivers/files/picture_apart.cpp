@@ -24,13 +24,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kDecodedBytesMax = 64 << 20;  // 3840x2160 in the colours of 48 bits
+constexpr std::size_t kDecodedBytesMax = 64 << 20;  // 3840x2160 with 48-bit colours
 constexpr std::size_t kLineMax = 1000;
 constexpr std::string_view kDone = "ok";
 constexpr ErrorCode kTold[] = {ErrorCode::kMalformed, ErrorCode::kUnsupported, ErrorCode::kMismatch,
                                ErrorCode::kInvalidArgument};
 
-/// Gone for good when this is.
+/// A child process, which ends with this object.
 class Process {
  public:
   explicit Process(pid_t number) : number_(number) {}
@@ -38,7 +38,7 @@ class Process {
   Process& operator=(const Process&) = delete;
   ~Process() { static_cast<void>(end()); }
 
-  /// Kills it, unless it ends by itself. @return as of waitpid()
+  /// Kills the process, unless it has already ended. @return as of waitpid()
   int end() {
     int status = 0;
     const pid_t number = std::exchange(number_, 0);
@@ -53,8 +53,8 @@ class Process {
   pid_t number_;
 };
 
-/// Sends and receives at once, as neither side waits for the other to have read everything.
-/// @return all that the process wrote, up to the limit
+/// Sends and receives at the same time, so that neither side blocks the other.
+/// @return all output of the process, up to the limit
 Result<std::string> exchange(int socket, std::string_view sent, std::size_t limit_bytes, Clock::time_point until) {
   std::string received;
   bool sending = true;
@@ -72,7 +72,7 @@ Result<std::string> exchange(int socket, std::string_view sent, std::size_t limi
     if ((ready.revents & POLLOUT) != 0) {
       const ssize_t taken = ::send(socket, sent.data(), sent.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
       if (taken > 0) sent.remove_prefix(static_cast<std::size_t>(taken));
-      if (taken < 0 && errno != EAGAIN && errno != EINTR) sent = {};  // it reads no more, and may have answered
+      if (taken < 0 && errno != EAGAIN && errno != EINTR) sent = {};  // it stopped reading, and may have answered
     }
     if ((ready.revents & (POLLIN | POLLHUP | POLLERR)) == 0) continue;
     const std::size_t before = received.size();

@@ -12,26 +12,25 @@
 
 namespace slsd {
 
-/// Decodes a stranger's picture in a process of its own without rights (slsd-picture, by confine()), and believes of
-/// its answer only what it has counted. It is killed at the end of the time.
-/// @param png      a PNG file of 8 bits a channel, of exactly this size
+/// Decodes an untrusted picture in a separate process without rights (slsd-picture, by confine()). Trusts only the size
+/// that it counted itself in the answer. Kills the process when the time is over.
+/// @param png      a PNG file of 8 bits per channel, of exactly this size
 /// @param until    the end of the time
 /// @param program  slsd-picture
-/// @errors kMalformed: damaged, or what decoded it died of it; kUnsupported: no PNG file; kMismatch: of another size,
-/// or
-///         of 16 bits; kInvalidArgument: declares too many pixels; kTimeout; kNotFound: not installed; kIo
+/// @errors kMalformed: damaged, or its decoder died; kUnsupported: not a PNG file; kMismatch: another size, or 16 bits;
+///         kInvalidArgument: declares too many pixels; kTimeout; kNotFound: not installed; kIo
 /// @thread reentrant
 [[nodiscard]] Result<Grey8> decode_apart(std::string_view png, int width_px, int height_px,
                                          std::chrono::steady_clock::time_point until,
                                          const std::filesystem::path& program);
 
-/// Decodes the file as slsd-picture does. @errors as decode_apart() @thread reentrant
+/// Decodes the file; slsd-picture calls this. @errors as decode_apart() @thread reentrant
 [[nodiscard]] Result<Grey8> decode_projected(std::string_view png, int width_px, int height_px);
 
-// What the two say to one another: a line that is "ok", or an error's code and message; then the pixels, row by row.
+// The messages between the two: a line with "ok", or with an error's code and message; then the pixels, row by row.
 
 [[nodiscard]] std::string answer_text(const Result<Grey8>& decoded);
-/// @errors as they were written; kMalformed for what is no whole answer @thread reentrant
+/// @errors those that were written; kMalformed for an incomplete answer @thread reentrant
 [[nodiscard]] Result<Grey8> read_answer(std::string_view answer, int width_px, int height_px);
 
 }  // namespace slsd

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-// Portable Network Graphics through libpng, which checks each chunk's CRC and that no pixel is missing.
+// Portable Network Graphics through libpng, which checks each chunk's CRC and the number of pixels.
 #include <png.h>
 
 #include <bit>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kDeflateRatioMax = 1032.0;
 
-/// libpng reports errors by longjmp(): the functions that call setjmp() hold no objects that would need a destructor.
+/// libpng reports errors with longjmp(): the functions that call setjmp() hold no objects with destructors.
 class PngReader {
  public:
   explicit PngReader(std::string_view bytes)
@@ -26,7 +26,7 @@ class PngReader {
   PngReader& operator=(const PngReader&) = delete;
   ~PngReader() { ::png_destroy_read_struct(&png_, &info_, nullptr); }
 
-  /// Reads up to the pixels, and asks for samples of 8 or 16 bits without alpha.
+  /// Reads up to the pixels, and requests samples of 8 or 16 bits without alpha.
   bool read_header() {
     if (info_ == nullptr || setjmp(png_jmpbuf(png_)) != 0) return false;
     ::png_set_read_fn(png_, this, on_read);
@@ -87,7 +87,7 @@ Result<DecodedImage> decode_png(std::string_view bytes, std::size_t limit_bytes)
   PngReader reader(bytes);
   if (!reader.read_header()) return fail_truncated("PNG");
   const ImageLayout layout = reader.layout();
-  // A palette or one bit a pixel makes up to 24 samples of one byte.
+  // A palette, or one bit per pixel, makes up to 24 samples from one byte.
   auto checked = check_layout("PNG", layout, bytes.size(), 24.0 * kDeflateRatioMax, limit_bytes);
   if (!checked) return tl::unexpected(std::move(checked.error()));
   if (layout.bytes_per_channel == 2) return read_as<std::uint16_t>(reader, layout);

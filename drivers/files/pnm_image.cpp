@@ -48,7 +48,7 @@ class Tokens {
     }
   }
 
-  /// A comment ends before its line does: the end of the line is white space.
+  /// Skips a comment up to its line's end, which counts as white space.
   void skip_comment() {
     if (rest_.starts_with('#')) rest_.remove_prefix(std::min(rest_.find_first_of("\r\n"), rest_.size()));
   }
@@ -63,9 +63,9 @@ struct Header {
   ImageLayout layout;
   std::uint64_t greatest = 0;
   bool plain = false;
-  bool crlf = false;        ///< CR LF ends it, of which the CR is the one white space
-  bool crlf_lines = false;  ///< CR LF stands in it before, too
-  std::string_view pixels;  ///< all that follows the one white space
+  bool crlf = false;        ///< the header ends in CR LF, whose CR is the one white space
+  bool crlf_lines = false;  ///< the header contains earlier CR LF line ends
+  std::string_view pixels;  ///< everything after the one white space
 
   [[nodiscard]] std::size_t pixel_bytes() const {
     return layout.row_samples() * layout.height_px * static_cast<std::size_t>(layout.bytes_per_channel);
@@ -94,7 +94,7 @@ std::optional<Header> read_header(std::string_view bytes) {
                 rest.substr(1)};
 }
 
-// Whether whole images follow one another to the end, as netpbm's programs write them.
+// Tells whether whole images follow each other to the end, as netpbm's programs write them.
 bool are_images(std::string_view bytes) {
   while (is_kind(bytes) && bytes[1] >= '5') {
     const auto next = read_header(bytes);
@@ -114,8 +114,8 @@ tl::unexpected<Error> fail_left_over(const Header& header, std::size_t bytes) {
                   "the pixels, no comment: write the file again");
 }
 
-/// The bytes of a raw image's pixels. The specification ends the header in one white space; writers in text mode make
-/// two of it, CR LF, which only the length tells from a first pixel that is LF.
+/// The bytes of a raw image's pixels. The specification ends the header in one white space. Writers in text mode write
+/// CR LF instead. Only the length distinguishes that from a first pixel with the value of LF.
 Result<std::string_view> raw_pixels(const Header& header) {
   const std::size_t needed = header.pixel_bytes();
   std::string_view pixels = header.pixels;
@@ -127,7 +127,7 @@ Result<std::string_view> raw_pixels(const Header& header) {
   return pixels.substr(0, needed);
 }
 
-/// Reads the samples row by row, from whichever kind of raster there is.
+/// Reads the samples row by row from either kind of raster.
 class Raster {
  public:
   static Result<Raster> of(const Header& header) {
@@ -151,7 +151,7 @@ class Raster {
     return {};
   }
 
-  /// Plain images alone: what follows the pixels of raw ones is known before.
+  /// Checks plain images only: the end of raw images is already known.
   [[nodiscard]] Result<> finish() {
     tokens_.skip_space();
     if (header_.plain && !tokens_.rest().empty()) return fail_left_over(header_, tokens_.rest().size());
@@ -161,7 +161,7 @@ class Raster {
  private:
   Raster(const Header& header, std::string_view pixels) : header_(header), tokens_(pixels), raw_(pixels) {}
 
-  // The most significant byte comes first.
+  // Most significant byte first.
   std::uint64_t raw_number(std::size_t bytes) {
     std::uint64_t value = 0;
     for (const char c : raw_.substr(0, bytes)) value = value << 8 | static_cast<unsigned char>(c);
@@ -195,7 +195,7 @@ Result<DecodedImage> decode_pnm(std::string_view bytes, std::size_t limit_bytes)
   if (!is_kind(bytes)) return fail_variant("PNM", "a kind but P2, P3, P5 or P6");
   const auto header = read_header(bytes);
   if (!header) return fail_truncated(kFormat);
-  // A plain number takes a digit and a space, and may stand for two bytes.
+  // A plain number has at least a digit and a space, and may become two bytes.
   auto checked = check_layout(kFormat, header->layout, header->pixels.size(), header->plain ? 2.0 : 1.0, limit_bytes);
   if (!checked) return tl::unexpected(std::move(checked.error()));
   if (header->layout.bytes_per_channel == 2) return read_as<std::uint16_t>(*header);

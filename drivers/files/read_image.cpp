@@ -12,7 +12,7 @@
 namespace slsd {
 namespace {
 
-/// Formats are told apart by their first bytes, not by the name, which people change.
+/// Identifies the format by the first bytes, not by the name, because people rename files.
 Result<DecodedImage> decode(std::string_view bytes, std::size_t limit_bytes) {
   using namespace std::string_view_literals;
   if (bytes.empty()) return fail(ErrorCode::kMalformed, "the image file is empty; record or copy it again");

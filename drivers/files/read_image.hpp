@@ -19,13 +19,12 @@ struct ReadImageOptions {
   std::size_t limit_decoded_bytes = 1u << 28;  ///< 256 MiB of pixels, as the file's header declares them
 };
 
-/// Turns the bytes of a PNG, TIFF, PGM, PPM, BMP or JPEG file into grey. Colour becomes 0.299 R + 0.587 G + 0.114 B
-/// (ITU-R BT.601), transparency is ignored. Values are kept, so that 10 bits in a 16-bit file stay below 1024; PGM and
-/// PPM name their greatest value, and are scaled to the whole range. A file that ends early is an error and never a
-/// half-grey image.
-/// @param name  what the error calls the bytes
-/// @errors kMalformed (empty, cut short, damaged), kUnsupported (another format, or a rare variant of one of these),
-///         kInvalidArgument (larger than the limits)
+/// Decodes a PNG, TIFF, PGM, PPM, BMP or JPEG file into grey. Colour becomes 0.299 R + 0.587 G + 0.114 B (ITU-R
+/// BT.601); transparency is ignored. Values are kept: 10 bits in a 16-bit file stay below 1024. PGM and PPM give their
+/// greatest value, and are scaled to the full range. A file that ends early is an error, not a partial image.
+/// @param name  the name of the bytes in errors
+/// @errors kMalformed (empty, cut short, damaged), kUnsupported (another format, or a rare variant), kInvalidArgument
+///         (larger than the limits)
 /// @thread reentrant
 [[nodiscard]] Result<GreyImage> decode_image(std::string_view bytes, std::string_view name,
                                              const ReadImageOptions& options = {});

@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kBlock = 512;
 constexpr char kRegular = '0';
 
-/// POSIX.1-1988, "ustar": texts end in a zero, numbers are octal.
+/// POSIX.1-1988, "ustar": texts end in a zero byte, numbers are octal.
 struct Header {
   std::array<char, 100> name;
   std::array<char, 8> mode, user, group;
@@ -26,7 +26,7 @@ struct Header {
   std::array<char, 8> sum;
   char type;
   std::array<char, 100> link;
-  std::array<char, 8> magic;  // and the version, without a zero between
+  std::array<char, 8> magic;  // includes the version, without a zero in between
   std::array<char, 32> user_name, group_name;
   std::array<char, 8> device_major, device_minor;
   std::array<char, 155> prefix;
@@ -41,7 +41,7 @@ void put(std::array<char, N>& field, unsigned long long value) {
   std::copy_n(digits.begin(), N - 1, field.begin());
 }
 
-// A file beyond 8 GB would take another dialect.
+// A file beyond 8 GB would need another dialect.
 template <std::size_t N>
 std::optional<std::uint64_t> octal(const std::array<char, N>& field) {
   std::uint64_t value = 0;
@@ -52,7 +52,7 @@ std::optional<std::uint64_t> octal(const std::array<char, N>& field) {
   return i > 0 && ended ? std::optional(value) : std::nullopt;
 }
 
-// The sum of all bytes, those of the sum itself as blanks.
+// The sum of all bytes; the sum's own bytes count as blanks.
 unsigned long long sum_of(Header header) {
   header.sum.fill(' ');
   unsigned long long sum = 0;
@@ -68,7 +68,7 @@ tl::unexpected<Error> fail_cut() {
   return fail(ErrorCode::kMalformed, "is cut: it has no end");
 }
 
-// A header's name, where the header is one of ours.
+// Returns the name if TarWriter could have written the header.
 Result<std::string> name_in(const Header& header) {
   if (octal(header.sum) != sum_of(header)) return fail(ErrorCode::kMalformed, "is damaged, or no tar archive");
   if (std::memcmp(header.magic.data(), "ustar\00000", 8) != 0)
@@ -87,8 +87,8 @@ Result<std::string> name_in(const Header& header) {
 
 bool plain_tar_name(std::string_view name) {
   if (name.empty() || name.size() > kTarNameBytesMax || name.back() == '/') return false;
-  if (name.front() == '-') return false;  // an option to those who unpack it by hand
-  bool begins = true;                     // a part
+  if (name.front() == '-') return false;  // tar would take it for an option when unpacked by hand
+  bool begins = true;                     // at the start of a part
   for (const char c : name) {
     const bool letter =
         (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';

@@ -17,10 +17,10 @@
 namespace slsd {
 namespace {
 
-// LZW's longest string for its shortest code, which is more than deflate can do.
+// LZW's longest string for its shortest code; deflate compresses less.
 constexpr double kCompressionMax = 4096.0 * 8.0 / 9.0;
 
-/// The file that libtiff reads. It must not end before the TIFF.
+/// The bytes that libtiff reads as a file. Must outlive the TIFF.
 struct Memory {
   std::string_view bytes;
   toff_t at = 0;
