@@ -13,18 +13,18 @@
 
 namespace slsd {
 
-/// The keys of the [projector] table that a headless projector reads.
+/// The keys of the [projector] table for a headless projector.
 struct HeadlessProjectorOptions {
   int width_px = 1280;  ///< 1 to 16384
   int height_px = 800;  ///< 1 to 16384
   LightOptions light = {};
   double refresh_hz = 60.0;                       ///< 1 to 1000
-  std::vector<std::uint64_t> disconnect_at = {};  ///< images, counted from 1, at which it is found unplugged
+  std::vector<std::uint64_t> disconnect_at = {};  ///< numbers of the images, from 1, at which it seems unplugged
 
   [[nodiscard]] Result<> validate() const;
 };
 
-/// A projector that nobody sees: keeps the image in memory as a monitor would get it, keeps the time of its refreshes.
+/// A projector without a screen. Keeps the image in memory as a monitor would receive it, and times its refreshes.
 /// @thread one at a time
 class HeadlessProjector final : public Projector {
  public:
@@ -37,7 +37,7 @@ class HeadlessProjector final : public Projector {
   [[nodiscard]] std::vector<std::string> warnings() const override { return {}; }
   [[nodiscard]] Result<Grey8> read_back() override;
 
-  /// Pulls the plug: every call but open() gives kDisconnected from now on.
+  /// Simulates an unplugged cable: from now on every call except open() gives kDisconnected.
   void disconnect() { connected_ = false; }
 
  private:
@@ -49,8 +49,8 @@ class HeadlessProjector final : public Projector {
   ProjectorDescription description_;
   bool connected_ = false;
   MonotonicTime first_refresh_;
-  Grey8 showing_, light_;                  // what was asked for, and the values that a monitor would get for it
-  std::optional<MonotonicTime> complete_;  ///< end of the first refresh that shows it, until show() has reported it
+  Grey8 showing_, light_;                  // the requested image, and the values that a monitor would receive for it
+  std::optional<MonotonicTime> complete_;  ///< end of the first refresh with the image, until show() has reported it
   std::uint64_t shows_ = 0;
 };
 

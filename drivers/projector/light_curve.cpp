@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kGreys = 256;
 
-// Where the rising response reaches the share of its span, 0 to 1.
+// The position, 0 to 1, at which the rising response reaches this share of its span.
 double invert(const std::vector<double>& response, double share) {
   const double light = response.front() + share * (response.back() - response.front());
   const auto above = std::lower_bound(response.begin() + 1, response.end() - 1, light);

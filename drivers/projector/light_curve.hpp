@@ -11,19 +11,18 @@
 
 namespace slsd {
 
-/// The keys of the [projector] table that say how grey becomes light.
+/// The keys of the [projector] table that map grey to light.
 struct LightOptions {
   double brightness = 1.0;            ///< factor on the light, 0 to 1
-  std::vector<double> gamma = {1.0};  ///< one number: the projector's light is its value to this power, 0.1 to 10; or 2
-                                      ///< to 256: its light as measured at values spaced evenly from 0 to 255, rising
-  int black_level = 0;                ///< the value sent for black, 0 to 254, where the projector swallows lower ones
+  std::vector<double> gamma = {1.0};  ///< one number: the light is the value to this power, 0.1 to 10; or 2 to 256
+                                      ///< numbers: rising light, measured at values evenly spaced from 0 to 255
+  int black_level = 0;                ///< the value sent for black, 0 to 254, if the projector does not show lower ones
 
   [[nodiscard]] Result<> validate() const;
   friend bool operator==(const LightOptions&, const LightOptions&) = default;
 };
 
-/// The value to send for each grey, such that the light is in proportion to the grey. With the defaults each grey
-/// itself.
+/// The value to send for each grey, so that light is proportional to grey. With the defaults, each grey itself.
 /// @thread reentrant
 class LightCurve {
  public:

@@ -8,23 +8,23 @@
 
 namespace slsd {
 
-/// Draws a grey image with OpenGL ES 3 so that texel (x, y) becomes pixel (x, y), the first row on top: no filter, no
-/// dithering, no sRGB, no scaling.
-/// Its objects belong to the context that was current when it was made, and end with it.
-/// @thread thread-bound: the context is current in every call
+/// Draws a grey image with OpenGL ES 3 so that texel (x, y) becomes pixel (x, y), with the first row on top: no filter,
+/// no dithering, no sRGB, no scaling. Its OpenGL objects belong to the context that was current at construction, and
+/// end with it.
+/// @thread thread-bound: the same context must be current in every call
 class TexelPainter {
  public:
-  /// @errors kUnsupported: the context cannot draw so large an image, or not as needed
-  /// @param curve  what becomes of each grey value; with the identity every value is exact
+  /// @errors kUnsupported: the context cannot draw an image this large, or not exactly
+  /// @param curve  maps each grey value; with the identity every value is exact
   [[nodiscard]] static Result<TexelPainter> create(int width_px, int height_px, const LightCurve& curve);
 
-  /// Takes the image that is drawn from now on. @param image  of the size that the painter was made for
+  /// Sets the image for the next draws. @param image  in the painter's size
   void load(const Grey8& image);
 
-  /// Draws the image over the whole current framebuffer, and waits until that is done.
+  /// Draws the image over the whole current framebuffer, and waits until it is drawn.
   void draw();
 
-  /// Reads the current framebuffer: the value of the green channel.
+  /// Reads the green channel of the current framebuffer.
   [[nodiscard]] Grey8 read() const;
 
  private:

@@ -22,19 +22,19 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr auto kEndMax = 3s;  // for the window to be taken away
+constexpr auto kEndMax = 3s;  // for removing the window
 
 }  // namespace
 
 struct DisplayThread::Shared {
   explicit Shared(const GlfwProjectorOptions& options) : screen(options) {}
 
-  ProjectorScreen screen;  ///< used on the thread alone
+  ProjectorScreen screen;  ///< used only on the thread
   std::atomic<bool> open{false};
   WakeEvent woken;
-  std::mutex mutex;  ///< guards what follows
+  std::mutex mutex;  ///< guards the members below
   std::condition_variable changed;
-  Work work;  ///< empty: none is under way
+  Work work;  ///< empty: no work is under way
   MonotonicTime since{};
   bool running = false;
   bool stop = false;

@@ -16,8 +16,7 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-// An X server that has not answered for so long hangs, as far as can be told; one that is only slow goes on all the
-// same.
+// An X server that has not answered for this long counts as hung. If it is only slow, the work still continues.
 constexpr std::chrono::nanoseconds kHangs = 2s;
 constexpr std::chrono::nanoseconds kOpeningHangs = 5s;
 constexpr auto kScreenshotMax = 10s;
@@ -28,8 +27,8 @@ GlfwProjector::GlfwProjector(GlfwProjectorOptions options)
     : options_(std::move(options)),
       description_{"glfw", options_.monitor, options_.width_px, options_.height_px},
       thread_(options_) {
-  // Where there is no DRI3 Mesa tries its predecessor, which is refused on any server of today, and says so on stderr
-  // at each start, before it draws on the processor. Set here, while the process has one thread.
+  // Without DRI3, Mesa tries the older DRI2. Current servers refuse that, and Mesa prints it on stderr at each start
+  // before it draws on the processor. Set here, while the process has one thread.
   ::setenv("LIBGL_DRI2_DISABLE", "true", 0);
 }
 
@@ -41,7 +40,7 @@ tl::unexpected<Error> GlfwProjector::fail_gone() const {
   return fail(ErrorCode::kDisconnected, "the projector is not there; check its cable and its power", where());
 }
 
-// For the end of what the thread was told last.
+// Waits for the end of the thread's last order.
 Result<> GlfwProjector::wait(MonotonicTime deadline) const {
   const MonotonicTime hangs = thread_.begun() + (is_under_way(Task::kOpen) ? kOpeningHangs : kHangs);
   if (thread_.wait(std::min(deadline, hangs))) return {};
@@ -65,7 +64,7 @@ Result<> GlfwProjector::open(MonotonicTime deadline) {
   if (auto started = thread_.start(); !started) return started;
   if (!is_under_way(Task::kOpen)) {
     if (auto done = wait(deadline); !done) return done;
-    if (order_ && thread_.screen_open()) return {};  // it hung or was slow, and still shows what it was told
+    if (order_ && thread_.screen_open()) return {};  // it was hung or slow, and still shows its image
     const auto open_screen = [](ProjectorScreen& screen, Order& order) {
       order.opened = screen.open();
       order.output = screen.output();
@@ -99,7 +98,7 @@ Result<MonotonicTime> GlfwProjector::show(const Grey8& image, MonotonicTime dead
   return std::exchange(order_, nullptr)->shown;
 }
 
-// What is asked of the server here it answers as it is now: an event that tells of the loss may still be under way.
+// The server answers queries with its current state, while an event about the loss may still be under way.
 Result<> GlfwProjector::check(MonotonicTime deadline) {
   if (!is_under_way(Task::kCheck)) {
     const auto look = [](ProjectorScreen& screen, Order&) { screen.handle_events(); };

@@ -12,35 +12,35 @@
 
 namespace slsd {
 
-/// A projector that is a monitor of an X server: a full-screen window on it, drawn once for each image and not again
-/// while that stands still.
+/// A projector connected as a monitor of an X server. Shows a full-screen window, drawn once for each image and not
+/// redrawn while the image stays.
 ///
-/// All of GLFW, Xlib and OpenGL runs on one thread, which this class owns. GLFW's documentation asks for the main
-/// thread, for the sake of macOS; its X11 code asks only that it is always the same one. Main serves the socket, and a
+/// GLFW, Xlib and OpenGL all run on one thread, which this class owns. GLFW's documentation requires the main thread
+/// because of macOS; its X11 code only requires the same thread each time. The main thread serves the socket, and a
 /// graphics driver may block for long.
 ///
-/// When the monitor or the X server is gone, open() tries to get it back: the same monitor, never another one unless
-/// the options name none and none was found before. An X server that hangs keeps the thread until it goes on, and then
-/// the projector does, or until it ends; until then every call says so at once.
+/// If the monitor or the X server is gone, open() tries to find the same monitor again. It takes another one only if
+/// the options name none and none was found before. A hung X server blocks the thread until it continues or ends.
+/// Meanwhile every call reports that at once; then the projector continues.
 /// @thread thread-bound; one at a time in a process
 class GlfwProjector final : public Projector {
  public:
   explicit GlfwProjector(GlfwProjectorOptions options);
 
-  /// The monitor is known after open().
+  /// The monitor becomes known in open().
   [[nodiscard]] const ProjectorDescription& description() const override { return description_; }
-  /// @errors kNotFound: no X server, or no such monitor; kInvalidArgument: several monitors could be meant; kMismatch:
-  ///         it does not show the projector's size pixel for pixel; kUnsupported: no OpenGL ES 3; kBusy: the process
-  ///         has another; kDisconnected; kIo: the X server hangs; kTimeout
+  /// @errors kNotFound: no X server, or no such monitor; kInvalidArgument: several monitors match; kMismatch: the
+  ///         monitor does not show the projector's size pixel for pixel; kUnsupported: no OpenGL ES 3; kBusy: the
+  ///         process has another; kDisconnected; kIo: the X server hangs; kTimeout
   [[nodiscard]] Result<> open(MonotonicTime deadline) override;
   [[nodiscard]] Result<MonotonicTime> show(const Grey8& image, MonotonicTime deadline) override;
   [[nodiscard]] Result<> check(MonotonicTime deadline) override;
   [[nodiscard]] std::vector<std::string> warnings() const override { return warnings_; }
-  /// A screenshot of the monitor: what other programs draw over the pattern is in it.
+  /// Takes a screenshot of the monitor, including what other programs draw over the pattern.
   [[nodiscard]] Result<Grey8> read_back() override;
 
  private:
-  /// The thread's last order and its outcome, until somebody fetched that.
+  /// The thread's last order and its outcome, until somebody fetches the outcome.
   struct Order {
     enum class Task { kOpen, kShow, kCheck, kReadBack } task;
     Grey8 image = {};  ///< the image to show
@@ -60,7 +60,7 @@ class GlfwProjector final : public Projector {
   GlfwProjectorOptions options_;
   ProjectorDescription description_;
   std::vector<std::string> warnings_;
-  std::shared_ptr<Order> order_;  // shared: with the thread, which may outlive this
+  std::shared_ptr<Order> order_;  // shared with the thread, which may outlive this object
   DisplayThread thread_;
 };
 

@@ -17,9 +17,9 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr auto kManagersPatience = 5s;  // a busy window manager
+constexpr auto kManagersPatience = 5s;  // a window manager may be busy
 
-std::atomic_flag in_use;  // GLFW is the process's
+std::atomic_flag in_use;  // a process has only one GLFW
 
 GLFWmonitor* find_monitor(unsigned long output) {
   int count = 0;
@@ -38,7 +38,7 @@ void set_hints(int refresh_hz) {
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 0);
   glfwWindowHint(GLFW_DEPTH_BITS, 0);
   glfwWindowHint(GLFW_STENCIL_BITS, 0);
-  glfwWindowHint(GLFW_ALPHA_BITS, 0);  // a compositor would see through what is not opaque
+  glfwWindowHint(GLFW_ALPHA_BITS, 0);  // a compositor would make non-opaque pixels transparent
   glfwWindowHint(GLFW_RESIZABLE, GLFW_FALSE);
   glfwWindowHint(GLFW_DECORATED, GLFW_FALSE);
   glfwWindowHint(GLFW_FOCUSED, GLFW_FALSE);
@@ -49,7 +49,7 @@ void set_hints(int refresh_hz) {
   glfwWindowHintString(GLFW_X11_INSTANCE_NAME, "slsd");
 }
 
-// The mode in use is kept where it fits; else the monitor's fastest of that size.
+// Keeps the current mode if it fits; else takes the monitor's fastest of that size.
 int refresh_to_ask_for(GLFWmonitor* monitor, int width_px, int height_px) {
   const GLFWvidmode* mode = glfwGetVideoMode(monitor);
   return mode != nullptr && mode->width == width_px && mode->height == height_px ? mode->refreshRate : GLFW_DONT_CARE;
@@ -144,7 +144,7 @@ bool FullscreenWindow::wait_until_it_covers(unsigned long output, int width_px, 
   while (steady_clock::now() < deadline && !session_.lost()) {
     session_.handle_events();
     const auto area = lit_area(session_.display(), output);
-    if (!area) return false;  // turned off meanwhile: nothing to be patient for
+    if (!area) return false;  // turned off meanwhile, so nothing to wait for
     if (area->width_px == width_px && area->height_px == height_px && covers(*area)) return true;
     std::this_thread::sleep_for(5ms);
   }

@@ -16,8 +16,8 @@ struct _XDisplay;
 
 namespace slsd {
 
-/// GLFW from its start to its end, with its connection to the X server, whose loss the process survives and whose
-/// monitors stay awake.
+/// GLFW from its start to its end, with its connection to the X server. The process survives the loss of that
+/// connection. The server's monitors stay awake.
 /// @thread thread-bound; one at a time in a process
 class GlfwSession {
  public:
@@ -30,9 +30,9 @@ class GlfwSession {
   [[nodiscard]] _XDisplay* display() const { return display_; }
   /// Readable when there are events.
   [[nodiscard]] int descriptor() const;
-  /// Tells whether the X server is gone; then the session can only be ended.
+  /// Tells whether the X server is gone; then only the destructor may follow.
   [[nodiscard]] bool lost() const { return lost_; }
-  /// Lets GLFW handle what has come; does not wait.
+  /// Lets GLFW handle pending events; does not wait.
   void handle_events();
 
  private:
@@ -43,15 +43,15 @@ class GlfwSession {
   std::unique_ptr<StayAwake> awake_;
 };
 
-/// A window over one whole monitor, with a context of OpenGL ES 3 that is current on this thread while it lives; no
-/// pointer on it, no screen saver.
+/// A window over one whole monitor. Its OpenGL ES 3 context is current on this thread while the window lives. Hides the
+/// pointer and blocks the screen saver.
 /// @thread thread-bound
 class FullscreenWindow {
  public:
-  /// @param session  outlives it
-  /// @param output   where; its mode is changed only where the size asked for is its native one and not that in use
-  /// @errors kNotFound: that monitor has gone meanwhile; kUnsupported: no OpenGL ES 3; kMismatch: the window does not
-  ///         get the whole monitor
+  /// @param session  must outlive the window
+  /// @param output   the monitor. Its mode changes only if the requested size is its native one and not in use
+  /// @errors kNotFound: the monitor has disappeared; kUnsupported: no OpenGL ES 3; kMismatch: the window does not get
+  ///         the whole monitor
   [[nodiscard]] static Result<std::unique_ptr<FullscreenWindow>> open(GlfwSession& session, const RandrOutput& output,
                                                                       int width_px, int height_px);
   ~FullscreenWindow();
@@ -59,11 +59,11 @@ class FullscreenWindow {
   FullscreenWindow& operator=(const FullscreenWindow&) = delete;
 
   [[nodiscard]] std::uint32_t id() const;
-  /// Tells whether it is on the screen, exactly there; asks the X server.
+  /// Tells whether the window is on the screen at exactly that place; asks the X server.
   [[nodiscard]] bool covers(const DesktopArea& area) const;
-  /// Tells whether what was shown was damaged since the last call, and has to be drawn anew.
+  /// Tells whether the window was damaged since the last call and must be redrawn.
   [[nodiscard]] bool take_damage() { return std::exchange(damaged_, false); }
-  /// Shows what was drawn; returns when the X server has it.
+  /// Shows the drawn image; returns when the X server has it.
   void swap();
 
  private:

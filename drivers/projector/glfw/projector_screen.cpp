@@ -16,7 +16,7 @@ namespace slsd {
 namespace {
 
 constexpr int kSideMaxPx = 16384;
-constexpr auto kProbePeriod = std::chrono::seconds(2);  // it may disturb what other monitors show
+constexpr auto kProbePeriod = std::chrono::seconds(2);  // probing may disturb other monitors
 
 struct DestroyImage {
   void operator()(XImage* image) const { XDestroyImage(image); }
@@ -42,8 +42,8 @@ Result<> ProjectorScreen::open() {
   if (auto opened = open_session(); !opened) return opened;
   if (auto found = find_output(); !found) return found;
   if (auto opened = open_window(); !opened) {
-    // GLFW keeps the modes of the monitor that it first saw at an output: where another stands there now, it would set
-    // the nearest of those for ever.
+    // GLFW keeps the modes of the first monitor at an output. If another is connected there now, it would always set
+    // the nearest of the old modes.
     opened.error().code == ErrorCode::kMismatch ? end() : close();
     return opened;
   }
@@ -89,7 +89,7 @@ Result<> ProjectorScreen::find_output() {
   return {};
 }
 
-// Under an X server without a desktop nobody else turns a monitor on, or looks which ones there are.
+// On an X server without a desktop, no other program turns monitors on or looks for them.
 Result<RandrOutput> ProjectorScreen::enabled_output() {
   _XDisplay* display = session_->display();
   const auto fits = [this](const Result<RandrOutput>& output) {
@@ -139,7 +139,7 @@ void ProjectorScreen::redraw() {
   swapped_ = true;
 }
 
-// One swap at a time: what tells that one is complete does not tell which.
+// One swap at a time, because the report of a complete swap does not say which.
 void ProjectorScreen::settle() {
   if (std::exchange(swapped_, false)) static_cast<void>(clock_->wait_refresh());
 }
@@ -184,14 +184,14 @@ Result<Grey8> ProjectorScreen::read_back() {
   return image;
 }
 
-// GLFW takes a window away from a monitor that was gone for a moment, and puts it elsewhere.
+// If a monitor was briefly gone, GLFW moves its window elsewhere.
 bool ProjectorScreen::is_in_place() const {
   return lit_area(session_->display(), output_.id) == output_.area && window_->covers(output_.area);
 }
 
 int ProjectorScreen::handle_events() {
   if (!session_) return -1;
-  do {  // what is asked of the server may read further events, which then no descriptor tells of
+  do {  // queries may read further events, which the descriptor then no longer shows
     session_->handle_events();
     if (clock_ && window_->take_damage() && !session_->lost()) redraw();
     if (window_ && !session_->lost() && !is_in_place()) close();

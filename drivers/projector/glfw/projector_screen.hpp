@@ -17,38 +17,38 @@
 
 namespace slsd {
 
-/// The keys of the [projector] table that a projector on a monitor reads.
+/// The keys of the [projector] table for a projector on a monitor.
 struct GlfwProjectorOptions {
   std::string monitor = {};  ///< see choose_output()
-  int width_px = 1280;       ///< 1 to 16384; the monitor's
-  int height_px = 800;       ///< 1 to 16384; the monitor's
+  int width_px = 1280;       ///< 1 to 16384; equal to the monitor's
+  int height_px = 800;       ///< 1 to 16384; equal to the monitor's
   LightOptions light = {};
-  bool enable_output = false;  ///< turn the monitor on and set it to that size: the display is the scanner's alone
-  double refresh_hz = 60.0;    ///< then at the nearest refresh that it has
+  bool enable_output = false;  ///< turn the monitor on and set that size: the scanner alone uses the display
+  double refresh_hz = 60.0;    ///< then at the monitor's nearest refresh rate
 
   [[nodiscard]] Result<> validate() const;
 };
 
-/// A full-screen window on the projector's monitor and all that it needs, from open() until the monitor is unplugged,
-/// is turned off or changes its place or size, or the X server ends.
+/// A full-screen window on the projector's monitor, with all that it needs. Lasts from open() until the X server ends,
+/// or the monitor is unplugged, turned off, moved or resized.
 /// @thread thread-bound
 class ProjectorScreen {
  public:
   explicit ProjectorScreen(GlfwProjectorOptions options) : options_(std::move(options)) {}
 
-  /// Ends what is open, opens anew and shows black. @errors as Projector::open()
+  /// Closes an open window, opens a new one and shows black. @errors as Projector::open()
   [[nodiscard]] Result<> open();
-  /// Takes the window away.
+  /// Removes the window.
   void close();
-  /// Also leaves the X server.
+  /// Also disconnects from the X server.
   void end();
 
-  /// @param image  of the projector's size @errors kDisconnected
+  /// @param image  in the projector's size @errors kDisconnected
   [[nodiscard]] Result<MonotonicTime> show(const Grey8& image);
-  /// The projector's part of the desktop, as a screenshot. @errors kDisconnected
+  /// Takes a screenshot of the projector's part of the desktop. @errors kDisconnected
   [[nodiscard]] Result<Grey8> read_back();
 
-  /// Handles what the X server tells. @return what to wait on for more, -1: nothing
+  /// Handles the X server's events. @return the descriptor to wait on for more, -1: none
   int handle_events();
 
   [[nodiscard]] bool is_open() const { return window_ != nullptr; }
@@ -69,11 +69,11 @@ class ProjectorScreen {
   RandrOutput output_;
   std::vector<std::string> warnings_;
   std::unique_ptr<GlfwSession> session_;
-  MonotonicTime probed_{};  ///< time when the X server last looked for monitors at our wish
+  MonotonicTime probed_{};  ///< time when this last made the X server look for monitors
   std::unique_ptr<FullscreenWindow> window_;
   std::optional<TexelPainter> painter_;
   std::unique_ptr<RefreshClock> clock_;
-  bool swapped_ = false;  ///< and nobody waited for it
+  bool swapped_ = false;  ///< set if nobody has waited for the swap yet
 };
 
 }  // namespace slsd

@@ -33,7 +33,7 @@ tl::unexpected<Error> not_there(const std::string& which, std::span<const RandrO
               "projector");
 }
 
-// Where the desktop has no primary monitor the first counts as that.
+// Without a primary monitor on the desktop, the first one counts as primary.
 std::vector<RandrOutput> others_than_primary(std::span<const RandrOutput> outputs) {
   auto primary = std::ranges::find_if(outputs, &RandrOutput::primary);
   if (primary == outputs.end()) primary = outputs.begin();

@@ -11,14 +11,13 @@
 
 namespace slsd {
 
-/// Chooses the monitor that is the projector.
-/// @param wanted  its name, its EDID serial, or its place on the desktop as in "+1280+0"; empty: the one that is not
-/// the
-///                primary, and where there is only one, that
-/// @param last    name of the monitor that was chosen before, empty where none was: without a wish only that will do,
-///                lest the pattern moves to the operator's monitor when the projector is unplugged
-/// @param enable  take one that is off, too, to turn it on
-/// @errors kNotFound: no such monitor; kInvalidArgument: several could be meant. The message lists those that are there
+/// Chooses the projector's monitor.
+/// @param wanted  its name, its EDID serial, or its place on the desktop such as "+1280+0"; empty: the monitor that is
+///                not primary, or the only one
+/// @param last    name of the previously chosen monitor, or empty. Without `wanted`, only that one is taken, so that
+///                the pattern never moves to the operator's monitor when the projector is unplugged
+/// @param enable  also take a monitor that is off, to turn it on
+/// @errors kNotFound: no such monitor; kInvalidArgument: several match. The message lists the present ones
 /// @thread reentrant
 [[nodiscard]] Result<RandrOutput> choose_output(std::span<const RandrOutput> outputs, const std::string& wanted,
                                                 const std::string& last, bool enable = false);
@@ -28,18 +27,18 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] Result<> check_fit(const RandrOutput& output, int width_px, int height_px);
 
-/// Warnings about disturbances of that monitor's light. Each is one sentence with the remedy.
+/// Warnings about disturbances of the monitor's light. Each is one sentence with the remedy.
 /// @thread reentrant
 [[nodiscard]] std::vector<std::string> output_warnings(const RandrOutput& output, std::span<const RandrOutput> outputs);
 
-/// The monitor that is the projector, and what disturbs its light.
+/// The projector's monitor, and the disturbances of its light.
 struct MonitorReport {
   RandrOutput output;
   std::vector<std::string> warnings;  ///< see output_warnings()
 };
 
-/// Looks at the monitor that a projector with these options takes; shows nothing on it, and leaves one that is off.
-/// @param enable  slsd would turn it on, and set it to that size
+/// Examines the monitor that a projector with these options would use. Shows nothing on it, and does not turn it on.
+/// @param enable  slsd would turn the monitor on and set that size
 /// @errors as list_outputs(), choose_output() and check_fit()
 /// @thread thread-safe
 [[nodiscard]] Result<MonitorReport> report_monitor(const std::string& wanted, int width_px, int height_px, bool enable);

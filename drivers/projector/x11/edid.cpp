@@ -14,7 +14,7 @@ constexpr std::uint8_t kHeader[] = {0x00, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0x
 constexpr std::uint8_t kSerialText = 0xFF;
 constexpr std::uint8_t kNameText = 0xFC;
 
-// The text of the descriptor with that tag; empty where there is none.
+// The text of the descriptor with this tag; empty if there is none.
 std::string descriptor_text(std::span<const std::uint8_t> block, std::uint8_t tag) {
   for (const std::size_t start : {54U, 72U, 90U, 108U}) {
     if (block[start] != 0 || block[start + 1] != 0 || block[start + 2] != 0 || block[start + 3] != tag) continue;
@@ -29,7 +29,7 @@ std::string descriptor_text(std::span<const std::uint8_t> block, std::uint8_t ta
   return {};
 }
 
-// Three letters of five bits each, and a number.
+// Three letters of five bits each, then a number.
 std::string maker_and_product(std::span<const std::uint8_t> block) {
   const unsigned letters = block[8] << 8U | block[9];
   const unsigned product = block[10] | block[11] << 8U;

@@ -14,7 +14,7 @@ struct EdidIdentity {
   std::string serial;  ///< text if the monitor has one, else a number; empty: none
 };
 
-/// Reads the first block of a monitor's EDID (VESA E-EDID 1.4). Bytes that are none give an empty identity.
+/// Reads the first block of a monitor's EDID (VESA E-EDID 1.4). Other bytes give an empty identity.
 /// @thread reentrant
 [[nodiscard]] EdidIdentity read_edid(std::span<const std::uint8_t> bytes);
 

@@ -23,7 +23,7 @@ namespace slsd {
 namespace {
 
 constexpr auto kAnswerMax = std::chrono::seconds(5);
-constexpr double kMillimetresPerPixel = 25.4 / 96;  // what X takes where nobody knows
+constexpr double kMillimetresPerPixel = 25.4 / 96;  // X's assumption if the size is unknown
 
 template <auto Free>
 struct Freeing {
@@ -44,7 +44,7 @@ struct Property {
   std::vector<std::uint8_t> bytes;
 };
 
-// Values of 32 bits come as longs.
+// Xlib returns 32-bit values as longs.
 Property read_property(Display* display, RROutput output, const char* name) {
   const Atom atom = XInternAtom(display, name, True);
   if (atom == None) return {};
@@ -87,7 +87,7 @@ bool is_active(const XRRCrtcGamma& gamma) {
   for (int i = 0; i < gamma.size; ++i) {
     const double linear = 65535.0 * i / std::max(1, gamma.size - 1);
     for (const unsigned short value : {gamma.red[i], gamma.green[i], gamma.blue[i]}) {
-      if (std::abs(value - linear) > 257.0) return true;  // a step of 8 bits: less is a driver's rounding
+      if (std::abs(value - linear) > 257.0) return true;  // one step of 8 bits; less is rounding by the driver
     }
   }
   return false;
@@ -273,7 +273,7 @@ Result<> set_output(_XDisplay* display, const RandrOutput& output, const std::ve
               where);
 }
 
-// Xlib waits for a server that hangs without bound: then its thread is left to wait.
+// Xlib waits without limit for a hung server, so this runs on a thread that may be abandoned.
 Result<std::vector<RandrOutput>> list_outputs() {
   std::packaged_task<Result<std::vector<RandrOutput>>()> ask(ask_for_outputs);
   auto outputs = ask.get_future();

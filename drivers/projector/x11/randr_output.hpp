@@ -34,7 +34,7 @@ struct RandrMode {
   double refresh_hz = 0.0;
 };
 
-/// A monitor that is plugged in, as RandR tells of it.
+/// A connected monitor according to RandR.
 struct RandrOutput {
   unsigned long id = 0;
   std::string name;    ///< name of the socket: "HDMI-1"
@@ -45,49 +45,49 @@ struct RandrOutput {
   DesktopArea area = {};  ///< the shown part of the desktop
   int mode_width_px = 0;  ///< width of the signal
   int mode_height_px = 0;
-  int native_width_px = 0;  ///< width of the mode that the monitor prefers; 0: it does not say
+  int native_width_px = 0;  ///< width of the monitor's preferred mode; 0: unknown
   int native_height_px = 0;
-  std::vector<RandrMode> modes = {};  ///< modes that it can be set to
+  std::vector<RandrMode> modes = {};  ///< modes that the monitor supports
   double refresh_hz = 0.0;
   int rotation_deg = 0;  ///< 0, 90, 180 or 270
   bool reflected = false;
-  bool transformed = false;  ///< scaled or warped on its way to the signal
+  bool transformed = false;  ///< the image is scaled or warped before output
   bool gamma_active = false;
-  std::string rgb_range;  ///< the property "Broadcast RGB"; empty: the driver does not say
+  std::string rgb_range;  ///< the property "Broadcast RGB"; empty: the driver has none
   bool underscan = false;
 
-  /// It shows a window of a larger area, which follows the mouse.
+  /// Tells whether it shows a window of a larger area that follows the mouse.
   [[nodiscard]] bool pans() const;
 };
 
 enum class Probe {
-  kKnown,     ///< the X server's last knowledge
-  kHardware,  ///< it looks at its sockets anew, which takes it up to a second
+  kKnown,     ///< what the X server last knew
+  kHardware,  ///< makes the server examine its sockets again, which takes up to a second
 };
 
-/// The monitors that are plugged in, on or off, in RandR's order.
+/// The connected monitors, on or off, in RandR's order.
 [[nodiscard]] std::vector<RandrOutput> read_outputs(_XDisplay* display, Probe probe = Probe::kKnown);
 
-/// The area where that output is lit now. Empty if it is unplugged or off.
+/// The area that the output shows now. Empty if it is unplugged or off.
 [[nodiscard]] std::optional<DesktopArea> lit_area(_XDisplay* display, unsigned long output);
 
-/// Turns a monitor on, or sets it to another size: to its mode of that size whose refresh is nearest. It stays where it
-/// is, unless it would be over another one: then it goes to the right of them all. The desktop grows as needed.
-/// @param outputs  all that are plugged in
-/// @errors kMismatch: it has no mode of that size; kUnsupported: the X server refuses
+/// Turns a monitor on, or changes its size: sets the mode of that size with the nearest refresh rate. The monitor stays
+/// in place unless it would overlap another; then it moves to the right of all others. The desktop grows as needed.
+/// @param outputs  all connected monitors
+/// @errors kMismatch: no mode of that size; kUnsupported: the X server refuses
 [[nodiscard]] Result<> set_output(_XDisplay* display, const RandrOutput& output,
                                   const std::vector<RandrOutput>& outputs, int width_px, int height_px,
                                   double refresh_hz);
 
-/// The mode of that size whose refresh is nearest; null where it has none.
+/// The mode of that size with the nearest refresh rate; null if there is none.
 [[nodiscard]] const RandrMode* find_mode(const RandrOutput& output, int width_px, int height_px, double refresh_hz);
 
-/// The place where that monitor has room for such a size: its present one, or to the right of all others.
+/// The place that has room for the monitor in such a size: its current one, or to the right of all others.
 [[nodiscard]] DesktopArea place_of(const RandrOutput& output, const std::vector<RandrOutput>& outputs, int width_px,
                                    int height_px);
 
-/// The monitors of the X server that DISPLAY names, over a connection of its own.
-/// @errors kNotFound: no X server is there; kIo: it does not answer; kUnsupported: it lacks RandR 1.3
+/// The monitors of the X server that DISPLAY names, over a separate connection.
+/// @errors kNotFound: no X server; kIo: no answer; kUnsupported: no RandR 1.3
 /// @thread thread-safe
 [[nodiscard]] Result<std::vector<RandrOutput>> list_outputs();
 

@@ -16,7 +16,7 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr auto kPatience = 5s;  // a busy machine is no unplugged projector
+constexpr auto kPatience = 5s;  // a busy machine is not an unplugged projector
 constexpr auto kOldest = 1s;
 constexpr int kRefreshesUntilAFlip = 3;
 
@@ -26,7 +26,7 @@ struct FreeMemory {
 template <class T>
 using Reply = std::unique_ptr<T, FreeMemory>;
 
-// A driver without a vertical blank may stamp nothing, or with another clock.
+// A driver without a vertical blank may give no stamps, or stamps from another clock.
 MonotonicTime plausible(std::uint64_t monotonic_us) {
   const auto now = steady_clock::now();
   const MonotonicTime time{std::chrono::microseconds(monotonic_us)};
@@ -78,7 +78,7 @@ bool RefreshClock::wait_readable(MonotonicTime deadline) {
          xcb_connection_has_error(connection_) == 0;
 }
 
-// The answer to the request of that number; with 0 the next flip. Notes the flips that come before it.
+// Waits for the answer to the request of that number; with 0, for the next flip. Notes flips that come before it.
 std::optional<RefreshClock::Refresh> RefreshClock::next_event(std::uint32_t serial, MonotonicTime deadline) {
   do {
     while (const Reply<xcb_generic_event_t> event{xcb_poll_for_special_event(connection_, events_)}) {
@@ -92,7 +92,7 @@ std::optional<RefreshClock::Refresh> RefreshClock::next_event(std::uint32_t seri
   return std::nullopt;
 }
 
-// A count that is over already is answered at once, with the refresh that is under way.
+// If the count has already passed, the answer comes at once, with the current refresh.
 std::optional<RefreshClock::Refresh> RefreshClock::refresh_at(std::uint64_t count, MonotonicTime deadline) {
   xcb_present_notify_msc(connection_, window_, ++serial_, count, 0, 0);
   xcb_flush(connection_);

@@ -15,36 +15,36 @@ struct xcb_special_event;
 
 namespace slsd {
 
-/// The clock of the refreshes of a window's monitor, by the X extension Present over a connection of its own. It takes
-/// the vertical blank of the graphics driver, stamped with CLOCK_MONOTONIC. Without Present, it assumes that the
-/// refresh begins one period after the buffers were swapped, the latest that is possible.
+/// Times the refreshes of a window's monitor with the X extension Present, over a separate connection. Uses the
+/// graphics driver's vertical blank, stamped with CLOCK_MONOTONIC. Without Present, assumes the latest possible time:
+/// the refresh begins one period after the buffers were swapped.
 ///
 ///     prepare()  swap                         wait_refresh() returns t
 ///     ----|-------|----|-----------------------|-----------------------
 ///                      the first refresh that  t: its end
 ///                      shows what was swapped
 ///
-/// A server that flips buffers says itself when it flipped; one that copies has copied before it answers, and the next
-/// refresh shows that.
+/// A server that flips buffers reports when it flipped. A server that copies has finished before it answers, and the
+/// next refresh shows the copy.
 /// @thread thread-bound
 class RefreshClock {
  public:
   /// @param window      X id of the window
-  /// @param refresh_hz  of its monitor; 0: unknown, 50 is taken
+  /// @param refresh_hz  of its monitor; 0: unknown, 50 is assumed
   [[nodiscard]] static std::unique_ptr<RefreshClock> open(const std::string& display, std::uint32_t window,
                                                           double refresh_hz);
   ~RefreshClock();
   RefreshClock(const RefreshClock&) = delete;
   RefreshClock& operator=(const RefreshClock&) = delete;
 
-  /// Tells whether the driver's own times are used.
+  /// Tells whether the driver's own times are available.
   [[nodiscard]] bool is_exact() const { return events_ != nullptr; }
 
-  /// Forgets what was before. Called before each swap.
+  /// Discards earlier events. Call it before each swap.
   void prepare();
 
-  /// Waits until the first refresh that shows what was swapped, from its first row on, is complete, and returns when
-  /// that was. @errors kDisconnected: no refresh comes
+  /// Waits until the first refresh with the swapped image is complete from its first row on, and returns the time of
+  /// its end. @errors kDisconnected: no refresh comes
   [[nodiscard]] Result<MonotonicTime> wait_refresh();
 
  private:

@@ -23,17 +23,17 @@ int on_failed_request(Display*, XErrorEvent*) {
 
 void note_loss(Display* display, void* lost);
 
-thread_local std::jmp_buf* guarded = nullptr;  // where to go on when a connection breaks
+thread_local std::jmp_buf* guarded = nullptr;  // the place to continue when a connection breaks
 
-// Xlib ends the process after this, unless survive_loss() came before, for which it is too early while GLFW begins.
+// Xlib ends the process after this, unless survive_loss() was called. GLFW calls Xlib before that is possible.
 int on_lost_connection(Display* display) {
   if (guarded == nullptr || display->exit_handler == note_loss) return 0;
   ::close(ConnectionNumber(display));
   std::longjmp(*guarded, 1);
 }
 
-// Xlib writes requests for a connection that broke into a buffer that nobody empties, and crashes when it is full;
-// where Mesa wrote last it is full from the start.
+// For a broken connection, Xlib writes requests into a buffer that nobody empties, and crashes when it is full. After a
+// write by Mesa it is full from the start.
 void forget_requests(Display* display) {
   constexpr std::size_t kEnoughBytes = 1 << 20;
   auto* buffer = static_cast<char*>(std::malloc(kEnoughBytes));

@@ -12,20 +12,20 @@ struct _XDisplay;
 
 namespace slsd {
 
-// Xlib ends the process when a request fails or a connection breaks. A service outlives its X server.
+// Xlib ends the process when a request fails or a connection breaks. A service must outlive its X server.
 
-/// Makes a request that fails do nothing, from now on. GLFW undoes this when it makes a window.
+/// Makes failed requests harmless from now on. GLFW undoes this when it creates a window.
 /// @thread thread-safe
 void survive_x_errors();
 
-/// Makes the end of this connection set the flag, from now on. Later requests over it do nothing.
-/// @param lost  outlives the connection
+/// Sets the flag when this connection ends. Later requests over it do nothing.
+/// @param lost  must outlive the connection
 void survive_loss(_XDisplay* display, std::atomic<bool>& lost);
 
-/// Makes a call that uses a connection, and comes back from the midst of it when that breaks: GLFW looks at no answer.
-/// What the call holds by then is lost.
-/// @param call  nothing in it has a destructor
-/// @return      false where the connection broke
+/// Makes a call that uses a connection, and jumps out of the call if the connection breaks, because GLFW checks no
+/// answer. Resources held by the call are lost.
+/// @param call  must hold nothing with a destructor
+/// @return      false if the connection broke
 [[nodiscard]] bool survive_call(const std::function<void()>& call);
 
 /// The error that no X server answers, with its remedy.
@@ -34,15 +34,15 @@ void survive_loss(_XDisplay* display, std::atomic<bool>& lost);
 /// The error kIo that the X server hangs, with its remedy.
 [[nodiscard]] tl::unexpected<Error> no_answer();
 
-/// Tells whether the X server that DISPLAY names belongs to the scanner alone, as that of slsd-display.service does.
-/// The unit of slsd says so by the folder that SLSD_OWN_DISPLAY names, which is there while that server runs.
+/// Tells whether only the scanner uses the X server that DISPLAY names, such as that of slsd-display.service. The unit
+/// of slsd names a folder in SLSD_OWN_DISPLAY, which exists while that server runs.
 [[nodiscard]] bool owns_display();
 
-/// Keeps the monitors of an X server lit (DPMS off) for as long as it lives; then power saving is as it was.
+/// Keeps the monitors of an X server on (DPMS off) while this object lives; then restores power saving.
 /// @thread thread-bound
 class StayAwake {
  public:
-  /// @param display  outlives it
+  /// @param display  must outlive this object
   [[nodiscard]] static std::unique_ptr<StayAwake> begin(_XDisplay* display);
   ~StayAwake();
   StayAwake(const StayAwake&) = delete;
