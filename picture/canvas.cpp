@@ -10,8 +10,8 @@
 namespace slsd {
 namespace {
 
-// The letters from space to ~ as strokes: points of two characters each, a digit for x and a letter for y, from a (4
-// below the base line e) to q, the height of a capital; a space lifts the pen.
+// The letters from space to ~ as strokes. Each point has two characters: a digit for x, and a letter for y. The letter
+// runs from a (4 below the base line e) to q (the height of a capital). A space lifts the pen.
 constexpr std::array<std::string_view, 95> kStrokes{
     "", "0q0h 0f0e", "0q0n 3q3n", "2e3q 5e6q 0i8i 0m8m", "7o5q2q0o0m2k5k7i7g5e2e0g 3d4r",
     "0e8q 1n1p2q3p3n2m1n 5f5h6i7h7f6e5f", "8e1n1p2q4q5p5n0i0g2e4e8i", "0q0n", "3r0o0g3d", "0r3o3g0d", "3h3n 0i6m 0m6i",
@@ -39,9 +39,9 @@ constexpr std::array<std::string_view, 95> kStrokes{
     "0m0g2e4e6g 6m6e", "0m3e6m", "0m2e4k6e8m", "0e6m 0m6e", "0m3e 6m3e2b0a", "0m6m0e6e",
     // { to ~
     "4r2q2l0j2i2d4c", "0r0c", "0r2q2l4j2i2d0c", "0i1k2k4i5i6k"};
-constexpr double kCapital = 12;  // of these units
+constexpr double kCapital = 12;  // in these units
 constexpr double kGap = 3;       // between two letters
-constexpr double kSpace = 3;     // the width of none
+constexpr double kSpace = 3;     // the width of a space
 
 std::string_view strokes_of(char letter) {
   const bool drawn = letter >= ' ' && letter <= '~';
@@ -59,12 +59,12 @@ double stroke_px(double height_px) {
   return std::max(1.0, height_px / 11.0);
 }
 
-// The share of a pixel that lies within a shape, by how far its centre is from the shape's middle.
+// The share of a pixel inside a shape, from the distance of its centre to the shape's middle.
 double covered(double distance_px, double half_width_px) {
   return std::clamp(half_width_px + 0.5 - distance_px, 0.0, 1.0);
 }
 
-// From the first whole number above `low` to the last below `high`, of those within a side of the picture.
+// The whole numbers above `low` and below `high` that lie within a side of the picture.
 struct Pixels {
   int first, last;
   Pixels(double low, double high, int side)
@@ -72,8 +72,8 @@ struct Pixels {
         last(static_cast<int>(std::clamp(std::floor(high), -1.0, side - 1.0))) {}
 };
 
-// Colours each pixel within the reach of a stroke from one point to another. Goes along its longer side, so that a
-// thin line through the whole picture costs its length alone.
+// Colours each pixel within reach of a stroke between two points. Follows the longer side, so the cost of a thin line
+// grows only with its length.
 void stroke(ColourImage& picture, const Eigen::Vector2d& from, const Eigen::Vector2d& to, Rgb colour, double width_px) {
   const Eigen::Vector2d along = to - from;
   const double squared = along.squaredNorm(), reach = 0.5 * width_px + 0.5;

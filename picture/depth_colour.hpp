@@ -6,7 +6,7 @@
 
 namespace slsd {
 
-/// Colour of a depth: gold is near, indigo far; lightness falls steadily, so that it also reads without colour.
+/// The colour of a depth: gold is near, indigo far. Lightness falls steadily, so the scale is readable without colour.
 /// @param share  0 near to 1 far; clamped
 /// @thread reentrant
 [[nodiscard]] Rgb depth_colour(double share);

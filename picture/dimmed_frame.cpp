@@ -11,7 +11,7 @@
 namespace slsd {
 namespace {
 
-constexpr double kBrightShare = 0.99;  // of the pixels are not brighter than what is drawn brightest
+constexpr double kBrightShare = 0.99;  // this share of pixels is no brighter than full brightness
 constexpr double kDim = 0.46;
 constexpr Rgb kFooter{24, 27, 34};
 

@@ -64,7 +64,7 @@ int scale_of(const GreyView& frame, double pitch) {
   return scale;
 }
 
-// Frame pixels to picture pixels, and marks in sizes that suit the pitch.
+// Maps frame pixels to picture pixels, and sizes marks by the pitch.
 class Marker {
  public:
   Marker(ColourImage& picture, int scale, double pitch) : canvas_(picture), scale_(scale), pitch_(scale * pitch) {}
@@ -79,7 +79,7 @@ class Marker {
     canvas_.disc(place(region), 0.2 * pitch_ + 1.0, kRim);
     canvas_.disc(place(region), 0.2 * pitch_, letter_colour(region.letter));
   }
-  /// Draws a decoded region about which there is nothing to say.
+  /// Draws a decoded region that needs no comment.
   void settled(const RegionSeen& region) { canvas_.disc(place(region), 0.12 * pitch_, kSettledColour); }
   void undecoded(const RegionSeen& region) {
     canvas_.plus(place(region), 0.27 * pitch_, kUndecodedColour, stroke() + 1);
@@ -162,7 +162,7 @@ void draw_legend(ColourImage& picture, int top, double text_px, const Decoding& 
   legend.dashes(kBrokenLinkColour, "broken link");
 }
 
-/// The height of the legend, in heights of its letters.
+/// The height of the legend in letter heights.
 double footer_lines(const Decoding& decoding, DecodingLook look) {
   constexpr double kUsual = 8.5, kForARule = 0.7;
   double lines = kUsual;

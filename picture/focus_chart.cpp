@@ -62,7 +62,7 @@ class FocusChart {
     fill(0, bottom / 2, right, (bottom + 1) / 2);
   }
 
-  // Each spoke and each gap between two is a kSpokes-th of half a turn.
+  // Each spoke and each gap is a kSpokes-th of half a turn.
   void star(int centre_x, int centre_y) {
     for (int y = -star_radius_; y <= star_radius_; ++y) {
       for (int x = -star_radius_; x <= star_radius_; ++x) {
@@ -79,7 +79,7 @@ class FocusChart {
     }
   }
 
-  // A star, and the lines beside it, to the right with side = 1.
+  // Draws a star and the lines beside it; to the right if side = 1.
   void target(int centre_x, int centre_y, int side) {
     star(centre_x, centre_y);
     const int block = star_radius_ - kGapPx / 2;

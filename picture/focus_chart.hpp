@@ -6,11 +6,11 @@
 
 namespace slsd {
 
-/// A chart by which a projector is focused and framed, in whole black and white pixels: the outermost pixels lit all
-/// around and a frame a twentieth of the height inside; a cross through the exact centre, two pixels wide where a side
-/// is even; the size in pixels; and in the centre and the corners a star whose spokes run together where the light is
-/// blurred, beside lines of one and of two pixels, upright and lying. Where the lines of one pixel are grey the picture
-/// is scaled or blurred.
+/// A chart for focusing and framing a projector, in whole black and white pixels. The outermost pixels are lit all
+/// around, and a frame runs a twentieth of the height inside. A cross marks the exact centre, two pixels wide if a side
+/// is even. The chart shows its size in pixels. The centre and the corners have stars, whose spokes merge if the light
+/// is blurred. Beside them are lines of one and two pixels, vertical and horizontal. If the one-pixel lines look grey,
+/// the picture is scaled or blurred.
 ///
 ///     +-----------+-----------+
 ///     | * =       |       = * |
@@ -20,7 +20,7 @@ namespace slsd {
 ///     | * =       |       = * |
 ///     +-----------+-----------+
 ///
-/// @param width_px, height_px  of the projector; what finds no room in a tiny one is cut
+/// @param width_px, of the projector; elements that do not fit a tiny one are clipped
 /// @thread reentrant
 [[nodiscard]] Grey8 draw_focus_chart(int width_px, int height_px);
 

@@ -7,7 +7,7 @@ namespace {
 
 constexpr Rgb kLegendInk{222, 228, 238};
 
-// In heights of a letter.
+// In letter heights.
 constexpr double kMarkWidth = 1.9;
 constexpr double kEntryGap = 2.1;
 constexpr double kLinePitch = 2.2;

@@ -8,7 +8,7 @@
 
 namespace slsd {
 
-/// Words one after the other, each behind its mark; a new line begins where the picture ends.
+/// Words in a row, each behind its mark; wraps at the picture's border.
 /// @thread thread-bound
 class Legend {
  public:
@@ -22,7 +22,7 @@ class Legend {
   void dashes(Rgb colour, const std::string& words);
 
  private:
-  /// Makes room for the words and their mark; gives the mark's centre.
+  /// Makes room for the words and their mark; returns the mark's centre.
   Eigen::Vector2d begin(const std::string& words);
   void write(const std::string& words);
 

@@ -34,7 +34,7 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-// Samples of a pixel lie in its middle and symmetrically about it.
+// The samples of a pixel are symmetric about its centre.
 Eigen::Vector3d to_samples(const Eigen::Vector3d& place) {
   const double shift = 0.5 * (Relief::kSamples - 1);
   return {place.x() * Relief::kSamples + shift, place.y() * Relief::kSamples + shift, place.z()};

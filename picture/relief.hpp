@@ -13,8 +13,8 @@ namespace slsd {
 
 /// A corner of a triangle as the viewer sees it.
 struct ReliefVertex {
-  Eigen::Vector3d place;   ///< picture px, and depth in the same scale, growing away from the viewer
-  Eigen::Vector3d normal;  ///< towards the viewer or away; of any length
+  Eigen::Vector3d place;   ///< picture px, with depth in the same scale, growing away from the viewer
+  Eigen::Vector3d normal;  ///< of either orientation and any length
   double colour_share;     ///< argument of depth_colour()
   double brightness = 1;   ///< brightness of a disc: 0 is black
 };
@@ -22,17 +22,17 @@ struct ReliefVertex {
 /// Direction to the light, rig frame: from the upper left, behind the viewer.
 [[nodiscard]] Eigen::Vector3d light_direction();
 
-/// A shaded layer with hidden surfaces removed, sampled kSamples x kSamples times a pixel.
+/// A shaded layer with hidden surfaces removed, sampled kSamples x kSamples times per pixel.
 /// @thread thread-bound
 class Relief {
  public:
-  /// @param forward  direction in which the viewer looks, rig frame
+  /// @param forward  the viewer's direction, rig frame
   Relief(int width_px, int height_px, const Eigen::Vector3d& forward);
 
   void triangle(const std::array<ReliefVertex, 3>& corners);
-  /// A disc that faces the viewer.
+  /// Draws a disc that faces the viewer.
   void disc(const ReliefVertex& centre, double radius_px);
-  /// Lays the layer over a picture of its size; where depth jumps, the nearer side gets a thin dark outline.
+  /// Draws the layer over a picture of its size. At jumps of depth, the nearer side gets a thin dark outline.
   /// @param jump  in the places' scale
   void compose(ColourImage& picture, double jump) const;
 

@@ -20,20 +20,20 @@ namespace {
 constexpr Rgb kTop{255, 255, 255};
 constexpr Rgb kBottom{232, 236, 243};
 constexpr Rgb kInk{44, 50, 66};
-constexpr double kTrimmedShare = 0.01;  // of the depths, at either end of the colours
-constexpr double kLeastSpan = 0.008;    // of the depth
+constexpr double kTrimmedShare = 0.01;  // share of depths cut at either end of the colours
+constexpr double kLeastSpan = 0.008;    // as a share of the depth
 constexpr float kFarthestMm = 1e6F;
 constexpr double kDotBrightness = 0.72;
 constexpr Rgb kSoftInk{104, 112, 130};
 
-// Depths that the colours span, mm.
+// The range of depths that the colours cover, mm.
 using DepthRange = std::pair<double, double>;
 
 double share_of(const DepthRange& range, double depth_mm) {
   return (depth_mm - range.first) / std::max(range.second - range.first, 1e-9);
 }
 
-// Nearly all depths; so wide that the noise of a flat plane does not take all the colours.
+// The range of nearly all depths; wide enough that noise on a flat plane does not use all colours.
 DepthRange depths_within(const Surface& surface, const Box& box) {
   std::vector<double> depths;
   for (const Eigen::Vector3d& point : surface.points) {
@@ -47,7 +47,7 @@ DepthRange depths_within(const Surface& surface, const Box& box) {
   return {low - 0.5 * missing, high + 0.5 * missing};
 }
 
-// A cloud may come from a file: what is not finite, or absurdly far, cannot be drawn.
+// A cloud may come from a file: infinite or absurdly far points cannot be drawn.
 Cloud drawable(Cloud cloud) {
   std::erase_if(cloud.points, [](const CloudPoint& point) {
     const auto far = [](float value) { return !(std::abs(value) < kFarthestMm); };
@@ -94,7 +94,7 @@ void draw_surface(ColourImage& picture, const Surface& surface, const View& view
     if (!shown(i)) continue;
     ReliefVertex point = vertex(i);
     const bool joined = surface.normals[i].norm() > 0;
-    // Lifted off its own surface, so that the whole disc is seen.
+    // Lifted off its surface, so that the whole disc is visible.
     if (joined) point.place.z() -= 0.3 * spacing_px, point.brightness = kDotBrightness;
     relief.disc(point, joined ? std::min(0.11 * spacing_px, 3.0) : std::clamp(0.3 * spacing_px, 1.0, 8.0));
   }

@@ -15,10 +15,11 @@ struct CloudPictureSize {
   int height_px = 1200;  ///< 240 to 8192
 };
 
-/// Draws a cloud for people: seen from beside and above the scanner, neighbours of the lattice joined where depth runs
-/// on, shaded, coloured by depth; axes in millimetres (rig frame), a scale bar and a colour bar.
-/// @param measured  points that the title names; those of the cloud, unless it is a part of a larger one
-/// @return          a picture with its axes alone where the cloud is empty
+/// Draws a cloud for people, seen from beside and above the scanner. Joins neighbours of the lattice if depth is
+/// continuous; shades them and colours them by depth. Adds axes in millimetres (rig frame), a scale bar and a colour
+/// bar.
+/// @param measured  number of points in the title; the cloud's own, unless it is part of a larger one
+/// @return          a picture; with axes alone if the cloud is empty
 /// @thread          reentrant
 [[nodiscard]] ColourImage render_cloud(const Cloud& cloud, CloudPictureSize size = {},
                                        std::optional<std::size_t> measured = {});

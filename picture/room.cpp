@@ -19,9 +19,9 @@ constexpr Rgb kFrame{150, 158, 174};
 constexpr Rgb kText{70, 78, 96};
 constexpr double kShadow = 0.30;
 
-// A side of the box that faces the viewer from behind the cloud.
+// A side of the box behind the cloud, facing the viewer.
 struct Side {
-  int axis;      // the one that stands upright on it
+  int axis;      // the axis perpendicular to the side
   bool at_high;  // whether it lies at the box's high end
   Rgb colour;
 };
@@ -36,7 +36,7 @@ double step_of(const Box& box) {
   return tick_step(box.size().maxCoeff(), kMostTicks);
 }
 
-// The point of the side at shares (a, b) of its two other axes.
+// The point of the side at shares (a, b) of the two other axes.
 Eigen::Vector3d on_side(const Side& side, const Box& box, double a, double b) {
   const int first = (side.axis + 1) % 3, second = (side.axis + 2) % 3;
   Eigen::Vector3d point;
@@ -75,7 +75,7 @@ void draw_grid(Canvas& canvas, const Side& side, const View& view, const Box& bo
   }
 }
 
-// Where the light throws the surface onto a side, softened; 255 is full shadow.
+// The surface's soft shadow on a side; 255 is full shadow.
 cv::Mat shadow_on(const Side& side, const cv::Size& size, const View& view, const Box& box, const Surface& surface) {
   const Eigen::Vector3d light = light_direction();
   cv::Mat shadow = cv::Mat::zeros(size, CV_8U);
@@ -113,7 +113,7 @@ void draw_frame(Canvas& canvas, const Side& side, const View& view, const Box& b
   }
 }
 
-// An edge of the box that carries numbers, and where they stand beside it.
+// An edge of the box with numbers, and the place of the numbers beside it.
 struct Edge {
   int axis;
   Eigen::Vector3d from;

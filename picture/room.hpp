@@ -8,7 +8,7 @@
 
 namespace slsd {
 
-/// Draws what stands behind the cloud: floor, side and back of the box with their grids, and the cloud's soft shadow.
+/// Draws the background of the cloud: floor, side and back of the box with their grids, and the cloud's soft shadow.
 void draw_room(ColourImage& picture, const View& view, const Box& box, const Surface& surface);
 
 /// Draws the numbers along the box's edges and the names of its axes.

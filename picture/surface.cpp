@@ -16,7 +16,7 @@ constexpr double kMaxEdge = 3.0;
 
 using Corners = std::array<std::int32_t, 4>;  // clockwise from the top left; -1: no point
 
-// The points by their cells. As large as there are points, wherever in the lattice a file says that they lie.
+// The points by their cells. Its size is the number of points, wherever a file places them in the lattice.
 class Lattice {
  public:
   explicit Lattice(const Cloud& cloud) {
@@ -32,7 +32,7 @@ class Lattice {
     quads_.erase(std::unique(quads_.begin(), quads_.end()), quads_.end());  // clang 14 cannot read its ranges form
   }
 
-  // Visits each square of four neighbouring cells that holds a point, camera by camera, row by row.
+  // Visits each square of four neighbouring cells that contains a point, by camera and row.
   template <class Visit>
   void for_each_quad(Visit visit) const {
     constexpr std::uint64_t kRow = 1U << 17U;
@@ -41,12 +41,12 @@ class Lattice {
   }
 
  private:
-  // Cells are of 16 bits; the one beyond the last is no cell of the next row.
+  // Cells have 16 bits; the one after the last must not wrap to another row.
   static std::uint64_t key(int camera, int row, int column) {
     return (static_cast<std::uint64_t>(camera) << 34U) + (static_cast<std::uint64_t>(row) << 17U) +
            static_cast<std::uint64_t>(column);
   }
-  // Of points that share a cell the last one counts.
+  // If points share a cell, the last one counts.
   [[nodiscard]] std::int32_t at(std::uint64_t key) const {
     const auto after = std::ranges::upper_bound(cells_, key, {}, &std::pair<std::uint64_t, std::int32_t>::first);
     return after != cells_.begin() && std::prev(after)->first == key ? std::prev(after)->second : -1;
@@ -56,7 +56,7 @@ class Lattice {
   std::vector<std::uint64_t> quads_;
 };
 
-// Length of an edge in lattice pitches at its depth, where a pitch grows with the distance.
+// The length of an edge in lattice pitches at its depth; a pitch grows with the distance.
 double edge(const std::vector<Eigen::Vector3d>& points, std::int32_t a, std::int32_t b) {
   return (points[a] - points[b]).norm() / std::max(1.0, 0.5 * (points[a].z() + points[b].z()));
 }
@@ -76,7 +76,7 @@ class Joiner {
  public:
   Joiner(Surface& surface, double longest) : surface_(surface), longest_(longest) {}
 
-  // Two triangles across the shorter diagonal, or the one that three corners allow.
+  // Two triangles across the shorter diagonal, or one triangle for three corners.
   void join(const Corners& quad) {
     const bool falling = quad[0] >= 0 && quad[2] >= 0;
     const bool rising = quad[1] >= 0 && quad[3] >= 0;

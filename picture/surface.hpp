@@ -12,9 +12,10 @@
 
 namespace slsd {
 
-/// A cloud joined to a surface: neighbours of the pattern's lattice whose distance is that of a smooth surface.
+/// A cloud joined to a surface: neighbours of the pattern's lattice are joined if their distance suits a smooth
+/// surface.
 struct Surface {
-  std::vector<Eigen::Vector3d> points;   ///< mm, rig frame; those of the cloud, in its order
+  std::vector<Eigen::Vector3d> points;   ///< mm, rig frame; the cloud's points, in its order
   std::vector<Eigen::Vector3d> normals;  ///< unit length, towards the first camera; zero if nothing is joined
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };

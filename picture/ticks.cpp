@@ -23,7 +23,7 @@ double tick_step(double span, int most) {
 std::vector<double> ticks(double low, double high, double step) {
   const double first = std::ceil(low / step - 1e-9), last = std::floor(high / step + 1e-9);
   std::vector<double> values;
-  // Counted in whole numbers: far from zero, adding a step may change nothing.
+  // Counted in whole numbers: far from zero, adding a step may have no effect.
   for (int i = 0; i <= last - first && i < kMostTicks; ++i) values.push_back((first + i) * step);
   return values;
 }

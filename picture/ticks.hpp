@@ -7,7 +7,7 @@
 
 namespace slsd {
 
-/// A step of 1, 2 or 5 times a power of ten, so that at most `most` of them fit into the span.
+/// The smallest step of 1, 2 or 5 times a power of ten with at most `most` steps in the span.
 /// @param span  above zero
 [[nodiscard]] double tick_step(double span, int most);
 

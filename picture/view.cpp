@@ -19,7 +19,7 @@ constexpr double kMargin = 0.05;
 constexpr double kThinnest = 0.2;  // of the widest side
 constexpr double kSmallestMm = 1.0;
 
-// Nearly all values: a few stray points do not shrink the rest to a dot.
+// Nearly all values, so that a few stray points do not shrink the rest to a dot.
 void span(std::vector<double> values, double& low, double& high) {
   std::sort(values.begin(), values.end());
   const auto skipped = static_cast<std::size_t>(kTrimmedOfAxis * static_cast<double>(values.size()));

@@ -19,13 +19,13 @@ struct Box {
   [[nodiscard]] Eigen::Vector3d size() const { return high - low; }
 };
 
-/// The box around nearly all points (four in a thousand may lie outside), never thinner than a fifth of its widest
-/// side.
+/// The box around nearly all points (four in a thousand may lie outside). No side is thinner than a fifth of the
+/// widest.
 /// @param cloud  finite coordinates
 [[nodiscard]] Box box_of(const Cloud& cloud);
 
-/// Orthographic view from beside and above the scanner, the whole box fitted into a rectangle of the picture: lengths
-/// across the view are everywhere to one scale.
+/// An orthographic view from beside and above the scanner, with the whole box fitted into a rectangle of the picture.
+/// Lengths across the view have one scale everywhere.
 /// @thread reentrant
 class View {
  public:
@@ -34,12 +34,12 @@ class View {
   };
   View(const Box& box, const Frame& frame);
 
-  /// Place in the picture (x right, y down, px), and depth away from the viewer in the same scale.
+  /// The place in the picture (x right, y down, px), and the depth away from the viewer in the same scale.
   [[nodiscard]] Eigen::Vector3d place(const Eigen::Vector3d& point) const {
     return axes_ * point * px_per_mm_ + shift_;
   }
   [[nodiscard]] Eigen::Vector2d flat(const Eigen::Vector3d& point) const { return place(point).head<2>(); }
-  /// Direction in which the viewer looks, rig frame.
+  /// The viewer's direction, rig frame.
   [[nodiscard]] Eigen::Vector3d forward() const { return axes_.row(2).transpose(); }
   [[nodiscard]] double px_per_mm() const { return px_per_mm_; }
 

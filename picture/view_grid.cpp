@@ -57,7 +57,7 @@ void draw_lines(ColourImage& picture) {
   canvas.rectangle(width - 1, 0, 1, height, kFrame);
 }
 
-// Beside the first place of the outline that has room for the words.
+// Beside the first point of the outline with room for the words.
 void name_outline(ColourImage& picture, const std::vector<Eigen::Vector2d>& outline, const std::string& words) {
   Canvas canvas(picture);
   const double height_px = std::max(9.0, picture.height() / 50.0);
@@ -77,7 +77,7 @@ void draw_view(ColourImage& picture, const Calibration& calibration, const Calib
   const auto outline = outline_of_view(calibration, camera, depth.mm);
   Canvas canvas(picture);
   for (std::size_t i = 0; i + 1 < outline.size(); ++i) {
-    const double gap = (outline[i + 1] - outline[i]).norm();  // where places were left out
+    const double gap = (outline[i + 1] - outline[i]).norm();  // points were left out here
     if (gap < picture.width() / 2.0) canvas.line(outline[i], outline[i + 1], kFrame, depth.thickness_px);
   }
   name_outline(picture, outline, camera.name + " " + depth.name + " " + std::to_string(std::lround(depth.mm)) + " mm");

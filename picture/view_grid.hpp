@@ -11,20 +11,20 @@
 
 namespace slsd {
 
-/// The border of a camera's image in the projector's, for a surface at one depth.
+/// The border of a camera's image in projector pixels, for a surface at one depth.
 /// @param depth_mm  along the camera's axis, above 0
-/// @param step_px   of the camera, from one place to the next along the border
-/// @return          projector px, distorted, around the border and back to its beginning; without what lies behind the
-///                  projector or so far outside its picture that its distortion says nothing
+/// @param step_px   distance of neighbouring points along the border, camera px
+/// @return          projector px, distorted, once around the border and closed; without points behind the projector, or
+///                  so far outside its picture that its distortion model does not apply
 /// @thread reentrant
 [[nodiscard]] std::vector<Eigen::Vector2d> outline_of_view(const Calibration& calibration,
                                                            const CalibratedCamera& camera, double depth_mm,
                                                            double step_px = 8);
 
-/// A grid by which scanner and object are placed: lines over the projector's whole picture, and what each camera sees
-/// at the nearest, the middle and the farthest depth, each named. Between the outlines lies what can be measured.
+/// A grid for placing scanner and object: lines over the projector's whole picture, and the named outlines of each
+/// camera's view at the nearest, middle and farthest depth. The measurable region lies between the outlines.
 /// @param depth_min_mm, depth_max_mm  along the cameras' axes
-/// @return of the projector's size
+/// @return in the projector's size
 /// @thread reentrant
 [[nodiscard]] Grey8 draw_view_grid(const Calibration& calibration, double depth_min_mm, double depth_max_mm);
 
