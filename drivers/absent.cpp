@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-// For a build without device drivers (SLSD_DEVICES=OFF): no camera and no monitor is seen.
+// For a build without device drivers (SLSD_DEVICES=OFF): no camera and no monitor is visible.
 #include "drivers/camera/listing/list_cameras.hpp"
 #include "drivers/projector/x11/choose_output.hpp"
 #include "drivers/projector/x11/x_display.hpp"

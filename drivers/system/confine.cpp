@@ -20,7 +20,7 @@
 namespace slsd {
 namespace {
 
-constexpr rlim_t kMemoryBytes = 256 << 20;  // a picture of 4K, its file and the libraries
+constexpr rlim_t kMemoryBytes = 256 << 20;  // for a 4K picture, its file and the libraries
 constexpr rlim_t kProcessorSeconds = 10;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -52,8 +52,8 @@ void drop_capabilities() {
   ::syscall(SYS_capset, &header, none);
 }
 
-/// The filter in the language of the kernel's filters, in which a jump skips that many instructions. It looks at the
-/// low halves of arguments, which is where these flags are.
+/// The filter program for the kernel; a jump skips that many instructions. It checks the low halves of arguments, which
+/// contain these flags.
 std::vector<sock_filter> filter() {
   const auto load = [](std::size_t at) {
     return sock_filter BPF_STMT(BPF_LD | BPF_W | BPF_ABS, static_cast<unsigned>(at));

@@ -6,13 +6,13 @@
 
 namespace slsd {
 
-/// Confines this process to computing, to reading and writing what it has open, and to memory up to a limit. The kernel
-/// kills it (SIGSYS) if it asks for anything else: a file, socket, process, signal or executable memory, whoever has
-/// taken it over. It has no capabilities and may not have new rights. Call it in a program with one thread, before the
-/// first byte of a stranger's.
+/// Confines this process to computing, to its open descriptors, and to a limit of memory. The kernel kills it (SIGSYS)
+/// if it requests anything else: a file, socket, process, signal or executable memory. That holds even if an attacker
+/// controls the process. It has no capabilities and cannot gain rights. Call it in a single-threaded program, before
+/// reading untrusted bytes.
 ///
-/// A sanitizer needs calls of its own: a program that is built with one is not confined.
-/// @errors kUnsupported: the kernel filters no system calls
+/// A sanitizer needs further system calls: a program built with one is not confined.
+/// @errors kUnsupported: the kernel has no system call filter
 /// @thread thread-bound
 [[nodiscard]] Result<> confine();
 

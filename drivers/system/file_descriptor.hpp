@@ -9,12 +9,12 @@
 
 namespace slsd {
 
-/// Owns a file descriptor, or none: of a file, a socket, a device, an event.
+/// Owns a file descriptor of a file, a socket, a device or an event; or none.
 /// @thread thread-bound
 class FileDescriptor {
  public:
   FileDescriptor() = default;
-  /// @param number  as open(), socket() and their kind return it: negative where they failed
+  /// @param number  a result of open(), socket() and the like: negative if they failed
   explicit FileDescriptor(int number) : number_(number) {}
   FileDescriptor(FileDescriptor&& other) noexcept : number_(other.release()) {}
   FileDescriptor& operator=(FileDescriptor&& other) noexcept {
@@ -30,8 +30,8 @@ class FileDescriptor {
   [[nodiscard]] int number() const { return number_; }
   [[nodiscard]] int release() { return std::exchange(number_, -1); }
 
-  /// Zero or errno: a network file system may report a full disk only here. Leaves errno as it was, so that a
-  /// destructor on the way out does not hide why a call failed.
+  /// Returns zero or errno: a network file system may report a full disk only here. Preserves errno, so that a
+  /// destructor does not hide why a call failed.
   [[nodiscard]] int close() {
     const int number = release();
     if (number < 0) return 0;

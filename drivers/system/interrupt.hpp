@@ -4,11 +4,11 @@
 
 namespace slsd {
 
-/// Lets the first SIGINT or SIGTERM end a command after the step under way; the second ends the program at once.
+/// Ends a command at the first SIGINT or SIGTERM after its current step; the second ends the program at once.
 /// @thread thread-bound
 class Interrupt {
  public:
-  /// Watches for the signals from now on.
+  /// Starts watching for the signals.
   static void watch();
   [[nodiscard]] static bool came();
 };

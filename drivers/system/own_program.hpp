@@ -12,19 +12,19 @@
 
 namespace slsd {
 
-/// Finds a program of slsd's own: beside this one, as it is built; else where it is installed, or will be.
+/// Finds one of slsd's programs: beside this one, as in a build tree; else in the install folder.
 /// @thread reentrant
 [[nodiscard]] std::filesystem::path find_own_program(const std::string& name);
 
-/// The descriptors that a child begins with; it has no other. -1 is /dev/null.
+/// The descriptors that a child starts with; it gets no others. -1 is /dev/null.
 struct ChildStreams {
   int in = -1;
   int out = -1;
   int errors = -1;
 };
 
-/// Starts it with no signal ignored or held back. Who starts it waits for its end.
-/// @errors kNotFound where there is no such program, kIo
+/// Starts the program with no signal ignored or blocked. The caller must wait for its end.
+/// @errors kNotFound if there is no such program, kIo
 /// @thread reentrant
 [[nodiscard]] Result<pid_t> start_own_program(const std::filesystem::path& program,
                                               const std::vector<std::string>& arguments, const ChildStreams& streams);

@@ -10,18 +10,18 @@
 
 namespace slsd {
 
-/// The meaning of a number of errno, and the user's remedy.
+/// The meaning of an errno value, and the user's remedy.
 struct SystemErrorMeaning {
   int number;
   ErrorCode code;
   std::string_view remedy;  ///< "check the path"
 };
 
-/// The error of a system call that failed: "cannot read: No such file or directory; check the path".
+/// The error of a failed system call: "cannot read: No such file or directory; check the path".
 /// @param number  errno
-/// @param doing   what was tried, as in "cannot read"
+/// @param doing   the failed action, such as "cannot read"
 /// @param where   the path, device or address
-/// @param known   what this place knows better than the table for all; the number 0 is for those that neither names
+/// @param known   meanings that override the general table; the number 0 covers all numbers in neither
 /// @thread        reentrant
 [[nodiscard]] Error system_error(int number, std::string_view doing, std::string where = {},
                                  std::span<const SystemErrorMeaning> known = {});

@@ -8,7 +8,7 @@
 
 namespace slsd {
 
-/// Names the calling thread, as `top -H` and a debugger show it; Linux keeps 15 bytes.
+/// Names the calling thread for `top -H` and debuggers; Linux keeps 15 bytes.
 inline void name_this_thread(const std::string& name) {
   pthread_setname_np(pthread_self(), name.substr(0, 15).c_str());
 }

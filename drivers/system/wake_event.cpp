@@ -37,7 +37,7 @@ Result<> WakeEvent::open() {
   const int number = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   if (number < 0) return fail_system(errno, "cannot make an event to wait for");
   number_ = number;
-  if (woken_) wake();  // came before, or while the number was on its way
+  if (woken_) wake();  // wake() came before, or during open()
   return {};
 }
 
@@ -68,7 +68,7 @@ void WakeEvent::reset() const {
   static_cast<void>(take());
 }
 
-// The event first: a wake() that comes in between leaves the flag, and then at most a poll() that ends early.
+// Reset the event first: a wake() in between leaves the flag, and at worst one poll() ends early.
 bool WakeEvent::take() const {
   std::uint64_t count = 0;
   [[maybe_unused]] const auto count_read = ::read(number_, &count, sizeof count);
