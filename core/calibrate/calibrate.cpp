@@ -52,7 +52,7 @@ Result<> check_one_rig(const Adjustment& adjustment, const Observations& observa
                           change->text, parts.empty() ? "" : ", or calibrate by those of one part:" + parts, now));
 }
 
-/// Leaves out what contradicts the rest, one after the other.
+/// Removes poses and points that contradict the rest, one after the other.
 Result<> settle(Adjustment& adjustment, Observations& observations, PoseList& poses) {
   do {
     while (const auto contradiction = find_contradiction(observations, adjustment.rig(), adjustment.influence())) {
@@ -80,12 +80,12 @@ Result<Adjustment> solve(Observations& observations, PoseList& poses, const Eige
   const std::size_t count = observations.poses.size();
   if (auto settled = settle(*adjustment, observations, poses); !settled) return tl::unexpected(settled.error());
   if (observations.poses.size() == count) return adjustment;
-  // Once more without the poses that contradict the others: a smaller change shows then.
+  // Test again without the poses that contradict the others: a smaller change then shows.
   if (auto one = check_one_rig(*adjustment, observations); !one) return tl::unexpected(one.error());
   return adjustment;
 }
 
-/// Takes the looks at the reference plane, which come last, out of the observations.
+/// Moves the looks at the reference plane, which come last, out of the observations.
 std::vector<PoseObservation> set_planes_aside(Observations& observations) {
   const auto first = std::ranges::find(observations.poses, PoseSubject::kPlane, &PoseObservation::subject);
   std::vector<PoseObservation> planes(std::make_move_iterator(first),
@@ -94,7 +94,8 @@ std::vector<PoseObservation> set_planes_aside(Observations& observations) {
   return planes;
 }
 
-/// Explains distances on planes that were left out: a print of another scale contradicts the poses too.
+/// Adds distance errors to the reasons of planes that were left out: a print of another scale also contradicts the
+/// poses.
 void explain_distances(const std::vector<PlaneCheck>& checks, PoseList& poses) {
   constexpr double kWorthTellingPercent = 0.1;
   for (const PlaneCheck& check : checks) {
@@ -106,7 +107,7 @@ void explain_distances(const std::vector<PlaneCheck>& checks, PoseList& poses) {
   }
 }
 
-/// @return what the planes say of the calibration by the poses alone, and of that by both
+/// @return checks of the planes by the calibration from the poses alone, and by the one from both
 Result<std::vector<PlaneCheck>> solve_with_planes(std::vector<PoseObservation> planes, Adjustment& adjustment,
                                                   Observations& observations, PoseList& poses) {
   for (PoseObservation& plane : planes) {
@@ -178,7 +179,7 @@ std::vector<ParameterReport> report_parameters(const Adjustment& adjustment, con
   const auto& shared = adjustment.equations().shared;
   for (std::size_t i = 0; i < shared.size(); ++i) {
     const SharedParameter& parameter = shared[i];
-    if (parameter.kind == SharedParameter::Kind::kShape) continue;  // the board's report has it
+    if (parameter.kind == SharedParameter::Kind::kShape) continue;  // the board's report covers it
     const std::string device =
         parameter.device < 0 ? "projector" : observations.cameras[static_cast<std::size_t>(parameter.device)].name;
     out.push_back(

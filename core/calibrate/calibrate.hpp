@@ -12,19 +12,19 @@
 namespace slsd {
 
 struct CalibrateOptions {
-  double depth_min_mm = 400;  ///< the working range, in which the depth's uncertainty is foretold
+  double depth_min_mm = 400;  ///< the working range, for which the depth's uncertainty is predicted
   double depth_max_mm = 2500;
-  Eigen::AlignedBox2d sheet_mm;  ///< the board with its white border, in the board's frame; empty: what is seen of it
+  Eigen::AlignedBox2d sheet_mm;  ///< the board with its white border, in the board's frame; empty: the part that is
+                                 ///< seen
 };
 
-/// Calibrates cameras and projector together: Zhang's method, the projector by where the cameras' rays to its pixels
-/// meet the board, then one adjustment of everything, in which terms of distortion take part only as far as the poses
-/// determine them. Poses that contradict the others and points that lie off are left out and named.
+/// Calibrates cameras and projector together by Zhang's method. The projector follows from the points at which the
+/// cameras' rays to its pixels meet the board. Then one adjustment covers everything; distortion terms count only as
+/// far as the poses determine them. Contradicting poses and outlying points are left out and reported.
 ///
-/// Where there are looks at a reference plane (Elahi et al. 2020), that is the first step, without them. In the second
-/// one each look is measured by the calibration so far, and then everything is adjusted again with the looks among the
-/// poses.
-/// @errors kImpossible: what was seen does not determine the rig; the message says what to shoot
+/// Looks at a reference plane (Elahi et al. 2020) add a second step. The first step leaves them out. In the second
+/// step, the calibration so far measures each look, and everything is adjusted again with the looks among the poses.
+/// @errors kImpossible: the observations do not determine the rig; the message says which poses to add
 /// @thread reentrant
 [[nodiscard]] Result<CalibrationOutcome> calibrate(Observations observations, const CalibrateOptions& options);
 

@@ -16,20 +16,20 @@
 namespace slsd {
 namespace {
 
-constexpr double kAlike = 1.6;  // a factor of five
+constexpr double kAlike = 1.6;  // odds within a factor of five
 
 double log_likelihood(const CameraRig& rig, const DepthRange& range) {
   return look_at_rig(rig, range).log_likelihood() + camera_likelihood(rig.camera.lens).sum() +
          projector_likelihood(rig.projector).sum();
 }
 
-/// A misreading, and how much more likely than the calibration as given: natural logarithm of the odds.
+/// A misreading, and the natural logarithm of its odds against the calibration as given.
 struct Ranked {
   const Misreading* misreading;
   double log_odds;
 };
 
-/// The advice of the likeliest, and of the next where it is nearly as likely.
+/// The advice of the likeliest misreading, and of the next if it is nearly as likely.
 std::string advice_of(std::vector<Ranked> ranked) {
   std::ranges::sort(ranked, std::greater(), &Ranked::log_odds);
   std::string advice = ranked.front().misreading->advice;
@@ -113,8 +113,8 @@ Disagreement compare(const RigidTransform& a, const RigidTransform& b) {
   return {turn * 180 / std::numbers::pi, (a.translation - b.translation).norm()};
 }
 
-/// Doubt about a further camera: R and T lead to the projector directly, and rig_from_camera by way of the first
-/// camera.
+/// Doubt about a further camera. R and T lead directly to the projector, while rig_from_camera leads there by way of
+/// the first camera.
 std::string detour_doubt(const CalibratedCamera& first, const CalibratedCamera& camera) {
   const RigidTransform &straight = camera.projector_from_camera, &given = camera.rig_from_camera;
   const double length_mm = std::max(first.projector_from_camera.translation.norm(), straight.translation.norm());
@@ -148,7 +148,7 @@ std::string about(const CalibratedCamera& camera, const std::string& doubt) {
 struct Explained {
   double on_line_share = 0, points_share = 0;
   std::vector<double> residuals_px{};
-  std::vector<double> depths_mm{};  ///< depths of those on their lines; sorted
+  std::vector<double> depths_mm{};  ///< depths of the symbols on their lines, sorted
 };
 
 Explained explain(std::span<const Match> matches, const CameraRig& rig, const DepthRange& range, double gate_px) {

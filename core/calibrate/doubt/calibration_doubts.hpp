@@ -11,16 +11,16 @@
 
 namespace slsd {
 
-/// Faults that make a calibration implausible within a range of depths: one sentence for each, with what to change.
-/// Empty for any rig that somebody would build. A rig and its mirror image are alike here: only symbols tell them
-/// apart, see symbol_doubt().
+/// Faults that make a calibration implausible within a range of depths: one sentence for each, with the remedy. Empty
+/// for any rig that someone might build. It cannot distinguish a rig from its mirror image; only symbols can, see
+/// symbol_doubt().
 /// @thread reentrant
 [[nodiscard]] std::vector<std::string> calibration_doubts(const Calibration& calibration, const DepthRange& range);
 
-/// Compares a camera's calibration with symbols that were read without it.
+/// Compares a camera's calibration with symbols that were read without the calibration.
 /// @param matches  at least kSymbolsForDoubt; a few of them may be wrong
-/// @param gate_px  how far off their epipolar lines symbols are accepted
-/// @return a sentence that says why they give no points, with what to change; empty if the calibration explains most
+/// @param gate_px  largest accepted distance of symbols from their epipolar lines
+/// @return a sentence that says why the symbols give no points, with the remedy; empty if the calibration explains most
 /// @thread reentrant
 [[nodiscard]] std::string symbol_doubt(std::span<const Match> matches, const CameraRig& rig, const DepthRange& range,
                                        double gate_px);

@@ -14,7 +14,7 @@ namespace {
 struct Unit {
   const char* name;
   double mm;
-  double share;  // of the calibrations that are met
+  double share;  // of the calibrations in practice
 };
 constexpr std::array kUnits{Unit{"", 1, 1}, Unit{"metres", 1000, 0.01}, Unit{"centimetres", 10, 0.01},
                             Unit{"inches", 25.4, 0.003}, Unit{"micrometres", 0.001, 0.001}};
@@ -77,7 +77,7 @@ void scale(Lens& lens, double factor) {
   lens.cx = (lens.cx + kToEdge) * factor - kToEdge, lens.cy = (lens.cy + kToEdge) * factor - kToEdge;
 }
 
-// A matrix that was found with larger or smaller images.
+// A camera matrix for larger or smaller images.
 void add_sizes(const CameraRig& rig, std::vector<Misreading>& found) {
   constexpr double kShare = 0.003;
   for (const double factor : {2.0, 4.0, 1.5, 0.5, 0.25, 1 / 1.5}) {

@@ -18,11 +18,12 @@ struct CameraRig {
 /// Another convention in which a calibration may have been written.
 struct Misreading {
   std::string advice;  ///< likely cause and remedy: "T looks like metres: multiply it by 1000"
-  double log_prior;    ///< the natural logarithm of how often this is met
+  double log_prior;    ///< natural logarithm of how common this is
   CameraRig rig;       ///< the rig in that convention
 };
 
-/// Every convention that is tried: units of T, directions of R and T, axes, matrices swapped or of another image size.
+/// Every convention to try: units of T, directions of R and T, axes, matrices that are swapped or belong to another
+/// image size.
 /// @thread reentrant
 [[nodiscard]] std::vector<Misreading> misreadings_of(const CameraRig& rig);
 

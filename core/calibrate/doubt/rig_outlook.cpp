@@ -19,7 +19,7 @@ double square(double value) {
   return value * value;
 }
 
-/// Unit vectors are not needed: the directions of a grid of an image's pixels, z = 1.
+/// Directions of a grid of an image's pixels, with z = 1 rather than unit length.
 std::vector<Eigen::Vector3d> directions_over(const Lens& lens) {
   std::vector<Eigen::Vector3d> directions;
   for (int row = 0; row < kDown; ++row) {
@@ -41,12 +41,12 @@ bool is_inside(const Lens& lens, const Eigen::Vector2d& pixel) {
          pixel.y() <= lens.height_px - 0.5;
 }
 
-// Without the distortion, which far outside of the picture folds back into it.
+// Without distortion, which far outside the image folds back into it.
 bool sees(const Lens& lens, const Eigen::Vector3d& point) {
   return point.z() > 0 && is_inside(lens, pinhole_pixel(lens, point));
 }
 
-/// The point of a projector's ray at a depth of the camera, in the camera's frame; nothing where it has none.
+/// The point on a projector's ray at a depth of the camera, in the camera's frame; empty if the ray has none.
 std::optional<Eigen::Vector3d> point_at_depth(const RigidTransform& camera_from_projector,
                                               const Eigen::Vector3d& direction, double depth_mm) {
   const Eigen::Vector3d start = camera_from_projector.translation, slope = camera_from_projector.rotation * direction;
@@ -77,7 +77,7 @@ double log_normal(double value, double middle, double deviations) {
   return value > 0 ? -0.5 * square(std::log(value / middle) / deviations) : -1e3;
 }
 
-// Lenses of half the picture's width to ten times it are met.
+// Focal lengths in practice are half the image's width to ten times the width.
 double log_focal_length(double share_of_width) {
   return log_normal(share_of_width, 1.4, 0.8);
 }
@@ -118,7 +118,7 @@ RigOutlook look_at_rig(const CameraRig& rig, const DepthRange& range) {
 
 LensLikelihood camera_likelihood(const Lens& lens) {
   constexpr double kAcrossDeviation = 0.05, kDownDeviation = 0.06;
-  constexpr double kCropped = 4e-4, kNever = 1e-6;  // a region of the sensor may lie anywhere
+  constexpr double kCropped = 4e-4, kNever = 1e-6;  // a crop of the sensor may lie anywhere
   const double x = lens.cx / lens.width_px, y = lens.cy / lens.height_px;
   const double off = square((x - 0.5) / kAcrossDeviation) + square((y - 0.5) / kDownDeviation);
   const bool inside = is_inside(lens, {lens.cx, lens.cy});
@@ -127,7 +127,7 @@ LensLikelihood camera_likelihood(const Lens& lens) {
 
 LensLikelihood projector_likelihood(const Lens& lens) {
   constexpr double kAcrossDeviation = 0.05, kShiftedAcross = 1e-3, kNever = 1e-6;
-  constexpr double kShiftedMost = 1.2;  // of the picture's height, beyond its rim
+  constexpr double kShiftedMost = 1.2;  // of the image's height, beyond its edge
   const double x = lens.cx / lens.width_px, y = lens.cy / lens.height_px;
   const bool inside = x >= 0 && x <= 1, shifted = y >= -kShiftedMost && y <= 1 + kShiftedMost;
   const double across = std::exp(-0.5 * square((x - 0.5) / kAcrossDeviation)) + (inside ? kShiftedAcross : 0);

@@ -15,15 +15,15 @@ namespace {
 
 constexpr double kBentSigmas = 5;
 constexpr double kBentShare = 3e-4;     // of the size: 0.1 mm of A4
-constexpr double kFarBentShare = 6e-3;  // beyond this a print is no longer a smooth surface
-constexpr double kToldShare = 1e-3;     // of the size: a deviation beyond this tells nothing
+constexpr double kFarBentShare = 6e-3;  // with a larger bend, a print is no longer a smooth surface
+constexpr double kToldShare = 1e-3;     // of the size: a larger deviation makes the result meaningless
 constexpr double kUnevenTimes = 5, kUnevenShare = 3e-5;
 constexpr char kMount[] = "mount the print on glass or an aluminium composite plate";
 
 constexpr int kPlacesAcross = 8, kPlacesDown = 6;
-constexpr std::size_t kPosesOfPlace = 4;  // of fewer their scatter tells little
+constexpr std::size_t kPosesOfPlace = 4;  // the scatter of fewer poses is weak evidence
 
-/// The lowest and the highest place of a shape.
+/// The lowest and the highest height of a shape.
 struct Extremes {
   Eigen::Vector2d lowest, highest;
 };
@@ -41,14 +41,13 @@ Extremes extremes_of(const BoardShape& shape, const Eigen::AlignedBox2d& sheet) 
   return extremes;
 }
 
-/// Heights that one pose says of a place: their sum and that of their weights.
+/// Heights of a place in one pose: their weighted sum, and the sum of the weights.
 struct Heights {
   double sum = 0, weight = 0;
 };
 using HeightMap = std::array<Heights, kPlacesAcross * kPlacesDown>;
 
-/// A residual over how it changes as the board is raised: how much higher the board must be for the point to be where
-/// it was seen.
+/// Divides a residual by its change as the board rises: the height that would explain where the point was seen.
 void add_height(const Eigen::Vector2d& residual, const Eigen::Vector2d& raised, double sigma_px, Heights& heights) {
   const Eigen::Vector2d slope = (raised - residual) / sigma_px;
   heights.sum -= slope.dot(residual) / sigma_px;
@@ -63,7 +62,7 @@ double rms_of(const std::vector<Point>& points, std::vector<Eigen::Vector2d> res
   return rms_px(residuals);
 }
 
-/// Measures the height of each place of the board above the shape.
+/// Measures the height of each place of the board above the fitted shape.
 HeightMap heights_of(const PoseObservation& pose, const RigModel& rig, const MotionVector& rig_from_board,
                      const Eigen::AlignedBox2d& sheet) {
   const RigidTransform place = to_motion(rig_from_board);
@@ -96,8 +95,8 @@ HeightMap heights_of(const PoseObservation& pose, const RigModel& rig, const Mot
   return map;
 }
 
-/// Compares the height that all poses leave at a place with how far they scatter there: that measures chance, whatever
-/// the noise is like.
+/// Compares the mean height of a place over all poses with its scatter over the poses, which measures chance for any
+/// kind of noise.
 void judge_relief(const Observations& observations, const RigModel& rig, BoardReport& board) {
   std::vector<HeightMap> poses;
   for (std::size_t i = 0; i < observations.poses.size(); ++i) {

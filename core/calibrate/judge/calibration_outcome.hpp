@@ -27,17 +27,18 @@ struct ParameterReport {
 struct CalibrationOutcome {
   Calibration calibration;
   RigModel rig;               ///< holds the used poses
-  Observations observations;  ///< used ones, with the outlying points marked
+  Observations observations;  ///< used observations, with the outlying points marked
   std::vector<PoseReport> poses;
   std::vector<ParameterReport> parameters;
   double camera_rms_px = 0;                               ///< board corners in the cameras
   double projector_rms_px = 0;                            ///< symbols, in the projector
   double symbol_rms_px = 0;                               ///< symbols, in the cameras
   double epipolar_rms_px = 0;                             ///< symbols off their epipolar line, in the projector
-  double held_out_corner_px = 0, held_out_symbol_px = 0;  ///< poses left out in turn, in the cameras
+  double held_out_corner_px = 0, held_out_symbol_px = 0;  ///< each pose under the calibration by the others, in the
+                                                          ///< cameras
   std::vector<DepthUncertainty> depth;                    ///< near, middle, far
   BoardReport board;
-  std::vector<PlaneCheck> planes;  ///< one to a camera's look at the reference plane
+  std::vector<PlaneCheck> planes;  ///< one for each camera's look at the reference plane
   std::vector<std::string> warnings;
   Verdict verdict;
 };

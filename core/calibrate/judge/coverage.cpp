@@ -9,7 +9,7 @@
 namespace slsd {
 namespace {
 
-constexpr int kParts = 3;  // of the image, each way, that have a name
+constexpr int kParts = 3;  // named regions of the image, along each axis
 
 int cell(double position, int length_px, int cells) {
   return std::clamp(static_cast<int>((position + 0.5) / length_px * cells), 0, cells - 1);

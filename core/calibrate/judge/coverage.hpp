@@ -20,17 +20,17 @@ struct Coverage {
   void add(const Eigen::Vector2d& pixel, const ImageSize& size);
   /// Share of the cells with any point: 0 to 1.
   [[nodiscard]] double share() const;
-  /// "the upper left", "the right": the region with the fewest points, or empty where all have some.
+  /// "the upper left", "the right": the region with the fewest points; empty if all regions have some.
   [[nodiscard]] std::string emptiest() const;
 };
 
 [[nodiscard]] Coverage camera_coverage(const Observations& observations, std::size_t camera);
 [[nodiscard]] Coverage projector_coverage(const Observations& observations);
 
-/// The board's tilt against the first camera's axis, degrees, one to a pose.
+/// The board's tilt relative to the first camera's axis, degrees, one for each pose.
 [[nodiscard]] std::vector<double> tilts_deg(const RigModel& rig);
 
-/// The board's distances, mm along the first camera's axis, one to a pose.
+/// The board's distances, mm along the first camera's axis, one for each pose.
 [[nodiscard]] std::vector<double> distances_mm(const RigModel& rig);
 
 }  // namespace slsd

@@ -33,7 +33,7 @@ double* value_in(RigModel& rig, const SharedParameter& parameter) {
   return &rig.board_stretch;
 }
 
-/// A step of a parameter over which the depth is as good as linear.
+/// A step of a parameter over which the depth is practically linear.
 double step_of(const SharedParameter& parameter) {
   if (parameter.kind == SharedParameter::Kind::kLens) return parameter.index < 4 ? 1e-2 : 1e-6;
   return parameter.index < 3 ? 1e-6 : 1e-2;
@@ -80,7 +80,7 @@ std::vector<DepthUncertainty> depth_uncertainty(const RigModel& rig, const std::
       const TriangulatedPoint point = depth_of(match, rig, symbol_sigma_px);
       Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(shared.size()));
       for (std::size_t i = 0; i < shared.size(); ++i) {
-        if (shared[i].kind == SharedParameter::Kind::kShape) continue;  // it moves no depth by itself
+        if (shared[i].kind == SharedParameter::Kind::kShape) continue;  // it does not affect depth directly
         RigModel changed = rig;
         *value_in(changed, shared[i]) += step_of(shared[i]);
         const double moved = depth_of(match, changed, symbol_sigma_px).point_in_camera.z();

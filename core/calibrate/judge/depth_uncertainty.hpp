@@ -13,12 +13,12 @@ namespace slsd {
 struct DepthUncertainty {
   double depth_mm = 0;
   double calibration_mm = 0;  ///< one standard deviation, from the uncertainty of the calibration
-  double noise_mm = 0;        ///< the same of one symbol, from the noise of its centre
+  double noise_mm = 0;        ///< one standard deviation of one symbol's depth, from the noise of its centre
 };
 
-/// Carries the parameters' covariance over to the depth of points that the first camera and the projector both see.
+/// Propagates the parameters' covariance to the depth of points that the first camera and the projector both see.
 /// @param symbol_sigma_px  one standard deviation of a symbol's centre in x and in y
-/// @return one to a depth; those where no point is seen by both are left out
+/// @return one for each depth, without depths at which no point is seen by both
 /// @thread reentrant
 [[nodiscard]] std::vector<DepthUncertainty> depth_uncertainty(const RigModel& rig,
                                                               const std::vector<SharedParameter>& shared,

@@ -15,7 +15,7 @@
 namespace slsd {
 namespace {
 
-/// Takes the board's shape off a point: all poses share it, so it is no fault of one.
+/// Removes the board's shape from a point: all poses share it, so it is no fault of one.
 Eigen::Vector3d off_shape(const Eigen::Vector3d& point, PoseSubject subject, const RigModel& rig) {
   const double height_mm = subject == PoseSubject::kBoard ? rig.shape.height_mm(point.head<2>()) : 0;
   return point - height_mm * Eigen::Vector3d::UnitZ();
@@ -40,10 +40,10 @@ std::vector<Eigen::Vector3d> points_on_board(const PoseObservation& pose, const 
   return points;
 }
 
-/// Share of half the board's size up to which a symbol before the plane may be on the board.
+/// Share of half the board's size by which a symbol may lie before the plane and still be on the board.
 constexpr double kBeforeShare = 0.03;
 
-/// z over terms in x and y, both of about one; misread symbols, which lie anywhere, have no part.
+/// z over terms in x and y, both of about one; misread symbols, which lie anywhere, get no weight.
 struct SurfaceFit {
   Eigen::VectorXd coefficients;
   Eigen::VectorXd weights;  // 0 to 1

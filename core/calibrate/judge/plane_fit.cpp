@@ -19,12 +19,13 @@ namespace {
 
 using Points = std::span<const Eigen::Vector3d>;
 
-constexpr int kDraws = 100;           // with half of the points elsewhere, all but one in a million find the plane
+constexpr int kDraws = 100;           // with half of the points off the plane, all but one in a million sets of draws
+                                      // find it
 constexpr std::size_t kScored = 500;  // points by which a draw is judged
 constexpr int kRefinements = 5;
 constexpr double kGateSigmas = 5;
-constexpr double kGateMinMm = 1e-6;  // of points without noise
-constexpr double kLineShare = 1e-9;  // of the largest variance: below, it is a line
+constexpr double kGateMinMm = 1e-6;  // for points without noise
+constexpr double kLineShare = 1e-9;  // of the largest variance: below, the points lie on a line
 
 std::vector<double> offsets(Points points, const PlaneFit& plane) {
   std::vector<double> out;

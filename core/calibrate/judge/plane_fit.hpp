@@ -10,12 +10,12 @@
 
 namespace slsd {
 
-/// A plane through points of which some lie elsewhere.
+/// A plane through points of which some lie off it.
 struct PlaneFit {
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();   ///< mean of the points on it
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();   ///< mean of the points on the plane
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit length, away from the origin
-  std::vector<std::size_t> on_plane;                  ///< indices of the points that it was fitted to
-  double rms_mm = 0;                                  ///< distance of these from the plane
+  std::vector<std::size_t> on_plane;                  ///< indices of the fitted points
+  double rms_mm = 0;                                  ///< root mean square distance of these points from the plane
 
   /// Signed distance of a point from the plane, along its normal.
   [[nodiscard]] double off_mm(const Eigen::Vector3d& point) const { return normal.dot(point - middle); }
@@ -23,10 +23,10 @@ struct PlaneFit {
   [[nodiscard]] Eigen::Vector3d meet(const Eigen::Vector2d& direction) const;
 };
 
-/// The plane that most of the points lie on: the least median of squares over draws from a fixed seed, then least
-/// squares over what is within five robust standard deviations. A bend of all points stays in the residual.
-/// @param points  mm, as seen from the origin
-/// @return        nothing where there are fewer than three points, or all on a line
+/// The plane on which most of the points lie: the least median of squares over draws from a fixed seed, then least
+/// squares over points within five robust standard deviations. A bend of all points stays in the residual.
+/// @param points  mm, from the viewpoint as origin
+/// @return        empty for fewer than three points, or if all lie on a line
 /// @thread reentrant
 [[nodiscard]] std::optional<PlaneFit> fit_plane(std::span<const Eigen::Vector3d> points);
 

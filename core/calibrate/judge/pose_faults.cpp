@@ -18,35 +18,36 @@
 namespace slsd {
 namespace {
 
-/// An error this much above that of the other poses is no chance.
+/// Ratio to the other poses' error above which chance does not explain an error.
 constexpr double kContradiction = 2.5;
 constexpr double kContradictionMinPx = 0.1;
-/// The same in standard deviations of what the poses say of the rig: about 1 of poses that agree, and one that turned
-/// by 0.1 degrees before the pattern came is at 4, and moves the principal point by 3 px.
+/// The same in standard deviations of what the poses say about the rig. Consistent poses have about 1. A board that
+/// turned by 0.1 degrees before the pattern came has 4, and moves the principal point by 3 px.
 constexpr double kDisagreementMin = 3;
-/// Share of a pose's points that lie off the rest: above it they are no wrong points but a wrong pose.
+/// Share of outlying points of a pose: above it the pose is wrong, rather than single points.
 constexpr double kOutlyingShare = 0.15, kUsualOutlyingShare = 0.05;
-/// A bend or a shift this much above that of the other poses is what explains an error.
+/// Ratio to the other poses' bend or shift above which it explains an error.
 constexpr double kExplains = 3;
 constexpr double kBowShareMin = 0.4;
-/// Corners that are bent say a plane that is off by about the bend; a move without a bend shows none.
+/// Corners on a bent board give a plane that is off by about the bend; a board that moved without a bend shows none.
 constexpr double kBowOfShiftMin = 0.3;
-/// Symbols whose pattern was divided by a print that lay elsewhere scatter, the less the smaller the move.
+/// Symbols scatter if the pattern was divided by a displaced print; the smaller the move, the less they scatter.
 constexpr double kUnevenOfShiftMin = 0.3;
-/// Root mean square off a plane beyond which it is no board, as a share of half the board's size.
+/// Largest root mean square distance from a plane that a board can have, as a share of half the board's size.
 constexpr double kUnevenShareMax = 0.1;
-/// The print lies this much elsewhere under the pattern: the picture of the board tells nothing of it.
+/// Displacement of the print under the pattern above which the board's picture says nothing about the pattern's
+/// picture.
 constexpr double kShiftMaxPx = 1;
-/// Symbols that lie off the board as if it had moved so far in the camera, whose print did not move: it is not the
-/// board.
+/// Symbols lie off the board as if it had moved this far in the camera, but its print did not move: then the board is
+/// not the cause.
 constexpr double kShownByPrintPx = 5;
-/// Corners that are this near those of an earlier pose, as a share of the picture's width, say what those said.
+/// Corners this near to those of an earlier pose, as a share of the image's width, add no information.
 constexpr double kSamePlaceShare = 0.005;
-/// Share of a pose's symbols with something before them; of more it is the board that moved.
+/// Share of a pose's symbols with an object before them; above the second limit, the board moved.
 constexpr double kCoveredShare = 0.08, kUncoveredShare = 0.5;
-/// Multiple of the usual error from which on the figure tells nothing more.
+/// Ratio to the usual error above which the figure has no meaning.
 constexpr double kTimesTelling = 100;
-/// Share of a pose's points that lie off, from which on nothing else needs to be said.
+/// Share of outlying points above which no other fault needs to be reported.
 constexpr double kHardlyAnyShare = 0.9;
 constexpr char kHardlyAny[] = "hardly a point of it agrees with them";
 
@@ -65,7 +66,7 @@ double usual_blur_of(PoseSubject subject, const Observations& observations) {
   return median_of(std::move(blurs));
 }
 
-/// Describes the lack of corners in the view that has the most, if all views lack some.
+/// Describes the missing corners in the view with the most corners, if all views lack some.
 std::string least_lack_of_corners(const PoseObservation& pose) {
   std::string lack = "the board was not found";
   std::size_t most = 0;
@@ -77,7 +78,7 @@ std::string least_lack_of_corners(const PoseObservation& pose) {
   return lack;
 }
 
-/// Describes the lack of symbols among views with enough corners.
+/// Describes the missing symbols among views with enough corners.
 std::string least_lack_of_symbols(const PoseObservation& pose) {
   std::size_t most = 0;
   for (const PoseView& view : pose.views) {
@@ -98,7 +99,7 @@ double shift_of(const PoseObservation& pose) {
   return shift;
 }
 
-/// Distance between the corners that both views have, root mean square; nothing if they share hardly any.
+/// Root mean square distance between the corners that both views share; empty if they share hardly any.
 std::optional<double> apart_px(const PoseView& one, const PoseView& other) {
   constexpr std::size_t kCommonMin = 4;
   std::map<std::pair<double, double>, Eigen::Vector2d> places;
@@ -147,7 +148,7 @@ double usual(const std::vector<double>& values, PoseSubject subject, const Obser
   return median_of(std::move(same));
 }
 
-/// The surface of the symbols against the plane that the corners alone say: that of the rig is drawn to both.
+/// The surface of the symbols relative to the plane through the corners alone: the rig's own estimate depends on both.
 LitSurface surface_of(std::size_t pose, const Observations& observations, const RigModel& rig) {
   const MotionVector& joint = rig.rig_from_board[pose];
   const auto by_corners = pose_by_corners(observations.poses[pose], rig, joint);
@@ -155,7 +156,7 @@ LitSurface surface_of(std::size_t pose, const Observations& observations, const 
 }
 
 /// Shift of the print under the pattern that a move of the board along its normal would cause. It is that of the view
-/// that would show it most, among views whose print stayed; root mean square over the corners.
+/// that would show it most, among views whose print did not move; root mean square over the corners.
 double unshown_px(const PoseObservation& pose, const RigModel& rig, const MotionVector& place, double along_normal_mm) {
   double most = 0;
   for (const PoseView& view : pose.views) {
@@ -174,24 +175,24 @@ double unshown_px(const PoseObservation& pose, const RigModel& rig, const Motion
   return most;
 }
 
-/// Surfaces of a pose and how they compare with the others'.
+/// Surfaces of a pose, and how they compare with those of the others.
 struct Explanation {
   LitSurface surface;
   double shift_mm = 0;
   double bow_factor = 0, shift_factor = 0, flatness_factor = 0;
-  double believable_mm = 0;  ///< limit beyond which it is no board that was held
+  double believable_mm = 0;  ///< limit above which it is no board
 
-  /// Tells whether the board has a bend of second order, like a print that is mounted on cardboard.
+  /// Tells whether the board has a second-order bend, like a print on cardboard.
   [[nodiscard]] bool is_bowed() const {
     return surface.bow_share > kBowShareMin && bow_factor > kExplains && surface.bow_mm > kBowOfShiftMin * shift_mm &&
            surface.bow_mm < believable_mm;
   }
-  /// Tells whether the symbols lie on no plane, beyond the error that a moved print leaves in them.
+  /// Tells whether the symbols lie on no plane, beyond the error that a displaced print causes.
   [[nodiscard]] bool is_uneven() const {
     return flatness_factor > kExplains && surface.flatness_mm < kUnevenShareMax * believable_mm &&
            surface.flatness_mm > kUnevenOfShiftMin * shift_mm;
   }
-  /// The symbols lie on a plane, but not on that of the corners.
+  /// Tells whether the symbols lie on a plane other than that of the corners.
   [[nodiscard]] bool is_moved() const { return shift_factor > kExplains && !is_uneven() && shift_mm < believable_mm; }
 };
 
@@ -211,7 +212,7 @@ Explanation compare(std::size_t pose, const Observations& observations, const Ri
           factor(shifts), factor(flatnesses), half_size_mm(observations.poses[pose])};
 }
 
-/// @param error  what is said where nothing explains it
+/// @param error  the reason if nothing explains the fault
 FaultyPose explain(std::size_t pose, const std::string& error, const Observations& observations, const RigModel& rig) {
   const Explanation shown = compare(pose, observations, rig);
   const char* const subject = observations.poses[pose].subject == PoseSubject::kBoard ? "board" : "plane";
@@ -337,7 +338,7 @@ std::optional<FaultyPose> find_contradiction(const Observations& observations, c
     disagreement.push_back(held_out.disagreement);
   }
   const double usual_disagreement = std::max(median_of(disagreement), 1.0);
-  // Corners of the board and of the plane are not found equally well.
+  // Corners of the board and of the plane are found with different accuracy.
   const std::map<PoseSubject, double> usual_corner{
       {PoseSubject::kBoard, usual(corner, PoseSubject::kBoard, observations)},
       {PoseSubject::kPlane, usual(corner, PoseSubject::kPlane, observations)}};

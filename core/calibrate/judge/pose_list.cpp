@@ -11,7 +11,7 @@
 namespace slsd {
 namespace {
 
-constexpr double kClippedToSay = 0.02;  // as a session on hardware does not take it
+constexpr double kClippedToSay = 0.02;  // more than a session on hardware accepts
 
 std::string text_of_gap(const PoseView& view) {
   if (view.hidden_clipped) {

@@ -16,43 +16,43 @@ namespace slsd {
 struct PoseReport {
   std::string name;
   PoseSubject subject = PoseSubject::kBoard;
-  std::optional<PoseFault> fault;    ///< the reason if it was left out
-  std::string reason;                ///< the same for a person, with the figure; empty where it was used
-  std::vector<std::string> without;  ///< for a used pose: cameras whose view was left out, and why
-  std::vector<std::string> remarks;  ///< for a used pose: its lesser faults
+  std::optional<PoseFault> fault;    ///< the reason if the pose was left out
+  std::string reason;                ///< the same for the user, with the figure; empty if the pose was used
+  std::vector<std::string> without;  ///< for a used pose: cameras whose view was left out, with the reason
+  std::vector<std::string> remarks;  ///< for a used pose: its minor faults
   std::size_t corners = 0, symbols = 0;
   std::size_t outlying_corners = 0, outlying_symbols = 0;
   double corner_rms_px = 0, symbol_rms_px = 0;  ///< errors in the camera
-  HeldOut held_out;                             ///< under the rig that the other poses give
+  HeldOut held_out;                             ///< under the rig from the other poses
 };
 
-/// List of the input's poses: those that take part, and the reasons why the others do not.
+/// List of the input's poses: those that take part, and the reasons for leaving the others out.
 /// @thread thread-bound
 class PoseList {
  public:
-  /// All of them take part.
+  /// Starts with all poses taking part.
   explicit PoseList(const Observations& observations);
 
-  /// Takes a pose, by its index among those that take part, out of everything.
-  /// @param rig  nothing: it has no poses yet
+  /// Removes a pose, by its index among those that take part, from all data.
+  /// @param rig  null: it has no poses yet
   void leave_out(const FaultyPose& faulty, Observations& observations, RigModel* rig);
-  /// Takes the views that cannot take part out of the poses that take part.
+  /// Removes the views that cannot take part from the poses that do.
   void leave_views_out(Observations& observations);
-  /// Adds to why a pose was left out, where it was.
+  /// Appends to the reason of a pose that was left out.
   void explain(const std::string& pose, const std::string& more);
 
-  /// Tells whether there were any poses of a subject, and all of them were left out.
+  /// Tells whether there were poses of a subject and all of them were left out.
   [[nodiscard]] bool lacks(PoseSubject subject) const;
   /// Returns the report of a pose, by its index among those that take part.
   [[nodiscard]] PoseReport& used(std::size_t pose) { return reports_[used_[pose]]; }
-  /// All, in the order of the input.
+  /// All poses, in the order of the input.
   [[nodiscard]] const std::vector<PoseReport>& reports() const { return reports_; }
-  /// "pose_01: blurred ...; pose_03: ..."; empty where none was left out.
+  /// "pose_01: blurred ...; pose_03: ..."; empty if none was left out.
   [[nodiscard]] std::string faults() const;
 
  private:
   std::vector<PoseReport> reports_;
-  std::vector<std::size_t> used_;  // indices of those that take part
+  std::vector<std::size_t> used_;  // indices of the poses that take part
 };
 
 }  // namespace slsd

@@ -15,13 +15,13 @@ namespace slsd {
 namespace {
 
 constexpr double kDegreesOfRadian = 180 / std::numbers::pi;
-constexpr double kSurelySigmas = 5;  // beyond which a difference is no chance
+constexpr double kSurelySigmas = 5;  // above which chance does not explain a difference
 /// Differences that move no measurement by more than a good calibration's own error.
 constexpr double kTurnMinDeg = 0.03, kShiftMinShare = 2e-3, kFocalMinShare = 2e-3, kPrincipalMinPx = 3;
 constexpr double kUpsideDownDeg = 150, kAboutAxis = 0.9;
 constexpr char kProjector[] = "projector";
 
-using Sigmas = std::vector<double>;  // of fx fy cx cy ...; empty: not known
+using Sigmas = std::vector<double>;  // for fx fy cx cy ...; empty: unknown
 
 double sigma_of(const CalibrationOutcome& outcome, const std::string& device, std::string_view parameter) {
   for (const ParameterReport& one : outcome.parameters) {
@@ -59,7 +59,7 @@ std::string lens_change(const CalibrationOutcome& outcome, const std::string& de
   return {};
 }
 
-/// Two devices that see the same: the place of one in the frame of the other, then and now.
+/// Two devices with a common view: the place of one in the frame of the other, then and now.
 struct Pair {
   RigidTransform now, then;  // second from first
   double turn_sigma_deg = 0, place_sigma_mm = 0;
@@ -73,19 +73,19 @@ struct Pair {
   }
   [[nodiscard]] double longer() const { return now.translation.norm() / then.translation.norm() - 1; }
   [[nodiscard]] double longer_sigma() const { return std::sqrt(2.0) * place_sigma_mm / then.translation.norm(); }
-  /// Rest of a move after all distances became longer by one factor.
+  /// Part of a move that a common factor of all distances does not explain.
   [[nodiscard]] double sideways_mm() const { return (now.translation - (1 + longer()) * then.translation).norm(); }
 
   [[nodiscard]] bool turned() const { return turn_deg() > std::max(kTurnMinDeg, kSurelySigmas * turn_sigma_deg); }
   [[nodiscard]] bool changed() const {
-    // A turn that is no more than the deviations moves the place about as far: it is part of what is not known.
+    // A turn within its deviation moves the place accordingly; this adds to the place's uncertainty.
     const double unsure_mm = std::hypot(place_sigma_mm, turn_sigma_deg / kDegreesOfRadian * now.translation.norm());
     return turned() || sideways_mm() > std::max(kShiftMinShare * then.translation.norm(),
                                                 kSurelySigmas * std::sqrt(2.0) * unsure_mm);
   }
 };
 
-/// Uncertainty of the principal point, as the turn that it could be mistaken for.
+/// Uncertainty of the principal point, as the turn that would look the same.
 double unknown_turn_deg(const Lens& lens, const Sigmas& sigmas) {
   if (sigmas.size() < 4) return 0;
   return std::hypot(sigmas[2] / lens.fx, sigmas[3] / lens.fy) * kDegreesOfRadian;
@@ -177,7 +177,7 @@ class Comparison {
     return text;
   }
 
-  /// A device that turns about itself stays where it is for the other one.
+  /// A device that turns about its own centre stays in place for the other one.
   [[nodiscard]] std::string device_of(const Pair& pair) const {
     constexpr double kClearly = 3;
     const double unsure_mm = std::max(kSurelySigmas * pair.place_sigma_mm, 0.5);

@@ -19,11 +19,11 @@ struct Trueness {
   double worst_percent = 0;     ///< the largest error among these
 };
 
-/// Carries a board's points to where the camera's rays meet the plane that the symbols were measured on, so that camera
-/// and projector both have a part, and compares their distances with the true ones.
-/// @param corners  camera px, distorted; board mm. Outlying ones are left out
+/// Compares distances between a board's points with the true ones. The points are where the camera's rays meet the
+/// plane of the measured symbols, so camera and projector both contribute.
+/// @param corners  camera px, distorted; board mm. Outlying ones are ignored
 /// @param plane    mm, in the camera's frame
-/// @return         nothing with fewer than four points
+/// @return         empty for fewer than four points
 /// @thread reentrant
 [[nodiscard]] std::optional<Trueness> measure_trueness(const std::vector<BoardPoint>& corners, const Lens& camera,
                                                        const PlaneFit& plane);

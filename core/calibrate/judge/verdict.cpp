@@ -11,7 +11,7 @@
 namespace slsd {
 namespace {
 
-constexpr double kDistanceSpread = 1.15;  // of the farthest to the nearest pose
+constexpr double kDistanceSpread = 1.15;  // ratio of the farthest to the nearest pose
 
 class Jury {
  public:

@@ -7,8 +7,8 @@
 
 namespace slsd {
 
-/// Judges a calibration by its errors on held-out poses, by the uncertainty of depth, and by the poses' cover of both
-/// images.
+/// Judges a calibration by its errors on held-out poses, by the uncertainty of depth, and by the poses' coverage of
+/// both images.
 /// @thread reentrant
 [[nodiscard]] Verdict judge(const CalibrationOutcome& outcome);
 

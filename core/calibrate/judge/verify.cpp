@@ -21,10 +21,10 @@ namespace slsd {
 namespace {
 
 constexpr std::size_t kSymbolsMin = 30;
-constexpr double kMisreadSigmas = 6, kMisreadMinPx = 1;  // off where the other symbols lie
-constexpr double kOnPlaneMin = 0.7;                      // of the symbols
-constexpr double kTurnSigmas = 5;                        // from which on a turn is no chance
-constexpr double kScaleOnly = 0.5;  // of the long distances' error, what may be left beside the common factor
+constexpr double kMisreadSigmas = 6, kMisreadMinPx = 1;  // distance from the other symbols' plane
+constexpr double kOnPlaneMin = 0.7;                      // share of the symbols
+constexpr double kTurnSigmas = 5;                        // above which chance does not explain a turn
+constexpr double kScaleOnly = 0.5;  // share of the long distances' error that may remain beside the common factor
 
 struct MeasuredSymbol {
   Eigen::Vector3d point_mm;
@@ -33,7 +33,7 @@ struct MeasuredSymbol {
   Match match;
 };
 
-/// Removes misread symbols, which no calibration has checked yet: they lie far from the others, wherever those are.
+/// Removes misread symbols, which no calibration has checked yet: they lie far from the others, wherever those lie.
 std::vector<MeasuredSymbol> without_misread(std::vector<MeasuredSymbol> symbols) {
   std::vector<double> residuals;
   for (const MeasuredSymbol& symbol : symbols) residuals.push_back(symbol.epipolar_px);
@@ -57,7 +57,7 @@ std::vector<MeasuredSymbol> measure(const PoseView& view, const CalibratedCamera
   return out.empty() ? out : without_misread(std::move(out));
 }
 
-/// Ratio of the symbols' noise in this look to the assumed noise, as on a printed board. It compares the residuals off
+/// Ratio of the symbols' noise in this look to the assumed noise, as on a printed board. It compares the residuals from
 /// the plane, without a smooth bend, with the expected ones.
 double noise_factor(const std::vector<MeasuredSymbol>& symbols, const PlaneFit& plane) {
   const auto rows = static_cast<Eigen::Index>(plane.on_plane.size());
@@ -76,7 +76,7 @@ double noise_factor(const std::vector<MeasuredSymbol>& symbols, const PlaneFit& 
   return std::max(1.0, std::sqrt(rough.squaredNorm() / std::max(expected.squaredNorm(), 1e-12)));
 }
 
-/// Root mean square off the plane that the symbols' noise explains.
+/// Root mean square distance from the plane that the symbols' noise explains.
 double expected_rms_mm(const std::vector<MeasuredSymbol>& symbols, const PlaneFit& plane) {
   double sum = 0;
   for (const std::size_t i : plane.on_plane) {
@@ -86,12 +86,12 @@ double expected_rms_mm(const std::vector<MeasuredSymbol>& symbols, const PlaneFi
   return noise_factor(symbols, plane) * std::sqrt(sum);
 }
 
-/// The turn of the projector that explains best how the symbols lie off their epipolar lines. A look that does not show
-/// a turn about some axis, as none shows that along the lines, says so.
+/// Finds the turn of the projector that best explains the symbols' distances from their epipolar lines. A look may not
+/// show a turn about some axis, and none shows a turn along the lines; the result names that axis.
 void find_turn(const std::vector<MeasuredSymbol>& symbols, const CalibratedCamera& camera, const Lens& projector,
                ViewCheck& check) {
   constexpr double kStep = 1e-5, kDegrees = 180 / std::numbers::pi, kShownDeg = 0.01;
-  // What moves the symbols by less than this as it turns by the limit is no better known than the lenses.
+  // If a turn by the limit moves the symbols by less than this, it is known no better than the lenses.
   constexpr double kShownPx = 0.05, kTurnRad = 0.03 / kDegrees;
   const auto rows = static_cast<Eigen::Index>(symbols.size());
   Eigen::MatrixX3d slope(rows, 3);
@@ -140,7 +140,7 @@ bool is_common_factor(const Trueness& trueness) {
   return left < kScaleOnly * kScaleOnly * square;
 }
 
-/// A root mean square over several, each with its weight.
+/// A weighted root mean square.
 class Pool {
  public:
   void add(double rms, double weight) { sum_ += weight * rms * rms, weight_ += weight; }

@@ -13,13 +13,13 @@ namespace {
 
 constexpr std::size_t kCornersMin = 8;
 constexpr std::size_t kSymbolsMin = 30;
-/// Share of the board's pixels at full level, above which its edges and the symbols look displaced.
+/// Share of the board's saturated pixels above which its edges and the symbols appear displaced.
 constexpr double kClippedMax = 0.25;
-constexpr std::ptrdiff_t kLinesMin = 2;  // rows, and columns, with two corners or more
+constexpr std::ptrdiff_t kLinesMin = 2;  // rows, and columns, with two or more corners
 /// Limits of blur as a factor and in px: both must be exceeded.
 constexpr double kBlurFactor = 1.5, kBlurMorePx = 0.35;
 
-/// Counts the lines along one axis of the board that have two corners or more.
+/// Counts the lines along one axis of the board that have two or more corners.
 std::ptrdiff_t lines(const PoseView& view, Eigen::Index axis) {
   constexpr double kSameMm = 1e-3;
   std::map<long, int> counts;

@@ -8,10 +8,11 @@
 
 namespace slsd {
 
-/// Lacks that keep a view from taking part, whatever others show. A session uses them to take the pose again, and a
-/// calibration to leave it out. They are for a person, with the figure and what to do; empty if the view lacks nothing.
+/// Faults that exclude a view whatever the others show. After one, a session takes the pose again, and a calibration
+/// leaves it out. The text is for the user, with the figure and what to do; empty without a fault.
 
-/// Corners: enough of them, in two rows and two columns of two or more each, without which they fit any pose.
+/// Describes a lack of corners. A view needs enough of them, in at least two rows and two columns of two or more each:
+/// fewer fit any pose.
 /// @thread reentrant
 [[nodiscard]] std::string lack_of_corners(const PoseView& view);
 
@@ -19,12 +20,12 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] std::string lack_of_symbols(std::size_t symbols);
 
-/// @param clipped_share  of the board's pixels, those at full level
+/// @param clipped_share  share of the board's pixels that are saturated
 /// @thread reentrant
 [[nodiscard]] std::string excess_of_light(double clipped_share);
 
-/// Tells whether a blur is so far above that of the other poses that it moves corners and symbols.
-/// @param usual_px  0: there are none
+/// Tells whether the blur exceeds that of the other poses by so much that it displaces corners and symbols.
+/// @param usual_px  0: there are no other poses
 /// @thread reentrant
 [[nodiscard]] bool is_blurred(double blur_px, double usual_px);
 

@@ -10,7 +10,7 @@
 namespace slsd {
 namespace {
 
-/// Width of the border that is white for certain, of the board's pitch.
+/// Width of the border that is certainly white, of the board's pitch.
 constexpr double kBorder = 0.8;
 /// Reach of a symbol, of the board's pitch: one larger than a square of the board cannot be read among its edges.
 constexpr double kNear = kBorder + 1;
@@ -50,7 +50,7 @@ bool BoardRegion::is_printed(const Eigen::Vector2d& camera_px) const {
 }
 
 double full_share_of_print(const GreyView& image, const Board& board, const BoardSighting& sighting) {
-  constexpr double kPixelsLookedAt = 5e5;  // more tell no more
+  constexpr double kPixelsLookedAt = 5e5;  // more pixels add no information
   const BoardRegion region(board, sighting);
   const double full = guess_full_level(image);
   return std::visit(

@@ -10,20 +10,20 @@
 
 namespace slsd {
 
-/// Share of the pixels of a board's print at the level of a saturated one, even if a reflection leaves no point of it.
+/// Share of the saturated pixels of a board's print, even if a reflection hides all its points.
 /// @return 0 to 1
 /// @thread reentrant
 [[nodiscard]] double full_share_of_print(const GreyView& image, const Board& board, const BoardSighting& sighting);
 
-/// Region of the board in an image: light of the projector elsewhere is not on its plane.
+/// Region of the board in an image: light of the projector outside it is not on the board's plane.
 /// @thread reentrant
 class BoardRegion {
  public:
   BoardRegion(const Board& board, const BoardSighting& sighting);
 
-  /// Tells whether a pixel lies on the print, or on the white border that has to be around it.
+  /// Tells whether a pixel lies on the print, or on the required white border around it.
   [[nodiscard]] bool contains(const Eigen::Vector2d& camera_px) const;
-  /// Tells whether a symbol that lies on the board may reach there.
+  /// Tells whether a symbol on the board may reach this pixel.
   [[nodiscard]] bool is_near(const Eigen::Vector2d& camera_px) const;
   /// Tells whether a pixel lies on the print.
   [[nodiscard]] bool is_printed(const Eigen::Vector2d& camera_px) const;

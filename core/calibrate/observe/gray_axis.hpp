@@ -10,19 +10,18 @@
 
 namespace slsd {
 
-/// One axis of a Gray code as a camera saw it. The stripes of the finest bits may be lost in the projector's blur;
-/// without them a pixel's place is known to a bin of 2 or 4 of the projector's pixels.
+/// One axis of a Gray code in a camera's images. The projector's blur may hide the stripes of the finest bits. A
+/// pixel's place is then known only to a bin of 2 or 4 projector pixels.
 /// @thread reentrant
 class GrayAxis {
  public:
-  /// @param images  8 bits; the highest bit first, each followed by its inverse; they have to outlive this
+  /// @param images  8 bits; the highest bit first, each followed by its inverse; must outlive this object
   explicit GrayAxis(std::span<const cv::Mat> images);
 
-  /// Leaves out the finest bits that fewer than half of these pixels of the camera show.
+  /// Ignores the finest bits that fewer than half of these camera pixels show.
   void leave_out_unseen(std::span<const cv::Point> pixels);
 
-  /// The middle of the bin that lights a camera pixel, projector px, 0 to a power of two; none where a bit is
-  /// uncertain.
+  /// The centre of the bin that lights a camera pixel, projector px, 0 to a power of two; empty if a bit is uncertain.
   [[nodiscard]] std::optional<double> place_px(const cv::Point& pixel) const;
   /// Width of a bin, projector px.
   [[nodiscard]] int bin_px() const;
@@ -31,7 +30,7 @@ class GrayAxis {
   [[nodiscard]] int contrast(std::size_t bit, const cv::Point& pixel) const;
 
   std::span<const cv::Mat> images_;
-  std::size_t bits_;  // those that are read
+  std::size_t bits_;  // number of readable bits
 };
 
 }  // namespace slsd

@@ -23,21 +23,21 @@ namespace {
 
 using cv::structured_light::GrayCodePattern;
 
-/// Sides of the squares of the projector whose pixels are taken together, finest first: the first that gives enough
-/// points serves.
+/// Sides of the projector squares whose pixels are combined, finest first. The first side that gives enough points is
+/// used.
 constexpr int kSquareSidesPx[] = {8, 16, 32};
 constexpr std::size_t kPointsEnough = 150;
-/// Members that a square has to have.
+/// Members that a square needs.
 constexpr std::size_t kSeenMin = 12;
 /// Grey levels of 255 between lit and unlit for a pixel to be certain.
 constexpr int kContrastMin = 12;
-/// Pixels of the camera that a member may lie off its square's affine map, besides its place in its bin.
+/// Camera pixels by which a member may lie off its square's affine map, in addition to its place in its bin.
 constexpr double kMemberOffPx = 0.75;
-/// Pixels from which on their shares tell something.
+/// Number of pixels above which their shares are meaningful.
 constexpr std::ptrdiff_t kPixelsTelling = 2000;
 constexpr double kBeyondShareMax = 0.02, kFittingShareMin = 0.3;
 
-/// @param full  the level of a saturated pixel, which becomes 255. Where it is that already nothing is copied
+/// @param full  the level of a saturated pixel, which becomes 255. If it is 255 already, nothing is copied
 cv::Mat to_mat(const GreyView& view, double full) {
   return std::visit(
       [full](const auto& image) {
@@ -52,7 +52,7 @@ cv::Mat to_mat(const GreyView& view, double full) {
       view);
 }
 
-/// A pixel of the camera and its place in the projector. Eight bytes: a camera may have tens of millions.
+/// A camera pixel and its place in the projector. Eight bytes, because a camera may have tens of millions.
 struct Member {
   std::uint16_t x, y;                          // camera px
   std::uint16_t half_pixels_u, half_pixels_v;  // projector, from the first pixel's centre
@@ -61,14 +61,14 @@ struct Member {
   [[nodiscard]] Eigen::Vector2d projector_px() const { return {0.5 * half_pixels_u, 0.5 * half_pixels_v}; }
 };
 
-/// Members of a square, and the bins that the code tells apart, projector px.
+/// Members of a square, and the width of the code's bins, projector px.
 struct Square {
   std::vector<Member> members;
   Eigen::Vector2d bin_px{1, 1};
 };
 
-/// Distances of the members from the affine map from projector to camera over their square (least squares). The part
-/// due to their places in their bins is taken off.
+/// Distances of the members from the least-squares affine map from projector to camera over their square. The part due
+/// to their places in their bins is subtracted.
 std::vector<double> distances_from_affine(const Square& square) {
   const std::vector<Member>& members = square.members;
   Eigen::Matrix3d normal = Eigen::Matrix3d::Identity() * 1e-9;
@@ -89,7 +89,7 @@ std::vector<double> distances_from_affine(const Square& square) {
   return distances;
 }
 
-/// Means of the members that fit, and how sure they are.
+/// Means of the fitting members, and their certainty.
 ProjectedPoint mean_of(const Square& square) {
   ProjectedPoint mean;
   mean.camera_px = mean.projector_px = Eigen::Vector2d::Zero();
@@ -98,12 +98,12 @@ ProjectedPoint mean_of(const Square& square) {
     mean.camera_px += member.camera_px() / count;
     mean.projector_px += member.projector_px() / count;
   }
-  const double sigma_px = square.bin_px.norm() / std::sqrt(12);  // of a place in a bin
+  const double sigma_px = square.bin_px.norm() / std::sqrt(12);  // standard deviation of a place in a bin
   mean.sigma_px = std::max(sigma_px / std::sqrt(count), 0.02);
   return mean;
 }
 
-/// Leaves out the members that do not fit.
+/// Removes the members that do not fit.
 void keep_fitting(Square& square) {
   constexpr int kRounds = 2;
   for (int round = 0; round < kRounds && square.members.size() >= kSeenMin; ++round) {
@@ -120,7 +120,7 @@ cv::Ptr<GrayCodePattern> code_of(const ImageSize& projector) {
   return GrayCodePattern::create(projector.width_px, projector.height_px);
 }
 
-/// The images of the code as those of one camera, of one size.
+/// The code's images, if they all have one size.
 Result<std::vector<cv::Mat>> checked_images(const GrayCapture& capture, const ImageSize& projector) {
   const std::size_t expected = gray_code_images(projector);
   if (capture.code.size() != expected) {
@@ -129,7 +129,7 @@ Result<std::vector<cv::Mat>> checked_images(const GrayCapture& capture, const Im
                     std::to_string(expected) + " belong to a projector of " + std::to_string(projector.width_px) + "x" +
                     std::to_string(projector.height_px) + " pixels; set the projector's size to that of the captures");
   }
-  const double full = guess_full_level(capture.white);  // of all: what is compared needs one scale
+  const double full = guess_full_level(capture.white);  // of all images: a comparison needs one scale
   std::vector<cv::Mat> images{to_mat(capture.white, full), to_mat(capture.black, full)};
   for (const GreyView& image : capture.code) images.push_back(to_mat(image, full));
   if (std::ranges::any_of(images, [&](const cv::Mat& image) { return image.size() != images[0].size(); })) {
@@ -138,7 +138,7 @@ Result<std::vector<cv::Mat>> checked_images(const GrayCapture& capture, const Im
   return images;
 }
 
-/// Pixels of the camera that are brighter in one picture than in another.
+/// Camera pixels that are brighter in one picture than in another.
 std::vector<cv::Point> brighter_pixels(const cv::Mat& light, const cv::Mat& dark,
                                        const std::function<bool(int x, int y)>& wanted) {
   std::vector<cv::Point> brighter;
@@ -152,7 +152,7 @@ std::vector<cv::Point> brighter_pixels(const cv::Mat& light, const cv::Mat& dark
 }
 
 /// Pixels that the projector lights.
-/// @errors kMismatch: white and black are exchanged
+/// @errors kMismatch: white and black are swapped
 Result<std::vector<cv::Point>> lit_pixels(const cv::Mat& white, const cv::Mat& black,
                                           const std::function<bool(int x, int y)>& wanted) {
   auto lit = brighter_pixels(white, black, wanted);
@@ -168,7 +168,7 @@ struct Reading {
 };
 
 /// The place of each lit pixel.
-/// @errors kMismatch: places beyond the projector
+/// @errors kMismatch: places outside the projector
 Result<Reading> read_places(std::span<const cv::Mat> code, const ImageSize& projector,
                             const std::vector<cv::Point>& lit) {
   const auto columns = static_cast<std::size_t>(std::bit_width(static_cast<unsigned>(projector.width_px - 1)));
@@ -197,7 +197,8 @@ Result<Reading> read_places(std::span<const cv::Mat> code, const ImageSize& proj
   return reading;
 }
 
-/// The points of all squares that have enough, and of how many members. Brings the pixels of a square together.
+/// The points of all squares with enough members, and the total number of members. Reorders the pixels so that those of
+/// a square are adjacent.
 std::pair<std::vector<ProjectedPoint>, std::size_t> summarise(Reading& reading, int side_px) {
   const auto place = [side_px](const Member& member) {
     return std::pair(member.half_pixels_u / (2 * side_px), member.half_pixels_v / (2 * side_px));

@@ -13,7 +13,7 @@
 namespace slsd {
 
 /// The images of a Gray code, in the order of OpenCV's GrayCodePattern: columns first, the highest bit first, each bit
-/// followed by its inverse. White and black belong to it and are not among them.
+/// followed by its inverse. White and black belong to the code but are not included.
 [[nodiscard]] std::vector<Grey8> draw_gray_code(const ImageSize& projector);
 [[nodiscard]] std::size_t gray_code_images(const ImageSize& projector);
 
@@ -23,11 +23,10 @@ struct GrayCapture {
   std::vector<GreyView> code;  ///< gray_code_images() of them
 };
 
-/// The projector pixels that the camera sees. Every pixel that is certain has a part: those of a square of the
-/// projector are taken together, and their means belong to each other. Stripes too fine for a projector out of focus
-/// are left out.
-/// @param wanted  whether a camera pixel is asked for
-/// @errors kMismatch: the count of images, their sizes, their order or the projector's size do not fit
+/// The projector pixels that the camera sees. Every certain pixel counts: the means over a projector square's camera
+/// and projector pixels form a pair. Stripes too fine for a projector out of focus are ignored.
+/// @param wanted  whether to use a camera pixel
+/// @errors kMismatch: the number of images, their sizes, their order or the projector's size are inconsistent
 /// @thread reentrant
 [[nodiscard]] Result<std::vector<ProjectedPoint>> read_gray_code(const GrayCapture& capture, const ImageSize& projector,
                                                                  const std::function<bool(int x, int y)>& wanted);

@@ -12,11 +12,10 @@
 
 namespace slsd {
 
-/// Reads the pattern wherever it is seen in a picture, for a plain plane without a board.
-/// @param white  what is printed on the plane and how the light falls on it are divided out, where it is there
-/// @return without corners
-/// @errors kMismatch: the pictures are not of the same size; kNotFound: none of the pattern is seen; kUnsupported: too
-///         large
+/// Reads the pattern anywhere in a picture, for a blank plane without a board.
+/// @param white  if given, the print on the plane and the light on it are divided out
+/// @return a view without corners
+/// @errors kMismatch: the pictures differ in size; kNotFound: the pattern is not visible; kUnsupported: too large
 [[nodiscard]] Result<PoseView> observe_plane(const GreyView& pattern, const std::optional<GreyView>& white,
                                              PatternReader& reader);
 

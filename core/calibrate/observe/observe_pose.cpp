@@ -15,13 +15,13 @@
 namespace slsd {
 namespace {
 
-/// Regions of the size of symbols from which on it is a pattern that is seen, though not this one.
+/// Number of regions of symbol size above which a pattern is visible, though a different one.
 constexpr std::size_t kPatternRegions = 60;
-/// Number of symbols from which on the pattern is certain: fewer of so many shapes agree by chance.
+/// Number of symbols above which the pattern is certain: fewer among so many shapes may agree by chance.
 constexpr std::size_t kSymbolsCertain = 20;
 
-/// Leaves the board and what is near it. Where the projector lights nothing, the quotient is that of two noises, as
-/// bright as the pattern: the reader would take it for the noise of the frame.
+/// Keeps only the board and its vicinity. Where the projector lights nothing, the quotient is that of two noises, as
+/// bright as the pattern. The reader would count it as the frame's noise.
 void clear_surroundings(const BoardRegion& region, Grey16& quotient) {
   for (int y = 0; y < quotient.height(); ++y) {
     for (int x = 0; x < quotient.width(); ++x) {

@@ -21,13 +21,13 @@ struct PosePictures {
 };
 
 /// Finds the board in the white picture.
-/// @errors what find_board() says
+/// @errors errors of find_board()
 /// @thread reentrant
 [[nodiscard]] Result<PoseView> observe_board(const PosePictures& pictures, const Board& board, BoardSighting& sighting);
 
 /// Reads the pattern on the board, with the light and the print divided out.
-/// @param view  gets the symbols; those beside the board are left out
-/// @errors kMismatch; kNotFound: none of the pattern is seen; kUnsupported: the pictures are too large
+/// @param view  gets the symbols; symbols beside the board are ignored
+/// @errors kMismatch; kNotFound: the pattern is not visible; kUnsupported: the pictures are too large
 [[nodiscard]] Result<> observe_pattern(const PosePictures& pictures, const Board& board, const BoardSighting& sighting,
                                        PatternReader& reader, PoseView& view);
 

@@ -17,11 +17,11 @@ namespace {
 
 constexpr int kReachPx = 24;
 constexpr std::size_t kEdgesUsed = 6000, kEdgesMin = 200;
-constexpr float kEdgeMin = 0.1F;   // of the light, in natural logarithms a pixel
-constexpr float kCapped = 0.3F;    // beyond which an edge weighs no more
-constexpr float kFaintLevels = 4;  // of 255: added, so that noise in the dark is no edge
+constexpr float kEdgeMin = 0.1F;   // of the light, natural logarithm per pixel
+constexpr float kCapped = 0.3F;    // limit of an edge's weight
+constexpr float kFaintLevels = 4;  // of 255: an offset, so that noise in the dark is no edge
 
-/// The logarithm of a picture's light, smoothed over its pixels' neighbours.
+/// The logarithm of a picture's light, smoothed over neighbouring pixels.
 Image<float> log_light(const GreyView& picture) {
   return std::visit(
       [](const auto& view) {
@@ -60,7 +60,7 @@ Gradient gradient_at(const Image<float>& light, int x, int y) {
   return {capped(light.at(x + 1, y) - light.at(x - 1, y)), capped(light.at(x, y + 1) - light.at(x, y - 1))};
 }
 
-/// The gradients of all of a picture.
+/// The gradients of a whole picture.
 struct GradientField {
   Image<float> x, y;
 
@@ -80,7 +80,7 @@ struct Edge {
   Gradient gradient;
 };
 
-/// The edges of the print, evenly over the board. What lies beside it may stand still while it moves.
+/// The edges of the print, evenly over the board. Edges beside the board may stand still while it moves.
 std::vector<Edge> edges_of(const Image<float>& light, const Board& board, const BoardSighting& sighting) {
   const BoardRegion region(board, sighting);
   Eigen::AlignedBox2d box;

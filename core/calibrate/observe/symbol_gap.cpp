@@ -12,24 +12,24 @@
 namespace slsd {
 namespace {
 
-constexpr std::size_t kFoundMin = 20;  // of fewer nobody can say where the others should be
-/// Cells as bright as each other under the white projector: of them as many are seen in one place as in another, on ink
-/// as on paper.
+constexpr std::size_t kFoundMin = 20;  // fewer do not show where the others should be
+/// Classes of cells with equal brightness under the white projector. Within a class, symbols are equally likely to be
+/// read anywhere, on ink as on paper.
 constexpr std::size_t kBrightnesses = 8;
 constexpr int kWindow = 5;  // cells across and down, wider than the ink of most squares
-/// Limits of a window with a gap: the largest seen share of the expected symbols, the least number of expected symbols,
-/// and the least lack in standard deviations of chance.
+/// Limits of a window with a gap: the largest share of expected symbols that are seen, the smallest number of expected
+/// symbols, and the smallest lack in standard deviations of chance.
 constexpr double kSeenShare = 0.2, kExpectedMin = 8, kDeviations = 4;
 constexpr double kClippedShare = 0.5;
 
 /// A symbol of the pattern that falls on the board.
 struct Cell {
   bool on_board = false, seen = false, in_gap = false;
-  double level = 0;   ///< grey level of the white picture there
-  double likely = 0;  ///< chance to be seen
+  double level = 0;   ///< grey level of the white picture at the symbol
+  double likely = 0;  ///< probability of being read
 };
 
-/// The pattern's, row by row.
+/// The pattern's cells, row by row.
 struct Cells {
   explicit Cells(const Pattern& pattern)
       : columns(pattern.whole_columns()),

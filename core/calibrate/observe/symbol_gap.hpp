@@ -12,15 +12,15 @@
 
 namespace slsd {
 
-/// A place on the board where the pattern should be seen, as the projector lights it there, and is not.
+/// A place on the board where the projector lights the pattern, but none of it is seen.
 struct SymbolGap {
-  std::size_t symbols = 0;  ///< number of unseen symbols; 0: there is no such place
-  bool clipped = false;     ///< the white picture is at full level there
+  std::size_t symbols = 0;  ///< number of unseen symbols; 0: no such place
+  bool clipped = false;     ///< the white picture is saturated there
 };
 
-/// Finds such places, of 5 by 5 symbols or more. Single symbols that are not read, ink that hides a row of them, and
-/// those that the board's edge cuts are none.
-/// @param found  on the board, of one look at it
+/// Finds such places, of at least 5 by 5 symbols. Single unread symbols, a row hidden by ink, and symbols cut by the
+/// board's edge do not count.
+/// @param found  symbols found on the board in one look
 /// @param white  the picture under the white projector
 /// @thread reentrant
 [[nodiscard]] SymbolGap find_symbol_gap(const std::vector<SymbolMatch>& found, const Pattern& pattern,

@@ -13,17 +13,17 @@
 namespace slsd {
 namespace {
 
-/// Standard deviations from which a point is no part of the rest.
+/// Standard deviations above which a point is an outlier.
 constexpr double kOutlyingSigmas = 5;
-/// Least deviation of a point: no estimator is better than this, whatever little noise a few points show.
+/// Smallest deviation of a point: no estimator is better than this, however little noise a few points show.
 constexpr double kSigmaMinPx = 0.005;
-/// A print longer one way than the other by this share, beyond doubt.
+/// A print that is certainly longer along one axis than along the other by this share.
 constexpr double kStretchMin = 0.001, kStretchSigmas = 5;
-/// Two prints whose scales differ by this share, beyond doubt. Of one look nobody can tell whether it or the print is
-/// off.
+/// Two prints whose scales certainly differ by this share. A single look does not show whether the look or the print is
+/// wrong.
 constexpr double kScaleMin = 0.001, kScaleSigmas = 5;
 constexpr std::size_t kLooksForScale = 2;
-/// A stretch that changes by less than this has settled.
+/// A smaller change of the stretch counts as convergence.
 constexpr double kStretchSettled = 1e-5;
 
 template <class Visit>
@@ -33,8 +33,8 @@ void visit_views(Observations& observations, Visit visit) {
   }
 }
 
-/// The noise of a view over the session's, which counts as so many components more: of few points little can be told.
-/// One that is far off is no noise.
+/// Ratio of a view's noise to the session's. The session counts as additional components, because few points are weak
+/// evidence. The ratio is limited: a larger one is not noise.
 double noise_over(const std::vector<double>& components, double session) {
   constexpr double kSession = 60, kLeast = 0.5, kMost = 2.5;
   const auto count = static_cast<double>(components.size());
@@ -42,7 +42,7 @@ double noise_over(const std::vector<double>& components, double session) {
   return std::clamp(std::sqrt((count * own * own + kSession) / (count + kSession)), kLeast, kMost);
 }
 
-/// The highest term less likely, where a lens turns back on itself within its picture.
+/// Narrows the prior of the highest term if a lens folds back on itself within its image.
 bool tighten(const DeviceModel& device, DistortionPrior& prior) {
   constexpr double kLess = 0.2;
   if (device.lens[0] <= 0 || to_lens(device.lens, device.size).invertible()) return false;
@@ -63,8 +63,8 @@ double value_of(const SharedParameter& parameter, const RigModel& rig) {
   return parameter.kind == SharedParameter::Kind::kLens ? device.lens[index] : device.device_from_rig[index];
 }
 
-/// Calls with each view, what it shows, and the components of its corners' and of its symbols' residuals, these in
-/// their own deviations.
+/// Calls with each view, its observations, and the residual components of its corners and symbols; those of symbols are
+/// in their own deviations.
 template <class Visit>
 void Adjustment::visit_components(Observations& observations, Visit visit) const {
   visit_views(observations, [&](PoseView& view, std::size_t pose) {
@@ -152,7 +152,7 @@ Result<Adjustment> Adjustment::begin(Observations& observations, RigModel rig) {
   std::vector<PoseObservation> aside = adjustment.set_aside(*doubtful, observations);
   if (auto solved = adjust(observations, options, adjustment.rig_); !solved) return tl::unexpected(solved.error());
   if (auto solved = adjustment.adjust_again(observations); !solved) return tl::unexpected(solved.error());
-  // Before poses and terms are judged: under a stretched board they bear its errors.
+  // Before judging poses and terms, which absorb the errors of a stretched board.
   if (auto looked = adjustment.look_for_stretch(observations); !looked) return tl::unexpected(looked.error());
   if (auto back = adjustment.take_back(*doubtful, std::move(aside), observations); !back)
     return tl::unexpected(back.error());
@@ -183,7 +183,7 @@ Result<> Adjustment::take_back(const std::vector<std::size_t>& doubtful, std::ve
   return find_influence_of(observations);
 }
 
-/// Everything at once, with distortions that can be undone over the whole of each picture.
+/// Adjusts everything together, with distortions that are invertible over the whole of each image.
 Result<> Adjustment::adjust_to_lenses(const Observations& observations) {
   constexpr int kRounds = 8;
   for (int round = 0; round < kRounds; ++round) {
@@ -242,11 +242,11 @@ Result<> Adjustment::look_for_stretch(Observations& observations) {
     Adjustment trial = *this;
     trial.options_.stretch = true;
     if (auto solved = adjust(observations, trial.options_, trial.rig_); !solved) return tl::unexpected(solved.error());
-    if (auto found = trial.find_influence_of(observations); !found) return {};  // the poses do not tell it
+    if (auto found = trial.find_influence_of(observations); !found) return {};  // the poses do not determine it
     if (!trial.is_stretched()) return {};
     *this = std::move(trial);
   }
-  // The errors without it passed for noise: as they fall, the points weigh more.
+  // Without the stretch, its errors counted as noise; as they fall, the points gain weight.
   constexpr int kRounds = 10;
   for (int round = 0; round < kRounds; ++round) {
     const double before = rig_.board_stretch;

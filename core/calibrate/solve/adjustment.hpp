@@ -12,28 +12,27 @@
 
 namespace slsd {
 
-/// The course of an adjustment: solved, the noise measured, what lies off marked, solved again.
+/// The steps of an adjustment: solve, measure the noise, mark outliers, and solve again.
 /// @thread thread-bound
 class Adjustment {
  public:
-  /// Cameras first, then the projector, then everything together.
-  /// @param observations  in and out: points that lie off are marked
+  /// Adjusts the cameras first, then the projector, then everything together.
+  /// @param observations  in and out: outliers are marked
   /// @param rig           cameras and poses, as estimated
   /// @errors kImpossible
   [[nodiscard]] static Result<Adjustment> begin(Observations& observations, RigModel rig);
 
-  /// Everything together, from where it stands.
+  /// Adjusts everything together from the current state.
   [[nodiscard]] Result<> adjust_again(Observations& observations);
 
-  /// Says whether the board is stretched, and adjusts once more.
+  /// Determines whether the board is stretched, and adjusts again.
   [[nodiscard]] Result<> look_for_stretch(Observations& observations);
 
-  /// Goes on with looks at the reference plane among the poses. With two or more of them the board's scale is open, so
-  /// that prints of different scales contradict nothing.
+  /// Continues with looks at the reference plane among the poses. With two or more looks, the board's scale is free, so
+  /// that prints of different scales do not contradict each other.
   [[nodiscard]] Result<> begin_with_planes(Observations& observations);
 
-  /// Holds the board's scale again where the prints agree as far as can be told; otherwise says by how much they do
-  /// not.
+  /// Fixes the board's scale again if the prints agree within their deviations; otherwise keeps their difference.
   [[nodiscard]] Result<> compare_prints(Observations& observations);
 
   /// Looks for a change of the rig during the session.
@@ -51,10 +50,10 @@ class Adjustment {
   explicit Adjustment(RigModel rig) : rig_(std::move(rig)) {}
   [[nodiscard]] Result<> find_influence_of(const Observations& observations);
   [[nodiscard]] std::string unplaced_text(const Observations& observations) const;
-  /// Takes poses out, so that they have no part in what follows.
+  /// Removes poses, so that they have no effect on later steps.
   [[nodiscard]] std::vector<PoseObservation> set_aside(const std::vector<std::size_t>& doubtful,
                                                        Observations& observations);
-  /// Puts them back where their corners say, to be judged by the others.
+  /// Restores the poses at the places that their corners give, to be judged by the others.
   [[nodiscard]] Result<> take_back(const std::vector<std::size_t>& doubtful, std::vector<PoseObservation> aside,
                                    Observations& observations);
   template <class Visit>
@@ -68,7 +67,7 @@ class Adjustment {
   BundleOptions options_;
   BundleEquations equations_;
   PoseInfluence influence_;
-  bool settled_ = true;  // the last time that all was adjusted
+  bool settled_ = true;  // whether the last full adjustment converged
   std::vector<std::string> warnings_;
 };
 

@@ -8,7 +8,7 @@ namespace slsd {
 namespace {
 
 constexpr std::size_t kOrders = 5;
-/// Reach from the middle, in halves of the longer side: beyond it, a polynomial soon is higher than any board.
+/// Reach from the centre, in halves of the longer side: beyond it, a polynomial soon is higher than any board.
 constexpr double kReach = 2;
 
 /// Powers of u and v in each term.
@@ -45,9 +45,9 @@ ShapeAt shape_at(const double* terms_mm, const ShapeFrame& frame, const Eigen::V
 
 std::optional<Eigen::Vector3d> meet_shape(const double* terms_mm, const ShapeFrame& frame, const Eigen::Vector3d& eye,
                                           const Eigen::Vector3d& ray) {
-  constexpr int kRounds = 12;  // a board is nearly flat: three or four are enough
+  constexpr int kRounds = 12;  // a board is nearly flat: three or four rounds are enough
   constexpr double kSettled = 1e-13;
-  constexpr double kGrazing = 1e-9;  // rad: where such a ray meets the shape is rounding
+  constexpr double kGrazing = 1e-9;  // rad: at a smaller angle, rounding decides where the ray meets the shape
   double along = -eye.z() / ray.z();
   for (int round = 0; round < kRounds; ++round) {
     const Eigen::Vector3d at = eye + along * ray;

@@ -20,7 +20,7 @@ constexpr double kHuberSigmas = 3;
 /// Shift of all symbols of a view, camera px: a block of the adjustment.
 using Shift = std::array<double, 2>;
 
-/// The problem of Ceres, and which of its blocks belong to what.
+/// The Ceres problem, and the meaning of its blocks.
 class Problem {
  public:
   Problem(const Observations& observations, const BundleOptions& options, RigModel& rig)
@@ -41,7 +41,7 @@ class Problem {
   /// Returns the shifts of the pose's views in which symbols were seen.
   [[nodiscard]] const std::vector<double*>& shifts_of(std::size_t pose) const { return shifts_of_[pose]; }
   double* pose_block(std::size_t pose) { return rig_.rig_from_board[pose].data(); }
-  /// Returns the place of a camera, by its index, or of the projector: -1.
+  /// Returns the place of the camera with this index, or of the projector: -1.
   double* place_block(int device, std::size_t pose) {
     const bool moved = rig_.moved && pose >= rig_.moved->first_pose && device != 0;
     if (device < 0) return moved ? rig_.moved->projector.data() : rig_.projector.device_from_rig.data();
@@ -56,8 +56,8 @@ class Problem {
     return own == rig_.rig_from_lit.end() ? pose_block(pose) : own->second.data();
   }
 
-  /// The poses are eliminated first. Each other block has a group of its own: within one Ceres goes by the addresses,
-  /// and sums in another order give other last digits.
+  /// The poses are eliminated first. Each other block has a group of its own: within a group, Ceres orders blocks by
+  /// address, and sums in another order differ in the last digits.
   std::shared_ptr<ceres::ParameterBlockOrdering> ordering() {
     auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
     const auto add = [&](double* block, int group) {
@@ -82,7 +82,7 @@ class Problem {
     return ordering;
   }
 
-  /// Blocks that all poses share and that are adjusted, with their parameters in the order of the columns.
+  /// Lists adjusted blocks that all poses share, with their parameters in the order of the columns.
   void list_shared(std::vector<double*>& blocks, std::vector<SharedParameter>& parameters) {
     const auto add_device = [&](DeviceModel& device, int index) {
       if (active(device.lens.data())) {
@@ -174,7 +174,7 @@ class Problem {
     return shift;
   }
 
-  // Of a lens that nothing was seen by there is none: its block is not part of the problem.
+  // A lens without observations has no prior: its block is not part of the problem.
   void add_prior(DeviceModel& device, const DistortionPrior& prior) {
     if (!problem_.HasParameterBlock(device.lens.data())) return;
     ceres::Matrix in_sigmas = ceres::Matrix::Zero(static_cast<Eigen::Index>(prior.size()), 9);
@@ -195,7 +195,7 @@ class Problem {
 
   void hold_constant() {
     keep(rig_.cameras[0].device_from_rig.data());
-    // Of symbols alone a board may lie anywhere on its plane.
+    // Symbols alone leave the board's place on its plane open.
     for (auto& [pose, lit] : rig_.rig_from_lit) {
       if (problem_.HasParameterBlock(lit.data())) {
         problem_.SetManifold(lit.data(), new ceres::SubsetManifold(6, {2, 3, 4}));
@@ -222,13 +222,13 @@ class Problem {
   const Observations& observations_;
   const BundleOptions& options_;
   RigModel& rig_;
-  double true_scale_ = 0, true_stretch_ = 0;  // of the reference plane's print
-  ShapeVector flat_{};                        // of the reference plane
+  double true_scale_ = 0, true_stretch_ = 0;  // scale and stretch of the reference plane's print
+  ShapeVector flat_{};                        // shape of the reference plane
   ceres::HuberLoss loss_{kHuberSigmas};
   ceres::Problem problem_{keeps_loss()};
   std::vector<std::vector<ceres::ResidualBlockId>> residuals_;
-  std::vector<std::vector<double>> sigmas_px_;  // of each residual block
-  std::deque<Shift> shifts_;                    // where it is stays where it is
+  std::vector<std::vector<double>> sigmas_px_;  // for each residual block
+  std::deque<Shift> shifts_;                    // a deque, because its elements never move
   std::vector<std::vector<double*>> shifts_of_;
   std::vector<std::size_t> corners_;
 };
@@ -250,7 +250,7 @@ Result<Adjusted> adjust(const Observations& observations, const BundleOptions& o
   how.linear_solver_ordering = problem.ordering();
   how.max_num_iterations = options.iterations_max;
   how.function_tolerance = 1e-6;
-  how.num_threads = 1;  // of more, each sums what it happens to get: other last digits in every run
+  how.num_threads = 1;  // with more threads, the order of the sums changes the last digits in every run
   how.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(how, &problem.ceres(), &summary);

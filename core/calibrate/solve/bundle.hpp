@@ -14,20 +14,19 @@
 namespace slsd {
 
 struct BundleOptions {
-  std::vector<DistortionPrior> cameras;  ///< one to a camera
+  std::vector<DistortionPrior> cameras;  ///< one for each camera
   DistortionPrior projector = kUsualDistortion;
-  bool with_symbols = true;  ///< otherwise the cameras and poses alone are adjusted
-  bool scale = false;        ///< whether the board's scale is adjusted too, against that of the reference plane
-  bool stretch = false;      ///< whether the board's aspect is adjusted too
-  /// Bend that the board may have before any observation: one standard deviation of each term of its shape. Nothing:
-  /// the shape is held as it is.
+  bool with_symbols = true;  ///< otherwise only the cameras and poses are adjusted
+  bool scale = false;        ///< whether to adjust the board's scale, relative to the reference plane's
+  bool stretch = false;      ///< whether to adjust the board's aspect ratio
+  /// Prior of the board's bend: one standard deviation of each term of its shape. Empty: the shape is fixed.
   std::optional<ShapeVector> shape_sigma_mm = {};
   int iterations_max = 60;
   double corner_sigma_px = 0.1;
   double plane_corner_sigma_px = 0.1;  ///< for the reference plane's corners
   double symbol_sigma_factor = 1;      ///< factor of ProjectedPoint::sigma_px
-  /// Error that all symbols of a view share, which no number of symbols lessens: skewed light out of focus, or an
-  /// exposure that moved. docs/notes/2026-11-calibration.md has the measurements.
+  /// Error common to all symbols of a view, which more symbols do not reduce: skewed light out of focus, or an exposure
+  /// that moved. docs/notes/2026-11-calibration.md has the measurements.
   double symbol_shift_px = 0.005;
 
   [[nodiscard]] double corner_sigma_of(PoseSubject subject) const {
@@ -37,26 +36,26 @@ struct BundleOptions {
 
 /// Result of an adjustment.
 struct Adjusted {
-  bool settled = false;  ///< within its iterations; if not, the rig is the best so far
-  double cost = 0;       ///< half of the sum of all squared residuals, lessened by the loss
+  bool settled = false;  ///< converged within its iterations; if not, the rig is the best so far
+  double cost = 0;       ///< half of the sum of all squared residuals, reduced by the loss function
 };
 
-/// Adjusts a rig to what was seen of it: all lenses, the devices' places and all poses at once (Ceres, Huber's
-/// loss), and what the symbols of each view are shifted by. Points marked as outlying have no part.
+/// Adjusts a rig to its observations: all lenses, the devices' places, all poses, and the symbols' shift in each view
+/// (Ceres, Huber's loss). Points marked as outlying are ignored.
 /// @param rig  in: near the solution; out: the solution
-/// @errors kImpossible: no solution was reached
+/// @errors kImpossible: the adjustment found no solution
 /// @thread reentrant
 [[nodiscard]] Result<Adjusted> adjust(const Observations& observations, const BundleOptions& options, RigModel& rig);
 
-/// The equations of the adjustment at its solution, linear: residuals of each pose and their derivatives. Empty where
+/// The linearised equations of the adjustment at its solution: residuals of each pose and their derivatives. Empty if
 /// all points of a pose are outlying.
 struct PoseEquations {
   Eigen::MatrixXd by_shared;  ///< residuals x shared parameters
-  /// Residuals x what the pose has of its own: its place (6), then the shift of each view's symbols (2 each, at 0).
+  /// Residuals x the pose's own parameters: its place (6), then the symbols' shift in each view (2 each, at 0).
   Eigen::MatrixXd by_pose;
-  Eigen::VectorXd pose_weight;  ///< one to a column of by_pose: of what was plausible before; 0: anything was
+  Eigen::VectorXd pose_weight;  ///< one for each column of by_pose: weight of the prior; 0: no prior
   Eigen::VectorXd residuals;    ///< standard deviations, two to a point: first the corners, then the symbols, by view
-  Eigen::VectorXd sigmas_px;    ///< one to a residual: what it is in px, the loss undone
+  Eigen::VectorXd sigmas_px;    ///< one for each residual: its standard deviation in px, without the loss function
   Eigen::Index corner_residuals = 0;
 };
 
@@ -70,8 +69,8 @@ struct SharedParameter {
 
 struct BundleEquations {
   std::vector<SharedParameter> shared;
-  Eigen::VectorXd prior_weight;  ///< one to a shared parameter: of what was plausible before; 0: anything was
-  Eigen::VectorXd prior_pull;    ///< its part in the gradient
+  Eigen::VectorXd prior_weight;  ///< one for each shared parameter: weight of the prior; 0: no prior
+  Eigen::VectorXd prior_pull;    ///< the prior's part of the gradient
   std::vector<PoseEquations> poses;
 };
 

@@ -8,11 +8,10 @@
 
 namespace slsd {
 
-/// Pose of a board at the moment its corners were seen, from these alone: symbols that were seen on it later have no
-/// part.
-/// @param rig    whose camera sees the corners; that with the most of them is asked
-/// @param begin  rig from board, near it
-/// @return       rig from board; none where fewer than 4 corners were seen
+/// Pose of a board when its corners were seen, from these alone, without symbols that were seen on it later.
+/// @param rig    used for the camera with the most corners
+/// @param begin  rig from board, near the solution
+/// @return       rig from board; empty if fewer than 4 corners were seen
 /// @thread reentrant
 [[nodiscard]] std::optional<MotionVector> pose_by_corners(const PoseObservation& pose, const RigModel& rig,
                                                           const MotionVector& begin);

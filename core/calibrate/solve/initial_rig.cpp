@@ -21,18 +21,19 @@ namespace slsd {
 namespace {
 
 constexpr std::size_t kPosesMin = 3;
-/// A focal length beyond these, in widths of the image, is not of a camera but of poses that do not tell it.
+/// Limits of a camera's focal length in widths of the image. Values beyond them mean that the poses do not determine
+/// it.
 constexpr double kFocalMin = 0.2, kFocalMax = 50;
-/// Focal lengths that are tried are this far apart: near enough for Zhang's method to take over.
+/// Ratio between trial focal lengths: close enough for Zhang's method to converge.
 constexpr double kFocalStep = 1.12;
-/// A focal length is judged by this share of the views, those that it suits best, so that wrong ones have no say; one
-/// at which they are off by this factor more than at the best suits the wrong ones.
+/// A focal length is judged by the best-fitting share of the views, so that wrong views have no influence. If those
+/// errors exceed the best focal length's by this factor, it fits wrong views.
 constexpr double kJudgingShare = 0.6, kNearlyBest = 2;
-/// A view this much farther off than most, and so many px, has no part in the first estimate. One that is so many px
-/// off still, when its camera's distortion is known, shows no board; a bent or a moved one is off by less, and is told
-/// apart later.
+/// A view this many times farther off than most, and by so many px, is excluded from the first estimate. If it is still
+/// so many px off with its camera's distortion known, it shows no board. A bent or a moved board is off by less, and is
+/// recognised later.
 constexpr double kGrossFactor = 8, kDoubtfulPx = 4, kNoBoardPx = 20;
-/// Least angle between the two boards whose tilts differ most.
+/// Smallest angle between the two boards whose tilts differ most.
 constexpr double kTiltsApartMinDeg = 8;
 constexpr char kTilt[] =
     "hold the board at an angle of 20 to 40 degrees to the camera in most poses, each time towards another side";
@@ -67,7 +68,7 @@ LensVector plain_lens(double focal, const ImageSize& size) {
   return {focal, focal, 0.5 * (size.width_px - 1), 0.5 * (size.height_px - 1), 0, 0, 0, 0, 0};
 }
 
-/// Zhang's estimate; 0 where the views leave it open.
+/// Zhang's estimate; 0 if the views do not determine it.
 double zhang_focal(const Views& views, const ImageSize& size) {
   CornerLists lists;
   for (const PoseView* view : views) append(*view, lists);
@@ -95,7 +96,7 @@ std::optional<RigidTransform> pose_of(const PoseView& view, const LensVector& le
   return to_motion({turn[0], turn[1], turn[2], shift[0], shift[1], shift[2]});
 }
 
-/// Error of the corners in the pose that fits them best under a lens without distortion.
+/// Error of the corners in their best-fitting pose, under a lens without distortion.
 double error_px(const PoseView& view, const LensVector& lens, const ImageSize& size) {
   const auto camera_from_board = pose_of(view, lens);
   if (!camera_from_board) return std::numeric_limits<double>::infinity();
@@ -114,7 +115,7 @@ std::vector<double> errors_px(const Views& views, const LensVector& lens, const 
   return errors;
 }
 
-/// Root mean square of the smallest.
+/// Root mean square of the smallest share of the errors.
 double judged_px(std::vector<double> errors, double share = kJudgingShare) {
   std::ranges::sort(errors);
   const auto count = static_cast<std::size_t>(std::ceil(share * static_cast<double>(errors.size())));
@@ -127,8 +128,8 @@ double limit_px(const std::vector<double>& errors, double least_px) {
   return std::max(kGrossFactor * median_of(errors), least_px);
 }
 
-/// Zhang's estimate, of all views or, where it suits most of them badly, of those that agree; 0 where they leave it
-/// open.
+/// Zhang's estimate from all views, or, if it fits most of them badly, from those that agree; 0 if they do not
+/// determine it.
 double estimate_focal(const Views& views, const ImageSize& size) {
   const double of_all = zhang_focal(views, size);
   std::vector<double> least;
@@ -165,7 +166,7 @@ Result<LensVector> estimate_lens(const Observations& observations, std::size_t c
   return plain_lens(focal, size);
 }
 
-/// Camera from board, of every view.
+/// Camera from board, for every view.
 using ViewPoses = std::vector<std::map<std::size_t, RigidTransform>>;
 
 ViewPoses poses_of_views(const Observations& observations, const RigModel& rig) {
@@ -178,7 +179,7 @@ ViewPoses poses_of_views(const Observations& observations, const RigModel& rig) 
   return poses;
 }
 
-/// Places each camera by a pose that it shares with one which is placed already.
+/// Places each camera by a pose that it shares with a placed camera.
 Result<> place_cameras(const Observations& observations, const ViewPoses& poses, RigModel& rig) {
   std::map<std::size_t, RigidTransform> placed{{0, RigidTransform{}}};  // camera from rig
   for (bool grew = true; grew && placed.size() < rig.cameras.size();) {
@@ -204,7 +205,7 @@ Result<> place_cameras(const Observations& observations, const ViewPoses& poses,
   return {};
 }
 
-/// Ascending: poses with a view that is far off under the first estimate of its camera; none where too few others are
+/// Ascending: poses with a view that is far off under the first estimate of its camera; empty if too few others are
 /// left.
 std::vector<std::size_t> find_doubtful(const Observations& observations, const RigModel& rig) {
   std::vector<bool> doubtful(observations.poses.size());
@@ -230,7 +231,7 @@ std::vector<std::size_t> find_doubtful(const Observations& observations, const R
 }
 
 /// Adjusts the cameras to the other poses, and judges the doubtful ones by them.
-/// @param initial  those that are faulty already have no part
+/// @param initial  poses that are already known to be faulty are excluded
 Result<> judge_doubtful(const std::vector<std::size_t>& doubtful, const Observations& observations,
                         InitialRig& initial) {
   std::vector<std::size_t> aside = doubtful;
@@ -274,7 +275,7 @@ Result<> judge_doubtful(const std::vector<std::size_t>& doubtful, const Observat
   return {};
 }
 
-/// A pose's symbols, where the cameras' rays to them meet its board.
+/// A pose's symbols, at the points where the cameras' rays to them meet its board.
 std::vector<SpacePoint> space_points(const PoseObservation& pose, const RigModel& rig, const MotionVector& place) {
   std::vector<SpacePoint> points;
   const RigidTransform rig_from_board = to_motion(place);
@@ -303,12 +304,12 @@ std::vector<double> errors_px(const std::vector<std::vector<SpacePoint>>& poses,
   return errors;
 }
 
-/// Poses with more symbols than so are judged as well by these.
+/// Number of symbols that suffices to judge a pose.
 constexpr std::size_t kSymbolsOfPose = 60;
 constexpr std::size_t kStartsTried = 24;
-constexpr double kHalf = 0.5;  // of the poses, that a device which moved in the middle leaves right
+constexpr double kHalf = 0.5;  // share of the poses that stay right if a device moved in the middle
 
-/// Ascending: poses that are far off, where half of them or more are not.
+/// Ascending: poses that are far off, if at least half of them are not.
 std::vector<std::size_t> far_off(const std::vector<double>& errors) {
   std::vector<double> sorted = errors;
   std::ranges::sort(sorted);
@@ -320,8 +321,8 @@ std::vector<std::size_t> far_off(const std::vector<double>& errors) {
   return far;
 }
 
-/// Resects from all poses or, if some are far off by these, from the run of poses that suits most of them best. A
-/// wholly wrong pose, and a device that moved during the session, leave some run right.
+/// Resects from all poses or, if that leaves some far off, from the run of poses that fits most of them best. A wholly
+/// wrong pose, or a device that moved during the session, leaves some run intact.
 Result<Resection> resect_most(const std::vector<std::vector<SpacePoint>>& poses) {
   const auto resect_but = [](const std::vector<std::vector<SpacePoint>>& some, const std::vector<std::size_t>& wrong) {
     std::vector<SpacePoint> points;
@@ -344,7 +345,7 @@ Result<Resection> resect_most(const std::vector<std::vector<SpacePoint>>& poses)
   std::vector<double> best;
   for (const std::size_t length : {std::max(kPosesMin, count / 3), std::max(kPosesMin, count / 2)}) {
     for (std::size_t start = 0; start < count && length < count; start += count / kStartsTried + 1) {
-      std::vector<SpacePoint> points;  // from the last pose on to the first
+      std::vector<SpacePoint> points;  // wraps from the last pose to the first
       for (std::size_t i = start; i < start + length; ++i) {
         points.insert(points.end(), few[i % count].begin(), few[i % count].end());
       }

@@ -19,11 +19,11 @@ inline constexpr std::size_t kFirstTerm = 4;  ///< first term of distortion in L
 using DistortionPrior = std::array<double, 5>;
 inline constexpr DistortionPrior kUsualDistortion{0.3, 0.2, 1e-3, 1e-3, 0.1};  ///< for wide lenses
 
-/// Distortion that lenses plausibly have. In wide ones the coefficients themselves have about this size. In long ones,
-/// which see small angles only, the shift of the outermost pixel has it, as a share of its distance from the middle.
-/// All terms are adjusted. One that the poses do not tell stays at 0 with this deviation, and what depends on it
-/// becomes as uncertain. Held at 0 instead, it would pull focal lengths and principal points away by many of their
-/// deviations.
+/// Plausible distortion of a lens: one standard deviation of each term. Wide lenses have kUsualDistortion. Long lenses
+/// see small angles only, so their coefficients may be larger. There the limit is the relative shift of the outermost
+/// pixel, 5 % by k1. All terms are adjusted. A term that the poses do not determine stays at 0 with this deviation,
+/// which adds to the uncertainty of dependent results. Fixing it at 0 instead would bias focal lengths and principal
+/// points by many of their deviations.
 [[nodiscard]] inline DistortionPrior plausible_distortion(const ImageSize& size, double focal_px) {
   const double half_px = 0.5 * std::hypot(size.width_px, size.height_px);
   const double radius = std::max(half_px / std::max(focal_px, 1.0), 1e-3);

@@ -22,7 +22,7 @@ namespace {
 constexpr int kPartsAcross = 5, kPartsDown = 4;
 constexpr int kPartsMin = 10;
 constexpr int kPointsOfAPart = 4;
-constexpr std::size_t kPointsMax = 20'000;  // of a dense cloud's, that the plane is fitted to
+constexpr std::size_t kPointsMax = 20'000;  // of a dense cloud, for fitting the plane
 constexpr double kBendMax = 5e-4;           // of the distance
 constexpr std::size_t kSharedMin = 4;
 constexpr int kRounds = 200;
@@ -32,7 +32,7 @@ constexpr int kDraws = 200;
 
 using Places = std::vector<std::vector<CloudLook>>;
 
-/// Pairs of a scanner's corners and where the others have them.
+/// A scanner's corners, paired with the places of the same corners in the other scanners.
 struct Pairs {
   std::vector<Eigen::Vector3d> from, to;
 
@@ -47,7 +47,7 @@ struct Pairs {
 
 using Poses = std::vector<std::optional<RigidTransform>>;
 
-// The corners of one scanner with the means of where those that are placed have them.
+// Pairs a scanner's corners with the means of their places in the scanners that are already placed.
 Pairs pairs_of(std::size_t scanner, const Places& places, const Poses& poses) {
   Pairs pairs;
   for (const auto& looks : places) {
@@ -73,7 +73,7 @@ Pairs pairs_of(std::size_t scanner, const Places& places, const Poses& poses) {
   return pairs;
 }
 
-// From the first on, the one that shares most is next.
+// Starting from the first scanner, continue with the one that shares most corners.
 Poses solve(const Places& places, std::size_t scanners, const Poses& begin) {
   Poses poses = begin;
   poses[0] = RigidTransform();
@@ -101,7 +101,7 @@ Poses solve(const Places& places, std::size_t scanners, const Poses& begin) {
   return poses;
 }
 
-/// Squares of corners off the means of all scanners, with the degrees of freedom that are in them.
+/// Squared distances of corners from the means of all scanners, with their degrees of freedom.
 struct Residuals {
   double in_plane = 0, off_plane = 0, freedom = 0;
   std::vector<double> place_mm;
@@ -137,7 +137,7 @@ Residuals residuals_of(const Places& places, const Poses& poses) {
   return all;
 }
 
-// The same looks without what they disagree in.
+// The same looks with their disagreement removed.
 Places agreeing(Places places, const Poses& poses) {
   for (auto& looks : places) {
     std::map<int, std::pair<Eigen::Vector3d, int>> sums;
@@ -156,7 +156,7 @@ Places agreeing(Places places, const Poses& poses) {
   return places;
 }
 
-// The same looks with errors of the size that theirs may have.
+// The same looks with simulated errors of realistic size.
 Places with_errors(Places places, double corner_mm, std::mt19937& random) {
   std::normal_distribution<double> normal;
   const auto draw = [&] { return normal(random); };
@@ -177,7 +177,7 @@ Places with_errors(Places places, double corner_mm, std::mt19937& random) {
 
 void estimate_sigmas(const Places& places, const Poses& poses, const Residuals& found, PlacedScanners& placed) {
   struct Scatter {
-    std::vector<Eigen::Vector3d> points;  ///< the middle first
+    std::vector<Eigen::Vector3d> points;  ///< the centre first
     std::vector<double> squares;
   };
   std::vector<Scatter> scatters(placed.scanners.size());
@@ -207,7 +207,7 @@ void estimate_sigmas(const Places& places, const Poses& poses, const Residuals& 
       }
     }
   }
-  // Planes that fit each other less well than their own points let expect: something else is wrong with them too.
+  // Planes that agree less than their own points predict have further errors.
   const double worse =
       expected_off_plane > kNothingMm2 ? std::max(1.0, std::sqrt(found.off_plane / expected_off_plane)) : 1.0;
   for (std::size_t s = 1; s < scatters.size(); ++s) {
@@ -221,7 +221,7 @@ void estimate_sigmas(const Places& places, const Poses& poses, const Residuals& 
 
 Result<CloudLook> look_in_cloud(std::span<const Eigen::Vector3d> cloud, const BoardSighting& sighting,
                                 const Board& board, const Lens& lens) {
-  std::vector<Tie> ties;  // of the board and directions without the lens's distortion
+  std::vector<Tie> ties;  // points of the board, and directions without the lens's distortion
   for (const SeenPoint& point : sighting.points)
     ties.push_back({board.point(point.id).head<2>(), lens.undistort(point.pixel)});
   const auto direction_of_board = fit_homography(ties);
@@ -248,7 +248,8 @@ Result<CloudLook> look_in_cloud(std::span<const Eigen::Vector3d> cloud, const Bo
   look.middle_mm = plane->middle;
   look.along = plane->normal.unitOrthogonal();
   look.across = plane->normal.cross(look.along);
-  // What is common to a part of the board is no noise of its points: its parts tell how well the plane is known.
+  // An error common to a part of the board is no noise of its points: the scatter of the parts shows how well the plane
+  // is known.
   std::map<int, std::pair<Eigen::Vector4d, int>> parts;
   for (const std::size_t i : plane->on_plane) {
     const int part = static_cast<int>(places[i].x() / width * kPartsAcross) +

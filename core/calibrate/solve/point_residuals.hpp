@@ -10,21 +10,21 @@
 
 namespace slsd {
 
-/// Residuals of one view, camera px: where the model sees each point, less where the camera saw it. Outlying points
-/// too. Infinite for a symbol whose rays miss the board's shape.
+/// Residuals of one view, camera px: the model's prediction of each point minus its observation, including outlying
+/// points. Infinite for a symbol whose rays miss the board's shape.
 struct ViewResiduals {
   std::vector<Eigen::Vector2d> corners_px;
   std::vector<Eigen::Vector2d> symbols_px;
-  std::vector<Eigen::Vector2d> symbols_projector_px;  ///< the same in the projector: its image of the camera's point
+  std::vector<Eigen::Vector2d> symbols_projector_px;  ///< the same in the projector: the image of the camera's point
 };
 
 /// @thread reentrant
 [[nodiscard]] ViewResiduals residuals_of(const PoseView& view, const RigModel& rig, const MotionVector& rig_from_board,
                                          PoseSubject subject = PoseSubject::kBoard);
 
-/// Root mean square of the lengths, as OpenCV counts it.
+/// Root mean square of the lengths, as OpenCV computes it.
 [[nodiscard]] double rms_px(const std::vector<Eigen::Vector2d>& residuals);
-/// One standard deviation of a component, from the median: outliers have no part.
+/// One standard deviation of a component, from the median, so that outliers have no influence.
 [[nodiscard]] double robust_sigma_px(std::vector<double> components);
 
 }  // namespace slsd

@@ -12,16 +12,17 @@
 namespace slsd {
 namespace {
 
-/// Least ratio of the smallest to the largest eigenvalue of the correlations.
+/// Smallest accepted ratio of the smallest to the largest eigenvalue of the correlations.
 constexpr double kInvertTolerance = 1e-13;
-/// Share of all poses' information on a parameter below which a pose says nothing.
+/// Share of all poses' information on a parameter below which a pose contributes nothing.
 constexpr double kShareMin = 1e-4;
-/// Points below which a pose that fits them tells nothing.
+/// Number of points below which a fitting pose contributes nothing.
 constexpr Eigen::Index kPointsOfPose = 4;
-/// Least ratio of the smallest to the largest eigenvalue of the correlations between a pose's own six parameters.
+/// Smallest accepted ratio of the smallest to the largest eigenvalue of the correlations between a pose's own six
+/// parameters.
 constexpr double kPlacedTolerance = 1e-12;
 
-/// The equations of one pose with what is its own eliminated (Schur's complement).
+/// The equations of one pose with its own parameters eliminated (Schur's complement).
 struct Reduced {
   Eigen::MatrixXd normal;    // shared x shared
   Eigen::VectorXd gradient;  // shared
@@ -43,12 +44,12 @@ Reduced reduce(const PoseEquations& pose, Eigen::Index shared) {
               cross * own.solve(Eigen::VectorXd(pose.by_pose.transpose() * pose.residuals))};
 }
 
-/// Root mean square of the points' distances, from their components in px.
+/// Root mean square distance of the points, from their components in px.
 double rms(const Eigen::Ref<const Eigen::VectorXd>& components) {
   return components.size() == 0 ? 0 : std::sqrt(2 * components.squaredNorm() / static_cast<double>(components.size()));
 }
 
-/// The residuals of a pose under changed shared parameters, what is its own fitted to them.
+/// The residuals of a pose under changed shared parameters, with its own parameters fitted to them.
 HeldOut hold_out(const PoseEquations& pose, const Eigen::VectorXd& change) {
   const Eigen::VectorXd moved = pose.residuals + pose.by_shared * change;
   const Eigen::VectorXd own = -pose_normal(pose).solve(Eigen::VectorXd(pose.by_pose.transpose() * moved));
@@ -56,9 +57,9 @@ HeldOut hold_out(const PoseEquations& pose, const Eigen::VectorXd& change) {
   return {rms(left_px.head(pose.corner_residuals)), rms(left_px.tail(left_px.size() - pose.corner_residuals))};
 }
 
-/// Compares the change that a pose asks for with the freedom that the others leave. In coordinates in which all poses
-/// together have the unit matrix for their normal equations, this one has diag(share). The difference of its own
-/// solution to that of the others is gradient / (share (1 - share)); its variance is 1 / share + 1 / (1 - share).
+/// Compares the change that a pose asks for with the freedom that the others leave. In coordinates in which the normal
+/// matrix of all poses is the identity, this pose's is diag(share). The difference of its own solution to that of the
+/// others is gradient / (share (1 - share)); its variance is 1 / share + 1 / (1 - share).
 void compare(const Reduced& pose, const Eigen::MatrixXd& normal, HeldOut& held_out) {
   const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(
@@ -172,7 +173,7 @@ Result<PoseInfluence> find_influence(const BundleEquations& equations) {
     squares += held_out.directions * held_out.disagreement * held_out.disagreement;
     directions += held_out.directions;
   }
-  // Over all poses and directions at once: of each parameter by itself a dozen poses would tell little.
+  // Over all poses and directions at once: a dozen poses are weak evidence on a single parameter.
   influence.scatter = directions > 0 ? std::max(1.0, std::sqrt(squares / directions)) : 1;
   Eigen::MatrixXd scattered = said / (influence.scatter * influence.scatter);
   scattered.diagonal() += equations.prior_weight;

@@ -21,10 +21,10 @@ using Normal = Eigen::Matrix<double, 12, 12>;
 
 constexpr std::size_t kPointsMin = 24;
 constexpr int kRounds = 8;
-/// Ratio of the second smallest to the largest eigenvalue: below it more than one solution fits.
+/// Smallest accepted ratio of the second smallest to the largest eigenvalue: below it more than one solution fits.
 constexpr double kRankTolerance = 1e-12;
 
-/// Coordinates with their middle at the origin and a spread of one.
+/// Coordinates with their mean at the origin and a spread of one.
 struct Scaling {
   Eigen::Vector3d point_middle = Eigen::Vector3d::Zero();
   Eigen::Vector2d pixel_middle = Eigen::Vector2d::Zero();
@@ -75,7 +75,7 @@ std::vector<double> weigh(std::span<const SpacePoint> points, const Scaling& sca
   return errors;
 }
 
-/// K [R | t] by an RQ decomposition, with a rotation that does not mirror.
+/// K [R | t] by an RQ decomposition, with a proper rotation.
 Resection decompose(Projection projection) {
   if (projection.leftCols<3>().determinant() < 0) projection = -projection;
   const Eigen::Matrix3d left = projection.leftCols<3>();
@@ -93,7 +93,7 @@ Resection decompose(Projection projection) {
   return {{k(0, 0), k(1, 1), k(0, 2), k(1, 2), 0, 0, 0, 0, 0}, {rotation, translation}};
 }
 
-/// Tells whether the points lie behind the device. In a mirrored picture they do, as the rotation does not mirror.
+/// Tells whether the points lie behind the device. In a mirrored picture they do, because the rotation is proper.
 bool lie_behind(std::span<const SpacePoint> points, const RigidTransform& device_from_points) {
   std::vector<double> depths;
   for (const SpacePoint& point : points) depths.push_back((device_from_points * point.point_mm).z());

@@ -11,19 +11,19 @@
 
 namespace slsd {
 
-/// A point in space and the pixel of a device that it belongs to.
+/// A point in space and its pixel in a device.
 struct SpacePoint {
   Eigen::Vector3d point_mm;
   Eigen::Vector2d pixel;
 };
 
 struct Resection {
-  LensVector lens;  ///< has no distortion
+  LensVector lens;  ///< without distortion
   RigidTransform device_from_points;
 };
 
 /// Lens and place of a projector from points that do not all lie on one plane: the direct linear transformation,
-/// reweighted so that points far off count little.
+/// reweighted so that outliers count little.
 /// @errors kImpossible: too few points, all on one plane, or a mirrored picture
 /// @thread reentrant
 [[nodiscard]] Result<Resection> resect(std::span<const SpacePoint> points);

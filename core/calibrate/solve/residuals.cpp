@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-// Derivatives by the chain rule, written down: Ceres' own, of numbers with 36 slopes each, take most of a calibration's
-// time.
+// Derivatives by the chain rule, by hand: Ceres' automatic ones, with 36 slopes to a number, would take most of a
+// calibration's time.
 #include "core/calibrate/solve/residuals.hpp"
 
 #include <algorithm>
@@ -25,7 +25,7 @@ Eigen::Matrix3d cross(const Eigen::Vector3d& by) {
   return matrix;
 }
 
-/// A turn by an angle-axis vector (Rodrigues' formula), and what a change of that vector turns it by.
+/// A rotation by an angle-axis vector (Rodrigues' formula), and its derivative with respect to that vector.
 class Turn {
  public:
   explicit Turn(const double* angle_axis) {
@@ -46,9 +46,9 @@ class Turn {
   }
 
   [[nodiscard]] const Eigen::Matrix3d& matrix() const { return matrix_; }
-  /// Derivatives of a point that was turned to here, by the angle-axis vector.
+  /// Derivatives of a rotated point with respect to the angle-axis vector.
   [[nodiscard]] Eigen::Matrix3d slopes_at(const Eigen::Vector3d& turned) const { return -cross(turned) * turned_on_; }
-  /// Derivatives of a point that was turned back to here.
+  /// The same for a point rotated back.
   [[nodiscard]] Eigen::Matrix3d slopes_back_at(const Eigen::Vector3d& turned) const {
     return cross(turned) * turned_on_.transpose();
   }
@@ -63,7 +63,7 @@ Lens lens_of(const double* block) {
   return to_lens(values, {});
 }
 
-/// Derivatives of Lens::distort() by the lens (Elahi et al. 2020, equations (24) to (28)).
+/// Derivatives of Lens::distort() with respect to the lens (Elahi et al. 2020, equations (24) to (28)).
 Slopes<9> slopes_by_lens(const Lens& lens, const Eigen::Vector2d& direction) {
   const auto& [k1, k2, p1, p2, k3] = lens.distortion;
   const double x = direction.x(), y = direction.y(), r2 = x * x + y * y;
@@ -88,7 +88,7 @@ void put(double** slopes, int block, const Slopes<kColumns>& of) {
     for (int column = 0; column < kColumns; ++column) slopes[block][row * kColumns + column] = of(row, column);
 }
 
-/// A point of the rig's frame in a camera, whose lens and place are the first two blocks.
+/// A point of the rig's frame, seen by a camera whose lens and place are the first two blocks.
 class Sight {
  public:
   Sight(const double* const* blocks, const Eigen::Vector3d& point)
@@ -100,7 +100,7 @@ class Sight {
   void put_residual(const Eigen::Vector2d& seen_px, double sigma_px, double* residual) const {
     Eigen::Map<Eigen::Vector2d>(residual, 2) = (lens_.distort(direction()) - seen_px) / sigma_px;
   }
-  /// Puts the derivatives by the camera; returns those by the point.
+  /// Writes the derivatives with respect to the camera; returns those with respect to the point.
   Slopes<3> put_slopes(double sigma_px, double** slopes) const {
     const double depth = at_.z();
     Slopes<3> projection;
@@ -162,7 +162,7 @@ bool SymbolResidual::Evaluate(const double* const* blocks, double* residual, dou
   const ShapeAt shape = shape_at(blocks[6], frame_, on_board->head<2>());
   const Eigen::Vector3d normal = board.matrix() * Eigen::Vector3d(-shape.slope.x(), -shape.slope.y(), 1);
   const double towards = normal.dot(ray), along = ray.dot(point - eye) / ray.squaredNorm();
-  // Where the ray is shifted or turned the point stays on the surface; where the surface is, on the ray.
+  // If the ray is shifted or turned, the point stays on the surface; if the surface moves, the point stays on the ray.
   const Slopes<3> by_shift = by_point - by_point * ray * (normal.transpose() / towards);
   const Slopes<1> by_step = by_point * ray / towards;
   const Slopes<2> by_direction = along * by_shift * turn.matrix().transpose().leftCols<2>();

@@ -9,9 +9,9 @@
 
 namespace slsd {
 
-/// A point of the board in the camera: where it is seen by the model, less where it was seen, in standard deviations.
-/// The print is larger than it should be by `scale`, and by `stretch` along y. Blocks: the camera's lens and place, the
-/// board's place, scale, stretch, shape.
+/// A point of the board in the camera: predicted minus observed place, in standard deviations. The print is larger than
+/// stated by `scale`, and by `stretch` along y. Blocks: the camera's lens and place, the board's place, scale, stretch,
+/// shape.
 class CornerResidual final : public ceres::SizedCostFunction<2, 9, 6, 6, 1, 1, static_cast<int>(kShapeTerms)> {
  public:
   CornerResidual(const Eigen::Vector2d& camera_px, const Eigen::Vector2d& board_mm, double sigma_px,
@@ -25,10 +25,10 @@ class CornerResidual final : public ceres::SizedCostFunction<2, 9, 6, 6, 1, 1, s
   ShapeFrame frame_;
 };
 
-/// A projector pixel in the camera: its ray meets the board, and the camera sees that point. The pixel is exact; what
-/// measures is the camera. Blocks: the camera's lens and place, the projector's lens and place, the board's place, by
-/// how much all symbols of the view are seen shifted (px of the camera), and the board's shape. Evaluation fails if the
-/// ray misses the shape: Ceres then rejects the trial step.
+/// A projector pixel in the camera: its ray meets the board, and the camera sees that point. The pixel is exact; the
+/// camera's observation has the error. Blocks: the camera's lens and place, the projector's lens and place, the board's
+/// place, the shift of all symbols of the view (px of the camera), and the board's shape. Evaluation fails if the ray
+/// misses the shape: Ceres then rejects the trial step.
 class SymbolResidual final : public ceres::SizedCostFunction<2, 9, 6, 9, 6, 6, 2, static_cast<int>(kShapeTerms)> {
  public:
   SymbolResidual(const Eigen::Vector2d& camera_px, const Eigen::Vector2d& projector_px, double sigma_px,

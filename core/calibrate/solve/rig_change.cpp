@@ -20,22 +20,22 @@ namespace slsd {
 namespace {
 
 constexpr std::size_t kPosesOfSession = 5, kPosesOfPart = 2;
-constexpr std::size_t kSymbolsOfView = 50;  // enough by far: a device that moved takes all of them along
-constexpr int kRoundsOfSearch = 5;          // of the adjustment at each moment tried: from one rig it is near
-constexpr std::size_t kMomentsTried = 24;   // at first; then those beside the best
+constexpr std::size_t kSymbolsOfView = 50;  // more than enough: a device that moved shifts all of them
+constexpr int kRoundsOfSearch = 5;          // of the adjustment at each trial moment, which starts near the solution
+constexpr std::size_t kMomentsTried = 24;   // first over the session; then those around the best
 
-/// The difference between both parts, squared, in the deviations of the six numbers that a device has: 6 on the average
-/// of a moment that was named beforehand, more of the most likely of many. Ten times that is no chance.
+/// Threshold of the squared difference between both parts, in deviations of a device's six numbers. The mean is 6 for a
+/// moment chosen in advance, and more for the likeliest of many. Ten times that is no chance.
 constexpr double kDifferentMin = 60;
-/// A change that moves symbols by less than this, in the projector, is none that anybody would notice.
+/// A change that moves symbols by less than this, in the projector, does not matter in practice.
 constexpr double kNoticedPx = 0.1;
-/// Poses with errors this much above the usual are wrong by themselves. They have no say.
+/// Poses with errors this much above the usual are themselves wrong, and are excluded.
 constexpr double kWrongPose = 3;
-constexpr double kWrongShare = 0.34;  // of the poses, that may be
-/// Unexplained excess of one of two explanations from which on it is dismissed.
+constexpr double kWrongShare = 0.34;  // largest share of wrong poses
+/// Excess of unexplained error above which one of two explanations is rejected.
 constexpr double kClearlyWorse = 12;
 
-/// Keeps every nth symbol, and marks nothing as outlying: points that lie off tell of the change.
+/// Keeps every nth symbol and marks no outliers: points that lie off are evidence of the change.
 Observations thinned(const Observations& observations) {
   Observations few = observations;
   std::erase_if(few.poses, [](const PoseObservation& pose) { return pose.subject != PoseSubject::kBoard; });
@@ -88,7 +88,7 @@ RigModel split_at(const RigModel& rig, std::size_t first_pose) {
   return split;
 }
 
-/// Adjusts until the symbols' noise is that which the model leaves.
+/// Adjusts until the assumed noise of the symbols equals the remaining noise.
 Model adjusted(const Observations& seen, BundleOptions options, RigModel rig, int rounds = 2) {
   constexpr double kSigmaOfDistance = 1 / 1.1774;  // of the median distance in a plane
   Model model{std::move(rig), std::move(options)};
@@ -124,7 +124,7 @@ std::size_t most_likely_moment(const Observations& seen, const BundleOptions& op
   return best;
 }
 
-/// The difference of a device's two places and its covariance, in the order of MotionVector.
+/// The difference between a device's two places and its covariance, in the order of MotionVector.
 struct Difference {
   int device;
   Eigen::Matrix<double, 6, 1> by;
@@ -160,15 +160,15 @@ std::vector<Difference> differences(const Model& model, const BundleEquations& e
   return all;
 }
 
-/// A device that turns about itself stays where it is for the other one. How far the camera's place, seen from the
-/// projector, shifted: squared, in deviations.
+/// A device that turns about its own centre stays in place for the other one. Squared shift of the camera's place, seen
+/// from the projector, in deviations.
 double shift_of_own_place(const Difference& difference) {
   const Eigen::Matrix3d covariance = difference.covariance.bottomRightCorner<3, 3>();
   const Eigen::Vector3d by = difference.by.tail<3>();
   return by.dot(covariance.ldlt().solve(by));
 }
 
-/// The same of the projector's place, seen from the camera.
+/// The same for the projector's place, seen from the camera.
 double shift_in_rig(const Difference& difference, const MotionVector& was) {
   const auto place = [](const Eigen::Matrix<double, 6, 1>& m) {
     const RigidTransform motion = to_motion({m(0), m(1), m(2), m(3), m(4), m(5)});
@@ -192,7 +192,7 @@ std::string camera_text(const Observations& seen, std::size_t camera) {
   return seen.cameras.size() == 1 ? "the camera" : "camera " + seen.cameras[camera].name;
 }
 
-/// Names the device that moved, from those that stay in place.
+/// Names the device that moved, by finding the devices that stayed in place.
 std::string device_text(const std::vector<Difference>& all, const Observations& seen, const RigModel& rig) {
   if (all.size() == 1) {
     const MotionVector& was = rig.projector.device_from_rig;
@@ -242,7 +242,7 @@ double moved_symbols_px(const Observations& seen, const Model& model) {
 }
 
 /// Tells whether boards that moved between their two pictures explain the smaller part better than a moved device. Each
-/// board has its own plane for its symbols, three numbers a pose, in place of the device's six.
+/// board then has its own plane for its symbols, three numbers a pose, instead of the device's six.
 bool boards_explain_better(const Observations& seen, const Model& split, const RigModel& one_rig) {
   const std::size_t first = split.rig.moved->first_pose, count = seen.poses.size();
   const bool second_part = count - first <= first;
@@ -257,7 +257,7 @@ bool boards_explain_better(const Observations& seen, const Model& split, const R
   return 2 * moved_boards.cost + numbers * std::log(points) < 2 * split.cost + devices * std::log(points);
 }
 
-/// The pose that is off most under a model, if one is wrong by itself.
+/// The pose that is off most under a model, if any pose is itself wrong.
 std::optional<std::size_t> wrong_pose(const Observations& seen, const RigModel& rig) {
   const std::vector<double> errors = usual_errors(seen, rig);
   const auto worst = std::ranges::max_element(errors);

@@ -11,16 +11,17 @@
 namespace slsd {
 namespace {
 
-constexpr std::size_t kPointsMin = 10;     // of a quarter, for its median to say something
-constexpr std::size_t kLookedAtMax = 256;  // points of a scan
+constexpr std::size_t kPointsMin = 10;     // in a quarter of the image, for a meaningful median
+constexpr std::size_t kLookedAtMax = 256;  // largest number of points of a scan that are used
 constexpr std::uint64_t kLearntScans = 20;
-constexpr std::uint64_t kAveragedScans = 5;  // medians of many points: a knock is told within ten scans
-constexpr std::uint64_t kScansMin = 5;       // before anything is said
-constexpr std::uint64_t kSpeaksFor = 20;     // scans that a quarter's average is good for without new points
-// Symbols that are misread lie anywhere: what they say is not one shift. The spread is half of the points' distance.
+constexpr std::uint64_t kAveragedScans = 5;  // medians of many points: a knock is detected within ten scans
+constexpr std::uint64_t kScansMin = 5;       // before any report
+constexpr std::uint64_t kSpeaksFor = 20;     // number of scans for which a quarter's average stays valid without new
+                                             // points
+// Misread symbols lie anywhere, so their distances are no common shift. The spread is half of the points' distance.
 constexpr double kSpreadMaxPx = 2, kSpreadMaxShare = 0.5;
-constexpr double kFineAgainShare = 0.8;    // of the limit: no to and fro at it
-constexpr double kLearntLimitMaxPx = 1.0;  // a rig may be out already as the service starts
+constexpr double kFineAgainShare = 0.8;    // of the limit: hysteresis against repeated changes
+constexpr double kLearntLimitMaxPx = 1.0;  // a rig may already be off when the service starts
 
 }  // namespace
 
@@ -46,7 +47,7 @@ void DriftWatch::sample(std::span<const CloudPoint> points, std::uint8_t camera)
   }
 }
 
-// Of the first scans the plain average, then with a memory of about as many.
+// A plain average of the first scans, then a running one with a memory of about as many.
 std::optional<double> DriftWatch::average_quarters() {
   std::optional<double> own_px;
   state_.epipolar_px = 0;
