@@ -12,10 +12,10 @@
 namespace slsd {
 namespace {
 
-// A point nearer than this to the projector's plane is taken for behind it.
+// A point nearer than this to the projector's plane counts as behind it.
 constexpr double kMinProjectorDepthMm = 1.0;
 
-/// The numbers of many segments.
+/// Data of many segments, one column for each quantity.
 struct Segments {
   PixelRays::Column line_x, line_y, offset, axis_x, axis_y, least, most;
 };
@@ -45,7 +45,8 @@ inline __attribute__((always_inline)) void find_segments(const EpipolarRig& rig,
     const bool rises = (slope_z > 0) & (crossing > depth_min), falls = (slope_z < 0) & (crossing < depth_max);
     const double nearest = rises ? crossing : depth_min, farthest = falls ? crossing : depth_max;
     const double near_z = start_z + nearest * slope_z, far_z = start_z + farthest * slope_z;
-    // Along the line at a depth: the axis' part of the point over its depth in the projector's frame.
+    // Position along the line at a depth: the point's component along the axis, over its depth in the projector's
+    // frame.
     const double along_start = axis_x * start_x + axis_y * start_y, along_slope = axis_x * slope_x + axis_y * slope_y;
     const double near_px = (along_start + nearest * along_slope) / near_z,
                  far_px = (along_start + farthest * along_slope) / far_z;
@@ -73,7 +74,7 @@ inline __attribute__((always_inline)) void compare_rays(const EpipolarRig& rig, 
     const double normal_x = line_x * per_fx, normal_y = line_y * per_fy;
     const double length = std::sqrt(normal_x * normal_x + normal_y * normal_y);
     residuals_px[i] = static_cast<float>(length > 0 ? (line_x * u + line_y * v + line_z) / length : kFar);
-    // The ray in the projector's frame, and what lies along the line in both.
+    // The ray in the projector's frame, and the components along the line.
     const double slope_x = r(0, 0) * x + r(0, 1) * y + r(0, 2), slope_y = r(1, 0) * x + r(1, 1) * y + r(1, 2),
                  slope_z = r(2, 0) * x + r(2, 1) * y + r(2, 2);
     const double there = line_x * v - line_y * u;

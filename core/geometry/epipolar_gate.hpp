@@ -12,9 +12,9 @@
 
 namespace slsd {
 
-/// Segment in which the projector may see a camera pixel's point: the part of the epipolar line within the working
-/// depth. In undistorted, normalised projector coordinates it is exactly straight. Distances are in projector px,
-/// scaled by the focal lengths (not by the distortion's local magnification, a few percent at the border).
+/// Segment of the epipolar line in which the projector may see a camera pixel's point, within the working depth. In
+/// undistorted, normalised projector coordinates it is exactly straight. Distances are in projector px, scaled by the
+/// focal lengths (not by the distortion's local magnification, a few percent at the border).
 ///
 ///     depth_max ───┬──────────●───────┬─── depth_min     residual_px: signed distance of ● from the line
 ///                  far end          near end              along_px: place on the line
@@ -24,7 +24,7 @@ class EpipolarSegment {
   [[nodiscard]] double residual_px(const Eigen::Vector2d& projector_direction) const {
     return line_.dot(projector_direction) + line_offset_px_;
   }
-  /// Place along the line, projector px.
+  /// Position along the line, projector px.
   [[nodiscard]] double along_px(const Eigen::Vector2d& projector_direction) const {
     return axis_.dot(projector_direction);
   }
@@ -46,12 +46,12 @@ class EpipolarSegment {
   double along_min_px_ = 1, along_max_px_ = -1;
 };
 
-/// Directions of up to PixelRays::kAtOnce pairs of rays, undistorted and normalised, each number in a column.
+/// Directions of up to PixelRays::kAtOnce pairs of rays, undistorted and normalised, one column for each component.
 struct RayPairs {
   PixelRays::Column camera_x, camera_y, projector_x, projector_y;
 };
 
-/// Quantities that segments are made from.
+/// Constants of a rig from which segments are computed.
 struct EpipolarRig {
   RigidTransform projector_from_camera;
   Eigen::Matrix3d line_from_camera;  ///< the essential matrix
@@ -68,14 +68,14 @@ class EpipolarGate {
 
   /// @param camera_direction  undistorted, normalised
   [[nodiscard]] EpipolarSegment prepare(const Eigen::Vector2d& camera_direction) const;
-  /// The same for many.
-  /// @param rays      their directions are read
-  /// @param segments  becomes one to a ray, for as many as it holds
+  /// The same for many rays.
+  /// @param rays      only their directions are used
+  /// @param segments  becomes one segment for each ray, up to its size
   void prepare(const PixelRays& rays, std::span<EpipolarSegment> segments) const;
-  /// Compares as many pairs as there are places for what comes of it, the same number in both.
+  /// Compares as many pairs as the results have places; both results have the same size.
   /// @param residuals_px  prepare(camera's).residual_px(projector's)
-  /// @param disparities   the baseline over the depth where both meet, seen along the epipolar line alone: what lies
-  ///                      across it has no part. Times a focal length it is a disparity. 0 where there is no such line
+  /// @param disparities   the baseline over the depth of the intersection, using the components along the epipolar line
+  ///                      only. Times a focal length it is a disparity. 0 without such a line
   void compare(const RayPairs& rays, std::span<float> residuals_px, std::span<float> disparities) const;
 
  private:

@@ -9,7 +9,7 @@
 namespace slsd {
 namespace {
 
-constexpr std::size_t kMaxElements = 14;  // of the longest distortion that OpenCV has
+constexpr std::size_t kMaxElements = 14;  // for the longest distortion vector of OpenCV
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 using Kind = FileNode::Kind;

@@ -13,13 +13,13 @@
 
 namespace slsd {
 
-/// A map of a calibration file, read key by key. The first key that is missing or wrong is kept as the error; from
-/// then on every read gives zeros.
+/// A map of a calibration file, read key by key. It keeps the first missing or wrong key as the error; from then on
+/// every read gives zeros.
 /// @thread thread-bound
 class FileSection {
  public:
-  /// @param node   outlives this
-  /// @param path   what stands before the keys in messages: "cameras[0] (left): ", or empty
+  /// @param node   must outlive this object
+  /// @param path   text before the keys in messages: "cameras[0] (left): ", or empty
   /// @param where  the file's name
   FileSection(const FileNode& node, std::string path, std::string where)
       : node_(node), path_(std::move(path)), where_(std::move(where)) {}
@@ -31,11 +31,11 @@ class FileSection {
   /// 1 to kMaxTextLength bytes without control characters.
   [[nodiscard]] std::string text(const char* key);
   [[nodiscard]] Eigen::Matrix3d matrix3(const char* key);
-  /// `count` numbers in a row or in a column; count at most 9.
-  /// @param hint  follows in the message if there are more or fewer
+  /// Reads `count` numbers in a row or in a column; count is at most 9.
+  /// @param hint  follows in the message if the count differs
   [[nodiscard]] Eigen::VectorXd vector(const char* key, int count, const std::string& hint = {});
 
-  /// Notes that this key is wrong, unless an earlier one was.
+  /// Records that this key is wrong, unless an earlier key was.
   void refuse(const std::string& key, const std::string& problem);
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
   void set_path(std::string path) { path_ = std::move(path); }

@@ -27,13 +27,15 @@ std::optional<double> number_in(std::string_view text) {
   double value = std::numeric_limits<double>::infinity();
   if (size != ".Inf" && size != ".inf") {
     const char* const end = size.data() + size.size();
-    if (size.empty() || size[0] == '-' || size[0] > '9') return std::nullopt;  // from_chars() knows "inf" and "nan"
+    if (size.empty() || size[0] == '-' || size[0] > '9')
+      return std::nullopt;  // from_chars() also accepts "inf" and
+                            // "nan"
     if (std::from_chars(size.data(), end, value).ptr != end) return std::nullopt;
   }
   return minus ? -value : value;
 }
 
-/// The text with its %YAML line made a comment: OpenCV's is none of YAML's directives, and no version matters here.
+/// Comments out the %YAML line: OpenCV's line is no valid YAML directive, and the version does not matter here.
 std::string without_version(std::string_view text) {
   constexpr std::string_view kMark = "\xef\xbb\xbf", kDirective = "%YAML";
   std::string plain(text.substr(text.starts_with(kMark) ? kMark.size() : 0));
@@ -64,7 +66,7 @@ std::string name_of(const yaml_char_t* name) {
   return name == nullptr ? std::string() : reinterpret_cast<const char*>(name);
 }
 
-/// Builds the tree from libyaml's events. The first problem ends it: no event comes after that.
+/// Builds the tree from libyaml's events. The first problem ends the events.
 class TreeReader {
  public:
   explicit TreeReader(std::string_view text) : text_(without_version(text)) {
@@ -95,14 +97,14 @@ class TreeReader {
   }
   void refuse(const yaml_event_t& event, const std::string& what) { refuse_at(event.start_mark, what); }
 
-  /// The next event; null if there is none any more.
+  /// The next event; null after the last.
   Event next() {
     if (problem_) return nullptr;
     auto made = std::make_unique<yaml_event_t>();
     if (yaml_parser_parse(&parser_, made.get()) != 0) return Event(made.release());
     const std::string what =
         "is no YAML: " + std::string(parser_.problem != nullptr ? parser_.problem : "out of memory");
-    if (parser_.error == YAML_READER_ERROR) {  // it has no mark
+    if (parser_.error == YAML_READER_ERROR) {  // this error has no position
       const auto bad = static_cast<std::ptrdiff_t>(std::min(parser_.problem_offset, text_.size()));
       problem_ = SyntaxProblem{static_cast<int>(std::count(text_.begin(), text_.begin() + bad, '\n')) + 1, what};
     } else {
@@ -160,7 +162,7 @@ class TreeReader {
     return result;
   }
 
-  /// Keeps what has a name, for those who repeat it.
+  /// Stores a node with an anchor for its aliases.
   FileNode keep(const yaml_char_t* anchor, FileNode made) {
     if (anchor != nullptr) named_.insert_or_assign(name_of(anchor), std::pair(made, size_of(made)));
     return made;

@@ -11,7 +11,7 @@
 
 namespace slsd {
 
-/// A value of a calibration file, and what is below it.
+/// A value of a calibration file, with its children.
 struct FileNode {
   enum class Kind { kEmpty, kNumber, kText, kMap, kSequence };
   Kind kind = Kind::kEmpty;
@@ -20,7 +20,7 @@ struct FileNode {
   std::vector<std::pair<std::string, FileNode>> entries{};
   std::vector<FileNode> items{};
 
-  /// Value of this map's key; null if it is not there or holds nothing.
+  /// Value of this map's key; null if the key is missing or empty.
   [[nodiscard]] const FileNode* find(std::string_view key) const;
 };
 
@@ -29,8 +29,8 @@ struct SyntaxProblem {
   std::string message;
 };
 
-/// Reads the first document of a YAML file, with or without OpenCV's header `%YAML:1.0`. Tags are passed over. Bounded:
-/// a file of many values, or of deep or repeated ones, is refused.
+/// Reads the first document of a YAML file, with or without OpenCV's header `%YAML:1.0`. Ignores tags. Bounded: rejects
+/// files with too many values, or with deep or repeated ones.
 /// @thread reentrant
 [[nodiscard]] tl::expected<FileNode, SyntaxProblem> read_file_tree(std::string_view text);
 

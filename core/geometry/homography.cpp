@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kRounds = 6;
 
-/// Moves the points' middle to the origin and their mean distance from it to the root of two.
+/// Moves the points' mean to the origin and scales their mean distance from it to sqrt(2).
 Eigen::Matrix3d normalisation(std::span<const Eigen::Vector2d> points) {
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& point : points) middle += point / static_cast<double>(points.size());

@@ -12,11 +12,11 @@ namespace {
 constexpr int kMaxSteps = 50;
 constexpr int kMaxHalvings = 20;
 
-// The image is sampled so densely that a distortion of five coefficients cannot fold between two samples unseen.
+// The samples are so dense that a distortion of five coefficients cannot fold between two of them.
 constexpr int kSamplesAcross = 32;
 constexpr int kSamplesAlongRay = 16;
 
-// Whether nothing folds on the way from the optical axis to this direction.
+// Whether the distortion does not fold between the optical axis and this direction.
 bool unfolded(const Lens& lens, const Eigen::Vector2d& normalised) {
   for (int i = 0; i <= kSamplesAlongRay; ++i) {
     const double share = static_cast<double>(i) / kSamplesAlongRay;

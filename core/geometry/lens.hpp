@@ -8,8 +8,8 @@
 
 namespace slsd {
 
-/// A pinhole with OpenCV's distortion k1 k2 p1 p2 k3 (Elahi et al. 2020, equations (24) to (28)). A projector is one
-/// too: an inverse camera.
+/// A pinhole with OpenCV's distortion k1 k2 p1 p2 k3 (Elahi et al. 2020, equations (24) to (28)). A projector is an
+/// inverse camera, with the same model.
 /// @thread reentrant
 struct Lens {
   int width_px = 0;

@@ -12,19 +12,19 @@
 
 namespace slsd {
 
-/// The ray of a pixel, undistorted, and how it turns as the pixel moves.
+/// The undistorted ray of a pixel, and its change as the pixel moves.
 struct PixelRay {
   Eigen::Vector2d direction;  ///< normalised: (x/z, y/z) in the device's frame
   Eigen::Matrix2d turn;       ///< change of the direction per (distorted) px: inverse of Lens::distort_jacobian
 };
 
-/// Rays of up to kAtOnce pixels, each of their numbers in a column, so that several are reckoned with at once.
+/// Rays of up to kAtOnce pixels, one column for each component, to compute with several at once.
 struct PixelRays {
   static constexpr std::size_t kAtOnce = 64;
   using Column = std::array<double, kAtOnce>;
   Column u, v;            ///< pixels
   Column x, y;            ///< directions
-  Column xx, xy, yx, yy;  ///< turns of the directions
+  Column xx, xy, yx, yy;  ///< derivatives of the directions
 
   [[nodiscard]] PixelRay at(std::size_t i) const {
     Eigen::Matrix2d turn;
@@ -37,7 +37,7 @@ struct PixelRays {
   }
 };
 
-/// @param pixel  distorted, as seen
+/// @param pixel  distorted, as observed
 /// @thread reentrant
 [[nodiscard]] inline PixelRay pixel_ray(const Lens& lens, const Eigen::Vector2d& pixel) {
   const Eigen::Vector2d direction = lens.undistort(pixel);

@@ -9,7 +9,7 @@
 namespace slsd {
 namespace {
 
-// 64 px keep the table of a 1600x1200 image in 8 kB, and one step is enough for ordinary lenses.
+// 64 px keep the table of a 1600x1200 image at 8 kB, and one step is enough for ordinary lenses.
 constexpr int kPitchPx = 64;
 constexpr double kErrorMax = 1e-10;
 
@@ -21,7 +21,7 @@ double nodes_per_px(int size_px) {
   return (nodes_across(size_px) - 1) / std::max(size_px - 1.0, 1.0);
 }
 
-/// A direction, and how it turns with the pixel.
+/// A direction, and its derivative with respect to the pixel.
 struct Turning {
   double x, y, xx, xy, yx, yy;
 };
@@ -61,7 +61,7 @@ RayTable::RayTable(const Lens& lens)
   refines_ = error_between_nodes() > kErrorMax;
 }
 
-/// Error of one step, at the places farthest from the nodes: there the estimate is worst.
+/// Error of one step at the places farthest from the nodes, where the estimate is worst.
 double RayTable::error_between_nodes() const {
   double error = 0;
   for (int row = 0; row + 1 < rows_; ++row) {

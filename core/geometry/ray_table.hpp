@@ -9,17 +9,17 @@
 
 namespace slsd {
 
-/// pixel_ray() at a fixed price: a coarse grid of undistorted directions, then one step of Newton's method, or two
-/// where the lens distorts much. The direction agrees with Lens::undistort to 1e-9 (some millionths of a pixel) for
-/// every lens that is invertible(), the turn to 1e-4 of itself.
+/// pixel_ray() at constant cost: a coarse grid of undistorted directions, then one step of Newton's method, or two if
+/// the lens distorts strongly. For every lens that is invertible(), the direction agrees with Lens::undistort to 1e-9
+/// (some millionths of a pixel), and the turn to 1e-4 of itself.
 /// @thread reentrant
 class RayTable {
  public:
   explicit RayTable(const Lens& lens);
 
-  /// @param pixel  distorted; outside the image the border's cells are continued
+  /// @param pixel  distorted; outside the image, the border cells are extrapolated
   [[nodiscard]] PixelRay ray(const Eigen::Vector2d& pixel) const;
-  /// The same for many: reads `u` and `v` of the first `count`, and fills in the rest.
+  /// The same for many: reads `u` and `v` of the first `count`, and writes the rest.
   void look_up(PixelRays& rays, std::size_t count) const;
 
  private:
@@ -31,7 +31,7 @@ class RayTable {
   int rows_;
   Eigen::Array2d nodes_per_px_;
   std::vector<Eigen::Vector2d> nodes_;
-  bool refines_ = false;  // a second step
+  bool refines_ = false;  // whether to take a second step
 };
 
 }  // namespace slsd

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kMaxFileSize = 1 << 20;
 constexpr std::size_t kMaxCameras = 64;
-constexpr double kMaxLength = 1e7;  // of a focal length in px, of a translation in mm
+constexpr double kMaxLength = 1e7;  // for a focal length in px or a translation in mm
 constexpr double kMinBaselineMm = 1e-3;
 constexpr double kRotationTolerance = 1e-4;
 
@@ -157,7 +157,7 @@ std::optional<Error> read_cameras(const std::vector<FileNode>& items, std::strin
   return std::nullopt;
 }
 
-/// Names the other kind of calibration that the file is, and what to do; empty: no known kind.
+/// Names the other kind of calibration file that this is, and what to do; empty if it is no known kind.
 std::string other_kind(const FileNode& root) {
   constexpr const char* kWanted =
       ": slsd takes one calibration of camera and projector together, in OpenCV's YAML with k1 k2 p1 p2 k3, which slsd "
@@ -175,7 +175,7 @@ std::string other_kind(const FileNode& root) {
   return of_opencv ? std::string("is a calibration of cameras alone") + kWanted : std::string();
 }
 
-/// Names the syntax of a file that is no YAML, by its first character; null if it may be YAML.
+/// Names the syntax of a file that is not YAML, by its first character; null if it may be YAML.
 const char* other_syntax(std::string_view text) {
   const std::size_t first = text.find_first_not_of(" \t\r\n\xef\xbb\xbf");
   if (first == text.npos) return "nothing";

@@ -11,12 +11,12 @@
 
 namespace slsd {
 
-/// The middle of the values, the upper one of two; 0 of none. It puts them into another order.
+/// The median of the values, the upper one of an even number; 0 without values. Reorders the values.
 /// @thread reentrant
 template <std::ranges::random_access_range Values>
 [[nodiscard]] auto median_in_place(Values&& values) -> std::ranges::range_value_t<Values> {
   if (std::ranges::empty(values)) return 0;
-  constexpr int kFew = 16;  // sorted by insertion
+  constexpr int kFew = 16;  // insertion sort up to this size
   const auto middle = std::ranges::begin(values) + std::ranges::ssize(values) / 2;
   if (std::ranges::ssize(values) <= kFew) {
     std::ranges::sort(values);
@@ -29,8 +29,8 @@ template <std::ranges::random_access_range Values>
   return median_in_place(values);
 }
 
-/// Usual value among many: the median of at most a thousand of them, evenly taken.
-/// @param value_at  from a place, 0 to count - 1, to its value
+/// Usual value: the median of at most a thousand values, evenly sampled.
+/// @param value_at  gives the value at a place, 0 to count - 1
 /// @thread reentrant
 template <class ValueAt>
 [[nodiscard]] float usual_of(std::size_t count, ValueAt&& value_at) {
@@ -42,10 +42,10 @@ template <class ValueAt>
   return median_in_place(std::span(sample).first(taken));
 }
 
-/// A normal distribution's standard deviation over the median of its absolute values.
+/// Ratio of a normal distribution's standard deviation to the median of its absolute values.
 inline constexpr double kSigmaOfMedian = 1.4826;
 
-/// Weight of a value at a distance, 1 to 0: a quarter at the scale, next to nothing far beyond it.
+/// Weight of a value at a distance, 1 to 0: a quarter at the scale, almost nothing far beyond it.
 [[nodiscard]] inline double robust_weight(double off, double scale) {
   const double ratio = off / scale, by = 1 + ratio * ratio;
   return 1 / (by * by);

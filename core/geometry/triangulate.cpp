@@ -30,12 +30,12 @@ ProjectionMatrix projection(const Lens& lens, const RigidTransform& motion) {
   return pinhole * matrix;
 }
 
-// The pixel that a lens without distortion would see.
+// The pixel as a lens without distortion would see it.
 Eigen::Vector2d straight_px(const Lens& lens, const Eigen::Vector2d& direction) {
   return {lens.fx * direction.x() + lens.cx, lens.fy * direction.y() + lens.cy};
 }
 
-// Equations (34) to (36): two rows for a pixel.
+// Equations (34) to (36): two rows for each pixel.
 void add_rows(Equations& equations, int row, const ProjectionMatrix& matrix, const Eigen::Vector2d& pixel) {
   for (int axis = 0; axis < 2; ++axis) {
     const Eigen::RowVector4d line = pixel[axis] * matrix.row(2) - matrix.row(axis);
@@ -44,7 +44,7 @@ void add_rows(Equations& equations, int row, const ProjectionMatrix& matrix, con
   }
 }
 
-// Derivative of the least-squares point by the camera's pixel, from differentiating its normal equations.
+// Derivative of the least-squares point with respect to the camera's pixel, by differentiating its normal equations.
 Eigen::Matrix<double, 3, 2> point_per_px(const Equations& equations, const Eigen::Vector3d& point, const Lens& lens,
                                          const Eigen::Matrix2d& turn) {
   const Eigen::Matrix3d inverse = (equations.a.transpose() * equations.a).inverse();

@@ -11,19 +11,19 @@ namespace slsd {
 
 namespace {
 
-/// The numbers of many points.
+/// Data of many points, one column for each quantity.
 struct Points {
   PixelRays::Column x, y, z, sigma_mm;
 };
 
 // With d the camera's direction (x, y, 1), a point is P = z d + (u, v, 0), and the camera's rows of (34) leave the
-// residuals w = (fx u, fy v). The projector's rows A read A P = q z + L w = b. What minimises |w|^2 + |q z + L w - b|^2
-// for a given z is w = L' S (b - q z) with S = (I + L L')^-1, two by two; and then
+// residuals w = (fx u, fy v). The projector's rows A read A P = q z + L w = b. For a given z, |w|^2 + |q z + L w - b|^2
+// is least at w = L' S (b - q z) with S = (I + L L')^-1, a 2x2 matrix. Then
 //
 //     z = q'S b / q'S q
 //
-// The slope along the ray for a pixel's move follows from (37), differentiated: it takes the solution of the same
-// normal equations for d on their right-hand side, here `pull`, found in the same way.
+// The slope along the ray with respect to the pixel follows from (37) by differentiation. It is the solution of the
+// same normal equations with another right-hand side, here `pull`, found in the same way.
 inline __attribute__((always_inline)) void solve(const TriangulationRig& rig, const RayMatches& matches,
                                                  std::size_t count, Points& points) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();

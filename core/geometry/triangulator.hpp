@@ -10,15 +10,15 @@
 
 namespace slsd {
 
-/// Quantities that points are made from.
+/// Constants of a rig from which points are computed.
 struct TriangulationRig {
   RigidTransform projector_from_camera;
   Eigen::Array2d camera_focal_px, per_camera_focal_px, projector_focal_px;
 };
 
-/// Matches of up to PixelRays::kAtOnce camera rays, each number in a column.
+/// Matches of up to PixelRays::kAtOnce camera rays, one column for each component.
 struct RayMatches {
-  PixelRays camera;                            ///< the pixels have no part
+  PixelRays camera;                            ///< the pixels are not used
   PixelRays::Column projector_x, projector_y;  ///< directions
   PixelRays::Column sigma_px;                  ///< one standard deviation of the camera's pixel in x and in y
 
@@ -30,14 +30,14 @@ struct RayMatches {
   }
 };
 
-/// triangulate() for many matches of one camera: the rays are given, the solution is in closed form.
+/// triangulate() for many matches of one camera, in closed form from given rays.
 /// @thread reentrant
 class Triangulator {
  public:
   Triangulator(const CalibratedCamera& camera, const Lens& projector);
 
-  /// @param points  becomes what triangulate() gives for each match, for as many as it holds: camera frame, mm; not a
-  ///                number behind the projector
+  /// @param points  becomes the result of triangulate() for each match, up to its size: camera frame, mm; NaN behind
+  ///                the projector
   void triangulate(const RayMatches& matches, std::span<TriangulatedPoint> points) const;
 
  private:

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kLineLength = 80;
 
-// As OpenCV reads them: a number of its own kind where a point tells it from a whole one.
+// As OpenCV reads them: only a decimal point distinguishes a real number from an integer.
 std::string number_text(double value) {
   if (std::isnan(value)) return ".Nan";
   if (std::isinf(value)) return value < 0 ? "-.Inf" : ".Inf";
@@ -25,7 +25,7 @@ std::string number_text(double value) {
   return std::string(text.data(), end) + (whole ? "." : "");
 }
 
-// OpenCV's YAML, line by line.
+// Writes OpenCV's YAML, line by line.
 class Writer {
  public:
   void begin_sequence(const char* key) { line(std::string(key) + ":"), indent_ += 3; }
