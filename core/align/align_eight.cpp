@@ -15,17 +15,17 @@ namespace {
 static_assert(kEight == kLanes);
 using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
 
-/// The order in which the unknowns are eliminated: the disparity last, as its variance is then the last pivot's
-/// inverse.
+/// The order in which the unknowns are eliminated: the disparity last, because its variance is then the inverse of the
+/// last pivot.
 enum Unknown { kOffset, kGain, kGainX, kGainY, kAcross, kSlopeX, kSlopeY, kDisparity };
 
-/// Inputs and results of one step for eight patches: a patch in each lane.
+/// Inputs and results of one step for eight patches, one in each lane.
 struct Eight {
   Lanes constant[3], x[3], y[3];  // of q, see PatchMap
   Lanes across_u, across_v, along_u, along_v;
   IntLanes origin_u, origin_v;  // of p, in samples
   Lanes gain, gain_x, gain_y, offset, noise;
-  Lanes per_scale;  // of residuals that count half; 0: all count
+  Lanes per_scale;  // scale of the residuals at which a pixel counts half; 0: all count fully
   Lanes across, across_weight, gain_slope_weight;
 
   Lanes step[kFitted], left, weights, pixels, positive, scatter, variance, slope_variance;
@@ -33,25 +33,25 @@ struct Eight {
 
 struct EightWindows {
   int side;
-  std::ptrdiff_t stride;  // of the frame
+  std::ptrdiff_t stride;  // stride of the frame
   float full;
   const std::uint32_t* samples;
   int field_width, field_height;
   float slope_unit;
 };
 
-/// Values of a row's pixels, found and summed up step by step, so that each step's numbers stay in registers.
+/// Values of a row's pixels, computed and summed step by step, so that each step's numbers stay in registers.
 struct RowPixels {
   static constexpr int kMost = 32;
   Lanes level[kMost];
-  BitLanes sample[kMost];              // of the field, the nearest
-  Lanes from_u[kMost], from_v[kMost];  // from there, in samples
+  BitLanes sample[kMost];              // the nearest sample of the field
+  Lanes from_u[kMost], from_v[kMost];  // offset from that sample, in samples
   Lanes p[kMost], g[kMost], c[kMost];  // the pattern; its slopes along and across the epipolar line
   Lanes r[kMost], w[kMost];            // the residual and its weight
   Lanes wg[kMost], wp[kMost];
 };
 
-/// Sums over adjacent pixels, each factor by its name above; x is the column.
+/// Sums over adjacent pixels; letters in a name are factors as above, x is the column.
 struct NinthSums {
   Lanes gg, gp, g, gr;
 };
@@ -71,7 +71,7 @@ struct RowSums {
   RestSums rest;
 };
 
-/// Places of a row's pixels, and the light on them.
+/// Positions of a row's pixels, and their grey levels.
 template <class T>
 struct Row {
   const T* pixels[kLanes];  // in the middle column
@@ -85,12 +85,12 @@ inline __attribute__((always_inline)) void clamp_to(IntLanes& lanes, int last) {
   lanes = lanes > zero ? lanes : zero;
 }
 
-/// Finds the places of the pixels in the pattern.
+/// Finds the positions of the pixels in the pattern.
 template <class T>
 inline __attribute__((always_inline)) void look_up(const Row<T>& row, int first, int count, const EightWindows& of,
                                                    const Eight& e, RowPixels& seen) {
   constexpr float kScale = PatternField::kSamplesPerPx;
-  constexpr int kFar = 4096;  // samples: keeps what is rounded positive
+  constexpr int kFar = 4096;  // samples: an offset that keeps rounded numbers positive
   const Lanes one = Lanes{} + 1;
   for (int k = 0; k < count; ++k) {
     const auto x = static_cast<float>(first + k);
@@ -113,7 +113,7 @@ inline __attribute__((always_inline)) void look_up(const Row<T>& row, int first,
   }
 }
 
-/// @param counted  how many pixels count, added to
+/// @param counted  number of counting pixels; the function adds to it
 template <class T>
 inline __attribute__((always_inline)) void compare(const Row<T>& row, int first, int count, const EightWindows& of,
                                                    const Eight& e, RowPixels& seen, Lanes& counted) {
@@ -144,7 +144,7 @@ inline __attribute__((always_inline)) void compare(const Row<T>& row, int first,
   }
 }
 
-/// @param third_px  from the middle to where the middle third ends
+/// @param third_px  distance from the centre to the end of the middle third
 inline __attribute__((always_inline)) void sum_up(const RowPixels& seen, int first, int count, int third_px,
                                                   RowSums& sums) {
   const int ends[4] = {0, std::clamp(-third_px - first, 0, count), std::clamp(third_px + 1 - first, 0, count), count};
@@ -185,7 +185,7 @@ inline __attribute__((always_inline)) void sum_up(const RowPixels& seen, int fir
   sums.rest = rest;
 }
 
-/// One step of Gauss and Newton, with what the model leaves as the right side, so that nothing large cancels.
+/// One step of Gauss and Newton. The right-hand side is the residual, so that no large numbers cancel.
 template <class T>
 inline __attribute__((always_inline)) void step_eight(const T* const* pixels, const EightWindows& of, Eight& e) {
   const Lanes zero{}, one = zero + 1;
@@ -246,7 +246,7 @@ inline __attribute__((always_inline)) void step_eight(const T* const* pixels, co
   normal[kSlopeY][kGainX] = normal[kSlopeX][kGainY];
   e.weights = normal[kOffset][kOffset], e.pixels = counted;
 
-  // What is known beforehand, see PatchAligner.
+  // Prior knowledge, see PatchAligner.
   normal[kAcross][kAcross] += e.across_weight, right[kAcross] -= e.across_weight * e.gain * e.across;
   normal[kGainX][kGainX] += e.gain_slope_weight, right[kGainX] -= e.gain_slope_weight * e.gain_x;
   normal[kGainY][kGainY] += e.gain_slope_weight, right[kGainY] -= e.gain_slope_weight * e.gain_y;
@@ -282,7 +282,7 @@ inline __attribute__((always_inline)) void step_eight(const T* const* pixels, co
   e.slope_variance = 0.5F * (per_pivot[kSlopeY] + l76 * l76 * per_pivot[kDisparity] + per_pivot[kSlopeX] +
                              l65 * l65 * per_pivot[kSlopeY] + l75 * l75 * per_pivot[kDisparity]);
 
-  // The disparities of the ninths, as the step leaves them, beyond what noise does.
+  // The disparities of the ninths after the step, beyond noise.
   const auto away = static_cast<float>((half + thirds + 1) / 2);
   Lanes of_ninths = zero, weight = zero, expected = zero;
   const Lanes noise = e.left / e.weights;
@@ -371,7 +371,7 @@ void align(const ImageView<T>& frame, double full, const PatternField& field, co
   Eight eight;
   const T* pixels[kEight];
   for (int lane = 0; lane < kEight; ++lane) {
-    // What is left of the lanes does what the first does.
+    // Unused lanes repeat the first one.
     PatchTask& task = *tasks[static_cast<std::size_t>(lane) < tasks.size() ? lane : 0];
     if (!(task.state.gain > 0)) task.state.offset = level_of(frame, task, window_px / 2);
     pixels[lane] = frame.row(task.y) + task.x;

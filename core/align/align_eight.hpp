@@ -9,24 +9,24 @@
 
 namespace slsd {
 
-/// Number of patches that are aligned at once.
+/// Number of patches aligned at once.
 inline constexpr int kEight = 8;
 
-/// A square window of the frame, to be aligned around its middle pixel.
+/// A square window of the frame, to be aligned around its centre pixel.
 struct PatchTask {
-  int x = 0, y = 0;          ///< the middle; the window lies within the frame
+  int x = 0, y = 0;          ///< the centre; the window lies within the frame
   PatchMap map;              ///< around the same pixel
   float noise = 0;           ///< one standard deviation of a pixel, grey levels
-  PatchState state;          ///< the start, and then what was found; gain 0: not known. Bends are not looked at
-  bool settled = false;      ///< the caller's: whether a step that moves little is the last
-  bool failed = false;       ///< nothing follows from what is seen there; the rest is then as it was
+  PatchState state;          ///< in: the start; out: the result; gain 0: unknown. Bends are ignored
+  bool settled = false;      ///< set by the caller: a step that moves little was the last
+  bool failed = false;       ///< the window does not determine the place; the other fields are unchanged
   float moved = 0;           ///< the last step's change of the disparity, projector px
-  float residual = 0;        ///< root mean square, grey levels, as the last step leaves it
+  float residual = 0;        ///< root mean square after the last step, grey levels
   float pixels = 0;          ///< number of pixels
-  float support = 0;         ///< the share of them that agreed with the pattern at the last step's start
-  float scatter = 0;         ///< scatter of the ninths about the plane, px, beyond the share of noise
+  float support = 0;         ///< share of them that agreed with the pattern before the last step
+  float scatter = 0;         ///< scatter of the ninths about the plane, px, beyond noise
   float variance = 0;        ///< variance of the disparity, for a noise of one grey level in each pixel
-  float slope_variance = 0;  ///< variance of its slopes, the mean of both
+  float slope_variance = 0;  ///< variance of its slopes, mean of both
 };
 
 /// Prior knowledge of `across` and of each of the gain's slopes: the amounts added to the diagonal of the normal
@@ -44,11 +44,11 @@ struct AlignPriors {
               : 0};
 }
 
-/// One step of PatchAligner for up to eight windows of the same size: the same equations, a patch to each lane. Eight
-/// are several times as fast as one after the other, as none of it goes across lanes, and the eight systems of
-/// equations are solved at once.
+/// One step of PatchAligner for up to eight windows of the same size: the same equations, one patch in each lane. This
+/// is several times faster than one by one: no operation crosses lanes, and the eight systems of equations are solved
+/// at once.
 /// @param full       the level of a saturated pixel, which does not count
-/// @param window_px  odd: the windows' side
+/// @param window_px  odd: side of the windows
 /// @thread reentrant
 void align_eight(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
                  int window_px, std::span<PatchTask* const> tasks);

@@ -18,13 +18,13 @@ namespace {
 
 using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
 
-constexpr float kNotCounted = -1;  // of a patch's pixels: saturated, or outside
+constexpr float kNotCounted = -1;  // marks a patch's pixels that are saturated or outside
 
 Eigen::Vector2f across_of(const PatchMap& map) {
   return {-map.along.y(), map.along.x()};
 }
 
-/// The coefficients of q in a window, by rows: q_k = constant + x + y + (xx + 2 xy + yy) / 2.
+/// The coefficients of q in a window, row by row: q_k = constant + x + y + (xx + 2 xy + yy) / 2.
 struct Warp {
   float constant[3], x[3], y[3], xx[3], xy[3], yy[3];
   float across_u, across_v;  // added to p
@@ -36,25 +36,25 @@ struct Pass {
   Warp warp;
   const float* patch;
   int stride, height;
-  float first_x, first_y;                                  // of the first pixel, from the window's middle
-  float third_left, third_right, third_top, third_bottom;  // where the ninths meet
+  float first_x, first_y;                                  // of the first pixel, from the window's centre
+  float third_left, third_right, third_top, third_bottom;  // boundaries of the ninths
   float middle_u, middle_v, half;
   const std::uint32_t* samples;
   int field_width, field_height;
   float origin_u, origin_v;  // of p, in samples
   float slope_unit;
-  float level;  // taken off every pixel: sums of small numbers keep their digits
-  // What the last step found, from which pixels that are far off count less; per_scale 0: all count.
+  float level;  // subtracted from every pixel: sums of small numbers keep their precision
+  // Result of the last step, from which outliers are down-weighted; per_scale 0: all pixels count fully.
   float gain, gain_x, gain_y, offset, per_scale;
 };
 
-/// g the pattern's slope along the epipolar line, c across it, p its value, i the pixel; w for pixels alone. What is
-/// summed with x and y is [power of x + y]: 1, x, y, xx, xy, yy.
+/// g is the pattern's slope along the epipolar line, c that across it, p its value, i the pixel; w is for pixels alone.
+/// Sums with x and y are indexed by [power of x + y]: 1, x, y, xx, xy, yy.
 struct Sums {
   float gg[6], gp[6], pp[6];
   float g[3], p[3], gc[3], pc[3], ig[3], ip[3];
   float w, c, cc, ic, i, ii;
-  float pixels;                  ///< pixels in the square, whether they count less or not
+  float pixels;                  ///< pixels in the square, down-weighted or not
   float part_gr[9], part_gg[9];  ///< g times the residual, and g squared, of the window's ninths
 };
 
@@ -198,7 +198,7 @@ inline __attribute__((always_inline)) void sum_patch(const Pass& pass, Sums& sum
   sums.i = sum_of(total[kI]), sums.ii = sum_of(total[kII]), sums.pixels = sum_of(total[kPixels]);
 }
 
-/// Distance of the patch's ninths from the plane by their disparities, root mean square, beyond the share of noise.
+/// Root mean square distance of the ninths from the plane, by their disparities, beyond noise.
 float scatter_of(const Sums& sums, float gain, float noise) {
   float squares = 0, expected = 0, weight = 0;
   for (int part = 0; part < 9; ++part) {
@@ -272,7 +272,7 @@ PatchMap make_patch_map(const Eigen::Matrix3d& turned, const Eigen::Vector2d& mi
   const Eigen::Vector2d direction = scale * middle.head<2>();
   const Eigen::Vector2d pixel = projector.distort(direction);
   map.origin_px = {static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))};
-  // The lens made linear around the direction, from the origin; all scaled so that q2 is 1 in the middle.
+  // The lens linearised around the direction, from the origin; scaled so that q2 is 1 at the centre.
   const Eigen::Matrix2d bend = projector.distort_jacobian(direction);
   const Eigen::Vector2d from_origin = pixel - map.origin_px.cast<double>();
   const auto through_lens = [&](const Eigen::Vector3d& q) {
@@ -321,7 +321,7 @@ PatchFit PatchAligner::align(const ImageView<T>& frame, double full, float noise
   pass.middle_u = window.square_middle_px.x() - static_cast<float>(map.origin_px.x());
   pass.middle_v = window.square_middle_px.y() - static_cast<float>(map.origin_px.y());
   pass.half = window.square_half_px;
-  // The square's own thirds: the window is a pixel larger all round.
+  // The square's own thirds: the window is one pixel larger on each side.
   const float third_x = (static_cast<float>(window.width) - 3) / 6,
               third_y = (static_cast<float>(window.height) - 3) / 6;
   const float mid_x = pass.first_x + 0.5F * static_cast<float>(window.width - 1),
@@ -350,7 +350,7 @@ PatchFit PatchAligner::align(const ImageView<T>& frame, double full, float noise
     fit.support = sums.w / std::max(1.F, sums.pixels);
     if (!(sums.w > 2 * kFitted)) return fit;
     fill(sums, normal, right);
-    // What is known of `across`, in units of the other equations: its column is c times the gain.
+    // The prior of `across`, in units of the other equations: its column is c times the gain.
     const double gain = std::max(1.F, std::abs(fit.state.gain));
     const double weight = options_.across_sigma_px > 0 ? std::pow(noise / (gain * options_.across_sigma_px), 2) : 1e12;
     normal(3, 3) += weight;
@@ -399,7 +399,7 @@ Eigen::Vector2f projector_offset(const PatchMap& map, const PatchState& state, c
 }
 
 Eigen::Vector2f camera_offset(const PatchMap& map, const PatchState& state, const Eigen::Vector2f& pixel) {
-  // The bend moves the pixel by some hundredths: three rounds of a fixed point are plenty.
+  // The bend moves the pixel by some hundredths: three fixed-point iterations are enough.
   const Eigen::Vector2f target = pixel - state.across * across_of(map);
   Eigen::Vector2f offset = Eigen::Vector2f::Zero();
   for (int round = 0; round < 3; ++round) {

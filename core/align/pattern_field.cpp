@@ -12,7 +12,7 @@ namespace {
 constexpr int kPhases = PatternField::kSamplesPerPx;
 constexpr int kSlopeMax = (1 << (PatternField::kSlopeBits - 1)) - 1;
 
-/// Weights of each pixel, a square of side 1, in a sample and in its slope, for the pixels from -reach to reach.
+/// Weights of a pixel, a square of side 1, in a sample and in its slope, for pixels from -reach to reach.
 struct Weights {
   std::vector<float> value, slope;
 };
@@ -50,14 +50,14 @@ PatternField::PatternField(const ImageView<std::uint8_t>& pattern, float blur_si
     : width_((pattern.width + 2 * kBorderPx) * kPhases),
       height_((pattern.height + 2 * kBorderPx) * kPhases),
       blur_sigma_px_(blur_sigma_px),
-      // No slope of a function between 0 and 1, blurred, exceeds the Gaussian's peak.
+      // No slope of a blurred function between 0 and 1 exceeds the Gaussian's peak.
       slope_unit_(1 / (blur_sigma_px * std::sqrt(2 * std::numbers::pi_v<float>) * kSlopeMax)),
       samples_(static_cast<std::size_t>(width_) * height_) {
   const int reach = static_cast<int>(std::ceil(3.5F * blur_sigma_px + 0.5F)), wide = pattern.width + 2 * kBorderPx;
   std::vector<Weights> weights;
   for (int phase = 0; phase < kPhases; ++phase)
     weights.push_back(weights_of(static_cast<float>(phase) / kPhases, blur_sigma_px, reach));
-  // Down the columns first, at the pattern's width; then along the rows.
+  // Along the columns first, at the pattern's width; then along the rows.
   const std::size_t padded = static_cast<std::size_t>(wide) + 2 * reach;
   std::vector<float> down(padded), down_slope(padded);
   for (int j = 0; j < height_; ++j) {

@@ -14,19 +14,19 @@
 
 namespace slsd {
 
-/// The pattern as it falls on a surface: its pixels as squares, blurred, with its slopes, two samples to a projector
-/// pixel. From the nearest sample and its slopes the value anywhere follows to 1 % of the contrast, half of it as if
-/// the blur were wider by 0.02 px^2, from a single load.
+/// The pattern's light on a surface: square pixels, blurred, with slopes, in two samples for each projector pixel. A
+/// single load gives the nearest sample with its slopes, and these give the value anywhere to 1 % of the contrast. Half
+/// of that error is as if the blur were wider by 0.02 px^2.
 ///
-/// Made once for a pattern and a blur, 16 bytes to a projector pixel, and shared by all that align with it.
+/// Made once for a pattern and a blur, with 16 bytes for each projector pixel, and shared by all aligners.
 /// @thread reentrant
 class PatternField {
  public:
   static constexpr int kSamplesPerPx = 2;
-  static constexpr int kBorderPx = 8;  ///< dark, all round the pattern
+  static constexpr int kBorderPx = 8;  ///< dark border around the pattern
 
-  /// @param pattern        what the projector shows; 255 is light 1
-  /// @param blur_sigma_px  of a Gaussian, projector px, 0.3 to 2.2
+  /// @param pattern        the projector's picture; 255 is light 1
+  /// @param blur_sigma_px  standard deviation of a Gaussian, projector px, 0.3 to 2.2
   PatternField(const ImageView<std::uint8_t>& pattern, float blur_sigma_px);
 
   /// Light at a sample, 0 to 1, and its slopes, per projector px.
@@ -69,7 +69,7 @@ class PatternField {
   std::vector<std::uint32_t> samples_;
 };
 
-/// The pattern at some blurs, each made when it is first asked for.
+/// The pattern at several blurs, each made on first use.
 /// @thread thread-safe
 class PatternFields {
  public:
