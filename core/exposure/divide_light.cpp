@@ -18,8 +18,8 @@
 namespace slsd {
 namespace {
 
-/// Limits of the light that is trusted: as a share of the white image's brightest, in standard deviations of its noise,
-/// and in levels.
+/// Limits of usable light: as a share of the white image's brightest, in standard deviations of its noise, and in
+/// levels.
 constexpr float kFaintShare = 0.02F, kFaintSigma = 4, kFaintLevels = 2;
 
 float full_of(const GreyView& image) {
@@ -47,18 +47,18 @@ float brightest(const GreyView& image) {
       image);
 }
 
-/// Images of one camera have the same depth; if not, full levels are what they have in common.
+/// Images of one camera have the same bit depth; if not, scale by their full levels.
 float scale_between(const GreyView& white, const GreyView& other) {
   return full_of(white) / full_of(other);
 }
 
 constexpr std::size_t kBins = 32;
 constexpr std::size_t kBinLeast = 200;            // pixels
-constexpr double kPixelsLookedAt = 2e6;           // more tell no more
-constexpr double kDarkFrom = 0.1, kDarkTo = 0.3;  // of a bin's pixels by their levels: those between the symbols
+constexpr double kPixelsLookedAt = 2e6;           // more add no information
+constexpr double kDarkFrom = 0.1, kDarkTo = 0.3;  // of a bin's pixels, sorted by level: those between the symbols
 constexpr double kRoomMax = 0.8;                  // of white
 
-/// The middle of what lies between the symbols. Reorders the levels.
+/// The mean level between the symbols. Reorders the levels.
 double dark_of(std::vector<float>& levels) {
   std::ranges::sort(levels);
   const auto first = static_cast<std::size_t>(kDarkFrom * static_cast<double>(levels.size()));
@@ -68,15 +68,15 @@ double dark_of(std::vector<float>& levels) {
          static_cast<double>(last - first);
 }
 
-/// The level of a pixel that no light falls on. Between the symbols there is a part of the light that there is under
-/// white, of the room's and what the projector scatters, the same part on ink and on paper: by how much it does not go
-/// to 0 with the white level is the black level.
+/// The level of a pixel without light. Between the symbols, a constant share of the white light remains, from the room
+/// and from scatter, on ink as on paper. So the dark level is a line over the white level, and the black level is its
+/// point where both are equal.
 double find_black_level(const GreyView& pattern, const GreyView& white,
                         const std::function<bool(int x, int y)>& contains) {
   const auto [width, height] = size_of(white);
   const float most = brightest(white), full = static_cast<float>(guess_full_level(white));
   const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / kPixelsLookedAt)));
-  std::array<std::vector<float>, kBins> bins;  // the pattern's levels, by those of white
+  std::array<std::vector<float>, kBins> bins;  // the pattern's levels, grouped by the white levels
   std::array<double, kBins> white_sums{};
   std::vector<float> lit, light;
   for (int y = 0; y < height; y += step) {
@@ -88,7 +88,7 @@ double find_black_level(const GreyView& pattern, const GreyView& white,
       bins[bin].push_back(lit[x]), white_sums[bin] += light[x];
     }
   }
-  // A line through dark over white, each bin by its pixels.
+  // Fit a line of dark over white, each bin weighted by its pixels.
   double count = 0, sum_white = 0, sum_dark = 0, white_white = 0, white_dark = 0;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < kBins; ++i) {
@@ -103,7 +103,7 @@ double find_black_level(const GreyView& pattern, const GreyView& white,
   if (!(spread > 0)) return 0;
   const double slope = (count * white_dark - sum_white * sum_dark) / spread;
   if (!(slope < kRoomMax)) return 0;
-  // Where dark and white are one there is no light.
+  // Without light, dark equals white.
   return std::clamp((sum_dark - slope * sum_white) / count / (1 - slope), 0.0, least);
 }
 
@@ -119,17 +119,17 @@ Result<> check_sizes(const GreyView& pattern, const GreyView& white, const std::
   return {};
 }
 
-/// Limit of the light that is trusted, in levels of the white image.
+/// Smallest usable light, in levels of the white image.
 float faint_light(const GreyView& white, const FrameNoise& noise) {
   return std::max({kFaintLevels, kFaintShare * brightest(white), kFaintSigma * noise.at(0)});
 }
 
-/// The noise of the quotient where a quarter of the surface is darker.
+/// The noise of the quotient at the 25th percentile of the surface's levels.
 FrameNoise noise_on_ink(const GreyView& white, const FrameNoise& noise, const PrintedSurface& surface, double black,
                         float faint) {
   constexpr double kInk = 0.25;
-  constexpr float kOfBoth = 1.414F;  // the noise of the pattern's image and that of the white one, where it is lit
-  constexpr float kReadable = 0.1F;  // of white: symbols that are noisier are lost, and cost those on paper
+  constexpr float kOfBoth = 1.414F;  // the noise of the pattern's image and that of the white one, on lit pixels
+  constexpr float kReadable = 0.1F;  // of white: noisier symbols are lost, and would cost symbols on paper
   const auto [width, height] = size_of(white);
   const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / kPixelsLookedAt)));
   std::vector<float> levels, light;
@@ -146,7 +146,7 @@ FrameNoise noise_on_ink(const GreyView& white, const FrameNoise& noise, const Pr
   return FrameNoise{1, 0}.scaled(static_cast<float>(kAsBrightAsWhite) * std::min(share, kReadable));
 }
 
-/// Exact where the light is more than faint; below that the less, the fainter it is.
+/// Exact above the faint level; below it, the quotient falls with the light.
 float share_of(float lit, float light, float faint) {
   return light >= faint ? lit / light : lit * std::max(0.F, light) / (faint * faint);
 }
@@ -161,7 +161,8 @@ struct DividedRow {
   std::vector<float> light, share;
 };
 
-/// Change of a pixel's quotient when its place moves back along one axis, by half the differences of its neighbours.
+/// Error of a pixel's quotient that blur causes along one axis. Blur takes light from farther towards the brighter
+/// side, by the variance times the relative slope of the light. Slopes are half the differences of the neighbours.
 float moved_back(float variance, float light, float light_before, float light_after, float before, float after,
                  float faint) {
   if (light_before < faint || light_after < faint) return 0;
@@ -197,7 +198,7 @@ Result<DividedPrint> divide_light(const GreyView& pattern, const GreyView& white
   const float faint = faint_light(white, noise);
   const auto black = static_cast<float>(find_black_level(pattern, white, surface.contains));
   const auto variance = static_cast<float>(surface.blur_px * surface.blur_px);
-  std::array<DividedRow, 3> rows;  // of row y at y % 3
+  std::array<DividedRow, 3> rows;  // row y is at y % 3
   const auto divide_row = [&](int y) {
     DividedRow& row = rows[y % 3];
     copy_row(pattern, y, scale_between(white, pattern), row.share);

@@ -8,13 +8,13 @@
 namespace slsd {
 namespace {
 
-constexpr double kTarget = 0.75;  // of full: below where sensors bend, above where noise counts
+constexpr double kTarget = 0.75;  // of full: below nonlinear sensor response, above significant noise
 constexpr double kGoodEnough = 1.15;
-constexpr double kClippedMax = 0.05;  // of the tiles: a shiny spot is no reason to darken everything
+constexpr double kClippedMax = 0.05;  // of the tiles: a shiny spot is no reason to darken the whole image
 constexpr double kMostlyClipped = 0.5;
 constexpr double kPatternedMin = 0.02;
 constexpr double kDarkToLitMax = 0.5;
-// Frames of the corpus have 0.03 to 0.055; blurred further they lose symbols from 0.08 on, and all by 0.1.
+// Frames of the corpus have 0.03 to 0.055. With more blur they lose symbols from 0.08 on, and all by 0.1.
 constexpr double kEdgeToPeriodMax = 0.075;
 constexpr double kContrastToNoiseMin = 8.0;
 constexpr double kUnevenMax = 20.0;
@@ -29,7 +29,7 @@ double decibels_of(double ratio) {
   return 20.0 * std::log10(ratio);
 }
 
-// How far above full a clipped level lies is not to be seen: steps that halve or more reach it in a few looks.
+// How far above full the true level lies is unknown: steps that halve the light or more reach it in a few looks.
 double wanted_change(const LightLevels& levels) {
   if (levels.clipped_share > kMostlyClipped) return 0.25;
   if (levels.clipped_share > kClippedMax) return 0.5;
@@ -37,7 +37,7 @@ double wanted_change(const LightLevels& levels) {
   return change < kGoodEnough && change > 1 / kGoodEnough ? 1.0 : change;
 }
 
-// What the frames themselves show, whatever the setting.
+// Troubles visible in the frames themselves, whatever the setting.
 void find_troubles(const LightLevels& levels, const std::optional<FrameChange>& change,
                    std::vector<Trouble>& troubles) {
   const auto note = [&](bool found, Trouble trouble) {

@@ -12,14 +12,14 @@
 
 namespace slsd {
 
-/// Troubles that another exposure or gain cannot mend.
+/// Troubles that no other exposure or gain can fix.
 enum class Trouble {
-  kNoPattern,       ///< the pattern is not seen
+  kNoPattern,       ///< the pattern is not visible
   kTooMuchLight,    ///< clipped even with the shortest exposure that suits the projector, and no gain
   kTooLittleLight,  ///< dark even with the longest exposure and the highest gain allowed
   kAmbient,         ///< between the symbols it is nearly as bright as on them
   kBlurred,         ///< the symbols' edges run into one another
-  kNoisy,           ///< between frames pixels change nearly as much as the symbols stand out
+  kNoisy,           ///< pixels change between frames nearly as much as the contrast of the symbols
   kUneven,          ///< near parts are clipped, or far parts are dark: no exposure suits both
   kMoves,           ///< the scene moves, so that a longer exposure blurs it
   kFlickers,        ///< the brightness changes from frame to frame
@@ -30,7 +30,7 @@ enum class Trouble {
 /// Remedy for a trouble, in a sentence or two.
 [[nodiscard]] std::string_view remedy(Trouble trouble);
 
-/// Setting with which a camera exposed.
+/// A camera's exposure setting.
 struct ExposureSetting {
   double exposure_us = 0;
   double gain_db = 0;
@@ -38,24 +38,25 @@ struct ExposureSetting {
 
 struct ExposureLimits {
   LightPeriods periods;
-  double exposure_max_us = 100'000;  ///< longest exposure: moving things are smeared over that time
+  double exposure_max_us = 100'000;  ///< longest exposure: moving objects are blurred over that time
   double gain_max_db = 24;           ///< noise grows with it
 };
 
 /// Advice on the setting.
 struct ExposureAdvice {
-  double brighter = 1;      ///< factor of light, or gain, that brings the symbols to their right level
-  bool look_again = false;  ///< clipped: how far above cannot be seen, so set this and look again
+  double brighter = 1;      ///< factor of light, or gain, that brings the symbols to the target level
+  bool look_again = false;  ///< clipped: the excess is unknown, so apply this setting and look again
   std::optional<ExposureSetting> setting = {};  ///< new setting, if the present one is known
   std::vector<Trouble> troubles = {};
 };
 
-/// Proposes exposure and gain with which the brightest symbols reach three quarters of full: as little gain as
-/// possible, and an exposure of whole periods of the light. Where the scene moves it is the shortest such exposure, and
-/// gain makes up for the rest.
+/// Proposes exposure and gain with which the brightest symbols reach three quarters of full. It uses as little gain as
+/// possible, and an exposure of whole periods of the light. If the scene moves, it uses the shortest such exposure, and
+/// gain compensates for the rest.
 /// @param levels   of one frame
-/// @param change   between two frames taken with the same setting; without it noise, motion and flicker are not found
-/// @param present  the setting of those frames, where it is known
+/// @param change   change between two frames taken with the same setting; without it, noise, motion and flicker are
+///                 unknown
+/// @param present  the setting of those frames, if known
 /// @thread reentrant
 [[nodiscard]] ExposureAdvice advise_exposure(const LightLevels& levels, const std::optional<FrameChange>& change,
                                              const std::optional<ExposureSetting>& present,

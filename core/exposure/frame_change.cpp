@@ -13,10 +13,10 @@
 namespace slsd {
 namespace {
 
-// Mean magnitude of the difference of two normal numbers, in standard deviations of one: 2 / sqrt(pi).
+// Mean magnitude of the difference of two normally distributed numbers, in standard deviations of one: 2 / sqrt(pi).
 constexpr double kMeanDifference = 1.128;
 constexpr double kMovedNoises = 3.0;
-constexpr double kMovedLevels = 2.0;  // of 255: what rounding and a codec change is no motion
+constexpr double kMovedLevels = 2.0;  // of 255: changes by rounding or a codec are no motion
 
 template <class T>
 double sum_of(const ImageView<T>& image) {
@@ -27,7 +27,7 @@ double sum_of(const ImageView<T>& image) {
   return sum;
 }
 
-// Mean magnitude of the change in a tile, once the whole frame's change of brightness is taken out.
+// Mean magnitude of the change in a tile, without the whole frame's change of brightness.
 template <class T>
 double change_in(const ImageView<T>& first, const ImageView<T>& second, double brighter, int left, int top) {
   double sum = 0;

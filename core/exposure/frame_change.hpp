@@ -6,19 +6,19 @@
 
 namespace slsd {
 
-/// Changes between two frames of a scene that should have stayed.
+/// Changes between two frames of a scene that should be static.
 struct FrameChange {
-  double noise = 0;        ///< one standard deviation of a pixel, where nothing moved
+  double noise = 0;        ///< one standard deviation of a pixel, in tiles without motion
   double moved_share = 0;  ///< share of the tiles, 64 px wide, that changed beyond noise; 0 to 1
-  double brighter = 1;     ///< brightness of the second over the first, over the whole frame
+  double brighter = 1;     ///< ratio of the second frame's brightness to the first's
 
-  /// Difference between the brightness of both, as a share. @return 0 and more
+  /// Relative difference between both brightnesses. @return at least 0
   [[nodiscard]] double flicker() const { return brighter > 1 ? brighter - 1 : 1 / brighter - 1; }
 };
 
 /// Compares two frames. A replayed image compared with itself has no noise.
 /// @param first, second  of the same size and depth, taken one after the other while the pattern was shown
-/// @return               nothing changed, where their sizes or depths differ
+/// @return               no change if their sizes or depths differ
 /// @thread reentrant
 [[nodiscard]] FrameChange compare_frames(const GreyView& first, const GreyView& second);
 

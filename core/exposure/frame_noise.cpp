@@ -13,19 +13,19 @@
 namespace slsd {
 namespace {
 
-constexpr int kStep = 11;  // from sample to sample, or more in a large frame
+constexpr int kStep = 11;  // distance between samples, or more in a large frame
 constexpr int kSamplesMax = 20000;
 constexpr int kGreys = 16;
-constexpr int kDifferences = 256;  // of a difference
-constexpr int kEnough = 60;        // samples of a level
+constexpr int kDifferences = 256;  // number of histogram bins for differences
+constexpr int kEnough = 60;        // smallest number of samples of a level
 constexpr int kFlatShare = 8, kFlatMin = 24;
-/// The median of |a - 2 b + c|, each normal with variance 1: that of the sum is 6.
+/// The median of |a - 2 b + c| for independent a, b and c, normal with variance 1: the sum has variance 6.
 constexpr float kOfSigma = 0.6745F * 2.4495F;
 
 using Histogram = std::array<int, kDifferences>;
 using Histograms = std::array<Histogram, kGreys>;
 
-/// The difference below which half of them lie, to fractions of a bin: 0 stands for 0 to 1/2, k for k -+ 1/2.
+/// The median difference, interpolated within a bin: 0 covers 0 to 1/2, k covers k -+ 1/2.
 float median(const Histogram& histogram, int count) {
   float below = 0;
   const float half = 0.5F * static_cast<float>(count);
@@ -40,20 +40,20 @@ float median(const Histogram& histogram, int count) {
   return kDifferences;
 }
 
-/// Three pixels of each of three rows. How flat it is there is told by the outer rows, whose noise is none of the
-/// middle one's, which is measured.
+/// Three pixels of each of three rows. The outer rows show how flat the image is there; their noise is independent of
+/// the middle row's, which is measured.
 struct Sample {
   std::uint8_t level, unevenness, difference;
 };
 using Samples = std::array<Sample, kSamplesMax>;
 
-/// Grey levels to a bin of differences.
+/// Grey levels for each bin of differences.
 template <class T>
 int unit_of(double full) {
   return std::is_same_v<T, std::uint8_t> ? 1 : std::max(1, static_cast<int>(full / 1024));
 }
 
-/// A sample of a frame's pixels, but for those that are saturated.
+/// A sample of a frame's unsaturated pixels.
 template <class T>
 std::size_t take_samples(const ImageView<T>& frame, double full, Samples& samples) {
   const auto per_level = static_cast<float>(kGreys / full);

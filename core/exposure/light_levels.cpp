@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kFaintest = 0.05;
 constexpr double kBrightest = 0.95;
-constexpr double kClipped = 0.985;  // of full: noise and the sensor's own unevenness keep some pixels below
+constexpr double kClipped = 0.985;  // of full: noise and uneven sensor response keep some pixels below
 
 std::vector<TileLevels> measure_tiles(const GreyView& frame, double full, int& tiles) {
   std::vector<TileLevels> seen;
@@ -33,7 +33,7 @@ std::vector<TileLevels> measure_tiles(const GreyView& frame, double full, int& t
   return seen;
 }
 
-/// The first number in a text; 0 where there is none.
+/// The first number in a text; 0 if there is none.
 int first_number(std::string_view text) {
   int number = 0;
   const auto first = std::ranges::find_if(text, [](char letter) { return letter >= '0' && letter <= '9'; });
@@ -77,7 +77,7 @@ double guess_full_level(const GreyView& frame) {
   if (wide == nullptr) return 255;
   std::uint16_t highest = 0;
   for (int y = 0; y < wide->height; ++y) {
-    // std::max_element is not turned into vector code, and this runs for every frame of more than 8 bits.
+    // The compiler does not vectorise std::max_element, and this runs for every frame of more than 8 bits.
     const std::uint16_t* row = wide->row(y);
     for (int x = 0; x < wide->width; ++x) highest = std::max(highest, row[x]);
   }

@@ -24,40 +24,42 @@ struct LightLevels {
   double clipped_share = 0;    ///< share of the tiles whose symbols are clipped; 0 to 1
   double edge_px = 0;          ///< one standard deviation of the blur at the symbols' edges; a sharp edge has about 0.8
   double period_px = 0;        ///< distance from one symbol's edge to the next's on the same side, along rows
-  double patterned_share = 0;  ///< share of the tiles in which the pattern is seen; 0 to 1. If it is 0, nothing
-                               ///< above but `full` is known
+  double patterned_share = 0;  ///< share of the tiles in which the pattern is visible; 0 to 1. If it is 0, only `full`
+                               ///< of the above is valid
 
   [[nodiscard]] double contrast() const { return lit - dark; }
 };
 
-/// Measures tile by tile, 64 px wide, where the pattern is seen and how. Needs no calibration and no decoder, so that
-/// it works on frames of which nothing can be decoded.
+/// Measures the visibility of the pattern tile by tile, 64 px wide. Needs no calibration and no decoder, so it works on
+/// frames that cannot be decoded.
 /// @param frame  taken while the pattern was shown
 /// @param full   the level of a saturated pixel: 255, 1023, 65535...
 /// @thread reentrant
 [[nodiscard]] LightLevels measure_light(const GreyView& frame, double full);
 
-/// The level of a saturated pixel where nobody says: 255, or for 16 bits the least of 1023, 4095, 16383 and 65535 that
-/// no pixel exceeds. A frame of which not one pixel reaches a quarter of full gets too low a level: the decoder then
-/// takes fainter light for the pattern, and intensities come out brighter.
+/// Guesses the level of a saturated pixel: 255, or for 16 bits the least of 1023, 4095, 16383 and 65535 that no pixel
+/// exceeds. If no pixel of a frame reaches a quarter of full, the guess is too low. The decoder then accepts fainter
+/// light as the pattern, and intensities come out brighter.
 /// @thread reentrant
 [[nodiscard]] double guess_full_level(const GreyView& frame);
 
-/// The level of a saturated pixel of one camera, frame after frame: a faint frame after a bright one is not of fewer
-/// bits. It may rise, once one of its pixels shows it, and does not fall.
+/// The level of a saturated pixel of one camera, over many frames: a faint frame after a bright one has no fewer bits.
+/// The level may rise once a pixel exceeds it, and never falls.
 /// @thread thread-bound
 class HeldFullLevel {
  public:
-  /// 255, or what was guessed of this frame of 16 bits or one before, whichever is more.
+  /// 255, or for 16 bits the greatest guess over this and the previous frames.
   [[nodiscard]] double of(const GreyView& frame);
 
  private:
   double greatest_ = 0;
 };
 
-/// The level of a saturated pixel. Formats that leave the upper bits of 16 empty say so by the first number in their
-/// names: "Y10", "Mono12", "Mono10p", "BayerRG12Packed". Those of 16 say nothing: what fills them may be less.
-/// @param format  the camera's name for it; where it says nothing, or a pixel is above what it says, guess_full_level()
+/// The level of a saturated pixel. Formats that leave the upper bits of 16 empty have their bit depth as the first
+/// number in their names: "Y10", "Mono12", "Mono10p", "BayerRG12Packed". Names of 16-bit formats do not tell: the
+/// content may have fewer bits.
+/// @param format  the camera's name for it; if it does not tell, or a pixel exceeds its level, guess_full_level()
+///                decides
 /// @thread reentrant
 [[nodiscard]] double full_level(std::string_view format, const GreyView& frame);
 

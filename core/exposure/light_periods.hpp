@@ -7,12 +7,12 @@
 
 namespace slsd {
 
-/// Periods of the light that changes while a camera exposes.
+/// Periods of light that varies while a camera exposes.
 struct LightPeriods {
-  double refresh_hz = 60.0;    ///< rate of the projector: its micromirrors write grey and colour in turn within
-                               ///< a frame; 0: it lights steadily
-  double power_line_hz = 0.0;  ///< frequency of the mains for the lamps, which are brightest twice
-                               ///< a period; 0: none, or not known
+  double refresh_hz = 60.0;    ///< rate of the projector, whose micromirrors write grey and colour sequentially within
+                               ///< a frame; 0: steady light
+  double power_line_hz = 0.0;  ///< frequency of the mains for lamps, which are brightest twice a period; 0: none, or
+                               ///< unknown
 
   [[nodiscard]] double projector_us() const { return refresh_hz > 0 ? 1e6 / refresh_hz : 0.0; }  ///< 0: none
   [[nodiscard]] double lamps_us() const { return power_line_hz > 0 ? 0.5e6 / power_line_hz : 0.0; }
@@ -23,7 +23,8 @@ struct LightPeriods {
 struct ExposureFit {
   bool projector = true;
   bool lamps = true;
-  std::optional<double> shorter_us = {};  ///< the nearest that suit both, where it does not; none above a second
+  std::optional<double> shorter_us = {};  ///< if it does not fit, the nearest exposures that fit both lights, none
+                                          ///< above a second
   std::optional<double> longer_us = {};
 
   [[nodiscard]] bool fits() const { return projector && lamps; }
@@ -33,7 +34,7 @@ struct ExposureFit {
 /// @thread reentrant
 [[nodiscard]] ExposureFit fit_exposure(double exposure_us, const LightPeriods& periods);
 
-/// All exposures that suit both lights, shortest first, in microseconds; none where both are steady and any does.
+/// All exposures that fit both lights, shortest first, in microseconds; empty if both are steady and any exposure fits.
 /// @param longest_us  up to 10 s
 /// @thread reentrant
 [[nodiscard]] std::vector<double> fitting_exposures(const LightPeriods& periods, double longest_us);

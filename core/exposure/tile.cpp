@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kDarkShare = 0.05;
 constexpr double kLitShare = 0.95;
-constexpr double kContrastMin = 0.015;  // of full: what is fainter is no symbol to the decoder either
-constexpr double kPeriodMinPx = 6.0;    // noise alone crosses its middle every fourth pixel
+constexpr double kContrastMin = 0.015;  // of full: the decoder does not accept fainter symbols either
+constexpr double kPeriodMinPx = 6.0;    // noise alone crosses its mean about every fourth pixel
 constexpr double kPeriodMaxPx = 0.75 * kTilePx;
 constexpr double kSteepShare = 0.99;
 
@@ -70,7 +70,8 @@ std::optional<TileLevels> Tile::measure(double full) {
   if (contrast < kContrastMin * full) return std::nullopt;
   levels.period_px = period_px(middle);
   if (levels.period_px < kPeriodMinPx || levels.period_px > kPeriodMaxPx) return std::nullopt;
-  // A step blurred by a Gaussian of sigma is steepest with 1 / (sqrt(2 pi) sigma) of its height to a pixel.
+  // A step blurred by a Gaussian of sigma has its steepest slope, 1 / (sqrt(2 pi) sigma) of its height per pixel, at
+  // the middle.
   levels.edge_px = 0.399 * contrast / steepest();
   return levels;
 }

@@ -19,15 +19,15 @@ struct TileLevels {
   double period_px = 0;
 };
 
-/// One tile's pixels in floating point, with room that is used again for the next.
+/// One tile's pixels in floating point; the buffer is reused for the next tile.
 /// @thread thread-bound
 class Tile {
  public:
-  /// Takes the tile whose first pixel is (left, top) and which lies inside the frame.
+  /// Loads the tile with its first pixel at (left, top), which lies inside the frame.
   void take(const GreyView& frame, int left, int top);
 
-  /// Measures the levels; nothing if no pattern is seen: too little contrast, fewer edges than symbols have, or as many
-  /// as noise has.
+  /// Measures the levels; empty if no pattern is visible: too little contrast, fewer edges than symbols have, or as
+  /// many as noise has.
   [[nodiscard]] std::optional<TileLevels> measure(double full);
 
  private:
