@@ -15,7 +15,7 @@ void add_squares(BoardInk& ink, const Board& board, int columns, int rows) {
   }
 }
 
-// One rectangle to each run of black cells in a row.
+// One rectangle for each run of black cells in a row.
 void add_marker(BoardInk& ink, const Board& board, int id) {
   const Eigen::Vector2d first = marker_corners(board, square_of_marker(board, id))[0];
   const int cells = board.family->cells();

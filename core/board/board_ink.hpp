@@ -23,13 +23,13 @@ struct InkDisc {
   double diameter_mm = 0;
 };
 
-/// Black shapes on a board. Shapes do not overlap; those of a marker have sides in common.
+/// Black shapes on a board. They do not overlap, but those of a marker share sides.
 struct BoardInk {
   std::vector<InkRectangle> rectangles;
   std::vector<InkDisc> discs;
 };
 
-/// ChArUco boards are laid out as OpenCV does since 4.6: the top left square is black.
+/// Computes the shapes of a board. ChArUco boards have OpenCV's layout since 4.6: the top left square is black.
 /// @thread reentrant
 [[nodiscard]] BoardInk ink_of(const Board& board);
 

@@ -12,7 +12,7 @@ namespace slsd {
 namespace {
 
 constexpr std::size_t kSamples = 20000;
-constexpr double kLeftOut = 0.005;  // of the pixels, at either end
+constexpr double kLeftOut = 0.005;  // share of the pixels at either end
 
 template <class T>
 Image<float> light_of(const ImageView<T>& image) {

@@ -15,15 +15,15 @@ namespace {
 
 constexpr double kLeastReachPx = 3;
 constexpr double kGreatestReachPx = 14;
-constexpr double kReachOfSquare = 0.38;        // of a chessboard
-constexpr double kReachOfCharucoSquare = 0.2;  // touches the markers' black borders only, which are symmetrical
-constexpr double kMaxStrayOfSquare = 0.2;      // from where it is foretold
+constexpr double kReachOfSquare = 0.38;        // for a chessboard
+constexpr double kReachOfCharucoSquare = 0.2;  // reaches only the markers' black borders, which are symmetrical
+constexpr double kMaxStrayOfSquare = 0.2;      // from its predicted place
 constexpr double kOutlierOfSquare = 0.08;
 constexpr double kLeastOutlierPx = 0.8;
 constexpr int kNeighbourhood = 2;  // rows and columns to either side
 constexpr std::size_t kLeastNeighbours = 5;
 
-// Whether two rows have two corners each, without which a homography is loose.
+// Whether two rows have at least two corners each; otherwise a homography is poorly determined.
 bool determine_a_homography(std::span<const Tie> ties) {
   std::map<double, int> in_row;
   for (const Tie& tie : ties) ++in_row[tie.board.y()];
@@ -92,7 +92,7 @@ void CornerLattice::drop_outliers() {
   for (const auto& [id, corner] : corners_) {
     if (is_outlier(id)) outliers.push_back(id);
   }
-  // One bad corner makes its neighbours look bad: those that are good without it are kept.
+  // One bad corner makes its neighbours look bad: keep those that are good without it.
   auto all = corners_;
   for (const int id : outliers) corners_.erase(id);
   for (const int id : outliers) {

@@ -12,19 +12,19 @@
 
 namespace slsd {
 
-/// The inner corners of a chessboard or a ChArUco board, gathered one by one.
+/// The inner corners of a chessboard or a ChArUco board, found one by one.
 /// @thread thread-bound
 class CornerLattice {
  public:
-  /// Borrows both.
+  /// Keeps references to both.
   /// @param white_first  whether the square at the board's top left is white
   CornerLattice(const Image<float>& light, const Board& board, bool white_first = false);
 
-  /// Fits a corner where a homography of its surroundings has it; keeps it where it is of the right colours.
+  /// Fits a corner at the place that a homography of its surroundings predicts; keeps it if its colours are right.
   bool look_for(int id, const Homography& local);
-  /// Drops the corners that are not where their neighbours would have them.
+  /// Drops the corners that are not where their neighbours predict them.
   void drop_outliers();
-  /// Looks for corners beside those there are, until no more are found.
+  /// Searches beside the found corners until no more are found.
   void grow();
 
   [[nodiscard]] std::vector<MeasuredPoint> corners() const;

@@ -18,12 +18,12 @@ namespace {
 
 constexpr double kLeastStepOfDisc = 3;  // levels
 constexpr int kRays = 24;
-constexpr double kOwnVariancePx2 = 0.25;  // what reading between pixels, a pixel apart, adds to a blur
+constexpr double kOwnVariancePx2 = 0.25;  // blur that interpolation between pixels adds
 
 struct Pixel {
   Eigen::Vector2d at;
   double level;
-  double distance;  ///< distance from the centre on the board, of the radius
+  double distance;  ///< distance from the centre on the board, as a share of the radius
 };
 
 std::vector<Pixel> pixels_about(const Image<float>& light, const Homography& local, const Eigen::Vector2d& centre_mm,
@@ -46,7 +46,7 @@ std::vector<Pixel> pixels_about(const Image<float>& light, const Homography& loc
   return pixels;
 }
 
-// Level of the white at (1, x, y).
+// White level as a linear function, coefficients of (1, x, y).
 Eigen::Vector3d fit_white(const std::vector<Pixel>& pixels, double from) {
   Eigen::Matrix3d left = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -62,7 +62,7 @@ Eigen::Vector3d fit_white(const std::vector<Pixel>& pixels, double from) {
   return plane;
 }
 
-// Black of white; under an uneven light this is what is the same all over the disc.
+// Ratio of black to white, which is constant over the disc even in uneven light.
 double black_share(const std::vector<Pixel>& pixels, const Eigen::Vector3d& white) {
   double sum = 0;
   int count = 0;
@@ -80,7 +80,7 @@ double level_at(const Image<float>& light, const Eigen::Vector2d& at) {
   return level_between(light.view(), x, y, at.x() - x, at.y() - y);
 }
 
-// From the steepest slope along each ray: a step of height 1 blurred by s has 1 / (s sqrt(2 pi)).
+// From the steepest slope along each ray: a step of height 1 blurred by s has slope 1 / (s sqrt(2 pi)).
 double blur_at_edge(const Image<float>& light, const Homography& local, const Eigen::Vector2d& centre_mm,
                     double radius_mm, double step) {
   const Eigen::Vector2d centre = local.map(centre_mm);

@@ -16,7 +16,7 @@ namespace slsd {
 namespace {
 
 constexpr int kLeastSidePx = 16;
-/// Share of a picture's pixels at full level that a reflection on a board makes at least.
+/// Smallest share of a picture's saturated pixels that indicates a reflection on a board.
 constexpr double kClippedShare = 0.01;
 
 double full_share(const BoardPhoto& photo) {

@@ -9,15 +9,14 @@
 
 namespace slsd {
 
-/// Finds a board and its points. Of charuco and plane boards a part is enough; a chessboard and circles must be whole.
-/// Corners are where a chessboard's corner, blurred and unevenly lit, fits the image best: bias below 0.02 px. (The
-/// corners of OpenCV 4.6's interpolateCornersCharuco are not used: they are off by half a pixel.) The centres of discs
-/// are those of the discs, not of the ellipses in the image, which perspective moves.
-/// @param image  grey of 8 or 16 bits, at least 16 px wide and high
-/// @errors kNotFound (nothing of this board is seen, or too little, or it is cut off), kMismatch (another board is
-/// seen:
-///         markers of another dictionary or of ids that it has not, another number of corners, another layout, the
-///         legacy layout; or it is mirrored), kInvalidArgument (the image is too small)
+/// Finds a board and its points. For charuco and plane boards a part is enough; a chessboard and circles must be whole.
+/// A corner is the best fit of a blurred, unevenly lit chessboard corner to the image: bias below 0.02 px. (OpenCV
+/// 4.6's interpolateCornersCharuco is not used: its corners are off by half a pixel.) Centres are those of the discs,
+/// not of the ellipses in the image, which perspective displaces.
+/// @param image  8 or 16 bits grey, at least 16 px wide and high
+/// @errors kNotFound (the board is not visible, or too little of it, or it is cut off), kMismatch (another board:
+///         markers of another dictionary or with unknown ids, another number of corners, another layout, the legacy
+///         layout; or it is mirrored), kInvalidArgument (the image is too small)
 /// @thread reentrant
 [[nodiscard]] Result<BoardSighting> find_board(const GreyView& image, const Board& board);
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kLeastCorners = 6;
 
-// The markers in the four squares that meet at a corner.
+// Markers in the four squares that meet at a corner.
 std::vector<SeenMarker> markers_around(const std::vector<SeenMarker>& markers, const Board& board, int id) {
   const int column = id % (board.columns - 1);
   const int row = id / (board.columns - 1);

@@ -9,8 +9,8 @@
 
 namespace slsd {
 
-/// find_board() for a ChArUco board: markers; corners foretold by the markers around each, each corner fitted; then
-/// corners foretold by those found, where markers were not read.
+/// find_board() for a ChArUco board. It finds the markers, and fits each corner at the place that nearby markers
+/// predict. Where no markers were read, it fits corners at the places that found corners predict.
 /// @errors as find_board()
 /// @thread reentrant
 [[nodiscard]] Result<BoardSighting> find_charuco(const BoardPhoto& photo, const Board& board);

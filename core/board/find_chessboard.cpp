@@ -16,7 +16,7 @@ namespace slsd {
 namespace {
 
 constexpr int kReducedWidthPx = 900;
-constexpr int kLeastPerCent = 80;  // of the corners
+constexpr int kLeastPerCent = 80;  // share of the corners
 
 cv::Mat matrix_of(const Grey8& image) {
   return {image.height(), image.width(), CV_8UC1, const_cast<std::uint8_t*>(image.data())};
@@ -41,8 +41,8 @@ cv::Mat reduced(const cv::Mat& image, double scale) {
   return small;
 }
 
-/// Tells whether there are far more bright patches than a board has squares, as in the projected pattern. The search by
-/// squares would not end with them in any reasonable time.
+/// Tells whether there are far more bright patches than a board has squares, as in the projected pattern. With them,
+/// the search by squares would take unreasonably long.
 bool is_crowded(const Grey8& image, const Board& board) {
   constexpr int kAround = 31, kBrighter = 5, kLeastPx = 12, kOthersMax = 200;
   cv::Mat bright, labels, statistics, centres;
@@ -54,7 +54,7 @@ bool is_crowded(const Grey8& image, const Board& board) {
   return patches > (board.columns + 1) * (board.rows + 1) + kOthersMax;
 }
 
-// By the black squares' corners: quick, and sees small squares beside a bright border and a dark room.
+// Searches by the black squares' corners: quick, and finds small squares beside a bright border and in a dark room.
 std::vector<cv::Point2f> search_by_squares(const cv::Mat& image, const cv::Size& size) {
   std::vector<cv::Point2f> corners;
   constexpr int kFlags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;
@@ -62,7 +62,7 @@ std::vector<cv::Point2f> search_by_squares(const cv::Mat& image, const cv::Size&
   return corners;
 }
 
-// By the saddles: slower, and sees blurred boards.
+// Searches by the saddles: slower, and finds blurred boards.
 std::vector<cv::Point2f> search_by_saddles(const cv::Mat& image, const cv::Size& size, int flags) {
   std::vector<cv::Point2f> corners;
   if (!cv::findChessboardCornersSB(image, size, corners, flags)) corners.clear();
@@ -86,7 +86,7 @@ struct Part {
   bool at_edge = false;  ///< touches the edge of the image
 };
 
-// The largest chessboard of any size that is seen.
+// The largest visible chessboard of any size.
 Part largest_part(const Grey8& image) {
   const double scale = reduction_of(image);
   const cv::Mat small = reduced(matrix_of(image), scale);
@@ -121,7 +121,7 @@ tl::unexpected<Error> refuse(const Grey8& image, const Board& board) {
   return fail(ErrorCode::kNotFound, name + " is hidden in part, unevenly lit, or another one: " + size + " are seen");
 }
 
-// Finds none where the order would have the top left square of the other colour.
+// Empty if, in this order, the top left square would have the other colour.
 std::vector<MeasuredPoint> fitted(const BoardPhoto& photo, const Board& board, const GridOrder& order,
                                   bool white_first) {
   CornerLattice lattice(photo.light, board, white_first);
@@ -144,8 +144,8 @@ Result<BoardSighting> find_chessboard(const BoardPhoto& photo, const Board& boar
   }
   if (found.size() != static_cast<std::size_t>(board.point_count())) return refuse(photo.grey, board);
   std::vector<MeasuredPoint> most;
-  // By the black corner, where a board has one: that tells which end is up. One of 9x7 has four of the same colour,
-  // black or white; as 7x9 it is the same board.
+  // By the black corner, if the board has a single one: it shows which end is up. A 9x7 board has four corners of the
+  // same colour, black or white; as 7x9 it is the same board.
   const bool corners_alike = (board.columns + board.rows) % 2 == 0 && board.columns != board.rows;
   for (const bool white_first : {false, true}) {
     if (white_first && !(corners_alike && most.empty())) break;

@@ -9,9 +9,9 @@
 
 namespace slsd {
 
-/// find_board() for a chessboard: OpenCV's search, in the image reduced first; then each corner fitted. The top left
-/// square is black, which tells the board's upper end; where its opposite is black too, the end that is up in the image
-/// is taken.
+/// find_board() for a chessboard: OpenCV's search, first in a reduced image; then a fit of each corner. The top left
+/// square is black, which shows the board's upper end. If the opposite corner is also black, the end that is up in the
+/// image counts as upper.
 /// @errors as find_board()
 /// @thread reentrant
 [[nodiscard]] Result<BoardSighting> find_chessboard(const BoardPhoto& photo, const Board& board);

@@ -18,9 +18,9 @@ namespace slsd {
 namespace {
 
 constexpr int kReducedWidthPx = 1000;
-constexpr double kMaxStrayOfSpacing = 0.35;  // from a homography of the whole board; lens distortion stays below it
-constexpr double kLeastShare = 0.8;          // of the discs
-constexpr double kWhiteOfGap = 0.8;          // of the way from a disc's edge to the next one's, halved
+constexpr double kMaxStrayOfSpacing = 0.35;  // from a homography of the whole board; lens distortion is smaller
+constexpr double kLeastShare = 0.8;          // share of the discs
+constexpr double kWhiteOfGap = 0.8;          // share of half the gap between two discs
 
 cv::Ptr<cv::FeatureDetector> disc_detector(const cv::Mat& image) {
   cv::SimpleBlobDetector::Params params;
@@ -100,7 +100,7 @@ std::vector<MeasuredPoint> measure(const BoardPhoto& photo, const Board& board, 
   return discs;
 }
 
-// Orders that were measured once, with centroids of the ellipses, make better homographies.
+// Centroids of the ellipses, measured once, give better homographies for the second measurement.
 GridOrder improved(GridOrder order, const std::vector<MeasuredPoint>& discs) {
   for (const auto& disc : discs) order[disc.point.id] = disc.point.pixel;
   return order;

@@ -14,7 +14,7 @@ namespace slsd {
 namespace {
 
 constexpr double kLeastPerimeterPx = 36;
-constexpr double kSmallSidePx = 30;  // below it OpenCV misreads bits
+constexpr double kSmallSidePx = 30;  // OpenCV misreads bits of smaller markers
 constexpr double kLargeSidePx = 150;
 constexpr int kReducibleWidthPx = 900;
 constexpr int kMaxMagnifiedPixels = 16 << 20;
@@ -38,7 +38,7 @@ cv::Ptr<cv::aruco::DetectorParameters> parameters_for(const cv::Mat& image) {
   return parameters;
 }
 
-// A pixel's centre in an image that was resized by `scale`, in the image it was made of.
+// Pixel centres of an image that was resized by `scale`, converted to the original image.
 Quad original(const std::vector<cv::Point2f>& corners, double scale) {
   Quad quad;
   for (std::size_t i = 0; i < quad.size(); ++i) {
@@ -66,7 +66,8 @@ double median_side(const SeenMarkers& seen) {
   return median_in_place(sides);
 }
 
-// Adds the markers that are not there; a second marker of the same id is a false one or another board's, and goes.
+// Adds the markers that are not yet there. A second marker with the same id is false, or another board's, and is
+// dropped.
 void add(SeenMarkers& all, SeenMarkers more) {
   if (more.unknown.size() > all.unknown.size()) all.unknown = std::move(more.unknown);
   for (const SeenMarker& marker : more.markers) {
@@ -75,7 +76,7 @@ void add(SeenMarkers& all, SeenMarkers more) {
   std::ranges::sort(all.markers, {}, &SeenMarker::id);
 }
 
-// The cells of a quadrangle, 1 white, 0 black; empty where its border is not black.
+// The cells of a quadrangle, 1 white, 0 black; empty if its border is not black.
 cv::Mat read_cells(const cv::Mat& image, const Quad& quad, int cells) {
   const auto side = static_cast<float>(cells * kCellPx);
   std::vector<cv::Point2f> from;

@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// find_board() for the reference plane: markers, and the four straight edges of each, fitted.
+/// find_board() for the reference plane: finds markers, and fits the four straight edges of each.
 /// @errors as find_board()
 /// @thread reentrant
 [[nodiscard]] Result<BoardSighting> find_plane(const BoardPhoto& photo, const Board& board);

@@ -12,18 +12,18 @@
 
 namespace slsd {
 
-/// Points of a board in the order of their ids, all of them.
+/// All points of a board in the order of their ids.
 using GridOrder = std::vector<Eigen::Vector2d>;
 
-/// The ways in which a grid of points may be numbered in rows of the board's columns: begun at any of its corners, and
-/// by columns where the board is square.
+/// Possible numberings of a grid of points in rows of the board's columns, starting at any of its corners; for square
+/// boards also by columns.
 /// @param pixels  Board::point_count() points, row by row from any corner
-/// @return        those in which the board is seen from the front; first that whose rows run most to the right in the
-/// image
+/// @return        the numberings that show the board from the front; first the one whose rows run most to the right in
+/// the image
 /// @thread reentrant
 [[nodiscard]] std::vector<GridOrder> grid_orders(std::span<const Eigen::Vector2d> pixels, const Board& board);
 
-/// The ties of a point and those up to `steps` rows and columns from it.
+/// The ties of a point and of those up to `steps` rows and columns away.
 /// @thread reentrant
 [[nodiscard]] std::vector<Tie> ties_around(const GridOrder& order, const Board& board, int id, int steps);
 

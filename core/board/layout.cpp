@@ -9,8 +9,9 @@
 namespace slsd {
 namespace {
 
-constexpr std::size_t kLeastTenths = 6;    // of the markers seen, those that must be where the board has them
-constexpr double kToleranceOfSide = 0.35;  // lens distortion over the whole board stays below it
+constexpr std::size_t kLeastTenths = 6;    // of the seen markers, the smallest number that must match the board's
+                                           // layout
+constexpr double kToleranceOfSide = 0.35;  // lens distortion over the whole board is smaller
 
 bool holds_marker(const Board& board, Square square, bool legacy) {
   if (board.kind == BoardKind::kPlane) return true;

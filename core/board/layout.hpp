@@ -16,17 +16,17 @@
 
 namespace slsd {
 
-/// The square that a marker of a ChArUco board is in; for a plane the marker's cell.
+/// The square of a ChArUco board that contains a marker; for a plane, the marker's cell.
 struct Square {
   int column = 0;
   int row = 0;
 };
 
-/// @param legacy  as OpenCV before 4.6 laid out boards of an even number of rows: the top left square is white
+/// @param legacy  the layout of OpenCV before 4.6 for boards with an even number of rows: the top left square is white
 /// @thread reentrant
 [[nodiscard]] Square square_of_marker(const Board& board, int id, bool legacy = false);
 
-/// The marker in a square, or nothing where the square is black.
+/// The marker in a square, or empty if the square is black.
 /// @thread reentrant
 [[nodiscard]] std::optional<int> marker_in_square(const Board& board, Square square);
 
@@ -34,14 +34,14 @@ struct Square {
 /// @thread reentrant
 [[nodiscard]] std::array<Eigen::Vector2d, 4> marker_corners(const Board& board, Square square);
 
-/// Keeps the markers that lie where the board has them.
-/// @param seen   of the board's family
-/// @return       empty where none is of the board
+/// Keeps the markers that lie at their places on the board.
+/// @param seen   markers of the board's family
+/// @return       empty if no marker belongs to the board
 /// @errors kMismatch (another board, or the legacy layout)
 /// @thread reentrant
 [[nodiscard]] Result<std::vector<SeenMarker>> markers_of_board(const std::vector<SeenMarker>& seen, const Board& board);
 
-/// Four ties to a marker.
+/// Four ties for each marker.
 /// @thread reentrant
 [[nodiscard]] std::vector<Tie> ties_of(const Board& board, std::span<const SeenMarker> markers, bool legacy = false);
 

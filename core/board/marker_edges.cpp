@@ -12,12 +12,12 @@
 namespace slsd {
 namespace {
 
-constexpr double kEndsLeftOut = 0.12;  // of the side, at either end, where the corner bends the edge
+constexpr double kEndsLeftOut = 0.12;  // of the side, at either end, as the corner bends the edge there
 constexpr double kStepPx = 0.5;
 constexpr double kLeastStep = 3;  // levels
 constexpr int kRounds = 3;
 constexpr int kLeastPoints = 4;
-constexpr double kOwnVariancePx2 = 1.0 / 6;  // what reading between pixels adds to a blur
+constexpr double kOwnVariancePx2 = 1.0 / 6;  // blur that interpolation between pixels adds
 constexpr double kOutlierPx = 0.7;
 
 struct EdgePoint {
@@ -40,7 +40,7 @@ std::optional<double> level_at(const Image<float>& light, const Eigen::Vector2d&
   return level_between(light.view(), x, y, at.x() - x, at.y() - y);
 }
 
-// The centroid of the slope from black to white along a line through `at`.
+// Centroid of the slope from black to white along a line through `at`.
 std::optional<EdgePoint> edge_near(const Image<float>& light, const Eigen::Vector2d& at,
                                    const Eigen::Vector2d& outwards, double reach) {
   double sum = 0;

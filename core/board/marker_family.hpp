@@ -7,22 +7,22 @@
 
 namespace slsd {
 
-/// A dictionary of square markers, as OpenCV's aruco module names and holds it.
+/// A dictionary of square markers, by its name and number in OpenCV's aruco module.
 struct MarkerFamily {
   std::string_view name;
   int opencv_number;  ///< cv::aruco::PREDEFINED_DICTIONARY_NAME
-  int bits;           ///< bits to a side, without the black border of one cell
+  int bits;           ///< bits along a side, without the black border of one cell
   int count;          ///< number of markers
 
-  /// Cells to a marker's side, its black border with it.
+  /// Cells along a marker's side, including its black border.
   [[nodiscard]] constexpr int cells() const { return bits + 2; }
 };
 
-/// All that there are, of each size the smallest first.
+/// All families; for each number of bits, the smallest first.
 /// @thread reentrant
 [[nodiscard]] std::span<const MarkerFamily> marker_families();
 
-/// @return nullptr where there is none of that name; else valid for ever
+/// @return nullptr if there is none of that name; otherwise always valid
 /// @thread reentrant
 [[nodiscard]] const MarkerFamily* find_marker_family(std::string_view name);
 

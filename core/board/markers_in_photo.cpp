@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kLeastMirrored = 3;
 
-// Few markers belong to a family by chance in either image; a mirrored board has many, and where the board has them.
+// By chance, few markers belong to a family in either image. A mirrored board has many, at their places on the board.
 bool is_mirrored(const BoardPhoto& photo, const Board& board) {
   const auto seen = find_markers(mirrored(photo.grey), *board.family).markers;
   const auto own = markers_of_board(seen, board);

@@ -11,8 +11,8 @@
 
 namespace slsd {
 
-/// The board's markers that lie where it has them, at least one.
-/// @errors kNotFound (none), kMismatch (another board's, another dictionary's, the legacy layout, a mirrored image)
+/// The board's markers that lie at their places on it, at least one.
+/// @errors kNotFound (none), kMismatch (another board, another dictionary, the legacy layout, a mirrored image)
 /// @thread reentrant
 [[nodiscard]] Result<std::vector<SeenMarker>> markers_in_photo(const BoardPhoto& photo, const Board& board);
 

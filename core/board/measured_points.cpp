@@ -37,7 +37,7 @@ struct Clipped {
   double share = 0, full_share = 0;
 };
 
-// Looked at once to about a pixel, within the points seen.
+// Reads each pixel once, for pixels inside the seen points, to about a pixel.
 Clipped clipped_shares(const std::vector<MeasuredPoint>& points, const Homography& homography, const Board& board,
                        const BoardPhoto& photo, double pitch_px) {
   Eigen::AlignedBox2d area;

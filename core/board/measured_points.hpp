@@ -10,19 +10,19 @@
 
 namespace slsd {
 
-/// A point of a board with what was measured at it.
+/// A point of a board with its measurements.
 struct MeasuredPoint {
   SeenPoint point;
-  double step = 0;     ///< white less black, levels
+  double step = 0;     ///< white minus black, levels
   double blur_px = 0;  ///< one standard deviation
 };
 
-/// Sums points up into a sighting, sorted by id.
+/// Summarises points as a sighting, sorted by id.
 /// @param points  at least one
 /// @thread reentrant
 [[nodiscard]] BoardSighting summarise(std::vector<MeasuredPoint> points, const BoardPhoto& photo, const Board& board);
 
-/// Tells whether points are at least `least` and span the plane: not all in one row or one column of it.
+/// Tells whether there are at least `least` points that span the plane: not all in one row or one column.
 /// @thread reentrant
 [[nodiscard]] bool span_a_plane(const std::vector<MeasuredPoint>& points, const Board& board, std::size_t least);
 

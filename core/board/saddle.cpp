@@ -14,11 +14,11 @@ namespace slsd {
 namespace {
 
 constexpr int kMaxSteps = 30;
-constexpr double kConverged = 1e-9;  // a step that lowers the squares by less than that share
+constexpr double kConverged = 1e-9;  // a step that reduces the sum of squares by less than this share
 constexpr int kMaxCentres = 8;
 constexpr double kStays_px = 0.05;
 constexpr double kLeastBlur_px = 0.2;
-constexpr double kMaxMisfit = 0.15;  // of the step; noise and markers leave less than 0.1
+constexpr double kMaxMisfit = 0.15;  // relative to the step; noise and markers cause less than 0.1
 constexpr double kLeastStep = 3;     // levels
 constexpr double kLeastAngle = 0.3;  // sine of the angle between the edges
 
@@ -27,7 +27,7 @@ using Vector = Eigen::Matrix<double, kParameters, 1>;
 
 struct Edge {
   double value;  // E(distance / blur)
-  double slope;  // its derivative by the distance
+  double slope;  // derivative with respect to the distance
 };
 
 Edge edge_at(double distance, double blur) {
@@ -82,7 +82,7 @@ double model(const Vector& p, const Eigen::Vector2d& at, Vector& gradient) {
   return albedo * light;
 }
 
-/// Residuals of the model at each sample, times the root of its weight: as Ceres' small solver asks for it.
+/// Residuals of the model at each sample, times the root of its weight, in the form that Ceres' small solver expects.
 struct Residuals {
   using Scalar = double;
   enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = kParameters };  // NOLINT: Ceres' names
@@ -91,7 +91,7 @@ struct Residuals {
   [[nodiscard]] int NumResiduals() const { return static_cast<int>(samples.size()); }  // NOLINT: Ceres' name
   bool operator()(const double* parameters, double* residuals, double* jacobian) const {
     Vector p(parameters), gradient;
-    p[kBlur] = std::max(p[kBlur], kLeastBlur_px);  // a sharper picture looks the same
+    p[kBlur] = std::max(p[kBlur], kLeastBlur_px);  // a sharper image looks the same
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const double root = std::sqrt(samples[i].weight);
       residuals[i] = root * (model(p, samples[i].at, gradient) - samples[i].level);
@@ -143,7 +143,7 @@ std::optional<Saddle> fit_saddle(const Image<float>& light, const SaddleGuess& g
   Vector p = first_estimate(samples, guess);
   ceres::TinySolver<Residuals> solver;
   solver.options.max_num_iterations = kMaxSteps, solver.options.function_tolerance = kConverged;
-  // Weights are about the corner, lest they pull it to the guess.
+  // Weights are centred on the corner, so that they do not pull it to the guess.
   Eigen::Vector2d centre = guess.pixel;
   for (int nth = 0;; ++nth) {
     solver.Solve(Residuals{samples}, &p);

@@ -23,7 +23,7 @@ Points points_of(std::span<const Tie> ties) {
   return points;
 }
 
-// cv::findHomography throws where the points lie on a line.
+// cv::findHomography throws if the points lie on a line.
 cv::Mat solve(const Points& points, int method, double tolerance_px, cv::Mat& inliers) {
   try {
     return cv::findHomography(points.board, points.pixel, method, tolerance_px, inliers, 500, 0.999);
