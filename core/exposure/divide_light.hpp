@@ -37,8 +37,8 @@ struct DividedPrint {
   FrameNoise noise;
 };
 
-/// The same with fractions of a pixel at the print's edges, without a dark image. A plain quotient contains two errors
-/// of the camera, which pull places across an edge towards the ink:
+/// The same, accurate to fractions of a pixel at the print's edges, for captures without a dark image. A plain quotient
+/// contains two errors of the camera, which pull places across an edge towards the ink:
 ///
 /// - The black level, which is part of both images. Ink reflects little light, so the black level is a larger share of
 ///   it, and the dark pattern appears brighter there than on paper. This difference gives the black level.
