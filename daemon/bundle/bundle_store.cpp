@@ -21,8 +21,8 @@ constexpr std::size_t kWayBytesMax = 80;
 constexpr std::string_view kExtension = ".tar";
 constexpr std::size_t kTimeBytes = 17;  // "20260131T120000Z-"
 
-// What the client asked for, or took back. A file or a device that is not found is named, a camera that is not
-// configured is not.
+// Tells whether the client caused or cancelled the failure. An error about a missing file or device names it in
+// `where`; one about an unconfigured camera does not.
 bool of_the_client(const Error& error) {
   if (error.code == ErrorCode::kCancelled || error.code == ErrorCode::kBusy) return true;
   return error.where.empty() && (error.code == ErrorCode::kNotFound || error.code == ErrorCode::kInvalidArgument);
@@ -44,7 +44,7 @@ std::string stamp(system_clock::time_point now) {
   return text;
 }
 
-// Ours, oldest first: their names begin with the time.
+// Our bundles, oldest first: their names begin with the time.
 std::vector<fs::path> bundles_in(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -90,7 +90,7 @@ Result<fs::path> BundleStore::put(const Error& error, std::string_view bundle, s
   }
   std::error_code failed;
   if (fs::create_directories(folder_, failed)) {
-    fs::permissions(folder_, fs::perms::owner_all, failed);  // pictures may be private
+    fs::permissions(folder_, fs::perms::owner_all, failed);  // pictures may be confidential
   }
   if (failed) return tl::unexpected(system_error(failed.value(), "cannot make the folder", folder_));
   std::vector<fs::path> files = bundles_in(folder_);
@@ -99,7 +99,7 @@ Result<fs::path> BundleStore::put(const Error& error, std::string_view bundle, s
     const std::uintmax_t size = fs::file_size(file, failed);
     bytes += failed ? 0 : size;
   }
-  // Room first, so that the bounds hold at every moment.
+  // Makes room first, so that the limits hold at every moment.
   for (std::size_t i = 0; i < files.size() && (files.size() - i >= kFilesMax || bytes > bytes_max_); ++i) {
     const std::uintmax_t size = fs::file_size(files[i], failed);
     bytes -= failed ? 0 : size;

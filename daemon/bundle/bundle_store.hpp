@@ -15,25 +15,25 @@
 
 namespace slsd {
 
-/// The bundles that the service writes by itself: one to each way in which scans fail,
-/// "20260131T120000Z-frame_torn-left.tar". The folder itself is the memory of what is not new: as long as the bundle of
-/// a way is there, no other is written.
+/// The bundles that the service writes on its own: one for each kind of failure,
+/// "20260131T120000Z-frame_torn-left.tar". The folder records the known kinds: as long as it contains a bundle of a
+/// kind, no other is written.
 /// @thread thread-safe
 class BundleStore {
  public:
   static constexpr std::size_t kFilesMax = 8;
-  static constexpr std::chrono::minutes kPause{10};  ///< between two, whatever fails
+  static constexpr std::chrono::minutes kPause{10};  ///< between two bundles, whatever fails
 
-  /// @param folder     made where it is missing; empty: nothing is ever written
-  /// @param bytes_max  of all together; 0: nothing is ever written
+  /// @param folder     created if missing; empty: no bundle is ever written
+  /// @param bytes_max  limit of all bundles together; 0: no bundle is ever written
   BundleStore(std::filesystem::path folder, std::size_t bytes_max)
       : folder_(std::move(folder)), bytes_max_(bytes_max) {}
 
-  /// Tells whether this error is to be bundled: the client did not cause it, it is new, and the last bundle is old
-  /// enough. A caller that gets true has to call put().
+  /// Tells whether to bundle this error: the client did not cause it, its kind is new, and the last bundle is old
+  /// enough. After true, the caller must call put().
   [[nodiscard]] bool claim(const Error& error, std::chrono::system_clock::time_point now);
-  /// Writes it, whole or not at all, and removes the oldest of those beyond the bounds.
-  /// @errors kNoSpace: it alone is larger than all may be; those of write_file_atomically()
+  /// Writes the bundle, whole or not at all, and removes the oldest beyond the limits.
+  /// @errors kNoSpace: the bundle alone exceeds the limit; those of write_file_atomically()
   [[nodiscard]] Result<std::filesystem::path> put(const Error& error, std::string_view bundle,
                                                   std::chrono::system_clock::time_point now);
 
@@ -43,7 +43,7 @@ class BundleStore {
   const std::filesystem::path folder_;
   const std::size_t bytes_max_;
   mutable std::mutex mutex_;
-  std::set<std::string> claimed_;  // ways of this run: where a bundle cannot be written it is not tried for ever
+  std::set<std::string> claimed_;  // kinds in this run, so that a failing write is not repeated for ever
   std::optional<std::chrono::system_clock::time_point> last_;
   std::uint64_t written_ = 0;
 };

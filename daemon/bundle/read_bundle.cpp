@@ -12,14 +12,14 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kTextBytesMax = 16 << 20;  // of a pattern or a calibration
+constexpr std::size_t kTextBytesMax = 16 << 20;  // limit of a pattern or a calibration
 constexpr std::size_t kLineBytesMax = 64 << 10;
 
 tl::unexpected<Error> fail_part(std::string message, std::string file) {
   return fail(ErrorCode::kMalformed, std::move(message), std::move(file));
 }
 
-// An object of bounded length, depth and number of values.
+// Reads an object of limited length, depth and number of values.
 Result<json> object_in(std::string_view text, const std::string& file) {
   if (text.size() > kLineBytesMax) return fail_part("is longer than what tells of a scan", file);
   const JsonShape shape = shape_of(text);
@@ -29,7 +29,7 @@ Result<json> object_in(std::string_view text, const std::string& file) {
   return object;
 }
 
-// A member of the right type, or what stands for none.
+// A member if it has the right type, else the default.
 template <class T>
 T member(const json& object, const char* name, bool (json::*of_type)() const noexcept, T otherwise) {
   const auto found = object.find(name);

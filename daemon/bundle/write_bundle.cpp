@@ -20,14 +20,14 @@ namespace {
 
 using nlohmann::json;
 
-/// A name as CSV has it: quoted, with its quotes doubled.
+/// A name in CSV: quoted, with its quotes doubled.
 std::string csv_field(const std::string& text) {
   std::string field = "\"";
   for (const char c : text) field.append(c == '"' ? 2 : 1, c);
   return field + '"';
 }
 
-/// Every region that gave no point: where it is, and the rules that say why.
+/// Lists every region that gave no point: its place, and the rules that explain it.
 std::string reasons_csv(const ScanResult& scan, const std::vector<std::string>& cameras) {
   std::string text = "camera,u,v,status,rule,guard\n";
   for (const RegionReason& reason : scan.reasons) {
