@@ -19,10 +19,10 @@ namespace {
 
 constexpr std::string_view kAll = "*";
 constexpr std::size_t kEntryBytes =
-    1 << 16;                           // of the host's list; a group of thousands may need more, and is not found
-constexpr std::size_t kShownMax = 64;  // of a name, in a message
+    1 << 16;                           // of the host's list; a group of thousands may exceed it, and is then not found
+constexpr std::size_t kShownMax = 64;  // of a name in a message
 
-// The reentrant forms, as a reload reads in a thread of its own.
+// Uses the reentrant functions, because a reload reads in a separate thread.
 std::optional<gid_t> group_number(const std::string& name) {
   std::vector<char> bytes(kEntryBytes);
   group entry{}, *found = nullptr;
@@ -65,7 +65,7 @@ Peer peer_of(int socket) {
   if (::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return {kNobody, kNobody, 0, {}};
   Peer peer{credentials.uid, credentials.gid, credentials.pid, {}};
   socklen_t bytes = 0;
-  ::getsockopt(socket, SOL_SOCKET, SO_PEERGROUPS, nullptr, &bytes);  // fails, and says how many
+  ::getsockopt(socket, SOL_SOCKET, SO_PEERGROUPS, nullptr, &bytes);  // fails, but returns the number of bytes
   peer.groups.resize(bytes / sizeof(gid_t));
   if (bytes > 0 && ::getsockopt(socket, SOL_SOCKET, SO_PEERGROUPS, peer.groups.data(), &bytes) != 0)
     peer.groups.clear();

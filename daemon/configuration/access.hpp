@@ -16,7 +16,7 @@ namespace slsd {
 
 struct ServerOptions;
 
-/// The rights of a client. Each role includes those before it.
+/// The rights of a client. Each role includes the previous ones.
 enum class Role : std::uint8_t { kNone, kObserve, kScan, kAdminister };
 [[nodiscard]] std::string_view to_string(Role role);
 
@@ -25,22 +25,21 @@ struct Peer {
   uid_t user;
   gid_t group;
   pid_t process;
-  std::vector<gid_t> groups;  ///< the others that the user belongs to
+  std::vector<gid_t> groups;  ///< the user's other groups
 };
-/// @return  of a socket that is gone, a user who may nothing
+/// @return  if the socket is closed, a user without rights
 [[nodiscard]] Peer peer_of(int socket);
 
 /// The rights by user and group: [server] observe, scan and administer, with names resolved to numbers.
 class AccessRules {
  public:
-  /// Names of users, of groups as "@name", or "*" for whoever can open the socket.
-  /// @errors kNotFound: a user or group that this host does not know, but for those of the defaults;
-  ///         kInvalidArgument: an empty name
+  /// Names of users, of groups as "@name", or "*" for every user who can open the socket.
+  /// @errors kNotFound: a user or group unknown to this host, except the defaults; kInvalidArgument: an empty name
   [[nodiscard]] static Result<AccessRules> of(const ServerOptions& options);
 
-  /// Root, and who runs the service, may everything.
+  /// The role of a peer. Root, and the user who runs the service, have all rights.
   [[nodiscard]] Role role_of(const Peer& peer) const;
-  /// "be in the group slsd-admin, and log in again: ...": what gives somebody the role.
+  /// How to get the role: "be in the group slsd-admin, and log in again: ...".
   [[nodiscard]] const std::string& way_to(Role role) const { return ways_[static_cast<std::size_t>(role)]; }
 
  private:

@@ -44,7 +44,7 @@ void read_keys(TableReader& reader, FileCameraOptions& options) {
 
 void read_keys(TableReader& reader, V4l2CameraOptions& options) {
   std::string device = options.device.string();
-  reader.read("device", device);  // not a path: a bare name is one of /dev/v4l/by-id
+  reader.read("device", device);  // not as a path: a bare name is one of /dev/v4l/by-id
   options.device = device;
   reader.read("format", options.format);
   reader.read_both("width_px", "height_px", options.size_px);

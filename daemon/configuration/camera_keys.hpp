@@ -11,9 +11,9 @@
 namespace slsd {
 
 /// Reads the [[camera]] tables.
-/// @param file  for the places of errors and for relative paths
-/// @errors kInvalidArgument: a key that is unknown, of another driver, of the wrong type or out of range, or a name
-/// twice
+/// @param file  for error places and relative paths
+/// @errors kInvalidArgument: a key that is unknown, of another driver, of the wrong type or out of range; or a repeated
+///         name
 /// @thread reentrant
 [[nodiscard]] Result<std::vector<CameraOptions>> read_cameras(const std::vector<const toml::table*>& tables,
                                                               const std::filesystem::path& file);

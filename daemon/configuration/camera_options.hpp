@@ -24,19 +24,19 @@ struct Overloaded : Visits... {
 template <class... Visits>
 Overloaded(Visits...) -> Overloaded<Visits...>;
 
-/// A [[camera]] table: the keys of its driver, and what all drivers have in common.
+/// A [[camera]] table: the keys of its driver, and the keys common to all drivers.
 struct CameraOptions {
   std::variant<FileCameraOptions, V4l2CameraOptions, AravisCameraOptions> of_driver;
-  std::vector<Fault> faults;  ///< errors that the camera is made to show, for tests of the code above it
+  std::vector<Fault> faults;  ///< simulated faults, for tests of the code above the camera
 
   [[nodiscard]] const std::string& name() const;
   [[nodiscard]] std::string_view driver() const;  ///< "file", "v4l2" or "aravis"
-  /// The configured exposure. Empty if the driver keeps the camera's own or has none.
+  /// The configured exposure. Empty if the driver keeps the camera's own value or has none.
   [[nodiscard]] std::optional<double> exposure_us() const;
   [[nodiscard]] std::optional<double> gain_db() const;
-  /// The pixel format, by the driver's name for it. Empty if the driver chooses.
+  /// The pixel format, in the driver's words. Empty if the driver chooses.
   [[nodiscard]] std::string format() const;
-  /// Its frames are files': no device is looked for.
+  /// Tells whether the frames come from files: then no device is needed.
   [[nodiscard]] bool replays() const { return std::holds_alternative<FileCameraOptions>(of_driver); }
   /// @errors kInvalidArgument: the message begins with the key
   [[nodiscard]] Result<> validate() const;

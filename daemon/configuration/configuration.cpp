@@ -47,7 +47,7 @@ Result<> read_projector(const toml::table* table, const path& file, ProjectorOpt
   return reader.finish(options.validate());
 }
 
-// A pattern file holds the whole pattern: another key beside it could only contradict it.
+// A pattern file contains the whole pattern: another key beside it could only contradict it.
 void refuse_keys_beside_file(TableReader& reader) {
   for (const char* key : {"symbol_size_px", "spacing_px", "symbols", "seed", "method", "minimum_distance",
                           "half_turn_unique", "row_reach", "column_reach"}) {
@@ -135,7 +135,7 @@ Result<> read_black_box(const toml::table* table, const path& file, BlackBoxOpti
   return reader.finish(options.validate());
 }
 
-// The keys as they were given, table by table. Dates and times, which no key has, become null.
+// The keys as given, by table. Dates and times, which no key uses, become null.
 json given_keys(const toml::node& node);
 
 json keys_of(const toml::table& table) {

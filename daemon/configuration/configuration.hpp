@@ -22,10 +22,10 @@ namespace slsd {
 
 inline constexpr const char* kConfigurationFile = "/etc/slsd/slsd.toml";
 
-/// The outcome of a scan whose camera or projector is not the calibrated one.
+/// What happens to a scan if its camera or projector is not the calibrated one.
 enum class OtherHardware { kError, kWarn };
 
-/// The configuration file's content, one member per table. Paths are those of the file, joined to its folder.
+/// The configuration file's content, one member for each table. Relative paths are joined to the file's folder.
 struct Configuration {
   std::filesystem::path pattern_file;  ///< replaces `pattern` unless it is empty
   PatternOptions pattern;              ///< includes the projector's size and the named symbols
@@ -37,12 +37,12 @@ struct Configuration {
   ScanOptions scan;
   ServerOptions server;
   BlackBoxOptions black_box;
-  nlohmann::json given = nlohmann::json::object();  ///< the keys as the file has them, table by table, for a record
+  nlohmann::json given = nlohmann::json::object();  ///< the keys as in the file, by table, for the record
 };
 
 /// Reads a configuration's text.
-/// @param file  its path, for the places of errors and for relative paths
-/// @errors kMalformed: no TOML; kInvalidArgument: a key that is unknown, of the wrong type or out of range. The place
+/// @param file  its path, for error places and relative paths
+/// @errors kMalformed: not TOML; kInvalidArgument: a key that is unknown, of the wrong type or out of range. The place
 ///         is file:line:column
 /// @thread reentrant
 [[nodiscard]] Result<Configuration> read_configuration(std::string_view text, const std::filesystem::path& file);
@@ -50,8 +50,8 @@ struct Configuration {
 /// Reads a configuration file. @errors as above, and those of read_file() @thread reentrant
 [[nodiscard]] Result<Configuration> load_configuration(const std::filesystem::path& file);
 
-/// The file named; without one kConfigurationFile where that is there, else the defaults: for commands that serve
-/// before anything is configured.
+/// Loads the given file; without one, kConfigurationFile if it exists, else the defaults. For commands that work before
+/// slsd is configured.
 /// @errors as load_configuration()
 [[nodiscard]] Result<Configuration> load_configuration_or_defaults(const std::optional<std::filesystem::path>& file);
 

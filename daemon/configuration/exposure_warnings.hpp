@@ -9,8 +9,8 @@
 
 namespace slsd {
 
-/// Warnings about exposures that do not suit the projector's refresh or the lamps' flicker. Each camera gets one
-/// sentence, with the nearest exposures that suit them. Empty if all suit or no exposure is configured.
+/// Warnings about exposures that do not suit the projector's refresh or the flicker of lamps. Each camera gets one
+/// sentence with the nearest suitable exposures. Empty if all suit or no exposure is configured.
 /// @thread reentrant
 [[nodiscard]] std::vector<std::string> exposure_warnings(const Configuration& configuration);
 

@@ -18,16 +18,15 @@ enum class ProjectorDriver { kHeadless, kGlfw };
 /// The [projector] table.
 struct ProjectorOptions {
   ProjectorDriver driver = ProjectorDriver::kHeadless;
-  std::string monitor;  ///< name, EDID serial or place on the desktop; empty: the monitor that is not the primary
+  std::string monitor;  ///< name, EDID serial or place on the desktop; empty: the monitor that is not primary
   int width_px = 1280;  ///< 640 to 3840
   int height_px = 800;  ///< 360 to 2160
   LightOptions light;   ///< conversion of grey levels to light
-  /// Turn the monitor on and set it to that size, where nobody else does; unset: where the display is the scanner's
-  /// own.
+  /// Turns the monitor on and sets that size if no other program does; unset: if the scanner alone uses the display.
   std::optional<bool> enable_output;
-  double refresh_hz = 60.0;          ///< 10 to 1000; 0: it lights steadily, so that every exposure suits it
+  double refresh_hz = 60.0;          ///< 10 to 1000; 0: the light is steady, so that every exposure suits it
   Picture idle = Picture::kPattern;  ///< shown when nobody has scanned for a while: kPattern, kBlack or kWhite
-  int idle_after_ms = 2000;          ///< 0 to 3600000; how long after a scan that takes the pattern's place
+  int idle_after_ms = 2000;          ///< 0 to 3600000; delay between a scan and the idle picture
 
   [[nodiscard]] Result<> validate() const;
   friend bool operator==(const ProjectorOptions&, const ProjectorOptions&) = default;

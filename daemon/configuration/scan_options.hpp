@@ -12,13 +12,12 @@ inline constexpr int kMaxTimeoutMs = 600'000;
 
 /// The [scan] table.
 struct ScanOptions {
-  int timeout_ms = 5000;         ///< 1 to 600000; how long a scan waits for devices and frames unless the client says
-  int exposure_skew_ms = 100;    ///< 0 to 10000; how far apart the exposures of a scan's cameras may begin
-  int reopen_first_ms = 100;     ///< 1 to 60000; pause before a device that failed is opened again; doubles each time
-  int reopen_longest_ms = 1000;  ///< the longest such pause
-  double projector_latency_ms =
-      0.0;                ///< 0 to 1000; from an image that the projector shows to a frame that has it whole
-  int power_line_hz = 0;  ///< 50 or 60, of the lamps around, which flicker with it; 0: none, or not known
+  int timeout_ms = 5000;              ///< 1 to 600000; a scan's wait for devices and frames unless the client sets it
+  int exposure_skew_ms = 100;         ///< 0 to 10000; the greatest difference between the starts of a scan's exposures
+  int reopen_first_ms = 100;          ///< 1 to 60000; the pause before a failed device is reopened; doubles each time
+  int reopen_longest_ms = 1000;       ///< the greatest such pause
+  double projector_latency_ms = 0.0;  ///< 0 to 1000; from showing an image to a frame with the whole image
+  int power_line_hz = 0;              ///< 50 or 60: mains frequency of the flickering lamps around; 0: none, or unknown
 
   [[nodiscard]] std::chrono::milliseconds timeout() const { return std::chrono::milliseconds(timeout_ms); }
   [[nodiscard]] std::chrono::microseconds projector_latency() const {

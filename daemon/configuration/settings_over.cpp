@@ -67,8 +67,8 @@ Result<> merge_camera(json& before, const json& changes, const std::string& wher
   return merge_keys(before, changes, where);
 }
 
-// A whole number, however it is written: JSON has one kind of number, where TOML has two. As a key that takes any
-// number takes whole ones too, none is lost.
+// Accepts a whole number in any notation: JSON has one type of number, and TOML has two. Keys for any number accept
+// whole ones too, so nothing is lost.
 std::optional<std::int64_t> whole_number(const json& value) {
   if (value.is_number_integer()) return value.get<std::int64_t>();
   constexpr double kExact = 9007199254740992.0;  // 2^53
@@ -131,7 +131,7 @@ Result<json> merge_settings(json before, const json& changes) {
 }
 
 Result<Configuration> load_configuration_with(const path& file, const json& settings) {
-  auto plain = load_configuration(file);  // what is wrong with the file itself is told by its own lines
+  auto plain = load_configuration(file);  // errors of the file itself refer to its own lines
   if (!plain || settings.empty()) return plain;
   const auto text = read_file(file, kConfigurationBytesMax);
   if (!text) return tl::unexpected(text.error());
@@ -140,7 +140,7 @@ Result<Configuration> load_configuration_with(const path& file, const json& sett
     toml::table document = toml::parse(*text, file.string());
     for (const char* const name : kTables) {
       if (!settings.contains(name)) continue;
-      // A pattern's keys belong together: the file's other ones could only contradict those that are set.
+      // A pattern's keys belong together: the file's other keys could only contradict the new ones.
       if (!document.contains(name) || name == std::string_view("pattern"))
         document.insert_or_assign(name, toml::table());
       for (const auto& [key, value] : settings[name].items()) insert(*document[name].as_table(), key, value);
@@ -157,7 +157,7 @@ Result<Configuration> load_configuration_with(const path& file, const json& sett
     return fail(ErrorCode::kMalformed, std::string(error.description()), file.string());
   }
   auto configuration = read_configuration(merged.str(), file);
-  if (!configuration) configuration.error().where.clear();  // a line of no file
+  if (!configuration) configuration.error().where.clear();  // refers to a line of no file
   return configuration;
 }
 
@@ -183,7 +183,7 @@ Result<json> read_kept_settings(const path& file) {
 }
 
 Result<json> find_kept_settings(const path& configuration) {
-  constexpr const char* kState = "/var/lib/slsd";  // StateDirectory= of the unit, which others than it have no name for
+  constexpr const char* kState = "/var/lib/slsd";  // the unit's StateDirectory=, for programs without the variable
   path file = kept_settings_file(configuration);
   std::error_code ignored;
   const path folder = std::filesystem::absolute(configuration, ignored).parent_path();

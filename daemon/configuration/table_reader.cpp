@@ -222,7 +222,7 @@ Result<> TableReader::finish(Result<> valid) const {
   if (auto unknown = unknown_key()) return tl::unexpected(*unknown);
   if (error_) return tl::unexpected(*error_);
   if (valid) return {};
-  // Options name the key as the error's place ("rate_hz", "decode.depth_min_mm") or in its message.
+  // Options name the key in the error's place ("rate_hz", "decode.depth_min_mm") or in its message.
   const Error& error = valid.error();
   const std::string key = error.where.substr(error.where.find_last_of('.') + 1);
   const bool named = error.message.find(key) != std::string::npos;

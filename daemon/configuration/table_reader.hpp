@@ -20,13 +20,13 @@ namespace slsd {
 /// The place of a node, as "file:line:column".
 [[nodiscard]] std::string place_of(const toml::source_region& source, std::string_view file);
 
-/// Reads the keys of one TOML table into an options struct. A key that is not there keeps the value's default; the
-/// first wrong type is kept until finish(), which also finds the keys that nobody asked for.
+/// Reads the keys of one TOML table into an options struct. A missing key keeps the default. The first wrong type is
+/// kept until finish(), which also finds unknown keys.
 /// @thread thread-bound
 class TableReader {
  public:
-  /// @param table  null where the table was left out
-  /// @param name   as a person writes it, "[pattern]"; empty for the file's top
+  /// @param table  null if the table is missing
+  /// @param name   as a user writes it, "[pattern]"; empty for the file's top level
   /// @param file   the configuration file; relative paths are relative to its folder
   TableReader(const toml::table* table, std::string name, std::filesystem::path file);
 
@@ -45,7 +45,7 @@ class TableReader {
   /// One number, or a list of them.
   void read(std::string_view key, std::vector<double>& value);
 
-  /// Two numbers of which each needs the other.
+  /// Two numbers; each requires the other.
   void read_both(std::string_view first_key, std::string_view second_key, std::optional<std::pair<int, int>>& values);
 
   /// One of several words.
@@ -66,19 +66,19 @@ class TableReader {
     refuse(key, "must be one of " + names);
   }
 
-  /// A table below this one; null where it was left out.
+  /// A subtable; null if missing.
   [[nodiscard]] const toml::table* table(std::string_view key);
-  /// An array of tables below this one; empty where it was left out.
+  /// An array of subtables; empty if missing.
   [[nodiscard]] std::vector<const toml::table*> tables(std::string_view key);
 
-  /// The keys asked for so far, whether they are there or not.
+  /// The keys requested so far, present or not.
   [[nodiscard]] const std::vector<std::string>& known() const { return known_; }
 
-  /// Notes that a key's value is wrong: "[pattern] seed must be ...".
+  /// Records that a key's value is wrong: "[pattern] seed must be ...".
   void refuse(std::string_view key, std::string_view what);
 
-  /// The first thing wrong with the table: a key that is unknown, a type, or what the options' own validate() said,
-  /// placed at the key which its message names.
+  /// The first error of the table: an unknown key, a wrong type, or the result of the options' validate(), placed at
+  /// the key in its message.
   [[nodiscard]] Result<> finish(Result<> valid = {}) const;
 
  private:
