@@ -50,7 +50,7 @@ std::optional<std::string> from_base64(std::string_view text) {
     held -= 8;
     bytes += static_cast<char>(bits >> held & 0xFFU);
   }
-  // What the last letter has beyond the last byte is zero, or another text would give the same bytes.
+  // Unused bits of the last letter must be zero; otherwise two texts would give the same bytes.
   if ((bits & ((1U << held) - 1)) != 0) return std::nullopt;
   return bytes;
 }

@@ -8,11 +8,11 @@
 
 namespace slsd {
 
-/// Bytes as text, four letters to three bytes, filled up with "=" (RFC 4648, section 4).
+/// Encodes bytes as text: four letters for three bytes, padded with "=" (RFC 4648, section 4).
 /// @thread reentrant
 [[nodiscard]] std::string to_base64(std::string_view bytes);
 
-/// The bytes; nothing where the text is not exactly what to_base64() makes.
+/// Decodes the text; nothing unless it is exactly what to_base64() makes.
 /// @thread reentrant
 [[nodiscard]] std::optional<std::string> from_base64(std::string_view text);
 

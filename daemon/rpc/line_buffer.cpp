@@ -5,7 +5,7 @@
 namespace slsd {
 namespace {
 
-constexpr std::size_t kKeptBytes = 64 << 10;  // a longer buffer is given back when it is empty
+constexpr std::size_t kKeptBytes = 64 << 10;  // a longer buffer is freed when empty
 
 std::string_view without_carriage_return(std::string_view line) {
   if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
@@ -14,8 +14,7 @@ std::string_view without_carriage_return(std::string_view line) {
 
 }  // namespace
 
-// What was read is cut off here, once for all the lines of a chunk: cut off line by line it would cost the square of
-// their number.
+// Removes read lines here, once for each chunk. Removing them one by one would take quadratic time.
 void LineBuffer::append(std::string_view bytes) {
   if (begin_ > 0) {
     bytes_.erase(0, begin_);

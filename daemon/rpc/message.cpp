@@ -10,7 +10,7 @@ using nlohmann::json;
 
 namespace {
 
-// JSON-RPC leaves -32000 to -32099 to servers. Numbers stay for good, as the order of the codes does: programs outside
+// JSON-RPC leaves -32000 to -32099 to servers. Numbers never change, nor does the order of the codes: other programs
 // compare them.
 constexpr int kFirstOfOurs = -32001;
 static_assert(static_cast<int>(ErrorCode::kInvalidArgument) == 0 && static_cast<int>(ErrorCode::kFrameSkewed) == 18);
@@ -24,7 +24,8 @@ int rpc_code(ErrorCode code) {
   return kFirstOfOurs - static_cast<int>(code);
 }
 
-// A message may quote what a client, a device or a file said; what quotes it cuts it. This is for the one forgotten.
+// A message may quote a client, a device or a file; the code that quotes should shorten it. This limit is for code that
+// forgot.
 json RpcError::to_json() const {
   const std::string place = printable(where, kMaxWhereBytes);
   const std::string text = printable(message, kMaxMessageBytes);

@@ -12,19 +12,19 @@
 
 namespace slsd {
 
-/// The error sent to a client whose request failed. The codes are JSON-RPC's own, and ours from -32001 down, listed in
-/// docs/protocol.md.
+/// The error sent to a client whose request failed. The codes are JSON-RPC's, and our own from -32001 down;
+/// docs/protocol.md lists them.
 struct RpcError {
   int code;
-  std::string name;     ///< "frame_stale": what a program compares
+  std::string name;     ///< "frame_stale": for programs to compare
   std::string message;  ///< the cause and the remedy
   std::string where;    ///< file:line:column, key, device, or empty
 
-  /// Printable, and at most about 2 kB, whatever it quotes.
+  /// Printable, and at most about 2 kB, whatever the error quotes.
   [[nodiscard]] nlohmann::json to_json() const;
 };
 
-/// The number by which a client knows the code: -32001 to -32019.
+/// The number of the code for clients: -32001 to -32019.
 [[nodiscard]] int rpc_code(ErrorCode code);
 
 [[nodiscard]] RpcError parse_error(std::string message);
@@ -33,8 +33,8 @@ struct RpcError {
 [[nodiscard]] RpcError invalid_params(std::string message);
 [[nodiscard]] RpcError rpc_error(const Error& error);
 
-/// One JSON object to a line, line feed included. A text that is no UTF-8 (a file's name may be any bytes) gets
-/// replacement characters.
+/// Writes one JSON object and a line feed. Invalid UTF-8 (a file's name may be any bytes) becomes replacement
+/// characters.
 [[nodiscard]] std::string to_line(const nlohmann::json& message);
 
 [[nodiscard]] nlohmann::json result_message(const nlohmann::json& id, nlohmann::json result);

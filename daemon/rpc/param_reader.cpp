@@ -36,8 +36,8 @@ bool ParamReader::boolean(const char* name, bool otherwise) {
 int ParamReader::integer(const char* name, int otherwise, int low, int high) {
   const auto* value = find(name);
   if (value == nullptr) return otherwise;
-  // As a double first: a number beyond 64 bits is read as one, and its conversion to int is undefined. JSON has one
-  // kind of number: 5000.0 is 5000.
+  // Reads a double first: a number beyond 64 bits is read as one, and its conversion to int is undefined. JSON has one
+  // type of number: 5000.0 is 5000.
   const double number = value->is_number() ? value->get<double>() : low - 1.0;
   if (number >= low && number <= high && std::trunc(number) == number) return static_cast<int>(number);
   refuse(name, "a whole number from " + std::to_string(low) + " to " + std::to_string(high));

@@ -14,26 +14,26 @@
 
 namespace slsd {
 
-/// The longest text that a parameter has, but for one that is a file.
+/// The longest text of a parameter, except file contents.
 inline constexpr std::size_t kMaxTextBytes = 1024;
 
-/// Reads a request's parameters by name. What is not there keeps its default; the first thing wrong is kept.
+/// Reads a request's parameters by name. Missing ones keep their defaults; the first error is kept.
 /// @thread thread-bound
 class ParamReader {
  public:
-  /// @param params  an object, which outlives the reader
+  /// @param params  an object; must outlive the reader
   explicit ParamReader(const nlohmann::json& params) : params_(params) {}
 
   [[nodiscard]] bool boolean(const char* name, bool otherwise);
   [[nodiscard]] int integer(const char* name, int otherwise, int low, int high);
-  /// The number of that name; empty if it is not there.
+  /// The number of that name; empty if missing.
   [[nodiscard]] std::optional<double> number(const char* name, double low, double high);
-  /// Any text of so many bytes, control characters with it: printable() before it is quoted.
+  /// A text of at most this many bytes. It may contain control characters: use printable() before quoting it.
   [[nodiscard]] std::string text(const char* name, std::size_t bytes_max = kMaxTextBytes);
-  /// One of the words; the first if it is not there.
+  /// One of the words; the first if missing.
   [[nodiscard]] std::string choice(const char* name, std::initializer_list<std::string_view> words);
 
-  /// The first thing wrong: a type, a range, a name that nobody asked for.
+  /// The first error: a wrong type, a value out of range, or an unknown name.
   [[nodiscard]] std::optional<RpcError> error() const;
 
  private:

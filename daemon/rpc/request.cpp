@@ -20,7 +20,7 @@ bool usable_as_id(const json& id) {
   return id.is_null() || id.is_number();
 }
 
-// A member, moved out of the message: it may be as long as the line.
+// Moves a member out of the message, because it may be as long as the line.
 json take(json& message, const char* name, json otherwise) {
   const auto found = message.find(name);
   return found == message.end() ? std::move(otherwise) : std::move(*found);
@@ -35,7 +35,7 @@ tl::expected<Request, BadRequest> read_members(json& message, json id) {
     return refuse(id, invalid_request("\"method\" must be a text, such as \"status\""));
   }
   json params = take(message, "params", json::object());
-  if (params.is_null() || params.empty()) params = json::object();  // some libraries write "no parameters" so
+  if (params.is_null() || params.empty()) params = json::object();  // some libraries write "no parameters" like this
   if (!params.is_object()) {
     return refuse(id, invalid_params("\"params\" must be an object: parameters go by name"));
   }
@@ -75,7 +75,7 @@ tl::expected<Request, BadRequest> parse_request(std::string_view line) {
   if (shape.values > kMaxValues) {
     return refuse(nullptr, parse_error("more than " + std::to_string(kMaxValues) + " values: a request has a few"));
   }
-  // What is cut short is not parsed: the parser's error, which nobody reads, would quote all of it.
+  // Does not parse a truncated message: the parser's unused error would quote all of it.
   json message = shape.closed ? json::parse(line, nullptr, /*allow_exceptions=*/false) : json(json::value_t::discarded);
   if (message.is_discarded()) {
     return refuse(nullptr, parse_error("no JSON: send one JSON-RPC 2.0 object to a line, in UTF-8"));

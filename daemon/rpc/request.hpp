@@ -12,7 +12,7 @@
 
 namespace slsd {
 
-/// Deeper JSON, and more of it, is refused before it is parsed: a line's cost is its length, whatever it says.
+/// Limits JSON before it is parsed, so that a line costs no more than its length, whatever it contains.
 inline constexpr int kMaxNesting = 32;
 inline constexpr int kMaxValues = 1000;
 
@@ -21,25 +21,25 @@ struct Request {
   nlohmann::json id;  ///< null, a number or a text
   bool wants_reply;   ///< false for a notification, which has no id
   std::string method;
-  nlohmann::json params;  ///< an object, empty where the request had none
+  nlohmann::json params;  ///< an object; empty if the request had none
 };
 
-/// A line that is no request, and the id that the error goes to: null where none could be read.
+/// An invalid line, and the id for the error: null if it has no readable id.
 struct BadRequest {
   nlohmann::json id;
   RpcError error;
 };
 
-/// Reads one line, without its line feed. Any bytes at all.
+/// Reads one line without its line feed; it may contain any bytes.
 /// @thread reentrant
 [[nodiscard]] tl::expected<Request, BadRequest> parse_request(std::string_view line);
 
-/// The cost of reading a JSON text: the depth of its nested objects and arrays, and an upper bound on its values.
-/// Brackets and commas within texts do not count. Counting stops at a limit that is exceeded.
+/// The cost of reading a JSON text: the depth of nested objects and arrays, and an upper bound on the number of values.
+/// Ignores brackets and commas within texts. Counting stops when a limit is exceeded.
 struct JsonShape {
   int depth = 0;
   int values = 1;
-  bool closed = true;  ///< each text and bracket that is opened
+  bool closed = true;  ///< every text and bracket is closed
 };
 [[nodiscard]] JsonShape shape_of(std::string_view json);
 
