@@ -10,13 +10,13 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kSkewMaxMs = 10'000;  // files have no exposure; the skew is that of two threads
+constexpr int kSkewMaxMs = 10'000;  // files have no exposure; two threads may differ this much
 
 bool plain(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
 }
 
-// Numbers, texts and lists of them are written in TOML as in JSON.
+// TOML writes numbers, texts and lists of them like JSON.
 std::string line(const std::string& key, const json& value) {
   return key + " = " + value.dump() + "\n";
 }

@@ -16,18 +16,18 @@ struct RecordedCamera {
   std::string folder;
 };
 
-/// The cameras that `settings` names, each with a folder whose name is safe and its own.
+/// The cameras in `settings`, each with a safe and unique folder name.
 /// @thread reentrant
 [[nodiscard]] std::vector<RecordedCamera> recorded_cameras(const nlohmann::json& settings);
 
-/// A configuration, as TOML, with which slsd replays a recording: its frames by file cameras, its pattern and its
-/// calibration beside it, its keys of [decode].
-/// @param settings  what `settings` answered
+/// Writes a TOML configuration with which slsd replays a recording: frames through file cameras, with its pattern,
+/// calibration and [decode] keys.
+/// @param settings  the answer to `settings`
 /// @thread reentrant
 [[nodiscard]] std::string replay_configuration(const nlohmann::json& settings,
                                                const std::vector<RecordedCamera>& cameras);
 
-/// "00000042.png": file cameras replay by name.
+/// Makes "00000042.png": file cameras replay in order of names.
 [[nodiscard]] std::string numbered(std::uint64_t number, const char* extension);
 
 }  // namespace slsd
