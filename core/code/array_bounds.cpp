@@ -29,7 +29,7 @@ std::string grouped(std::int64_t number) {
   return digits;
 }
 
-// A window that may be read either way up uses its own word and the turned one.
+// A window that may be read either way up uses its own word and the rotated one.
 std::int64_t usable_words(const ArrayOptions& options) {
   const std::int64_t words = word_count(options.letters);
   return options.half_turn_unique ? words - power(options.letters, (kWindowCells + 1) / 2) : words;

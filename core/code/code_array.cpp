@@ -18,10 +18,11 @@ constexpr std::int64_t kStepsForDistanceAsked = 6'000'000;
 constexpr std::int64_t kStepsForDistanceTried = 1'500'000;
 constexpr std::int64_t kStepsForReachAsked = 6'000'000;
 constexpr std::int64_t kStepsForReachTried = 1'500'000;
-constexpr int kReachStep = 5;  // columns or rows, from one reach that is tried to the next
+constexpr int kReachStep = 5;  // step between the reaches to try, columns or rows
 
-// Windows times the words that each forbids, over all words. Raster greedy construction succeeds up to about 1.6;
-// beyond 1.9 no trial ever did, and the search for the largest distance does not begin there.
+// Number of windows times the words that each forbids, divided by the number of words. Greedy construction in raster
+// order succeeds up to about 1.6. No trial above 1.9 ever succeeded, so the search for the largest distance starts
+// below.
 constexpr double kHopelessDensity = 1.9;
 
 double density(const ArrayOptions& options, int distance) {
@@ -66,7 +67,7 @@ Result<CodeArray> construct_largest(const ArrayOptions& options) {
 /// Widens the reach of the array's runs until a search fails.
 class WithoutRepeats {
  public:
-  /// @param windows_alone  the array of these options in which runs may recur
+  /// @param windows_alone  the array of these options, with recurring runs allowed
   WithoutRepeats(const ArrayOptions& options, CodeArray windows_alone)
       : options_(options),
         distance_(options.minimum_distance.value_or(windows_alone.minimum_distance)),

@@ -16,8 +16,8 @@ namespace slsd {
 /// Elahi et al. 2020, equations (1) and (2).
 [[nodiscard]] int array_extent(int projector_px, int symbol_size_px, int spacing_px);
 
-/// The smallest Hamming distance between any two overlapping 3x3 windows, by plain comparison of all pairs
-/// (and of all windows with all turned ones where half_turn is set).
+/// The smallest Hamming distance between any two overlapping 3x3 windows, by plain comparison of all pairs. With
+/// half_turn, it includes all pairs of a window and a rotated window.
 [[nodiscard]] int minimum_window_distance(const CodeArray& array, bool half_turn = false);
 
 }  // namespace slsd

@@ -16,16 +16,16 @@ namespace slsd {
 /// The nine letters of a 3x3 window, row by row.
 using Codeword = std::array<std::uint8_t, kWindowCells>;
 
-/// Finds windows of the array by their codewords, or by such as differ in one letter.
+/// Finds windows of the array by their codewords, or by codewords that differ in one letter.
 ///
-/// Only the windows themselves are kept, 12 bytes each and as much room again: a codeword that is misread is looked for
-/// by all words that differ from it in one letter, which are 9 (letters - 1) questions to a table in the cache.
+/// Stores only the windows themselves, 12 bytes each in a table at most half full. To correct a misread codeword, it
+/// looks up all 9 (letters - 1) words that differ in one letter, in a table that fits the cache.
 /// @thread reentrant
 class Codebook {
  public:
   struct Entry {
     std::uint32_t key;
-    std::int16_t row, column;  ///< cell in the window's middle; row -1: an empty slot
+    std::int16_t row, column;  ///< cell at the window's centre; row -1: an empty slot
   };
 
   /// @param rows, columns  the part of the array that is shown
@@ -34,11 +34,11 @@ class Codebook {
   [[nodiscard]] int rows() const { return rows_; }
   [[nodiscard]] int columns() const { return columns_; }
 
-  /// The key of a codeword, letter by letter: append(append(0, first), second) and so on to the ninth.
+  /// Extends the key of a codeword by a letter: append(append(0, first), second) and so on to the ninth.
   [[nodiscard]] std::uint32_t append(std::uint32_t key, std::uint8_t letter) const { return key * letters_ + letter; }
   [[nodiscard]] std::uint32_t key_of(const Codeword& codeword) const;
 
-  /// The key of the window around a cell; kNoKey where the cell lies at the border or outside.
+  /// The key of the window around a cell; kNoKey if the cell lies at the border or outside.
   static constexpr std::uint32_t kNoKey = 0xFFFFFFFFU;
   [[nodiscard]] std::uint32_t key_at(int row, int column) const {
     if (row < 0 || column < 0 || row >= rows_ || column >= columns_) return kNoKey;
@@ -55,7 +55,7 @@ class Codebook {
   /// The same for every window that differs from the codeword in one letter.
   template <class Found>
   void find_one_off(std::uint32_t key, Found&& found) const {
-    std::uint32_t worth = 1;  // of the letter in the key
+    std::uint32_t worth = 1;  // weight of the letter in the key
     for (int i = 0; i < kWindowCells; ++i, worth *= letters_) {
       const std::uint32_t read = key / worth % letters_, without = key - read * worth;
       for (std::uint32_t letter = 0; letter < letters_; ++letter)
@@ -69,7 +69,7 @@ class Codebook {
 
   std::uint32_t letters_;
   int rows_, columns_;
-  std::vector<std::uint32_t> keys_;  // of the cells
+  std::vector<std::uint32_t> keys_;  // for each cell
   std::size_t mask_;
   std::vector<Entry> table_;  // open addressing, at most half full
 };
@@ -77,7 +77,7 @@ class Codebook {
 /// The codeword around a cell that has all its neighbours.
 [[nodiscard]] Codeword codeword_at(const CodeArray& array, int row, int column);
 
-/// A pattern with the codebook of the symbols that it shows whole. Copies share both, which never change: one serves
+/// A pattern with the codebook of its fully visible symbols. Copies share both, which never change: one instance serves
 /// every camera, thread and trial.
 class IndexedPattern {
  public:
@@ -85,7 +85,7 @@ class IndexedPattern {
       : both_(std::make_shared<const Both>(std::move(pattern))) {}
 
   [[nodiscard]] const Pattern& pattern() const { return both_->pattern; }
-  /// Keeps the pattern, too.
+  /// The codebook, which also keeps the pattern alive.
   [[nodiscard]] std::shared_ptr<const Codebook> codebook() const { return {both_, &both_->codebook}; }
 
  private:

@@ -15,14 +15,14 @@ namespace {
 
 constexpr int kRollbacksPerRow = 12;  // over the whole array, before a restart
 
-// How long the search stays with a row before it takes rows back.
+// Effort that the search spends on a row before it removes rows.
 struct Patience {
   int steps_per_cell;
   int tries;
   int longest_rollback_rows;
 };
 
-// A row without repeats fails by its own letters more often than by those of the rows above.
+// Without repeats, a row's own letters block it more often than the rows above.
 constexpr Patience kWithWindowsOnly{60, 1, 8}, kWithoutRepeats{200, 16, 2};
 
 CodeArray transposed(const CodeArray& array) {
@@ -33,7 +33,7 @@ CodeArray transposed(const CodeArray& array) {
   return turned;
 }
 
-/// The search of one array: a stack of cells, each with the letters that are still to be tried there.
+/// The search for one array: a stack of cells, each with its untried letters.
 class Construction {
  public:
   Construction(const ArrayOptions& options, int minimum_distance, RunReach reach, std::int64_t step_budget)
@@ -77,7 +77,7 @@ class Construction {
     return false;
   }
 
-  // From the row's first free cell to its end, depth first; false where the row's steps are used up or nothing fits.
+  // Fills the row from its first free cell, depth first; false if the row's steps are used up or nothing fits.
   bool fill_row() {
     const int first = next_ / options_.columns * options_.columns;
     const int end = first + options_.columns;
@@ -130,8 +130,8 @@ class Construction {
     return true;
   }
 
-  // Whether a run that ends at the next cell is too like one that ends before it in the line.
-  // step: from a cell of the line to the next one; position: of the cell in the line.
+  // Whether a run that ends at the next cell resembles an earlier run in its line too much. step: distance between
+  // cells of the line; position: that of the cell in the line.
   [[nodiscard]] bool ends_recurring_run(int step, int position, int reach) const {
     const std::uint8_t* const run = &array_.cells[static_cast<std::size_t>(next_)];
     for (int apart = 1; apart <= std::min(reach, position); ++apart) {
@@ -181,7 +181,7 @@ class Construction {
   WindowIndex index_;
   CodeArray array_;
   std::vector<Choices> choices_;
-  int next_ = 0;  // the first cell that is not filled
+  int next_ = 0;  // the first empty cell
 };
 
 }  // namespace

@@ -18,13 +18,14 @@ struct RunReach {
   friend bool operator==(const RunReach&, const RunReach&) = default;
 };
 
-/// Fills the array cell by cell so that every overlapping 3x3 window keeps the distance from all before it, and no run
-/// recurs within its reach: random order of letters, backtracking within the row, rows rolled back if one cannot be
-/// filled, restarts from nothing. If columns have the longer reach, it fills column by column.
+/// Fills the array cell by cell, so that every overlapping 3x3 window keeps the distance from all earlier ones, and no
+/// run recurs within its reach. The search takes letters in random order and backtracks within the row. If it cannot
+/// fill a row, it removes rows, and at last restarts. If columns have the longer reach, it fills column by column.
 /// @param options           rows and columns at least 3, letters, seed, half_turn_unique
 /// @param minimum_distance  1 to 9
 /// @param reach             0 or more columns and rows
-/// @param step_budget       letters tried before it gives up; steps and not seconds, so that every machine agrees
+/// @param step_budget       number of letters tried before it gives up; steps instead of seconds, so that all machines
+///                          agree
 /// @return                  empty if the budget did not suffice
 /// @thread reentrant
 [[nodiscard]] std::optional<CodeArray> construct_array(const ArrayOptions& options, int minimum_distance,

@@ -11,10 +11,10 @@ namespace slsd {
 
 enum class Windows {
   kAligned,      ///< side by side, as the paper compares them
-  kOverlapping,  ///< at every cell, as the decoder meets them
+  kOverlapping,  ///< at every cell, as the decoder reads them
 };
 
-/// Numbers of an array's pairs of windows by the number of cells that differ.
+/// Histogram of an array's pairs of windows by the number of differing cells.
 struct HammingProfile {
   std::array<std::int64_t, kWindowCells + 1> pairs{};  ///< by distance, 0 to 9
 
@@ -26,7 +26,7 @@ struct HammingProfile {
 };
 
 /// The Hamming distance profile of an array. Elahi et al. 2020, figure 3 and table 3, equations (3) and (4).
-/// @param array  at least two windows
+/// @param array  with at least two windows
 /// @thread reentrant
 [[nodiscard]] HammingProfile hamming_profile(const CodeArray& array, Windows windows);
 

@@ -15,14 +15,14 @@
 
 namespace slsd {
 
-/// Reads typed keys of a TOML document and keeps the first thing that is wrong; after that every question is answered
-/// with a default, so that a reader asks for all its keys in a row and looks at error() once.
+/// Reads typed keys of a TOML document and keeps the first error. After an error, every read returns a default, so that
+/// a caller can read all its keys in a row and check error() once.
 /// @thread thread-bound
 class KeyReader {
  public:
   explicit KeyReader(std::string_view file_name) : file_name_(file_name) {}
 
-  /// Refuses keys that are not known, naming the nearest that is.
+  /// Rejects unknown keys, and suggests the nearest known one.
   void only(const toml::table& table, std::span<const std::string_view> known);
   [[nodiscard]] const toml::table& table(const toml::table& parent, std::string_view key);
   [[nodiscard]] std::int64_t integer(const toml::table& table, std::string_view key, std::int64_t low,

@@ -7,14 +7,14 @@
 
 namespace slsd {
 
-/// Letters from the Mersenne Twister. std::mt19937 gives the same numbers everywhere, the standard distributions do
-/// not: hence a draw of its own.
+/// Letters from the Mersenne Twister. std::mt19937 gives the same numbers everywhere, but the standard distributions do
+/// not, so this class has its own.
 /// @thread thread-bound
 class LetterSource {
  public:
   explicit LetterSource(std::uint32_t seed) : twister_(seed) {}
 
-  /// A number from 0 to count - 1, each as likely as the other.
+  /// A uniform number from 0 to count - 1.
   [[nodiscard]] int below(int count);
 
  private:

@@ -30,7 +30,7 @@ std::size_t edits_between(std::string_view a, std::string_view b) {
 
 std::string_view nearest_key(std::string_view key, std::span<const std::string_view> known) {
   assert(!known.empty());
-  // A key of any length may come from a file; no known one is longer than this.
+  // A key from a file may have any length; all known ones are shorter than this.
   const std::string_view start = key.substr(0, 64);
   return *std::ranges::min_element(known, {}, [&](std::string_view k) { return edits_between(start, k); });
 }

@@ -7,8 +7,7 @@
 
 namespace slsd {
 
-/// The known key that takes the fewest insertions, deletions and replacements of a letter to reach from `key`; the
-/// first of equals.
+/// The known key with the fewest insertions, deletions and replacements of a letter from `key`; the first on a tie.
 /// @param known  at least one
 /// @thread reentrant
 [[nodiscard]] std::string_view nearest_key(std::string_view key, std::span<const std::string_view> known);

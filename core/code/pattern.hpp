@@ -25,8 +25,8 @@ struct PatternOptions {
   int projector_width_px = 1280;  ///< 640 to 3840
   int projector_height_px = 800;  ///< 360 to 2160
   int symbol_size_px = 16;        ///< one of kSymbolSizesPx
-  int spacing_px = 2;             ///< 1 to 16; dark, between two symbols
-  std::vector<int> symbols{};     ///< 2 to 8 different symbol numbers; letter i of the array is shown as symbols[i]
+  int spacing_px = 2;             ///< 1 to 16; dark gap between two symbols
+  std::vector<int> symbols{};     ///< 2 to 8 different symbol numbers; letter i of the array is drawn as symbols[i]
   std::uint32_t seed = 1;
   ArrayMethod method = ArrayMethod::kNoRepeats;
   std::optional<int> minimum_distance{};
@@ -38,11 +38,11 @@ struct PatternOptions {
   friend bool operator==(const PatternOptions&, const PatternOptions&) = default;
 };
 
-/// The symbols that serve best at a size: what is used where the user names none.
+/// The best symbols for a size, used if the user names none.
 [[nodiscard]] std::vector<int> default_symbols(int symbol_size_px);
 
-/// A pattern: the array and how it is laid on the projector. Cells are pitch_px() wide, cell (0, 0) at the top left;
-/// what reaches beyond the projector on the right and at the bottom is cut (Elahi et al. 2020, equations (5), (6)).
+/// A pattern: the array and its layout on the projector. Cells are pitch_px() wide, cell (0, 0) at the top left; the
+/// part beyond the projector's right and bottom edges is cut (Elahi et al. 2020, equations (5), (6)).
 ///
 ///     cell (row, column):   |<- pitch = size + spacing ->|
 ///                           |s/2|<- symbol_size_px ->|s/2|      (the odd pixel of the spacing on the right)
@@ -52,7 +52,7 @@ struct Pattern {
 
   [[nodiscard]] int pitch_px() const { return options.symbol_size_px + options.spacing_px; }
   [[nodiscard]] int letters() const { return array.letters; }
-  /// Columns and rows of cells whose symbols are shown whole.
+  /// Number of columns and rows of fully visible symbols.
   [[nodiscard]] int whole_columns() const;
   [[nodiscard]] int whole_rows() const;
   /// Projector pixel of the symbol's top left pixel.
@@ -67,17 +67,17 @@ struct Pattern {
   }
 };
 
-/// Makes the array for the projector and lays the symbols on it. An empty `symbols` stands for default_symbols().
+/// Makes the array for the projector and lays out the symbols. An empty `symbols` means default_symbols().
 /// @errors kInvalidArgument; kImpossible with the bound that forbids it
 [[nodiscard]] Result<Pattern> make_pattern(PatternOptions options);
 
-/// The exact image that the projector shows: 255 where it is lit, 0 where it is dark.
+/// The exact image for the projector: 255 for lit pixels, 0 for dark ones.
 [[nodiscard]] Grey8 draw_pattern(const Pattern& pattern);
 
-/// A pattern file: TOML with the options and the array itself, so that it can be kept and shared.
+/// Writes a pattern file: TOML with the options and the array itself, to keep and share.
 [[nodiscard]] std::string write_pattern(const Pattern& pattern);
 
-/// Reads a pattern file's text and checks it: sizes, letters, that the windows have the promised distance.
+/// Reads a pattern file's text and checks sizes, letters, and the promised distance of the windows.
 /// @errors kMalformed with line and key; kInvalidArgument; kMismatch
 [[nodiscard]] Result<Pattern> read_pattern(std::string_view text, std::string_view name);
 

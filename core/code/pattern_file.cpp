@@ -145,7 +145,7 @@ void check_reach(KeyReader& reader, const toml::table& table, Pattern& pattern) 
                       " rows, sooner than the file promises: a letter was changed; make the pattern anew");
 }
 
-// What the file promises is computed anew: a letter changed by hand or in transit must not become a wrong point.
+// Recompute what the file promises: a letter changed by hand or in transit must not cause a wrong point.
 void check_promises(KeyReader& reader, const toml::table& table, Pattern& pattern) {
   const int promised = read_int(reader, table, "minimum_distance", 0, kWindowCells);
   if (reader.error()) return;

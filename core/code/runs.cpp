@@ -11,7 +11,7 @@
 namespace slsd {
 namespace {
 
-// A letter to a character. Shares nothing with the construction, which it has to check.
+// One character for each letter. Shares no code with the construction, which it checks.
 std::vector<std::string> lines_of(const CodeArray& array, Along along) {
   const bool rows = along == Along::kRows;
   std::vector<std::string> lines(static_cast<std::size_t>(rows ? array.rows : array.columns));
@@ -34,7 +34,7 @@ std::vector<std::string> runs_of(const std::string& line, int length) {
   return runs;
 }
 
-// From each run to the nearest one that it recurs as, over the whole array; 0 if it does not.
+// For each run, the distance to the nearest run that makes it recur, over the whole array; 0 if there is none.
 std::vector<int> recurrences(const CodeArray& array, Along along, int length) {
   assert(length >= kShortestRun && length <= kLongestRun);
   std::vector<int> nearest;

@@ -10,7 +10,7 @@
 namespace slsd {
 namespace {
 
-/// Pixel centres and rule units on one integer lattice: 2 n kRuleUnits steps to the cell's side of n pixels.
+/// Pixel centres and rule units on one integer lattice: 2 n kRuleUnits steps for a cell's side of n pixels.
 struct Lattice {
   int size_px;
   [[nodiscard]] int of_pixel(int x_px) const { return (2 * x_px + 1) * kRuleUnits; }
@@ -19,7 +19,7 @@ struct Lattice {
 
 bool covers(const Primitive& p, const Lattice& lattice, int x, int y) {
   const auto at = [&](std::size_t i) { return lattice.of_units(p.units[i]); };
-  // Not negative where (x, y) lies to the right of the way from corner i to corner j, or on it.
+  // Not negative if (x, y) lies on the line from corner i to corner j, or to its right.
   const auto side = [&](std::size_t i, std::size_t j) {
     return (at(j) - at(i)) * (y - at(i + 1)) - (at(j + 1) - at(i + 1)) * (x - at(i));
   };

@@ -8,10 +8,10 @@
 namespace slsd {
 
 /// The symbol with this number.
-/// @param number  1 to 25; anything else is a bug of the caller's
+/// @param number  1 to 25; other numbers are a bug of the caller
 [[nodiscard]] const Symbol& symbol(int number);
 
-/// Draws a symbol in its cell: size_px x size_px, 1 where it is lit, 0 where it is dark.
+/// Draws a symbol in its cell: size_px x size_px, 1 for lit pixels, 0 for dark ones.
 /// @param number   1 to 25
 /// @param size_px  one of kSymbolSizesPx
 [[nodiscard]] Grey8 draw_symbol(int number, int size_px);

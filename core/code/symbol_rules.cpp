@@ -30,8 +30,8 @@ constexpr SymbolRule rule(Symbol symbol, P... primitives) {
   return {symbol, static_cast<int>(sizeof...(P)), {primitives...}};
 }
 
-// Only the paper's symbols and those with short edges reach the cell's edge; the others leave a margin of a 24th, which
-// is a pixel at 12, 14 and 16 px, where there is room: blur makes neighbours grow together across the spacing.
+// Only the paper's symbols and those with short edges reach the cell's edge. The others leave a margin of a 24th, one
+// pixel at 12, 14 and 16 px, if there is room: blur makes neighbours grow together across the spacing.
 constexpr std::array<SymbolRule, kSymbolCount> kRules = {
     rule({1, "disc", "disc that fills the cell", false}, disc(12, 12, 12)),
     rule({2, "ring", "disc that fills the cell, without a disc of a third of its radius", false}, disc(12, 12, 12),

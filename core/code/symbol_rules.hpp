@@ -9,17 +9,17 @@
 
 namespace slsd {
 
-/// Units to a cell's side in the rules below: every edge is a whole number of 24ths of the cell.
+/// Units along a cell's side in the rules below: every edge is a whole number of 24ths of the cell.
 inline constexpr int kRuleUnits = 24;
 
 enum class Shape : std::uint8_t {
   kRectangle,  ///< a, b: left and top; c, d: right and bottom
   kDisc,       ///< a, b: centre; c: radius
   kTriangle,   ///< a, b; c, d; e, f: corners, clockwise on the screen
-  kMargin,     ///< a: what lies no further than this from one of the cell's edges
+  kMargin,     ///< a: covers all points at most this far from one of the cell's edges
 };
 
-/// One step of a symbol's rule: what it covers is lit, or made dark again.
+/// One step of a symbol's rule: lights the area that it covers, or makes it dark again.
 struct Primitive {
   Shape shape;
   bool lit;
@@ -28,16 +28,15 @@ struct Primitive {
 
 inline constexpr int kMaxPrimitives = 5;
 
-/// A symbol and how it is drawn: its primitives one after the other. A pixel belongs to a primitive where the
-/// pixel's centre lies in it or on its edge; in exact integer arithmetic, so that symmetric rules give symmetric
-/// pixels.
+/// A symbol and its drawing rule: primitives in order. A pixel belongs to a primitive if the pixel's centre lies in it
+/// or on its edge. The arithmetic is in exact integers, so symmetric rules give symmetric pixels.
 struct SymbolRule {
   Symbol symbol;
   int count;
   std::array<Primitive, kMaxPrimitives> primitives;
 };
 
-/// The alphabet, by number minus one.
+/// The alphabet; the index is the number minus one.
 [[nodiscard]] const std::array<SymbolRule, kSymbolCount>& symbol_rules();
 
 }  // namespace slsd

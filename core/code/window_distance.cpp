@@ -7,11 +7,11 @@
 namespace slsd {
 namespace {
 
-// Three bits a letter and nine letters: 27 bits. Shares nothing with the construction, which it has to check.
+// Three bits for each of nine letters: 27 bits. Shares no code with the construction, which it checks.
 constexpr std::uint32_t kFirstBitOfEachLetter = 0b001'001'001'001'001'001'001'001'001;
 constexpr std::uint32_t kFirstLetterOfEachRow = 0b000'000'111'000'000'111'000'000'111;
 
-// Counts by shifts and sums, which the compiler turns into vector code on any machine; popcount only on some.
+// Counts by shifts and sums, which the compiler vectorises on any machine; popcount only on some.
 std::uint32_t letters_that_differ(std::uint32_t a, std::uint32_t b) {
   const std::uint32_t bits = a ^ b;
   const std::uint32_t letters = (bits | (bits >> 1) | (bits >> 2)) & kFirstBitOfEachLetter;
@@ -49,7 +49,7 @@ int minimum_window_distance(const CodeArray& array, bool half_turn) {
   for (std::size_t i = 0; i < windows.size(); ++i)
     smallest = std::min(smallest, smallest_from(windows[i], windows.data() + i + 1, end));
   if (!half_turn) return static_cast<int>(smallest);
-  // Distance to a turned window is the same both ways, so the pairs from i upwards suffice; i itself is among them.
+  // The distance to a rotated window is symmetric, so pairs from i upwards suffice, including i itself.
   const std::vector<std::uint32_t> turned = all_windows(array, true);
   for (std::size_t i = 0; i < windows.size(); ++i)
     smallest = std::min(smallest, smallest_from(turned[i], windows.data() + i, end));

@@ -23,7 +23,7 @@ std::size_t files_of(int letters, int cells) {
   return files;
 }
 
-// What agrees on a whole group agrees on its first cells: fewer files, longer ones, the same answers.
+// Words that agree on a whole group agree on its first cells: this gives fewer and longer files with the same answers.
 int cells_filed(int letters, int cells) {
   while (files_of(letters, cells) > kMaxFiles) --cells;
   return cells;

@@ -13,15 +13,15 @@ namespace slsd {
 /// The letters of a 3x3 window, row by row, four bits each; the first letter in the lowest bits.
 using PackedWindow = std::uint64_t;
 
-/// The window turned by 180 degrees.
+/// The window rotated by 180 degrees.
 [[nodiscard]] PackedWindow half_turned(PackedWindow window);
 
 /// Counts the cells in which two windows differ.
 [[nodiscard]] int cells_that_differ(PackedWindow a, PackedWindow b);
 
-/// Windows, kept so that "is any of them closer than d?" is quick. Two words of nine letters that differ in fewer than
-/// d places agree on at least one of d groups that the places are cut into (pigeonhole): a window is filed under its
-/// letters in each group, and a question looks at d files only.
+/// An index of windows for the question "is any of them closer than d?". Two words of nine letters that differ in fewer
+/// than d places agree on at least one of d groups of places (pigeonhole). So a window is filed under its letters in
+/// each group, and a query reads only d files.
 /// @thread thread-bound
 class WindowIndex {
  public:
@@ -31,7 +31,7 @@ class WindowIndex {
 
   [[nodiscard]] bool has_closer(PackedWindow window) const;
   void add(PackedWindow window);
-  /// Takes back the window that was added last.
+  /// Removes the window that was added last.
   void remove_last(PackedWindow window);
 
  private:
