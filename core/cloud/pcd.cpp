@@ -43,7 +43,7 @@ CloudPoint no_point(int camera, int row, int column) {
   return point;
 }
 
-// One camera's lattice below the other's, each row by row.
+// The cameras' lattices one below the other, each row by row.
 std::vector<CloudPoint> organised(const Cloud& cloud) {
   std::vector<CloudPoint> cells;
   for (int camera = 0; camera < cloud.cameras; ++camera) {

@@ -8,9 +8,9 @@
 
 namespace slsd {
 
-/// Binary PCD 0.7 with the fields of the PLY (intensity as a float), organised on the pattern's lattice: WIDTH
-/// lattice_columns, HEIGHT lattice_rows times cameras (one camera's lattice below the other's); NaN where there is no
-/// point. A point outside the lattice has no place and is left out.
+/// Binary PCD 0.7 with the fields of the PLY (intensity as a float), organised on the pattern's lattice. WIDTH is
+/// lattice_columns, HEIGHT is lattice_rows times cameras (the cameras' lattices one below the other). Cells without a
+/// point are NaN. Points outside the lattice are left out.
 /// @thread reentrant
 [[nodiscard]] std::string write_pcd(const Cloud& cloud);
 

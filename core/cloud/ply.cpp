@@ -25,7 +25,7 @@ std::string property_lines() {
   return lines + "end_header\n";
 }
 
-// Takes the header's lines one by one; the first that is not as expected is kept as the problem.
+// Reads the header's lines one by one, and keeps the first unexpected one as the problem.
 class HeaderReader {
  public:
   explicit HeaderReader(std::string_view bytes) : rest_(bytes) {}

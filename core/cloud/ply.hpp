@@ -10,10 +10,10 @@
 
 namespace slsd {
 
-/// Binary little-endian PLY, as docs/formats.md says.
+/// Writes binary little-endian PLY as in docs/formats.md.
 [[nodiscard]] std::string write_ply(const Cloud& cloud);
 
-/// Reads back what write_ply wrote (and only that).
+/// Reads the output of write_ply, and no other PLY.
 /// @errors kMalformed
 [[nodiscard]] Result<Cloud> read_ply(std::string_view bytes, std::string_view name);
 

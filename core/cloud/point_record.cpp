@@ -23,7 +23,7 @@ constexpr std::size_t field_bytes(int PointField::*bytes) {
 static_assert(field_bytes(&PointField::ply_bytes) == kPointBytes);
 static_assert(field_bytes(&PointField::pcd_bytes) == kPcdPointBytes);
 
-// Column and row are int in a file: not every reader knows PLY's ushort.
+// Column and row are int in a file: some readers do not know PLY's ushort.
 struct Cell {
   std::int32_t column;
   std::int32_t row;

@@ -35,9 +35,9 @@ inline constexpr std::array<PointField, 13> kPointFields{{{"x", "float", 4, 'F',
                                                           {"column", "int", 4, 'I', 4},
                                                           {"row", "int", 4, 'I', 4}}};
 
-/// Bytes of one point in a PLY: the fields in their order, little endian, nothing between them.
+/// Bytes of one point in a PLY: the fields in order, little endian, without padding.
 inline constexpr std::size_t kPointBytes = 43;
-/// Bytes of one point in a PCD, where intensity is a float: PCL's PointXYZI takes no other.
+/// Bytes of one point in a PCD, where intensity is a float: PCL's PointXYZI accepts nothing else.
 inline constexpr std::size_t kPcdPointBytes = 46;
 
 /// Appends the kPointBytes of a point.
@@ -46,14 +46,14 @@ void append_point(const CloudPoint& point, std::string& bytes);
 /// Appends the kPcdPointBytes of a point.
 void append_pcd_point(const CloudPoint& point, std::string& bytes);
 
-/// The point that append_point() wrote; nothing if its cell is none.
+/// Reads a point that append_point() wrote; empty if its cell is invalid.
 /// @param bytes  at least kPointBytes
 [[nodiscard]] std::optional<CloudPoint> read_point(const char* bytes);
 
-/// sigma_calibration_mm as a header names it: "0.213", or empty.
+/// sigma_calibration_mm as text in a header: "0.213", or empty.
 [[nodiscard]] std::string sigma_calibration_text(const Cloud& cloud);
 
-/// A text fit for a line of a header: control characters become spaces.
+/// Makes a text fit a header's line: control characters become spaces.
 [[nodiscard]] std::string header_text(std::string_view text);
 
 }  // namespace slsd

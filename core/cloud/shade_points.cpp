@@ -9,11 +9,11 @@
 namespace slsd {
 namespace {
 
-constexpr double kSaturated = 0.985;  // of full: noise and the sensor's own unevenness keep some pixels below
+constexpr double kSaturated = 0.985;  // of full: noise and uneven sensor response keep some pixels below
 
-/// Levels of an image at a place between four pixels.
+/// Levels of an image at a position between four pixels.
 struct Sample {
-  double level = 0;    ///< between them
+  double level = 0;    ///< interpolated
   double highest = 0;  ///< highest of the four
 };
 

@@ -11,18 +11,18 @@
 
 namespace slsd {
 
-/// Frames of a camera without the pattern, of the size and depth of its other frames.
+/// Frames of a camera without the pattern, with the size and depth of its other frames.
 struct SceneLight {
   std::optional<GreyView> white;  ///< while the projector showed white
-  std::optional<GreyView> dark;   ///< and black: the light of the room alone
+  std::optional<GreyView> dark;   ///< while it showed black: the light of the room alone
   double full = 255;              ///< the level of a saturated pixel
 };
 
-/// Gives points the intensity of their places in the white frame, less the dark frame's, 0 to 255 of full. Without a
-/// white frame the dark one's is taken from the intensity that they have, which is the symbol's. Where a pixel of the
-/// white frame around a point is saturated nothing is known but that it is bright: its intensity is 255.
-/// @param points  of that camera alone, within its frame
-/// @return        how many of them were saturated
+/// Gives points the intensity of the white frame at their positions, minus the dark frame's, 0 to 255 of full. Without
+/// a white frame, it subtracts the dark level from the points' own intensity, which is the symbol's. If a white pixel
+/// around a point is saturated, only a lower bound is known, and the intensity is 255.
+/// @param points  points of that camera alone, within its frame
+/// @return        number of saturated points
 /// @thread reentrant
 std::size_t shade_points(std::span<CloudPoint> points, const SceneLight& light);
 
