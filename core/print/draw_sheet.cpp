@@ -22,12 +22,12 @@ constexpr double kTextHeightMm = 3;
 constexpr double kNumberHeightMm = 2.2;
 constexpr double kTextBelowRulerMm = 9.5;
 constexpr double kLineMm = 0.12;
-constexpr const char* kTypeface = "@cairo:";  // drawn by Cairo itself: the same with whatever fonts a machine has
+constexpr const char* kTypeface = "@cairo:";  // built into Cairo: independent of a machine's fonts
 
 using Surface = std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)>;
 using Pen = std::unique_ptr<cairo_t, decltype(&cairo_destroy)>;
 
-// All of it as one path, so that no seam shows between the rectangles of a marker.
+// One path for all shapes, so that no seam shows between the rectangles of a marker.
 void draw_ink(cairo_t* pen, const Board& board) {
   const BoardInk ink = ink_of(board);
   for (const auto& r : ink.rectangles) cairo_rectangle(pen, r.x_mm, r.y_mm, r.width_mm, r.height_mm);
@@ -114,7 +114,7 @@ Result<> draw_on(cairo_surface_t* surface, double scale, const Sheet& sheet) {
   return {};
 }
 
-// A file's last bytes come when its surface is finished; an image's pixels are gone then.
+// A file's last bytes come when its surface is finished; the pixels of an image are then gone.
 Result<std::string> draw_file(cairo_surface_t* surface, double scale, const Sheet& sheet, const std::string& bytes) {
   const auto drawn = draw_on(surface, scale, sheet);
   if (!drawn) return tl::unexpected(drawn.error());

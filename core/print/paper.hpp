@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// A sheet of paper, lying either way.
+/// A sheet of paper in either orientation.
 struct Paper {
   std::string name;
   double width_mm = 0;
@@ -19,8 +19,8 @@ struct Paper {
   friend bool operator==(const Paper&, const Paper&) = default;
 };
 
-/// Reads A0 to A4, letter, in either case, or WIDTHxHEIGHT in mm. What has a name lies on its long side.
-/// @errors kInvalidArgument (no such paper, or not of 50 to 10000 mm)
+/// Reads A0 to A4 or letter, in either case, or WIDTHxHEIGHT in mm. Named papers are in landscape orientation.
+/// @errors kInvalidArgument (unknown paper, or sides outside 50 to 10000 mm)
 /// @thread reentrant
 [[nodiscard]] Result<Paper> parse_paper(std::string_view text);
 

@@ -10,7 +10,7 @@
 namespace slsd {
 namespace {
 
-constexpr double kMarginMm = 8;  // that printers leave white
+constexpr double kMarginMm = 8;  // white margin of printers
 constexpr double kRulerMm = 6;
 constexpr double kTextMm = 5;
 constexpr int kColumns = 11;

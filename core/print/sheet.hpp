@@ -32,12 +32,12 @@ struct Sheet {
   double clear_mm = 0;                                  ///< width of white between the board and the rulers
 };
 
-/// Lays a board out on paper, on whichever side it fits; true to scale always.
-/// @errors kImpossible: it does not fit; the message has both sizes, and the paper on which it does
+/// Lays a board out on paper in the orientation that fits, always true to scale.
+/// @errors kImpossible: it does not fit; the message has both sizes, and a paper that fits
 /// @thread reentrant
 [[nodiscard]] Result<Sheet> lay_out(const Board& board, const Paper& paper);
 
-/// The ChArUco board of 11 x 7 squares, of whole millimetres, that fills a sheet.
+/// The ChArUco board of 11 x 7 squares with whole millimetres that fills a sheet.
 /// @errors kImpossible: the paper is too small for squares of 5 mm
 /// @thread reentrant
 [[nodiscard]] Result<Board> board_for(const Paper& paper);
