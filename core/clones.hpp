@@ -8,24 +8,24 @@
 
 namespace slsd {
 
-/// Instruction sets that core's inner loops are compiled for. One package serves every machine of an architecture: each
-/// loop is there several times, and the machine that it runs on chooses. On arm64 the plain code is NEON, which all of
-/// these have.
+/// Instruction sets for which core's inner loops are compiled. One package serves all machines of an architecture: it
+/// contains each loop several times, and chooses at run time. On arm64 the plain code is NEON, which all of these
+/// machines have.
 enum class Clone : std::uint8_t {
-  kPlain,    ///< the least that the architecture has: SSE2, NEON
-  kAvx2,     ///< the same numbers
-  kAvx2Fma,  ///< the same but for rounding, as products are not rounded before they are added to
+  kPlain,    ///< the architecture's minimum: SSE2, NEON
+  kAvx2,     ///< the same results as kPlain
+  kAvx2Fma,  ///< the same except for rounding, as products are not rounded before the addition
 };
 
 /// Lists the clones that this machine can run, the plain one first and the fastest last.
 [[nodiscard]] std::vector<Clone> clones_here();
 
-/// Clone that runs: the fastest, unless a test asks for another. Core's only variable.
+/// Clone in use: the fastest, unless a test selects another. Core's only variable.
 extern std::atomic<Clone> clone_in_use;
 
-/// A loop that is there once for each clone: Cloned<body>::call(...) calls that in use.
-/// @param kBody  an always_inline function, which each clone takes into itself. Its parameters are numbers, pointers,
-///               references and spans: how vectors are passed differs from clone to clone
+/// A loop that is compiled once for each clone: Cloned<body>::call(...) calls the clone in use.
+/// @param kBody  an always_inline function, inlined into each clone. Its parameters are numbers, pointers, references
+///               and spans: the calling convention for vectors differs between clones
 template <auto kBody>
 struct Cloned;
 

@@ -7,8 +7,8 @@
 
 namespace slsd {
 
-/// Runs the parts of a stage, beside each other or one after the other, and returns when all are done. Core starts no
-/// threads: whoever owns some passes them in by this.
+/// Runs the parts of a stage, in parallel or one after the other, and returns when all are done. Core starts no
+/// threads: the owner of threads passes them in through this interface.
 class Executor {
  public:
   Executor() = default;
@@ -19,16 +19,16 @@ class Executor {
   /// Number of parts that may run at the same time.
   [[nodiscard]] virtual int workers() const = 0;
 
-  /// @param work  called as work(part, worker) for each part from 0 on; no two at once have the same worker
+  /// @param work  called as work(part, worker) for each part from 0 on; no two concurrent calls have the same worker
   template <class Work>
   void run(int parts, const Work& work) {
     run_parts(
         parts, [](const void* of, int part, int worker) { (*static_cast<const Work*>(of))(part, worker); }, &work);
   }
 
-  /// A loop in ranges of one length, however many the workers are: what is done in the order of a range does not depend
-  /// on them.
-  /// @param work  called as work(first, last, worker) for each range of what is counted from 0 on, last not in it
+  /// Runs a loop in ranges of equal length, whatever the number of workers, so that results that depend on the order
+  /// within a range do not depend on the workers.
+  /// @param work  called as work(first, last, worker) for each range, from 0 on; excludes last
   template <class Work>
   void run_ranges(std::size_t count, const Work& work, std::size_t length = 256) {
     run(static_cast<int>((count + length - 1) / length), [&](int part, int worker) {

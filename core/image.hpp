@@ -25,7 +25,7 @@ struct ImageView {
   [[nodiscard]] bool contains(int x, int y) const { return x >= 0 && y >= 0 && x < width && y < height; }
 };
 
-/// The level between four pixels, all within the image: at x + right and y + down, each of 0 to 1.
+/// The interpolated level between four pixels, all within the image: at x + right and y + down, each of 0 to 1.
 template <class T>
 [[nodiscard]] double level_between(const ImageView<T>& image, int x, int y, double right, double down) {
   return (image.at(x, y) * (1 - right) + image.at(x + 1, y) * right) * (1 - down) +

@@ -9,9 +9,10 @@
 
 namespace slsd {
 
-/// Largest side of an image that is decoded: the ends of its runs have 16 bits.
+/// Largest side of an image that can be decoded: the ends of its runs have 16 bits.
 inline constexpr int kMaxImageSidePx = 32767;
-/// Largest number of pixels: the largest sensors have 250 million, and two lanes of this many still fit in memory.
+/// Largest number of pixels: the largest sensors have 250 million, and two decoding lanes of that size still fit in
+/// memory.
 inline constexpr std::int64_t kMaxImagePx = std::int64_t{1} << 28;
 
 [[nodiscard]] constexpr bool is_readable_size(int width_px, int height_px) {

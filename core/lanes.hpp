@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// Eight numbers that are reckoned with at once: one register of AVX2, two of SSE2.
+/// Eight numbers computed at once: one register of AVX2, two of SSE2.
 inline constexpr int kLanes = 8;
 using Lanes [[gnu::vector_size(32)]] = float;
 using IntLanes [[gnu::vector_size(32)]] = int;
@@ -17,28 +17,28 @@ using IntLanes [[gnu::vector_size(32)]] = int;
 inline constexpr Lanes kLane = {0, 1, 2, 3, 4, 5, 6, 7};
 inline constexpr IntLanes kIntLane = {0, 1, 2, 3, 4, 5, 6, 7};
 
-/// Four: a register of every processor, for what has four directions.
+/// Four numbers: one register of every processor, for the four directions.
 using FourLanes [[gnu::vector_size(16)]] = float;
 using FourIntLanes [[gnu::vector_size(16)]] = int;
 
-/// The bits of all lanes together.
+/// The bits of all lanes combined by or.
 static inline __attribute__((always_inline)) unsigned united(const FourIntLanes& lanes) {
   const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(lanes);
   const std::uint64_t both = halves[0] | halves[1];
   return static_cast<unsigned>(both | both >> 32U);
 }
-/// A bit to each of the lanes of a comparison that holds.
+/// One bit for each lane in which a comparison holds.
 static inline __attribute__((always_inline)) unsigned bits_of(const FourIntLanes& holds) {
   constexpr FourIntLanes kBits = {1, 2, 4, 8};
   return united(holds & kBits);
 }
 
-// Never passed by value between functions that are not inlined: how that is done depends on the processor.
+// Never pass vectors by value between functions that are not inlined: the calling convention depends on the processor.
 static inline __attribute__((always_inline)) void load(const float* from, Lanes& to) {
   std::memcpy(&to, from, sizeof to);
 }
 
-/// Numbers of another kind.
+/// Loads numbers of another type, with conversion.
 template <class T>
 static inline __attribute__((always_inline)) void load(const T* from, Lanes& to) {
   using Numbers [[gnu::vector_size(kLanes * sizeof(T))]] = T;

@@ -10,7 +10,7 @@
 namespace slsd {
 namespace {
 
-constexpr std::size_t kLongestWord = 64;  // what is longer is no misspelling of a key
+constexpr std::size_t kLongestWord = 64;  // a longer word is no misspelling of a key
 constexpr std::size_t kShortestBeginning = 3;
 
 const std::string* only_name_that_begins_with(std::string_view word, std::span<const std::string> names) {

@@ -13,12 +13,12 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] int edit_distance(std::string_view a, std::string_view b);
 
-/// The name that a person most likely meant by a word: within a third of its length, else the only one that begins with
-/// it. Empty if there is none.
+/// The name that a user most likely meant by a word: the nearest within a third of its length, or else the only one
+/// that begins with it. Empty if there is none.
 /// @thread reentrant
 [[nodiscard]] std::optional<std::string> nearest_name(std::string_view word, std::span<const std::string> names);
 
-/// "; did you mean symbols?", or nothing if no name is near.
+/// "; did you mean symbols?", or empty if no name is near.
 [[nodiscard]] std::string nearest_hint(std::string_view word, std::span<const std::string> names);
 
 }  // namespace slsd

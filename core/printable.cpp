@@ -12,7 +12,7 @@ namespace {
 constexpr std::string_view kEllipsis = "\u2026";
 
 struct Character {
-  char32_t code;     ///< code point; for a byte that is no UTF-8, that byte
+  char32_t code;     ///< code point; for a byte that is not UTF-8, that byte
   std::size_t size;  ///< size in bytes
   bool valid;
 };
@@ -21,7 +21,8 @@ bool continues(char byte) {
   return (static_cast<std::uint8_t>(byte) & 0xC0U) == 0x80U;
 }
 
-// The first character. Overlong forms, surrogates and what lies beyond U+10FFFF are no UTF-8 (RFC 3629, section 3).
+// Decodes the first character. Overlong forms, surrogates and values above U+10FFFF are not UTF-8 (RFC 3629, section
+// 3).
 Character decode(std::string_view text) {
   const auto first = static_cast<std::uint8_t>(text.front());
   const Character no_utf8{first, 1, false};
@@ -42,7 +43,7 @@ bool within(char32_t code, char32_t low, char32_t high) {
   return code >= low && code <= high;
 }
 
-// What a terminal obeys, ends a line, or shows other text than is there. Joiners (U+200C, U+200D) belong to words.
+// Characters that control a terminal, end a line, or disguise the text. Joiners (U+200C, U+200D) belong to words.
 bool obeyed(char32_t code) {
   return code < 0x20 || within(code, 0x7F, 0x9F) || code == 0x061C || code == 0x200B || within(code, 0x200E, 0x200F) ||
          within(code, 0x2028, 0x202E) || within(code, 0x2060, 0x206F) || code == 0xFEFF ||
@@ -63,7 +64,7 @@ std::string escape(const Character& character) {
 
 std::string printable(std::string_view foreign, std::size_t limit_bytes) {
   std::string text;
-  std::size_t before_ellipsis = 0;  // how much of the text leaves room for one
+  std::size_t before_ellipsis = 0;  // length of the text that leaves room for an ellipsis
   while (!foreign.empty()) {
     const Character character = decode(foreign);
     const bool plain = character.valid && !obeyed(character.code);

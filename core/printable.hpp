@@ -8,14 +8,13 @@
 
 namespace slsd {
 
-/// Foreign text, as an error, a log, a reply or a terminal may show it: valid UTF-8 on one line, without anything that
-/// a terminal or a log obeys. Whatever comes from a client, a device, a file or the network goes through here before
-/// it is quoted.
+/// Makes foreign text safe to show in an error, a log, a reply or a terminal: valid UTF-8 on one line, without control
+/// characters. All text from a client, a device, a file or the network passes through here before it is quoted.
 ///
-/// A control character (C0, DEL, C1), a line or paragraph separator, a mark that turns the direction of writing, and a
-/// byte that is no UTF-8 become visible escapes: "\n", "\x1b", "\u202e". All other text stays as it is, a backslash
-/// too: an escape is to be read, not to be undone. What is longer than the limit ends in an ellipsis.
-/// @param limit_bytes  of the result; characters and escapes stay whole
+/// Visible escapes ("\n", "\x1b", "\u202e") replace control characters (C0, DEL, C1), line and paragraph separators,
+/// marks that change the writing direction, and bytes that are not UTF-8. All other text stays unchanged, including
+/// backslashes: escapes are for reading, and cannot be undone. Text beyond the limit ends in an ellipsis.
+/// @param limit_bytes  limit of the result; characters and escapes stay whole
 /// @thread             reentrant
 [[nodiscard]] std::string printable(std::string_view foreign, std::size_t limit_bytes = 200);
 

@@ -10,12 +10,12 @@
 
 namespace slsd {
 
-/// Kind of a failure. A caller may act on the code; a person acts on the message. A new one goes to the end: clients
-/// know each by its number.
+/// Kind of a failure. Callers act on the code; users act on the message. Add new codes at the end: clients know each by
+/// its number.
 enum class ErrorCode {
   kInvalidArgument,  ///< a value outside its range: a configuration key, an option, a request's parameter
   kMalformed,        ///< a file or message that does not parse, or lacks a required part
-  kMismatch,         ///< two things that are each right and do not belong together
+  kMismatch,         ///< two things that are each correct but do not belong together
   kImpossible,       ///< the request cannot exist; the message names the bound that forbids it
   kNotFound,
   kPermissionDenied,
@@ -30,11 +30,11 @@ enum class ErrorCode {
   kFrameDropped,  ///< the device reports, or the sequence numbers show, that a frame was lost
   kFrameTorn,     ///< fewer bytes than a frame, or parts of two frames
   kFrameStale,    ///< exposed before the pattern was visible
-  kFrameLate,     ///< not there by its deadline
-  kFrameSkewed,   ///< the cameras' frames are not of the same exposure
+  kFrameLate,     ///< not received by its deadline
+  kFrameSkewed,   ///< the cameras' frames are from different exposures
 };
 
-/// "frame_stale": the name that programs outside compare, so it stays for good.
+/// "frame_stale": the name that outside programs compare, so it never changes.
 [[nodiscard]] constexpr std::string_view to_string(ErrorCode code) {
   switch (code) {
     case ErrorCode::kInvalidArgument:
@@ -79,8 +79,8 @@ enum class ErrorCode {
   return {};
 }
 
-/// The world failed: a code, a message that says what to do, and where it arose (file:line:column, key, device, or
-/// empty).
+/// A failure outside the program: a code, a message that says what to do, and its origin (file:line:column, key,
+/// device, or empty).
 struct Error {
   ErrorCode code;
   std::string message;
@@ -90,7 +90,7 @@ struct Error {
 template <class T = void>
 using Result = tl::expected<T, Error>;
 
-/// Makes the failed state of any Result<T>.
+/// Makes the error state of any Result<T>.
 inline tl::unexpected<Error> fail(ErrorCode code, std::string message, std::string where = {}) {
   return tl::unexpected<Error>(Error{code, std::move(message), std::move(where)});
 }

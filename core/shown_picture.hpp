@@ -15,10 +15,10 @@ enum class Picture {
   kPattern,
   kWhite,
   kBlack,
-  kFocus,  ///< a chart to focus by
+  kFocus,  ///< a chart for focusing
   kGrid,   ///< each camera's view
-  kImage,  ///< a client's own
-  kIdle,   ///< the configuration's choice while nobody scans: one of the first three
+  kImage,  ///< a client's own picture
+  kIdle,   ///< the configured picture while nobody scans: one of the first three
   kHeld,   ///< a client's choice until the next scan: any of the above
 };
 
@@ -42,7 +42,7 @@ inline constexpr std::array kPictureNames{
   return found == kPictureNames.end() ? std::nullopt : std::optional(found->second);
 }
 
-/// Name of a frame that was exposed under the picture: in black there is only the light of the room.
+/// Name of a frame that was exposed under the picture: under black, only the light of the room remains.
 [[nodiscard]] constexpr std::string_view light_name(Picture picture) {
   return picture == Picture::kBlack ? "dark" : to_string(picture);
 }

@@ -15,9 +15,9 @@ using std::chrono::system_clock;
 
 constexpr std::string_view kShape = "0000-00-00T00:00:00";
 constexpr std::size_t kDecimalsMax = 9;
-constexpr int kYearMin = 1678, kYearMax = 2261;  // what 64 bits of nanoseconds hold
+constexpr int kYearMin = 1678, kYearMax = 2261;  // range of 64 bits of nanoseconds
 
-// By the calendar of <chrono>, which knows no time zones. fmt 9 writes a system_clock time in local time, later
+// Uses the calendar of <chrono>, which has no time zones: fmt 9 writes a system_clock time in local time, later
 // versions in UTC.
 std::string text_in_seconds(std::chrono::sys_seconds time) {
   const auto day = floor<std::chrono::days>(time);
@@ -42,7 +42,7 @@ int number(std::string_view digits) {
   return value;
 }
 
-// ".250" or nothing at all.
+// ".250" or empty.
 std::optional<nanoseconds> fraction(std::string_view text) {
   if (text.empty()) return nanoseconds(0);
   std::string decimals(text.substr(1));

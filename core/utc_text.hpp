@@ -14,8 +14,8 @@ namespace slsd {
 /// The same with milliseconds: "2026-01-31T12:00:00.250Z". @thread reentrant
 [[nodiscard]] std::string utc_text_ms(std::chrono::system_clock::time_point time);
 
-/// Reads what the functions above write, and up to nine decimals.
-/// @return nothing if the text is no such time: no Z, another zone, a day that does not exist
+/// Reads the output of the functions above, with up to nine decimals.
+/// @return empty if the text is no such time: no Z, another zone, a day that does not exist
 /// @thread reentrant
 [[nodiscard]] std::optional<std::chrono::system_clock::time_point> time_from_utc(std::string_view text);
 
