@@ -13,13 +13,13 @@ namespace slsd {
 
 inline constexpr std::string_view kDefaultBoard = "charuco:11x7:23:17.25:DICT_5X5_1000";
 
-/// The board that is asked for, at the scale that its ruler was measured to have.
-/// @errors kInvalidArgument: what parse_board() says; a ruler that is not NOMINAL:MEASURED, or is off by more than a
+/// The requested board, at the scale of its measured ruler.
+/// @errors kInvalidArgument: errors of parse_board(); a ruler that is not NOMINAL:MEASURED, or is off by more than a
 ///         print can be
 [[nodiscard]] Result<Board> requested_board(const CalibrateRequest& request);
 
-/// The reference plane that is asked for, likewise; nothing where none is.
-/// @errors as requested_board(); kInvalidArgument: a ruler of no plane
+/// The requested reference plane, at the scale of its ruler; nothing if none is requested.
+/// @errors as requested_board(); kInvalidArgument: a ruler without a plane
 [[nodiscard]] Result<std::optional<Board>> requested_plane(const CalibrateRequest& request);
 
 }  // namespace slsd

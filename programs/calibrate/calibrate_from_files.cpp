@@ -19,7 +19,7 @@
 namespace slsd {
 namespace {
 
-/// Names of the cameras: the folders', in the order of the configuration as far as it names them.
+/// The cameras' names: those of the folders, in the configuration's order if it names them.
 std::vector<std::string> camera_names(const std::vector<CapturedPose>& poses, const Configuration& configuration) {
   std::set<std::string> folders;
   for (const CapturedPose& pose : poses) {
@@ -48,7 +48,7 @@ std::string refusals(const std::vector<PoseReport>& refused) {
   return text;
 }
 
-/// The poses from one name to another, and all looks at the reference plane.
+/// Keeps the poses from one name to another, and all looks at the reference plane.
 Result<> keep_part(const std::string& use, std::vector<CapturedPose>& poses) {
   const std::size_t colon = use.find(':');
   const std::string first = use.substr(0, colon), last = colon == use.npos ? first : use.substr(colon + 1);

@@ -23,7 +23,7 @@ path report_of(path file) {
   return file.replace_extension(".html");
 }
 
-// What cannot be written is told before poses are taken, not after.
+// Reports an unwritable file before poses are taken, not after.
 Result<path> checked(path file, const std::string& named_by) {
   if (report_of(file) == file) {
     return fail(
@@ -49,12 +49,12 @@ Result<> write_report(const path& report, const std::string& html) {
   return written;
 }
 
-/// The report of a refused calibration, beside the one in force, whose own report stays.
+/// The report of a refused calibration. It is beside the one in force, whose own report stays.
 path report_of_refused(const path& file) {
   return file.parent_path() / (file.stem().string() + "-refused.html");
 }
 
-/// Checks that a calibration may replace the one in force without being asked to.
+/// Checks that a calibration may replace the one in force without a request.
 Result<> check_gain(const CalibrateRequest& request, const CalibrationOutcome& outcome, const Board& board,
                     const path& in_force) {
   const std::string nevertheless =

@@ -18,10 +18,10 @@ namespace {
 using std::filesystem::path;
 
 constexpr std::size_t kMaxFileBytes = 1 << 20;
-/// More than a rig drifts, and less than a printer that fits to the page.
+/// More than a rig's drift, and less than the error of a printer that fits to the page.
 constexpr double kScalePercent = 0.5, kScaleSigmas = 5;
 
-/// Says how far the points of the calibrated poses move from one calibration to the other, root mean square.
+/// Describes how far the points of the calibrated poses move between the calibrations, root mean square.
 std::string difference(const CalibrationOutcome& outcome, const Calibration& before) {
   if (before.projector.width_px != outcome.calibration.projector.width_px ||
       before.projector.height_px != outcome.calibration.projector.height_px) {
@@ -55,7 +55,7 @@ bool same_size(const Lens& one, const Lens& other) {
   return one.width_px == other.width_px && one.height_px == other.height_px;
 }
 
-/// Tells whether both calibrations are of the same devices, as far as sizes, names and serials tell.
+/// Tells whether both calibrations belong to the same devices, according to sizes, names and serials.
 bool of_the_same_devices(const Calibration& one, const Calibration& other) {
   if (!same_size(one.projector, other.projector) || one.cameras.size() != other.cameras.size()) return false;
   if (are_other(one.report.projector_serial.value_or(""), other.report.projector_serial.value_or(""))) return false;
@@ -71,7 +71,7 @@ std::string dated(const Calibration& calibration) {
   return "the calibration in force" + (calibration.report.date ? " of " + *calibration.report.date : "");
 }
 
-/// Checks the board's scale: in a rig that has not changed, the distances between the devices measure the board too.
+/// Checks the board's scale: if the rig has not changed, the distances between its devices measure the board.
 Result<> check_scale(const RigComparison& comparison, const Board& board, const Calibration& before) {
   const double percent = 100 * (1 / (1 + comparison.longer_percent / 100) - 1);
   if (std::abs(percent) < std::max(kScalePercent, kScaleSigmas * comparison.longer_sigma_percent)) return {};

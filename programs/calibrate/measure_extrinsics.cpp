@@ -24,13 +24,13 @@ namespace {
 using nlohmann::json;
 
 constexpr auto kPatience = std::chrono::seconds(60);
-constexpr double kMovedMax = 0.2;         // of a cloud's white_differs
-constexpr double kScalesDifferMax = 0.2;  // %: two scanners that differ by more meet nowhere but at the board
+constexpr double kMovedMax = 0.2;         // limit of a cloud's white_differs
+constexpr double kScalesDifferMax = 0.2;  // %: two scanners that differ more agree only at the board
 
 struct Scanner {
   std::string name;
   client::Scanner service;
-  std::string camera;  ///< the first, whose frame is the scanner's
+  std::string camera;  ///< the first; its frame is the scanner's
   CalibratedCamera calibrated;
   std::string calibration_date;  ///< empty: the file has none
 };
@@ -84,7 +84,7 @@ GreyView view_of(const client::Frame& frame) {
                                  frame.height_px, frame.width_px};
 }
 
-// One scan with its white frame: the board in the frame, and the cloud on it.
+// Takes one scan with its white frame: the board in the frame, and its cloud.
 Result<CloudLook> look(Scanner& scanner, const Board& board) {
   client::Cloud cloud;
   json told;
@@ -119,7 +119,7 @@ Result<CloudLook> look(Scanner& scanner, const Board& board) {
 }
 
 std::string quoted(const std::string& text) {
-  return json(text).dump(-1, ' ', false, json::error_handler_t::replace);  // TOML's basic strings are JSON's
+  return json(text).dump(-1, ' ', false, json::error_handler_t::replace);  // TOML's basic strings use JSON's syntax
 }
 
 std::string file_text(const ExtrinsicsRequest& request, const std::vector<Scanner>& scanners, const Board& board,
@@ -148,7 +148,7 @@ std::string file_text(const ExtrinsicsRequest& request, const std::vector<Scanne
   return text;
 }
 
-// Scans by each scanner; what it says of those that see the board, and of those that do not.
+// Scans with each scanner. Reports those that see the board, and those that do not.
 Result<std::vector<CloudLook>> look_at_place(std::vector<Scanner>& scanners, const Board& board) {
   std::vector<CloudLook> looks;
   for (std::size_t i = 0; i < scanners.size(); ++i) {
@@ -168,7 +168,7 @@ Result<std::vector<CloudLook>> look_at_place(std::vector<Scanner>& scanners, con
   return looks;
 }
 
-// Scanners of different scales meet at the board and part beside it.
+// Scanners of different scales agree at the board and differ beside it.
 Result<> check_scales(const std::vector<std::vector<CloudLook>>& places, const std::vector<Scanner>& scanners) {
   for (const auto& looks : places) {
     const auto [least, most] = std::ranges::minmax_element(looks, {}, &CloudLook::scale_percent);

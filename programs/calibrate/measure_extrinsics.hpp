@@ -11,18 +11,18 @@
 
 namespace slsd {
 
-/// The options of `slsd --extrinsics` from its command line, beside the board and its ruler.
+/// The options of `slsd --extrinsics` from its command line, except the board and its ruler.
 struct ExtrinsicsRequest {
   std::filesystem::path file;         ///< output file
-  std::vector<std::string> scanners;  ///< "NAME=SOCKET"; the first is the frame of all
-  std::string parent = "cell";        ///< the name of that frame
-  int places = 3;                     ///< places of the board that two scanners or more see
+  std::vector<std::string> scanners;  ///< "NAME=SOCKET"; the first one's frame is the common frame
+  std::string parent = "cell";        ///< name of the common frame
+  int places = 3;                     ///< board placements that at least two scanners see
 };
 
-/// Measures where scanners stand to each other by a board that two or more of them see, and writes the file that
-/// slsd-dds reads. A client of their services: scans by each in turn, at each line that is read.
-/// @errors kInvalidArgument: fewer than two scanners; kNotFound: they do not see the board together; kMismatch: it is
-///         not flat, or not of one size; those of the services by their names
+/// Measures the scanners' positions relative to each other with a board that at least two of them see. Writes the file
+/// that slsd-dds reads. Is a client of their services: each line read starts a scan by each in turn.
+/// @errors kInvalidArgument: fewer than two scanners; kNotFound: no board that connects them was seen; kMismatch: the
+///         board is not flat, or its size differs; those of the services, with their names
 [[nodiscard]] Result<> measure_extrinsics(const ExtrinsicsRequest& request, const CalibrateRequest& board);
 
 }  // namespace slsd

@@ -8,7 +8,7 @@
 
 namespace slsd {
 
-/// A calibration for a person at a terminal: the poses, the errors, the devices, and the verdict.
+/// A calibration as text for a terminal: the poses, the errors, the devices, and the verdict.
 [[nodiscard]] std::string outcome_text(const CalibrationOutcome& outcome);
 
 }  // namespace slsd

@@ -29,7 +29,7 @@ std::vector<path> sorted_entries(const path& folder, bool folders) {
 
 constexpr std::array kExtensions{".png", ".tif", ".tiff", ".pgm", ".ppm", ".bmp", ".jpg", ".jpeg"};
 
-/// The rank of the file's extension among those that are read; their number if it is not among them.
+/// The rank of the file's extension among the readable ones; their number if it is not readable.
 std::size_t rank_of(const path& file) {
   return static_cast<std::size_t>(std::ranges::find(kExtensions, extension_of(file)) - kExtensions.begin());
 }
@@ -38,7 +38,7 @@ bool is_picture(const path& file) {
   return rank_of(file) < kExtensions.size();
 }
 
-/// The picture of a name, in any format that is read; empty where there is none.
+/// The picture of this name in any readable format; empty if there is none.
 path where_there(const path& folder, const std::string& name) {
   path found;
   for (const path& file : sorted_entries(folder, false)) {

@@ -14,13 +14,13 @@
 
 namespace slsd {
 
-/// The files of one camera's look at one pose.
+/// The files of one camera's view of one pose.
 struct CaptureFiles {
-  std::filesystem::path white;              ///< empty where there is none and none is needed
-  std::filesystem::path pattern;            ///< empty where there is none
+  std::filesystem::path white;              ///< empty if there is none and none is needed
+  std::filesystem::path pattern;            ///< empty if there is none
   std::vector<std::filesystem::path> gray;  ///< in the code's order; empty without a Gray code
-  std::filesystem::path black;              ///< empty where there is none
-  std::optional<Error> lack;                ///< a missing file without which this look is of no use
+  std::filesystem::path black;              ///< empty if there is none
+  std::optional<Error> lack;                ///< a missing file that this view needs
 };
 
 struct CapturedPose {
@@ -29,26 +29,26 @@ struct CapturedPose {
   PoseSubject subject = PoseSubject::kBoard;
 };
 
-/// The need for white.png in a pose. Without it there is no board, but a plane can be measured.
+/// Whether a pose needs white.png. Without it the board is not visible, but a plane can be measured.
 enum class WhitePicture { kNeeded, kOptional };
 
-/// Looks through a folder of captures:
+/// Lists the captures in a folder:
 ///
 ///     DIR/pose_NN[/CAMERA]/white.png, and pattern.png or gray_00.png, gray_01.png ... with black.png
 ///
 /// @return the poses in the order of their names
-/// @errors kNotFound: no folder, no pose, no white.png (a Gray code always needs it) or nothing
-///         projected in a pose; the message names the file
+/// @errors kNotFound: no folder, no pose, no white.png (a Gray code always needs it) or no projected picture in a pose;
+///         the message names the file
 [[nodiscard]] Result<std::vector<CapturedPose>> list_captures(const std::filesystem::path& folder,
                                                               WhitePicture white = WhitePicture::kNeeded);
 
-/// The same, and after the poses the looks at the reference plane, in DIR/plane_NN, where there are any.
+/// Lists the captures, followed by the looks at the reference plane in DIR/plane_NN, if any.
 /// @param knows_plane  whether its print is known
-/// @errors kInvalidArgument: there are looks at a plane that is not known
+/// @errors kInvalidArgument: there are looks at an unknown plane
 [[nodiscard]] Result<std::vector<CapturedPose>> list_captures_with_planes(const std::filesystem::path& folder,
                                                                           bool knows_plane);
 
-/// The extension of a picture's file, in lower case: cameras write .JPG as well.
+/// The extension of a picture's file in lower case, because cameras also write .JPG.
 [[nodiscard]] std::string extension_of(const std::filesystem::path& file);
 
 /// The beginning of the folders' names: "pose_" or "plane_".

@@ -12,11 +12,11 @@
 
 namespace slsd {
 
-/// The pattern that was recorded beside captures, as pattern.toml, or the configured one.
+/// The pattern recorded beside the captures as pattern.toml, or else the configured one.
 /// @errors of the file, read_pattern() and configured_pattern()
 [[nodiscard]] Result<Pattern> captured_pattern(const std::filesystem::path& folder, const Configuration& configuration);
 
-/// Tells whether there is no picture of the pattern, but of a Gray code.
+/// Tells whether the poses have pictures of a Gray code, and none of the pattern.
 [[nodiscard]] bool captured_in_gray(const std::vector<CapturedPose>& poses);
 
 }  // namespace slsd

@@ -20,7 +20,7 @@ struct CapturedPictures {
   std::vector<GreyImage> coded;  ///< the pattern alone, or the Gray code
   std::optional<GreyImage> black;
 
-  /// Borrowed from here.
+  /// Views of the pictures in this object.
   [[nodiscard]] PosePictures views() const;
 };
 

@@ -16,11 +16,11 @@ namespace slsd {
 namespace {
 
 constexpr double kTiltedDeg = 15;
-constexpr double kCoverageEnough = 0.5;  // of an image; what the verdict calls good
+constexpr double kCoverageEnough = 0.5;  // share of an image; the verdict calls this good
 constexpr double kDistanceSpread = 1.15;
 constexpr std::size_t kUsualMin = 3;
 
-/// Towards which side of the camera's picture the board's face is turned.
+/// The side of the camera's picture that the board faces.
 std::size_t side_of(const BoardPlace& place) {
   const Eigen::Vector3d face = -place.normal;
   if (std::abs(face.x()) > std::abs(face.y())) return face.x() < 0 ? 0 : 1;
@@ -117,7 +117,7 @@ std::string PoseCollection::missing_tilt() const {
                      kSides[rarest]);
 }
 
-/// The emptiest place of the device whose image is covered least, where that is less than enough.
+/// The emptiest place of the device with the least coverage, if that is not enough.
 std::string PoseCollection::missing_place(double enough) const {
   Coverage least = projector_coverage(observations_);
   std::string device = "the projector's light";

@@ -12,16 +12,16 @@
 
 namespace slsd {
 
-/// The poses of a session so far, and what they lack.
+/// The poses of a session so far, and what is missing.
 /// @thread thread-bound
 class PoseCollection {
  public:
-  /// @param so_far  with every camera's name; sizes where poses were read from a record
-  /// @param subject  what they show; poses of something else are passed over
+  /// @param so_far  with every camera's name; with sizes if poses were read from a record
+  /// @param subject  what the poses show; others are skipped
   PoseCollection(const Board& board, const Observations& so_far, PoseSubject subject = PoseSubject::kBoard);
 
   /// The sizes of the cameras' pictures, in their order.
-  /// @errors kMismatch: the poses so far are of another size
+  /// @errors kMismatch: the poses so far have another size
   [[nodiscard]] Result<> set_sizes(const std::vector<GreyImage>& pictures);
 
   void add(PoseObservation pose);
@@ -29,11 +29,11 @@ class PoseCollection {
   [[nodiscard]] std::size_t size() const { return observations_.poses.size(); }
   [[nodiscard]] PoseSubject subject() const { return subject_; }
 
-  /// The pose that shows the board just so, to every camera that sees it now; empty where none does.
+  /// The earlier pose with the same view of the board in every camera that sees it now; empty if there is none.
   [[nodiscard]] std::string same_as(const BoardSightings& sightings) const;
   /// The median blur of a camera's views, px; 0 below three views.
   [[nodiscard]] double usual_blur_px(std::size_t camera) const;
-  /// The advice for the next pose, to help most: "tilt the board ...".
+  /// The most helpful advice for the next pose: "tilt the board ...".
   [[nodiscard]] std::string most_helpful() const;
 
  private:
@@ -46,7 +46,7 @@ class PoseCollection {
   Board board_;
   PoseSubject subject_;
   Observations observations_;
-  std::vector<Places> places_;  // one to a pose
+  std::vector<Places> places_;  // one for each pose
 };
 
 }  // namespace slsd

@@ -25,7 +25,7 @@ Result<PoseView> PoseObserver::observe(std::size_t camera, const PosePictures& p
                                : observe_pattern(pictures, board_, sighting,
                                                  readers_.try_emplace(camera, pattern_).first->second, *view);
   if (read) return view;
-  // Of a board that is at full level nothing can be read, and that is why.
+  // An overexposed board is unreadable; this reports that as the reason.
   const std::string light = excess_of_light(view->clipped_share);
   return light.empty() ? tl::unexpected(read.error()) : fail(ErrorCode::kNotFound, light);
 }

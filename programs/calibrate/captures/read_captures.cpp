@@ -57,7 +57,7 @@ Result<> check_files(const CaptureFiles& files, bool gray_code) {
               gray_code ? "has no gray_00.png ..., unlike other poses" : "has no pattern.png, unlike other poses");
 }
 
-/// Reads one pose after the other.
+/// Reads the poses one by one.
 class CaptureReader {
  public:
   CaptureReader(const std::vector<std::string>& names, bool gray_code, PoseObservers& observers,
@@ -88,7 +88,7 @@ class CaptureReader {
     return {};
   }
 
-  /// Checks what only all poses together show: the size of a camera's pictures, and patterns that belong to other
+  /// Checks what only all poses together show: the sizes of a camera's pictures, and patterns that belong to other
   /// poses.
   void compare() {
     take_usual_sizes();
@@ -104,7 +104,7 @@ class CaptureReader {
   ReadCaptures captures;
 
  private:
-  static constexpr std::size_t kDoubtsMax = 12;  // of more it is the light that hides the print
+  static constexpr std::size_t kDoubtsMax = 12;  // with more, the light hides the print
   struct Look {
     std::string pose;
     std::size_t camera;
@@ -141,7 +141,7 @@ class CaptureReader {
     report_(fmt::format("{}: not used: {}", name, reason));
   }
 
-  /// The size that most poses have; one of another costs that pose alone.
+  /// Takes the size of most poses; a pose with another size is left out.
   void take_usual_sizes() {
     auto& cameras = captures.observations.cameras;
     for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
@@ -170,7 +170,7 @@ class CaptureReader {
     }
   }
 
-  /// Rules out poses whose pattern's picture belongs to another doubtful pose: its print lies where that one's white
+  /// Rules out poses whose pattern picture belongs to another doubtful pose: its print lies where that pose's white
   /// picture has it.
   void name_swapped() {
     if (doubts_.size() < 2 || doubts_.size() > kDoubtsMax) return;
@@ -189,8 +189,8 @@ class CaptureReader {
     }
   }
 
-  /// Rules out poses whose pattern's picture is a copy: its print lies where another pose, with a pattern of its own,
-  /// has it.
+  /// Rules out poses whose pattern picture is a copy: its print lies where another pose, with a pattern of its own, has
+  /// it.
   void name_copied() {
     if (doubts_.size() > kDoubtsMax) return;
     for (const Look& doubt : doubts_) {
@@ -226,7 +226,7 @@ class CaptureReader {
   const std::function<void(const std::string&)>& report_;
   std::map<std::pair<std::string, std::size_t>, ImageSize> sizes_;  // of each look
   std::vector<Look> looks_;                                         // of a pattern
-  std::vector<Look> doubts_;  // those whose print does not show under their own pattern
+  std::vector<Look> doubts_;  // those whose print does not show in their own pattern picture
   std::size_t jpegs_ = 0;
 };
 

@@ -12,17 +12,17 @@
 
 namespace slsd {
 
-/// The observations in captures on disk, and the poses that show nothing of use.
+/// The observations in captures on disk, and the useless poses.
 struct ReadCaptures {
   Observations observations;
   std::vector<PoseReport> refused;
 };
 
-/// Reads the pictures of every pose and looks at them.
+/// Reads and observes the pictures of every pose.
 /// @param names   of the cameras, the first one first; a folder's name, or the only camera's
-/// @param observers  that of the plane where a capture is of it
-/// @param report  is told a line for each picture
-/// @errors kMismatch: pictures of different sizes; kNotFound: a folder of no camera
+/// @param observers  the plane's observer is used for captures of the plane
+/// @param report  receives a line for each picture
+/// @errors kMismatch: pictures of different sizes; kNotFound: a folder that matches no camera
 [[nodiscard]] Result<ReadCaptures> read_captures(const std::vector<CapturedPose>& poses,
                                                  const std::vector<std::string>& names, const ImageSize& projector,
                                                  bool gray_code, PoseObservers& observers,

@@ -18,12 +18,12 @@ namespace {
 
 constexpr double kFigurePx = 460;
 constexpr std::size_t kMaxShapes = 2500;
-constexpr double kArrowPx = 14;  // of a residual as long as the RMS
+constexpr double kArrowPx = 14;  // length of a residual equal to the RMS
 constexpr const char* kOutlying = "#d00";
 
 struct DrawnPoint {
   Eigen::Vector2d pixel;
-  Eigen::Vector2d residual_px;  ///< the model's pixel less the seen one
+  Eigen::Vector2d residual_px;  ///< the model's pixel minus the observed one
   std::size_t pose;
   bool outlying;
 };
@@ -36,7 +36,7 @@ void add_camera_points(const PoseView& view, const ViewResiduals& residuals, std
   }
 }
 
-/// Corners and symbols, which both count for what is covered.
+/// Adds corners and symbols; both count for coverage.
 void add_covered_points(const PoseView& view, const ViewResiduals& residuals, std::size_t pose, Points& points) {
   add_camera_points(view, residuals, pose, points);
   for (const ProjectedPoint& symbol : view.symbols) {
@@ -73,7 +73,7 @@ Points projector_points(const CalibrationOutcome& outcome) {
   return gather(outcome, add_projector_points);
 }
 
-// Few enough for a browser; evenly over all, every outlying one, and one at least of each cell.
+// Few enough for a browser: evenly distributed, every outlier, and at least one in each cell.
 Points thinned(const Points& points, const ImageSize& size) {
   const std::size_t step = 1 + points.size() / kMaxShapes;
   Points kept;
@@ -121,7 +121,7 @@ std::string residual_figure(const ImageSize& size, const Points& points, const s
   SvgFigure figure = figure_of(size);
   const double rms = rms_of(points);
   const double magnified = kArrowPx / figure.scale() / std::max(rms, 1e-6);
-  // Outlying points lie beneath the others, and say no more than where to: at their length they would hide all.
+  // Outliers lie beneath the others and show only a direction: at full length they would hide everything.
   for (const bool outlying : {true, false}) {
     const double longest = (outlying ? 1 : 8) * kArrowPx / figure.scale();
     for (const DrawnPoint& point : thinned(points, size)) {

@@ -8,17 +8,17 @@
 
 namespace slsd {
 
-/// The name of a camera in texts: its own name only if there are several cameras.
+/// How texts call a camera: with its own name only if there are several cameras.
 /// @thread reentrant
 [[nodiscard]] std::string camera_text(const CalibrationOutcome& outcome, const std::string& name);
 
-/// Draws the places of points seen in a camera's image, or the projector's. Each pose has a colour; cells without
-/// points are red.
+/// Draws where points were seen in the image of a camera or the projector. Each pose has a colour; cells without points
+/// are red.
 /// @thread reentrant
 [[nodiscard]] std::string camera_coverage_figure(const CalibrationOutcome& outcome, std::size_t camera);
 [[nodiscard]] std::string projector_coverage_figure(const CalibrationOutcome& outcome);
 
-/// Draws the calibration's error at each point, as magnified arrows. Outlying points are red and take no part.
+/// Draws the calibration's error at each point, as magnified arrows. Outliers are red and were left out.
 /// @thread reentrant
 [[nodiscard]] std::string camera_residual_figure(const CalibrationOutcome& outcome, std::size_t camera);
 [[nodiscard]] std::string projector_residual_figure(const CalibrationOutcome& outcome);

@@ -35,7 +35,7 @@ svg { font: 11px sans-serif; max-width: 100%; height: auto } svg path { fill: no
 }
 )";
 
-/// A table that is scrolled by itself where the page is narrower.
+/// A table with its own scroll bar if the page is narrower.
 std::string table_of(const std::string& rows) {
   return "<div class='wide'><table>\n" + rows + "</table></div>\n";
 }
@@ -88,7 +88,7 @@ std::string plane_cells(const std::optional<ViewCheck>& check) {
   return fmt::format("<td>{:.3f}</td><td>{:.3f}</td>", check->plane_rms_mm, check->plane_sigma_mm) + distances;
 }
 
-/// The results of the looks at the reference plane, before they took part and after.
+/// The results of the looks at the reference plane, before and after they took part.
 std::string planes_of(const CalibrationOutcome& outcome) {
   if (outcome.planes.empty()) return {};
   std::string html =
@@ -130,7 +130,7 @@ std::string rig_figures(const CalibrationOutcome& outcome) {
                              depth;
 }
 
-/// A row's words over all columns but the first, which a narrow screen shows whole.
+/// A row's text across all columns except the first; a narrow screen shows it whole.
 std::string words_of(const std::string& words) {
   return "<td class='words' colspan='7'><div class='why'>" + escaped(words) + "</div></td></tr>\n";
 }
@@ -165,7 +165,7 @@ std::string poses_of(const CalibrationOutcome& outcome) {
          table_of(html);
 }
 
-/// The unit of a parameter, by its name: "fx" and "cy" are pixels, "k1" and "p1" have none, turns are radians, places
+/// The unit of a parameter by its name: "fx" and "cy" are pixels, "k1" and "p1" have none, turns are radians, positions
 /// mm.
 std::string_view unit_of(std::string_view parameter) {
   if (parameter.starts_with("f") || parameter.starts_with("c")) return "px";

@@ -9,15 +9,14 @@
 
 namespace slsd {
 
-/// A calibration as a page for a browser, by itself in one file, with pictures and without scripts: the verdict and
-/// what to shoot next, how flat the board is, the errors, what the poses cover, the residuals of every device, the
-/// poses in space, the depth's uncertainty, each parameter with its deviation, and each pose, with the reason where it
-/// was left out.
-/// @param refused  why it was not put in force; empty: it was
+/// A calibration as a single-file page for a browser, with pictures and without scripts. Contains the verdict and what
+/// to capture next, the board's flatness, the errors, the coverage, the residuals of every device, the poses in space,
+/// the depth's uncertainty, each parameter with its deviation, and each pose, with the reason if it was left out.
+/// @param refused  why the calibration was refused; empty: it is in force
 /// @thread reentrant
 [[nodiscard]] std::string report_html(const CalibrationOutcome& outcome, const std::string& refused = {});
 
-/// A session that gave no calibration, as a page: why, and which poses took no part for which reason.
+/// A page about a session that gave no calibration: why, and which poses were left out for which reason.
 /// @thread reentrant
 [[nodiscard]] std::string refusal_html(const std::string& why, const std::vector<PoseReport>& poses);
 

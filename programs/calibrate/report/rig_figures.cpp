@@ -16,16 +16,16 @@ namespace slsd {
 namespace {
 
 constexpr double kRigPx = 460;
-constexpr double kAbovePx = -8;  // of a label's foot from its dot
+constexpr double kAbovePx = -8;  // offset of a label from its dot
 constexpr double kBelowPx = 16;
-constexpr double kNamePx = 60, kLinePx = 13;  // a device's name: about so wide, and so high
-constexpr double kFlatMm = 0.1;               // of a board, what is drawn in full colour
-constexpr double kDeviceMm = 120;             // how far before a device its image is drawn
+constexpr double kNamePx = 60, kLinePx = 13;  // approximate width and height of a device's name
+constexpr double kFlatMm = 0.1;               // deviation of a board that has full colour
+constexpr double kDeviceMm = 120;             // distance between a device and its drawn image
 
 using Quad = std::array<Eigen::Vector3d, 4>;
 using Projection = Eigen::Matrix<double, 2, 3>;
 
-// To the right and down in the figure: z to the right; from above x up, from the right y down.
+// The figure's right and down. Right is z; from above, up is x; from the right, down is y.
 Projection from_above() {
   return (Projection() << 0, 0, 1, -1, 0, 0).finished();
 }
@@ -101,7 +101,7 @@ std::string poses_figure(const CalibrationOutcome& outcome, const Projection& lo
     draw_quad(figure, look, device.image, "#333", 1);
     for (const auto& corner : device.image) figure.line(look * device.eye, look * corner, "#333", 1);
     Eigen::Vector2d at = look * device.image[0] + 0.15 * border;
-    // Below the names that stand where it would.
+    // Placed below names that are already there.
     for (const Eigen::Vector2d& other : named) {
       const Eigen::Vector2d apart = figure.scale() * (at - other).cwiseAbs();
       if (apart.x() < kNamePx && apart.y() < kLinePx) at.y() = other.y() + kLinePx / figure.scale();
@@ -119,7 +119,7 @@ double largest_mm(const std::vector<DepthUncertainty>& depths) {
   return largest;
 }
 
-// Heights are drawn so that the largest fills the figure.
+// The largest height fills the figure.
 void draw_curve(SvgFigure& figure, const std::vector<DepthUncertainty>& depths, double DepthUncertainty::*what,
                 double unit, std::string_view colour, double label_px) {
   for (std::size_t i = 0; i < depths.size(); ++i) {

@@ -8,18 +8,18 @@
 
 namespace slsd {
 
-/// The devices and the poses that were used, from above and from the right, in the rig's frame.
+/// Draws the devices and the used poses from above and from the right, in the rig's frame.
 /// @thread reentrant
 [[nodiscard]] std::string poses_from_above(const CalibrationOutcome& outcome);
 [[nodiscard]] std::string poses_from_the_right(const CalibrationOutcome& outcome);
 
-/// The board's shape: how far each place lies off the board's plane.
-/// @return empty where nothing of the board was seen
+/// Draws the board's shape: the distance of each point from the board's plane.
+/// @return empty if no board was seen
 /// @thread reentrant
 [[nodiscard]] std::string board_figure(const CalibrationOutcome& outcome);
 
-/// Draws the possible error of a depth, over the working range.
-/// @return empty where it is not known
+/// Draws the possible error of depth over the working range.
+/// @return empty if it is unknown
 /// @thread reentrant
 [[nodiscard]] std::string depth_figure(const CalibrationOutcome& outcome);
 

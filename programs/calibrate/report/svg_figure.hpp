@@ -9,19 +9,19 @@
 
 namespace slsd {
 
-/// Text as HTML and SVG show it.
+/// Escapes text for HTML and SVG.
 /// @thread reentrant
 [[nodiscard]] std::string escaped(std::string_view text);
 
-/// A colour for each pose, one unlike the next: "hsl(...)".
+/// A colour for each pose, distinct from the next: "hsl(...)".
 /// @thread reentrant
 [[nodiscard]] std::string pose_colour(std::size_t pose);
 
-/// Maps the places of a drawing onto a figure, the same scale both ways, and places shapes there.
+/// Maps a drawing's coordinates onto a figure, with the same scale in both directions, and draws shapes there.
 /// @thread thread-bound
 class SvgFigure {
  public:
-  /// @param first, last  corners of what is drawn, in its own units; x to the right, y down
+  /// @param first, corners of the drawn area, in its own units; x to the right, y down
   /// @param width_px     of the figure; its height follows
   SvgFigure(const Eigen::Vector2d& first, const Eigen::Vector2d& last, double width_px);
 
@@ -31,7 +31,7 @@ class SvgFigure {
   void frame();
   void text(const Eigen::Vector2d& at, std::string_view words, std::string_view anchor = "start");
 
-  /// Figure px to a unit of the drawing.
+  /// Figure px for one unit of the drawing.
   [[nodiscard]] double scale() const { return scale_; }
   [[nodiscard]] std::string str(std::string_view caption) const;
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kPointsMin = 4;
 
-/// Nothing: too few points are seen both times.
+/// Empty if too few points are seen both times.
 std::optional<double> moved_px(const BoardSighting& before, const BoardSighting& after) {
   double sum = 0;
   std::size_t count = 0;

@@ -9,10 +9,10 @@
 
 namespace slsd {
 
-/// The sighting of the board by each camera, or the reason for seeing none.
+/// Each camera's sighting of the board, or the reason why it sees none.
 using BoardSightings = std::vector<Result<BoardSighting>>;
 
-/// The sight of all cameras at one moment, one entry to a camera.
+/// What all cameras see at one moment, one entry for each camera.
 struct BoardLook {
   std::vector<GreyImage> pictures;
   BoardSightings sightings;
@@ -25,8 +25,8 @@ struct BoardLook {
 [[nodiscard]] bool is_seen(const BoardSightings& sightings);
 
 /// The movement of the board's points in the image: root mean square over the points seen both times, in the camera
-/// where they moved most.
-/// @return px; infinite where no camera sees the board both times
+/// with the largest movement.
+/// @return px; infinite if no camera sees the board both times
 /// @thread reentrant
 [[nodiscard]] double moved_px(const BoardSightings& before, const BoardSightings& after);
 

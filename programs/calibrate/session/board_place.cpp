@@ -11,7 +11,7 @@
 namespace slsd {
 namespace {
 
-constexpr double kFocalGuess = 1.2;  // of the image's longer side
+constexpr double kFocalGuess = 1.2;  // relative to the image's longer side
 constexpr double kCentreMoved = 1.0 / 6;
 constexpr double kTilted = 8 * std::numbers::pi / 180;
 constexpr double kTurned = 25 * std::numbers::pi / 180;

@@ -15,8 +15,8 @@
 
 namespace slsd {
 
-/// The place of a board before a camera that is not calibrated yet. Its focal length is guessed, so that angles and
-/// distances serve only to compare poses.
+/// The place of a board in front of an uncalibrated camera. Its focal length is guessed, so angles and distances serve
+/// only to compare poses.
 struct BoardPlace {
   Eigen::Vector2d centre;  ///< the board's centre, as a share of the image's width and height
   Eigen::Vector3d normal;  ///< the board's normal, away from the camera, in the camera's frame, of length 1
@@ -27,13 +27,13 @@ struct BoardPlace {
   [[nodiscard]] double tilt_deg() const;
 };
 
-/// @param ties  places on the board and their pixels
-/// @return nothing where they do not determine it
+/// @param ties  points on the board and their pixels
+/// @return nothing if the points do not determine it
 /// @thread reentrant
 [[nodiscard]] std::optional<BoardPlace> place_of(std::span<const Tie> ties, const Board& board, const ImageSize& size);
 
-/// Tells whether two poses are so near each other that the second tells nothing new. Their centres are within a sixth
-/// of the image, and tilt, turn and distance are alike.
+/// Tells whether two poses are so similar that the second adds no information. Their centres are within a sixth of the
+/// image, and tilt, turn and distance are alike.
 /// @thread reentrant
 [[nodiscard]] bool are_alike(const BoardPlace& a, const BoardPlace& b);
 

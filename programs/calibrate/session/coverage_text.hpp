@@ -8,13 +8,13 @@
 
 namespace slsd {
 
-/// Draws the poses' coverage of each camera's picture and of the projector's image, with letters side by side:
+/// Draws the coverage of each camera's picture and of the projector's image side by side, in letters:
 ///
 ///     camera left       projector
 ///     . . o # # o . .   . o # # # # o .
 ///
-/// where . is nothing, o a few points and # many.
-/// @return lines, each ended
+/// In the drawing, . means no points, o a few and # many.
+/// @return lines, each with its line end
 /// @thread reentrant
 [[nodiscard]] std::string coverage_text(const Observations& observations);
 

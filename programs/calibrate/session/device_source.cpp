@@ -11,9 +11,9 @@ namespace slsd {
 namespace {
 
 constexpr int kLostMax = 5;
-constexpr int kPatienceMs = 10'000;  // cameras on a network take seconds to open
-constexpr double kLatencyMs = 200;   // covers what projectors take for their image processing, where nobody measured it
-constexpr int kSkewMs = 10'000;      // the board is held still: exposures need not be together
+constexpr int kPatienceMs = 10'000;  // network cameras take seconds to open
+constexpr double kLatencyMs = 200;   // covers the image processing of unmeasured projectors
+constexpr int kSkewMs = 10'000;      // the board is still, so exposures need not coincide
 
 bool only_this_frame(ErrorCode code) {
   return code == ErrorCode::kFrameDropped || code == ErrorCode::kFrameTorn || code == ErrorCode::kFrameStale ||

@@ -12,11 +12,11 @@
 
 namespace slsd {
 
-/// The configured projector and cameras. A device that is lost is opened again.
+/// The configured projector and cameras. Lost devices are reopened.
 /// @thread thread-bound; each camera has a thread of its own
 class DeviceSource final : public PoseSource {
  public:
-  /// Begins to open the devices; grab() waits until they are.
+  /// Begins to open the devices; grab() waits for them.
   /// @errors kUnsupported: this build lacks a driver; kNotFound: no camera is configured
   [[nodiscard]] static Result<std::unique_ptr<DeviceSource>> create(const Configuration& configuration);
 

@@ -9,13 +9,13 @@
 
 namespace slsd {
 
-/// A look's line for the terminal: for each camera "left: 60 corners, edges 0.6 px, clipped 0 %", or why it sees no
+/// A look as a line for the terminal. For each camera: "left: 60 corners, edges 0.6 px, clipped 0 %", or why it sees no
 /// board.
 /// @param cameras  their names
 /// @thread reentrant
 [[nodiscard]] std::string look_text(const BoardSightings& sightings, const std::vector<std::string>& cameras);
 
-/// The reasons why cameras see no board, a line to each, begun by a line end.
+/// The reasons why cameras see no board, one line each, each after a line end.
 /// @thread reentrant
 [[nodiscard]] std::string unseen_text(const BoardSightings& sightings, const std::vector<std::string>& cameras);
 

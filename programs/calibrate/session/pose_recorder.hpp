@@ -13,19 +13,19 @@
 
 namespace slsd {
 
-/// Keeps the pictures of a session, losslessly, in the folders that list_captures() reads. A pose is there whole or not
+/// Stores the pictures of a session losslessly in the folders that list_captures() reads. A pose is stored whole or not
 /// at all.
 /// @thread thread-bound
 class PoseRecorder {
  public:
-  /// @param folder   made with the first pose
-  /// @param cameras  names; with more than one, each has a folder of its own in a pose's
-  /// @errors kInvalidArgument: a camera's name can be no folder's
+  /// @param folder   created with the first pose
+  /// @param cameras  names; with several cameras, each has a folder within a pose's
+  /// @errors kInvalidArgument: a camera's name cannot be a folder's name
   [[nodiscard]] static Result<PoseRecorder> create(std::filesystem::path folder, std::vector<std::string> cameras,
                                                    const Pattern& pattern);
 
-  /// @param pictures  one to a camera
-  /// @param views     those cameras whose pictures are kept
+  /// @param pictures  one for each camera
+  /// @param views     the cameras whose pictures are stored
   /// @return the pose's name, "pose_NN" or "plane_NN"
   /// @errors of the files, and of encode_png()
   [[nodiscard]] Result<std::string> keep(PoseSubject subject, const std::vector<CapturedPictures>& pictures,
@@ -41,7 +41,7 @@ class PoseRecorder {
   std::filesystem::path folder_;
   std::vector<std::string> cameras_;
   std::string pattern_;  ///< a pattern file's text
-  bool begun_ = false;   ///< the folder is there, and the pattern in it
+  bool begun_ = false;   ///< the folder exists and contains the pattern
 };
 
 }  // namespace slsd

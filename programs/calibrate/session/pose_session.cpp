@@ -12,10 +12,10 @@
 namespace slsd {
 namespace {
 
-constexpr double kStillPx = 0.3;  // between two looks
-constexpr double kGonePx = 5;     // from where a pose was handled: it is another one
+constexpr double kStillPx = 0.3;  // movement between two looks
+constexpr double kGonePx = 5;     // movement that makes a handled pose a new one
 
-/// The board's place in the projector's image: the operator looks at the board.
+/// The board's place in the projector's image, because the operator looks at the board.
 std::optional<Eigen::Vector2d> lit_place(const std::vector<PoseView>& views) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   std::size_t count = 0;
@@ -68,7 +68,7 @@ Result<> PoseSession::step() {
   return attempt(last_);
 }
 
-/// Devices that fail are opened again; what fails for long ends the session.
+/// Failing devices are reopened; a long failure ends the session.
 Result<> PoseSession::bear(const Error& error) {
   if (!begun_) return tl::unexpected(error);
   const MonotonicTime now = parts_.time.now();
@@ -118,7 +118,7 @@ Result<> PoseSession::attempt(const BoardSightings& sightings) {
   show(Sign::kHold);
   auto before = parts_.taker.look();
   if (!before) return bear(before.error());
-  // It moved at the sign: nobody has to be told.
+  // The board moved at the sign: no message is needed.
   if (!(moved_px(sightings, before->sightings) < kStillPx)) return {};
   BoardSightings held = before->sightings;
   auto trial = parts_.taker.take(std::move(*before), parts_.poses);

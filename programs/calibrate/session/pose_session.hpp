@@ -19,12 +19,12 @@
 namespace slsd {
 
 struct PoseSessionOptions {
-  std::size_t poses = 12;                         ///< number at which the session ends, with earlier poses
-  std::chrono::milliseconds sign{500};            ///< time for which a sign is shown
-  std::chrono::milliseconds after_refusal{2000};  ///< pause before a board that is still there is tried again
-  std::chrono::seconds patience{60};              ///< until advice, without a board; until the end, without the devices
-  std::chrono::milliseconds retry{500};           ///< pause between two tries of devices that fail
-  bool begun = false;  ///< the devices have given a picture before: they are worth patience at once
+  std::size_t poses = 12;                         ///< number at which the session ends, including earlier poses
+  std::chrono::milliseconds sign{500};            ///< how long a sign is shown
+  std::chrono::milliseconds after_refusal{2000};  ///< pause before another attempt with the same board
+  std::chrono::seconds patience{60};     ///< time until advice without a board; or until the end without the devices
+  std::chrono::milliseconds retry{500};  ///< pause between two attempts with failing devices
+  bool begun = false;                    ///< the devices have given a picture before, so patience applies at once
 };
 
 /// The progress of a session, for displays other than a terminal.
@@ -36,7 +36,7 @@ struct PoseProgress {
   const BoardSightings& sightings;
 };
 
-/// The objects that a session works with; each outlives it.
+/// The objects that a session works with; each must outlive it.
 struct PoseSessionParts {
   PoseSource& source;
   PoseTaker& taker;
@@ -48,7 +48,7 @@ struct PoseSessionParts {
   std::function<void(const PoseProgress&)> progress = [](const PoseProgress&) {};
 };
 
-/// Takes poses of a board that a person holds, without a key pressed:
+/// Takes poses of a board that a person holds, without any key:
 ///
 ///     white ---> board seen, still for two looks ---> "hold" ---> white, pattern, white ---> kept, "taken"
 ///       ^  \-> not seen, moves                |                          \-> refused, "again"
@@ -60,9 +60,9 @@ class PoseSession {
  public:
   PoseSession(PoseSessionParts parts, const PoseSessionOptions& options);
 
-  /// Runs the session until there are poses enough, or it is interrupted.
-  /// @errors of the recorder; those of the devices: at once where they do not begin, else after their patience;
-  ///         kMismatch: the cameras are not those of the poses so far
+  /// Runs the session until there are enough poses, or until an interrupt.
+  /// @errors of the recorder; of the devices: at once if they never start, else after their patience; kMismatch: the
+  ///         cameras differ from those of the earlier poses
   [[nodiscard]] Result<> run();
 
  private:
@@ -77,11 +77,11 @@ class PoseSession {
 
   PoseSessionParts parts_;
   PoseSessionOptions options_;
-  BoardSightings last_;                    // of the look before
-  std::optional<BoardSightings> handled_;  // those that need no second attempt until the board moves
+  BoardSightings last_;                    // of the previous look
+  std::optional<BoardSightings> handled_;  // those that need no new attempt until the board moves
   MonotonicTime next_attempt_{};
-  MonotonicTime tell_at_{};                  // when there has been no board for long
-  std::optional<MonotonicTime> bear_until_;  // while the devices fail
+  MonotonicTime tell_at_{};                  // time for advice that no board was seen for long
+  std::optional<MonotonicTime> bear_until_;  // set while the devices fail
   bool begun_;                               // the devices have given a picture
   bool sized_ = false;                       // the sizes of the cameras' pictures are known
   Eigen::Vector2d sign_centre_px_;

@@ -12,7 +12,7 @@
 
 namespace slsd {
 
-/// The projector and the cameras, as a session of calibrating needs them.
+/// The projector and the cameras of a calibration session.
 /// @thread thread-bound
 class PoseSource {
  public:
@@ -22,11 +22,11 @@ class PoseSource {
   [[nodiscard]] virtual const std::vector<std::string>& cameras() const = 0;
   [[nodiscard]] virtual ImageSize projector() const = 0;
 
-  /// Shows an image of the projector's size from now on. Where the projector fails, grab() says so.
+  /// Shows an image of the projector's size from now on. If the projector fails, grab() reports it.
   virtual void show(const Grey8& image) = 0;
 
-  /// A picture of each camera, exposed while the image was visible, after the call.
-  /// @errors kTimeout: a device is not ready; those of Rig::capture(). It may be called again
+  /// Takes a picture with each camera, exposed after the call while the image is visible.
+  /// @errors kTimeout: a device is not ready; those of Rig::capture(). May be called again
   [[nodiscard]] virtual Result<std::vector<GreyImage>> grab() = 0;
 };
 

@@ -14,31 +14,31 @@
 
 namespace slsd {
 
-/// A pose that was tried.
+/// An attempted pose.
 struct PoseTrial {
   std::vector<PoseView> views;             ///< one for each camera that saw enough; empty: the pose is refused
-  std::vector<CapturedPictures> pictures;  ///< one to a camera
-  std::vector<std::string> lacks;          ///< reasons why a camera's view does not count, a sentence each
+  std::vector<CapturedPictures> pictures;  ///< one for each camera
+  std::vector<std::string> lacks;          ///< reasons why a camera's view does not count, one sentence each
   std::vector<std::string> advice;         ///< possible improvements
-  std::chrono::nanoseconds work{};         ///< the machine's own, without waiting for devices
+  std::chrono::nanoseconds work{};         ///< computing time, without waits for devices
 
   [[nodiscard]] bool refused() const { return views.empty(); }
   /// The reasons in one line.
   [[nodiscard]] std::string why() const;
 };
 
-/// Takes a pose: pattern or Gray code, then white again to see whether the board was held still.
+/// Takes a pose: the pattern or a Gray code, then white again to check that the board was held still.
 /// @thread thread-bound
 class PoseTaker {
  public:
-  /// @param images  of the projector's size: the pattern alone, or the Gray code, for which black is shown too
+  /// @param images  in the projector's size: the pattern alone, or the Gray code, which also needs black
   PoseTaker(PoseSource& source, PoseObserver& observer, std::vector<Grey8> images, bool gray_code);
 
-  /// White light, and a look at the board in it. @errors of PoseSource::grab()
+  /// Shows white light and looks at the board. @errors of PoseSource::grab()
   [[nodiscard]] Result<BoardLook> look();
 
   /// @param before  a look() at the board, held still
-  /// @param taken   the poses so far, against which blur is judged
+  /// @param taken   the poses so far, as a reference for blur
   /// @errors of PoseSource::grab()
   [[nodiscard]] Result<PoseTrial> take(BoardLook before, const PoseCollection& taken);
 

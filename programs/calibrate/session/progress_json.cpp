@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kPointsMax = 60;  // of a board, to be drawn
+constexpr std::size_t kPointsMax = 60;  // drawn points of a board
 
 json coverage_json(const Coverage& coverage) {
   return {{"columns", kCoverageColumns}, {"rows", kCoverageRows}, {"counts", coverage.counts}};

@@ -12,11 +12,11 @@
 
 namespace slsd {
 
-/// The progress of a session for a page that draws it: the number of poses, and each camera's present view of the
-/// board. Grids count the points seen so far in the cameras' pictures and in the projector's.
+/// The progress of a session for a page: the number of poses, and each camera's current view of the board. Grids count
+/// the points seen so far in the pictures of the cameras and the projector.
 [[nodiscard]] nlohmann::json progress_json(const PoseProgress& progress);
 
-/// The verdict on a calibration, with its reasons and what to do.
+/// The verdict on a calibration, with its reasons and advice.
 [[nodiscard]] nlohmann::json outcome_json(const CalibrationOutcome& outcome);
 
 }  // namespace slsd

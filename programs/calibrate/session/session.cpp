@@ -35,11 +35,11 @@ struct Preparation {
   Configuration configuration;
   Board board;
   std::optional<Board> plane;
-  path file;    // where the calibration is kept
-  path folder;  // where the pictures are
+  path file;    // file of the calibration
+  path folder;  // folder of the pictures
   Pattern pattern;
   path in_force;                         // the calibration that a worse one must not replace; empty: none
-  std::unique_ptr<SocketSource> source;  // that of a running service, where it has the devices
+  std::unique_ptr<SocketSource> source;  // the devices of a running service, if it has them
 };
 
 Result<Preparation> prepare(const CalibrateRequest& request) {
@@ -49,7 +49,7 @@ Result<Preparation> prepare(const CalibrateRequest& request) {
   if (request.planes < kPlanesMin || request.planes > kPosesMax) {
     return fail(ErrorCode::kInvalidArgument, fmt::format("must be {} to {}", kPlanesMin, kPosesMax), "--planes");
   }
-  std::ostringstream untold;  // whoever asks a running service asks it, too, what was set
+  std::ostringstream untold;  // dropped: a running service reports its settings itself
   auto configuration =
       load_configuration_in_force(request.configuration_file, request.socket.empty() ? std::cout : untold);
   if (!configuration) return tl::unexpected(configuration.error());
@@ -91,7 +91,7 @@ void print(const nlohmann::json& told) {
   print(told.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace));
 }
 
-/// @param begun  the devices have given pictures already
+/// @param begun  the devices have already given pictures
 Result<> take_poses(const CalibrateRequest& request, const Preparation& prepared, PoseSource& source,
                     PoseObserver& observer, PoseRecorder& recorder, PoseCollection& poses, bool begun) {
   if (Interrupt::came()) return {};
@@ -109,7 +109,7 @@ Result<> take_poses(const CalibrateRequest& request, const Preparation& prepared
   return PoseSession(std::move(parts), options).run();
 }
 
-/// The poses, then the looks at the reference plane; what was recorded before is among them.
+/// Takes the poses, then the looks at the reference plane; includes those recorded earlier.
 Result<Observations> take_all(const CalibrateRequest& request, const Preparation& prepared, PoseSource& source,
                               PoseObservers& observers, PoseRecorder& recorder, const Observations& recorded) {
   PoseCollection poses(prepared.board, recorded);

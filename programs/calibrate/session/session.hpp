@@ -7,11 +7,11 @@
 
 namespace slsd {
 
-/// slsd --calibrate: takes poses with the configured projector and cameras until there are enough or a signal comes,
-/// records them, calibrates, and keeps the calibration. The service must not run, as it owns the devices.
+/// Carries out slsd --calibrate. Takes poses with the configured devices until there are enough or a signal comes,
+/// stores them, calibrates, and keeps the calibration. The service must not run, because it owns the devices.
 /// @errors of the configuration, the board, the devices, the files and calibrate(); kInvalidArgument: the number of
-///         poses; kCancelled: it was ended with too few poses. The calibration in force stays as it is
-/// @thread that of the projector: main
+///         poses; kCancelled: interrupted with too few poses. On errors, the calibration in force stays
+/// @thread the projector's: main
 [[nodiscard]] Result<> calibrate_by_session(const CalibrateRequest& request);
 
 }  // namespace slsd

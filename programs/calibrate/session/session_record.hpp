@@ -19,15 +19,15 @@ namespace slsd {
 /// The folder of a session's pictures: the requested one, or calibration-TIME beside the calibration file.
 [[nodiscard]] std::filesystem::path record_folder(const CalibrateRequest& request, const std::filesystem::path& file);
 
-/// Tells whether the folder holds poses, so that a session goes on with them.
+/// Tells whether the folder contains poses, so that a session continues them.
 [[nodiscard]] bool holds_poses(const std::filesystem::path& folder);
 
-/// The pattern that the poses so far were taken with, or the configured one.
-/// @errors of the files; kMismatch: the pattern recorded is not of the configured projector's size
+/// The pattern of the earlier poses, or else the configured one.
+/// @errors of the files; kMismatch: the recorded pattern is for another projector size
 [[nodiscard]] Result<Pattern> session_pattern(const std::filesystem::path& folder, const Configuration& configuration);
 
-/// Reads the observations of the poses so far, and of the looks at the reference plane. Empty if there are none.
-/// @errors of list_captures_with_planes() and read_captures(); kMismatch: the poses so far are of the other code
+/// Reads the observations of the earlier poses, and of the looks at the reference plane. Empty if there are none.
+/// @errors of list_captures_with_planes() and read_captures(); kMismatch: the earlier poses use the other code
 [[nodiscard]] Result<ReadCaptures> read_record(const std::filesystem::path& folder,
                                                const std::vector<std::string>& cameras, const ImageSize& projector,
                                                bool gray_code, PoseObservers& observers,

@@ -10,24 +10,24 @@
 
 namespace slsd {
 
-/// The output of a session to a person: lines that stay, and below them one that is rewritten. A pipe or a file gets
-/// that one as a line of its own when its state changes, every two seconds at most.
+/// A session's output for a person: permanent lines, and below them a live line that is rewritten. In a pipe or a file,
+/// the live line becomes a new line when its state changes, at most every two seconds.
 /// @thread thread-bound
 class SessionTerminal {
  public:
-  /// @param out      outlives this
-  /// @param columns  to which the live line is cut; 0: what is written cannot be rewritten; kNoLive: it is left out
+  /// @param out      must outlive this object
+  /// @param columns  the live line is cut to this; 0: lines cannot be rewritten; kNoLive: omit the live line
   SessionTerminal(std::ostream& out, int columns, std::function<MonotonicTime()> now)
       : out_(out), columns_(columns), now_(std::move(now)) {}
 
   static constexpr int kNoLive = -1;
 
-  /// The width of the standard output; 0 if it is no terminal.
+  /// The width of standard output; 0 if it is not a terminal.
   [[nodiscard]] static int columns_of_stdout();
 
-  /// @param state  what of the text is worth a line of its own
+  /// @param state  the part of the text whose change deserves a new line
   void live(const std::string& text, const std::string& state);
-  /// Writes one line or more, without the last line's end.
+  /// Writes one or more lines; the last without its line end.
   void say(const std::string& text);
 
  private:

@@ -14,8 +14,8 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double kHalfHeight = 0.2;  // of the projector's height
-constexpr double kStroke = 0.3;      // of the half height
+constexpr double kHalfHeight = 0.2;  // share of the projector's height
+constexpr double kStroke = 0.3;      // share of the half height
 constexpr Rgb kWhite{255, 255, 255}, kDark{0, 0, 0};
 
 /// Strokes as polylines, in a square from -1 to 1.

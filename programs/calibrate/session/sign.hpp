@@ -9,15 +9,15 @@
 
 namespace slsd {
 
-/// The projector's signs to the operator, who looks at the board and not at the terminal.
+/// The projector's signs to the operator, who looks at the board, not at the terminal.
 enum class Sign {
-  kHold,   ///< two bars: keep it still
-  kTaken,  ///< a tick: the pose is taken, go on to the next
+  kHold,   ///< two bars: keep the board still
+  kTaken,  ///< a tick: the pose was taken, go on
   kAgain,  ///< a turning arrow: not taken
 };
 
-/// A large dark sign on white, so that the board stays lit.
-/// @param centre_px  where on the projector's image; moved so that all of the sign is in it
+/// A large dark sign on white, which keeps the board lit.
+/// @param centre_px  place in the projector's image; moved so that the whole sign fits
 /// @thread reentrant
 [[nodiscard]] Grey8 draw_sign(Sign sign, const ImageSize& projector, const Eigen::Vector2d& centre_px);
 

@@ -17,11 +17,11 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 
-constexpr int kTimeoutMs = 10'000;  // cameras on a network take seconds to open
+constexpr int kTimeoutMs = 10'000;  // network cameras take seconds to open
 constexpr auto kPatience = 30s;
-constexpr auto kLatency = 200ms;  // covers what projectors take for their image processing, where nobody measured it
+constexpr auto kLatency = 200ms;  // covers the image processing of unmeasured projectors
 
-/// The service's error as one of ours, by its name.
+/// Converts the service's error to ours, by its name.
 Error error_of(const json& told) {
   const std::string name = told.value("/data/name"_json_pointer, std::string());
   ErrorCode code = ErrorCode::kIo;
@@ -74,7 +74,7 @@ void SocketSource::show(const Grey8& image) {
   if (wanted_ == image) return;
   wanted_ = image;
   shown_ = false;
-  (void)show_now();  // where it fails the next grab() tries again, and says so
+  (void)show_now();  // if this fails, the next grab() tries again and reports it
 }
 
 Result<> SocketSource::show_now() {
@@ -102,7 +102,7 @@ Result<std::vector<GreyImage>> SocketSource::grab() {
     const auto frame =
         ask("frame", {{"camera", name}, {"format", "raw"}, {"as_shown", true}, {"timeout_ms", kTimeoutMs}});
     if (!frame) {
-      shown_ = false;  // whatever happened to the service may have happened to its picture
+      shown_ = false;  // after a failure of the service, its picture is uncertain
       return tl::unexpected(frame.error());
     }
     const auto image = frame->image(frame->message["result"]);

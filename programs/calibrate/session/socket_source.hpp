@@ -13,12 +13,12 @@
 
 namespace slsd {
 
-/// The projector and the cameras of a running service, which keeps them: pictures are shown by `project`, and taken by
-/// `frame`, one camera after the other, as the board is held still.
+/// The projector and the cameras of a running service, which keeps them. `project` shows pictures; `frame` takes them
+/// with one camera after another, while the board is held still.
 /// @thread thread-bound
 class SocketSource final : public PoseSource {
  public:
-  /// @errors of Connection::open(), and of the service; kNotFound: it has no camera
+  /// @errors of Connection::open(), and of the service; kNotFound: the service has no camera
   [[nodiscard]] static Result<std::unique_ptr<SocketSource>> create(const std::filesystem::path& socket);
 
   [[nodiscard]] const std::vector<std::string>& cameras() const override { return names_; }
@@ -26,9 +26,9 @@ class SocketSource final : public PoseSource {
   void show(const Grey8& image) override;
   [[nodiscard]] Result<std::vector<GreyImage>> grab() override;
 
-  /// The pattern that is in force, as a file has it.
+  /// The pattern in force, as a file's text.
   [[nodiscard]] const std::string& pattern() const { return pattern_; }
-  /// The calibration file that is in force; empty: none.
+  /// The calibration file in force; empty: none.
   [[nodiscard]] const std::filesystem::path& calibration() const { return calibration_; }
   /// The status of the devices.
   [[nodiscard]] const RigStatus& status() const { return status_; }
