@@ -38,10 +38,10 @@ using std::filesystem::path;
 constexpr std::size_t kMaxLatencyBytes = 1 << 20;
 constexpr std::size_t kLongestProblem = 1000;
 constexpr auto kOpenTime = std::chrono::seconds(30);
-constexpr int kDenseRuns = 3;                  // the first has buffers to make
-constexpr std::size_t kCloudBytesAPixel = 31;  // the map's 10 and a PCD file's 21
+constexpr int kDenseRuns = 3;                  // the first run allocates buffers
+constexpr std::size_t kCloudBytesAPixel = 31;  // 10 for the map and 21 for a PCD file
 
-/// Prints findings, and keeps whether one of them forbids a scan.
+/// Prints findings, and remembers whether one prevents a scan.
 class Findings {
  public:
   void good(const std::string& what) { std::cout << "ok       " << what << "\n"; }
@@ -61,12 +61,12 @@ class Findings {
   bool scan_possible_ = true;
 };
 
-/// The running service, asked about itself. It holds the devices, which nobody else can open meanwhile.
+/// The running service as a source of information: it holds the devices, so nobody else can open them.
 class LiveService {
  public:
-  /// Asks it, and waits some seconds for devices that it is opening.
-  /// @return nothing where none answers at this socket
-  /// @errors kPermissionDenied; kTimeout: it does not answer; kMalformed: it is no slsd
+  /// Asks the service, and waits some seconds for devices that it is opening.
+  /// @return nothing if no service answers at this socket
+  /// @errors kPermissionDenied; kTimeout: no answer; kMalformed: not slsd
   static Result<std::optional<LiveService>> ask(const path& socket) {
     auto connection = Connection::open(socket);
     if (!connection && connection.error().code == ErrorCode::kNotFound) return std::nullopt;
@@ -89,7 +89,7 @@ class LiveService {
     std::error_code ignored;
     return std::filesystem::equivalent(configuration_file(), file, ignored);
   }
-  /// The tables whose keys are not those that it has in force.
+  /// The tables whose keys differ from those in force.
   [[nodiscard]] std::vector<std::string> tables_behind(const Configuration& configuration) const {
     const json in_force = settings_.value("configuration", json::object());
     const json differences = json::diff(in_force, configuration.given);
@@ -101,7 +101,7 @@ class LiveService {
     }
     return tables;
   }
-  /// The settings over its socket, which replace those of the file.
+  /// The settings made over its socket, which override the file's.
   [[nodiscard]] Result<json> set() const {
     return merge_settings(json::object(), settings_.value("set", json::object()));
   }
@@ -111,7 +111,7 @@ class LiveService {
       if (camera.value("name", "") == name) return camera;
     return json::object();
   }
-  /// The reason for its last scan's having no points; empty: it had some.
+  /// Why its last scan gave no points; empty: it gave some.
   [[nodiscard]] std::string why_empty() const {
     const json empty = status_.value("scans", json::object()).value("empty", json());
     return empty.is_string() ? printable(empty.get<std::string>(), kLongestProblem) : std::string();
@@ -141,7 +141,7 @@ class LiveService {
   json settings_;
 };
 
-/// The checks of what a scan needs, one after the other.
+/// Checks what a scan needs, step by step.
 class Check {
  public:
   Check(Configuration configuration, const path& file, Findings& findings)
@@ -180,7 +180,7 @@ class Check {
   }
 
  private:
-  // One that runs is asked of its devices; one that does not answer is left alone with them.
+  // Asks a running service about its devices. If it does not answer, leaves its devices alone.
   void look_for_service() {
     const path socket = configuration_.server.socket;
     auto service = LiveService::ask(socket);
@@ -212,7 +212,7 @@ class Check {
       findings_.warn("the last scan gave no points: " + why);
   }
 
-  // As the service has it, or will have it when it starts.
+  // As the service has it, or will have it after a start.
   void take_settings(const Result<json>& settings) {
     if (settings && settings->empty()) return;
     auto with_them = settings ? load_configuration_with(file_, *settings) : tl::unexpected(settings.error());
@@ -222,7 +222,7 @@ class Check {
     findings_.good("as set over the socket: " + names_of_settings(*settings));
   }
 
-  /// Notes the service's report about a device that it holds. @return whether it is open
+  /// Notes the service's report about one of its devices. @return whether the device is open
   bool note_held(const std::string& name, const json& device) {
     const std::string state = device.value("state", "not among its cameras");
     const std::string problem = printable(device.value("problem", ""), kLongestProblem);
@@ -251,7 +251,7 @@ class Check {
                    "projector headless, " + size_text(options.width_px, options.height_px) + " px");
   }
 
-  // Only looks: the service that runs may be showing its pattern there, on a display that is not this user's.
+  // Shows nothing: a running service may be showing its pattern there, on another user's display.
   void check_monitor(bool open) {
     const ProjectorOptions& options = configuration_.projector;
     const auto report = report_monitor(options.monitor, options.width_px, options.height_px,
@@ -290,7 +290,7 @@ class Check {
     if (options.replays()) check_symbols(name, options, **camera);
   }
 
-  // Recorded frames show the pattern; what another camera sees now is up to the service.
+  // Recorded frames show the pattern; what another camera sees now depends on the service.
   void check_symbols(const std::string& name, const CameraOptions& options, Camera& camera) {
     const CalibratedCamera* const known = calibration_ ? calibration_->camera(options.name()) : nullptr;
     if (known == nullptr || !pattern_) return;
@@ -325,7 +325,7 @@ class Check {
                   " px: set the camera's size, or calibrate it again");
   }
 
-  // Tried on a wall as each camera would see it: the time is that of this machine, and the memory what it took.
+  // Simulates a wall as each camera would see it. The time and the memory are those of this machine.
   void check_dense(const ScanSetup& setup) {
     for (const std::string& warning : calibration_error_warnings(*setup.calibration)) findings_.warn(warning);
     Crew& crew = *setup.crew;
@@ -361,7 +361,7 @@ class Check {
         points = mapper.measure(frame.view(), 255, decoder.symbols(), crew).count(DensePixel::kMeasured);
         least = std::min(least, std::chrono::steady_clock::now() - begin);
       }
-      // The same frame again and again: what a stream keeps of it, and how long the third takes.
+      // Repeats the same frame: measures the memory that a stream keeps, and the time of the third run.
       auto still = std::chrono::steady_clock::duration::zero();
       for (int run = 0; run < kDenseRuns; ++run) {
         const auto begin = std::chrono::steady_clock::now();
@@ -396,7 +396,7 @@ class Check {
         drift.value("off_since_scan", std::uint64_t{0})));
   }
 
-  /// The projector's name as in the latency's report; empty if that cannot be told.
+  /// The projector's name in the latency report; empty if unknown.
   [[nodiscard]] std::string projector_in_use() const {
     if (live_) return projector_name(live_->projector().value("driver", ""), live_->projector().value("device", ""));
     const auto projector = make_projector(configuration_.projector);
@@ -407,7 +407,7 @@ class Check {
     return projector_name(description.driver, headless ? description.monitor : monitor_);
   }
 
-  // A projector in memory has no light to wait for.
+  // A virtual projector has no light to wait for.
   void check_latency() {
     const path file = latency_file(configuration_, file_);
     const auto text = read_file(file, kMaxLatencyBytes);
@@ -422,7 +422,7 @@ class Check {
     }
   }
 
-  // By frames of the calibration's size and two bytes a pixel, the most that there are.
+  // Assumes frames of the calibration's size with two bytes per pixel, the maximum.
   void check_black_box() {
     const BlackBoxOptions& options = configuration_.black_box;
     if (options.memory_max_mb == 0) return findings_.warn("black box: off, so that no failure can be explained later");
@@ -447,9 +447,9 @@ class Check {
   Findings& findings_;
   std::optional<Pattern> pattern_;
   std::optional<Calibration> calibration_;
-  std::optional<LiveService> live_;  ///< one with this configuration
-  bool held_ = false;                ///< the devices, by a service that cannot be asked
-  std::string monitor_;              ///< seen; empty: none
+  std::optional<LiveService> live_;  ///< the service with this configuration
+  bool held_ = false;                ///< a service that cannot be asked holds the devices
+  std::string monitor_;              ///< the visible monitor; empty: none
 };
 
 }  // namespace

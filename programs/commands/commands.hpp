@@ -10,35 +10,35 @@
 
 namespace slsd {
 
-// What slsd does instead of serving. Each takes the configuration file that the command line names; without one,
-// kConfigurationFile where that is there.
+// slsd's commands besides serving. Each takes the configuration file from the command line; without one,
+// kConfigurationFile if it exists.
 
 /// Writes the image that the projector shows. @errors of the configuration, the pattern and the file
 [[nodiscard]] Result<> write_pattern_image(const std::optional<std::filesystem::path>& configuration_file,
                                            const std::filesystem::path& image);
 
-/// Prints the cameras and projectors that it can see, by the names that the configuration uses.
-/// @param as_json  one JSON object, else text for people
+/// Prints the visible cameras and projectors, with the names for the configuration.
+/// @param as_json  print one JSON object; else text for people
 /// @errors of the configuration
 [[nodiscard]] Result<> list_devices(const std::optional<std::filesystem::path>& configuration_file, bool as_json);
 
-/// Flashes the projector, measures how late each camera sees it, prints that and keeps it.
-/// @param output  where it is kept; empty: latency_file()
+/// Flashes the projector, measures the delay of each camera, prints and stores it.
+/// @param output  file to write; empty: latency_file()
 /// @errors of the configuration, the devices, measure_latency() and the file
 [[nodiscard]] Result<> calibrate_latency(const std::optional<std::filesystem::path>& configuration_file,
                                          const std::filesystem::path& output);
 
-/// Looks at everything that a scan needs and prints each finding with what to do about it.
+/// Checks everything that a scan needs, and prints each finding with its remedy.
 /// @return whether a scan is possible
 [[nodiscard]] bool check_everything(const std::optional<std::filesystem::path>& configuration_file);
 
-/// Looks at the configuration alone, and the files that it names: it opens no device, and asks no service. Prints that
-/// all is well, with warnings, where it is.
-/// @errors as the service's start has them
+/// Checks only the configuration and the files that it names; opens no device and asks no service. If all is well,
+/// prints that, with warnings.
+/// @errors as at the service's start
 [[nodiscard]] Result<> check_configuration(const std::optional<std::filesystem::path>& configuration_file);
 
-/// Decodes the scans of a bundle anew, and prints for each whether its cloud is the same.
-/// @param folder  a new one, which the bundle is unpacked into and the clouds are written to; empty: none
+/// Decodes the scans of a bundle again, and prints for each whether its cloud is the same.
+/// @param folder  a new folder for the unpacked bundle and the clouds; empty: none
 /// @errors those of read_file() and read_bundle(); kMismatch: a cloud differs; of the folder
 [[nodiscard]] Result<> replay_bundle(const std::filesystem::path& bundle, const std::filesystem::path& folder);
 
@@ -50,9 +50,9 @@ struct PrintRequest {
   double dpi = 300;            ///< resolution of a PNG, 20 to 2400
 };
 
-/// Writes a board for calibrating, to be printed to true scale.
-/// @errors of the board, the paper and the file; kImpossible where the board does not fit, kInvalidArgument of another
-///         kind of file
+/// Writes a calibration board for printing at true scale.
+/// @errors of the board, the paper and the file; kImpossible: the board does not fit; kInvalidArgument: another type of
+///         file
 /// @thread reentrant
 [[nodiscard]] Result<> print_board(const PrintRequest& request);
 

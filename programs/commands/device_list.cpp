@@ -67,7 +67,7 @@ std::string camera_text(const ListedCamera& camera, const CameraOptions* configu
   return text.str();
 }
 
-/// The message about a camera that the configuration names and nobody sees.
+/// The message about a configured camera that is not visible.
 std::string unseen_text(const CameraOptions& camera) {
   std::ostringstream text;
   text << "configured camera \"" << camera.name() << "\", driver " << camera.driver() << ": ";
@@ -76,7 +76,7 @@ std::string unseen_text(const CameraOptions& camera) {
   return text.str();
 }
 
-/// A configuration without the table means a default, which is not a projector that anybody sees.
+/// If the configuration has no such table, the default projector applies, which is not visible.
 std::string projector_text(const Configuration& configuration) {
   if (!configuration.given.contains("projector"))
     return "no projector is configured: name its monitor in [projector]\n";

@@ -13,20 +13,20 @@
 
 namespace slsd {
 
-/// The cameras that this host can see, and those that the configuration names.
+/// The visible cameras, and the configured ones.
 /// @thread reentrant
 class CameraList {
  public:
   /// Looks for cameras, which takes a second or two.
   [[nodiscard]] static CameraList look(const Configuration& configuration);
-  /// @param configuration  outlives this
+  /// @param configuration  must outlive this object
   CameraList(const Configuration& configuration, CameraListing listing);
 
-  /// The list for people: several lines to a camera. Without any camera it tells what was looked at.
+  /// The list as text: several lines for each camera. Without any camera, tells which places were searched.
   [[nodiscard]] std::string text() const;
-  /// `cameras`, `configured` and `looked_at`, as slsd(8) says.
+  /// `cameras`, `configured` and `looked_at`, as slsd(8) describes them.
   [[nodiscard]] nlohmann::json json() const;
-  /// The suggestions for a camera that is absent: the names of those of its driver.
+  /// Suggestions for an absent camera: the names of visible cameras with its driver.
   [[nodiscard]] std::string similar_to(const CameraOptions& absent) const;
 
  private:
@@ -37,7 +37,7 @@ class CameraList {
   CameraListing listing_;
 };
 
-/// Tells whether this is the camera that the options name.
+/// Tells whether the options name this camera.
 [[nodiscard]] bool names(const CameraOptions& options, const ListedCamera& camera);
 
 /// The monitors of the X server that DISPLAY names.
@@ -47,9 +47,9 @@ class MonitorList {
   [[nodiscard]] static MonitorList look() { return MonitorList(list_outputs()); }
   explicit MonitorList(Result<std::vector<RandrOutput>> outputs) : outputs_(std::move(outputs)) {}
 
-  /// The list for people: a line to a monitor. Without any monitor it tells why.
+  /// The list as text: one line for each monitor. Without any monitor, tells why.
   [[nodiscard]] std::string text() const;
-  /// An array of monitors, as slsd(8) says.
+  /// An array of monitors, as slsd(8) describes it.
   [[nodiscard]] nlohmann::json json() const;
 
  private:

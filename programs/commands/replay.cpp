@@ -38,7 +38,7 @@ Result<> write_below(const path& folder, const std::string& name, std::string_vi
   return write_file_atomically(file, bytes);
 }
 
-/// A recording of a bundle, decoded anew.
+/// Decodes a recording of a bundle again.
 class Replay {
  public:
   [[nodiscard]] static Result<Replay> of(const BundledRecording& recording) {
@@ -68,7 +68,7 @@ class Replay {
       if (auto read = read_frames(scan, light_name(light), *frames); !read) return tl::unexpected(read.error());
     }
     if (set.frames.empty()) return fail(ErrorCode::kMalformed, "a scan has frames of white or dark alone");
-    // As it was then: a level that was seen in an earlier frame is that of a later one, too.
+    // As during the recording: a level from an earlier frame also holds for later ones.
     setup_.full_levels = std::make_unique<FullLevels>();
     for (std::size_t i = 0; i < std::min(scan.full_levels.size(), set.frames.size()); ++i)
       (void)setup_.full_levels->raise(i, scan.full_levels[i]);
@@ -86,7 +86,7 @@ class Replay {
  private:
   explicit Replay(ScanSetup setup) : setup_(std::move(setup)) {}
 
-  // None, or one to each camera, in their order.
+  // None, or one for each camera, in their order.
   [[nodiscard]] Result<> read_frames(const BundledScan& scan, std::string_view light, std::vector<Frame>& frames) {
     for (const BundledFrame& frame : scan.frames) {
       if (frame.light != light) continue;
@@ -104,10 +104,10 @@ class Replay {
   }
 
   ScanSetup setup_;
-  std::vector<std::unique_ptr<GreyImage>> images_;  // of the scan that is decoded
+  std::vector<std::unique_ptr<GreyImage>> images_;  // of the scan being decoded
 };
 
-/// Decodes a recording's scans, tells, and writes what comes of them. @return how many clouds differ
+/// Decodes a recording's scans, reports, and writes the results. @return the number of clouds that differ
 Result<int> replay(const BundledRecording& recording, const path& folder) {
   auto decoder = Replay::of(recording);
   if (!decoder) return tl::unexpected(decoder.error());
