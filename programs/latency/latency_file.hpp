@@ -21,18 +21,17 @@ struct LatencyReport {
   std::vector<CameraLatency> cameras;
 };
 
-/// The default file of the latencies: "latency.toml" beside the calibration. Without a configured calibration it is
-/// beside the configuration.
+/// The default file of the latencies: "latency.toml" beside the calibration, or beside the configuration if no
+/// calibration is configured.
 [[nodiscard]] std::filesystem::path latency_file(const Configuration& configuration,
                                                  const std::filesystem::path& configuration_file);
 
-/// A projector as the report names it, "glfw HDMI-1". @thread reentrant
+/// A projector's name in the report, "glfw HDMI-1". @thread reentrant
 [[nodiscard]] std::string projector_name(const std::string& driver, const std::string& monitor);
 
-/// Warnings about what does not suit the measured latencies, one sentence each. Examples are a [scan]
-/// projector_latency_ms that is too short, cameras that were not measured or were overexposed, and another projector.
-/// Empty if all is well.
-/// @param projector  the one in use, as projector_name(); empty where that cannot be told
+/// Warnings about settings that do not suit the measured latencies, one sentence each. Examples: a too short [scan]
+/// projector_latency_ms, unmeasured or overexposed cameras, another projector. Empty if all is well.
+/// @param projector  the one in use, from projector_name(); empty if unknown
 /// @thread reentrant
 [[nodiscard]] std::vector<std::string> latency_warnings(const Configuration& configuration, const LatencyReport& report,
                                                         const std::string& projector);

@@ -18,14 +18,14 @@ namespace {
 using std::chrono::microseconds;
 using std::chrono::nanoseconds;
 
-constexpr double kWhole = 0.9;  // lamps and a DLP's flashes let whole ones differ by some percent
+constexpr double kWhole = 0.9;  // lamps and a DLP's flashes make complete frames differ by some percent
 constexpr int kLostMax = 5;
 constexpr auto kShowTime = std::chrono::seconds(10);
 
 constexpr int kSamplesAcross = 200;
 constexpr double kBrightest = 0.99;
-constexpr double kChosen = 0.5;    // of the flash's own brightest
-constexpr double kAboveNoise = 4;  // times the brightest difference of two dark frames
+constexpr double kChosen = 0.5;    // share of the flash's own brightest
+constexpr double kAboveNoise = 4;  // multiple of the largest difference between two dark frames
 constexpr double kClipped = 0.985;
 
 double brightest_difference(const std::vector<double>& from, const std::vector<double>& to) {
@@ -36,23 +36,23 @@ double brightest_difference(const std::vector<double>& from, const std::vector<d
   return *nth;
 }
 
-/// The pixels of a camera that see the projector turn from black to white, and how bright both look there.
+/// The pixels of a camera that see the projector change from black to white, and their brightness in both.
 class FlashPixels {
  public:
-  /// Some of a frame's pixels, always the same ones: few enough to cost little, and a copy, so that the frame can go
-  /// back to its driver.
+  /// Samples of a frame at fixed pixels: few, to save time; copied, so that the frame can return to its driver.
   using Samples = std::vector<double>;
   [[nodiscard]] static Samples sample(const GreyView& frame);
 
-  /// @param dark, dark_again  of two frames of black: what differs between them is noise, or somebody walking by
-  /// @param lit               of a frame of white
-  /// @errors kNotFound: no flash is seen; kMismatch: frames of different sizes
+  /// @param dark, of two black frames: their difference is noise, or a person passing by
+  /// @param lit               of a white frame
+  /// @errors kNotFound: no flash is visible; kMismatch: frames of different sizes
   [[nodiscard]] static Result<FlashPixels> find(const Samples& dark, const Samples& dark_again, const Samples& lit);
 
-  /// The share of the white that is there. @param frame  of the same size @return about 0 for black, 1 for white
+  /// The share of white reached. @param frame  of the same size @return about 0 for black, 1 for white
   [[nodiscard]] double share_of_white(const Samples& frame) const;
 
-  /// Most of the pixels are saturated: a part of the white is enough for all of it, and an onset looks early.
+  /// Tells whether most of the pixels are saturated. Then a part of the white looks like all of it, and its onset seems
+  /// early.
   [[nodiscard]] bool clipped() const { return clipped_; }
 
  private:
@@ -96,7 +96,7 @@ Result<FlashPixels> FlashPixels::find(const Samples& dark, const Samples& dark_a
     pixels.lit_ += lit[i];
     saturated += lit[i] >= kClipped * highest ? 1 : 0;
   }
-  // The highest level of 8, 10, 12 or 16 bits, and of nothing in between.
+  // Only the highest level of 8, 10, 12 or 16 bits counts, nothing in between.
   const bool at_end = highest >= 255 && std::fmod(std::log2(highest + 1), 1.0) == 0;
   pixels.clipped_ = at_end && 2 * saturated > pixels.chosen_.size();
   return pixels;
@@ -152,7 +152,7 @@ class LatencyMeter {
     return shown;
   }
 
-  /// A frame as far as it matters here.
+  /// What matters here about a frame.
   struct Seen {
     FlashPixels::Samples samples;
     MonotonicTime exposure_start;
