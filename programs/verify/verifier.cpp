@@ -14,7 +14,7 @@
 namespace slsd {
 namespace {
 
-/// The board that is asked for; else the one of the calibration, as far as its file names it in our words.
+/// The requested board; else the calibration's, if its file names one that we can parse.
 Result<Board> board_to_look_for(const CalibrateRequest& request, const Calibration& calibration) {
   if (request.board.empty() && !request.ruler.empty()) {
     return fail(ErrorCode::kInvalidArgument,

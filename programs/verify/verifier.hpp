@@ -18,26 +18,26 @@
 
 namespace slsd {
 
-/// Looks at flat things by the calibration in force, and prints what each look says of it.
+/// Checks the calibration in force with flat objects, and prints the result of each look.
 /// @thread thread-bound
 class Verifier {
  public:
-  /// @param pattern    what is projected, unless it is a Gray code
+  /// @param pattern    the projected one, unless it is a Gray code
   /// @errors kNotFound: no calibration is configured; those of its file and of the board's text; kInvalidArgument: a
-  ///         ruler of no board; kMismatch: the pattern is for another projector
+  ///         ruler without a board; kMismatch: the pattern is for another projector
   [[nodiscard]] static Result<Verifier> create(const CalibrateRequest& request, const Configuration& configuration,
                                                Pattern pattern, bool gray_code);
 
-  /// One camera's look. What cannot be measured in it is printed, and does not count.
-  /// @param name      what is printed before it
-  /// @param camera    its name; empty: the configuration's first
-  /// @param pictures  an empty white one: a plain plane
-  /// @errors kNotFound: the calibration does not know the camera; kMismatch: the pictures are not of its size
+  /// Evaluates one camera's look. Prints what cannot be measured, and does not count it.
+  /// @param name      printed before the result
+  /// @param camera    its name; empty: the first configured one
+  /// @param pictures  without a white one: a plain plane
+  /// @errors kNotFound: the calibration does not contain the camera; kMismatch: the pictures have another size
   [[nodiscard]] Result<> look(const std::string& name, const std::string& camera, const CapturedPictures& pictures);
 
-  /// Prints what all looks say together.
-  /// @errors kMismatch: the calibration does not hold any more; the message says what to do; kNotFound: nothing was
-  ///         measured, or the board that was asked for was never seen
+  /// Prints the result of all looks together.
+  /// @errors kMismatch: the calibration no longer holds; the message says what to do; kNotFound: nothing was measured,
+  ///         or the requested board was never seen
   [[nodiscard]] Result<> finish() const;
 
   [[nodiscard]] const Pattern& pattern() const { return pattern_.pattern(); }
@@ -56,7 +56,7 @@ class Verifier {
   bool gray_code_ = false;
   bool board_asked_for_ = false;
   VerifyLimits limits_;
-  std::map<std::size_t, PatternReader> readers_;  // one to a camera: each keeps where its pattern lies
+  std::map<std::size_t, PatternReader> readers_;  // one for each camera: each remembers where its pattern lies
   std::vector<ViewCheck> checks_;
 };
 

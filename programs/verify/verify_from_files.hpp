@@ -7,10 +7,10 @@
 
 namespace slsd {
 
-/// Looks at captures of a board or of a plain plane by the calibration in force, without any hardware, and says whether
-/// it holds.
+/// Checks the calibration in force with captures of a board or a plain plane, without hardware, and reports whether it
+/// holds.
 /// @param request  its folder, board and ruler; the configuration names the calibration
-/// @errors of the configuration and the files; what Verifier says
+/// @errors of the configuration and the files; those of Verifier
 [[nodiscard]] Result<> verify_from_files(const CalibrateRequest& request);
 
 }  // namespace slsd

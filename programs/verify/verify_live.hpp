@@ -7,10 +7,10 @@
 
 namespace slsd {
 
-/// Takes one look with the configured projector and cameras, at a board or a plain plane, and says whether the
-/// calibration in force holds. The devices must be free: the service stopped.
+/// Takes one look at a board or a plain plane with the configured devices, and reports whether the calibration in force
+/// holds. The service must be stopped, because it owns the devices.
 /// @param request  its board and ruler
-/// @errors of the configuration and the devices; what Verifier says
+/// @errors of the configuration and the devices; those of Verifier
 [[nodiscard]] Result<> verify_live(const CalibrateRequest& request);
 
 }  // namespace slsd

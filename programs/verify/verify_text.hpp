@@ -8,13 +8,13 @@
 
 namespace slsd {
 
-/// The verdict of one look on the calibration, for a person at a terminal: a line, with PASS or FAIL at its end.
+/// The verdict of one look on the calibration: a line for the terminal that ends in PASS or FAIL.
 [[nodiscard]] std::string check_text(const ViewCheck& check, const VerifyLimits& limits);
 
-/// All looks together.
+/// The result of all looks.
 [[nodiscard]] std::string summary_text(const VerifySummary& summary, const VerifyLimits& limits);
 
-/// The advice on the faults, a sentence to each.
+/// The advice on the faults, one sentence each.
 [[nodiscard]] std::string advice(const VerifySummary& summary);
 
 }  // namespace slsd
