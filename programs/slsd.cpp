@@ -26,11 +26,11 @@
 
 namespace {
 
-constexpr int kWrongConfiguration = 78;  // EX_CONFIG; the unit does not start the service again
+constexpr int kWrongConfiguration = 78;  // EX_CONFIG; the unit does not restart the service after it
 constexpr int kOwnPagesBytes = 1 << 20;
 
-/// Tells whether the same start may succeed later, with nobody having changed anything: when a volume is mounted, or
-/// another daemon ends.
+/// Tells whether the same start may succeed later without any change by a user: when a volume is mounted, or another
+/// daemon ends.
 bool may_pass(slsd::ErrorCode code) {
   using slsd::ErrorCode;
   constexpr std::array kLasting{ErrorCode::kInvalidArgument, ErrorCode::kMalformed,   ErrorCode::kMismatch,
@@ -49,7 +49,7 @@ int not_served(const slsd::Error& error, bool passes) {
 
 using MadeService = slsd::Result<std::unique_ptr<slsd::Service>>;
 
-/// The service with what was set over its socket before, as far as that still fits: it holds up no start.
+/// Makes the service with the kept settings, as far as they still fit: they never prevent a start.
 MadeService make_service(const std::filesystem::path& file, slsd::Configuration configuration) {
   const auto kept_file = slsd::kept_settings_file(file);
   const auto kept = slsd::read_kept_settings(kept_file);
@@ -68,17 +68,17 @@ MadeService make_service(const std::filesystem::path& file, slsd::Configuration 
 }
 
 int serve(const std::filesystem::path& configuration_file) {
-  // Else the first frame's buffer that is freed raises this, and those of cameras that come and go fragment the heap:
-  // by 20 % in 240 losses of one.
+  // Otherwise the first freed frame buffer raises this threshold, and cameras that come and go fragment the heap: by 20
+  // % after 240 losses of a camera.
   ::mallopt(M_MMAP_THRESHOLD, kOwnPagesBytes);
   std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGIO, SIG_IGN);   // of the leases by which lent memfds are watched, should anybody else open one
-  std::signal(SIGHUP, SIG_IGN);  // what a reload would read is about to be read
+  std::signal(SIGIO, SIG_IGN);   // for leases that watch lent memfds, if another process opens one
+  std::signal(SIGHUP, SIG_IGN);  // a reload would read what is about to be read anyway
   spdlog::info("slsd {} starts with {}", SLSD_VERSION, configuration_file.string());
   slsd::queue_log();
   auto configuration = slsd::load_configuration(configuration_file);
   if (!configuration) {
-    // What is not found of a file that is there is a user or a group, which may come later from another host.
+    // If the file exists, kNotFound means a user or a group, which another host may provide later.
     const slsd::ErrorCode code = configuration.error().code;
     std::error_code ignored;
     const bool named = code == slsd::ErrorCode::kNotFound && std::filesystem::exists(configuration_file, ignored);
@@ -103,7 +103,7 @@ int carry_out(const slsd::CommandLine& line) {
   if (line.list) return slsd::exit_status(slsd::list_devices(line.configuration, line.as_json));
   if (line.check_configuration) return check_configuration(line);
   if (line.check) return slsd::check_everything(line.configuration) ? slsd::kDone : slsd::kFailed;
-  // Of one name for good: a reload compares the paths in it with those of the start.
+  // One name for good: a reload compares its paths with those at the start.
   std::error_code ignored;
   const std::filesystem::path file = line.configuration.value_or(slsd::kConfigurationFile);
   const auto absolute = std::filesystem::absolute(file, ignored);

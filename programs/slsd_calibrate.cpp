@@ -29,7 +29,7 @@ slsd::Result<> carry_out(const slsd::CommandLine& line) {
 
 }  // namespace
 
-// What slsd becomes for --calibrate, --verify, --extrinsics and --print-board.
+// Carries out slsd's --calibrate, --verify, --extrinsics and --print-board.
 int main(int argc, char** argv) {
   const auto line = slsd::parse_command_line(argc, argv);
   if (!line) return line.error();
@@ -37,7 +37,7 @@ int main(int argc, char** argv) {
     std::cerr << "slsd-calibrate: needs --calibrate, --verify, --extrinsics or --print-board; slsd is the service\n";
     return slsd::kWrongUsage;
   }
-  FLAGS_minloglevel = google::GLOG_FATAL;  // what Ceres warns of is judged by the result
+  FLAGS_minloglevel = google::GLOG_FATAL;  // the result is judged anyway, so Ceres need not warn
   slsd::start_logging(spdlog::level::from_str(line->level));
   const int status = slsd::exit_status(carry_out(*line));
   slsd::flush_log(slsd::kLogPatience);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-// Turns the PNG file of a client, who may be anybody, into the pixels that a projector shows: `slsd-picture WIDTH
-// HEIGHT`, the file by its input, the answer of picture_apart.hpp by its output.
+// Decodes the untrusted PNG file of a client into the pixels for a projector: `slsd-picture WIDTH HEIGHT`. Reads the
+// file from its input, and writes the answer of picture_apart.hpp to its output.
 #include <unistd.h>
 
 #include <charconv>
@@ -61,5 +61,5 @@ int main(int argc, char** argv) {
     return ::write(STDERR_FILENO, kUsage.data(), kUsage.size()) > 0 ? 2 : 1;
   }
   write_all(slsd::answer_text(decode(*width_px, *height_px)));
-  ::_exit(0);  // what a program does at its end is not allowed any more
+  ::_exit(0);  // system calls of a normal exit are no longer allowed
 }

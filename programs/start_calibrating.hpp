@@ -8,10 +8,10 @@ namespace slsd {
 
 inline constexpr const char* kCalibrator = "slsd-calibrate";
 
-/// Becomes slsd-calibrate, with the same command line: a program of its own, so that the service carries none of the
-/// libraries that only calibrating needs.
-/// @param argv  as main() was given it
-/// @return      only where that fails. @errors kNotFound where it is not installed
+/// Replaces this process by slsd-calibrate with the same command line. It is a separate program, so that the service
+/// does not load libraries that only calibrating needs.
+/// @param argv  main()'s own
+/// @return      only on failure. @errors kNotFound: not installed
 [[nodiscard]] Result<> start_calibrating(char** argv);
 
 }  // namespace slsd
