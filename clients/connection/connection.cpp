@@ -12,12 +12,12 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr auto kSilence = 10s;         // after which the service is asked whether it is there
-constexpr auto kProbePatience = 10s;   // for its answer: it answers between two scans, and while one is decoded
-constexpr auto kSendPatience = 60s;    // to take a request
-constexpr auto kBetweenCalls = 200ms;  // of what is called while an answer is awaited
+constexpr auto kSilence = 10s;         // silence after which the service is asked whether it is alive
+constexpr auto kProbePatience = 10s;   // for that answer: the service answers between scans and during decoding
+constexpr auto kSendPatience = 60s;    // to send a request
+constexpr auto kBetweenCalls = 200ms;  // interval of calls while an answer is awaited
 
-// The one place where what the library throws becomes a value.
+// The only place that turns the library's exceptions into values.
 template <class Function>
 Result<std::invoke_result_t<Function>> without_throwing(const Function& function) {
   try {
@@ -70,7 +70,7 @@ client::Connection::Deadline Connection::deadline() const {
 
 namespace {
 
-// Only silence says that it hangs: one that refuses or is busy is there.
+// Only silence shows that the service hangs: one that refuses or is busy is alive.
 Result<> check_alive(const std::filesystem::path& socket) {
   auto probe = Connection::open(socket);
   if (probe) {

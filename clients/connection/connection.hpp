@@ -24,9 +24,9 @@ struct Received {
   nlohmann::json message;
   client::Bytes bytes;
 
-  /// The bytes as raw pixels, 8 or 16 bits; it lives as long as they do.
-  /// @param about  the message's part that describes them: `width_px`, `height_px`, `bits`
-  /// @errors kMalformed: not as many bytes as that asks for
+  /// Views the bytes as raw pixels of 8 or 16 bits; valid as long as the bytes.
+  /// @param about  the part of the message that describes them: `width_px`, `height_px`, `bits`
+  /// @errors kMalformed: the number of bytes does not match
   [[nodiscard]] Result<GreyView> image(const nlohmann::json& about) const;
 };
 
@@ -36,29 +36,28 @@ struct Answered {
   std::vector<Received> events;
 };
 
-/// The client library's connection for slsctl: JSON that is parsed, errors as values. Waits for as long as the service
-/// works, unless told otherwise: if no answer comes for a while it asks on a second connection whether anybody is
-/// there.
+/// The client library's connection for slsctl, with parsed JSON and errors as values. Waits as long as the service
+/// works, unless limited. After a long silence, asks on a second connection whether the service is alive.
 /// @thread thread-bound
 class Connection {
  public:
   using Waiting = std::function<void(std::chrono::steady_clock::duration)>;
 
-  /// @errors kNotFound: no service answers at this path; kPermissionDenied; kInvalidArgument: too long a path; kIo
+  /// @errors kNotFound: no service answers at this path; kPermissionDenied; kInvalidArgument: the path is too long; kIo
   [[nodiscard]] static Result<Connection> open(const std::filesystem::path& socket);
 
-  /// Limits the time to send or receive each message, from now on; then kTimeout.
+  /// Limits the time to send or receive each message from now on; then kTimeout.
   void set_patience(std::chrono::seconds patience) { patience_ = patience; }
-  /// Calls this a few times a second while an answer is awaited, with the time since the waiting began.
+  /// Sets a function that is called a few times a second while an answer is awaited, with the waiting time so far.
   void set_waiting(Waiting waiting) { waiting_ = std::move(waiting); }
 
   /// Sends a request and waits for its reply, which may be a JSON-RPC error.
-  /// @errors kDisconnected: the service hung up; kTimeout: it hangs; kMalformed: it is no slsd; kIo
+  /// @errors kDisconnected: the service hung up; kTimeout: it hangs; kMalformed: it is not slsd; kIo
   [[nodiscard]] Result<Answered> call(std::string_view method, const nlohmann::json& params);
 
-  /// Sends a request and does not wait; reply() does. @errors as call()
+  /// Sends a request without waiting; reply() waits. @errors as call()
   [[nodiscard]] Result<> request(std::string_view method, const nlohmann::json& params);
-  /// Waits for the reply to the oldest request that has none. @errors as call()
+  /// Waits for the reply to the oldest open request. @errors as call()
   [[nodiscard]] Result<Answered> reply();
 
   /// Waits for the next message. @errors as call()
