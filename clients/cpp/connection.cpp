@@ -34,7 +34,7 @@ constexpr std::size_t kMaxDescriptors = 16;
 constexpr int kMaxDepth = 64;
 constexpr std::chrono::seconds kConnectMax{5};
 
-// How its user becomes one who may: by the group of the socket, or of the folder that hides it.
+// Explains how the user gets access: through the group of the socket, or of the folder that hides it.
 std::string way_in(std::string path) {
   struct stat about {};
   while (::stat(path.c_str(), &about) != 0 && path.find('/', 1) != std::string::npos) path.erase(path.rfind('/'));
@@ -67,7 +67,7 @@ std::size_t size_of(const json& value) {
   return value.get<std::size_t>();
 }
 
-// The part of a message that says what comes with it.
+// The part of a message that describes the bytes after it.
 const json* described(const json& message) {
   const auto found = message.find(message.contains("method") ? "params" : "result");
   return found != message.end() && found->is_object() ? &*found : nullptr;
@@ -95,7 +95,7 @@ Connection::Connection(const std::string& socket) : path_(socket), process_(::ge
   if (socket_ < 0) no_connection(errno, path_);
   address.sun_family = AF_UNIX;
   path_.copy(address.sun_path, path_.size());
-  // A service that accepts nobody any more fills its queue, and connecting would then wait for ever.
+  // A service that no longer accepts clients fills its queue, and connecting would then wait for ever.
   const timeval patience{kConnectMax.count(), 0};
   ::setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
   if (::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
@@ -133,7 +133,7 @@ void Connection::close() noexcept {
   for (const int descriptor : descriptors_) ::close(descriptor);
   descriptors_.clear();
   if (socket_ < 0) return;
-  if (is_own()) ::shutdown(socket_, SHUT_RDWR);  // a child made by fork may hold a copy
+  if (is_own()) ::shutdown(socket_, SHUT_RDWR);  // a forked child may hold a copy
   ::close(std::exchange(socket_, -1));
 }
 
@@ -181,7 +181,7 @@ std::int64_t Connection::send(std::string_view method, std::string_view params, 
     wait(POLLOUT, deadline);
     const ssize_t sent = ::send(socket_, left.data(), left.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     if (sent < 0 && (errno == EINTR || errno == EAGAIN)) continue;
-    // What the daemon said before it hung up is worth more than that it did.
+    // A last message of the daemon says more than the fact that it hung up.
     if (sent < 0 && (errno == EPIPE || errno == ECONNRESET)) break;
     if (sent < 0) throw ConnectionLost(std::string("cannot send: ") + std::strerror(errno), "io", path_);
     left.remove_prefix(static_cast<std::size_t>(sent));
@@ -233,7 +233,7 @@ std::string Connection::receive_line(const Deadline& deadline) {
   return line;
 }
 
-// Its memory grows with what came, whatever was said: one that lies about the size costs nothing.
+// Memory grows only with received bytes, so a false size costs nothing.
 Bytes Connection::receive_bytes(std::size_t count, const Deadline& deadline) {
   while (buffer_.size() < count) receive_more(deadline);
   if (buffer_.size() == count) return Bytes(std::exchange(buffer_, {}));
@@ -248,7 +248,7 @@ Bytes Connection::map_descriptor(std::size_t size) {
   }
   const int descriptor = descriptors_.front();
   descriptors_.erase(descriptors_.begin());
-  // One that may still shrink or change would end this process later, or give it points that nobody measured.
+  // A memfd that may still shrink or change could later crash this process, or give it wrong points.
   constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_WRITE;
   struct stat about {};
   const bool whole = ::fstat(descriptor, &about) == 0 && about.st_size == static_cast<off_t>(size) && size > 0;

@@ -18,7 +18,7 @@ using nlohmann::json;
 using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kGrace = std::chrono::seconds(5);  // beyond the timeout that the service keeps by itself
+constexpr auto kGrace = std::chrono::seconds(5);  // added to the timeout that the service itself keeps
 constexpr auto kReloadMax = std::chrono::seconds(60);
 
 [[noreturn]] void throw_answered(const json& error) {
@@ -50,7 +50,7 @@ constexpr auto kReloadMax = std::chrono::seconds(60);
   throw ProtocolError("the answer is not slsd's: " + what, "malformed");
 }
 
-// What is no UTF-8 in it (a camera's name may be any bytes) gets replacement characters.
+// Invalid UTF-8 (a camera's name may be any bytes) becomes replacement characters.
 std::string text_of(const json& value) {
   return value.dump(-1, ' ', false, json::error_handler_t::replace);
 }
@@ -109,15 +109,15 @@ json camera_params(const std::string& camera, milliseconds timeout) {
 
 namespace {
 
-// What one process has: nobody else's lock, which a thread of the parent may hold, and nobody else's connection.
+// The state of one process: no lock that a thread of the parent may hold, and no connection of another process.
 struct Own {
   pid_t process = ::getpid();
   std::mutex mutex;
   std::optional<Connection> connection;
 };
 
-// Ends what a child has of its parent. If a thread of the parent was at work with it, nobody knows in what state it is:
-// then it stays.
+// Frees a child's copy of its parent's state. If a thread of the parent was using it, its state is unknown, so it
+// stays.
 void leave(Own* inherited) {
   if (!inherited || !inherited->mutex.try_lock()) return;
   inherited->mutex.unlock();

@@ -34,7 +34,7 @@ struct Field {
   char kind;  ///< 'f' floating point, 'i' signed, 'u' unsigned
 };
 
-/// One field of all points, where they lie: nothing is copied. Valid as long as the cloud or a copy of it.
+/// One field of all points, without a copy. Valid as long as the cloud or a copy of it.
 template <class T>
 class Column {
  public:
@@ -57,7 +57,7 @@ struct Frame {
   int height_px = 0;
   int bits = 8;
   Bytes pixels;
-  std::string description;  ///< the service's description of it, as JSON
+  std::string description;  ///< the service's description of the frame, as JSON
 
   [[nodiscard]] unsigned at(int x, int y) const {
     const std::size_t i =
@@ -69,13 +69,13 @@ struct Frame {
   }
 };
 
-/// One scan. The points lie where they came to, as records; copies of a cloud share them.
+/// One scan. The points stay in the received records; copies of a cloud share them.
 /// @thread reentrant
 class Cloud {
  public:
-  /// The cloud in the bytes of a binary little-endian PLY file.
-  /// @param description  what the service says of the scan, as JSON
-  /// @throws ProtocolError: the header promises what is not there
+  /// Reads the cloud in the bytes of a binary little-endian PLY file.
+  /// @param description  the service's description of the scan, as JSON
+  /// @throws ProtocolError: the header does not match the data
   [[nodiscard]] static Cloud read_ply(Bytes ply, std::string description = "{}");
 
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -113,13 +113,13 @@ class Cloud {
   [[nodiscard]] Iterator begin() const { return {*this, 0}; }
   [[nodiscard]] Iterator end() const { return {*this, size_}; }
 
-  /// The records' fields: with symbols also camera_u camera_v projector_u projector_v (px), symbol, column, row; with
-  /// normals nx ny nz.
+  /// The records' fields. Clouds of symbols also have camera_u camera_v projector_u projector_v (px), symbol, column,
+  /// row; clouds with normals have nx ny nz.
   [[nodiscard]] const std::vector<Field>& fields() const { return fields_; }
   [[nodiscard]] bool has(std::string_view field) const { return find(field) != nullptr; }
 
   /// One field of all points.
-  /// @throws std::invalid_argument: there is none of this name, or it is no T
+  /// @throws std::invalid_argument: no field of this name, or another type than T
   template <class T>
   [[nodiscard]] Column<T> column(std::string_view name) const {
     const Field* field = find(name);
@@ -134,18 +134,17 @@ class Cloud {
   [[nodiscard]] std::size_t record_bytes() const { return record_bytes_; }
   /// The whole file.
   [[nodiscard]] const Bytes& bytes() const { return bytes_; }
-  /// The comments of the header, by their first words: scan_id, time, units, ...
+  /// The comments of the header, by their first word: scan_id, time, units, ...
   [[nodiscard]] const std::map<std::string, std::string>& comments() const { return comments_; }
 
   std::string description = "{}";  ///< the service's description of the scan, as JSON: docs/protocol.md
-  std::string scan;                ///< its id
-  std::string why_empty;           ///< reason for having no points, in words; empty: it has some
-  std::uint64_t lost = 0;          ///< clouds that a stream lost since the one before, as it read too slowly
-  std::optional<double>
-      sigma_calibration_mm;  ///< error of the depth from the calibration alone: it moves all points together
-  std::chrono::steady_clock::time_point received{};  ///< time when the last byte of its frames had arrived
-  Bytes picture;                                     ///< a PNG, where it was asked for
-  std::vector<Frame> frames;                         ///< if they were asked for
+  std::string scan;                ///< the scan's id
+  std::string why_empty;           ///< why there are no points, in words; empty: there are some
+  std::uint64_t lost = 0;  ///< clouds that a stream lost since the previous one because the client read too slowly
+  std::optional<double> sigma_calibration_mm;        ///< depth error from the calibration alone, common to all points
+  std::chrono::steady_clock::time_point received{};  ///< time when the last byte of the frames arrived
+  Bytes picture;                                     ///< a PNG, if requested
+  std::vector<Frame> frames;                         ///< if requested
 
  private:
   [[nodiscard]] const Field* find(std::string_view name) const;

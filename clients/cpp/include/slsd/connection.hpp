@@ -13,8 +13,7 @@
 
 namespace slsd::client {
 
-/// Bytes that came: memory that is shared with the service, or this process's own. Copies share them; nobody changes
-/// them.
+/// Received bytes, in memory shared with the service or in the process's own. Copies share them; nobody changes them.
 /// @thread reentrant
 class Bytes {
  public:
@@ -35,18 +34,19 @@ class Bytes {
 };
 
 /// The socket that clients connect to unless told otherwise: SLSD_SOCKET in the environment, else the usual place.
-/// @thread reentrant, while nobody changes the environment
+/// @thread reentrant while nobody changes the environment
 [[nodiscard]] std::string default_socket();
 
-/// One line of the protocol, and what came with it.
+/// One line of the protocol, and the data that came with it.
 struct Message {
   std::string json;
-  Bytes bytes;  ///< behind the line, or in a memfd
+  Bytes bytes;  ///< after the line, or in a memfd
 };
 
-/// The protocol without its meaning, for what Scanner has no method for: lines of JSON, the bytes behind them, memfds.
-/// Any error leaves it unusable: what comes later would be taken for the answer to the next request. A child made by
-/// fork shares the parent's connection: there send() and receive() throw, and its end leaves the parent's open.
+/// The protocol without its meaning, for requests that Scanner has no method for: lines of JSON, the bytes after them,
+/// memfds. After any error the connection is unusable, because later data would seem to answer the next request. A
+/// forked child shares its parent's connection: there send() and receive() throw, and the destructor leaves the
+/// parent's open.
 /// @thread thread-bound
 class Connection {
  public:
@@ -60,11 +60,11 @@ class Connection {
 
   /// Sends a request; returns its id.
   /// @param params    a JSON object
-  /// @param deadline  until when the service must have taken it; nothing: wait as long as it is there
+  /// @param deadline  time by which the service must have read it; nothing: wait while the service exists
   /// @throws ConnectionLost, TimedOut
   std::int64_t send(std::string_view method, std::string_view params, Deadline deadline = {});
 
-  /// Waits until a part of the next message is there, at most until the deadline. @return whether it is
+  /// Waits until a part of the next message has arrived, at most until the deadline. @return whether it has
   /// @throws ConnectionLost
   [[nodiscard]] bool answers(Deadline deadline) const;
 
@@ -72,7 +72,7 @@ class Connection {
   /// @throws ConnectionLost, TimedOut, ProtocolError
   [[nodiscard]] Message receive(Deadline deadline = {});
 
-  /// Tells a connection of this process from one that a parent opened.
+  /// Tells whether this process opened the connection, not a parent.
   [[nodiscard]] bool is_own() const;
 
  private:
@@ -88,9 +88,9 @@ class Connection {
   std::string path_;
   int socket_ = -1;
   std::string buffer_;
-  std::vector<int> descriptors_;  ///< received and not mapped yet
+  std::vector<int> descriptors_;  ///< received but not mapped yet
   std::int64_t last_id_ = 0;
-  int process_ = 0;  ///< the process that opened it
+  int process_ = 0;  ///< the process that opened the connection
 };
 
 }  // namespace slsd::client

@@ -8,7 +8,7 @@
 
 namespace slsd::client {
 
-/// An error that the service answered, or one of the connection to it. Of which kind it is tells its class.
+/// An error answered by the service, or an error of the connection. The class tells its kind.
 class ScannerError : public std::runtime_error {
  public:
   explicit ScannerError(const std::string& message, std::string name = {}, std::string where = {}, int code = 0)
@@ -18,7 +18,7 @@ class ScannerError : public std::runtime_error {
   [[nodiscard]] const std::string& name() const { return name_; }
   /// A file's line, a camera, a key, a socket, or empty.
   [[nodiscard]] const std::string& where() const { return where_; }
-  /// The error's code in the protocol: -32018. 0 if the service did not answer it.
+  /// The error's code in the protocol: -32018. 0 if the error is not the service's.
   [[nodiscard]] int code() const { return code_; }
 
  private:
@@ -34,7 +34,7 @@ class InvalidRequest : public ScannerError {
 class NotFound : public ScannerError {
   using ScannerError::ScannerError;
 };
-/// The client has no right to ask for this.
+/// The client has no right to make this request.
 class PermissionDenied : public ScannerError {
   using ScannerError::ScannerError;
 };
@@ -54,7 +54,7 @@ class Cancelled : public ScannerError {
 class DeviceError : public ScannerError {
   using ScannerError::ScannerError;
 };
-/// A frame was lost, torn, late, stale or skewed, in every try that the time allowed.
+/// A frame was lost, torn, late, stale or skewed in every try within the time.
 class FrameError : public ScannerError {
   using ScannerError::ScannerError;
 };
