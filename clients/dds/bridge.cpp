@@ -27,7 +27,7 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 
-constexpr auto kDiscovery = 2000ms;  // until others of the same name are known
+constexpr auto kDiscovery = 2000ms;  // time to discover others of the same name
 constexpr auto kRetry = 1s;
 constexpr std::size_t kExtrinsicsBytesMax = 1 << 20, kCalibrationBytesMax = 1 << 24;
 
@@ -49,7 +49,7 @@ Result<std::string> calibration_in_force(const std::string& socket) {
   }
 }
 
-/// A camera of the scanner in the network.
+/// A camera of the scanner as the network sees it.
 struct Camera {
   std::string name;  ///< the name in slsd's configuration
   std::string frame_id;
@@ -99,7 +99,7 @@ class Running : public Bridge {
     if (!made && all) all = tl::unexpected(made.error());
   }
 
-  // Waits for clouds until the service is gone.
+  // Receives clouds until the service is gone.
   void stream() {
     try {
       client::StreamOptions options;
@@ -130,7 +130,7 @@ class Running : public Bridge {
       if (!camera.calibrated) continue;
       const ros::Header header{stamp, camera.frame_id};
       camera.info.write(camera_info(*camera.calibrated, header));
-      if (cloud.has("camera_u")) continue;  // one of symbols has no depth image, and announces none
+      if (cloud.has("camera_u")) continue;  // a cloud of symbols has no depth image, so none is announced
       if (auto shown = show_depth(camera); !shown) say(to_string(shown.error()));
       if (!camera.depth.has_readers()) continue;
       camera.depth.write(depth_image(cloud, header, *camera.calibrated, i, options_.thinning.stride));
@@ -208,7 +208,7 @@ class Running : public Bridge {
                                     : std::chrono::nanoseconds(1s));
   }
 
-  // The cameras of the network by those of the service, and where all of them stand.
+  // Matches the network's cameras with the service's, and updates all positions.
   Result<> take_calibration(const json& settings) {
     calibration_text_ = settings.value("calibration", "");
     std::optional<Calibration> calibration;
@@ -252,7 +252,7 @@ class Running : public Bridge {
     return {};
   }
 
-  // With extrinsics that no longer hold the scanner stands nowhere: no place is better than a wrong one.
+  // If the extrinsics no longer hold, the scanner has no position: none is better than a wrong one.
   void publish_transforms(const std::vector<Device>& devices) const {
     const auto now = stamp_now();
     std::vector<ros::TransformStamped> all;
@@ -291,8 +291,8 @@ class Running : public Bridge {
   std::string frame_id_;
   Writer points_, transforms_, description_, diagnostics_;
   Trigger trigger_;
-  std::mutex mutex_;           ///< guards the members below, up to the threads
-  std::list<Camera> cameras_;  ///< changed by the thread of the state alone, as is the next
+  std::mutex mutex_;           ///< guards the members below, before the threads
+  std::list<Camera> cameras_;  ///< only the state thread changes this and the next member
   std::vector<CalibratedCamera> calibrated_;
   std::string calibration_text_, calibration_date_, said_;
   bool stale_ = false;

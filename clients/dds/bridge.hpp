@@ -13,26 +13,26 @@
 namespace slsd::dds {
 
 struct BridgeOptions {
-  std::string name = "scanner";      ///< the scanner's name in the network: its topics begin with it
+  std::string name = "scanner";      ///< the scanner's name in the network; its topics begin with it
   std::string socket;                ///< the service's socket; empty: the usual place
-  std::optional<double> rate_hz;     ///< clouds; 0: only those that are triggered; nothing: every frame
+  std::optional<double> rate_hz;     ///< of clouds; 0: only triggered ones; nothing: every frame
   std::string density;               ///< "symbols" or "pixels"; empty: as configured
-  Thinning thinning;                 ///< thins clouds and depth images
-  double image_rate_hz = 0;          ///< images of every camera; 0: none
-  bool transforms = true;            ///< false: a robot's own description has the scanner's frames
-  std::filesystem::path extrinsics;  ///< file with the scanner's place; empty: nobody tells it
+  Thinning thinning;                 ///< reduces clouds and depth images
+  double image_rate_hz = 0;          ///< of images from every camera; 0: none
+  bool transforms = true;            ///< false: the robot's own description contains the scanner's frames
+  std::filesystem::path extrinsics;  ///< file with the scanner's position; empty: unknown
 };
 
-/// The robot description (URDF) of a scanner: by the calibration in that file, or that of the service if it is empty.
-/// @errors kInvalidArgument: no name of ROS; kNotFound: no file, or not calibrated; kIo: no service; kMalformed
+/// The robot description (URDF) of a scanner, from that calibration file; if empty, from the service's calibration.
+/// @errors kInvalidArgument: not a valid ROS name; kNotFound: no file, or not calibrated; kIo: no service; kMalformed
 [[nodiscard]] Result<std::string> describe(const BridgeOptions& options, const std::filesystem::path& file);
 
-/// One scanner in a ROS 2 network. Ends with the process.
-/// Threads: one waits for clouds, one for triggers, one asks for the state each second and for images.
+/// One scanner in a ROS 2 network, until the process ends. Has three threads: one receives clouds, one waits for
+/// triggers, and one reads the state each second, and images.
 class Bridge {
  public:
-  /// @errors kInvalidArgument: no name of ROS; kAlreadyExists: another scanner of this name is there;
-  ///         kNotFound, kMalformed: extrinsics
+  /// @errors kInvalidArgument: not a valid ROS name; kAlreadyExists: another scanner has this name; kNotFound,
+  ///         kMalformed: extrinsics
   [[nodiscard]] static Result<std::unique_ptr<Bridge>> start(const BridgeOptions& options, Network network);
   virtual ~Bridge() = default;
 };

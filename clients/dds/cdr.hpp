@@ -11,10 +11,10 @@
 
 namespace slsd::dds {
 
-/// A message as it is on the wire: four bytes that say how it is encoded, then plain CDR, little-endian.
+/// A serialized message: four bytes with the encoding, then plain CDR, little-endian.
 using Bytes = std::vector<std::uint8_t>;
 
-/// A struct with `fields`, which calls a function with all of its members in the order of the wire.
+/// A struct with `fields`, which calls a function with all members in serialization order.
 template <typename Value>
 concept Message = requires(Value& value) {
   Value::fields(value, [](auto&...) {});
@@ -41,7 +41,7 @@ void put(Cdr& cdr, const Value& value) {
   }
 }
 
-// A sequence grows by what was read: a length that the bytes do not hold ends in an exception, not in an allocation.
+// A sequence grows while it is read: a false length ends in an exception, not in a huge allocation.
 template <typename Value>
 void get(Cdr& cdr, Value& value) {
   if constexpr (Message<Value>) {
@@ -70,11 +70,11 @@ template <Message Value>
   return {begin, begin + cdr.getSerializedDataLength()};
 }
 
-/// Decodes a message; empty if the bytes are none. Bytes behind it are passed over. @thread reentrant
+/// Decodes a message; empty if the bytes are invalid. Ignores bytes after it. @thread reentrant
 template <Message Value>
 [[nodiscard]] std::optional<Value> decode(const Bytes& bytes) {
   using eprosima::fastcdr::Cdr;
-  // Fast CDR takes no constant bytes; it only reads them.
+  // Fast CDR requires a non-const pointer, but only reads.
   eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(const_cast<std::uint8_t*>(bytes.data())), bytes.size());
   Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
   std::optional<Value> message(std::in_place);

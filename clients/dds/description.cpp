@@ -12,7 +12,7 @@
 namespace slsd::dds {
 namespace {
 
-// Behind the centre of the lens, which is the frame's origin.
+// Behind the lens centre, which is the frame's origin.
 struct Box {
   double width_m, height_m, depth_m;
   const char* colour;
@@ -21,8 +21,8 @@ constexpr Box kCamera{0.03, 0.03, 0.04, "0.2 0.2 0.25 1"};
 constexpr Box kProjector{0.12, 0.06, 0.10, "0.85 0.85 0.85 1"};
 constexpr const char* kProjectorPart = "projector";
 
-// Rotations about the fixed axes x, y and z, one after the other. Where the pitch is upright, roll and yaw are known
-// only together: the yaw is taken out first, so that their sum holds.
+// Rotations about the fixed axes x, y and z in sequence. At a vertical pitch, roll and yaw are known only together: the
+// yaw is extracted first, so that their sum holds.
 Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& r) {
   const double yaw = std::atan2(r(1, 0), r(0, 0));
   const double c = std::cos(yaw), s = std::sin(yaw);
@@ -31,7 +31,7 @@ Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& r) {
 }
 
 std::string numbers(const Eigen::Vector3d& v) {
-  const Eigen::Vector3d plain = v + Eigen::Vector3d::Zero();  // no -0
+  const Eigen::Vector3d plain = v + Eigen::Vector3d::Zero();  // avoids -0
   return fmt::format("{} {} {}", plain.x(), plain.y(), plain.z());
 }
 

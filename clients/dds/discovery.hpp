@@ -8,12 +8,12 @@
 
 namespace slsd::dds {
 
-/// The range of discovery, as ROS 2's environment says it (Jazzy and later).
+/// The range of discovery from ROS 2's environment (Jazzy and later).
 struct Discovery {
   enum class Range {
     kSystemDefault,  ///< Fast DDS's own configuration; peers are ignored
-    kSubnet,         ///< multicast, and the peers
-    kLocalhost,      ///< this host, and the peers
+    kSubnet,         ///< multicast, plus the peers
+    kLocalhost,      ///< this host, plus the peers
     kOff,            ///< nobody
   };
   Range range = Range::kSubnet;
@@ -21,8 +21,8 @@ struct Discovery {
   std::vector<std::string> warnings;
 };
 
-/// Reads ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS (separated by ;) and ROS_LOCALHOST_ONLY, which has the last
-/// word. An unknown range is LOCALHOST, as in ROS: it never reaches further than was meant.
+/// Reads ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS (separated by ;) and ROS_LOCALHOST_ONLY, which overrides them.
+/// An unknown range becomes LOCALHOST, as in ROS, so that it never reaches further than intended.
 /// @param variable  its value; empty: not set
 [[nodiscard]] Discovery read_discovery(const std::function<std::string(const char*)>& variable);
 

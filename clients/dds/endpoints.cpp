@@ -39,7 +39,7 @@ void Trigger::answer(const Scan& scan) const {
       replies_.reply(ros::WithCycloneHeader<ros::TriggerResponse>{*asked, {done, text}}, request->from);
     }
   }
-  // However many came meanwhile: each of them came before the scan began.
+  // One scan answers all waiting triggers, because each came before it began.
   bool asked = false;
   while (topic_.take()) asked = true;
   if (asked) (void)scan();

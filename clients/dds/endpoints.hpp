@@ -11,27 +11,27 @@
 
 namespace slsd::dds {
 
-/// The endpoints that a scanner and a merged cloud share in a ROS 2 network, beside their clouds.
+/// The endpoints that scanners and merged clouds have in common in a ROS 2 network, besides their clouds.
 
-/// Said once when clouds come faster than they may leave.
+/// Reported once when clouds come faster than they can be sent.
 inline constexpr const char* kOvertaken =
     "clouds come faster than they may leave, and some are not published: lower --rate, thin them by --stride or "
     "--voxel, or raise --rate-max";
 
-/// Tells whether ROS takes it for a topic's name: letters, digits and _, a letter first.
+/// Tells whether ROS accepts the topic name: letters, digits and _, a letter first.
 [[nodiscard]] bool is_ros_name(const std::string& name);
 
-/// std_msgs/Empty on NAME/trigger, and the service NAME/trigger (std_srvs/Trigger) for clients of any middleware: Fast
-/// DDS and others relate a reply to its request beside the data, rmw_cyclonedds in front of it.
+/// std_msgs/Empty on NAME/trigger, and the service NAME/trigger (std_srvs/Trigger) for clients of any middleware. Fast
+/// DDS and others relate a reply to its request beside the data; rmw_cyclonedds does so in front of the data.
 /// @thread thread-bound
 class Trigger {
  public:
-  /// Scans; whether it went well, and what is to be said of it.
+  /// Scans; returns whether it succeeded, and a message.
   using Scan = std::function<std::pair<bool, std::string>()>;
 
-  /// @param network  outlives it
+  /// @param network  must outlive it
   [[nodiscard]] static Result<Trigger> open(const Network& network, const std::string& name);
-  /// Waits for a second, and scans for those who asked.
+  /// Waits for a second, and scans if somebody requested it.
   void answer(const Scan& scan) const;
 
  private:
@@ -43,7 +43,7 @@ class Trigger {
 /// The levels of ROS diagnostics.
 enum class Level : std::uint8_t { kOk = 0, kWarn = 1, kError = 2 };
 
-/// A state, and the worst that is to be said of it, for /diagnostics.
+/// A state and its worst problem, for /diagnostics.
 struct Diagnosis {
   Level level = Level::kOk;
   std::string message;
@@ -54,7 +54,7 @@ struct Diagnosis {
   }
 };
 
-/// @param hardware  what is diagnosed, by its name in the network  @param of  "left: slsd"
+/// @param hardware  the diagnosed device, by its name in the network  @param of  "left: slsd"
 void write_diagnosis(const Writer& writer, const Diagnosis& diagnosis, const std::string& hardware,
                      const std::string& of);
 

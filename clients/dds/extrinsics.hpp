@@ -10,20 +10,20 @@
 
 namespace slsd::dds {
 
-/// The place of a scanner in a cell of several.
+/// The position of a scanner in a cell with several.
 struct Extrinsics {
-  std::string parent;                  ///< the frame of all
+  std::string parent;                  ///< the common frame
   RigidTransform parent_from_scanner;  ///< millimetres
-  std::string calibration_date;        ///< date of the calibration that it was measured with; empty: not known
+  std::string calibration_date;        ///< date of the calibration used in the measurement; empty: unknown
 };
 
-/// A scanner's place in a file of several:
+/// Reads a scanner's position from a file with several:
 ///     parent = "cell"
 ///     [scanner.left]
 ///     rotation = [1, 0, 0, 0, 1, 0, 0, 0, 1]     # parent_from_scanner, row by row
 ///     translation_mm = [0, 0, 0]
 ///     calibration_date = "2026-01-31T12:00:00Z"  # optional
-/// @errors kMalformed: no such file, or no rotation; kNotFound: it does not name the scanner
+/// @errors kMalformed: an invalid file or rotation; kNotFound: the file does not name the scanner
 [[nodiscard]] Result<Extrinsics> read_extrinsics(std::string_view text, const std::string& scanner,
                                                  const std::string& file);
 

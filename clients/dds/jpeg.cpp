@@ -23,14 +23,14 @@ struct Failure {
   std::longjmp(reinterpret_cast<Failure*>(codec->err)->back, 1);
 }
 
-/// Memory that libjpeg allocates; the caller frees it, whichever way encode() ends.
+/// Memory that libjpeg allocates; the caller frees it, however encode() ends.
 struct Encoded {
   unsigned char* bytes = nullptr;
   unsigned long size = 0;
   ~Encoded() { std::free(bytes); }
 };
 
-// Nothing with a destructor lives in here, as libjpeg leaves by a jump.
+// Holds nothing with a destructor, because libjpeg leaves by a jump.
 bool encode(const std::uint8_t* pixels, int width_px, int height_px, Encoded& to) {
   jpeg_compress_struct codec;
   Failure failure;

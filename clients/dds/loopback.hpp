@@ -8,9 +8,9 @@
 
 namespace slsd::dds {
 
-/// UDP on loopback alone, also with nodes that announce addresses of the host's other interfaces. Nodes of ROS do so
-/// even if they are restricted to this host; Fast DDS's own transport does not answer them.
-/// @param udp  its other settings
+/// UDP on loopback alone, even with nodes that announce addresses of the host's other interfaces. ROS nodes do so even
+/// if restricted to this host; Fast DDS's own transport does not answer them.
+/// @param udp  provides the other settings
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> loopback_transport(
     std::shared_ptr<eprosima::fastdds::rtps::UDPv4TransportDescriptor> udp);
 

@@ -29,8 +29,8 @@ using ros::PointCloud2;
 using ros::PointField;
 
 constexpr auto kDiscovery = 2000ms;
-constexpr auto kHearing = 3s;   // of diagnostics, that come each second
-constexpr auto kScanMax = 15s;  // a scanner that was triggered
+constexpr auto kHearing = 3s;   // for diagnostics, which come each second
+constexpr auto kScanMax = 15s;  // a triggered scanner's limit
 constexpr std::size_t kExtrinsicsBytesMax = 1 << 20;
 constexpr std::uint32_t kPointsMax = 100'000'000;
 
@@ -38,7 +38,7 @@ double seconds_of(const ros::Time& stamp) {
   return stamp.sec + 1e-9 * stamp.nanosec;
 }
 
-/// The offsets of the merged fields in a foreign cloud's point.
+/// The offsets of the merged fields in a point of another cloud.
 struct Layout {
   std::uint32_t x = 0, y = 0, z = 0;
   std::optional<std::uint32_t> sigma, intensity, byte_intensity, camera;
@@ -48,7 +48,7 @@ Result<Layout> malformed(const std::string& how) {
   return fail(ErrorCode::kMalformed, "cloud_malformed: its cloud " + how);
 }
 
-// A message says itself where its fields are, and is believed nothing.
+// A message describes its own fields; every value is checked.
 Result<Layout> layout_of(const PointCloud2& cloud, const std::string& frame_id) {
   if (cloud.header.frame_id != frame_id) return malformed("is not in its frame, " + frame_id);
   if (cloud.is_bigendian) return malformed("is big-endian");
@@ -83,13 +83,13 @@ struct Source {
   std::string name, frame_id;
   Reader reader;
   Extrinsics extrinsics;
-  std::optional<std::string> calibration_date;  ///< the date in its diagnostics; empty: not heard yet
+  std::optional<std::string> calibration_date;  ///< the date in its diagnostics; empty: not received yet
   std::string problem;                          ///< problem of the newest cloud; empty: none
-  std::vector<std::uint8_t> points;             ///< published points, in the frame of all
+  std::vector<std::uint8_t> points;             ///< published points, in the common frame
   ros::Time stamp{};
-  Clock::time_point arrived{};  ///< arrival of the newest cloud, placed or not
-  bool fresh = false;           ///< there is one that was not merged yet
-  std::uint64_t clouds = 0;     ///< clouds that could be placed
+  Clock::time_point arrived{};  ///< arrival of the newest cloud, whether placed or not
+  bool fresh = false;           ///< a cloud waits to be merged
+  std::uint64_t clouds = 0;     ///< clouds that were placed
 
   [[nodiscard]] std::string why_not_placed() const {
     if (extrinsics.calibration_date.empty()) return {};
@@ -230,7 +230,7 @@ class Running : public Merge {
     source.points.resize(static_cast<std::size_t>(to - source.points.data()));
   }
 
-  // Of scanners that send clouds each has a new one; or one has waited for the others as long as it may.
+  // Tells whether every active scanner has a new cloud, or one cloud has waited for its maximum time.
   void publish_when_whole() {
     const auto now = Clock::now();
     bool whole = true, any = false, waited = false;
@@ -243,7 +243,7 @@ class Running : public Merge {
     if (any && (whole || waited)) publish(options_.max_age.count());
   }
 
-  /// @param max_age_s  by which a part may be older than the newest
+  /// @param max_age_s  the greatest age of a part relative to the newest
   std::size_t publish(double max_age_s) {
     double newest = -INFINITY;
     for (const Source& source : sources_) {
@@ -274,7 +274,7 @@ class Running : public Merge {
     return parts;
   }
 
-  // Each in its turn, as the light of one is in the way of another.
+  // One after another, because their light would interfere.
   std::pair<bool, std::string> scan_all() {
     std::unique_lock lock(mutex_);
     triggered_ = true;
@@ -298,7 +298,7 @@ class Running : public Merge {
     return {true, std::to_string(point_count_) + " points of " + std::to_string(count) + " scanners"};
   }
 
-  // Where the file was written anew it is read anew; one that is broken leaves that in force which is.
+  // Reads a changed file again; a broken one leaves the previous extrinsics in force.
   std::string follow_extrinsics() {
     std::error_code error;
     const auto written = std::filesystem::last_write_time(options_.extrinsics, error);
@@ -362,11 +362,11 @@ class Running : public Merge {
   Network network_;
   Writer points_, diagnostics_;
   Reader heard_;
-  std::vector<Writer> triggers_of_;  ///< one to a source
+  std::vector<Writer> triggers_of_;  ///< one for each source
   Trigger trigger_;
-  std::filesystem::file_time_type extrinsics_written_;  ///< only the thread of the state uses this and the two below
+  std::filesystem::file_time_type extrinsics_written_;  ///< only the state thread uses this and the two below
   std::string extrinsics_problem_, said_;
-  std::mutex mutex_;  ///< guards the members below, up to the threads
+  std::mutex mutex_;  ///< guards the members below, before the threads
   std::condition_variable changed_;
   std::vector<Source> sources_;
   std::size_t point_count_ = 0;  ///< points of the newest merged cloud

@@ -17,7 +17,7 @@
 namespace slsd::dds {
 namespace {
 
-/// The pixel of a camera that a dense point lies on.
+/// The camera pixel of a dense point.
 struct Pixel {
   int u = 0, v = 0;
 };
@@ -28,7 +28,7 @@ Pixel pixel_of(const client::Point& point, const CalibratedCamera& camera) {
   return {static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))};
 }
 
-/// Takes the first point of each cube.
+/// Keeps the first point in each cube.
 class VoxelGrid {
  public:
   explicit VoxelGrid(double size_mm) : per_mm_(1 / size_mm) {}
@@ -136,7 +136,7 @@ ros::Image depth_image(const client::Cloud& cloud, const ros::Header& header, co
 
 ros::CameraInfo camera_info(const CalibratedCamera& camera, const ros::Header& header, int stride) {
   const Lens& lens = camera.lens;
-  // The first pixel of both is the same, and pixel centres have integer coordinates.
+  // Both have the same first pixel, and pixel centres have integer coordinates.
   const double fx = lens.fx / stride, fy = lens.fy / stride, cx = lens.cx / stride, cy = lens.cy / stride;
   ros::CameraInfo info;
   info.header = header;

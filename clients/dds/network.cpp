@@ -36,16 +36,16 @@ using namespace std::chrono_literals;
 
 constexpr int kDenseCloudBytes = 10 << 20;
 constexpr std::uint8_t kCycloneVendor[] = {0x01, 0x10};
-constexpr auto kHearing = 1s;     // until a client's reader of replies is known
-constexpr auto kBlockingMax = 5;  // seconds that a write waits for the one before it to leave
-constexpr auto kBacklogMax = 1s;  // until what was written before has left
+constexpr auto kHearing = 1s;     // time to discover a client's reply reader
+constexpr auto kBlockingMax = 5;  // seconds that a write waits until the previous one is sent
+constexpr auto kBacklogMax = 1s;  // time for earlier data to be sent
 
-/// Samples of any type, as their bytes.
+/// Samples of any type, as bytes.
 class BytesType : public fast::TopicDataType {
  public:
   explicit BytesType(const char* name) {
     setName(name);
-    m_typeSize = 4096;  // to begin with; it grows
+    m_typeSize = 4096;  // initial size; it grows
     auto_fill_type_object(false);
     auto_fill_type_information(false);
   }
@@ -87,7 +87,7 @@ void set_type_hash(Qos& qos, const ros::Type& type) {
   qos.user_data().assign(text.begin(), text.end());
 }
 
-// What is lost is asked for at once and sent again at once, not after the seconds that are usual.
+// Requests and repeats lost data at once, not after the usual seconds.
 fast::DataWriterQos writer_qos(const ros::Type& type, Quality quality, bool best_effort) {
   fast::DataWriterQos qos;
   set_quality(qos, quality, best_effort);
@@ -127,18 +127,18 @@ rtps::GUID_t guid_of(const std::array<std::uint8_t, 16>& bytes) {
 
 }  // namespace
 
-/// Events of the network, told by its threads. Nothing of DDS is called with `mutex` held.
+/// Network events, reported by its threads. No DDS function is called while `mutex` is held.
 struct Events {
   std::mutex mutex;
   std::condition_variable changed;
 };
 
-/// The time until the written clouds and images have left.
+/// The time until the written clouds and images are sent.
 class Backlog {
  public:
   explicit Backlog(double bytes_per_s) : bytes_per_s_(bytes_per_s) {}
-  /// Takes room for so many bytes more, if there is any. Without this check a writer that is too fast drops each sample
-  /// that it is about to finish.
+  /// Reserves room for this many more bytes, if there is any. Without this check, a writer that is too fast would drop
+  /// every sample shortly before completion.
   bool take(std::size_t bytes) {
     const std::lock_guard lock(mutex_);
     const auto now = std::chrono::steady_clock::now();
@@ -168,7 +168,7 @@ struct Writer::State : fast::DataWriterListener {
   Events& events;
   std::shared_mutex& use;
   const bool& left;
-  Backlog* backlog;  ///< set for a topic of sensors
+  Backlog* backlog;  ///< set for a sensor topic
   fast::DataWriter* writer = nullptr;
   std::set<std::array<std::uint8_t, 16>> readers;
 };
@@ -236,20 +236,20 @@ struct Network::State : fast::DomainParticipantListener {
   }
 
   Events events;
-  std::shared_mutex use;  ///< held by all who call DDS; alone by the one who leaves
+  std::shared_mutex use;  ///< shared by all callers of DDS; exclusive when leaving
   bool left = false;
   bool best_effort;
   Backlog backlog;
-  std::mutex making;  ///< guards the endpoints below, up to the others
+  std::mutex making;  ///< guards the endpoints below, before `others`
   std::map<std::string, fast::Topic*> topics;
   std::list<Writer::State> writers;
   std::list<Reader::State> readers;
-  ros::NodeEntitiesInfo node;  ///< not shown yet while it has no name
+  ros::NodeEntitiesInfo node;  ///< not shown while it has no name
   fast::DataWriter* node_writer = nullptr;
   fast::DomainParticipant* participant = nullptr;
   fast::Publisher* publisher = nullptr;
   fast::Subscriber* subscriber = nullptr;
-  std::map<rtps::GUID_t, std::string> others;  ///< topics of others' writers; of `events`
+  std::map<rtps::GUID_t, std::string> others;  ///< topics of others' writers; guarded by `events`
 };
 
 namespace {
@@ -282,8 +282,8 @@ bool Writer::write_bytes(const Bytes& bytes, const Requester* to) const {
   }
   if (state_->backlog) {
     if (has_readers() && !state_->backlog->take(bytes.size())) return false;
-    // Sends a heartbeat first. Cyclone's readers pass over all that is older than the first one that they hear, and a
-    // large sample is still on its way when the next is due.
+    // Sends a heartbeat first. Cyclone's readers skip everything older than the first sample that they hear of, and a
+    // large sample is still under way when the next is due.
     state_->writer->assert_liveliness();
   }
   return state_->writer->write(const_cast<Bytes*>(&bytes), related);
@@ -301,7 +301,7 @@ std::optional<Sample> Reader::take() const {
   const std::shared_lock lock(state_->use);
   if (state_->left) return std::nullopt;
   while (true) {
-    state_->arrived = false;  // before it is looked: what comes meanwhile is not missed
+    state_->arrived = false;  // reset before reading, so that later arrivals are not missed
     Sample sample;
     fast::SampleInfo info;
     if (state_->reader->take_next_sample(&sample.bytes, &info) != eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK)
@@ -340,11 +340,11 @@ void leave_networks() {
 
 Result<Network> Network::open(const NetworkOptions& options) {
   auto* factory = fast::DomainParticipantFactory::get_instance();
-  factory->load_profiles();  // the user's own, by FASTRTPS_DEFAULT_PROFILES_FILE
+  factory->load_profiles();  // the user's own profiles, from FASTRTPS_DEFAULT_PROFILES_FILE
   const auto qos = participant_qos(factory->get_default_participant_qos(), options);
   if (!qos) return tl::unexpected(qos.error());
   auto state = std::make_unique<State>(options);
-  const auto mask = fast::StatusMask::none();  // discovery alone; endpoints have their own listeners
+  const auto mask = fast::StatusMask::none();  // for discovery only; endpoints have their own listeners
   state->participant = factory->create_participant(options.domain, *qos, state.get(), mask);
   if (!state->participant) {
     return fail(ErrorCode::kInvalidArgument, "DDS cannot be joined: look at --interface, --peer and ROS's environment",

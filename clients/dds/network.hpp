@@ -19,16 +19,16 @@
 namespace slsd::dds {
 
 enum class Quality {
-  kSensor,   ///< clouds and images: the newest five; for readers of sensors' QoS, and for reliable ones
+  kSensor,   ///< clouds and images: the newest five; for readers with sensor or reliable QoS
   kService,  ///< requests, replies and diagnostics: reliable, the newest ten
-  kLatched,  ///< transforms: reliable, and for those who come later too
+  kLatched,  ///< transforms: reliable, also for later readers
 };
 
-/// The writer of a sample, and what a reply to it is related by.
+/// The writer of a sample, and the data that relates a reply to it.
 struct Requester {
   std::array<std::uint8_t, 16> guid{};  ///< GUID of the reader that waits for the reply, or of the writer
   std::uint64_t sequence_number = 0;
-  bool is_cyclone = false;  ///< known by the vendor in the writer's GUID
+  bool is_cyclone = false;  ///< recognised by the vendor in the writer's GUID
 };
 
 struct Sample {
@@ -36,16 +36,15 @@ struct Sample {
   Requester from;
 };
 
-/// Writes to one topic, and waits for no reader. @thread thread-safe
+/// Writes to one topic without waiting for readers. @thread thread-safe
 class Writer {
  public:
-  /// Writes the message. @return false if what was written before will not leave within a second: clouds and images
-  /// come too fast
+  /// Writes the message. @return false if earlier data cannot be sent within a second: clouds and images come too fast
   template <Message Value>
   bool write(const Value& message) const {
     return write_bytes(encode(message), nullptr);
   }
-  /// Answers a request: waits until the one who asked can hear it, at most a second.
+  /// Answers a request. Waits at most a second until the requester can receive the reply.
   template <Message Value>
   bool reply(const Value& message, const Requester& to) const {
     return write_bytes(encode(message), &to);
@@ -58,13 +57,13 @@ class Writer {
 
  private:
   bool write_bytes(const Bytes& bytes, const Requester* to) const;
-  State* state_;  ///< belongs to the network, which outlives it
+  State* state_;  ///< belongs to the network, which must outlive it
 };
 
 /// Reads one topic. @thread thread-bound
 class Reader {
  public:
-  /// The oldest sample that was not taken yet.
+  /// The oldest sample not taken yet.
   [[nodiscard]] std::optional<Sample> take() const;
   [[nodiscard]] int writer_count() const;
 
@@ -73,11 +72,11 @@ class Reader {
   [[nodiscard]] bool has_news() const;
 
  private:
-  State* state_;  ///< belongs to the network, which outlives it
+  State* state_;  ///< belongs to the network, which must outlive it
 };
 
-/// A node of ROS 2: a participant of a DDS domain with ROS's names and qualities of service. What it writes never waits
-/// for a reader: one that stalls loses what is older than the newest few.
+/// A ROS 2 node: a participant of a DDS domain with ROS's names and qualities of service. Writing never waits for a
+/// reader: one that stalls loses all but the newest few samples.
 /// @thread thread-safe
 class Network {
  public:
@@ -87,16 +86,16 @@ class Network {
   Network(Network&&) noexcept;
   Network& operator=(Network&&) = delete;
 
-  /// Shows the node /NAMESPACE/slsd, with all endpoints that there are and will be.
+  /// Announces the node /NAMESPACE/slsd, with all current and future endpoints.
   void show_node(const std::string& name_space);
 
-  /// @param topic  with its prefix, as DDS has it  @errors kIo
+  /// @param topic  with its DDS prefix  @errors kIo
   [[nodiscard]] Result<Writer> writer(const ros::Type& type, const std::string& topic, Quality quality) const;
   [[nodiscard]] Result<Reader> reader(const ros::Type& type, const std::string& topic, Quality quality) const;
 
-  /// The number of other writers of this topic so far.
+  /// The number of other writers discovered for this topic so far.
   [[nodiscard]] int other_writers(const std::string& topic) const;
-  /// Waits until one of these readers has a sample that was not taken, or the time is over.
+  /// Waits until one of these readers has an untaken sample, or the time is over.
   bool wait_for(const std::vector<Reader>& readers, std::chrono::milliseconds time) const;
 
   struct State;
@@ -106,10 +105,10 @@ class Network {
   std::unique_ptr<State> state_;
 };
 
-/// Tells the others that this process leaves: all of its networks. Whoever writes or reads afterwards does nothing.
+/// Announces that this process leaves all its networks. Later reads and writes do nothing.
 void leave_networks();
 
-/// The advice if this host's sockets cannot hold a dense cloud; empty: none is needed. @thread reentrant
+/// The advice if this host's socket buffers cannot hold a dense cloud; else empty. @thread reentrant
 [[nodiscard]] std::string receive_buffer_warning();
 
 }  // namespace slsd::dds

@@ -30,7 +30,7 @@ using Range = Discovery::Range;
 
 constexpr const char* kLoopback = "127.0.0.1";
 constexpr const char* kMulticast = "239.255.0.1";  // of RTPS
-constexpr std::uint32_t kParticipantsMax = 120;    // of one host, found one by one without multicast
+constexpr std::uint32_t kParticipantsMax = 120;    // of one host, tried one by one without multicast
 constexpr std::uint64_t kPacePeriodMs = 1;
 
 bool plain(const std::string& text) {
@@ -45,7 +45,7 @@ std::string text_of(const sockaddr* address) {
   return text;
 }
 
-// An interface by its name or by its address.
+// Finds an interface by its name or its address.
 Result<std::string> address_of_interface(const std::string& interface) {
   ifaddrs* all = nullptr;
   if (::getifaddrs(&all) != 0) return fail(ErrorCode::kIo, "the interfaces cannot be listed");
@@ -71,7 +71,7 @@ Result<std::string> address_of_host(const std::string& host) {
   return text_of(found->ai_addr);
 }
 
-// Port 0 stands for those of the first kParticipantsMax participants of the host.
+// Port 0 stands for the ports of the host's first kParticipantsMax participants.
 Locator_t locator(const std::string& address) {
   Locator_t locator;
   IPLocator::setIPv4(locator, address);
@@ -81,12 +81,12 @@ Locator_t locator(const std::string& address) {
 void listen_without_multicast(DomainParticipantQos& qos) {
   auto& builtin = qos.wire_protocol().builtin;
   builtin.metatrafficMulticastLocatorList.clear();
-  builtin.metatrafficUnicastLocatorList.push_back(Locator_t());  // any; without one it would listen to multicast
+  builtin.metatrafficUnicastLocatorList.push_back(Locator_t());  // any; without a locator it would listen to multicast
 }
 
 }  // namespace
 
-// Asked of a socket, as a unit may hide /proc/sys. The kernel doubles what it grants.
+// Asks a socket, because a unit may hide /proc/sys. The kernel doubles the granted size.
 int largest_receive_buffer() {
   constexpr int kMost = 1 << 30;
   const FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
@@ -113,7 +113,7 @@ Result<DomainParticipantQos> participant_qos(DomainParticipantQos qos, const Net
     udp->interfaceWhiteList.push_back(*address);
     alone = *address == kLoopback;
   }
-  qos.transport().use_builtin_transports = false;  // shared memory is not that of other versions of Fast DDS
+  qos.transport().use_builtin_transports = false;  // shared memory differs between versions of Fast DDS
   if (alone) qos.transport().user_transports.push_back(loopback_transport(udp));
   if (!alone) qos.transport().user_transports.push_back(udp);
 
@@ -127,7 +127,7 @@ Result<DomainParticipantQos> participant_qos(DomainParticipantQos qos, const Net
   const bool multicast = (range == Range::kSubnet && options.peers.empty()) || range == Range::kSystemDefault;
   if (!multicast) listen_without_multicast(qos);
   if (multicast && !peers.empty()) builtin.initialPeersList.push_back(locator(kMulticast));
-  if (range == Range::kOff) qos.allocation().participants.maximum = 1;  // itself
+  if (range == Range::kOff) qos.allocation().participants.maximum = 1;  // only itself
 
   auto pace = std::make_shared<FlowControllerDescriptor>();
   pace->name = kPace;

@@ -9,13 +9,13 @@
 
 namespace slsd::dds {
 
-/// The flow controller of clouds and images.
+/// The name of the flow controller of clouds and images.
 inline constexpr const char* kPace = "slsd pace";
 
-/// Bytes that a socket of this host may hold unread.
+/// The greatest number of unread bytes in a socket of this host.
 [[nodiscard]] int largest_receive_buffer();
 
-/// A participant's settings: where it listens, whom it looks for, and how fast it sends.
+/// A participant's settings: where it listens, which participants it looks for, and how fast it sends.
 /// @errors kInvalidArgument: no such interface or peer
 [[nodiscard]] Result<eprosima::fastdds::dds::DomainParticipantQos> participant_qos(
     eprosima::fastdds::dds::DomainParticipantQos qos, const NetworkOptions& options);

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-/// ROS 2's messages: fields and their order are those of ROS's own .msg and .srv files.
+/// ROS 2's messages, with the fields and their order in ROS's own .msg and .srv files.
 namespace slsd::dds::ros {
 
-/// A type as ROS 2 names it on the wire, and the hash of its description (REP 2016).
+/// A type with its ROS 2 name in DDS, and the hash of its description (REP 2016).
 struct Type {
   const char* name;
   const char* hash;
@@ -170,7 +170,7 @@ struct TriggerResponse {
   static void fields(auto& m, auto&& each) { each(m.success, m.message); }
 };
 
-/// rmw_cyclonedds relates a reply to its request by this, which both begin with.
+/// Relates a reply to its request in rmw_cyclonedds; both begin with it.
 struct CycloneHeader {
   std::uint64_t client_guid = 0;
   std::int64_t sequence_number = 0;

@@ -86,7 +86,7 @@ int main(int argc, char** argv) {
   add_network_options(app, network);
   if (const auto ended = slsd::parse_usage(app, argc, argv)) return *ended;
   if (calibration) return describe(options, *calibration);
-  // Before the first thread: they all leave these to the one who waits for them.
+  // Blocked before the first thread starts: all threads leave these signals to the one that waits for them.
   sigset_t ends;
   sigemptyset(&ends);
   sigaddset(&ends, SIGINT);
@@ -115,5 +115,5 @@ int main(int argc, char** argv) {
   int signal = 0;
   sigwait(&ends, &signal);
   slsd::dds::leave_networks();
-  std::_Exit(0);  // its threads wait for the service
+  std::_Exit(0);  // its threads may be waiting for the service
 }
