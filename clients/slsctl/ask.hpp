@@ -14,13 +14,13 @@
 
 namespace slsd {
 
-/// The cause of a command's failure: the daemon's own error, or one of this side. It has the exit status that it means.
+/// The cause of a command's failure, from the daemon or from this side, with the exit status that it implies.
 struct Failure {
   int exit_status;
   RpcError error;
 };
 
-/// A failure on this side. @return kNoDaemon where there is none, else kRequestFailed
+/// A failure on this side. @return kNoDaemon if no daemon answers, else kRequestFailed
 [[nodiscard]] Failure failure(const Error& error);
 
 /// A call's outcome; a JSON-RPC error is a failure.
@@ -30,7 +30,7 @@ struct Failure {
 [[nodiscard]] tl::expected<Answered, Failure> ask(Connection& connection, std::string_view method,
                                                   const nlohmann::json& params);
 
-/// Makes one call on a connection of its own.
+/// Makes one call on a new connection.
 [[nodiscard]] tl::expected<Answered, Failure> ask(const ClientOptions& options, std::string_view method,
                                                   const nlohmann::json& params);
 

@@ -36,7 +36,7 @@ json parameters(const ClientOptions& options) {
   return params;
 }
 
-/// The lines of a session for a person, each once. The service repeats the last few hundred each time.
+/// Prints each line of a session once. The service repeats the last few hundred lines each time.
 class Log {
  public:
   void show(const json& told) {

@@ -77,7 +77,7 @@ int image_command(const ClientOptions& options, const std::string& method) {
   return kDone;
 }
 
-// "camera.NAME.KEY=VALUE": a name may have dots in it, a key has none.
+// "camera.NAME.KEY=VALUE": a name may contain dots, a key may not.
 int set_command(const ClientOptions& options) {
   json params = json::object();
   for (const std::string& assignment : options.assignments) {
@@ -115,7 +115,7 @@ void print_settings(const json& keys, const json& set, const std::string& where,
 
 }  // namespace
 
-// Where each is from; those that are not listed are the defaults.
+// Prints the source of each key; keys that are not listed have defaults.
 int settings_command(const ClientOptions& options) {
   const auto answered = ask(options, "settings", json::object());
   if (!answered) return report(options, answered.error());

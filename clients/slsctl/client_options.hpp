@@ -21,34 +21,34 @@ inline constexpr int kNoDaemon = 3;
 struct ClientOptions {
   std::filesystem::path socket = client::default_socket();
   bool json = false;
-  std::filesystem::path output;           ///< scan: the cloud; metrics, bundle: the file; empty: none
-  std::string format;                     ///< scan: the cloud's, "ply", "pcd" or "tiff"; empty: as its name ends
-  std::string metrics_format;             ///< metrics: "openmetrics" or "prometheus"; empty: by where it goes
-  std::filesystem::path picture;          ///< scan: the frame with what was decoded
-  bool why = false;                       ///< scan: the picture says by which rule each region was rejected
+  std::filesystem::path output;   ///< scan: the cloud; metrics, bundle: the file; empty: none
+  std::string format;             ///< scan: the cloud's format, "ply", "pcd" or "tiff"; empty: from the file's name
+  std::string metrics_format;     ///< metrics: "openmetrics" or "prometheus"; empty: depends on the destination
+  std::filesystem::path picture;  ///< scan: the frame with the decoded symbols
+  bool why = false;               ///< scan: the picture shows the rule that rejected each region
   std::filesystem::path cloud_picture;    ///< scan: the cloud, drawn
   std::filesystem::path image;            ///< preview, frame, pattern: the PNG to write
   std::filesystem::path shown;            ///< project: a picture's name, or a file
   std::string density;                    ///< scan, watch: "symbols" or "pixels"; empty: as configured
   bool normals = false;                   ///< scan: normals of pixels
   bool texture = false;                   ///< scan: intensities from a frame in white light
-  bool ambient = false;                   ///< scan: less the light of the room
-  bool as_shown = false;                  ///< frame: whatever the projector shows
-  std::filesystem::path folder;           ///< record: where to
+  bool ambient = false;                   ///< scan: minus the room's light
+  bool as_shown = false;                  ///< frame: keep the projector's picture
+  std::filesystem::path folder;           ///< record: the destination
   bool clouds = false;                    ///< record: the clouds too
-  std::optional<double> seconds;          ///< record: ends after so long
+  std::optional<double> seconds;          ///< record: ends after this time
   std::string camera;                     ///< exposure, frame, preview, scan: its name; empty: the first
-  std::optional<double> exposure_max_us;  ///< exposure: the longest that is proposed
-  std::optional<double> gain_max_db;      ///< exposure: the highest that is proposed
+  std::optional<double> exposure_max_us;  ///< exposure: the longest to propose
+  std::optional<double> gain_max_db;      ///< exposure: the highest to propose
   std::optional<int> timeout_ms;
   std::vector<std::string> assignments;  ///< set: "decode.density=pixels"
-  std::string action = "begin";          ///< calibrate: or "look", "end" or "cancel"
-  std::string board, ruler, code;        ///< calibrate: as slsd --calibrate has them; empty: its own
+  std::string action = "begin";          ///< calibrate: this, or "look", "end" or "cancel"
+  std::string board, ruler, code;        ///< calibrate: as for slsd --calibrate; empty: its defaults
   std::optional<int> poses;              ///< calibrate
-  bool resume = false;                   ///< calibrate: the pictures of the last session count
-  double interval_s = 1.0;               ///< top: between two looks
+  bool resume = false;                   ///< calibrate: continue with the last session's pictures
+  double interval_s = 1.0;               ///< top: between two refreshes
   std::optional<double> rate_hz;         ///< watch
-  std::uint64_t count = 0;               ///< watch: clouds, record: scans, top: looks, after which it ends; 0: none
+  std::uint64_t count = 0;  ///< ends after this many clouds (watch), scans (record) or refreshes (top); 0: no limit
 };
 
 }  // namespace slsd

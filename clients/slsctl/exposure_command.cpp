@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-/// The inspected camera, and the results of the look.
+/// The inspected camera, and the result.
 struct Look {
   json camera;
   std::optional<ExposureSetting> present;
@@ -32,7 +32,7 @@ tl::expected<Answered, Failure> ask_for_frame(Connection& connection, const Clie
   return ask(connection, "frame", params);
 }
 
-// The first camera, where none is named, as the daemon has it.
+// Without a name, the first camera, as in the daemon.
 json camera_named(const json& settings, const std::string& name) {
   for (const json& camera : settings.value("cameras", json::array())) {
     if (name.empty() || camera.value("name", "") == name) return camera;

@@ -22,7 +22,7 @@ using std::filesystem::path;
 constexpr std::array<std::pair<const char*, const char*>, 4> kCloudFormats{
     {{".ply", "ply"}, {".pcd", "pcd"}, {".tiff", "tiff"}, {".tif", "tiff"}}};
 
-/// Empty if the name ends in none of them.
+/// Empty if the name has none of the known extensions.
 std::string format_named(const path& file) {
   const std::string extension = lower_extension(file);
   const auto found = std::ranges::find(kCloudFormats, extension, [](const auto& each) { return each.first; });
@@ -44,7 +44,7 @@ std::string wrong_cloud(const ClientOptions& options) {
   return {};
 }
 
-/// @param extension  the one that the command writes; a name without any is fine
+/// @param extension  the command's own extension; a name without any is fine
 std::string wrong_name(const path& file, const std::string& extension, const std::string& what) {
   const std::string given = lower_extension(file);
   if (file.empty() || given.empty() || given == extension) return {};

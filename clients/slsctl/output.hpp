@@ -18,27 +18,27 @@ namespace slsd {
 /// Tells whether a file to write is "-".
 [[nodiscard]] bool is_standard_output(const std::filesystem::path& file);
 
-/// The files that a command line names to be written.
+/// The output files of a command line.
 [[nodiscard]] std::vector<std::filesystem::path> outputs_of(const ClientOptions& options);
 
-/// The stream for words: standard output, or standard error if the result itself goes to standard output.
+/// The stream for messages: standard output, or standard error if the result itself goes to standard output.
 [[nodiscard]] std::ostream& words(const ClientOptions& options);
 
-/// The format of a scan's cloud, by --format or the end of the file's name: "ply", "pcd" or "tiff"; "ply" for standard
-/// output, and if there is no file. Empty: the name ends in none of them.
+/// The format of a scan's cloud from --format or the file's extension: "ply", "pcd" or "tiff"; "ply" for standard
+/// output, and without a file. Empty: an unknown extension.
 [[nodiscard]] std::string cloud_format(const ClientOptions& options);
 
-/// The fault in the names of the files to write, before anything is done; empty: none.
+/// The error in the names of the output files, found before any work; empty: none.
 [[nodiscard]] std::string wrong_outputs(const ClientOptions& options, const std::string& command);
 
-/// Checks that the files could be written now; a scan that cannot be kept is not begun.
+/// Checks that the files could be written now, so that no scan is taken in vain.
 [[nodiscard]] tl::expected<void, Failure> check_outputs(const ClientOptions& options);
 
-/// Writes a file, whole or not at all, or to standard output. If that fails the request failed; it never means that
-/// there is no service.
+/// Writes a file, whole or not at all, or standard output. A failure means that the request failed, never that the
+/// service is missing.
 [[nodiscard]] tl::expected<void, Failure> write_output(const std::filesystem::path& file, std::string_view bytes);
 
-/// Flushes what a command printed. @return its exit status; kRequestFailed if standard output took not all of it
+/// Flushes the output of a command. @return its exit status; kRequestFailed if standard output did not accept all
 [[nodiscard]] int finish(const ClientOptions& options, int exit_status);
 
 }  // namespace slsd

@@ -13,7 +13,7 @@
 namespace slsd {
 namespace {
 
-constexpr std::chrono::seconds kSoon{1};  // what is over by then needs no progress
+constexpr std::chrono::seconds kSoon{1};  // shorter requests need no progress
 
 }  // namespace
 

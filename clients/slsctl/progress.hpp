@@ -9,13 +9,13 @@
 
 namespace slsd {
 
-/// Shows on a terminal's standard error for how long an answer has been awaited, from the first second on. Elsewhere,
-/// and with --json, it shows nothing. The line is wiped when it ends.
+/// Shows on a terminal's standard error how long an answer has been awaited, after the first second. Shows nothing
+/// elsewhere or with --json. The destructor erases the line.
 /// @thread thread-bound
 class Progress {
  public:
-  /// @param connection  outlives it
-  /// @param doing       what takes its time: "scanning"
+  /// @param connection  must outlive this object
+  /// @param doing       the slow activity: "scanning"
   Progress(const ClientOptions& options, Connection& connection, std::string doing);
   ~Progress();
   Progress(const Progress&) = delete;
@@ -24,7 +24,7 @@ class Progress {
  private:
   Connection& connection_;
   std::string doing_;
-  std::size_t shown_ = 0;  ///< columns to be wiped
+  std::size_t shown_ = 0;  ///< columns to erase
 };
 
 }  // namespace slsd

@@ -22,10 +22,10 @@ using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-// Longer than a camera takes to come back after its plug was pulled, short enough not to record nothing all night.
+// Longer than a camera needs to return after it was unplugged, but short enough not to waste a night.
 constexpr auto kPatience = 60s;
 
-// What passes by itself, or when a hand plugs something in again.
+// Errors that pass by themselves, or once a device is plugged in again.
 bool passes(const Failure& failure) {
   constexpr std::array kPassing{"frame_dropped", "frame_torn", "frame_stale",  "frame_late",
                                 "frame_skewed",  "timeout",    "disconnected", "busy"};
@@ -37,14 +37,14 @@ bool passes(const Failure& failure) {
 
 class Recorder {
  public:
-  /// @param settings  as at the beginning
+  /// @param settings  those at the beginning
   Recorder(const ClientOptions& options, Connection connection, Recording recording, json settings)
       : options_(options),
         connection_(std::move(connection)),
         recording_(std::move(recording)),
         settings_(std::move(settings)) {}
 
-  /// The first thing that ended it too early.
+  /// Runs the recording. Returns the first error that ended it early.
   [[nodiscard]] std::optional<Failure> run() {
     std::optional<Failure> failed = ask_for_scan();
     while (!failed) {
@@ -73,7 +73,7 @@ class Recorder {
   }
 
  private:
-  /// @param coming  scans that are not written yet
+  /// @param coming  scans not written yet
   [[nodiscard]] bool enough(std::uint64_t coming) const {
     if (Interrupt::came()) return true;
     if (options_.count > 0 && recording_.scans() + coming >= options_.count) return true;
@@ -104,7 +104,7 @@ class Recorder {
     return std::nullopt;
   }
 
-  // One that was told to reload decodes the later frames with a pattern or calibration that was not recorded.
+  // After a reload, the service decodes later frames with a pattern or calibration that was not recorded.
   [[nodiscard]] std::optional<Failure> check_settings() {
     const auto now = ask(connection_, "settings", json::object());
     if (!now) return now.error();

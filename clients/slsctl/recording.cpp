@@ -23,7 +23,7 @@ Result<> make_folder(const path& folder) {
   return {};
 }
 
-// A folder that is there may be used only while it is empty: a replay takes every image in it.
+// An existing folder must be empty, because a replay takes every image in it.
 Result<> check_empty(const path& folder) {
   std::error_code error;
   if (!std::filesystem::exists(folder, error)) return {};

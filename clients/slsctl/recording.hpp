@@ -16,25 +16,25 @@
 
 namespace slsd {
 
-/// A folder of frames with all that their clouds depend on, laid out as docs/formats.md says.
+/// A folder of frames with everything that their clouds depend on, in the layout of docs/formats.md.
 /// @thread thread-bound
 class Recording {
  public:
-  /// Makes the folder, and everything in it but the frames.
-  /// @param settings  what `settings` answered
-  /// @param clouds    clouds are kept too
+  /// Creates the folder, and everything in it except the frames.
+  /// @param settings  the answer to `settings`
+  /// @param clouds    also keep the clouds
   /// @errors kAlreadyExists: the folder is not empty; kPermissionDenied, kNoSpace, kNotFound, kIo
   [[nodiscard]] static Result<Recording> create(const std::filesystem::path& folder, nlohmann::json settings,
                                                 bool clouds);
 
-  /// Writes a scan's frames, and its line last. Where that fails none of its frames stay, so that those of several
-  /// cameras keep in step.
-  /// @param scan  a reply, its cloud as PLY, and its events of frames as raw pixels
-  /// @errors kMalformed: frames are missing, or not what they say; kNoSpace, kPermissionDenied, kIo
+  /// Writes a scan's frames, and its line last. On an error none of its frames remain, so that several cameras stay in
+  /// step.
+  /// @param scan  a reply with its cloud as PLY, and the events with its frames as raw pixels
+  /// @errors kMalformed: frames are missing or inconsistent; kNoSpace, kPermissionDenied, kIo
   [[nodiscard]] Result<> add(const Answered& scan);
   /// Writes that a scan failed. @errors kNoSpace, kIo
   [[nodiscard]] Result<> add_failure(const nlohmann::json& error);
-  /// Writes what the recording came to. @errors kNoSpace, kIo
+  /// Writes the recording's summary. @errors kNoSpace, kIo
   [[nodiscard]] Result<> finish();
 
   [[nodiscard]] std::uint64_t scans() const { return scans_; }

@@ -19,7 +19,7 @@ using nlohmann::json;
 
 constexpr std::size_t kLongestText = 1000;
 
-/// A text of the daemon's, as a terminal may show it: much of what it tells came from clients, devices and files.
+/// A text from the daemon, made safe for a terminal: it may quote clients, devices and files.
 std::string text_of(const json& about, const char* key) {
   return printable(about.value(key, ""), kLongestText);
 }
