@@ -11,21 +11,21 @@
 
 namespace slsd {
 
-/// A word of the user's as a message quotes it: printable, in quotation marks.
+/// Quotes a user's word in a message: printable, in quotation marks.
 [[nodiscard]] std::string quoted(const std::string& word);
 
-/// A value that is one of these words. A misspelt one is answered with the nearest.
+/// Accepts one of these words. For a misspelt one, suggests the nearest.
 [[nodiscard]] CLI::Validator one_of(std::vector<std::string> words);
 
-/// A number from `least` to `most`, both included.
+/// Accepts a number from `least` to `most`, both included.
 [[nodiscard]] CLI::Validator between(double least, double most);
 
-/// Parses the command line of a program. Prints help or version; or, on standard error, one sentence that says what is
-/// wrong with the usage: a misspelt command or option with the nearest one, a program without its command with the list
-/// of all. An option is never taken for another option's value: `--pattern --help` would write a picture of that name.
+/// Parses the command line of a program. Prints help or version, or one sentence on standard error about wrong usage.
+/// For a misspelt command or option it suggests the nearest; for a missing command it lists all. An option is never
+/// taken as another option's value: `--pattern --help` would write a picture of that name.
 /// @param app    has the program's name
-/// @param check  what is left to check once all is parsed; throws CLI::ParseError
-/// @return  nothing if the program is to run, else the status to exit with: 0, or 2 for wrong usage
+/// @param check  further checks after parsing; throws CLI::ParseError
+/// @return  nothing if the program should run, else the exit status: 0, or 2 for wrong usage
 [[nodiscard]] std::optional<int> parse_usage(CLI::App& app, int argc, const char* const* argv,
                                              const std::function<void()>& check = {});
 
