@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view kPrefix = "address-";
 constexpr std::size_t kAddressBytesMax = 4096;
 
-// systemd's folder for the unit, or that of the user who started it.
+// systemd's folder for the unit, or for the user who started it.
 std::optional<fs::path> own_folder() {
   if (const char* folder = std::getenv("RUNTIME_DIRECTORY"); folder != nullptr && *folder == '/')
     return fs::path(folder);

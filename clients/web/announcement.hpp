@@ -10,11 +10,11 @@
 
 namespace slsd::web {
 
-/// The page's address in a file that its user and root may read, for `slsd-web --address`; locked while the program
-/// runs, and so told from one that an earlier run left.
+/// The page's address in a file that only its user and root may read, for `slsd-web --address`. The file is locked
+/// while the program runs; that distinguishes it from files of earlier runs.
 class Announcement {
  public:
-  /// @errors kIo: there is a folder for it, but no file could be written
+  /// @errors kIo: the folder exists, but the file cannot be written
   [[nodiscard]] static Result<Announcement> write(int port, const std::string& address);
   Announcement(Announcement&& other) noexcept;
   Announcement(const Announcement&) = delete;
@@ -29,7 +29,7 @@ class Announcement {
   int descriptor_ = -1;
 };
 
-/// The addresses of the pages that this user may open. @errors kNotFound: none, with what to do
+/// The addresses of the pages that this user may open. @errors kNotFound: none, with the remedy
 [[nodiscard]] Result<std::vector<std::string>> announced_addresses();
 
 }  // namespace slsd::web

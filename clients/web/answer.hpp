@@ -21,14 +21,14 @@ struct Answer {
   int status = 200;
   std::string type;                                          ///< the body's type; empty: no body
   client::Bytes body;                                        ///< sent in pieces of 1 MiB
-  std::vector<std::pair<std::string, std::string>> headers;  ///< beside those that every answer has
-  std::function<void(std::string_view)> on_sent;             ///< called with each piece when it is sent; may be empty
+  std::vector<std::pair<std::string, std::string>> headers;  ///< in addition to those of every answer
+  std::function<void(std::string_view)> on_sent;             ///< called when a piece has been sent; may be empty
 };
 
-/// A refusal as the page reads it.
+/// A refusal in the page's format.
 [[nodiscard]] Answer answer_of(const Refusal& refusal);
 
-/// Callbacks by which the server asks the page behind it.
+/// The server's callbacks to the page.
 struct Handlers {
   /// Judges a request by its head alone, before its body is read. @return the refusal, if any. @thread that of run()
   std::function<std::optional<Answer>(const Request&)> refuse;

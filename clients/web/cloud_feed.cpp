@@ -12,7 +12,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kStaysWanted = 5s;  // after the last watcher asked
+constexpr auto kStaysWanted = 5s;  // after the last watcher's request
 constexpr auto kPatience = 20s;
 constexpr auto kPause = 500ms;  // after a failure
 
@@ -42,7 +42,7 @@ void CloudFeed::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     {
       std::unique_lock lock(mutex_);
-      newest_.reset();  // of long ago by the time that somebody asks again
+      newest_.reset();  // it would be old by the next request
       if (!changed_.wait(lock, stop, [this] { return wanted(); })) return;
     }
     Failure failed = follow(stop);
@@ -55,7 +55,7 @@ void CloudFeed::run(const std::stop_token& stop) {
   }
 }
 
-// Until nobody wants it any more, or something is wrong.
+// Receives until nobody wants the clouds any more, or an error occurs.
 Failure CloudFeed::follow(const std::stop_token& stop) {
   auto connection = Connection::open(socket_);
   if (!connection) return failure(connection.error());

@@ -17,7 +17,7 @@
 
 namespace slsd::web {
 
-/// A cloud as the service sent it: a PLY, and its description.
+/// A cloud from the service: a PLY, and its description.
 struct WatchedCloud {
   std::uint64_t number = 0;
   nlohmann::json about;
@@ -25,7 +25,7 @@ struct WatchedCloud {
 };
 using SharedCloud = std::shared_ptr<const WatchedCloud>;  // shared: watchers send it at their own pace
 
-/// The newest cloud of one density, for any number of watchers: one subscription, while somebody asks.
+/// The newest cloud of one density for any number of watchers, from one subscription while somebody watches.
 /// @thread thread-safe
 class CloudFeed {
  public:
@@ -33,7 +33,7 @@ class CloudFeed {
   CloudFeed(const CloudFeed&) = delete;
   CloudFeed& operator=(const CloudFeed&) = delete;
 
-  /// Waits for a cloud after that number, or for a failure. @return null where neither came in time
+  /// Waits for a cloud after that number, or for a failure. @return null if neither came in time
   [[nodiscard]] tl::expected<SharedCloud, Failure> next(std::uint64_t after, std::chrono::milliseconds time);
 
  private:

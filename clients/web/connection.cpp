@@ -27,13 +27,13 @@ namespace http = boost::beast::http;
 
 constexpr auto kIdle = 5s;     // between two requests
 constexpr auto kRequest = 5s;  // from a request's first byte to its last
-constexpr int kCrowd = 128;    // if so many send nothing, or slowly, each has less:
+constexpr int kCrowd = 128;    // with more silent or slow connections, each has less time:
 constexpr auto kIdleInCrowd = 200ms;
 constexpr auto kRequestInCrowd = 1s;
 constexpr auto kWrite = 10s;  // for each of these:
 constexpr std::size_t kWriteBytes = 1 << 20;
 constexpr int kRequestsMax = 1000;
-constexpr auto kThrowAway = 2s;  // closed at once, a socket with unread bytes resets, and the answer is lost
+constexpr auto kThrowAway = 2s;  // closing a socket with unread bytes at once would reset it and lose the answer
 constexpr std::size_t kThrowAwayBytes = 1 << 20;
 
 std::string text_of(const asio::ip::address& address) {
@@ -65,7 +65,7 @@ void HttpConnection::set_waiting(bool waiting) {
   shared_.waiting += waiting ? 1 : -1;
 }
 
-// Any error ends the connection: the last reference to it goes with the callback.
+// Any error ends the connection: the callback holds the last reference to it.
 template <class Then>
 void HttpConnection::read_more(Then then) {
   stream_.async_read_some(asio::buffer(piece_),
@@ -98,7 +98,7 @@ void HttpConnection::read_head() {
   admit();
 }
 
-// A body is read only if the request is admitted by its head: an unread one ends the connection.
+// A body is read only if the head is admitted; an unread body ends the connection.
 void HttpConnection::admit() {
   error_code gone;
   request_.address = text_of(stream_.socket().remote_endpoint(gone).address());
@@ -123,7 +123,7 @@ void HttpConnection::read_body() {
   have_answered();
 }
 
-// Nothing is read meanwhile: what the peer sends beyond this request waits in its socket.
+// Nothing is read meanwhile: further data from the peer waits in its socket.
 void HttpConnection::have_answered() {
   stream_.expires_never();
   asio::post(shared_.workers, [self = shared_from_this()]() mutable {
@@ -143,7 +143,7 @@ void HttpConnection::have_answered() {
 void HttpConnection::refuse(const Refusal& refusal, bool head_is_whole) {
   if (!head_is_whole) {
     request_ = {};
-    if (received_.starts_with("HEAD ")) request_.method = "HEAD";  // whose answer has no body
+    if (received_.starts_with("HEAD ")) request_.method = "HEAD";  // its answer has no body
   }
   send(answer_of(refusal), /*close=*/true);
 }

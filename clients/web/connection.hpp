@@ -15,17 +15,17 @@
 
 namespace slsd::web {
 
-/// State that all connections of a server share. @thread that of its io_context, but for the workers
+/// The state that all connections of a server share. @thread that of its io_context, except the workers
 struct Shared {
   Handlers handlers;
   boost::asio::io_context io{1};
   int open = 0;     ///< connections
-  int waiting = 0;  ///< connections that have no whole request
+  int waiting = 0;  ///< connections without a whole request
   std::function<void()> on_closed;
   boost::asio::thread_pool workers;
 };
 
-/// One peer: reads a request, has it answered, and reads the next.
+/// One peer: reads a request, answers it, and reads the next.
 /// @thread that of the io_context
 class HttpConnection : public std::enable_shared_from_this<HttpConnection> {  // shared: pending reads and writes own it
  public:
@@ -54,10 +54,10 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {  //
   Shared& shared_;
   boost::beast::tcp_stream stream_;
   std::array<char, 4096> piece_{};
-  std::string received_;  ///< and not read yet
+  std::string received_;  ///< but not parsed yet
   Request request_;
   Answer answer_;
-  std::string head_;  ///< the answer's
+  std::string head_;  ///< the head of the answer
   int served_ = 0;
   std::size_t thrown_away_ = 0;
   bool waiting_ = false, close_ = false, body_unread_ = false;

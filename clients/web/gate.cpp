@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::string_view kBearer = "Bearer ";
 
-/// Compares two texts in a time that does not tell where they differ.
+/// Compares two texts in constant time, so that timing does not reveal where they differ.
 bool same(std::string_view a, std::string_view b) {
   unsigned difference = a.size() == b.size() ? 0 : 1;
   for (std::size_t i = 0; i < a.size(); ++i)
@@ -26,7 +26,7 @@ bool same(std::string_view a, std::string_view b) {
 
 std::string random_text() {
   std::array<unsigned char, 24> bytes{};
-  // So few bytes come whole or, on a kernel without random numbers, never: then nobody may be let in.
+  // This few bytes come whole, or never if the kernel has no random numbers; then nobody may enter.
   if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) std::abort();
   std::string text;
   for (const unsigned char byte : bytes) {
@@ -50,7 +50,7 @@ std::string without_port(std::string_view host) {
   return lower(host);
 }
 
-/// "scanner:80" is "scanner" over HTTP, "scanner:443" over HTTPS.
+/// Removes a default port: "scanner:80" is "scanner" over HTTP, "scanner:443" over HTTPS.
 std::string without_usual_port(std::string_view host, std::string_view scheme) {
   const std::string_view usual = scheme == "https" ? ":443" : ":80";
   return lower(host.ends_with(usual) ? host.substr(0, host.size() - usual.size()) : host);
@@ -99,7 +99,7 @@ std::optional<Refusal> Gate::check(const Request& request, Clock::time_point now
                  "open the address that slsd-web printed when it started, or enter the token of this scanner"};
 }
 
-// All cookies of the name count: of two scanners below one name, a browser may send both.
+// All cookies of the name count, because a browser may send those of two scanners under one host name.
 bool Gate::knows(const Request& request, Clock::time_point now) {
   std::erase_if(sessions_, [&](const Known& session) { return now - session.used > kSession; });
   std::string_view rest = request.cookie;

@@ -19,8 +19,8 @@ namespace {
 using boost::asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr std::size_t kWorkers = 48;  // each watcher holds one while it waits for a cloud
-constexpr int kConnectionsMax = 500;  // a process has 1024 files, unless told otherwise
+constexpr std::size_t kWorkers = 48;  // each watcher occupies one while it waits for a cloud
+constexpr int kConnectionsMax = 500;  // by default a process may have 1024 files
 constexpr int kBacklog = 64;
 constexpr std::chrono::milliseconds kPause{100};
 
@@ -47,7 +47,7 @@ class Server final : public HttpServer {
     if (error) return error;
     const tcp::endpoint endpoint = found.begin()->endpoint();
     acceptor_.open(endpoint.protocol(), error);
-    // A port of late connections may be had again; one that somebody listens at may not (no SO_REUSEPORT).
+    // Takes over a port that only old connections use; not one with a listener (no SO_REUSEPORT).
     if (!error) acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
     if (!error) acceptor_.bind(endpoint, error);
     if (!error) acceptor_.listen(kBacklog, error);
@@ -70,7 +70,7 @@ class Server final : public HttpServer {
     accept();
     shared_.io.run();
     at_end();
-    // Workers may wait for the service for long: the signal ends them.
+    // Workers may wait long for the service, so the signal ends them.
     std::signal(ended_by, SIG_DFL);
     std::raise(ended_by);
   }
@@ -88,7 +88,7 @@ class Server final : public HttpServer {
       accept();
     });
   }
-  // As when the process has no file left: asked again at once, the answer would be the same.
+  // For example, the process has no free descriptor: an immediate retry would fail again.
   void pause() {
     pause_.expires_after(kPause);
     pause_.async_wait([this](const error_code&) {

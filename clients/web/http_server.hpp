@@ -17,19 +17,19 @@ namespace slsd::web {
 ///                                     |
 ///                                     +--> refused: what is left unread is thrown away, and the connection closed
 ///
-/// If many connections have no whole request, each has less time. A piece of an answer has to be taken within ten
-/// seconds. Slow peers hold no thread.
+/// If many connections have no whole request, each gets less time. The peer must accept each piece of an answer within
+/// ten seconds. Slow peers occupy no thread.
 class HttpServer {
  public:
   virtual ~HttpServer() = default;
 
-  /// @param address  a number, or a name of this machine
-  /// @param port     0: any that is free
-  /// @errors kIo: cannot listen there, with who has the port if that can be seen
+  /// @param address  an address, or a name of this machine
+  /// @param port     0: any free port
+  /// @errors kIo: cannot listen there; names the program at the port if visible
   [[nodiscard]] static Result<std::unique_ptr<HttpServer>> open(const std::string& address, int port,
                                                                 Handlers handlers);
   [[nodiscard]] virtual int port() const = 0;
-  /// Serves until SIGINT or SIGTERM. @param at_end  is called before the signal ends the program
+  /// Serves until SIGINT or SIGTERM. @param at_end  called before the signal ends the program
   virtual void run(const std::function<void()>& at_end) = 0;
 };
 

@@ -32,7 +32,7 @@ constexpr std::size_t kPastMax = 50;
 constexpr std::size_t kPastBytesMax = 48 << 20;
 constexpr std::size_t kScriptBytesMax = 4 << 20;
 
-// No exceptions: no script, style or picture of anywhere else, none written in the page, no frame around it.
+// No exceptions: no external or inline script, style or picture, and no frame around the page.
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'";
@@ -65,7 +65,7 @@ std::string parameter(const Request& request, const char* name) {
   return found == request.query.end() ? "" : found->second;
 }
 
-/// Takes pages of a memfd out of this process again: they stay where the service has them, and may be read anew.
+/// Releases a memfd's pages in this process: the service still has them, and they can be read again.
 void forget(const char* data, std::size_t size) {
   const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
   const auto begin = reinterpret_cast<std::uintptr_t>(data), first = (begin + page - 1) / page * page;
@@ -77,7 +77,7 @@ std::pair<std::string, std::string> header_about(const json& about) {
   return {"X-Slsd-About", about.dump(-1, ' ', true, json::error_handler_t::replace)};
 }
 
-// Clouds are memfds, of which no more is here than is being sent, however many read however many.
+// Clouds are memfds; only the parts being sent are resident here, however many clients read.
 Answer cloud_answer(client::Bytes bytes, const json& about) {
   return {200, "application/octet-stream", std::move(bytes), {header_about(about)}, [](std::string_view sent) {
             forget(sent.data(), sent.size());
@@ -142,7 +142,7 @@ Result<> PageServer::open() {
   return {};
 }
 
-// By its head alone, so that nobody without a secret has a body read.
+// Judges the head alone, so that no body without a secret is read.
 std::optional<Answer> PageServer::refuse(const Request& request) {
   if (const auto refused = gate_->check_host(request)) return answer_of(*refused);
   const auto route = routes_.find(request.path);
@@ -164,7 +164,7 @@ void PageServer::add_pages() {
                                          return page.path == "/" ? index(page, request) : page_answer(page);
                                        }};
   }
-  // Debian's, by their own names: no path of a request's.
+  // Debian's files, under fixed names: requests cannot choose a path.
   for (const auto& [path, file] : {std::pair{"/three.js", "three.min.js"},
                                    std::pair{"/orbit_controls.js", "examples/js/controls/OrbitControls.js"}}) {
     routes_[path] = {"GET", true, [file = options_.three / file](const Request&) {
@@ -182,15 +182,15 @@ void PageServer::add_pages() {
   }
 }
 
-// The address that slsd-web prints has the token: it is exchanged for a session, and does not stay in the address. A
-// token that another page has its browser bring in the background is not looked at.
+// The address that slsd-web prints contains the token. It is exchanged for a session and removed from the address. A
+// token in another page's background request is ignored.
 Answer PageServer::index(const Page& page, const Request& request) {
   const auto token = request.query.find("token");
   const bool opened = request.destination.empty() || request.destination == "document";
   if (token == request.query.end() || !opened) return page_answer(page);
   const auto session = gate_->log_in(request.address, token->second);
   if (!session) {
-    Answer answer = page_answer(page);  // which asks for the token
+    Answer answer = page_answer(page);  // asks for the token
     answer.status = session.error().status;
     return answer;
   }
@@ -217,7 +217,7 @@ void PageServer::post(const char* path, bool open, HandleBody handle) {
                    }};
 }
 
-// The service says what is wrong with the parameters, and to whom it is not given.
+// The service itself reports wrong parameters and missing rights.
 void PageServer::pass_on(const char* path, const char* method) {
   post(path, false,
        [this, method](const Request&, const json& body) { return result_or_refusal(call(method, body, kPatience)); });
@@ -302,7 +302,7 @@ Answer PageServer::image(const Request& request, const char* method) const {
           {}};
 }
 
-/// A frame with the rule that rejected each region, and what these mean.
+/// A frame with the rule that rejected each region, and the rules' meanings.
 Answer PageServer::reasons(const Request& request) const {
   json params{{"why", true}};
   if (const std::string camera = parameter(request, "camera"); !camera.empty()) params["camera"] = camera;
@@ -333,7 +333,7 @@ Answer PageServer::scan(const json& body) {
     if (!known) return refusal(400, "invalid_params", "no such parameter: \"" + printable(key, 64) + "\"");
     params[key] = value;
   }
-  // Organised, as a PLY of pixels does not say where they are: the page makes both files of it.
+  // Organised, because a PLY of pixels does not contain their positions; the page makes both files from it.
   if (params.value("density", json()) == "pixels") params["format"] = "pcd";
   auto answered = call("scan", std::move(params), kPatience);
   if (!answered) {
@@ -358,7 +358,7 @@ Answer PageServer::past(const Request& request) {
   return refusal(404, "not_found", "this cloud is not kept any more: scan again");
 }
 
-// The newest clouds as far as they fit; of the others only what they were.
+// Keeps the newest clouds within the limit; of older ones only their descriptions.
 void PageServer::keep(PastScan scan) {
   const std::lock_guard lock(mutex_);
   past_.push_front(std::move(scan));

@@ -28,22 +28,22 @@ struct PageOptions {
   std::filesystem::path socket = client::default_socket();
   std::string listen = "127.0.0.1";
   int port = 8384;
-  std::vector<std::string> names = {};    ///< names that the page is asked for by, besides the address
-  std::filesystem::path token_file = {};  ///< empty: a token of this run
+  std::vector<std::string> names = {};                          ///< the page's host names, in addition to the address
+  std::filesystem::path token_file = {};                        ///< empty: a random token for this run
   std::filesystem::path three = "/usr/share/javascript/three";  ///< Debian's libjs-three
 };
 
-/// Tells an address that only this machine reaches.
+/// Tells whether only this machine can reach the address.
 [[nodiscard]] bool is_loopback(const std::string& address);
 
-/// A scan that the page asked for.
+/// A scan that the page requested.
 struct PastScan {
   nlohmann::json about;
-  client::Bytes cloud;  ///< empty: none, or given up for newer ones
+  client::Bytes cloud;  ///< empty: none, or dropped for newer ones
 };
 
-/// The page and what it asks for, each as one request to the service's socket.
-/// @thread the handlers run on the server's workers
+/// The page and its data; each request becomes one request to the service's socket.
+/// @thread the server's workers call the handlers
 class PageServer {
  public:
   PageServer(PageOptions options, Token token);
@@ -51,14 +51,14 @@ class PageServer {
   /// Listens. @errors those of HttpServer::open()
   [[nodiscard]] Result<> open();
   [[nodiscard]] int port() const { return server_->port(); }
-  /// Serves until a signal ends the program. @param at_end  is called before
+  /// Serves until a signal ends the program. @param at_end  called before
   void run(const std::function<void()>& at_end) { server_->run(at_end); }
 
  private:
   /// One address: its method, its secret, its answer.
   struct Route {
-    std::string method;  ///< GET, which is HEAD too, or POST
-    bool open;           ///< true for those without a secret: it shows no data and does nothing
+    std::string method;  ///< GET (also serves HEAD) or POST
+    bool open;           ///< needs no secret: shows no data and does nothing
     std::function<Answer(const Request&)> answer;
   };
   using Handle = std::function<Answer(const Request&)>;
@@ -84,13 +84,13 @@ class PageServer {
 
   PageOptions options_;
   Token token_;
-  std::unique_ptr<Gate> gate_;  ///< after open(): its cookie has the port's number
+  std::unique_ptr<Gate> gate_;  ///< set by open(), because the cookie's name contains the port
   std::unique_ptr<HttpServer> server_;
   std::map<std::string, Route, std::less<>> routes_;
   CloudFeed symbols_;
   CloudFeed pixels_;
   std::mutex mutex_;
-  std::deque<PastScan> past_;  ///< the newest first
+  std::deque<PastScan> past_;  ///< newest first
 };
 
 }  // namespace slsd::web

@@ -7,7 +7,7 @@
 
 namespace slsd::web {
 
-/// A file of the folder page/, which is part of the program: nothing is looked up by a path that a request names.
+/// A file of the folder page/, embedded in the program: requests cannot name other paths.
 struct Page {
   std::string_view path;
   std::string_view type;

@@ -13,13 +13,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The files "socket:[inode]" that listen at the port, from the kernel's tables (proc(5)).
+// The "socket:[inode]" names of listeners at the port, from the kernel's tables (proc(5)).
 std::vector<std::string> listening_sockets(int port) {
   std::vector<std::string> sockets;
   for (const char* table : {"/proc/net/tcp", "/proc/net/tcp6"}) {
     std::ifstream file(table);
     std::string line;
-    std::getline(file, line);  // the names of its columns
+    std::getline(file, line);  // the header row
     while (std::getline(file, line)) {
       std::istringstream columns(line);
       std::string slot, local, remote, state, queues, timer, retransmits, user, timeout, inode;

@@ -7,7 +7,8 @@
 
 namespace slsd::web {
 
-/// The program that listens at a TCP port of this machine, as "slsd-web (process 1234)"; nothing if it cannot be seen.
+/// The program that listens at a TCP port of this machine, such as "slsd-web (process 1234)"; nothing if it is not
+/// visible.
 [[nodiscard]] std::optional<std::string> port_holder(int port);
 
 }  // namespace slsd::web

@@ -19,7 +19,7 @@ namespace {
 namespace http = boost::beast::http;
 using Fields = http::fields;
 
-// These decide who asks, and for what: a second one could be the one that a proxy looked at.
+// These headers identify the client and the target: a proxy may have read a second one.
 constexpr std::string_view kOnce[] = {"Host",          "Content-Length", "Transfer-Encoding", "Origin",
                                       "Authorization", "Sec-Fetch-Site", "X-Slsd-Page",       "Expect"};
 

@@ -15,14 +15,14 @@ namespace slsd::web {
 inline constexpr std::size_t kHeadBytesMax = 16 << 10;
 inline constexpr std::size_t kRequestLineBytesMax = 8 << 10;
 
-/// The refusal to answer a request, with its cause.
+/// The refusal of a request, with its cause.
 struct Refusal {
   int status;  ///< HTTP's status
   std::string name;
   std::string message;  ///< the remedy
 };
 
-/// A request whose framing has one meaning only.
+/// A request with unambiguous framing.
 struct Request {
   std::string method;
   std::string path;  ///< the sent path without the query; begins with '/'
@@ -30,29 +30,30 @@ struct Request {
   std::string host, origin, cookie, authorization;  ///< headers; empty: none
   std::string site, destination;                    ///< headers Sec-Fetch-Site and Sec-Fetch-Dest
   std::string page_key;                             ///< header X-Slsd-Page
-  bool by_https = false;                            ///< a proxy says so
+  bool by_https = false;                            ///< according to a proxy
   bool keep_alive = false;
   bool expects_continue = false;
   std::size_t body_bytes = 0;
   std::string body;
   std::string address;        ///< the client's address
-  std::string local_address;  ///< this machine's address that the request came to
+  std::string local_address;  ///< this machine's address that received the request
 };
 
-/// The end of a head, or the reason why it cannot become one.
+/// The end of a head, or the reason why the head is invalid.
 struct HeadEnd {
-  std::size_t bytes = 0;  ///< length with the empty line; 0: more is to come
+  std::size_t bytes = 0;  ///< length with the empty line; 0: incomplete
   std::optional<Refusal> refusal;
 };
 
-/// Looks for the end of a head in what has come so far. Control characters, line ends other than CR LF, folded lines
-/// and too long a head are refused as soon as they are seen.
+/// Searches for the end of a head in the received data. Immediately refuses control characters, line ends other than CR
+/// LF, folded lines and a head that is too long.
 /// @thread reentrant
 [[nodiscard]] HeadEnd find_head_end(std::string_view received);
 
-/// Reads a request line and its headers. Whatever two programs could read in two ways is refused: one Host, at most one
-/// Content-Length of one number, no Transfer-Encoding, no body where the method has none (RFC 9112, 6.3 and 11.2).
-/// @param head  of the length that find_head_end() gave
+/// Parses a request line and its headers. Refuses everything that two programs may interpret differently: requires one
+/// Host, at most one Content-Length with one number, no Transfer-Encoding, and no body if the method has none (RFC
+/// 9112, 6.3 and 11.2).
+/// @param head  of the length from find_head_end()
 /// @thread reentrant
 [[nodiscard]] tl::expected<Request, Refusal> read_head(std::string_view head);
 

@@ -21,7 +21,7 @@ using slsd::web::Token;
 constexpr int kOwnPagesBytes = 256 << 10;
 constexpr std::size_t kTokenBytesMin = 16, kTokenBytesMax = 1024;
 
-/// @errors kInvalidArgument: none where one is needed, or too short a one; those of read_file()
+/// @errors kInvalidArgument: a required token is missing or too short; those of read_file()
 slsd::Result<Token> read_token(const PageOptions& options) {
   if (options.token_file.empty()) {
     if (slsd::web::is_loopback(options.listen)) return slsd::web::random_token();
@@ -45,8 +45,8 @@ std::string address_of(const PageOptions& options, int port) {
   return "http://" + (brackets ? "[" + host + "]" : host) + ":" + std::to_string(port) + "/";
 }
 
-/// Tells the user what to open. A token that somebody chose is not printed: that person knows it.
-/// @return the address with the token of this run
+/// Tells the user what to open. Does not print a chosen token: its author knows it.
+/// @return the address with this run's token
 std::string announce(const PageOptions& options, const Token& token, int port) {
   const std::string query = token.chosen ? "" : "?token=" + token.text, address = address_of(options, port) + query;
   std::cout << "slsd-web: open " << address
@@ -99,7 +99,7 @@ int main(int argc, char** argv) {
   app.add_flag("--address", only_address, "print the address of the page that is running, with its token, and exit");
   if (const auto ended = slsd::parse_usage(app, argc, argv)) return *ended;
   std::signal(SIGPIPE, SIG_IGN);
-  // Clouds are large: what one took goes back to the system with it, whichever of many threads had it.
+  // Clouds are large: freed memory returns to the system at once, whichever thread had it.
   ::mallopt(M_MMAP_THRESHOLD, kOwnPagesBytes);
   ::mallopt(M_ARENA_MAX, 2);
   const slsd::Result<> done = only_address ? print_addresses() : serve(options);
