@@ -21,9 +21,9 @@ enum Unknown { kOffset, kGain, kGainX, kGainY, kAcross, kSlopeX, kSlopeY, kDispa
 
 /// Inputs and results of one step for eight patches, one in each lane.
 struct Eight {
-  Lanes constant[3], x[3], y[3];  // of q, see PatchMap
+  Lanes constant[3], x[3], y[3];  // coefficients of q, see PatchMap
   Lanes across_u, across_v, along_u, along_v;
-  IntLanes origin_u, origin_v;  // of p, in samples
+  IntLanes origin_u, origin_v;  // origin of p, in samples
   Lanes gain, gain_x, gain_y, offset, noise;
   Lanes per_scale;  // scale of the residuals at which a pixel counts half; 0: all count fully
   Lanes across, across_weight, gain_slope_weight;

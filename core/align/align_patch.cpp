@@ -36,12 +36,12 @@ struct Pass {
   Warp warp;
   const float* patch;
   int stride, height;
-  float first_x, first_y;                                  // of the first pixel, from the window's centre
+  float first_x, first_y;                                  // position of the first pixel, from the window's centre
   float third_left, third_right, third_top, third_bottom;  // boundaries of the ninths
   float middle_u, middle_v, half;
   const std::uint32_t* samples;
   int field_width, field_height;
-  float origin_u, origin_v;  // of p, in samples
+  float origin_u, origin_v;  // origin of p, in samples
   float slope_unit;
   float level;  // subtracted from every pixel: sums of small numbers keep their precision
   // Result of the last step, from which outliers are down-weighted; per_scale 0: all pixels count fully.

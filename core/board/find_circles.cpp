@@ -18,7 +18,8 @@ namespace slsd {
 namespace {
 
 constexpr int kReducedWidthPx = 1000;
-constexpr double kMaxStrayOfSpacing = 0.35;  // from a homography of the whole board; lens distortion is smaller
+constexpr double kMaxStrayOfSpacing = 0.35;  // largest distance from a homography of the whole board; lens distortion
+                                             // is smaller
 constexpr double kLeastShare = 0.8;          // share of the discs
 constexpr double kWhiteOfGap = 0.8;          // share of half the gap between two discs
 

@@ -12,7 +12,7 @@
 namespace slsd {
 namespace {
 
-constexpr double kClearPx = 2;  // of the bits outside the border, which is one cell wide
+constexpr double kClearPx = 2;  // distance kept from the bits inside the border, which is one cell wide
 constexpr double kLeastReachPx = 1.5;
 constexpr double kGreatestReachPx = 5;
 

@@ -9,8 +9,7 @@
 namespace slsd {
 namespace {
 
-constexpr std::size_t kLeastTenths = 6;    // of the seen markers, the smallest number that must match the board's
-                                           // layout
+constexpr std::size_t kLeastTenths = 6;    // tenths of the seen markers that must match the board's layout
 constexpr double kToleranceOfSide = 0.35;  // lens distortion over the whole board is smaller
 
 bool holds_marker(const Board& board, Square square, bool legacy) {

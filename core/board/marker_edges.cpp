@@ -12,7 +12,8 @@
 namespace slsd {
 namespace {
 
-constexpr double kEndsLeftOut = 0.12;  // of the side, at either end, as the corner bends the edge there
+constexpr double kEndsLeftOut = 0.12;  // share of the side that is ignored at either end, as the corner bends the edge
+                                       // there
 constexpr double kStepPx = 0.5;
 constexpr double kLeastStep = 3;  // levels
 constexpr int kRounds = 3;

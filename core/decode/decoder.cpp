@@ -26,12 +26,12 @@ struct Decoder::Parts {
   std::optional<SymbolAligner> aligner;  // for precision "fine"
   HeldFullLevel full_level{};
   Decoding decoding{};
-  std::vector<PixelRay> rays{};  // of the symbols to align, and their depths
+  std::vector<PixelRay> rays{};  // rays of the symbols to align, and their depths
   std::vector<double> depths_mm{};
-  const std::vector<AlignedSymbol>* aligned = nullptr;  // of this frame
-  std::vector<TriangulatedPoint> solutions{};           // one to a symbol
+  const std::vector<AlignedSymbol>* aligned = nullptr;  // symbols of this frame
+  std::vector<TriangulatedPoint> solutions{};           // one for each symbol
 
-  const Lattice* lattice_read = nullptr;  // of this frame
+  const Lattice* lattice_read = nullptr;  // lattice of this frame
 
   void solve(const std::vector<LatticeSymbol>& symbols, Executor& executor);
   void place_symbols(Executor& executor);

@@ -21,8 +21,8 @@ constexpr double kScaleMin = 0.35, kScaleMax = 16, kScaleStep = 1.3;
 constexpr double kLargePx = 48, kLargeEnoughPx = 24;
 /// Number of rotations of the pattern in the camera's image to try, over a full turn.
 constexpr int kTurns = 12;
-/// A scale is likely if shapes of a symbol's size cover at least one part in so many of their area at the best scale:
-/// specks are many, but small.
+/// A scale is likely if shapes of a symbol's size cover at least this fraction (1 / kFewOfMany) of the area at the best
+/// scale: specks are many, but small.
 constexpr double kFewOfMany = 4;
 /// Numbers of symbols on one plane that do not agree by chance. In a frame of another pattern, some in a hundred are
 /// read, scattered everywhere.

@@ -66,7 +66,8 @@ class PatternReader {
   std::vector<std::unique_ptr<Trial>> trials_;                                     // one for each scale
   std::optional<Homography> last_;                                                 // camera from projector, of the last
                                                                                    // frame
-  std::map<int, std::variant<Image<std::uint8_t>, Image<std::uint16_t>>> shrunk_;  // of this frame, by their factors
+  std::map<int, std::variant<Image<std::uint8_t>, Image<std::uint16_t>>> shrunk_;  // shrunk images of this frame, by
+                                                                                   // their factors
   HeldFullLevel full_level_;
   double full_ = 255;                // saturated level of the frame that is read
   std::optional<FrameNoise> noise_;  // noise of the frame that is read

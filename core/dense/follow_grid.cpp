@@ -29,7 +29,7 @@ constexpr float kSeenMin = 0.7F;
 constexpr double kFollowedMin = 0.5;
 /// Excess of still nodes over continued ones above which a new frame is kept, which itself takes time.
 constexpr double kStillMore = 0.2;
-/// Samples one node's window in so many for that.
+/// Interval at which windows are sampled to count still nodes.
 constexpr std::size_t kSampled = 37;
 
 using enum FollowedFrame::Unknown;

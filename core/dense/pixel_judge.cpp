@@ -35,7 +35,7 @@ constexpr float kSamePx = 0.08F;
 constexpr float kMisfit = 0.04F;                               // of the dark: scattered light
 constexpr float kGainSpread = 0.12F;                           // of the light: print, relief
 constexpr float kPlaceSpread = 0.2F;                           // camera px
-constexpr float kOutliers = 0.05F;                             // of the pixels
+constexpr float kOutliers = 0.05F;                             // share of the pixels
 constexpr float kLevels = 1.6F;                                // over which outliers are spread
 constexpr float kDark = 0.4F, kLit = 0.35F, kBetween = 0.25F;  // levels of a pixel on another surface
 
@@ -176,7 +176,7 @@ inline __attribute__((always_inline)) void weigh_lanes(const Weighing& in, float
 }
 
 struct Summing {
-  int side, reach, cell;  // of the whole block, of a pixel's surroundings, of the cell
+  int side, reach, cell;  // sizes of the whole block, of a pixel's surroundings, of the cell
   float of_half;          // added to the evidence of a half
 };
 
@@ -227,7 +227,7 @@ struct Blending {
   float value[4], slope_x[4], slope_y[4];  // inverse depth at the cell's first pixel
   float sigma_px[4], light[4];
   float per_px, per_stride, of_full;
-  int first_x, first_y;  // of the cell, relative to the pixel of its first node
+  int first_x, first_y;  // first pixel of the cell, relative to that of its first node
 };
 
 /// Blends a row of pixels.
@@ -269,7 +269,7 @@ struct PixelJudge::Cell {
   const PatternField& field;
   const SurfaceGrid& grid;
   DenseMap& map;
-  int column, row;               // of its top left node
+  int column, row;               // place of its top left node
   int left, top, right, bottom;  // its pixels; right and bottom are one past the last
   std::array<const SurfaceNode*, kCandidates> candidates{};
   std::array<Eigen::Vector2i, kCandidates> nodes{};  // column, row

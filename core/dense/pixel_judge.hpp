@@ -86,7 +86,7 @@ class PixelJudge {
 
   Options options_;
   EvidenceTable table_;
-  int side_ = 0;                // of the block around a cell
+  int side_ = 0;                // side of the block around a cell
   std::vector<float> xs_, ys_;  // pixels relative to the cell's first
   std::vector<Scratch> scratch_;
 };

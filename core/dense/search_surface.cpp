@@ -37,7 +37,7 @@ using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
 
 /// A window and the pattern at some depths.
 struct Comparing {
-  const float *levels, *weights, *x, *y;  // of the frame, without their mean
+  const float *levels, *weights, *x, *y;  // the frame's levels without their mean
   int count;                              // a multiple of kLanes
   float warp[9], shift[3];                // row by row; and what a level adds to the last column
   float origin_u, origin_v;

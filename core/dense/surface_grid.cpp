@@ -18,14 +18,14 @@ constexpr float kSettledPx = 0.1F;
 constexpr int kStepsMost = 4;
 
 /// Conditions of a good fit: docs/notes/2026-11-dense.md has the reason for each.
-constexpr float kSupportMin = 0.6F;   // of the window's pixels agree
-constexpr float kSeenMin = 0.7F;      // of them are in the frame and not saturated
-constexpr float kResidualMax = 0.3F;  // of the gain
+constexpr float kSupportMin = 0.6F;   // share of the window's pixels that agree
+constexpr float kSeenMin = 0.7F;      // share of them in the frame and not saturated
+constexpr float kResidualMax = 0.3F;  // share of the gain
 constexpr float kStepMaxPx = 0.8F;    // from the neighbour's plane: within the range in which the fit converges
 constexpr float kSlopeMax = 0.5F;     // projector px for one camera px: steeper faces show too little of the pattern
 constexpr float kSigmaMaxPx = 0.3F;
-constexpr float kGainSlopeMax = 0.08F;  // of the gain, for one camera px
-constexpr float kContrastMin = 4;       // of the gain over the noise of a pixel
+constexpr float kGainSlopeMax = 0.08F;  // share of the gain, for one camera px
+constexpr float kContrastMin = 4;       // ratio of the gain to the noise of a pixel
 
 /// Parts of sigma, as for symbols (docs/notes/2026-11-decoder.md).
 constexpr float kLeastPx = 0.003F, kOfScatter = 0.8F;
@@ -348,7 +348,7 @@ constexpr float kBendBeyond = 1 / 2.4F, kWindowBeyond = 6 / (2.4F * 40), kBeyond
 /// Inputs of fuse_lanes(): eight nodes of a row and their neighbours, in the order of Around.
 struct Fusing {
   const float* around[7];
-  std::ptrdiff_t row;  // from a row to the next
+  std::ptrdiff_t row;  // distance between rows
   float stride, of_bend, of_disagreement;
   float beyond;  // factor of the bend correction
 };

@@ -53,7 +53,7 @@ struct ExposureAdvice {
 /// Proposes exposure and gain with which the brightest symbols reach three quarters of full. It uses as little gain as
 /// possible, and an exposure of whole periods of the light. If the scene moves, it uses the shortest such exposure, and
 /// gain compensates for the rest.
-/// @param levels   of one frame
+/// @param levels   levels of one frame
 /// @param change   change between two frames taken with the same setting; without it, noise, motion and flicker are
 ///                 unknown
 /// @param present  the setting of those frames, if known

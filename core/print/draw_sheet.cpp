@@ -17,7 +17,7 @@ namespace slsd {
 namespace {
 
 constexpr double kPointsToMm = 72 / 25.4;
-constexpr int kMaxSidePx = 32767;  // of Cairo's images
+constexpr int kMaxSidePx = 32767;  // largest side of Cairo's images
 constexpr double kTextHeightMm = 3;
 constexpr double kNumberHeightMm = 2.2;
 constexpr double kTextBelowRulerMm = 9.5;

@@ -14,7 +14,7 @@ namespace {
 struct Unit {
   const char* name;
   double mm;
-  double share;  // of the calibrations in practice
+  double share;  // share of such calibrations in practice
 };
 constexpr std::array kUnits{Unit{"", 1, 1}, Unit{"metres", 1000, 0.01}, Unit{"centimetres", 10, 0.01},
                             Unit{"inches", 25.4, 0.003}, Unit{"micrometres", 0.001, 0.001}};
@@ -72,7 +72,7 @@ void add_motions(const CameraRig& rig, std::vector<Misreading>& found) {
 }
 
 void scale(Lens& lens, double factor) {
-  constexpr double kToEdge = 0.5;  // from the first pixel's centre
+  constexpr double kToEdge = 0.5;  // from the first pixel's centre to the image's edge
   lens.fx *= factor, lens.fy *= factor;
   lens.cx = (lens.cx + kToEdge) * factor - kToEdge, lens.cy = (lens.cy + kToEdge) * factor - kToEdge;
 }

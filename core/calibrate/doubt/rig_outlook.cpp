@@ -127,7 +127,7 @@ LensLikelihood camera_likelihood(const Lens& lens) {
 
 LensLikelihood projector_likelihood(const Lens& lens) {
   constexpr double kAcrossDeviation = 0.05, kShiftedAcross = 1e-3, kNever = 1e-6;
-  constexpr double kShiftedMost = 1.2;  // of the image's height, beyond its edge
+  constexpr double kShiftedMost = 1.2;  // largest shift beyond the image's edge, of its height
   const double x = lens.cx / lens.width_px, y = lens.cy / lens.height_px;
   const bool inside = x >= 0 && x <= 1, shifted = y >= -kShiftedMost && y <= 1 + kShiftedMost;
   const double across = std::exp(-0.5 * square((x - 0.5) / kAcrossDeviation)) + (inside ? kShiftedAcross : 0);

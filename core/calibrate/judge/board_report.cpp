@@ -14,9 +14,9 @@ namespace slsd {
 namespace {
 
 constexpr double kBentSigmas = 5;
-constexpr double kBentShare = 3e-4;     // of the size: 0.1 mm of A4
+constexpr double kBentShare = 3e-4;     // share of the size: 0.1 mm of A4
 constexpr double kFarBentShare = 6e-3;  // with a larger bend, a print is no longer a smooth surface
-constexpr double kToldShare = 1e-3;     // of the size: a larger deviation makes the result meaningless
+constexpr double kToldShare = 1e-3;     // share of the size: a larger deviation makes the result meaningless
 constexpr double kUnevenTimes = 5, kUnevenShare = 3e-5;
 constexpr char kMount[] = "mount the print on glass or an aluminium composite plate";
 

@@ -25,7 +25,7 @@ constexpr std::size_t kScored = 500;  // points by which a draw is judged
 constexpr int kRefinements = 5;
 constexpr double kGateSigmas = 5;
 constexpr double kGateMinMm = 1e-6;  // for points without noise
-constexpr double kLineShare = 1e-9;  // of the largest variance: below, the points lie on a line
+constexpr double kLineShare = 1e-9;  // share of the largest variance: below, the points lie on a line
 
 std::vector<double> offsets(Points points, const PlaneFit& plane) {
   std::vector<double> out;

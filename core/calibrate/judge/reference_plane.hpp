@@ -21,7 +21,7 @@ struct PlaneCheck {
 };
 
 /// Measures every look at the plane by a calibration; skips poses of the board.
-/// @return as `before`
+/// @return the checks with `before` filled in
 /// @thread reentrant
 [[nodiscard]] std::vector<PlaneCheck> check_planes(const Observations& observations, const Calibration& calibration);
 

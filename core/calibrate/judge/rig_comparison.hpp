@@ -22,7 +22,7 @@ struct RigComparison {
 /// Compares the places of the devices, which a knock changes, and the focal lengths and principal points, which a lens
 /// changes. A print of another size changes distances alone. Each is compared with the deviations of both calibrations.
 /// If the earlier one has no deviations, it counts as exact as the new one.
-/// @param before  of the same devices, by their names and sizes
+/// @param before  an earlier calibration of the same devices, by their names and sizes
 /// @thread reentrant
 [[nodiscard]] RigComparison compare_rigs(const CalibrationOutcome& outcome, const Calibration& before);
 

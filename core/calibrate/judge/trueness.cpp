@@ -9,7 +9,7 @@ namespace slsd {
 namespace {
 
 constexpr std::size_t kCornersMin = 4;
-constexpr double kLongShare = 0.5;  // of the longest: shorter ones show the corners' noise more than the scale
+constexpr double kLongShare = 0.5;  // share of the longest: shorter ones show the corners' noise more than the scale
 
 struct MeasuredCorner {
   Eigen::Vector3d measured_mm;

@@ -129,7 +129,7 @@ Result<std::vector<cv::Mat>> checked_images(const GrayCapture& capture, const Im
                     std::to_string(expected) + " belong to a projector of " + std::to_string(projector.width_px) + "x" +
                     std::to_string(projector.height_px) + " pixels; set the projector's size to that of the captures");
   }
-  const double full = guess_full_level(capture.white);  // of all images: a comparison needs one scale
+  const double full = guess_full_level(capture.white);  // full level of all images: a comparison needs one scale
   std::vector<cv::Mat> images{to_mat(capture.white, full), to_mat(capture.black, full)};
   for (const GreyView& image : capture.code) images.push_back(to_mat(image, full));
   if (std::ranges::any_of(images, [&](const cv::Mat& image) { return image.size() != images[0].size(); })) {

@@ -62,7 +62,7 @@ std::optional<Eigen::Vector3d> meet_shape(const double* terms_mm, const ShapeFra
 }
 
 ShapeVector plausible_shape(const ShapeFrame& frame) {
-  constexpr double kSecondOrder = 0.01, kHigherOrders = 0.001;  // of half the longer side
+  constexpr double kSecondOrder = 0.01, kHigherOrders = 0.001;  // shares of half the longer side
   ShapeVector sigmas_mm;
   for (std::size_t i = 0; i < kShapeTerms; ++i) {
     sigmas_mm[i] = (i < kSecondOrderTerms ? kSecondOrder : kHigherOrders) * frame.half_mm;

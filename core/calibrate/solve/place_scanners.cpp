@@ -22,8 +22,8 @@ namespace {
 constexpr int kPartsAcross = 5, kPartsDown = 4;
 constexpr int kPartsMin = 10;
 constexpr int kPointsOfAPart = 4;
-constexpr std::size_t kPointsMax = 20'000;  // of a dense cloud, for fitting the plane
-constexpr double kBendMax = 5e-4;           // of the distance
+constexpr std::size_t kPointsMax = 20'000;  // largest number of a dense cloud's points for fitting the plane
+constexpr double kBendMax = 5e-4;           // share of the distance
 constexpr std::size_t kSharedMin = 4;
 constexpr int kRounds = 200;
 constexpr double kSettledMm = 1e-6;

@@ -33,8 +33,8 @@ struct CloudLook {
   double scale_percent = 0;  ///< excess of the board's size in the cloud over the stated size, per cent
 };
 
-/// @param cloud  of one camera, in its frame, mm
-/// @param lens   of that camera
+/// @param cloud  cloud of one camera, in its frame, mm
+/// @param lens   lens of that camera
 /// @errors kNotFound: too few points of the cloud are on the board; kMismatch: these points are not flat
 /// @thread reentrant
 [[nodiscard]] Result<CloudLook> look_in_cloud(std::span<const Eigen::Vector3d> cloud, const BoardSighting& sighting,
@@ -55,7 +55,7 @@ struct PlacedScanners {
 
 /// Places several scanners by a board that at least two of them saw at each place.
 /// @param places  for each place, the scanners' looks at the same board
-/// @param names   of the scanners
+/// @param names   names of the scanners
 /// @errors kNotFound: a scanner shares no place with those connected to the first
 /// @thread reentrant
 [[nodiscard]] Result<PlacedScanners> place_scanners(const std::vector<std::vector<CloudLook>>& places,

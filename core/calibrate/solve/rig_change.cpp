@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::size_t kPosesOfSession = 5, kPosesOfPart = 2;
 constexpr std::size_t kSymbolsOfView = 50;  // more than enough: a device that moved shifts all of them
-constexpr int kRoundsOfSearch = 5;          // of the adjustment at each trial moment, which starts near the solution
+constexpr int kRoundsOfSearch = 5;          // rounds of adjustment at each trial moment, which starts near the solution
 constexpr std::size_t kMomentsTried = 24;   // first over the session; then those around the best
 
 /// Threshold of the squared difference between both parts, in deviations of a device's six numbers. The mean is 6 for a
@@ -90,7 +90,7 @@ RigModel split_at(const RigModel& rig, std::size_t first_pose) {
 
 /// Adjusts until the assumed noise of the symbols equals the remaining noise.
 Model adjusted(const Observations& seen, BundleOptions options, RigModel rig, int rounds = 2) {
-  constexpr double kSigmaOfDistance = 1 / 1.1774;  // of the median distance in a plane
+  constexpr double kSigmaOfDistance = 1 / 1.1774;  // standard deviation over the median distance in a plane
   Model model{std::move(rig), std::move(options)};
   for (int round = 0; round < rounds; ++round) {
     const auto adjusted = adjust(seen, model.options, model.rig);

@@ -20,7 +20,7 @@ constexpr std::uint64_t kSpeaksFor = 20;     // number of scans for which a quar
                                              // points
 // Misread symbols lie anywhere, so their distances are no common shift. The spread is half of the points' distance.
 constexpr double kSpreadMaxPx = 2, kSpreadMaxShare = 0.5;
-constexpr double kFineAgainShare = 0.8;    // of the limit: hysteresis against repeated changes
+constexpr double kFineAgainShare = 0.8;    // share of the limit: hysteresis against repeated changes
 constexpr double kLearntLimitMaxPx = 1.0;  // a rig may already be off when the service starts
 
 }  // namespace

@@ -36,7 +36,7 @@ struct DriftState {
 /// @thread thread-bound
 class DriftWatch {
  public:
-  /// @param camera       of this calibration
+  /// @param camera       camera of this calibration
   /// @param expected_px  the calibration's own figure; empty: learnt from the first 20 scans
   DriftWatch(const CalibratedCamera& camera, const Lens& projector, std::optional<double> expected_px);
 

@@ -30,7 +30,7 @@ class Correspondence {
 
  private:
   Rules rules_;
-  std::vector<std::int32_t> claims_of_;  // of each cell
+  std::vector<std::int32_t> claims_of_;  // for each cell
 };
 
 }  // namespace slsd

@@ -59,12 +59,12 @@ class CentreCorrection {
   float slight_bend_;
   std::vector<Eigen::Vector2f> centroids_px_;
   std::vector<Eigen::Matrix2f> second_moments_px2_;
-  std::vector<std::int32_t> cells_;       // of each node that is decoded, numbered by rows; -1 of others
-  std::vector<std::int32_t> symbol_of_;   // of each node, or -1
-  std::vector<std::int32_t> sightings_;   // of each symbol: its node
-  std::vector<Eigen::Vector2f> centres_;  // of each symbol's square
-  std::vector<Neighbours> neighbours_;    // of each symbol
-  std::vector<Derivatives> derivatives_;  // of each symbol
+  std::vector<std::int32_t> cells_;       // for each decoded node, numbered by rows; -1 for others
+  std::vector<std::int32_t> symbol_of_;   // for each node, or -1
+  std::vector<std::int32_t> sightings_;   // for each symbol: its node
+  std::vector<Eigen::Vector2f> centres_;  // centre of each symbol's square
+  std::vector<Neighbours> neighbours_;    // for each symbol
+  std::vector<Derivatives> derivatives_;  // for each symbol
 };
 
 }  // namespace slsd

@@ -90,7 +90,7 @@ LetterPlace place_by_neighbours(const Sightings& seen, std::int32_t node) {
 LetterPlace place_by_plane(const Sightings& seen, std::int32_t node, float pitch_px,
                            std::vector<std::int32_t>& around) {
   constexpr std::size_t kAroundMin = 8;
-  constexpr float kRmsMax = 0.08F;  // of the pitch: the limb of a curved surface deviates more
+  constexpr float kRmsMax = 0.08F;  // share of the pitch: the limb of a curved surface deviates more
   find_around(seen, node, around);
   if (around.size() < kAroundMin) return {};
   const PlaneFit fit = fit_plane(seen, seen.claims[node], pitch_px, around);

@@ -19,7 +19,7 @@ class SymbolMender {
   SymbolMender(const Pattern& pattern, const std::shared_ptr<const LetterFields>& letters, Rules rules = {});
 
   /// Mended symbols get a new place, frame, light, shape and misfit, and then hold their neighbours.
-  /// @param scene  whose claims are proposals
+  /// @param scene  its claims are proposals
   /// @return       the mended sightings, in order; valid until the next call
   const std::vector<std::int32_t>& mend(const LetterScene& scene);
 

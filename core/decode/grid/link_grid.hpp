@@ -120,7 +120,7 @@ class GridLinker {
   // in sound_steps_, also NaN for links to or from torn symbols.
   std::vector<std::array<float, 4>> steps_, sound_steps_;
   std::vector<std::array<bool, 4>> inconsistent_;
-  std::vector<std::uint8_t> relinked_;  // of each node: whether the last search changed its links
+  std::vector<std::uint8_t> relinked_;  // for each node: whether the last search changed its links
   std::vector<std::uint8_t> all_trusted_;
 };
 

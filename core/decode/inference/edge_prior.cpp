@@ -57,7 +57,7 @@ void EdgePrior::spread(const NodesSeen& seen) {
 void EdgePrior::measure(const NodesSeen& seen, const LetterEvidence& letters) {
   find_cut(seen, letters);
   counts_.assign(seen.nodes.size(), {});
-  float links = 2, cut = 1;  // as if seen
+  float links = 2, cut = 1;  // pseudo-counts
   for (std::size_t i = 0; i < seen.nodes.size(); ++i) {
     for (const Direction d : kDirections) {
       const std::int32_t other = seen.nodes[i].links[d];

@@ -36,7 +36,7 @@ class EdgePrior {
 
   std::vector<std::array<bool, 4>> cut_;
   std::vector<Count> counts_, next_;
-  std::vector<std::array<float, 2>> odds_;  // of each node, along rows and along columns
+  std::vector<std::array<float, 2>> odds_;  // for each node, along rows and along columns
 };
 
 }  // namespace slsd

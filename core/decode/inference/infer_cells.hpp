@@ -76,10 +76,10 @@ class CellInference {
   std::vector<float> rivals_;                    // for each node: the nats of a contradicting cell that a neighbour
                                                  // predicts
   std::vector<float> nats_, margins_;            // for each node: the nats of its own letter, and of its cell
-  std::vector<std::array<float, 4>> capacity_, against_;  // of each link, at the start
+  std::vector<std::array<float, 4>> capacity_, against_;  // for each link, at the start
   std::vector<float> line_capacity_;
   std::vector<std::int32_t> component_;   // nodes whose links lead from cell to cell
-  std::vector<std::uint8_t> is_reached_;  // of each node
+  std::vector<std::uint8_t> is_reached_;  // for each node
 };
 
 }  // namespace slsd

@@ -27,7 +27,7 @@ class LetterEvidence {
 
   /// Starts a new frame. Until measure_torn(), torn shapes are no evidence for an edge.
   void look_at(std::span<const Classification> shapes, std::span<const Aligned> aligned);
-  /// @param labels   cells, one to a node
+  /// @param labels   cells, one for each node
   void measure_torn(std::span<const Beside> beside, std::span<const std::int32_t> labels);
 
   /// Nats for a cell of the grid; negative if the shape contradicts it.
@@ -43,7 +43,7 @@ class LetterEvidence {
 
   CellGrid grid_;
   float letter_count_;
-  std::vector<std::uint8_t> letters_;  // of each cell of the grid
+  std::vector<std::uint8_t> letters_;  // for each cell of the grid
   std::span<const Classification> shapes_;
   std::span<const Aligned> aligned_;
   std::array<float, kWholenesses> torn_nats_{};

@@ -22,7 +22,7 @@ struct ArrayCell {
 /// links. If the window's codeword is exactly one of the array's, its nine regions get their cells. The paper has no
 /// rule for repeated codewords or for windows that disagree. Here the array's first occurrence, and the first window in
 /// the order of the regions, count. Elahi et al. 2020, section III G.
-/// @param letters  of each region, or -1
+/// @param letters  letter of each region, or -1
 /// @param links    from link_grid_paper, of the same length
 /// @return         one for each region, in order; empty if no window names its cell
 /// @thread reentrant

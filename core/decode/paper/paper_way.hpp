@@ -25,7 +25,7 @@ class PaperWay {
   /// @param centre  kPaper: also the centroids of the masks, equations (7) and (8)
   void describe(const Regions& regions, Sightings& seen, Method centre);
   /// Letters by thresholds.
-  /// @param side_px  of a symbol's square in the camera
+  /// @param side_px  side of a symbol's square in the camera
   void classify(float side_px, Sightings& seen) const;
   /// Links by equations (9) to (22).
   void link_grid(const Regions& regions, int width_px, int height_px, Sightings& seen);

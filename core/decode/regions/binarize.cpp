@@ -54,7 +54,7 @@ inline __attribute__((always_inline)) T difference(T a, T b) {
 
 /// The greatest difference between pixels two apart, across or down, for each of `count` pixels; the row's first and
 /// last pixels have none.
-/// @param count  of those that are asked for; beyond the row there are none either
+/// @param count  number of requested pixels; beyond the row there is no difference either
 template <class T>
 inline __attribute__((always_inline)) void find_steepest(const T* above, const T* row, const T* below, int width,
                                                          int length, int count, T* steepest) {

@@ -49,7 +49,7 @@ class Classifier {
   Classifier(const std::vector<Prototype>& prototypes, float distance_max);
 
   [[nodiscard]] Classification classify(const ShapeFeatures& features) const;
-  /// @param to  of the first of eight, as many as it holds
+  /// @param to  becomes the classifications of the first shapes, as many as it holds
   void classify(const EightShapes& shapes, std::span<Classification> to) const;
 
   /// Distances of eight shapes from each letter's prototype, standard deviations squared.

@@ -84,7 +84,7 @@ class GreyMomentMeter {
 
   int margin_px_;
   float patch_px_;
-  int left_ = 0, top_ = 0, width_ = 0, height_ = 0, stride_ = 0;  // of the patch
+  int left_ = 0, top_ = 0, width_ = 0, height_ = 0, stride_ = 0;  // box and stride of the patch
   std::vector<std::int16_t> edges_;
   std::vector<float> patch_;  // grey values; kOutside for pixels of others
   PatchRange range_;          // range of the patch

@@ -73,13 +73,13 @@ class SymbolReview {
                    std::size_t node) const;
 
   CodeArray array_;
-  const std::vector<Prototype>* prototypes_ = nullptr;  // of the current review
+  const std::vector<Prototype>* prototypes_ = nullptr;  // prototypes of the current review
   float size_px_, pitch_px_;
   ReviewOptions options_;
   std::vector<std::uint8_t> trusted_;
   std::vector<std::uint8_t> decoded_;  // for each node, at the start of the review
   std::vector<std::int32_t> distrusted_;
-  std::vector<Eigen::Vector2f> light_changes_;  // from cell to cell along u and v, relative
+  std::vector<Eigen::Vector2f> light_changes_;  // relative change from cell to cell along u and v
 };
 
 }  // namespace slsd

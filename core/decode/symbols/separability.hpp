@@ -59,7 +59,7 @@ struct Separability {
 /// @thread reentrant
 [[nodiscard]] Result<Separability> assess_separability(const std::vector<int>& symbols, const LookOptions& options);
 
-/// Warnings for the user, one to a line, empty if nothing is risky: "symbols 7 (square) and 3 (frame) look alike at 8
+/// Warnings for the user, one per line, empty if nothing is risky: "symbols 7 (square) and 3 (frame) look alike at 8
 /// px: ...".
 [[nodiscard]] std::vector<std::string> separability_warnings(const Separability& separability, int symbol_size_px);
 

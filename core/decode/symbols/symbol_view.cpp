@@ -15,8 +15,8 @@ namespace {
 constexpr int kCells = 3;
 constexpr int kSubpixels = 3;
 constexpr float kLight = 160, kDark = 20;
-/// Sharper frames than a lens makes are drawn ones, whose pixels may coincide with the pattern's: one view in so many
-/// does.
+/// Frames sharper than any lens makes them are drawn ones. Their pixels may coincide with the pattern's; one view in
+/// kDrawnOneIn does.
 constexpr float kDrawnBlurPx = 0.3F;
 constexpr int kDrawnOneIn = 4;
 

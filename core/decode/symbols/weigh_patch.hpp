@@ -63,7 +63,7 @@ struct RowPowers {
 /// @param stride    columns of the patch, a multiple of kLanes
 /// @param rows      one for each row of the patch
 /// @param middle_x  origin of x, from the first pixel's centre
-/// @param moments   with the steady centre
+/// @param moments   including the steady centre
 /// @thread reentrant
 void sum_moments(const float* patch, int stride, std::span<const RowPowers> rows, float middle_x,
                  const PatchLevels& levels, RawMoments& moments);
