@@ -14,7 +14,7 @@ struct Discovery {
     kSystemDefault,  ///< Fast DDS's own configuration; peers are ignored
     kSubnet,         ///< multicast, plus the peers
     kLocalhost,      ///< this host, plus the peers
-    kOff,            ///< nobody
+    kOff,            ///< no other participant
   };
   Range range = Range::kSubnet;
   std::vector<std::string> peers;  ///< addresses or names of hosts

@@ -282,8 +282,8 @@ bool Writer::write_bytes(const Bytes& bytes, const Requester* to) const {
   }
   if (state_->backlog) {
     if (has_readers() && !state_->backlog->take(bytes.size())) return false;
-    // Sends a heartbeat first. Cyclone's readers skip everything older than the first sample that they hear of, and a
-    // large sample is still under way when the next is due.
+    // Sends a heartbeat first. Cyclone's readers skip everything older than the first sample that they hear of. A large
+    // sample is still under way when the next is due.
     state_->writer->assert_liveliness();
   }
   return state_->writer->write(const_cast<Bytes*>(&bytes), related);

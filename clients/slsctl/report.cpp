@@ -24,7 +24,7 @@ std::string text_of(const json& about, const char* key) {
   return printable(about.value(key, ""), kLongestText);
 }
 
-/// A line about a camera that was knocked out of its calibration; empty while it is as it was calibrated.
+/// A line about a camera that was knocked out of its calibration; empty while the calibration holds.
 std::string drift_line(const json& camera) {
   const json drift = camera.value("calibration", json());
   if (!drift.is_object() || !drift.value("off_since_scan", json()).is_number()) return {};
@@ -79,11 +79,11 @@ std::string times_table(const json& scans) {
   return text;
 }
 
-/// @param what  "regions", or "rules" that decided on them
+/// @param what  "regions", or "rules" that decided on regions
 std::string counts_table(const json& scans, const std::string& what) {
   const json last = scans.value(what + "_of_last", json::object());
   const json all = scans.value(what, json::object());
-  if (all.empty()) return "";  // of a service that is older
+  if (all.empty()) return "";  // an older service has none
   std::string text = fmt::format("  {:<24}{:>9}{:>14}\n", what, "last", "all");
   for (const auto& [status, count] : all.items()) {
     if (count == 0) continue;
@@ -92,7 +92,7 @@ std::string counts_table(const json& scans, const std::string& what) {
   return text;
 }
 
-/// Advises how to find the service that does not answer: other sockets beside the tried one are those of instances.
+/// Advises how to find a service that does not answer: other sockets in the same folder belong to other instances.
 std::string way_to_service(const std::filesystem::path& socket) {
   std::string others;
   std::error_code error;

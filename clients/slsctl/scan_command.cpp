@@ -21,7 +21,7 @@ namespace {
 using nlohmann::json;
 using std::filesystem::path;
 
-// Every other pixel of an organised cloud, as the lattice that a picture is drawn of.
+// Every other pixel of an organised cloud forms the lattice of the picture.
 constexpr int kPictureStep = 2;
 
 // A record of an organised cloud: x y z sigma_mm intensity as floats, camera as a byte, a normal.
@@ -66,7 +66,7 @@ Result<Cloud> lattice_of_pixels(const json& result, std::string_view pcd, bool n
   return cloud;
 }
 
-// The points of an organised cloud that are there, as a PLY, whose intensity is a byte.
+// The existing points of an organised cloud as a PLY, whose intensity is a byte.
 std::string dense_ply_of(const json& result, std::string_view pcd, bool normals) {
   const std::size_t begin = pcd.find("\nDATA binary\n") + 13, record = record_bytes(normals);
   std::string points;
@@ -98,7 +98,8 @@ tl::expected<void, Failure> write_cloud_picture(const path& file, const Result<C
   return write_output(file, *png);
 }
 
-// A picture of a cloud is drawn here: of symbols from a PLY, of pixels from a PCD. The file is then made of that.
+// slsctl draws a cloud's picture itself: of symbols from a PLY, of pixels from a PCD. It then makes the file from the
+// same data.
 std::string asked_format(const ClientOptions& options, bool dense) {
   if (options.cloud_picture.empty()) return cloud_format(options);
   return dense ? "pcd" : "ply";
@@ -132,7 +133,7 @@ tl::expected<void, Failure> write_files(const ClientOptions& options, const Answ
   return written;
 }
 
-/// The density to ask for; empty: the service's configured one. A picture's format depends on it.
+/// The density to request; empty: the service's configured one. The format for the picture depends on it.
 tl::expected<std::string, Failure> asked_density(const ClientOptions& options, Connection& connection) {
   if (!options.density.empty()) return options.density;
   if (options.normals || cloud_format(options) == "tiff") return "pixels";

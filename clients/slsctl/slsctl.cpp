@@ -25,7 +25,7 @@ const char* const kWatch = "Watch";
 const char* const kSetUp = "Set up";
 const char* const kDiagnose = "Diagnose";
 
-/// A command of a group of the help, with examples below its options.
+/// Adds a command to a group of the help, with examples below its options.
 CLI::App* add_command(CLI::App& app, const char* group, const std::string& name, const std::string& what,
                       const std::string& examples) {
   CLI::App* command = app.add_subcommand(name, what);
@@ -235,7 +235,7 @@ int run(const std::string& command, const ClientOptions& options) {
   return slsd::image_command(options, command);
 }
 
-/// "help scan" is "scan --help".
+/// Turns "help scan" into "scan --help".
 std::vector<const char*> without_help_command(int argc, char** argv) {
   std::vector<const char*> arguments(argv, argv + argc);
   if (argc < 2 || std::string_view(argv[1]) != "help") return arguments;

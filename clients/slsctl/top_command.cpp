@@ -28,7 +28,7 @@ using nlohmann::json;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kCausesShown = 6;
 
-/// One look at the metrics: the value of each series, by its name and labels as they are written.
+/// One reading of the metrics: the value of each series, by its name and labels as in the text.
 using Series = std::map<std::string, double, std::less<>>;
 
 Series read_series(std::string_view text) {
@@ -44,7 +44,7 @@ Series read_series(std::string_view text) {
   return series;
 }
 
-/// The change of the metrics between two looks.
+/// The change of the metrics between two readings.
 class Change {
  public:
   Change(const Series& before, const Series& now, double seconds) : before_(before), now_(now), seconds_(seconds) {}
@@ -53,14 +53,14 @@ class Change {
     const auto found = now_.find(series);
     return found == now_.end() ? 0 : found->second;
   }
-  /// The growth of a counter; its whole value if it was counted anew.
+  /// The growth of a counter; its whole value if it was reset.
   [[nodiscard]] double grown(const std::string& series) const {
     const auto found = before_.find(series);
     const double now = value(series), was = found == before_.end() ? 0 : found->second;
     return now >= was ? now - was : now;
   }
   [[nodiscard]] double rate(const std::string& series) const { return grown(series) / seconds_; }
-  /// All series of a family that begin so, by what follows.
+  /// All series of a family with this beginning, by the rest of the name.
   [[nodiscard]] std::vector<std::pair<std::string, double>> grown_by(const std::string& begin) const {
     std::vector<std::pair<std::string, double>> parts;
     for (auto at = now_.lower_bound(begin); at != now_.end() && at->first.starts_with(begin); ++at)
@@ -72,13 +72,13 @@ class Change {
     for (const auto& [rest, grew] : grown_by(begin)) sum += grew;
     return sum / seconds_;
   }
-  /// The mean of a histogram's new values, in milliseconds; NaN where there are none.
+  /// The mean of a histogram's new values, in milliseconds; NaN if there are none.
   [[nodiscard]] double mean_ms(const std::string& family, const std::string& labels) const {
     const std::string of = labels.empty() ? "" : "{" + labels + "}";
     const double count = grown(family + "_count" + of);
     return count > 0 ? 1000 * grown(family + "_sum" + of) / count : kNone;
   }
-  /// The quantile of a histogram's new values, in milliseconds, by a line through the bucket; NaN if there are none.
+  /// The quantile of a histogram's new values, in milliseconds, interpolated within the bucket; NaN if there are none.
   [[nodiscard]] double quantile_ms(const std::string& family, const std::string& labels, double part) const {
     std::vector<std::pair<double, double>> buckets;
     const std::string begin = family + "_bucket{" + (labels.empty() ? "" : labels + ",") + "le=\"";
@@ -88,7 +88,7 @@ class Change {
     const double wanted = part * buckets.back().second;
     double low = 0, counted = 0;
     for (const auto& [bound, below] : buckets) {
-      if (below >= wanted && std::isinf(bound)) return 1000 * low;  // longer than the last bound says
+      if (below >= wanted && std::isinf(bound)) return 1000 * low;  // beyond the last finite bound
       if (below >= wanted) return 1000 * (low + (bound - low) * (wanted - counted) / (below - counted));
       low = bound, counted = below;
     }
@@ -111,7 +111,7 @@ std::string time_line(const Change& change, const std::string& name, const std::
                      figure(change.quantile_ms(family, labels, 0.5)), figure(change.quantile_ms(family, labels, 0.95)));
 }
 
-/// "decoded 95.0 %, no_neighbour 3.1 %": the largest few, of this interval.
+/// The largest few shares of this interval: "decoded 95.0 %, no_neighbour 3.1 %".
 std::string shares(const Change& change, const std::string& begin) {
   auto parts = change.grown_by(begin);
   double sum = 0;
@@ -133,7 +133,7 @@ std::string device_lines(const json& device, const std::string& rates) {
 }
 
 std::string camera_lines(const json& camera, const Change& change) {
-  std::string name;  // as a label has it
+  std::string name;  // as in the label
   for (const char letter : camera.value("name", ""))
     name += (letter == '\\' || letter == '"' ? std::string(1, '\\') : std::string()) + letter;
   const std::string label = "{camera=\"" + name + "\"";
@@ -207,14 +207,14 @@ int top_command(const ClientOptions& options) {
     const json& told = status->reply.message["result"];
     Series now = read_series(metrics->reply.bytes);
     const double uptime_s = now["slsd_uptime_seconds"];
-    // The first look tells of all the time since the service began.
+    // The first reading covers the whole time since the service started.
     const double seconds = std::max(uptime_s - uptime_before_s, 1e-3);
     const Change change(before, now, seconds);
     if (options.json) {
       std::cout << to_line(as_json(change, seconds)) << std::flush;
     } else {
       std::string text = screen(told, change);
-      if (live) {  // in the place of the look before, each line to its end, and what is below
+      if (live) {  // overwrites the previous screen and clears the rest of each line and below
         for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos; at += 4)
           text.replace(at, 1, "\x1b[K\n");
         text = (looks == 0 ? "\x1b[2J\x1b[H" : "\x1b[H") + text + "\x1b[J";

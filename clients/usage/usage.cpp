@@ -17,7 +17,8 @@ namespace {
 
 constexpr int kWrongUsage = 2;
 
-/// "--density {symbols,pixels}", "--poses N (3..99)"; which options need or exclude which is told when it matters.
+/// Lists options as "--density {symbols,pixels}" or "--poses N (3..99)". Leaves out which options need or exclude
+/// others: errors explain that.
 class PlainHelp : public CLI::Formatter {
  public:
   PlainHelp() {
@@ -27,7 +28,7 @@ class PlainHelp : public CLI::Formatter {
   }
   [[nodiscard]] std::string make_option(const CLI::Option* option, bool is_positional) const override {
     std::string opts = make_option_opts(option);
-    if (is_positional && !opts.starts_with(" {")) opts.clear();  // its name says what it is
+    if (is_positional && !opts.starts_with(" {")) opts.clear();  // its name explains it
     std::stringstream out;
     CLI::detail::format_help(out, make_option_name(option, is_positional) + opts, make_option_desc(option),
                              column_width_);
@@ -57,7 +58,7 @@ void refuse_options_as_values(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands(nullptr)) refuse_options_as_values(*command);
 }
 
-/// The command that was given, or the program itself.
+/// The given command, or the program itself.
 const CLI::App& chosen_command(const CLI::App& app) {
   const auto given = app.get_subcommands();
   return given.empty() ? app : *given.back();
@@ -72,7 +73,7 @@ bool looks_like_option(const std::string& word) {
   return word.size() > 1 && word.front() == '-';
 }
 
-/// The first argument that nothing takes; options before others, as a misspelt one leaves its value behind.
+/// The first argument that nothing accepts. Options come before others, because a misspelt one leaves its value behind.
 std::optional<std::string> unknown_argument(const CLI::App& app) {
   auto words = app.remaining(/*recurse=*/true);
   std::erase(words, "--");
@@ -103,7 +104,7 @@ std::string unknown_word(const CLI::App& app, const CLI::App& chosen, const std:
   return "there is no command " + quoted(word) + nearest_hint(word, names);
 }
 
-/// "FILE, the PNG to write", of the first argument that is missing.
+/// Describes the first missing argument: "FILE, the PNG to write".
 std::string missing_argument(const CLI::App& chosen, const CLI::ParseError& error) {
   for (const CLI::Option* option : chosen.get_options())
     if (option->get_required() && option->count() == 0)
@@ -111,7 +112,7 @@ std::string missing_argument(const CLI::App& chosen, const CLI::ParseError& erro
   return error.what();
 }
 
-/// CLI11's own words for the rest, put plainly.
+/// Rewords CLI11's other errors plainly.
 std::string other_error(const CLI::App& chosen, const CLI::ParseError& error) {
   const std::string text = error.what();
   const std::string option = text.substr(0, text.find_first_of(": "));
@@ -144,7 +145,7 @@ std::string explain(const CLI::App& app, const CLI::ParseError& error) {
   if (lacks_command && !unknown && kind == CLI::ExitCodes::RequiredError)
     return app.help() + "\n" + app.get_name() + ": name one of these commands\n";
   std::string problem;
-  if (unknown && looks_like_option(*unknown)) {  // it explains what else is wrong
+  if (unknown && looks_like_option(*unknown)) {  // an unknown option explains the other errors
     problem = unknown_option(app, chosen, *unknown);
   } else if (unknown && (lacks_command || kind == CLI::ExitCodes::ExtrasError)) {
     problem = unknown_word(app, chosen, *unknown);

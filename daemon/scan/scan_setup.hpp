@@ -24,8 +24,8 @@
 
 namespace slsd {
 
-/// The pattern that the configuration asks for: made anew, or read from its file.
-/// @errors of make_pattern(), read_file() and read_pattern(); kMismatch: not of the projector's size
+/// The pattern that the configuration asks for: generated, or read from its file.
+/// @errors of make_pattern(), read_file() and read_pattern(); kMismatch: not in the projector's size
 [[nodiscard]] Result<Pattern> configured_pattern(const Configuration& configuration);
 
 /// Camera pixels for one projector pixel, in the calibrated camera that sees the pattern smallest. Without a

@@ -19,8 +19,9 @@ namespace slsd {
 /// time would charge a client for other programs' turns. Sorting by the start of turns, not their end, would make a
 /// client's two quick turns wait for long turns of others.
 ///
-/// A client that leaves the loop to others between its turns is forgiven a sixteenth of that time. Otherwise, of 65
-/// clients, one that asks for the status 50 times a second would use up its share and wait as long as those that flood.
+/// A client that leaves the loop to others between its turns is forgiven a sixteenth of that time. Otherwise one of 65
+/// clients could use up its share by asking for the status 50 times a second. It would then wait as long as those that
+/// flood.
 ///
 ///     time     a turn begins where the client's turn before ended, but not before now; now is the start of the latest
 ///              turn under way, and goes on by the share that each of those who wait had in it

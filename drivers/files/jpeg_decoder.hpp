@@ -14,8 +14,8 @@
 namespace slsd {
 
 /// Decodes one JPEG image from a file or a camera into grey, with libjpeg. A picture with missing data or displaced
-/// blocks is an error. These are accepted: bytes after the end marker, bytes before a marker that form no blocks,
-/// unusual headers, and missing Huffman tables as in MJPG (the standard's tables apply).
+/// blocks is an error. Accepts bytes after the end marker, bytes before a marker that form no blocks, and unusual
+/// headers. If Huffman tables are missing, as in MJPG, the standard's tables apply.
 ///
 /// The errors contain no remedy, because the caller knows it.
 /// @thread thread-bound

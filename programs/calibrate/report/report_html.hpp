@@ -9,9 +9,10 @@
 
 namespace slsd {
 
-/// A calibration as a single-file page for a browser, with pictures and without scripts. Contains the verdict and what
-/// to capture next, the board's flatness, the errors, the coverage, the residuals of every device, the poses in space,
-/// the depth's uncertainty, each parameter with its deviation, and each pose, with the reason if it was left out.
+/// A calibration as a single-file page for a browser, with pictures and without scripts. Contains the verdict, what to
+/// capture next, the board's flatness, the errors, the coverage and the residuals of every device. Also shows the poses
+/// in space, the depth's uncertainty, and each parameter with its deviation. Lists each pose, with the reason if it was
+/// left out.
 /// @param refused  why the calibration was refused; empty: it is in force
 /// @thread reentrant
 [[nodiscard]] std::string report_html(const CalibrationOutcome& outcome, const std::string& refused = {});
