@@ -26,8 +26,8 @@ class Executor {
         parts, [](const void* of, int part, int worker) { (*static_cast<const Work*>(of))(part, worker); }, &work);
   }
 
-  /// Runs a loop in ranges of equal length, whatever the number of workers, so that results that depend on the order
-  /// within a range do not depend on the workers.
+  /// Runs a loop in ranges of equal length, whatever the number of workers. Results that depend on the order within a
+  /// range are therefore the same for any number.
   /// @param work  called as work(first, last, worker) for each range, from 0 on; excludes last
   template <class Work>
   void run_ranges(std::size_t count, const Work& work, std::size_t length = 256) {

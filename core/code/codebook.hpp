@@ -19,7 +19,7 @@ using Codeword = std::array<std::uint8_t, kWindowCells>;
 /// Finds windows of the array by their codewords, or by codewords that differ in one letter.
 ///
 /// Stores only the windows themselves, 12 bytes each in a table at most half full. To correct a misread codeword, it
-/// looks up all 9 (letters - 1) words that differ in one letter, in a table that fits the cache.
+/// looks up all 9 (letters - 1) words that differ in one letter. The table fits the cache.
 /// @thread reentrant
 class Codebook {
  public:

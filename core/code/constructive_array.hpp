@@ -18,9 +18,9 @@ struct RunReach {
   friend bool operator==(const RunReach&, const RunReach&) = default;
 };
 
-/// Fills the array cell by cell, so that every overlapping 3x3 window keeps the distance from all earlier ones, and no
-/// run recurs within its reach. The search takes letters in random order and backtracks within the row. If it cannot
-/// fill a row, it removes rows, and at last restarts. If columns have the longer reach, it fills column by column.
+/// Fills the array cell by cell. Every overlapping 3x3 window keeps the distance from all earlier ones, and no run
+/// recurs within its reach. The search takes letters in random order and backtracks within the row. If it cannot fill a
+/// row, it removes rows, and at last restarts. If columns have the longer reach, it fills column by column.
 /// @param options           rows and columns at least 3, letters, seed, half_turn_unique
 /// @param minimum_distance  1 to 9
 /// @param reach             0 or more columns and rows

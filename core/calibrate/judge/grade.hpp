@@ -23,8 +23,8 @@ inline constexpr Bounds kHeldOutPx{0.3, 1.0};       ///< each pose under the cal
 inline constexpr Bounds kEpipolarPx{0.3, 1.0};      ///< symbols off their epipolar lines, in the projector
 inline constexpr Bounds kDepthShare{0.001, 0.005};  ///< the depth's deviation relative to the distance, at the middle
                                                     ///< of the range
-inline constexpr double kCoverageGood = 0.5;  ///< share of an image
-inline constexpr double kTiltGoodDeg = 15;    ///< tilt of the most tilted pose
+inline constexpr double kCoverageGood = 0.5;        ///< share of an image
+inline constexpr double kTiltGoodDeg = 15;          ///< tilt of the most tilted pose
 inline constexpr std::size_t kPosesGood = 8;
 
 /// A grade for a calibration, its reasons, and which poses to add.

@@ -42,7 +42,7 @@ inline __attribute__((always_inline)) void take_logarithms(const Lanes& of, Lane
                2 * s * (1 + ss * (1 / 3.F + ss * (1 / 5.F + ss * (1 / 7.F + ss * (1 / 9.F)))));
 }
 
-/// Vectors have no square root of their own; the compiler vectorizes this loop.
+/// Vectors have no square root of their own; the compiler vectorises this loop.
 inline __attribute__((always_inline)) void take_roots(const Lanes& of, Lanes& roots) {
   alignas(Lanes) float numbers[kLanes];
   std::memcpy(numbers, &of, sizeof of);
@@ -50,8 +50,8 @@ inline __attribute__((always_inline)) void take_roots(const Lanes& of, Lanes& ro
   slsd::load(numbers, roots);
 }
 
-/// Adds the squares of the whitened features from kRow on. The rows of the triangle differ in length, so templates
-/// unroll them.
+/// Adds the squares of the whitened features from kRow on. The rows of the triangle differ in length, so a template
+/// unrolls them.
 template <int kRow>
 inline __attribute__((always_inline)) void add_squares(const Classifier::Letter& letter, const Lanes* deviation,
                                                        Lanes& squared_distance) {
