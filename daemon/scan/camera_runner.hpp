@@ -52,7 +52,7 @@ class SequenceGaps {
 /// Runs and supervises one camera on a thread of its own. Opens the camera, and reopens a lost one for ever, with
 /// growing pauses. Looks after it between captures, and takes a frame on request. Logs the first failure and the
 /// recovery, not each attempt. docs/supervision.md draws the states.
-/// @thread thread-safe, but for the captures, which belong to one thread
+/// @thread thread-safe, except the captures, which belong to one thread
 class CameraRunner {
  public:
   CameraRunner(std::unique_ptr<Camera> camera, const ScanOptions& options);

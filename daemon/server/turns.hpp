@@ -23,8 +23,8 @@ namespace slsd {
 /// clients could use up its share by asking for the status 50 times a second. It would then wait as long as those that
 /// flood.
 ///
-///     time     a turn begins where the client's turn before ended, but not before now; now is the start of the latest
-///              turn under way, and goes on by the share that each of those who wait had in it
+///     time     a turn begins at the end of the client's previous turn, but not before now; now is the start of the
+///              latest turn, and advances after it by the turn's cost, shared among the waiting clients
 ///     floods   A |--------|
 ///              B |--------|
 ///     status   C |-|-|                  ends first, and is next, twice

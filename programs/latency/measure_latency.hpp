@@ -40,8 +40,8 @@ struct CameraLatency {
 ///     show(white) returns     light arrives
 ///     ----|-----------------------|------------------------>
 ///     [frame, dark]  [frame, in part]  [frame, whole]
-///                     |<- latest that is not whole     latency: the soonest whole one that began after every frame
-///                                      |               of every flash that was not
+///                     |<- the latest incomplete one    latency: the start of the earliest whole frame that began
+///                                      |               after every incomplete frame of every flash
 ///
 /// @param projector, camera  open
 /// @errors kNotFound: no flash is visible; kTimeout: a flash was missed; if too many frames in a row are lost, the

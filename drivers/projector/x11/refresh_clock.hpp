@@ -22,7 +22,7 @@ namespace slsd {
 ///     prepare()  swap                         wait_refresh() returns t
 ///     ----|-------|----|-----------------------|-----------------------
 ///                      the first refresh that  t: its end
-///                      shows what was swapped
+///                      shows the swapped image
 ///
 /// A server that flips buffers reports when it flipped. A server that copies has finished before it answers, and the
 /// next refresh shows the copy.
