@@ -354,7 +354,7 @@ void MapCleaner::prune(DenseMap& map, double reach_px, std::size_t hole_most) {
   const BitRows rows{static_cast<std::size_t>(map.width + 63) / 64, map.height};
   const std::size_t words = rows.words;
   const auto either = [](std::uint64_t a, std::uint64_t b) { return a | b; };
-  // Both sides of every broken joint.
+  // Both pixels of every pair that is not joined.
   bits_.assign(measured_.size(), 0), rows_.assign(measured_.size(), 0);
   const std::uint64_t beyond = map.width % 64 == 0 ? 0 : ~std::uint64_t{0} << (map.width % 64);
   for (int y = 0; y < map.height; ++y) {

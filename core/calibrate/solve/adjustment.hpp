@@ -32,7 +32,7 @@ class Adjustment {
   /// that prints of different scales do not contradict each other.
   [[nodiscard]] Result<> begin_with_planes(Observations& observations);
 
-  /// Fixes the board's scale again if the prints agree within their deviations; otherwise keeps their difference.
+  /// Fixes the board's scale again if the prints agree within their deviations; otherwise warns of their difference.
   [[nodiscard]] Result<> compare_prints(Observations& observations);
 
   /// Looks for a change of the rig during the session.

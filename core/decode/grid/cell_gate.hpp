@@ -67,7 +67,7 @@ class CellGate {
     };
     double across = -first / slope;
     for (int along = 0; along <= last_along; ++along) {
-      // Start at the previous row: lens distortion bends the line away from it only gradually.
+      // Predict from the previous cell: lens distortion bends the line only gradually.
       const int before = static_cast<int>(std::lround(std::clamp<double>(across, 0, last_across)));
       across = before - off_line_at(along, before) / slope;
       const auto nearest = static_cast<int>(std::lround(std::clamp<double>(across, -1, last_across + 1)));

@@ -16,8 +16,9 @@ constexpr float kAreaMin = 0.08F;
 constexpr float kAreaMax = 1.1F;
 constexpr int kAreaMinPx = 6;
 constexpr float kExtentMax = 1.5F;  // multiple of a cell's side
-/// Blur that the prototypes still cover. Sharpening removes the excess, and rather too little than too much, as
-/// oversharpening causes ripples. The last limit is the largest amount, as a share of a symbol's side.
+/// Blur from which on a frame is sharpened: the prototypes cover less. Sharpening undoes this share of the blur, rather
+/// too little than too much, as oversharpening causes ripples. The last limit is the most that it undoes, as a share of
+/// a symbol's side.
 constexpr float kBlurMinPx = 1.9F;
 constexpr float kBlurUndone = 0.85F;
 constexpr float kBlurMax = 0.2F;
