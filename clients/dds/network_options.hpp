@@ -10,7 +10,7 @@
 
 namespace slsd::dds {
 
-/// How to reach the other participants.
+/// The ways to reach the other participants.
 struct NetworkOptions {
   std::uint32_t domain = 0;        ///< ROS_DOMAIN_ID
   std::string interface;           ///< "eth0", "lo", or an address; empty: all

@@ -16,8 +16,7 @@ namespace {
 
 /// Scales to try, camera px per projector px, in this order around 1.
 constexpr double kScaleMin = 0.35, kScaleMax = 16, kScaleStep = 1.3;
-/// If symbols are larger in the camera than the first value, the frame is shrunk. They stay at least as large as the
-/// second.
+/// Size of symbols in the camera from which on the frame is shrunk, and the smallest size that shrinking leaves them.
 constexpr double kLargePx = 48, kLargeEnoughPx = 24;
 /// Number of rotations of the pattern in the camera's image to try, over a full turn.
 constexpr int kTurns = 12;

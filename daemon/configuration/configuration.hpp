@@ -22,7 +22,7 @@ namespace slsd {
 
 inline constexpr const char* kConfigurationFile = "/etc/slsd/slsd.toml";
 
-/// What happens to a scan if its camera or projector is not the calibrated one.
+/// The fate of a scan whose camera or projector is not the calibrated one.
 enum class OtherHardware { kError, kWarn };
 
 /// The configuration file's content, one member for each table. Relative paths are joined to the file's folder.

@@ -86,7 +86,7 @@ class Rig {
   [[nodiscard]] DeviceStatus projector_status() const { return projection_.status(); }
   [[nodiscard]] std::vector<DeviceStatus> camera_statuses() const;
   [[nodiscard]] RigStatus status() const { return {projector_status(), camera_statuses()}; }
-  /// How often all devices together were opened. When it grows, a device may have been replaced.
+  /// The number of times that any device was opened. When it grows, a device may have been replaced.
   [[nodiscard]] std::uint64_t openings() const;
 
  private:

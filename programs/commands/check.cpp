@@ -111,7 +111,7 @@ class LiveService {
       if (camera.value("name", "") == name) return camera;
     return json::object();
   }
-  /// Why its last scan gave no points; empty: it gave some.
+  /// The reason why the last scan gave no points; empty: it gave some.
   [[nodiscard]] std::string why_empty() const {
     const json empty = status_.value("scans", json::object()).value("empty", json());
     return empty.is_string() ? printable(empty.get<std::string>(), kLongestProblem) : std::string();

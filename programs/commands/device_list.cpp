@@ -76,7 +76,7 @@ std::string unseen_text(const CameraOptions& camera) {
   return text.str();
 }
 
-/// If the configuration has no such table, the default projector applies, which is not visible.
+/// Describes the projector. Without such a table the default projector applies, which is not visible.
 std::string projector_text(const Configuration& configuration) {
   if (!configuration.given.contains("projector"))
     return "no projector is configured: name its monitor in [projector]\n";

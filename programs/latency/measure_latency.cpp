@@ -152,7 +152,7 @@ class LatencyMeter {
     return shown;
   }
 
-  /// What matters here about a frame.
+  /// The part of a frame that matters here.
   struct Seen {
     FlashPixels::Samples samples;
     MonotonicTime exposure_start;

@@ -24,7 +24,7 @@ class LetterFields {
  public:
   explicit LetterFields(const PatternOptions& pattern);
   /// Returns the letters at the nearest blur.
-  /// @param blur_px  Returns the centre of a letter's square in these fields.
+  /// @param blur_px  standard deviation, projector px
   [[nodiscard]] const PatternField& at(float blur_px) const { return fields_.nearest(blur_px); }
   /// Returns the middle of a letter's square in these fields.
   [[nodiscard]] Eigen::Vector2f middle_px(int letter) const;

@@ -53,7 +53,7 @@ CellProposer::Proposal CellProposer::weigh(std::int32_t node, std::int32_t cell)
 }
 
 /// Proposes the cell adjacent to the certain cell of a neighbour, with few alternatives to compare.
-/// @param first  first node without proposals
+/// @param first  first node of the range that is under way: the nodes before it may change meanwhile
 CellProposer::Proposal CellProposer::continued(const Frame& frame, std::int32_t node, std::int32_t first) const {
   for (const Direction d : {kLeft, kUp}) {
     const std::int32_t other = frame.beside[static_cast<std::size_t>(node)][d];

@@ -97,7 +97,8 @@ float SymbolReview::distance_from_letter(const Sightings& seen, std::size_t node
   return nearer_around(seen, node, moments, distance_in(seen, node, moments, seen.nodes[node].frame));
 }
 
-/// If print has displaced centres, a symbol's own frame is worse than the mean of those around it. A symbol off the
+/// Compares the distances in both frames: if print has displaced centres, a symbol's own frame is worse than the mean
+/// of those around it. A symbol off the
 /// grid lies on another surface with another frame, and the distance shows that.
 /// @param own  the distance in the symbol's own frame
 float SymbolReview::nearer_around(const Sightings& seen, std::size_t node, const GreyMoments& moments,

@@ -58,7 +58,7 @@ class AravisCamera final : public Camera {
 
   /// The statistics of the open session, or of the previous one.
   [[nodiscard]] AravisStatistics statistics() const;
-  /// How much faster the device's clock runs than the host's, in parts per million; 0 until known.
+  /// The drift of the device's clock against the host's, in parts per million, faster is positive; 0 until known.
   [[nodiscard]] double clock_drift_ppm() const;
   /// The names of system properties that may cost frames, or could not be verified: "receive_buffer", "packet_size",
   /// "fragments", "packet_resend", "device_clock", "chunks", "first_frame".

@@ -49,7 +49,7 @@ struct ChunkSelection {
   friend bool operator==(const ChunkSelection&, const ChunkSelection&) = default;
 };
 
-/// If the options ask for it, makes the camera append to each frame the exposure's start, its length and the gain.
+/// Makes the camera append the exposure's start, its length and the gain to each frame, if the options ask for it.
 /// Chunks that the camera lacks or refuses stay off.
 /// @errors as turn_chunks_off()
 [[nodiscard]] Result<ChunkSelection> configure_chunks(const DeviceFeatures& features,

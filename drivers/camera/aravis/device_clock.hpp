@@ -39,7 +39,7 @@ class DeviceClock {
   bool observe(const ClockReading& reading);
 
   [[nodiscard]] bool was_read() const { return count_ > 0; }
-  /// Why the clock is not trusted; empty while it is.
+  /// The reason for distrusting the clock; empty while it is trusted.
   [[nodiscard]] std::string_view fault() const { return fault_; }
   /// Tells whether the clock can be read and trusted.
   [[nodiscard]] bool ready() const { return was_read() && fault_.empty(); }
@@ -56,7 +56,7 @@ class DeviceClock {
   [[nodiscard]] std::chrono::nanoseconds device_time(MonotonicTime host) const;
   /// The error of host_time(device): an upper bound of its standard deviation.
   [[nodiscard]] std::chrono::nanoseconds uncertainty(std::chrono::nanoseconds device) const;
-  /// How much faster the device's clock runs than the host's, in parts per million; 0 until known.
+  /// The drift of the device's clock against the host's, in parts per million, faster is positive; 0 until known.
   [[nodiscard]] double drift_ppm() const { return (1.0 / host_per_device_ - 1.0) * 1e6; }
 
  private:

@@ -16,7 +16,7 @@
 
 namespace slsd {
 
-/// How a pixel format stores grey.
+/// The storage of grey in a pixel format.
 enum class GreyLayout {
   kGrey8,     ///< one byte per pixel, row by row; chroma follows the rows
   kGrey16,    ///< two bytes per pixel, little-endian

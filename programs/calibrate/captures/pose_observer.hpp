@@ -24,7 +24,7 @@ class PoseObserver {
   /// @errors those of observe_board(), observe_pattern() and observe_gray_code()
   [[nodiscard]] Result<PoseView> observe(std::size_t camera, const PosePictures& pictures);
 
-  /// How much of the white picture's print shows in a pattern's picture, and where.
+  /// Measures how much of the white picture's print shows in a pattern's picture, and where.
   /// @return a significance of 0 if the board is not found
   [[nodiscard]] PrintShift print_shift(const GreyView& white, const GreyView& pattern) const;
 

@@ -8,7 +8,7 @@
 
 namespace slsd {
 
-/// How texts call a camera: with its own name only if there are several cameras.
+/// The words for a camera in texts: its own name only if there are several cameras.
 /// @thread reentrant
 [[nodiscard]] std::string camera_text(const CalibrationOutcome& outcome, const std::string& name);
 

@@ -12,7 +12,7 @@ namespace slsd {
 /// Each camera's sighting of the board, or the reason why it sees none.
 using BoardSightings = std::vector<Result<BoardSighting>>;
 
-/// What all cameras see at one moment, one entry for each camera.
+/// The views of all cameras at one moment, one entry for each camera.
 struct BoardLook {
   std::vector<GreyImage> pictures;
   BoardSightings sightings;
