@@ -79,9 +79,9 @@ std::vector<HardFrames> hard_frames() {
       {16, Kind::kSwappedPatch, {68, 82, 292, 60418, 600342, 1700472, 5100456, 5201686, 5301614, 5302142, 25000936}}};
 }
 
-// Chance alone makes some of them, and a margin of so many nats allows for as many.
+// Chance alone makes some of them, and a margin of so many nats allows for as many: the bound only falls.
 TEST(AdversaryFrames, SeldomHaveAWrongCellThoughTheyAreHard) {
-  constexpr int kWrongMax = 23;
+  constexpr int kWrongMax = 22;
   int frames = 0, wrong = 0;
   for (const int size_px : {8, 16}) {
     Bench bench = Bench::of(size_px);

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include "core/decode/centres/align_letters.hpp"
 #include "core/decode/grid/sightings.hpp"
@@ -20,12 +19,5 @@ inline constexpr int kFewHolders = 2;
 /// Place of a symbol between accepted neighbours on opposite sides, or one step beyond two in a line; the mean of all
 /// these. Without such neighbours there is no place.
 [[nodiscard]] LetterPlace place_by_neighbours(const Sightings& seen, std::int32_t node);
-
-/// Place of a symbol on a plane through the symbols around it, worn ones included, as print wears each symbol
-/// differently. Their proposed cells must lie beside each other as the symbols do. There is no place if they are few or
-/// do not lie on a plane.
-/// @param around  buffer for the nodes around
-[[nodiscard]] LetterPlace place_by_plane(const Sightings& seen, std::int32_t node, float pitch_px,
-                                         std::vector<std::int32_t>& around);
 
 }  // namespace slsd

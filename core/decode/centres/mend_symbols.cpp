@@ -114,11 +114,9 @@ bool SymbolMender::shows_letter(const LetterScene& scene, const AskedLetter& ask
 
 void SymbolMender::mend_asked(const LetterScene& scene) {
   aligner_.clear();
-  for (const std::int32_t node : to_ask_) {
-    LetterPlace place = place_by_neighbours(scene.seen, node);
-    if (place.held_by == 0) place = place_by_plane(scene.seen, node, pitch_px_, around_);
-    if (place.held_by > 0) aligner_.ask(scene, node, place);
-  }
+  for (const std::int32_t node : to_ask_)
+    if (const LetterPlace place = place_by_neighbours(scene.seen, node); place.held_by > 0)
+      aligner_.ask(scene, node, place);
   for (const AskedLetter& asked : aligner_.asked()) {
     if (scene.seen.shapes[asked.node].is_well_seen()) continue;
     const GreyMoments& light = scene.seen.moments[asked.node];

@@ -33,7 +33,7 @@ class SymbolMender {
   float pitch_px_;
   Rules rules_;
   LetterAligner aligner_;
-  std::vector<std::int32_t> to_ask_, mended_, around_;  // sightings
+  std::vector<std::int32_t> to_ask_, mended_;  // sightings
 };
 
 }  // namespace slsd

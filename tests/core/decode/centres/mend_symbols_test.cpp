@@ -62,34 +62,6 @@ TEST_F(MendOneOfMany, ShowsItsLetter) {
   EXPECT_FALSE(seen_.nodes[kWorn].torn);
 }
 
-// Print wears all of them, each by another part, as on a poster.
-TEST_F(MendOneOfMany, PlacesItByThePlaneOfThoseThatAreWornToo) {
-  const auto wear_all = [&](float moved_px) {
-    for (int i = 0; i < kSide * kSide; ++i) {
-      seen_.claims[i].status = RegionStatus::kDamagedShape;
-      const int way = i % 3 - 1;
-      if (i != kWorn) seen_.nodes[i].centre_px += moved_px * Eigen::Vector2f(way, -way);
-    }
-  };
-  const Sightings all = seen_;
-  wear_all(0.7F);
-  const std::vector<std::int32_t> mended = mend_all();
-  EXPECT_THAT(mended, testing::Contains(static_cast<std::int32_t>(kWorn)));
-  for (const std::int32_t node : mended) {
-    const Eigen::Vector2f centroid(seen_.moments[node].x, seen_.moments[node].y);
-    EXPECT_LT((centroid - true_centre(node / kSide, node % kSide)).norm(), 0.1F) << node;
-  }
-  seen_ = all;
-  wear_all(4);
-  EXPECT_THAT(mend_all(), testing::IsEmpty()) << "they lie on no plane";
-  seen_ = all;
-  wear_all(0.7F);
-  seen_.claims[kWorn + 1].column += 1, seen_.claims[kWorn - 1].column += 1;
-  seen_.claims[kWorn + kSide].row += 1, seen_.claims[kWorn - kSide].row += 1;
-  EXPECT_THAT(mend_all(), testing::Not(testing::Contains(static_cast<std::int32_t>(kWorn))))
-      << "those beside it are of other cells";
-}
-
 TEST_F(MendOneOfMany, MendsTheLinksToThoseThatPutItThere) {
   for (const Direction d : kDirections)
     seen_.nodes[kWorn].broken[d] = seen_.nodes[seen_.nodes[kWorn].links[d]].broken[opposite(d)] = true;
