@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/code/letter_source.hpp"
-#include "core/code/runs.hpp"
+#include "core/code/run_index.hpp"
 #include "core/code/window_index.hpp"
 
 namespace slsd {
@@ -39,14 +39,20 @@ class Construction {
   Construction(const ArrayOptions& options, int minimum_distance, RunReach reach, std::int64_t step_budget)
       : options_(options),
         minimum_distance_(minimum_distance),
-        reach_(reach),
         patience_(reach == RunReach{} ? kWithWindowsOnly : kWithoutRepeats),
         steps_left_(step_budget),
         source_(options.seed),
         index_(options.letters, minimum_distance),
+        row_runs_(options.rows, options.columns, options.letters, reach.along_rows),
+        column_runs_(options.columns, options.rows, options.letters, reach.along_columns),
         array_{options.rows, options.columns, options.letters,
                std::vector<std::uint8_t>(static_cast<std::size_t>(options.rows) * options.columns)},
-        choices_(array_.cells.size()) {}
+        choices_(array_.cells.size()) {
+    for (int cell = 0; cell < cell_count(); ++cell) {
+      choices_[cell].row = cell / options.columns;
+      choices_[cell].column = cell % options.columns;
+    }
+  }
 
   std::optional<CodeArray> run() {
     int rollbacks = 0;
@@ -65,11 +71,16 @@ class Construction {
 
  private:
   struct Choices {
+    int row = 0, column = 0;  // of the cell; divisions would take a sixth of the time
     std::array<std::uint8_t, 8> order;
     int tried = 0;
+    unsigned excluded = 0;  // one bit for each letter
   };
 
   [[nodiscard]] int cell_count() const { return static_cast<int>(array_.cells.size()); }
+  [[nodiscard]] unsigned all_letters() const { return (1U << options_.letters) - 1; }
+  [[nodiscard]] int row_of(int cell) const { return choices_[cell].row; }
+  [[nodiscard]] int column_of(int cell) const { return choices_[cell].column; }
 
   bool fill_row_in_tries() {
     for (int tries = patience_.tries; tries > 0 && steps_left_ > 0; --tries)
@@ -108,6 +119,9 @@ class Construction {
   void open_cell() {
     Choices& choices = choices_[next_];
     choices.tried = 0;
+    choices.excluded = row_runs_.ending_recurring_run(row_of(next_), column_of(next_)) |
+                       column_runs_.ending_recurring_run(column_of(next_), row_of(next_));
+    if (ends_window(next_)) choices.excluded |= ending_close_window(~choices.excluded & all_letters());
     for (int i = 0; i < options_.letters; ++i) {
       const int j = source_.below(i + 1);
       choices.order[i] = choices.order[j];
@@ -119,40 +133,33 @@ class Construction {
     Choices& choices = choices_[next_];
     if (choices.tried == options_.letters) return false;
     array_.cells[next_] = choices.order[choices.tried++];
-    if (ends_recurring_run(1, next_ % options_.columns, reach_.along_rows) ||
-        ends_recurring_run(options_.columns, next_ / options_.columns, reach_.along_columns))
-      return false;
+    if ((choices.excluded >> array_.cells[next_] & 1U) != 0) return false;
+    row_runs_.add(row_of(next_), column_of(next_), array_.cells[next_]);
+    column_runs_.add(column_of(next_), row_of(next_), array_.cells[next_]);
     if (!ends_window(next_)) return true;
     const PackedWindow window = window_ending_at(next_);
-    if (!fits(window)) return false;
     index_.add(window);
     if (options_.half_turn_unique) index_.add(half_turned(window));
     return true;
   }
 
-  // Whether a run that ends at the next cell resembles an earlier run in its line too much. step: distance between
-  // cells of the line; position: that of the cell in the line.
-  [[nodiscard]] bool ends_recurring_run(int step, int position, int reach) const {
-    const std::uint8_t* const run = &array_.cells[static_cast<std::size_t>(next_)];
-    for (int apart = 1; apart <= std::min(reach, position); ++apart) {
-      const int longest = std::min(kLongestRun, position - apart + 1);
-      int differing = 0;
-      for (int back = 0; back < longest; ++back) {
-        differing += run[-back * step] != run[-(back + apart) * step] ? 1 : 0;
-        if (back + 1 - differing >= kShortestRun) return true;
-      }
+  // Letters that end a window too close to another or to itself rotated, one bit for each letter.
+  unsigned ending_close_window(unsigned asked) {
+    unsigned letters = index_.closer_with(window_ending_at(next_), asked);
+    if (!options_.half_turn_unique) return letters;
+    for (int letter = 0; letter < options_.letters; ++letter) {
+      array_.cells[next_] = static_cast<std::uint8_t>(letter);
+      const PackedWindow window = window_ending_at(next_);
+      if (cells_that_differ(window, half_turned(window)) < minimum_distance_) letters |= 1U << letter;
     }
-    return false;
-  }
-
-  [[nodiscard]] bool fits(PackedWindow window) const {
-    if (options_.half_turn_unique && cells_that_differ(window, half_turned(window)) < minimum_distance_) return false;
-    return !index_.has_closer(window);
+    return letters;
   }
 
   void take_back_to(int cell) {
     while (next_ > cell) {
       --next_;
+      row_runs_.remove_last(row_of(next_), column_of(next_), array_.cells[next_]);
+      column_runs_.remove_last(column_of(next_), row_of(next_), array_.cells[next_]);
       if (!ends_window(next_)) continue;
       const PackedWindow window = window_ending_at(next_);
       if (options_.half_turn_unique) index_.remove_last(half_turned(window));
@@ -161,7 +168,7 @@ class Construction {
   }
 
   [[nodiscard]] bool ends_window(int cell) const {
-    return cell / options_.columns >= kWindowSide - 1 && cell % options_.columns >= kWindowSide - 1;
+    return row_of(cell) >= kWindowSide - 1 && column_of(cell) >= kWindowSide - 1;
   }
 
   [[nodiscard]] PackedWindow window_ending_at(int cell) const {
@@ -174,11 +181,11 @@ class Construction {
 
   const ArrayOptions& options_;
   int minimum_distance_;
-  RunReach reach_;
   Patience patience_;
   std::int64_t steps_left_;
   LetterSource source_;
   WindowIndex index_;
+  RunIndex row_runs_, column_runs_;
   CodeArray array_;
   std::vector<Choices> choices_;
   int next_ = 0;  // the first empty cell

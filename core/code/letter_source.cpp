@@ -8,11 +8,11 @@ namespace slsd {
 
 int LetterSource::below(int count) {
   assert(count > 0);
-  const std::uint64_t range = std::uint64_t{1} << 32;
-  const std::uint64_t limit = range - range % static_cast<std::uint64_t>(count);
-  std::uint64_t draw = twister_();
-  while (draw >= limit) draw = twister_();
-  return static_cast<int>(draw % static_cast<std::uint64_t>(count));
+  const auto divisor = static_cast<std::uint32_t>(count);
+  std::uint32_t draw = twister_();
+  // Draws beyond the largest multiple of count would favour small numbers. The first comparison spares most divisions.
+  while (draw >= -divisor && draw > ~(-divisor % divisor)) draw = twister_();
+  return static_cast<int>(draw % divisor);
 }
 
 }  // namespace slsd

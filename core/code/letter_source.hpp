@@ -18,7 +18,10 @@ class LetterSource {
   [[nodiscard]] int below(int count);
 
  private:
-  std::mt19937 twister_;
+  // std::mt19937, but its words have 32 bits on all machines: twice as many fit into a vector.
+  std::mersenne_twister_engine<std::uint32_t, 32, 624, 397, 31, 0x9908b0df, 11, 0xffffffff, 7, 0x9d2c5680, 15,
+                               0xefc60000, 18, 1812433253>
+      twister_;
 };
 
 }  // namespace slsd

@@ -19,9 +19,10 @@ using PackedWindow = std::uint64_t;
 /// Counts the cells in which two windows differ.
 [[nodiscard]] int cells_that_differ(PackedWindow a, PackedWindow b);
 
-/// An index of windows for the question "is any of them closer than d?". Two words of nine letters that differ in fewer
-/// than d places agree on at least one of d groups of places (pigeonhole). So a window is filed under its letters in
-/// each group, and a query reads only d files.
+/// An index of windows for the question "is any of them closer than d?", which it answers at once for all letters of
+/// the last cell. Two words of nine letters that differ in fewer than d places agree on at least one of d groups of
+/// places (pigeonhole). So a window is filed under its letters in each group, and a query reads only the files of d
+/// groups.
 /// @thread thread-bound
 class WindowIndex {
  public:
@@ -29,18 +30,23 @@ class WindowIndex {
   /// @param minimum_distance  1 to 9
   WindowIndex(int letters, int minimum_distance);
 
-  [[nodiscard]] bool has_closer(PackedWindow window) const;
+  /// Letters with which, as its last, the window is closer to one of the index: one bit for each letter.
+  /// @param window   its last letter does not matter
+  /// @param letters  the letters in question, one bit for each
+  [[nodiscard]] unsigned closer_with(PackedWindow window, unsigned letters) const;
   void add(PackedWindow window);
   /// Removes the window that was added last.
   void remove_last(PackedWindow window);
 
  private:
+  using File = std::vector<PackedWindow>;
   struct Group {
     int first_cell;
     int cells;
-    std::vector<std::vector<PackedWindow>> files;
+    std::vector<File> files;
   };
   [[nodiscard]] std::size_t file_of(const Group& group, PackedWindow window) const;
+  [[nodiscard]] unsigned closer_in(const File& file, PackedWindow window) const;
 
   int letters_;
   int minimum_distance_;

@@ -14,10 +14,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr ArrayMethod kNoRepeats = ArrayMethod::kNoRepeats;
-
 Result<CodeArray> array_of(ArrayOptions options) {
-  options.method = kNoRepeats;
+  options.method = ArrayMethod::kNoRepeats;
   return make_code_array(options);
 }
 
@@ -126,7 +124,7 @@ TEST(NoRepeats, RefusesReachesThatMeanNothing) {
   EXPECT_THAT(why_not({.row_reach = 0, .column_reach = 0}), HasSubstr("constructive"));
   EXPECT_FALSE(ArrayOptions{.row_reach = 10}.validate());
   EXPECT_FALSE((ArrayOptions{.method = ArrayMethod::kPaper, .column_reach = 10}.validate()));
-  EXPECT_TRUE((ArrayOptions{.method = kNoRepeats, .row_reach = 0}.validate()));
+  EXPECT_TRUE((ArrayOptions{.method = ArrayMethod::kNoRepeats, .row_reach = 0}.validate()));
 }
 
 // At 2 letters the Hamming bound allows five runs, at 5 and 6 the Singleton bound q^3.
