@@ -52,10 +52,19 @@ class Client:
         """One message and the bytes that follow it."""
         message = self.receive_line()
         size = (message.get("result") or message.get("params") or {}).get("bytes", 0)
-        while len(self.buffer) < size:
-            self.more()
         payload, self.buffer = self.buffer[:size], self.buffer[size:]
-        return message, payload
+        return message, payload + self.receive_bytes(size - len(payload))
+
+    def receive_bytes(self, size):
+        """In place: to append each piece to the others would copy a cloud of pixels hundreds of times."""
+        payload = bytearray(size)
+        rest = memoryview(payload)
+        while rest:
+            count = self.socket.recv_into(rest)
+            if not count:
+                raise ConnectionError("the daemon hung up")
+            rest = rest[count:]
+        return payload
 
     def request(self, method, **params):
         self.last_id += 1
