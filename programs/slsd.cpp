@@ -118,6 +118,6 @@ int main(int argc, char** argv) {
   if (line->calibrates()) return slsd::exit_status(slsd::start_calibrating(argv));
   slsd::start_logging(spdlog::level::from_str(line->level));
   const int status = carry_out(*line);
-  slsd::flush_log(slsd::kLogPatience);
+  slsd::flush_log(slsd::kLogTimeout);
   return status;
 }

@@ -40,6 +40,6 @@ int main(int argc, char** argv) {
   FLAGS_minloglevel = google::GLOG_FATAL;  // the result is judged anyway, so Ceres need not warn
   slsd::start_logging(spdlog::level::from_str(line->level));
   const int status = slsd::exit_status(carry_out(*line));
-  slsd::flush_log(slsd::kLogPatience);
+  slsd::flush_log(slsd::kLogTimeout);
   return status;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 // Decodes the untrusted PNG file of a client into the pixels for a projector: `slsd-picture WIDTH HEIGHT`. Reads the
-// file from its input, and writes the answer of picture_apart.hpp to its output.
+// file from its input, and writes the answer of picture_process.hpp to its output.
 #include <unistd.h>
 
 #include <charconv>
@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include "core/image_size.hpp"
-#include "drivers/files/picture_apart.hpp"
+#include "drivers/files/picture_process.hpp"
 #include "drivers/system/confine.hpp"
 
 namespace {

@@ -13,8 +13,8 @@ using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
 constexpr auto kSilence = 10s;         // silence after which the service is asked whether it is alive
-constexpr auto kProbePatience = 10s;   // for that answer: the service answers between scans and during decoding
-constexpr auto kSendPatience = 60s;    // to send a request
+constexpr auto kProbeTimeout = 10s;    // for that answer: the service answers between scans and during decoding
+constexpr auto kSendTimeout = 60s;     // to send a request
 constexpr auto kBetweenCalls = 200ms;  // interval of calls while an answer is awaited
 
 // The only place that turns the library's exceptions into values.
@@ -64,8 +64,8 @@ Result<Connection> Connection::open(const std::filesystem::path& socket) {
 }
 
 client::Connection::Deadline Connection::deadline() const {
-  if (!patience_) return {};
-  return Clock::now() + *patience_;
+  if (!timeout_) return {};
+  return Clock::now() + *timeout_;
 }
 
 namespace {
@@ -74,7 +74,7 @@ namespace {
 Result<> check_alive(const std::filesystem::path& socket) {
   auto probe = Connection::open(socket);
   if (probe) {
-    probe->set_patience(kProbePatience);
+    probe->set_timeout(kProbeTimeout);
     const auto answered = probe->call("status", nlohmann::json::object());
     if (!answered && answered.error().code == ErrorCode::kTimeout) return tl::unexpected(answered.error());
   } else if (probe.error().code == ErrorCode::kTimeout) {
@@ -107,12 +107,12 @@ Result<Answered> Connection::call(std::string_view method, const nlohmann::json&
 
 Result<> Connection::request(std::string_view method, const nlohmann::json& params) {
   const auto text = params.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  const auto until = patience_ ? deadline() : Clock::now() + kSendPatience;
+  const auto until = timeout_ ? deadline() : Clock::now() + kSendTimeout;
   return without_throwing([&] { socket_.send(method, text, until); });
 }
 
 Result<Received> Connection::receive() {
-  if (!patience_) {
+  if (!timeout_) {
     if (auto awaited = await_answer(); !awaited) return tl::unexpected(awaited.error());
   }
   return without_throwing([&] {

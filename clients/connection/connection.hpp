@@ -47,7 +47,7 @@ class Connection {
   [[nodiscard]] static Result<Connection> open(const std::filesystem::path& socket);
 
   /// Limits the time to send or receive each message from now on; then kTimeout.
-  void set_patience(std::chrono::seconds patience) { patience_ = patience; }
+  void set_timeout(std::chrono::seconds timeout) { timeout_ = timeout; }
   /// Sets a function that is called a few times a second while an answer is awaited, with the waiting time so far.
   void set_waiting(Waiting waiting) { waiting_ = std::move(waiting); }
 
@@ -71,7 +71,7 @@ class Connection {
 
   client::Connection socket_;
   std::filesystem::path path_;
-  std::optional<std::chrono::seconds> patience_;
+  std::optional<std::chrono::seconds> timeout_;
   Waiting waiting_;
 };
 

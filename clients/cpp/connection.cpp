@@ -96,8 +96,8 @@ Connection::Connection(const std::string& socket) : path_(socket), process_(::ge
   address.sun_family = AF_UNIX;
   path_.copy(address.sun_path, path_.size());
   // A service that no longer accepts clients fills its queue, and connecting would then wait for ever.
-  const timeval patience{kConnectMax.count(), 0};
-  ::setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
+  const timeval timeout{kConnectMax.count(), 0};
+  ::setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &timeout, sizeof timeout);
   if (::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     const int number = errno;
     close();

@@ -155,8 +155,8 @@ class Backlog {
 };
 
 struct Writer::State : fast::DataWriterListener {
-  State(Events& heard, std::shared_mutex& in_use, const bool& is_left, Backlog* waiting)
-      : events(heard), use(in_use), left(is_left), backlog(waiting) {}
+  State(Events& heard, std::shared_mutex& in_use, const bool& has_left, Backlog* waiting)
+      : events(heard), use(in_use), left(has_left), backlog(waiting) {}
   void on_publication_matched(fast::DataWriter*, const fast::PublicationMatchedStatus& info) override {
     const std::lock_guard lock(events.mutex);
     const auto guid = bytes_of(rtps::iHandle2GUID(info.last_subscription_handle));
@@ -174,7 +174,7 @@ struct Writer::State : fast::DataWriterListener {
 };
 
 struct Reader::State : fast::DataReaderListener {
-  State(Events& heard, std::shared_mutex& in_use, const bool& is_left) : events(heard), use(in_use), left(is_left) {}
+  State(Events& heard, std::shared_mutex& in_use, const bool& has_left) : events(heard), use(in_use), left(has_left) {}
   void on_data_available(fast::DataReader*) override {
     const std::lock_guard lock(events.mutex);
     arrived = true;

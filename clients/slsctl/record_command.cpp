@@ -23,7 +23,7 @@ using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
 // Longer than a camera needs to return after it was unplugged, but short enough not to waste a night.
-constexpr auto kPatience = 60s;
+constexpr auto kTimeout = 60s;
 
 // Errors that pass by themselves, or once a device is plugged in again.
 bool passes(const Failure& failure) {
@@ -99,7 +99,7 @@ class Recorder {
   }
 
   [[nodiscard]] std::optional<Failure> keep_failure(const Failure& failure) {
-    if (!passes(failure) || Clock::now() - last_good_ > kPatience) return failure;
+    if (!passes(failure) || Clock::now() - last_good_ > kTimeout) return failure;
     if (auto kept = recording_.add_failure(failure.error.to_json()); !kept) return file_failure(kept.error());
     return std::nullopt;
   }

@@ -13,7 +13,7 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
 constexpr auto kStaysWanted = 5s;  // after the last watcher's request
-constexpr auto kPatience = 20s;
+constexpr auto kTimeout = 20s;
 constexpr auto kPause = 500ms;  // after a failure
 
 }  // namespace
@@ -59,7 +59,7 @@ void CloudFeed::run(const std::stop_token& stop) {
 Failure CloudFeed::follow(const std::stop_token& stop) {
   auto connection = Connection::open(socket_);
   if (!connection) return failure(connection.error());
-  connection->set_patience(kPatience);
+  connection->set_timeout(kTimeout);
   const auto subscribed =
       ask(*connection, "subscribe",
           {{"format", "ply"}, {"density", density_}, {"rate_hz", rate_hz_}, {"transport", "memfd"}});

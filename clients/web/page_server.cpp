@@ -25,8 +25,8 @@ using nlohmann::json;
 
 constexpr std::size_t kBodyMax = 16 << 10;
 constexpr auto kWaitForCloud = 10s;
-constexpr auto kPatience = 90s;
-constexpr auto kPatienceOfStatus = 5s;  // the service answers at once, unless it hangs
+constexpr auto kTimeout = 90s;
+constexpr auto kTimeoutOfStatus = 5s;  // the service answers at once, unless it hangs
 constexpr double kSymbolsHz = 15.0, kPixelsHz = 5.0;
 constexpr std::size_t kPastMax = 50;
 constexpr std::size_t kPastBytesMax = 48 << 20;
@@ -220,7 +220,7 @@ void PageServer::post(const char* path, bool open, HandleBody handle) {
 // The service itself reports wrong parameters and missing rights.
 void PageServer::pass_on(const char* path, const char* method) {
   post(path, false,
-       [this, method](const Request&, const json& body) { return result_or_refusal(call(method, body, kPatience)); });
+       [this, method](const Request&, const json& body) { return result_or_refusal(call(method, body, kTimeout)); });
 }
 
 void PageServer::add_requests() {
@@ -231,7 +231,7 @@ void PageServer::add_requests() {
   get("/api/cloud", [this](const Request& request) { return cloud(request); });
   get("/api/past", [this](const Request& request) { return past(request); });
   get("/api/metrics", [this](const Request&) {
-    const auto answered = call("metrics", {{"format", "prometheus"}}, kPatience);
+    const auto answered = call("metrics", {{"format", "prometheus"}}, kTimeout);
     if (!answered) return refusal(answered.error());
     return Answer{200, "text/plain; version=0.0.4; charset=utf-8", answered->reply.bytes, {}, {}};
   });
@@ -243,31 +243,31 @@ void PageServer::add_requests() {
     return advice ? json_answer(*advice) : refusal(advice.error());
   });
   get("/api/calibration", [this](const Request&) {
-    return result_or_refusal(call("calibrate", {{"action", "look"}}, kPatience));
+    return result_or_refusal(call("calibrate", {{"action", "look"}}, kTimeout));
   });
   post("/api/scan", false, [this](const Request&, const json& body) { return scan(body); });
   post("/api/project", false, [this](const Request&, const json& body) {
     const auto picture = body.find("picture");
     if (picture == body.end() || !picture->is_string() || *picture == "image")
       return refusal(400, "invalid_params", "\"picture\" must be the name of a picture");
-    return result_or_refusal(call("project", {{"picture", *picture}}, kPatience));
+    return result_or_refusal(call("project", {{"picture", *picture}}, kTimeout));
   });
   pass_on("/api/set", "set");
   pass_on("/api/calibrate", "calibrate");
   post("/api/login", true, [this](const Request& request, const json& body) { return log_in(request, body); });
 }
 
-tl::expected<Answered, Failure> PageServer::call(const char* method, json params, std::chrono::seconds patience) const {
+tl::expected<Answered, Failure> PageServer::call(const char* method, json params, std::chrono::seconds timeout) const {
   auto connection = Connection::open(options_.socket);
   if (!connection) return tl::unexpected(failure(connection.error()));
-  connection->set_patience(patience);
+  connection->set_timeout(timeout);
   return ask(*connection, method, std::move(params));
 }
 
 Answer PageServer::status() {
-  const auto status = call("status", json::object(), kPatienceOfStatus);
+  const auto status = call("status", json::object(), kTimeoutOfStatus);
   if (!status) return refusal(status.error());
-  const auto settings = call("settings", json::object(), kPatienceOfStatus);
+  const auto settings = call("settings", json::object(), kTimeoutOfStatus);
   if (!settings) return refusal(settings.error());
   const json& set = settings->reply.message["result"];
   json result{{"status", status->reply.message["result"]},
@@ -292,7 +292,7 @@ Answer PageServer::image(const Request& request, const char* method) const {
   if (parameter(request, "as_shown") == "1") params["as_shown"] = true;
   const bool raw = parameter(request, "format") == "raw" && method == std::string_view("frame");
   if (raw) params["format"] = "raw";
-  auto answered = call(method, std::move(params), kPatience);
+  auto answered = call(method, std::move(params), kTimeout);
   if (!answered) return refusal(answered.error());
   const json about = answered->reply.message["result"];
   return {200,
@@ -306,7 +306,7 @@ Answer PageServer::image(const Request& request, const char* method) const {
 Answer PageServer::reasons(const Request& request) const {
   json params{{"why", true}};
   if (const std::string camera = parameter(request, "camera"); !camera.empty()) params["camera"] = camera;
-  const auto answered = call("preview", std::move(params), kPatience);
+  const auto answered = call("preview", std::move(params), kTimeout);
   if (!answered) return refusal(answered.error());
   const json& about = answered->reply.message["result"];
   return json_answer({{"png", to_base64(answered->reply.bytes)}, {"reasons", about.value("reasons", json::array())}});
@@ -335,7 +335,7 @@ Answer PageServer::scan(const json& body) {
   }
   // Organised, because a PLY of pixels does not contain their positions; the page makes both files from it.
   if (params.value("density", json()) == "pixels") params["format"] = "pcd";
-  auto answered = call("scan", std::move(params), kPatience);
+  auto answered = call("scan", std::move(params), kTimeout);
   if (!answered) {
     keep({{{"time", utc_text_ms(std::chrono::system_clock::now())},
            {"error", printable(answered.error().error.message, 300)}},

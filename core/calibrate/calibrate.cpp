@@ -97,11 +97,11 @@ std::vector<PoseObservation> set_planes_aside(Observations& observations) {
 /// Adds distance errors to the reasons of planes that were left out: a print of another scale also contradicts the
 /// poses.
 void explain_distances(const std::vector<PlaneCheck>& checks, PoseList& poses) {
-  constexpr double kWorthTellingPercent = 0.1;
+  constexpr double kReportedPercentMin = 0.1;
   for (const PlaneCheck& check : checks) {
     if (!check.before || !check.before->trueness) continue;
     const double percent = check.before->trueness->scale_percent;
-    if (std::abs(percent) < kWorthTellingPercent) continue;
+    if (std::abs(percent) < kReportedPercentMin) continue;
     poses.explain(check.name, fmt::format("; by the poses of the board, distances on it are measured {:.2f} % too {}",
                                           std::abs(percent), percent > 0 ? "long" : "short"));
   }

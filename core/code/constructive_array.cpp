@@ -16,14 +16,14 @@ namespace {
 constexpr int kRollbacksPerRow = 12;  // over the whole array, before a restart
 
 // Effort that the search spends on a row before it removes rows.
-struct Patience {
+struct SearchBudget {
   int steps_per_cell;
   int tries;
   int longest_rollback_rows;
 };
 
 // Without repeats, a row's own letters block it more often than the rows above.
-constexpr Patience kWithWindowsOnly{60, 1, 8}, kWithoutRepeats{200, 16, 2};
+constexpr SearchBudget kWithWindowsOnly{60, 1, 8}, kWithoutRepeats{200, 16, 2};
 
 CodeArray transposed(const CodeArray& array) {
   CodeArray turned{array.columns, array.rows, array.letters, {}};
@@ -39,7 +39,7 @@ class Construction {
   Construction(const ArrayOptions& options, int minimum_distance, RunReach reach, std::int64_t step_budget)
       : options_(options),
         minimum_distance_(minimum_distance),
-        patience_(reach == RunReach{} ? kWithWindowsOnly : kWithoutRepeats),
+        budget_(reach == RunReach{} ? kWithWindowsOnly : kWithoutRepeats),
         steps_left_(step_budget),
         source_(options.seed),
         index_(options.letters, minimum_distance),
@@ -83,7 +83,7 @@ class Construction {
   [[nodiscard]] int column_of(int cell) const { return choices_[cell].column; }
 
   bool fill_row_in_tries() {
-    for (int tries = patience_.tries; tries > 0 && steps_left_ > 0; --tries)
+    for (int tries = budget_.tries; tries > 0 && steps_left_ > 0; --tries)
       if (fill_row()) return true;
     return false;
   }
@@ -92,7 +92,7 @@ class Construction {
   bool fill_row() {
     const int first = next_ / options_.columns * options_.columns;
     const int end = first + options_.columns;
-    std::int64_t steps = std::int64_t{patience_.steps_per_cell} * options_.columns;
+    std::int64_t steps = std::int64_t{budget_.steps_per_cell} * options_.columns;
     next_ = first;
     open_cell();
     while (next_ < end) {
@@ -113,7 +113,7 @@ class Construction {
 
   void roll_back() {
     const int row = next_ / options_.columns;
-    take_back_to(std::max(0, row - 1 - source_.below(patience_.longest_rollback_rows)) * options_.columns);
+    take_back_to(std::max(0, row - 1 - source_.below(budget_.longest_rollback_rows)) * options_.columns);
   }
 
   void open_cell() {
@@ -181,7 +181,11 @@ class Construction {
 
   const ArrayOptions& options_;
   int minimum_distance_;
-  Patience patience_;
+<<<<<<< HEAD
+  SearchBudget budget_;
+=======
+  RunReach reach_;
+>>>>>>> 2838fe6 (core, daemon, drivers, clients: rename after the glossary)
   std::int64_t steps_left_;
   LetterSource source_;
   WindowIndex index_;

@@ -68,7 +68,7 @@ struct RegionSeen {
   std::array<bool, 4> broken;                      ///< a link that was removed because it disagreed with its neighbours
   std::int16_t column, row;                        ///< cell of the pattern; -1 unless decoded
   DecodeRule rule = DecodeRule::kCertain;          ///< the rule that decided on its status
-  std::optional<DecodeRule> guard = std::nullopt;  ///< the last guard that kept it from being mended
+  std::optional<DecodeRule> guard = std::nullopt;  ///< the last guard that kept it from being recovered
   float margin_nats = 0;                           ///< margin of its cell over any other, up to the required margin
 };
 

@@ -35,10 +35,10 @@ inline constexpr int kRegionStatusCount = 15;
 [[nodiscard]] std::string_view to_string(RegionStatus status);
 
 /// Rules that decide on a symbol: the ways to accept it, each test that rejects it, and each guard that prevents
-/// mending. Their texts are in rules.cpp, in this order.
+/// recovery. Their texts are in rules.cpp, in this order.
 enum class DecodeRule : std::uint8_t {
   kCertain,
-  kMended,
+  kRecovered,
   // Regions.
   kTouchesBorder,
   kTooSmall,
@@ -53,7 +53,7 @@ enum class DecodeRule : std::uint8_t {
   kCellOffLine,
   kCellOutOfRange,
   // Shapes.
-  kTorn,
+  kSplit,
   kUnlikeLetter,
   kCutCentre,
   kNotAligned,
@@ -63,19 +63,19 @@ enum class DecodeRule : std::uint8_t {
   kCellTwice,
   kPointOutOfRange,
   // Guards.
-  kMendUnsettled,
-  kMendOffLine,
-  kMendMoved,
-  kMendTilted,
-  kMendHidden,
-  kMendUnlike,
+  kRecoverUnsettled,
+  kRecoverOffLine,
+  kRecoverMoved,
+  kRecoverTilted,
+  kRecoverHidden,
+  kRecoverUnlike,
 };
-inline constexpr std::size_t kDecodeRuleCount = static_cast<std::size_t>(DecodeRule::kMendUnlike) + 1;
+inline constexpr std::size_t kDecodeRuleCount = static_cast<std::size_t>(DecodeRule::kRecoverUnlike) + 1;
 
 enum class RuleKind : std::uint8_t {
   kAccepts,
   kRejects,
-  kGuards,  ///< prevents mending; another rule decides on the symbol
+  kGuards,  ///< prevents recovery; another rule decides on the symbol
 };
 
 /// "rejects", as in the metrics.

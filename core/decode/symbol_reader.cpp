@@ -47,7 +47,7 @@ SymbolReader::SymbolReader(const IndexedPattern& indexed, const Lens& projector,
       inference_(pattern(), indexed.codebook(), options.wrong_cells_max, Rules(options.trial)),
       review_(pattern(), {.rules = Rules(options.trial)}),
       letters_(std::make_shared<const LetterFields>(pattern().options)),
-      mender_(pattern(), letters_, Rules(options.trial)),
+      recovery_(pattern(), letters_, Rules(options.trial)),
       correspondence_(Rules(options.trial)),
       centre_correction_(fixed_->appearances.usual().as_measured, static_cast<float>(pattern().pitch_px()),
                          static_cast<float>(pattern().options.symbol_size_px)) {}
@@ -112,7 +112,7 @@ void SymbolReader::classify(Executor& executor) {
     }
     for (std::size_t i = first; i < last; ++i) {
       GridNode& node = seen_.nodes[i];
-      node.torn = seen_.shapes[i].is_torn();
+      node.split = seen_.shapes[i].is_split();
       if (seen_.shapes[i].letter >= 0)
         node.centre_px -= node.frame * look_->as_expected[seen_.shapes[i].letter].centroid_px;
     }
@@ -141,7 +141,7 @@ void SymbolReader::classify_in_measured_frames(Executor& executor) {
   });
 }
 
-/// Infers the cells, and mends worn symbols in between, so that these become evidence too.
+/// Infers the cells, and recovers degraded symbols in between, so that these become evidence too.
 void SymbolReader::infer_cells(const GreyView& frame, EpipolarView* view, Executor& executor) {
   if (options_.decode_windows == Method::kPaper) {
     paper_->decode_windows(pattern().whole_rows(), pattern().whole_columns(), seen_);
@@ -150,7 +150,7 @@ void SymbolReader::infer_cells(const GreyView& frame, EpipolarView* view, Execut
   }
   const CellGate gate = gate_of(view);
   inference_.propose(gate, executor, seen_);
-  mend(frame, gate, view);
+  recover(frame, gate, view);
   inference_.decide(gate, executor, seen_);
 }
 
@@ -164,13 +164,13 @@ float SymbolReader::blur_px() const {
 }
 
 /// Requires the default method in all stages.
-void SymbolReader::mend(const GreyView& frame, const CellGate& gate, EpipolarView* view) {
+void SymbolReader::recover(const GreyView& frame, const CellGate& gate, EpipolarView* view) {
   if (options_.any_paper()) return;
   const LetterScene scene{
       frame, 255.0 * finder_.frame_levels(), finder_.noise(), letters_->at(blur_px()), gate, look_->as_measured, seen_};
-  const std::vector<std::int32_t>& mended = mender_.mend(scene);
+  const std::vector<std::int32_t>& recovered = recovery_.recover(scene);
   if (view == nullptr) return;
-  for (const std::int32_t sighting : mended) view->look_again_at(sighting, seen_);
+  for (const std::int32_t sighting : recovered) view->look_again_at(sighting, seen_);
 }
 
 void SymbolReader::review(const GreyView& frame, Executor& executor) {
@@ -208,8 +208,8 @@ void SymbolReader::fit_lattice(const GreyView& frame, double full, const Epipola
   noise_ = measure_noise(frame, full);
 }
 
-/// Rejects symbols that an edge cuts. The rest of one may still resemble it, but its centre is displaced. At a rim,
-/// this rejects symbols whose error is an order larger than the median.
+/// Rejects symbols that an edge cuts. The rest of one may still resemble it, but its centre is displaced. At a
+/// boundary, this rejects symbols whose error is an order larger than the median.
 void SymbolReader::refuse_cut() {
   constexpr float kOfMedian = 13;
   std::vector<LatticeSymbol>& symbols = lattice_.symbols;

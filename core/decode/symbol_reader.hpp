@@ -10,7 +10,7 @@
 #include "core/decode/centres/centre_sigma.hpp"
 #include "core/decode/centres/correspond.hpp"
 #include "core/decode/centres/curvature.hpp"
-#include "core/decode/centres/mend_symbols.hpp"
+#include "core/decode/centres/recover_symbols.hpp"
 #include "core/decode/centres/symbol_match.hpp"
 #include "core/decode/decoding.hpp"
 #include "core/decode/grid/epipolar_view.hpp"
@@ -87,7 +87,7 @@ class SymbolReader {
   [[nodiscard]] CellGate gate_of(const EpipolarView* view) const;
   /// Blur of the pattern in this frame, standard deviation, projector px.
   [[nodiscard]] float blur_px() const;
-  void mend(const GreyView& frame, const CellGate& gate, EpipolarView* view);
+  void recover(const GreyView& frame, const CellGate& gate, EpipolarView* view);
   void correspond(const EpipolarView* view, Executor& executor);
   void refuse_cut();
   void fit_lattice(const GreyView& frame, double full, const EpipolarView* view, Executor& executor);
@@ -100,7 +100,7 @@ class SymbolReader {
   CellInference inference_;
   SymbolReview review_;
   std::shared_ptr<const LetterFields> letters_;
-  SymbolMender mender_;
+  SymbolRecovery recovery_;
   Correspondence correspondence_;
   CentreCorrection centre_correction_;
   CentreJudge centre_judge_;

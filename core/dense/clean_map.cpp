@@ -199,7 +199,7 @@ void MapCleaner::drop_beyond_the_light(DenseMap& map) {
     if (label_[pixel] < 0 && map.measured(pixel)) map.drop(pixel, DensePixel::kUnlit);
 }
 
-void MapCleaner::drop_unlit_rims(DenseMap& map, int reach_px) {
+void MapCleaner::drop_unlit_boundaries(DenseMap& map, int reach_px) {
   const BitRows rows{static_cast<std::size_t>(map.width + 63) / 64, map.height};
   bits_.assign(rows.words * static_cast<std::size_t>(map.height), 0);
   rows_.resize(bits_.size());
@@ -279,7 +279,7 @@ void MapCleaner::find_runs(int width, int height, const First& first, const End&
   first_runs_.push_back(runs_.size());
 }
 
-void MapCleaner::drop_islands(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds) {
+void MapCleaner::drop_small_components(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds) {
   find_joined(map);
   const std::size_t words = static_cast<std::size_t>(map.width + 63) / 64;
   const auto row = [&](const std::vector<std::uint64_t>& bits, int y) {
@@ -304,7 +304,7 @@ void MapCleaner::drop_islands(DenseMap& map, std::size_t least, std::span<const 
     const Run& all = runs_[root(static_cast<std::int32_t>(run))];
     if (all.pixels >= (all.borne ? least : kWithoutSymbol * least)) continue;
     for (int x = runs_[run].first; x < runs_[run].end; ++x)
-      map.drop(static_cast<std::size_t>(runs_[run].y) * map.width + x, DensePixel::kIsland);
+      map.drop(static_cast<std::size_t>(runs_[run].y) * map.width + x, DensePixel::kSmallComponent);
   }
 }
 

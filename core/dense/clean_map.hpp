@@ -28,12 +28,12 @@ class MapCleaner {
   /// Drops points outside the projector's image. These drops make no edges, so this comes last. Needs the map that
   /// drop_occluded() has seen.
   void drop_beyond_the_light(DenseMap& map);
-  /// Drops unlit pixels at rims: where the pattern is dark, a surface looks like a shadow. A pixel stays if firm ones
-  /// enclose it, that is within their closing (dilation, then erosion by the same radius).
-  void drop_unlit_rims(DenseMap& map, int reach_px);
+  /// Drops unlit pixels at boundaries: where the pattern is dark, a surface looks like a shadow. A pixel stays if firm
+  /// ones enclose it, that is within their closing (dilation, then erosion by the same radius).
+  void drop_unlit_boundaries(DenseMap& map, int reach_px);
   /// Drops areas without a jump inside that have fewer pixels than a patch: so few are no evidence. An area without a
   /// seed needs far more pixels.
-  void drop_islands(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds);
+  void drop_small_components(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds);
   /// Drops pixels closer than that to a hole or to a jump. Small holes inside one surface do not count.
   void prune(DenseMap& map, double reach_px, std::size_t hole_most);
   [[nodiscard]] std::size_t bytes() const;  ///< memory in use

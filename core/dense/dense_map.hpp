@@ -19,10 +19,10 @@ enum class DensePixel : std::uint8_t {
   kNoSupport,   ///< its surroundings contradict every nearby surface
   kSaturated,   ///< it is at the camera's full level
   kOutOfDepthRange,
-  kOccluded,  ///< another surface, nearer to the projector, receives the light of its projector pixel
-  kUnlit,     ///< dark where the pattern is dark, at a rim: there is no evidence for the surface
-  kIsland,    ///< too few connected pixels
-  kAtAnEdge,  ///< closer to a hole or a jump than dense_prune_px
+  kOccluded,        ///< another surface, nearer to the projector, receives the light of its projector pixel
+  kUnlit,           ///< dark where the pattern is dark, at a boundary: there is no evidence for the surface
+  kSmallComponent,  ///< too few connected pixels
+  kAtAnEdge,        ///< closer to a hole or a jump than dense_prune_px
 };
 inline constexpr int kDensePixelCount = 9;
 /// Change of depth between adjacent pixels, as a share of the depth, above which there is a jump to another surface.

@@ -45,9 +45,9 @@ std::string_view to_string(DenseStage stage) {
 }
 
 std::string_view to_string(DensePixel pixel) {
-  constexpr std::array<std::string_view, kDensePixelCount> kNames{
-      "measured", "not_reached", "no_support", "saturated", "out_of_depth_range",
-      "occluded", "unlit",       "island",     "at_an_edge"};
+  constexpr std::array<std::string_view, kDensePixelCount> kNames{"measured",  "not_reached",        "no_support",
+                                                                  "saturated", "out_of_depth_range", "occluded",
+                                                                  "unlit",     "small_component",    "at_an_edge"};
   return kNames[static_cast<std::size_t>(pixel)];
 }
 
@@ -197,9 +197,9 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   judge_.judge(seen, field, grid_, map_, executor);
   done(DenseStage::kJudge);
   cleaner_.drop_occluded(map_, executor);
-  cleaner_.drop_unlit_rims(map_, fixed_->close_px);
+  cleaner_.drop_unlit_boundaries(map_, fixed_->close_px);
   const std::size_t patch = static_cast<std::size_t>(fixed_->window_px) * fixed_->window_px;
-  cleaner_.drop_islands(map_, patch, seeds_);
+  cleaner_.drop_small_components(map_, patch, seeds_);
   cleaner_.prune(map_, fixed_->decode.dense.prune_px, patch);
   cleaner_.drop_beyond_the_light(map_);
   map_.count_pixels();

@@ -14,7 +14,7 @@
 namespace slsd {
 namespace {
 
-/// Width of an upright part, in windows, at which half of it is measured; its rims are pruned.
+/// Width of an upright part, in windows, at which half of it is measured; its borders are pruned.
 constexpr double kThinnestWindows = 1.3;
 constexpr double kHalfTransferWindows = 1.3;
 /// Ratio of a window to a cell below which every pattern has a window without an edge.

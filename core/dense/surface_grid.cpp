@@ -29,7 +29,7 @@ constexpr float kContrastMin = 4;       // ratio of the gain to the noise of a p
 
 /// Parts of sigma, as for symbols (docs/notes/2026-11-decoder.md).
 constexpr float kLeastPx = 0.003F, kOfScatter = 0.8F;
-/// Factor of the window's saturated share: pixels at its rims are wrong too.
+/// Factor of the window's saturated share: pixels at its borders are wrong too.
 constexpr float kOfUnseen = 4;
 
 /// Numbers of seeds for the epipolar offset: at most, at least for its middle, and at least for its slopes.
@@ -76,7 +76,7 @@ bool SurfaceGrid::begin(const DenseFrame& frame, const Attempt& attempt, PatchTa
     return false;
   task.x = x_of(attempt.node % columns_), task.y = y_of(attempt.node / columns_);
   const int half = options_.window_px / 2;
-  // Half a window determines a slope poorly: the frame's rim takes its planes from farther inside.
+  // Half a window determines a slope poorly: the frame's border takes its planes from farther inside.
   const Lens& lens = geometry_->camera.lens;
   if (task.x < half || task.y < half || task.x + half >= lens.width_px || task.y + half >= lens.height_px) return false;
   task.map = map_at(attempt.node % columns_, attempt.node / columns_, inverse_depth);

@@ -64,13 +64,13 @@ std::uint64_t CameraRunner::openings() const {
   return status_.opened;
 }
 
-Result<> CameraRunner::wait_ready(const Patience& patience) {
+Result<> CameraRunner::wait_ready(const WaitLimit& limit) {
   std::unique_lock lock(mutex_);
   const auto decided = [this] { return stopped_ || status_.state == DeviceState::kReady; };
-  const bool ready = patience.wait_until(patience.deadline, changed_, lock, decided) && !stopped_;
+  const bool ready = limit.wait_until(limit.deadline, changed_, lock, decided) && !stopped_;
   if (ready) return {};
   if (stopped_) return fail(ErrorCode::kCancelled, "the service is stopping");
-  if (patience.over.stop_requested()) return fail(ErrorCode::kCancelled, "nobody waits for it any more");
+  if (limit.over.stop_requested()) return fail(ErrorCode::kCancelled, "nobody waits for it any more");
   return fail_not_ready();
 }
 
@@ -88,9 +88,9 @@ void CameraRunner::begin_capture(MonotonicTime deadline, Exposure exposure, Pict
   changed_.notify_all();
 }
 
-bool CameraRunner::wait_captured(const Patience& patience, MonotonicTime until) {
+bool CameraRunner::wait_captured(const WaitLimit& limit, MonotonicTime until) {
   std::unique_lock lock(mutex_);
-  return patience.wait_until(until, changed_, lock, [this] { return stopped_ || answer_.has_value(); });
+  return limit.wait_until(until, changed_, lock, [this] { return stopped_ || answer_.has_value(); });
 }
 
 void CameraRunner::cancel_capture() {

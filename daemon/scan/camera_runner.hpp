@@ -16,7 +16,7 @@
 #include "core/result.hpp"
 #include "daemon/scan/device_status.hpp"
 #include "daemon/scan/heartbeat.hpp"
-#include "daemon/scan/patience.hpp"
+#include "daemon/scan/wait_limit.hpp"
 #include "drivers/camera/camera.hpp"
 
 namespace slsd {
@@ -78,7 +78,7 @@ class CameraRunner {
 
   /// Waits until the camera is open.
   /// @errors kTimeout, with the reason why the camera is not open; kCancelled
-  [[nodiscard]] Result<> wait_ready(const Patience& patience);
+  [[nodiscard]] Result<> wait_ready(const WaitLimit& limit);
 
   /// Replaces this camera by one with other settings of the same device: closes this one and opens the next. If the
   /// device was open and refuses the settings, or takes longer than the deadline, opens `otherwise`, a new copy of the
@@ -90,7 +90,7 @@ class CameraRunner {
   /// Starts the exposure of one frame now. wait_captured() and end_capture() finish the capture.
   void begin_capture(MonotonicTime deadline, Exposure exposure = Exposure::kFresh, Picture light = Picture::kPattern);
   /// Waits for the driver's answer. @return whether it has come, or will never come
-  [[nodiscard]] bool wait_captured(const Patience& patience, MonotonicTime until);
+  [[nodiscard]] bool wait_captured(const WaitLimit& limit, MonotonicTime until);
   /// Makes a driver that has not answered yet do so now.
   void cancel_capture();
   /// Takes the driver's answer. Abandons a driver that has none; when it answers, the camera is reopened.

@@ -47,12 +47,12 @@ std::uint64_t DecodeLanes::done() const {
   return delivered_ + skipped_;
 }
 
-bool DecodeLanes::wait_done(std::uint64_t done, const Patience& patience) {
+bool DecodeLanes::wait_done(std::uint64_t done, const WaitLimit& limit) {
   std::unique_lock lock(mutex_);
   const auto another = [&] { return delivered_ + skipped_ > done; };
   if (another()) return true;
   if (delivered_ == arrived_) return false;
-  return patience.wait_until(patience.deadline, changed_, lock, another);
+  return limit.wait_until(limit.deadline, changed_, lock, another);
 }
 
 void DecodeLanes::push(std::shared_ptr<FrameJob> job) {

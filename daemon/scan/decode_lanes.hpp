@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "daemon/scan/heartbeat.hpp"
-#include "daemon/scan/patience.hpp"
+#include "daemon/scan/wait_limit.hpp"
 #include "drivers/camera/frame.hpp"
 
 namespace slsd {
@@ -60,8 +60,8 @@ class DecodeLanes {
   /// The number of offered jobs destroyed undelivered since the start.
   [[nodiscard]] std::uint64_t skipped() const;
 
-  /// Waits until more than `done` jobs are done. @return false: no job is under way, or patience ended first
-  [[nodiscard]] bool wait_done(std::uint64_t done, const Patience& patience);
+  /// Waits until more than `done` jobs are done. @return false: no job is under way, or the limit ended first
+  [[nodiscard]] bool wait_done(std::uint64_t done, const WaitLimit& limit);
   /// The number of jobs delivered or destroyed so far.
   [[nodiscard]] std::uint64_t done() const;
 

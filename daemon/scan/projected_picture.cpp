@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 #include "daemon/scan/projected_picture.hpp"
 
-#include "drivers/files/picture_apart.hpp"
+#include "drivers/files/picture_process.hpp"
 #include "drivers/system/own_program.hpp"
 #include "picture/focus_chart.hpp"
 #include "picture/view_grid.hpp"
@@ -35,7 +35,7 @@ Result<std::optional<Grey8>> draw_projected(Picture picture, std::string_view pn
     case Picture::kGrid:
       return draw_grid(setup);
     case Picture::kImage:
-      return decode_apart(png, width_px, height_px, until, find_own_program("slsd-picture"));
+      return decode_in_process(png, width_px, height_px, until, find_own_program("slsd-picture"));
   }
   return std::nullopt;
 }

@@ -28,7 +28,7 @@ struct ProjectRequest {
 /// @param picture  neither kIdle nor kHeld
 /// @param png      for kImage, in the projector's size; an unprivileged process decodes it
 /// @param until    the end of the time for decoding
-/// @errors those of decode_apart(); kNotFound: a grid without a calibration
+/// @errors those of decode_in_process(); kNotFound: a grid without a calibration
 /// @thread reentrant
 [[nodiscard]] Result<std::optional<Grey8>> draw_projected(Picture picture, std::string_view png, const ScanSetup& setup,
                                                           MonotonicTime until);

@@ -13,7 +13,7 @@
 #include "core/result.hpp"
 #include "core/shown_picture.hpp"
 #include "daemon/scan/device_status.hpp"
-#include "daemon/scan/patience.hpp"
+#include "daemon/scan/wait_limit.hpp"
 #include "drivers/projector/projector.hpp"
 
 namespace slsd {

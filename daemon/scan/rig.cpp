@@ -79,32 +79,32 @@ std::uint64_t Rig::openings() const {
 
 // Waits for the projection in steps, because the deadline may be far.
 template <class Show>
-Result<> Rig::show(const Patience& patience, Show show) {
-  patience.note("projector");
+Result<> Rig::show(const WaitLimit& limit, Show show) {
+  limit.note("projector");
   for (;;) {
-    const MonotonicTime end = patience.step(patience.deadline);
+    const MonotonicTime end = limit.step(limit.deadline);
     auto shown = show(end);
     const bool out_of_time = !shown && shown.error().code == ErrorCode::kTimeout;
-    if (!out_of_time || end >= patience.deadline) return shown;
+    if (!out_of_time || end >= limit.deadline) return shown;
     if (stopping_.stop_requested()) return fail(ErrorCode::kCancelled, "the service is stopping");
   }
 }
 
-Result<> Rig::hold(const std::optional<Grey8>& picture, const Patience& patience) {
-  return show(patience, [&](MonotonicTime end) { return projection_.hold(picture, end, patience.over); });
+Result<> Rig::hold(const std::optional<Grey8>& picture, const WaitLimit& limit) {
+  return show(limit, [&](MonotonicTime end) { return projection_.hold(picture, end, limit.over); });
 }
 
-Result<> Rig::release(const Patience& patience) {
-  return show(patience, [&](MonotonicTime end) { return projection_.release(end, patience.over); });
+Result<> Rig::release(const WaitLimit& limit) {
+  return show(limit, [&](MonotonicTime end) { return projection_.release(end, limit.over); });
 }
 
-Result<std::vector<Frame>> Rig::collect(Cameras cameras, const Patience& patience) {
+Result<std::vector<Frame>> Rig::collect(Cameras cameras, const WaitLimit& limit) {
   for (CameraRunner* camera : cameras) {
-    patience.note("camera " + camera->name());
-    if (!camera->wait_captured(patience, patience.deadline + kLate)) break;
+    limit.note("camera " + camera->name());
+    if (!camera->wait_captured(limit, limit.deadline + kLate)) break;
   }
   for (CameraRunner* camera : cameras) camera->cancel_capture();
-  const Patience last(steady_clock::now() + (patience.over.stop_requested() ? kHangUpTime : kCancelTime));
+  const WaitLimit last(steady_clock::now() + (limit.over.stop_requested() ? kHangUpTime : kCancelTime));
   std::vector<Frame> frames;
   frames.reserve(cameras.size());
   Result<> outcome;
@@ -114,7 +114,7 @@ Result<std::vector<Frame>> Rig::collect(Cameras cameras, const Patience& patienc
     if (frame) {
       frames.push_back(std::move(*frame));
     } else if (outcome) {
-      patience.note("camera " + camera->name());
+      limit.note("camera " + camera->name());
       outcome = tl::unexpected(incomplete(frame.error(), cameras.size()));
     }
   }
@@ -124,25 +124,25 @@ Result<std::vector<Frame>> Rig::collect(Cameras cameras, const Patience& patienc
 
 Result<std::vector<Frame>> Rig::expose(Cameras cameras, const Shot& shot) {
   for (CameraRunner* camera : cameras) {
-    shot.patience.note("camera " + camera->name());
-    if (auto ready = camera->wait_ready(shot.patience); !ready) return tl::unexpected(ready.error());
+    shot.limit.note("camera " + camera->name());
+    if (auto ready = camera->wait_ready(shot.limit); !ready) return tl::unexpected(ready.error());
   }
   const MonotonicTime since = shot.exposure == Exposure::kNext ? projection_.visible() : steady_clock::now();
-  for (CameraRunner* camera : cameras) camera->begin_capture(shot.patience.deadline, shot.exposure, shot.light);
-  auto frames = collect(cameras, shot.patience);
+  for (CameraRunner* camera : cameras) camera->begin_capture(shot.limit.deadline, shot.exposure, shot.light);
+  auto frames = collect(cameras, shot.limit);
   if (!frames) return frames;
-  Result<> outcome = check_times(cameras, *frames, since, shot.patience.deadline);
-  if (outcome) outcome = projection_.check(shot.patience.deadline);
+  Result<> outcome = check_times(cameras, *frames, since, shot.limit.deadline);
+  if (outcome) outcome = projection_.check(shot.limit.deadline);
   if (!outcome) return tl::unexpected(outcome.error());
   return frames;
 }
 
 Result<std::vector<Frame>> Rig::take_set(const Shot& shot) {
   const auto shown =
-      show(shot.patience, [&](MonotonicTime end) { return projection_.show(shot.light, end, shot.patience.over); });
+      show(shot.limit, [&](MonotonicTime end) { return projection_.show(shot.light, end, shot.limit.over); });
   if (!shown) return tl::unexpected(shown.error());
   const bool going_on = std::exchange(changes_before_, projection_.changes()) == projection_.changes();
-  auto frames = expose(cameras_, {shot.patience, going_on ? shot.exposure : Exposure::kFresh, shot.light});
+  auto frames = expose(cameras_, {shot.limit, going_on ? shot.exposure : Exposure::kFresh, shot.light});
   if (!frames) return frames;
   if (auto aligned = align(*frames, shot); !aligned) return tl::unexpected(aligned.error());
   if (auto together = check_skew(*frames); !together) return tl::unexpected(together.error());
@@ -153,15 +153,15 @@ bool Rig::only_replays() const {
   return std::ranges::all_of(cameras_, [](const auto& camera) { return camera->replays() && camera->rate_hz() <= 0; });
 }
 
-Result<FrameSet> Rig::capture(const Patience& patience, Exposure exposure, LightFrames light) {
+Result<FrameSet> Rig::capture(const WaitLimit& limit, Exposure exposure, LightFrames light) {
   const auto begin = steady_clock::now();
   FrameSet set;
   for (const Picture now : {Picture::kPattern, Picture::kWhite, Picture::kBlack}) {
     if (now == Picture::kWhite && !light.white) continue;
     if (now == Picture::kBlack && !light.dark) continue;
-    auto frames = take_set({patience, exposure, now});
-    while (!frames && patience.again && patience.again(frames.error())) {
-      frames = take_set({patience, Exposure::kFresh, now});
+    auto frames = take_set({limit, exposure, now});
+    while (!frames && limit.again && limit.again(frames.error())) {
+      frames = take_set({limit, Exposure::kFresh, now});
     }
     if (!frames) return tl::unexpected(frames.error());
     (now == Picture::kPattern ? set.frames : now == Picture::kWhite ? set.white : set.dark) = std::move(*frames);
@@ -171,16 +171,15 @@ Result<FrameSet> Rig::capture(const Patience& patience, Exposure exposure, Light
   return set;
 }
 
-Result<Frame> Rig::capture_one(std::size_t camera, const Patience& patience, bool as_shown) {
+Result<Frame> Rig::capture_one(std::size_t camera, const WaitLimit& limit, bool as_shown) {
   for (;;) {
-    const auto shown = show(patience, [&](MonotonicTime end) {
-      return as_shown ? projection_.show_due(end, patience.over)
-                      : projection_.show(Picture::kPattern, end, patience.over);
+    const auto shown = show(limit, [&](MonotonicTime end) {
+      return as_shown ? projection_.show_due(end, limit.over) : projection_.show(Picture::kPattern, end, limit.over);
     });
     if (!shown) return tl::unexpected(shown.error());
-    auto frames = expose(Cameras(cameras_).subspan(camera, 1), {patience});
+    auto frames = expose(Cameras(cameras_).subspan(camera, 1), {limit});
     if (frames) return std::move(frames->front());
-    if (!patience.again || !patience.again(frames.error())) return tl::unexpected(frames.error());
+    if (!limit.again || !limit.again(frames.error())) return tl::unexpected(frames.error());
   }
 }
 
@@ -190,7 +189,7 @@ Result<> Rig::align(std::vector<Frame>& frames, const Shot& shot) {
   for (std::size_t tries = 0; frames.size() > 1 && tries < kAlignTriesMax; ++tries) {
     const auto first = static_cast<std::size_t>(exposures(frames).min - frames.begin());
     if (skew_of(frames) <= slack(*cameras_[first])) return {};
-    auto next = expose(Cameras(cameras_).subspan(first, 1), {shot.patience, Exposure::kNext, shot.light});
+    auto next = expose(Cameras(cameras_).subspan(first, 1), {shot.limit, Exposure::kNext, shot.light});
     if (!next) return tl::unexpected(next.error());
     frames[first] = std::move(next->front());
   }

@@ -46,19 +46,19 @@ class Rig {
   [[nodiscard]] bool only_replays() const;
 
   /// Takes one frame of each camera. If cameras run freely, takes the frames with the closest exposures. Takes lost
-  /// frames again if patience allows.
+  /// frames again if the limit allows.
   /// @param exposure  kNext: a frame may have begun before the call, but after the pattern was visible and after the
   ///                  previous capture's frames
   /// @param light     exposed after the pattern's frames, white first, each once its own picture is visible
   /// @errors kTimeout: a device is not ready; kFrameDropped, kFrameTorn, kFrameStale, kFrameLate, kMismatch,
   ///         kDisconnected, kBusy: of one camera; kFrameSkewed: exposures too far apart; kCancelled
-  [[nodiscard]] Result<FrameSet> capture(const Patience& patience, Exposure exposure = Exposure::kFresh,
+  [[nodiscard]] Result<FrameSet> capture(const WaitLimit& limit, Exposure exposure = Exposure::kFresh,
                                          LightFrames light = {});
 
   /// Takes one frame of one camera while the pattern is visible. @errors as capture()
   /// @param camera    its index
   /// @param as_shown  keep the projector's picture, whatever it is, instead of the pattern
-  [[nodiscard]] Result<Frame> capture_one(std::size_t camera, const Patience& patience, bool as_shown = false);
+  [[nodiscard]] Result<Frame> capture_one(std::size_t camera, const WaitLimit& limit, bool as_shown = false);
 
   /// Shows another pattern from the next capture on.
   void show(Grey8 image) { projection_.set_pattern(std::move(image)); }
@@ -68,9 +68,9 @@ class Rig {
   }
   /// Shows a picture at once, until the next capture, hold() or release(). @param picture  nothing: the pattern
   /// @errors kTimeout: the projector is not ready; kCancelled; the previous picture then stays
-  [[nodiscard]] Result<> hold(const std::optional<Grey8>& picture, const Patience& patience);
+  [[nodiscard]] Result<> hold(const std::optional<Grey8>& picture, const WaitLimit& limit);
   /// Shows the idle picture at once. @errors as hold()
-  [[nodiscard]] Result<> release(const Patience& patience);
+  [[nodiscard]] Result<> release(const WaitLimit& limit);
 
   /// Replaces a camera as CameraRunner::replace() does. @param camera  its index @thread thread-safe
   [[nodiscard]] Result<> replace(std::size_t camera, std::unique_ptr<Camera> next, std::unique_ptr<Camera> otherwise,
@@ -93,15 +93,15 @@ class Rig {
   using Cameras = std::span<CameraRunner* const>;
   /// The conditions under which one set of frames is exposed.
   struct Shot {
-    const Patience& patience;
+    const WaitLimit& limit;
     Exposure exposure = Exposure::kFresh;
     Picture light = Picture::kPattern;
   };
   template <class Show>
-  [[nodiscard]] Result<> show(const Patience& patience, Show show);
+  [[nodiscard]] Result<> show(const WaitLimit& limit, Show show);
   [[nodiscard]] Result<std::vector<Frame>> take_set(const Shot& shot);
   [[nodiscard]] Result<std::vector<Frame>> expose(Cameras cameras, const Shot& shot);
-  [[nodiscard]] Result<std::vector<Frame>> collect(Cameras cameras, const Patience& patience);
+  [[nodiscard]] Result<std::vector<Frame>> collect(Cameras cameras, const WaitLimit& limit);
   [[nodiscard]] Result<> align(std::vector<Frame>& frames, const Shot& shot);
   [[nodiscard]] std::chrono::nanoseconds slack(const CameraRunner& camera) const;
   [[nodiscard]] Result<> check_times(Cameras cameras, const std::vector<Frame>& frames, MonotonicTime since,

@@ -56,7 +56,7 @@ void Scan::note_lost(const Error& error) {
   lost_.last.push_back(error);
 }
 
-void Scan::expose(Rig& rig, HardwareGuard& hardware, SharedSetup setup, const Patience& patience, Exposure exposure,
+void Scan::expose(Rig& rig, HardwareGuard& hardware, SharedSetup setup, const WaitLimit& limit, Exposure exposure,
                   CloudFormats formats) {
   setup_ = std::move(setup);
   request_.formats = request_.formats | formats;
@@ -64,7 +64,7 @@ void Scan::expose(Rig& rig, HardwareGuard& hardware, SharedSetup setup, const Pa
     set_ = tl::unexpected(possible.error());
     return;
   }
-  set_ = rig.capture(patience, exposure, {request_.texture, request_.ambient});
+  set_ = rig.capture(limit, exposure, {request_.texture, request_.ambient});
   if (!set_) set_ = tl::unexpected(after_tries(set_.error(), lost_));
   if (!set_) return;
   if (auto same = hardware.check(setup_, rig); !same) set_ = tl::unexpected(same.error());
@@ -87,11 +87,11 @@ FrameTask::FrameTask(FrameRequest request, Answer answer)
       frame_(fail_stopping()),
       result_(fail_stopping()) {}
 
-void FrameTask::expose(Rig& rig, const ScanSetup& setup, const Patience& patience) {
+void FrameTask::expose(Rig& rig, const ScanSetup& setup, const WaitLimit& limit) {
   if (auto known = setup.check_camera(request_.camera); !known) {
     frame_ = tl::unexpected(known.error());
   } else {
-    frame_ = rig.capture_one(setup.camera_index(request_.camera), patience, request_.as_shown);
+    frame_ = rig.capture_one(setup.camera_index(request_.camera), limit, request_.as_shown);
   }
 }
 

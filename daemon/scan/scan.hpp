@@ -42,9 +42,9 @@ class Scan final : public TaskOf<ScanResult>, public FrameJob {
   [[nodiscard]] bool exposed() const { return set_.has_value(); }
 
   /// Takes the frames, or finds out why it cannot.
-  /// @param patience  this task's own
+  /// @param limit  this task's own
   /// @param formats   the forms that subscribers want in addition to the request's
-  void expose(Rig& rig, HardwareGuard& hardware, SharedSetup setup, const Patience& patience, Exposure exposure,
+  void expose(Rig& rig, HardwareGuard& hardware, SharedSetup setup, const WaitLimit& limit, Exposure exposure,
               CloudFormats formats);
   /// Notes a try that lost its frames and is repeated; the outcome reports it.
   void note_lost(const Error& error);
@@ -69,7 +69,7 @@ class FrameTask final : public TaskOf<FrameImage>, public FrameJob {
   FrameTask(FrameRequest request, Answer answer);
 
   [[nodiscard]] const FrameRequest& request() const { return request_; }
-  void expose(Rig& rig, const ScanSetup& setup, const Patience& patience);
+  void expose(Rig& rig, const ScanSetup& setup, const WaitLimit& limit);
 
   void compute(std::size_t lane) override;
   void deliver() override { end(std::move(result_)); }

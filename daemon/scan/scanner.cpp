@@ -160,9 +160,9 @@ void Scanner::scan_freely() {
   request.deadline = begin + kFreeScanTimeout, request.of_stream = true;
   const auto scan = make_scan(std::move(request), true, {});
   take_turn({scan, [&] {
-               Patience patience = patience_of(*scan);
-               patience.again = wait_for_frames(*scan);
-               scan->expose(*rig_, hardware_, adopted_, patience, every_frame_ ? Exposure::kNext : Exposure::kFresh,
+               WaitLimit limit = limit_of(*scan);
+               limit.again = wait_for_frames(*scan);
+               scan->expose(*rig_, hardware_, adopted_, limit, every_frame_ ? Exposure::kNext : Exposure::kFresh,
                             free_formats_);
              }});
   heartbeat_.promise(kWorkPromise);
@@ -175,16 +175,16 @@ void Scanner::scan_freely() {
   every_frame_ = next_free_scan_ <= now;
 }
 
-Patience Scanner::patience_of(Task& task) {
-  Patience patience = task.patience();
-  patience.alive = [this] { heartbeat_.promise(kStepPromise); };
-  return patience;
+WaitLimit Scanner::limit_of(Task& task) {
+  WaitLimit limit = task.limit();
+  limit.alive = [this] { heartbeat_.promise(kStepPromise); };
+  return limit;
 }
 
 // If the frames under way are all that the camera lends, its next capture waits for one of them.
 std::function<bool(const Error&)> Scanner::wait_for_frames(Task& task) {
   return [this, &task, done = lanes_.done()](const Error& error) mutable {
-    if (error.code != ErrorCode::kBusy || !lanes_.wait_done(done, patience_of(task))) return false;
+    if (error.code != ErrorCode::kBusy || !lanes_.wait_done(done, limit_of(task))) return false;
     done = lanes_.done();
     return true;
   };
@@ -266,10 +266,10 @@ void Scanner::scan(ScanRequest request, Answer<ScanResult> answer) {
   auto scan = make_scan(std::move(request), free_rate_hz_ > 0, std::move(answer));
   submit({scan,
           [this, scan] {
-            Patience patience = patience_of(*scan);
-            patience.again = try_again(*scan, [&](const Error& error) { scan->note_lost(error); });
-            scan->expose(*rig_, hardware_, adopted_, patience, Exposure::kFresh, free_formats_);
-            patience.note("decoding");
+            WaitLimit limit = limit_of(*scan);
+            limit.again = try_again(*scan, [&](const Error& error) { scan->note_lost(error); });
+            scan->expose(*rig_, hardware_, adopted_, limit, Exposure::kFresh, free_formats_);
+            limit.note("decoding");
             heartbeat_.promise(kWorkPromise);
             lanes_.push(scan);
           }},
@@ -281,10 +281,10 @@ void Scanner::frame(FrameRequest request, Answer<FrameImage> answer) {
   auto frame = std::make_shared<FrameTask>(std::move(request), std::move(answer));
   submit({frame,
           [this, frame] {
-            Patience patience = patience_of(*frame);
-            patience.again = try_again(*frame, [](const Error&) {});
-            frame->expose(*rig_, *adopted_, patience);
-            patience.note("decoding");
+            WaitLimit limit = limit_of(*frame);
+            limit.again = try_again(*frame, [](const Error&) {});
+            frame->expose(*rig_, *adopted_, limit);
+            limit.note("decoding");
             heartbeat_.promise(kWorkPromise);
             lanes_.push(frame);
           }},
@@ -296,11 +296,11 @@ void Scanner::project(ProjectRequest request, Answer<void> answer) {
   auto task = std::make_shared<TaskOf<void>>(request.deadline, std::move(answer));
   submit({task,
           [this, task, request = std::move(request)] {
-            const Patience patience = patience_of(*task);
-            if (request.picture == Picture::kIdle) return task->end(rig_->release(patience));
+            const WaitLimit limit = limit_of(*task);
+            if (request.picture == Picture::kIdle) return task->end(rig_->release(limit));
             heartbeat_.promise(kWorkPromise);
             auto drawn = draw_projected(request.picture, request.png, *adopted_, request.deadline);
-            task->end(drawn ? rig_->hold(*drawn, patience) : tl::unexpected(drawn.error()));
+            task->end(drawn ? rig_->hold(*drawn, limit) : tl::unexpected(drawn.error()));
           }},
          gone);
 }
@@ -406,7 +406,7 @@ void Scanner::conclude(const Scan& scan, Result<ScanResult>& result) {
   const std::lock_guard lock(concluding_);
   const LogField about("SLSD_SCAN", scan.id());
   const std::uint64_t skipped = lanes_.skipped();
-  const std::uint64_t skipped_now = skipped - std::exchange(skipped_told_, skipped);
+  const std::uint64_t skipped_now = skipped - std::exchange(skipped_reported_, skipped);
   if (result) result->skipped = skipped_now;
   statistics_.note(result, skipped_now);
   if (result) watch_.note(scan.setup(), *result, scan.number());
@@ -422,8 +422,8 @@ void Scanner::log_outcome(const std::string& scan_id, const Result<ScanResult>& 
                   result->cloud.points.size(), milliseconds(result->capture_time), milliseconds(result->decode_time),
                   result->lost.count);
     if (result->empty.empty()) {
-      empty_told_ = false;
-    } else if (!empty_told_.exchange(true)) {
+      empty_reported_ = false;
+    } else if (!empty_reported_.exchange(true)) {
       spdlog::warn("scan {}: no points: {}", scan_id, result->empty);
     }
     if (failures_in_a_row_.exchange(0) == 0) return;

@@ -128,7 +128,7 @@ class Scanner {
   [[nodiscard]] Result<> set_exposures(const std::vector<CameraOptions>& running,
                                        const std::vector<CameraOptions>& wanted);
   [[nodiscard]] std::shared_ptr<Scan> make_scan(ScanRequest request, bool listened, Answer<ScanResult> answer);
-  [[nodiscard]] Patience patience_of(Task& task);
+  [[nodiscard]] WaitLimit limit_of(Task& task);
   [[nodiscard]] std::function<bool(const Error&)> wait_for_frames(Task& task);
   [[nodiscard]] std::function<bool(const Error&)> try_again(Task& task, std::function<void(const Error&)> note);
   [[nodiscard]] Error overdue(const Task& task) const;
@@ -152,11 +152,11 @@ class Scanner {
   HardwareGuard hardware_;
   std::string run_id_;
   std::atomic<std::uint64_t> scans_{0};
-  std::mutex concluding_;  ///< guards skipped_told_, and keeps the log in the order of the totals
-  std::uint64_t skipped_told_ = 0;
+  std::mutex concluding_;  ///< guards skipped_reported_, and keeps the log in the order of the totals
+  std::uint64_t skipped_reported_ = 0;
   std::atomic<int> failures_in_a_row_{0};
-  std::atomic<bool> empty_told_{false};  ///< the log has the cause of the empty clouds
-  std::atomic<double> free_rate_hz_{0};  ///< 0: only on request
+  std::atomic<bool> empty_reported_{false};  ///< the log has the cause of the empty clouds
+  std::atomic<double> free_rate_hz_{0};      ///< 0: only on request
   std::atomic<CloudFormats> free_formats_{};
   MonotonicTime next_free_scan_{};
   bool every_frame_ = false;  ///< the next free scan is due as soon as the previous one is captured

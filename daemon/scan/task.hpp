@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "core/result.hpp"
-#include "daemon/scan/patience.hpp"
+#include "daemon/scan/wait_limit.hpp"
 
 namespace slsd {
 
@@ -33,13 +33,13 @@ class Task : public std::enable_shared_from_this<Task> {  // shared: whoever end
   [[nodiscard]] bool over() const { return over_.stop_requested(); }
 
   /// The limits of the wait for its work. The wait reports the devices that it waits for.
-  [[nodiscard]] Patience patience() {
-    Patience patience(deadline_, over_.get_token());
-    patience.waits_for = [this](const std::string& device) {
+  [[nodiscard]] WaitLimit limit() {
+    WaitLimit limit(deadline_, over_.get_token());
+    limit.waits_for = [this](const std::string& device) {
       const std::lock_guard lock(mutex_);
       waits_for_ = device;
     };
-    return patience;
+    return limit;
   }
   /// The device that it waits for, or waited for last: "camera left". Empty before its turn.
   [[nodiscard]] std::string waits_for() const {

@@ -177,9 +177,9 @@ void LogSink::queue_lines() {
   }).detach();
 }
 
-bool LogSink::wait_written(std::chrono::milliseconds patience) const {
+bool LogSink::wait_written(std::chrono::milliseconds timeout) const {
   std::unique_lock lock(queue_->mutex);
-  return queue_->changed.wait_for(lock, patience, [&] { return queue_->lines.empty() && !queue_->writing; });
+  return queue_->changed.wait_for(lock, timeout, [&] { return queue_->lines.empty() && !queue_->writing; });
 }
 
 std::uint64_t LogSink::dropped() const {
@@ -203,8 +203,8 @@ void queue_log() {
   log_sink->queue_lines();
 }
 
-void flush_log(std::chrono::milliseconds patience) {
-  static_cast<void>(log_sink->wait_written(patience));
+void flush_log(std::chrono::milliseconds timeout) {
+  static_cast<void>(log_sink->wait_written(timeout));
 }
 
 std::uint64_t log_lines_dropped() {

@@ -17,7 +17,7 @@ namespace slsd {
 /// The longest line of the log, with its end. Longer lines end in an ellipsis.
 inline constexpr std::size_t kLogLineBytesMax = 2048;
 /// The longest wait for the log's reader at the end of the program.
-inline constexpr std::chrono::milliseconds kLogPatience{300};
+inline constexpr std::chrono::milliseconds kLogTimeout{300};
 /// The greatest number of lines that wait for the log's reader. Later lines are dropped and counted, until half of them
 /// are read.
 inline constexpr std::size_t kLogLinesMax = 1024;
@@ -51,7 +51,7 @@ class LogSink final : public spdlog::sinks::sink {
   /// Queues every line from now on.
   void queue_lines();
   /// Waits until all earlier lines are written, at most this long. @return whether they are
-  [[nodiscard]] bool wait_written(std::chrono::milliseconds patience) const;
+  [[nodiscard]] bool wait_written(std::chrono::milliseconds timeout) const;
   [[nodiscard]] std::uint64_t dropped() const;
 
  private:
@@ -66,7 +66,7 @@ void start_logging(spdlog::level::level_enum level);
 /// Queues the log's lines from now on, so that no line delays any thread. For the service.
 void queue_log();
 /// Gives the log's reader this long to read the rest before the program ends.
-void flush_log(std::chrono::milliseconds patience);
+void flush_log(std::chrono::milliseconds timeout);
 /// Lines dropped since queue_log() because the reader was too slow.
 [[nodiscard]] std::uint64_t log_lines_dropped();
 

@@ -202,7 +202,7 @@ void Service::await_end(std::chrono::steady_clock::time_point began) {
   // A driver or a long computation may be impossible to interrupt. No file is half written: a bundle is whole or
   // absent.
   spdlog::warn("stopped without waiting for a device or a computation");
-  flush_log(kLogPatience);
+  flush_log(kLogTimeout);
   std::_Exit(EXIT_SUCCESS);
 }
 

@@ -44,7 +44,8 @@ std::string table_of(RuleKind kind) {
 std::string reason_document() {
   return kIntroduction + std::string("## Rejected\n\n") + table_of(RuleKind::kRejects) + "## Decoded\n\n" +
          table_of(RuleKind::kAccepts) +
-         "## Not mended\n\nThe decoder aligns a spoilt symbol with its letter. Each of these guards is the last that "
+         "## Not recovered\n\nThe decoder aligns a spoilt symbol with its letter. Each of these guards is the last "
+         "that "
          "kept "
          "it from that; another rule decides on it.\n\n" +
          table_of(RuleKind::kGuards);

@@ -68,7 +68,7 @@ JpegDecoder::~JpegDecoder() {
 }
 
 Result<> JpegDecoder::read_header() {
-  if (!parse_header()) return fail_as_told();
+  if (!parse_header()) return fail_with_message();
   // If such data ends early, libjpeg continues with zeros, without a warning.
   if (info_.arith_code != FALSE) return fail_variant("JPEG", "arithmetic coding");
   if (info_.num_components == 4) return fail_variant("JPEG", "CMYK colours");
@@ -78,7 +78,7 @@ Result<> JpegDecoder::read_header() {
 }
 
 Result<> JpegDecoder::read_grey(Grey8& grey) {
-  if (!start()) return fail_as_told();
+  if (!start()) return fail_with_message();
   const bool counted = ::jpeg_has_multiple_scans(&info_) == FALSE;
   const bool lacking = lacks_a_scan(info_);  // start() has read all scans if there are several
   const ScanBlocks blocks = counted ? count_blocks(info_, scan_) : ScanBlocks::kAgree;
@@ -118,7 +118,7 @@ bool JpegDecoder::read_rows(Grey8& grey) {
   return true;
 }
 
-Result<> JpegDecoder::fail_as_told() const {
+Result<> JpegDecoder::fail_with_message() const {
   switch (failure_.manager.msg_code) {
     case JERR_BAD_PRECISION:
       return fail_variant("JPEG", std::to_string(failure_.manager.msg_parm.i[0]) + " bits a sample");

@@ -52,7 +52,7 @@ class JpegDecoder {
   bool parse_header();
   bool start();
   bool read_rows(Grey8& grey);
-  [[nodiscard]] Result<> fail_as_told() const;
+  [[nodiscard]] Result<> fail_with_message() const;
 
   std::string_view bytes_;
   std::string_view scan_;  ///< the bytes after the first scan's header

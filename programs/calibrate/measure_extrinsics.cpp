@@ -23,7 +23,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr auto kPatience = std::chrono::seconds(60);
+constexpr auto kTimeout = std::chrono::seconds(60);
 constexpr double kMovedMax = 0.2;         // limit of a cloud's white_differs
 constexpr double kScalesDifferMax = 0.2;  // %: two scanners that differ more agree only at the board
 
@@ -91,7 +91,7 @@ Result<CloudLook> look(Scanner& scanner, const Board& board) {
   const client::Frame* white = nullptr;
   try {
     client::ScanOptions options;
-    options.timeout = kPatience;
+    options.timeout = kTimeout;
     options.density = "pixels";
     options.texture = options.frames = true;
     cloud = scanner.service.scan(options);

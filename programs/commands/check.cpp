@@ -71,10 +71,10 @@ class LiveService {
     auto connection = Connection::open(socket);
     if (!connection && connection.error().code == ErrorCode::kNotFound) return std::nullopt;
     if (!connection) return tl::unexpected(connection.error());
-    connection->set_patience(kPatience);
+    connection->set_timeout(kTimeout);
     const auto settings = result_of(connection->call("settings", json::object()), socket);
     if (!settings) return tl::unexpected(settings.error());
-    const auto end = std::chrono::steady_clock::now() + kPatience;
+    const auto end = std::chrono::steady_clock::now() + kTimeout;
     while (true) {
       const auto status = result_of(connection->call("status", json::object()), socket);
       if (!status) return tl::unexpected(status.error());
@@ -119,7 +119,7 @@ class LiveService {
   [[nodiscard]] std::uint64_t log_lines_dropped() const { return status_.value("log_lines_dropped", std::uint64_t{0}); }
 
  private:
-  static constexpr std::chrono::seconds kPatience{10};
+  static constexpr std::chrono::seconds kTimeout{10};
   static constexpr std::chrono::milliseconds kPause{100};
 
   LiveService(json status, json settings) : status_(std::move(status)), settings_(std::move(settings)) {}

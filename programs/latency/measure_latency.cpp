@@ -160,7 +160,7 @@ class LatencyMeter {
 
   Result<Seen> capture() {
     for (int lost = 0;; ++lost) {
-      const auto frame = camera_.capture(time_.now() + options_.patience);
+      const auto frame = camera_.capture(time_.now() + options_.timeout);
       if (frame) return Seen{FlashPixels::sample(frame->image()), frame->exposure_start()};
       if (lost == kLostMax || !only_this_frame(frame.error().code)) return tl::unexpected(frame.error());
     }
@@ -189,7 +189,7 @@ class LatencyMeter {
     const auto shown = projector_.show(white_, time_.now() + kShowTime);
     if (!shown) return tl::unexpected(shown.error());
     Flash flash;
-    while (time_.now() < *shown + options_.patience) {
+    while (time_.now() < *shown + options_.timeout) {
       const auto seen = capture();
       if (!seen) return tl::unexpected(seen.error());
       flash.first_whole = seen->exposure_start - *shown;

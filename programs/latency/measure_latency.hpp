@@ -14,9 +14,9 @@
 namespace slsd {
 
 struct LatencyOptions {
-  int flashes = 20;                          ///< 3 to 1000
-  std::chrono::milliseconds settle{300};     ///< time after which black or white is certainly visible
-  std::chrono::milliseconds patience{2000};  ///< limit for a frame, and for a flash to be completely visible
+  int flashes = 20;                         ///< 3 to 1000
+  std::chrono::milliseconds settle{300};    ///< time after which black or white is certainly visible
+  std::chrono::milliseconds timeout{2000};  ///< limit for a frame, and for a flash to be completely visible
   std::uint32_t seed = 1;  ///< seed of the pauses, whose variation makes flashes meet every phase of the camera
 };
 

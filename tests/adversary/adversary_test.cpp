@@ -65,7 +65,7 @@ std::vector<HardFrames> hard_frames() {
       {8, Kind::kSlats1to2, {40675, 8500353, 13000449, 19400035, 19500109, 25000239}},
       {8, Kind::kSlats2, {19400939, 19701005}},
       {8, Kind::kSlats3to6, {5201859}},
-      {8, Kind::kSlidRows, {539}},
+      {8, Kind::kShiftedRows, {539}},
       {8, Kind::kSwappedPatch, {37, 43, 55, 279, 533, 17200447, 25000111}},
       {16, Kind::kPickets, {60334, 180356}},
       {16, Kind::kShelves, {128,      166,      332,      334,      390,      566,      3020,     3312,

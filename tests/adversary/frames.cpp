@@ -47,7 +47,7 @@ std::string_view to_string(Kind kind) {
   constexpr std::string_view kNames[kKinds] = {
       "slats, 1 symbol", "slats, 1 to 2",  "slats, 2",        "slats, 3 to 6",  "shelves, 1 to 2", "pickets, 1 to 6",
       "foreign",         "foreign beside", "random",          "random beside",  "mirrored",        "mutated, 5 to 40 %",
-      "tiled",           "slid rows",      "swapped patches", "two projectors", "two alike"};
+      "tiled",           "shifted rows",   "swapped patches", "two projectors", "two alike"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -138,7 +138,7 @@ Shown FrameMaker::letters_of(Kind kind, Random& random) const {
       });
       break;
     }
-    case Kind::kSlidRows: {
+    case Kind::kShiftedRows: {
       const int high = whole(random, 1, 3), reach = whole(random, 1, 3);
       const bool every_other = whole(random, 0, 1) == 1;
       int by = 0;

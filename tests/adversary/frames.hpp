@@ -17,7 +17,7 @@
 
 namespace slsd::adversary {
 
-/// What a frame is made of to lead the decoder astray.
+/// What a frame is made of to mislead the decoder.
 enum class Kind : std::uint8_t {
   kSlats1,         ///< horizontal slats one symbol high at random depths
   kSlats1to2,      ///< of 1 to 2 symbols
@@ -32,7 +32,7 @@ enum class Kind : std::uint8_t {
   kMirrored,       ///< the pattern in a mirror, with its symbols or without
   kMutated,        ///< 5 to 40 % of the letters changed
   kTiled,          ///< a part of the pattern, 2 to 14 cells wide and high, over and over
-  kSlidRows,       ///< bands of 1 to 3 rows slid by some columns each
+  kShiftedRows,    ///< bands of 1 to 3 rows shifted by some columns each
   kSwappedPatch,   ///< two parts of the pattern, 1 to 10 cells wide and high, swapped
   kTwoProjectors,  ///< the light of a second projector with another array beside and over the first
   kTwoAlike,       ///< the light of a second projector with the same pattern

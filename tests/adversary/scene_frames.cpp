@@ -26,7 +26,7 @@ struct Sighting {
   std::array<Corner, 4> corners;  // around the symbol
   int pixels = 0;
   std::uint16_t part = SceneTruth::kNothing;
-  bool torn = false;  // on two surfaces
+  bool split = false;  // on two surfaces
 
   [[nodiscard]] double area_px() const {
     double twice = 0;
@@ -41,7 +41,7 @@ struct Sighting {
   [[nodiscard]] bool is_whole(double facing_px) const {
     constexpr double kCovered = 0.7, kForeshortened = 0.25;
     const double area = area_px();
-    return !torn && std::ranges::all_of(corners, &Corner::seen) && pixels >= kCovered * area &&
+    return !split && std::ranges::all_of(corners, &Corner::seen) && pixels >= kCovered * area &&
            area >= kForeshortened * facing_px;
   }
 };
@@ -121,7 +121,7 @@ std::vector<bool> SceneFrameMaker::visible_symbols(const SceneTruth& truth) cons
       if (right < 0 || down < 0 || right > side || down > side) continue;
       ++sighting.pixels;
       const std::uint16_t part = truth.part.at(x, y);
-      sighting.torn = sighting.torn || (sighting.part != SceneTruth::kNothing && sighting.part != part);
+      sighting.split = sighting.split || (sighting.part != SceneTruth::kNothing && sighting.part != part);
       sighting.part = part;
     }
   }

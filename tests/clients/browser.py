@@ -11,7 +11,7 @@ import time
 import urllib.error
 import urllib.request
 
-PATIENCE_S = 120
+TIMEOUT_S = 120
 ARGUMENTS = ["--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
              "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage", "--hide-scrollbars",
              "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -35,7 +35,7 @@ class Browser:
                                        stderr=subprocess.DEVNULL)
         options = {"binary": shutil.which("chromium"), "args": [*ARGUMENTS, *arguments, f"--user-data-dir={self.profile}"],
                    "prefs": {"download.default_directory": str(downloads or self.profile)}}
-        end = time.monotonic() + PATIENCE_S
+        end = time.monotonic() + TIMEOUT_S
         while True:
             try:
                 made = self.ask("POST", "/session", {"capabilities": {"alwaysMatch": {
@@ -52,7 +52,7 @@ class Browser:
                                          data=None if body is None else json.dumps(body).encode(),
                                          headers={"Content-Type": "application/json"})
         try:
-            with urllib.request.urlopen(request, timeout=PATIENCE_S) as response:
+            with urllib.request.urlopen(request, timeout=TIMEOUT_S) as response:
                 return json.load(response)["value"]
         except urllib.error.HTTPError as error:
             raise AssertionError(error.read().decode()) from error
@@ -63,7 +63,7 @@ class Browser:
     def run(self, script, *arguments):
         return self.ask("POST", self.session + "/execute/sync", {"script": script, "args": list(arguments)})
 
-    def wait(self, condition, what, seconds=PATIENCE_S):
+    def wait(self, condition, what, seconds=TIMEOUT_S):
         """Until an expression of the page's is true; its value."""
         end = time.monotonic() + seconds
         while True:

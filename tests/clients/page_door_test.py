@@ -13,7 +13,7 @@ import threading
 import time
 import unittest
 
-from page_service import BIN, PATIENCE_S, TOKEN, Web, name_of, resident_mib
+from page_service import BIN, TIMEOUT_S, TOKEN, Web, name_of, resident_mib
 from service import Service, wait_until
 
 
@@ -269,7 +269,7 @@ class Door(unittest.TestCase):
                     file.write(TOKEN)
                     file.flush()
                     second = subprocess.run([BIN / "slsd-web", "--port", str(web.port), "--listen", listen, "--token-file", file.name],
-                                            capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+                                            capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
                 self.assertEqual((second.returncode, second.stdout), (1, ""), listen)
                 self.assertIn(f"{web.port}", second.stderr)
                 self.assertIn(f"the port is taken by slsd-web (process {web.process.pid})", second.stderr)
@@ -278,7 +278,7 @@ class Door(unittest.TestCase):
                 listening.bind(("127.0.0.1", 0))
                 listening.listen()
                 second = subprocess.run([BIN / "slsd-web", "--port", str(listening.getsockname()[1])], capture_output=True,
-                                        text=True, check=False, timeout=PATIENCE_S)
+                                        text=True, check=False, timeout=TIMEOUT_S)
                 self.assertIn(f"(process {os.getpid()})", second.stderr)
 
 

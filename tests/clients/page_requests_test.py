@@ -5,7 +5,7 @@
 import socket
 import unittest
 
-from page_service import PATIENCE_S, Web
+from page_service import TIMEOUT_S, Web
 from service import Service
 
 
@@ -13,7 +13,7 @@ class Peer:
     """A connection that reads answers one by one."""
 
     def __init__(self, web):
-        self.socket = socket.create_connection(("127.0.0.1", web.port), timeout=PATIENCE_S)
+        self.socket = socket.create_connection(("127.0.0.1", web.port), timeout=TIMEOUT_S)
         self.received = b""
 
     def __enter__(self):

@@ -13,7 +13,7 @@ import sys
 import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
-from service import BIN, PATIENCE_S
+from service import BIN, TIMEOUT_S
 
 TOKEN = "correct horse battery staple"
 
@@ -46,7 +46,7 @@ class Web:
         shutil.rmtree(self.runtime, ignore_errors=True)
 
     def ask(self, method, path, body=None, headers=None):
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=TIMEOUT_S)
         try:
             connection.request(method, path, body, self.secret if headers is None else headers)
             response = connection.getresponse()
@@ -69,7 +69,7 @@ class Web:
 
     def raw(self, data):
         """What comes back until the connection ends."""
-        with socket.create_connection(("127.0.0.1", self.port), timeout=PATIENCE_S) as connection:
+        with socket.create_connection(("127.0.0.1", self.port), timeout=TIMEOUT_S) as connection:
             answer = b""
             try:
                 connection.sendall(data)

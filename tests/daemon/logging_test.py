@@ -15,7 +15,7 @@ import time
 import unittest
 
 from client import RpcError
-from service import BIN, PATIENCE_S, Service, wait_until
+from service import BIN, TIMEOUT_S, Service, wait_until
 
 F_SETPIPE_SZ = 1031
 PRIVATE_RUN = ["unshare", "--mount", "--map-root-user", "sh", "-c", 'mount --bind "$0" /run && exec "$@"']
@@ -59,7 +59,7 @@ class Journaled(Service):
         (run / "systemd/journal").mkdir(parents=True)
         self.journal = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.journal.bind(str(run / "systemd/journal/socket"))
-        self.journal.settimeout(PATIENCE_S)
+        self.journal.settimeout(TIMEOUT_S)
         with open(self.log, "ab") as log:
             about = os.fstat(log.fileno())
             self.process = subprocess.Popen(

@@ -13,7 +13,7 @@ import sys
 import tempfile
 import unittest
 
-from service import BIN, PATIENCE_S, SCENE, Service, slsctl, wait_until
+from service import BIN, TIMEOUT_S, SCENE, Service, slsctl, wait_until
 
 CORPUS = pathlib.Path(__file__).parent.parent / "corpus"
 # Of a cloud's file these lines name the scan; every other byte is the measurement's.
@@ -164,7 +164,7 @@ class Record(unittest.TestCase):
         self.assertLess(first + 4096, second)
         script = f"trap '' XFSZ; ulimit -f {(first + second) // 2048}; exec \"$@\""
         result = subprocess.run(["bash", "-c", script, "bash", BIN / "slsctl", "--socket", self.two.socket, "record",
-                                 self.recording], capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+                                 self.recording], capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
         self.assertEqual(result.returncode, 1)
         self.assertIn("free some space", result.stderr)
         for folder in ("___left_eye", "right"):
@@ -173,7 +173,7 @@ class Record(unittest.TestCase):
     def test_ends_at_an_interrupt_with_whole_files(self):
         process = self.start_recording(self.one, "--json")
         process.send_signal(signal.SIGINT)
-        out, error = process.communicate(timeout=PATIENCE_S)
+        out, error = process.communicate(timeout=TIMEOUT_S)
         self.assertEqual(process.returncode, 0, error)
         summary = json.loads(out)
         self.assertEqual(summary["scans"], len(list((self.recording / "camera").iterdir())))
@@ -209,13 +209,13 @@ class Record(unittest.TestCase):
             with service.client() as client:
                 client.call("reload")
             process.send_signal(signal.SIGINT)
-            _, error = process.communicate(timeout=PATIENCE_S)
+            _, error = process.communicate(timeout=TIMEOUT_S)
             self.assertEqual(process.returncode, 1)
             self.assertIn("was reloaded meanwhile", error)
             shutil.rmtree(self.recording)
             process = self.start_recording(service)
             service.stop()
-            _, error = process.communicate(timeout=PATIENCE_S)
+            _, error = process.communicate(timeout=TIMEOUT_S)
         self.assertEqual(process.returncode, 1)
         self.assertRegex(error, "hung up|stopping")
 

@@ -10,7 +10,7 @@ import time
 
 from client import RpcError
 
-PATIENCE_S = 60
+TIMEOUT_S = 60
 # What a scan may say that lost its frame or its camera. Which of them depends on where the fault met it.
 LOST = {"disconnected", "timeout", "frame_dropped", "frame_late", "frame_stale", "frame_torn"}
 
@@ -26,13 +26,13 @@ def scan_until_it_works(client):
         except RpcError as error:
             errors.append(error.name)
             last = str(error)
-        if time.monotonic() - begin > PATIENCE_S:
+        if time.monotonic() - begin > TIMEOUT_S:
             raise TimeoutError(f"no scan works: {collections.Counter(errors)}, the last: {last}")
 
 
 def scan_until_it_fails(client, name=None, **params):
     """The error of the first scan that fails; with a name, of the first that fails with it."""
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + TIMEOUT_S
     others = collections.Counter()
     while time.monotonic() < end:
         try:

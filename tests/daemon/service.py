@@ -14,7 +14,7 @@ from client import Client
 
 BIN = pathlib.Path(os.environ["SLSD_BIN"])
 SCENE = pathlib.Path(os.environ["SLSD_SCENE"])
-PATIENCE_S = 120
+TIMEOUT_S = 120
 REPORTS = ("ThreadSanitizer", "AddressSanitizer", "LeakSanitizer", "runtime error:")
 
 CONFIGURATION = """
@@ -37,7 +37,7 @@ socket = "slsd.sock"
 
 
 def wait_until(condition, what):
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + TIMEOUT_S
     while not condition():
         if time.monotonic() > end:
             raise TimeoutError(what)
@@ -100,7 +100,7 @@ class Service:
         """The exit status and the seconds that it took."""
         begin = time.monotonic()
         self.send_signal(number)
-        status = self.process.wait(PATIENCE_S)
+        status = self.process.wait(TIMEOUT_S)
         self.check_sanitizers()
         return status, time.monotonic() - begin
 
@@ -115,10 +115,10 @@ class Service:
 
 
 def slsd(*arguments, **options):
-    return subprocess.run([BIN / "slsd", *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE_S,
+    return subprocess.run([BIN / "slsd", *map(str, arguments)], capture_output=True, text=True, timeout=TIMEOUT_S,
                           check=False, **options)
 
 
 def slsctl(*arguments, **options):
-    return subprocess.run([BIN / "slsctl", *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE_S,
+    return subprocess.run([BIN / "slsctl", *map(str, arguments)], capture_output=True, text=True, timeout=TIMEOUT_S,
                           check=False, **options)

@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 
-from service import PATIENCE_S, Service
+from service import TIMEOUT_S, Service
 
 
 def cpu_seconds(pid):
@@ -35,7 +35,7 @@ def start_once(scans):
     with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as notifications:
         path = os.path.join(folder, "notify")
         notifications.bind(path)
-        notifications.settimeout(PATIENCE_S)
+        notifications.settimeout(TIMEOUT_S)
         service = Service(environment={"NOTIFY_SOCKET": path})
         service.launch()
         try:

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "drivers/files/picture_apart.hpp"
+#include "drivers/files/picture_process.hpp"
 
 // What a client sends, and what the process that decodes it answers: both are a stranger's.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {

@@ -59,7 +59,7 @@ def is_right(machine):
     return machine.shell(CLOUD_SUM)[1] == machine.read("/srv/scene/reference")
 
 
-def scan_until_good(machine, what, patience_s):
+def scan_until_good(machine, what, timeout_s):
     """Every answer is a right cloud or an error. @return the errors until there was one, and how long it took"""
     errors, begin = [], time.monotonic()
     while True:
@@ -72,7 +72,7 @@ def scan_until_good(machine, what, patience_s):
         require(status == 1 and output.startswith("slsctl: "), f"{what}: status {status}: {output}")
         require(not any(words in output for words in LASTING), f"{what}: {output}")
         errors.append(output.strip().removeprefix("slsctl: "))
-        require(time.monotonic() < begin + patience_s * min(machine.slow, 10), f"{what}: no cloud again; {errors[-1]}")
+        require(time.monotonic() < begin + timeout_s * min(machine.slow, 10), f"{what}: no cloud again; {errors[-1]}")
 
 
 def state_of(machine, number=0):

@@ -34,9 +34,9 @@ def is_exact(machine):
     return differing(machine.screen(), pattern(machine)) == 0
 
 
-def scan_until_shown(machine, what, patience_s=60):
+def scan_until_shown(machine, what, timeout_s=60):
     """@return how long it took until a scan succeeds; the second monitor then shows the pattern"""
-    _, took = cameras.scan_until_good(machine, what, patience_s)
+    _, took = cameras.scan_until_good(machine, what, timeout_s)
     wait_for(lambda: is_exact(machine), f"{what}: the pattern on the second monitor", 30 * machine.slow, 1)
     return took
 

@@ -28,8 +28,8 @@ def accelerator():
     return ["-accel", "tcg,thread=multi,tb-size=512", "-cpu", "max"]
 
 
-def connect(path, patience_s=30):
-    end = time.monotonic() + patience_s
+def connect(path, timeout_s=30):
+    end = time.monotonic() + timeout_s
     while True:
         with contextlib.suppress(OSError):
             client = socket.socket(socket.AF_UNIX)

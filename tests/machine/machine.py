@@ -7,7 +7,7 @@ import re
 import subprocess
 import time
 
-PATIENCE_S = 120
+TIMEOUT_S = 120
 ENVIRONMENT = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "LC_ALL": "C", "DEBIAN_FRONTEND": "noninteractive"}
 IDLE_COUNT_S = 0.04  # what look_how_slow() takes on two idle cores of 2020, with no emulation
 
@@ -17,11 +17,11 @@ def require(holds, what):
         raise AssertionError(what)
 
 
-def wait_for(condition, what, patience_s=PATIENCE_S, pause_s=0.05):
-    end = time.monotonic() + patience_s
+def wait_for(condition, what, timeout_s=TIMEOUT_S, pause_s=0.05):
+    end = time.monotonic() + timeout_s
     while not (value := condition()):
         if time.monotonic() > end:
-            raise TimeoutError(f"{what}: not within {patience_s:.0f} s")
+            raise TimeoutError(f"{what}: not within {timeout_s:.0f} s")
         time.sleep(pause_s)
     return value
 
@@ -36,8 +36,8 @@ class Machine:
         become = ("runuser", "-u", user, "--") if user else ()
         return self.start_as_root((*become, *arguments), text)
 
-    def run(self, *arguments, user=None, check=True, text=None, patience_s=PATIENCE_S):
-        status, output = self.start(*arguments, user=user, text=text).finish(patience_s * self.slow)
+    def run(self, *arguments, user=None, check=True, text=None, timeout_s=TIMEOUT_S):
+        status, output = self.start(*arguments, user=user, text=text).finish(timeout_s * self.slow)
         if check and status != 0:
             raise AssertionError(f"{' '.join(arguments)}: status {status}\n{output}")
         return status, output
@@ -47,7 +47,7 @@ class Machine:
 
     def look_how_slow(self):
         begin = time.monotonic()
-        self.shell("i=0; while [ $i -lt 50000 ]; do i=$((i+1)); done", patience_s=600)
+        self.shell("i=0; while [ $i -lt 50000 ]; do i=$((i+1)); done", timeout_s=600)
         self.slow = max(1.0, (time.monotonic() - begin) / IDLE_COUNT_S)
 
     def show(self, unit, what):

@@ -19,7 +19,7 @@ from machine import Container, require
 
 PAGES = ("README.md", "docs/installing.md")
 USER, HOME = "newcomer", "/home/newcomer"
-PATIENCE_S = 4 * 3600
+TIMEOUT_S = 4 * 3600
 # What stands for the devices that the reader writes into the configuration.
 STAND_IN = "sed s#/run/slsd/example.sock#/run/slsd/slsd.sock# /etc/slsd/example.toml >/etc/slsd/slsd.toml"
 NEEDS_A_PERSON = "slsctl calibrate"  # waits for a board
@@ -42,7 +42,7 @@ class Newcomer:
     def login(self, script, environment=""):
         """What a shell of a new login makes of it. @return its exit status and what it printed"""
         self.machine.write(f"{HOME}/block", script)  # not by its standard input, which its programs may read
-        return self.machine.run("su", "-", USER, "-c", f"cd slsd && {environment} bash -e ~/block", check=False, patience_s=PATIENCE_S)
+        return self.machine.run("su", "-", USER, "-c", f"cd slsd && {environment} bash -e ~/block", check=False, timeout_s=TIMEOUT_S)
 
     def run_shell(self, text):
         for command in self.passed_over:

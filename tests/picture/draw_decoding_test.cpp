@@ -139,11 +139,11 @@ TEST(DrawDecoding, StandsRegionsOutsideTheFrameAndNone) {
 
 TEST(DrawDecoding, ShowsReasonsInTheColoursOfTheirRules) {
   Scene scene = scene_of({"a-+ + b"});
-  scene.decoding.regions[1].rule = DecodeRule::kTorn, scene.decoding.regions[2].rule = DecodeRule::kUncertain;
-  for (const DecodeRule rule : {DecodeRule::kTorn, DecodeRule::kUncertain})
+  scene.decoding.regions[1].rule = DecodeRule::kSplit, scene.decoding.regions[2].rule = DecodeRule::kUncertain;
+  for (const DecodeRule rule : {DecodeRule::kSplit, DecodeRule::kUncertain})
     scene.decoding.rules[static_cast<std::size_t>(rule)] = 1;
   const ColourImage picture = draw_decoding(scene.frame.view(), scene.decoding, scene.pattern, DecodingLook::kReasons);
-  EXPECT_TRUE(has(picture, 2 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kTorn)));
+  EXPECT_TRUE(has(picture, 2 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kSplit)));
   EXPECT_FALSE(has(picture, 2 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kUncertain)));
   EXPECT_TRUE(has(picture, 3 * kPitchPx, kPitchPx, rule_colour(DecodeRule::kUncertain)));
   EXPECT_FALSE(has(picture, kPitchPx, kPitchPx, letter_colour(0))) << "letters would hide what is asked for";

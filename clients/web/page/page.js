@@ -4,7 +4,7 @@
 
 const $ = (id) => document.getElementById(id);
 const countOf = (n, what) => `${n} ${what}${n === 1 ? "" : "s"}`;
-const kStatusPause = 1000, kRetryPause = 1500, kStatusPatience = 6000, kPatience = 100000;
+const kStatusPause = 1000, kRetryPause = 1500, kStatusTimeout = 6000, kTimeout = 100000;
 
 // ---- what is asked for ----
 
@@ -40,8 +40,8 @@ function sessionKey() {
 const noAnswer = () => new Refused(0, {name: "no_page_service", message: "slsd-web does not answer: look whether it is running"});
 
 // Names are relative: the page may lie below any path of a proxy.
-async function ask(path, body, patience = kPatience) {
-  const ends = new AbortController(), timer = setTimeout(() => ends.abort(), patience);
+async function ask(path, body, timeout = kTimeout) {
+  const ends = new AbortController(), timer = setTimeout(() => ends.abort(), timeout);
   try {
     const response = await fetch(path, {
       method: body === undefined ? "GET" : "POST", headers: {"X-Slsd-Page": sessionKey()}, credentials: "same-origin",
@@ -172,7 +172,7 @@ async function followStatus() {
   for (;; await pause(kStatusPause)) {
     if (document.hidden) continue;
     try {
-      showStatus(await (await ask("api/status", undefined, kStatusPatience)).json());
+      showStatus(await (await ask("api/status", undefined, kStatusTimeout)).json());
       if ($("login").open) welcome();  // let in by another tab
       else if (complaints.has("camera") && !$("camera-live").checked) showPicture();  // it failed by itself, and is tried again
     } catch (error) {

@@ -16,7 +16,7 @@ namespace {
 constexpr double kBentSigmas = 5;
 constexpr double kBentShare = 3e-4;     // share of the size: 0.1 mm of A4
 constexpr double kFarBentShare = 6e-3;  // with a larger bend, a print is no longer a smooth surface
-constexpr double kToldShare = 1e-3;     // share of the size: a larger deviation makes the result meaningless
+constexpr double kKnownShare = 1e-3;    // share of the size: a larger deviation makes the result meaningless
 constexpr double kUnevenTimes = 5, kUnevenShare = 3e-5;
 constexpr char kMount[] = "mount the print on glass or an aluminium composite plate";
 
@@ -127,8 +127,8 @@ bool BoardReport::is_bent() const {
   return bend_mm > std::max(kBentSigmas * bend_sigma_mm, kBentShare * size_mm());
 }
 
-bool BoardReport::is_told() const {
-  return bend_sigma_mm <= kToldShare * size_mm();
+bool BoardReport::is_known() const {
+  return bend_sigma_mm <= kKnownShare * size_mm();
 }
 
 bool BoardReport::is_uneven() const {
@@ -178,7 +178,7 @@ std::string board_text(const BoardReport& board) {
 
 std::vector<std::string> board_warnings(const BoardReport& board) {
   std::vector<std::string> warnings;
-  if (!board.is_told()) {
+  if (!board.is_known()) {
     warnings.push_back(
         fmt::format("the poses do not tell whether the board is flat: it is {}. Tilt it by 20 to 40 degrees towards "
                     "all sides, in more poses, or {}",

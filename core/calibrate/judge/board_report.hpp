@@ -26,7 +26,7 @@ struct BoardReport {
   /// Tells whether the board is certainly bent, and by more than a good print.
   [[nodiscard]] bool is_bent() const;
   /// Tells whether the poses determine if the board is bent.
-  [[nodiscard]] bool is_told() const;
+  [[nodiscard]] bool is_known() const;
   /// Tells whether the board has a shape that the adjustment does not describe.
   [[nodiscard]] bool is_uneven() const;
 };

@@ -46,7 +46,7 @@ constexpr double kSamePlaceShare = 0.005;
 /// Share of a pose's symbols with an object before them; above the second limit, the board moved.
 constexpr double kCoveredShare = 0.08, kUncoveredShare = 0.5;
 /// Ratio to the usual error above which the figure has no meaning.
-constexpr double kTimesTelling = 100;
+constexpr double kErrorRatioShownMax = 100;
 /// Share of outlying points above which no other fault needs to be reported.
 constexpr double kHardlyAnyShare = 0.9;
 constexpr char kHardlyAny[] = "hardly a point of it agrees with them";
@@ -357,8 +357,9 @@ std::optional<FaultyPose> find_contradiction(const Observations& observations, c
   if (times < kContradiction) return std::nullopt;
   if (shares[worst] > kHardlyAnyShare) return explain(worst, kHardlyAny, observations, rig);
   return explain(worst,
-                 times < kTimesTelling ? fmt::format("its error is {:.1f} times theirs", times)
-                                       : fmt::format("its error is more than {:.0f} times theirs", kTimesTelling),
+                 times < kErrorRatioShownMax
+                     ? fmt::format("its error is {:.1f} times theirs", times)
+                     : fmt::format("its error is more than {:.0f} times theirs", kErrorRatioShownMax),
                  observations, rig);
 }
 

@@ -34,7 +34,7 @@ constexpr int kContrastMin = 12;
 /// Camera pixels by which a member may lie off its square's affine map, in addition to its place in its bin.
 constexpr double kMemberOffPx = 0.75;
 /// Number of pixels above which their shares are meaningful.
-constexpr std::ptrdiff_t kPixelsTelling = 2000;
+constexpr std::ptrdiff_t kPixelsMin = 2000;
 constexpr double kBeyondShareMax = 0.02, kFittingShareMin = 0.3;
 
 /// @param full  the level of a saturated pixel, which becomes 255. If it is 255 already, nothing is copied
@@ -156,7 +156,7 @@ std::vector<cv::Point> brighter_pixels(const cv::Mat& light, const cv::Mat& dark
 Result<std::vector<cv::Point>> lit_pixels(const cv::Mat& white, const cv::Mat& black,
                                           const std::function<bool(int x, int y)>& wanted) {
   auto lit = brighter_pixels(white, black, wanted);
-  if (std::ssize(brighter_pixels(black, white, wanted)) > std::max(std::ssize(lit), kPixelsTelling)) {
+  if (std::ssize(brighter_pixels(black, white, wanted)) > std::max(std::ssize(lit), kPixelsMin)) {
     return fail(ErrorCode::kMismatch, "white.png is darker than black.png: exchange the two");
   }
   return lit;
@@ -188,7 +188,7 @@ Result<Reading> read_places(std::span<const cv::Mat> code, const ImageSize& proj
     reading.seen.push_back({small(pixel.x), small(pixel.y), small(2 * *u), small(2 * *v)});
   }
   const auto all = static_cast<double>(std::ssize(reading.seen) + beyond);
-  if (beyond > kPixelsTelling / 10 && static_cast<double>(beyond) > kBeyondShareMax * all) {
+  if (beyond > kPixelsMin / 10 && static_cast<double>(beyond) > kBeyondShareMax * all) {
     return fail(ErrorCode::kMismatch,
                 "the Gray code reaches beyond " + std::to_string(projector.width_px) + "x" +
                     std::to_string(projector.height_px) +
@@ -249,7 +249,7 @@ Result<std::vector<ProjectedPoint>> read_gray_code(const GrayCapture& capture, c
     std::tie(points, fitting) = summarise(*reading, side_px);
     if (points.size() >= kPointsEnough) break;
   }
-  if (std::ssize(reading->seen) > kPixelsTelling &&
+  if (std::ssize(reading->seen) > kPixelsMin &&
       static_cast<double>(fitting) < kFittingShareMin * static_cast<double>(reading->seen.size())) {
     return fail(ErrorCode::kMismatch,
                 "neighbours in the picture are none in the Gray code: its pictures are not in the order of OpenCV's "

@@ -183,12 +183,12 @@ void LetterAligner::take_over(const LetterScene& scene, const AskedLetter& asked
   moments.background = task.state.offset, moments.peak = task.state.offset + task.state.gain;
   const float camera_px = std::sqrt(std::abs(place.frame.determinant()));
   seen.misfits[node] = std::sqrt(kMisfitSquaredPerPx * sigma_px(task) * camera_px);
-  seen.claims[node].decide(DecodeRule::kMended);
+  seen.claims[node].decide(DecodeRule::kRecovered);
   // Near an edge in depth, the visible part of a symbol may fit the letter of either side.
   constexpr float kDistanceWhole = 2.5F, kDistanceAtEdge = 4;
   const bool at_edge = shows_other_light(scene, asked) || support_beside_print(scene, asked) < kWholeBesidePrintMin;
   seen.aligned[node] = at_edge ? Aligned::kAtEdge : Aligned::kWhole;
-  seen.nodes[node].torn = at_edge;
+  seen.nodes[node].split = at_edge;
   seen.shapes[node] = Classification::of_letter(letter_of(seen.claims[node]), array_.letters,
                                                 at_edge ? kDistanceAtEdge : kDistanceWhole);
 }

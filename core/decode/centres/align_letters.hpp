@@ -50,7 +50,7 @@ struct LetterPlace {
   Eigen::Vector2f centre_px = Eigen::Vector2f::Zero();  ///< middle of its square in the camera's image
   LatticeFrame frame = LatticeFrame::Zero();
   float background = 0, peak = 0;  ///< grey levels
-  int held_by = 0;                 ///< number of neighbours that predict it; 0: there is no place
+  int supported_by = 0;            ///< number of neighbours that predict it; 0: there is no place
 };
 
 /// One letter in its cell, with the result of its alignment.

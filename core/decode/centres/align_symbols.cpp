@@ -12,7 +12,7 @@
 namespace slsd {
 namespace {
 
-/// Width of a patch's rim beyond its cell, projector px: the neighbours' edges help to place it.
+/// Width of a patch's border beyond its cell, projector px: the neighbours' edges help to place it.
 constexpr float kBeyondCellPx = 1.5F;
 /// Share of the patch that agrees with the pattern. Below it, the aligner also tries the planes of the neighbours.
 constexpr float kSupportWeak = 0.94F;

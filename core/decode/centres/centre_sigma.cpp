@@ -26,7 +26,7 @@ constexpr float kOfMisfitSquared = 0.01F;  // px
 /// Residual across the line, and unevenness, on the smoothest surfaces, besides noise.
 constexpr float kSmoothAcrossPx = 0.03F, kSmoothUnevenPx = 0.02F;
 constexpr float kUnknownBendPx = 0.015F;
-/// Factors for shapes that are cut, not only worn.
+/// Factors for shapes that are cut, not only degraded.
 constexpr float kDamageOfAcross = 0.35F;
 constexpr float kDamageOfMisfitSquared = 0.018F;  // px
 /// Largest residual of a neighbour that counts: beyond it the neighbour itself is wrong.

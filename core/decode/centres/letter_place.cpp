@@ -6,24 +6,24 @@
 
 namespace slsd {
 
-std::int32_t holder_of(const Sightings& seen, std::int32_t node, Direction d) {
+std::int32_t supporter_of(const Sightings& seen, std::int32_t node, Direction d) {
   const std::int32_t other = seen.nodes[node].links[d];
   const bool holds = other >= 0 && seen.claims[other].status == RegionStatus::kDecoded;
   return holds && seen.claims[node].fits(seen.claims[other], d) ? other : -1;
 }
 
 LetterPlace place_by_neighbours(const Sightings& seen, std::int32_t node) {
-  const auto holder = [&](std::int32_t of, Direction d) { return holder_of(seen, of, d); };
+  const auto supporter = [&](std::int32_t of, Direction d) { return supporter_of(seen, of, d); };
   LetterPlace place;
   float count = 0;
   for (const Direction d : kDirections) {
-    const std::int32_t beside = holder(node, d);
+    const std::int32_t beside = supporter(node, d);
     if (beside < 0) continue;
-    ++place.held_by;
+    ++place.supported_by;
     const GreyMoments& light = seen.moments[beside];
     place.frame += seen.nodes[beside].frame, place.background += light.background, place.peak += light.peak;
     const Eigen::Vector2f& centre = seen.nodes[beside].centre_px;
-    const std::int32_t behind = holder(node, opposite(d)), next = decoded_beside(seen.nodes, seen.claims, beside, d);
+    const std::int32_t behind = supporter(node, opposite(d)), next = decoded_beside(seen.nodes, seen.claims, beside, d);
     if (behind >= 0) {
       place.centre_px += 0.5F * (centre + seen.nodes[behind].centre_px), ++count;
     } else if (next >= 0) {
@@ -31,9 +31,9 @@ LetterPlace place_by_neighbours(const Sightings& seen, std::int32_t node) {
     }
   }
   if (count == 0) return {};
-  const auto held_by = static_cast<float>(place.held_by);
-  return {place.centre_px / count, place.frame / held_by, place.background / held_by, place.peak / held_by,
-          place.held_by};
+  const auto supported_by = static_cast<float>(place.supported_by);
+  return {place.centre_px / count, place.frame / supported_by, place.background / supported_by,
+          place.peak / supported_by, place.supported_by};
 }
 
 }  // namespace slsd

@@ -23,9 +23,9 @@ struct CellClaim {
   std::int16_t row = -1, column = -1;
   float margin_nats = 0;  ///< nats by which its cell is likelier than any other, up to the required margin
   RegionStatus status = RegionStatus::kNoNeighbour;  ///< kDecoded, or why not; decide() alone writes it
-  GridFit grid_fit = GridFit::kTight;                ///< fit of a node at a rim; nodes inside always fit
+  GridFit grid_fit = GridFit::kTight;                ///< fit of a node at a boundary; nodes inside always fit
   DecodeRule rule = DecodeRule::kNoNeighbour;        ///< the rule that decided on the status
-  DecodeRule guard = DecodeRule::kCertain;           ///< the last guard that kept it from being mended, or kCertain
+  DecodeRule guard = DecodeRule::kCertain;           ///< the last guard that kept it from being recovered, or kCertain
 
   struct Cell {
     int row, column;
@@ -36,7 +36,7 @@ struct CellClaim {
   };
 
   void decide(DecodeRule by) { status = text_of(by).gives, rule = by; }
-  /// @return  whether the guard allows mending
+  /// @return  whether the guard allows recovery
   bool pass(const Rules& rules, DecodeRule by, bool holds) {
     const bool stopped = rules.apply(by, !holds);
     if (stopped) guard = by;

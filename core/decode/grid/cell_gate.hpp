@@ -22,9 +22,9 @@ class CellGate {
   CellGate(const CellRays& cells, std::span<const EpipolarSegment> segments, double tolerance_px)
       : cells_(cells), segments_(segments), tolerance_px_(tolerance_px) {}
 
-  /// @param astray_px  additional distance from its line that this node may have
-  [[nodiscard]] bool admits(std::int32_t node, int row, int column, double astray_px = 0) const {
-    return segments_.empty() || segments_[node].passes(cells_.ray(row, column).direction, tolerance_px_ + astray_px);
+  /// @param off_line_px  additional distance from its line that this node may have
+  [[nodiscard]] bool admits(std::int32_t node, int row, int column, double off_line_px = 0) const {
+    return segments_.empty() || segments_[node].passes(cells_.ray(row, column).direction, tolerance_px_ + off_line_px);
   }
   /// Signed distance of the cell from the node's epipolar line, projector px; 0 without known lines.
   [[nodiscard]] double residual_px(std::int32_t node, int row, int column) const {
@@ -49,9 +49,9 @@ class CellGate {
   [[nodiscard]] bool knows_lines() const { return !segments_.empty(); }
   /// Calls visit(row, column) for the candidate cells of a node: one for each column, or for each row, that its
   /// epipolar line crosses.
-  /// @param astray_px  additional distance from its line that this node may have
+  /// @param off_line_px  additional distance from its line that this node may have
   template <class Visit>
-  void visit_along(std::int32_t node, double astray_px, Visit&& visit) const {
+  void visit_along(std::int32_t node, double off_line_px, Visit&& visit) const {
     const EpipolarSegment& segment = segments_[static_cast<std::size_t>(node)];
     if (segment.empty()) return;
     const auto off_line = [&](int row, int column) { return segment.residual_px(cells_.ray(row, column).direction); };
@@ -73,7 +73,7 @@ class CellGate {
       const auto nearest = static_cast<int>(std::lround(std::clamp<double>(across, -1, last_across + 1)));
       if (nearest < 0 || nearest > last_across) continue;
       const int row = is_steep ? along : nearest, column = is_steep ? nearest : along;
-      if (admits(node, row, column, astray_px)) visit(row, column);
+      if (admits(node, row, column, off_line_px)) visit(row, column);
     }
   }
   /// Distance between adjacent cells, projector px.

@@ -225,16 +225,16 @@ void GridLinker::measure_steps(const std::vector<GridNode>& nodes, Executor& exe
         const std::int32_t other = nodes[i].links[d];
         const std::size_t x = 2 * static_cast<std::size_t>(d), y = x + 1;
         const Eigen::Vector2f step_px = other < 0 ? Eigen::Vector2f(kNone, kNone) : link_vector(nodes, i, d);
-        const bool torn = nodes[i].torn || (other >= 0 && nodes[other].torn);
+        const bool split = nodes[i].split || (other >= 0 && nodes[other].split);
         steps_[i][x] = step_px.x(), steps_[i][y] = step_px.y();
-        sound_steps_[i][x] = torn ? kNone : step_px.x(), sound_steps_[i][y] = torn ? kNone : step_px.y();
+        sound_steps_[i][x] = split ? kNone : step_px.x(), sound_steps_[i][y] = split ? kNone : step_px.y();
       }
     }
   });
 }
 
 /// Finds links that disagree with the same step behind and ahead, or with most of the steps behind, ahead and on both
-/// sides. Along a straight edge in depth, the links on both sides agree; those behind and ahead do not. Links of torn
+/// sides. Along a straight edge in depth, the links on both sides agree; those behind and ahead do not. Links of split
 /// shapes are compared only with each other.
 /// @return one bit for the link to the right, and one for the link down
 unsigned GridLinker::find_inconsistent(const GridNode& node, std::size_t index) const {
@@ -242,7 +242,7 @@ unsigned GridLinker::find_inconsistent(const GridNode& node, std::size_t index) 
     return std::bit_cast<FourLanes>(from[at]);
   };
   const FourLanes own = load(steps_, index), own_sound = load(sound_steps_, index);
-  const FourIntLanes is_torn = own_sound != own_sound;
+  const FourIntLanes is_split = own_sound != own_sound;
   const Eigen::Matrix2f cells_from_camera = node.frame.inverse() / options_.pitch_px;
   const float xx = cells_from_camera(0, 0), xy = cells_from_camera(0, 1), yx = cells_from_camera(1, 0),
               yy = cells_from_camera(1, 1);
@@ -250,7 +250,7 @@ unsigned GridLinker::find_inconsistent(const GridNode& node, std::size_t index) 
   FourIntLanes count{};  // negative, as a true comparison gives -1
   const auto find_against = [&](Direction d) -> FourIntLanes {
     const std::size_t other = node.links[d] < 0 ? steps_.size() - 1 : static_cast<std::size_t>(node.links[d]);
-    const FourLanes difference = own - (is_torn ? load(steps_, other) : load(sound_steps_, other));
+    const FourLanes difference = own - (is_split ? load(steps_, other) : load(sound_steps_, other));
     const FourLanes cells = from_x * __builtin_shufflevector(difference, difference, 0, 0, 2, 2) +
                             from_y * __builtin_shufflevector(difference, difference, 1, 1, 3, 3);
     const FourLanes squared = cells * cells;

@@ -20,7 +20,7 @@ struct GridNode {
   LatticeFrame frame;         ///< in: as expected; out: as measured from the neighbours, if there are any
   std::array<std::int32_t, 4> links{-1, -1, -1, -1};  ///< by Direction
   std::array<bool, 4> broken{};
-  bool torn = false;                            ///< in: its links are no evidence about the links beside them
+  bool split = false;                           ///< in: its links are no evidence about the links beside them
   bool measured_u = false, measured_v = false;  ///< steps of the frame that come from neighbours
 };
 
@@ -117,7 +117,7 @@ class GridLinker {
   std::vector<Links> chosen_, hints_;
   std::vector<std::uint8_t> changed_;  // for each node: whether its links differ from its previous ones
   // Steps right and down from each node, as x, y, x, y, camera px, with one spare entry at the end. NaN without a link;
-  // in sound_steps_, also NaN for links to or from torn symbols.
+  // in sound_steps_, also NaN for links to or from split symbols.
   std::vector<std::array<float, 4>> steps_, sound_steps_;
   std::vector<std::array<bool, 4>> inconsistent_;
   std::vector<std::uint8_t> relinked_;  // for each node: whether the last search changed its links

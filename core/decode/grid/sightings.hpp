@@ -15,7 +15,7 @@ namespace slsd {
 /// The result of aligning a symbol's letter with the frame.
 enum class Aligned : std::uint8_t {
   kNot,
-  kPrinted,  ///< not aligned, but its cell is dark wherever its letter is: print may have torn it
+  kPrinted,  ///< not aligned, but its cell is dark wherever its letter is: print may have split it
   kWhole,    ///< aligned, and whole apart from print
   kAtEdge,   ///< aligned, but partly missing, or lit where its letter is dark, as at an edge in depth
 };

@@ -9,7 +9,7 @@ namespace slsd {
 namespace {
 
 constexpr float kContradicts = -2;     // nats of a shape for the cell that a link leads to
-constexpr float kTornIsCut = 0.5F;     // links to torn symbols that lead across an edge
+constexpr float kSplitIsCut = 0.5F;    // links to split symbols that lead across an edge
 constexpr float kMissingIsCut = 0.2F;  // places of the grid where nothing is seen
 constexpr float kUsualCounts = 0.5F;   // links that the share of the whole frame counts as
 constexpr float kShareMin = 0.001F, kUsualMax = 0.3F, kShareMax = 0.4F;
@@ -68,7 +68,7 @@ void EdgePrior::measure(const NodesSeen& seen, const LetterEvidence& letters) {
       }
       const bool own = seen.nodes[i].broken[d] || contradicts(seen, letters, static_cast<std::int32_t>(i), other, d);
       if (seen.aligned[i] == Aligned::kPrinted || seen.aligned[other] == Aligned::kPrinted) continue;
-      const float share = own ? 1 : seen.nodes[other].torn ? kTornIsCut : 0;
+      const float share = own ? 1 : seen.nodes[other].split ? kSplitIsCut : 0;
       counts_[i].links[d % 2] += 1, counts_[i].cut[d % 2] += share;
       links += 1, cut += share;
     }

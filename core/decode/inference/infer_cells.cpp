@@ -49,8 +49,8 @@ void CellInference::drop_misread() {
 void CellInference::set_capacities() {
   capacity_.assign(labels_.size(), {}), against_.assign(labels_.size(), {}), rivals_.assign(labels_.size(), 0);
   for (std::size_t i = 0; i < labels_.size(); ++i) {
-    const bool is_torn = labels_[i] < 0 && proposed_[i] >= 0 && !letters_.shapes()[i].is_well_seen();
-    if (labels_[i] < 0 && !is_torn) continue;
+    const bool is_split = labels_[i] < 0 && proposed_[i] >= 0 && !letters_.shapes()[i].is_well_seen();
+    if (labels_[i] < 0 && !is_split) continue;
     for (const Direction d : kDirections) {
       const std::int32_t other = beside_[i][d];
       if (other < 0) continue;
@@ -60,7 +60,7 @@ void CellInference::set_capacities() {
       const std::int32_t there = grid_.beyond(proposed_[i], d);
       if (there >= 0 && labels_[other] == there) {
         capacity_[i][d] = trusted;
-      } else if (!is_torn) {  // a torn symbol contradicts nothing and supports nothing: its neighbours support it
+      } else if (!is_split) {  // a split symbol contradicts nothing and supports nothing: its neighbours support it
         const float against = there < 0 ? kAgainstMax : -letters_.of(other, there);
         const float rival = rival_nats(i, d);
         against_[i][d] = std::min(trusted, std::max({0.F, against, rival > 0 ? trusted : 0.F}));
@@ -185,21 +185,21 @@ void CellInference::measure_margins(Executor& executor) {
   });
 }
 
-/// Fit of a node at a rim. Another surface fits tightly in one of sixty cases at most.
+/// Fit of a node at a boundary. Another surface fits tightly in one of sixty cases at most.
 GridFit CellInference::grid_fit(std::size_t node) const {
   float most = 0;
-  int held_by = 0, sides = 0;
+  int supported_by = 0, sides = 0;
   for (const Direction d : kDirections) {
     if (capacity_[node][d] <= 0) continue;
     ++sides;
     const std::int32_t other = beside_[node][d];
     const float slip = links_.slip(static_cast<std::size_t>(other), d);
-    if (!std::isnan(slip)) most = std::max(most, std::abs(slip)), ++held_by;
+    if (!std::isnan(slip)) most = std::max(most, std::abs(slip)), ++supported_by;
   }
   constexpr int kAllSides = 4, kTightLinks = 2;
   if (sides == kAllSides) return GridFit::kTight;
-  if (held_by == 0 || most > kOffGridSlip) return GridFit::kNone;
-  return held_by >= kTightLinks && most <= kTightSlip ? GridFit::kTight : GridFit::kLoose;
+  if (supported_by == 0 || most > kOffGridSlip) return GridFit::kNone;
+  return supported_by >= kTightLinks && most <= kTightSlip ? GridFit::kTight : GridFit::kLoose;
 }
 
 /// Names the rule that accepts or rejects a node with a proposed cell.
@@ -210,10 +210,10 @@ DecodeRule CellInference::rule_of(const CellGate& gate, const Sightings& seen, s
   if (shape.letter < 0) return DecodeRule::kNoLetter;
   if (!speaks && shape.is_well_seen()) return DecodeRule::kOtherLetter;
   if (margins_[node] < margin_needed_) return DecodeRule::kUncertain;
-  if (!speaks && !is_aligned(seen.aligned[node])) return DecodeRule::kTorn;
+  if (!speaks && !is_aligned(seen.aligned[node])) return DecodeRule::kSplit;
   if (!gate.on_line(gate.residual_px(static_cast<std::int32_t>(node), row, column))) return DecodeRule::kCellOffLine;
   if (!gate.admits(static_cast<std::int32_t>(node), row, column)) return DecodeRule::kCellOutOfRange;
-  return is_aligned(seen.aligned[node]) ? DecodeRule::kMended : DecodeRule::kCertain;
+  return is_aligned(seen.aligned[node]) ? DecodeRule::kRecovered : DecodeRule::kCertain;
 }
 
 void CellInference::claim_cells(const CellGate& gate, Sightings& seen) const {
@@ -285,19 +285,19 @@ void CellInference::propose(const CellGate& gate, Executor& executor, Sightings&
     const bool speaks = letters_.of(static_cast<std::int32_t>(i), proposed_[i]) > 0;
     const bool is_well_seen = seen.shapes[i].is_well_seen();
     if (speaks) seen.misfits[i] = seen.shapes[i].distance;
-    claim.decide(!is_well_seen ? DecodeRule::kTorn : speaks ? DecodeRule::kCertain : DecodeRule::kOtherLetter);
+    claim.decide(!is_well_seen ? DecodeRule::kSplit : speaks ? DecodeRule::kCertain : DecodeRule::kOtherLetter);
   }
 }
 
 void CellInference::decide(const CellGate& gate, Executor& executor, Sightings& seen) {
   const float cells = static_cast<float>(grid_.rows) * static_cast<float>(grid_.columns);
   margin_needed_ = margin_min_ + (gate.knows_lines() ? 0 : std::log(std::max(1.F, cells / kUsualPlaces)));
-  find_beside(seen.nodes, beside_);  // mended symbols have new links
+  find_beside(seen.nodes, beside_);  // recovered symbols have new links
   labels_ = proposed_;
   nats_.resize(labels_.size());
   letters_.look_at(seen.shapes, seen.aligned);
   links_.measure(view_of(seen), letters_, gate);
-  letters_.measure_torn(beside_, labels_);
+  letters_.measure_split(beside_, labels_);
   drop_misread();
   prior_.measure(view_of(seen), letters_);
   set_capacities();

@@ -14,8 +14,8 @@ struct Misread {
 };
 constexpr std::array kMisread{Misread{2, 0.001F}, Misread{3, 0.01F}, Misread{4, 0.05F},   Misread{6, 0.15F},
                               Misread{8, 0.5F},   Misread{12, 0.8F}, Misread{1e9F, 0.95F}};
-/// Shares of doubtful and of torn shapes among symbols that an edge cuts.
-constexpr float kDoubtfulAtEdges = 0.2F, kTornAtEdges = 0.5F;
+/// Shares of doubtful and of split shapes among symbols that an edge cuts.
+constexpr float kDoubtfulAtEdges = 0.2F, kSplitAtEdges = 0.5F;
 
 }  // namespace
 
@@ -29,20 +29,20 @@ LetterEvidence::LetterEvidence(const CodeArray& array, CellGrid grid)
 
 /// Aligned and printed symbols are whole, unless an edge may run through them.
 LetterEvidence::Wholeness LetterEvidence::wholeness_of(std::size_t node) const {
-  if (aligned_[node] != Aligned::kNot) return aligned_[node] == Aligned::kAtEdge ? kTorn : kWhole;
+  if (aligned_[node] != Aligned::kNot) return aligned_[node] == Aligned::kAtEdge ? kSplit : kWhole;
   const Classification& shape = shapes_[node];
   if (shape.is_well_seen()) return kWhole;
-  return shape.distance < kTornDistance ? kDoubtful : kTorn;
+  return shape.distance < kSplitDistance ? kDoubtful : kSplit;
 }
 
 void LetterEvidence::look_at(std::span<const Classification> shapes, std::span<const Aligned> aligned) {
   shapes_ = shapes, aligned_ = aligned;
-  torn_nats_ = {};
+  split_nats_ = {};
 }
 
-void LetterEvidence::measure_torn(std::span<const Beside> beside, std::span<const std::int32_t> labels) {
+void LetterEvidence::measure_split(std::span<const Beside> beside, std::span<const std::int32_t> labels) {
   constexpr float kAgrees = 1;     // nats
-  constexpr float kAsIfSeen = 20;  // symbols, one of them torn
+  constexpr float kAsIfSeen = 20;  // symbols, one of them split
   std::array<float, kWholenesses> count{};
   float amid = 0;
   agrees_.resize(labels.size());
@@ -58,7 +58,7 @@ void LetterEvidence::measure_torn(std::span<const Beside> beside, std::span<cons
   const auto nats = [&](Wholeness how, float at_edges) {
     return std::min(0.F, std::log((count[how] + 1) / (amid + kAsIfSeen) / at_edges));
   };
-  torn_nats_ = {0, nats(kDoubtful, kDoubtfulAtEdges), nats(kTorn, kTornAtEdges)};
+  split_nats_ = {0, nats(kDoubtful, kDoubtfulAtEdges), nats(kSplit, kSplitAtEdges)};
 }
 
 float LetterEvidence::of(std::int32_t node, std::int32_t cell) const {
@@ -67,8 +67,8 @@ float LetterEvidence::of(std::int32_t node, std::int32_t cell) const {
   const float share = shape.share_of(letter_of(cell), 1 / letter_count_);
   const float misread =
       std::ranges::find_if(kMisread, [&](const Misread& m) { return shape.distance < m.distance_max; })->share;
-  const float torn = torn_nats_[wholeness_of(static_cast<std::size_t>(node))];
-  const float nats = std::log((1 - misread) * share * letter_count_ + misread) + torn;
+  const float split = split_nats_[wholeness_of(static_cast<std::size_t>(node))];
+  const float nats = std::log((1 - misread) * share * letter_count_ + misread) + split;
   // A symbol that cannot be aligned at its predicted place may be a different symbol.
   return aligned_[static_cast<std::size_t>(node)] == Aligned::kPrinted ? std::min(0.F, nats) : nats;
 }

@@ -16,7 +16,7 @@ constexpr float kCertainShare = 0.85F;
 /// line, nats.
 constexpr float kBesideCertain = 3.7F;
 /// Distance from its line that a damaged shape may have, of the pitch of the cells.
-constexpr double kAstrayShare = 0.2;
+constexpr double kOffLineShare = 0.2;
 
 }  // namespace
 
@@ -66,11 +66,11 @@ CellProposer::Proposal CellProposer::continued(const Frame& frame, std::int32_t 
 }
 
 CellProposer::Proposal CellProposer::best_on_line(const Frame& frame, std::int32_t node) const {
-  const double astray_px =
-      frame.shapes[static_cast<std::size_t>(node)].is_well_seen() ? 0 : kAstrayShare * frame.gate.pitch_px();
+  const double off_line_px =
+      frame.shapes[static_cast<std::size_t>(node)].is_well_seen() ? 0 : kOffLineShare * frame.gate.pitch_px();
   std::int32_t best = -1;
   float most = 0;
-  frame.gate.visit_along(node, astray_px, [&](int row, int column) {
+  frame.gate.visit_along(node, off_line_px, [&](int row, int column) {
     const std::int32_t cell = grid_.at(row, column);
     if (const float nats = window_nats(node, cell); nats > most) best = cell, most = nats;
   });
@@ -107,17 +107,17 @@ void CellProposer::carry_on(const Frame& frame) {
   for (std::size_t i = 0; i < proposals_.size(); ++i) {
     if (proposals_[i].certain) continue;
     const auto node = static_cast<std::int32_t>(i);
-    const bool is_worn = !frame.shapes[i].is_well_seen();  // its centroid may be displaced, and break its links
-    const double astray_px = is_worn ? kAstrayShare * frame.gate.pitch_px() : 0;
+    const bool is_degraded = !frame.shapes[i].is_well_seen();  // its centroid may be displaced, and break its links
+    const double off_line_px = is_degraded ? kOffLineShare * frame.gate.pitch_px() : 0;
     for (const Direction d : kDirections) {
-      const std::int32_t other = is_worn ? frame.nodes[i].links[d] : frame.beside[i][d];
+      const std::int32_t other = is_degraded ? frame.nodes[i].links[d] : frame.beside[i][d];
       if (other < 0) continue;
       const Proposal& from = proposals_[static_cast<std::size_t>(other)];
       const std::int32_t cell = grid_.beyond(from.cell, opposite(d));
       if (cell < 0 || cell == next_[i].cell) continue;
-      if (!frame.gate.admits(node, grid_.row_of(cell), grid_.column_of(cell), astray_px)) continue;
+      if (!frame.gate.admits(node, grid_.row_of(cell), grid_.column_of(cell), off_line_px)) continue;
       Proposal there = weigh(node, cell);
-      if (is_worn && from.certain) there.nats += kBesideCertain;
+      if (is_degraded && from.certain) there.nats += kBesideCertain;
       if (next_[i].cell < 0 || there.nats > next_[i].nats) next_[i] = there;
     }
   }

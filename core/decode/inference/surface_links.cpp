@@ -73,13 +73,13 @@ void SurfaceLinks::measure_slips(const NodesSeen& seen, float least) {
   for (std::size_t i = 0; i < seen.nodes.size(); ++i) {
     for (const Direction d : {kRight, kDown}) {
       const std::int32_t other = seen.beside[i][d];
-      if (other < 0 || seen.nodes[i].torn || seen.nodes[other].torn) continue;
+      if (other < 0 || seen.nodes[i].split || seen.nodes[other].split) continue;
       float most = 0;  // density
       const auto compare = [&](std::int32_t from, Direction way) {
         const Eigen::Vector2f bend = bends_[from][way % 2];
         if (std::isnan(bend.x())) return;
         const std::int32_t behind = seen.beside[from][opposite(way)];
-        if (seen.nodes[behind].torn) return;
+        if (seen.nodes[behind].split) return;
         float before = bends_[behind][way % 2].x();
         if (before * bend.x() < 0) before = 0;  // one displaced symbol bends its neighbours the other way
         const float variance =

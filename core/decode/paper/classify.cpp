@@ -34,16 +34,16 @@ double angle_between(double a, double b) {
   return std::abs(std::remainder(a - b, pi));
 }
 
-bool told_apart_by_direction(const Drawn& a, const Drawn& b) {
+bool differ_in_direction(const Drawn& a, const Drawn& b) {
   return a.carries_direction && b.carries_direction &&
          angle_between(a.shape.orientation_rad, b.shape.orientation_rad) > kSeparationRad;
 }
 
-bool told_apart(const Drawn& a, const Drawn& b) {
+bool are_distinct(const Drawn& a, const Drawn& b) {
   for (std::size_t i = 0; i < kComparedCount; ++i) {
     if (std::abs(a.values[i] - b.values[i]) > kSeparation[i]) return true;
   }
-  return told_apart_by_direction(a, b);
+  return differ_in_direction(a, b);
 }
 
 void limit(LetterThresholds& letter, const Drawn& own, const Drawn& other) {
@@ -53,7 +53,7 @@ void limit(LetterThresholds& letter, const Drawn& own, const Drawn& other) {
     if (other.values[i] < own.values[i] - kSeparation[i]) interval.low = std::max(interval.low, midway);
     if (other.values[i] > own.values[i] + kSeparation[i]) interval.high = std::min(interval.high, midway);
   }
-  if (!told_apart_by_direction(own, other)) return;
+  if (!differ_in_direction(own, other)) return;
   const double midway = angle_between(own.shape.orientation_rad, other.shape.orientation_rad) / 2;
   letter.orientation_margin_rad = std::min(letter.orientation_margin_rad, midway);
 }
@@ -87,7 +87,7 @@ Result<std::vector<LetterThresholds>> make_thresholds(std::span<const int> symbo
     LetterThresholds letter{{}, drawn[own].shape.orientation_rad, pi};
     for (std::size_t other = 0; other < drawn.size(); ++other) {
       if (other == own) continue;
-      if (!told_apart(drawn[own], drawn[other])) {
+      if (!are_distinct(drawn[own], drawn[other])) {
         return fail(ErrorCode::kUnsupported, "symbols " + std::to_string(symbols[own]) + " and " +
                                                  std::to_string(symbols[other]) +
                                                  " have the same shape descriptors; choose others, or leave "

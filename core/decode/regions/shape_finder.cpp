@@ -43,7 +43,7 @@ ShapeFinder::ShapeFinder(const PatternOptions& pattern, ExpectedFrames expected,
       rules_(rules),
       expected_(std::move(expected)),
       binarizer_(binarize_options(pattern, expected_.in_the_middle().scale)),
-      splitter_({.tile_px = binarizer_.options().tile_px}) {
+      separator_({.tile_px = binarizer_.options().tile_px}) {
   const float scale = expected_.in_the_middle().scale;
   meters_.emplace_back(margin_px(pattern.spacing_px, scale), 2 * pitch_px_ * scale);
 }
@@ -88,8 +88,8 @@ GreyView ShapeFinder::binarize_faint(const GreyView& frame, double full, Executo
 void ShapeFinder::find_regions(const GreyView& frame, Executor& executor) {
   region_finder_.find(mask_, regions_, executor);
   if (find_regions_ == Method::kPaper) return;
-  splitter_.split_all(frame, std::max(binarizer_.contrast_min(0), kContrastMin * frame_levels_), regions_,
-                      [this](const Region& region) { return is_too_large(region, scale_at(region)); });
+  separator_.separate_all(frame, std::max(binarizer_.contrast_min(0), kContrastMin * frame_levels_), regions_,
+                          [this](const Region& region) { return is_too_large(region, scale_at(region)); });
 }
 
 float ShapeFinder::scale_at(const Region& region) const {

@@ -13,8 +13,8 @@
 #include "core/decode/regions/binarize.hpp"
 #include "core/decode/regions/find_regions.hpp"
 #include "core/decode/regions/mask.hpp"
+#include "core/decode/regions/separate_regions.hpp"
 #include "core/decode/regions/sharpen.hpp"
-#include "core/decode/regions/split_regions.hpp"
 #include "core/decode/symbols/grey_moments.hpp"
 
 namespace slsd {
@@ -68,7 +68,7 @@ class ShapeFinder {
   Binarizer binarizer_;
   Sharpener sharpener_;
   RegionFinder region_finder_;
-  RegionSplitter splitter_;
+  RegionSeparator separator_;
   std::vector<GreyMomentMeter> meters_;
 
   Mask mask_;

@@ -54,8 +54,8 @@ const Appearance& Appearances::at(std::size_t blur) const {
 }
 
 const Appearance& Appearances::likeliest(std::span<const ShapeFeatures> shapes) const {
-  constexpr std::size_t kTelling = 12;
-  if (shapes.size() < kTelling) return usual_;
+  constexpr std::size_t kSymbolsMin = 12;
+  if (shapes.size() < kSymbolsMin) return usual_;
   static_assert(kShapesMax % kLanes == 0);
   std::array<EightShapes, kShapesMax / kLanes> eights;
   std::array<float, kShapesMax> buffer;

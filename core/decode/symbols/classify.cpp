@@ -17,7 +17,7 @@ constexpr float kDegreesOfFreedom = 4;
 constexpr float kFarthestSquared = 1e5F;  // beyond it all letters are equally unlikely, and floats run out of range
 
 /// Probability that a shape is another letter than the likeliest one, for reasons that the prototypes lack: cut at an
-/// edge, torn, run together, printed on. It grows with the distance from the nearest prototype. Measured on drawn and
+/// edge, split, run together, printed on. It grows with the distance from the nearest prototype. Measured on drawn and
 /// rendered frames: see the table in docs/notes/2026-11-decoder.md.
 constexpr float kDoubtMin = 0.01F, kDoubtMax = 0.5F;
 constexpr float kDoubtFrom = 2, kDoubtSlope = 0.12F;

@@ -12,9 +12,9 @@
 
 namespace slsd {
 
-/// Distance from a letter's prototype, in standard deviations, beyond which a shape is torn: its centre is then
+/// Distance from a letter's prototype, in standard deviations, beyond which a shape is split: its centre is then
 /// unreliable.
-inline constexpr float kTornDistance = 6;
+inline constexpr float kSplitDistance = 6;
 
 /// Probabilities of the letters that a shape may show.
 struct Classification {
@@ -31,7 +31,7 @@ struct Classification {
     constexpr float kWellSeen = 3;  // standard deviations
     return letter >= 0 && distance < kWellSeen;
   }
-  [[nodiscard]] bool is_torn() const { return distance >= kTornDistance; }
+  [[nodiscard]] bool is_split() const { return distance >= kSplitDistance; }
   /// The probability of a letter, 0 to 1, if only letters can be there. It excludes the assumed doubt.
   /// @param even  probability of one letter if all are equally likely
   [[nodiscard]] float share_of(int of_letter, float even) const;

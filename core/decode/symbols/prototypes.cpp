@@ -12,7 +12,7 @@
 
 #include "core/code/symbol.hpp"
 #include "core/decode/regions/find_regions.hpp"
-#include "core/decode/regions/split_regions.hpp"
+#include "core/decode/regions/separate_regions.hpp"
 #include "core/decode/symbols/grey_moments.hpp"
 #include "core/decode/symbols/symbol_view.hpp"
 
@@ -42,8 +42,8 @@ class Observer {
   explicit Observer(const PrototypeOptions& options)
       : cell_px_(static_cast<float>(options.symbol_size_px + options.spacing_px)),
         symbol_px_(static_cast<float>(options.symbol_size_px) * options.camera_px_per_projector_px),
-        splitter_({.tile_px = threshold_tile_px(options.symbol_size_px + options.spacing_px,
-                                                options.camera_px_per_projector_px)}),
+        separator_({.tile_px = threshold_tile_px(options.symbol_size_px + options.spacing_px,
+                                                 options.camera_px_per_projector_px)}),
         meter_(margin_px(options.spacing_px, options.camera_px_per_projector_px)) {}
 
   /// The region nearest to the middle of the view.
@@ -54,7 +54,7 @@ class Observer {
   /// Reads a view again after splitting what ran together in the last look.
   std::optional<Look> look_closer(const SymbolView& view) {
     const float reach = reach_px(view);
-    splitter_.split_all(view.image.view(), kContrastMin, regions_, [&](const Region& region) {
+    separator_.separate_all(view.image.view(), kContrastMin, regions_, [&](const Region& region) {
       return static_cast<float>(std::max(region.width_px(), region.height_px())) > 2 * reach;
     });
     return measure(view);
@@ -87,7 +87,7 @@ class Observer {
 
   float cell_px_, symbol_px_;  // projector px; camera px
   RegionFinder finder_;
-  RegionSplitter splitter_;
+  RegionSeparator separator_;
   GreyMomentMeter meter_;
   Regions regions_;
 };

@@ -235,11 +235,11 @@ void SymbolReview::review_node(const ImageView<T>& frame, const Regions& regions
     const Eigen::Vector2f from_steady = lattice_frame * (prototype.centroid_px - prototype.steady_centroid_px);
     moments.x = moments.steady_x + from_steady.x(), moments.y = moments.steady_y + from_steady.y();
   }
-  const float at_rim =
+  const float at_boundary =
       seen.claims[node].grid_fit == GridFit::kTight ? options_.damaged_distance_on_grid : options_.damaged_distance;
-  if (options_.rules.apply(DecodeRule::kTorn, distance > options_.damaged_distance_held)) {
-    seen.claims[node].decide(DecodeRule::kTorn);
-  } else if (options_.rules.apply(DecodeRule::kUnlikeLetter, distance > at_rim && !is_inside(seen, node))) {
+  if (options_.rules.apply(DecodeRule::kSplit, distance > options_.damaged_distance_held)) {
+    seen.claims[node].decide(DecodeRule::kSplit);
+  } else if (options_.rules.apply(DecodeRule::kUnlikeLetter, distance > at_boundary && !is_inside(seen, node))) {
     seen.claims[node].decide(DecodeRule::kUnlikeLetter);
   }
 }

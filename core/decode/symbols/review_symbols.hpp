@@ -30,7 +30,7 @@ struct ReviewOptions {
   float damaged_distance_on_grid = 4;
   /// The same limit for a symbol among decoded neighbours on all sides. Print and relief disturb its shape, but its
   /// cell is certain; its sigma covers the displacement of its centre.
-  float damaged_distance_held = kTornDistance;
+  float damaged_distance_held = kSplitDistance;
   Rules rules = {};
 };
 

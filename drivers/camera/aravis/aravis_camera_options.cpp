@@ -77,11 +77,11 @@ nanoseconds from_us(double duration_us) {
   return nanoseconds(static_cast<std::int64_t>(duration_us * 1e3));
 }
 
-nanoseconds frame_patience(const AravisCameraOptions& options) {
+nanoseconds frame_timeout(const AravisCameraOptions& options) {
   return milliseconds(options.frame_timeout_ms) + exposure_time(options);
 }
 
-nanoseconds first_frame_patience(const AravisCameraOptions& options, AravisTrigger trigger, int tries_before) {
+nanoseconds first_frame_timeout(const AravisCameraOptions& options, AravisTrigger trigger, int tries_before) {
   const double period_us = trigger == AravisTrigger::kFreeRun && options.rate_hz > 0.0 ? 1e6 / options.rate_hz : 0.0;
   const milliseconds transfer = tries_before == 0 ? kFirstFrame : kLaterFrame;
   return std::min(milliseconds(options.frame_timeout_ms), transfer) + from_us(options.exposure_us + period_us);
@@ -89,7 +89,7 @@ nanoseconds first_frame_patience(const AravisCameraOptions& options, AravisTrigg
 
 nanoseconds first_frame_time_max(const AravisCameraOptions& options) {
   nanoseconds time{0};
-  for (int i = 0; i < kFirstFrameTries; ++i) time += first_frame_patience(options, options.trigger, i);
+  for (int i = 0; i < kFirstFrameTries; ++i) time += first_frame_timeout(options, options.trigger, i);
   return kWaysToOpen * time;
 }
 

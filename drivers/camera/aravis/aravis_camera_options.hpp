@@ -68,7 +68,7 @@ struct AravisCameraOptions {
 
 /// The longest time from the request to the arrival of a frame.
 /// @thread reentrant
-[[nodiscard]] std::chrono::nanoseconds frame_patience(const AravisCameraOptions& options);
+[[nodiscard]] std::chrono::nanoseconds frame_timeout(const AravisCameraOptions& options);
 
 /// The number of streams that are tried until one gives a frame.
 inline constexpr int kFirstFrameTries = 3;
@@ -77,8 +77,8 @@ inline constexpr int kFirstFrameTries = 3;
 /// @param trigger       kFreeRun or kSoftware, depending on how frames are verified
 /// @param tries_before  0 to kFirstFrameTries - 1
 /// @thread reentrant
-[[nodiscard]] std::chrono::nanoseconds first_frame_patience(const AravisCameraOptions& options, AravisTrigger trigger,
-                                                            int tries_before);
+[[nodiscard]] std::chrono::nanoseconds first_frame_timeout(const AravisCameraOptions& options, AravisTrigger trigger,
+                                                           int tries_before);
 
 /// The longest time for all these tries, with chunks and again without.
 /// @thread reentrant

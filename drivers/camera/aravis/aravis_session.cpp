@@ -147,19 +147,19 @@ void AravisSession::read_clock_again() {
 }
 
 bool AravisSession::note_clock() {
-  if (clock_told_ || options_.device_clock == AravisClock::kArrival) return false;
+  if (clock_reported_ || options_.device_clock == AravisClock::kArrival) return false;
   const DeviceClock clock = control_->clock();
   if (!receiver_->goes_by_arrival(clock)) return false;
   warnings_.push_back(device_clock_warning(!clock.was_read()                 ? "cannot be read"
                                            : receiver_->stamps_are_foreign() ? "is not the one that stamps its frames"
                                                                              : clock.fault()));
-  return clock_told_ = true;
+  return clock_reported_ = true;
 }
 
 bool AravisSession::note_fragments() {
-  if (fragments_told_ || !fragments_.seen()) return false;
+  if (fragments_reported_ || !fragments_.seen()) return false;
   warnings_.push_back(fragments_warning(options_.packet_bytes, interface_of(device_.camera.get())));
-  return fragments_told_ = true;
+  return fragments_reported_ = true;
 }
 
 // Software triggers and free run verify the final stream itself. For a line or an action, a command verifies the
@@ -187,7 +187,7 @@ Result<> AravisSession::warm_up(AravisTrigger trigger) {
   for (int i = 0; i < kFirstFrameTries; ++i) {
     if (auto done = i > 0 ? make_stream() : Result<>(); !done) return done;
     if (auto done = start(trigger); !done) return done;
-    const auto first = wait_for_first_frame(trigger, first_frame_patience(options_, trigger, i));
+    const auto first = wait_for_first_frame(trigger, first_frame_timeout(options_, trigger, i));
     if (!first) return tl::unexpected(first.error());
     if (*first == FirstFrame::kCame) return {};
     if (auto done = stop(); !done) return done;

@@ -106,8 +106,8 @@ class AravisSession {
   unsigned long control_lost_handler_ = 0;
   bool abandoned_ = false;
   FragmentWatch fragments_;
-  bool clock_told_ = false;      ///< the clock warning was given
-  bool fragments_told_ = false;  ///< the fragment warning was given
+  bool clock_reported_ = false;      ///< the clock warning was given
+  bool fragments_reported_ = false;  ///< the fragment warning was given
 };
 
 }  // namespace slsd

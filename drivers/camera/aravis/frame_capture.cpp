@@ -73,7 +73,7 @@ std::optional<std::uint64_t> FrameCapture::action_time() const {
 
 // After a pause, waiting frames are old, and the time limit of the frame is over.
 Result<Frame> FrameCapture::capture_since(MonotonicTime since, MonotonicTime deadline) {
-  const auto age_max = std::min(next_frame_age_max(options_), frame_patience(options_) / 2);
+  const auto age_max = std::min(next_frame_age_max(options_), frame_timeout(options_) / 2);
   if (steady_clock::now() - since > age_max) return capture(deadline);
   if (auto may = may_capture(deadline); !may) return tl::unexpected(may.error());
   return await_frame(since, deadline);
@@ -89,7 +89,7 @@ Result<> FrameCapture::settle(MonotonicTime deadline) {
   if (options_.trigger != AravisTrigger::kSoftware) return {};
   if (out_of_step_)
     if (auto quiet = wait_until_quiet(deadline); !quiet) return quiet;
-  const MonotonicTime limit = std::min(deadline, triggered_ + frame_patience(options_));
+  const MonotonicTime limit = std::min(deadline, triggered_ + frame_timeout(options_));
   while (frames_due_ > 0 || !events_.trigger_answered()) {
     const auto wake = frames_due_ > 0 ? events_.wait_buffer(limit) : events_.wait_trigger_answered(limit);
     if (wake == CaptureEvents::Wake::kLost) return lost(events_.lost_reason());
@@ -110,7 +110,7 @@ Result<> FrameCapture::settle(MonotonicTime deadline) {
 // Otherwise, after one frame of an earlier trigger, each capture would get the previous capture's frame for ever.
 Result<> FrameCapture::wait_until_quiet(MonotonicTime deadline) {
   const auto quiet = std::min<std::chrono::nanoseconds>(from_us(options_.exposure_us) + 2 * longest_wait_ + kQuietLeast,
-                                                        frame_patience(options_));
+                                                        frame_timeout(options_));
   for (;;) {
     const auto wake = events_.wait_buffer(std::min(deadline, steady_clock::now() + quiet));
     if (wake == CaptureEvents::Wake::kLost) return lost(events_.lost_reason());
@@ -127,7 +127,7 @@ Result<> FrameCapture::wait_until_quiet(MonotonicTime deadline) {
 Result<Frame> FrameCapture::await_frame(MonotonicTime asked, MonotonicTime deadline, bool was_quiet) {
   const bool paced = options_.trigger != AravisTrigger::kLine;
   MonotonicTime heard = asked;
-  MonotonicTime limit = paced ? std::min(deadline, heard + frame_patience(options_)) : deadline;
+  MonotonicTime limit = paced ? std::min(deadline, heard + frame_timeout(options_)) : deadline;
   for (;;) {
     switch (events_.wait_buffer(limit)) {
       case CaptureEvents::Wake::kCancelled:
@@ -135,14 +135,14 @@ Result<Frame> FrameCapture::await_frame(MonotonicTime asked, MonotonicTime deadl
       case CaptureEvents::Wake::kLost:
         return lost(events_.lost_reason());
       case CaptureEvents::Wake::kTimeout:
-        if (deadline <= limit && steady_clock::now() - heard < frame_patience(options_)) return late();
+        if (deadline <= limit && steady_clock::now() - heard < frame_timeout(options_)) return late();
         return missed(deadline);
       case CaptureEvents::Wake::kBuffer:
         if (auto judged = judge(asked, was_quiet)) return std::move(*judged);
         // Frames timed by arrival are skipped on a slow link, although the camera is present.
         if (!paced || !goes_by_arrival()) continue;
         heard = steady_clock::now();
-        limit = std::min(deadline, heard + frame_patience(options_));
+        limit = std::min(deadline, heard + frame_timeout(options_));
     }
   }
 }

@@ -17,7 +17,7 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr auto kManagersPatience = 5s;  // a window manager may be busy
+constexpr auto kManagersTimeout = 5s;  // a window manager may be busy
 
 std::atomic_flag in_use;  // a process has only one GLFW
 
@@ -140,7 +140,7 @@ bool FullscreenWindow::covers(const DesktopArea& area) const {
 }
 
 bool FullscreenWindow::wait_until_it_covers(unsigned long output, int width_px, int height_px) {
-  const auto deadline = steady_clock::now() + kManagersPatience;
+  const auto deadline = steady_clock::now() + kManagersTimeout;
   while (steady_clock::now() < deadline && !session_.lost()) {
     session_.handle_events();
     const auto area = lit_area(session_.display(), output);

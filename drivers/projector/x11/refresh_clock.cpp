@@ -16,7 +16,7 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr auto kPatience = 5s;  // a busy machine is not an unplugged projector
+constexpr auto kTimeout = 5s;  // a busy machine is not an unplugged projector
 constexpr auto kOldest = 1s;
 constexpr int kRefreshesUntilAFlip = 3;
 
@@ -109,7 +109,7 @@ Result<MonotonicTime> RefreshClock::wait_refresh() {
 Result<MonotonicTime> RefreshClock::wait_begin() {
   const MonotonicTime swapped = steady_clock::now();
   if (events_ == nullptr) return swapped + period_;
-  const auto deadline = swapped + kPatience;
+  const auto deadline = swapped + kTimeout;
   const auto now = refresh_at(0, deadline);
   auto next = now ? refresh_at(now->count + 1, deadline) : std::nullopt;
   const auto shown = next;

@@ -11,9 +11,9 @@ namespace slsd {
 namespace {
 
 constexpr int kLostMax = 5;
-constexpr int kPatienceMs = 10'000;  // network cameras take seconds to open
-constexpr double kLatencyMs = 200;   // covers the image processing of unmeasured projectors
-constexpr int kSkewMs = 10'000;      // the board is still, so exposures need not coincide
+constexpr int kTimeoutMs = 10'000;  // network cameras take seconds to open
+constexpr double kLatencyMs = 200;  // covers the image processing of unmeasured projectors
+constexpr int kSkewMs = 10'000;     // the board is still, so exposures need not coincide
 
 bool only_this_frame(ErrorCode code) {
   return code == ErrorCode::kFrameDropped || code == ErrorCode::kFrameTorn || code == ErrorCode::kFrameStale ||
@@ -21,7 +21,7 @@ bool only_this_frame(ErrorCode code) {
 }
 
 ScanOptions patient(ScanOptions options) {
-  options.timeout_ms = std::max(options.timeout_ms, kPatienceMs);
+  options.timeout_ms = std::max(options.timeout_ms, kTimeoutMs);
   options.exposure_skew_ms = std::max(options.exposure_skew_ms, kSkewMs);
   options.projector_latency_ms = std::max(options.projector_latency_ms, kLatencyMs);
   return options;

@@ -43,7 +43,7 @@ PoseSession::PoseSession(PoseSessionParts parts, const PoseSessionOptions& optio
       sign_centre_px_(0.5 * parts_.source.projector().width_px, 0.5 * parts_.source.projector().height_px) {}
 
 Result<> PoseSession::run() {
-  tell_at_ = parts_.time.now() + options_.patience;
+  tell_at_ = parts_.time.now() + options_.timeout;
   parts_.terminal.say("next: " + parts_.poses.most_helpful());
   while (parts_.poses.size() < options_.poses && !parts_.interrupted()) {
     if (auto gone_on = step(); !gone_on) return gone_on;
@@ -74,7 +74,7 @@ Result<> PoseSession::bear(const Error& error) {
   const MonotonicTime now = parts_.time.now();
   if (!bear_until_) {
     parts_.terminal.say("no pictures: " + to_string(error) + "; trying again");
-    bear_until_ = now + options_.patience;
+    bear_until_ = now + options_.timeout;
   }
   if (now >= *bear_until_) return tl::unexpected(error);
   parts_.time.sleep(options_.retry);
@@ -84,14 +84,14 @@ Result<> PoseSession::bear(const Error& error) {
 void PoseSession::watch_for_board(const BoardSightings& sightings) {
   const MonotonicTime now = parts_.time.now();
   if (is_seen(sightings)) {
-    tell_at_ = now + options_.patience;
+    tell_at_ = now + options_.timeout;
   } else if (now >= tell_at_) {
     parts_.terminal.say(
         fmt::format("no {0} has been seen for {1} s: hold it where the projector lights it and a camera sees it, and "
                     "look whether --{0} names the one you hold{2}",
-                    parts_.poses.subject() == PoseSubject::kBoard ? "board" : "plane", options_.patience.count(),
+                    parts_.poses.subject() == PoseSubject::kBoard ? "board" : "plane", options_.timeout.count(),
                     unseen_text(sightings, parts_.source.cameras())));
-    tell_at_ = now + options_.patience;
+    tell_at_ = now + options_.timeout;
   }
 }
 

@@ -22,9 +22,9 @@ struct PoseSessionOptions {
   std::size_t poses = 12;                         ///< number at which the session ends, including earlier poses
   std::chrono::milliseconds sign{500};            ///< how long a sign is shown
   std::chrono::milliseconds after_refusal{2000};  ///< pause before another attempt with the same board
-  std::chrono::seconds patience{60};     ///< time until advice without a board; or until the end without the devices
+  std::chrono::seconds timeout{60};      ///< time until advice without a board; or until the end without the devices
   std::chrono::milliseconds retry{500};  ///< pause between two attempts with failing devices
-  bool begun = false;                    ///< the devices have given a picture before, so patience applies at once
+  bool begun = false;                    ///< the devices have given a picture before, so timeout applies at once
 };
 
 /// The progress of a session, for displays other than a terminal.
@@ -61,7 +61,7 @@ class PoseSession {
   PoseSession(PoseSessionParts parts, const PoseSessionOptions& options);
 
   /// Runs the session until there are enough poses, or until an interrupt.
-  /// @errors of the recorder; of the devices: at once if they never start, else after their patience; kMismatch: the
+  /// @errors of the recorder; of the devices: at once if they never start, else after their timeout; kMismatch: the
   ///         cameras differ from those of the earlier poses
   [[nodiscard]] Result<> run();
 

@@ -49,9 +49,9 @@ Result<Preparation> prepare(const CalibrateRequest& request) {
   if (request.planes < kPlanesMin || request.planes > kPosesMax) {
     return fail(ErrorCode::kInvalidArgument, fmt::format("must be {} to {}", kPlanesMin, kPosesMax), "--planes");
   }
-  std::ostringstream untold;  // dropped: a running service reports its settings itself
+  std::ostringstream unused_notes;  // dropped: a running service reports its settings itself
   auto configuration =
-      load_configuration_in_force(request.configuration_file, request.socket.empty() ? std::cout : untold);
+      load_configuration_in_force(request.configuration_file, request.socket.empty() ? std::cout : unused_notes);
   if (!configuration) return tl::unexpected(configuration.error());
   auto board = requested_board(request);
   if (!board) return tl::unexpected(board.error());

@@ -18,7 +18,7 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 
 constexpr int kTimeoutMs = 10'000;  // network cameras take seconds to open
-constexpr auto kPatience = 30s;
+constexpr auto kTimeout = 30s;
 constexpr auto kLatency = 200ms;  // covers the image processing of unmeasured projectors
 
 /// Converts the service's error to ours, by its name.
@@ -36,7 +36,7 @@ Error error_of(const json& told) {
 Result<std::unique_ptr<SocketSource>> SocketSource::create(const std::filesystem::path& socket) {
   auto connection = Connection::open(socket);
   if (!connection) return tl::unexpected(connection.error());
-  connection->set_patience(kPatience);
+  connection->set_timeout(kTimeout);
   std::unique_ptr<SocketSource> source(new SocketSource(std::move(*connection)));
   if (auto learnt = source->learn(); !learnt) return tl::unexpected(learnt.error());
   return source;

@@ -201,7 +201,7 @@ TEST(BentBoard, IsDoubtfulIfThePosesDoNotTellIt) {
   BoardReport board{.sheet_mm = {Eigen::Vector2d(0, 0), Eigen::Vector2d(300, 200)}};
   board.bend_mm = 0.5, board.bend_sigma_mm = 0.4;
   EXPECT_FALSE(board.is_bent());
-  EXPECT_FALSE(board.is_told());
+  EXPECT_FALSE(board.is_known());
   EXPECT_THAT(board_warnings(board), testing::ElementsAre(testing::HasSubstr("do not tell whether the board is flat")));
   board.bend_sigma_mm = 0.05;
   EXPECT_TRUE(board.is_bent());

@@ -66,7 +66,7 @@ TEST(NoRepeats, ReachesAlongWholeColumnsIfRowsAreLeftOut) {
   EXPECT_EQ(naive_minimum_distance(*array, false), 3);
 }
 
-TEST(NoRepeats, TellsTurnedWindowsApartToo) {
+TEST(NoRepeats, DistinguishesTurnedWindowsToo) {
   const auto array =
       array_of({.rows = 20, .columns = 30, .letters = 6, .minimum_distance = 2, .half_turn_unique = true});
   ASSERT_TRUE(array) << array.error().message;

@@ -47,40 +47,40 @@ TEST(Rules, GiveEveryStatusButOne) {
 
 TEST(Rules, DecideOnAClaim) {
   CellClaim claim;
-  claim.decide(DecodeRule::kTorn);
+  claim.decide(DecodeRule::kSplit);
   EXPECT_EQ(claim.status, RegionStatus::kDamagedShape);
-  EXPECT_EQ(claim.rule, DecodeRule::kTorn);
-  claim.decide(DecodeRule::kMended);
+  EXPECT_EQ(claim.rule, DecodeRule::kSplit);
+  claim.decide(DecodeRule::kRecovered);
   EXPECT_EQ(claim.status, RegionStatus::kDecoded);
 }
 
 TEST(Rules, GuardsAreKeptWhereTheyHold) {
   CellClaim claim;
-  EXPECT_TRUE(claim.pass(Rules(), DecodeRule::kMendTilted, true));
+  EXPECT_TRUE(claim.pass(Rules(), DecodeRule::kRecoverTilted, true));
   EXPECT_EQ(claim.guard, DecodeRule::kCertain);
-  EXPECT_FALSE(claim.pass(Rules(), DecodeRule::kMendTilted, false));
-  EXPECT_EQ(claim.guard, DecodeRule::kMendTilted);
+  EXPECT_FALSE(claim.pass(Rules(), DecodeRule::kRecoverTilted, false));
+  EXPECT_EQ(claim.guard, DecodeRule::kRecoverTilted);
 }
 
 TEST(Rules, ThatAreLeftOutDoNotApplyButWereMet) {
   RuleTrial trial;
   const Rules rules(&trial);
-  EXPECT_TRUE(rules.apply(DecodeRule::kTorn, true));
-  trial.off.set(static_cast<std::size_t>(DecodeRule::kTorn));
+  EXPECT_TRUE(rules.apply(DecodeRule::kSplit, true));
+  trial.off.set(static_cast<std::size_t>(DecodeRule::kSplit));
   trial.forget();
-  EXPECT_FALSE(rules.apply(DecodeRule::kTorn, false));
-  EXPECT_FALSE(trial.met[static_cast<std::size_t>(DecodeRule::kTorn)]);
-  EXPECT_FALSE(rules.apply(DecodeRule::kTorn, true));
-  EXPECT_TRUE(trial.met[static_cast<std::size_t>(DecodeRule::kTorn)]);
+  EXPECT_FALSE(rules.apply(DecodeRule::kSplit, false));
+  EXPECT_FALSE(trial.met[static_cast<std::size_t>(DecodeRule::kSplit)]);
+  EXPECT_FALSE(rules.apply(DecodeRule::kSplit, true));
+  EXPECT_TRUE(trial.met[static_cast<std::size_t>(DecodeRule::kSplit)]);
   CellClaim claim;
-  trial.off.set(static_cast<std::size_t>(DecodeRule::kMendMoved));
-  EXPECT_TRUE(claim.pass(rules, DecodeRule::kMendMoved, false));
+  trial.off.set(static_cast<std::size_t>(DecodeRule::kRecoverMoved));
+  EXPECT_TRUE(claim.pass(rules, DecodeRule::kRecoverMoved, false));
   EXPECT_EQ(claim.guard, DecodeRule::kCertain);
 }
 
 // What a status says and the rule that a picture shows could part otherwise.
 TEST(Rules, AloneWriteAStatus) {
-  const std::regex writes(R"((claim|claims\[[^=;]*\]|other|adopted|island)\.status = )");
+  const std::regex writes(R"((claim|claims\[[^=;]*\]|other|adopted)\.status = )");
   int files = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(SLSD_SOURCE_DIR "/core/decode")) {
     if (!entry.is_regular_file()) continue;

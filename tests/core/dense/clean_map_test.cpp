@@ -57,26 +57,26 @@ SurfaceSeed seed_at(float x, float y, float depth_mm = 1000) {
   return {{x, y}, {1 / depth_mm, 0, 0}};
 }
 
-TEST(DropIslands, KeepsWhatIsLargeEnough) {
+TEST(DropSmallComponents, KeepsWhatIsLargeEnough) {
   DenseMap map = map_of({"##...#", "##...#", "......", "###..."});
   const std::vector<SurfaceSeed> seeds = {seed_at(0, 0), seed_at(5, 1), seed_at(2.3F, 2.8F)};
-  cleaner().drop_islands(map, 3, seeds);
+  cleaner().drop_small_components(map, 3, seeds);
   EXPECT_EQ(left_of(map), "##....\n##....\n......\n###...\n");
-  EXPECT_EQ(map.pixels[5], DensePixel::kIsland);
+  EXPECT_EQ(map.pixels[5], DensePixel::kSmallComponent);
 }
 
-TEST(DropIslands, AJumpInDepthParts) {
+TEST(DropSmallComponents, AJumpInDepthParts) {
   DenseMap map = map_of({"####22", "####22"});
   const std::vector<SurfaceSeed> seeds = {seed_at(1, 1), seed_at(5, 1, 2000)};
-  cleaner().drop_islands(map, 5, seeds);
+  cleaner().drop_small_components(map, 5, seeds);
   EXPECT_EQ(left_of(map), "####..\n####..\n");
 }
 
-TEST(DropIslands, WhatBearsNoSymbolHasToBeFarLarger) {
+TEST(DropSmallComponents, WhatBearsNoSymbolHasToBeFarLarger) {
   const Drawing rows = {"###############..........", ".........................", "#########################"};
   const auto after = [&](const std::vector<SurfaceSeed>& seeds) {
     DenseMap map = map_of(rows);
-    cleaner().drop_islands(map, 1, seeds);
+    cleaner().drop_small_components(map, 1, seeds);
     return map.measured(0);
   };
   EXPECT_FALSE(after({}));
@@ -84,7 +84,7 @@ TEST(DropIslands, WhatBearsNoSymbolHasToBeFarLarger) {
   EXPECT_FALSE(after({seed_at(7, 0, 2000)})) << "a symbol behind it";
   EXPECT_FALSE(after({seed_at(7, 1), seed_at(7, 2), seed_at(20, 0), seed_at(-3, 0), seed_at(9, 40)})) << "beside it";
   DenseMap map = map_of(rows);
-  cleaner().drop_islands(map, 1, {});
+  cleaner().drop_small_components(map, 1, {});
   EXPECT_TRUE(map.measured(50)) << "25 pixels are enough by themselves";
 }
 
@@ -110,7 +110,7 @@ TEST(Prune, ASmallHoleWithinOneSurfaceIsNoEdge) {
   };
   EXPECT_EQ(after(rows, 3), "########\n#..##.##\n#.###..#\n########\n");
   EXPECT_NE(after(rows, 2), after(rows, 3));
-  // At the map's rim, or between two surfaces, nobody knows what is there.
+  // At the map's border, or between two surfaces, nobody knows what is there.
   EXPECT_EQ(after({"#.####", "######"}, 9), "...###\n#.####\n");
   EXPECT_EQ(after({"#####", "##.##", "#####"}, 9), "#####\n##.##\n#####\n");
   EXPECT_EQ(after({"#####", "##.#2", "#####"}, 9), "####.\n##...\n####.\n") << "the jump alone";
@@ -125,7 +125,7 @@ TEST(Prune, TakesBothSidesOfAJump) {
 
 TEST(DropUnlitRims, KeepsWhatFirmPixelsEnclose) {
   DenseMap map = map_of({"##o##ooo", "##o##ooo", "##o##ooo", "##o##ooo"});
-  cleaner().drop_unlit_rims(map, 1);
+  cleaner().drop_unlit_boundaries(map, 1);
   EXPECT_EQ(left_of(map), "#####...\n#####...\n#####...\n#####...\n");
   EXPECT_EQ(map.pixels[5], DensePixel::kUnlit);
 }
@@ -133,10 +133,10 @@ TEST(DropUnlitRims, KeepsWhatFirmPixelsEnclose) {
 TEST(DropUnlitRims, BridgesTwiceItsReachAcrossWords) {
   const std::string lit(60, '#'), row = lit + "oooooo" + lit, whole(126, '#');
   DenseMap map = map_of({row, row});
-  cleaner().drop_unlit_rims(map, 3);
+  cleaner().drop_unlit_boundaries(map, 3);
   EXPECT_EQ(left_of(map), whole + "\n" + whole + "\n");
   map = map_of({row, row});
-  cleaner().drop_unlit_rims(map, 2);
+  cleaner().drop_unlit_boundaries(map, 2);
   EXPECT_EQ(left_of(map).find('.'), 60U);
 }
 

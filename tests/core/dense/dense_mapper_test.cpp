@@ -155,7 +155,7 @@ TEST(DenseMapper, DrawsNoSurfaceOverAShadow) {
   EXPECT_LT(share(got.unlit, got.measured), 0.001);
 }
 
-/// A strip of wall, too narrow for its symbols to be decoded, beside a column: growth runs off the column's rim there.
+/// A strip of wall, too narrow for its symbols to be decoded, beside a column: growth runs off the column's edge there.
 TEST(DenseMapper, DrawsNoSurfaceThatNoSymbolBears) {
   const auto strip = [](const Ray& ray) -> std::optional<double> {
     const auto wall = plane({0, 0, 2150}, {0, 0, 1})(ray), near = cylinder({40, 0, 1990}, {0, 1, 0}, 40)(ray);

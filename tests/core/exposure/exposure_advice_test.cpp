@@ -114,7 +114,7 @@ TEST(AdviseExposure, KeepsTheExposureShortWhereThingsMove) {
   EXPECT_THAT(advice.setting->gain_db, DoubleNear(13.3, 1.5));
 }
 
-TEST(AdviseExposure, NamesWhatItCannotMend) {
+TEST(AdviseExposure, NamesWhatItCannotCorrect) {
   const Grey8 frame = corpus_frame("16px-5-plane_30");
   const auto troubles = [](const Grey8& image, const std::optional<FrameChange>& change = {}) {
     return advise_exposure(measure_light(image.view(), 255), change, {}, {}).troubles;

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "daemon/scan/heartbeat.hpp"
-#include "daemon/scan/patience.hpp"
+#include "daemon/scan/wait_limit.hpp"
 
 namespace slsd {
 namespace {

@@ -44,9 +44,9 @@ struct Watched {
   }
   /// As the rig does it.
   Result<Frame> end_capture(std::chrono::milliseconds time) {
-    const Patience patience(steady_clock::now() + time);
-    if (!runner->wait_captured(patience, patience.deadline)) runner->cancel_capture();
-    (void)runner->wait_captured(patience, steady_clock::now() + 100ms);
+    const WaitLimit limit(steady_clock::now() + time);
+    if (!runner->wait_captured(limit, limit.deadline)) runner->cancel_capture();
+    (void)runner->wait_captured(limit, steady_clock::now() + 100ms);
     return runner->end_capture();
   }
   void wait_for(DeviceState state) const {

@@ -86,10 +86,10 @@ TEST_F(ScannerTest, FreeRunAfterAPauseTakesNoFrameOfBefore) {
   std::this_thread::sleep_for(100ms);
   // Statistics count a scan a little before its listener hears of it: that cloud would be taken for the first after the
   // pause.
-  const auto all_told = [&] {
+  const auto all_concluded = [&] {
     return clouds + scanner_->totals().skipped == scanner_->rig().camera_statuses().at(0).frames;
   };
-  while (!all_told()) std::this_thread::sleep_for(1ms);
+  while (!all_concluded()) std::this_thread::sleep_for(1ms);
   const std::uint64_t before = clouds;
   const auto resumed = static_cast<std::uint64_t>((steady_clock::now() - start_) / kPeriod);
   scanner_->run_freely(FreeRun{kEveryFrame, {}});

@@ -28,7 +28,7 @@ using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-constexpr auto kPatience = 60s;
+constexpr auto kTimeout = 60s;
 
 std::string request(const std::string& method, int id = 1) {
   return R"({"jsonrpc":"2.0","id":)" + std::to_string(id) + R"(,"method":")" + method + "\"}\n";
@@ -74,7 +74,7 @@ class SessionTest : public ::testing::Test {
     ASSERT_EQ(::send(client_.number(), bytes.data(), bytes.size(), MSG_NOSIGNAL), static_cast<ssize_t>(bytes.size()));
   }
   void run_until(const std::function<bool()>& done) {
-    const auto end = std::chrono::steady_clock::now() + kPatience;
+    const auto end = std::chrono::steady_clock::now() + kTimeout;
     bool is_done = done();
     while (!is_done && std::chrono::steady_clock::now() < end) {
       events_.restart();

@@ -22,7 +22,7 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using ::testing::StartsWith;
 
-constexpr auto kPatience = 120s;
+constexpr auto kTimeout = 120s;
 
 /// Reads the log, or stands still.
 class Reader {
@@ -117,14 +117,14 @@ TEST(LogSink, HoldsNobodyUpAndTellsOnceWhatWasDropped) {
   const std::uint64_t dropped = sink.dropped();
   EXPECT_GE(dropped, kLogged - kLogLinesMax - 1);
   reader.set_reading(true);
-  ASSERT_TRUE(sink.wait_written(kPatience));
+  ASSERT_TRUE(sink.wait_written(kTimeout));
   EXPECT_EQ(sink.dropped(), dropped);
   const auto lines = reader.lines();
   ASSERT_THAT(lines, SizeIs(kLogged - dropped + 1));
   for (std::size_t i = 0; i + 1 < lines.size(); ++i) EXPECT_EQ(lines[i], "> " + std::to_string(i));
   EXPECT_THAT(lines.back(), HasSubstr(std::to_string(dropped) + " lines of the log were dropped here"));
   log_line(sink, "flows again");
-  ASSERT_TRUE(sink.wait_written(kPatience));
+  ASSERT_TRUE(sink.wait_written(kTimeout));
   EXPECT_EQ(reader.lines().back(), "> flows again");
 }
 

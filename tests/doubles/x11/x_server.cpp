@@ -21,7 +21,7 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-constexpr auto kPatience = 30s;
+constexpr auto kTimeout = 30s;
 constexpr int kFirstDisplay = 1000;  // servers that look for a number themselves take the lowest that is free
 constexpr int kDisplays = 50000;
 constexpr int kDisplaysOfAProcess = 16;
@@ -84,7 +84,7 @@ std::string own_display() {
 
 // The number that the server writes when it is ready; empty where it ends or takes too long.
 std::string read_number(int descriptor) {
-  const auto deadline = steady_clock::now() + kPatience;
+  const auto deadline = steady_clock::now() + kTimeout;
   std::string number;
   for (;;) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - steady_clock::now());

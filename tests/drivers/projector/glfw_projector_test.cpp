@@ -34,10 +34,10 @@ using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-constexpr auto kPatience = 30s;
+constexpr auto kTimeout = 30s;
 
 bool eventually(const std::function<bool()>& holds) {
-  for (const auto end = steady_clock::now() + kPatience; steady_clock::now() < end;) {
+  for (const auto end = steady_clock::now() + kTimeout; steady_clock::now() < end;) {
     if (holds()) return true;
     std::this_thread::sleep_for(5ms);
   }

@@ -28,7 +28,7 @@ TEST(DrawSign, LeavesTheBoardLit) {
   }
 }
 
-TEST(DrawSign, TellsThemApart) {
+TEST(DrawSign, DistinguishesThem) {
   EXPECT_NE(draw_sign(Sign::kHold, kProjector, {640, 400}), draw_sign(Sign::kTaken, kProjector, {640, 400}));
   EXPECT_NE(draw_sign(Sign::kAgain, kProjector, {640, 400}), draw_sign(Sign::kTaken, kProjector, {640, 400}));
 }

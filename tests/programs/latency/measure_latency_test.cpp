@@ -102,7 +102,7 @@ TEST(MeasureLatency, RefusesWhereTheLightComesTooLate) {
   DarkRoom room;
   room.late = 290ms;
   LatencyOptions options;
-  options.patience = 100ms;
+  options.timeout = 100ms;
   const auto latency = measure(room, options);
   ASSERT_FALSE(latency);
   EXPECT_EQ(latency.error().code, ErrorCode::kTimeout);

@@ -147,7 +147,7 @@ TEST(LinkGrid, KeepsALinkBetweenTornSymbols) {
     for (const int column : {left - 1, left + 2}) {
       GridNode& node = grid.nodes[grid.node_at(10, column)];
       node.centre_px += moved;
-      node.torn = told;
+      node.split = told;
     }
     GridLinker({}).link(grid.nodes, alone);
     const GridNode& node = grid.nodes[grid.node_at(10, left)];

@@ -33,10 +33,10 @@ class InferCells : public testing::Test {
     shape.distance = distance;
     seen_.shapes.push_back(shape);
   }
-  /// @param slid  columns by which the letters are those of other cells
-  void show_pattern(int top, int left, int bottom, int right, int slid = 0) {
+  /// @param shifted  columns by which the letters are those of other cells
+  void show_pattern(int top, int left, int bottom, int right, int shifted = 0) {
     for (int row = top; row < bottom; ++row)
-      for (int column = left; column < right; ++column) show(row, column, pattern_.array.at(row, column + slid));
+      for (int column = left; column < right; ++column) show(row, column, pattern_.array.at(row, column + shifted));
   }
   void infer() {
     grid_.link_truly();
@@ -45,7 +45,7 @@ class InferCells : public testing::Test {
     seen_.moments.assign(seen_.nodes.size(), {});
     for (GreyMoments& moments : seen_.moments) moments.background = 20, moments.peak = 180;
     if (!seen_.moments.empty()) seen_.moments.back().peak = peak_of_last_;
-    // Each cell where it is at one depth; those of slid letters lie on the same lines.
+    // Each cell where it is at one depth; those of shifted letters lie on the same lines.
     const Calibration rig = paper_rig();
     const RigidTransform& to_projector = rig.cameras[0].projector_from_camera;
     const EpipolarGate lines(rig.cameras[0], rig.projector, 350, 3200);
@@ -104,7 +104,7 @@ TEST_F(InferCells, AcceptsNothingOfRandomLetters) {
   EXPECT_EQ(score().decoded, 0);
 }
 
-TEST_F(InferCells, AcceptsNoIslandOfThreeSymbols) {
+TEST_F(InferCells, AcceptsNoComponentOfThreeSymbols) {
   show_pattern(5, 5, 6, 8);
   infer();
   EXPECT_EQ(score().decoded, 0);

@@ -61,7 +61,7 @@ TEST(LetterEvidence, SaysNothingOfAShapeThatIsNoLetter) {
   EXPECT_EQ(evidence.of(0, 2), 0);
 }
 
-// Amid whole surfaces a torn shape is rare, so it speaks for an edge; print that tore it does not.
+// Amid whole surfaces a split shape is rare, so it speaks for an edge; print that split it does not.
 TEST(LetterEvidence, OfATornShapeSpeaksForAnEdgeUnlessItWasPrintedOn) {
   constexpr int kHigh = 9;
   const CodeArray array = columns_of_letters(kHigh);
@@ -79,16 +79,16 @@ TEST(LetterEvidence, OfATornShapeSpeaksForAnEdgeUnlessItWasPrintedOn) {
   shapes.back().distance = 20;
   std::vector<Aligned> aligned(shapes.size());
   evidence.look_at(shapes, aligned);
-  const std::int32_t torn = kHigh * kLetters - 1;
-  const float before = evidence.of(torn, torn);
-  evidence.measure_torn(beside, labels);
-  EXPECT_LT(evidence.of(torn, torn), before - 1);
+  const std::int32_t split = kHigh * kLetters - 1;
+  const float before = evidence.of(split, split);
+  evidence.measure_split(beside, labels);
+  EXPECT_LT(evidence.of(split, split), before - 1);
   aligned.back() = Aligned::kWhole;
-  EXPECT_EQ(evidence.of(torn, torn), before);
+  EXPECT_EQ(evidence.of(split, split), before);
   aligned.back() = Aligned::kPrinted;
-  EXPECT_EQ(evidence.of(torn, torn), 0) << "what cannot be aligned may be another symbol";
+  EXPECT_EQ(evidence.of(split, split), 0) << "what cannot be aligned may be another symbol";
   aligned.back() = Aligned::kAtEdge;
-  EXPECT_LT(evidence.of(torn, torn), before - 1) << "though its letter could be aligned";
+  EXPECT_LT(evidence.of(split, split), before - 1) << "though its letter could be aligned";
 }
 
 }  // namespace

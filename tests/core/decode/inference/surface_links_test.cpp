@@ -86,7 +86,7 @@ TEST(SurfaceLinks, SpeakAgainstASymbolThatIsDarkerThanThoseBesideIt) {
 
 TEST(SurfaceLinks, KnowNothingOfTornSymbols) {
   Plane plane;
-  plane.grid.nodes[static_cast<std::size_t>(plane.grid.node_at(4, 4))].torn = true;
+  plane.grid.nodes[static_cast<std::size_t>(plane.grid.node_at(4, 4))].split = true;
   plane.shapes[static_cast<std::size_t>(plane.grid.node_at(4, 4))].distance = 20;
   plane.measure();
   for (const Direction d : kDirections) EXPECT_EQ(plane.nats(4, 4, d), 0);

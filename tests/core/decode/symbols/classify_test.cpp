@@ -58,7 +58,7 @@ TEST(Classify, TakesWhatIsNoNumberForTorn) {
     const Classification shape = Classifier(prototypes, kDistanceMax).classify(unknown);
     EXPECT_EQ(shape.letter, -1) << i;
     EXPECT_LT(shape.likelihood, 1e-20F) << i;
-    EXPECT_TRUE(shape.is_torn()) << i;
+    EXPECT_TRUE(shape.is_split()) << i;
   }
 }
 

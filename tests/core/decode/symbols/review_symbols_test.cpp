@@ -153,13 +153,13 @@ TEST_F(ReviewSymbols, TakesTheFramesAroundForOneThatIsOffOnTheGridAlone) {
   for (const GridFit fit : {GridFit::kNone, GridFit::kLoose, GridFit::kTight}) {
     seen_ = {};
     look();
-    const std::size_t at_rim = sighting_at(0, 5);
-    seen_.claims[at_rim].grid_fit = fit;
+    const std::size_t at_boundary = sighting_at(0, 5);
+    seen_.claims[at_boundary].grid_fit = fit;
     // Print has moved the centre of the one below.
     seen_.nodes[sighting_at(1, 5)].centre_px.y() += 0.2F * kPitchPx;
-    linker_.measure_frame(seen_.nodes, std::vector<std::uint8_t>(seen_.size(), 1), at_rim);
+    linker_.measure_frame(seen_.nodes, std::vector<std::uint8_t>(seen_.size(), 1), at_boundary);
     review();
-    EXPECT_EQ(seen_.claims[at_rim].status == RegionStatus::kDecoded, fit != GridFit::kNone);
+    EXPECT_EQ(seen_.claims[at_boundary].status == RegionStatus::kDecoded, fit != GridFit::kNone);
   }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/regions/split_regions.hpp"
+#include "core/decode/regions/separate_regions.hpp"
 
 #include <gmock/gmock.h>
 
@@ -9,7 +9,7 @@
 namespace slsd {
 namespace {
 
-constexpr SplitOptions kOptions{.tile_px = 6};
+constexpr SeparateOptions kOptions{.tile_px = 6};
 constexpr float kContrastMin = 8;
 const auto kEvery = [](const Region&) { return true; };
 const auto kNone = [](const Region&) { return false; };
@@ -57,21 +57,21 @@ TEST(SplitRegions, TakesApartWhatRanTogether) {
   const Grey8 frame = two_run_together();
   Regions regions = regions_of(frame);
   ASSERT_THAT(regions.regions, testing::SizeIs(2));
-  RegionSplitter(kOptions).split_all(frame.view(), kContrastMin, regions, kEvery);
+  RegionSeparator(kOptions).separate_all(frame.view(), kContrastMin, regions, kEvery);
   expect_split(regions);
 }
 
 TEST(SplitRegions, TakesApartSixteenBitsAlike) {
   const Grey8 frame = two_run_together();
   Regions regions = regions_of(frame);
-  RegionSplitter(kOptions).split_all(sixteen_bits(frame).view(), kContrastMin, regions, kEvery);
+  RegionSeparator(kOptions).separate_all(sixteen_bits(frame).view(), kContrastMin, regions, kEvery);
   expect_split(regions);
 }
 
 TEST(SplitRegions, LeavesWhatIsNotMerged) {
   const Grey8 frame = two_run_together();
   Regions regions = regions_of(frame);
-  RegionSplitter(kOptions).split_all(frame.view(), kContrastMin, regions, kNone);
+  RegionSeparator(kOptions).separate_all(frame.view(), kContrastMin, regions, kNone);
   ASSERT_THAT(regions.regions, testing::SizeIs(2));
   EXPECT_EQ(regions.regions[0].area_px, 84);
 }
@@ -82,7 +82,7 @@ TEST(SplitRegions, LeavesWholeWhatTheLevelDoesNotSplit) {
   regions.regions.erase(regions.regions.begin() + 1);
   Grey8 even = frame;
   for (std::size_t i = 0; i < even.size(); ++i) even.data()[i] = even.data()[i] > 50 ? 200 : 10;
-  RegionSplitter(kOptions).split_all(even.view(), kContrastMin, regions, kEvery);
+  RegionSeparator(kOptions).separate_all(even.view(), kContrastMin, regions, kEvery);
   ASSERT_THAT(regions.regions, testing::SizeIs(1));
   EXPECT_EQ(regions.regions[0].area_px, 84);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "drivers/files/picture_apart.hpp"
+#include "drivers/files/picture_process.hpp"
 
 #include <poll.h>
 #include <sys/socket.h>
@@ -27,8 +27,8 @@ using Clock = std::chrono::steady_clock;
 constexpr std::size_t kDecodedBytesMax = 64 << 20;  // 3840x2160 with 48-bit colours
 constexpr std::size_t kLineMax = 1000;
 constexpr std::string_view kDone = "ok";
-constexpr ErrorCode kTold[] = {ErrorCode::kMalformed, ErrorCode::kUnsupported, ErrorCode::kMismatch,
-                               ErrorCode::kInvalidArgument};
+constexpr ErrorCode kAnswered[] = {ErrorCode::kMalformed, ErrorCode::kUnsupported, ErrorCode::kMismatch,
+                                   ErrorCode::kInvalidArgument};
 
 /// A child process, which ends with this object.
 class Process {
@@ -93,8 +93,8 @@ tl::unexpected<Error> fail_died(int status) {
 
 }  // namespace
 
-Result<Grey8> decode_apart(std::string_view png, int width_px, int height_px, Clock::time_point until,
-                           const std::filesystem::path& program) {
+Result<Grey8> decode_in_process(std::string_view png, int width_px, int height_px, Clock::time_point until,
+                                const std::filesystem::path& program) {
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) return fail_system(errno, "no socket");
   const FileDescriptor here(ends[0]);
@@ -147,7 +147,7 @@ Result<Grey8> read_answer(std::string_view answer, int width_px, int height_px) 
         std::memcpy(grey.row(y), pixels.data() + static_cast<std::size_t>(y) * row_bytes, row_bytes);
       return grey;
     }
-    for (const ErrorCode code : kTold) {
+    for (const ErrorCode code : kAnswered) {
       const std::string_view name = to_string(code);
       if (line.starts_with(name) && line.size() > name.size() + 1 && line[name.size()] == ' ' && pixels.empty())
         return fail(code, printable(line.substr(name.size() + 1), kLineMax));

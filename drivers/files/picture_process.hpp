@@ -20,11 +20,11 @@ namespace slsd {
 /// @errors kMalformed: damaged, or its decoder died; kUnsupported: not a PNG file; kMismatch: another size, or 16 bits;
 ///         kInvalidArgument: declares too many pixels; kTimeout; kNotFound: not installed; kIo
 /// @thread reentrant
-[[nodiscard]] Result<Grey8> decode_apart(std::string_view png, int width_px, int height_px,
-                                         std::chrono::steady_clock::time_point until,
-                                         const std::filesystem::path& program);
+[[nodiscard]] Result<Grey8> decode_in_process(std::string_view png, int width_px, int height_px,
+                                              std::chrono::steady_clock::time_point until,
+                                              const std::filesystem::path& program);
 
-/// Decodes the file; slsd-picture calls this. @errors as decode_apart() @thread reentrant
+/// Decodes the file; slsd-picture calls this. @errors as decode_in_process() @thread reentrant
 [[nodiscard]] Result<Grey8> decode_projected(std::string_view png, int width_px, int height_px);
 
 // The messages between the two: a line with "ok", or with an error's code and message; then the pixels, row by row.

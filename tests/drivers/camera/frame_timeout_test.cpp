@@ -23,16 +23,16 @@ AravisCameraOptions slowest() {
   return options;
 }
 
-TEST(FirstFramePatience, IsSecondsBeyondTheExposureAndThePeriodWhereThatPaces) {
+TEST(FirstFrameTimeout, IsSecondsBeyondTheExposureAndThePeriodWhereThatPaces) {
   for (int tries = 0; tries < kFirstFrameTries; ++tries) {
-    EXPECT_LE(first_frame_patience(slowest(), AravisTrigger::kSoftware, tries), 10s + 3s);
-    EXPECT_GE(first_frame_patience(slowest(), AravisTrigger::kSoftware, tries), 10s + 250ms);
-    EXPECT_LE(first_frame_patience(slowest(), AravisTrigger::kFreeRun, tries), 110s + 3s);
-    EXPECT_GE(first_frame_patience(slowest(), AravisTrigger::kFreeRun, tries), 110s + 250ms);
+    EXPECT_LE(first_frame_timeout(slowest(), AravisTrigger::kSoftware, tries), 10s + 3s);
+    EXPECT_GE(first_frame_timeout(slowest(), AravisTrigger::kSoftware, tries), 10s + 250ms);
+    EXPECT_LE(first_frame_timeout(slowest(), AravisTrigger::kFreeRun, tries), 110s + 3s);
+    EXPECT_GE(first_frame_timeout(slowest(), AravisTrigger::kFreeRun, tries), 110s + 250ms);
   }
   AravisCameraOptions quick;
   quick.frame_timeout_ms = 100;
-  EXPECT_EQ(first_frame_patience(quick, AravisTrigger::kSoftware, 2), 110ms);
+  EXPECT_EQ(first_frame_timeout(quick, AravisTrigger::kSoftware, 2), 110ms);
 }
 
 TEST(AravisCamera, TellsHowLongItsOpeningMayTake) {
@@ -41,7 +41,7 @@ TEST(AravisCamera, TellsHowLongItsOpeningMayTake) {
   options.trigger = AravisTrigger::kFreeRun;
   std::chrono::nanoseconds frames{0};
   for (int tries = 0; tries < kFirstFrameTries; ++tries)
-    frames += 2 * first_frame_patience(options, AravisTrigger::kFreeRun, tries);
+    frames += 2 * first_frame_timeout(options, AravisTrigger::kFreeRun, tries);
   EXPECT_GE(AravisCamera(options).open_time_max(), frames + 30s);
 }
 

@@ -20,10 +20,10 @@ namespace slsd {
 /// The limits of a wait for devices: its deadline, what ends it sooner, and who is notified meanwhile. Waits proceed in
 /// steps of at most one second, however far the deadline is.
 /// @thread thread-bound
-struct Patience {
+struct WaitLimit {
   static constexpr std::chrono::milliseconds kStep{1000};
 
-  Patience(MonotonicTime until, std::stop_token ended = {}) : deadline(until), over(std::move(ended)) {}  // NOLINT
+  WaitLimit(MonotonicTime until, std::stop_token ended = {}) : deadline(until), over(std::move(ended)) {}  // NOLINT
 
   MonotonicTime deadline;
   std::stop_token over;                               ///< requested: nobody waits any more

@@ -9,7 +9,7 @@
 
 #include <gmock/gmock.h>
 
-#include "core/decode/centres/mend_symbols.hpp"
+#include "core/decode/centres/recover_symbols.hpp"
 #include "core/decode/grid/cell_rays.hpp"
 #include "core/geometry/epipolar_gate.hpp"
 #include "tests/core/decode/decoded_scene.hpp"
@@ -17,11 +17,11 @@
 
 namespace slsd::test {
 
-/// A plane that is seen whole: five symbols by five, each known but for the one in their middle, which is worn.
-class MendedPlane : public testing::Test {
+/// A plane that is seen whole: five symbols by five, each known but for the one in their middle, which is degraded.
+class RecoveredPlane : public testing::Test {
  protected:
-  static constexpr int kSide = 5, kRow = 20, kColumn = 30, kWorn = kSide * kSide / 2;
-  MendedPlane()
+  static constexpr int kSide = 5, kRow = 20, kColumn = 30, kDegraded = kSide * kSide / 2;
+  RecoveredPlane()
       : pattern_(shipped_pattern("16px-5.toml")),
         rig_(paper_rig()),
         frame_(simulate(draw_pattern(pattern_), rig_, kTilted, {.dark = 12, .lit = 170, .noise_sigma = 1})),
@@ -53,9 +53,9 @@ class MendedPlane : public testing::Test {
       }
     }
     // A centroid that has gone with what is missing.
-    seen_.claims[kWorn].status = RegionStatus::kDamagedShape;
-    seen_.moments[kWorn].x += 2, seen_.moments[kWorn].y -= 3;
-    seen_.nodes[kWorn].centre_px += Eigen::Vector2f(2, -3);
+    seen_.claims[kDegraded].status = RegionStatus::kDamagedShape;
+    seen_.moments[kDegraded].x += 2, seen_.moments[kDegraded].y -= 3;
+    seen_.nodes[kDegraded].centre_px += Eigen::Vector2f(2, -3);
   }
 
   [[nodiscard]] Eigen::Vector2f true_centre(int row, int column) const {
@@ -64,10 +64,11 @@ class MendedPlane : public testing::Test {
     return camera_from_projector(square, rig_, kTilted)->cast<float>();
   }
 
-  /// Multiplies the grey values of the worn symbol's cell by share(x, y), projector px from the middle of its square.
+  /// Multiplies the grey values of the degraded symbol's cell by share(x, y), projector px from the middle of its
+  /// square.
   void print(const std::function<double(double, double)>& share) {
     const Eigen::Vector2f centre = true_centre(kSide / 2, kSide / 2);
-    const Eigen::Matrix2f inverse = seen_.nodes[kWorn].frame.inverse();
+    const Eigen::Matrix2f inverse = seen_.nodes[kDegraded].frame.inverse();
     for (int y = -14; y <= 14; ++y) {
       for (int x = -14; x <= 14; ++x) {
         const int u = static_cast<int>(std::lround(centre.x())) + x, v = static_cast<int>(std::lround(centre.y())) + y;
@@ -89,18 +90,18 @@ class MendedPlane : public testing::Test {
     const CellGate gate(cells_, segments_, 1.5);
     return look(LetterScene{view, 255, noise, letters_->at(blur_px_), gate, prototypes_, seen_});
   }
-  [[nodiscard]] std::vector<std::int32_t> mend_all() {
+  [[nodiscard]] std::vector<std::int32_t> recover_all() {
     return look([&](const LetterScene& scene) -> std::vector<std::int32_t> {
-      return SymbolMender(pattern_, letters_).mend(scene);
+      return SymbolRecovery(pattern_, letters_).recover(scene);
     });
   }
-  /// How far off the symbol is then, camera px; nothing where it is not mended.
-  std::optional<float> mend() {
-    const auto mended = mend_all();
-    if (mended.empty()) return std::nullopt;
-    EXPECT_THAT(mended, testing::ElementsAre(static_cast<std::int32_t>(kWorn)));
-    EXPECT_EQ(seen_.claims[kWorn].status, RegionStatus::kDecoded);
-    const GreyMoments& moments = seen_.moments[kWorn];
+  /// How far off the symbol is then, camera px; nothing where it is not recovered.
+  std::optional<float> recover() {
+    const auto recovered = recover_all();
+    if (recovered.empty()) return std::nullopt;
+    EXPECT_THAT(recovered, testing::ElementsAre(static_cast<std::int32_t>(kDegraded)));
+    EXPECT_EQ(seen_.claims[kDegraded].status, RegionStatus::kDecoded);
+    const GreyMoments& moments = seen_.moments[kDegraded];
     return (Eigen::Vector2f(moments.x, moments.y) - true_centre(kSide / 2, kSide / 2)).norm();
   }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/regions/split_regions.hpp"
+#include "core/decode/regions/separate_regions.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -14,7 +14,7 @@ constexpr float kNone = std::numeric_limits<float>::lowest();
 }  // namespace
 
 /// Appends the parts of a region, one or more, and empties it. Leaves the region alone if nothing separates it.
-void RegionSplitter::split(const GreyView& frame, float contrast_min, std::size_t index, Regions& regions) {
+void RegionSeparator::split(const GreyView& frame, float contrast_min, std::size_t index, Regions& regions) {
   const Region region = regions.regions[index];
   std::visit([&](const auto& view) { find_parts(view, region, regions.runs_of(region), contrast_min); }, frame);
   if (parts_.regions.empty()) return;
@@ -24,14 +24,14 @@ void RegionSplitter::split(const GreyView& frame, float contrast_min, std::size_
 }
 
 template <class Visit>
-void RegionSplitter::visit_around(int column, int row, Visit&& visit) const {
+void RegionSeparator::visit_around(int column, int row, Visit&& visit) const {
   for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows_ - 1); ++r) {
     for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns_ - 1); ++c) visit(r * columns_ + c);
   }
 }
 
 template <class T>
-void RegionSplitter::measure_tiles(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
+void RegionSeparator::measure_tiles(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
   const int tile = options_.tile_px;
   columns_ = (region.width_px() + tile - 1) / tile, rows_ = (region.height_px() + tile - 1) / tile;
   tiles_.assign(static_cast<std::size_t>(columns_) * rows_, {std::numeric_limits<float>::max(), kNone});
@@ -50,7 +50,7 @@ void RegionSplitter::measure_tiles(const ImageView<T>& frame, const Region& regi
 }
 
 /// Sets thresholds as binarize does: midway within 3x3 tiles, then the mean of 3x3 of these.
-void RegionSplitter::set_thresholds(float contrast_min) {
+void RegionSeparator::set_thresholds(float contrast_min) {
   midway_.assign(tiles_.size(), kNone);
   threshold_.assign(tiles_.size(), 0);
   for (int row = 0; row < rows_; ++row) {
@@ -79,7 +79,7 @@ void RegionSplitter::set_thresholds(float contrast_min) {
 
 /// Lights pixels above the thresholds, interpolated between the tiles' centres.
 template <class T>
-void RegionSplitter::compare(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
+void RegionSeparator::compare(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
   const auto tile = static_cast<float>(options_.tile_px);
   mask_.clear(region.width_px(), region.height_px());
   line_.resize(columns_ + 1);
@@ -110,8 +110,8 @@ void RegionSplitter::compare(const ImageView<T>& frame, const Region& region, st
 }
 
 template <class T>
-void RegionSplitter::find_parts(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
-                                float contrast_min) {
+void RegionSeparator::find_parts(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
+                                 float contrast_min) {
   measure_tiles(frame, region, runs);
   set_thresholds(contrast_min);
   compare(frame, region, runs);
@@ -127,7 +127,7 @@ void RegionSplitter::find_parts(const ImageView<T>& frame, const Region& region,
   }
 }
 
-template void RegionSplitter::find_parts(const ImageView<std::uint8_t>&, const Region&, std::span<const Run>, float);
-template void RegionSplitter::find_parts(const ImageView<std::uint16_t>&, const Region&, std::span<const Run>, float);
+template void RegionSeparator::find_parts(const ImageView<std::uint8_t>&, const Region&, std::span<const Run>, float);
+template void RegionSeparator::find_parts(const ImageView<std::uint16_t>&, const Region&, std::span<const Run>, float);
 
 }  // namespace slsd

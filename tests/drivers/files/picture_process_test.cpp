@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "drivers/files/picture_apart.hpp"
+#include "drivers/files/picture_process.hpp"
 
 #include <sys/wait.h>
 
@@ -21,11 +21,11 @@ using namespace std::chrono_literals;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr auto kPatience = 60s;
+constexpr auto kTimeout = 60s;
 
 Result<Grey8> decode(std::string_view png, int width_px, int height_px) {
-  return decode_apart(png, width_px, height_px, std::chrono::steady_clock::now() + kPatience,
-                      find_own_program("slsd-picture"));
+  return decode_in_process(png, width_px, height_px, std::chrono::steady_clock::now() + kTimeout,
+                           find_own_program("slsd-picture"));
 }
 
 Grey8 noise(int width_px, int height_px) {
@@ -37,12 +37,12 @@ Grey8 noise(int width_px, int height_px) {
   return image;
 }
 
-TEST(DecodeApart, GivesThePixels) {
+TEST(DecodeInProcess, GivesThePixels) {
   const Grey8 image = noise(1280, 800);  // larger than what a socket holds, both ways
   EXPECT_EQ(decode(*encode_png(image), 1280, 800), image);
 }
 
-TEST(DecodeApart, NamesWhatIsNoPictureForTheProjector) {
+TEST(DecodeInProcess, NamesWhatIsNoPictureForTheProjector) {
   const std::string png = *encode_png(noise(40, 30));
   const auto other = decode(png, 50, 30);
   ASSERT_FALSE(other);
@@ -53,7 +53,7 @@ TEST(DecodeApart, NamesWhatIsNoPictureForTheProjector) {
   EXPECT_EQ(decode("", 40, 30).error().code, ErrorCode::kUnsupported);
 }
 
-TEST(DecodeApart, SurvivesEveryDamage) {
+TEST(DecodeInProcess, SurvivesEveryDamage) {
   const std::string png = test::png_bytes(test::samples_of(noise(9, 7)));
   for (std::size_t size = 8; size < png.size(); size += 7)
     EXPECT_EQ(decode(png.substr(0, size), 9, 7).error().code, ErrorCode::kMalformed);
@@ -65,10 +65,10 @@ TEST(DecodeApart, SurvivesEveryDamage) {
 /// What may stand in the place of slsd-picture once somebody has taken it over.
 class HostileProgram : public ::testing::Test {
  protected:
-  Result<Grey8> decode_by(const std::string& script, std::chrono::milliseconds time = kPatience) {
+  Result<Grey8> decode_by(const std::string& script, std::chrono::milliseconds time = kTimeout) {
     const auto program = folder_.write("program", "#!/bin/sh\n" + script + "\n");
     std::filesystem::permissions(program, std::filesystem::perms::owner_all);
-    return decode_apart(std::string(1 << 20, 'x'), 4, 3, std::chrono::steady_clock::now() + time, program);
+    return decode_in_process(std::string(1 << 20, 'x'), 4, 3, std::chrono::steady_clock::now() + time, program);
   }
 
   void TearDown() override {
@@ -120,8 +120,9 @@ TEST_F(HostileProgram, MayAnswerBeforeItHasReadAll) {
   }());
 }
 
-TEST(DecodeApart, ThatIsNotInstalledIsNamed) {
-  const auto missing = decode_apart("x", 4, 3, std::chrono::steady_clock::now() + kPatience, "/nowhere/slsd-picture");
+TEST(DecodeInProcess, ThatIsNotInstalledIsNamed) {
+  const auto missing =
+      decode_in_process("x", 4, 3, std::chrono::steady_clock::now() + kTimeout, "/nowhere/slsd-picture");
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().code, ErrorCode::kNotFound);
   EXPECT_THAT(to_string(missing.error()), HasSubstr("/nowhere/slsd-picture: is not installed"));

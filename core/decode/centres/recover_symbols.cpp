@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/decode/centres/mend_symbols.hpp"
+#include "core/decode/centres/recover_symbols.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -31,60 +31,61 @@ constexpr float kDoubtfulDistance = 2.5F, kDoubtfulAcrossPx = 0.25F, kSupportGoo
 /// Largest ratio of a printed symbol's light to its neighbours' light: print absorbs light.
 constexpr float kPrintedLightMax = 1.2F;
 
-bool is_worn(const CellGate& gate, const Sightings& seen, std::int32_t node) {
+bool is_degraded(const CellGate& gate, const Sightings& seen, std::int32_t node) {
   const CellClaim& claim = seen.claims[node];
   if (!claim.named() || is_aligned(seen.aligned[node])) return false;
   if (claim.status != RegionStatus::kDecoded) return claim.status == RegionStatus::kDamagedShape;
   return seen.misfits[node] > kDoubtfulDistance || gate.off_line_px(node, claim.row, claim.column) > kDoubtfulAcrossPx;
 }
 
-/// Mends the links of a symbol that lies at the place its holders predict.
-void mend_links(Sightings& seen, std::int32_t node) {
+/// Restores the links of a symbol that lies at the place its supporters predict.
+void restore_links(Sightings& seen, std::int32_t node) {
   for (const Direction d : kDirections)
-    if (const std::int32_t other = holder_of(seen, node, d); other >= 0)
+    if (const std::int32_t other = supporter_of(seen, node, d); other >= 0)
       seen.nodes[node].broken[d] = seen.nodes[other].broken[opposite(d)] = false;
 }
 
-/// Tells whether the camera sees the symbol's centre. Another surface may hide it, and few holders make that likelier:
-/// the less of the patch agrees, the more of its middle has to agree. With more holders, pixels that print darkens do
-/// not count.
+/// Tells whether the camera sees the symbol's centre. Another surface may hide it, and few supporters make that
+/// likelier: the less of the patch agrees, the more of its middle has to agree. With more supporters, pixels that print
+/// darkens do not count.
 bool shows_centre(const AskedLetter& asked, const LightShares& middle) {
   constexpr float kMiddleMin = 0.67F, kBothBesideFewMin = 1.45F;
-  if (asked.place.held_by > kFewHolders) return middle.agree_beside_print() >= kMiddleMin;
+  if (asked.place.supported_by > kFewSupporters) return middle.agree_beside_print() >= kMiddleMin;
   return middle.agree >= kMiddleMin && asked.task.support + middle.agree >= kBothBesideFewMin;
 }
 
 }  // namespace
 
-SymbolMender::SymbolMender(const Pattern& pattern, const std::shared_ptr<const LetterFields>& letters, Rules rules)
+SymbolRecovery::SymbolRecovery(const Pattern& pattern, const std::shared_ptr<const LetterFields>& letters, Rules rules)
     : pitch_px_(static_cast<float>(pattern.pitch_px())), rules_(rules), aligner_(pattern, letters) {}
 
-void SymbolMender::ask_all(const LetterScene& scene) {
+void SymbolRecovery::ask_all(const LetterScene& scene) {
   to_ask_.clear();
   for (std::size_t i = 0; i < scene.seen.size(); ++i)
-    if (const auto node = static_cast<std::int32_t>(i); is_worn(scene.gate, scene.seen, node)) to_ask_.push_back(node);
+    if (const auto node = static_cast<std::int32_t>(i); is_degraded(scene.gate, scene.seen, node))
+      to_ask_.push_back(node);
 }
 
-/// Queues the neighbours of the mended symbols, from the given one on.
-void SymbolMender::ask_beside(const LetterScene& scene, std::size_t first) {
+/// Queues the neighbours of the recovered symbols, from the given one on.
+void SymbolRecovery::ask_beside(const LetterScene& scene, std::size_t first) {
   to_ask_.clear();
-  for (std::size_t i = first; i < mended_.size(); ++i) {
-    for (const std::int32_t other : scene.seen.nodes[mended_[i]].links)
-      if (other >= 0 && is_worn(scene.gate, scene.seen, other)) to_ask_.push_back(other);
+  for (std::size_t i = first; i < recovered_.size(); ++i) {
+    for (const std::int32_t other : scene.seen.nodes[recovered_[i]].links)
+      if (other >= 0 && is_degraded(scene.gate, scene.seen, other)) to_ask_.push_back(other);
   }
   std::ranges::sort(to_ask_);
   to_ask_.erase(std::unique(to_ask_.begin(), to_ask_.end()), to_ask_.end());
 }
 
 /// Tells whether the letter settled near its predicted place, and on its line.
-bool SymbolMender::lies_there(Sightings& seen, const AskedLetter& asked) const {
+bool SymbolRecovery::lies_there(Sightings& seen, const AskedLetter& asked) const {
   const PatchTask& task = asked.task;
   CellClaim& claim = seen.claims[asked.node];
-  const bool lone = asked.place.held_by < kFewHolders;
+  const bool lone = asked.place.supported_by < kFewSupporters;
   const bool settled = !task.failed && std::abs(task.moved) <= kAlignedSettledPx;
-  if (!claim.pass(rules_, DecodeRule::kMendUnsettled, settled) || task.failed) return false;
+  if (!claim.pass(rules_, DecodeRule::kRecoverUnsettled, settled) || task.failed) return false;
   const float across_max_px = lone ? kLoneAcrossMaxPx : kAlignedAcrossMaxPx;
-  if (!claim.pass(rules_, DecodeRule::kMendOffLine, std::abs(task.state.across) <= across_max_px)) return false;
+  if (!claim.pass(rules_, DecodeRule::kRecoverOffLine, std::abs(task.state.across) <= across_max_px)) return false;
   const auto lies_near = [&] {
     if (std::abs(task.state.disparity) > (lone ? kLoneMovedMax : kMovedMax) * pitch_px_) return false;
     // An extreme tilt can put the letter anywhere.
@@ -93,29 +94,29 @@ bool SymbolMender::lies_there(Sightings& seen, const AskedLetter& asked) const {
     const GridNode& node = seen.nodes[asked.node];
     return (node.frame.inverse() * (asked.centre_px - node.centre_px)).norm() < kMovedMax * pitch_px_;
   };
-  if (!claim.pass(rules_, DecodeRule::kMendMoved, lies_near())) return false;
+  if (!claim.pass(rules_, DecodeRule::kRecoverMoved, lies_near())) return false;
   const float noise_px = kTiltSigmas * task.noise * std::sqrt(task.variance);
   const float beside_more_px =
-      asked.place.held_by > kFewHolders ? std::hypot(kAlignedTiltMaxPx, noise_px) : kTiltBesideFewMaxPx;
-  return claim.pass(rules_, DecodeRule::kMendTilted, asked.tilt_px <= (lone ? kLoneTiltMaxPx : beside_more_px));
+      asked.place.supported_by > kFewSupporters ? std::hypot(kAlignedTiltMaxPx, noise_px) : kTiltBesideFewMaxPx;
+  return claim.pass(rules_, DecodeRule::kRecoverTilted, asked.tilt_px <= (lone ? kLoneTiltMaxPx : beside_more_px));
 }
 
-bool SymbolMender::shows_letter(const LetterScene& scene, const AskedLetter& asked) const {
+bool SymbolRecovery::shows_letter(const LetterScene& scene, const AskedLetter& asked) const {
   CellClaim& claim = scene.seen.claims[asked.node];
-  const bool lone = asked.place.held_by < kFewHolders;
+  const bool lone = asked.place.supported_by < kFewSupporters;
   const bool shows = shows_centre(asked, aligner_.shares_of_middle(scene, asked));
-  if (!claim.pass(rules_, DecodeRule::kMendHidden, shows)) return false;
+  if (!claim.pass(rules_, DecodeRule::kRecoverHidden, shows)) return false;
   float support = asked.task.support;
-  if (lone || (asked.place.held_by > kFewHolders && support < kSupportGood))
+  if (lone || (asked.place.supported_by > kFewSupporters && support < kSupportGood))
     support = aligner_.support_beside_print(scene, asked);
   const float of_more = claim.status == RegionStatus::kDecoded ? kSupportGood : kWholeSupportMin;
-  return claim.pass(rules_, DecodeRule::kMendUnlike, support >= (lone ? kLoneSupportMin : of_more));
+  return claim.pass(rules_, DecodeRule::kRecoverUnlike, support >= (lone ? kLoneSupportMin : of_more));
 }
 
-void SymbolMender::mend_asked(const LetterScene& scene) {
+void SymbolRecovery::recover_asked(const LetterScene& scene) {
   aligner_.clear();
   for (const std::int32_t node : to_ask_)
-    if (const LetterPlace place = place_by_neighbours(scene.seen, node); place.held_by > 0)
+    if (const LetterPlace place = place_by_neighbours(scene.seen, node); place.supported_by > 0)
       aligner_.ask(scene, node, place);
   for (const AskedLetter& asked : aligner_.asked()) {
     if (scene.seen.shapes[asked.node].is_well_seen()) continue;
@@ -125,27 +126,27 @@ void SymbolMender::mend_asked(const LetterScene& scene) {
     if (!brighter && !aligner_.shows_other_light(scene, asked)) scene.seen.aligned[asked.node] = Aligned::kPrinted;
   }
   aligner_.align(scene);
-  // Check all before mending any, so that their order has no effect.
+  // Check all before any is recovered, so that their order has no effect.
   std::erase_if(aligner_.asked(), [&](const AskedLetter& asked) {
     return !lies_there(scene.seen, asked) || !shows_letter(scene, asked);
   });
   for (const AskedLetter& asked : aligner_.asked()) {
     aligner_.take_over(scene, asked);
-    mend_links(scene.seen, asked.node);
-    mended_.push_back(asked.node);
+    restore_links(scene.seen, asked.node);
+    recovered_.push_back(asked.node);
   }
 }
 
-const std::vector<std::int32_t>& SymbolMender::mend(const LetterScene& scene) {
-  mended_.clear();
+const std::vector<std::int32_t>& SymbolRecovery::recover(const LetterScene& scene) {
+  recovered_.clear();
   ask_all(scene);
   while (!to_ask_.empty()) {
-    const std::size_t before = mended_.size();
-    mend_asked(scene);
+    const std::size_t before = recovered_.size();
+    recover_asked(scene);
     ask_beside(scene, before);
   }
-  std::ranges::sort(mended_);
-  return mended_;
+  std::ranges::sort(recovered_);
+  return recovered_;
 }
 
 }  // namespace slsd

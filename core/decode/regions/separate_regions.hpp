@@ -10,7 +10,7 @@
 
 namespace slsd {
 
-struct SplitOptions {
+struct SeparateOptions {
   /// Side of a tile in camera pixels, as for binarize.
   int tile_px = 12;
   /// Threshold's place between the least and the greatest grey value of the region's pixels nearby.
@@ -23,15 +23,15 @@ struct SplitOptions {
 /// background and everything on it is bright. The splitter computes new thresholds from the region's own pixels, tile
 /// by tile. So darkness beside the region has no influence, and light may fall off over it.
 /// @thread thread-bound: keeps its buffers
-class RegionSplitter {
+class RegionSeparator {
  public:
-  explicit RegionSplitter(SplitOptions options) : options_(options) {}
+  explicit RegionSeparator(SeparateOptions options) : options_(options) {}
 
   /// Splits every `merged` region, and its parts as long as they are merged.
   /// @param contrast_min  smallest difference between light and dark inside a region, levels of the frame
   /// @param merged        bool(const Region&)
   template <class Merged>
-  void split_all(const GreyView& frame, float contrast_min, Regions& regions, Merged&& merged) {
+  void separate_all(const GreyView& frame, float contrast_min, Regions& regions, Merged&& merged) {
     suspects_.clear();
     const auto suspect_from = [&](std::size_t first) {
       for (std::size_t i = first; i < regions.regions.size(); ++i)
@@ -65,7 +65,7 @@ class RegionSplitter {
   template <class Visit>
   void visit_around(int column, int row, Visit&& visit) const;
 
-  SplitOptions options_;
+  SeparateOptions options_;
   int columns_ = 0, rows_ = 0;  // number of tiles
   std::vector<TileRange> tiles_;
   std::vector<float> midway_, threshold_, line_;
