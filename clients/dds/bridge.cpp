@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 #include <slsd/scanner.hpp>
 
+#include "core/calibration_file/calibration_file.hpp"
 #include "description.hpp"
 #include "drivers/files/file.hpp"
 #include "endpoints.hpp"

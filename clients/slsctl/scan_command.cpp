@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
 #include <ostream>
 
 #include "clients/slsctl/client_commands.hpp"
 #include "clients/slsctl/output.hpp"
 #include "clients/slsctl/progress.hpp"
 #include "clients/slsctl/report.hpp"
+#include "core/cloud/dense_file.hpp"
 #include "core/cloud/pcd.hpp"
 #include "core/cloud/ply.hpp"
 #include "daemon/rpc/message.hpp"
@@ -24,71 +22,23 @@ using std::filesystem::path;
 // Every other pixel of an organised cloud forms the lattice of the picture.
 constexpr int kPictureStep = 2;
 
-// A record of an organised cloud: x y z sigma_mm intensity as floats, camera as a byte, a normal.
-constexpr std::size_t kIntensityAt = 16, kCameraAt = 20;
-
-std::size_t record_bytes(bool normals) {
-  return normals ? 33 : 21;
+DenseFacts facts_of(const json& result, bool normals) {
+  return {.scan_id = result.value("scan", ""),
+          .time = result.value("time", ""),
+          .frame = result.value("frame", std::uint64_t{0}),
+          .normals = normals};
 }
 
-float float_at(const char* bytes) {
-  float value;
-  std::memcpy(&value, bytes, sizeof value);
-  return value;
+Result<DensePcd> pixels_of(const json& result, std::string_view bytes, bool normals) {
+  return DensePcd::open(bytes, result.value("height_px", 0), normals);
 }
 
-Result<Cloud> lattice_of_pixels(const json& result, std::string_view pcd, bool normals) {
-  const std::size_t data = pcd.find("\nDATA binary\n"), record = record_bytes(normals);
-  const auto field = [&](std::string_view key) {
-    const std::size_t at = pcd.find(key);
-    return at >= data ? 0 : std::atoi(pcd.data() + at + key.size());
-  };
-  const int width = field("\nWIDTH "), height = result.value("height_px", 0);
-  const std::size_t begin = data + 13, needed = record * static_cast<std::size_t>(width) * height;
-  if (data == std::string_view::npos || width <= 0 || height <= 0 || pcd.size() - begin < needed)
-    return fail(ErrorCode::kMalformed, "the service's cloud is not organised as its pixels are");
-  Cloud cloud;
-  cloud.lattice_columns = (width + kPictureStep - 1) / kPictureStep;
-  cloud.lattice_rows = (height + kPictureStep - 1) / kPictureStep;
+Result<Cloud> lattice_of_pixels(const json& result, std::string_view bytes, bool normals) {
+  const auto pixels = pixels_of(result, bytes, normals);
+  if (!pixels) return tl::unexpected(pixels.error());
+  Cloud cloud = pixels->lattice(kPictureStep);
   cloud.scan_id = result.value("scan", ""), cloud.time = result.value("time", "");
-  for (int y = 0; y < height; y += kPictureStep) {
-    for (int x = 0; x < width; x += kPictureStep) {
-      const char* from = pcd.data() + begin + record * (static_cast<std::size_t>(y) * width + x);
-      CloudPoint point;
-      point.x = float_at(from), point.y = float_at(from + 4), point.z = float_at(from + 8);
-      if (!(point.z > 0)) continue;
-      point.column = static_cast<std::uint16_t>(x / kPictureStep);
-      point.row = static_cast<std::uint16_t>(y / kPictureStep);
-      point.intensity = static_cast<std::uint8_t>(float_at(from + kIntensityAt));
-      cloud.points.push_back(point);
-    }
-  }
   return cloud;
-}
-
-// The existing points of an organised cloud as a PLY, whose intensity is a byte.
-std::string dense_ply_of(const json& result, std::string_view pcd, bool normals) {
-  const std::size_t begin = pcd.find("\nDATA binary\n") + 13, record = record_bytes(normals);
-  std::string points;
-  std::size_t count = 0;
-  for (std::size_t at = begin; at + record <= pcd.size(); at += record) {
-    const std::string_view from = pcd.substr(at, record);
-    if (std::isnan(float_at(from.data() + 8))) continue;
-    points.append(from.substr(0, kIntensityAt));
-    points += static_cast<char>(static_cast<std::uint8_t>(float_at(from.data() + kIntensityAt)));
-    points.append(from.substr(kCameraAt));
-    ++count;
-  }
-  std::string ply = "ply\nformat binary_little_endian 1.0\ncomment scan_id " + result.value("scan", "") +
-                    "\ncomment time " + result.value("time", "") + "\ncomment frame " +
-                    std::to_string(result.value("frame", std::uint64_t{0})) +
-                    "\ncomment units mm\ncomment coordinate_frame rig: the first camera's, x right, y down, z forward\n"
-                    "element vertex " +
-                    std::to_string(count) +
-                    "\nproperty float x\nproperty float y\nproperty float z\nproperty float sigma_mm\nproperty uchar "
-                    "intensity\nproperty uchar camera\n";
-  if (normals) ply += "property float nx\nproperty float ny\nproperty float nz\n";
-  return ply + "end_header\n" + points;
 }
 
 tl::expected<void, Failure> write_cloud_picture(const path& file, const Result<Cloud>& cloud, std::size_t measured) {
@@ -109,7 +59,11 @@ tl::expected<void, Failure> write_cloud(const ClientOptions& options, const json
                                         bool dense) {
   if (options.output.empty()) return {};
   if (asked_format(options, dense) == cloud_format(options)) return write_output(options.output, bytes);
-  if (dense) return write_output(options.output, dense_ply_of(result, bytes, options.normals));
+  if (dense) {
+    const auto pixels = pixels_of(result, bytes, options.normals);
+    if (!pixels) return tl::unexpected(failure(pixels.error()));
+    return write_output(options.output, pixels->to_ply(facts_of(result, options.normals)));
+  }
   const auto cloud = read_ply(bytes, "the service's cloud");
   if (!cloud) return tl::unexpected(failure(cloud.error()));
   return write_output(options.output, write_pcd(*cloud));

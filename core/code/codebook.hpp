@@ -85,6 +85,7 @@ class IndexedPattern {
       : both_(std::make_shared<const Both>(std::move(pattern))) {}
 
   [[nodiscard]] const Pattern& pattern() const { return both_->pattern; }
+  [[nodiscard]] std::shared_ptr<const CodeArray> array() const { return {both_, &both_->pattern.array}; }
   /// The codebook, which also keeps the pattern alive.
   [[nodiscard]] std::shared_ptr<const Codebook> codebook() const { return {both_, &both_->codebook}; }
 

@@ -67,7 +67,7 @@ Result<Decoder> Decoder::create(const IndexedPattern& indexed, const Calibration
   }
   std::optional<PaperWay> paper;
   if (options.any_paper()) {
-    auto created = PaperWay::create(pattern);
+    auto created = PaperWay::create(indexed);
     if (!created) return tl::unexpected(created.error());
     paper = std::move(*created);
   }

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -14,6 +13,7 @@
 #include "core/cloud/cloud.hpp"
 #include "core/decode/centres/symbol_match.hpp"
 #include "core/decode/rules.hpp"
+#include "core/regions/direction.hpp"
 
 namespace slsd {
 
@@ -31,33 +31,6 @@ enum class Stage : std::uint8_t {
 };
 inline constexpr int kStageCount = 10;
 [[nodiscard]] std::string_view to_string(Stage stage);
-
-/// Directions of the grid's links, along the pattern's axes: u to the right, v down.
-enum Direction : std::uint8_t { kRight, kDown, kLeft, kUp };
-
-/// All four. Computed rather than stored, so that the compiler unrolls loops over them.
-struct Directions {
-  class Iterator {
-   public:
-    using difference_type = std::ptrdiff_t;
-    using value_type = Direction;
-    constexpr Iterator() = default;
-    constexpr explicit Iterator(int count) : count_(count) {}
-    constexpr Direction operator*() const { return static_cast<Direction>(count_); }
-    constexpr Iterator& operator++() {
-      ++count_;
-      return *this;
-    }
-    constexpr Iterator operator++(int) { return Iterator(count_++); }
-    constexpr bool operator==(const Iterator&) const = default;
-
-   private:
-    int count_ = 0;
-  };
-  [[nodiscard]] static constexpr Iterator begin() { return Iterator(kRight); }
-  [[nodiscard]] static constexpr Iterator end() { return Iterator(kUp + 1); }
-};
-inline constexpr Directions kDirections;
 
 /// One region of the frame, accepted or not: the data from which pictures are drawn.
 struct RegionSeen {

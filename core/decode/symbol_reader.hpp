@@ -20,7 +20,7 @@
 #include "core/decode/inference/infer_cells.hpp"
 #include "core/decode/lattice.hpp"
 #include "core/decode/options.hpp"
-#include "core/decode/paper/paper_way.hpp"
+#include "core/decode/paper_way.hpp"
 #include "core/decode/regions/shape_finder.hpp"
 #include "core/decode/symbols/appearance.hpp"
 #include "core/decode/symbols/review_symbols.hpp"

@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 
 #include "core/clones.hpp"
+#include "core/cloud/dense_file.hpp"
 #include "core/cloud/point_record.hpp"
 #include "core/lanes.hpp"
 
@@ -20,7 +21,6 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the records are copied as they lie in memory");
 
-constexpr std::size_t kPlyBytes = 18, kPcdBytes = 21, kNormalBytes = 12;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 /// Share of the full level above which a pixel is saturated: noise and uneven pixels keep some below the full level.
 constexpr double kSaturated = 0.985;
@@ -138,8 +138,12 @@ void put_point(char*& to, const DenseView& view, const RowPlaces& row, const Vie
   if (normals) put(to, points.normal(x, y));
 }
 
+DenseFacts facts_of(const DenseCloud& cloud, bool normals) {
+  return {cloud.scan_id, cloud.time, cloud.frame, cloud.views.size(), normals};
+}
+
 std::size_t bytes_of_point(std::size_t record, bool normals) {
-  return record + (normals ? kNormalBytes : 0);
+  return record + (normals ? kDenseNormalBytes : 0);
 }
 
 }  // namespace
@@ -194,21 +198,13 @@ std::size_t shade_view(DenseView& view, const SceneLight& light) {
 }
 
 std::string write_dense_ply(const DenseCloud& cloud, bool normals) {
-  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment scan_id " + header_text(cloud.scan_id) +
-                      "\ncomment time " + header_text(cloud.time) + "\ncomment frame " + std::to_string(cloud.frame) +
-                      "\ncomment units mm\ncomment coordinate_frame rig: the first camera's, x right, y down, z "
-                      "forward\ncomment cameras " +
-                      std::to_string(cloud.views.size()) + "\nelement vertex " + std::to_string(cloud.points()) +
-                      "\nproperty float x\nproperty float y\nproperty float z\nproperty float sigma_mm\nproperty uchar "
-                      "intensity\nproperty uchar camera\n";
-  if (normals) bytes += "property float nx\nproperty float ny\nproperty float nz\n";
-  bytes += "end_header\n";
-  bytes.reserve(bytes.size() + cloud.points() * bytes_of_point(kPlyBytes, normals));
+  std::string bytes = dense_ply_header(facts_of(cloud, normals), cloud.points());
+  bytes.reserve(bytes.size() + cloud.points() * bytes_of_point(kDensePlyBytes, normals));
   std::string row;
   for (const DenseView& view : cloud.views) {
     const ViewPoints points(view);
     RowPlaces places(view);
-    row.resize(static_cast<std::size_t>(view.map.width) * bytes_of_point(kPlyBytes, normals));
+    row.resize(static_cast<std::size_t>(view.map.width) * bytes_of_point(kDensePlyBytes, normals));
     for (int y = 0; y < view.map.height; ++y) {
       places.place(y);
       char* to = row.data();
@@ -224,18 +220,9 @@ std::string write_dense_ply(const DenseCloud& cloud, bool normals) {
 std::string write_dense_pcd(const DenseCloud& cloud, bool normals) {
   int width = 0, height = 0;
   for (const DenseView& view : cloud.views) width = std::max(width, view.map.width), height += view.map.height;
-  const std::string size = std::to_string(width), rows = std::to_string(height),
-                    count = std::to_string(static_cast<std::size_t>(width) * height);
-  std::string bytes =
-      "# .PCD v0.7 - Point Cloud Data file format\n# scan_id " + header_text(cloud.scan_id) + "\n# time " +
-      header_text(cloud.time) + "\n# frame " + std::to_string(cloud.frame) +
-      "\n# units mm\n# coordinate_frame rig: the first camera's, x right, y down, z forward\nVERSION 0.7\n";
-  bytes += normals ? "FIELDS x y z sigma_mm intensity camera normal_x normal_y normal_z\nSIZE 4 4 4 4 4 1 4 4 4\n"
-                     "TYPE F F F F F U F F F\nCOUNT 1 1 1 1 1 1 1 1 1\n"
-                   : "FIELDS x y z sigma_mm intensity camera\nSIZE 4 4 4 4 4 1\nTYPE F F F F F U\nCOUNT 1 1 1 1 1 1\n";
-  bytes += "WIDTH " + size + "\nHEIGHT " + rows + "\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + count + "\nDATA binary\n";
+  std::string bytes = dense_pcd_header(facts_of(cloud, normals), width, height);
   const std::size_t begin = bytes.size();
-  bytes.resize(begin + static_cast<std::size_t>(width) * height * bytes_of_point(kPcdBytes, normals));
+  bytes.resize(begin + static_cast<std::size_t>(width) * height * bytes_of_point(kDensePcdBytes, normals));
   char* to = bytes.data() + begin;
   const Eigen::Vector3f none = Eigen::Vector3f::Constant(kNone);
   for (const DenseView& view : cloud.views) {

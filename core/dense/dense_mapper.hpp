@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/align/pattern_field.hpp"
+#include "core/appearance/pattern_field.hpp"
 #include "core/code/pattern.hpp"
 #include "core/decode/decoder.hpp"
 #include "core/dense/clean_map.hpp"

@@ -6,7 +6,7 @@
 
 #include <Eigen/Geometry>
 
-#include "core/align/align_patch.hpp"
+#include "core/appearance/align_patch.hpp"
 #include "core/decode/grid/lattice_frame.hpp"
 #include "core/dense/ray_grid.hpp"
 #include "core/geometry/ray_table.hpp"

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "core/align/pattern_field.hpp"
+#include "core/appearance/pattern_field.hpp"
 #include "core/dense/dense_map.hpp"
 #include "core/dense/followed_frame.hpp"
 #include "core/dense/surface_grid.hpp"

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/align/align_patch.hpp"
-#include "core/align/pattern_field.hpp"
+#include "core/appearance/align_patch.hpp"
+#include "core/appearance/pattern_field.hpp"
 #include "core/dense/surface_grid.hpp"
 #include "core/executor.hpp"
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/align/pattern_field.hpp"
+#include "core/appearance/pattern_field.hpp"
 #include "core/dense/dense_map.hpp"
 #include "core/dense/surface_grid.hpp"
 

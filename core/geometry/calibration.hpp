@@ -10,7 +10,6 @@
 #include <Eigen/Core>
 
 #include "core/geometry/lens.hpp"
-#include "core/result.hpp"
 
 namespace slsd {
 
@@ -68,10 +67,5 @@ struct Calibration {
   /// The camera with this name; a single camera in the file matches any name.
   [[nodiscard]] const CalibratedCamera* camera(std::string_view name) const;
 };
-
-/// Reads a calibration file's text (OpenCV FileStorage YAML, keys in docs/formats.md).
-/// @errors kMalformed, kInvalidArgument: the message names the key
-[[nodiscard]] Result<Calibration> read_calibration(std::string_view text, std::string_view name);
-[[nodiscard]] std::string write_calibration(const Calibration& calibration);
 
 }  // namespace slsd

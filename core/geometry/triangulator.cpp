@@ -24,7 +24,7 @@ struct Points {
 //
 // The slope along the ray with respect to the pixel follows from (37) by differentiation. It is the solution of the
 // same normal equations with another right-hand side, here `pull`, found in the same way.
-inline __attribute__((always_inline)) void solve(const TriangulationRig& rig, const RayMatches& matches,
+inline __attribute__((always_inline)) void solve_rays(const TriangulationRig& rig, const RayMatches& matches,
                                                  std::size_t count, Points& points) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const auto& [rotation, translation] = rig.projector_from_camera;
@@ -80,7 +80,7 @@ Triangulator::Triangulator(const CalibratedCamera& camera, const Lens& projector
 
 void Triangulator::triangulate(const RayMatches& matches, std::span<TriangulatedPoint> points) const {
   Points solved;
-  Cloned<solve>::call(rig_, matches, points.size(), solved);
+  Cloned<solve_rays>::call(rig_, matches, points.size(), solved);
   for (std::size_t i = 0; i < points.size(); ++i)
     points[i] = {{solved.x[i], solved.y[i], solved.z[i]}, solved.sigma_mm[i]};
 }

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "core/calibration_file/calibration_file.hpp"
 #include "core/cloud/ply.hpp"
 #include "core/shown_picture.hpp"
 #include "core/utc_text.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include "daemon/scan/scan_setup.hpp"
+#include "core/calibration_file/calibration_file.hpp"
 
 #include <algorithm>
 #include <future>

@@ -7,9 +7,9 @@
 
 #include "core/code/pattern.hpp"
 #include "core/code/symbol.hpp"
-#include "core/decode/regions/descriptors.hpp"
 #include "core/decode/symbols/prototypes.hpp"
 #include "core/decode/symbols/separability.hpp"
+#include "core/regions/descriptors.hpp"
 #include "docs/tables/best_symbols.hpp"
 #include "docs/tables/table.hpp"
 
@@ -33,7 +33,7 @@ the paper's. "Direction" says that the second moments tell the direction of the 
 constexpr const char* kDescriptorText = R"(
 ## Descriptors and centroid
 
-The paper's ten descriptors of the shapes as they are drawn (`core/decode/regions/descriptors.hpp`), at each size in projector pixels. The
+The paper's ten descriptors of the shapes as they are drawn (`core/regions/descriptors.hpp`), at each size in projector pixels. The
 centroid is that of the estimator in use: grey values through a soft threshold, 1.4 camera pixels per projector pixel
 (`core/decode/symbols/prototypes.hpp`). It counts from the middle of the symbol's square, in projector pixels, x to the right, y down.
 

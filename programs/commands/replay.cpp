@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "core/calibration_file/calibration_file.hpp"
 #include "core/cloud/ply.hpp"
 #include "core/printable.hpp"
 #include "core/shown_picture.hpp"

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <string>
 
+#include "core/calibration_file/calibration_file.hpp"
 #include "core/cloud/ply.hpp"
 #include "core/decode/decoder.hpp"
 #include "drivers/files/file.hpp"

@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 #include <opencv2/core/utility.hpp>
 
+#include "core/calibration_file/calibration_file.hpp"
 #include "core/dense/dense_cloud.hpp"
 #include "core/dense/dense_mapper.hpp"
 #include "core/exposure/light_levels.hpp"

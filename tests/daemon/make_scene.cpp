@@ -8,6 +8,7 @@
 #include <iostream>
 #include <string>
 
+#include "core/calibration_file/calibration_file.hpp"
 #include "core/code/pattern.hpp"
 #include "core/geometry/calibration.hpp"
 #include "drivers/files/encode_png.hpp"

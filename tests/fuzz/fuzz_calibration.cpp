@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "core/calibration_file/calibration_file.hpp"
 #include "core/geometry/calibration.hpp"
 
 // Whatever is read can be written and read again.

@@ -96,8 +96,10 @@ float LightShares::agree_beside_print() const {
   return agree / std::max(1 - darkened, 0.4F);
 }
 
-LetterAligner::LetterAligner(const Pattern& pattern, std::shared_ptr<const LetterFields> letters)
-    : array_(pattern.array), pitch_px_(static_cast<float>(pattern.pitch_px())), letters_(std::move(letters)) {}
+LetterAligner::LetterAligner(const IndexedPattern& indexed, std::shared_ptr<const LetterFields> letters)
+    : array_(indexed.array()),
+      pitch_px_(static_cast<float>(indexed.pattern().pitch_px())),
+      letters_(std::move(letters)) {}
 
 void LetterAligner::ask(const LetterScene& scene, std::int32_t node, const LetterPlace& place) {
   const auto [width, height] = size_of(scene.frame);
@@ -189,7 +191,7 @@ void LetterAligner::take_over(const LetterScene& scene, const AskedLetter& asked
   const bool at_edge = shows_other_light(scene, asked) || support_beside_print(scene, asked) < kWholeBesidePrintMin;
   seen.aligned[node] = at_edge ? Aligned::kAtEdge : Aligned::kWhole;
   seen.nodes[node].split = at_edge;
-  seen.shapes[node] = Classification::of_letter(letter_of(seen.claims[node]), array_.letters,
+  seen.shapes[node] = Classification::of_letter(letter_of(seen.claims[node]), array_->letters,
                                                 at_edge ? kDistanceAtEdge : kDistanceWhole);
 }
 

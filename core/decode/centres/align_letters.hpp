@@ -7,8 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "core/align/align_eight.hpp"
-#include "core/align/pattern_field.hpp"
+#include "core/appearance/align_eight.hpp"
+#include "core/appearance/pattern_field.hpp"
+#include "core/code/codebook.hpp"
 #include "core/code/pattern.hpp"
 #include "core/decode/grid/cell_gate.hpp"
 #include "core/decode/grid/sightings.hpp"
@@ -75,10 +76,10 @@ struct LightShares {
 
 /// Aligns letters of known cells with what the frame shows of them. Uses the equations of precision = "fine", eight
 /// letters at a time.
-/// @thread thread-bound: keeps its buffers; the letters are shared with copies
+/// @thread thread-bound: keeps its buffers; array and letters are shared with copies
 class LetterAligner {
  public:
-  LetterAligner(const Pattern& pattern, std::shared_ptr<const LetterFields> letters);
+  LetterAligner(const IndexedPattern& pattern, std::shared_ptr<const LetterFields> letters);
 
   void clear() { asked_.clear(); }
   /// Queues a symbol at a place, unless its cell reaches beyond the frame there.
@@ -88,7 +89,7 @@ class LetterAligner {
   [[nodiscard]] std::vector<AskedLetter>& asked() { return asked_; }
   [[nodiscard]] const std::vector<AskedLetter>& asked() const { return asked_; }
 
-  [[nodiscard]] int letter_of(const CellClaim& claim) const { return array_.at(claim.row, claim.column); }
+  [[nodiscard]] int letter_of(const CellClaim& claim) const { return array_->at(claim.row, claim.column); }
   [[nodiscard]] LightShares shares_of_middle(const LetterScene& scene, const AskedLetter& asked) const;
   [[nodiscard]] LightShares shares_of_cell(const LetterScene& scene, const AskedLetter& asked) const;
   /// Tells whether the cell has light where its letter has none. Two surfaces that share a cell cause this; print does
@@ -100,7 +101,7 @@ class LetterAligner {
   void take_over(const LetterScene& scene, const AskedLetter& asked) const;
 
  private:
-  CodeArray array_;
+  std::shared_ptr<const CodeArray> array_;
   float pitch_px_;
   std::shared_ptr<const LetterFields> letters_;
   std::vector<AskedLetter> asked_;

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "core/align/align_patch.hpp"
-#include "core/align/pattern_field.hpp"
+#include "core/appearance/align_patch.hpp"
+#include "core/appearance/pattern_field.hpp"
 #include "core/code/pattern.hpp"
 #include "core/decode/grid/cell_rays.hpp"
 #include "core/decode/lattice.hpp"

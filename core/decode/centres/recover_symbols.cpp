@@ -56,8 +56,9 @@ bool shows_centre(const AskedLetter& asked, const LightShares& middle) {
 
 }  // namespace
 
-SymbolRecovery::SymbolRecovery(const Pattern& pattern, const std::shared_ptr<const LetterFields>& letters, Rules rules)
-    : pitch_px_(static_cast<float>(pattern.pitch_px())), rules_(rules), aligner_(pattern, letters) {}
+SymbolRecovery::SymbolRecovery(const IndexedPattern& indexed, const std::shared_ptr<const LetterFields>& letters,
+                               Rules rules)
+    : pitch_px_(static_cast<float>(indexed.pattern().pitch_px())), rules_(rules), aligner_(indexed, letters) {}
 
 void SymbolRecovery::ask_all(const LetterScene& scene) {
   to_ask_.clear();

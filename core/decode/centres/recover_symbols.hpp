@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/code/codebook.hpp"
 #include "core/decode/centres/align_letters.hpp"
 
 namespace slsd {
@@ -16,7 +17,7 @@ namespace slsd {
 /// @thread thread-bound: keeps its buffers; the letters are shared with copies
 class SymbolRecovery {
  public:
-  SymbolRecovery(const Pattern& pattern, const std::shared_ptr<const LetterFields>& letters, Rules rules = {});
+  SymbolRecovery(const IndexedPattern& pattern, const std::shared_ptr<const LetterFields>& letters, Rules rules = {});
 
   /// Recovered symbols get a new place, frame, light, shape and misfit, and then hold their neighbours.
   /// @param scene  its claims are proposals

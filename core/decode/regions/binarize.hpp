@@ -8,10 +8,10 @@
 #include <tuple>
 #include <vector>
 
-#include "core/decode/regions/mask.hpp"
 #include "core/executor.hpp"
 #include "core/exposure/frame_noise.hpp"
 #include "core/image.hpp"
+#include "core/regions/mask.hpp"
 
 namespace slsd {
 

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "core/decode/regions/find_regions.hpp"
 #include "core/image.hpp"
+#include "core/regions/find_regions.hpp"
 
 namespace slsd {
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/decode/paper/binarize.hpp"
 #include "core/decode/symbols/prototypes.hpp"
+#include "core/paper/binarize.hpp"
 
 namespace slsd {
 namespace {

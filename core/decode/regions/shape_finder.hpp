@@ -11,11 +11,11 @@
 #include "core/decode/grid/sightings.hpp"
 #include "core/decode/options.hpp"
 #include "core/decode/regions/binarize.hpp"
-#include "core/decode/regions/find_regions.hpp"
-#include "core/decode/regions/mask.hpp"
 #include "core/decode/regions/separate_regions.hpp"
 #include "core/decode/regions/sharpen.hpp"
 #include "core/decode/symbols/grey_moments.hpp"
+#include "core/regions/find_regions.hpp"
+#include "core/regions/mask.hpp"
 
 namespace slsd {
 

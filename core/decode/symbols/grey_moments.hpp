@@ -8,9 +8,9 @@
 #include <Eigen/Core>
 
 #include "core/decode/grid/lattice_frame.hpp"
-#include "core/decode/regions/find_regions.hpp"
 #include "core/decode/symbols/weigh_patch.hpp"
 #include "core/image.hpp"
+#include "core/regions/find_regions.hpp"
 
 namespace slsd {
 

@@ -11,10 +11,10 @@
 #include <Eigen/LU>
 
 #include "core/code/symbol.hpp"
-#include "core/decode/regions/find_regions.hpp"
 #include "core/decode/regions/separate_regions.hpp"
 #include "core/decode/symbols/grey_moments.hpp"
 #include "core/decode/symbols/symbol_view.hpp"
+#include "core/regions/find_regions.hpp"
 
 namespace slsd {
 namespace {

@@ -61,10 +61,10 @@ std::optional<Eigen::Vector2f> centre_from_neighbours(const std::vector<GridNode
 
 }  // namespace
 
-SymbolReview::SymbolReview(const Pattern& pattern, ReviewOptions options)
-    : array_(pattern.array),
-      size_px_(static_cast<float>(pattern.options.symbol_size_px)),
-      pitch_px_(static_cast<float>(pattern.pitch_px())),
+SymbolReview::SymbolReview(const IndexedPattern& indexed, ReviewOptions options)
+    : array_(indexed.array()),
+      size_px_(static_cast<float>(indexed.pattern().options.symbol_size_px)),
+      pitch_px_(static_cast<float>(indexed.pattern().pitch_px())),
       options_(options) {}
 
 /// Mean of the frames of a symbol and of those around it whose cells fit, up to two links away.
@@ -128,7 +128,7 @@ void SymbolReview::measure_distances(const Classifier& letters, Executor& execut
       for (std::size_t lane = 0; lane < count; ++lane) {
         const std::size_t node = asked[lane];
         const CellClaim& claim = seen.claims[node];
-        const float own = std::sqrt(squared.of[array_.at(claim.row, claim.column)][lane]);
+        const float own = std::sqrt(squared.of[array_->at(claim.row, claim.column)][lane]);
         seen.misfits[node] = nearer_around(seen, node, seen.moments[node], own);
       }
       count = 0;

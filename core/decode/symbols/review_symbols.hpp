@@ -2,10 +2,12 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "core/code/codebook.hpp"
 #include "core/code/pattern.hpp"
 #include "core/decode/grid/sightings.hpp"
 #include "core/executor.hpp"
@@ -40,7 +42,7 @@ struct ReviewOptions {
 /// @thread thread-bound: keeps its buffers
 class SymbolReview {
  public:
-  SymbolReview(const Pattern& pattern, ReviewOptions options);
+  SymbolReview(const IndexedPattern& pattern, ReviewOptions options);
 
   /// Look of the letters in measured frames.
   struct Look {
@@ -66,13 +68,13 @@ class SymbolReview {
   [[nodiscard]] float nearer_around(const Sightings& seen, std::size_t node, const GreyMoments& moments,
                                     float own) const;
   [[nodiscard]] const Prototype& prototype_of(const CellClaim& claim) const {
-    return (*prototypes_)[array_.at(claim.row, claim.column)];
+    return (*prototypes_)[array_->at(claim.row, claim.column)];
   }
   template <class T>
   void review_node(const ImageView<T>& frame, const Regions& regions, GreyMomentMeter& meter, Sightings& seen,
                    std::size_t node) const;
 
-  CodeArray array_;
+  std::shared_ptr<const CodeArray> array_;
   const std::vector<Prototype>* prototypes_ = nullptr;  // prototypes of the current review
   float size_px_, pitch_px_;
   ReviewOptions options_;

@@ -7,9 +7,9 @@
 #include <limits>
 #include <span>
 
-#include "core/decode/regions/find_regions.hpp"
 #include "core/image.hpp"
 #include "core/lanes.hpp"
+#include "core/regions/find_regions.hpp"
 
 namespace slsd {
 

@@ -13,10 +13,10 @@
 #include <gmock/gmock.h>
 
 #include "core/decode/regions/binarize.hpp"
-#include "core/decode/regions/find_regions.hpp"
 #include "core/decode/regions/sharpen.hpp"
 #include "core/decode/symbols/classify.hpp"
 #include "core/decode/symbols/weigh_patch.hpp"
+#include "core/regions/find_regions.hpp"
 #include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/decoded_scene.hpp"
 #include "tests/core/decode/images.hpp"

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/decode/regions/mask.hpp"
 #include "core/image.hpp"
+#include "core/regions/mask.hpp"
 
 namespace slsd {
 

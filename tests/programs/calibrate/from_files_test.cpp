@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>
 
+#include "core/calibration_file/calibration_file.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/files/read_image.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include "programs/verify/verify_from_files.hpp"
+#include "core/calibration_file/calibration_file.hpp"
 
 #include <cstdlib>
 #include <fstream>

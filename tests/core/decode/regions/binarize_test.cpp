@@ -10,8 +10,8 @@
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
 
-#include "core/decode/paper/binarize.hpp"
-#include "core/decode/regions/find_regions.hpp"
+#include "core/paper/binarize.hpp"
+#include "core/regions/find_regions.hpp"
 #include "tests/core/decode/alone.hpp"
 #include "tests/core/decode/images.hpp"
 

@@ -12,7 +12,7 @@
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
 
-#include "core/decode/regions/find_regions.hpp"
+#include "core/regions/find_regions.hpp"
 #include "tests/core/decode/images.hpp"
 
 namespace slsd {

@@ -8,7 +8,7 @@
 
 #include "core/code/pattern.hpp"
 #include "core/code/symbol.hpp"
-#include "core/decode/regions/descriptors.hpp"
+#include "core/regions/descriptors.hpp"
 
 namespace slsd {
 namespace {

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/appearance/pattern_field.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace slsd {
+namespace {
+
+constexpr int kPhases = PatternField::kSamplesPerPx;
+constexpr int kSlopeMax = (1 << (PatternField::kSlopeBits - 1)) - 1;
+
+/// Weights of a pixel, a square of side 1, in a sample and in its slope, for pixels from -reach to reach.
+struct Weights {
+  std::vector<float> value, slope;
+};
+
+Weights weights_of(float phase_px, float sigma_px, int reach) {
+  Weights weights;
+  const auto share_below = [&](float edge) {
+    return 0.5F * std::erfc(-(edge - phase_px) / (sigma_px * std::numbers::sqrt2_v<float>));
+  };
+  const auto density = [&](float edge) {
+    const float x = (edge - phase_px) / sigma_px;
+    return std::exp(-0.5F * x * x) / (sigma_px * std::sqrt(2 * std::numbers::pi_v<float>));
+  };
+  for (int k = -reach; k <= reach; ++k) {
+    const float left = static_cast<float>(k) - 0.5F, right = static_cast<float>(k) + 0.5F;
+    weights.value.push_back(share_below(right) - share_below(left));
+    weights.slope.push_back(density(left) - density(right));
+  }
+  return weights;
+}
+
+std::uint32_t packed(float value, float slope_u, float slope_v, float per_slope_unit) {
+  const auto bits = [&](float slope) {
+    const int steps = std::clamp(static_cast<int>(std::lround(slope * per_slope_unit)), -kSlopeMax, kSlopeMax);
+    return static_cast<std::uint32_t>(steps) & ((1U << PatternField::kSlopeBits) - 1);
+  };
+  const auto level =
+      static_cast<std::uint32_t>(std::clamp(static_cast<int>(std::lround(value / PatternField::kValueUnit)), 0, 1023));
+  return level << (2 * PatternField::kSlopeBits) | bits(slope_u) << PatternField::kSlopeBits | bits(slope_v);
+}
+
+}  // namespace
+
+PatternField::PatternField(const ImageView<std::uint8_t>& pattern, float blur_sigma_px)
+    : width_((pattern.width + 2 * kBorderPx) * kPhases),
+      height_((pattern.height + 2 * kBorderPx) * kPhases),
+      blur_sigma_px_(blur_sigma_px),
+      // No slope of a blurred function between 0 and 1 exceeds the Gaussian's peak.
+      slope_unit_(1 / (blur_sigma_px * std::sqrt(2 * std::numbers::pi_v<float>) * kSlopeMax)),
+      samples_(static_cast<std::size_t>(width_) * height_) {
+  const int reach = static_cast<int>(std::ceil(3.5F * blur_sigma_px + 0.5F)), wide = pattern.width + 2 * kBorderPx;
+  std::vector<Weights> weights;
+  for (int phase = 0; phase < kPhases; ++phase)
+    weights.push_back(weights_of(static_cast<float>(phase) / kPhases, blur_sigma_px, reach));
+  // Along the columns first, at the pattern's width; then along the rows.
+  const std::size_t padded = static_cast<std::size_t>(wide) + 2 * reach;
+  std::vector<float> down(padded), down_slope(padded);
+  for (int j = 0; j < height_; ++j) {
+    const int middle = j / kPhases - kBorderPx;
+    const Weights& w = weights[j % kPhases];
+    std::fill(down.begin(), down.end(), 0.F);
+    std::fill(down_slope.begin(), down_slope.end(), 0.F);
+    for (int k = -reach; k <= reach; ++k) {
+      if (middle + k < 0 || middle + k >= pattern.height) continue;
+      const std::uint8_t* row = pattern.row(middle + k);
+      const float value = w.value[k + reach] / 255, slope = w.slope[k + reach] / 255;
+      float *const to = down.data() + reach + kBorderPx, *const to_slope = down_slope.data() + reach + kBorderPx;
+      for (int x = 0; x < pattern.width; ++x) {
+        to[x] += value * static_cast<float>(row[x]);
+        to_slope[x] += slope * static_cast<float>(row[x]);
+      }
+    }
+    for (int i = 0; i < width_; ++i) {
+      const Weights& across = weights[i % kPhases];
+      const float *const from = down.data() + i / kPhases, *const from_slope = down_slope.data() + i / kPhases;
+      float value = 0, slope_u = 0, slope_v = 0;
+      for (int k = 0; k <= 2 * reach; ++k) {
+        value += across.value[k] * from[k];
+        slope_u += across.slope[k] * from[k];
+        slope_v += across.value[k] * from_slope[k];
+      }
+      samples_[static_cast<std::size_t>(j) * width_ + i] = packed(value, slope_u, slope_v, 1 / slope_unit_);
+    }
+  }
+}
+
+const PatternField& PatternFields::at(std::size_t blur) const {
+  std::call_once(made_[blur], [&] { fields_[blur].emplace(pattern_.view(), kBlursPx[blur]); });
+  return *fields_[blur];
+}
+
+const PatternField& PatternFields::nearest(float blur_px) const {
+  const auto off = [&](float known) { return std::abs(known - blur_px); };
+  return at(static_cast<std::size_t>(std::ranges::min_element(kBlursPx, {}, off) - kBlursPx.begin()));
+}
+
+}  // namespace slsd

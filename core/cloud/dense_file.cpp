@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/cloud/dense_file.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+
+#include "core/cloud/point_record.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr std::string_view kUnits = "units mm\n",
+                           kFrame = "coordinate_frame rig: the first camera's, x right, y down, z forward\n",
+                           kDataBegins = "\nDATA binary\n";
+constexpr std::size_t kDepthAt = 8, kIntensityAt = 16, kCameraAt = 20;  // in a PCD's record
+
+float float_at(std::string_view record, std::size_t at) {
+  float value;
+  std::memcpy(&value, record.data() + at, sizeof value);
+  return value;
+}
+
+bool is_measured(std::string_view record) {
+  return float_at(record, kDepthAt) > 0;
+}
+
+std::uint8_t intensity_of(std::string_view record) {
+  const float level = float_at(record, kIntensityAt);
+  return static_cast<std::uint8_t>(level > 0 ? std::min(level, 255.F) : 0);
+}
+
+/// What both formats say of the cloud, each line after the format's mark of a comment.
+std::string comments(std::string_view mark, const DenseFacts& facts) {
+  std::string lines;
+  const auto add = [&](std::string_view text) { lines.append(mark).append(text); };
+  add("scan_id " + header_text(facts.scan_id) + "\n");
+  add("time " + header_text(facts.time) + "\n");
+  add("frame " + std::to_string(facts.frame) + "\n");
+  add(kUnits), add(kFrame);
+  return lines;
+}
+
+int number_after(std::string_view header, std::string_view key) {
+  const std::size_t at = header.find(key);
+  int number = 0;
+  if (at != std::string_view::npos)
+    std::from_chars(header.data() + at + key.size(), header.data() + header.size(), number);
+  return number;
+}
+
+}  // namespace
+
+std::string dense_ply_header(const DenseFacts& facts, std::size_t points) {
+  return "ply\nformat binary_little_endian 1.0\n" + comments("comment ", facts) + "comment cameras " +
+         std::to_string(facts.cameras) + "\nelement vertex " + std::to_string(points) +
+         "\nproperty float x\nproperty float y\nproperty float z\nproperty float sigma_mm\nproperty uchar intensity\n"
+         "property uchar camera\n" +
+         (facts.normals ? "property float nx\nproperty float ny\nproperty float nz\n" : "") + "end_header\n";
+}
+
+std::string dense_pcd_header(const DenseFacts& facts, int width, int height) {
+  const std::string fields =
+      facts.normals ? "FIELDS x y z sigma_mm intensity camera normal_x normal_y normal_z\nSIZE 4 4 4 4 4 1 4 4 4\n"
+                      "TYPE F F F F F U F F F\nCOUNT 1 1 1 1 1 1 1 1 1\n"
+                    : "FIELDS x y z sigma_mm intensity camera\nSIZE 4 4 4 4 4 1\nTYPE F F F F F U\nCOUNT 1 1 1 1 1 1\n";
+  return "# .PCD v0.7 - Point Cloud Data file format\n" + comments("# ", facts) + "VERSION 0.7\n" + fields + "WIDTH " +
+         std::to_string(width) + "\nHEIGHT " + std::to_string(height) + "\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " +
+         std::to_string(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) + std::string(kDataBegins);
+}
+
+Result<DensePcd> DensePcd::open(std::string_view bytes, int height, bool normals) {
+  const std::size_t end = bytes.find(kDataBegins);
+  const int width = end == std::string_view::npos ? 0 : number_after(bytes.substr(0, end), "\nWIDTH ");
+  if (width <= 0 || height <= 0)
+    return fail(ErrorCode::kMalformed, "the cloud is no organised PCD: its header has no size");
+  const std::string_view records = bytes.substr(end + kDataBegins.size());
+  const DensePcd cloud(records, width, height, normals);
+  if (records.size() < cloud.record(0).size() * static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
+    return fail(ErrorCode::kMalformed, "the cloud has fewer points than its header says");
+  return cloud;
+}
+
+std::string_view DensePcd::record(std::size_t pixel) const {
+  const std::size_t bytes = kDensePcdBytes + (normals_ ? kDenseNormalBytes : 0);
+  return records_.substr(std::min(records_.size(), pixel * bytes), bytes);
+}
+
+std::string DensePcd::to_ply(const DenseFacts& facts) const {
+  std::string points;
+  std::size_t count = 0;
+  DenseFacts all = facts;
+  for (std::size_t pixel = 0; pixel < static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_); ++pixel) {
+    const std::string_view from = record(pixel);
+    all.cameras = std::max(all.cameras, std::size_t{static_cast<std::uint8_t>(from[kCameraAt])} + 1);
+    if (!is_measured(from)) continue;
+    points.append(from.substr(0, kIntensityAt));
+    points += static_cast<char>(intensity_of(from));
+    points.append(from.substr(kCameraAt));
+    ++count;
+  }
+  return dense_ply_header(all, count) + points;
+}
+
+Cloud DensePcd::lattice(int step) const {
+  Cloud cloud;
+  cloud.lattice_columns = (width_ + step - 1) / step;
+  cloud.lattice_rows = (height_ + step - 1) / step;
+  for (int y = 0; y < height_; y += step) {
+    for (int x = 0; x < width_; x += step) {
+      const std::string_view from = record(static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + x);
+      if (!is_measured(from)) continue;
+      CloudPoint& point = cloud.points.emplace_back();
+      point.x = float_at(from, 0), point.y = float_at(from, 4), point.z = float_at(from, kDepthAt);
+      point.column = static_cast<std::uint16_t>(x / step), point.row = static_cast<std::uint16_t>(y / step);
+      point.intensity = intensity_of(from);
+    }
+  }
+  return cloud;
+}
+
+}  // namespace slsd

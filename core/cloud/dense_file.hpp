@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "core/cloud/cloud.hpp"
+#include "core/result.hpp"
+
+namespace slsd {
+
+// Files of dense clouds, as in docs/formats.md: binary, little-endian. A record is x, y, z and sigma_mm as floats, the
+// intensity, the camera's index as a byte, and with normals three floats more.
+
+inline constexpr std::size_t kDensePlyBytes = 18;     ///< of a record without a normal; the intensity is a byte
+inline constexpr std::size_t kDensePcdBytes = 21;     ///< the same in a PCD; the intensity is a float, which PCL needs
+inline constexpr std::size_t kDenseNormalBytes = 12;  ///< of a normal
+
+/// Facts about a dense cloud in a file's header.
+struct DenseFacts {
+  std::string scan_id;
+  std::string time;         ///< ISO 8601, UTC
+  std::uint64_t frame = 0;  ///< sequence number of the first camera's frame
+  std::size_t cameras = 1;
+  bool normals = false;
+};
+
+/// @param points  number of records that follow
+[[nodiscard]] std::string dense_ply_header(const DenseFacts& facts, std::size_t points);
+/// @param width, height  size of the organised cloud; width * height records follow
+[[nodiscard]] std::string dense_pcd_header(const DenseFacts& facts, int width, int height);
+
+/// An organised cloud, read where it lies in memory.
+class DensePcd {
+ public:
+  /// @param bytes   the file, as dense_pcd_header() begins it; must outlive this object
+  /// @param height  rows of the organised cloud
+  /// @errors kMalformed: no such header, or too few records
+  [[nodiscard]] static Result<DensePcd> open(std::string_view bytes, int height, bool normals);
+
+  /// Converts to a PLY, without the pixels that are not measured. Counts the cameras itself.
+  [[nodiscard]] std::string to_ply(const DenseFacts& facts) const;
+  /// Every step-th pixel of every step-th row as a point whose column and row are its place in that lattice. Leaves out
+  /// pixels that are not measured.
+  [[nodiscard]] Cloud lattice(int step) const;
+
+ private:
+  DensePcd(std::string_view records, int width, int height, bool normals)
+      : records_(records), width_(width), height_(height), normals_(normals) {}
+  [[nodiscard]] std::string_view record(std::size_t pixel) const;
+
+  std::string_view records_;
+  int width_, height_;
+  bool normals_;
+};
+
+}  // namespace slsd
