@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/geometry/calibration.hpp"
+#include "core/result.hpp"
 
 namespace slsd::dds {
 

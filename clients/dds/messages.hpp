@@ -10,6 +10,7 @@
 #include <slsd/cloud.hpp>
 
 #include "core/geometry/calibration.hpp"
+#include "core/result.hpp"
 #include "ros.hpp"
 
 namespace slsd::dds {

@@ -15,6 +15,7 @@
 #include "core/code/pattern.hpp"
 #include "core/decode/options.hpp"
 #include "core/geometry/calibration.hpp"
+#include "core/result.hpp"
 #include "daemon/scan/frame_set.hpp"
 #include "daemon/scan/scan_result.hpp"
 #include "daemon/scan/scan_setup.hpp"

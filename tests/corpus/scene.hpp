@@ -8,6 +8,7 @@
 
 #include "core/code/pattern.hpp"
 #include "core/geometry/calibration.hpp"
+#include "core/result.hpp"
 #include "drivers/files/grey_image.hpp"
 #include "tests/corpus/truth.hpp"
 
