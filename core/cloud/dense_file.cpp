@@ -11,8 +11,8 @@
 namespace slsd {
 namespace {
 
-constexpr std::string_view kUnits = "units mm\n",
-                           kFrame = "coordinate_frame rig: the first camera's, x right, y down, z forward\n",
+constexpr std::string_view kUnitsLine = "units mm\n",
+                           kFrameLine = "coordinate_frame rig: the first camera's, x right, y down, z forward\n",
                            kDataBegins = "\nDATA binary\n";
 constexpr std::size_t kDepthAt = 8, kIntensityAt = 16, kCameraAt = 20;  // in a PCD's record
 
@@ -38,7 +38,7 @@ std::string comments(std::string_view mark, const DenseFacts& facts) {
   add("scan_id " + header_text(facts.scan_id) + "\n");
   add("time " + header_text(facts.time) + "\n");
   add("frame " + std::to_string(facts.frame) + "\n");
-  add(kUnits), add(kFrame);
+  add(kUnitsLine), add(kFrameLine);
   return lines;
 }
 
