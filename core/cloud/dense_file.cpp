@@ -31,7 +31,7 @@ std::uint8_t intensity_of(std::string_view record) {
   return static_cast<std::uint8_t>(level > 0 ? std::min(level, 255.F) : 0);
 }
 
-/// What both formats say of the cloud, each line after the format's mark of a comment.
+/// The facts in both formats: a comment for each, after the format's mark.
 std::string comments(std::string_view mark, const DenseFacts& facts) {
   std::string lines;
   const auto add = [&](std::string_view text) { lines.append(mark).append(text); };

@@ -181,11 +181,7 @@ class Construction {
 
   const ArrayOptions& options_;
   int minimum_distance_;
-<<<<<<< HEAD
   SearchBudget budget_;
-=======
-  RunReach reach_;
->>>>>>> 2838fe6 (core, daemon, drivers, clients: rename after the glossary)
   std::int64_t steps_left_;
   LetterSource source_;
   WindowIndex index_;
