@@ -3,6 +3,7 @@
 #include "core/decode/symbols/appearance.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "core/lanes.hpp"
@@ -16,23 +17,25 @@ constexpr float kMeasuredFrameError = 0.05F;
 /// Distance from the nearest prototype, in standard deviations, beyond which a shape is none of the pattern's symbols.
 constexpr float kExpectedDistanceMax = 25;
 constexpr float kMeasuredDistanceMax = 20;
+constexpr std::optional<float> kAnyBlur[] = {std::nullopt};
 
-std::vector<std::vector<Prototype>> make(const PatternOptions& pattern, float scale, std::optional<float> blur_px) {
+/// One for each of the blurs.
+std::vector<Appearance> make_appearances(const PatternOptions& pattern, float scale,
+                                         std::span<const std::optional<float>> blurs_px) {
   constexpr float kFrameErrors[] = {kExpectedFrameError, kMeasuredFrameError};
-  return make_prototypes({.symbols = pattern.symbols,
-                          .symbol_size_px = pattern.symbol_size_px,
-                          .spacing_px = pattern.spacing_px,
-                          .camera_px_per_projector_px = scale,
-                          .blur_px = blur_px},
-                         kFrameErrors);
+  auto made = make_prototypes({.symbols = pattern.symbols,
+                               .symbol_size_px = pattern.symbol_size_px,
+                               .spacing_px = pattern.spacing_px,
+                               .camera_px_per_projector_px = scale},
+                              kFrameErrors, blurs_px);
+  std::vector<Appearance> appearances;
+  for (std::size_t i = 0; i < made.size(); ++i) appearances.emplace_back(blurs_px[i], std::move(made[i]));
+  return appearances;
 }
 
 }  // namespace
 
-Appearance::Appearance(const PatternOptions& pattern, float camera_px_per_projector_px, std::optional<float> blur)
-    : Appearance(blur, make(pattern, camera_px_per_projector_px, blur)) {}
-
-Appearance::Appearance(std::optional<float> blur, std::vector<std::vector<Prototype>>&& made)
+Appearance::Appearance(std::optional<float> blur, PrototypeSets&& made)
     : blur_px(blur),
       as_expected(std::move(made[0])),
       as_measured(std::move(made[1])),
@@ -42,15 +45,19 @@ Appearance::Appearance(std::optional<float> blur, std::vector<std::vector<Protot
 Appearances::Appearances(const PatternOptions& pattern, float camera_px_per_projector_px)
     : pattern_(pattern),
       scale_(camera_px_per_projector_px),
-      usual_(pattern, camera_px_per_projector_px, std::nullopt) {}
+      usual_(std::move(make_appearances(pattern, camera_px_per_projector_px, kAnyBlur).front())) {}
 
-const Appearance& Appearances::at(std::size_t blur) const {
-  std::call_once(made_[blur], [&] {
+const std::vector<Appearance>& Appearances::of_blurs() const {
+  std::call_once(made_, [&] {
     const float symbol_px = static_cast<float>(pattern_.symbol_size_px) * scale_;
-    const float times = blur == 0 ? 1 : std::max(1.F, symbol_px / kUsualSymbolPx);
-    appearances_[blur] = std::make_unique<const Appearance>(pattern_, scale_, times * kBlursPx[blur]);
+    std::array<std::optional<float>, kBlursPx.size()> blurs_px;
+    std::ranges::copy(kBlursPx, blurs_px.begin());
+    const auto of_lenses = std::span(blurs_px).subspan(1);
+    for (auto& blur_px : of_lenses) *blur_px *= std::max(1.F, symbol_px / kUsualSymbolPx);
+    of_blurs_ = make_appearances(pattern_, scale_, std::span(blurs_px).first(1));
+    std::ranges::move(make_appearances(pattern_, scale_, of_lenses), std::back_inserter(of_blurs_));
   });
-  return *appearances_[blur];
+  return of_blurs_;
 }
 
 const Appearance& Appearances::likeliest(std::span<const ShapeFeatures> shapes) const {
@@ -66,7 +73,7 @@ const Appearance& Appearances::likeliest(std::span<const ShapeFeatures> shapes) 
   std::size_t best = 0;
   float best_median = -1;
   for (std::size_t blur = 0; blur < kBlursPx.size(); ++blur) {
-    const Classifier& classifier = at(blur).measured;
+    const Classifier& classifier = of_blurs()[blur].measured;
     std::array<Classification, kLanes> looks;
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       if (i % kLanes == 0) classifier.classify(eights[i / kLanes], looks);
@@ -75,7 +82,7 @@ const Appearance& Appearances::likeliest(std::span<const ShapeFeatures> shapes) 
     std::ranges::nth_element(likelihoods, middle);
     if (*middle > best_median) best = blur, best_median = *middle;
   }
-  return at(best);
+  return of_blurs()[best];
 }
 
 }  // namespace slsd

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -22,15 +21,13 @@ struct Appearance {
   std::vector<Prototype> as_expected, as_measured;
   Classifier expected, measured;
 
-  Appearance(const PatternOptions& pattern, float camera_px_per_projector_px, std::optional<float> blur);
-
- private:
-  Appearance(std::optional<float> blur, std::vector<std::vector<Prototype>>&& made);
+  /// @param made  prototypes in expected frames and in measured ones
+  Appearance(std::optional<float> blur, PrototypeSets&& made);
 };
 
 /// Appearances at each blur that occurs. The soft threshold is low, so that it includes faint light on print. It also
 /// includes more of a blurred symbol, so the look depends on the blur.
-/// @thread reentrant: each appearance is made on first use, once for all who share this object
+/// @thread reentrant: those of the blurs are made on first use, once for all who share this object
 class Appearances {
  public:
   Appearances(const PatternOptions& pattern, float camera_px_per_projector_px);
@@ -47,13 +44,13 @@ class Appearances {
   /// Standard deviations, camera px: first of a drawn frame, then of lenses. Larger symbols come with larger blurs.
   static constexpr std::array kBlursPx{0.2F, 0.45F, 0.7F, 1.0F, 1.4F, 2.0F};
   static constexpr float kUsualSymbolPx = 24;
-  [[nodiscard]] const Appearance& at(std::size_t blur) const;
+  [[nodiscard]] const std::vector<Appearance>& of_blurs() const;
 
   PatternOptions pattern_;
   float scale_;
   Appearance usual_;
-  mutable std::array<std::once_flag, kBlursPx.size()> made_;
-  mutable std::array<std::unique_ptr<const Appearance>, kBlursPx.size()> appearances_;
+  mutable std::once_flag made_;
+  mutable std::vector<Appearance> of_blurs_;
 };
 
 }  // namespace slsd

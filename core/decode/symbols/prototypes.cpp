@@ -3,6 +3,7 @@
 #include "core/decode/symbols/prototypes.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -113,10 +114,10 @@ Prototype prototype_of(const SymbolSpread& spread) {
   return prototype;
 }
 
-SymbolViewer viewer_of(const PrototypeOptions& options) {
+SymbolViewer viewer_of(const PrototypeOptions& options, bool drawn) {
   return SymbolViewer({options.symbols, options.symbol_size_px, options.spacing_px, options.camera_px_per_projector_px,
                        threshold_level(options.symbol_size_px, options.spacing_px, options.camera_px_per_projector_px),
-                       options.blur_px, options.noise});
+                       options.noise, drawn});
 }
 
 Eigen::Vector2f mean_of(const std::vector<Eigen::Vector2f>& points) {
@@ -124,6 +125,34 @@ Eigen::Vector2f mean_of(const std::vector<Eigen::Vector2f>& points) {
   for (const Eigen::Vector2f& point : points) sum += point;
   return points.empty() ? sum : (sum / static_cast<float>(points.size())).eval();
 }
+
+/// Looks at one letter in one blur.
+class LooksOfLetter {
+ public:
+  explicit LooksOfLetter(std::size_t frame_errors) : shapes_(frame_errors) {}
+
+  void add_tilted(const Look& look, const LatticeFrame& frame, const FrameError& error,
+                  std::span<const float> frame_errors, float symbol_size_px) {
+    for (std::size_t i = 0; i < frame_errors.size(); ++i) {
+      const LatticeFrame assumed = frame * error.of_size(frame_errors[i]);
+      shapes_[i].push_back(shape_features(look.moments, assumed.inverse(), symbol_size_px));
+    }
+  }
+  void add_upright(const Look& look) {
+    centroids_.push_back(look.centroid_px);
+    steady_centroids_.push_back(look.steady_centroid_px);
+  }
+  [[nodiscard]] Prototype prototype(std::size_t frame_error) const {
+    Prototype prototype = prototype_of(spread_of(shapes_[frame_error]));
+    prototype.centroid_px = mean_of(centroids_);
+    prototype.steady_centroid_px = mean_of(steady_centroids_);
+    return prototype;
+  }
+
+ private:
+  std::vector<std::vector<ShapeFeatures>> shapes_;  // by error of the local frame
+  std::vector<Eigen::Vector2f> centroids_, steady_centroids_;
+};
 
 }  // namespace
 
@@ -145,12 +174,13 @@ float threshold_level(int symbol_size_px, int spacing_px, float camera_px_per_pr
 std::vector<SymbolSpread> spread_of_symbols(const PrototypeOptions& options) {
   std::vector<SymbolSpread> spreads;
   Observer observer(options);
-  SymbolViewer viewer = viewer_of(options);
+  SymbolViewer viewer = viewer_of(options, is_drawn(options.blur_px));
   for (std::size_t letter = 0; letter < options.symbols.size(); ++letter) {
     std::vector<ShapeFeatures> looks;
     int lost = 0;
     for (int sample = 0; sample < options.samples; ++sample) {
-      const SymbolView& view = viewer.view(static_cast<int>(letter), 1);
+      viewer.expose(static_cast<int>(letter), 1);
+      const SymbolView& view = viewer.develop(options.blur_px);
       const LatticeFrame assumed = view.frame * viewer.frame_error().of_size(options.frame_error);
       const auto look = observer.look_at(view);
       if (look && look->whole) {
@@ -170,36 +200,35 @@ std::vector<Prototype> make_prototypes(const PrototypeOptions& options) {
   return std::move(make_prototypes(options, std::span(&options.frame_error, 1)).front());
 }
 
-std::vector<std::vector<Prototype>> make_prototypes(const PrototypeOptions& options,
-                                                    std::span<const float> frame_errors) {
-  std::vector<std::vector<Prototype>> prototypes(frame_errors.size());
+PrototypeSets make_prototypes(const PrototypeOptions& options, std::span<const float> frame_errors) {
+  return std::move(make_prototypes(options, frame_errors, std::span(&options.blur_px, 1)).front());
+}
+
+std::vector<PrototypeSets> make_prototypes(const PrototypeOptions& options, std::span<const float> frame_errors,
+                                           std::span<const std::optional<float>> blurs_px) {
+  const bool drawn = !blurs_px.empty() && is_drawn(blurs_px.front());
+  assert(std::ranges::all_of(blurs_px, [&](const auto& blur_px) { return is_drawn(blur_px) == drawn; }));
+  std::vector<PrototypeSets> prototypes(blurs_px.size(), PrototypeSets(frame_errors.size()));
   const auto size_px = static_cast<float>(options.symbol_size_px);
   Observer observer(options);
-  SymbolViewer viewer = viewer_of(options);
-  for (std::size_t letter = 0; letter < options.symbols.size(); ++letter) {
-    std::vector<std::vector<ShapeFeatures>> looks(frame_errors.size());
-    std::vector<Eigen::Vector2f> centroids, steady_centroids;
+  SymbolViewer viewer = viewer_of(options, drawn);
+  for (int letter = 0; letter < static_cast<int>(options.symbols.size()); ++letter) {
+    std::vector<LooksOfLetter> looks(blurs_px.size(), LooksOfLetter(frame_errors.size()));
     for (int sample = 0; sample < options.samples; ++sample) {
-      const SymbolView& tilted = viewer.view(static_cast<int>(letter), 1);
+      viewer.expose(letter, 1);
       const FrameError error = viewer.frame_error();
-      if (const auto look = observer.look_at(tilted)) {
-        for (std::size_t i = 0; i < frame_errors.size(); ++i) {
-          const LatticeFrame assumed = tilted.frame * error.of_size(frame_errors[i]);
-          looks[i].push_back(shape_features(look->moments, assumed.inverse(), size_px));
-        }
+      for (std::size_t blur = 0; blur < blurs_px.size(); ++blur) {
+        const SymbolView& tilted = viewer.develop(blurs_px[blur]);
+        if (const auto look = observer.look_at(tilted))
+          looks[blur].add_tilted(*look, tilted.frame, error, frame_errors, size_px);
       }
-      const SymbolView& upright = viewer.view(static_cast<int>(letter), 0);
+      viewer.expose(letter, 0);
       (void)viewer.frame_error();  // also for the untilted view, so that both use the same random numbers
-      if (const auto look = observer.look_at(upright)) {
-        centroids.push_back(look->centroid_px);
-        steady_centroids.push_back(look->steady_centroid_px);
-      }
+      for (std::size_t blur = 0; blur < blurs_px.size(); ++blur)
+        if (const auto look = observer.look_at(viewer.develop(blurs_px[blur]))) looks[blur].add_upright(*look);
     }
-    for (std::size_t i = 0; i < frame_errors.size(); ++i) {
-      prototypes[i].push_back(prototype_of(spread_of(looks[i])));
-      prototypes[i].back().centroid_px = mean_of(centroids);
-      prototypes[i].back().steady_centroid_px = mean_of(steady_centroids);
-    }
+    for (std::size_t blur = 0; blur < blurs_px.size(); ++blur)
+      for (std::size_t i = 0; i < frame_errors.size(); ++i) prototypes[blur][i].push_back(looks[blur].prototype(i));
   }
   return prototypes;
 }

@@ -62,12 +62,22 @@ struct SymbolSpread {
 /// @thread reentrant
 [[nodiscard]] std::vector<Prototype> make_prototypes(const PrototypeOptions& options);
 
+/// One set for each of several errors of the local frame; each has one prototype for each letter.
+using PrototypeSets = std::vector<std::vector<Prototype>>;
+
 /// The same for several errors of the local frame, in little more time than for one: the looks are shared.
 /// @param frame_errors  replace that of the options
 /// @return one set for each error
 /// @thread reentrant
-[[nodiscard]] std::vector<std::vector<Prototype>> make_prototypes(const PrototypeOptions& options,
-                                                                  std::span<const float> frame_errors);
+[[nodiscard]] PrototypeSets make_prototypes(const PrototypeOptions& options, std::span<const float> frame_errors);
+
+/// The same for several blurs, which share the looks before they are blurred.
+/// @param blurs_px  replace that of the options; all of drawn frames (is_drawn) or none
+/// @return for each blur, one set for each error
+/// @thread reentrant
+[[nodiscard]] std::vector<PrototypeSets> make_prototypes(const PrototypeOptions& options,
+                                                         std::span<const float> frame_errors,
+                                                         std::span<const std::optional<float>> blurs_px);
 
 /// Largest margin that follows a region's edge without reaching its neighbour.
 [[nodiscard]] int margin_px(int spacing_px, float camera_px_per_projector_px);

@@ -20,10 +20,13 @@ struct SymbolViewOptions {
   int symbol_size_px;
   int spacing_px;
   float camera_px_per_projector_px;
-  float threshold_level;           ///< between dark and light
-  std::optional<float> blur_px{};  ///< standard deviation, to a third; if missing, all that occur
-  std::optional<float> noise{};    ///< standard deviation, as a share of the contrast; if missing, all that occurs
+  float threshold_level;         ///< between dark and light
+  std::optional<float> noise{};  ///< standard deviation, as a share of the contrast; if missing, all that occurs
+  bool drawn = false;            ///< sharper than any lens: pixels may coincide with the pattern's
 };
+
+/// Whether a frame of this blur is a drawn one, without a lens.
+[[nodiscard]] bool is_drawn(std::optional<float> blur_px);
 
 /// One symbol among its neighbours, as a camera might see it.
 struct SymbolView {
@@ -41,15 +44,19 @@ struct FrameError {
   [[nodiscard]] Eigen::Matrix2f of_size(float size) const;
 };
 
-/// Draws symbols in random tilt, blur, noise and position on the pixels, identical in every run.
+/// Draws symbols in random tilt, blur, noise and position on the pixels, identical in every run. One exposure serves
+/// any number of blurs.
 /// @thread thread-bound
 class SymbolViewer {
  public:
   explicit SymbolViewer(SymbolViewOptions options);
 
-  /// Draws a new look at a letter. The result is valid until the next call.
+  /// Draws a new look at a letter, still without blur.
   /// @param tilt  0 for a surface that faces the devices, 1 for every tilt that occurs
-  [[nodiscard]] const SymbolView& view(int letter, float tilt);
+  void expose(int letter, float tilt);
+  /// Blurs the exposure and adds its noise. The result is valid until the next call.
+  /// @param blur_px  standard deviation, to a third; if missing, all that occur
+  [[nodiscard]] const SymbolView& develop(std::optional<float> blur_px);
 
   [[nodiscard]] FrameError frame_error();
 
@@ -60,15 +67,20 @@ class SymbolViewer {
   float share();
   float uniform(float low, float high);
   void draw_cells(int letter);
-  void expose(int side_px);
+  void light_pixels(int side_px);
+  void draw_noise(int pixels);
   void blur(float sigma_px);
-  void add_noise(float size);
+  void add_noise();
 
   SymbolViewOptions options_;
   Random random_{1};
   std::vector<Grey8> drawings_;
   Grey8 cells_;  // three by three cells, with a dark border of one pixel
-  std::vector<float> light_, blurred_, wide_row_;
+  std::vector<float> exposed_, light_, blurred_, wide_row_, tall_;
+  float blur_share_ = 0;  // where in the range of blurs
+  float noise_ = 0;       // standard deviation, grey levels
+  std::vector<std::uint32_t> draws_;
+  std::vector<float> noises_;               // for each pixel, in standard deviations
   std::vector<float> column_u_, column_v_;  // contribution of a subpixel's column to its place among the cells
   std::vector<std::int32_t> pixels_;        // pattern pixels under a row's subpixels
   std::vector<int> lit_;                    // sums of a row's pixels

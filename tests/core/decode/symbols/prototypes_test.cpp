@@ -69,6 +69,22 @@ TEST(MakePrototypes, GivesEachFrameErrorWhatItWouldGetAlone) {
   EXPECT_NE(together[0][0].whitening, together[1][0].whitening);
 }
 
+TEST(MakePrototypes, GivesEachBlurWhatItWouldGetAlone) {
+  PrototypeOptions options = options_of({5, 7, 22});
+  const std::vector<std::optional<float>> blurs_px{std::nullopt, 0.45F, 2.0F};
+  const auto together = make_prototypes(options, std::span(&options.frame_error, 1), blurs_px);
+  for (std::size_t blur = 0; blur < blurs_px.size(); ++blur) {
+    options.blur_px = blurs_px[blur];
+    const auto alone = make_prototypes(options);
+    for (std::size_t i = 0; i < alone.size(); ++i) {
+      EXPECT_EQ(together[blur][0][i].mean, alone[i].mean);
+      EXPECT_EQ(together[blur][0][i].whitening, alone[i].whitening);
+      EXPECT_EQ(together[blur][0][i].steady_centroid_px, alone[i].steady_centroid_px);
+    }
+  }
+  EXPECT_NE(together[1][0][0].whitening, together[2][0][0].whitening);
+}
+
 TEST(MakePrototypes, GivesTheSameForTheSameOptions) {
   const auto once = make_prototypes(options_of({5, 7, 22}));
   const auto again = make_prototypes(options_of({5, 7, 22}));
