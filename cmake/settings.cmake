@@ -11,6 +11,8 @@ if(NOT CMAKE_BUILD_TYPE)
 endif()
 
 include(CTest)
+# Packages are found beside the targets that need them, and used by all that link those.
+set(CMAKE_FIND_PACKAGE_TARGETS_GLOBAL ON)
 option(SLSD_BENCHMARKS "Build the benchmarks" ON)
 option(SLSD_UNITY "Compile the files of a library together: quicker from nothing, slower after a change of one of them" ON)
 option(SLSD_DEVICES "Build the drivers of cameras and projectors, calibrating and all clients; OFF: slsd and slsctl for recorded frames" ON)

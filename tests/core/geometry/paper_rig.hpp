@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "core/geometry/calibration.hpp"
+#include "core/geometry/triangulate.hpp"
 
 namespace slsd {
 
@@ -37,6 +38,25 @@ inline Eigen::Vector2d any_pixel(const Lens& lens) {
 inline Eigen::Vector3d any_point(const Lens& lens, double depth_min_mm = 400.0, double depth_max_mm = 2500.0) {
   const Eigen::Vector2d direction = lens.undistort(any_pixel(lens));
   return uniform(depth_min_mm, depth_max_mm) * direction.homogeneous();
+}
+
+inline Lens any_distorted_lens() {
+  Lens lens{1600, 1200, uniform(2000, 4000), uniform(2000, 4000), uniform(700, 900), uniform(500, 700), {}};
+  lens.distortion = {uniform(-0.25, 0.25), uniform(-0.2, 0.2), uniform(-0.003, 0.003), uniform(-0.003, 0.003),
+                     uniform(-0.05, 0.05)};
+  return lens;
+}
+
+/// A point and its match.
+struct PointAndMatch {
+  Eigen::Vector3d point;
+  Match match;
+};
+
+inline PointAndMatch any_point_and_match(const Calibration& rig) {
+  const CalibratedCamera& camera = rig.cameras[0];
+  const Eigen::Vector3d point = any_point(camera.lens);
+  return {point, {camera.lens.project(point), rig.projector.project(camera.projector_from_camera * point)}};
 }
 
 }  // namespace slsd
