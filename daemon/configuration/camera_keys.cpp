@@ -116,9 +116,7 @@ void refuse_keys_of_others(TableReader& reader, const toml::table& table, std::s
   }
 }
 
-Result<CameraOptions> read_camera(const toml::table& table, const path& file) {
-  TableReader reader(&table, "[[camera]]", file);
-  CameraOptions options;
+void read_keys(TableReader& reader, CameraOptions& options) {
   std::string name = options.name();
   reader.read("name", name);
   const auto of_drivers = drivers();
@@ -126,6 +124,12 @@ Result<CameraOptions> read_camera(const toml::table& table, const path& file) {
   std::visit([&](auto& of_driver) { of_driver.name = name; }, options.of_driver);
   read_driver_keys(reader, options.of_driver);
   read_faults(reader, options);
+}
+
+Result<CameraOptions> read_camera(const toml::table& table, const path& file) {
+  TableReader reader(&table, "[[camera]]", file);
+  CameraOptions options;
+  read_keys(reader, options);
   refuse_keys_of_others(reader, table, options.driver());
   if (auto read = reader.finish(options.validate()); !read) return tl::unexpected(read.error());
   return options;
@@ -147,6 +151,17 @@ Result<std::vector<CameraOptions>> read_cameras(const std::vector<const toml::ta
     cameras.push_back(std::move(*camera));
   }
   return cameras;
+}
+
+std::vector<std::string> known_camera_keys() {
+  std::vector<std::string> keys;
+  for (const auto& [driver, of_driver] : drivers()) {
+    TableReader reader(nullptr, "", "");
+    CameraOptions ignored{of_driver, {}};
+    read_keys(reader, ignored);
+    for (const std::string& key : reader.known()) keys.push_back("camera." + std::string(driver) + "." + key);
+  }
+  return keys;
 }
 
 }  // namespace slsd

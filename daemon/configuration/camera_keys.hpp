@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "daemon/configuration/camera_options.hpp"
@@ -17,5 +18,8 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] Result<std::vector<CameraOptions>> read_cameras(const std::vector<const toml::table*>& tables,
                                                               const std::filesystem::path& file);
+
+/// The keys of a [[camera]] table by driver: "camera.v4l2.device".
+[[nodiscard]] std::vector<std::string> known_camera_keys();
 
 }  // namespace slsd

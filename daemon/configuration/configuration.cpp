@@ -31,8 +31,7 @@ constexpr std::array kMethods{std::pair("default"sv, Method::kDefault), std::pai
 constexpr std::array kOtherHardware{std::pair("error"sv, OtherHardware::kError),
                                     std::pair("warn"sv, OtherHardware::kWarn)};
 
-Result<> read_projector(const toml::table* table, const path& file, ProjectorOptions& options) {
-  TableReader reader(table, "[projector]", file);
+void read_keys(TableReader& reader, ProjectorOptions& options) {
   reader.choose("driver", options.driver, kProjectorDrivers);
   reader.read("monitor", options.monitor);
   reader.read("width_px", options.width_px);
@@ -44,23 +43,9 @@ Result<> read_projector(const toml::table* table, const path& file, ProjectorOpt
   reader.read("refresh_hz", options.refresh_hz);
   reader.choose("idle", options.idle, kIdlePictures);
   reader.read("idle_after_ms", options.idle_after_ms);
-  return reader.finish(options.validate());
 }
 
-// A pattern file contains the whole pattern: another key beside it could only contradict it.
-void refuse_keys_beside_file(TableReader& reader) {
-  for (const char* key : {"symbol_size_px", "spacing_px", "symbols", "seed", "method", "minimum_distance",
-                          "half_turn_unique", "row_reach", "column_reach"}) {
-    if (reader.has(key)) reader.refuse(key, "cannot stand beside file, which holds the whole pattern: remove one");
-  }
-}
-
-Result<> read_pattern_table(const toml::table* table, const path& file, Configuration& configuration) {
-  TableReader reader(table, "[pattern]", file);
-  PatternOptions& options = configuration.pattern;
-  options.projector_width_px = configuration.projector.width_px;
-  options.projector_height_px = configuration.projector.height_px;
-  reader.read("file", configuration.pattern_file);
+void read_keys(TableReader& reader, PatternOptions& options) {
   reader.read("symbol_size_px", options.symbol_size_px);
   reader.read("spacing_px", options.spacing_px);
   reader.read("symbols", options.symbols);
@@ -70,14 +55,9 @@ Result<> read_pattern_table(const toml::table* table, const path& file, Configur
   reader.read("half_turn_unique", options.half_turn_unique);
   reader.read("row_reach", options.row_reach);
   reader.read("column_reach", options.column_reach);
-  if (!configuration.pattern_file.empty()) refuse_keys_beside_file(reader);
-  if (auto read = reader.finish(options.validate()); !read) return read;
-  if (options.symbols.empty()) options.symbols = default_symbols(options.symbol_size_px);
-  return {};
 }
 
-Result<> read_decode(const toml::table* table, const path& file, DecodeOptions& options) {
-  TableReader reader(table, "[decode]", file);
+void read_keys(TableReader& reader, DecodeOptions& options) {
   reader.read("depth_min_mm", options.depth_min_mm);
   reader.read("depth_max_mm", options.depth_max_mm);
   reader.read("wrong_cells_max", options.wrong_cells_max);
@@ -92,29 +72,18 @@ Result<> read_decode(const toml::table* table, const path& file, DecodeOptions& 
   reader.choose("link_grid", options.link_grid, kMethods);
   reader.choose("decode_windows", options.decode_windows, kMethods);
   reader.choose("correspond", options.correspond, kMethods);
-  return reader.finish(options.validate());
 }
 
-Result<> read_calibration_table(const toml::table* table, const path& file, Configuration& configuration) {
-  TableReader reader(table, "[calibration]", file);
-  reader.read("file", configuration.calibration_file);
-  reader.choose("other_hardware", configuration.other_hardware, kOtherHardware);
-  return reader.finish();
-}
-
-Result<> read_scan(const toml::table* table, const path& file, ScanOptions& options) {
-  TableReader reader(table, "[scan]", file);
+void read_keys(TableReader& reader, ScanOptions& options) {
   reader.read("timeout_ms", options.timeout_ms);
   reader.read("exposure_skew_ms", options.exposure_skew_ms);
   reader.read("reopen_first_ms", options.reopen_first_ms);
   reader.read("reopen_longest_ms", options.reopen_longest_ms);
   reader.read("projector_latency_ms", options.projector_latency_ms);
   reader.read("power_line_hz", options.power_line_hz);
-  return reader.finish(options.validate());
 }
 
-Result<> read_server(const toml::table* table, const path& file, ServerOptions& options) {
-  TableReader reader(table, "[server]", file);
+void read_keys(TableReader& reader, ServerOptions& options) {
   reader.read("socket", options.socket);
   reader.read("socket_mode", options.socket_mode);
   reader.read("observe", options.observe);
@@ -124,15 +93,44 @@ Result<> read_server(const toml::table* table, const path& file, ServerOptions& 
   reader.read("request_bytes_max", options.request_bytes_max);
   reader.read("memory_max_mb", options.memory_max_mb);
   reader.read("send_timeout_ms", options.send_timeout_ms);
-  return reader.finish(options.validate());
 }
 
-Result<> read_black_box(const toml::table* table, const path& file, BlackBoxOptions& options) {
-  TableReader reader(table, "[black_box]", file);
+void read_keys(TableReader& reader, BlackBoxOptions& options) {
   reader.read("memory_max_mb", options.memory_max_mb);
   reader.read("disk_max_mb", options.disk_max_mb);
   reader.read("folder", options.folder);
+}
+
+template <class Options>
+Result<> read_table(TableReader reader, Options& options) {
+  read_keys(reader, options);
   return reader.finish(options.validate());
+}
+
+// A pattern file contains the whole pattern: another key beside it could only contradict it.
+Result<> read_pattern_table(TableReader reader, Configuration& configuration) {
+  PatternOptions& options = configuration.pattern;
+  options.projector_width_px = configuration.projector.width_px;
+  options.projector_height_px = configuration.projector.height_px;
+  read_keys(reader, options);
+  const std::vector<std::string> of_pattern = reader.known();
+  reader.read("file", configuration.pattern_file);
+  for (const std::string& key : of_pattern)
+    if (!configuration.pattern_file.empty() && reader.has(key))
+      reader.refuse(key, "cannot stand beside file, which holds the whole pattern: remove one");
+  if (auto read = reader.finish(options.validate()); !read) return read;
+  if (options.symbols.empty()) options.symbols = default_symbols(options.symbol_size_px);
+  return {};
+}
+
+void read_calibration_keys(TableReader& reader, Configuration& configuration) {
+  reader.read("file", configuration.calibration_file);
+  reader.choose("other_hardware", configuration.other_hardware, kOtherHardware);
+}
+
+Result<> read_calibration_table(TableReader reader, Configuration& configuration) {
+  read_calibration_keys(reader, configuration);
+  return reader.finish();
 }
 
 // The keys as given, by table. Dates and times, which no key uses, become null.
@@ -162,28 +160,25 @@ json given_keys(const toml::node& node) {
 
 Result<Configuration> read_tables(const toml::table& document, const path& file) {
   TableReader top(&document, "", file);
-  const toml::table* projector = top.table("projector");
-  const toml::table* pattern = top.table("pattern");
+  const auto table = [&](const std::string& name) { return TableReader(top.table(name), "[" + name + "]", file); };
+  const TableReader projector = table("projector"), pattern = table("pattern"), calibration = table("calibration"),
+                    decode = table("decode"), scan = table("scan"), server = table("server"),
+                    black_box = table("black_box");
   const std::vector<const toml::table*> cameras = top.tables("camera");
-  const toml::table* calibration = top.table("calibration");
-  const toml::table* decode = top.table("decode");
-  const toml::table* scan = top.table("scan");
-  const toml::table* server = top.table("server");
-  const toml::table* black_box = top.table("black_box");
   Configuration configuration;
   Result<> read = top.finish();
-  if (read) read = read_projector(projector, file, configuration.projector);
-  if (read) read = read_pattern_table(pattern, file, configuration);
+  if (read) read = read_table(projector, configuration.projector);
+  if (read) read = read_pattern_table(pattern, configuration);
   if (read) {
     auto listed = read_cameras(cameras, file);
     if (!listed) return tl::unexpected(listed.error());
     configuration.cameras = std::move(*listed);
   }
-  if (read) read = read_calibration_table(calibration, file, configuration);
-  if (read) read = read_decode(decode, file, configuration.decode);
-  if (read) read = read_scan(scan, file, configuration.scan);
-  if (read) read = read_server(server, file, configuration.server);
-  if (read) read = read_black_box(black_box, file, configuration.black_box);
+  if (read) read = read_calibration_table(calibration, configuration);
+  if (read) read = read_table(decode, configuration.decode);
+  if (read) read = read_table(scan, configuration.scan);
+  if (read) read = read_table(server, configuration.server);
+  if (read) read = read_table(black_box, configuration.black_box);
   if (!read) return tl::unexpected(read.error());
   configuration.given = given_keys(document);
   return configuration;
@@ -197,6 +192,24 @@ Result<Configuration> read_configuration(std::string_view text, const path& file
   } catch (const toml::parse_error& error) {
     return fail(ErrorCode::kMalformed, std::string(error.description()), place_of(error.source(), file.string()));
   }
+}
+
+std::vector<std::string> known_keys() {
+  std::vector<std::string> keys = known_camera_keys();
+  Configuration ignored;
+  const auto add = [&](const std::string& table, const auto& read) {
+    TableReader reader(nullptr, "", "");
+    read(reader);
+    for (const std::string& key : reader.known()) keys.push_back(table + "." + key);
+  };
+  add("pattern", [&](auto& reader) { read_keys(reader, ignored.pattern), reader.read("file", ignored.pattern_file); });
+  add("projector", [&](auto& reader) { read_keys(reader, ignored.projector); });
+  add("calibration", [&](auto& reader) { read_calibration_keys(reader, ignored); });
+  add("decode", [&](auto& reader) { read_keys(reader, ignored.decode); });
+  add("scan", [&](auto& reader) { read_keys(reader, ignored.scan); });
+  add("server", [&](auto& reader) { read_keys(reader, ignored.server); });
+  add("black_box", [&](auto& reader) { read_keys(reader, ignored.black_box); });
+  return keys;
 }
 
 Result<Configuration> load_configuration(const path& file) {

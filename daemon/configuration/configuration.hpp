@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -46,6 +47,9 @@ struct Configuration {
 ///         is file:line:column
 /// @thread reentrant
 [[nodiscard]] Result<Configuration> read_configuration(std::string_view text, const std::filesystem::path& file);
+
+/// The keys that read_configuration() knows: "projector.width_px", and of cameras by driver: "camera.v4l2.device".
+[[nodiscard]] std::vector<std::string> known_keys();
 
 /// Reads a configuration file. @errors as above, and those of read_file() @thread reentrant
 [[nodiscard]] Result<Configuration> load_configuration(const std::filesystem::path& file);

@@ -7,6 +7,7 @@
 #include "docs/tables/alphabet_picture.hpp"
 #include "docs/tables/alphabet_tables.hpp"
 #include "docs/tables/array_tables.hpp"
+#include "docs/tables/configuration_files.hpp"
 #include "docs/tables/profile_chart.hpp"
 #include "docs/tables/reason_table.hpp"
 #include "docs/tables/shipped_patterns.hpp"
@@ -39,13 +40,16 @@ bool write_documents(const std::string& folder) {
 
 }  // namespace
 
-// Writes the generated tables and pictures of docs/ anew, and the shipped patterns where their folder is named.
+// Writes the generated tables and pictures of docs/ anew, the shipped patterns, the configuration and its page.
 int main(int argc, char** argv) {
-  if (argc < 2 || argc > 3) {
-    std::cerr << "usage: slsd-tables DOCS_FOLDER [PATTERNS_FOLDER]\n";
+  if (argc != 2) {
+    std::cerr << "usage: slsd-tables FOLDER_OF_THE_SOURCES\n";
     return 2;
   }
-  const bool written = write_documents(argv[1]) && (argc < 3 || write_patterns(argv[2]));
-  if (!written) std::cerr << "slsd-tables: cannot write into " << argv[1] << "\n";
+  const std::string sources = argv[1];
+  const bool written = write(sources + "/config/slsd.toml", slsd::configuration_file()) &&
+                       write(sources + "/man/slsd.toml.5", slsd::configuration_page()) &&
+                       write_patterns(sources + "/config/patterns") && write_documents(sources + "/docs");
+  if (!written) std::cerr << "slsd-tables: cannot write into " << sources << "\n";
   return written ? 0 : 1;
 }

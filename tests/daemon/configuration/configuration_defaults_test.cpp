@@ -2,10 +2,8 @@
 // Copyright the slsd authors
 
 // What holds where the file says nothing, and that the shipped file says the same.
-#include <algorithm>
 #include <fstream>
 #include <iterator>
-#include <regex>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -86,44 +84,6 @@ TEST(ReadConfiguration, ShippedCamerasEqualTheDefaults) {
   aravis.id = "192.0.2.10";
   EXPECT_THAT(cameras, testing::UnorderedElementsAre(CameraOptions{file, {}}, CameraOptions{v4l2, {}},
                                                      CameraOptions{aravis, {}}));
-}
-
-/// The part of the shipped file that begins with a line, up to the next table.
-std::string shipped_part(const std::string& heading) {
-  const std::string text = "\n" + shipped();
-  const std::size_t begin = text.find("\n" + heading + "\n");
-  if (begin == std::string::npos) return {};
-  return text.substr(begin, text.find("\n[", begin + 2 + heading.size()) - begin);
-}
-
-// Every key stands in its table of the shipped file, in force or in a comment.
-TEST(ReadConfiguration, ShippedFileHasEveryKey) {
-  const std::pair<const char*, const char*> tables[] = {
-      {"[pattern]",
-       "file symbol_size_px spacing_px symbols seed method minimum_distance half_turn_unique row_reach "
-       "column_reach"},
-      {"[projector]", "driver monitor width_px height_px brightness gamma black_level refresh_hz idle idle_after_ms"},
-      {"# [[camera]]",
-       "name driver path loop rate_hz bayer faults device width_px height_px format frame_rate_hz exposure_us "
-       "gain_steps "
-       "focus_steps power_line_hz automatic readout_us settle_frames id interface trigger trigger_line gain_db "
-       "pixel_format chunks action_device_key action_group_key action_group_mask action_lead_us ptp packet_bytes "
-       "packet_delay_us receive_buffer_bytes packet_resend packet_socket frame_timeout_ms missed_frames_max "
-       "frames_held_max"},
-      {"[calibration]", "file other_hardware"},
-      {"[decode]",
-       "depth_min_mm depth_max_mm wrong_cells_max precision binarize find_regions classify centre link_grid "
-       "decode_windows correspond"},
-      {"[scan]", "timeout_ms exposure_skew_ms reopen_first_ms reopen_longest_ms projector_latency_ms power_line_hz"},
-      {"[server]",
-       "socket socket_mode observe scan administer clients_max request_bytes_max memory_max_mb send_timeout_ms"}};
-  for (const auto& [heading, keys] : tables) {
-    const std::string part = shipped_part(heading);
-    std::istringstream words(keys);
-    for (std::string key; words >> key;) {
-      EXPECT_TRUE(std::regex_search(part, std::regex("\n(# )*" + key + " = "))) << heading << " " << key;
-    }
-  }
 }
 
 }  // namespace
