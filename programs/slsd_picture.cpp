@@ -10,8 +10,8 @@
 #include <string_view>
 
 #include "core/image_size.hpp"
+#include "drivers/confine/confine.hpp"
 #include "drivers/files/picture_process.hpp"
-#include "drivers/system/confine.hpp"
 
 namespace {
 

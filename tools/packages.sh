@@ -6,7 +6,7 @@
 # For slsd and slsctl on recorded frames
 demo_packages=(g++ cmake ninja-build pkg-config libexpected-dev libtomlplusplus-dev nlohmann-json3-dev libfmt-dev
   libspdlog-dev libcli11-dev libasio-dev libsystemd-dev libeigen3-dev libopencv-core-dev libopencv-imgproc-dev
-  libpng-dev libtiff-dev libjpeg-dev libyaml-dev)
+  libpng-dev libtiff-dev libjpeg-dev libyaml-dev libseccomp-dev)
 build_packages=("${demo_packages[@]}"
   libopencv-imgcodecs-dev libopencv-calib3d-dev libopencv-features2d-dev libopencv-contrib-dev
   libcairo2-dev libgtest-dev libgmock-dev librapidcheck-dev libceres-dev

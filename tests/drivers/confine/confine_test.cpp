@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "drivers/system/confine.hpp"
+#include "drivers/confine/confine.hpp"
 
 #include <fcntl.h>
 #include <sys/mman.h>

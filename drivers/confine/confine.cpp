@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "drivers/confine/confine.hpp"
+
+#include <linux/capability.h>
+#include <seccomp.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <memory>
+#include <system_error>
+
+namespace slsd {
+namespace {
+
+constexpr rlim_t kMemoryBytes = 256 << 20;  // for a 4K picture, its file and the libraries
+constexpr rlim_t kProcessorSeconds = 10;
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;
+#else
+constexpr bool kSanitized = false;
+#endif
+
+constexpr int kAllowed[] = {SCMP_SYS(read),   SCMP_SYS(write),   SCMP_SYS(brk),  SCMP_SYS(munmap),
+                            SCMP_SYS(mremap), SCMP_SYS(madvise), SCMP_SYS(exit), SCMP_SYS(exit_group)};
+
+void limit(__rlimit_resource_t what, rlim_t most) {
+  const rlimit both{most, most};
+  ::setrlimit(what, &both);
+}
+
+void drop_capabilities() {
+  ::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0, 0, 0);
+  __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+  const __user_cap_data_struct none[_LINUX_CAPABILITY_U32S_3]{};
+  ::syscall(SYS_capset, &header, none);
+}
+
+/// Forbids this process all other system calls, and memory that is executable or of a file.
+/// @return  0, or a negative error number
+int filter_system_calls() {
+  const std::unique_ptr<void, decltype(&seccomp_release)> filter(seccomp_init(SCMP_ACT_KILL_PROCESS), seccomp_release);
+  if (filter == nullptr) return -EINVAL;
+  int error = seccomp_attr_set(filter.get(), SCMP_FLTATR_ACT_BADARCH, SCMP_ACT_KILL_PROCESS);
+  for (const int call : kAllowed)
+    if (error == 0) error = seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, call, 0);
+  if (error == 0)
+    error = seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, SCMP_SYS(mmap), 2, SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0),
+                             SCMP_A3(SCMP_CMP_MASKED_EQ, MAP_ANONYMOUS, MAP_ANONYMOUS));
+  return error == 0 ? seccomp_load(filter.get()) : error;  // which also forbids new privileges
+}
+
+}  // namespace
+
+Result<> confine() {
+  if (kSanitized) return {};
+  limit(RLIMIT_CORE, 0);
+  limit(RLIMIT_CPU, kProcessorSeconds);
+  limit(RLIMIT_AS, kMemoryBytes);
+  drop_capabilities();
+  const int error = filter_system_calls();
+  if (error == 0) return {};
+  return fail(ErrorCode::kUnsupported,
+              "this kernel filters no system calls: " + std::generic_category().message(-error));
+}
+
+}  // namespace slsd
