@@ -24,7 +24,7 @@ ConfigurationTable file_camera() {
       "camera.file",
       "",
       {{{{"path", R"("frames")", kExample}},
-        "A folder of PNG, TIFF, PGM, PPM or BMP images, replayed in the order of their names, or one image. Frames "
+        "A folder of PNG, TIFF, PGM or PPM images, replayed in the order of their names, or one image. Frames "
         R"(for scans with texture or ambient light come from its folders "white" and "dark", or those beside the one )"
         "image."},
        {{{"loop", "true"}}, "Begins again after the last image. Else the camera then has no more frames."},

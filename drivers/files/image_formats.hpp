@@ -26,7 +26,6 @@ struct DecodedImage {
 [[nodiscard]] Result<DecodedImage> decode_tiff(std::string_view bytes, std::size_t limit_bytes);
 [[nodiscard]] Result<DecodedImage> decode_pnm(std::string_view bytes, std::size_t limit_bytes);
 [[nodiscard]] Result<DecodedImage> decode_jpeg(std::string_view bytes, std::size_t limit_bytes);
-[[nodiscard]] Result<DecodedImage> decode_bmp(std::string_view bytes, std::size_t limit_bytes);
 
 /// The image's size and samples that a header declares.
 struct ImageLayout {

@@ -20,9 +20,8 @@ Result<DecodedImage> decode(std::string_view bytes, std::size_t limit_bytes) {
   for (const auto mark : {"II*\0"sv, "MM\0*"sv, "II+\0"sv, "MM\0+"sv})
     if (bytes.starts_with(mark)) return decode_tiff(bytes, limit_bytes);
   if (bytes.starts_with("\xFF\xD8\xFF"sv)) return decode_jpeg(bytes, limit_bytes);
-  if (bytes.starts_with("BM"sv)) return decode_bmp(bytes, limit_bytes);
   if (bytes.size() >= 3 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '7') return decode_pnm(bytes, limit_bytes);
-  return fail(ErrorCode::kUnsupported, "is not a PNG, TIFF, PGM, PPM, BMP or JPEG image; convert it to one of these");
+  return fail(ErrorCode::kUnsupported, "is not a PNG, TIFF, PGM, PPM or JPEG image; convert it to one of these");
 }
 
 Result<GreyImage> grey_from(DecodedImage image, BayerPattern bayer) {

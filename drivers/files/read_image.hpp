@@ -19,7 +19,7 @@ struct ReadImageOptions {
   std::size_t limit_decoded_bytes = 1u << 28;  ///< 256 MiB of pixels, as the file's header declares them
 };
 
-/// Decodes a PNG, TIFF, PGM, PPM, BMP or JPEG file into grey. Colour becomes 0.299 R + 0.587 G + 0.114 B (ITU-R
+/// Decodes a PNG, TIFF, PGM, PPM or JPEG file into grey. Colour becomes 0.299 R + 0.587 G + 0.114 B (ITU-R
 /// BT.601); transparency is ignored. Values are kept: 10 bits in a 16-bit file stay below 1024. PGM and PPM give their
 /// greatest value, and are scaled to the full range. A file that ends early is an error, not a partial image.
 /// @param name  the name of the bytes in errors

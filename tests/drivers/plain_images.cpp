@@ -147,30 +147,6 @@ std::string plain_pnm_bytes(const Samples& samples) {
   return bytes;
 }
 
-std::string bmp_bytes(const Samples& samples, bool top_down) {
-  const int row_bytes = (samples.width * samples.channels + 3) / 4 * 4;
-  const int palette = samples.channels == 1 ? 256 : 0;
-  std::string bmp("BM");
-  for (const int value : {54 + 4 * palette + row_bytes * samples.height, 0, 54 + 4 * palette, 40, samples.width,
-                          top_down ? -samples.height : samples.height})
-    put(bmp, static_cast<std::uint32_t>(value), 4, false);
-  put(bmp, 1, 2, false);
-  put(bmp, 8 * samples.channels, 2, false);
-  for (const int value : {0, row_bytes * samples.height, 2835, 2835, palette, 0}) put(bmp, value, 4, false);
-  for (int i = 0; i < palette; ++i) put(bmp, i << 16 | i << 8 | i, 4, false);
-  for (int i = 0; i < samples.height; ++i) {
-    const std::size_t row = bmp.size();
-    const int y = top_down ? i : samples.height - 1 - i;
-    for (int x = 0; x < samples.width; ++x)
-      for (int c = 0; c < samples.channels; ++c) {
-        const int channel = c < 3 && samples.channels > 1 ? 2 - c : c;  // blue comes first
-        bmp.push_back(static_cast<char>(samples.values[(y * samples.width + x) * samples.channels + channel]));
-      }
-    bmp.resize(row + row_bytes, '\0');
-  }
-  return bmp;
-}
-
 std::string png_bytes(const Samples& samples, bool interlaced) {
   constexpr int kColourTypes[] = {0, 0, 4, 2, 6};
   return png_of(samples, kColourTypes[samples.channels], "", interlaced);

@@ -26,7 +26,6 @@ struct Samples {
 /// Image files written here from their formats' descriptions alone, the simplest kind of each.
 [[nodiscard]] std::string pnm_bytes(const Samples& samples);
 [[nodiscard]] std::string plain_pnm_bytes(const Samples& samples);
-[[nodiscard]] std::string bmp_bytes(const Samples& samples, bool top_down = false);
 [[nodiscard]] std::string png_bytes(const Samples& samples, bool interlaced = false);
 [[nodiscard]] std::string palette_png_bytes(const Grey8& indices, const std::vector<Rgb>& palette);
 [[nodiscard]] std::string tiff_bytes(const Samples& samples, bool big_endian, int rows_per_strip = 3);

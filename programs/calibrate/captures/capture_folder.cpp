@@ -27,7 +27,7 @@ std::vector<path> sorted_entries(const path& folder, bool folders) {
   return entries;
 }
 
-constexpr std::array kExtensions{".png", ".tif", ".tiff", ".pgm", ".ppm", ".bmp", ".jpg", ".jpeg"};
+constexpr std::array kExtensions{".png", ".tif", ".tiff", ".pgm", ".ppm", ".jpg", ".jpeg"};
 
 /// The rank of the file's extension among the readable ones; their number if it is not readable.
 std::size_t rank_of(const path& file) {

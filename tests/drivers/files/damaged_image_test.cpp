@@ -67,8 +67,6 @@ INSTANTIATE_TEST_SUITE_P(
                       Format{"PgmRaw16", [] { return test::pnm_bytes(samples_of(ramp16(9, 7))); }},
                       Format{"PgmPlain", [] { return test::plain_pnm_bytes(samples_of(ramp8(9, 7))); }},
                       Format{"PpmRaw", [] { return test::pnm_bytes(colour_samples()); }},
-                      Format{"BmpGrey", [] { return test::bmp_bytes(samples_of(ramp8(9, 7))); }},
-                      Format{"BmpColour", [] { return test::bmp_bytes(colour_samples()); }},
                       Format{"PngStored", [] { return test::png_bytes(samples_of(ramp8(9, 7))); }},
                       Format{"PngColour", [] { return test::png_bytes(colour_samples()); }},
                       Format{"PngInterlaced", [] { return test::png_bytes(samples_of(ramp16(9, 7)), true); }},
@@ -80,10 +78,10 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(DecodeImage, RefusesHugeDeclaredSizesBeforeItTakesTheMemory) {
   const Samples small = samples_of(ramp8(4, 4));
-  for (std::string file : {test::png_bytes(small), test::bmp_bytes(small), test::tiff_bytes(small, true)}) {
-    const bool png = file[0] == '\x89', bmp = file[0] == 'B';
-    const std::size_t width_at = png ? 16 : bmp ? 18 : file.find(std::string("\x01\x00\x00\x04", 4)) + 8;
-    file[width_at + (bmp ? 3 : 0)] = 0x7f;
+  for (std::string file : {test::png_bytes(small), test::tiff_bytes(small, true)}) {
+    const bool png = file[0] == '\x89';
+    const std::size_t width_at = png ? 16 : file.find(std::string("\x01\x00\x00\x04", 4)) + 8;
+    file[width_at] = 0x7f;
     const auto refused = decode_image(file, "file");
     ASSERT_FALSE(refused);
     EXPECT_FALSE(refused.error().message.empty());
@@ -103,9 +101,7 @@ TEST(DecodeImage, RefusesMoreThanTheLimits) {
 
 TEST(DecodeImage, RefusesKindsThatWouldNotBeDecodedFaithfully) {
   EXPECT_EQ(decode_image("P4\n8 1\nx", "file").error().code, ErrorCode::kUnsupported);
-  std::string bmp = test::bmp_bytes(samples_of(ramp8(4, 4)));
-  bmp[30] = 1;  // run-length encoded
-  EXPECT_EQ(decode_image(bmp, "file").error().code, ErrorCode::kUnsupported);
+  EXPECT_EQ(decode_image("BM, a Windows bitmap", "file").error().code, ErrorCode::kUnsupported);
   std::string tiff = test::tiff_bytes(samples_of(ramp8(4, 4)), true);
   tiff[tiff.find(std::string("\x01\x03\x00\x03\x00\x00\x00\x01\x00\x01", 10)) + 9] = 7;  // JPEG
   EXPECT_EQ(decode_image(tiff, "file").error().code, ErrorCode::kUnsupported);
