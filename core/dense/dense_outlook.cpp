@@ -6,7 +6,7 @@
 
 #include <Eigen/Geometry>
 
-#include "core/appearance/align_patch.hpp"
+#include "core/appearance/patch_map.hpp"
 #include "core/decode/grid/lattice_frame.hpp"
 #include "core/dense/ray_grid.hpp"
 #include "core/geometry/ray_table.hpp"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "core/appearance/align_eight.hpp"
+#include "core/appearance/align_patches.hpp"
 #include "core/clones.hpp"
 #include "core/lanes.hpp"
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/appearance/align_patch.hpp"
+#include "core/appearance/patch_map.hpp"
 #include "core/appearance/pattern_field.hpp"
 #include "core/dense/surface_grid.hpp"
 #include "core/executor.hpp"

@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-#include "core/appearance/align_eight.hpp"
+#include "core/appearance/align_patches.hpp"
 #include "core/executor.hpp"
 #include "core/exposure/frame_noise.hpp"
 #include "core/geometry/calibration.hpp"

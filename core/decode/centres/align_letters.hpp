@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "core/appearance/align_eight.hpp"
+#include "core/appearance/align_patches.hpp"
 #include "core/appearance/pattern_field.hpp"
 #include "core/code/codebook.hpp"
 #include "core/code/pattern.hpp"

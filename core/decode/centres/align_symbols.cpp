@@ -33,8 +33,13 @@ double inverse_depth(const PatchMap& map, const PatchState& state, const Eigen::
 }
 
 /// Variance of the disparity at the patch's centre, from the remaining residual.
-float variance_of_noise(const PatchFit& fit) {
-  return fit.covariance(0, 0) * fit.residual * fit.residual;
+float variance_of_noise(const CellTask& cell) {
+  return cell.covariance(0, 0) * cell.patch.residual * cell.patch.residual;
+}
+
+/// The ray of a pixel near the one whose ray this is.
+PixelRay ray_beside(const PixelRay& ray, const Eigen::Vector2d& off_px) {
+  return {ray.direction + ray.turn * off_px, ray.turn};
 }
 
 /// A neighbour's plane as the starting point of this patch.
@@ -70,17 +75,23 @@ SymbolAligner::SymbolAligner(const Pattern& pattern, const CalibratedCamera& cam
       half_px_(0.5F * pitch_px_ + kBeyondCellPx),
       fields_(std::make_shared<const PatternFields>(draw_pattern(pattern))) {}
 
-SymbolAligner::Patch SymbolAligner::patch_of(const LatticeSymbol& symbol, const PixelRay& ray, double depth_mm) const {
-  Patch patch{};
-  patch.level = symbol.background + 0.5F * symbol.gain;
-  patch.map = make_patch_map(ray, symbol.centre_px.cast<double>(), camera_.projector_from_camera, projector_, depth_mm);
+CellTask SymbolAligner::cell_of(const LatticeSymbol& symbol, const PixelRay& ray, double depth_mm,
+                                const FrameNoise& noise) const {
+  CellTask cell;
+  PatchTask& patch = cell.patch;
+  patch.x = static_cast<int>(std::lround(symbol.centre_px.x()));
+  patch.y = static_cast<int>(std::lround(symbol.centre_px.y()));
+  patch.noise = noise.at(symbol.background + 0.5F * symbol.gain);  // midway between dark and lit
+  const Eigen::Vector2d middle_px(patch.x, patch.y);
+  patch.map = make_patch_map(ray_beside(ray, middle_px - symbol.centre_px.cast<double>()), middle_px,
+                             camera_.projector_from_camera, projector_, depth_mm);
   const PatchMap& map = patch.map;
   // Slopes that make the patch map match the symbol's local frame.
   const Eigen::Matrix2f inverse = symbol.frame.inverse();
   const Eigen::Vector2f at = map.base.topRightCorner<2, 1>();
   const Eigen::Matrix2f flat = map.base.topLeftCorner<2, 2>() - at * map.base.bottomLeftCorner<1, 2>();
   const Eigen::RowVector2f slopes = map.along.transpose() * (inverse - flat);
-  PatchState& start = patch.start;
+  PatchState& start = patch.state;
   start.slope_x = slopes.x(), start.slope_y = slopes.y();
   // The map from the pattern to the camera bends. The disparity bends with it, less the part that perspective gives a
   // plane.
@@ -100,39 +111,31 @@ SymbolAligner::Patch SymbolAligner::patch_of(const LatticeSymbol& symbol, const 
               top = static_cast<float>(symbol.row) * pitch_px_ + static_cast<float>(options_.spacing_px / 2);
   const float half_symbol = 0.5F * static_cast<float>(options_.symbol_size_px - 1);
   const Eigen::Vector2f square(left + half_symbol, top + half_symbol);
-  const Eigen::Vector2f middle = symbol.centre_px + camera_offset(map, start, square - map.origin_px.cast<float>());
+  cell.square_middle_px = square, cell.square_half_px = half_px_;
+  const Eigen::Vector2f middle = camera_offset(map, start, square - map.origin_px.cast<float>());
   const Eigen::Vector2f reach = half_px_ * symbol.frame.cwiseAbs().rowwise().sum() + Eigen::Vector2f::Constant(1);
-  patch.window = {static_cast<int>(std::floor(middle.x() - reach.x())),
-                  static_cast<int>(std::floor(middle.y() - reach.y())),
-                  static_cast<int>(std::ceil(2 * reach.x())) + 1,
-                  static_cast<int>(std::ceil(2 * reach.y())) + 1,
-                  square,
-                  half_px_};
-  return patch;
+  cell.window_px = 2 * static_cast<int>(std::ceil((middle.cwiseAbs() + reach).maxCoeff())) + 1;
+  return cell;
 }
 
-PatchFit SymbolAligner::fit(const GreyView& frame, double full, const FrameNoise& noise, const Patch& patch,
-                            const PatchState& start, std::size_t blur) {
-  return std::visit(
-      [&](const auto& view) {
-        return aligner_.align(view, full, noise.at(patch.level), fields_->at(blur), patch.map, patch.window, start);
-      },
-      frame);
+void SymbolAligner::align_with_blur(const GreyView& frame, double full, std::size_t blur,
+                                    std::vector<CellTask>& cells) {
+  align_cells(frame, full, fields_->at(blur), {}, cells);
 }
 
 /// Finds the blur that fits a sample of the symbols best, downhill from the middle of the available blurs.
-std::size_t SymbolAligner::find_blur(const GreyView& frame, double full, const FrameNoise& noise) {
+std::size_t SymbolAligner::find_blur(const GreyView& frame, double full) {
   constexpr std::size_t kUnknown = std::numeric_limits<std::size_t>::max();
-  const std::size_t step = std::max<std::size_t>(1, patches_.size() / kBlurSamples);
+  const std::size_t step = std::max<std::size_t>(1, cells_.size() / kBlurSamples);
   std::array<float, PatternFields::kBlursPx.size()> misfit;
   misfit.fill(-1);
   const auto misfit_at = [&](std::size_t blur) {
     if (misfit[blur] >= 0) return misfit[blur];
-    misfits_.clear();
-    for (std::size_t i = step / 2; i < patches_.size(); i += step) {
-      const PatchFit fitted = fit(frame, full, noise, patches_[i], patches_[i].start, blur);
-      misfits_.push_back(fitted.solved ? fitted.residual / fitted.state.gain : 1);
-    }
+    sample_.clear(), misfits_.clear();
+    for (std::size_t i = step / 2; i < cells_.size(); i += step) sample_.push_back(cells_[i]);
+    align_with_blur(frame, full, blur, sample_);
+    for (const auto& [patch, window_px, middle_px, half_px, covariance] : sample_)
+      misfits_.push_back(patch.failed ? 1 : patch.residual / patch.state.gain);
     const auto middle = misfits_.begin() + static_cast<std::ptrdiff_t>(misfits_.size() / 2);
     std::nth_element(misfits_.begin(), middle, misfits_.end());
     return misfit[blur] = *middle;
@@ -148,37 +151,44 @@ std::size_t SymbolAligner::find_blur(const GreyView& frame, double full, const F
 
 /// Tries the planes of the neighbours as starts. If part of a symbol is cut off, many planes nearly fit the rest; its
 /// neighbours' planes are better starts.
-void SymbolAligner::try_neighbours(const GreyView& frame, double full, const FrameNoise& noise, const Lattice& lattice,
-                                   std::size_t index, std::size_t blur) {
-  Patch& patch = patches_[index];
-  for (const std::int32_t other : lattice.symbols[index].neighbours) {
-    if (other < 0) continue;
-    const Patch& beside = patches_[static_cast<std::size_t>(other)];
-    if (!beside.fit.solved || beside.fit.support < kSupportWeak) continue;
-    const PatchState start = continued(beside.map, beside.fit.state, patch.map, patch.fit.state);
-    if (std::abs(start.disparity) > 2) continue;
-    const PatchFit again = fit(frame, full, noise, patch, start, blur);
-    if (again.solved && again.support > patch.fit.support + 0.005F) patch.fit = again;
+void SymbolAligner::try_neighbours(const GreyView& frame, double full, const Lattice& lattice, std::size_t blur) {
+  const auto is_good = [](const PatchTask& patch) { return !patch.failed && patch.support >= kSupportWeak; };
+  again_.clear(), again_for_.clear();
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    const PatchTask& patch = cells_[i].patch;
+    if (patch.failed || is_good(patch)) continue;
+    for (const std::int32_t other : lattice.symbols[i].neighbours) {
+      if (other < 0 || !is_good(cells_[static_cast<std::size_t>(other)].patch)) continue;
+      const PatchTask& beside = cells_[static_cast<std::size_t>(other)].patch;
+      const PatchState start = continued(beside.map, beside.state, patch.map, patch.state);
+      if (std::abs(start.disparity) > 2) continue;
+      again_.push_back(cells_[i]), again_for_.push_back(i);
+      again_.back().patch.state = start;
+    }
+  }
+  align_with_blur(frame, full, blur, again_);
+  for (std::size_t k = 0; k < again_.size(); ++k) {
+    CellTask& cell = cells_[again_for_[k]];
+    if (!again_[k].patch.failed && again_[k].patch.support > cell.patch.support + 0.005F) cell = again_[k];
   }
 }
 
 /// Median distance of a patch from its neighbours' planes, continued to it, projector px, less the part that noise
 /// explains.
 float SymbolAligner::disagreement_px(const Lattice& lattice, std::size_t index) const {
-  const Patch& own = patches_[index];
+  const CellTask& own = cells_[index];
   std::array<float, 4> off;
   off.fill(std::numeric_limits<float>::max());
   int count = 0;
   float noise = 0;
   for (const std::int32_t other : lattice.symbols[index].neighbours) {
-    if (other < 0 || !patches_[static_cast<std::size_t>(other)].fit.solved) continue;
-    const Patch& beside = patches_[static_cast<std::size_t>(other)];
-    const PatchState there = continued(beside.map, beside.fit.state, own.map, own.fit.state);
-    off[count++] = std::abs(own.fit.state.disparity - there.disparity);
-    const float squared_px = (own.map.middle_px - beside.map.middle_px).squaredNorm();
-    noise += variance_of_noise(own.fit) + variance_of_noise(beside.fit) +
-             0.5F * (beside.fit.covariance(1, 1) + beside.fit.covariance(2, 2)) * beside.fit.residual *
-                 beside.fit.residual * squared_px;
+    if (other < 0 || cells_[static_cast<std::size_t>(other)].patch.failed) continue;
+    const CellTask& beside = cells_[static_cast<std::size_t>(other)];
+    const PatchTask &here = own.patch, &there = beside.patch;
+    off[count++] = std::abs(here.state.disparity - continued(there.map, there.state, here.map, here.state).disparity);
+    const float squared_px = (here.map.middle_px - there.map.middle_px).squaredNorm();
+    noise += variance_of_noise(own) + variance_of_noise(beside) +
+             0.5F * (beside.covariance(1, 1) + beside.covariance(2, 2)) * there.residual * there.residual * squared_px;
   }
   if (count == 0) return 0;
   std::sort(off.begin(), off.end());
@@ -190,21 +200,24 @@ float SymbolAligner::disagreement_px(const Lattice& lattice, std::size_t index) 
 
 AlignedSymbol SymbolAligner::point_of(const Lattice& lattice, std::size_t index, const PixelRay& ray,
                                       const Eigen::Vector2f& projector_px) const {
-  const auto& [map, window, start, fit, level] = patches_[index];
-  const PatchState& state = fit.state;
+  const CellTask& cell = cells_[index];
+  const PatchTask& patch = cell.patch;
+  const PatchMap& map = patch.map;
+  const PatchState& state = patch.state;
   const Eigen::Vector2f off = camera_offset(map, state, projector_px - map.origin_px.cast<float>());
   const double inverse = inverse_depth(map, state, off);
-  const Eigen::Vector3d direction = (ray.direction + ray.turn * off.cast<double>()).homogeneous();
   AlignedSymbol aligned;
-  aligned.point_in_camera = direction / inverse;
   aligned.centre_px = map.middle_px + off;
-  aligned.whole = fit.solved && fit.support > kWholeSupportMin;
+  const Eigen::Vector2d off_centre = (aligned.centre_px - lattice.symbols[index].centre_px).cast<double>();
+  const Eigen::Vector3d direction = ray_beside(ray, off_centre).direction.homogeneous();
+  aligned.point_in_camera = direction / inverse;
+  aligned.whole = !patch.failed && patch.support > kWholeSupportMin;
   const Eigen::Vector3f by(1, off.x(), off.y());
-  const float noise = by.dot(fit.covariance.topLeftCorner<3, 3>() * by) * fit.residual * fit.residual;
+  const float noise = by.dot(cell.covariance * by) * patch.residual * patch.residual;
   const auto square = [](float x) { return x * x; };
   const float shading = std::hypot(state.gain_x, state.gain_y) / state.gain;
   const float sigma_px =
-      std::sqrt(square(kSamplingPx) + square(aligned_sigma_px(noise, fit.scatter, fit.support)) +
+      std::sqrt(square(kSamplingPx) + square(aligned_sigma_px(noise, patch.scatter, patch.support)) +
                 square(kOfDisagreement * disagreement_px(lattice, index)) + square(kOfShading * shading));
   aligned.sigma_mm = static_cast<float>(map.inverse_depth_per_px / (inverse * inverse) * direction.norm() * sigma_px);
   return aligned;
@@ -213,18 +226,15 @@ AlignedSymbol SymbolAligner::point_of(const Lattice& lattice, std::size_t index,
 const std::vector<AlignedSymbol>& SymbolAligner::align(const GreyView& frame, double full, const FrameNoise& noise,
                                                        const Lattice& lattice, std::span<const PixelRay> rays,
                                                        std::span<const double> depths_mm, const CellRays& cells) {
-  patches_.clear();
+  cells_.clear();
   aligned_.clear();
   for (std::size_t i = 0; i < lattice.symbols.size(); ++i)
-    patches_.push_back(patch_of(lattice.symbols[i], rays[i], depths_mm[i]));
-  if (patches_.empty()) return aligned_;
-  const std::size_t blur = find_blur(frame, full, noise);
-  for (Patch& patch : patches_) patch.fit = fit(frame, full, noise, patch, patch.start, blur);
-  for (std::size_t i = 0; i < patches_.size(); ++i) {
-    if (patches_[i].fit.solved && patches_[i].fit.support < kSupportWeak)
-      try_neighbours(frame, full, noise, lattice, i, blur);
-  }
-  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    cells_.push_back(cell_of(lattice.symbols[i], rays[i], depths_mm[i], noise));
+  if (cells_.empty()) return aligned_;
+  const std::size_t blur = find_blur(frame, full);
+  align_with_blur(frame, full, blur, cells_);
+  try_neighbours(frame, full, lattice, blur);
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
     const LatticeSymbol& symbol = lattice.symbols[i];
     aligned_.push_back(point_of(lattice, i, rays[i], cells.pixel(symbol.row, symbol.column).cast<float>()));
   }

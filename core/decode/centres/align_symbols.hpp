@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/appearance/align_patch.hpp"
+#include "core/appearance/align_patches.hpp"
 #include "core/appearance/pattern_field.hpp"
 #include "core/code/pattern.hpp"
 #include "core/decode/grid/cell_rays.hpp"
@@ -51,19 +51,11 @@ class SymbolAligner {
                                                         std::span<const double> depths_mm, const CellRays& cells);
 
  private:
-  struct Patch {
-    PatchMap map;
-    PatchWindow window;
-    PatchState start;
-    PatchFit fit;
-    float level;  // midway between dark and lit
-  };
-  [[nodiscard]] Patch patch_of(const LatticeSymbol& symbol, const PixelRay& ray, double depth_mm) const;
-  [[nodiscard]] std::size_t find_blur(const GreyView& frame, double full, const FrameNoise& noise);
-  [[nodiscard]] PatchFit fit(const GreyView& frame, double full, const FrameNoise& noise, const Patch& patch,
-                             const PatchState& start, std::size_t blur);
-  void try_neighbours(const GreyView& frame, double full, const FrameNoise& noise, const Lattice& lattice,
-                      std::size_t index, std::size_t blur);
+  [[nodiscard]] CellTask cell_of(const LatticeSymbol& symbol, const PixelRay& ray, double depth_mm,
+                                 const FrameNoise& noise) const;
+  [[nodiscard]] std::size_t find_blur(const GreyView& frame, double full);
+  void align_with_blur(const GreyView& frame, double full, std::size_t blur, std::vector<CellTask>& cells);
+  void try_neighbours(const GreyView& frame, double full, const Lattice& lattice, std::size_t blur);
   [[nodiscard]] AlignedSymbol point_of(const Lattice& lattice, std::size_t index, const PixelRay& ray,
                                        const Eigen::Vector2f& projector_px) const;
   [[nodiscard]] float disagreement_px(const Lattice& lattice, std::size_t index) const;
@@ -73,8 +65,8 @@ class SymbolAligner {
   PatternOptions options_;
   float pitch_px_, half_px_;
   std::shared_ptr<const PatternFields> fields_;
-  PatchAligner aligner_{{}};
-  std::vector<Patch> patches_;
+  std::vector<CellTask> cells_, sample_, again_;
+  std::vector<std::size_t> again_for_;  // for each of again_: index of its symbol
   std::vector<AlignedSymbol> aligned_;
   std::vector<float> misfits_;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/appearance/align_eight.hpp"
+#include "core/appearance/align_patches.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -27,8 +27,13 @@ struct Eight {
   Lanes gain, gain_x, gain_y, offset, noise;
   Lanes per_scale;  // scale of the residuals at which a pixel counts half; 0: all count fully
   Lanes across, across_weight, gain_slope_weight;
+  // Of cells: second derivatives of q, the square of the pattern that counts, and the window's part within the frame.
+  Lanes xx[3], xy[3], yy[3];
+  Lanes square_u, square_v, square_half;
+  IntLanes left_px, right_px, top_px, bottom_px;  // relative to the centre, inclusive
 
   Lanes step[kFitted], left, weights, pixels, positive, scatter, variance, slope_variance;
+  Lanes covariance[3][3];  // of disparity and slopes: the upper triangle
 };
 
 struct EightWindows {
@@ -48,6 +53,7 @@ struct RowPixels {
   Lanes from_u[kMost], from_v[kMost];  // offset from that sample, in samples
   Lanes p[kMost], g[kMost], c[kMost];  // the pattern; its slopes along and across the epipolar line
   Lanes r[kMost], w[kMost];            // the residual and its weight
+  Lanes inside[kMost];                 // of cells: the pixel's share within the square and the frame
   Lanes wg[kMost], wp[kMost];
 };
 
@@ -75,8 +81,9 @@ struct RowSums {
 template <class T>
 struct Row {
   const T* pixels[kLanes];  // in the middle column
-  Lanes constant[3];        // of q
+  Lanes constant[3], x[3];  // of q
   Lanes gain;
+  IntLanes within;  // all bits set if the row lies within the frame
 };
 
 inline __attribute__((always_inline)) void clamp_to(IntLanes& lanes, int last) {
@@ -85,8 +92,21 @@ inline __attribute__((always_inline)) void clamp_to(IntLanes& lanes, int last) {
   lanes = lanes > zero ? lanes : zero;
 }
 
+/// The share of a pixel that counts: nothing outside the frame and the square, and less than all at the square's
+/// border.
+inline __attribute__((always_inline)) void find_inside(const Eight& e, const Lanes& u, const Lanes& v,
+                                                       const IntLanes& within, Lanes& inside) {
+  constexpr float kPerSample = 1.F / PatternField::kSamplesPerPx;
+  const Lanes zero{}, one = zero + 1;
+  const Lanes off_u = u * kPerSample - e.square_u, off_v = v * kPerSample - e.square_v;
+  const Lanes far_u = off_u > zero ? off_u : -off_u, far_v = off_v > zero ? off_v : -off_v;
+  inside = e.square_half - (far_u > far_v ? far_u : far_v);
+  inside = inside < one ? inside : one;
+  inside = (within & (inside > zero)) ? inside : zero;
+}
+
 /// Finds the positions of the pixels in the pattern.
-template <class T>
+template <bool kCells, class T>
 inline __attribute__((always_inline)) void look_up(const Row<T>& row, int first, int count, const EightWindows& of,
                                                    const Eight& e, RowPixels& seen) {
   constexpr float kScale = PatternField::kSamplesPerPx;
@@ -94,12 +114,19 @@ inline __attribute__((always_inline)) void look_up(const Row<T>& row, int first,
   const Lanes one = Lanes{} + 1;
   for (int k = 0; k < count; ++k) {
     const auto x = static_cast<float>(first + k);
-    IntLanes level;
-    for (int lane = 0; lane < kLanes; ++lane) level[lane] = row.pixels[lane][first + k];
+    IntLanes level, column = IntLanes{} + (first + k);
+    [[maybe_unused]] IntLanes within{};
+    if constexpr (kCells) {
+      within = row.within & (column >= e.left_px) & (column <= e.right_px);
+      column = column < e.left_px ? e.left_px : column > e.right_px ? e.right_px : column;
+    }
+    for (int lane = 0; lane < kLanes; ++lane) level[lane] = row.pixels[lane][column[lane]];
     seen.level[k] = __builtin_convertvector(level, Lanes);
-    const Lanes per_q2 = one / (row.constant[2] + x * e.x[2]);
-    const Lanes u = ((row.constant[0] + x * e.x[0]) * per_q2 + e.across_u) * kScale,
-                v = ((row.constant[1] + x * e.x[1]) * per_q2 + e.across_v) * kScale;
+    Lanes q[3];
+    for (int i = 0; i < 3; ++i) q[i] = row.constant[i] + x * (kCells ? row.x[i] + 0.5F * x * e.xx[i] : e.x[i]);
+    const Lanes per_q2 = one / q[2];
+    const Lanes u = (q[0] * per_q2 + e.across_u) * kScale, v = (q[1] * per_q2 + e.across_v) * kScale;
+    if constexpr (kCells) find_inside(e, u, v, within, seen.inside[k]);
     const IntLanes to_u = __builtin_convertvector(u + (kFar + 0.5F), IntLanes) - kFar,
                    to_v = __builtin_convertvector(v + (kFar + 0.5F), IntLanes) - kFar;
     seen.from_u[k] = u - __builtin_convertvector(to_u, Lanes);
@@ -114,7 +141,7 @@ inline __attribute__((always_inline)) void look_up(const Row<T>& row, int first,
 }
 
 /// @param counted  number of counting pixels; the function adds to it
-template <class T>
+template <bool kCells, class T>
 inline __attribute__((always_inline)) void compare(const Row<T>& row, int first, int count, const EightWindows& of,
                                                    const Eight& e, RowPixels& seen, Lanes& counted) {
   constexpr float kScale = PatternField::kSamplesPerPx;
@@ -136,7 +163,8 @@ inline __attribute__((always_inline)) void compare(const Row<T>& row, int first,
     const Lanes r = seen.level[k] - e.offset - p * (row.gain + x * e.gain_x);
     const Lanes off = r * e.per_scale;
     const Lanes weight = one / (one + off * off);
-    const Lanes counts = seen.level[k] < of.full ? one : zero;
+    Lanes counts = seen.level[k] < of.full ? one : zero;
+    if constexpr (kCells) counts *= seen.inside[k];
     const Lanes w = counts * weight * weight;
     seen.p[k] = p, seen.g[k] = g, seen.c[k] = c, seen.r[k] = r, seen.w[k] = w;
     seen.wg[k] = w * g, seen.wp[k] = w * p;
@@ -186,7 +214,7 @@ inline __attribute__((always_inline)) void sum_up(const RowPixels& seen, int fir
 }
 
 /// One step of Gauss and Newton. The right-hand side is the residual, so that no large numbers cancel.
-template <class T>
+template <bool kCells, class T>
 inline __attribute__((always_inline)) void step_eight(const T* const* pixels, const EightWindows& of, Eight& e) {
   const Lanes zero{}, one = zero + 1;
   NinthSums ninths[3][3]{};
@@ -201,13 +229,21 @@ inline __attribute__((always_inline)) void step_eight(const T* const* pixels, co
   for (int down = -half; down <= half; ++down) {
     const auto y = static_cast<float>(down);
     Row<T> row;
-    for (int k = 0; k < 3; ++k) row.constant[k] = e.constant[k] + y * e.y[k];
+    for (int k = 0; k < 3; ++k) {
+      row.constant[k] = e.constant[k] + y * e.y[k];
+      if constexpr (kCells) row.constant[k] += 0.5F * y * y * e.yy[k], row.x[k] = e.x[k] + y * e.xy[k];
+    }
     row.gain = e.gain + y * e.gain_y;
-    for (int lane = 0; lane < kLanes; ++lane) row.pixels[lane] = pixels[lane] + down * of.stride;
+    IntLanes at = IntLanes{} + down;
+    if constexpr (kCells) {
+      row.within = (at >= e.top_px) & (at <= e.bottom_px);
+      at = at < e.top_px ? e.top_px : at > e.bottom_px ? e.bottom_px : at;
+    }
+    for (int lane = 0; lane < kLanes; ++lane) row.pixels[lane] = pixels[lane] + at[lane] * of.stride;
     for (int first = -half; first <= half; first += RowPixels::kMost) {
       const int count = std::min(RowPixels::kMost, half + 1 - first);
-      look_up(row, first, count, of, e, seen);
-      compare(row, first, count, of, e, seen, counted);
+      look_up<kCells>(row, first, count, of, e, seen);
+      compare<kCells>(row, first, count, of, e, seen, counted);
       RowSums sum;
       sum_up(seen, first, count, thirds, sum);
       NinthSums* const ninth = ninths[down < -thirds ? 0 : down > thirds ? 2 : 1];
@@ -246,7 +282,7 @@ inline __attribute__((always_inline)) void step_eight(const T* const* pixels, co
   normal[kSlopeY][kGainX] = normal[kSlopeX][kGainY];
   e.weights = normal[kOffset][kOffset], e.pixels = counted;
 
-  // Prior knowledge, see PatchAligner.
+  // Prior knowledge, see AlignPriors.
   normal[kAcross][kAcross] += e.across_weight, right[kAcross] -= e.across_weight * e.gain * e.across;
   normal[kGainX][kGainX] += e.gain_slope_weight, right[kGainX] -= e.gain_slope_weight * e.gain_x;
   normal[kGainY][kGainY] += e.gain_slope_weight, right[kGainY] -= e.gain_slope_weight * e.gain_y;
@@ -278,9 +314,15 @@ inline __attribute__((always_inline)) void step_eight(const T* const* pixels, co
   const Lanes& l65 = normal[kSlopeY][kSlopeX];
   const Lanes& l76 = normal[kDisparity][kSlopeY];
   const Lanes l75 = normal[kDisparity][kSlopeX] - l76 * l65;
+  const Lanes &of_x = per_pivot[kSlopeX], &of_y = per_pivot[kSlopeY];
   e.variance = per_pivot[kDisparity];
-  e.slope_variance = 0.5F * (per_pivot[kSlopeY] + l76 * l76 * per_pivot[kDisparity] + per_pivot[kSlopeX] +
-                             l65 * l65 * per_pivot[kSlopeY] + l75 * l75 * per_pivot[kDisparity]);
+  const Lanes variance_x = of_x + l65 * l65 * of_y + l75 * l75 * e.variance, variance_y = of_y + l76 * l76 * e.variance;
+  e.slope_variance = 0.5F * (variance_x + variance_y);
+  if constexpr (kCells) {
+    e.covariance[0][0] = e.variance, e.covariance[1][1] = variance_x, e.covariance[2][2] = variance_y;
+    e.covariance[0][1] = l75 * -e.variance, e.covariance[0][2] = l76 * -e.variance;
+    e.covariance[1][2] = l76 * l75 * e.variance - l65 * of_y;
+  }
 
   // The disparities of the ninths after the step, beyond noise.
   const auto away = static_cast<float>((half + thirds + 1) / 2);
@@ -301,19 +343,40 @@ inline __attribute__((always_inline)) void step_eight(const T* const* pixels, co
   e.scatter = (beyond > zero ? beyond : zero) / (weight + 1e-20F);
 }
 
-inline __attribute__((always_inline)) void step_of_bytes(const std::uint8_t* const* pixels, const EightWindows& of,
+template <class T>
+using Centres = const T* const*;
+
+inline __attribute__((always_inline)) void step_of_bytes(Centres<std::uint8_t> centres, const EightWindows& of,
                                                          Eight& eight) {
-  step_eight(pixels, of, eight);
+  step_eight<false>(centres, of, eight);
 }
-inline __attribute__((always_inline)) void step_of_words(const std::uint16_t* const* pixels, const EightWindows& of,
+inline __attribute__((always_inline)) void step_of_words(Centres<std::uint16_t> centres, const EightWindows& of,
                                                          Eight& eight) {
-  step_eight(pixels, of, eight);
+  step_eight<false>(centres, of, eight);
 }
-void call_step(const std::uint8_t* const* pixels, const EightWindows& of, Eight& eight) {
-  Cloned<step_of_bytes>::call(pixels, of, eight);
+inline __attribute__((always_inline)) void cell_step_of_bytes(Centres<std::uint8_t> centres, const EightWindows& of,
+                                                              Eight& eight) {
+  step_eight<true>(centres, of, eight);
 }
-void call_step(const std::uint16_t* const* pixels, const EightWindows& of, Eight& eight) {
-  Cloned<step_of_words>::call(pixels, of, eight);
+inline __attribute__((always_inline)) void cell_step_of_words(Centres<std::uint16_t> centres, const EightWindows& of,
+                                                              Eight& eight) {
+  step_eight<true>(centres, of, eight);
+}
+template <bool kCells>
+void call_step(Centres<std::uint8_t> centres, const EightWindows& of, Eight& eight) {
+  if constexpr (kCells) {
+    Cloned<cell_step_of_bytes>::call(centres, of, eight);
+  } else {
+    Cloned<step_of_bytes>::call(centres, of, eight);
+  }
+}
+template <bool kCells>
+void call_step(Centres<std::uint16_t> centres, const EightWindows& of, Eight& eight) {
+  if constexpr (kCells) {
+    Cloned<cell_step_of_words>::call(centres, of, eight);
+  } else {
+    Cloned<step_of_words>::call(centres, of, eight);
+  }
 }
 
 /// Estimates the mean of a window from its diagonals.
@@ -365,22 +428,75 @@ void take(const Eight& e, int lane, PatchTask& task) {
   task.variance = e.variance[lane] / (gain * gain), task.slope_variance = e.slope_variance[lane] / (gain * gain);
 }
 
+void take_covariance(const Eight& e, int lane, CellTask& task) {
+  const float per_gain = 1 / task.patch.state.gain;
+  for (int row = 0; row < 3; ++row)
+    for (int column = row; column < 3; ++column)
+      task.covariance(row, column) = task.covariance(column, row) =
+          e.covariance[row][column][lane] * per_gain * per_gain;
+}
+
+EightWindows windows_of(std::ptrdiff_t stride, double full, const PatternField& field, int window_px) {
+  return {window_px,     stride,         static_cast<float>(full), field.samples(),
+          field.width(), field.height(), field.slope_unit()};
+}
+
 template <class T>
 void align(const ImageView<T>& frame, double full, const PatternField& field, const AlignOptions& options,
            int window_px, std::span<PatchTask* const> tasks) {
   Eight eight;
-  const T* pixels[kEight];
+  const T* centres[kEight];
   for (int lane = 0; lane < kEight; ++lane) {
     // Unused lanes repeat the first one.
     PatchTask& task = *tasks[static_cast<std::size_t>(lane) < tasks.size() ? lane : 0];
     if (!(task.state.gain > 0)) task.state.offset = level_of(frame, task, window_px / 2);
-    pixels[lane] = frame.row(task.y) + task.x;
+    centres[lane] = frame.row(task.y) + task.x;
     put(eight, lane, task, options);
   }
-  const EightWindows windows{window_px,     frame.stride,   static_cast<float>(full), field.samples(),
-                             field.width(), field.height(), field.slope_unit()};
-  call_step(pixels, windows, eight);
+  call_step<false>(centres, windows_of(frame.stride, full, field, window_px), eight);
   for (std::size_t lane = 0; lane < tasks.size(); ++lane) take(eight, static_cast<int>(lane), *tasks[lane]);
+}
+
+/// Adds the properties that only cells have.
+template <class T>
+void put_cell(Eight& e, int lane, const ImageView<T>& frame, const CellTask& task) {
+  const PatchMap& map = task.patch.map;
+  const PatchState& state = task.patch.state;
+  for (int k = 0; k < 3; ++k) {
+    e.xx[k][lane] = map.shift[k] * state.bend_xx;
+    e.xy[k][lane] = map.shift[k] * state.bend_xy;
+    e.yy[k][lane] = map.shift[k] * state.bend_yy;
+  }
+  const Eigen::Vector2f square = task.square_middle_px - map.origin_px.cast<float>();
+  e.square_u[lane] = square.x(), e.square_v[lane] = square.y(), e.square_half[lane] = task.square_half_px;
+  e.left_px[lane] = -task.patch.x, e.right_px[lane] = frame.width - 1 - task.patch.x;
+  e.top_px[lane] = -task.patch.y, e.bottom_px[lane] = frame.height - 1 - task.patch.y;
+}
+
+/// Aligns up to eight cells in all steps. The largest window serves all.
+template <class T>
+void align_some(const ImageView<T>& frame, double full, const PatternField& field, const AlignOptions& options,
+                std::span<CellTask> tasks) {
+  Eight eight;
+  const T* centres[kEight];
+  const int window_px = std::ranges::max(tasks, {}, &CellTask::window_px).window_px;
+  const EightWindows windows = windows_of(frame.stride, full, field, window_px);
+  for (int step = 0; step < options.steps; ++step) {
+    for (int lane = 0; lane < kEight; ++lane) {
+      CellTask& task = tasks[static_cast<std::size_t>(lane) < tasks.size() ? lane : 0];
+      centres[lane] = frame.row(task.patch.y) + task.patch.x;
+      if (!(task.patch.state.gain > 0)) task.patch.state.offset = static_cast<float>(*centres[lane]);
+      put(eight, lane, task.patch, options);
+      put_cell(eight, lane, frame, task);
+    }
+    call_step<true>(centres, windows, eight);
+    for (std::size_t i = 0; i < tasks.size(); ++i) {
+      if (tasks[i].patch.failed) continue;
+      const auto lane = static_cast<int>(i);
+      take(eight, lane, tasks[i].patch);
+      if (!tasks[i].patch.failed) take_covariance(eight, lane, tasks[i]);
+    }
+  }
 }
 
 }  // namespace
@@ -388,6 +504,15 @@ void align(const ImageView<T>& frame, double full, const PatternField& field, co
 void align_eight(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
                  int window_px, std::span<PatchTask* const> tasks) {
   std::visit([&](const auto& pixels) { align(pixels, full, field, options, window_px, tasks); }, frame);
+}
+
+void align_cells(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
+                 std::span<CellTask> tasks) {
+  for (CellTask& task : tasks) task.patch.failed = false;
+  for (std::size_t first = 0; first < tasks.size(); first += kEight) {
+    const auto some = tasks.subspan(first, std::min<std::size_t>(kEight, tasks.size() - first));
+    std::visit([&](const auto& pixels) { align_some(pixels, full, field, options, some); }, frame);
+  }
 }
 
 }  // namespace slsd

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/appearance/align_eight.hpp"
+#include "core/appearance/align_patches.hpp"
 
 #include <array>
 #include <random>
@@ -11,6 +11,7 @@
 
 #include "core/clones.hpp"
 #include "core/code/pattern.hpp"
+#include "tests/core/appearance/plain_step.hpp"
 #include "tests/simulator/simulator.hpp"
 
 namespace slsd {
@@ -73,42 +74,39 @@ void align(const GreyView& frame, double full, std::array<PatchTask, kCount>& ta
   align_eight(frame, full, blurred_field(), options(), side, all);
 }
 
-void expect_same(const PatchTask& task, const PatchFit& fit, float grey = 1) {
-  ASSERT_TRUE(fit.solved);
+void expect_same(const PatchTask& task, const test::PlainStep& step, float grey = 1) {
+  ASSERT_TRUE(step.solved);
   ASSERT_FALSE(task.failed);
-  EXPECT_NEAR(task.state.disparity, fit.state.disparity, 2e-3);
-  EXPECT_NEAR(task.state.slope_x, fit.state.slope_x, 5e-4);
-  EXPECT_NEAR(task.state.slope_y, fit.state.slope_y, 5e-4);
-  EXPECT_NEAR(task.state.across, fit.state.across, 5e-4);
-  EXPECT_NEAR(task.state.gain, fit.state.gain, 0.05 * grey);
-  EXPECT_NEAR(task.state.gain_x, fit.state.gain_x, 0.02 * grey);
-  EXPECT_NEAR(task.state.gain_y, fit.state.gain_y, 0.02 * grey);
-  EXPECT_NEAR(task.state.offset, fit.state.offset, 0.05 * grey);
-  EXPECT_NEAR(task.residual, fit.residual, 0.02 * fit.residual);
-  EXPECT_EQ(task.pixels, fit.pixels);
-  EXPECT_NEAR(task.support, fit.support, 0.002);
-  EXPECT_NEAR(task.variance, fit.covariance(0, 0), 0.01F * fit.covariance(0, 0));
-  const float of_slopes = 0.5F * (fit.covariance(1, 1) + fit.covariance(2, 2));
-  EXPECT_NEAR(task.slope_variance, of_slopes, 0.01F * of_slopes);
+  EXPECT_NEAR(task.state.disparity, step.state.disparity, 2e-3);
+  EXPECT_NEAR(task.state.slope_x, step.state.slope_x, 5e-4);
+  EXPECT_NEAR(task.state.slope_y, step.state.slope_y, 5e-4);
+  EXPECT_NEAR(task.state.across, step.state.across, 5e-4);
+  EXPECT_NEAR(task.state.gain, step.state.gain, 0.05 * grey);
+  EXPECT_NEAR(task.state.gain_x, step.state.gain_x, 0.02 * grey);
+  EXPECT_NEAR(task.state.gain_y, step.state.gain_y, 0.02 * grey);
+  EXPECT_NEAR(task.state.offset, step.state.offset, 0.05 * grey);
+  EXPECT_NEAR(task.residual, step.residual, 0.02 * step.residual);
+  EXPECT_NEAR(task.pixels, step.pixels, 1e-5 * step.pixels);
+  EXPECT_NEAR(task.support, step.support, 0.002);
+  EXPECT_NEAR(task.variance, step.covariance(0, 0), 0.01 * step.covariance(0, 0));
+  const double of_slopes = 0.5 * (step.covariance(1, 1) + step.covariance(2, 2));
+  EXPECT_NEAR(task.slope_variance, of_slopes, 0.01 * of_slopes);
 }
 
-PatchFit fit(const GreyView& frame, double full, const PatchTask& start, int side, int steps) {
-  AlignOptions of_steps = options();
-  of_steps.steps = steps;
-  PatchAligner aligner(of_steps);
-  const PatchWindow window{start.x - side / 2, start.y - side / 2, side, side};
+/// A window whose every pixel counts.
+CellTask window_of(const PatchTask& patch, int side) {
+  return {.patch = patch, .window_px = side, .square_half_px = 1e6F};
+}
+
+test::PlainStep one_step(const GreyView& frame, double full, const PatchTask& start, int side = kSide) {
   return std::visit(
       [&](const auto& pixels) {
-        return aligner.align(pixels, full, start.noise, blurred_field(), start.map, window, start.state);
+        return test::plain_step(pixels, full, blurred_field(), options(), window_of(start, side));
       },
       frame);
 }
 
-PatchFit one_step(const GreyView& frame, double full, const PatchTask& start, int side = kSide) {
-  return fit(frame, full, start, side, 1);
-}
-
-TEST(AlignEight, IsAStepOfTheAlignerOfSymbols) {
+TEST(AlignEight, IsAStepOfThePlainForm) {
   const std::array<PatchTask, kEight> starts = seen().tasks();
   std::array<PatchTask, kEight> tasks = starts;
   align(seen().frame.view(), 255, tasks);
@@ -122,26 +120,31 @@ TEST(AlignEight, WindowsMayBeOfAnySize) {
     std::array<PatchTask, kEight> tasks = starts;
     align(seen().frame.view(), 255, tasks, side);
     for (int i = 0; i < kEight; ++i) {
-      const PatchFit fit = one_step(seen().frame.view(), 255, starts[i], side);
+      const test::PlainStep step = one_step(seen().frame.view(), 255, starts[i], side);
       SCOPED_TRACE(testing::Message() << side << " px, task " << i);
-      ASSERT_NE(tasks[i].failed, fit.solved);
-      if (fit.solved) expect_same(tasks[i], fit);
+      ASSERT_NE(tasks[i].failed, step.solved);
+      if (step.solved) expect_same(tasks[i], step);
     }
   }
 }
 
 // On what is bent the ninths lie off the plane, once it has come to rest: the thirds of a row are summed up apart.
-TEST(AlignEight, ScattersAsTheAlignerOfSymbolsDoes) {
+TEST(AlignEight, ScattersAsThePlainFormDoes) {
   constexpr int kSteps = 6;
   const Seen bent{.surface = cylinder({0, 0, 2150}, {0.2, 1, 0}, 150)};
   for (const int side : {45, 65}) {
-    PatchTask start = bent.task(785, 600, 0);
+    const PatchTask start = bent.task(785, 600, 0);
     std::array<PatchTask, 1> tasks{start};
-    for (int step = 0; step < kSteps; ++step) align(bent.frame.view(), 255, tasks, side);
-    const PatchFit plain = fit(bent.frame.view(), 255, start, side, kSteps);
+    test::PlainStep plain{.state = start.state};
+    for (int step = 0; step < kSteps; ++step) {
+      align(bent.frame.view(), 255, tasks, side);
+      PatchTask at = start;
+      at.state = plain.state;
+      plain = one_step(bent.frame.view(), 255, at, side);
+    }
     ASSERT_TRUE(plain.solved);
     EXPECT_GT(plain.scatter, 0) << side;
-    EXPECT_NEAR(tasks[0].scatter, plain.scatter, 0.02F * plain.scatter) << side;
+    EXPECT_NEAR(tasks[0].scatter, plain.scatter, 0.02 * plain.scatter) << side;
   }
 }
 
@@ -212,6 +215,72 @@ TEST(AlignEight, ClonesAgree) {
     }
   }
   clone_in_use = usual;
+}
+
+/// A cell of the pattern around what the pixel sees, on a bent surface.
+CellTask cell_at(int x, int y, float off_px) {
+  CellTask cell{.patch = seen().task(x, y, off_px), .window_px = 31, .square_half_px = 9.3F};
+  PatchState& state = cell.patch.state;
+  state.bend_xx = 2e-3F, state.bend_xy = -1e-3F, state.bend_yy = 5e-4F;
+  const Eigen::Vector2f middle = projector_offset(cell.patch.map, state, {0.3F, -0.6F});
+  cell.square_middle_px = middle + cell.patch.map.origin_px.cast<float>();
+  return cell;
+}
+
+void expect_same(const CellTask& task, const test::PlainStep& step) {
+  expect_same(task.patch, step);
+  EXPECT_NEAR(task.patch.scatter, step.scatter, 0.02 * step.scatter + 1e-3);
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column)
+      EXPECT_NEAR(task.covariance(row, column), step.covariance(row, column),
+                  0.01 * std::sqrt(step.covariance(row, row) * step.covariance(column, column)))
+          << row << column;
+}
+
+AlignOptions one_step_options() {
+  AlignOptions one = options();
+  one.steps = 1;
+  return one;
+}
+
+TEST(AlignCells, AreStepsOfThePlainForm) {
+  std::vector<CellTask> starts;
+  for (int i = 0; i < 11; ++i) starts.push_back(cell_at(650 + 23 * i, 450 + 17 * i, 0.03F * static_cast<float>(i - 5)));
+  std::vector<CellTask> tasks = starts;
+  align_cells(seen().frame.view(), 255, blurred_field(), one_step_options(), tasks);
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    SCOPED_TRACE(i);
+    const auto plain = test::plain_step(seen().frame.view(), 255, blurred_field(), options(), starts[i]);
+    EXPECT_LT(plain.pixels, 0.9 * 31 * 31) << "the square is smaller than the window";
+    expect_same(tasks[i], plain);
+  }
+}
+
+// The corner of a crop sees what the whole frame sees there; windows reach beyond it on two sides.
+TEST(AlignCells, MayReachBeyondTheFrame) {
+  constexpr int kLeft = 700, kTop = 500, kWide = 40, kHigh = 30;
+  Grey8 crop(kWide, kHigh);
+  for (int y = 0; y < kHigh; ++y)
+    for (int x = 0; x < kWide; ++x) crop.at(x, y) = seen().frame.at(kLeft + x, kTop + y);
+  for (const auto& [x, y] : {std::pair(4, 6), std::pair(kWide - 5, kHigh - 4)}) {
+    CellTask start = cell_at(kLeft + x, kTop + y, 0.02F);
+    start.patch.x = x, start.patch.y = y;
+    std::array<CellTask, 1> tasks{start};
+    align_cells(crop.view(), 255, blurred_field(), one_step_options(), tasks);
+    const auto plain = test::plain_step(crop.view(), 255, blurred_field(), options(), start);
+    ASSERT_NE(tasks[0].patch.failed, plain.solved);
+    if (plain.solved) expect_same(tasks[0], plain);
+  }
+}
+
+TEST(AlignCells, KeepTheStateOfTheLastGoodStep) {
+  CellTask start = cell_at(750, 520, 0);
+  start.square_half_px = 0.5F;  // too few pixels
+  std::array<CellTask, 1> tasks{start};
+  align_cells(seen().frame.view(), 255, blurred_field(), options(), tasks);
+  EXPECT_TRUE(tasks[0].patch.failed);
+  EXPECT_EQ(tasks[0].patch.state.disparity, start.patch.state.disparity);
+  EXPECT_EQ(tasks[0].patch.state.gain, start.patch.state.gain);
 }
 
 }  // namespace

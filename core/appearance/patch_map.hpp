@@ -2,14 +2,10 @@
 // Copyright the slsd authors
 #pragma once
 
-#include <vector>
-
 #include <Eigen/Core>
 
-#include "core/appearance/pattern_field.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/geometry/pixel_ray.hpp"
-#include "core/image.hpp"
 
 namespace slsd {
 
@@ -53,70 +49,6 @@ struct PatchState {
   float gain = 0, gain_x = 0, gain_y = 0;  ///< grey levels for light 1 at the centre, and their change for one camera
                                            ///< px
   float offset = 0;                        ///< grey level of the dark pattern
-};
-
-/// Pixels of the camera to align.
-struct PatchWindow {
-  int left, top, width, height;
-  /// Square of the pattern that counts: centre and half side, in projector px along both axes.
-  Eigen::Vector2f square_middle_px = Eigen::Vector2f::Zero();
-  float square_half_px = 1e6F;
-};
-
-struct AlignOptions {
-  float across_sigma_px = 0.15F;  ///< deviation of the pattern from the epipolar lines; 0: none
-  /// Standard deviation of the gain's change for one camera px, as a share of the gain; 0: no prior. Small windows need
-  /// it, because light that fades within them resembles a displacement.
-  float gain_slope_sigma = 0;
-  int steps = 4;
-  /// Model error in a good fit, as a share of the gain.
-  float misfit_share = 0.02F;
-  /// Standard deviations of noise and misfit at which a pixel counts half: the surface may end there or carry print.
-  float outlier_sigmas = 4;
-};
-
-/// The fitted parameters, in this order: disparity, its slopes, across; gain, its slopes, offset.
-inline constexpr int kFitted = 8;
-
-struct PatchFit {
-  PatchState state;
-  float residual = 0;  ///< root mean square, grey levels
-  float pixels = 0;    ///< number of pixels
-  float support = 0;   ///< share of the pixels that agree with the pattern
-  float scatter = 0;   ///< scatter of the patch's ninths about the plane, px, beyond the share of noise
-  /// Covariance of disparity, its slopes and across, for a noise of one grey level in each pixel.
-  Eigen::Matrix4f covariance = Eigen::Matrix4f::Zero();
-  bool solved = false;  ///< the pattern is visible and determines the place
-};
-
-/// Aligns a window of the frame with the pattern by least squares of
-///
-///     I(x, y) = (gain + gain_x x + gain_y y) P(p(x, y)) + offset
-///
-/// with P the blurred pattern, by Gauss and Newton (Lucas and Kanade 1981; Baker and Matthews 2004). Gain, its slopes
-/// and offset are linear, so each step solves for them anew without an initial estimate.
-/// @thread thread-bound: keeps its buffers
-class PatchAligner {
- public:
-  explicit PatchAligner(AlignOptions options) : options_(options) {}
-
-  /// @param full   the level of a saturated pixel, which does not count
-  /// @param noise  one standard deviation of a pixel, grey levels: weighs the pixels against the prior of `across`
-  /// @param start  within about a pixel of the truth
-  template <class T>
-  [[nodiscard]] PatchFit align(const ImageView<T>& frame, double full, float noise, const PatternField& field,
-                               const PatchMap& map, const PatchWindow& window, const PatchState& start);
-
- private:
-  AlignOptions options_;
-  std::vector<float> patch_;
-};
-
-/// Sums over a patch for the normal equations.
-struct PatchSums {
-  Eigen::Matrix<double, kFitted, kFitted> normal;
-  Eigen::Matrix<double, kFitted, 1> right;
-  double squares, pixels;
 };
 
 /// The camera pixel, relative to the window's centre, that sees a projector pixel (relative to the map's origin) on the

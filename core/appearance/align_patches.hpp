@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <algorithm>
+#include <span>
+
+#include <Eigen/Core>
+
+#include "core/appearance/patch_map.hpp"
+#include "core/appearance/pattern_field.hpp"
+#include "core/image.hpp"
+
+namespace slsd {
+
+struct AlignOptions {
+  float across_sigma_px = 0.15F;  ///< deviation of the pattern from the epipolar lines; 0: none
+  /// Standard deviation of the gain's change for one camera px, as a share of the gain; 0: no prior. Small windows need
+  /// it, because light that fades within them resembles a displacement.
+  float gain_slope_sigma = 0;
+  int steps = 4;  ///< of align_cells()
+  /// Model error in a good fit, as a share of the gain.
+  float misfit_share = 0.02F;
+  /// Standard deviations of noise and misfit at which a pixel counts half: the surface may end there or carry print.
+  float outlier_sigmas = 4;
+};
+
+/// The fitted parameters: disparity, its slopes, across; gain, its slopes, offset.
+inline constexpr int kFitted = 8;
+/// Number of patches aligned at once.
+inline constexpr int kEight = 8;
+
+/// A square window of the frame, to be aligned around its centre pixel.
+struct PatchTask {
+  int x = 0, y = 0;          ///< the centre
+  PatchMap map;              ///< around the same pixel
+  float noise = 0;           ///< one standard deviation of a pixel, grey levels
+  PatchState state;          ///< in: the start; out: the result; gain 0: unknown
+  bool settled = false;      ///< set by the caller: a step that moves little was the last
+  bool failed = false;       ///< the window does not determine the place; the other fields are unchanged
+  float moved = 0;           ///< the last step's change of the disparity, projector px
+  float residual = 0;        ///< root mean square after the last step, grey levels
+  float pixels = 0;          ///< number of pixels
+  float support = 0;         ///< share of them that agreed with the pattern before the last step
+  float scatter = 0;         ///< scatter of the ninths about the plane, px, beyond noise
+  float variance = 0;        ///< variance of the disparity, for a noise of one grey level in each pixel
+  float slope_variance = 0;  ///< variance of its slopes, mean of both
+};
+
+/// A square of the pattern on a bent surface, to be aligned wherever the frame shows it. The patch's window has to
+/// contain the square; it may reach beyond the frame, but its centre may not.
+struct CellTask {
+  PatchTask patch{};
+  int window_px = 1;                                           ///< odd: side of the window
+  Eigen::Vector2f square_middle_px = Eigen::Vector2f::Zero();  ///< projector px
+  float square_half_px = 0;                                    ///< half side, along both of the projector's axes
+  Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();        ///< of disparity and slopes, as PatchTask::variance
+};
+
+/// Prior knowledge of `across` and of each of the gain's slopes: the amounts added to the diagonal of the normal
+/// matrix. Its unknowns are in units of gain times px and of levels.
+struct AlignPriors {
+  float across, gain_slope;
+};
+/// @param noise  one standard deviation of a pixel, grey levels
+[[nodiscard]] inline AlignPriors align_priors(const AlignOptions& options, float noise, float gain) {
+  const float per_gain = 1 / std::max(1.F, gain), of_noise = noise * noise * per_gain * per_gain;
+  const auto weight = [](float squares, float sigma) { return squares / (sigma * sigma); };
+  return {options.across_sigma_px > 0 ? weight(of_noise, options.across_sigma_px) : 1e9F,
+          options.gain_slope_sigma > 0
+              ? weight(of_noise + options.misfit_share * options.misfit_share, options.gain_slope_sigma)
+              : 0};
+}
+
+/// Aligns windows of the frame with the pattern by least squares of
+///
+///     I(x, y) = (gain + gain_x x + gain_y y) P(p(x, y)) + offset
+///
+/// with P the blurred pattern, by one step of Gauss and Newton (Lucas and Kanade 1981; Baker and Matthews 2004). Pixels
+/// far off the last step's result count less. Takes up to eight windows of the same size, one in each lane: no
+/// operation crosses lanes, and the eight systems of equations are solved at once. Ignores bends.
+/// @param full       the level of a saturated pixel, which does not count
+/// @param window_px  odd: side of the windows, which lie within the frame
+/// @thread reentrant
+void align_eight(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
+                 int window_px, std::span<PatchTask* const> tasks);
+
+/// Aligns any number of cells by the same equations, in options.steps steps. Takes the bends as given. A task that
+/// fails keeps the state before the step that failed.
+/// @param tasks  in any order; the quickest if neighbours have windows of one size
+/// @thread reentrant
+void align_cells(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
+                 std::span<CellTask> tasks);
+
+}  // namespace slsd
