@@ -229,7 +229,6 @@ CellTask cell_at(int x, int y, float off_px) {
 
 void expect_same(const CellTask& task, const test::PlainStep& step) {
   expect_same(task.patch, step);
-  EXPECT_NEAR(task.patch.scatter, step.scatter, 0.02 * step.scatter + 1e-3);
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 3; ++column)
       EXPECT_NEAR(task.covariance(row, column), step.covariance(row, column),
@@ -253,6 +252,24 @@ TEST(AlignCells, AreStepsOfThePlainForm) {
     const auto plain = test::plain_step(seen().frame.view(), 255, blurred_field(), options(), starts[i]);
     EXPECT_LT(plain.pixels, 0.9 * 31 * 31) << "the square is smaller than the window";
     expect_same(tasks[i], plain);
+  }
+}
+
+// What the last step changes is known for the middle of each ninth alone, so the steps have to come to rest.
+TEST(AlignCells, ScatterAsThePlainFormDoes) {
+  AlignOptions many = options();
+  many.steps = 8;
+  for (int i = 0; i < 4; ++i) {
+    CellTask start = cell_at(650 + 23 * i, 450 + 17 * i, 0);
+    std::array<CellTask, 1> tasks{start};
+    align_cells(seen().frame.view(), 255, blurred_field(), many, tasks);
+    test::PlainStep plain{.state = start.patch.state};
+    for (int step = 0; step < many.steps; ++step) {
+      start.patch.state = plain.state;
+      plain = test::plain_step(seen().frame.view(), 255, blurred_field(), options(), start);
+    }
+    EXPECT_GT(plain.scatter, 0.003) << i;
+    EXPECT_NEAR(tasks[0].patch.scatter, plain.scatter, 0.05 * plain.scatter) << i;
   }
 }
 

@@ -57,7 +57,8 @@ PlainStep plain_step(const ImageView<T>& frame, double full, const PatternField&
           level - before.offset - light.value * (before.gain + before.gain_x * off_px.x() + before.gain_y * off_px.y());
       const double weight = before.gain > 0 ? inside * std::pow(1 + std::pow(off / scale, 2), -2) : inside;
       Pixel& pixel = seen.emplace_back();
-      pixel.row << g, g * along, g * down, c, light.value, light.value * along, light.value * down, 1;
+      pixel.row << g, g * off_px.x(), g * off_px.y(), c, light.value, light.value * off_px.x(),
+          light.value * off_px.y(), 1;
       pixel.off = off, pixel.weight = weight, pixel.ninth = 3 * part_of(down) + part_of(along);
       normal += weight * pixel.row * pixel.row.transpose(), right += weight * off * pixel.row;
       squares += weight * off * off, weights += weight, result.pixels += inside;
