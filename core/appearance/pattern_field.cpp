@@ -34,15 +34,52 @@ Weights weights_of(float phase_px, float sigma_px, int reach) {
   return weights;
 }
 
+/// The nearest whole number, halves away from zero: std::lround(), but in vectors.
+int rounded(float number) {
+  const int whole = static_cast<int>(number);
+  const float rest = number - static_cast<float>(whole);
+  return whole + (rest >= 0.5F ? 1 : 0) - (rest <= -0.5F ? 1 : 0);
+}
+
 std::uint32_t packed(float value, float slope_u, float slope_v, float per_slope_unit) {
   const auto bits = [&](float slope) {
-    const int steps = std::clamp(static_cast<int>(std::lround(slope * per_slope_unit)), -kSlopeMax, kSlopeMax);
+    const int steps = std::clamp(rounded(slope * per_slope_unit), -kSlopeMax, kSlopeMax);
     return static_cast<std::uint32_t>(steps) & ((1U << PatternField::kSlopeBits) - 1);
   };
-  const auto level =
-      static_cast<std::uint32_t>(std::clamp(static_cast<int>(std::lround(value / PatternField::kValueUnit)), 0, 1023));
+  const auto level = static_cast<std::uint32_t>(std::clamp(rounded(value / PatternField::kValueUnit), 0, 1023));
   return level << (2 * PatternField::kSlopeBits) | bits(slope_u) << PatternField::kSlopeBits | bits(slope_v);
 }
+
+/// The samples of a row at one phase: next to each other, so that they are computed in vectors.
+class RowOfPhase {
+ public:
+  explicit RowOfPhase(int pixels) : value_(pixels), slope_u_(pixels), slope_v_(pixels) {}
+
+  /// @param down, down_slope  weighted along the columns, from `reach` pixels before the row
+  void weigh(const float* down, const float* down_slope, const Weights& across) {
+    for (auto* sums : {&value_, &slope_u_, &slope_v_}) std::ranges::fill(*sums, 0.F);
+    for (std::size_t k = 0; k < across.value.size(); ++k) {
+      const float weight = across.value[k], slope = across.slope[k];
+      const float *const from = down + k, *const from_slope = down_slope + k;
+      float *const value = value_.data(), *const slope_u = slope_u_.data(), *const slope_v = slope_v_.data();
+#pragma omp simd
+      for (std::size_t x = 0; x < value_.size(); ++x) {
+        value[x] += weight * from[x];
+        slope_u[x] += slope * from[x];
+        slope_v[x] += weight * from_slope[x];
+      }
+    }
+  }
+
+  /// @param to  every kPhases-th of these
+  void pack(float per_slope_unit, std::uint32_t* to) const {
+    for (std::size_t x = 0; x < value_.size(); ++x)
+      to[x * kPhases] = packed(value_[x], slope_u_[x], slope_v_[x], per_slope_unit);
+  }
+
+ private:
+  std::vector<float> value_, slope_u_, slope_v_;
+};
 
 }  // namespace
 
@@ -60,6 +97,7 @@ PatternField::PatternField(const ImageView<std::uint8_t>& pattern, float blur_si
   // Along the columns first, at the pattern's width; then along the rows.
   const std::size_t padded = static_cast<std::size_t>(wide) + 2 * reach;
   std::vector<float> down(padded), down_slope(padded);
+  RowOfPhase samples(wide);
   for (int j = 0; j < height_; ++j) {
     const int middle = j / kPhases - kBorderPx;
     const Weights& w = weights[j % kPhases];
@@ -75,16 +113,9 @@ PatternField::PatternField(const ImageView<std::uint8_t>& pattern, float blur_si
         to_slope[x] += slope * static_cast<float>(row[x]);
       }
     }
-    for (int i = 0; i < width_; ++i) {
-      const Weights& across = weights[i % kPhases];
-      const float *const from = down.data() + i / kPhases, *const from_slope = down_slope.data() + i / kPhases;
-      float value = 0, slope_u = 0, slope_v = 0;
-      for (int k = 0; k <= 2 * reach; ++k) {
-        value += across.value[k] * from[k];
-        slope_u += across.slope[k] * from[k];
-        slope_v += across.value[k] * from_slope[k];
-      }
-      samples_[static_cast<std::size_t>(j) * width_ + i] = packed(value, slope_u, slope_v, 1 / slope_unit_);
+    for (int phase = 0; phase < kPhases; ++phase) {
+      samples.weigh(down.data(), down_slope.data(), weights[phase]);
+      samples.pack(1 / slope_unit_, &samples_[static_cast<std::size_t>(j) * width_ + phase]);
     }
   }
 }
