@@ -71,24 +71,42 @@ const Seen& column() {
   return seen;
 }
 
+/// A decoder that has seen no frame, without making its constant data again.
+Decoder fresh_decoder() {
+  static const Decoder first = Decoder::create(pattern(), small_rig(), 0, {}).value();
+  return first.another();
+}
+
+DenseMapper fresh_mapper() {
+  static const DenseMapper first(pattern(), small_rig(), 0, {});
+  return first.another();
+}
+
 struct Measured {
   std::size_t symbols;
   DenseMap map;
 };
 
-Measured measure(const GreyView& frame, double full = 255, const DenseOptions& options = {},
-                 Executor* executor = nullptr) {
+Measured measure(const GreyView& frame, DenseMapper& mapper, double full = 255, Executor* executor = nullptr) {
   SerialExecutor serial;
-  const Calibration rig = small_rig();
-  Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
+  Decoder decoder = fresh_decoder();
   const auto decoding = decoder.decode(frame, full);
   EXPECT_TRUE(decoding);
-  DecodeOptions decode;
-  decode.dense = options;
-  DenseMapper mapper(pattern(), rig, 0, decode);
   const DecodedSymbols symbols = decoder.symbols();
   return {symbols.lattice->symbols.size(),
           mapper.measure(frame, full, symbols, executor != nullptr ? *executor : serial)};
+}
+
+Measured measure(const GreyView& frame, double full = 255) {
+  DenseMapper mapper = fresh_mapper();
+  return measure(frame, mapper, full);
+}
+
+Measured measure_by(const DenseOptions& options, const GreyView& frame) {
+  DecodeOptions decode;
+  decode.dense = options;
+  DenseMapper mapper(pattern(), small_rig(), 0, decode);
+  return measure(frame, mapper);
 }
 
 struct Score {
@@ -247,7 +265,7 @@ TEST(DenseMapper, WithoutPruningItReachesFartherAndNearerToWrong) {
   DenseOptions few;
   few.prune_px = 4;
   const auto count = [](const DenseOptions& options) {
-    return measure(column().frame.view(), 255, options).map.count(DensePixel::kMeasured);
+    return measure_by(options, column().frame.view()).map.count(DensePixel::kMeasured);
   };
   const std::uint32_t whole = count(all), usual = count({}), pruned = count(few);
   EXPECT_GT(whole, usual + 500);
@@ -259,9 +277,9 @@ Measured measure_moved(double moved_px, float* offset_px) {
   Calibration moved = small_rig();
   moved.projector.cy += moved_px;
   const Grey8 frame = simulate(draw_pattern(pattern()), moved, kTilted, {});
-  Decoder decoder = Decoder::create(pattern(), small_rig(), 0, {}).value();
+  Decoder decoder = fresh_decoder();
   EXPECT_TRUE(decoder.decode(frame.view(), 255));
-  DenseMapper mapper(pattern(), small_rig(), 0, {});
+  DenseMapper mapper = fresh_mapper();
   SerialExecutor serial;
   const DecodedSymbols symbols = decoder.symbols();
   Measured measured{symbols.lattice->symbols.size(), mapper.measure(frame.view(), 255, symbols, serial)};
@@ -388,7 +406,8 @@ bool same(const DenseMap& a, const DenseMap& b) {
 
 TEST(DenseMapper, ThreadsChangeNothing) {
   test::Threads threads(2);
-  EXPECT_TRUE(same(measure(column().frame.view()).map, measure(column().frame.view(), 255, {}, &threads).map));
+  DenseMapper mapper = fresh_mapper();
+  EXPECT_TRUE(same(measure(column().frame.view()).map, measure(column().frame.view(), mapper, 255, &threads).map));
 }
 
 TEST(DenseMapper, ClonesMeasureTheSame) {
@@ -413,9 +432,8 @@ TEST(DenseMapper, ClonesMeasureTheSame) {
 }
 
 TEST(DenseMapper, AFrameDoesNotDependOnTheOneBefore) {
-  const Calibration rig = small_rig();
-  Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
-  DenseMapper mapper(pattern(), rig, 0, {});
+  Decoder decoder = fresh_decoder();
+  DenseMapper mapper = fresh_mapper();
   SerialExecutor executor;
   for (const Seen* seen : {&tilted(), &column()}) {
     ASSERT_TRUE(decoder.decode(seen->frame.view(), 255));
@@ -425,9 +443,8 @@ TEST(DenseMapper, AFrameDoesNotDependOnTheOneBefore) {
 }
 
 TEST(DenseMapper, AllocatesNothingAfterTheFirstFrame) {
-  const Calibration rig = small_rig();
-  Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
-  DenseMapper mapper(pattern(), rig, 0, {});
+  Decoder decoder = fresh_decoder();
+  DenseMapper mapper = fresh_mapper();
   SerialExecutor executor;
   ASSERT_TRUE(decoder.decode(tilted().frame.view(), 255));
   const DecodedSymbols symbols = decoder.symbols();
@@ -450,8 +467,8 @@ class Stream {
   }
 
  private:
-  Decoder decoder_ = Decoder::create(pattern(), small_rig(), 0, {}).value();
-  DenseMapper mapper_{pattern(), small_rig(), 0, {}};
+  Decoder decoder_ = fresh_decoder();
+  DenseMapper mapper_ = fresh_mapper();
   SerialExecutor executor_;
 };
 
@@ -498,9 +515,8 @@ TEST(DenseStream, AStillSceneIsFollowedAsExactlyAndItsNoiseIsEachFramesOwn) {
 }
 
 TEST(DenseStream, AllocatesNothingWhileTheSceneStandsStill) {
-  const Calibration rig = small_rig();
-  Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
-  DenseMapper mapper(pattern(), rig, 0, {});
+  Decoder decoder = fresh_decoder();
+  DenseMapper mapper = fresh_mapper();
   SerialExecutor executor;
   const Seen again = see_again(kTilted, 2);
   ASSERT_TRUE(decoder.decode(tilted().frame.view(), 255));
@@ -513,9 +529,8 @@ TEST(DenseStream, AllocatesNothingWhileTheSceneStandsStill) {
 }
 
 TEST(DenseStream, ThreadsAndLanesChangeNothing) {
-  const Calibration rig = small_rig();
-  Decoder decoder = Decoder::create(pattern(), rig, 0, {}).value();
-  DenseMapper mapper(pattern(), rig, 0, {});
+  Decoder decoder = fresh_decoder();
+  DenseMapper mapper = fresh_mapper();
   DenseMapper other = mapper.another();
   SerialExecutor serial;
   test::Threads threads(2);
@@ -532,8 +547,8 @@ TEST(DenseStream, ThreadsAndLanesChangeNothing) {
 /// The third frame of a still scene, of another noise than the first two.
 template <class Image>
 DenseMap third_of_stream(const Image& first, const Image& third, double full) {
-  Decoder decoder = Decoder::create(pattern(), small_rig(), 0, {}).value();
-  DenseMapper mapper(pattern(), small_rig(), 0, {});
+  Decoder decoder = fresh_decoder();
+  DenseMapper mapper = fresh_mapper();
   SerialExecutor executor;
   for (const Image* frame : {&first, &first, &third}) {
     EXPECT_TRUE(decoder.decode(frame->view(), full));
@@ -601,8 +616,8 @@ TEST(DenseStream, SlowDriftIsFollowedToItsEnd) {
 }
 
 TEST(DenseStream, TellsHowFarAKnockedRigIsOffItsEpipolarLines) {
-  Decoder decoder = Decoder::create(pattern(), small_rig(), 0, {}).value();
-  DenseMapper mapper(pattern(), small_rig(), 0, {});
+  Decoder decoder = fresh_decoder();
+  DenseMapper mapper = fresh_mapper();
   SerialExecutor executor;
   std::size_t followed = 0;
   for (std::uint32_t frame = 1; frame <= 8; ++frame) {
@@ -670,7 +685,7 @@ TEST(DenseMapper, EveryStrideMeasures) {
   for (const int stride : {2, 7, 16}) {
     DenseOptions options;
     options.stride_px = stride;
-    const Score got = score(measure(tilted().frame.view(), 255, options).map, tilted());
+    const Score got = score(measure_by(options, tilted().frame.view()).map, tilted());
     EXPECT_GT(share(got.measured, got.lit), stride < 10 ? 0.93 : 0.7) << stride;
     EXPECT_EQ(got.gross, 0U) << stride;
   }

@@ -42,6 +42,7 @@ class LateLightTest : public ::testing::Test {
   static void SetUpTestSuite() {
     calibration_ = new Calibration(paper_rig());
     pattern_ = new Pattern(*make_pattern({}));
+    decoder_ = new Decoder(std::move(*Decoder::create(*pattern_, *calibration_, 0, {})));
     PatternOptions other;
     other.seed = 2;
     pictures_ = new std::vector<LateLight::Picture>;
@@ -54,6 +55,7 @@ class LateLightTest : public ::testing::Test {
   static void TearDownTestSuite() {
     delete other_png_;
     delete pictures_;
+    delete decoder_;
     delete pattern_;
     delete calibration_;
   }
@@ -63,7 +65,7 @@ class LateLightTest : public ::testing::Test {
     light_ = std::make_unique<LateLight>(*pictures_, kRefresh, late_refreshes);
     ScanSetup setup{*pattern_, (*pictures_)[kPattern].shown, *calibration_, {"camera"}, {}};
     setup.lanes.resize(DecodeLanes::lanes_here());
-    for (auto& lane : setup.lanes) lane.push_back(std::move(*Decoder::create(*pattern_, *calibration_, 0, {})));
+    for (auto& lane : setup.lanes) lane.push_back(decoder_->another());
     std::vector<std::unique_ptr<Camera>> cameras;
     cameras.push_back(std::make_unique<LightCamera>(*light_, camera_period));
     ScanOptions options;
@@ -132,6 +134,7 @@ class LateLightTest : public ::testing::Test {
 
   static Calibration* calibration_;
   static Pattern* pattern_;
+  static Decoder* decoder_;
   static std::vector<LateLight::Picture>* pictures_;
   static std::string* other_png_;
   std::mt19937 random_{7};
@@ -141,6 +144,7 @@ class LateLightTest : public ::testing::Test {
 
 Calibration* LateLightTest::calibration_ = nullptr;
 Pattern* LateLightTest::pattern_ = nullptr;
+Decoder* LateLightTest::decoder_ = nullptr;
 std::vector<LateLight::Picture>* LateLightTest::pictures_ = nullptr;
 std::string* LateLightTest::other_png_ = nullptr;
 

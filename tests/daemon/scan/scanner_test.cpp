@@ -31,7 +31,8 @@ class ScannerTest : public ::testing::Test {
     frame_ = simulate(draw_pattern(pattern), calibration, plane({0, 0, 2000}, {0, 0, 1}));
     ScanSetup setup{pattern, draw_pattern(pattern), calibration, {"camera"}, {}};
     setup.lanes.resize(DecodeLanes::lanes_here());
-    for (auto& lane : setup.lanes) lane.push_back(std::move(*Decoder::create(pattern, calibration, 0, {})));
+    const Decoder decoder = std::move(*Decoder::create(pattern, calibration, 0, {}));
+    for (auto& lane : setup.lanes) lane.push_back(decoder.another());
     std::vector<std::unique_ptr<Camera>> cameras;
     cameras.push_back(std::make_unique<ClockedCamera>("camera", frame_, start_, kPeriod));
     auto rig = std::make_unique<Rig>(std::move(*make_projector({})), std::move(cameras), setup.image, ScanOptions{});
