@@ -3,14 +3,15 @@
 # Copyright the slsd authors
 # Builds and runs tests.
 
-# run_tests PRESET [OPTION OF CTEST...]: runs two tests per processor, because many wait more than they work. Reports
-# skipped tests; in CI (CI=true) only those of tests/skips.txt may skip.
+# run_tests PRESET [OPTION OF CTEST...]: runs three tests per processor, because many wait more than they work; two if
+# they are instrumented and work longer. Reports skipped tests; in CI (CI=true) only those of tests/skips.txt may skip.
 run_tests() {
-  local preset=$1 results=$PWD/build/$1/tests.xml status=0
+  local preset=$1 results=$PWD/build/$1/tests.xml status=0 per_processor=2
+  [ "$preset" != release ] || per_processor=3
   export TZ=${TZ-Asia/Kathmandu}  # on a machine set to UTC, a test would not notice local time in its place
   shift
   rm -f "$results"
-  ctest --preset "$preset" --parallel $((2 * $(nproc))) --output-junit "$results" --test-output-size-passed 1000000 "$@" || status=$?
+  ctest --preset "$preset" --parallel $((per_processor * $(nproc))) --output-junit "$results" --test-output-size-passed 1000000 "$@" || status=$?
   [ ! -e "$results" ] || tests/skips.py "$results" || status=1
   return $status
 }
