@@ -84,15 +84,16 @@ bool BundleStore::claim(const Error& error, system_clock::time_point now) {
 Result<fs::path> BundleStore::put(const Error& error, std::string_view bundle, system_clock::time_point now) {
   const std::lock_guard lock(mutex_);
   if (bundle.size() > bytes_max_) {
-    return fail(ErrorCode::kNoSpace,
-                "a bundle of " + std::to_string(bundle.size()) + " bytes is more than [black_box] disk_max_mb",
-                folder_.string());
+    return fail(
+        ErrorCode::kNoSpace,
+        "the bundle has " + std::to_string(bundle.size()) + " bytes, more than [black_box] disk_max_mb: raise it",
+        folder_.string());
   }
   std::error_code failed;
   if (fs::create_directories(folder_, failed)) {
     fs::permissions(folder_, fs::perms::owner_all, failed);  // pictures may be confidential
   }
-  if (failed) return tl::unexpected(system_error(failed.value(), "cannot make the folder", folder_));
+  if (failed) return tl::unexpected(system_error(failed.value(), "cannot create the folder", folder_));
   std::vector<fs::path> files = bundles_in(folder_);
   std::uintmax_t bytes = bundle.size();
   for (const fs::path& file : files) {

@@ -21,11 +21,11 @@ tl::unexpected<Error> fail_part(std::string message, std::string file) {
 
 // Reads an object of limited length, depth and number of values.
 Result<json> object_in(std::string_view text, const std::string& file) {
-  if (text.size() > kLineBytesMax) return fail_part("is longer than what tells of a scan", file);
+  if (text.size() > kLineBytesMax) return fail_part("is too long for the description of a scan", file);
   const JsonShape shape = shape_of(text);
   const bool plain = shape.closed && shape.depth <= kMaxNesting && shape.values <= kMaxValues;
   json object = plain ? json::parse(text, nullptr, /*allow_exceptions=*/false) : json();
-  if (!object.is_object()) return fail_part("is no JSON object", file);
+  if (!object.is_object()) return fail_part("is not a JSON object", file);
   return object;
 }
 
@@ -49,17 +49,17 @@ class Reader {
 
   [[nodiscard]] Result<Bundle> read() && {
     if (bundle_.files.empty() || bundle_.files.front().name != "bundle.json")
-      return fail(ErrorCode::kMalformed, "is a tar archive, and no bundle: it does not begin with bundle.json");
+      return fail(ErrorCode::kMalformed, "is a tar archive but not a bundle: it does not begin with bundle.json");
     auto about = object_in(bundle_.files.front().bytes, "bundle.json");
     if (!about) return tl::unexpected(about.error());
     if (text_of(*about, "format") != "slsd bundle")
-      return fail(ErrorCode::kMalformed, "is no bundle of slsd", "bundle.json");
+      return fail(ErrorCode::kMalformed, "is not a bundle of slsd", "bundle.json");
     bundle_.version = printable(text_of(*about, "slsd"), 40);
     const auto version = member<std::int64_t>(*about, "version", &json::is_number_integer, -1);
     if (version != kBundleVersion) {
       return fail(ErrorCode::kUnsupported,
-                  "is of version " + std::to_string(version) + ", and this slsd reads version " +
-                      std::to_string(kBundleVersion) + ": replay it by slsd " + bundle_.version,
+                  "has version " + std::to_string(version) + ", but this slsd reads version " +
+                      std::to_string(kBundleVersion) + ": replay it with slsd " + bundle_.version,
                   "bundle.json");
     }
     bundle_.written = printable(text_of(*about, "written"), 40);
@@ -79,7 +79,7 @@ class Reader {
  private:
   [[nodiscard]] Result<std::string_view> file_of(const std::string& name) const {
     const auto found = by_name_.find(name);
-    if (found == by_name_.end()) return fail_part("is missing in the bundle", printable(name));
+    if (found == by_name_.end()) return fail_part("is missing from the bundle", printable(name));
     return found->second;
   }
 
@@ -91,7 +91,7 @@ class Reader {
           std::pair("/calibration.yml", &recording.calibration)}) {
       const auto bytes = file_of(name + file);
       if (!bytes) return tl::unexpected(bytes.error());
-      if (bytes->size() > kTextBytesMax) return fail_part("is longer than such a file may be", name + file);
+      if (bytes->size() > kTextBytesMax) return fail_part("is too long", name + file);
       *text = *bytes;
     }
     auto lines = file_of(name + "/scans.jsonl");
@@ -120,11 +120,11 @@ class Reader {
         64);
     scan.dense = text_of(*line, "density") == to_string(Density::kPixels);
     for (const json& level : member<json>(*line, "full_levels", &json::is_array, json::array())) {
-      if (!level.is_number()) return fail_part("full_levels has something that is no number", where);
+      if (!level.is_number()) return fail_part("full_levels must hold only numbers", where);
       scan.full_levels.push_back(level.get<double>());
     }
     for (const json& told : member<json>(*line, "frames", &json::is_array, json::array())) {
-      if (!told.is_object()) return fail_part("frames has something that is no object", where);
+      if (!told.is_object()) return fail_part("frames must hold only objects", where);
       BundledFrame frame{text_of(told, "camera"),
                          text_of(told, "light"),
                          {},

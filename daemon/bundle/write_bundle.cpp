@@ -60,7 +60,7 @@ class RecordingPart {
   [[nodiscard]] Result<> add(const KeptScan& scan) {
     json line = described(scan);
     if (scan.times > 1) line["times"] = scan.times;
-    if (scan.too_large) line["frames_left_out"] = "a scan of them is larger than [black_box] memory_max_mb";
+    if (scan.too_large) line["frames_left_out"] = "the frames of one scan exceed [black_box] memory_max_mb";
     if (scan.frames) {
       line["density"] = to_string(scan.density);
       for (const FrameImage& image : *scan.frames) {
@@ -98,7 +98,7 @@ class RecordingPart {
   [[nodiscard]] static json described(const KeptScan& scan) {
     json line{{"scan", scan.id}, {"time", utc_text_ms(scan.time)}};
     if (!scan.outcome) {
-      line["error"] = rpc_error({ErrorCode::kCancelled, "it was still being decoded", {}}).to_json();
+      line["error"] = rpc_error({ErrorCode::kCancelled, "the scan was still being decoded", {}}).to_json();
     } else if (const Result<ScanResult>& outcome = *scan.outcome; outcome) {
       line = scan_json(*outcome);
     } else {

@@ -39,7 +39,7 @@ std::optional<uid_t> user_number(const std::string& name) {
 Result<> unknown(std::string_view key, std::string_view kind, std::string_view name) {
   return fail(ErrorCode::kNotFound, std::string(key) + " names the " + std::string(kind) + " \"" +
                                         printable(name, kShownMax) +
-                                        "\", which this host does not know: " + "create it, or correct the name");
+                                        "\", which does not exist on this host: create it, or correct the name");
 }
 
 }  // namespace
@@ -85,7 +85,7 @@ Result<AccessRules> AccessRules::of(const ServerOptions& options) {
                          Key{Role::kAdminister, "administer", options.administer, kDefaults.administer}}) {
     Names& names = rules.names_[static_cast<std::size_t>(key.role)];
     std::string& way = rules.ways_[static_cast<std::size_t>(key.role)];
-    way = "be named in [server] " + std::string(key.name) + ", and connect again";
+    way = "let an administrator add you to [server] " + std::string(key.name) + ", then reconnect";
     const bool may_be_missing = key.given == key.by_default;
     for (const std::string& name : key.given) {
       if (name.empty() || name == "@")
@@ -95,7 +95,7 @@ Result<AccessRules> AccessRules::of(const ServerOptions& options) {
       } else if (name.front() == '@') {
         if (const auto number = group_number(name.substr(1))) {
           names.groups.push_back(*number);
-          way = "be in the group " + name.substr(1) + ", and log in again: a process keeps the groups of its login";
+          way = "join the group " + name.substr(1) + ", then log in again: a process keeps the groups of its login";
         } else if (!may_be_missing) {
           return tl::unexpected(unknown(key.name, "group", name.substr(1)).error());
         }

@@ -99,7 +99,7 @@ void read_faults(TableReader& reader, CameraOptions& options) {
   if (auto faults = parse_faults(texts)) {
     options.faults = std::move(*faults);
   } else {
-    reader.refuse("faults", "has an entry that is no fault: " + faults.error().message);
+    reader.refuse("faults", "has an invalid fault: " + faults.error().message);
   }
 }
 
@@ -145,7 +145,7 @@ Result<std::vector<CameraOptions>> read_cameras(const std::vector<const toml::ta
     const auto same = [&](const CameraOptions& other) { return other.name() == camera->name(); };
     if (std::ranges::any_of(cameras, same)) {
       return fail(ErrorCode::kInvalidArgument,
-                  "[[camera]] name \"" + camera->name() + "\" is taken: give each camera a name of its own",
+                  "[[camera]] name \"" + camera->name() + "\" is used twice: give each camera its own name",
                   place_of(table->contains("name") ? table->get("name")->source() : table->source(), file.string()));
     }
     cameras.push_back(std::move(*camera));

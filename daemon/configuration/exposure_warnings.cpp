@@ -14,10 +14,10 @@ namespace {
 std::string misfits(const ExposureFit& fit, const LightPeriods& periods) {
   std::string text;
   if (!fit.projector) {
-    text += fmt::format("a frame of the projector, {:.0f} us at {:g} Hz", periods.projector_us(), periods.refresh_hz);
+    text += fmt::format("a projector frame ({:.0f} us at {:g} Hz)", periods.projector_us(), periods.refresh_hz);
   }
   if (!fit.lamps) {
-    text += fmt::format("{}half a period of the lamps, {:.0f} us at {} Hz", text.empty() ? "" : ", nor of ",
+    text += fmt::format("{}half a lamp period ({:.0f} us at {} Hz)", text.empty() ? "" : ", nor of ",
                         periods.lamps_us(), periods.power_line_hz);
   }
   return text;
@@ -42,7 +42,7 @@ std::vector<std::string> exposure_warnings(const Configuration& configuration) {
     const ExposureFit fit = fit_exposure(*exposure_us, periods);
     if (fit.fits()) continue;
     warnings.push_back(fmt::format(
-        "camera \"{}\": exposure_us = {:g} is no whole multiple of {}, so that frames come out differently bright: {}",
+        "camera \"{}\": exposure_us = {:g} is not a whole multiple of {}, so frames differ in brightness: {}",
         camera.name(), *exposure_us, misfits(fit, periods), nearest(fit)));
   }
   return warnings;

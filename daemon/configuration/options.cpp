@@ -53,7 +53,7 @@ std::string CameraOptions::format() const {
 
 Result<> CameraOptions::validate() const {
   if (name().empty() || name().size() > 64 || printable(name()) != name()) {
-    return fail(ErrorCode::kInvalidArgument, "name must have 1 to 64 letters, of UTF-8 and no control characters");
+    return fail(ErrorCode::kInvalidArgument, "name must have 1 to 64 bytes of UTF-8, without control characters");
   }
   const auto* const file = std::get_if<FileCameraOptions>(&of_driver);
   if (file != nullptr && file->path.empty()) {
@@ -72,7 +72,7 @@ Result<> ProjectorOptions::validate() const {
   if (auto valid = light.validate(); !valid) return valid;
   if (auto valid = in_range("idle_after_ms", idle_after_ms, 0, 3'600'000); !valid) return valid;
   if (refresh_hz == 0 || (refresh_hz >= 10 && refresh_hz <= 1000)) return {};
-  return fail(ErrorCode::kInvalidArgument, "refresh_hz must be 10 to 1000, or 0 for a projector that lights steadily");
+  return fail(ErrorCode::kInvalidArgument, "refresh_hz must be 10 to 1000, or 0 for a projector with steady light");
 }
 
 Result<> ScanOptions::validate() const {
@@ -84,7 +84,7 @@ Result<> ScanOptions::validate() const {
     return fail(ErrorCode::kInvalidArgument, "projector_latency_ms must be 0 to 1000");
   }
   if (power_line_hz == 0 || power_line_hz == 50 || power_line_hz == 60) return {};
-  return fail(ErrorCode::kInvalidArgument, "power_line_hz must be 50, 60, or 0 where no lamps are near");
+  return fail(ErrorCode::kInvalidArgument, "power_line_hz must be 50, 60, or 0 if no lamps are near");
 }
 
 std::filesystem::path BlackBoxOptions::bundles() const {

@@ -50,8 +50,7 @@ Result<> merge_keys(json& before, const json& changes, const std::string& where)
     } else if (is_value(value)) {
       before[key] = value;
     } else {
-      return refuse("\"" + where + "." + printable(key, 64) +
-                    "\" must be a value as the configuration has it, or null");
+      return refuse("\"" + where + "." + printable(key, 64) + "\" must be a value as in the configuration, or null");
     }
   }
   return before.size() <= kKeysMax ? Result<>() : refuse("\"" + where + "\" has too many keys");
@@ -61,8 +60,8 @@ Result<> merge_camera(json& before, const json& changes, const std::string& wher
   if (!changes.is_object()) return refuse("\"" + where + "\" must be an object of keys and values");
   for (const auto& [key, value] : changes.items()) {
     if (std::ranges::find(kCameraKeys, key) == kCameraKeys.end())
-      return refuse("of \"" + where + "\" exposure_us, gain_db and gain_steps can be set; \"" + printable(key, 64) +
-                    "\" is for the configuration file");
+      return refuse("\"" + where + "." + printable(key, 64) +
+                    "\" can only be set in the configuration file; set exposure_us, gain_db or gain_steps here");
   }
   return merge_keys(before, changes, where);
 }
@@ -122,8 +121,8 @@ Result<json> merge_settings(json before, const json& changes) {
       }
       if (before.contains(table) && before[table].empty()) before.erase(table);
     } else {
-      merged = refuse("\"pattern\", \"calibration\", \"decode\" and \"camera\" can be set; \"" + printable(table, 64) +
-                      "\" is for the configuration file");
+      merged = refuse("\"" + printable(table, 64) +
+                      "\" can only be set in the configuration file; set pattern, calibration, decode or camera here");
     }
     if (!merged) return tl::unexpected(merged.error());
   }
@@ -176,7 +175,7 @@ Result<json> read_kept_settings(const path& file) {
   const auto text = read_file(file, kKeptBytesMax);
   if (!text) return tl::unexpected(text.error());
   const json kept = json::parse(*text, nullptr, /*allow_exceptions=*/false);
-  if (!kept.is_object()) return fail(ErrorCode::kMalformed, "is no JSON object", file.string());
+  if (!kept.is_object()) return fail(ErrorCode::kMalformed, "is not a JSON object", file.string());
   auto merged = merge_settings(json::object(), kept);
   if (!merged) merged.error().where = file.string();
   return merged;
@@ -217,10 +216,10 @@ Result<Configuration> load_configuration_in_force(const std::optional<path>& fil
   if (kept && kept->empty()) return configuration;
   auto with_kept = kept ? load_configuration_with(own, *kept) : tl::unexpected(kept.error());
   if (!with_kept) {
-    told << "warning: what was set over the socket is passed over: " << to_string(with_kept.error()) << "\n";
+    told << "warning: ignoring the settings made over the socket: " << to_string(with_kept.error()) << "\n";
     return configuration;
   }
-  told << "as set over the socket: " << names_of_settings(*kept) << "\n";
+  told << "set over the socket: " << names_of_settings(*kept) << "\n";
   return with_kept;
 }
 

@@ -109,7 +109,7 @@ void TableReader::read(std::string_view key, std::string& value) {
   if (text != nullptr && text->get().find('\0') == std::string::npos) {
     value = text->get();
   } else {
-    refuse(key, "must be a text in quotes");
+    refuse(key, "must be a string in quotes");
   }
 }
 
@@ -140,7 +140,7 @@ void TableReader::read(std::string_view key, std::vector<std::string>& value) {
   for (std::size_t i = 0; array != nullptr && i < array->size(); ++i) {
     if (auto word = array->get(i)->value_exact<std::string>()) words.push_back(std::move(*word));
   }
-  if (array == nullptr || words.size() != array->size()) return refuse(key, "must be a list of texts");
+  if (array == nullptr || words.size() != array->size()) return refuse(key, "must be a list of strings");
   value = std::move(words);
 }
 
@@ -197,7 +197,7 @@ std::optional<Error> TableReader::unknown_key() const {
     if (std::ranges::find(known_, key.str()) != known_.end()) continue;
     const std::string what = name_.empty() ? "no such table or key: " : "no such key in " + name_ + ": ";
     std::string hint = nearest_hint(key.str(), known_);
-    if (hint.empty()) hint = "; this is slsd " SLSD_VERSION ": is the configuration of another version?";
+    if (hint.empty()) hint = "; this is slsd " SLSD_VERSION ": is the configuration for another version?";
     return Error{ErrorCode::kInvalidArgument, what + printable(key.str(), 64) + hint,
                  place_of(key.source(), file_.string())};
   }

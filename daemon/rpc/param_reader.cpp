@@ -57,7 +57,7 @@ std::string ParamReader::text(const char* name, std::size_t bytes_max) {
   const auto* value = find(name);
   if (value == nullptr) return {};
   if (value->is_string() && value->get_ref<const std::string&>().size() <= bytes_max) return value->get<std::string>();
-  refuse(name, "a text of at most " + std::to_string(bytes_max) + " bytes");
+  refuse(name, "a string of at most " + std::to_string(bytes_max) + " bytes");
   return {};
 }
 

@@ -32,7 +32,7 @@ tl::expected<Request, BadRequest> read_members(json& message, json id) {
   }
   const auto method = message.find("method");
   if (method == message.end() || !method->is_string()) {
-    return refuse(id, invalid_request("\"method\" must be a text, such as \"status\""));
+    return refuse(id, invalid_request("\"method\" must be a string, such as \"status\""));
   }
   json params = take(message, "params", json::object());
   if (params.is_null() || params.empty()) params = json::object();  // some libraries write "no parameters" like this
@@ -73,20 +73,21 @@ tl::expected<Request, BadRequest> parse_request(std::string_view line) {
     return refuse(nullptr, parse_error("nested deeper than " + std::to_string(kMaxNesting) + " levels"));
   }
   if (shape.values > kMaxValues) {
-    return refuse(nullptr, parse_error("more than " + std::to_string(kMaxValues) + " values: a request has a few"));
+    return refuse(nullptr,
+                  parse_error("more than " + std::to_string(kMaxValues) + " values: a request needs only a few"));
   }
   // Does not parse a truncated message: the parser's unused error would quote all of it.
   json message = shape.closed ? json::parse(line, nullptr, /*allow_exceptions=*/false) : json(json::value_t::discarded);
   if (message.is_discarded()) {
-    return refuse(nullptr, parse_error("no JSON: send one JSON-RPC 2.0 object to a line, in UTF-8"));
+    return refuse(nullptr, parse_error("not JSON: send one JSON-RPC 2.0 object per line, in UTF-8"));
   }
   if (message.is_array()) {
-    return refuse(nullptr, invalid_request("batches are not supported: send one request to a line"));
+    return refuse(nullptr, invalid_request("batches are not supported: send one request per line"));
   }
-  if (!message.is_object()) return refuse(nullptr, invalid_request("a request is a JSON object"));
+  if (!message.is_object()) return refuse(nullptr, invalid_request("a request must be a JSON object"));
   json id = message.contains("id") ? message["id"] : json();
   if (!usable_as_id(id)) {
-    return refuse(nullptr, invalid_request("\"id\" must be a number, null or a text of at most 256 bytes"));
+    return refuse(nullptr, invalid_request("\"id\" must be a number, null or a string of at most 256 bytes"));
   }
   return read_members(message, std::move(id));
 }

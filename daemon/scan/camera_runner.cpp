@@ -70,7 +70,7 @@ Result<> CameraRunner::wait_ready(const WaitLimit& limit) {
   const bool ready = limit.wait_until(limit.deadline, changed_, lock, decided) && !stopped_;
   if (ready) return {};
   if (stopped_) return fail(ErrorCode::kCancelled, "the service is stopping");
-  if (limit.over.stop_requested()) return fail(ErrorCode::kCancelled, "nobody waits for it any more");
+  if (limit.over.stop_requested()) return fail(ErrorCode::kCancelled, "cancelled: the client disconnected");
   return fail_not_ready();
 }
 
@@ -115,8 +115,8 @@ Result<Frame> CameraRunner::end_capture() {
   if (status_.state != DeviceState::kCapturing) return fail_not_ready();
   given_up_ = true;
   const LogField about("SLSD_CAMERA", name_);  // the caller may be another thread
-  const Error error{ErrorCode::kDisconnected, "the camera's driver does not answer; it is opened again when it does",
-                    "camera " + name_};
+  const Error error{ErrorCode::kDisconnected,
+                    "the camera's driver does not answer; slsd reopens the camera when it does", "camera " + name_};
   note_lost(error, std::move(lock));
   return tl::unexpected(error);
 }
@@ -150,7 +150,7 @@ Result<> CameraRunner::replace(std::unique_ptr<Camera> next, std::unique_ptr<Cam
   replacement_.reset();  // if it has not begun; else its result is dropped
   ++replacements_;
   if (stopped_) return fail(ErrorCode::kCancelled, "the service is stopping", "camera " + name_);
-  return fail(ErrorCode::kTimeout, "the camera does not take other settings in time: look at its status",
+  return fail(ErrorCode::kTimeout, "the camera did not take the new settings in time: check slsctl status",
               "camera " + name_);
 }
 
@@ -176,7 +176,7 @@ void CameraRunner::exchange(Replacement replacement) {
   {
     const std::lock_guard lock(mutex_);
     const bool awaited = replacement.number == replacements_;
-    if (!awaited) outcome = fail(ErrorCode::kTimeout, "nobody waits for it any more");
+    if (!awaited) outcome = fail(ErrorCode::kTimeout, "the request ended before the camera took its settings");
     if (outcome) replaced_ = Result<>();  // from here on no caller abandons it
   }
   if (!outcome) opened = open(std::move(replacement.otherwise));

@@ -13,7 +13,7 @@ namespace {
 
 tl::unexpected<Error> lacks(std::string_view driver) {
   return fail(ErrorCode::kUnsupported,
-              "this slsd was built without the driver " + std::string(driver) + "; ./run build makes one that has it");
+              "this slsd was built without the driver " + std::string(driver) + "; ./run build builds one that has it");
 }
 
 }  // namespace

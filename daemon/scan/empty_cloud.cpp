@@ -20,8 +20,8 @@ using std::chrono::steady_clock;
 
 constexpr int kRarely = 10;  // looks take at most a tenth of the time
 constexpr const char* kLook =
-    "look at a picture of one (slsctl preview), whether the projector shows this pattern (slsd --pattern), and whether "
-    "light and focus suffice";
+    "check light and focus, look at a decoded frame (slsctl preview), and check that the projector shows this pattern "
+    "(slsd --pattern)";
 
 std::string by_counts(const RegionCounts& regions) {
   const auto seen = std::accumulate(regions.begin(), regions.end(), std::uint64_t{0});
@@ -29,17 +29,17 @@ std::string by_counts(const RegionCounts& regions) {
   const std::uint32_t off_line = count(RegionStatus::kOffEpipolarLine), far = count(RegionStatus::kOutOfDepthRange);
   if (far > off_line && far >= kSymbolsForDoubt) {
     return fmt::format(
-        "{} symbols lie out of the working range: look at depth_min_mm and depth_max_mm in [decode], and "
-        "at the calibration",
+        "{} symbols lie outside the working range: check depth_min_mm and depth_max_mm in [decode], and the "
+        "calibration",
         far);
   }
   if (off_line >= kSymbolsForDoubt) {
     return fmt::format(
-        "{} symbols lie off their epipolar lines: the calibration is of another rig, or projector or "
-        "camera were moved: calibrate again",
+        "{} symbols lie off their epipolar lines: the calibration belongs to another rig, or the projector or a camera "
+        "moved: calibrate again",
         off_line);
   }
-  return fmt::format("no symbol of the pattern was decoded in any frame, of {} bright regions: {}", seen, kLook);
+  return fmt::format("no symbol of the pattern was decoded among {} bright regions: {}", seen, kLook);
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ void note_hardware(const RigStatus& rig, Calibration& calibration) {
 Result<> check_hardware(const std::string& who, const std::string& calibrated, const std::string& connected) {
   if (calibrated.empty() || connected.empty() || calibrated == connected) return {};
   return fail(ErrorCode::kMismatch,
-              "is \"" + connected + "\", and the calibration is of \"" + calibrated +
+              "is \"" + connected + "\", but the calibration is for \"" + calibrated +
                   "\": connect that one, calibrate again, or set [calibration] other_hardware = \"warn\"",
               who);
 }

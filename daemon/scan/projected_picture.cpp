@@ -12,7 +12,7 @@ namespace {
 
 Result<std::optional<Grey8>> draw_grid(const ScanSetup& setup) {
   if (setup.calibration) return draw_view_grid(*setup.calibration, setup.depth_min_mm, setup.depth_max_mm);
-  return fail(ErrorCode::kNotFound, "what the cameras see is known once they are calibrated: calibrate first");
+  return fail(ErrorCode::kNotFound, "the grid needs a calibration: calibrate first");
 }
 
 }  // namespace

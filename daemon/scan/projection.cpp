@@ -178,7 +178,9 @@ Result<> Projection::await(Picture which, MonotonicTime deadline, const std::sto
     if (steady_clock::now() >= deadline) return fail_not_ready();
     sleep_until(std::min(deadline, next_attempt_), stop);
   }
-  if (visible_ > deadline) return fail(ErrorCode::kTimeout, "the picture is not visible in time", "projector");
+  if (visible_ > deadline)
+    return fail(ErrorCode::kTimeout, "the projector did not show the picture in time: allow a longer timeout",
+                "projector");
   sleep_until(visible_, stop);
   if (stop.stop_requested()) return fail(ErrorCode::kCancelled, "the service is stopping");
   return {};
@@ -187,7 +189,7 @@ Result<> Projection::await(Picture which, MonotonicTime deadline, const std::sto
 tl::unexpected<Error> Projection::fail_not_ready() const {
   const std::string problem = status().problem;
   return fail(ErrorCode::kTimeout,
-              "the projector did not become ready in time: " + (problem.empty() ? "it takes longer" : problem),
+              "the projector did not become ready in time: " + (problem.empty() ? "it is still opening" : problem),
               "projector");
 }
 

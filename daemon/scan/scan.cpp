@@ -22,7 +22,7 @@ Error after_tries(Error error, const LostTries& lost) {
   const bool cut_short = error.code == ErrorCode::kFrameLate || error.code == ErrorCode::kTimeout;
   if (cut_short) error = lost.last.back();
   error.message += " (" + std::to_string(lost.count + 1) +
-                   " tries; the one before: " + std::string(to_string(lost.last.back().code)) + ")";
+                   " tries; the error before: " + std::string(to_string(lost.last.back().code)) + ")";
   return error;
 }
 

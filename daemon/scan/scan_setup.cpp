@@ -23,7 +23,7 @@ constexpr std::size_t kMaxFileBytes = 16 << 20;
 Result<> check_size(int width_px, int height_px, const ProjectorOptions& projector, const std::string& what) {
   if (width_px == projector.width_px && height_px == projector.height_px) return {};
   return fail(ErrorCode::kMismatch, what + " is for a projector of " + size_text(width_px, height_px) +
-                                        " px, and [projector] says " +
+                                        " px, but [projector] says " +
                                         size_text(projector.width_px, projector.height_px) + ": change one of them");
 }
 
@@ -36,13 +36,14 @@ Result<std::vector<std::size_t>> calibrated_cameras(const Calibration& calibrati
     const CalibratedCamera* found = calibration.camera(camera.name());
     if (found == nullptr) {
       return fail(ErrorCode::kMismatch,
-                  "no camera \"" + camera.name() + "\" in the calibration: calibrate it, or " +
-                      "give the [[camera]] the name that the calibration has",
+                  "no camera \"" + camera.name() +
+                      "\" in the calibration: calibrate it, or name the [[camera]] as in the calibration",
                   where);
     }
     const auto index = static_cast<std::size_t>(found - calibration.cameras.data());
     if (std::ranges::find(indices, index) != indices.end()) {
-      return fail(ErrorCode::kMismatch, "the calibration has one camera and the configuration several", where);
+      return fail(ErrorCode::kMismatch, "the calibration has one camera, the configuration several: calibrate them all",
+                  where);
     }
     indices.push_back(index);
   }
@@ -136,10 +137,10 @@ std::vector<std::string> calibration_error_warnings(const Calibration& calibrati
   std::vector<std::string> warnings;
   const auto look = [&](const std::optional<double>& error_px, const char* what) {
     if (!error_px || !(*error_px > kLargePx)) return;
-    warnings.push_back(fmt::format(
-        "the calibration's {} is {:.2f} px, and dense clouds measure to some hundredths: their points agree with each "
-        "other and are off together; calibrate again",
-        what, *error_px));
+    warnings.push_back(
+        fmt::format("the calibration's {} is {:.2f} px, too much for dense clouds: all their points are off together; "
+                    "calibrate again",
+                    what, *error_px));
   };
   look(report.reprojection_error_camera_px, "reprojection error in the camera");
   look(report.reprojection_error_projector_px, "reprojection error in the projector");
@@ -248,7 +249,7 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
 
 Result<> ScanSetup::check(const ScanRequest& request) const {
   if (!calibration) {
-    return fail(ErrorCode::kNotFound, "no calibration: name its file as [calibration] file in the configuration");
+    return fail(ErrorCode::kNotFound, "no calibration: calibrate, or set [calibration] file in the configuration");
   }
   return check_camera(request.camera);
 }
@@ -260,7 +261,7 @@ Result<> ScanSetup::check_camera(const std::string& name) const {
   if (camera_index(name) < camera_names.size()) return {};
   std::string names;
   for (const std::string& each : camera_names) names += (names.empty() ? "" : ", ") + each;
-  return fail(ErrorCode::kNotFound, "no camera is called \"" + printable(name, 64) + "\"; there are: " + names);
+  return fail(ErrorCode::kNotFound, "no camera is called \"" + printable(name, 64) + "\"; configured: " + names);
 }
 
 std::size_t ScanSetup::camera_index(const std::string& name) const {

@@ -215,7 +215,8 @@ void Scanner::submit(Turn turn, const std::stop_token& gone) {
     if (thread_.get_stop_token().stop_requested()) task->fail_with(stopping());
     return;
   }
-  task->fail_with({ErrorCode::kBusy, std::to_string(kMaxWaiting) + " requests wait already: ask again later", {}});
+  task->fail_with(
+      {ErrorCode::kBusy, std::to_string(kMaxWaiting) + " requests are waiting already: try again later", {}});
 }
 
 Error Scanner::overdue(const Task& task) const {
@@ -226,15 +227,15 @@ Error Scanner::overdue(const Task& task) const {
     if (under_way_) holder = under_way_->waits_for();
   }
   if (holder.empty()) {
-    return {ErrorCode::kTimeout, "other requests took all of its time: allow a longer timeout", {}};
+    return {ErrorCode::kTimeout, "other requests used up its time: allow a longer timeout", {}};
   }
   const RigStatus rig = rig_->status();
   std::string problem = holder == "projector" ? rig.projector.problem : "";
   for (const DeviceStatus& camera : rig.cameras) {
     if (holder == "camera " + camera.name) problem = camera.problem;
   }
-  std::string message = had_its_turn ? "the scan's time ran out here: allow more (timeout_ms)"
-                                     : "the scan's time ran out: a request before it still waits here";
+  std::string message = had_its_turn ? "the scan timed out here: raise timeout_ms"
+                                     : "the scan timed out: an earlier request is still waiting here";
   if (!problem.empty()) message += "; " + problem;
   return {ErrorCode::kTimeout, std::move(message), std::move(holder)};
 }
@@ -327,7 +328,8 @@ void Scanner::refuse_chores() {
 void Scanner::submit_chore(Chore chore) {
   if (!chores_.try_push(std::move(chore))) {
     // What found no room was not moved. NOLINTNEXTLINE(bugprone-use-after-move)
-    return chore(fail(ErrorCode::kBusy, std::to_string(kMaxChores) + " such requests wait already: ask again later"));
+    return chore(
+        fail(ErrorCode::kBusy, std::to_string(kMaxChores) + " such requests are waiting already: try again later"));
   }
   if (chores_thread_.get_stop_token().stop_requested()) refuse_chores();  // its thread may already have ended
 }

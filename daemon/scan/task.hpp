@@ -69,7 +69,7 @@ class Task : public std::enable_shared_from_this<Task> {  // shared: whoever end
   struct HungUp {
     std::weak_ptr<Task> task;
     void operator()() const {
-      if (const auto known = task.lock()) known->fail_with({ErrorCode::kCancelled, "the client hung up", {}});
+      if (const auto known = task.lock()) known->fail_with({ErrorCode::kCancelled, "the client disconnected", {}});
     }
   };
 

@@ -42,7 +42,7 @@ CalibrationRun::~CalibrationRun() {
 }
 
 Result<> CalibrationRun::begin(const std::filesystem::path& program, const std::vector<std::string>& arguments) {
-  if (under_way()) return fail(ErrorCode::kBusy, "a calibration is under way: end or cancel that one first");
+  if (under_way()) return fail(ErrorCode::kBusy, "a calibration is under way: end or cancel it first");
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) return fail(ErrorCode::kIo, "no pipe: " + std::generic_category().message(errno));
   const FileDescriptor writing(ends[1]);
@@ -52,7 +52,7 @@ Result<> CalibrationRun::begin(const std::filesystem::path& program, const std::
   auto started = start_own_program(program, arguments, {-1, writing.number(), writing.number()});
   if (!started) {
     if (started.error().code == ErrorCode::kNotFound)
-      started.error().message = "what calibrates is not installed: install the package slsd-calibrate";
+      started.error().message = "the calibration program is not installed: install the package slsd-calibrate";
     return tl::unexpected(std::move(started.error()));
   }
   process_ = *started;
@@ -64,7 +64,7 @@ Result<> CalibrationRun::begin(const std::filesystem::path& program, const std::
   line_.clear();
   ++number_;
   looked_ = Clock::now();
-  spdlog::info("a calibration begins (process {})", process_);
+  spdlog::info("calibration started (process {})", process_);
   read();
   watch();
   return {};
@@ -136,7 +136,8 @@ void CalibrationRun::on_exit(int status) {
     phase_ = Phase::kTakingForce;
     return ended_(true);
   }
-  if (error_.is_null()) error_ = cancelled_ ? "it was cancelled" : "what calibrates ended early: look at the log";
+  if (error_.is_null())
+    error_ = cancelled_ ? "the calibration was cancelled" : "the calibration program ended early: see the log";
   conclude({});
   ended_(false);
 }
@@ -147,7 +148,8 @@ void CalibrationRun::conclude(const Result<>& in_force) {
   if (!in_force) error_ = printable(to_string(in_force.error()), 1000);
   progress_["state"] = error_.is_null() ? "in force" : "ended";
   watch_.cancel();
-  spdlog::info("a calibration ended: {}", error_.is_null() ? "it is in force" : error_.get<std::string>());
+  spdlog::info("calibration ended: {}",
+               error_.is_null() ? "the new calibration is in force" : error_.get<std::string>());
 }
 
 void CalibrationRun::watch() {
@@ -155,7 +157,7 @@ void CalibrationRun::watch() {
   watch_.async_wait([this](const std::error_code& error) {
     if (error || !under_way()) return;
     if (Clock::now() - looked_ > kUnwatched && process_ != 0 && !cancelled_) {
-      error_ = "nobody looked at it for two minutes: it was given up";
+      error_ = "cancelled: no client asked for its state for two minutes";
       cancel();
     }
     watch();

@@ -33,7 +33,7 @@ bool is_held_by_others(const FileDescriptor& kept) {
 
 Result<SealedMemory> sealed_memory(std::string_view bytes) {
   const FileDescriptor memory(::memfd_create("slsd-cloud", MFD_CLOEXEC | MFD_ALLOW_SEALING));
-  if (!memory) return fail_system(errno, "cannot make a memfd");
+  if (!memory) return fail_system(errno, "cannot create a memfd");
   for (std::string_view rest = bytes; !rest.empty();) {
     const ssize_t written = ::write(memory.number(), rest.data(), rest.size());
     if (written < 0 && errno == EINTR) continue;
@@ -45,7 +45,7 @@ Result<SealedMemory> sealed_memory(std::string_view bytes) {
   }
   // Opens the file twice more, because the first descriptor, open for writing, would prevent the lease.
   SealedMemory sealed{open_to_read(memory), open_to_read(memory), bytes.size()};
-  if (!sealed.given || !sealed.kept) return fail_system(errno, "cannot open a memfd to read");
+  if (!sealed.given || !sealed.kept) return fail_system(errno, "cannot open a memfd for reading");
   return sealed;
 }
 
@@ -56,10 +56,9 @@ LentMemory::~LentMemory() {
 Result<> LentMemory::add(FileDescriptor kept, std::size_t bytes, const void* to) {
   sweep();
   if (lent_.size() == kMemoriesMax || !budget_.lend(bytes)) {
-    return fail(ErrorCode::kBusy, std::to_string(lent_.size()) + " clouds that were sent as memfds, " +
-                                      std::to_string(budget_.lent() >> 20U) +
-                                      " MB, are still open or mapped by clients: close them, or ask with " +
-                                      "\"transport\": \"inline\"");
+    return fail(ErrorCode::kBusy, "clients still hold " + std::to_string(lent_.size()) +
+                                      " clouds that were sent as memfds (" + std::to_string(budget_.lent() >> 20U) +
+                                      " MB): close them, or ask for \"transport\": \"inline\"");
   }
   lent_.push_back({std::move(kept), bytes, to});
   return {};

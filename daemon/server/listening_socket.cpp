@@ -44,22 +44,23 @@ FileDescriptor new_socket() {
 Result<> check_free(const path& path) {
   struct stat status {};
   if (::lstat(path.c_str(), &status) != 0) {
-    return errno == ENOENT ? Result<>() : fail_system(errno, "cannot look at the socket's path", path.string());
+    return errno == ENOENT ? Result<>() : fail_system(errno, "cannot check the socket's path", path.string());
   }
   if (!S_ISSOCK(status.st_mode)) {
-    return fail(ErrorCode::kAlreadyExists, "there is something that is no socket: choose another path, or remove it",
+    return fail(ErrorCode::kAlreadyExists, "this path exists and is not a socket: remove it, or choose another path",
                 path.string());
   }
   const FileDescriptor probe = new_socket();
-  if (!probe) return fail_system(errno, "cannot make a socket", path.string());
+  if (!probe) return fail_system(errno, "cannot create a socket", path.string());
   const sockaddr_un address = address_of(path);
   const int connected = ::connect(probe.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
   // A full backlog (EAGAIN) is a sign of life too.
   if (connected == 0 || errno == EAGAIN) {
-    return fail(ErrorCode::kBusy, "another daemon answers there: stop it, or choose another path", path.string());
+    return fail(ErrorCode::kBusy, "another daemon already listens here: stop it, or choose another path",
+                path.string());
   }
   return errno == ECONNREFUSED ? Result<>()
-                               : fail_system(errno, "cannot tell whether a daemon answers there", path.string());
+                               : fail_system(errno, "cannot tell whether another daemon listens here", path.string());
 }
 
 constexpr std::string_view kTemporary = ".slsd-";  // the process id follows
@@ -87,13 +88,13 @@ Result<> listen_in(const FileDescriptor& socket, const FileDescriptor& folder, c
   const sockaddr_un address = address_of("/proc/self/fd/" + std::to_string(folder.number()) + "/" + temporary);
   ::unlinkat(folder.number(), temporary.c_str(), 0);
   if (::bind(socket.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    return fail_system(errno, "cannot make the socket", path.string());
+    return fail_system(errno, "cannot create the socket", path.string());
   }
   const bool listening = ::fchmodat(folder.number(), temporary.c_str(), mode, 0) == 0 &&
                          ::listen(socket.number(), kBacklog) == 0 &&
                          ::renameat(folder.number(), temporary.c_str(), AT_FDCWD, path.c_str()) == 0;
   if (listening) return {};
-  auto failed = fail_system(errno, "cannot listen at the socket", path.string());
+  auto failed = fail_system(errno, "cannot listen on the socket", path.string());
   ::unlinkat(folder.number(), temporary.c_str(), 0);
   return failed;
 }
@@ -122,17 +123,17 @@ Result<std::optional<FileDescriptor>> handed_over(const path& path) {
     if (::sd_is_socket(socket, AF_UNIX, SOCK_STREAM, 1) > 0 && same_file(bound, path)) {
       FileDescriptor own(::fcntl(socket, F_DUPFD_CLOEXEC, 0));
       if (!own || ::fcntl(own.number(), F_SETFL, O_NONBLOCK) != 0) {
-        return fail_system(errno, "cannot take the socket that systemd listens at", path.string());
+        return fail_system(errno, "cannot take over the socket from systemd", path.string());
       }
       return own;
     }
     others += (others.empty() ? "" : ", ") + bound.string();
   }
-  return fail(ErrorCode::kMismatch,
-              "systemd listens at " + others +
-                  " for this service: set [server] socket to that, or ListenStream= to this " +
-                  "(systemctl edit of the socket's unit)",
-              path.string());
+  return fail(
+      ErrorCode::kMismatch,
+      "systemd listens on " + others +
+          " for this service: set [server] socket to that path, or ListenStream= in the socket's unit to this one",
+      path.string());
 }
 
 }  // namespace
@@ -144,7 +145,7 @@ Result<> check_socket_path(const path& path) {
                 path.string());
   }
   if (::access(folder_of(path).c_str(), W_OK | X_OK) != 0) {
-    return fail_system(errno, "cannot make the socket in this folder", path.string());
+    return fail_system(errno, "cannot create the socket in this folder", path.string());
   }
   return check_free(path);
 }
@@ -158,12 +159,12 @@ Result<ListeningSocket> ListeningSocket::open(const path& path, int mode) {
   const FileDescriptor folder(::open(folder_of(path).c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
   if (!folder) return fail_system(errno, "cannot open the socket's folder", path.string());
   FileDescriptor socket = new_socket();
-  if (!socket) return fail_system(errno, "cannot make a socket", path.string());
+  if (!socket) return fail_system(errno, "cannot create a socket", path.string());
   if (auto listening = listen_in(socket, folder, path, static_cast<mode_t>(mode)); !listening) {
     return tl::unexpected(listening.error());
   }
   struct stat status {};
-  if (::lstat(path.c_str(), &status) != 0) return fail_system(errno, "the socket is gone again", path.string());
+  if (::lstat(path.c_str(), &status) != 0) return fail_system(errno, "the socket disappeared", path.string());
   return ListeningSocket(std::move(socket), path, status.st_ino);
 }
 

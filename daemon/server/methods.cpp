@@ -138,9 +138,8 @@ CloudForm read_form(ParamReader& reader, const ServiceState& state) {
 // Refuses parameters that exclude each other.
 std::optional<RpcError> refused_form(CloudForm form) {
   const bool tiff = form.format == CloudFormat::kTiff;
-  if (tiff && !form.dense()) return invalid_params("\"tiff\" is a depth map: ask for \"density\": \"pixels\" with it");
-  if (form.normals && !form.dense())
-    return invalid_params("\"normals\" are those of pixels: ask for \"density\": \"pixels\" with them");
+  if (tiff && !form.dense()) return invalid_params("\"tiff\" is a depth map: it needs \"density\": \"pixels\"");
+  if (form.normals && !form.dense()) return invalid_params("\"normals\" need \"density\": \"pixels\"");
   if (form.normals && tiff) return invalid_params("a depth map (\"tiff\") has no normals: ask for \"ply\" or \"pcd\"");
   return std::nullopt;
 }
@@ -287,9 +286,9 @@ std::optional<RpcError> refused_picture(ServiceState& state, const Session& sess
   double& left = state.pictures.try_emplace(user, PictureAllowance{kPicturesPerSecond, now}).first->second.left;
   if (left >= 1.0) return left -= 1.0, std::nullopt;
   return rpc_error({ErrorCode::kBusy,
-                    "user " + std::to_string(user) + " has had " +
+                    "user " + std::to_string(user) + " has shown " +
                         std::to_string(static_cast<int>(kPicturesPerSecond)) +
-                        " pictures shown within a second, which is what one user gets: ask again later",
+                        " pictures within a second, the most for one user: try again later",
                     {}});
 }
 
@@ -301,7 +300,8 @@ void run_project(ServiceState& state, const json& params, Session& session, Resp
   const int timeout_ms = read_timeout(reader, state);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
   if (!png || (name == "image") == png->empty()) {
-    return respond(tl::unexpected(invalid_params("\"png\" must be an image as base64, and only with \"image\"")));
+    return respond(tl::unexpected(
+        invalid_params("\"png\" must be an image in base64, and goes only with \"picture\": \"image\"")));
   }
   if (auto refused = refused_picture(state, session)) return respond(tl::unexpected(*refused));
   state.scanner.project({*picture_named(name), std::move(*png), deadline_in(timeout_ms), session.gone()},
@@ -371,10 +371,11 @@ std::filesystem::path made_calibration(const ServiceState& state) {
 Result<> begin_calibration(ServiceState& state, const std::vector<std::string>& wanted, bool resume) {
   const auto file = made_calibration(state);
   if (file.empty())
-    return fail(ErrorCode::kNotFound,
-                "there is no $STATE_DIRECTORY to keep a calibration in: start the service by its unit");
+    return fail(
+        ErrorCode::kNotFound,
+        "$STATE_DIRECTORY is not set, so a calibration cannot be kept: start the service with its systemd unit");
   if (state.calibration->under_way())
-    return fail(ErrorCode::kBusy, "a calibration is under way: end or cancel that one first");
+    return fail(ErrorCode::kBusy, "a calibration is under way: end or cancel it first");
   const auto poses = std::filesystem::path(file).replace_extension(".poses");
   std::error_code ignored;
   if (!resume) std::filesystem::remove_all(poses, ignored);
@@ -439,11 +440,11 @@ RpcError not_for(Session& session, const RpcMethod& method) {
   const Peer& peer = session.peer();
   const MessageId id(MessageId::kClientRefused);
   if (session.is_first_refusal())
-    spdlog::warn("a client (process {}, user {}) asked for {}, which takes the role \"{}\": refused", peer.process,
+    spdlog::warn("a client (process {}, user {}) asked for {}, which needs the role \"{}\": refused", peer.process,
                  peer.user, method.name, to_string(method.role));
   return rpc_error({ErrorCode::kPermissionDenied,
-                    "\"" + std::string(method.name) + "\" takes the role \"" + std::string(to_string(method.role)) +
-                        "\", and user " + std::to_string(peer.user) + " has \"" +
+                    "\"" + std::string(method.name) + "\" needs the role \"" + std::string(to_string(method.role)) +
+                        "\", but user " + std::to_string(peer.user) + " has \"" +
                         std::string(to_string(session.role())) + "\": " + session.way_to(method.role),
                     {}});
 }
@@ -470,7 +471,8 @@ void calibrated(ServiceState& state, bool made) {
   if (!made) return release();
   const auto conclude = [&state, release](const Outcome& outcome) {
     state.calibration->conclude(
-        outcome ? Result<>() : fail(ErrorCode::kIo, "it is kept, but not in force: " + outcome.error().message));
+        outcome ? Result<>()
+                : fail(ErrorCode::kIo, "the calibration is saved but not in force: " + outcome.error().message));
     release();
   };
   auto settings = merge_settings(state.settings, {{"calibration", {{"file", made_calibration(state).string()}}}});
@@ -488,7 +490,7 @@ void dispatch(ServiceState& state, const Request& request, Session& session, Res
     if (session.role() < found->role) return respond(tl::unexpected(not_for(session, *found)));
     if (would_disturb(state, *found, request.params, session))
       return respond(tl::unexpected(rpc_error(
-          {ErrorCode::kBusy, "a calibration is under way: wait until it has ended, or cancel it (calibrate)", {}})));
+          {ErrorCode::kBusy, "a calibration is under way: wait until it ends, or cancel it (calibrate)", {}})));
     const bool is_look = request.method == "calibrate" && request.params.value("action", json("look")) == "look";
     const bool is_own = state.calibration && session.peer().process == state.calibration->process();
     if (found->role == Role::kAdminister && !is_look && !is_own)

@@ -84,19 +84,20 @@ class Exposition {
 
 void tell_service(const ServiceState& state, Exposition& out) {
   const auto uptime = std::chrono::duration<double>(std::chrono::steady_clock::now() - state.started);
-  out.family("slsd_build", "gauge", "1, with the version of the service.");
+  out.family("slsd_build", "gauge", "Always 1; its label has the version of the service.");
   out.sample(1, {{"version", SLSD_VERSION}});
   out.one("slsd_uptime_seconds", "gauge", "How long the service has been running.", uptime.count(), "seconds");
-  out.one("slsd_ready", "gauge", "1 where all devices are open and there is a calibration.", is_ready(state) ? 1 : 0);
-  out.one("slsd_resident_bytes", "gauge", "Memory of the service.", static_cast<double>(resident_bytes()), "bytes");
-  out.one("slsd_log_lines_dropped", "counter", "Lines of the log that nobody read in time.",
+  out.one("slsd_ready", "gauge", "1 if all devices are open and there is a calibration.", is_ready(state) ? 1 : 0);
+  out.one("slsd_resident_bytes", "gauge", "Resident memory of the service.", static_cast<double>(resident_bytes()),
+          "bytes");
+  out.one("slsd_log_lines_dropped", "counter", "Lines of the log that were dropped because nothing read them in time.",
           static_cast<double>(state.log_lines_dropped()));
 }
 
 void tell_black_box(const ServiceState& state, Exposition& out) {
-  out.one("slsd_black_box_bytes", "gauge", "Memory of the last scans.",
+  out.one("slsd_black_box_bytes", "gauge", "Memory that holds the last scans.",
           static_cast<double>(state.scanner.black_box().bytes()), "bytes");
-  out.one("slsd_bundles_written", "counter", "Bundles that the service wrote by itself, as scans failed in a new way.",
+  out.one("slsd_bundles_written", "counter", "Bundles that the service wrote because a scan failed in a new way.",
           static_cast<double>(state.bundles_written()));
 }
 
@@ -107,25 +108,26 @@ void tell_clients(const ServiceState& state, Exposition& out) {
                          std::string_view unit = {}) {
     out.one(name, "counter", help, static_cast<double>(value), unit);
   };
-  out.one("slsd_clients", "gauge", "Clients that are connected.", static_cast<double>(server.clients()));
-  out.one("slsd_subscribers", "gauge", "Of these, those that are sent clouds.",
+  out.one("slsd_clients", "gauge", "Connected clients.", static_cast<double>(server.clients()));
+  out.one("slsd_subscribers", "gauge", "Connected clients that subscribe to clouds.",
           static_cast<double>(server.subscribers()));
-  count("slsd_clients_accepted", "Clients that connected.", traffic.accepted);
-  count("slsd_clients_refused", "Clients that were turned away, for want of places or of a role.", traffic.refused);
-  count("slsd_clients_dropped", "Clients that took what was sent to them too slowly.", traffic.dropped);
-  count("slsd_received_bytes", "Bytes of requests.", traffic.bytes_received, "bytes");
-  count("slsd_sent_bytes", "Bytes of replies and events; memfds are not among them.", traffic.bytes_sent, "bytes");
-  count("slsd_clouds_lost", "Clouds that subscribers lost, as they read too slowly.", traffic.clouds_lost);
+  count("slsd_clients_accepted", "Clients that have connected.", traffic.accepted);
+  count("slsd_clients_refused", "Clients refused because all places were taken, or for lack of a role.",
+        traffic.refused);
+  count("slsd_clients_dropped", "Clients dropped because they read too slowly.", traffic.dropped);
+  count("slsd_received_bytes", "Bytes received in requests.", traffic.bytes_received, "bytes");
+  count("slsd_sent_bytes", "Bytes sent in replies and events, without memfds.", traffic.bytes_sent, "bytes");
+  count("slsd_clouds_lost", "Clouds that subscribers lost because they read too slowly.", traffic.clouds_lost);
   const MemoryBudget& memory = server.memory();
-  out.family("slsd_clients_memory_bytes", "gauge", "Memory that waits for clients: held, lent of that, the limit.",
-             "bytes");
+  out.family("slsd_clients_memory_bytes", "gauge",
+             "Memory of replies that clients have not read: held, lent as memfds, and the limit.", "bytes");
   out.sample(static_cast<double>(memory.held()), {{"part", "held"}});
   out.sample(static_cast<double>(memory.lent()), {{"part", "lent"}});
   out.sample(static_cast<double>(memory.limit()), {{"part", "limit"}});
   out.family("slsd_requests", "counter", "Requests, by method.");
   for (const auto& [method, asked] : state.requests.by_method)
     out.sample(static_cast<double>(asked), {{"method", method}});
-  out.family("slsd_requests_failed", "counter", "Requests that were answered with an error, by its name.");
+  out.family("slsd_requests_failed", "counter", "Requests answered with an error, by its name.");
   for (const auto& [name, failed] : state.requests.failed) out.sample(static_cast<double>(failed), {{"error", name}});
 }
 
@@ -134,7 +136,7 @@ constexpr DeviceState kStates[] = {DeviceState::kAbsent, DeviceState::kOpening, 
 
 void tell_cameras(const ServiceState& state, Exposition& out) {
   const std::vector<DeviceStatus> cameras = state.scanner.rig().camera_statuses();
-  out.family("slsd_camera_state", "gauge", "1 for the state that the camera is in.");
+  out.family("slsd_camera_state", "gauge", "1 for the camera's current state, 0 for the others.");
   for (const DeviceStatus& camera : cameras) {
     for (const DeviceState each : kStates)
       out.sample(camera.state == each ? 1 : 0, {{"camera", camera.name}, {"state", to_string(each)}});
@@ -145,10 +147,10 @@ void tell_cameras(const ServiceState& state, Exposition& out) {
       out.sample(static_cast<double>(value_of(camera)), {{"camera", camera.name}});
   };
   count("slsd_camera_frames", "Frames delivered.", [](const DeviceStatus& camera) { return camera.frames; });
-  count("slsd_camera_reconnects", "Times the camera was opened again after it was lost.",
+  count("slsd_camera_reconnects", "Times the camera was reopened after it was lost.",
         [](const DeviceStatus& camera) { return camera.opened > 0 ? camera.opened - 1 : 0; });
   out.family("slsd_camera_frames_lost", "counter",
-             "Frames asked for and not delivered, by the error; \"missing\": between two that were delivered.");
+             "Frames requested but not delivered, by error; \"missing\": gaps between delivered frames.");
   for (const DeviceStatus& camera : cameras) {
     std::uint64_t missing = camera.frames_lost;
     for (const auto& [code, failed] : camera.frames_failed) {
@@ -158,8 +160,8 @@ void tell_cameras(const ServiceState& state, Exposition& out) {
     out.sample(static_cast<double>(missing), {{"camera", camera.name}, {"cause", "missing"}});
   }
   for (const bool counts : {true, false}) {
-    counts ? out.family("slsd_camera_driver", "counter", "What the camera's driver counts itself, since it opened it.")
-           : out.family("slsd_camera_driver_now", "gauge", "What the camera's driver tells of itself.");
+    counts ? out.family("slsd_camera_driver", "counter", "Counters of the camera's driver since it opened the camera.")
+           : out.family("slsd_camera_driver_now", "gauge", "Current values that the camera's driver reports.");
     for (const DeviceStatus& camera : cameras) {
       for (const DriverFigure& figure : camera.figures) {
         if (figure.counts == counts)
@@ -177,17 +179,18 @@ void tell_cameras(const ServiceState& state, Exposition& out) {
       "slsd_camera_epipolar_px", "How far the points of recent scans lie off their epipolar lines.",
       [](const DriftState& of) { return of.epipolar_px; }, "px");
   drift(
-      "slsd_camera_epipolar_limit_px", "Up to there the camera is as it was calibrated.",
+      "slsd_camera_epipolar_limit_px",
+      "Limit of slsd_camera_epipolar_px: above it the camera does not match its calibration.",
       [](const DriftState& of) { return of.limit_px; }, "px");
-  drift("slsd_camera_knocked", "1 since the camera was knocked out of its calibration.",
+  drift("slsd_camera_knocked", "1 if the camera was knocked out of its calibration.",
         [](const DriftState& of) { return of.off_since_scan ? 1.0 : 0.0; }, {});
 }
 
 void tell_projector(const ServiceState& state, Exposition& out) {
   const DeviceStatus projector = state.scanner.rig().projector_status();
-  out.family("slsd_projector_state", "gauge", "1 for the state that the projector is in.");
+  out.family("slsd_projector_state", "gauge", "1 for the projector's current state, 0 for the others.");
   for (const DeviceState each : kStates) out.sample(projector.state == each ? 1 : 0, {{"state", to_string(each)}});
-  out.one("slsd_projector_reconnects", "counter", "Times the projector was opened again after it was lost.",
+  out.one("slsd_projector_reconnects", "counter", "Times the projector was reopened after it was lost.",
           static_cast<double>(projector.opened > 0 ? projector.opened - 1 : 0));
 }
 
@@ -197,35 +200,34 @@ void tell_scans(const ServiceState& state, Exposition& out) {
     out.one(name, "counter", help, static_cast<double>(value));
   };
   count("slsd_scans_succeeded", "Scans that gave a cloud.", totals.succeeded);
-  out.family("slsd_scans_failed", "counter", "Scans that gave an error, by its name.");
+  out.family("slsd_scans_failed", "counter", "Scans that failed, by the error's name.");
   for (const auto& [code, failed] : totals.failed)
     out.sample(static_cast<double>(failed), {{"error", to_string(code)}});
-  count("slsd_scans_skipped", "Sets of frames taken and not decoded, as newer ones came.", totals.skipped);
-  count("slsd_scan_tries_lost", "Tries that lost their frames, of scans that then gave a cloud.", totals.lost_tries);
-  count("slsd_points", "Points of symbols, of all clouds.", totals.all_points);
-  out.one("slsd_points_of_last_scan", "gauge", "Points of symbols of the last cloud.",
-          static_cast<double>(totals.points));
-  out.family("slsd_regions", "counter", "Regions of all frames, decoded or by the reason why not.");
+  count("slsd_scans_skipped", "Sets of frames that were not decoded because newer ones came.", totals.skipped);
+  count("slsd_scan_tries_lost", "Tries that lost their frames, in scans that succeeded later.", totals.lost_tries);
+  count("slsd_points", "Symbol points in all clouds.", totals.all_points);
+  out.one("slsd_points_of_last_scan", "gauge", "Symbol points in the last cloud.", static_cast<double>(totals.points));
+  out.family("slsd_regions", "counter", "Regions of all frames, by status: decoded, or the reason for rejection.");
   for (std::size_t i = 0; i < totals.regions.size(); ++i)
     out.sample(static_cast<double>(totals.regions[i]), {{"status", to_string(static_cast<RegionStatus>(i))}});
-  out.family(
-      "slsd_regions_by_rule", "counter",
-      "Regions of all frames by the rule that decided on them; guards kept what was rejected from being brought back.");
+  out.family("slsd_regions_by_rule", "counter",
+             "Regions of all frames, by the rule that decided; guards kept rejected regions from recovery.");
   for (std::size_t i = 0; i < totals.rules.size(); ++i)
     out.sample(static_cast<double>(totals.rules[i]),
                {{"rule", to_string(decode_rule(i))}, {"kind", to_string(text_of(decode_rule(i)).kind)}});
-  out.family("slsd_pixels", "counter", "Pixels of all dense clouds, measured or by the reason why not.");
+  out.family("slsd_pixels", "counter", "Pixels of all dense clouds, by status: measured, or the reason why not.");
   for (std::size_t i = 0; i < totals.pixels.size(); ++i)
     out.sample(static_cast<double>(totals.pixels[i]), {{"status", to_string(static_cast<DensePixel>(i))}});
   const auto times = [&](std::string_view name, std::string_view help, const Duration& duration) {
     out.family(name, "histogram", help, "seconds");
     out.histogram(duration);
   };
-  times("slsd_capture_seconds", "From a scan's turn to its last frame.", totals.capture);
-  times("slsd_decode_seconds", "From its frames to its cloud.", totals.decode);
-  times("slsd_dense_seconds", "Of that, what the points of pixels took.", totals.dense);
-  times("slsd_latency_seconds", "From the last byte of its frames to its cloud at a client's socket.", totals.latency);
-  out.family("slsd_stage_seconds", "histogram", "What each stage of decoding took.", "seconds");
+  times("slsd_capture_seconds", "Time from a scan's turn to its last frame.", totals.capture);
+  times("slsd_decode_seconds", "Time from a scan's last frame to its cloud.", totals.decode);
+  times("slsd_dense_seconds", "Part of the decoding time that dense points took.", totals.dense);
+  times("slsd_latency_seconds", "Time from the last byte of a scan's frames to its cloud at a client's socket.",
+        totals.latency);
+  out.family("slsd_stage_seconds", "histogram", "Time of each decoding stage.", "seconds");
   for (std::size_t i = 0; i < totals.stages.size(); ++i)
     out.histogram(totals.stages[i], "stage", to_string(static_cast<Stage>(i)));
 }

@@ -44,8 +44,8 @@ void add_pixels(const DenseCloud& dense, const ScanResult& scan, json& result) {
   if (dense.points() > 0) return;
   result["empty"] = !scan.empty.empty()
                         ? scan.empty
-                        : "symbols were decoded, but around none the surface fits the pattern within the working "
-                          "range: \"pixels\" has the reasons; look at depth_min_mm, depth_max_mm and the calibration";
+                        : "symbols were decoded, but no surface around them fits the pattern: \"pixels\" has the "
+                          "reasons; check depth_min_mm, depth_max_mm and the calibration";
 }
 
 }  // namespace

@@ -127,8 +127,8 @@ std::optional<Error> Server::refuses(const Peer& peer) const {
       std::ranges::count_if(sessions_, [&](const auto& session) { return session->peer().user == peer.user; }));
   if (role == Role::kAdminister || own < places - sessions_.size()) return std::nullopt;
   return Error{ErrorCode::kBusy,
-               "user " + std::to_string(peer.user) + " has " + std::to_string(own) + " of " + std::to_string(places) +
-                   " places already, and the rest is for others: end some of these connections",
+               "user " + std::to_string(peer.user) + " already has " + std::to_string(own) + " of " +
+                   std::to_string(places) + " connections, the most for one user: close some of them",
                {}};
 }
 
@@ -139,7 +139,7 @@ void Server::turn_away(Session::Socket socket, const Error& error) {
 
 // Without descriptors or memory the kernel keeps the client waiting, and accept() would fail again at once.
 void Server::retry_later(const std::error_code& error) {
-  if (!std::exchange(retrying_, true)) spdlog::warn("cannot take another client: {}", error.message());
+  if (!std::exchange(retrying_, true)) spdlog::warn("cannot accept another client: {}", error.message());
   retry_.expires_after(kRetryAccept);
   retry_.async_wait([this](const std::error_code& cancelled) {
     if (!cancelled && acceptor_.is_open()) accept();

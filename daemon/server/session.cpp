@@ -175,10 +175,11 @@ bool Session::receive() {
   memory_.release(MemoryAccount::Part::kRequest);
   closing_ = true;
   input_ = Input::kShut;
-  refuse(nullptr, rpc_error({ErrorCode::kBusy,
-                             "other clients hold the memory that so long a request takes: send it "
-                             "again later; the connection ends",
-                             {}}));
+  refuse(
+      nullptr,
+      rpc_error({ErrorCode::kBusy,
+                 "other clients hold the memory that this long request needs: send it again later; the connection ends",
+                 {}}));
   return false;
 }
 
@@ -228,14 +229,14 @@ std::optional<RpcError> Session::reserve(std::size_t bytes) {
   const std::string limit = "[server] memory_max_mb is " + std::to_string(room_.options.memory_max_mb);
   if (bytes > room_.memory.limit_of_one()) {
     return rpc_error({ErrorCode::kBusy,
-                      "this takes up to " + megabytes(bytes) + ", and one client gets half of what " + "all have, as " +
-                          limit + ": raise it, or ask for less",
+                      "this takes up to " + megabytes(bytes) +
+                          ", but one client gets at most half of all memory: " + limit + "; raise it, or ask for less",
                       {}});
   }
   return rpc_error({ErrorCode::kBusy,
-                    "this takes up to " + megabytes(bytes) + ", more than the other clients leave: " + limit +
+                    "this takes up to " + megabytes(bytes) + ", more than other clients leave free: " + limit +
                         ", and " + megabytes(room_.memory.held()) +
-                        " wait for clients to read them: ask again later, or for less",
+                        " wait for clients to read them; try again later, or ask for less",
                     {}});
 }
 
@@ -318,7 +319,8 @@ void Session::write() {
     const ssize_t sent = send_part(socket_.native_handle(), front, sent_);
     if (sent < 0 && errno == EINTR) continue;
     if (sent < 0 && errno == ETOOMANYREFS && front.descriptor) {
-      const Error error{ErrorCode::kNoSpace, "too many descriptors are on their way to clients: ask again later", {}};
+      const Error error{
+          ErrorCode::kNoSpace, "too many file descriptors wait for clients to receive them: try again later", {}};
       outgoing_.front().line = to_line(error_message(id_, rpc_error(error)));
       outgoing_.front().descriptor = FileDescriptor();
       continue;
@@ -375,11 +377,12 @@ bool Session::is_sending_since(Clock::time_point time) const {
 void Session::drop() {
   ++room_.traffic.dropped;
   const MessageId id(MessageId::kClientDropped);
-  spdlog::info("a client (process {}, user {}) took {} of {} bytes in {} ms: dropped", peer_.process, peer_.user,
-               sent_ - timed_, std::min(outgoing_.front().size() - timed_, kSlice), room_.options.send_timeout_ms);
+  spdlog::info("dropped a client (process {}, user {}) that read only {} of {} bytes in {} ms", peer_.process,
+               peer_.user, sent_ - timed_, std::min(outgoing_.front().size() - timed_, kSlice),
+               room_.options.send_timeout_ms);
   if (sent_ == 0) {
-    const std::string line = to_line(error_message(
-        nullptr, rpc_error({ErrorCode::kTimeout, "this client takes too slowly what is sent to it: dropped", {}})));
+    const std::string line =
+        to_line(error_message(nullptr, rpc_error({ErrorCode::kTimeout, "dropped: this client reads too slowly", {}})));
     ::send(socket_.native_handle(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   }
   end();

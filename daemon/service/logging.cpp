@@ -121,7 +121,7 @@ struct LogSink::Queue {
     const auto missing = std::exchange(told, dropped);
     dropping = false;
     lines.push_back({spdlog::level::warn,
-                     fmt::format("{} lines of the log were dropped here: nobody read them in time", dropped - missing),
+                     fmt::format("{} lines of the log were dropped here: nothing read them in time", dropped - missing),
                      {fmt::format("MESSAGE_ID={}", MessageId::kLogDropped)}});
   }
 

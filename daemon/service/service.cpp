@@ -80,7 +80,7 @@ Result<std::unique_ptr<Service>> Service::create(Configuration configuration, co
     if (!camera) return tl::unexpected(camera.error());
     cameras.push_back(std::move(*camera));
   }
-  Notifier().starting("starting: prepares the decoder", kPrepareTime);
+  Notifier().starting("starting: preparing the decoder", kPrepareTime);
   auto setup = ScanSetup::create(configuration, DecodeLanes::lanes_here());
   if (!setup) return tl::unexpected(setup.error());
   warn_of_symbols(setup->pattern.options, pattern_scale(setup->calibration, configuration.decode));
@@ -211,7 +211,7 @@ void Service::await_end(std::chrono::steady_clock::time_point began) {
 void Service::reload(const nlohmann::json& settings, Respond answered) {
   const bool sets = settings != state_.settings;
   if (setting_ || (sets && reloads_ > 0)) {
-    const Error busy{ErrorCode::kBusy, "another change of the settings is under way: ask again", {}};
+    const Error busy{ErrorCode::kBusy, "another change of the settings is under way: try again", {}};
     return answered(tl::unexpected(rpc_error(busy)));
   }
   ++reloads_;
@@ -233,7 +233,7 @@ void Service::on_reloaded(const Result<Configuration>& configuration, nlohmann::
   if (std::exchange(reload_again_, false)) asio::post(events_, [this] { reload(state_.settings, [](Outcome) {}); });
   if (!configuration) {
     const MessageId id(MessageId::kReloadRefused);
-    spdlog::error("reload refused, everything stays as it was: {}", to_string(configuration.error()));
+    spdlog::error("reload refused, the previous settings stay in force: {}", to_string(configuration.error()));
     return answered(tl::unexpected(rpc_error(configuration.error())));
   }
   nlohmann::json restart = tables_that_need_restart(state_.configuration, *configuration);
@@ -255,11 +255,12 @@ void Service::on_reloaded(const Result<Configuration>& configuration, nlohmann::
   const std::filesystem::path kept = kept_settings_file(state_.configuration_file);
   nlohmann::json why_not_kept;
   state_.settings = std::move(settings);
-  if (changed && kept.empty()) why_not_kept = "there is no $STATE_DIRECTORY: the next start knows nothing of it";
+  if (changed && kept.empty())
+    why_not_kept = "$STATE_DIRECTORY is not set, so the next start will not have this setting";
   if (changed && !kept.empty()) {
     if (auto written = write_file_atomically(kept, state_.settings.dump(2) + "\n"); !written) {
       why_not_kept = to_string(written.error());
-      spdlog::warn("settings are in force, and are not kept: {}", to_string(written.error()));
+      spdlog::warn("settings are in force but not saved: {}", to_string(written.error()));
     }
   }
   nlohmann::json reply{{"needs_restart", std::move(restart)}};
@@ -287,12 +288,12 @@ void Service::on_failure(const std::string& scan_id, const Error& error) {
           bytes ? bundles_.put(error, *bytes, std::chrono::system_clock::now()) : tl::unexpected(bytes.error());
       if (!file) {
         if (file.error().code != ErrorCode::kCancelled)
-          spdlog::warn("no bundle of scan {} was written: {}", scan_id, to_string(file.error()));
+          spdlog::warn("cannot write a bundle of scan {}: {}", scan_id, to_string(file.error()));
         return;
       }
       const MessageId id(MessageId::kBundleWritten);
-      spdlog::warn("scan {} failed in a new way ({}): the last scans are in {}; look at them by slsd --replay", scan_id,
-                   to_string(error.code), file->string());
+      spdlog::warn("scan {} failed in a new way ({}): the last scans are in {}; decode them again with slsd --replay",
+                   scan_id, to_string(error.code), file->string());
     });
   });
 }

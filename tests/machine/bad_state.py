@@ -33,7 +33,7 @@ def unknown_groups(machine):
     require(status != 0, "a reload with a group that does not exist succeeds")
     still_scans(machine, "a refused reload")
     machine.run("systemctl", "restart", "slsd", check=False)
-    wait_for(lambda: 'names the group "robots", which this host does not know' in machine.journal(), "the error that names the group")
+    wait_for(lambda: 'names the group "robots", which does not exist on this host' in machine.journal(), "the error that names the group")
     machine.run("groupadd", "robots")
     try:
         wait_for(lambda: machine.is_active("slsd.service"), "the start after groupadd")

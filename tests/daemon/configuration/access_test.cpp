@@ -55,7 +55,8 @@ TEST(AccessRules, RefuseNamesThatTheHostDoesNotKnow) {
     const auto rules = AccessRules::of(options_of({"*"}, {name}, {}));
     ASSERT_FALSE(rules);
     EXPECT_EQ(rules.error().code, ErrorCode::kNotFound);
-    EXPECT_THAT(rules.error().message, testing::AllOf(HasSubstr("scan names"), HasSubstr("this host does not know")));
+    EXPECT_THAT(rules.error().message,
+                testing::AllOf(HasSubstr("scan names"), HasSubstr("does not exist on this host")));
   }
   for (const char* const name : {"", "@"}) {
     const auto rules = AccessRules::of(options_of({name}, {}, {}));

@@ -26,7 +26,7 @@ TEST(ReadConfiguration, NamesThePlaceAndTheRemedy) {
   EXPECT_EQ(error_of("[projector]\ndriver = \"beamer\"\n"),
             "etc/slsd.toml:2:10: [projector] driver must be one of headless, glfw");
   EXPECT_EQ(error_of("[[camera]]\npath = \"a\"\n[[camera]]\npath = \"b\"\nname = \"camera\"\n"),
-            "etc/slsd.toml:5:8: [[camera]] name \"camera\" is taken: give each camera a name of its own");
+            "etc/slsd.toml:5:8: [[camera]] name \"camera\" is used twice: give each camera its own name");
 }
 
 TEST(ReadConfiguration, PlacesRangesAtTheKey) {
@@ -55,7 +55,7 @@ TEST(ReadConfiguration, RefusesAReachOfRunsThatTheMethodDoesNotPromise) {
   EXPECT_THAT(error_of("[pattern]\nmethod = \"constructive\"\nrow_reach = 40\n"),
               HasSubstr("row_reach and column_reach need method = \"no_repeats\""));
   EXPECT_THAT(error_of("[pattern]\nmethod = \"no_repeats\"\nrow_reach = 600\n"), HasSubstr("0 to 512"));
-  EXPECT_THAT(error_of("[pattern]\nfile = \"p.toml\"\ncolumn_reach = 3\n"), HasSubstr("cannot stand beside file"));
+  EXPECT_THAT(error_of("[pattern]\nfile = \"p.toml\"\ncolumn_reach = 3\n"), HasSubstr("cannot be combined with file"));
 }
 
 TEST(ReadConfiguration, RefusesWrongTypes) {

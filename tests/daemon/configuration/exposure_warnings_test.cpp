@@ -32,9 +32,10 @@ TEST(ExposureWarnings, NameCameraPeriodAndNearestExposures) {
 TEST(ExposureWarnings, ThinkOfTheLampsWhereTheyAreKnown) {
   const std::string lamps = "[scan]\npower_line_hz = 50\n";
   EXPECT_THAT(warnings_for(lamps + camera("exposure_us = 16667\n")),
-              ElementsAre(AllOf(HasSubstr("lamps, 10000 us at 50 Hz"), HasSubstr("set 50000"),
-                                Not(HasSubstr("a frame of the projector")))));
-  EXPECT_THAT(warnings_for(lamps + camera("exposure_us = 12000\n")), ElementsAre(HasSubstr(", nor of half a period")));
+              ElementsAre(AllOf(HasSubstr("half a lamp period (10000 us at 50 Hz)"), HasSubstr("set 50000"),
+                                Not(HasSubstr("a projector frame")))));
+  EXPECT_THAT(warnings_for(lamps + camera("exposure_us = 12000\n")),
+              ElementsAre(HasSubstr(", nor of half a lamp period")));
   EXPECT_THAT(warnings_for(lamps + camera("exposure_us = 50000\n")), IsEmpty());
 }
 

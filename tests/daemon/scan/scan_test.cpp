@@ -110,7 +110,7 @@ TEST_F(ScanTest, TellsOfAllTriesWhereNoneSucceeded) {
   const auto result = scan(60s).get();
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, ErrorCode::kMismatch);
-  EXPECT_THAT(result.error().message, HasSubstr("3 tries; the one before: frame_dropped"));
+  EXPECT_THAT(result.error().message, HasSubstr("3 tries; the error before: frame_dropped"));
 }
 
 TEST_F(ScanTest, NamesWhatHappenedAndNotThatTheTimeWasOver) {

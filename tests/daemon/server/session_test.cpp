@@ -295,7 +295,7 @@ TEST_F(SessionTest, TellsWhoAsksForMoreThanThereIs) {
   send(request("wait"));
   run_until([&] { return bool(respond_); });
   respond_(Reply{{}, std::make_shared<const std::string>(300 << 20, 'c')});
-  EXPECT_THAT(receive_until("\n"), HasSubstr("one client gets half"));
+  EXPECT_THAT(receive_until("\n"), HasSubstr("one client gets at most half"));
   send(request("echo"));
   receive_until("echo");
   EXPECT_LT(room_->memory.held(), 1U << 20U);
@@ -307,11 +307,11 @@ TEST_F(SessionTest, CountsARequestThatIsCollected) {
   send(part);
   run_until([&] { return room_->memory.held() >= part.size(); });
   send("\n");
-  receive_until("no JSON");
+  receive_until("not JSON");
   run_until([&] { return room_->memory.held() < 100'000; });
 }
 
-// Clouds of 3 MB for one who reads none: of 16 MB one client gets half.
+// Clouds of 3 MB for one who reads none: of 16 MB one client gets at most half.
 TEST_F(SessionTest, CountsCloudsThatWait) {
   ServerOptions options;
   options.memory_max_mb = 16;
