@@ -8,7 +8,7 @@
 namespace slsd {
 namespace {
 
-constexpr auto kAbsent = "this slsd was built without drivers for devices; ./run build makes one that has them";
+constexpr auto kAbsent = "this slsd was built without drivers for devices; ./run build builds one that has them";
 
 }  // namespace
 

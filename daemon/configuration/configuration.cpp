@@ -117,7 +117,7 @@ Result<> read_pattern_table(TableReader reader, Configuration& configuration) {
   reader.read("file", configuration.pattern_file);
   for (const std::string& key : of_pattern)
     if (!configuration.pattern_file.empty() && reader.has(key))
-      reader.refuse(key, "cannot stand beside file, which holds the whole pattern: remove one");
+      reader.refuse(key, "cannot be combined with file, which holds the whole pattern: remove one");
   if (auto read = reader.finish(options.validate()); !read) return read;
   if (options.symbols.empty()) options.symbols = default_symbols(options.symbol_size_px);
   return {};

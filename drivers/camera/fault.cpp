@@ -59,13 +59,13 @@ Result<Fault> parse_fault(std::string_view text) {
   const std::string_view rest = text.substr(at + 1);
   const std::size_t colon = std::min(rest.find(':'), rest.size());
   const auto capture = parse_capture(rest.substr(0, colon));
-  if (!capture) return fail_fault(text, "the capture is a whole number from 1 on");
+  if (!capture) return fail_fault(text, "the capture must be a whole number, 1 or more");
   Fault fault{*kind, *capture, std::nullopt};
   if (colon == rest.size()) return fault;
   if (fault.kind == FaultKind::kDrop || fault.kind == FaultKind::kTear)
     return fail_fault(text, "drop and tear have no duration");
   fault.duration = parse_duration(rest.substr(colon + 1));
-  if (!fault.duration) return fail_fault(text, "a duration is a number up to one hour and us, ms or s, as in 200ms");
+  if (!fault.duration) return fail_fault(text, "a duration is a number with us, ms or s, up to one hour, as in 200ms");
   return fault;
 }
 

@@ -65,9 +65,9 @@ const Fault* FaultyCamera::fault_now() const {
 Result<Frame> FaultyCamera::capture_with(const Fault& fault, MonotonicTime deadline) {
   switch (fault.kind) {
     case FaultKind::kDrop:
-      return lose_frame(ErrorCode::kFrameDropped, "a frame was lost on its way; scan again", deadline);
+      return lose_frame(ErrorCode::kFrameDropped, "a frame was lost in transit; scan again", deadline);
     case FaultKind::kTear:
-      return lose_frame(ErrorCode::kFrameTorn, "only a part of the frame arrived; scan again", deadline);
+      return lose_frame(ErrorCode::kFrameTorn, "only part of the frame arrived; scan again", deadline);
     case FaultKind::kLate:
       return delay_frame(fault, deadline);
     case FaultKind::kStale:
@@ -121,7 +121,7 @@ Result<Frame> FaultyCamera::disconnect(const Fault& fault) {
 
 Result<> FaultyCamera::wait_until(MonotonicTime time, MonotonicTime deadline) {
   if (wake_.sleep_until(std::min(time, deadline))) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
-  if (time > deadline) return fail_here(ErrorCode::kFrameLate, "no frame came before the deadline; scan again");
+  if (time > deadline) return fail_here(ErrorCode::kFrameLate, "no frame arrived before the deadline; scan again");
   return {};
 }
 

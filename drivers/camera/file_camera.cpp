@@ -98,7 +98,7 @@ Result<> FileCamera::check() {
   std::error_code ignored;
   if (pool_ && std::filesystem::exists(options_.path, ignored)) return {};
   pool_.reset();
-  return fail(ErrorCode::kDisconnected, "the folder or file is gone; bring it back", options_.path.string());
+  return fail(ErrorCode::kDisconnected, "the folder or file is gone; restore it", options_.path.string());
 }
 
 Result<MonotonicTime> FileCamera::wait_for_exposure(MonotonicTime deadline) {
@@ -127,7 +127,7 @@ Result<Frame> FileCamera::deliver(MonotonicTime exposure_start) {
 Result<const GreyImage*> FileCamera::next_image() {
   if (patterns_ >= folder_.size() && !options_.loop)
     return fail(ErrorCode::kNotFound,
-                "all " + std::to_string(folder_.size()) + " images were shown; set loop = true to begin again",
+                "all " + std::to_string(folder_.size()) + " images have been replayed; set loop = true to start over",
                 options_.path.string());
   ++next_sequence_;
   return folder_.image(patterns_++ % folder_.size());
@@ -138,21 +138,21 @@ Result<const GreyImage*> FileCamera::image_in_light() {
   ImageFolder& folder = light_ == Picture::kWhite ? white_ : dark_;
   if (folder.size() == 0)
     return fail(ErrorCode::kNotFound,
-                "a replay has such frames only from a folder \"" + std::string(light_name(light_)) +
-                    "\" beside its images: make one, or scan without",
+                "such frames need a folder \"" + std::string(light_name(light_)) +
+                    "\" beside the images: add one, or scan without them",
                 options_.path.string());
   ++next_sequence_;
   return folder.image((patterns_ == 0 ? 0 : patterns_ - 1) % folder.size());
 }
 
 tl::unexpected<Error> FileCamera::fail_late() const {
-  return fail(ErrorCode::kFrameLate, "no frame came before the deadline; allow more time or raise rate_hz",
+  return fail(ErrorCode::kFrameLate, "no frame arrived before the deadline; allow more time or raise rate_hz",
               options_.name);
 }
 
 tl::unexpected<Error> FileCamera::fail_busy() const {
   return fail(ErrorCode::kBusy,
-              "all " + std::to_string(options_.frames_held_max) + " frames are held; give some back first",
+              "all " + std::to_string(options_.frames_held_max) + " frames are held; release some first",
               options_.name);
 }
 
@@ -163,7 +163,7 @@ tl::unexpected<Error> FileCamera::fail_format(const FrameFormat& format) const {
           : "an image in the folder \"" + std::string(light_name(light_)) + "\"";
   return fail(ErrorCode::kMismatch,
               which + " is " + format_text(format) + ", the first is " + format_text(pool_->format()) +
-                  "; keep images of one kind to a folder",
+                  "; keep images of one kind in a folder",
               options_.path.string());
 }
 

@@ -57,8 +57,8 @@ Result<> ImageFolder::list_folder() {
   }
   if (error) return fail_system(error.value(), "cannot list", path_);
   if (images_.empty())
-    return fail(ErrorCode::kNotFound,
-                "no PNG, TIFF, PGM or PPM image is in this folder; record some, or check the path", path_.string());
+    return fail(ErrorCode::kNotFound, "this folder has no PNG, TIFF, PGM or PPM image; record some, or check the path",
+                path_.string());
   std::sort(images_.begin(), images_.end(),
             [](const Entry& a, const Entry& b) { return a.path.native() < b.path.native(); });
   return {};

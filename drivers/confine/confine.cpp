@@ -66,7 +66,7 @@ Result<> confine() {
   const int error = filter_system_calls();
   if (error == 0) return {};
   return fail(ErrorCode::kUnsupported,
-              "this kernel filters no system calls: " + std::generic_category().message(-error));
+              "this kernel cannot filter system calls: " + std::generic_category().message(-error));
 }
 
 }  // namespace slsd

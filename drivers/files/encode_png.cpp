@@ -80,9 +80,9 @@ class PngWriter {
 
 Result<std::string> encode(const Rows& rows) {
   if (rows.width <= 0 || rows.height <= 0)
-    return fail(ErrorCode::kInvalidArgument, "an image without pixels has no PNG");
+    return fail(ErrorCode::kInvalidArgument, "an image without pixels cannot become a PNG");
   PngWriter writer;
-  if (!writer.write(rows)) return fail(ErrorCode::kIo, "the image could not be turned into PNG; free some memory");
+  if (!writer.write(rows)) return fail(ErrorCode::kIo, "cannot encode the image as PNG; free some memory");
   return writer.bytes();
 }
 

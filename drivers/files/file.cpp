@@ -34,10 +34,10 @@ Result<> check_readable(const FileDescriptor& file, const fs::path& path, std::s
     return fail(ErrorCode::kInvalidArgument, "is a folder; name a file in it", path.string());
   if (!S_ISREG(status.st_mode)) return fail(ErrorCode::kInvalidArgument, "is not a regular file", path.string());
   if (static_cast<std::size_t>(status.st_size) > limit_bytes)
-    return fail(
-        ErrorCode::kInvalidArgument,
-        "is " + std::to_string(status.st_size) + " bytes long; at most " + std::to_string(limit_bytes) + " are read",
-        path.string());
+    return fail(ErrorCode::kInvalidArgument,
+                "is " + std::to_string(status.st_size) + " bytes long, more than the limit of " +
+                    std::to_string(limit_bytes) + " bytes",
+                path.string());
   return {};
 }
 
@@ -52,7 +52,7 @@ Result<std::string> read_to_end(const FileDescriptor& file, const fs::path& path
     if (count < 0) return fail_call("cannot read", path);
     if (count == 0) break;
     size += static_cast<std::size_t>(count);
-    if (size > limit_bytes) return fail(ErrorCode::kInvalidArgument, "grows beyond what is read", path.string());
+    if (size > limit_bytes) return fail(ErrorCode::kInvalidArgument, "grew beyond the size limit", path.string());
     if (size == bytes.size()) bytes.resize(2 * size);
   }
   bytes.resize(size);

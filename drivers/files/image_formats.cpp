@@ -33,7 +33,7 @@ Result<> check_layout(std::string_view format, const ImageLayout& layout, std::s
       layout.bytes() > static_cast<double>(limit_bytes))
     return fail(ErrorCode::kInvalidArgument,
                 "the " + std::string(format) + " image declares " + std::to_string(layout.width_px) + "x" +
-                    std::to_string(layout.height_px) + " pixels, more than are read; save it smaller");
+                    std::to_string(layout.height_px) + " pixels, more than the limit; save it smaller");
   // Also prevents a small file from using much memory.
   if (layout.bytes() > compression_max * static_cast<double>(file_bytes)) return fail_truncated(format);
   return {};
@@ -54,7 +54,7 @@ tl::unexpected<Error> fail_truncated(std::string_view format) {
 
 tl::unexpected<Error> fail_variant(std::string_view format, std::string_view what) {
   return fail(ErrorCode::kUnsupported, "a " + std::string(format) + " image with " + std::string(what) +
-                                           " is not read; save it as PNG, 8 or 16 bits, grey or RGB");
+                                           " is not supported; save it as PNG, 8 or 16 bits, grey or RGB");
 }
 
 }  // namespace slsd

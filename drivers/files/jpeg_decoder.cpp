@@ -22,10 +22,10 @@ tl::unexpected<Error> fail_damaged(const char* how) {
 const char* meaning_of(int warning) {
   switch (warning) {
     case JWRN_HIT_MARKER:
-      return "a part of its data is missing";
+      return "part of its data is missing";
     case JWRN_HUFF_BAD_CODE:
     case JWRN_BOGUS_PROGRESSION:
-      return "a part of its data is not what was written";
+      return "part of its data is corrupt";
     case JWRN_MUST_RESYNC:
       return "a restart marker is missing or out of order";
     case JWRN_JPEG_EOF:
@@ -84,7 +84,7 @@ Result<> JpegDecoder::read_grey(Grey8& grey) {
   const ScanBlocks blocks = counted ? count_blocks(info_, scan_) : ScanBlocks::kAgree;
   if (!read_rows(grey)) return fail_damaged(meaning_of(JWRN_HUFF_BAD_CODE));  // for example, a header within the data
   if (blocks == ScanBlocks::kLeftOver || (failure_.extraneous && !counted))
-    return fail_damaged("it has more data than blocks, so that a part before is missing");
+    return fail_damaged("it has more data than blocks, so an earlier part is missing");
   if (failure_.warning != 0) return fail_damaged(meaning_of(failure_.warning));
   if (blocks == ScanBlocks::kMissing || lacking) return fail_damaged(meaning_of(JWRN_HIT_MARKER));
   return {};
@@ -121,14 +121,14 @@ bool JpegDecoder::read_rows(Grey8& grey) {
 Result<> JpegDecoder::fail_with_message() const {
   switch (failure_.manager.msg_code) {
     case JERR_BAD_PRECISION:
-      return fail_variant("JPEG", std::to_string(failure_.manager.msg_parm.i[0]) + " bits a sample");
+      return fail_variant("JPEG", std::to_string(failure_.manager.msg_parm.i[0]) + " bits per sample");
     case JERR_SOF_UNSUPPORTED:
       return fail_variant("JPEG", "lossless or hierarchical coding");
     case JERR_CONVERSION_NOTIMPL:
     case JERR_BAD_J_COLORSPACE:
       return fail_variant("JPEG", "unusual colours");
     default:
-      return fail_damaged(failure_.warning != 0 ? meaning_of(failure_.warning) : "a header in it is invalid");
+      return fail_damaged(failure_.warning != 0 ? meaning_of(failure_.warning) : "one of its headers is invalid");
   }
 }
 

@@ -9,7 +9,7 @@
 
 namespace slsd {
 
-/// Whether a JPEG scan's blocks match its size.
+/// Comparison of a JPEG scan's blocks with its size.
 enum class ScanBlocks {
   kAgree,
   kMissing,  ///< data ends before the last block, a code is invalid, or a level is outside any picture's range

@@ -66,8 +66,8 @@ Result<std::string> exchange(int socket, std::string_view sent, std::size_t limi
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
     pollfd ready{socket, static_cast<short>(POLLIN | (sending ? POLLOUT : 0)), 0};
     const int count = left > 0 ? ::poll(&ready, 1, static_cast<int>(std::min<long>(left, 60'000))) : 0;
-    if (count < 0 && errno != EINTR) return fail_system(errno, "cannot wait for what decodes the image");
-    if (left <= 0) return fail(ErrorCode::kTimeout, "the image was not decoded in time; save it anew");
+    if (count < 0 && errno != EINTR) return fail_system(errno, "cannot wait for the image decoder");
+    if (left <= 0) return fail(ErrorCode::kTimeout, "the image was not decoded in time; save it again");
     if (count <= 0) continue;
     if ((ready.revents & POLLOUT) != 0) {
       const ssize_t taken = ::send(socket, sent.data(), sent.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
@@ -88,7 +88,7 @@ tl::unexpected<Error> fail_died(int status) {
   const std::string how = WIFSIGNALED(status) ? "killed by signal " + std::to_string(WTERMSIG(status))
                                               : "status " + std::to_string(WEXITSTATUS(status));
   return fail(ErrorCode::kMalformed,
-              "the image cannot be decoded: what decodes it ended early (" + how + "); save it anew");
+              "the image cannot be decoded: the decoder ended early (" + how + "); save it again");
 }
 
 }  // namespace
@@ -118,11 +118,12 @@ Result<Grey8> decode_projected(std::string_view png, int width_px, int height_px
   auto decoded = decode_png(png, kDecodedBytesMax);
   if (!decoded) return tl::unexpected(decoded.error());
   auto* grey = std::get_if<Grey8>(&decoded->grey);
-  if (grey == nullptr) return fail(ErrorCode::kMismatch, "the image has 16 bits a pixel, a projector 8: convert it");
+  if (grey == nullptr)
+    return fail(ErrorCode::kMismatch, "the image has 16 bits per pixel, but a projector takes 8: convert it");
   if (grey->width() == width_px && grey->height() == height_px) return std::move(*grey);
   return fail(ErrorCode::kMismatch, "the image is " + size_text(grey->width(), grey->height()) +
                                         " pixels, the projector " + size_text(width_px, height_px) +
-                                        ": it is shown pixel for pixel, make it of that size");
+                                        ": resize it to match, because slsd shows it pixel for pixel");
 }
 
 std::string answer_text(const Result<Grey8>& decoded) {
@@ -153,7 +154,7 @@ Result<Grey8> read_answer(std::string_view answer, int width_px, int height_px) 
         return fail(code, printable(line.substr(name.size() + 1), kLineMax));
     }
   }
-  return fail(ErrorCode::kMalformed, "the image cannot be decoded: what decodes it gave no whole answer; save it anew");
+  return fail(ErrorCode::kMalformed, "the image cannot be decoded: the decoder's answer is incomplete; save it again");
 }
 
 }  // namespace slsd

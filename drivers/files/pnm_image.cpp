@@ -106,12 +106,12 @@ bool are_images(std::string_view bytes) {
 }
 
 tl::unexpected<Error> fail_left_over(const Header& header, std::size_t bytes) {
-  return fail(ErrorCode::kMalformed,
-              "the " + std::string(kFormat) + " header declares " + std::to_string(header.layout.width_px) + "x" +
-                  std::to_string(header.layout.height_px) + " pixels and greatest value " +
-                  std::to_string(header.greatest) + ", and " + std::to_string(bytes) +
-                  " bytes are left over after them; exactly one white space may stand between the greatest value and "
-                  "the pixels, no comment: write the file again");
+  return fail(
+      ErrorCode::kMalformed,
+      "the " + std::string(kFormat) + " header declares " + std::to_string(header.layout.width_px) + "x" +
+          std::to_string(header.layout.height_px) + " pixels and greatest value " + std::to_string(header.greatest) +
+          ", but " + std::to_string(bytes) +
+          " bytes are left over; put exactly one white space and no comment between the greatest value and the pixels");
 }
 
 /// The bytes of a raw image's pixels. The specification ends the header in one white space. Writers in text mode write
@@ -192,7 +192,7 @@ Result<DecodedImage> read_as(const Header& header) {
 }  // namespace
 
 Result<DecodedImage> decode_pnm(std::string_view bytes, std::size_t limit_bytes) {
-  if (!is_kind(bytes)) return fail_variant("PNM", "a kind but P2, P3, P5 or P6");
+  if (!is_kind(bytes)) return fail_variant("PNM", "a type other than P2, P3, P5 or P6");
   const auto header = read_header(bytes);
   if (!header) return fail_truncated(kFormat);
   // A plain number has at least a digit and a space, and may become two bytes.

@@ -36,7 +36,7 @@ Result<GreyImage> grey_from(DecodedImage image, BayerPattern bayer) {
 
 Result<GreyImage> decode_at_no_place(std::string_view bytes, const ReadImageOptions& options) {
   if (bytes.size() > options.limit_file_bytes)
-    return fail(ErrorCode::kInvalidArgument, "the image file is longer than is read; save it smaller");
+    return fail(ErrorCode::kInvalidArgument, "the image file is too large; save it smaller");
   auto image = decode(bytes, options.limit_decoded_bytes);
   if (!image) return tl::unexpected(std::move(image.error()));
   return grey_from(std::move(*image), options.bayer);

@@ -65,21 +65,21 @@ std::size_t padded(std::size_t bytes) {
 }
 
 tl::unexpected<Error> fail_cut() {
-  return fail(ErrorCode::kMalformed, "is cut: it has no end");
+  return fail(ErrorCode::kMalformed, "is cut off: it has no end");
 }
 
 // Returns the name if TarWriter could have written the header.
 Result<std::string> name_in(const Header& header) {
-  if (octal(header.sum) != sum_of(header)) return fail(ErrorCode::kMalformed, "is damaged, or no tar archive");
+  if (octal(header.sum) != sum_of(header)) return fail(ErrorCode::kMalformed, "is damaged, or not a tar archive");
   if (std::memcmp(header.magic.data(), "ustar\00000", 8) != 0)
-    return fail(ErrorCode::kUnsupported, "is a tar archive of another dialect");
+    return fail(ErrorCode::kUnsupported, "is a tar archive in another format");
   const std::string name(header.name.data(), ::strnlen(header.name.data(), header.name.size()));
   const std::string quoted = "\"" + printable(name) + "\"";
   if (header.type != kRegular)
-    return fail(ErrorCode::kUnsupported, quoted + " is no regular file but a link, a folder or a device");
+    return fail(ErrorCode::kUnsupported, quoted + " is not a regular file but a link, a folder or a device");
   const auto zero = [](char c) { return c == '\0'; };
   if (!plain_tar_name(name) || !std::ranges::all_of(header.prefix, zero) || !std::ranges::all_of(header.link, zero))
-    return fail(ErrorCode::kUnsupported, quoted + " is a name that might lead elsewhere");
+    return fail(ErrorCode::kUnsupported, quoted + " is a name that might lead outside the archive");
   return name;
 }
 
@@ -126,7 +126,7 @@ Result<std::vector<TarFile>> read_tar(std::string_view archive) {
       const std::string_view end = archive.substr(at);
       if (end.size() < 2 * kBlock) return fail_cut();
       if (end.find_first_not_of('\0') != std::string_view::npos)
-        return fail(ErrorCode::kMalformed, "goes on behind its end");
+        return fail(ErrorCode::kMalformed, "continues after its end");
       return files;
     }
     Header header;

@@ -92,11 +92,11 @@ std::optional<std::string> find_rare(const Tiff& tiff) {
     return "this compression";
   if (!one_of(photometric, {PHOTOMETRIC_MINISBLACK, PHOTOMETRIC_RGB}))
     return "inverted grey, a palette or rare colours";
-  if (!one_of(tag(tiff, TIFFTAG_BITSPERSAMPLE), {8, 16})) return "other than 8 or 16 bits";
+  if (!one_of(tag(tiff, TIFFTAG_BITSPERSAMPLE), {8, 16})) return "a bit depth other than 8 or 16";
   if (!one_of(samples, rgb ? std::initializer_list<std::uint32_t>{3, 4} : std::initializer_list<std::uint32_t>{1, 2}))
     return "more channels than colours and alpha";
   if (samples > 1 && tag(tiff, TIFFTAG_PLANARCONFIG) != PLANARCONFIG_CONTIG) return "separate planes";
-  if (tag(tiff, TIFFTAG_ORIENTATION) != ORIENTATION_TOPLEFT) return "turned or mirrored rows";
+  if (tag(tiff, TIFFTAG_ORIENTATION) != ORIENTATION_TOPLEFT) return "rotated or mirrored rows";
   if (tag(tiff, TIFFTAG_SAMPLEFORMAT) != SAMPLEFORMAT_UINT) return "signed or floating-point pixels";
   return std::nullopt;
 }

@@ -42,7 +42,8 @@ Result<MonotonicTime> HeadlessProjector::show(const Grey8& image, MonotonicTime 
   if (auto begun = begin(image); !begun) return tl::unexpected(begun.error());
   const MonotonicTime complete = *complete_;
   std::this_thread::sleep_until(std::min(complete, deadline));
-  if (complete > deadline) return fail(ErrorCode::kTimeout, "it takes longer", description_.monitor);
+  if (complete > deadline)
+    return fail(ErrorCode::kTimeout, "the projector needs more time: allow a longer timeout", description_.monitor);
   complete_.reset();
   return complete;
 }
@@ -71,7 +72,7 @@ Result<Grey8> HeadlessProjector::read_back() {
 
 Result<> HeadlessProjector::check(MonotonicTime) {
   if (connected_) return {};
-  return fail(ErrorCode::kDisconnected, "the projector is not there; check its cable and open it again",
+  return fail(ErrorCode::kDisconnected, "the projector is not connected; check its cable and open it again",
               description_.monitor);
 }
 

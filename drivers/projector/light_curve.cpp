@@ -30,8 +30,7 @@ Result<> check_gamma(const std::vector<double>& gamma) {
   if (gamma.size() == 1 && gamma[0] >= 0.1 && gamma[0] <= 10) return {};
   const bool rising = std::ranges::adjacent_find(gamma, std::greater_equal<>()) == gamma.end();
   if (gamma.size() >= 2 && gamma.size() <= kGreys && rising) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              "gamma must be 0.1 to 10, or a list of 2 to 256 lights of which each is above the one before");
+  return fail(ErrorCode::kInvalidArgument, "gamma must be 0.1 to 10, or a rising list of 2 to 256 light values");
 }
 
 }  // namespace

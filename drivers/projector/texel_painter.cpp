@@ -45,7 +45,7 @@ Result<TexelPainter> TexelPainter::create(int width_px, int height_px, const Lig
   glGetIntegerv(GL_MAX_TEXTURE_SIZE, &side_max_px);
   if (width_px > side_max_px || height_px > side_max_px) {
     return fail(ErrorCode::kUnsupported,
-                "the graphics driver draws at most " + std::to_string(side_max_px) + " pixels a side");
+                "the graphics driver draws at most " + std::to_string(side_max_px) + " pixels per side");
   }
   TexelPainter painter(width_px, height_px, curve);
   if (auto made = painter.make_program(); !made) return tl::unexpected(made.error());

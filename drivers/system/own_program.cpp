@@ -70,7 +70,7 @@ Result<pid_t> start_own_program(const std::filesystem::path& program, const std:
   const int error = SpawnSetting(streams).spawn(process, program, arguments);
   if (error == 0) return process;
   if (error == ENOENT || error == ENOTDIR)
-    return fail(ErrorCode::kNotFound, "is not installed: install the packages of slsd again", program.string());
+    return fail(ErrorCode::kNotFound, "is not installed: reinstall the packages of slsd", program.string());
   return fail(ErrorCode::kIo, "does not start: " + std::generic_category().message(error), program.string());
 }
 

@@ -10,15 +10,16 @@
 namespace slsd {
 namespace {
 
-constexpr std::string_view kNoDescriptor = "no file descriptor is left: end what holds them, or raise LimitNOFILE";
-constexpr std::string_view kNoMemory = "no memory is left: end other programs, or add some";
+constexpr std::string_view kNoDescriptor =
+    "no file descriptor is left: end programs that hold many, or raise LimitNOFILE";
+constexpr std::string_view kNoMemory = "no memory is left: end other programs, or add memory";
 
 constexpr SystemErrorMeaning kMeanings[] = {
     {ENOENT, ErrorCode::kNotFound, "check the path"},
     {ENOTDIR, ErrorCode::kNotFound, "check the path"},
     {EACCES, ErrorCode::kPermissionDenied, "give this user access to it"},
     {EPERM, ErrorCode::kPermissionDenied, "give this user access to it"},
-    {EROFS, ErrorCode::kPermissionDenied, "choose a place that may be written"},
+    {EROFS, ErrorCode::kPermissionDenied, "choose a writable place"},
     {EEXIST, ErrorCode::kAlreadyExists, "choose another name, or remove it"},
     {ENOSPC, ErrorCode::kNoSpace, "free some space or choose another place"},
     {EDQUOT, ErrorCode::kNoSpace, "free some space or choose another place"},
@@ -36,7 +37,7 @@ constexpr SystemErrorMeaning kMeanings[] = {
     {ENXIO, ErrorCode::kDisconnected, "check its cable"},
     {EPIPE, ErrorCode::kDisconnected, "connect again"},
     {ECONNRESET, ErrorCode::kDisconnected, "connect again"},
-    {ETIMEDOUT, ErrorCode::kTimeout, "check that it is on, and its cable"},
+    {ETIMEDOUT, ErrorCode::kTimeout, "check its power and its cable"},
 };
 
 constexpr SystemErrorMeaning kAnyOther{0, ErrorCode::kIo, "check the disk or the device, and try again"};

@@ -35,7 +35,7 @@ WakeEvent::~WakeEvent() {
 Result<> WakeEvent::open() {
   if (number_ >= 0) return {};
   const int number = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
-  if (number < 0) return fail_system(errno, "cannot make an event to wait for");
+  if (number < 0) return fail_system(errno, "cannot create an event to wait for");
   number_ = number;
   if (woken_) wake();  // wake() came before, or during open()
   return {};

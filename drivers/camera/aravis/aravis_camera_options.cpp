@@ -54,9 +54,9 @@ Result<> AravisCameraOptions::validate() const {
   if (!interface.empty() && !is_address(interface)) return refuse("interface must be an IPv4 address of this host");
   if (trigger == AravisTrigger::kLine && trigger_line.empty()) return refuse("trigger_line must name an input");
   if (trigger == AravisTrigger::kAction && action.group_mask == 0)
-    return refuse("action_group_mask must have a bit, where the trigger is an action");
+    return refuse("action_group_mask must have at least one bit if trigger is \"action\"");
   if (!within(action_lead_us, 0.0, 1e6)) return refuse("action_lead_us must be 0 to 1000000");
-  if (action_lead_us > 0.0 && !ptp) return refuse("action_lead_us needs ptp = true, without which clocks differ");
+  if (action_lead_us > 0.0 && !ptp) return refuse("action_lead_us needs ptp = true, so that the clocks agree");
   if (rate_hz != 0.0 && !within(rate_hz, 0.01, 10000.0)) return refuse("rate_hz must be 0, or 0.01 to 10000");
   if (!within(readout_us, 0.0, 1e7)) return refuse("readout_us must be 0 to 10000000");
   if (!within(exposure_us, 1.0, 1e7)) return refuse("exposure_us must be 1 to 10000000");

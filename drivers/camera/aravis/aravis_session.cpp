@@ -95,7 +95,8 @@ Result<> AravisSession::prepare() {
 Result<> AravisSession::join_group() {
   if (options_.trigger != AravisTrigger::kAction) return {};
   if (device_.address.empty())
-    return fail_here(ErrorCode::kUnsupported, "only GigE Vision cameras expose at an action; set another trigger");
+    return fail_here(ErrorCode::kUnsupported,
+                     "only GigE Vision cameras support the trigger \"action\"; set another one");
   action_.emplace(ActionGroup::of(options_.action), device_.address, options_.interface);
   return {};
 }
@@ -112,7 +113,7 @@ Result<> AravisSession::make_stream() {
   stream_.reset();
   while (events_.take_buffer()) continue;  // those buffers ended with their stream
   stream_ = make_reporting_stream(device_.camera.get(), events_, number_, error);
-  if (!stream_) return fail(error.code(), "the camera gives no stream: " + error.message(), options_.name);
+  if (!stream_) return fail(error.code(), "the camera does not open a stream: " + error.message(), options_.name);
   std::vector<NetworkWarning> warnings;
   configure_stream(stream_.get(), options_, layout_.bytes(), warnings);
   for (NetworkWarning& warning : warnings)
@@ -196,8 +197,8 @@ Result<> AravisSession::warm_up(AravisTrigger trigger) {
   if (unreadable) return go_without_chunks(trigger);
   if (note_fragments()) return fail_here(ErrorCode::kDisconnected, warnings_.back().advice);
   return fail_here(ErrorCode::kDisconnected,
-                   "the camera answers, and sends no frame; check that it is reached through the right interface, and "
-                   "that no firewall holds back UDP from its address");
+                   "the camera answers but sends no frame; check that slsd reaches it through the right interface, and "
+                   "that no firewall blocks UDP from its address");
 }
 
 Result<AravisSession::FirstFrame> AravisSession::wait_for_first_frame(AravisTrigger trigger,

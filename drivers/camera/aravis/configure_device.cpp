@@ -126,7 +126,8 @@ constexpr std::size_t kChunkBytesMax = 1 << 16;  // bound for everything that a 
 
 Result<DeviceLayout> configure_image(const DeviceFeatures& features, const AravisCameraOptions& options) {
   const auto pixels = find_pixel_layout(options.pixel_format);
-  if (!pixels) return fail(ErrorCode::kInvalidArgument, "is no pixel format that can be read", options.pixel_format);
+  if (!pixels)
+    return fail(ErrorCode::kInvalidArgument, "is not a pixel format that slsd can read", options.pixel_format);
   // Chunks behind the image would change the size of a frame.
   Result<> done = features.turn_if_there("ChunkModeActive", false);
   if (done) done = set_region(features, options);
@@ -181,12 +182,13 @@ Result<> turn_chunks_off(const DeviceFeatures& features) {
 Result<std::size_t> read_payload_bytes(ArvCamera* camera, const DeviceLayout& layout, const ChunkSelection& chunks) {
   GErrorSlot error;
   const std::size_t payload = arv_camera_get_payload(camera, error.out());
-  if (error.failed()) return fail(error.code(), "the camera tells no frame size: " + error.message(), "PayloadSize");
+  if (error.failed())
+    return fail(error.code(), "the camera does not report its frame size: " + error.message(), "PayloadSize");
   const std::size_t most = layout.bytes() + (chunks.any() ? kChunkBytesMax : 0);
   if (payload >= layout.bytes() && payload <= most) return payload;
   return fail(ErrorCode::kMismatch,
-              "the camera sends " + std::to_string(payload) + " bytes a frame, where its size and pixel format make " +
-                  std::to_string(layout.bytes()) + "; turn off what it adds",
+              "the camera sends " + std::to_string(payload) + " bytes per frame, but its size and pixel format make " +
+                  std::to_string(layout.bytes()) + "; turn off what it appends",
               "PayloadSize");
 }
 

@@ -92,7 +92,8 @@ Result<> set_packet_size(ArvCamera* camera, const AravisCameraOptions& options) 
   if (error.failed()) return tl::unexpected(in_words(error, "packet size"));
   const unsigned taken = arv_camera_gv_get_packet_size(camera, error.out());
   if (static_cast<int>(taken) == options.packet_bytes) return {};
-  return fail(ErrorCode::kMismatch, "the camera took packets of " + std::to_string(taken) + " bytes", "packet_bytes");
+  return fail(ErrorCode::kMismatch,
+              "the camera uses packets of " + std::to_string(taken) + " bytes instead; set that, or 0", "packet_bytes");
 }
 
 }  // namespace
@@ -130,50 +131,47 @@ bool packet_socket_allowed() {
 }
 
 NetworkWarning device_clock_warning(std::string_view fault) {
-  return {"device_clock", "the camera's clock " + std::string(fault) +
-                              ": when frames were exposed is told by their arrival, a capture that is not triggered "
-                              "waits some frames longer, and a frame that comes too late ends the session; set "
-                              "device_clock = \"arrival\", and readout_us where it is known"};
+  return {"device_clock",
+          "the camera's clock " + std::string(fault) +
+              ", so slsd times frames by their arrival: untriggered captures wait some frames longer, and a late frame "
+              "ends the session; set device_clock = \"arrival\", and readout_us if you know it"};
 }
 
 NetworkWarning chunks_warning() {
   return {"chunks",
-          "what the camera appends to its frames is not as it describes it: it is turned off, and a frame of another "
-          "exposure or gain than configured is not noticed; chunks = false spares the attempts"};
+          "the camera's chunks do not match its description: slsd turned them off, and cannot notice frames of another "
+          "exposure or gain; set chunks = false to skip the attempts"};
 }
 
 NetworkWarning first_frame_warning() {
-  return {"first_frame",
-          "the camera exposes at a signal only, so that opening cannot prove that its frames arrive; the first scan "
-          "does"};
+  return {
+      "first_frame",
+      "the camera exposes only at a signal, so opening it cannot check that its frames arrive; the first scan does"};
 }
 
 NetworkWarning packet_size_warning(unsigned packet_bytes, const std::optional<HostInterface>& interface) {
-  std::string advice = "packets have " + std::to_string(packet_bytes) + " bytes only";
+  std::string advice = "packets have only " + std::to_string(packet_bytes) + " bytes";
   const int mtu_bytes = interface ? interface->mtu_bytes.value_or(0) : 0;
   if (mtu_bytes >= kJumboMtu)
-    advice += ", and " + interface->name + " takes " + std::to_string(mtu_bytes) +
-              ": let every switch and the camera pass 9000, or set packet_bytes if the camera cannot try sizes";
+    advice += ", although " + interface->name + " takes " + std::to_string(mtu_bytes) +
+              ": allow 9000 on every switch and the camera, or set packet_bytes if the camera cannot test sizes";
   else
     advice += "; set the MTU of " + (interface ? interface->name : "the interface") + ", and of every switch, to 9000";
   return {"packet_size", advice};
 }
 
 NetworkWarning fragments_warning(int packet_bytes, const std::optional<HostInterface>& interface) {
-  const char* const sizes = packet_bytes != 0 ? "set packet_bytes to 1500 or less, or to 0, so that sizes are tried"
-                                              : "it breaks up those that try sizes, too; set packet_bytes to 1500";
-  return {"fragments",
-          std::string("the camera's packets are larger than the network takes whole, arrive in pieces, and "
-                      "frames are torn: ") +
-              sizes + "; or set the MTU of " + (interface ? interface->name : "the interface") +
-              ", and of every switch, to 9000"};
+  const char* const sizes = packet_bytes != 0 ? "set packet_bytes to 1500 or less, or to 0 to test sizes"
+                                              : "it fragments test packets, too; set packet_bytes to 1500";
+  return {"fragments", std::string("the network fragments the camera's packets, which tears frames: ") + sizes +
+                           "; or set the MTU of " + (interface ? interface->name : "the interface") +
+                           ", and of every switch, to 9000"};
 }
 
 NetworkWarning packet_socket_warning(const std::optional<HostInterface>& interface) {
-  return {"packet_socket",
-          "other devices send on " + (interface ? interface->name : "the interface") +
-              " without a pause, so that packets are taken from the UDP socket, which loses more: give the camera an "
-              "interface of its own, or set packet_socket = false to skip the attempts"};
+  return {"packet_socket", "other devices keep sending on " + (interface ? interface->name : "the interface") +
+                               ", so slsd reads the UDP socket, which loses more packets: give the camera its own "
+                               "interface, or set packet_socket = false to skip the attempts"};
 }
 
 std::optional<HostInterface> interface_of(ArvCamera* camera) {
@@ -222,13 +220,13 @@ void configure_stream(ArvStream* stream, const AravisCameraOptions& options, std
   ArvGvStreamPacketResend resend = ARV_GV_STREAM_PACKET_RESEND_NEVER;
   g_object_get(stream, "packet-resend", &resend, nullptr);
   if (options.packet_resend && resend == ARV_GV_STREAM_PACKET_RESEND_NEVER)
-    warnings.push_back({"packet_resend", "the camera cannot send packets again: each one lost is a frame lost"});
+    warnings.push_back({"packet_resend", "the camera cannot resend packets: each lost packet loses a frame"});
   if (!options.packet_resend) g_object_set(stream, "packet-resend", ARV_GV_STREAM_PACKET_RESEND_NEVER, nullptr);
   if (receive_buffer_allowed() >= wanted || takes_packet_socket(stream, options)) return;
   const std::string bytes = std::to_string(wanted);
   warnings.push_back({"receive_buffer", "net.core.rmem_max is " + std::to_string(receive_buffer_allowed()) +
-                                            " and frames need " + bytes + ": run sysctl -w net.core.rmem_max=" + bytes +
-                                            " and keep it in /etc/sysctl.d, or give slsd CAP_NET_RAW"});
+                                            ", but frames need " + bytes + ": run sysctl -w net.core.rmem_max=" +
+                                            bytes + " and keep it in /etc/sysctl.d, or give slsd CAP_NET_RAW"});
 }
 
 }  // namespace slsd

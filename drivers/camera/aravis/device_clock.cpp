@@ -70,9 +70,9 @@ void DeviceClock::note_step(const ClockReading& reading) {
   if (reading.device == newest().device)
     fault_ = "stands still";
   else if (reading.device < newest().device)
-    fault_ = "goes back again and again";
+    fault_ = "keeps jumping back";
   else
-    fault_ = "does not go at the rate that it says";
+    fault_ = "does not run at the rate that it states";
 }
 
 bool DeviceClock::has_stepped(const ClockReading& reading) const {

@@ -18,8 +18,8 @@ using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
 tl::unexpected<Error> fail_taken(const char* name, const std::string& asked, const std::string& taken) {
-  return fail(ErrorCode::kMismatch, "the camera took " + taken + " where " + asked + " was set; set what it can do",
-              name);
+  return fail(ErrorCode::kMismatch,
+              "the camera set " + taken + " instead of " + asked + "; choose a value that it supports", name);
 }
 
 std::string text(double value) {
@@ -104,7 +104,7 @@ Result<> DeviceFeatures::check_range(const char* name, double value, double tole
   if (error.failed() || !(low < high)) return {};  // the camera reports no range
   if (value >= low - tolerance && value <= high + tolerance) return {};
   return fail(ErrorCode::kInvalidArgument,
-              "the camera goes from " + text(low) + " to " + text(high) + ", not to " + text(value), name);
+              "the camera takes " + text(low) + " to " + text(high) + ", not " + text(value), name);
 }
 
 Result<> DeviceFeatures::set(const char* name, double value, double tolerance) const {
@@ -249,7 +249,7 @@ void DeviceControl::read_clock() {
 bool DeviceControl::observe_clock() {
   const auto reading = read_device_clock(camera_);
   if (!reading) {
-    events_.report_lost(session_, "the camera does not answer any more");
+    events_.report_lost(session_, "the camera no longer answers");
     return false;
   }
   const std::lock_guard lock(mutex_);

@@ -51,7 +51,7 @@ class DeviceFeatures {
   ArvCamera* camera_;
 };
 
-/// Whether a device's clock is locked to the network's (IEEE 1588). Locking takes seconds after opening.
+/// Lock of a device's clock to the network's (IEEE 1588). Locking takes seconds after opening.
 enum class PtpLock {
   kUnknown,  ///< the device does not report it
   kOpen,     ///< the device uses its own clock, or is about to set it

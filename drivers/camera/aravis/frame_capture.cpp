@@ -35,8 +35,8 @@ Result<> FrameCapture::check() const {
 Result<> FrameCapture::may_capture(MonotonicTime deadline) {
   passed_over_ = 0;
   if (events_.take_cancel()) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
-  if (deadline <= steady_clock::now()) return fail_here(ErrorCode::kFrameLate, "the deadline is past");
-  if (receiver_.all_held()) return fail_here(ErrorCode::kBusy, "all frames are held; give some back first");
+  if (deadline <= steady_clock::now()) return fail_here(ErrorCode::kFrameLate, "the deadline has passed");
+  if (receiver_.all_held()) return fail_here(ErrorCode::kBusy, "all frames are held; release some first");
   return {};
 }
 
@@ -96,7 +96,7 @@ Result<> FrameCapture::settle(MonotonicTime deadline) {
     if (wake == CaptureEvents::Wake::kCancelled) return fail_here(ErrorCode::kCancelled, "the capture was cancelled");
     if (wake == CaptureEvents::Wake::kTimeout) {
       if (deadline <= limit)
-        return fail_here(ErrorCode::kFrameLate, "the frame of the trigger before has not come yet");
+        return fail_here(ErrorCode::kFrameLate, "the frame of the previous trigger has not arrived yet");
       const auto error = missed(deadline);
       if (error.value().code == ErrorCode::kDisconnected) return error;
     } else if (frames_due_ > 0) {
@@ -159,7 +159,8 @@ std::optional<Result<Frame>> FrameCapture::judge(MonotonicTime asked, bool was_q
   out_of_step_ = stale;
   stale_in_a_row_ = stale ? stale_in_a_row_ + 1 : 0;
   // Synchronizing again did not help: the next session checks the clock anew.
-  if (stale_in_a_row_ >= kStaleMax) return Result<Frame>(lost("the camera answers with frames of before"));
+  if (stale_in_a_row_ >= kStaleMax)
+    return Result<Frame>(lost("the camera keeps sending frames from before the trigger"));
   if (!taken) return Result<Frame>(tl::unexpected(taken.error()));
   if (!*taken) return std::nullopt;
   longest_wait_ = std::max(longest_wait_, steady_clock::now() - asked);
@@ -174,18 +175,19 @@ tl::unexpected<Error> FrameCapture::missed(MonotonicTime deadline) {
   ++frames_missed_;
   // Without the device's clock, a late frame would be taken for the next one.
   const bool enough = frames_missed_ >= options_.missed_frames_max || goes_by_arrival();
-  if (options_.trigger != AravisTrigger::kLine && enough) return lost("the camera answers, and sends no frames");
+  if (options_.trigger != AravisTrigger::kLine && enough) return lost("the camera answers but sends no frames");
   if (steady_clock::now() >= deadline) return late();
-  return fail_here(ErrorCode::kFrameDropped, "no frame came within " + std::to_string(options_.frame_timeout_ms) +
-                                                 " ms; it is lost, or frame_timeout_ms is too short");
+  return fail_here(ErrorCode::kFrameDropped, "no frame arrived within " + std::to_string(options_.frame_timeout_ms) +
+                                                 " ms: it was lost, or frame_timeout_ms is too short");
 }
 
 tl::unexpected<Error> FrameCapture::late() const {
-  if (passed_over_ == 0) return fail_here(ErrorCode::kFrameLate, "no frame came before the deadline");
-  if (!goes_by_arrival()) return fail_here(ErrorCode::kFrameLate, "only frames of before came until the deadline");
+  if (passed_over_ == 0) return fail_here(ErrorCode::kFrameLate, "no frame arrived before the deadline");
+  if (!goes_by_arrival())
+    return fail_here(ErrorCode::kFrameLate, "only frames from before the trigger arrived in time");
   return fail_here(ErrorCode::kFrameLate,
-                   "only frames came that may have been exposed before; set readout_us to the longest that the camera "
-                   "takes from the end of an exposure until its frame is there");
+                   "only frames arrived that may be older than the trigger; set readout_us to the longest time from "
+                   "the end of an exposure to its frame's arrival");
 }
 
 tl::unexpected<Error> FrameCapture::lost(const std::string& reason) const {

@@ -34,7 +34,7 @@ constexpr std::uint64_t kLongest = 1ull << 62;  // 146 years in nanoseconds
 
 std::string difference(const char* what, double taken, double configured, const char* unit) {
   char text[128];
-  std::snprintf(text, sizeof(text), "its %s was %.10g %s where %.10g is configured", what, taken, unit, configured);
+  std::snprintf(text, sizeof(text), "its %s was %.10g %s, but %.10g is configured", what, taken, unit, configured);
   return text;
 }
 

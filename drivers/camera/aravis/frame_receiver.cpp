@@ -37,11 +37,11 @@ std::string status_text(ArvBufferStatus status) {
     case ARV_BUFFER_STATUS_MISSING_PACKETS:
       return "packets are missing";
     case ARV_BUFFER_STATUS_WRONG_PACKET_ID:
-      return "a packet has a number that is not of this frame";
+      return "a packet has a number of another frame";
     case ARV_BUFFER_STATUS_SIZE_MISMATCH:
       return "it is larger than a frame";
     default:
-      return "the stream gave it up";
+      return "the stream aborted it";
   }
 }
 
@@ -162,22 +162,23 @@ Result<std::optional<Frame>> FrameReceiver::take(const Proof& proof) {
   ArvBuffer* buffer = pop();
   if (buffer == nullptr) return std::nullopt;
   if (const std::string wrong = wrong_with(buffer); !wrong.empty())
-    return refuse(buffer, counted_.torn, ErrorCode::kFrameTorn, "the frame is not whole: " + wrong);
+    return refuse(buffer, counted_.torn, ErrorCode::kFrameTorn, "the frame is incomplete: " + wrong);
   const auto chunks = read_chunks(buffer);
   if (!chunks)
     return refuse(buffer, counted_.torn, ErrorCode::kFrameTorn,
-                  "the frame is not whole: its chunks are not as the camera describes them; where that happens with "
+                  "the frame is incomplete: its chunks do not match the camera's description; if this happens with "
                   "every frame, set chunks = false");
   note_identifier(buffer);
   note_pace(buffer);
   judge_stamps(buffer, *chunks, proof.clock);
   if (const std::string unlike = unlike_configured(*chunks, options_); !unlike.empty())
-    return refuse(buffer, counted_.misexposed, ErrorCode::kMismatch,
-                  "the frame was exposed with other settings: " + unlike +
-                      "; scan again, and if it stays so see that nothing else sets the camera, or set chunks = false");
+    return refuse(
+        buffer, counted_.misexposed, ErrorCode::kMismatch,
+        "the frame was exposed with other settings: " + unlike +
+            "; scan again; if this persists, check that no other program sets the camera, or set chunks = false");
   const auto start = exposure_start(buffer, *chunks, proof);
   if (start) return deliver(buffer, *start);
-  return refuse(buffer, counted_.stale, ErrorCode::kFrameStale, "the frame was exposed before it was asked for");
+  return refuse(buffer, counted_.stale, ErrorCode::kFrameStale, "the frame was exposed before it was requested");
 }
 
 tl::unexpected<Error> FrameReceiver::refuse(ArvBuffer* buffer, std::uint64_t& count, ErrorCode code,
@@ -198,7 +199,7 @@ std::string FrameReceiver::wrong_with(ArvBuffer* buffer) const {
   if (status != ARV_BUFFER_STATUS_SUCCESS) return status_text(status);
   const ArvBufferPayloadType payload = arv_buffer_get_payload_type(buffer);
   const bool extended = chunks_ && payload == ARV_BUFFER_PAYLOAD_TYPE_EXTENDED_CHUNK_DATA;
-  if (payload != ARV_BUFFER_PAYLOAD_TYPE_IMAGE && !extended) return "it is no image";
+  if (payload != ARV_BUFFER_PAYLOAD_TYPE_IMAGE && !extended) return "it is not an image";
   std::size_t bytes = 0;
   arv_buffer_get_image_data(buffer, &bytes);
   if (bytes < layout_.bytes())
@@ -209,7 +210,7 @@ std::string FrameReceiver::wrong_with(ArvBuffer* buffer) const {
   int x_padding = 0;
   int y_padding = 0;
   arv_buffer_get_image_padding(buffer, &x_padding, &y_padding);
-  return same && x_padding == 0 ? "" : "its size or pixel format is not as configured";
+  return same && x_padding == 0 ? "" : "its size or pixel format differs from the configured one";
 }
 
 // If the stream ran out of buffers, nobody requested the missing frames. They are missing after those that filled the
@@ -286,7 +287,7 @@ Result<std::optional<Frame>> FrameReceiver::deliver(ArvBuffer* buffer, Monotonic
   }
   auto grey = as_grey(buffer, start);
   buffers_.return_unread(buffer);
-  if (!grey) return fail(ErrorCode::kBusy, "all frames are held; give some back first", options_.name);
+  if (!grey) return fail(ErrorCode::kBusy, "all frames are held; release some first", options_.name);
   ++counted_.delivered;
   return std::move(*grey).restamped(start, there);
 }

@@ -38,7 +38,7 @@ class GErrorSlot {
     return &error_;
   }
   [[nodiscard]] bool failed() const { return error_ != nullptr; }
-  [[nodiscard]] std::string message() const { return failed() ? printable(error_->message) : "no reason is given"; }
+  [[nodiscard]] std::string message() const { return failed() ? printable(error_->message) : "no reason given"; }
 
   /// The error's code for users of the camera: kDisconnected if the device does not answer, kPermissionDenied if
   /// another application controls it, else kUnsupported.

@@ -64,11 +64,12 @@ class ControlChannel {
   [[nodiscard]] Result<> connect(const std::string& address, const std::string& interface) {
     const auto to = socket_address(address, kGvcpPort);
     const auto from = socket_address(interface.empty() ? "0.0.0.0" : interface, 0);
-    if (!to || !from) return fail(ErrorCode::kInvalidArgument, "is no IPv4 address", !to ? address : interface);
+    if (!to || !from) return fail(ErrorCode::kInvalidArgument, "is not an IPv4 address", !to ? address : interface);
     socket_ = udp_socket();
     if (!socket_) return fail_system(errno, "cannot open a socket", address);
     if (::bind(socket_.number(), generic(*from), sizeof(*from)) != 0)
-      return fail(ErrorCode::kInvalidArgument, "no interface of this host has this address; see ip address", interface);
+      return fail(ErrorCode::kInvalidArgument,
+                  "no interface of this host has this address; run ip address to list them", interface);
     (void)::connect(socket_.number(), generic(*to), sizeof(*to));  // if this fails, nothing will answer
     return {};
   }
@@ -203,8 +204,8 @@ Result<GigeDevice> probe_gige_device(const std::string& address, const std::stri
   auto device = channel.ask(gvcp_discovery, read_gvcp_discovery, timeout);
   if (!device)
     return fail(ErrorCode::kNotFound,
-                "no camera answers at this address; check its power and cable, that it is in the network of this "
-                "host's interface, and that no firewall holds back UDP from port 3956",
+                "no camera answers at this address; check its power and cable, that its address is in this host's "
+                "network, and that no firewall blocks UDP port 3956",
                 address);
   device->address = address;
   device->interface = channel.interface();

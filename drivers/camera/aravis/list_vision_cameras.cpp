@@ -37,7 +37,7 @@ void note_formats(const Result<OpenedDevice>& device, ListedCamera& camera) {
   arv_camera_get_sensor_size(device->camera.get(), &width, &height, error.out());
   for (const std::string& name : pixel_formats_of(device->camera.get()))
     if (find_pixel_layout(name)) camera.formats.push_back({name, {{width, height}}});
-  if (camera.formats.empty()) camera.problem = "it has no pixel format that slsd reads";
+  if (camera.formats.empty()) camera.problem = "it has no pixel format that slsd can read";
 }
 
 std::string user_text(const std::string& controller, const std::vector<HostInterface>& interfaces) {
@@ -57,8 +57,8 @@ void note_control(const GigeDevice& device, const std::vector<HostInterface>& in
   const auto controller = gige_controller(device, kWait);
   if (!controller) {
     camera.problem =
-        "it answers to a broadcast only: its address is not in the network of the interface; give the camera an "
-        "address there, or the interface a second one in the camera's network";
+        "it answers only broadcasts, because its address is outside the interface's network; give the camera an "
+        "address in that network, or the interface a second one in the camera's network";
   } else if (!controller->empty()) {
     camera.user = user_text(*controller, interfaces);
   } else if (may_open) {

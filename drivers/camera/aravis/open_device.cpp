@@ -82,7 +82,7 @@ GObjectPtr<GInetAddress> inet_address(const std::string& text) {
 tl::unexpected<Error> fail_controlled(const std::string& by, const std::string& name) {
   return fail(ErrorCode::kPermissionDenied,
               "another application controls the camera" + (by.empty() ? "" : ", from " + by) +
-                  "; close it there, or wait until its heartbeat has run out",
+                  "; close it there, or wait until its heartbeat times out",
               name);
 }
 
@@ -159,8 +159,8 @@ Result<OpenedDevice> open_device(const AravisCameraOptions& options, const std::
   const auto usb3 = std::ranges::find_if(listed, [&](const auto& one) { return named(one) || one.id == options.id; });
   if (usb3 != listed.end()) return open_usb3_device(*usb3);
   return fail(ErrorCode::kNotFound,
-              "no GigE Vision or USB3 Vision camera of this name is found; slsd --list shows those that are. One in "
-              "another network is found by its address only",
+              "no GigE Vision or USB3 Vision camera has this name; slsd --list shows all that it finds. Name a camera "
+              "in another network by its address",
               options.id);
 }
 

@@ -78,7 +78,7 @@ void add_sizes(const V4l2Device& device, const PixelFormat& format, const V4l2Ca
 std::string list_text(const std::vector<FrameMode>& modes) {
   std::string text;
   for (const FrameMode& mode : modes) (text += text.empty() ? "" : ", ") += to_string(mode);
-  return text.empty() ? "nothing that can be decoded" : text;
+  return text.empty() ? "nothing that slsd can decode" : text;
 }
 
 // Smaller is better.
@@ -169,8 +169,8 @@ Result<FrameMode> choose_mode(const std::vector<FrameMode>& modes, const V4l2Cam
   }
   if (best != nullptr) return *best;
   return fail(ErrorCode::kUnsupported,
-              "the camera has no such format and size; it has: " + list_text(modes) +
-                  "; choose format, width_px and height_px among them",
+              "the camera does not offer this format and size; it offers: " + list_text(modes) +
+                  "; choose format, width_px and height_px from these",
               options.device.string());
 }
 
@@ -189,7 +189,7 @@ Result<FrameLayout> set_mode(const V4l2Device& device, const FrameMode& mode) {
   const bool progressive = made.field == V4L2_FIELD_NONE || made.field == V4L2_FIELD_ANY;
   if (got != mode || !progressive) {
     return fail(ErrorCode::kMismatch,
-                "asked for " + to_string(mode) + " the camera made it " + to_string(got) +
+                "asked for " + to_string(mode) + ", the camera set " + to_string(got) +
                     (progressive ? "" : " interlaced") + "; choose another format or size",
                 device.path());
   }

@@ -73,9 +73,9 @@ Result<GreyView> GreyConverter::convert_jpeg(std::span<const std::byte> bytes) {
   if (auto header = decoder.read_header(); !header) return as_torn(std::move(header.error()));
   if (decoder.width_px() != grey.width() || decoder.height_px() != grey.height()) {
     return fail(ErrorCode::kFrameTorn, "a JPEG image of " + size_text(decoder.width_px(), decoder.height_px()) +
-                                           " pixels came, but the camera's format is " +
+                                           " pixels arrived, but the camera's format is " +
                                            size_text(grey.width(), grey.height()) +
-                                           "; choose another size or format if this comes again");
+                                           "; choose another size or format if this happens again");
   }
   if (auto read = decoder.read_grey(grey); !read) return as_torn(std::move(read.error()));
   return view(grey_);

@@ -47,7 +47,7 @@ void note_modes(const V4l2Device& device, ListedCamera& camera) {
     if (format == camera.formats.end()) format = camera.formats.insert(format, {name});
     format->sizes_px.emplace_back(mode.width_px, mode.height_px);
   }
-  if (camera.formats.empty()) camera.problem = "it has no pixel format that slsd reads";
+  if (camera.formats.empty()) camera.problem = "it has no pixel format that slsd can read";
 }
 
 std::optional<ListedCamera> look_at(const path& node, const path& devices, const path& sysfs) {

@@ -97,11 +97,11 @@ Result<> V4l2Camera::wait_for_first_frame() {
   const auto woken = wake_.wait(stream_->device().descriptor(), steady_clock::now() + longest);
   if (woken == WakeEvent::Woken::kReady) return {};
   close();
-  if (woken == WakeEvent::Woken::kWoken) return fail_here(ErrorCode::kCancelled, "the opening was cancelled");
+  if (woken == WakeEvent::Woken::kWoken) return fail_here(ErrorCode::kCancelled, "opening was cancelled");
   if (woken == WakeEvent::Woken::kGone) return fail_gone();
   return fail_here(ErrorCode::kTimeout,
-                   "it starts and sends no frame; unplug it and plug it in again, try another cable or port; for one "
-                   "that waits for a trigger set missed_frames_max = 0");
+                   "it starts but sends no frame; unplug it and plug it in again, or try another cable or port; if it "
+                   "waits for a trigger, set missed_frames_max = 0");
 }
 
 Result<Frame> V4l2Camera::capture(MonotonicTime deadline) {
@@ -141,7 +141,7 @@ Result<> V4l2Camera::check() {
 
 Result<Frame> V4l2Camera::capture_after(Capture capture) {
   if (!pool_ && stream_->buffers().lent() >= held_max_)
-    return fail_here(ErrorCode::kBusy, "all " + std::to_string(held_max_) + " frames are held; give some back first");
+    return fail_here(ErrorCode::kBusy, "all " + std::to_string(held_max_) + " frames are held; release some first");
   if (!capture.next) {
     if (auto dropped = drop_waiting(); !dropped) return tl::unexpected(dropped.error());
   }
@@ -182,10 +182,9 @@ MonotonicTime V4l2Camera::dead_at() const {
 tl::unexpected<Error> V4l2Camera::fail_dead() const {
   const auto silence =
       std::chrono::duration_cast<std::chrono::milliseconds>(steady_clock::now() - stream_->quiet_since());
-  return fail_here(ErrorCode::kDisconnected,
-                   "its stream has brought no frame for " + std::to_string(silence.count()) +
-                       " ms and is started anew; check its cable if this comes again, and for a camera that waits for "
-                       "a trigger set missed_frames_max = 0");
+  return fail_here(ErrorCode::kDisconnected, "no frame arrived for " + std::to_string(silence.count()) +
+                                                 " ms, so slsd restarts its stream; check its cable if this happens "
+                                                 "again; if it waits for a trigger, set missed_frames_max = 0");
 }
 
 tl::unexpected<Error> V4l2Camera::fail_gone() const {
@@ -210,9 +209,9 @@ Result<> V4l2Camera::wait(const Capture& capture) {
 tl::unexpected<Error> V4l2Camera::fail_late(const Capture& capture) const {
   if (capture.stale < kStaleToTell)
     return fail_here(ErrorCode::kFrameLate,
-                     "no frame came before the deadline; allow more time or raise the frame rate");
+                     "no frame arrived before the deadline; allow more time or raise the frame rate");
   return fail_here(ErrorCode::kFrameStale, std::to_string(capture.stale) +
-                                               " frames came, all exposed before the trigger by their time stamps; "
+                                               " frames arrived, all exposed before the trigger by their time stamps; "
                                                "scan again, then unplug the camera and plug it in again");
 }
 
@@ -220,7 +219,7 @@ Result<std::optional<Frame>> V4l2Camera::take(Capture& capture) {
   const auto buffer = stream_->take();
   if (!buffer && buffer.error().code == ErrorCode::kDisconnected) return tl::unexpected(buffer.error());
   if (!buffer && ++faults_in_a_row_ >= kFaultsInARowMax)
-    return fail_here(ErrorCode::kDisconnected, "the driver reports one fault after another; it is opened again");
+    return fail_here(ErrorCode::kDisconnected, "the driver keeps reporting faults; slsd reopens the camera");
   if (!buffer) {
     ++counts_.dropped;
     return lose(ErrorCode::kFrameDropped, 1, buffer.error().message);
@@ -249,10 +248,10 @@ Result<std::optional<Frame>> V4l2Camera::judge(const v4l2_buffer& buffer, Captur
   }
   if (lost > 0 && capture.next) next_sequence_ += lost;
   if (lost > 0 && !capture.next)  // one of them may be the requested frame
-    return lose(ErrorCode::kFrameDropped, lost, std::to_string(lost) + " frames were lost on their way; scan again");
+    return lose(ErrorCode::kFrameDropped, lost, std::to_string(lost) + " frames were lost in transit; scan again");
   if (!is_whole(buffer)) {
     ++counts_.torn;
-    return lose(ErrorCode::kFrameTorn, 1, "only a part of the frame arrived; scan again");
+    return lose(ErrorCode::kFrameTorn, 1, "only part of the frame arrived; scan again");
   }
   if (received > capture.deadline)
     return fail_here(ErrorCode::kFrameLate, "the frame came after the deadline; allow more time");
@@ -273,8 +272,8 @@ void V4l2Camera::note_stamp(const v4l2_buffer& buffer, MonotonicTime received) {
   clock_.note(buffer, received);
   if (clock_.is_trusted() || std::exchange(clock_warned_, true)) return;
   spdlog::warn(
-      "camera {}: time_stamps: its driver's stamps are not of the monotonic clock; the order of the frames is "
-      "used in their place, and a scan may wait for one more",
+      "camera {}: time_stamps: its driver does not stamp frames by the monotonic clock; slsd goes by their order "
+      "instead, and a scan may wait for one more",
       options_.name);
 }
 
@@ -306,7 +305,7 @@ Result<Frame> V4l2Camera::convert(const v4l2_buffer& buffer, MonotonicTime expos
   auto frame = pool_->lend(*grey, next_sequence_, exposure_start);
   if (!frame)
     return fail_here(ErrorCode::kBusy,
-                     "all " + std::to_string(options_.frames_held_max) + " frames are held; give some back first");
+                     "all " + std::to_string(options_.frames_held_max) + " frames are held; release some first");
   ++next_sequence_;
   ++counts_.delivered;
   return std::move(*frame).restamped(exposure_start, received);

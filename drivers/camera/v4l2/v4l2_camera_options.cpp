@@ -28,7 +28,7 @@ Result<> V4l2CameraOptions::validate() const {
   if (outside(frame_rate_hz, 0.01, 10000.0)) return refuse("frame_rate_hz must be 0.01 to 10000");
   if (outside(exposure_us, 1.0, 1e7)) return refuse("exposure_us must be 1 to 10000000");
   if (outside(gain_db, 0.0, 60.0)) return refuse("gain_db must be 0 to 60");
-  if (gain_db && gain_steps) return refuse("gain_db and gain_steps set the same; leave one out");
+  if (gain_db && gain_steps) return refuse("gain_db and gain_steps both set the gain; leave one out");
   if (power_line_hz && *power_line_hz != 0 && *power_line_hz != 50 && *power_line_hz != 60)
     return refuse("power_line_hz must be 0, 50 or 60");
   if (outside(readout_us, 0.0, 1e7)) return refuse("readout_us must be 0 to 10000000");

@@ -60,8 +60,8 @@ Result<> write_control(const V4l2Device& device, const v4l2_queryctrl& descripti
   const auto taken = read_control(device, description.id);
   if (taken == value) return {};
   return fail(ErrorCode::kMismatch,
-              name_of(description) + " was set to " + std::to_string(value) + " and reads back " +
-                  (taken ? std::to_string(*taken) : "nothing") + "; choose a value that the camera takes",
+              name_of(description) + " was set to " + std::to_string(value) + ", but reads back " +
+                  (taken ? std::to_string(*taken) : "nothing") + "; choose a value that the camera supports",
               device.path());
 }
 
@@ -92,8 +92,8 @@ Result<> set(const V4l2Device& device, const Setting& setting, double steps) {
   }
   if (!(steps >= control->minimum - 0.5 && steps <= control->maximum + 0.5)) {
     return fail(ErrorCode::kInvalidArgument,
-                std::string(setting.key) + ": " + name_of(*control) + " goes from " + std::to_string(control->minimum) +
-                    " to " + std::to_string(control->maximum) + ", not to " + std::to_string(std::llround(steps)),
+                std::string(setting.key) + ": " + name_of(*control) + " takes " + std::to_string(control->minimum) +
+                    " to " + std::to_string(control->maximum) + ", not " + std::to_string(std::llround(steps)),
                 device.path());
   }
   const double step = control->type == V4L2_CTRL_TYPE_INTEGER ? std::max(control->step, 1) : 1;
@@ -140,8 +140,8 @@ std::string decibels_text(const std::vector<Sensitivity>& choices) {
 tl::unexpected<Error> fail_unit(const V4l2Device& device) {
   const auto gain = query(device, gain_control(device));
   return fail(ErrorCode::kUnsupported,
-              gain ? "gain_db: the driver does not tell what a step of " + name_of(*gain) +
-                         " is worth; set gain_steps instead, " + std::to_string(gain->minimum) + " to " +
+              gain ? "gain_db: the driver does not say how many dB a step of " + name_of(*gain) +
+                         " is; set gain_steps instead, " + std::to_string(gain->minimum) + " to " +
                          std::to_string(gain->maximum)
                    : "gain_db: the camera has no gain; leave it out",
               device.path());
@@ -209,8 +209,8 @@ Result<> set_frame_rate(const V4l2Device& device, const V4l2CameraOptions& optio
   const auto taken = rate_hz(parameters);
   if (taken && std::abs(*taken / *options.frame_rate_hz - 1.0) <= kRateTolerance) return {};
   return fail(ErrorCode::kMismatch,
-              "frame_rate_hz: asked for " + hertz_text(*options.frame_rate_hz) + " the camera took " +
-                  (taken ? hertz_text(*taken) : "nothing") + "; choose a rate that it has at this size",
+              "frame_rate_hz: asked for " + hertz_text(*options.frame_rate_hz) + ", the camera set " +
+                  (taken ? hertz_text(*taken) : "nothing") + "; choose a rate that it offers at this size",
               device.path());
 }
 

@@ -24,9 +24,9 @@ constexpr SystemErrorMeaning kMeanings[] = {
     {ENOTDIR, ErrorCode::kNotFound, "plug it in, or correct device"},
     {EACCES, ErrorCode::kPermissionDenied, "add the service's user to the group video"},
     {EPERM, ErrorCode::kPermissionDenied, "add the service's user to the group video"},
-    {ENODEV, ErrorCode::kDisconnected, "check its cable; it is opened again"},
-    {ENXIO, ErrorCode::kDisconnected, "check its cable; it is opened again"},
-    {ENOTTY, ErrorCode::kUnsupported, "it is not a camera of V4L2; correct device"},
+    {ENODEV, ErrorCode::kDisconnected, "check its cable; slsd reopens it"},
+    {ENXIO, ErrorCode::kDisconnected, "check its cable; slsd reopens it"},
+    {ENOTTY, ErrorCode::kUnsupported, "it is not a V4L2 camera; correct device"},
     {0, ErrorCode::kIo, "unplug it and plug it in again"},
 };
 
@@ -72,15 +72,16 @@ Result<V4l2Device> V4l2Device::open(const std::string& path) {
   if (device.descriptor_ < 0) return device.fail_call(errno, "cannot open the camera");
   v4l2_capability capability{};
   if (const int error = device.call(VIDIOC_QUERYCAP, &capability))
-    return device.fail_call(error, "cannot ask what the device can do");
+    return device.fail_call(error, "cannot query the device's capabilities");
   const __u32 can =
       (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? capability.device_caps : capability.capabilities;
   if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0)
-    return fail(ErrorCode::kUnsupported, "the device captures no video; name another, often the one with index0", path);
+    return fail(ErrorCode::kUnsupported, "the device does not capture video; name another, often the one with index0",
+                path);
   device.driver_ = device_text(capability.driver);
   device.card_ = device_text(capability.card);
   if (v4l2_fd_open(device.descriptor_, V4L2_DISABLE_CONVERSION) < 0)
-    return device.fail_call(errno, "libv4l2 cannot take the camera");
+    return device.fail_call(errno, "libv4l2 cannot open the camera");
   return device;
 }
 

@@ -30,10 +30,10 @@ Result<std::shared_ptr<MappedBuffers>> MappedBuffers::request(const V4l2Device& 
   request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   request.memory = V4L2_MEMORY_MMAP;
   if (const int error = device.call(VIDIOC_REQBUFS, &request))
-    return device.fail_call(error, "cannot get buffers of the camera");
+    return device.fail_call(error, "cannot allocate the camera's buffers");
   if (request.count < kFewest || request.count > VIDEO_MAX_FRAME)
-    return fail(ErrorCode::kUnsupported, "the driver gives " + std::to_string(request.count) + " buffers, 3 are needed",
-                device.path());
+    return fail(ErrorCode::kUnsupported,
+                "the driver gives " + std::to_string(request.count) + " buffers, but 3 are needed", device.path());
   auto buffers = std::make_shared<MappedBuffers>(request.count);
   for (std::size_t i = 0; i < request.count; ++i) {
     if (auto mapped = buffers->map(device, i); !mapped) return tl::unexpected(mapped.error());
@@ -67,9 +67,10 @@ Result<V4l2Stream> V4l2Stream::start(V4l2Device device, int buffers) {
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   const int error = stream.device_.call(VIDIOC_STREAMON, &type);
   if (error == ENOSPC) {
-    return fail(ErrorCode::kNoSpace,
-                "its bus has no room for the frames; lower frame_rate_hz or the size, or give it a bus of its own",
-                stream.device_.path());
+    return fail(
+        ErrorCode::kNoSpace,
+        "its bus lacks bandwidth for the frames; lower frame_rate_hz or the size, or give the camera its own bus",
+        stream.device_.path());
   }
   if (error != 0) return stream.device_.fail_call(error, "cannot start the camera");
   stream.quiet_since_ = std::chrono::steady_clock::now();
@@ -91,7 +92,7 @@ Result<std::optional<v4l2_buffer>> V4l2Stream::take() {
   v4l2_buffer filled = describe(0);
   const int error = device_.call(VIDIOC_DQBUF, &filled);
   if (error == EAGAIN) return std::nullopt;
-  if (error == EIO) return fail(ErrorCode::kIo, "the driver reports a passing fault; scan again", device_.path());
+  if (error == EIO) return fail(ErrorCode::kIo, "the driver reports a temporary fault; scan again", device_.path());
   if (error != 0 || filled.index >= buffers_->size() || !with_driver_[filled.index])
     return fail(ErrorCode::kDisconnected, "the camera is gone; check its cable", device_.path());
   with_driver_[filled.index] = false;
@@ -103,7 +104,7 @@ Result<std::optional<v4l2_buffer>> V4l2Stream::take() {
 Result<> V4l2Stream::put_back(std::size_t buffer) {
   v4l2_buffer empty = describe(buffer);
   if (device_.call(VIDIOC_QBUF, &empty) != 0)
-    return fail(ErrorCode::kDisconnected, "the camera takes no buffers any more; check its cable", device_.path());
+    return fail(ErrorCode::kDisconnected, "the camera no longer takes buffers; check its cable", device_.path());
   with_driver_[buffer] = true;
   if (queued_++ == 0) quiet_since_ = std::chrono::steady_clock::now();
   return {};

@@ -57,7 +57,7 @@ Result<> DisplayThread::start() {
   try {
     std::thread([shared = shared_] { serve(shared); }).detach();
   } catch (const std::system_error&) {
-    return fail(ErrorCode::kNoSpace, "no thread is left for the display", "projector");
+    return fail(ErrorCode::kNoSpace, "cannot start a thread for the display", "projector");
   }
   shared_->running = true;
   return {};

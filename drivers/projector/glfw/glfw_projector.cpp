@@ -37,14 +37,15 @@ std::string GlfwProjector::where() const {
 }
 
 tl::unexpected<Error> GlfwProjector::fail_gone() const {
-  return fail(ErrorCode::kDisconnected, "the projector is not there; check its cable and its power", where());
+  return fail(ErrorCode::kDisconnected, "the projector is not connected; check its cable and its power", where());
 }
 
 // Waits for the end of the thread's last order.
 Result<> GlfwProjector::wait(MonotonicTime deadline) const {
   const MonotonicTime hangs = thread_.begun() + (is_under_way(Task::kOpen) ? kOpeningHangs : kHangs);
   if (thread_.wait(std::min(deadline, hangs))) return {};
-  if (steady_clock::now() < hangs) return fail(ErrorCode::kTimeout, "it takes longer", where());
+  if (steady_clock::now() < hangs)
+    return fail(ErrorCode::kTimeout, "the projector needs more time: allow a longer timeout", where());
   Error error = no_answer().value();
   error.where = where();
   return tl::unexpected(std::move(error));

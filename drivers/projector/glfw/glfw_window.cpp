@@ -58,13 +58,13 @@ int refresh_to_ask_for(GLFWmonitor* monitor, int width_px, int height_px) {
 std::string last_error() {
   const char* description = nullptr;
   glfwGetError(&description);
-  return description != nullptr ? description : "for no reason given";
+  return description != nullptr ? description : "no reason given";
 }
 
 }  // namespace
 
 Result<std::unique_ptr<GlfwSession>> GlfwSession::open() {
-  if (in_use.test_and_set()) return fail(ErrorCode::kBusy, "the process has a GLFW projector already", "projector");
+  if (in_use.test_and_set()) return fail(ErrorCode::kBusy, "this process already has a GLFW projector", "projector");
   survive_x_errors();
   int begun = GLFW_FALSE;
   if (!survive_call([&begun] { begun = glfwInit(); }) || begun != GLFW_TRUE) {
@@ -97,17 +97,17 @@ Result<std::unique_ptr<FullscreenWindow>> FullscreenWindow::open(GlfwSession& se
                                                                  int width_px, int height_px) {
   const std::string where = "monitor " + output.name;
   GLFWmonitor* monitor = find_monitor(output.id);
-  if (monitor == nullptr) return fail(ErrorCode::kNotFound, "it went away while it was opened", where);
+  if (monitor == nullptr) return fail(ErrorCode::kNotFound, "it was disconnected while it was opening", where);
   set_hints(refresh_to_ask_for(monitor, width_px, height_px));
   std::unique_ptr<FullscreenWindow> window(new FullscreenWindow(session));
   GLFWwindow* created = nullptr;
   const auto create = [&] { created = glfwCreateWindow(width_px, height_px, "slsd projector", monitor, nullptr); };
   const bool survived = survive_call(create);
   survive_x_errors();
-  if (!survived) return fail(ErrorCode::kDisconnected, "the X server ended while it was opened", where);
+  if (!survived) return fail(ErrorCode::kDisconnected, "the X server ended while it was opening", where);
   window->window_ = created;
   if (window->window_ == nullptr) {
-    return fail(ErrorCode::kUnsupported, "cannot draw there: " + last_error() + "; install libgl1-mesa-dri and libegl1",
+    return fail(ErrorCode::kUnsupported, "cannot draw on it: " + last_error() + "; install libgl1-mesa-dri and libegl1",
                 where);
   }
   glfwMakeContextCurrent(window->window_);
@@ -119,8 +119,8 @@ Result<std::unique_ptr<FullscreenWindow>> FullscreenWindow::open(GlfwSession& se
   });
   if (window->wait_until_it_covers(output.id, width_px, height_px)) return window;
   return fail(ErrorCode::kMismatch,
-              "it does not give the window all of its pixels: set it to the size that [projector] says, and let no "
-              "window manager keep a part of it",
+              "the window does not cover all of its pixels: set it to the size in [projector], and let no window "
+              "manager reserve a part of it",
               where);
 }
 

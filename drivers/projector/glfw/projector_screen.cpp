@@ -146,7 +146,7 @@ void ProjectorScreen::settle() {
 
 Result<> ProjectorScreen::check_open() const {
   if (is_open()) return {};
-  return fail(ErrorCode::kDisconnected, "the projector is not there; check its cable and its power",
+  return fail(ErrorCode::kDisconnected, "the projector is not connected; check its cable and its power",
               output_.name.empty() ? "projector" : "monitor " + output_.name);
 }
 

@@ -20,11 +20,11 @@ std::string place_text(const DesktopArea& area) {
 std::string names_of(std::span<const RandrOutput> outputs) {
   std::string names;
   for (const RandrOutput& output : outputs) (names += names.empty() ? "" : "; ") += describe_output(output);
-  return names.empty() ? "no monitor is plugged in" : "there are: " + names;
+  return names.empty() ? "no monitor is plugged in" : "plugged in: " + names;
 }
 
 std::string turn_on(const RandrOutput& output) {
-  return "run xrandr --output " + output.name + " --auto, or let slsd do it by [projector] enable_output = true";
+  return "run xrandr --output " + output.name + " --auto, or set [projector] enable_output = true";
 }
 
 tl::unexpected<Error> not_there(const std::string& which, std::span<const RandrOutput> outputs) {
@@ -66,7 +66,7 @@ Result<RandrOutput> choose_output(std::span<const RandrOutput> outputs, const st
   const std::string& name = wanted.empty() ? last : wanted;
   if (!name.empty()) {
     const auto found = std::ranges::find_if(outputs, [&](const RandrOutput& output) { return is_meant(output, name); });
-    if (found == outputs.end()) return not_there("the monitor \"" + name + "\" is not there", outputs);
+    if (found == outputs.end()) return not_there("the monitor \"" + name + "\" is not plugged in", outputs);
     if (found->on || enable) return *found;
     return fail(ErrorCode::kNotFound, "the monitor \"" + name + "\" is plugged in, but off: " + turn_on(*found),
                 "projector");
@@ -75,12 +75,12 @@ Result<RandrOutput> choose_output(std::span<const RandrOutput> outputs, const st
   std::ranges::copy_if(outputs, std::back_inserter(usable),
                        [&](const RandrOutput& output) { return output.on || enable; });
   if (usable.empty() && !outputs.empty()) return not_there("no monitor is on: " + turn_on(outputs.front()), outputs);
-  if (usable.empty()) return not_there("the projector is not there", outputs);
+  if (usable.empty()) return not_there("the projector is not plugged in", outputs);
   if (usable.size() == 1) return usable.front();
   const auto others = others_than_primary(usable);
   if (others.size() == 1) return others.front();
-  return fail(ErrorCode::kInvalidArgument,
-              "name the monitor that is the projector as [projector] monitor; " + names_of(outputs), "projector");
+  return fail(ErrorCode::kInvalidArgument, "set [projector] monitor to the projector's monitor; " + names_of(outputs),
+              "projector");
 }
 
 Result<> check_fit(const RandrOutput& output, int width_px, int height_px) {
@@ -99,10 +99,10 @@ Result<> check_fit(const RandrOutput& output, int width_px, int height_px) {
   }
   if (output.area.width_px == width_px && output.area.height_px == height_px) return {};
   if (output.rotation_deg % 180 != 0 && output.area.width_px == height_px && output.area.height_px == width_px) {
-    return fail(ErrorCode::kMismatch, "its picture is turned: run " + xrandr + " --rotate normal", where);
+    return fail(ErrorCode::kMismatch, "its picture is rotated: run " + xrandr + " --rotate normal", where);
   }
   return fail(ErrorCode::kMismatch,
-              "it shows " + size_text(output.area.width_px, output.area.height_px) + " pixels, and [projector] says " +
+              "it shows " + size_text(output.area.width_px, output.area.height_px) + " pixels, but [projector] says " +
                   size + ": set width_px and height_px to its native size" +
                   (output.native_width_px > 0 ? ", " + size_text(output.native_width_px, output.native_height_px)
                                               : std::string()) +
@@ -117,28 +117,28 @@ std::vector<std::string> output_warnings(const RandrOutput& output, std::span<co
       output.mode_width_px == output.native_width_px && output.mode_height_px == output.native_height_px;
   if (output.native_width_px > 0 && !native) {
     warnings.push_back("its native size is " + size_text(output.native_width_px, output.native_height_px) +
-                       ": it scales the pattern, which blurs it; use that size");
+                       ": it scales and blurs the pattern; use that size");
   }
   for (const RandrOutput& other : outputs) {
     if (other.id == output.id || !overlap(other.area, output.area)) continue;
-    warnings.push_back("it mirrors " + other.name + ": what others show there is in the pattern; " + xrandr +
-                       " --right-of " + other.name);
+    warnings.push_back("it mirrors " + other.name + ", so windows there cover the pattern: " + xrandr + " --right-of " +
+                       other.name);
   }
   if (output.rotation_deg != 0 || output.reflected) {
-    warnings.push_back("its picture is turned or reflected: it must stay as it was when calibrating; else " + xrandr +
+    warnings.push_back("its picture is rotated or reflected: keep it as it was when calibrating, or " + xrandr +
                        " --rotate normal --reflect normal");
   }
   if (output.gamma_active) {
-    warnings.push_back("a gamma table is active, which changes grey values: " + xrandr +
-                       " --gamma 1:1:1, and end night light and colour management");
+    warnings.push_back("an active gamma table changes grey values: " + xrandr +
+                       " --gamma 1:1:1, and turn off night light and colour management");
   }
   if (!output.rgb_range.empty() && output.rgb_range != "Full") {
-    warnings.push_back("its RGB range is \"" + output.rgb_range + "\", with which black may not be dark: " + xrandr +
+    warnings.push_back("its RGB range is \"" + output.rgb_range + "\", so black may not be dark: " + xrandr +
                        " --set \"Broadcast RGB\" Full");
   }
   if (output.underscan) warnings.push_back("underscan scales the pattern: " + xrandr + " --set underscan off");
   if (output.name.starts_with("XWAYLAND")) {
-    warnings.push_back("a Wayland session stands between: it may scale, delay and cover the pattern; use an X server");
+    warnings.push_back("a Wayland session may scale, delay and cover the pattern: use an X server");
   }
   return warnings;
 }
@@ -154,7 +154,7 @@ Result<MonitorReport> report_monitor(const std::string& wanted, int width_px, in
   if (!fits && !will_fit) return tl::unexpected(fits.error());
   if (!fits) {
     const std::string now = output->on ? "it has another size" : "it is off";
-    return MonitorReport{std::move(*output), {now + ": slsd turns it on with the right one"}};
+    return MonitorReport{std::move(*output), {now + ": slsd sets it to the right size"}};
   }
   auto warnings = output_warnings(*output, *outputs);
   return MonitorReport{std::move(*output), std::move(warnings)};

@@ -262,15 +262,15 @@ Result<> set_output(_XDisplay* display, const RandrOutput& output, const std::ve
   const Resources resources(XRRGetScreenResourcesCurrent(display, DefaultRootWindow(display)));
   const OutputInfo info(resources ? XRRGetOutputInfo(display, resources.get(), output.id) : nullptr);
   const RRCrtc crtc = info ? free_crtc(display, resources.get(), *info) : None;
-  if (crtc == None) return fail(ErrorCode::kUnsupported, "the graphics card drives no further monitor", where);
+  if (crtc == None) return fail(ErrorCode::kUnsupported, "the graphics card cannot drive another monitor", where);
   const DesktopArea place = place_of(output, outputs, width_px, height_px);
   grow_desktop(display, place.x_px + width_px, place.y_px + height_px);
   RROutput id = output.id;
   const Status set = XRRSetCrtcConfig(display, resources.get(), crtc, CurrentTime, place.x_px, place.y_px, mode->id,
                                       RR_Rotate_0, &id, 1);
   if (set == RRSetConfigSuccess) return {};
-  return fail(ErrorCode::kUnsupported, "the X server does not set it to " + size_text(width_px, height_px) + " pixels",
-              where);
+  return fail(ErrorCode::kUnsupported,
+              "the X server refuses to set it to " + size_text(width_px, height_px) + " pixels", where);
 }
 
 // Xlib waits without limit for a hung server, so this runs on a thread that may be abandoned.
@@ -280,7 +280,7 @@ Result<std::vector<RandrOutput>> list_outputs() {
   try {
     std::thread(std::move(ask)).detach();
   } catch (const std::system_error&) {
-    return fail(ErrorCode::kNoSpace, "no thread is left for the display");
+    return fail(ErrorCode::kNoSpace, "cannot start a thread for the display");
   }
   if (outputs.wait_for(kAnswerMax) == std::future_status::ready) return outputs.get();
   return no_answer();

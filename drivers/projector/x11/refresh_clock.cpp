@@ -116,7 +116,7 @@ Result<MonotonicTime> RefreshClock::wait_begin() {
   for (int i = 0; !flips_ && next && !flipped_ && i < kRefreshesUntilAFlip; ++i) {
     next = refresh_at(next->count + 1, deadline);
   }
-  if (!shown) return fail(ErrorCode::kDisconnected, "the monitor has no refresh: check its power and cable");
+  if (!shown) return fail(ErrorCode::kDisconnected, "the monitor does not refresh: check its power and cable");
   if (!flips_) flips_ = flipped_.has_value();
   if (*flips_ && !flipped_) static_cast<void>(next_event(0, deadline));
   return flipped_.value_or(shown->begin);

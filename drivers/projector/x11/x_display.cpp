@@ -76,13 +76,13 @@ tl::unexpected<Error> no_display() {
   const char* name = std::getenv("DISPLAY");
   if (name == nullptr || *name == '\0') {
     return fail(ErrorCode::kNotFound,
-                "no display: DISPLAY is not set; start the projector's X server (slsd-display.service), or let the "
-                "service into your session, as docs/projector.md says",
+                "no display: DISPLAY is not set; start the projector's X server (slsd-display.service), or allow the "
+                "service into your session (docs/projector.md)",
                 "projector");
   }
   return fail(ErrorCode::kNotFound,
-              "no display: no X server lets us in at DISPLAY=" + printable(name) +
-                  "; start it, or give the service's user the right (xhost, XAUTHORITY)",
+              "no display: cannot connect to the X server at DISPLAY=" + printable(name) +
+                  "; start it, or allow the service's user in (xhost, XAUTHORITY)",
               "projector");
 }
 
@@ -90,7 +90,7 @@ tl::unexpected<Error> no_answer() {
   const char* name = std::getenv("DISPLAY");
   return fail(ErrorCode::kIo,
               "the display server does not answer at DISPLAY=" + printable(name != nullptr ? name : "") +
-                  "; the projector is back when it does, else restart it (slsd-display.service)",
+                  "; the projector returns when it does, otherwise restart it (slsd-display.service)",
               "projector");
 }
 

@@ -84,9 +84,8 @@ TEST_F(AravisCameraTest, RefusesWhatIsBeyondTheRangeThatTheCameraTells) {
     ASSERT_FALSE(opened);
     EXPECT_EQ(opened.error().code, ErrorCode::kInvalidArgument);
     EXPECT_THAT(to_string(opened.error()),
-                HasSubstr(exposure ? "ExposureTime: the camera goes from 10 to 1000000, not to "
-                                     "2000000"
-                                   : "Gain: the camera goes from 0 to 24, not to 30"));
+                HasSubstr(exposure ? "ExposureTime: the camera takes 10 to 1000000, not 2000000"
+                                   : "Gain: the camera takes 0 to 24, not 30"));
   }
 }
 

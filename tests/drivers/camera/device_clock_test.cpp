@@ -129,9 +129,9 @@ std::string_view fault_of(const std::function<nanoseconds(int)>& shown, bool may
 TEST(DeviceClock, FindsOutWhatCannotBeTrusted) {
   EXPECT_EQ(fault_of([](int i) { return i * 1s; }), "");
   EXPECT_EQ(fault_of([](int) { return 7s; }), "stands still");
-  EXPECT_EQ(fault_of([](int i) { return i * 2s; }), "does not go at the rate that it says");
-  EXPECT_EQ(fault_of([](int i) { return i * 1010ms; }), "does not go at the rate that it says");
-  EXPECT_EQ(fault_of([](int i) { return 100s - i * 1s; }), "goes back again and again");
+  EXPECT_EQ(fault_of([](int i) { return i * 2s; }), "does not run at the rate that it states");
+  EXPECT_EQ(fault_of([](int i) { return i * 1010ms; }), "does not run at the rate that it states");
+  EXPECT_EQ(fault_of([](int i) { return 100s - i * 1s; }), "keeps jumping back");
   EXPECT_EQ(fault_of([](int i) { return i * 1s + (i > 1 ? 40s : 0s) - (i > 2 ? 90s : 0s); }), "");
   EXPECT_EQ(fault_of([](int) { return 7s; }, true), "");
 }

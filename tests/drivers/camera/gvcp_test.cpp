@@ -65,7 +65,7 @@ TEST(PacketSizeWarning, AsksForNoMtuThatIsThere) {
               HasSubstr("set the MTU of eth1, and of every switch, to 9000"));
   EXPECT_THAT(packet_size_warning(1400, std::nullopt).advice, HasSubstr("set the MTU of the interface"));
   interface.mtu_bytes = 9000;
-  EXPECT_THAT(packet_size_warning(1400, interface).advice, HasSubstr("eth1 takes 9000: let every switch"));
+  EXPECT_THAT(packet_size_warning(1400, interface).advice, HasSubstr("eth1 takes 9000: allow 9000 on every switch"));
 }
 
 TEST(FragmentsWarning, NamesTheRemedy) {
@@ -79,8 +79,8 @@ TEST(FragmentsWarning, NamesTheRemedy) {
 TEST(PacketSocketWarning, NamesTheInterface) {
   HostInterface interface;
   interface.name = "eth1";
-  EXPECT_THAT(packet_socket_warning(interface).advice, HasSubstr("other devices send on eth1 without a pause"));
-  EXPECT_THAT(packet_socket_warning(std::nullopt).advice, HasSubstr("other devices send on the interface without"));
+  EXPECT_THAT(packet_socket_warning(interface).advice, HasSubstr("other devices keep sending on eth1,"));
+  EXPECT_THAT(packet_socket_warning(std::nullopt).advice, HasSubstr("other devices keep sending on the interface,"));
 }
 
 TEST(ReadGvcpDiscovery, RefusesOtherAnswers) {

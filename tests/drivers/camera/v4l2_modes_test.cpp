@@ -117,7 +117,7 @@ TEST_F(V4l2Settings, NameTheControlThatDidNotTakeItsValue) {
   const Error error = open_error(options, {.gain_steps = 20});
   if (!double_) return;
   EXPECT_EQ(error.code, ErrorCode::kMismatch);
-  EXPECT_THAT(error.message, HasSubstr("\"Gain\" was set to 20 and reads back 10"));
+  EXPECT_THAT(error.message, HasSubstr("\"Gain\" was set to 20, but reads back 10"));
 }
 
 TEST_F(V4l2Settings, NameTheAutomaticThatStaysOn) {
@@ -133,7 +133,7 @@ TEST_F(V4l2Settings, NameTheRange) {
   const Error error = open_error(uvc(), {.exposure_us = 600000.0});
   if (!double_) return;
   EXPECT_EQ(error.code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(error.message, HasSubstr("exposure_us: the control \"Exposure Time, Absolute\" goes from 1 to 5000"));
+  EXPECT_THAT(error.message, HasSubstr("exposure_us: the control \"Exposure Time, Absolute\" takes 1 to 5000"));
 }
 
 TEST_F(V4l2Settings, NameTheKeyThatTheCameraLacks) {
@@ -178,14 +178,14 @@ TEST_F(V4l2Settings, RefuseDecibelsWhereTheGainHasNoUnit) {
   if (!double_) return;
   EXPECT_EQ(error.code, ErrorCode::kUnsupported);
   EXPECT_THAT(error.message,
-              HasSubstr("what a step of the control \"Gain\" is worth; set gain_steps instead, 0 to 96"));
+              HasSubstr("how many dB a step of the control \"Gain\" is; set gain_steps instead, 0 to 96"));
 }
 
 TEST_F(V4l2Settings, NameTheRateThatItHasInstead) {
   const Error error = open_error(uvc(), {.frame_rate_hz = 300.0});
   if (!double_) return;
   EXPECT_EQ(error.code, ErrorCode::kMismatch);
-  EXPECT_THAT(error.message, HasSubstr("asked for 300 Hz the camera took 250 Hz"));
+  EXPECT_THAT(error.message, HasSubstr("asked for 300 Hz, the camera set 250 Hz"));
 }
 
 TEST_F(V4l2Settings, RefuseAFormatThatWasChangedInSilence) {
@@ -194,7 +194,7 @@ TEST_F(V4l2Settings, RefuseAFormatThatWasChangedInSilence) {
   const Error error = open_error(options, {});
   if (!double_) return;
   EXPECT_EQ(error.code, ErrorCode::kMismatch);
-  EXPECT_THAT(error.message, HasSubstr("asked for GREY 160x120 the camera made it GREY 160x112"));
+  EXPECT_THAT(error.message, HasSubstr("asked for GREY 160x120, the camera set GREY 160x112"));
 }
 
 TEST(V4l2CameraOptions, AreChecked) {

@@ -163,7 +163,7 @@ TEST(DecodeJpeg, NamesTheKindThatItDoesNotRead) {
   std::string deep = jpeg_bytes(busy_image(64, 48));
   deep[deep.find("\xff\xc0") + 4] = 12;
   EXPECT_THAT(jpeg_refusal(jpeg_bytes(busy_image(64, 48), {.arithmetic = true})).message, HasSubstr("arithmetic"));
-  EXPECT_THAT(jpeg_refusal(deep).message, HasSubstr("12 bits a sample"));
+  EXPECT_THAT(jpeg_refusal(deep).message, HasSubstr("12 bits per sample"));
   std::string lossless = jpeg_bytes(busy_image(64, 48));
   lossless[lossless.find("\xff\xc0") + 1] = '\xc3';
   EXPECT_THAT(jpeg_refusal(lossless).message, HasSubstr("lossless"));

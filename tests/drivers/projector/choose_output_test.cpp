@@ -47,7 +47,7 @@ TEST(ChooseOutput, TakesTheOneThatIsNotPrimary) {
 }
 
 TEST(ChooseOutput, StaysWithTheMonitorThatItHad) {
-  EXPECT_THAT(chosen({kDesk[0]}, "", "HDMI-1"), HasSubstr("\"HDMI-1\" is not there"));
+  EXPECT_THAT(chosen({kDesk[0]}, "", "HDMI-1"), HasSubstr("\"HDMI-1\" is not plugged in"));
   EXPECT_EQ(chosen(kDesk, "", "DP-1"), "DP-1");
   EXPECT_EQ(chosen(kDesk, "HDMI-1", "DP-1"), "HDMI-1");
 }

@@ -424,7 +424,7 @@ TEST_F(OnTwoMonitors, WarnsOfWhatNoScreenshotShows) {
   ASSERT_TRUE(desktop_->xrandr("--output DUMMY1 --gamma 1.5:1.5:1.5"));
   ASSERT_TRUE(desktop_->xrandr("--output DUMMY1 --pos 100x0"));
   ASSERT_TRUE(eventually([&] { return projector.open(soon()).has_value(); }));
-  EXPECT_THAT(projector.warnings(), Contains(HasSubstr("gamma table is active")));
+  EXPECT_THAT(projector.warnings(), Contains(HasSubstr("active gamma table")));
   EXPECT_THAT(projector.warnings(), Contains(HasSubstr("mirrors DUMMY0")));
 }
 
