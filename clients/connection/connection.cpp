@@ -45,7 +45,7 @@ template <class T>
 Result<GreyView> view_of(std::string_view bytes, int width_px, int height_px) {
   const std::size_t pixels = static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
   if (width_px <= 0 || height_px <= 0 || bytes.size() != pixels * sizeof(T)) {
-    return fail(ErrorCode::kMalformed, "the service's frame has fewer or more bytes than its size asks for");
+    return fail(ErrorCode::kMalformed, "the frame from the service has the wrong number of bytes for its size");
   }
   return ImageView<T>{reinterpret_cast<const T*>(bytes.data()), width_px, height_px, width_px};
 }

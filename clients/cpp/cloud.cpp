@@ -57,7 +57,7 @@ Cloud Cloud::read_ply(Bytes ply, std::string told) {
   const std::string_view whole = ply.view();
   const std::size_t end = whole.substr(0, kHeaderMax).find(kEnd);
   if (whole.rfind("ply\nformat binary_little_endian 1.0\n", 0) != 0 || end == std::string_view::npos) {
-    lies("is no binary little-endian PLY");
+    lies("is not a binary little-endian PLY");
   }
   Cloud cloud;
   std::optional<std::uint64_t> count;
@@ -77,7 +77,7 @@ Cloud Cloud::read_ply(Bytes ply, std::string told) {
       cloud.fields_.push_back({std::string(words[2]), cloud.record_bytes_, type->size, type->kind});
       cloud.record_bytes_ += type->size;
     } else if (words[0] == "element" || words[0] == "property") {
-      lies("has a line in its header that is none of slsd's: " + std::string(line.substr(0, 80)));
+      lies("has an unknown line in its header: " + std::string(line.substr(0, 80)));
     }
   }
   const auto offset = [&](std::string_view name, std::size_t size, char kind) -> std::optional<std::size_t> {
@@ -86,10 +86,10 @@ Cloud Cloud::read_ply(Bytes ply, std::string told) {
     return field->offset;
   };
   const auto x = offset("x", 4, 'f'), y = offset("y", 4, 'f'), z = offset("z", 4, 'f');
-  if (!count || !x || !y || !z) lies("has a header that names no points");
+  if (!count || !x || !y || !z) lies("has a header without points");
   const std::string_view body = whole.substr(end + kEnd.size());
   if (*count != body.size() / cloud.record_bytes_ || body.size() % cloud.record_bytes_ != 0) {
-    lies("has " + std::to_string(body.size()) + " bytes where its header says " + std::to_string(*count) +
+    lies("has " + std::to_string(body.size()) + " bytes, but its header says " + std::to_string(*count) +
          " points of " + std::to_string(cloud.record_bytes_));
   }
   cloud.x_ = *x, cloud.y_ = *y, cloud.z_ = *z;

@@ -45,23 +45,24 @@ std::string way_in(std::string path) {
 
 [[noreturn]] void no_connection(int number, const std::string& path) {
   if (number == ENOENT || number == ECONNREFUSED || number == ENOTDIR) {
-    throw NoService("no service answers there: start slsd (systemctl start slsd), or name its socket by SLSD_SOCKET",
+    throw NoService("no service answers there: start slsd (systemctl start slsd), or set SLSD_SOCKET to its socket",
                     "not_found", path);
   }
   if (number == EACCES || number == EPERM) {
     throw PermissionDenied("you may not use this socket: " + way_in(path), "permission_denied", path);
   }
-  if (number == EAGAIN) throw TimedOut("the service accepts nobody: look at its log, or restart it", "timeout", path);
+  if (number == EAGAIN)
+    throw TimedOut("the service does not accept connections: check its log, or restart it", "timeout", path);
   throw ConnectionLost(std::strerror(number), "io", path);
 }
 
 [[noreturn]] void hung_up(const std::string& path, const char* when = "") {
-  throw ConnectionLost(std::string("the service hung up") + when, "disconnected", path);
+  throw ConnectionLost(std::string("the service closed the connection") + when, "disconnected", path);
 }
 
 std::size_t size_of(const json& value) {
   if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMaxBytes) {
-    throw ProtocolError("the answer is not slsd's: it says that " + value.dump().substr(0, 40) + " bytes follow it",
+    throw ProtocolError("not a valid answer of slsd: it announces " + value.dump().substr(0, 40) + " bytes",
                         "malformed");
   }
   return value.get<std::size_t>();
@@ -89,7 +90,7 @@ std::string default_socket() {
 Connection::Connection(const std::string& socket) : path_(socket), process_(::getpid()) {
   sockaddr_un address{};
   if (path_.size() >= sizeof address.sun_path) {
-    throw ConnectionLost("a socket's path has at most 107 bytes", "invalid_argument", path_);
+    throw ConnectionLost("the socket's path is longer than 107 bytes: choose a shorter one", "invalid_argument", path_);
   }
   socket_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (socket_ < 0) no_connection(errno, path_);
@@ -144,7 +145,8 @@ bool Connection::is_own() const {
 void Connection::refuse_others() const {
   if (socket_ < 0) hung_up(path_);
   if (!is_own()) {
-    throw ConnectionLost("this connection is the parent process's: open one in this process", "disconnected", path_);
+    throw ConnectionLost("this connection belongs to the parent process: open one in this process", "disconnected",
+                         path_);
   }
 }
 
@@ -164,7 +166,7 @@ bool Connection::ready(short events, const Deadline& deadline) const {
 
 void Connection::wait(short events, const Deadline& deadline) const {
   if (!ready(events, deadline))
-    throw TimedOut("the service does not answer: look at its log, or restart it", "timeout", path_);
+    throw TimedOut("the service does not answer: check its log, or restart it", "timeout", path_);
 }
 
 bool Connection::answers(Deadline deadline) const {
@@ -213,7 +215,7 @@ void Connection::receive_more(const Deadline& deadline) {
     }
   }
   if (descriptors_.size() > kMaxDescriptors) {
-    throw ProtocolError("the answer is not slsd's: descriptors came that no message names", "malformed", path_);
+    throw ProtocolError("not a valid answer of slsd: it has unexpected descriptors", "malformed", path_);
   }
   buffer_.append(chunk.data(), static_cast<std::size_t>(size));
 }
@@ -223,7 +225,7 @@ std::string Connection::receive_line(const Deadline& deadline) {
   std::size_t end = std::string::npos;
   while ((end = buffer_.find('\n', searched)) == std::string::npos) {
     if (buffer_.size() > kMaxLine) {
-      throw ProtocolError("the answer is not slsd's: its line has no end", "malformed", path_);
+      throw ProtocolError("not a valid answer of slsd: its line does not end", "malformed", path_);
     }
     searched = buffer_.size();
     receive_more(deadline);
@@ -244,7 +246,7 @@ Bytes Connection::receive_bytes(std::size_t count, const Deadline& deadline) {
 
 Bytes Connection::map_descriptor(std::size_t size) {
   if (descriptors_.empty()) {
-    throw ProtocolError("a cloud was to come as a memfd, and no descriptor came", "malformed", path_);
+    throw ProtocolError("the service announced a cloud as a memfd, but sent no descriptor", "malformed", path_);
   }
   const int descriptor = descriptors_.front();
   descriptors_.erase(descriptors_.begin());
@@ -255,9 +257,9 @@ Bytes Connection::map_descriptor(std::size_t size) {
   const bool sealed = (::fcntl(descriptor, F_GET_SEALS) & kSeals) == kSeals;
   void* memory = whole && sealed ? ::mmap(nullptr, size, PROT_READ, MAP_SHARED, descriptor, 0) : MAP_FAILED;
   ::close(descriptor);
-  if (!whole) throw ProtocolError("the memfd is not of the size that the service said", "malformed", path_);
+  if (!whole) throw ProtocolError("the memfd does not have the announced size", "malformed", path_);
   if (!sealed) throw ProtocolError("the memfd is not sealed", "malformed", path_);
-  if (memory == MAP_FAILED) throw ScannerError("there is no address space for the cloud", "no_space", path_);
+  if (memory == MAP_FAILED) throw ScannerError("no address space is left for the cloud", "no_space", path_);
   std::shared_ptr<const void> kept(memory, [size](const void* mapped) { ::munmap(const_cast<void*>(mapped), size); });
   return {std::move(kept), {static_cast<const char*>(memory), size}};
 }
@@ -272,7 +274,7 @@ Message Connection::receive(Deadline deadline) {
   };
   const json read = json::parse(message.json, shallow, /*allow_exceptions=*/false);
   if (deep || !read.is_object() || read.value("jsonrpc", json()) != "2.0") {
-    throw ProtocolError("the answer is not slsd's: no JSON-RPC 2.0", "malformed", path_);
+    throw ProtocolError("not a valid answer of slsd: it is not JSON-RPC 2.0", "malformed", path_);
   }
   const json* about = described(read);
   if (about && about->contains("memfd_bytes")) {

@@ -47,7 +47,7 @@ constexpr auto kReloadMax = std::chrono::seconds(60);
 }
 
 [[noreturn]] void not_slsd(const std::string& what) {
-  throw ProtocolError("the answer is not slsd's: " + what, "malformed");
+  throw ProtocolError("not a valid answer of slsd: " + what, "malformed");
 }
 
 // Invalid UTF-8 (a camera's name may be any bytes) becomes replacement characters.
@@ -73,7 +73,7 @@ Answer ask(Connection& connection, const std::string& method, const std::string&
       continue;
     }
     if (!read.contains("error") && (read.value("id", json()) != id || !read.value("result", json()).is_object())) {
-      not_slsd("it is none to " + method);
+      not_slsd("it does not answer " + method);
     }
     answer.result = std::move(read);
     answer.bytes = std::move(message.bytes);
@@ -84,18 +84,18 @@ Answer ask(Connection& connection, const std::string& method, const std::string&
 Frame frame_of(const json& about, Bytes pixels) {
   const auto number = [&](const char* key) {
     if (!about.contains(key) || !about[key].is_number_unsigned() || about[key].get<std::uint64_t>() > 1 << 20)
-      not_slsd("a frame came without its size");
+      not_slsd("a frame lacks its size");
     return about[key].get<int>();
   };
   Frame frame{number("width_px"), number("height_px"), number("bits"), std::move(pixels), text_of(about)};
   const std::size_t needed =
       static_cast<std::size_t>(frame.width_px) * static_cast<std::size_t>(frame.height_px) * (frame.bits > 8 ? 2 : 1);
-  if (needed == 0 || needed != frame.pixels.size()) not_slsd("a frame has not as many bytes as its size asks for");
+  if (needed == 0 || needed != frame.pixels.size()) not_slsd("a frame has the wrong number of bytes for its size");
   return frame;
 }
 
 Bytes needed(Bytes bytes, const char* what) {
-  if (bytes.empty()) not_slsd(std::string(what) + " did not come with it");
+  if (bytes.empty()) not_slsd(std::string(what) + " is missing");
   return bytes;
 }
 
@@ -270,7 +270,7 @@ std::string Scanner::settings() {
 
 std::string Scanner::role() {
   const json role = state_->call("status", "{}", kGrace).result.value("role", json());
-  if (!role.is_string()) not_slsd("it tells no role: the service is older than this library");
+  if (!role.is_string()) not_slsd("it has no role: the service is older than this library");
   return role;
 }
 

@@ -34,7 +34,7 @@ constexpr std::size_t kExtrinsicsBytesMax = 1 << 20, kCalibrationBytesMax = 1 <<
 
 Result<> check_name(const BridgeOptions& options) {
   if (is_ros_name(options.name)) return {};
-  return fail(ErrorCode::kInvalidArgument, "a name of ROS has letters, digits and _, and begins with a letter",
+  return fail(ErrorCode::kInvalidArgument, "a ROS name has letters, digits and _, and begins with a letter",
               options.name);
 }
 
@@ -42,11 +42,11 @@ Result<std::string> calibration_in_force(const std::string& socket) {
   try {
     const std::string text = json::parse(client::Scanner(socket).settings()).value("calibration", "");
     if (!text.empty()) return text;
-    return fail(ErrorCode::kNotFound, "not calibrated, so nobody knows where the projector is: run slsctl calibrate");
+    return fail(ErrorCode::kNotFound, "not calibrated, so the pose of the projector is unknown: run slsctl calibrate");
   } catch (const client::ScannerError& error) {
     return fail(ErrorCode::kIo, error.what());
   } catch (const json::exception& error) {
-    return fail(ErrorCode::kIo, std::string("the service's settings are not slsd's: ") + error.what());
+    return fail(ErrorCode::kIo, std::string("the service sent invalid settings: ") + error.what());
   }
 }
 
@@ -187,12 +187,12 @@ class Running : public Bridge {
         state.worse(Level::kWarn, "the last cloud is empty: " + why.get<std::string>());
       if (calibration_text_.empty()) state.worse(Level::kError, "not calibrated");
       if (stale_)
-        state.worse(Level::kError, "extrinsics_stale: the scanner was calibrated anew since; measure where it stands");
+        state.worse(Level::kError, "extrinsics_stale: the scanner was calibrated again since; measure where it stands");
       publish_images(scanner);
     } catch (const client::ScannerError& error) {
       state.worse(Level::kError, error.what());
     } catch (const json::exception& error) {
-      state.worse(Level::kError, std::string("the service's state is not slsd's: ") + error.what());
+      state.worse(Level::kError, std::string("the service sent an invalid state: ") + error.what());
     }
     if (network_.other_writers("rt/" + options_.name + "/points") > 0)
       state.worse(Level::kError,
@@ -326,7 +326,7 @@ Result<std::unique_ptr<Bridge>> Bridge::start(const BridgeOptions& options, Netw
   std::this_thread::sleep_for(kDiscovery);
   if (network.other_writers("rt/" + options.name + "/points") > 0) {
     return fail(ErrorCode::kAlreadyExists,
-                "name_taken: another scanner of this name is in the network; name this one with --name", options.name);
+                "name_taken: the network already has a scanner of this name; choose another with --name", options.name);
   }
   auto bridge = std::make_unique<Running>(options, std::move(network), std::move(extrinsics));
   if (auto opened = bridge->open(); !opened) return tl::unexpected(opened.error());

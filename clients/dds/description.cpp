@@ -111,8 +111,7 @@ std::string robot_description(const std::string& scanner, const std::vector<Devi
       "<?xml version=\"1.0\"?>\n"
       "<!-- The joints are those of {}. The boxes are symbols, not the sizes of the devices. -->\n"
       "<robot name=\"{}\">\n",
-      devices.empty() ? "a scanner that is not calibrated: where its projector stands is not known"
-                      : "the scanner's calibration",
+      devices.empty() ? "an uncalibrated scanner, whose projector has no known pose" : "the scanner's calibration",
       scanner);
   if (!placed) {
     text += link(body_frame(scanner), nullptr);

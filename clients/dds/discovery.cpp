@@ -42,9 +42,8 @@ Discovery read_discovery(const std::function<std::string(const char*)>& variable
     discovery.range = known->second;
   } else {
     discovery.range = Range::kLocalhost;
-    discovery.warnings.push_back(
-        std::string(kRange) + " is \"" + range +
-        "\", which is none of SUBNET, LOCALHOST, OFF and SYSTEM_DEFAULT: only this host is reached");
+    discovery.warnings.push_back(std::string(kRange) + " is \"" + range +
+                                 "\", not SUBNET, LOCALHOST, OFF or SYSTEM_DEFAULT: slsd-dds reaches only this host");
   }
   discovery.peers = split(variable(kPeers));
   const bool ignored = discovery.range == Range::kOff || discovery.range == Range::kSystemDefault;

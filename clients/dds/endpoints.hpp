@@ -15,8 +15,8 @@ namespace slsd::dds {
 
 /// Reported once when clouds come faster than they can be sent.
 inline constexpr const char* kOvertaken =
-    "clouds come faster than they may leave, and some are not published: lower --rate, thin them by --stride or "
-    "--voxel, or raise --rate-max";
+    "clouds exceed the rate limit, and some are not published: lower --rate, thin clouds with --stride or --voxel, or "
+    "raise --rate-max";
 
 /// Tells whether ROS accepts the topic name: letters, digits and _, a letter first.
 [[nodiscard]] bool is_ros_name(const std::string& name);

@@ -53,7 +53,8 @@ Result<Extrinsics> read_extrinsics(std::string_view text, const std::string& sca
   const toml::table* entry = table["scanner"][scanner].as_table();
   if (!entry) {
     return fail(ErrorCode::kNotFound,
-                "extrinsics_missing: the file has no [scanner." + scanner + "]: measure where it stands", file);
+                "extrinsics_missing: the file has no [scanner." + scanner + "]: measure it with slsd --extrinsics",
+                file);
   }
   const auto rotation = numbers(*entry, "rotation", 9), translation = numbers(*entry, "translation_mm", 3);
   const auto parent = table["parent"].value<std::string>();
@@ -69,7 +70,7 @@ Result<Extrinsics> read_extrinsics(std::string_view text, const std::string& sca
   extrinsics.calibration_date = (*entry)["calibration_date"].value_or(std::string());
   const Eigen::Matrix3d& turn = extrinsics.parent_from_scanner.rotation;
   if ((turn * turn.transpose() - Eigen::Matrix3d::Identity()).norm() > kNoRotation || turn.determinant() < 0) {
-    return fail(ErrorCode::kMalformed, "scanner." + scanner + ".rotation is no rotation", file);
+    return fail(ErrorCode::kMalformed, "scanner." + scanner + ".rotation is not a rotation matrix", file);
   }
   return extrinsics;
 }

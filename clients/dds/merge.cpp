@@ -50,7 +50,7 @@ Result<Layout> malformed(const std::string& how) {
 
 // A message describes its own fields; every value is checked.
 Result<Layout> layout_of(const PointCloud2& cloud, const std::string& frame_id) {
-  if (cloud.header.frame_id != frame_id) return malformed("is not in its frame, " + frame_id);
+  if (cloud.header.frame_id != frame_id) return malformed("is not in the frame " + frame_id);
   if (cloud.is_bigendian) return malformed("is big-endian");
   const std::uint64_t row = std::uint64_t{cloud.width} * cloud.point_step;
   if (std::uint64_t{cloud.width} * cloud.height > kPointsMax || row > cloud.row_step ||
@@ -68,7 +68,7 @@ Result<Layout> layout_of(const PointCloud2& cloud, const std::string& frame_id) 
   };
   const auto x = offset("x", PointField::kFloat32, 4), y = offset("y", PointField::kFloat32, 4),
              z = offset("z", PointField::kFloat32, 4);
-  if (!x || !y || !z) return malformed("has no x, y, z within its points");
+  if (!x || !y || !z) return malformed("has points without x, y, z");
   return Layout{*x,
                 *y,
                 *z,
@@ -93,9 +93,9 @@ struct Source {
 
   [[nodiscard]] std::string why_not_placed() const {
     if (extrinsics.calibration_date.empty()) return {};
-    if (!calibration_date) return "extrinsics_unknown: its diagnostics do not tell when it was calibrated";
+    if (!calibration_date) return "extrinsics_unknown: its diagnostics lack the calibration date";
     if (*calibration_date != extrinsics.calibration_date)
-      return "extrinsics_stale: the scanner was calibrated anew since; measure where it stands";
+      return "extrinsics_stale: the scanner was calibrated again since; measure where it stands";
     return {};
   }
 };
@@ -187,7 +187,7 @@ class Running : public Merge {
     }
     if (!source.problem.empty()) return;
     const auto cloud = decode<PointCloud2>(bytes);
-    const auto layout = cloud ? layout_of(*cloud, source.frame_id) : malformed("is no PointCloud2");
+    const auto layout = cloud ? layout_of(*cloud, source.frame_id) : malformed("is not a PointCloud2");
     if (!layout) {
       source.problem = layout.error().message;
       return;
@@ -256,7 +256,8 @@ class Running : public Merge {
       if (!source.fresh) continue;
       source.fresh = false;
       if (newest - seconds_of(source.stamp) > max_age_s) {
-        source.problem = "cloud_old: its cloud is older than others by more than --max-age; are the clocks the same?";
+        source.problem =
+            "cloud_old: its cloud is older than the others by more than --max-age; check that the clocks agree";
         continue;
       }
       if (parts == 0 || seconds_of(source.stamp) < seconds_of(oldest)) oldest = source.stamp;
@@ -311,7 +312,7 @@ class Running : public Merge {
     for (const Source& source : sources_) {
       auto read = text ? read_extrinsics(*text, source.name, options_.extrinsics.string())
                        : Result<Extrinsics>(tl::unexpected(text.error()));
-      if (!read) return extrinsics_problem_ = to_string(read.error()) + "; the old ones stay in force";
+      if (!read) return extrinsics_problem_ = to_string(read.error()) + "; the previous ones stay in force";
       all.push_back(std::move(*read));
     }
     const std::lock_guard lock(mutex_);
@@ -340,14 +341,15 @@ class Running : public Merge {
           state.worse(Level::kError, source.name + ": " + source.problem);
         } else if (silent > std::max(std::chrono::duration<double>(5s), 2 * options_.max_age)) {
           told = "no cloud for " + std::to_string(silent.count()) + " s";
-          state.worse(Level::kWarn, source.name + ": sends no clouds any more");
+          state.worse(Level::kWarn, source.name + ": no longer sends clouds");
         }
         state.values.emplace_back(source.name, told);
       }
       state.values.emplace_back("clouds published", std::to_string(published_));
     }
     if (network_.other_writers("rt/" + options_.name + "/points") > 0)
-      state.worse(Level::kError, "name_taken: another publishes as \"" + options_.name + "\"; rename one of them");
+      state.worse(Level::kError,
+                  "name_taken: another program publishes as \"" + options_.name + "\"; rename one of them");
     if (state.level == Level::kError && state.message != said_) say(said_ = state.message);
     if (state.level == Level::kOk) said_.clear();
     write_diagnosis(diagnostics_, state, options_.name, options_.name + ": slsd merge");
@@ -380,7 +382,7 @@ class Running : public Merge {
 
 Result<std::unique_ptr<Merge>> Merge::start(const MergeOptions& options, Network network) {
   if (!is_ros_name(options.name)) {
-    return fail(ErrorCode::kInvalidArgument, "a name of ROS has letters, digits and _, and begins with a letter",
+    return fail(ErrorCode::kInvalidArgument, "a ROS name has letters, digits and _, and begins with a letter",
                 options.name);
   }
   if (options.extrinsics.empty()) {
@@ -401,7 +403,7 @@ Result<std::unique_ptr<Merge>> Merge::start(const MergeOptions& options, Network
     auto read = read_extrinsics(*text, name, file);
     if (!read) return tl::unexpected(read.error());
     if (!is_ros_name(name) || name == options.name || sources.size() == 256)
-      return fail(ErrorCode::kInvalidArgument, "is no name of a scanner to merge", name);
+      return fail(ErrorCode::kInvalidArgument, "is not a valid name of a scanner to merge", name);
     Source& source = sources.emplace_back();
     source.name = name;
     source.frame_id = name + "_optical_frame";
@@ -412,8 +414,8 @@ Result<std::unique_ptr<Merge>> Merge::start(const MergeOptions& options, Network
   }
   std::this_thread::sleep_for(kDiscovery);
   if (network.other_writers("rt/" + options.name + "/points") > 0) {
-    return fail(ErrorCode::kAlreadyExists,
-                "name_taken: another of this name is in the network; name this one with --name", options.name);
+    return fail(ErrorCode::kAlreadyExists, "name_taken: the network already has this name; choose another with --name",
+                options.name);
   }
   auto merge = std::make_unique<Running>(options, std::move(network), std::move(sources));
   if (auto opened = merge->open(); !opened) return tl::unexpected(opened.error());

@@ -258,7 +258,7 @@ std::mutex networks_mutex;
 std::set<Network::State*> networks;
 
 Error not_made(const std::string& what) {
-  return fail(ErrorCode::kIo, "Fast DDS does not create it", what).value();
+  return fail(ErrorCode::kIo, "Fast DDS cannot create it", what).value();
 }
 
 }  // namespace
@@ -347,7 +347,8 @@ Result<Network> Network::open(const NetworkOptions& options) {
   const auto mask = fast::StatusMask::none();  // for discovery only; endpoints have their own listeners
   state->participant = factory->create_participant(options.domain, *qos, state.get(), mask);
   if (!state->participant) {
-    return fail(ErrorCode::kInvalidArgument, "DDS cannot be joined: look at --interface, --peer and ROS's environment",
+    return fail(ErrorCode::kInvalidArgument,
+                "cannot join DDS: check --interface, --peer and the ROS environment variables",
                 "domain " + std::to_string(options.domain));
   }
   state->publisher = state->participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
@@ -408,8 +409,8 @@ std::string receive_buffer_warning() {
   const int largest = largest_receive_buffer();
   if (largest >= kDenseCloudBytes) return {};
   return "net.core.rmem_max is " + std::to_string(largest) +
-         ": of a dense cloud a reader on this host may lose a part, and get it late or never: "
-         "echo net.core.rmem_max=67108864 >/etc/sysctl.d/60-clouds.conf, and run sysctl --system";
+         ": readers on this host may get dense clouds late or never: run echo net.core.rmem_max=67108864 "
+         ">/etc/sysctl.d/60-clouds.conf, then sysctl --system";
 }
 
 }  // namespace slsd::dds

@@ -48,14 +48,14 @@ std::string text_of(const sockaddr* address) {
 // Finds an interface by its name or its address.
 Result<std::string> address_of_interface(const std::string& interface) {
   ifaddrs* all = nullptr;
-  if (::getifaddrs(&all) != 0) return fail(ErrorCode::kIo, "the interfaces cannot be listed");
+  if (::getifaddrs(&all) != 0) return fail(ErrorCode::kIo, "cannot list the network interfaces");
   const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> owner(all, ::freeifaddrs);
   for (const ifaddrs* one = all; one; one = one->ifa_next) {
     if (!one->ifa_addr || one->ifa_addr->sa_family != AF_INET) continue;
     if (interface == one->ifa_name || interface == text_of(one->ifa_addr)) return text_of(one->ifa_addr);
   }
   return fail(ErrorCode::kInvalidArgument,
-              "this host has no interface of that name with an IPv4 address: see ip address",
+              "this host has no interface of that name with an IPv4 address: run ip address to list them",
               "--interface " + interface);
 }
 
@@ -99,7 +99,7 @@ int largest_receive_buffer() {
 Result<DomainParticipantQos> participant_qos(DomainParticipantQos qos, const NetworkOptions& options) {
   if ((!options.interface.empty() && !plain(options.interface)) ||
       !std::all_of(options.peers.begin(), options.peers.end(), plain)) {
-    return fail(ErrorCode::kInvalidArgument, "an interface or peer is a name or an address");
+    return fail(ErrorCode::kInvalidArgument, "an interface or peer must be a name or an address");
   }
   const Range range = options.peers.empty() ? options.discovery.range : Range::kSubnet;
   std::vector<std::string> peers = options.peers.empty() ? options.discovery.peers : options.peers;

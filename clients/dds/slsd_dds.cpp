@@ -26,58 +26,62 @@ int describe(const slsd::dds::BridgeOptions& options, const std::string& calibra
 }
 
 void add_merge_options(CLI::App& app, bool& merges, slsd::dds::MergeOptions& merge) {
-  auto* merging = app.add_flag("--merge", merges, "one cloud of several scanners, by --extrinsics");
+  auto* merging = app.add_flag("--merge", merges, "publish one cloud of several scanners, placed by --extrinsics");
   for (const char* alone :
        {"--socket", "--rate", "--density", "--stride", "--voxel", "--image-rate", "--no-transforms", "--describe"})
     merging->excludes(app.get_option(alone));
-  app.add_option("--scanner", merge.scanners, "with --merge: a scanner to merge; without it all of the file")
+  app.add_option("--scanner", merge.scanners, "with --merge: a scanner to merge; may be repeated (all in the file)")
       ->needs(merging);
   app.add_option_function<double>(
          "--max-age", [&merge](double seconds) { merge.max_age = std::chrono::duration<double>(seconds); },
-         "with --merge: seconds by which a cloud may be older than the newest (1)")
+         "with --merge: how many seconds a cloud may be older than the newest (1)")
       ->check(slsd::between(0.01, 3600.0))
       ->needs(merging);
 }
 
 void add_network_options(CLI::App& app, slsd::dds::NetworkOptions& network) {
-  app.add_option("--rate-max", network.rate_max_mb, "clouds and images leave at so many megabytes a second (16)")
+  app.add_option("--rate-max", network.rate_max_mb, "the limit for clouds and images, in megabytes per second (16)")
       ->check(slsd::between(1.0, 2000.0));
-  app.add_option("--domain", network.domain, "of DDS (0)")->envname("ROS_DOMAIN_ID")->check(slsd::between(0, 232));
-  app.add_option("--interface", network.interface, "of the network: eth0, lo");
-  app.add_option("--peer", network.peers, "an address of others, where the network has no multicast; may be repeated");
-  app.add_flag("--best-effort", network.best_effort, "do not send again what is lost on the way");
+  app.add_option("--domain", network.domain, "the DDS domain (0)")
+      ->envname("ROS_DOMAIN_ID")
+      ->check(slsd::between(0, 232));
+  app.add_option("--interface", network.interface, "the network interface, such as eth0 or lo");
+  app.add_option("--peer", network.peers, "the address of a peer, if the network has no multicast; may be repeated");
+  app.add_flag("--best-effort", network.best_effort, "do not resend lost data");
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Shows a scanner of slsd to a ROS 2 network: clouds, images, diagnostics, where it stands, and a trigger.\n"
-      "Exit status: 0 done, 1 it cannot be shown, 2 wrong usage.",
+      "Publishes a scanner in ROS 2: clouds, images, diagnostics, transforms, and a service that scans.\nExit status: "
+      "0 done, 1 cannot publish, 2 wrong usage.",
       "slsd-dds");
   slsd::dds::BridgeOptions options;
   slsd::dds::NetworkOptions network;
   app.set_version_flag("--version", "slsd-dds " SLSD_VERSION);
-  auto* name = app.add_option("--name", options.name, "of the scanner: its topics begin with it (scanner; merged)");
-  app.add_option("--socket", options.socket, "of its service; SLSD_SOCKET names it, too (/run/slsd/slsd.sock)");
-  app.add_option("--rate", options.rate_hz, "at most so many clouds a second; 0: only those that are triggered")
+  auto* name = app.add_option("--name", options.name,
+                              "the scanner's name, with which its topics begin (scanner; with --merge: merged)");
+  app.add_option("--socket", options.socket,
+                 "the service's socket (SLSD_SOCKET in the environment, or /run/slsd/slsd.sock)");
+  app.add_option("--rate", options.rate_hz, "at most this many clouds per second; 0: only triggered ones")
       ->check(slsd::between(0.0, 1000.0));
   app.add_option("--density", options.density, "a point for each symbol, or for each camera pixel")
       ->check(slsd::one_of({"symbols", "pixels"}));
   app.add_option("--stride", options.thinning.stride,
-                 "dense clouds and depth images have every so many pixels and rows of the camera's (2)")
+                 "use every Nth camera pixel and row in dense clouds and depth images (2)")
       ->check(slsd::between(1, 16));
-  app.add_option("--voxel", options.thinning.voxel_mm, "millimetres: one point to each cube of this size; 0: all (0)")
+  app.add_option("--voxel", options.thinning.voxel_mm, "keep one point per cube of this size in mm; 0: keep all (0)")
       ->check(slsd::between(0.0, 1000.0));
-  app.add_option("--image-rate", options.image_rate_hz, "images a second, 1 or more; 0: none (0)")
+  app.add_option("--image-rate", options.image_rate_hz, "images per second, 1 or more; 0: none (0)")
       ->check(slsd::between(0.0, 100.0));
-  app.add_option("--extrinsics", options.extrinsics, "where the scanners stand, as TOML");
+  app.add_option("--extrinsics", options.extrinsics, "the TOML file with the poses of the scanners");
   app.add_flag_callback(
       "--no-transforms", [&options] { options.transforms = false; },
-      "leave /tf_static to a robot's description that has the frames");
+      "do not publish /tf_static; a robot description has the frames");
   std::optional<std::string> calibration;
   app.add_option("--describe", calibration,
-                 "print the scanner as a robot description (URDF): by this calibration file, or that in force")
+                 "print the scanner as a robot description (URDF), from this calibration file or the one in force")
       ->expected(0, 1)
       ->default_str("");
   bool merges = false;

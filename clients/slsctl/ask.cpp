@@ -29,7 +29,7 @@ tl::expected<Answered, Failure> judge(Result<Answered> answered) {
     return tl::unexpected(daemon_failure(message["error"]));
   }
   if (!message.contains("result") || !message["result"].is_object()) {
-    return tl::unexpected(failure({ErrorCode::kMalformed, "the answer is not slsd's", {}}));
+    return tl::unexpected(failure({ErrorCode::kMalformed, "not a valid answer of slsd", {}}));
   }
   return std::move(*answered);
 }

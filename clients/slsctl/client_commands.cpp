@@ -98,7 +98,7 @@ int set_command(const ClientOptions& options) {
   const json& result = answered->reply.message["result"];
   if (options.json) std::cout << to_line(result);
   if (const json why = result.value("not_kept", json()); !options.json && why.is_string())
-    std::cerr << "slsctl: in force, but not kept for the next start: " << printable(why.get<std::string>(), 1000)
+    std::cerr << "slsctl: in force, but not saved for the next start: " << printable(why.get<std::string>(), 1000)
               << "\n";
   return kDone;
 }

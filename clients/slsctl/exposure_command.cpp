@@ -109,14 +109,17 @@ json to_json(const Look& look) {
 std::string proposal(const Look& look) {
   const ExposureAdvice& advice = look.advice;
   if (look.levels.patterned_share == 0) return "";
-  std::string text = advice.brighter == 1 ? "brightness: good as it is\n"
-                                          : fmt::format("brightness: {:.2g} times as much\n", advice.brighter);
+  std::string text = advice.brighter == 1
+                         ? "brightness: good as it is\n"
+                         : fmt::format("brightness: {:.2g} times as much light would be best\n", advice.brighter);
   if (advice.setting) {
     text +=
         fmt::format("set exposure_us = {:.0f}, gain {:.1f} dB; now {:.0f} and {:.1f} dB\n", advice.setting->exposure_us,
                     advice.setting->gain_db, look.present->exposure_us, look.present->gain_db);
   }
-  return text + (advice.look_again ? "symbols are clipped, how far cannot be seen: set this and look again\n" : "");
+  return text + (advice.look_again
+                     ? "symbols are clipped, by an unknown amount: set this, and run slsctl exposure again\n"
+                     : "");
 }
 
 std::string text_of(const Look& look) {

@@ -37,10 +37,9 @@ std::string wrong_cloud(const ClientOptions& options) {
   if (is_standard_output(options.output)) return {};
   const std::string named = format_named(options.output);
   if (named.empty() && options.format.empty())
-    return quoted(options.output) +
-           ": a cloud is written as .ply or .pcd, a depth map as .tiff; choose one, or --format";
+    return quoted(options.output) + ": write a cloud as .ply or .pcd, a depth map as .tiff, or add --format";
   if (!named.empty() && !options.format.empty() && named != options.format)
-    return quoted(options.output) + " is not the name of a file in the format " + options.format;
+    return quoted(options.output) + " does not match --format " + options.format;
   return {};
 }
 
@@ -54,11 +53,11 @@ std::string wrong_name(const path& file, const std::string& extension, const std
 std::string wrong_depth_map(const ClientOptions& options) {
   if (cloud_format(options) != "tiff") {
     const bool symbols = options.normals && options.density == "symbols";
-    return symbols ? "--normals are those of pixels: add --density pixels" : "";
+    return symbols ? "--normals needs --density pixels" : "";
   }
-  if (options.density == "symbols") return "a depth map has a value for each pixel: add --density pixels";
+  if (options.density == "symbols") return "a depth map needs --density pixels";
   if (options.normals) return "a depth map has no normals: write the cloud as .ply or .pcd";
-  if (!options.cloud_picture.empty()) return "--cloud-picture is drawn of a cloud: write the cloud as .ply or .pcd";
+  if (!options.cloud_picture.empty()) return "--cloud-picture needs a cloud: write it as .ply or .pcd";
   return {};
 }
 
@@ -87,7 +86,8 @@ std::string cloud_format(const ClientOptions& options) {
 std::string wrong_outputs(const ClientOptions& options, const std::string& command) {
   const auto files = outputs_of(options);
   const auto on_standard_output = std::ranges::count_if(files, is_standard_output);
-  if (is_standard_output(options.folder)) return "a recording is a folder, and cannot go to standard output: name one";
+  if (is_standard_output(options.folder))
+    return "a recording is a folder and cannot go to standard output: name a folder";
   if (on_standard_output > 1) return "standard output (-) takes one file only";
   std::string wrong;
   if (command == "scan" && !options.output.empty()) wrong = wrong_cloud(options);
@@ -123,7 +123,7 @@ tl::expected<void, Failure> write_output(const path& file, std::string_view byte
 
 int finish(const ClientOptions& options, int exit_status) {
   if (words(options).flush()) return exit_status;
-  std::cerr << "slsctl: cannot write to standard output: look whether its disk is full\n";
+  std::cerr << "slsctl: cannot write to standard output: check whether its disk is full\n";
   return exit_status == kDone ? kRequestFailed : exit_status;
 }
 

@@ -110,14 +110,14 @@ class Recorder {
     if (!now) return now.error();
     if (now->reply.message["result"] == settings_) return std::nullopt;
     return file_failure({ErrorCode::kMismatch,
-                         "the service was reloaded meanwhile: the recording has the settings of its beginning, which "
-                         "are not those of its last scans; record again",
+                         "the service was reloaded while recording, so the last scans have other settings than the "
+                         "recording says; record again",
                          options_.folder.string()});
   }
 
   void show_progress() const {
     if (options_.json || ::isatty(STDERR_FILENO) == 0) return;
-    std::cerr << fmt::format("\r{} scans, {} failed, {:.1f} MB, {:.1f} s, {:.1f} a second ", recording_.scans(),
+    std::cerr << fmt::format("\r{} scans, {} failed, {:.1f} MB, {:.1f} s, {:.1f} per second ", recording_.scans(),
                              recording_.failures(), static_cast<double>(recording_.bytes()) / 1e6, seconds(),
                              static_cast<double>(recording_.scans()) / seconds())
               << std::flush;

@@ -19,7 +19,7 @@ using std::filesystem::path;
 Result<> make_folder(const path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error) return tl::unexpected(system_error(error.value(), "cannot make the folder", folder));
+  if (error) return tl::unexpected(system_error(error.value(), "cannot create the folder", folder));
   return {};
 }
 

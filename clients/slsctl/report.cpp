@@ -128,7 +128,7 @@ std::string status_table(const json& status) {
   const std::string calibration = text_of(status, "calibration");
   text += "calibration " + (calibration.empty() ? "none" : calibration) + "\n";
   if (const auto dropped = status.value("log_lines_dropped", std::uint64_t{0})) {
-    text += fmt::format("log         {} lines were dropped: nobody read them in time\n", dropped);
+    text += fmt::format("log         {} lines were dropped: nothing read them in time\n", dropped);
   }
   text += device_line(status.value("projector", json::object()));
   for (const json& camera : status.value("cameras", json::array())) text += device_line(camera);
@@ -139,7 +139,7 @@ std::string reason_lines(const json& scan) {
   std::string text;
   for (const json& reason : scan.value("reasons", json::array())) {
     text += fmt::format("{:>6} {}{}: {} {}\n", reason.value("regions", 0),
-                        reason.value("kind", "") == "guards" ? "not brought back, " : "", text_of(reason, "rule"),
+                        reason.value("kind", "") == "guards" ? "recovery prevented, " : "", text_of(reason, "rule"),
                         text_of(reason, "meaning"), text_of(reason, "remedy"));
   }
   return text;

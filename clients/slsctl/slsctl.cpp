@@ -30,7 +30,7 @@ CLI::App* add_command(CLI::App& app, const char* group, const std::string& name,
                       const std::string& examples) {
   CLI::App* command = app.add_subcommand(name, what);
   command->group(group);
-  command->footer("Examples:\n" + examples + "\n--socket and --json are options of every command: see slsctl --help");
+  command->footer("Examples:\n" + examples + "\nEvery command takes --socket and --json: see slsctl --help");
   return command;
 }
 
@@ -61,15 +61,16 @@ void add_scan(CLI::App& app, ClientOptions& options) {
   CLI::Option* output = scan->add_option("-o,--output,CLOUD", options.output,
                                          "the file to write: .ply, .pcd or .tiff; - is standard output")
                             ->type_name("FILE");
-  scan->add_option("--format", options.format, "the format, if the file's name does not tell it")
+  scan->add_option("--format", options.format, "the format, if the file's name does not show it")
       ->check(one_of({"ply", "pcd", "tiff"}))
       ->needs(output);
   add_density(scan, options);
   scan->add_flag("--normals", options.normals, "also write the surface's normals (of pixels)");
-  scan->add_flag("--texture", options.texture, "also light the scene in white: intensities are those of the points");
-  scan->add_flag("--ambient", options.ambient, "also take a frame without light, and subtract the light of the room");
+  scan->add_flag("--texture", options.texture, "also take a frame in white light, for the points' intensities");
+  scan->add_flag("--ambient", options.ambient,
+                 "also take a frame without the projector's light, and subtract the room's light");
   CLI::Option* picture =
-      scan->add_option("--picture", options.picture, "write the camera's frame with what was decoded in it")
+      scan->add_option("--picture", options.picture, "write the camera's frame with the decoded symbols drawn in")
           ->type_name("FILE.png");
   scan->add_flag("--why", options.why, "mark each rejected region in the picture by the rule that rejected it")
       ->needs(picture);
@@ -79,37 +80,40 @@ void add_scan(CLI::App& app, ClientOptions& options) {
 }
 
 void add_record(CLI::App& app, ClientOptions& options) {
-  CLI::App* record = add_command(app, kMeasure, "record", "scan again and again, and keep the frames to replay them",
+  CLI::App* record = add_command(app, kMeasure, "record", "scan repeatedly, and keep the frames for replay",
                                  "  slsctl record session-1 --frames 100\n"
                                  "  slsctl record session-2 --seconds 60 --clouds\n");
   record->add_option("DIR", options.folder, "a new or an empty folder")->required()->type_name("FOLDER");
-  add_count(record, options, "--frames", "end after so many scans");
-  record->add_option("--seconds", options.seconds, "end after so long")->check(between(0.001, 1e9))->type_name("S");
+  add_count(record, options, "--frames", "end after this many scans");
+  record->add_option("--seconds", options.seconds, "end after this many seconds")
+      ->check(between(0.001, 1e9))
+      ->type_name("S");
   record->add_flag("--clouds", options.clouds, "keep the clouds too");
   add_timeout(record, options);
 }
 
 void add_watching(CLI::App& app, ClientOptions& options) {
-  add_command(app, kWatch, "status", "show the state of service, devices and scans", "  slsctl status\n");
-  CLI::App* watch = add_command(app, kWatch, "watch", "print a line for each cloud; the service scans meanwhile",
+  add_command(app, kWatch, "status", "show the state of the service, devices and scans", "  slsctl status\n");
+  CLI::App* watch = add_command(app, kWatch, "watch", "scan continuously, and print a line for each cloud",
                                 "  slsctl watch --rate 2\n  slsctl watch --count 1 --json\n");
-  add_count(watch, options, "--count", "end after so many clouds");
-  watch->add_option("--rate", options.rate_hz, "at most so many a second")
+  add_count(watch, options, "--count", "end after this many clouds");
+  watch->add_option("--rate", options.rate_hz, "at most this many clouds per second")
       ->check(between(0.001, 1000.0))
       ->type_name("HZ");
   add_density(watch, options);
   CLI::App* top = add_command(app, kWatch, "top", "show rates, times and states live",
                               "  slsctl top\n  slsctl top --interval 10 --json\n");
-  top->add_option("--interval", options.interval_s, "seconds between two looks (1)")
+  top->add_option("--interval", options.interval_s, "seconds between updates (1)")
       ->check(between(0.1, 3600.0))
       ->type_name("S");
-  add_count(top, options, "--count", "end after so many looks");
-  CLI::App* metrics = add_command(app, kWatch, "metrics", "print what the service counts, as text for Prometheus",
+  add_count(top, options, "--count", "end after this many updates");
+  CLI::App* metrics = add_command(app, kWatch, "metrics", "print the service's metrics, as text for Prometheus",
                                   "  slsctl metrics\n  slsctl metrics -o /var/lib/node_exporter/slsd.prom\n");
-  metrics->add_option("-o,--output,FILE", options.output, "the file to write, whole or not at all")->type_name("FILE");
+  metrics->add_option("-o,--output,FILE", options.output, "the file to write; readers never see a part of it")
+      ->type_name("FILE");
   metrics
       ->add_option("--format", options.metrics_format,
-                   "printed: openmetrics; in a file: prometheus, the older text format")
+                   "default: openmetrics; with --output: prometheus, the older text format")
       ->check(one_of({"openmetrics", "prometheus"}));
 }
 
@@ -122,7 +126,7 @@ void add_image(CLI::App& app, ClientOptions& options, const char* group, const s
   if (name == "pattern") return;
   add_camera(command, options, "which camera (the first)");
   add_timeout(command, options);
-  if (name == "frame") command->add_flag("--as-shown", options.as_shown, "leave what the projector shows");
+  if (name == "frame") command->add_flag("--as-shown", options.as_shown, "keep what the projector shows");
 }
 
 const CLI::Validator kPicture(
@@ -138,30 +142,30 @@ const CLI::Validator kAssignment(
     [](const std::string& text) {
       const bool whole = text.find('=') != std::string::npos && text.find('.') < text.find('=');
       return whole ? std::string()
-                   : slsd::quoted(text) + " is no setting: write TABLE.KEY=VALUE or camera.NAME.KEY=VALUE";
+                   : slsd::quoted(text) + " is not a setting: write TABLE.KEY=VALUE or camera.NAME.KEY=VALUE";
     },
     "");
 
 void add_calibrate(CLI::App& app, ClientOptions& options) {
-  CLI::App* calibrate = add_command(app, kSetUp, "calibrate", "calibrate with the service's devices, pose after pose",
+  CLI::App* calibrate = add_command(app, kSetUp, "calibrate", "calibrate with the service's devices, pose by pose",
                                     "  slsctl calibrate --board charuco:11x7:23:17.25:DICT_5X5_1000\n"
                                     "  slsctl calibrate --resume --poses 20\n"
                                     "  slsctl calibrate cancel\n");
   calibrate
       ->add_option("ACTION", options.action,
-                   "begin one and follow it (begin), or look at, end or cancel the one under way")
+                   "begin a calibration and follow it (begin), or look at, end or cancel the one under way")
       ->check(one_of({"begin", "look", "end", "cancel"}));
-  calibrate->add_option("--board", options.board, "the board; the manual of slsd lists the kinds");
-  calibrate->add_option("--ruler", options.ruler, "what the ruler on the print says and measures, in mm")
+  calibrate->add_option("--board", options.board, "the board; slsd(8) lists the kinds");
+  calibrate->add_option("--ruler", options.ruler, "the length on the print's ruler, and what it measures, in mm")
       ->type_name("NOMINAL:MEASURED");
-  calibrate->add_option("--code", options.code, "what is projected on it (pattern)")
+  calibrate->add_option("--code", options.code, "what to project onto the board (pattern)")
       ->check(one_of({"pattern", "gray"}));
   calibrate->add_option("--poses", options.poses, "how many poses to take (12)")->check(between(3, 99))->type_name("N");
-  calibrate->add_flag("--resume", options.resume, "go on with the pictures of the last session");
+  calibrate->add_flag("--resume", options.resume, "continue with the pictures of the last session");
 }
 
 void add_exposure(CLI::App& app, ClientOptions& options) {
-  CLI::App* exposure = add_command(app, kSetUp, "exposure", "look at the scene and propose exposure and gain",
+  CLI::App* exposure = add_command(app, kSetUp, "exposure", "measure the scene's light, and propose exposure and gain",
                                    "  slsctl exposure\n  slsctl exposure --camera left --gain-max-db 6\n");
   add_camera(exposure, options, "which camera (the first)");
   exposure->add_option("--exposure-max-us", options.exposure_max_us, "the longest exposure to propose (100000)")
@@ -174,9 +178,9 @@ void add_exposure(CLI::App& app, ClientOptions& options) {
 }
 
 void add_project(CLI::App& app, ClientOptions& options) {
-  CLI::App* project = add_command(app, kSetUp, "project", "show a picture until the next scan",
+  CLI::App* project = add_command(app, kSetUp, "project", "project a picture until the next scan",
                                   "  slsctl project focus\n  slsctl project chart.png\n  slsctl project idle\n");
-  project->add_option("PICTURE", options.shown, "what to show; an image has the projector's size")
+  project->add_option("PICTURE", options.shown, "what to project; an image must have the projector's size")
       ->required()
       ->check(kPicture);
   add_timeout(project, options);
@@ -187,17 +191,16 @@ void add_settings(CLI::App& app, ClientOptions& options) {
                               "  slsctl set camera.left.exposure_us=8000\n"
                               "  slsctl set decode.density=pixels decode.depth_max_mm=1500\n"
                               "  slsctl set decode.density=default\n");
-  set->add_option("SETTING", options.assignments,
-                  "decode.KEY=VALUE or camera.NAME.exposure_us=N; =default takes it back")
+  set->add_option("SETTING", options.assignments, "decode.KEY=VALUE or camera.NAME.exposure_us=N; =default resets it")
       ->required()
       ->check(kAssignment)
       ->type_name("TABLE.KEY=VALUE");
-  add_command(app, kSetUp, "settings", "list the settings that are given, and where each is from",
+  add_command(app, kSetUp, "settings", "list the settings that are given, and where each comes from",
               "  slsctl settings\n");
 }
 
 void add_bundle(CLI::App& app, ClientOptions& options) {
-  CLI::App* bundle = add_command(app, kDiagnose, "bundle", "write the last scans with all that belongs to them",
+  CLI::App* bundle = add_command(app, kDiagnose, "bundle", "write the last scans with their frames and settings",
                                  "  slsctl bundle\n  slsctl bundle fault.tar\n");
   bundle->add_option("-o,--output,FILE", options.output, "the file to write (slsd-TIME.tar); - is standard output")
       ->type_name("FILE.tar");
@@ -210,12 +213,11 @@ void add_commands(CLI::App& app, ClientOptions& options) {
   add_calibrate(app, options);
   add_exposure(app, options);
   add_project(app, options);
-  add_image(app, options, kSetUp, "frame", "write what a camera sees", "  slsctl frame left.png --camera left\n");
+  add_image(app, options, kSetUp, "frame", "write a camera's frame", "  slsctl frame left.png --camera left\n");
   add_settings(app, options);
-  add_image(app, options, kDiagnose, "preview", "scan, and write the frame with what was decoded in it",
+  add_image(app, options, kDiagnose, "preview", "scan, and write the frame with the decoded symbols drawn in",
             "  slsctl preview decoded.png\n");
-  add_image(app, options, kDiagnose, "pattern", "write the pattern that the projector shows",
-            "  slsctl pattern pattern.png\n");
+  add_image(app, options, kDiagnose, "pattern", "write the image of the pattern", "  slsctl pattern pattern.png\n");
   add_bundle(app, options);
 }
 
@@ -248,15 +250,15 @@ std::vector<const char*> without_help_command(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Talks to slsd, the service of a structured-light scanner.\n"
-      "Exit status: 0 done, 1 the request failed, 2 wrong usage, 3 no service answers.",
+      "Controls slsd, the service of a structured-light scanner.\nExit status: 0 done, 1 the request failed, 2 wrong "
+      "usage, 3 no service answers.",
       "slsctl");
   ClientOptions options;
   app.set_version_flag("--version", "slsctl " SLSD_VERSION);
   app.add_option("--socket", options.socket,
                  "the service's socket (SLSD_SOCKET in the environment, or /run/slsd/slsd.sock)")
       ->type_name("PATH");
-  app.add_flag("--json", options.json, "print JSON, one object to a line, errors too");
+  app.add_flag("--json", options.json, "print JSON, one object per line, also for errors");
   app.require_subcommand(1);
   app.fallthrough();
   app.footer("\"slsctl COMMAND --help\" shows the options of a command and examples.");

@@ -92,13 +92,13 @@ std::string unknown_option(const CLI::App& app, const CLI::App& chosen, const st
   const std::string problem = "there is no option " + quoted(name);
   if (const auto nearest = nearest_name(bare, names)) return problem + "; did you mean --" + *nearest + "?";
   for (const CLI::App* command : app.get_subcommands(nullptr))
-    if (command->get_option_no_throw(name) != nullptr) return problem + " here: it is one of " + full_name(*command);
+    if (command->get_option_no_throw(name) != nullptr) return problem + " here: it belongs to " + full_name(*command);
   return problem;
 }
 
 std::string unknown_word(const CLI::App& app, const CLI::App& chosen, const std::string& word) {
   const auto commands = app.get_subcommands(nullptr);
-  if (&chosen != &app || commands.empty()) return "it takes no argument " + quoted(word);
+  if (&chosen != &app || commands.empty()) return "unexpected argument " + quoted(word);
   std::vector<std::string> names;
   for (const CLI::App* command : commands) names.push_back(command->get_name());
   return "there is no command " + quoted(word) + nearest_hint(word, names);
@@ -121,9 +121,7 @@ std::string other_error(const CLI::App& chosen, const CLI::ParseError& error) {
     case CLI::ExitCodes::RequiredError:
       return missing_argument(chosen, error);
     case CLI::ExitCodes::ArgumentMismatch:
-      return contains("missing")   ? option + " lacks its value"
-             : contains("At Most") ? option + " is given twice"
-                                   : text;
+      return contains("missing") ? option + " needs a value" : contains("At Most") ? option + " is given twice" : text;
     case CLI::ExitCodes::ConversionError:
       return contains(" = ")
                  ? text.substr(text.find("--"), text.find(" = ") - text.find("--")) + " takes a whole number"
@@ -143,7 +141,7 @@ std::string explain(const CLI::App& app, const CLI::ParseError& error) {
   const auto kind = static_cast<CLI::ExitCodes>(error.get_exit_code());
   const bool lacks_command = &chosen == &app && app.get_require_subcommand_min() > 0;
   if (lacks_command && !unknown && kind == CLI::ExitCodes::RequiredError)
-    return app.help() + "\n" + app.get_name() + ": name one of these commands\n";
+    return app.help() + "\n" + app.get_name() + ": choose one of these commands\n";
   std::string problem;
   if (unknown && looks_like_option(*unknown)) {  // an unknown option explains the other errors
     problem = unknown_option(app, chosen, *unknown);
@@ -152,7 +150,7 @@ std::string explain(const CLI::App& app, const CLI::ParseError& error) {
   } else {
     problem = other_error(chosen, error);
   }
-  return full_name(chosen) + ": " + problem + "\n\"" + full_name(chosen) + " --help\" says more\n";
+  return full_name(chosen) + ": " + problem + "\nsee \"" + full_name(chosen) + " --help\"\n";
 }
 
 }  // namespace
@@ -165,7 +163,8 @@ CLI::Validator one_of(std::vector<std::string> words) {
   const std::string list = fmt::format("{}", fmt::join(words, ","));
   return {[words = std::move(words)](const std::string& value) {
             if (std::ranges::find(words, value) != words.end()) return std::string();
-            return fmt::format("{} is none of {}", quoted(value), fmt::join(words, ", ")) + nearest_hint(value, words);
+            return fmt::format("{} is not one of {}", quoted(value), fmt::join(words, ", ")) +
+                   nearest_hint(value, words);
           },
           "{" + list + "}"};
 }
@@ -174,7 +173,7 @@ CLI::Validator between(double least, double most) {
   return {[=](const std::string& value) {
             double number = 0;
             if (CLI::detail::lexical_cast(value, number) && number >= least && number <= most) return std::string();
-            return fmt::format("{} is no number from {} to {}", quoted(value), least, most);
+            return fmt::format("{} is not a number from {} to {}", quoted(value), least, most);
           },
           fmt::format("{}..{}", least, most)};
 }

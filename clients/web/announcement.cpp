@@ -59,13 +59,13 @@ Result<Announcement> Announcement::write(int port, const std::string& address) {
   fs::remove(file, error);
   const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (descriptor < 0)
-    return fail(ErrorCode::kIo, "the address is not kept for --address: " + std::generic_category().message(errno),
+    return fail(ErrorCode::kIo, "cannot save the address for --address: " + std::generic_category().message(errno),
                 file.string());
   Announcement made(file, descriptor);
   const std::string line = address + "\n";
   const bool written = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0 &&
                        ::write(descriptor, line.data(), line.size()) == static_cast<ssize_t>(line.size());
-  if (!written) return fail(ErrorCode::kIo, "the address is not kept for --address", file.string());
+  if (!written) return fail(ErrorCode::kIo, "cannot save the address for --address", file.string());
   return made;
 }
 
@@ -92,8 +92,9 @@ Result<std::vector<std::string>> announced_addresses() {
   }
   if (!addresses.empty()) return addresses;
   return fail(ErrorCode::kNotFound,
-              forbidden ? "the service's address is for those who administer this machine: sudo slsd-web --address"
-                        : "no slsd-web is running: start it with \"sudo systemctl start slsd-web\", or run slsd-web");
+              forbidden
+                  ? "only an administrator of this machine may read the page's address: run sudo slsd-web --address"
+                  : "no slsd-web is running: start it with \"sudo systemctl start slsd-web\", or run slsd-web");
 }
 
 }  // namespace slsd::web

@@ -68,7 +68,7 @@ Failure CloudFeed::follow(const std::stop_token& stop) {
     auto event = connection->receive();
     if (!event) return failure(event.error());
     const std::lock_guard lock(mutex_);
-    if (stop.stop_requested() || !wanted()) return failure({ErrorCode::kCancelled, "nobody watches", {}});
+    if (stop.stop_requested() || !wanted()) return failure({ErrorCode::kCancelled, "no page is watching", {}});
     nlohmann::json params = event->message.value("params", nlohmann::json::object());
     if (event->message.value("method", "") == "cloud" && params.contains("memfd_bytes")) {
       newest_ =

@@ -76,16 +76,15 @@ std::optional<Refusal> Gate::check_host(const Request& request) const {
   const bool address = name == request.local_address || name == "[" + request.local_address + "]";
   if (address || std::ranges::find(names_, name) != names_.end()) return std::nullopt;
   return Refusal{403, "unknown_host",
-                 "the page is not served under this name: ask for it by the address that it listens at, or start "
-                 "slsd-web with --name"};
+                 "the page is not served under this name: use the address that slsd-web listens on, or start slsd-web "
+                 "with --name"};
 }
 
 std::optional<Refusal> Gate::check_origin(const Request& request) const {
   if (auto refused = check_host(request)) return refused;
   if (is_of_this_origin(request)) return std::nullopt;
-  return Refusal{
-      403, "not_from_the_page",
-      "only the page itself may ask for this; behind a proxy, let that pass on the header Host with its port"};
+  return Refusal{403, "not_from_the_page",
+                 "only the page itself may ask for this; a proxy must pass on the header Host with its port"};
 }
 
 std::optional<Refusal> Gate::check(const Request& request, Clock::time_point now) {

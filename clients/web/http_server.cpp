@@ -28,12 +28,12 @@ Error cannot_listen(const std::string& address, int port, const error_code& erro
   const std::string where = address + ":" + std::to_string(port);
   if (error == boost::asio::error::address_in_use) {
     const std::string holder = port_holder(port).value_or("another program");
-    return {ErrorCode::kIo, "the port is taken by " + holder + ": stop that, or choose another port with --port",
-            where};
+    return {ErrorCode::kIo, "the port is in use by " + holder + ": stop it, or choose another port with --port", where};
   }
   if (error == boost::asio::error::access_denied)
-    return {ErrorCode::kIo, "only root may listen at ports below 1024: choose another with --port", where};
-  return {ErrorCode::kIo, "cannot listen there (" + error.message() + "): name an address of this machine", where};
+    return {ErrorCode::kIo, "only root may listen on ports below 1024: choose another with --port", where};
+  return {ErrorCode::kIo, "cannot listen on this address (" + error.message() + "): choose an address of this machine",
+          where};
 }
 
 class Server final : public HttpServer {

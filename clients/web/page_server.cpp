@@ -150,10 +150,10 @@ std::optional<Answer> PageServer::refuse(const Request& request) {
   if (!is_open && (route != routes_.end() || request.path.starts_with("/api/"))) {
     if (const auto refused = gate_->check(request)) return answer_of(*refused);
   }
-  if (route == routes_.end()) return refusal(404, "not_found", "there is nothing of this name");
+  if (route == routes_.end()) return refusal(404, "not_found", "there is nothing at this address");
   const std::string& method = route->second.method;
   if (request.method == method || (request.method == "HEAD" && method == "GET")) return std::nullopt;
-  Answer wrong = refusal(405, "invalid_request", "this is asked for with " + method);
+  Answer wrong = refusal(405, "invalid_request", "use the method " + method);
   wrong.headers.emplace_back("Allow", method == "GET" ? "GET, HEAD" : method);
   return wrong;
 }
@@ -172,7 +172,7 @@ void PageServer::add_pages() {
                        if (!script)
                          return refusal(
                              404, "no_three",
-                             file.string() + " cannot be read: install libjs-three, or name its folder with --three");
+                             file.string() + " cannot be read: install libjs-three, or give its folder with --three");
                        return Answer{200,
                                      "text/javascript",
                                      client::Bytes(std::move(*script)),
@@ -212,7 +212,7 @@ void PageServer::post(const char* path, bool open, HandleBody handle) {
   routes_[path] = {"POST", open, [handle = std::move(handle)](const Request& request) {
                      const json body = json::parse(request.body, nullptr, /*allow_exceptions=*/false);
                      if (!body.is_object())
-                       return refusal(400, "invalid_request", "the request's body is no JSON object");
+                       return refusal(400, "invalid_request", "the request's body is not a JSON object");
                      return handle(request, body);
                    }};
 }
@@ -317,7 +317,7 @@ Answer PageServer::cloud(const Request& request) {
   std::uint64_t after = 0;
   const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), after);
   if (!is_density(density) || wrong != std::errc() || end != text.data() + text.size())
-    return refusal(400, "invalid_params", "\"density\" is \"symbols\" or \"pixels\", \"after\" a number");
+    return refusal(400, "invalid_params", "\"density\" must be \"symbols\" or \"pixels\", and \"after\" a number");
   const auto next = (density == "pixels" ? pixels_ : symbols_).next(after, kWaitForCloud);
   if (!next) return refusal(next.error());
   if (!*next) return {204, "", {}, {}, {}};
@@ -343,7 +343,7 @@ Answer PageServer::scan(const json& body) {
     return refusal(answered.error());
   }
   if (!answered->reply.message["result"].contains("memfd_bytes"))
-    return refusal(502, "malformed", "the service sends clouds otherwise than asked: it is of another version");
+    return refusal(502, "malformed", "the service did not send the cloud as a memfd: its version differs");
   const json about = brief(answered->reply.message["result"]);
   keep({about, answered->reply.bytes});
   return cloud_answer(answered->reply.bytes, about);
@@ -355,7 +355,7 @@ Answer PageServer::past(const Request& request) {
   for (const PastScan& scan : past_) {
     if (!scan.cloud.empty() && scan.about.value("scan", "") == id) return cloud_answer(scan.cloud, scan.about);
   }
-  return refusal(404, "not_found", "this cloud is not kept any more: scan again");
+  return refusal(404, "not_found", "this cloud is no longer kept: scan again");
 }
 
 // Keeps the newest clouds within the limit; of older ones only their descriptions.

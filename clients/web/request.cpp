@@ -24,7 +24,7 @@ constexpr std::string_view kOnce[] = {"Host",          "Content-Length", "Transf
                                       "Authorization", "Sec-Fetch-Site", "X-Slsd-Page",       "Expect"};
 
 Refusal bad(std::string what) {
-  return {400, "invalid_request", "the request can be read in two ways or none: " + std::move(what)};
+  return {400, "invalid_request", "the request is ambiguous or malformed: " + std::move(what)};
 }
 
 std::string text(boost::beast::string_view view) {
@@ -63,7 +63,7 @@ std::optional<Refusal> read_query(std::string_view query, std::map<std::string, 
     const std::size_t equals = std::min(pair.find('='), pair.size());
     const auto name = without_percents(pair.substr(0, equals));
     const auto value = without_percents(pair.substr(std::min(pair.size(), equals + 1)));
-    if (!name || !value) return bad("an escape of its address is not % and two digits");
+    if (!name || !value) return bad("an escape in its address is not % and two digits");
     if (!values.emplace(*name, *value).second) return bad("its address names a parameter twice");
   }
   return std::nullopt;
@@ -71,7 +71,7 @@ std::optional<Refusal> read_query(std::string_view query, std::map<std::string, 
 
 std::optional<Refusal> read_target(std::string_view target, Request& request) {
   if (target.empty() || target.front() != '/' || target.find('#') != std::string_view::npos)
-    return bad("its address is no path");
+    return bad("its address is not a path");
   const std::size_t question = std::min(target.find('?'), target.size());
   request.path = target.substr(0, question);
   return read_query(target.substr(std::min(target.size(), question + 1)), request.query);
@@ -80,17 +80,17 @@ std::optional<Refusal> read_target(std::string_view target, Request& request) {
 std::optional<Refusal> read_framing(const Fields& fields, Request& request) {
   for (const std::string_view name : kOnce) {
     if (fields.count(boost::beast::string_view(name.data(), name.size())) > 1)
-      return bad("the header " + std::string(name) + " is there twice");
+      return bad("the header " + std::string(name) + " appears twice");
   }
   if (fields.count(http::field::transfer_encoding) > 0)
-    return bad("Transfer-Encoding is not taken; send the body with a Content-Length");
+    return bad("Transfer-Encoding is not supported; send the body with a Content-Length");
   if (fields.count(http::field::content_length) > 0) {
     const std::string digits = field(fields, "Content-Length");
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), request.body_bytes);
     if (error != std::errc() || end != digits.data() + digits.size()) return bad("Content-Length is not one number");
   }
   if (request.body_bytes > 0 && (request.method == "GET" || request.method == "HEAD"))
-    return bad("a " + request.method + " has no body");
+    return bad("a " + request.method + " must not have a body");
   return std::nullopt;
 }
 
@@ -108,7 +108,7 @@ std::optional<Refusal> read_fields(const Fields& fields, Request& request) {
   const std::string expectation = field(fields, "Expect");
   request.expects_continue = boost::beast::iequals(expectation, "100-continue");
   if (!expectation.empty() && !request.expects_continue)
-    return Refusal{417, "invalid_request", "only 100-continue may be expected"};
+    return Refusal{417, "invalid_request", "only \"Expect: 100-continue\" is supported"};
   return std::nullopt;
 }
 

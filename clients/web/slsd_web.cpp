@@ -26,15 +26,15 @@ slsd::Result<Token> read_token(const PageOptions& options) {
   if (options.token_file.empty()) {
     if (slsd::web::is_loopback(options.listen)) return slsd::web::random_token();
     return slsd::fail(slsd::ErrorCode::kInvalidArgument,
-                      "beyond loopback whoever knows the address could scan: name a file with a token of 16 characters "
-                      "or more with --token-file",
+                      "beyond loopback, anyone who knows the address could scan: give --token-file a file with a token "
+                      "of 16 characters or more",
                       options.listen);
   }
   auto text = slsd::read_file(options.token_file, kTokenBytesMax);
   if (!text) return tl::unexpected(text.error());
   while (!text->empty() && std::isspace(static_cast<unsigned char>(text->back())) != 0) text->pop_back();
   if (text->size() >= kTokenBytesMin) return Token{std::move(*text), /*chosen=*/true};
-  return slsd::fail(slsd::ErrorCode::kInvalidArgument, "a token has 16 characters or more",
+  return slsd::fail(slsd::ErrorCode::kInvalidArgument, "a token must have 16 characters or more",
                     options.token_file.string());
 }
 
@@ -81,22 +81,22 @@ slsd::Result<> print_addresses() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("The page of a structured-light scanner: a client of slsd's socket that browsers can talk to.",
-               "slsd-web");
+  CLI::App app("Serves the web page of a structured-light scanner, as a client of slsd's socket.", "slsd-web");
   PageOptions options;
   bool only_address = false;
   app.set_version_flag("--version", "slsd-web " SLSD_VERSION);
   app.add_option("--socket", options.socket,
-                 "the service's socket; SLSD_SOCKET names it, too (" + options.socket.string() + ")");
+                 "the service's socket; default: SLSD_SOCKET if set (" + options.socket.string() + ")");
   app.add_option("--listen", options.listen,
-                 "the address to listen at; beyond loopback it takes a token (" + options.listen + ")");
+                 "the address to listen on; beyond loopback it needs --token-file (" + options.listen + ")");
   app.add_option("--port", options.port,
-                 "the port to listen at; 0: any that is free (" + std::to_string(options.port) + ")")
+                 "the port to listen on; 0: any free port (" + std::to_string(options.port) + ")")
       ->check(slsd::between(0, 65535));
-  app.add_option("--name", options.names, "a name by which browsers ask for the page, besides the address");
-  app.add_option("--token-file", options.token_file, "a file with the token to enter; without, each run has its own");
-  app.add_option("--three", options.three, "the folder of three.js (that of Debian's libjs-three)");
-  app.add_flag("--address", only_address, "print the address of the page that is running, with its token, and exit");
+  app.add_option("--name", options.names, "another host name under which browsers may open the page");
+  app.add_option("--token-file", options.token_file,
+                 "a file with the token to enter; default: a new token for each run");
+  app.add_option("--three", options.three, "the folder of three.js; default: that of Debian's libjs-three");
+  app.add_flag("--address", only_address, "print the address and token of the running page, and exit");
   if (const auto ended = slsd::parse_usage(app, argc, argv)) return *ended;
   std::signal(SIGPIPE, SIG_IGN);
   // Clouds are large: freed memory returns to the system at once, whichever thread had it.

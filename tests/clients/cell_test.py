@@ -62,7 +62,7 @@ class Extrinsics(Folder):
         done = measure_extrinsics(services, self.folder / "cell.toml", 2)
         self.assertEqual(done.returncode, 1)
         self.assertIn("third: not used", done.stdout)
-        self.assertIn("third: saw the board at no place together with another", done.stderr)
+        self.assertIn("third: shares no place of the board with the first scanner", done.stderr)
         self.assertFalse((self.folder / "cell.toml").exists())
 
     def test_without_two_who_see_the_board_are_refused(self):
@@ -75,7 +75,7 @@ class Extrinsics(Folder):
         one = {"left": self.services("board", ["left"])["left"]}
         for more, reason in (([], "two scanners"), (["--scanner", "left=x"], "no service answers"),
                              (["--scanner", "right"], "NAME=SOCKET"), (["--scanner", "a.b=x"], "NAME=SOCKET"),
-                             (["--scanner", f"left={one['left'].socket}"], "named twice")):
+                             (["--scanner", f"left={one['left'].socket}"], "given twice")):
             done = measure_extrinsics(one, self.folder / "cell.toml", 1, *more)
             self.assertEqual(done.returncode, 1)
             self.assertIn(reason, done.stderr)
@@ -157,7 +157,7 @@ class Merged(Folder):
             with Bridge(scenes["right"], "--rate", "5", name="right"):
                 self.wait_state("", "both")
                 self.assertEqual(self.sources(), {0, 1})
-            self.wait_state("right: sends no clouds any more", "that it is gone")
+            self.wait_state("right: no longer sends clouds", "that it is gone")
             self.assertEqual(self.sources(), {0})
             with Bridge(scenes["right"], "--rate", "5", name="right"):
                 self.wait_state("", "both again")

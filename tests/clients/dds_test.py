@@ -361,7 +361,7 @@ class Thinned(unittest.TestCase):
             clouds.next()
             wait_until(lambda: int(states.samples.get("left: slsd", {"values": {"clouds lost before publishing": "0"}})["values"]
                                    ["clouds lost before publishing"]) > 2, "that clouds are lost")
-            self.assertEqual(bridge.said().count("clouds come faster than they may leave"), 1)
+            self.assertEqual(bridge.said().count("clouds exceed the rate limit"), 1)
 
 
 class Empty(unittest.TestCase):
@@ -378,9 +378,9 @@ class Empty(unittest.TestCase):
 class Usage(unittest.TestCase):
     def test_that_is_misspelt_is_answered_with_the_nearest(self):
         for words, hint in ((["--intefrace", "lo"], "did you mean --interface?"), (["--density", "pixel"], "did you mean pixels?"),
-                            (["--stride", "0"], '"0" is no number from 1 to 16'),
+                            (["--stride", "0"], '"0" is not a number from 1 to 16'),
                             (["--name", "--rate"], "a value is missing before --rate"),
-                            (["--scanner", "left"], "--scanner needs --merge"), (["left"], 'no argument "left"')):
+                            (["--scanner", "left"], "--scanner needs --merge"), (["left"], 'unexpected argument "left"')):
             done = subprocess.run([BIN / "slsd-dds", *words], capture_output=True, text=True, timeout=60, check=False)
             self.assertEqual((done.returncode, done.stdout), (2, ""))
             self.assertIn(hint, done.stderr)
@@ -511,10 +511,10 @@ class Impostors(unittest.TestCase):
                 return answer + json.dumps({"jsonrpc": "2.0", "method": "cloud", "params": {"bytes": len(cloud)}}).encode() + b"\n" + cloud
             return answer
 
-        self.told(lies, "where its header says")
-        self.told(lambda request: b'{"jsonrpc": "3.0", "id": 1, "result": {}}\n', "no JSON-RPC 2.0")
-        self.told(lambda request: b"220 mail ready\n", "not slsd's")
-        self.told(lambda request: result(request, cameras="none", calibration=7, ready=[]), "not slsd's")
+        self.told(lies, "but its header says")
+        self.told(lambda request: b'{"jsonrpc": "3.0", "id": 1, "result": {}}\n', "not JSON-RPC 2.0")
+        self.told(lambda request: b"220 mail ready\n", "not a valid answer of slsd")
+        self.told(lambda request: result(request, cameras="none", calibration=7, ready=[]), "the service sent")
 
 
 class Vanishing(unittest.TestCase):
@@ -561,7 +561,7 @@ class ExtrinsicsFile(unittest.TestCase):
     def test_that_does_not_hold_is_refused_by_name(self):
         with Service() as service:
             for text, name in (("parent = \"cell\"\n", "extrinsics_missing"), ("nonsense", ":1"),
-                               (self.GOOD.replace("[0, -1", "[0, -2"), "no rotation"),
+                               (self.GOOD.replace("[0, -1", "[0, -2"), "not a rotation"),
                                (self.GOOD.replace("100, 0, 50", "100, 0"), "3 numbers")):
                 with Bridge(service, "--extrinsics", self.write(text)) as bridge:
                     self.assertEqual(bridge.process.wait(30), 1)

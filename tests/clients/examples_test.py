@@ -166,7 +166,7 @@ class Usage(unittest.TestCase):
             missing = {"to_open3d.py": "open3d", "live_view.py": "matplotlib"}.get(name)
             if missing is None or there(missing):
                 self.assertIn("/nonexistent/slsd.sock", error)
-                self.assertIn("is slsd running?", error)
+                self.assertIn("check that slsd runs", error)
 
     def test_names_the_recorded_frames(self):
         for name in self.RIGHT:

@@ -126,7 +126,7 @@ class Adversity(unittest.TestCase):
             browser.devtools("Network.clearBrowserCookies")
             browser.open(web.address[:-4] + "0000")
             browser.wait("document.getElementById('login').open", "a wrong address is taken")
-            self.assertIn("The token of this address", browser.run("return document.getElementById('login-message').textContent;"))
+            self.assertIn("The token in this address", browser.run("return document.getElementById('login-message').textContent;"))
 
     def test_a_service_that_hangs_is_not_called_ready(self):
         with Service() as service, Web(service) as web, Browser() as browser:

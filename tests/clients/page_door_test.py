@@ -272,7 +272,7 @@ class Door(unittest.TestCase):
                                             capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
                 self.assertEqual((second.returncode, second.stdout), (1, ""), listen)
                 self.assertIn(f"{web.port}", second.stderr)
-                self.assertIn(f"the port is taken by slsd-web (process {web.process.pid})", second.stderr)
+                self.assertIn(f"the port is in use by slsd-web (process {web.process.pid})", second.stderr)
                 self.assertIn("--port", second.stderr)
             with socket.socket() as listening:  # by any other program
                 listening.bind(("127.0.0.1", 0))

@@ -117,7 +117,7 @@ class Views(unittest.TestCase):
             browser.wait("/shows held/.test(document.getElementById('device-list').textContent)", "no chart")
             browser.click("#propose")
             browser.wait("document.querySelectorAll('#exposure p').length > 0 && "
-                         "!/looks at/.test(document.getElementById('exposure').textContent)", "no proposal")
+                         "!/Taking two frames/.test(document.getElementById('exposure').textContent)", "no proposal")
             browser.click("#ask-reasons")
             browser.wait("!document.getElementById('reasons-list').hidden", "no reasons")
             self.assertIn("touches border", browser.run("return document.getElementById('reasons-list').textContent;"))
@@ -151,7 +151,7 @@ class Views(unittest.TestCase):
             browser.click("#calibrate-begin")
             browser.wait("/^[3-7] of 8 poses/.test(document.getElementById('calibrate-next').textContent)", "no poses")
             browser.wait("document.querySelectorAll('#calibrate-pictures figure').length === 2", "no pictures")
-            browser.wait("/Being|being calibrated/.test(document.getElementById('state').textContent)", "no state")
+            browser.wait("/Calibrating|being calibrated/.test(document.getElementById('state').textContent)", "no state")
             self.assertEqual(browser.run("return [...document.querySelectorAll('#calibrate .bar')].map((b) => b.offsetParent !== null);"),
                              [False, True])
             browser.picture(self.folder / "calibrating-1600.png")
@@ -182,12 +182,12 @@ class Views(unittest.TestCase):
             take = "document.getElementById('exposure').replaceChildren(takeExposure('camera', arguments[0]));"
             browser.run(take, told)
             browser.click("#take-exposure")
-            browser.wait("/Taken: exposure_us = 9000/.test(document.getElementById('exposure').textContent)", "not taken")
+            browser.wait("/Set: exposure_us = 9000/.test(document.getElementById('exposure').textContent)", "not taken")
             self.assertEqual(client.call("settings")[0]["cameras"][0]["exposure_us"], 9000)
             told["proposed"]["gain_db"] = 59
             browser.run(take, told)
             browser.click("#take-exposure")
-            browser.wait("/0 to 24, not to 59/.test(document.getElementById('message').textContent)", "no reason")
+            browser.wait("/0 to 24, not 59/.test(document.getElementById('message').textContent)", "no reason")
             browser.picture(self.folder / "refused-1600.png")
             self.assertEqual(client.call("settings")[0]["cameras"][0]["gain_db"], 0)
 

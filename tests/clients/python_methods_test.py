@@ -59,7 +59,7 @@ class Saving(OnAService):
         self.assertEqual(read.comments, cloud.comments)
         near.save(str(self.folder / "text.ply"))
         for name in ("cloud.pcd", "cloud"):
-            with self.assertRaisesRegex(ValueError, "ends in .ply"):
+            with self.assertRaisesRegex(ValueError, "must end in .ply"):
                 near.save(self.folder / name)
         with self.assertRaisesRegex(ValueError, "'count'"):
             slsd.Cloud(np.zeros(2, [("x", "<f4"), ("count", "<i8")]), {}, {}).save(self.folder / "wide.ply")
@@ -107,7 +107,7 @@ class Options(OnAService):
 
     def test_that_json_has_no_value_for_are_named_and_break_nothing(self):
         for rate in (float("nan"), object()):
-            with self.assertRaisesRegex(slsd.InvalidRequest, "subscribe: a parameter is no value of JSON"):
+            with self.assertRaisesRegex(slsd.InvalidRequest, "subscribe: a parameter is not valid in JSON"):
                 next(self.scanner.stream(rate_hz=rate))
         self.assertGreater(len(next(self.scanner.stream(rate_hz=np.float32(30)))), 0)
 

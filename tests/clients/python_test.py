@@ -162,7 +162,7 @@ class Vanishing(unittest.TestCase):
             self.assertGreater(len(scanner.scan()), 0)
 
     def test_nobody_listening_is_told_with_what_to_do(self):
-        with self.assertRaisesRegex(slsd.ConnectionLost, "is slsd running"):
+        with self.assertRaisesRegex(slsd.ConnectionLost, "check that slsd runs"):
             slsd.Scanner("/nonexistent/slsd.sock")
 
     def test_stalling_ends_in_time(self):
@@ -192,7 +192,7 @@ class Vanishing(unittest.TestCase):
             listener.bind(path)
             listener.listen(0)
             waiting = []
-            with self.assertRaisesRegex(slsd.TimedOut, "accepts nobody"):
+            with self.assertRaisesRegex(slsd.TimedOut, "does not accept connections"):
                 for _ in range(10):
                     waiting.append(slsd.Scanner(path))
             for scanner in waiting:
@@ -251,15 +251,15 @@ class Lies(unittest.TestCase):
             return str(caught.exception)
 
     def test_about_json_and_version_are_refused(self):
-        self.assertIn("no JSON", self.refused(lambda request: b"220 mail ready\n"))
+        self.assertIn("not JSON", self.refused(lambda request: b"220 mail ready\n"))
         self.assertIn("JSON-RPC 2.0", self.refused(lambda request: b'{"id": 1, "result": {}}\n'))
         self.assertIn("JSON-RPC 2.0", self.refused(lambda request: b"[]\n"))
         self.assertIn("1 MiB", self.refused(lambda request: b"x" * (1 << 21)))
 
     def test_about_sizes_are_refused(self):
         for size in (-1, True, "12", 1 << 60, None, 1.5):
-            self.assertIn("bytes follow", self.refused(lambda request: result(request, bytes=size)))
-        self.assertIn("did not come", self.refused(lambda request: result(request)))
+            self.assertIn("announces", self.refused(lambda request: result(request, bytes=size)))
+        self.assertIn("is missing", self.refused(lambda request: result(request)))
 
     def test_about_memory_are_refused(self):
         self.assertIn("no descriptor", self.refused(lambda request: result(request, memfd_bytes=100)))
@@ -276,11 +276,11 @@ class Lies(unittest.TestCase):
             os.close(descriptor)
 
     def test_of_a_header_are_refused(self):
-        for data, reason in ((ply(3, said=4), "where its header says"), (ply(3, said=10**30), "where its header says"),
-                             (ply(3)[:-1], "where its header says"), (b"ply\n", "no binary"), (b"", "no binary"),
-                             (ply(1, lines=["property list uchar int x"]), "none of slsd's"),
-                             (ply(1, lines=["property float x", "property float x", "property float y"]), "names no"),
-                             (ply(3, said=-1), "none of slsd's")):
+        for data, reason in ((ply(3, said=4), "but its header says"), (ply(3, said=10**30), "but its header says"),
+                             (ply(3)[:-1], "but its header says"), (b"ply\n", "not a binary"), (b"", "not a binary"),
+                             (ply(1, lines=["property list uchar int x"]), "an unknown line"),
+                             (ply(1, lines=["property float x", "property float x", "property float y"]), "lacks the points"),
+                             (ply(3, said=-1), "an unknown line")):
             with self.assertRaisesRegex(slsd.ProtocolError, reason):
                 slsd.read_ply(data)
         self.assertEqual(len(slsd.read_ply(ply(3))), 3)

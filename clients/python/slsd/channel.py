@@ -115,7 +115,7 @@ def _answer(connection: Connection, method: str, params: dict[str, Any], deadlin
         elif "error" in message or (message.get("id") == ident and isinstance(message.get("result"), dict)):
             return message, body, events
         else:
-            raise ProtocolError(f"what came is no answer to {method}")
+            raise ProtocolError(f"the message is not an answer to {method}")
 
 
 def _explained(error: ScannerError, params: dict[str, Any]) -> ScannerError:

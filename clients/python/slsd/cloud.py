@@ -89,7 +89,7 @@ class Cloud:
         """
         target = pathlib.Path(file)
         if target.suffix.lower() != ".ply":
-            raise ValueError(f"{target}: a cloud's file ends in .ply; Scanner.save takes a scan into .pcd or .tiff")
+            raise ValueError(f"{target}: the file of a cloud must end in .ply; Scanner.save scans into .pcd or .tiff")
         kinds = {name: self.points.dtype[name].newbyteorder("<") for name in self.points.dtype.names or ()}
         for name, kind in kinds.items():
             if kind.str.replace("|", "<") not in _NAMES:
@@ -116,7 +116,7 @@ def read_ply(data: Buffer, description: Mapping[str, Any] | None = None) -> Clou
     head = bytes(view[:_HEADER_MAX])
     end = head.find(_END.encode())
     if not head.startswith(_BEGIN.encode()) or end < 0:
-        raise ProtocolError("the cloud is no binary little-endian PLY")
+        raise ProtocolError("the cloud is not a binary little-endian PLY")
     comments: dict[str, str] = {}
     fields: list[tuple[str, str]] = []
     count = None
@@ -129,12 +129,12 @@ def read_ply(data: Buffer, description: Mapping[str, Any] | None = None) -> Clou
         elif words[0] == "property" and len(words) == 3 and words[1] in _TYPES:
             fields.append((words[2], _TYPES[words[1]]))
         elif words[0] in ("element", "property"):
-            raise ProtocolError(f"the cloud's header has a line that is none of slsd's: {line[:80]!r}")
+            raise ProtocolError(f"the cloud's header has an unknown line: {line[:80]!r}")
     if count is None or not fields or len({name for name, _ in fields}) != len(fields):
-        raise ProtocolError("the cloud's header names no points")
+        raise ProtocolError("the cloud's header lacks the points")
     body = view[end + len(_END):]
     record = np.dtype(fields)
     if count * record.itemsize != len(body):
-        raise ProtocolError(f"the cloud has {len(body)} bytes where its header says {count} points of "
+        raise ProtocolError(f"the cloud has {len(body)} bytes, but its header says {count} points of "
                             f"{record.itemsize}")
     return Cloud(np.frombuffer(body, record, count), comments, description or {})

@@ -54,10 +54,10 @@ class Connection:
                                    "permission_denied", self.path) from error
         except (BlockingIOError, TimeoutError) as error:  # the queue is full: the service accepts no connections
             self.close()
-            raise TimedOut(f"{self.path}: the service accepts nobody; systemctl restart slsd", "timeout", self.path) from error
+            raise TimedOut(f"{self.path}: the service does not accept connections; run systemctl restart slsd", "timeout", self.path) from error
         except OSError as error:
             self.close()
-            raise ConnectionLost(f"{self.path}: {error.strerror}; is slsd running? systemctl status slsd",
+            raise ConnectionLost(f"{self.path}: {error.strerror}; check that slsd runs: systemctl status slsd",
                                  where=self.path) from error
 
     @property
@@ -84,7 +84,7 @@ class Connection:
         try:
             line = json.dumps(request, allow_nan=False, default=_plain)
         except (TypeError, ValueError) as error:
-            raise InvalidRequest(f"{method}: a parameter is no value of JSON: {error}", "invalid_params") from error
+            raise InvalidRequest(f"{method}: a parameter is not valid in JSON: {error}", "invalid_params") from error
         try:
             self._socket.settimeout(10)
             self._socket.sendall(line.encode() + b"\n")
@@ -100,16 +100,16 @@ class Connection:
         self._refuse_others()
         while (end := self._buffer.find(b"\n")) < 0:
             if len(self._buffer) > _LINE_MAX:
-                raise ProtocolError("what came is no message of slsd: a line of more than 1 MiB")
+                raise ProtocolError("the answer is not a message of slsd: its line exceeds 1 MiB")
             self._more(deadline)
         line = bytes(self._buffer[:end])
         del self._buffer[:end + 1]
         try:
             message = json.loads(line)
         except ValueError as error:
-            raise ProtocolError(f"what came is no JSON: {line[:80]!r}") from error
+            raise ProtocolError(f"the answer is not JSON: {line[:80]!r}") from error
         if not isinstance(message, dict) or message.get("jsonrpc") != "2.0":
-            raise ProtocolError("what came is no JSON-RPC 2.0")
+            raise ProtocolError("the answer is not JSON-RPC 2.0")
         body = message.get("params" if "method" in message else "result")
         if not isinstance(body, dict):
             return message, None
@@ -121,13 +121,13 @@ class Connection:
 
     def _refuse_others(self) -> None:
         if not self.is_own:
-            raise ConnectionLost(f"{self.path}: this connection is the parent process's; open one in this process",
+            raise ConnectionLost(f"{self.path}: this connection belongs to the parent process; open one in this process",
                                  "disconnected", self.path)
 
     def _lost(self, error: OSError) -> Exception:
         if isinstance(error, TimeoutError):
             return TimedOut(f"{self.path}: the service does not answer", "timeout", self.path)
-        return ConnectionLost(f"{self.path}: the service hung up: {error.strerror or error}", where=self.path)
+        return ConnectionLost(f"{self.path}: the service closed the connection: {error.strerror or error}", where=self.path)
 
     def _wait(self, deadline: float | None) -> None:
         if deadline is None:
@@ -151,7 +151,7 @@ class Connection:
                 received.frombytes(data[:len(data) - len(data) % received.itemsize])
                 self._descriptors.extend(received)
         if not chunk:
-            raise ConnectionLost(f"{self.path}: the service hung up", where=self.path)
+            raise ConnectionLost(f"{self.path}: the service closed the connection", where=self.path)
         self._buffer += chunk
 
     def _bytes(self, size: int, deadline: float | None) -> bytearray:
@@ -167,17 +167,17 @@ class Connection:
             except OSError as error:
                 raise self._lost(error) from error
             if count == 0:
-                raise ConnectionLost(f"{self.path}: the service hung up in the middle of a cloud", where=self.path)
+                raise ConnectionLost(f"{self.path}: the service closed the connection in the middle of a cloud", where=self.path)
             rest = rest[count:]
         return data
 
     def _map(self, size: int) -> mmap.mmap:
         if not self._descriptors:
-            raise ProtocolError("a cloud was to come as a memfd, and no descriptor came")
+            raise ProtocolError("the service announced a cloud as a memfd, but sent no descriptor")
         descriptor = self._descriptors.pop(0)
         try:
             if os.fstat(descriptor).st_size != size or size == 0:
-                raise ProtocolError("the memfd is not of the size that the service said")
+                raise ProtocolError("the memfd does not have the announced size")
             if not _sealed(descriptor):
                 raise ProtocolError("the memfd is not sealed")
             memory = mmap.mmap(descriptor, size, prot=mmap.PROT_READ)
@@ -221,5 +221,5 @@ def _sealed(descriptor: int) -> bool:
 
 def _size(value: Any) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= _BYTES_MAX:
-        raise ProtocolError(f"a message says that {value!r} bytes follow it")
+        raise ProtocolError(f"a message announces {value!r} bytes")
     return value

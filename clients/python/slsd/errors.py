@@ -70,7 +70,7 @@ _BY_NAME = {
 def error_of(answer: Any) -> ScannerError:
     """Makes the exception for the `error` of a reply."""
     if not isinstance(answer, Mapping):
-        return ProtocolError("the service answered an error that is no object")
+        return ProtocolError("the service sent an error that is not an object")
     data = answer.get("data")
     data = data if isinstance(data, Mapping) else {}
     name, where = str(data.get("name", "")), str(data.get("where", ""))

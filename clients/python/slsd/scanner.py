@@ -118,7 +118,7 @@ class Scanner:
         target = pathlib.Path(file)
         kind = _FILES.get(target.suffix.lower())
         if kind is None:
-            raise ValueError(f"{target}: a cloud's file ends in {', '.join(_FILES)}")
+            raise ValueError(f"{target}: the file of a cloud must end in {', '.join(_FILES)}")
         params = _params(format=kind, timeout_ms=_milliseconds(timeout_s), density=density, normals=normals,
                          texture=texture, ambient=ambient)
         part = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
@@ -225,7 +225,7 @@ class Scanner:
         about = next((each for each in cameras if camera in (None, each.get("name"))), None)
         if about is None:
             known = ", ".join(str(each.get("name")) for each in cameras) or "none is configured"
-            raise NotFound(f"no such camera: {camera!r} (there are: {known})", "not_found", camera or "camera")
+            raise NotFound(f"no such camera: {camera!r} (configured: {known})", "not_found", camera or "camera")
         wanted: CameraSettings = {}
         if exposure_us is not None:
             wanted["exposure_us"] = exposure_us
@@ -284,7 +284,7 @@ class Scanner:
         """The role of this user: "observe", "scan" (which includes observing) or "administer" (everything)."""
         role = self.status().get("role")
         if not isinstance(role, str):
-            raise ProtocolError("the service tells no role: it is older than this package")
+            raise ProtocolError("the service reports no role: it is older than this package")
         return role
 
     def reload(self) -> list[str]:
@@ -323,7 +323,7 @@ def _need(answer: Answer, what: str) -> Any:
 
 def _body(body: Body, what: str) -> Any:
     if body is None:
-        raise ProtocolError(f"{what} did not come with the answer")
+        raise ProtocolError(f"{what} is missing from the answer")
     return body
 
 
@@ -331,8 +331,8 @@ def _frame(description: dict[str, Any], body: Any) -> Frame:
     try:
         width, height, bits = (int(description[key]) for key in ("width_px", "height_px", "bits"))
     except (KeyError, TypeError, ValueError) as error:
-        raise ProtocolError("a frame came without its size") from error
+        raise ProtocolError("a frame lacks its size") from error
     kind = np.dtype("<u2" if bits > 8 else "u1")
     if width <= 0 or height <= 0 or width * height * kind.itemsize != len(body):
-        raise ProtocolError(f"a frame of {width}x{height} px came with {len(body)} bytes")
+        raise ProtocolError(f"a frame of {width}x{height} px has {len(body)} bytes")
     return Frame(np.frombuffer(body, kind).reshape(height, width), dict(description))

@@ -7,7 +7,7 @@ const kMany = 20;  // points in a cell of the coverage
 
 const kSessionStates = {
   "starting": "Starting…",
-  "no board": "No board is seen",
+  "no board": "No board in view",
   "moving": "Hold it still",
   "still": "Still…",
   "hold": "HOLD",
@@ -15,7 +15,7 @@ const kSessionStates = {
   "again": "Not taken",
   "done": "Now another pose",
   "computing": "Computing…",
-  "in force": "Calibrated, and in force",
+  "in force": "Calibrated and in force",
   "ended": "Not calibrated"};
 
 // Where points were seen so far: red where none was, yellow where few, green where many.
@@ -79,8 +79,8 @@ function showVerdict({outcome, error, under_way}) {
     for (const reason of outcome.reasons) lines.push(element("p", reason));
     for (const warning of outcome.warnings) lines.push(element("p", warning, "wait"));
     for (const advice of outcome.advice) lines.push(element("p", "Next time: " + advice));
-    lines.push(element("p", `Off by ${outcome.camera_rms_px.toFixed(3)} px in the camera, ${outcome.projector_rms_px.toFixed(3)} px ` +
-      `in the projector, ${outcome.epipolar_rms_px.toFixed(3)} px off the epipolar lines (root mean square).`));
+    lines.push(element("p", `RMS error: ${outcome.camera_rms_px.toFixed(3)} px in the camera, ${outcome.projector_rms_px.toFixed(3)} px ` +
+      `in the projector, ${outcome.epipolar_rms_px.toFixed(3)} px off the epipolar lines.`));
   }
   $("verdict").replaceChildren(...(under_way ? [] : lines));
 }

@@ -24,7 +24,7 @@ function readPly(buffer) {
   const bytes = new Uint8Array(buffer);
   const head = new TextDecoder("latin1").decode(bytes.subarray(0, 4096));
   const end = head.indexOf("end_header\n");
-  if (end < 0) throw new Error("the cloud is no PLY");
+  if (end < 0) throw new Error("the cloud is not a PLY");
   const header = head.slice(0, end);
   const count = Number(/^element vertex (\d+)$/m.exec(header)[1]);
   const fields = {};
@@ -95,7 +95,7 @@ function put(view, at, type, value) {
 function plyOfPixels(buffer) {
   const head = new TextDecoder("latin1").decode(new Uint8Array(buffer, 0, Math.min(4096, buffer.byteLength)));
   const end = head.indexOf("\nDATA binary\n");
-  if (end < 0) throw new Error("the cloud is no PCD");
+  if (end < 0) throw new Error("the cloud is not a PCD");
   const words = (key) => new RegExp(`^${key} (.*)$`, "m").exec(head)[1].split(" ");
   const count = Number(words("POINTS")[0]), begin = end + "\nDATA binary\n".length;
   const sizes = words("SIZE").map(Number), types = words("TYPE");

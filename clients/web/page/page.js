@@ -37,7 +37,7 @@ function sessionKey() {
   }
 }
 
-const noAnswer = () => new Refused(0, {name: "no_page_service", message: "slsd-web does not answer: look whether it is running"});
+const noAnswer = () => new Refused(0, {name: "no_page_service", message: "slsd-web does not answer: check that it is running"});
 
 // Names are relative: the page may lie below any path of a proxy.
 async function ask(path, body, timeout = kTimeout) {
@@ -92,10 +92,10 @@ function onClick(button, action) {
 
 const kStates = {
   ready: ["good", "ready"],
-  capturing: ["good", "takes a frame"],
-  opening: ["wait", "is being opened"],
-  absent: ["bad", "not found", "Look at its cable and its power. It is looked for again and again."],
-  faulted: ["bad", "does not work", "Look at its cable. It is opened again by itself."]};
+  capturing: ["good", "is taking a frame"],
+  opening: ["wait", "is opening"],
+  absent: ["bad", "not found", "Check its cable and its power. The service keeps looking for it."],
+  faulted: ["bad", "does not work", "Check its cable. The service reopens it."]};
 
 function element(tag, text, kind) {
   const made = document.createElement(tag);
@@ -116,8 +116,8 @@ function deviceItem(device, what) {
   const drift = device.calibration;
   if (drift && drift.off_since_scan !== null) {
     item.append(element("span", `Knocked out of its calibration since scan ${drift.off_since_scan}: points lie ` +
-      `${drift.epipolar_px.toFixed(2)} px off, ${drift.limit_px.toFixed(2)} are fine. Fasten projector and camera, look ` +
-      "with slsd --verify, and calibrate again.", "remedy bad"));
+      `${drift.epipolar_px.toFixed(2)} px off, ${drift.limit_px.toFixed(2)} are fine. Fasten projector and camera, run ` +
+      "slsd --verify, and calibrate again.", "remedy bad"));
   }
   return item;
 }
@@ -125,12 +125,12 @@ function deviceItem(device, what) {
 function stateInWords({status}) {
   const devices = [["the projector", status.projector], ...status.cameras.map((camera) => [`camera ${camera.name}`, camera])];
   const bad = devices.find(([, device]) => !["ready", "capturing"].includes(device.state));
-  if (status.cameras.length === 0) return ["bad", "No camera is configured: name one in slsd.toml."];
+  if (status.cameras.length === 0) return ["bad", "No camera is configured: add one to slsd.toml."];
   if (bad) return [kStates[bad[1].state][0], `Not ready: ${bad[0]} ${kStates[bad[1].state][1]}.`];
-  if (status.calibrating) return ["wait", "Is being calibrated."];
-  if (!status.calibration) return ["bad", "Not calibrated: calibrate it."];
+  if (status.calibrating) return ["wait", "Calibrating."];
+  if (!status.calibration) return ["bad", "Not calibrated: calibrate the scanner."];
   if (status.cameras.some((camera) => camera.calibration && camera.calibration.off_since_scan !== null))
-    return ["bad", "Scans, but was knocked out of its calibration."];
+    return ["bad", "Knocked out of its calibration: clouds may be wrong."];
   return ["good", "Ready to scan."];
 }
 
@@ -145,7 +145,7 @@ function showStatus(told) {
   }
   $("calibrate-begin").disabled = !mayAdminister;
   if (!mayAdminister) $("calibrate-next").textContent =
-    "slsd-web may not administer this scanner: docs/page.md says how it is allowed to.";
+    "slsd-web may not administer this scanner; docs/page.md says how to allow it.";
   const [kind, words] = stateInWords(told);
   $("state").className = kind;
   $("state").textContent = words;
@@ -188,7 +188,7 @@ async function takePicture() {
   const figures = await drawFrame($("picture"), await askFrame($("which-camera").value),
                                   {clipping: $("show-clipping").checked, sharpness: $("show-sharpness").checked});
   $("picture-figures").textContent = `${figures.width} × ${figures.height} px, ${(100 * figures.clipped).toFixed(2)} % clipped` +
-    (figures.sharpness === null ? "; too little contrast to judge how sharp it is"
+    (figures.sharpness === null ? "; too little contrast to judge the sharpness"
                                 : `; sharpness ${figures.sharpness.toFixed(2)} (1: edges within two pixels)`);
 }
 
@@ -215,26 +215,26 @@ let mayAdminister = false;
 
 // What the proposal would set; the gain only where it is to be another.
 function takeExposure(camera, {present, proposed}) {
-  const button = element("button", "Take it");
+  const button = element("button", "Use this exposure");
   button.id = "take-exposure";
   onClick(button, async () => {
     const set = {exposure_us: Math.round(proposed.exposure_us)};
     if (Math.abs(proposed.gain_db - present.gain_db) > 0.05) set.gain_db = Math.round(10 * proposed.gain_db) / 10;
     const told = await (await ask("api/set", {camera: {[camera]: set}})).json();
-    $("exposure").replaceChildren(element("p", `Taken: ${Object.entries(set).map(([key, value]) => `${key} = ${value}`).join(", ")}.` +
-      (told.not_kept ? ` The next start will not know it: ${told.not_kept}` : ""), "good"));
+    $("exposure").replaceChildren(element("p", `Set: ${Object.entries(set).map(([key, value]) => `${key} = ${value}`).join(", ")}.` +
+      (told.not_kept ? ` Not saved for the next start: ${told.not_kept}` : ""), "good"));
     await takePicture();
   });
   return button;
 }
 
 async function proposeExposure() {
-  $("exposure").replaceChildren(element("p", "looks at two frames…"));
+  $("exposure").replaceChildren(element("p", "Taking two frames…"));
   try {
     const camera = $("which-camera").value;
     const told = await (await ask("api/exposure?camera=" + encodeURIComponent(camera))).json();
     const lines = [];
-    lines.push(element("p", told.patterned_share === 0 ? "No pattern is seen in the frame." :
+    lines.push(element("p", told.patterned_share === 0 ? "The frame shows no pattern." :
       `Symbols reach ${Math.round(told.lit)} of ${told.full}; the pattern covers ${Math.round(100 * told.patterned_share)} % ` +
       `of the frame, ${Math.round(100 * told.clipped_share)} % of that is clipped.`));
     if (told.proposed && told.present)
@@ -284,7 +284,7 @@ function showCloud(buffer, about) {
   $("cloud-figures").textContent = `${about.points.toLocaleString("en")} points of scan ${about.scan}, ${about.time}` +
     (about.decode_ms !== undefined ? `; decoded in ${about.decode_ms.toFixed(0)} ms` : "") +
     (about.sigma_calibration_mm !== undefined ?
-      `; the calibration may put all of it off by ${about.sigma_calibration_mm.toFixed(2)} mm (one standard deviation)` : "") +
+      `; the calibration may shift the whole cloud by ${about.sigma_calibration_mm.toFixed(2)} mm (one standard deviation)` : "") +
     (about.empty !== undefined ? `. No points: ${about.empty}` : "");
   $("save-ply").disabled = false;
   $("save-pcd").disabled = !view.ply.pcd;
@@ -354,7 +354,7 @@ function measureAt(event) {
   const place = $("space").getBoundingClientRect();
   const marked = view.mark(event.clientX - place.left, event.clientY - place.top);
   $("distance").textContent = !marked ? "No point there." :
-    marked.points === 1 ? "Now the second point." :
+    marked.points === 1 ? "Now click the second point." :
     `${marked.distance.toFixed(2)} mm ± ${marked.sigma.toFixed(2)} mm (one standard deviation)`;
 }
 
@@ -385,7 +385,7 @@ function showPast(past) {
     }
     return item;
   }));
-  if (past.length === 0) $("past").append(element("li", "No scan was asked for here yet."));
+  if (past.length === 0) $("past").append(element("li", "No scans from this page yet."));
 }
 
 // ---- the whole ----
@@ -411,7 +411,7 @@ function readAddress() {
   const key = /^#key=([0-9a-f]+)$/.exec(location.hash);
   if (key) keepKey(key[1]);
   if (/[?&]token=/.test(location.search))
-    $("login-message").textContent = "The token of this address is not that of the scanner. slsd-web makes a new one " +
+    $("login-message").textContent = "The token in this address is not the scanner's. slsd-web makes a new one " +
       "whenever it starts, unless it has a token file.";
   if (key || location.search) history.replaceState(null, "", location.pathname);
 }
@@ -472,7 +472,7 @@ function begin() {
 function load(script) {
   return new Promise((done, failed) => {
     const element = Object.assign(document.createElement("script"), {src: script, onload: done});
-    element.onerror = () => failed(new Error("three.js was not found on the scanner: install its package libjs-three."));
+    element.onerror = () => failed(new Error("three.js was not found on the scanner: install the package libjs-three."));
     document.head.append(element);
   });
 }

@@ -27,12 +27,12 @@ ARGUMENTS = (
     ('socket', '', f'socket of the service; default: that of config, else SLSD_SOCKET, else {USUAL_SOCKET}'),
     ('start_service', 'auto', 'whether to start slsd; auto: if no service answers at the socket', ('auto', 'true', 'false')),
     ('config', '', 'configuration of a service that this starts; default: /etc/slsd/slsd.toml'),
-    ('rate', '', 'clouds a second at most; 0: only triggered ones; default: every frame'),
+    ('rate', '', 'at most this many clouds per second; 0: only triggered ones; default: every frame'),
     ('density', '', 'a point for each symbol, or for each camera pixel; default: as the service is configured',
      ('', 'symbols', 'pixels')),
-    ('stride', '', 'dense clouds use every so many pixels and rows of the camera; default: 2'),
-    ('voxel', '', 'millimetres: one point for each cube of this size; default: all points'),
-    ('image_rate', '2', 'images a second of each camera, if somebody subscribes; 0: none'),
+    ('stride', '', 'use every Nth camera pixel and row in dense clouds; default: 2'),
+    ('voxel', '', 'one point per cube of this size in mm; default: all points'),
+    ('image_rate', '2', 'images per second of each camera, if somebody subscribes; 0: none'),
     ('extrinsics', '', 'file with the places of several scanners; default: NAME_link is its root'),
     ('transforms', 'true', 'false: your robot description places the scanner\'s frames', ('true', 'false')),
     ('rviz', 'false', 'whether to start RViz', ('true', 'false')),
@@ -52,7 +52,7 @@ def socket_of(config):
     try:
         import tomllib
     except ImportError:  # Python 3.10 in Humble
-        raise RuntimeError(f'name the socket of {config}, too: socket:=PATH') from None
+        raise RuntimeError(f'also give the socket of {config}: socket:=PATH') from None
     with open(config, 'rb') as file:
         path = tomllib.load(file).get('server', {}).get('socket', USUAL_SOCKET)
     return os.path.join(os.path.dirname(os.path.abspath(config)), path)
